@@ -1,0 +1,45 @@
+# Settings that every target of the project shares.
+
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(THREADS_PREFER_PTHREAD_FLAG ON)
+find_package(Threads REQUIRED)
+
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+  set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+endif()
+
+# In the tree as in an installed package, headers are included as "glint/<room>/<header>.h".
+set(GLINT_INCLUDE_DIR ${PROJECT_BINARY_DIR}/include)
+file(MAKE_DIRECTORY ${GLINT_INCLUDE_DIR}/glint)
+foreach(room model query bake)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/libglint/${room} ${GLINT_INCLUDE_DIR}/glint/${room} SYMBOLIC)
+endforeach()
+file(CREATE_LINK ${PROJECT_SOURCE_DIR}/formats ${GLINT_INCLUDE_DIR}/glint/formats SYMBOLIC)
+
+add_library(glint_warnings INTERFACE)
+target_compile_options(glint_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
+
+# glint_add_library(<room> [INTERFACE])  makes target glint_<room> with alias glint::<room>
+function(glint_add_library room)
+  cmake_parse_arguments(ARG "INTERFACE" "" "SOURCES" ${ARGN})
+  if(ARG_INTERFACE)
+    add_library(glint_${room} INTERFACE)
+    set(scope INTERFACE)
+  else()
+    add_library(glint_${room} STATIC ${ARG_SOURCES})
+    set(scope PUBLIC)
+    target_link_libraries(glint_${room} PRIVATE $<BUILD_INTERFACE:glint_warnings>)
+    set_target_properties(glint_${room} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  endif()
+  add_library(glint::${room} ALIAS glint_${room})
+  target_compile_features(glint_${room} ${scope} cxx_std_20)
+  target_include_directories(glint_${room} ${scope}
+    $<BUILD_INTERFACE:${GLINT_INCLUDE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  set_target_properties(glint_${room} PROPERTIES EXPORT_NAME ${room} CXX_EXTENSIONS OFF)
+endfunction()

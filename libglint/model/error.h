@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace glint {
+
+/// What went wrong, in the classes that a caller or a pipeline treats differently. Values are the exit codes of the tools.
+enum class ErrorCode : std::uint8_t {
+  usage = 1,          ///< an argument is missing, unknown or out of range
+  io = 2,             ///< a file cannot be opened, read or written
+  invalid_input = 3,  ///< a file was read, but what it holds cannot be used
+  failed = 4,         ///< the work itself failed (memory, no convergence)
+  unsupported = 5,    ///< valid, but newer or other than this version handles
+  differs = 7,        ///< a comparison found a difference
+};
+
+/// The one exception of the libraries: what happened, where, and what to do about it.
+class Error : public std::runtime_error {
+ public:
+  /// @param rule    stable id of the broken rule, e.g. "normals.finite"; empty if there is none
+  /// @param path    file at fault; empty if there is none
+  /// @param object  place in the file, e.g. "/level_0/masks" or "texel (3, 7)"; may be empty
+  /// @param what    what is wrong, a clause without a full stop
+  /// @param remedy  what the user can do, a clause without a full stop; may be empty
+  Error(ErrorCode code, std::string rule, std::string path, std::string object, std::string what, std::string remedy = {})
+      : std::runtime_error(message(path, object, what, remedy)),
+        code_(code),
+        rule_(std::move(rule)),
+        path_(std::move(path)),
+        object_(std::move(object)),
+        remedy_(std::move(remedy)) {}
+
+  ErrorCode code() const { return code_; }
+  const std::string& rule() const { return rule_; }
+  const std::string& path() const { return path_; }
+  const std::string& object() const { return object_; }
+  const std::string& remedy() const { return remedy_; }
+
+ private:
+  static std::string message(const std::string& path, const std::string& object, const std::string& what,
+                             const std::string& remedy) {
+    std::string text;
+    if (!path.empty()) text += path + ": ";
+    if (!object.empty()) text += object + ": ";
+    text += what;
+    if (!remedy.empty()) text += "; " + remedy;
+    return text;
+  }
+
+  ErrorCode code_;
+  std::string rule_;
+  std::string path_;
+  std::string object_;
+  std::string remedy_;
+};
+
+}  // namespace glint

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+
+#include "glint/model/vec.h"
+
+namespace glint {
+
+/// Symmetric 2x2 covariance, texels^2.
+struct Covariance {
+  float xx = 0;
+  float xy = 0;
+  float yy = 0;
+};
+
+/// The region of texture space that a shading point sees.
+///
+/// `centre` is a uv; the plane is periodic, so any finite uv is valid. Sizes are in texels:
+///  - `gaussian`: weights exp(-d^T C^-1 d / 2), normalised to 1, with C = `covariance`;
+///  - `box`: the parallelogram centre +- axis_a +- axis_b, texels weighted by their covered area.
+struct Footprint {
+  enum class Kind : std::uint8_t { gaussian, box };
+
+  Kind kind = Kind::gaussian;
+  Vec2 centre;
+  Covariance covariance;
+  Vec2 axis_a;
+  Vec2 axis_b;
+
+  /// Isotropic Gaussian of standard deviation `sigma_texels`.
+  static GLINT_HD constexpr Footprint isotropic(Vec2 centre_uv, float sigma_texels) {
+    const float variance = sigma_texels * sigma_texels;
+    return gaussian(centre_uv, {variance, 0, variance});
+  }
+
+  static GLINT_HD constexpr Footprint gaussian(Vec2 centre_uv, Covariance covariance_texels2) {
+    Footprint p;
+    p.kind = Kind::gaussian;
+    p.centre = centre_uv;
+    p.covariance = covariance_texels2;
+    return p;
+  }
+
+  /// Parallelogram with two half axes. Its `covariance` member holds its second moments.
+  static GLINT_HD constexpr Footprint box(Vec2 centre_uv, Vec2 half_axis_a, Vec2 half_axis_b) {
+    Footprint p;
+    p.kind = Kind::box;
+    p.centre = centre_uv;
+    p.axis_a = half_axis_a;
+    p.axis_b = half_axis_b;
+    p.covariance = {(half_axis_a.x * half_axis_a.x + half_axis_b.x * half_axis_b.x) / 3,
+                    (half_axis_a.x * half_axis_a.y + half_axis_b.x * half_axis_b.y) / 3,
+                    (half_axis_a.y * half_axis_a.y + half_axis_b.y * half_axis_b.y) / 3};
+    return p;
+  }
+};
+
+}  // namespace glint

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "glint/model/normal_map.h"
+
+namespace glint {
+
+/// An angular block is kBlockSize x kBlockSize pixels of an NDF image (t in Deng 2022, section 4.2).
+inline constexpr int kBlockSize = 16;
+inline constexpr int kBlockPixels = kBlockSize * kBlockSize;
+/// Most levels that a pyramid can have.
+inline constexpr int kMaxPyramidLevels = 16;
+
+/// Where the footprints of one level lie: centres ((i + 0.5) stride, (j + 0.5) stride) in texels.
+struct PyramidGrid {
+  float stride = 0;  ///< texels
+  int columns = 0;   ///< ceil(width / stride)
+  int rows = 0;      ///< ceil(height / stride)
+
+  GLINT_HD constexpr std::size_t imageCount() const { return static_cast<std::size_t>(columns) * rows; }
+};
+
+/// What all pyramids of NDF images share, compressed or not (section 4.1 of Deng 2022).
+struct PyramidShape {
+  int width = 0;       ///< of the normal map, texels
+  int height = 0;      ///< of the normal map, texels
+  int resolution = 0;  ///< pixels of an NDF image along each axis; a multiple of kBlockSize
+  float sigma_r = 0;   ///< intrinsic roughness, disk units
+  Surface surface = Surface::flat;
+  Boundary boundary = Boundary::wrap;
+  int level_count = 0;
+  PyramidGrid levels[kMaxPyramidLevels];
+
+  GLINT_HD constexpr int blocksPerAxis() const { return resolution / kBlockSize; }
+  GLINT_HD constexpr int blocksPerImage() const { return blocksPerAxis() * blocksPerAxis(); }
+  /// 64-bit words that hold one occupancy bit for each block of an image.
+  GLINT_HD constexpr int maskWords() const { return (blocksPerImage() + 63) / 64; }
+};
+
+/// Standard deviation, in strides, of the footprint of a level: 1.5 / sqrt(12).
+inline constexpr float kFootprintPerStride = 0.4330127018922193f;
+
+enum class BlockPrecision : std::uint8_t { f16, f32 };
+
+/// The NDF images of one level. Only blocks that hold something are stored.
+struct PyramidLevel {
+  std::span<const std::uint64_t> masks;        ///< [rows][columns][maskWords]; bit b: block b = by * blocksPerAxis + bx is stored
+  std::span<const std::uint64_t> first_block;  ///< [rows][columns + 1 in total]: running count of stored blocks, imageCount() + 1 values
+  std::span<const float> block_means;          ///< [blocks]: mean density of each stored block
+  const void* pixels = nullptr;                ///< [blocks][16][16] of f16 or f32: density (pixel means) / value_scale
+};
+
+/// NDF images at every footprint size. Pixels hold the mean of the density over the pixel.
+struct NdfPyramid {
+  PyramidShape shape;
+  BlockPrecision precision = BlockPrecision::f16;
+  float value_scale = 1;  ///< density = value_scale * stored pixel
+  PyramidLevel levels[kMaxPyramidLevels];
+};
+
+}  // namespace glint

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "glint/model/vec.h"
+
+namespace glint {
+
+/// How normals behave between texel centres.
+enum class Surface : std::uint8_t {
+  flat,    ///< each texel is a facet: a point of the disk
+  smooth,  ///< linear over the two triangles of every cell of four texel centres
+};
+
+/// What lies beyond the border of a map.
+enum class Boundary : std::uint8_t { wrap, clamp };
+
+/// Smallest box of the disk that holds the normals of a block of texels. Stored as four floats in this order.
+struct NormalBounds {
+  float low_x;
+  float low_y;
+  float high_x;
+  float high_y;
+};
+static_assert(sizeof(NormalBounds) == 16);
+
+/// One level of the min-max pyramid of a normal map.
+///
+/// Node (i, j) of level k bounds the texels [i 2^k, (i+1) 2^k] x [j 2^k, (j+1) 2^k]: its block and one more row and column
+/// (wrapped), so that the bounds also hold for the triangles of a smooth surface that start in the block.
+struct NormalBoundsLevel {
+  int columns = 0;
+  int rows = 0;
+  std::span<const NormalBounds> nodes;  ///< [rows][columns]
+};
+
+/// A map of normals, each given by its projection (nx, ny) on the unit disk; nz = sqrt(1 - nx^2 - ny^2) > 0.
+///
+/// Bottom row first: element [j][i] is centred at u = (i + 0.5) / width, v = (j + 0.5) / height.
+struct NormalMap {
+  static constexpr int kMaxBoundsLevels = 20;
+
+  int width = 0;   ///< texels
+  int height = 0;  ///< texels
+  float texel_size_um = 0;  ///< 0 when unknown
+  std::span<const Vec2> normals;  ///< [height][width]
+
+  /// Min-max pyramid from the finest level (2x2 texels) to the coarsest (one node); empty when not built.
+  int bounds_level_count = 0;
+  NormalBoundsLevel bounds[kMaxBoundsLevels];
+
+  GLINT_HD const Vec2& at(int i, int j) const { return normals.data()[static_cast<std::size_t>(j) * width + i]; }
+};
+
+/// A height field, same order as NormalMap. Heights are in texels (height / texel size).
+struct HeightMap {
+  int width = 0;
+  int height = 0;
+  float texel_size_um = 0;  ///< 0 when unknown
+  std::span<const float> heights;  ///< [height][width], texels
+};
+
+}  // namespace glint
