@@ -108,6 +108,11 @@ Option& Option::unrecorded() {
   return *this;
 }
 
+Option& Option::defaultText(const std::string& text) {
+  option_->default_str(text);
+  return *this;
+}
+
 bool Option::given() const { return option_->count() > 0; }
 
 struct Tool::State {

@@ -44,6 +44,8 @@ class Option {
   Option& needs(const Option& other);
   /// Leaves the option out of the `command` record: it does not change the result.
   Option& unrecorded();
+  /// Shown in the help text instead of the value, for defaults that depend on other options.
+  Option& defaultText(const std::string& text);
   /// Whether the command line or the configuration file set it. Valid after parsing.
   bool given() const;
 
