@@ -1,0 +1,394 @@
+#include "common/tool.h"
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <new>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <system_error>
+
+#include "common/files.h"
+#include "common/image_io.h"
+#include "common/progress_reporter.h"
+#include "common/suggest.h"
+
+namespace glint::apps {
+namespace {
+
+using nlohmann::json;
+
+/// Version of the layout of the --json document.
+constexpr int kJsonSchema = 1;
+constexpr int kMaxThreads = 1024;
+
+/// Floats are recorded as the shortest decimal that reads back the same, so that 0.3 stays 0.3.
+json toJson(float value) { return json::parse(fmt::format("{}", value)); }
+template <class T>
+json toJson(const T& value) {
+  return value;
+}
+json toJson(const std::vector<float>& values) {
+  json list = json::array();
+  for (const float value : values) list.push_back(toJson(value));
+  return list;
+}
+
+template <class T>
+constexpr bool kIsList = false;
+template <class T>
+constexpr bool kIsList<std::vector<T>> = true;
+
+/// "-o,--sigma-r" -> "sigma-r", "KIND" -> "kind".
+std::string recordKey(const std::string& name) {
+  std::string key = name.substr(name.rfind(',') + 1);
+  key.erase(0, key.find_first_not_of('-'));
+  return CLI::detail::to_lower(key);
+}
+
+std::string finiteNumber(const std::string& text) {
+  double value = 0;
+  if (!CLI::detail::lexical_cast(text, value)) return "'" + text + "' is not a number";
+  return std::isfinite(value) ? std::string() : "'" + text + "' is not a finite number";
+}
+
+const char* codeName(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::usage: return "usage";
+    case ErrorCode::io: return "io";
+    case ErrorCode::invalid_input: return "invalid_input";
+    case ErrorCode::failed: return "failed";
+    case ErrorCode::unsupported: return "unsupported";
+    case ErrorCode::differs: return "differs";
+  }
+  return "failed";
+}
+
+/// Paths may hold any bytes; JSON must be UTF-8.
+std::string dump(const json& document) { return document.dump(2, ' ', false, json::error_handler_t::replace); }
+
+}  // namespace
+
+Option& Option::required() {
+  option_->required();
+  return *this;
+}
+
+Option& Option::range(double low, double high) {
+  const std::string text = fmt::format("{:g} to {:g}", low, high);
+  option_->check(CLI::Validator(
+      [low, high, text](std::string& value) {
+        double number = 0;
+        if (!CLI::detail::lexical_cast(value, number)) return "'" + value + "' is not a number";
+        return number >= low && number <= high ? std::string() : value + " is not in the range " + text;
+      },
+      text, "range"));
+  return *this;
+}
+
+Option& Option::excludes(const Option& other) {
+  option_->excludes(other.option_);
+  return *this;
+}
+
+Option& Option::needs(const Option& other) {
+  option_->needs(other.option_);
+  return *this;
+}
+
+Option& Option::unrecorded() {
+  recorded_ = false;
+  return *this;
+}
+
+Option& Option::defaultText(const std::string& text) {
+  option_->default_str(text);
+  return *this;
+}
+
+bool Option::given() const { return option_->count() > 0; }
+
+struct Tool::State {
+  ToolInfo info;
+  CLI::App app;
+  std::deque<Option> options;  // deque: references handed out stay valid
+  std::vector<std::pair<std::string, std::function<json()>>> recorders;  // one for each option, same order
+  std::vector<std::function<void()>> checks;
+  std::vector<std::string> inputs;
+  std::vector<std::string> outputs;
+  json result = json::object();
+  json warnings = json::array();
+  std::unique_ptr<ProgressReporter> reporter;
+  std::optional<ErrorCode> exit_code;
+
+  int threads = 0;
+  std::uint64_t seed = 1;
+  bool seed_used = false;
+  bool json_result = false;
+  bool quiet = false;
+  bool verbose = false;
+  bool force = false;
+  ProgressMode progress_mode = ProgressMode::automatic;
+  std::string depfile;
+
+  Option& add(CLI::Option* option, const std::string& name, std::function<json()> value) {
+    options.emplace_back();
+    options.back().option_ = option;
+    recorders.emplace_back(recordKey(name), std::move(value));
+    return options.back();
+  }
+};
+
+Tool::Tool(ToolInfo info) : state_(std::make_unique<State>()) {
+  state_->info = std::move(info);
+  CLI::App& app = state_->app;
+  app.description(state_->info.summary);
+  app.name(state_->info.name);
+  app.footer("Example:\n  " + state_->info.example +
+             "\n\nExit codes: 0 ok, 1 usage, 2 input/output, 3 invalid input, 4 failed, 5 unsupported, 7 differs");
+  app.get_formatter()->column_width(34);
+  app.option_defaults()->always_capture_default();
+  app.allow_config_extras(CLI::config_extras_mode::error);
+  addStandardOptions();
+}
+
+Tool::~Tool() = default;
+
+void Tool::addStandardOptions() {
+  State& s = *state_;
+  CLI::App& app = s.app;
+  const std::string group = "Shared by every tool";
+  app.set_help_flag("-h,--help", "print this help and exit")->group(group);
+  app.set_version_flag("--version", generator(), "print the version and exit")->group(group);
+  app.set_config("--config", "", "read options from a TOML or INI file; the command line has precedence")
+      ->group(group)
+      ->type_name("FILE");
+  app.add_option("--threads", s.threads, "most threads to use; 0: all that the machine has")
+      ->group(group)
+      ->type_name("N")
+      ->check(CLI::Range(0, kMaxThreads));
+  app.add_option("--seed", s.seed, "seed of every random choice")->group(group)->type_name("N");
+  app.add_flag("--json", s.json_result, "print the result, or the error, as one JSON document on stdout")->group(group);
+  choice("--progress", s.progress_mode,
+         {{"auto", ProgressMode::automatic}, {"none", ProgressMode::none}, {"json", ProgressMode::json}},
+         "progress on stderr; auto: a bar, on a terminal only")
+      .unrecorded()
+      .option_->group(group);
+  CLI::Option* quiet = app.add_flag("--quiet,-q", s.quiet, "no warnings and no progress")->group(group);
+  app.add_flag("--verbose,-v", s.verbose, "print a summary of the result")->group(group)->excludes(quiet);
+  app.add_flag("--force,-f", s.force, "replace an output that is an input or of another kind")->group(group);
+  app.add_option("--depfile", s.depfile, "write what the output depends on, as a Make rule")->group(group)->type_name("FILE");
+}
+
+template <class T>
+Option& Tool::option(const std::string& name, T& value, const std::string& help) {
+  CLI::Option* option = state_->app.add_option(name, value, help);
+  if constexpr (kIsList<T>) option->delimiter(',')->allow_extra_args(false);  // must not swallow the positional arguments
+  if constexpr (std::is_floating_point_v<T> || std::is_same_v<T, std::vector<float>>) {
+    option->check(CLI::Validator(finiteNumber, "", "finite"));
+  }
+  return state_->add(option, name, [&value] { return toJson(value); });
+}
+template Option& Tool::option(const std::string&, int&, const std::string&);
+template Option& Tool::option(const std::string&, std::uint64_t&, const std::string&);
+template Option& Tool::option(const std::string&, float&, const std::string&);
+template Option& Tool::option(const std::string&, double&, const std::string&);
+template Option& Tool::option(const std::string&, std::string&, const std::string&);
+template Option& Tool::option(const std::string&, std::vector<int>&, const std::string&);
+template Option& Tool::option(const std::string&, std::vector<float>&, const std::string&);
+template Option& Tool::option(const std::string&, std::vector<std::string>&, const std::string&);
+
+Option& Tool::flag(const std::string& name, bool& value, const std::string& help) {
+  return state_->add(state_->app.add_flag(name, value, help), name, [&value] { return json(value); });
+}
+
+Option& Tool::choiceOf(const std::string& name, const std::vector<std::string>& names, std::size_t current,
+                       std::function<void(std::size_t)> set, const std::string& help) {
+  const auto word = std::make_shared<std::string>(names[current]);
+  CLI::Option* option = state_->app.add_option_function<std::string>(
+      name,
+      [=](const std::string& given) {
+        *word = given;
+        set(static_cast<std::size_t>(std::find(names.begin(), names.end(), given) - names.begin()));
+      },
+      help);
+  const std::string all = fmt::format("{}", fmt::join(names, "|"));
+  option->default_str(*word)->type_name(all)->check(CLI::Validator(
+      [names, all](std::string& given) {
+        if (std::find(names.begin(), names.end(), given) != names.end()) return std::string();
+        const std::string near = nearestName(given, names);
+        return "'" + given + "' is not one of " + all + (near.empty() ? "" : "; did you mean '" + near + "'?");
+      },
+      "", "choice"));
+  return state_->add(option, name, [word] { return json(*word); });
+}
+
+CLI::App& Tool::parser() { return state_->app; }
+void Tool::addCheck(std::function<void()> check) { state_->checks.push_back(std::move(check)); }
+const std::string& Tool::name() const { return state_->info.name; }
+bool Tool::quiet() const { return state_->quiet; }
+bool Tool::verbose() const { return state_->verbose; }
+bool Tool::wantsJson() const { return state_->json_result; }
+bool Tool::force() const { return state_->force; }
+int Tool::threads() const { return state_->threads > 0 ? state_->threads : tbb::info::default_concurrency(); }
+void Tool::setResult(const nlohmann::json& result) { state_->result = result; }
+void Tool::setExitCode(ErrorCode code) { state_->exit_code = code; }
+void Tool::addInput(const std::string& path) { state_->inputs.push_back(path); }
+void Tool::addOutput(const std::string& path) { state_->outputs.push_back(path); }
+const std::vector<std::string>& Tool::inputPaths() const { return state_->inputs; }
+std::string Tool::generator() const { return state_->info.name + " " GLINT_VERSION; }
+
+std::uint64_t Tool::seed() {
+  state_->seed_used = true;
+  return state_->seed;
+}
+
+bake::ProgressFn Tool::progress(const std::string& stage) {
+  State& s = *state_;
+  s.reporter.reset();
+  if (s.progress_mode == ProgressMode::none || (s.quiet && s.progress_mode == ProgressMode::automatic)) return {};
+  s.reporter = std::make_unique<ProgressReporter>(s.progress_mode, s.info.name, stage);
+  return [reporter = s.reporter.get()](std::size_t done, std::size_t total) { reporter->update(done, total); };
+}
+
+void Tool::print(const std::string& text) {
+  if (wantsJson()) return;
+  state_->reporter.reset();
+  std::fputs(text.c_str(), stdout);
+}
+
+void Tool::summary(const std::string& text) {
+  if (verbose()) print(text);
+}
+
+void Tool::warn(const std::string& text) {
+  state_->warnings.push_back(text);
+  if (quiet()) return;
+  state_->reporter.reset();
+  fmt::print(stderr, "{}: warning: {}\n", name(), text);
+}
+
+std::string Tool::commandJson() const {
+  nlohmann::json command = nlohmann::json::object();
+  for (std::size_t i = 0; i < state_->options.size(); ++i) {
+    if (state_->options[i].recorded_) command[state_->recorders[i].first] = state_->recorders[i].second();
+  }
+  if (state_->seed_used) command["seed"] = state_->seed;
+  return command.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+}
+
+std::vector<InputRecord> Tool::inputRecords() const {
+  std::vector<InputRecord> records;
+  for (const std::string& path : state_->inputs) {
+    records.push_back({std::filesystem::path(path).filename().string(), hashFile(path)});
+  }
+  return records;
+}
+
+bool Tool::parse(int argc, char** argv) {
+  CLI::App& app = state_->app;
+  try {
+    app.parse(argc, argv);
+    return true;
+  } catch (const CLI::CallForHelp&) {
+    std::fputs(app.help().c_str(), stdout);
+    return false;
+  } catch (const CLI::CallForVersion&) {
+    fmt::print("{}\n", generator());
+    return false;
+  } catch (const CLI::FileError& error) {
+    throw Error(ErrorCode::io, "cli.config", "", "", error.what(), "check the name given to --config");
+  } catch (const CLI::ParseError& error) {
+    // A misspelt name is the cause of most other complaints ("--output is required"), so it is reported first.
+    std::vector<std::string> known;
+    for (const CLI::Option* option : app.get_options()) {
+      for (const std::string& long_name : option->get_lnames()) known.push_back("--" + long_name);
+    }
+    for (const std::string& word : app.remaining()) {
+      if (word.size() < 2 || word[0] != '-') continue;
+      const std::string unknown = word.substr(0, word.find('='));
+      const std::string near = nearestName(unknown, known);
+      throw Error(ErrorCode::usage, "cli.unknown_option", "", "", "unknown option " + unknown,
+                  (near.empty() ? "" : "did you mean " + near + "? ") + "see " + name() + " --help");
+    }
+    throw Error(ErrorCode::usage, "cli.usage", "", "", error.what(), "see " + name() + " --help");
+  }
+}
+
+int Tool::work(const std::function<void()>& body) {
+  State& s = *state_;
+  for (const auto& check : s.checks) check();
+  if (!s.depfile.empty()) checkWritable(s.depfile);
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads()));
+  setImageThreads(threads());
+  body();
+  s.reporter.reset();
+  if (!s.depfile.empty()) {
+    std::vector<std::string> prerequisites = s.inputs;
+    if (const CLI::Option* config = s.app.get_config_ptr(); config->count() > 0) {
+      prerequisites.push_back(config->as<std::string>());
+    }
+    writeFileAtomically(s.depfile, makeDepfile(s.outputs, prerequisites));
+  }
+  const int code = s.exit_code ? static_cast<int>(*s.exit_code) : 0;
+  if (s.json_result) {
+    const char* status = s.exit_code ? codeName(*s.exit_code) : "ok";
+    fmt::print("{}\n", dump({{"schema", kJsonSchema},
+                             {"tool", s.info.name},
+                             {"version", GLINT_VERSION},
+                             {"status", status},
+                             {"result", s.result},
+                             {"warnings", s.warnings}}));
+  }
+  if (std::fflush(stdout) != 0) throw Error(ErrorCode::io, "stdout", "", "", "stdout cannot be written", "check its target");
+  return code;
+}
+
+int Tool::fail(const Error& error) {
+  State& s = *state_;
+  s.reporter.reset();
+  fmt::print(stderr, "{}: error: {}\n", s.info.name, error.what());
+  if (s.json_result) {
+    fmt::print("{}\n", dump({{"schema", kJsonSchema},
+                             {"tool", s.info.name},
+                             {"version", GLINT_VERSION},
+                             {"status", "error"},
+                             {"error",
+                              {{"code", codeName(error.code())},
+                               {"rule", error.rule()},
+                               {"path", error.path()},
+                               {"object", error.object()},
+                               {"message", error.what()},
+                               {"remedy", error.remedy()}}},
+                             {"warnings", s.warnings}}));
+    std::fflush(stdout);
+  }
+  return static_cast<int>(error.code());
+}
+
+int Tool::run(int argc, char** argv, const std::function<void()>& body) {
+  try {
+    // Parsing stops at the first error, which may come before --json is seen.
+    for (int i = 1; i < argc; ++i) state_->json_result |= std::string(argv[i]) == "--json";
+    if (!parse(argc, argv)) return 0;
+    return work(body);
+  } catch (const Error& error) {
+    return fail(error);
+  } catch (const std::bad_alloc&) {
+    return fail({ErrorCode::failed, "memory", "", "", "out of memory",
+                 "use a smaller map or lower resolution, or a machine with more memory"});
+  } catch (const std::system_error& error) {  // includes std::filesystem::filesystem_error
+    return fail({ErrorCode::io, "system", "", "", error.what()});
+  } catch (const std::exception& error) {
+    return fail({ErrorCode::failed, "internal", "", "", error.what(), "please report this as a defect"});
+  }
+}
+
+}  // namespace glint::apps

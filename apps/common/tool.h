@@ -1,0 +1,161 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <initializer_list>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "glint/bake/progress.h"
+#include "glint/model/error.h"
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace glint::apps {
+
+class ProgressReporter;
+
+/// What `--help` says about a tool.
+struct ToolInfo {
+  std::string name;     ///< "glint-pyramid"
+  std::string summary;  ///< one or two sentences: what it reads and what it makes
+  std::string example;  ///< one command line that works, shown at the end of the help text
+};
+
+/// One file that the result depends on. Same contents as the record in an asset.
+struct InputRecord {
+  std::string name;  ///< file name without its folder, so that outputs do not depend on where a build runs
+  std::string hash_hex;  ///< XXH3-128 of the contents, 32 lower-case hexadecimal digits
+};
+
+/// A declared option, for the constraints that are checked while the command line is parsed.
+class Option {
+ public:
+  Option& required();
+  /// Numbers outside [low, high] are a usage error. Applies to each element of a list.
+  Option& range(double low, double high);
+  Option& excludes(const Option& other);
+  Option& needs(const Option& other);
+  /// Leaves the option out of the `command` record: it does not change the result.
+  Option& unrecorded();
+  /// Shown in the help text instead of the value, for defaults that depend on other options.
+  Option& defaultText(const std::string& text);
+  /// Whether the command line or the configuration file set it. Valid after parsing.
+  bool given() const;
+
+ private:
+  friend class Tool;
+  CLI::Option* option_ = nullptr;
+  bool recorded_ = true;
+};
+
+/// A command-line program: declares the flags that every tool shares, parses, runs the work, and exits.
+///
+/// Shared flags: --threads --seed --json --progress --quiet --verbose --force --depfile --config --version --help.
+/// Declare inputs and outputs with the mix-ins of files.h and parameters with option(), flag() and choice(); then
+/// `return tool.run(argc, argv, [&] { ... });`. References passed in must outlive run().
+///
+/// With --json, stdout holds exactly one JSON document: {"schema", "tool", "version", "status": "ok", "result", "warnings"}, or on
+/// failure {..., "status": "error", "error": {"code", "rule", "path", "object", "message", "remedy"}}. The message for people
+/// is on stderr in both cases.
+class Tool {
+ public:
+  explicit Tool(ToolInfo info);
+  ~Tool();
+  Tool(const Tool&) = delete;
+  Tool& operator=(const Tool&) = delete;
+
+  /// Declares an option or, when `name` has no dash, a positional argument. `value` holds the default, which the help shows.
+  /// T: int, std::uint64_t, float, double, std::string, or std::vector of int, float or std::string (given as a,b,c).
+  /// Numbers that are not finite are a usage error.
+  template <class T>
+  Option& option(const std::string& name, T& value, const std::string& help);
+
+  /// Declares a flag without a value.
+  Option& flag(const std::string& name, bool& value, const std::string& help);
+
+  /// Declares an option that takes one of a few words.
+  template <class E>
+  Option& choice(const std::string& name, E& value, std::initializer_list<std::pair<const char*, E>> words,
+                 const std::string& help) {
+    std::vector<std::string> names;
+    std::vector<E> values;
+    std::size_t current = 0;
+    for (const auto& [word, word_value] : words) {
+      if (word_value == value) current = names.size();
+      names.emplace_back(word);
+      values.push_back(word_value);
+    }
+    return choiceOf(name, names, current, [&value, values](std::size_t index) { value = values[index]; }, help);
+  }
+
+  /// The parser, for what the functions above do not cover. Options declared here are not in the `command` record.
+  CLI::App& parser();
+
+  /// Adds a check that runs after parsing and before the work. It throws glint::Error.
+  void addCheck(std::function<void()> check);
+
+  /// Parses, checks, works, writes the depfile and the JSON result; turns every exception into a message and an exit code.
+  /// @return exit code: 0 ok, or the value of the ErrorCode
+  int run(int argc, char** argv, const std::function<void()>& work);
+
+  // What the work may use.
+
+  const std::string& name() const;
+  bool quiet() const;
+  bool verbose() const;
+  bool wantsJson() const;
+  bool force() const;
+  /// Value of --threads; all the processor's when it was not given. oneTBB and OpenImageIO are limited to it already.
+  int threads() const;
+  /// Value of --seed. Calling this records the seed in `command`, so call it before commandJson().
+  std::uint64_t seed();
+  /// Progress of a named stage, as --progress asks. The reporter lives until the next call or the end of the run.
+  bake::ProgressFn progress(const std::string& stage);
+  /// Sets the result that --json prints. An object whose keys are snake_case, with units in their names.
+  void setResult(const nlohmann::json& result);
+  /// Prints text that is the tool's result on stdout; nothing with --json.
+  void print(const std::string& text);
+  /// Prints a summary on stdout if --verbose was given, and nothing with --json.
+  void summary(const std::string& text);
+  /// Prints a warning on stderr unless --quiet was given; it is also in the JSON result.
+  void warn(const std::string& text);
+  /// Makes run() return this code although nothing failed, for comparisons (ErrorCode::differs).
+  void setExitCode(ErrorCode code);
+
+  /// Adds a file that the result was read from to `inputs` and to the depfile. The mix-ins of files.h call this.
+  void addInput(const std::string& path);
+  /// Adds a file that the run makes to the targets of the depfile. The mix-ins of files.h call this.
+  void addOutput(const std::string& path);
+  /// Inputs declared so far.
+  const std::vector<std::string>& inputPaths() const;
+
+  /// "glint-pyramid 0.1.0".
+  std::string generator() const;
+  /// JSON object of every recorded parameter, defaults included, keys sorted.
+  std::string commandJson() const;
+  /// Name and hash of every input. Reads the files.
+  /// @throws Error io if one cannot be read
+  std::vector<InputRecord> inputRecords() const;
+
+ private:
+  struct State;
+
+  Option& choiceOf(const std::string& name, const std::vector<std::string>& names, std::size_t current,
+                   std::function<void(std::size_t)> set, const std::string& help);
+  void addStandardOptions();
+  /// @return false when --help or --version was answered
+  bool parse(int argc, char** argv);
+  int work(const std::function<void()>& work);
+  int fail(const Error& error);
+
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace glint::apps

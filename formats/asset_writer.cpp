@@ -1,0 +1,323 @@
+#include "glint/formats/asset_writer.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <cstdio>
+#include <cstring>
+#include <map>
+#include <set>
+
+#include "glint/formats/hash.h"
+#include "glint/formats/hdf5_handle.h"
+#include "glint/formats/load.h"
+
+namespace glint::formats {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kMaxTextBytes = 60000;      // an object header message holds less than 64 KiB
+constexpr std::uint64_t kBigBytes = 64 << 10;     // datasets from here on start on a page
+constexpr hsize_t kPageBytes = 4096;
+constexpr hsize_t kLineBytes = 64;                // a cache line: where all other datasets start
+constexpr std::size_t kWriteBytes = 8 << 20;      // of one write call
+
+[[noreturn]] void throwIo(const fs::path& path, const std::string& what, int error) {
+  const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
+  throw Error(ErrorCode::io, "file.writable", path.string(), {}, what + ": " + std::strerror(error),
+              full ? "free some space or write to another disk" : "check the folder and its permissions");
+}
+
+/// A file under a unique name beside the target, removed unless it was renamed to it.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const fs::path& target) : target_(target) {
+    static std::atomic<unsigned> counter{0};
+    const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+    for (int attempt = 0;; ++attempt) {
+      const auto ticks = static_cast<unsigned long long>(std::chrono::steady_clock::now().time_since_epoch().count());
+      char suffix[64];
+      std::snprintf(suffix, sizeof suffix, ".%d-%u-%llx.tmp", static_cast<int>(::getpid()), counter++, ticks);
+      path_ = folder / ("." + target.filename().string() + suffix);
+      file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+      if (file_ >= 0) return;
+      if (errno != EEXIST || attempt > 100) throwIo(target, "cannot be created", errno);
+    }
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  ~TemporaryFile() {
+    if (file_ >= 0) ::close(file_);
+    if (!renamed_) ::unlink(path_.c_str());
+  }
+
+  const fs::path& path() const { return path_; }
+
+  /// Writes at an offset that the caller knows to be right.
+  void write(const void* data, std::uint64_t size, std::uint64_t offset) {
+    const char* at = static_cast<const char*>(data);
+    while (size > 0) {
+      const ssize_t written = ::pwrite(file_, at, std::min<std::uint64_t>(size, kWriteBytes), static_cast<off_t>(offset));
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) throwIo(target_, "cannot be written", written < 0 ? errno : EIO);
+      at += written;
+      offset += static_cast<std::uint64_t>(written);
+      size -= static_cast<std::uint64_t>(written);
+    }
+  }
+
+  /// Flushes to the disk and takes the target's name.
+  void publish(bool overwrite) {
+    if (::fsync(file_) != 0) throwIo(target_, "cannot be flushed to the disk", errno);
+    if (overwrite) {
+      if (::rename(path_.c_str(), target_.c_str()) != 0) throwIo(target_, "cannot be replaced", errno);
+    } else {
+      // Unlike rename, link fails if another process has made the target meanwhile.
+      if (::link(path_.c_str(), target_.c_str()) != 0) throwIo(target_, "cannot be created", errno);
+      ::unlink(path_.c_str());
+    }
+    renamed_ = true;
+    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
+    const int directory = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (directory < 0) return;
+    ::fsync(directory);  // some file systems cannot flush folders; the data is safe either way
+    ::close(directory);
+  }
+
+ private:
+  fs::path target_;
+  fs::path path_;
+  int file_ = -1;
+  bool renamed_ = false;
+};
+
+void writeAttribute(hid_t object, const std::string& name, const AttributeValue& value, const hdf5::TypeTable& types) {
+  constexpr ErrorCode io = ErrorCode::io;
+  const std::string place = "@" + name;
+  const hsize_t count = value.count();
+  const hdf5::Handle space(value.scalar ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &count, nullptr), "cannot be written", place, io);
+  if (value.type == ElementType::text) {
+    std::size_t width = 1;
+    bool ascii = true;
+    for (const std::string& text : value.texts) {
+      width = std::max(width, text.size());
+      ascii &= std::all_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 128; });
+    }
+    if (width * std::max<std::size_t>(value.texts.size(), 1) > kMaxTextBytes || [&] {
+          return std::any_of(value.texts.begin(), value.texts.end(), [](const std::string& t) { return t.find('\0') != t.npos; });
+        }()) {
+      throw Error(ErrorCode::usage, "attribute.size", {}, "/" + place, "is longer than 60000 bytes or holds a NUL");
+    }
+    const hdf5::Handle type(H5Tcopy(H5T_C_S1), "cannot be written", place, io);
+    hdf5::check(H5Tset_size(type, width), "cannot be written", place, io);
+    hdf5::check(H5Tset_strpad(type, H5T_STR_NULLPAD), "cannot be written", place, io);
+    hdf5::check(H5Tset_cset(type, ascii ? H5T_CSET_ASCII : H5T_CSET_UTF8), "cannot be written", place, io);
+    std::string bytes;
+    for (const std::string& text : value.texts) bytes += text + std::string(width - text.size(), '\0');
+    const hdf5::Handle attribute(H5Acreate2(object, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), "cannot be written", place, io);
+    if (count > 0) hdf5::check(H5Awrite(attribute, type, bytes.data()), "cannot be written", place, io);
+    return;
+  }
+  const hdf5::Handle attribute(H5Acreate2(object, name.c_str(), types[value.type], space, H5P_DEFAULT, H5P_DEFAULT),
+                               "cannot be written", place, io);
+  // HDF5 converts; every schema type is exact in a double.
+  if (count > 0) hdf5::check(H5Awrite(attribute, H5T_NATIVE_DOUBLE, value.numbers.data()), "cannot be written", place, io);
+}
+
+AttributeValue text(std::string value) { return {ElementType::text, true, {}, {std::move(value)}}; }
+
+/// Root attributes that every kind has.
+Attributes commonValues(std::string_view kind, const Provenance& provenance) {
+  std::vector<std::string> inputs;
+  for (const InputRecord& input : provenance.inputs) inputs.push_back(input.hash_hex + "  " + input.name);
+  return {{"glint_format", text("glint")},
+          {"format_major", {ElementType::i32, true, {kFormatMajor}, {}}},
+          {"format_minor", {ElementType::i32, true, {kFormatMinor}, {}}},
+          {"required_features", {ElementType::text, false, {}, {}}},
+          {"kind", text(std::string(kind))},
+          {"generator", text(provenance.generator)},
+          {"command", text(provenance.command_json)},
+          {"inputs", {ElementType::text, false, {}, std::move(inputs)}}};
+}
+
+/// The schema entry that a packed array belongs to.
+const DatasetSchema& schemaOf(const KindSchema& kind, const std::string& path) {
+  for (const DatasetSchema& dataset : kind.datasets) {
+    const std::size_t place = dataset.path.find("{l}");
+    if (place == std::string_view::npos ? path == dataset.path
+                                        : path.size() == dataset.path.size() - 1 && path.starts_with(dataset.path.substr(0, place)) &&
+                                              path.ends_with(dataset.path.substr(place + 3))) {
+      return dataset;
+    }
+  }
+  throw Error(ErrorCode::failed, "dataset.unknown", {}, "/" + path, "is not in the schema");
+}
+
+/// Writes everything but the datasets' bytes and finds where those go.
+///
+/// HDF5 only reserves the space: the bytes are then written with plain calls, at the speed of the disk and with its errors.
+class MetadataWriter {
+ public:
+  MetadataWriter(const fs::path& path, const PackedAsset& packed) : path_(path), packed_(packed) {
+    for (const PackedArray& array : packed.arrays) hashes_[array.path] = hashBytes(array.data, array.size_bytes);
+  }
+
+  /// @return offset of each dataset by path
+  std::map<std::string, std::uint64_t> write(const Provenance& provenance) {
+    const hdf5::LibraryScope scope;
+    const hdf5::TypeTable types;
+    {
+      hdf5::Handle file = create();
+      const hdf5::Handle root(H5Gopen2(file, "/", H5P_DEFAULT), "cannot be written", "/", ErrorCode::io);
+      Attributes attributes = commonValues(packed_.kind, provenance);
+      attributes.insert(packed_.attributes.begin(), packed_.attributes.end());
+      for (const auto& [name, value] : attributes) writeAttribute(root, name, value, types);
+      createGroups(file);
+      createDatasets(file, false, types);
+      hdf5::check(file.close(), "cannot be written", {}, ErrorCode::io);
+    }
+    hdf5::Handle file(H5Fopen(path_.c_str(), H5F_ACC_RDWR, access(kPageBytes)), "cannot be written", {}, ErrorCode::io);
+    createDatasets(file, true, types);
+    hdf5::check(file.close(), "cannot be written", {}, ErrorCode::io);
+    return std::move(offsets_);
+  }
+
+ private:
+  static constexpr ErrorCode kIo = ErrorCode::io;
+
+  /// Access that starts every object of `alignment` bytes or more at a multiple of it.
+  static hdf5::Handle access(hsize_t alignment) {
+    hdf5::Handle properties(H5Pcreate(H5P_FILE_ACCESS), "cannot create properties", {}, kIo);
+    hdf5::check(H5Pset_fapl_sec2(properties), "cannot set properties", {}, kIo);
+    hdf5::check(H5Pset_libver_bounds(properties, H5F_LIBVER_V18, H5F_LIBVER_V110), "cannot set properties", {}, kIo);
+    hdf5::check(H5Pset_file_locking(properties, false, true), "cannot set properties", {}, kIo);
+    // Small metadata need not be aligned; datasets below the threshold come from blocks that are switched off here.
+    hdf5::check(H5Pset_alignment(properties, alignment == kLineBytes ? 1 : alignment, alignment), "cannot set properties", {}, kIo);
+    hdf5::check(H5Pset_small_data_block_size(properties, 0), "cannot set properties", {}, kIo);
+    return properties;
+  }
+
+  /// Creation properties without times, attributes kept in the object header (which is checksummed as a whole).
+  static hdf5::Handle creation(hid_t type) {
+    hdf5::Handle properties(H5Pcreate(type), "cannot create properties", {}, kIo);
+    hdf5::check(H5Pset_obj_track_times(properties, false), "cannot set properties", {}, kIo);
+    hdf5::check(H5Pset_attr_phase_change(properties, 64, 0), "cannot set properties", {}, kIo);
+    if (type != H5P_DATASET_CREATE) hdf5::check(H5Pset_link_phase_change(properties, 64, 0), "cannot set properties", {}, kIo);
+    return properties;
+  }
+
+  hdf5::Handle create() const {
+    return hdf5::Handle(H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, creation(H5P_FILE_CREATE), access(kLineBytes)), "cannot be created", {}, kIo);
+  }
+
+  void createGroups(hid_t file) const {
+    std::set<std::string> groups;
+    for (const PackedArray& array : packed_.arrays) {
+      const std::size_t slash = array.path.rfind('/');
+      if (slash != std::string::npos) groups.insert(array.path.substr(0, slash));
+    }
+    for (const std::string& group : groups) {
+      const hdf5::Handle handle(H5Gcreate2(file, group.c_str(), H5P_DEFAULT, creation(H5P_GROUP_CREATE), H5P_DEFAULT),
+                                "cannot be written", "/" + group, kIo);
+    }
+  }
+
+  void createDatasets(hid_t file, bool big, const hdf5::TypeTable& types) {
+    std::vector<const PackedArray*> sorted;
+    for (const PackedArray& array : packed_.arrays) {
+      if ((array.size_bytes >= kBigBytes) == big) sorted.push_back(&array);
+    }
+    std::sort(sorted.begin(), sorted.end(), [](const PackedArray* a, const PackedArray* b) { return a->path < b->path; });
+    for (const PackedArray* array : sorted) createDataset(file, *array, types);
+  }
+
+  void createDataset(hid_t file, const PackedArray& array, const hdf5::TypeTable& types) {
+    const std::string object = "/" + array.path;
+    const hdf5::Handle properties = creation(H5P_DATASET_CREATE);
+    hdf5::check(H5Pset_layout(properties, H5D_CONTIGUOUS), "cannot set properties", object, kIo);
+    hdf5::check(H5Pset_alloc_time(properties, H5D_ALLOC_TIME_EARLY), "cannot set properties", object, kIo);
+    hdf5::check(H5Pset_fill_time(properties, H5D_FILL_TIME_NEVER), "cannot set properties", object, kIo);
+    const std::vector<hsize_t> dims(array.dims.begin(), array.dims.end());
+    const hdf5::Handle space(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr), "cannot be written", object, kIo);
+    const hdf5::Handle dataset(H5Dcreate2(file, array.path.c_str(), types[array.type], space, H5P_DEFAULT, properties, H5P_DEFAULT),
+                               "cannot be written", object, kIo);
+    const DatasetSchema& schema = schemaOf(*findKindSchema(packed_.kind), array.path);
+    writeAttribute(dataset, "long_name", text(std::string(schema.long_name)), types);
+    writeAttribute(dataset, "units", text(std::string(schema.units)), types);
+    writeAttribute(dataset, "xxh3_128", text(hashes_.at(array.path)), types);
+    if (array.size_bytes == 0) return;
+    const haddr_t offset = H5Dget_offset(dataset);
+    if (offset == HADDR_UNDEF) hdf5::fail("has no place in the file", object, kIo);
+    offsets_[array.path] = offset;
+  }
+
+  fs::path path_;
+  const PackedAsset& packed_;
+  std::map<std::string, std::string> hashes_;
+  std::map<std::string, std::uint64_t> offsets_;
+};
+
+/// Reads the finished file as a reader would.
+void checkWritten(const fs::path& temporary) {
+  Findings findings(temporary);
+  loadAsset(temporary, findings);
+  for (const Finding& finding : findings.report().findings) {
+    if (finding.severity != Severity::error) continue;
+    throw Error(ErrorCode::failed, finding.rule, {}, finding.object, "cannot be written as a valid asset: " + finding.message);
+  }
+}
+
+void writePacked(const fs::path& path, const PackedAsset& packed, const Provenance& provenance, const WriteOptions& options) {
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored) || !path.has_filename()) throwIo(path, "cannot be written", EISDIR);
+  if (!options.overwrite && fs::exists(fs::symlink_status(path, ignored))) {
+    throw Error(ErrorCode::io, "file.writable", path.string(), {}, "exists", "pass --force to replace it");
+  }
+  TemporaryFile temporary(path);
+  const auto offsets = MetadataWriter(temporary.path(), packed).write(provenance);
+  for (const PackedArray& array : packed.arrays) {
+    if (array.size_bytes > 0) temporary.write(array.data, array.size_bytes, offsets.at(array.path));
+  }
+  checkWritten(temporary.path());
+  temporary.publish(options.overwrite);
+}
+
+template <class Model>
+void writeModel(const fs::path& path, const Model& model, const Provenance& provenance, const WriteOptions& options) {
+  try {
+    writePacked(path, pack(model), provenance, options);
+  } catch (const Error& error) {
+    if (!error.path().empty()) throw;
+    // Rules and HDF5 know the object only: name the file that was to be written.
+    std::string what = error.what();
+    if (!error.object().empty()) what.erase(0, error.object().size() + 2);
+    if (!error.remedy().empty()) what.resize(what.size() - error.remedy().size() - 2);
+    throw Error(error.code(), error.rule(), path.string(), error.object(), what, error.remedy());
+  }
+}
+
+}  // namespace
+
+void writeAsset(const fs::path& path, const NormalMap& map, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, map, provenance, options);
+}
+
+void writeAsset(const fs::path& path, const HeightMap& map, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, map, provenance, options);
+}
+
+void writeAsset(const fs::path& path, const NdfPyramid& pyramid, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, pyramid, provenance, options);
+}
+
+void writeAsset(const fs::path& path, const CompressedNdf& ndf, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, ndf, provenance, options);
+}
+
+}  // namespace glint::formats

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+
+#include "glint/formats/provenance.h"
+#include "glint/model/compressed_ndf.h"
+#include "glint/model/error.h"
+#include "glint/model/ndf_pyramid.h"
+#include "glint/model/normal_map.h"
+
+namespace glint::formats {
+
+struct WriteOptions {
+  bool overwrite = false;  ///< replace a file that exists
+};
+
+/// Writes an asset. The file appears whole or not at all: it is written under a temporary name in the target's folder, read back
+/// and checked as a reader would, flushed to the disk and renamed. On failure the temporary file is removed and an old file stays.
+/// The same arguments give the same bytes.
+/// @throws Error  io: cannot be written, or exists and may not be replaced; usage: an array does not have the size that the struct
+///                says; failed: the struct breaks a rule of the format (its id is in the error)
+void writeAsset(const std::filesystem::path& path, const NormalMap& map, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const HeightMap& map, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const NdfPyramid& pyramid, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const CompressedNdf& ndf, const Provenance& provenance,
+                const WriteOptions& options = {});
+
+}  // namespace glint::formats

@@ -1,0 +1,230 @@
+#include "glint/formats/conformance.h"
+
+#include <algorithm>
+#include <set>
+
+namespace glint::formats {
+namespace {
+
+/// Calls `use` with each part of `list` between separators.
+template <class Use>
+void split(std::string_view list, char separator, Use use) {
+  while (true) {
+    const std::size_t end = list.find(separator);
+    use(list.substr(0, end));
+    if (end == std::string_view::npos) return;
+    list.remove_prefix(end + 1);
+  }
+}
+
+bool isOneOf(std::string_view value, std::string_view choices) {
+  bool found = false;
+  split(choices, '|', [&](std::string_view choice) { found |= choice == value; });
+  return found;
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
+  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
+  return text;
+}
+
+/// Whether the condition of a TypeChoice holds.
+bool holds(std::string_view when, const Attributes& attributes) {
+  if (when.empty()) return true;
+  bool all = true;
+  split(when, '&', [&](std::string_view term) {
+    const std::size_t equal = term.find('=');
+    const auto found = attributes.find(trimmed(term.substr(0, equal)));
+    all &= found != attributes.end() && found->second.texts.size() == 1 &&
+           isOneOf(found->second.texts[0], trimmed(term.substr(equal + 1)));
+  });
+  return all;
+}
+
+std::string listed(const std::vector<std::uint64_t>& dims) {
+  std::string text = "[";
+  for (const std::uint64_t n : dims) text += (text.size() > 1 ? ", " : "") + std::to_string(n);
+  return text + "]";
+}
+
+/// Checks one attribute. Returns whether it can be used.
+bool checkAttribute(const Attributes& attributes, const std::string& object, const AttributeSchema& schema,
+                    const SizeScope& scope, Findings& findings) {
+  const std::string place = object + "@" + std::string(schema.name);
+  const auto found = attributes.find(schema.name);
+  if (found == attributes.end()) {
+    findings.add("attribute.missing", place, "is missing");
+    return false;
+  }
+  const AttributeValue& value = found->second;
+  if (value.type != schema.type) {
+    findings.add("attribute.type", place, "is " + std::string(name(value.type)) + ", not " + std::string(name(schema.type)));
+    return false;
+  }
+  const bool scalar = schema.count.empty();
+  const auto count = scalar ? 1 : schema.count == "*" ? value.count() : evaluateSize(schema.count, scope).value_or(0);
+  if (value.scalar != scalar || value.count() != count) {
+    findings.add("attribute.type", place,
+                 "has " + std::to_string(value.count()) + " elements" + (value.scalar ? " (scalar)" : "") + ", not " +
+                     (scalar ? "a scalar" : "a list of " + std::to_string(count)));
+    return false;
+  }
+  // Written so that NaN fails.
+  const auto in_range = [&](double number) { return number >= schema.minimum && number <= schema.maximum; };
+  if (!std::all_of(value.numbers.begin(), value.numbers.end(), in_range)) {
+    const double bad = *std::find_if_not(value.numbers.begin(), value.numbers.end(), in_range);
+    findings.add("attribute.value", place,
+                 "is " + std::to_string(bad) + ", outside " + std::to_string(schema.minimum) + " to " + std::to_string(schema.maximum));
+    return false;
+  }
+  for (const std::string& text : value.texts) {
+    if (schema.values.empty() || isOneOf(text, schema.values)) continue;
+    findings.add("attribute.value", place, "is \"" + text + "\", not one of " + std::string(schema.values));
+    return false;
+  }
+  return true;
+}
+
+void warnOfUnknown(const Attributes& attributes, const std::string& object, std::span<const AttributeSchema> common,
+                   std::span<const AttributeSchema> own, Findings& findings) {
+  for (const auto& [attribute, value] : attributes) {
+    const auto same = [&, &key = attribute](const AttributeSchema& schema) { return schema.name == key; };
+    if (std::none_of(common.begin(), common.end(), same) && std::none_of(own.begin(), own.end(), same)) {
+      findings.add("attribute.unknown", object + "@" + attribute, "is not in the schema");
+    }
+  }
+}
+
+/// Checks root attributes and derives the values that sizes are made of. Returns whether datasets can be checked.
+bool checkRoot(const FileStructure& structure, const KindSchema& schema, SizeScope& scope, Findings& findings) {
+  bool usable = true;
+  for (const AttributeSchema& attribute : commonAttributes()) {
+    usable &= checkAttribute(structure.attributes, "/", attribute, scope, findings);
+  }
+  for (const AttributeSchema& attribute : schema.attributes) {
+    if (!checkAttribute(structure.attributes, "/", attribute, scope, findings)) {
+      usable = false;
+      continue;
+    }
+    if (attribute.type != ElementType::i32) continue;
+    std::vector<std::uint64_t>& values = scope.values[std::string(attribute.name)];
+    for (const double number : structure.attributes.find(attribute.name)->second.numbers) {
+      values.push_back(static_cast<std::uint64_t>(number));
+    }
+  }
+  warnOfUnknown(structure.attributes, "/", commonAttributes(), schema.attributes, findings);
+  for (const DerivedValue& derived : schema.derived) {
+    if (!usable) break;
+    scope.values[std::string(derived.name)] = {evaluateSize(derived.expression, scope).value_or(0)};
+  }
+  return usable;
+}
+
+/// Checks one dataset; binds size names that no attribute gives.
+void checkDataset(const DatasetRecord& record, const std::string& path, const DatasetSchema& schema, const Attributes& root,
+                  SizeScope& scope, Findings& findings) {
+  const std::string object = "/" + path;
+  for (const AttributeSchema& attribute : datasetAttributes()) {
+    checkAttribute(record.attributes, object, attribute, scope, findings);
+  }
+  warnOfUnknown(record.attributes, object, datasetAttributes(), {}, findings);
+  const auto type = std::find_if(schema.types.begin(), schema.types.end(), [&](const TypeChoice& c) { return holds(c.when, root); });
+  if (type == schema.types.end() || !record.known_type || record.type != type->type) {
+    findings.add("dataset.type", object,
+                 "has elements of type " + std::string(record.known_type ? name(record.type) : "unknown") + ", not " +
+                     std::string(type == schema.types.end() ? "any" : name(type->type)));
+  }
+  std::vector<std::uint64_t> expected;
+  for (std::size_t d = 0; d < schema.dims.size(); ++d) {
+    auto size = evaluateSize(schema.dims[d], scope);
+    if (!size && d < record.dims.size()) {
+      size = record.dims[d];
+      scope.values[std::string(schema.dims[d])] = {*size};
+    }
+    expected.push_back(size.value_or(0));
+  }
+  if (record.dims != expected) {
+    findings.add("dataset.dims", object, "has sizes " + listed(record.dims) + ", not " + listed(expected));
+  }
+}
+
+}  // namespace
+
+const KindSchema* checkHeader(const FileStructure& structure, Findings& findings) {
+  const SizeScope scope;
+  const auto attribute = [&](std::string_view wanted) -> const AttributeValue* {
+    for (const AttributeSchema& schema : commonAttributes()) {
+      if (schema.name != wanted) continue;
+      // glint_format has its own rule for its value.
+      AttributeSchema relaxed = schema;
+      if (wanted == "glint_format") relaxed.values = {};
+      if (!checkAttribute(structure.attributes, "/", relaxed, scope, findings)) return nullptr;
+    }
+    return &structure.attributes.find(wanted)->second;
+  };
+  const AttributeValue* format = attribute("glint_format");
+  if (format == nullptr) return nullptr;
+  if (format->texts[0] != "glint") {
+    findings.add("format.name", "/@glint_format", "is \"" + format->texts[0] + "\", not \"glint\"");
+    return nullptr;
+  }
+  const AttributeValue* major = attribute("format_major");
+  const AttributeValue* minor = attribute("format_minor");
+  if (major == nullptr || minor == nullptr) return nullptr;
+  const std::string version = std::to_string(static_cast<int>(major->numbers[0])) + "." + std::to_string(static_cast<int>(minor->numbers[0]));
+  const std::string own = std::to_string(kFormatMajor) + "." + std::to_string(kFormatMinor);
+  if (major->numbers[0] != kFormatMajor) {
+    findings.add("format.major", "/@format_major", "has format version " + version + ", this reader knows " + own);
+    return nullptr;
+  }
+  if (minor->numbers[0] > kFormatMinor) {
+    findings.add("format.minor", "/@format_minor", "has format version " + version + ", this reader knows " + own);
+  }
+  const AttributeValue* features = attribute("required_features");
+  if (features == nullptr) return nullptr;
+  for (const std::string& feature : features->texts) {
+    // Version 1.0 has no optional features yet, so every name is unknown.
+    findings.add("format.feature", "/@required_features", "requires the unknown feature \"" + feature + "\"");
+  }
+  const AttributeValue* kind = attribute("kind");
+  if (kind == nullptr || !features->texts.empty()) return nullptr;
+  const KindSchema* schema = findKindSchema(kind->texts[0]);
+  if (schema == nullptr) findings.add("format.kind", "/@kind", "is \"" + kind->texts[0] + "\", a kind that this reader does not know");
+  return schema;
+}
+
+void checkConformance(const FileStructure& structure, const KindSchema& schema, Findings& findings) {
+  SizeScope scope;
+  if (!checkRoot(structure, schema, scope, findings)) return;
+  std::set<std::string> known;
+  for (std::size_t place = 0; place < schema.datasets.size(); ++place) {
+    // Names that no attribute gives are bound per level, so all datasets of a level are checked together.
+    const DatasetSchema& first = schema.datasets[place];
+    std::size_t end = place + 1;
+    while (!first.repeat.empty() && end < schema.datasets.size() && schema.datasets[end].repeat == first.repeat) ++end;
+    const auto levels = first.repeat.empty() ? 1 : evaluateSize(first.repeat, scope).value_or(0);
+    for (std::uint64_t level = 0; level < levels; ++level) {
+      SizeScope level_scope = scope;
+      level_scope.level = level;
+      SizeScope& use = first.repeat.empty() ? scope : level_scope;
+      for (std::size_t k = place; k < end; ++k) {
+        const DatasetSchema& dataset = schema.datasets[k];
+        const std::string path = levelPath(dataset.path, static_cast<int>(level));
+        known.insert(path);
+        const auto found = structure.datasets.find(path);
+        if (found != structure.datasets.end()) {
+          checkDataset(found->second, path, dataset, structure.attributes, use, findings);
+        } else if (dataset.required) {
+          findings.add("dataset.missing", "/" + path, "is missing");
+        }
+      }
+    }
+    place = end - 1;
+  }
+  for (const auto& [path, record] : structure.datasets) {
+    if (!known.contains(path)) findings.add("dataset.unknown", "/" + path, "is not in the schema");
+  }
+}
+
+}  // namespace glint::formats

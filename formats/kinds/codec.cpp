@@ -1,0 +1,63 @@
+#include "glint/formats/kinds/codec.h"
+
+#include <array>
+
+namespace glint::formats {
+namespace {
+
+template <class Model>
+constexpr Codec codecOf(std::string_view kind) {
+  return {kind,
+          [](const Content& content) {
+            Model model;
+            unpack(content, model);
+            return AnyAsset(model);
+          },
+          [](const AnyAsset& asset, Findings& findings) { checkIndex(std::get<Model>(asset), findings); },
+          [](const AnyAsset& asset, Findings& findings) { checkData(std::get<Model>(asset), findings); }};
+}
+
+constexpr std::array kCodecs = {codecOf<HeightMap>("heights"), codecOf<CompressedNdf>("ndf-cp"),
+                                codecOf<NdfPyramid>("ndf-pyramid"), codecOf<NormalMap>("normals")};
+
+}  // namespace
+
+const Codec* findCodec(std::string_view kind) {
+  for (const Codec& codec : kCodecs) {
+    if (codec.kind == kind) return &codec;
+  }
+  return nullptr;
+}
+
+void PackedAsset::integer(std::string name, std::int64_t value) {
+  attributes.emplace_back(std::move(name), AttributeValue{ElementType::i32, true, {static_cast<double>(value)}, {}});
+}
+
+void PackedAsset::real(std::string name, float value) {
+  attributes.emplace_back(std::move(name), AttributeValue{ElementType::f32, true, {value}, {}});
+}
+
+void PackedAsset::text(std::string name, std::string_view value) {
+  attributes.emplace_back(std::move(name), AttributeValue{ElementType::text, true, {}, {std::string(value)}});
+}
+
+void PackedAsset::integers(std::string name, std::vector<double> values) {
+  attributes.emplace_back(std::move(name), AttributeValue{ElementType::i32, false, std::move(values), {}});
+}
+
+void PackedAsset::reals(std::string name, std::vector<double> values) {
+  attributes.emplace_back(std::move(name), AttributeValue{ElementType::f32, false, std::move(values), {}});
+}
+
+void PackedAsset::array(std::string path, ElementType type, std::vector<std::uint64_t> dims, const void* data,
+                        std::uint64_t count) {
+  std::uint64_t expected = 1;
+  for (const std::uint64_t n : dims) expected *= n;
+  if (expected != count || (count != 0 && data == nullptr)) {
+    throw Error(ErrorCode::usage, "dataset.dims", {}, "/" + path,
+                "holds " + std::to_string(data == nullptr ? 0 : count) + " elements where its sizes need " + std::to_string(expected));
+  }
+  arrays.push_back({std::move(path), type, std::move(dims), data, count * sizeBytes(type)});
+}
+
+}  // namespace glint::formats

@@ -1,0 +1,40 @@
+#include <cmath>
+
+#include "glint/formats/kinds/codec.h"
+
+namespace glint::formats {
+
+PackedAsset pack(const HeightMap& map) {
+  PackedAsset packed{"heights", {}, {}};
+  packed.integer("width", map.width);
+  packed.integer("height", map.height);
+  packed.real("texel_size_um", map.texel_size_um);
+  packed.array("heights", ElementType::f32, {static_cast<std::uint64_t>(map.height), static_cast<std::uint64_t>(map.width)},
+               map.heights.data(), map.heights.size());
+  return packed;
+}
+
+void unpack(const Content& content, HeightMap& map) {
+  map.width = content.integer("width");
+  map.height = content.integer("height");
+  map.texel_size_um = content.real("texel_size_um");
+  map.heights = content.array<float>("heights");
+}
+
+void checkIndex(const HeightMap&, Findings&) {}
+
+void checkData(const HeightMap& map, Findings& findings) {
+  std::size_t bad = 0;
+  std::size_t first = 0;
+  for (std::size_t k = 0; k < map.heights.size(); ++k) {
+    if (std::isfinite(map.heights[k])) continue;
+    if (bad++ == 0) first = k;
+  }
+  if (bad == 0) return;
+  const std::size_t width = static_cast<std::size_t>(map.width);
+  findings.add("heights.finite", "/heights",
+               std::to_string(bad) + " texels are not finite (first at column " + std::to_string(first % width) + ", row " +
+                   std::to_string(first / width) + ")");
+}
+
+}  // namespace glint::formats

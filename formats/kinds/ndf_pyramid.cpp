@@ -1,0 +1,137 @@
+#include <bit>
+#include <cmath>
+
+#include "glint/formats/kinds/pyramid_shape.h"
+
+namespace glint::formats {
+namespace {
+
+constexpr double kIntegralTolerance = 1e-3;
+/// block_means may be taken before pixels are rounded to half precision (2^-11 relative each, 2^-25 near zero).
+constexpr double kMeanTolerance = 1e-3;
+constexpr double kMeanFloor = 0x1p-24;
+
+std::string levelObject(int l, const char* dataset) { return "/" + levelPath("level_{l}/", l) + dataset; }
+
+float pixel(const NdfPyramid& pyramid, const PyramidLevel& level, std::size_t index) {
+  return pyramid.precision == BlockPrecision::f16 ? halfToFloat(static_cast<const std::uint16_t*>(level.pixels)[index])
+                                                  : static_cast<const float*>(level.pixels)[index];
+}
+
+/// Checks the pixels of one level against its means. Returns the sum of the pixels of each block.
+std::vector<double> checkBlocks(const NdfPyramid& pyramid, int l, Findings& findings) {
+  const PyramidLevel& level = pyramid.levels[l];
+  std::vector<double> sums(level.block_means.size());
+  std::size_t bad_pixels = 0;
+  std::size_t bad_means = 0;
+  std::size_t first_pixel = 0;
+  std::size_t first_mean = 0;
+  for (std::size_t b = 0; b < sums.size(); ++b) {
+    for (std::size_t k = b * kBlockPixels; k < (b + 1) * kBlockPixels; ++k) {
+      const float value = pixel(pyramid, level, k);
+      if (!(std::isfinite(value) && value >= 0) && bad_pixels++ == 0) first_pixel = b;
+      sums[b] += value;
+    }
+    const double mean = sums[b] * pyramid.value_scale / kBlockPixels;
+    const double tolerance = kMeanTolerance * std::abs(mean) + kMeanFloor * pyramid.value_scale;
+    if (!(std::abs(mean - level.block_means[b]) <= tolerance) && bad_means++ == 0) first_mean = b;
+  }
+  if (bad_pixels > 0) {
+    findings.add("pyramid.pixels", levelObject(l, "pixels"),
+                 std::to_string(bad_pixels) + " pixels are negative or not finite (first in block " + std::to_string(first_pixel) + ")");
+  }
+  if (bad_means > 0) {
+    findings.add("pyramid.block_means", levelObject(l, "block_means"),
+                 std::to_string(bad_means) + " means differ from the pixels' (first in block " + std::to_string(first_mean) + ")");
+  }
+  return sums;
+}
+
+}  // namespace
+
+PackedAsset pack(const NdfPyramid& pyramid) {
+  PackedAsset packed{"ndf-pyramid", {}, {}};
+  const PyramidShape& shape = pyramid.shape;
+  packShape(shape, packed);
+  packed.text("precision", pyramid.precision == BlockPrecision::f16 ? "f16" : "f32");
+  packed.real("value_scale", pyramid.value_scale);
+  for (int l = 0; l < shape.level_count; ++l) {
+    const PyramidLevel& level = pyramid.levels[l];
+    const auto path = [&](const char* dataset) { return levelPath("level_{l}/", l) + dataset; };
+    const auto rows = static_cast<std::uint64_t>(shape.levels[l].rows);
+    const auto columns = static_cast<std::uint64_t>(shape.levels[l].columns);
+    const std::uint64_t blocks = level.block_means.size();
+    packed.array(path("masks"), ElementType::u64, {rows, columns, static_cast<std::uint64_t>(shape.maskWords())},
+                 level.masks.data(), level.masks.size());
+    packed.array(path("first_block"), ElementType::u64, {rows * columns + 1}, level.first_block.data(), level.first_block.size());
+    packed.array(path("block_means"), ElementType::f32, {blocks}, level.block_means.data(), blocks);
+    // The pixels are a bare pointer: the running count is the only witness of how many there are.
+    packed.array(path("pixels"), pyramid.precision == BlockPrecision::f16 ? ElementType::f16 : ElementType::f32,
+                 {blocks, kBlockSize, kBlockSize}, level.pixels,
+                 (level.first_block.empty() ? 0 : level.first_block.back()) * kBlockPixels);
+  }
+  return packed;
+}
+
+void unpack(const Content& content, NdfPyramid& pyramid) {
+  unpackShape(content, pyramid.shape);
+  pyramid.precision = content.is("precision", "f16") ? BlockPrecision::f16 : BlockPrecision::f32;
+  pyramid.value_scale = content.real("value_scale");
+  for (int l = 0; l < pyramid.shape.level_count; ++l) {
+    const auto path = [&](const char* dataset) { return levelPath("level_{l}/", l) + dataset; };
+    PyramidLevel& level = pyramid.levels[l];
+    level.masks = content.array<std::uint64_t>(path("masks"));
+    level.first_block = content.array<std::uint64_t>(path("first_block"));
+    level.block_means = content.array<float>(path("block_means"));
+    level.pixels = content.dataset(path("pixels")).data;
+  }
+}
+
+void checkIndex(const NdfPyramid& pyramid, Findings& findings) {
+  checkShape(pyramid.shape, findings);
+  const int words = pyramid.shape.maskWords();
+  const int tail_bits = pyramid.shape.blocksPerImage() % 64;
+  const std::uint64_t beyond = tail_bits == 0 ? 0 : ~std::uint64_t{0} << tail_bits;
+  for (int l = 0; l < pyramid.shape.level_count; ++l) {
+    const PyramidLevel& level = pyramid.levels[l];
+    std::uint64_t count = 0;
+    std::uint64_t stray = 0;
+    bool counts_hold = true;
+    const std::size_t images = level.first_block.size() - 1;
+    for (std::size_t image = 0; image < images; ++image) {
+      counts_hold &= level.first_block[image] == count;
+      const std::uint64_t* mask = &level.masks[image * static_cast<std::size_t>(words)];
+      for (int w = 0; w < words; ++w) count += static_cast<std::uint64_t>(std::popcount(mask[w]));
+      stray |= mask[words - 1] & beyond;
+    }
+    counts_hold &= level.first_block[images] == count && count == level.block_means.size();
+    if (stray != 0) findings.add("pyramid.masks", levelObject(l, "masks"), "has bits beyond the blocks of an image");
+    if (!counts_hold) {
+      findings.add("pyramid.first_block", levelObject(l, "first_block"), "is not the running count of the bits in masks");
+    }
+  }
+}
+
+void checkData(const NdfPyramid& pyramid, Findings& findings) {
+  const double pixel_area = 4.0 / (static_cast<double>(pyramid.shape.resolution) * pyramid.shape.resolution);
+  for (int l = 0; l < pyramid.shape.level_count; ++l) {
+    const PyramidLevel& level = pyramid.levels[l];
+    const std::vector<double> sums = checkBlocks(pyramid, l, findings);
+    std::size_t bad = 0;
+    double worst = 1;
+    for (std::size_t image = 0; image + 1 < level.first_block.size(); ++image) {
+      double integral = 0;
+      for (std::uint64_t b = level.first_block[image]; b < level.first_block[image + 1]; ++b) integral += sums[b];
+      integral *= pyramid.value_scale * pixel_area;
+      if (std::abs(integral - 1) <= kIntegralTolerance) continue;
+      ++bad;
+      if (!(std::abs(integral - 1) <= std::abs(worst - 1))) worst = integral;
+    }
+    if (bad > 0) {
+      findings.add("pyramid.integral", levelObject(l, "pixels"),
+                   std::to_string(bad) + " images do not integrate to 1 (worst " + std::to_string(worst) + ")");
+    }
+  }
+}
+
+}  // namespace glint::formats

@@ -1,0 +1,19 @@
+#pragma once
+
+// Private to formats/: the part that every pyramid of NDF images shares.
+
+#include "glint/formats/kinds/codec.h"
+
+namespace glint::formats {
+
+void packShape(const PyramidShape& shape, PackedAsset& packed);
+void unpackShape(const Content& content, PyramidShape& shape);
+void checkShape(const PyramidShape& shape, Findings& findings);
+
+/// Images of all levels together.
+std::size_t imageCount(const PyramidShape& shape);
+
+/// Value of an IEEE half.
+float halfToFloat(std::uint16_t bits);
+
+}  // namespace glint::formats

@@ -1,0 +1,75 @@
+#include "glint/formats/load.h"
+
+#include "glint/formats/conformance.h"
+#include "glint/formats/hash.h"
+
+namespace glint::formats {
+namespace {
+
+std::string textOf(const Attributes& attributes, std::string_view attribute) {
+  const auto found = attributes.find(attribute);
+  return found == attributes.end() || found->second.texts.empty() ? std::string() : found->second.texts[0];
+}
+
+int numberOf(const Attributes& attributes, std::string_view attribute) {
+  const auto found = attributes.find(attribute);
+  if (found == attributes.end() || found->second.type != ElementType::i32 || found->second.numbers.empty()) return 0;
+  return static_cast<int>(found->second.numbers[0]);
+}
+
+std::vector<std::string> textsOf(const Attributes& attributes, std::string_view attribute) {
+  const auto found = attributes.find(attribute);
+  return found == attributes.end() ? std::vector<std::string>() : found->second.texts;
+}
+
+/// Collects what the file says about itself, as far as it could be read.
+AssetInfo describe(const FileStructure& structure) {
+  AssetInfo info;
+  info.kind = textOf(structure.attributes, "kind");
+  info.format_major = numberOf(structure.attributes, "format_major");
+  info.format_minor = numberOf(structure.attributes, "format_minor");
+  info.required_features = textsOf(structure.attributes, "required_features");
+  info.provenance.generator = textOf(structure.attributes, "generator");
+  info.provenance.command_json = textOf(structure.attributes, "command");
+  for (const std::string& line : textsOf(structure.attributes, "inputs")) {
+    const std::size_t gap = line.find("  ");
+    info.provenance.inputs.push_back({gap == std::string::npos ? std::string() : line.substr(gap + 2), line.substr(0, gap)});
+  }
+  info.file_bytes = structure.mapping.size();
+  for (const auto& [path, record] : structure.datasets) {
+    info.datasets.push_back({"/" + path, record.known_type ? std::string(name(record.type)) : "unknown", record.dims,
+                             record.size_bytes, record.offset, textOf(record.attributes, "xxh3_128"),
+                             textOf(record.attributes, "units"), textOf(record.attributes, "long_name")});
+  }
+  return info;
+}
+
+}  // namespace
+
+LoadedAsset loadAsset(const std::filesystem::path& path, Findings& findings) {
+  LoadedAsset asset;
+  asset.structure = readStructure(path, findings);
+  if (asset.structure.attributes.empty() && findings.failed()) return asset;
+  asset.info = describe(asset.structure);
+  findings.report().kind = asset.info.kind;
+  const KindSchema* schema = checkHeader(asset.structure, findings);
+  if (schema != nullptr) checkConformance(asset.structure, *schema, findings);
+  if (findings.failed()) return asset;
+  const Codec* codec = findCodec(asset.info.kind);
+  asset.model = codec->unpack(Content(asset.structure));
+  codec->check_index(asset.model, findings);
+  if (!findings.failed()) asset.codec = codec;
+  return asset;
+}
+
+void checkHashes(const LoadedAsset& asset, Findings& findings) {
+  for (const auto& [path, record] : asset.structure.datasets) {
+    const std::string stored = textOf(record.attributes, "xxh3_128");
+    const std::string actual = hashBytes(record.data, record.size_bytes);
+    if (stored != actual) {
+      findings.add("dataset.hash", "/" + path, "has bytes with hash " + actual + ", not " + (stored.empty() ? "none" : stored));
+    }
+  }
+}
+
+}  // namespace glint::formats

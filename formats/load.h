@@ -1,0 +1,26 @@
+#pragma once
+
+// Private to formats/: the one checker behind Asset::open and validateAsset.
+
+#include "glint/formats/asset_reader.h"
+#include "glint/formats/findings.h"
+#include "glint/formats/kinds/codec.h"
+#include "glint/formats/structure.h"
+
+namespace glint::formats {
+
+/// A file that was read and checked. `model` and `codec` are set only if nothing is broken.
+struct LoadedAsset {
+  FileStructure structure;
+  AssetInfo info;
+  AnyAsset model;
+  const Codec* codec = nullptr;
+};
+
+/// Reads a file and checks structure, schema and indices. Broken rules are added to `findings`.
+LoadedAsset loadAsset(const std::filesystem::path& path, Findings& findings);
+
+/// Compares every dataset with its hash attribute.
+void checkHashes(const LoadedAsset& asset, Findings& findings);
+
+}  // namespace glint::formats

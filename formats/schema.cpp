@@ -1,0 +1,310 @@
+#include "glint/formats/schema.h"
+
+#include <cctype>
+#include <cfloat>
+#include <charconv>
+
+#include "glint/model/compressed_ndf.h"
+
+namespace glint::formats {
+namespace {
+
+using enum ElementType;
+
+constexpr double kMaxMapSize = 1 << 20;  // texels along an axis; keeps every product of sizes far below 2^63
+constexpr double kMaxText = 0;           // texts have no numeric range
+
+AttributeSchema integer(std::string_view name, double low, double high, std::string_view units, std::string_view long_name) {
+  return {name, i32, "", units, long_name, low, high};
+}
+
+AttributeSchema real(std::string_view name, double low, double high, std::string_view units, std::string_view long_name) {
+  return {name, f32, "", units, long_name, low, high};
+}
+
+AttributeSchema choice(std::string_view name, std::string_view values, std::string_view long_name) {
+  return {name, text, "", "1", long_name, 0, kMaxText, values};
+}
+
+std::vector<AttributeSchema> mapSize() {
+  return {integer("width", 1, kMaxMapSize, "texel", "width of the map"),
+          integer("height", 1, kMaxMapSize, "texel", "height of the map"),
+          real("texel_size_um", 0, FLT_MAX, "um", "width of a texel; 0 when unknown")};
+}
+
+/// Attributes of glint::PyramidShape.
+std::vector<AttributeSchema> pyramidShape() {
+  return {integer("width", 1, kMaxMapSize, "texel", "width of the normal map"),
+          integer("height", 1, kMaxMapSize, "texel", "height of the normal map"),
+          integer("resolution", kBlockSize, 1024, "pixel", "pixels of an NDF image along each axis; a multiple of 16"),
+          real("sigma_r", FLT_MIN, 1, "1", "intrinsic roughness: standard deviation in disk units"),
+          choice("surface", "flat|smooth", "normals between texel centres"),
+          choice("boundary", "wrap|clamp", "what lies beyond the border of the map"),
+          integer("level_count", 1, kMaxPyramidLevels, "1", "number of levels"),
+          {"level_strides", f32, "level_count", "texel", "distance between footprint centres of each level", FLT_MIN, kMaxMapSize},
+          {"level_columns", i32, "level_count", "1", "footprints along u of each level", 1, kMaxMapSize},
+          {"level_rows", i32, "level_count", "1", "footprints along v of each level", 1, kMaxMapSize}};
+}
+
+std::vector<AttributeSchema> joined(std::vector<AttributeSchema> a, const std::vector<AttributeSchema>& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+KindSchema heightsSchema() {
+  return {"heights",
+          "Height field",
+          mapSize(),
+          {},
+          {{"heights", "", {{"", f32}}, {"height", "width"}, "texel", "height over the base plane, bottom row first"}}};
+}
+
+KindSchema normalsSchema() {
+  return {"normals",
+          "Normal map",
+          joined(mapSize(), {integer("bounds_level_count", 0, 20, "1", "levels of the min-max pyramid; 0 when there is none")}),
+          {},
+          {{"normals", "", {{"", f32}}, {"height", "width", "2"}, "1", "(nx, ny) on the unit disk, bottom row first"},
+           {"bounds/level_{l}",
+            "bounds_level_count",
+            {{"", f32}},
+            {"ceil_div(height, pow2(l + 1))", "ceil_div(width, pow2(l + 1))", "4"},
+            "1",
+            "low nx, low ny, high nx, high ny of the texels of each node and one more row and column, wrapped"}}};
+}
+
+KindSchema ndfPyramidSchema() {
+  return {"ndf-pyramid",
+          "Pyramid of NDF images",
+          joined(pyramidShape(), {choice("precision", "f16|f32", "type of the stored pixels"),
+                                  real("value_scale", FLT_MIN, FLT_MAX, "1", "density = value_scale * stored pixel")}),
+          {{"mask_words", "ceil_div(resolution * resolution, 16384)", "64-bit words of occupancy bits of an image"}},
+          {{"level_{l}/masks",
+            "level_count",
+            {{"", u64}},
+            {"level_rows[l]", "level_columns[l]", "mask_words"},
+            "1",
+            "bit b of word w: block 64 w + b of the image is stored"},
+           {"level_{l}/first_block",
+            "level_count",
+            {{"", u64}},
+            {"level_rows[l] * level_columns[l] + 1"},
+            "1",
+            "stored blocks of all images before this one; the last value is their total"},
+           {"level_{l}/block_means", "level_count", {{"", f32}}, {"stored_blocks"}, "1", "mean density of each stored block"},
+           {"level_{l}/pixels",
+            "level_count",
+            {{"precision=f16", f16}, {"precision=f32", f32}},
+            {"stored_blocks", "16", "16"},
+            "1",
+            "mean density of each pixel of each stored block, divided by value_scale"}}};
+}
+
+KindSchema ndfCpSchema() {
+  return {"ndf-cp",
+          "Compressed pyramid of NDF images",
+          joined(pyramidShape(),
+                 {choice("method", "cp|tucker|pca", "how the basis images of a cluster are made"),
+                  choice("coefficient_type", "i8|f16|f32", "type of the stored coefficients"),
+                  integer("region_columns", 1, 65535, "1", "spatial regions along u"),
+                  integer("region_rows", 1, 65535, "1", "spatial regions along v"),
+                  integer("words_per_cluster", 1, 1024, "1", "64-bit words of slot mask of a cluster")}),
+          {{"blocks_per_image", "ceil_div(resolution * resolution, 256)", "angular blocks of an image"},
+           {"regions", "region_columns * region_rows", "spatial regions"}},
+          {{"image_regions", "", {{"", u16}}, {"images"}, "1", "region that an image belongs to"},
+           {"image_slots", "", {{"", u16}}, {"images"}, "1", "slot of an image in its region"},
+           {"image_scales", "", {{"", f32}}, {"images"}, "1", "factor that makes an image integrate to 1"},
+           {"clusters", "", {{"", ndf_cluster}}, {"regions", "blocks_per_image"}, "1", "place and size of each cluster's factors"},
+           {"masks", "", {{"", u64}}, {"regions", "blocks_per_image", "words_per_cluster"}, "1",
+            "bit b of word w: slot 64 w + b has a slice in the cluster"},
+           {"mask_ranks", "", {{"", u32}}, {"regions", "blocks_per_image", "words_per_cluster"}, "1",
+            "set bits of the cluster before this word"},
+           {"basis",
+            "",
+            {{"coefficient_type=f32", f32}, {"method=cp|tucker", i16}, {"method=pca", i32}},
+            {"basis_count"},
+            "1",
+            "inclusive prefix sums of each cluster's basis, columns fastest"},
+           {"coefficients",
+            "",
+            {{"coefficient_type=i8", i8}, {"coefficient_type=f16", f16}, {"coefficient_type=f32", f32}},
+            {"coefficient_count"},
+            "1",
+            "coefficients of each cluster, [slices][columns]"},
+           {"scales", "", {{"", f32}}, {"scale_count"}, "1", "scale of each column of each cluster"}}};
+}
+
+/// Recursive descent over one size expression.
+class SizeParser {
+ public:
+  SizeParser(std::string_view source, const SizeScope& scope) : rest_(source), scope_(scope) {}
+
+  std::optional<std::uint64_t> parse() {
+    const auto value = sum();
+    skipSpace();
+    return rest_.empty() ? value : std::nullopt;
+  }
+
+ private:
+  using Value = std::optional<std::uint64_t>;
+
+  void skipSpace() {
+    while (!rest_.empty() && rest_.front() == ' ') rest_.remove_prefix(1);
+  }
+  bool take(char c) {
+    skipSpace();
+    if (rest_.empty() || rest_.front() != c) return false;
+    rest_.remove_prefix(1);
+    return true;
+  }
+
+  Value sum() {
+    Value left = product();
+    while (left && take('+')) {
+      const Value right = product();
+      std::uint64_t total = 0;
+      if (!right || __builtin_add_overflow(*left, *right, &total)) return std::nullopt;
+      left = total;
+    }
+    return left;
+  }
+
+  Value product() {
+    Value left = factor();
+    while (left && take('*')) {
+      const Value right = factor();
+      std::uint64_t total = 0;
+      if (!right || __builtin_mul_overflow(*left, *right, &total)) return std::nullopt;
+      left = total;
+    }
+    return left;
+  }
+
+  Value factor() {
+    if (take('(')) {
+      const Value value = sum();
+      return take(')') ? value : std::nullopt;
+    }
+    std::size_t length = 0;
+    while (length < rest_.size() && (std::isalnum(static_cast<unsigned char>(rest_[length])) || rest_[length] == '_')) ++length;
+    const std::string_view word = rest_.substr(0, length);
+    rest_.remove_prefix(length);
+    if (word.empty()) return std::nullopt;
+    if (std::isdigit(static_cast<unsigned char>(word.front()))) {
+      std::uint64_t number = 0;
+      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+      return error == std::errc() && end == word.data() + word.size() ? Value(number) : std::nullopt;
+    }
+    if (word == "ceil_div" || word == "pow2") return call(word);
+    return lookUp(word);
+  }
+
+  Value call(std::string_view function) {
+    if (!take('(')) return std::nullopt;
+    const Value a = sum();
+    if (function == "pow2") return a && *a < 63 && take(')') ? Value(std::uint64_t{1} << *a) : std::nullopt;
+    if (!a || !take(',')) return std::nullopt;
+    const Value b = sum();
+    if (!b || *b == 0 || !take(')')) return std::nullopt;
+    return *a / *b + (*a % *b != 0);
+  }
+
+  Value lookUp(std::string_view word) {
+    if (word == "l") return scope_.level;
+    const auto found = scope_.values.find(word);
+    std::uint64_t index = 0;
+    if (take('[')) {
+      const Value at = sum();
+      if (!at || !take(']')) return std::nullopt;
+      index = *at;
+    }
+    if (found == scope_.values.end() || index >= found->second.size()) return std::nullopt;
+    return found->second[index];
+  }
+
+  std::string_view rest_;
+  const SizeScope& scope_;
+};
+
+}  // namespace
+
+std::string_view name(ElementType type) {
+  switch (type) {
+    case i8: return "i8";
+    case i16: return "i16";
+    case i32: return "i32";
+    case u16: return "u16";
+    case u32: return "u32";
+    case u64: return "u64";
+    case f16: return "f16";
+    case f32: return "f32";
+    case text: return "text";
+    case ndf_cluster: return "ndf_cluster";
+  }
+  return "unknown";
+}
+
+std::size_t sizeBytes(ElementType type) {
+  switch (type) {
+    case i8: return 1;
+    case i16:
+    case u16:
+    case f16: return 2;
+    case i32:
+    case u32:
+    case f32: return 4;
+    case u64: return 8;
+    case ndf_cluster: return sizeof(NdfCluster);
+    case text: return 0;
+  }
+  return 0;
+}
+
+std::span<const KindSchema> kindSchemas() {
+  static const std::vector<KindSchema> table = {heightsSchema(), ndfCpSchema(), ndfPyramidSchema(), normalsSchema()};
+  return table;
+}
+
+const KindSchema* findKindSchema(std::string_view kind) {
+  for (const KindSchema& schema : kindSchemas()) {
+    if (schema.name == kind) return &schema;
+  }
+  return nullptr;
+}
+
+std::span<const AttributeSchema> commonAttributes() {
+  static const std::vector<AttributeSchema> table = {
+      {"glint_format", text, "", "1", "name of the format", 0, 0, "glint"},
+      {"format_major", i32, "", "1", "major version of the format", 0, 1e9},
+      {"format_minor", i32, "", "1", "minor version of the format", 0, 1e9},
+      {"required_features", text, "*", "1", "features that a reader has to know to read the file", 0, 0},
+      {"kind", text, "", "1", "kind of asset", 0, 0},
+      {"generator", text, "", "1", "tool and version that made the file", 0, 0},
+      {"command", text, "", "1", "JSON of every parameter that changed the result", 0, 0},
+      {"inputs", text, "*", "1", "hash, two spaces and name of every input", 0, 0},
+  };
+  return table;
+}
+
+std::span<const AttributeSchema> datasetAttributes() {
+  static const std::vector<AttributeSchema> table = {
+      {"long_name", text, "", "1", "what the dataset holds", 0, 0},
+      {"units", text, "", "1", "units of its elements", 0, 0},
+      {"xxh3_128", text, "", "1", "XXH3 128-bit hash of its bytes, 32 lower-case hexadecimal digits", 0, 0},
+  };
+  return table;
+}
+
+std::string levelPath(std::string_view path, int level) {
+  std::string result(path);
+  const std::size_t place = result.find("{l}");
+  if (place == std::string::npos) return result;
+  const std::string digits = std::to_string(level);
+  return result.replace(place, 3, digits.size() < 2 ? "0" + digits : digits);
+}
+
+std::optional<std::uint64_t> evaluateSize(std::string_view expression, const SizeScope& scope) {
+  return SizeParser(expression, scope).parse();
+}
+
+}  // namespace glint::formats

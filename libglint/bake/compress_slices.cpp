@@ -1,0 +1,158 @@
+#include "glint/bake/compress_slices.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "glint/bake/compress_kernels.h"
+#include "glint/model/error.h"
+
+namespace glint::bake {
+namespace {
+
+/// Region of column i of a level: where its centre lies (compressed_ndf.h).
+int regionOf(int i, float stride, int size, int regions) {
+  return std::min(regions - 1, static_cast<int>(std::floor((2.0 * i + 1) * stride * regions / (2.0 * size))));
+}
+
+[[noreturn]] void rejectLevel(int level, const std::string& what) {
+  throw Error(ErrorCode::invalid_input, "pyramid.layout", "", "level " + std::to_string(level), what,
+              "build the pyramid again with glint-pyramid");
+}
+
+/// The arrays of a level must have the sizes that its shape and masks ask for.
+void checkLevel(const NdfPyramid& pyramid, int level) {
+  const PyramidShape& shape = pyramid.shape;
+  const PyramidLevel& data = pyramid.levels[level];
+  const std::size_t images = shape.levels[level].imageCount();
+  const std::size_t words = shape.maskWords();
+  if (!(shape.levels[level].stride > 0)) rejectLevel(level, "the stride is not positive");
+  if (data.masks.size() != images * words) rejectLevel(level, "the masks do not fit the number of images");
+  if (data.first_block.size() != images + 1) rejectLevel(level, "the running count of blocks does not fit the number of images");
+  const int spare_bits = static_cast<int>(words) * 64 - shape.blocksPerImage();
+  for (std::size_t i = 0; i < images; ++i) {
+    std::uint64_t count = 0;
+    for (std::size_t w = 0; w < words; ++w) count += std::popcount(data.masks[i * words + w]);
+    if (data.first_block[i + 1] - data.first_block[i] != count)
+      rejectLevel(level, "the running count of blocks contradicts the masks (first at image " + std::to_string(i) + ")");
+    if (spare_bits > 0 && data.masks[i * words + words - 1] >> (64 - spare_bits))
+      rejectLevel(level, "a mask has bits beyond the last block (first at image " + std::to_string(i) + ")");
+  }
+  if (data.first_block[0] != 0) rejectLevel(level, "the running count of blocks does not start at 0");
+  if (data.first_block[images] > 0 && data.pixels == nullptr) rejectLevel(level, "the pixels are missing");
+}
+
+void checkShape(const PyramidShape& shape) {
+  const bool valid = shape.width > 0 && shape.height > 0 && shape.resolution > 0 && shape.resolution % kBlockSize == 0 &&
+                     shape.level_count > 0 && shape.level_count <= kMaxPyramidLevels;
+  if (!valid)
+    throw Error(ErrorCode::invalid_input, "pyramid.shape", "", "", "the shape of the pyramid is not valid",
+                "build the pyramid again with glint-pyramid");
+}
+
+}  // namespace
+
+SliceIndex::SliceIndex(const NdfPyramid& pyramid, int regions) : pyramid_(pyramid), regions_(regions) {
+  checkShape(pyramid.shape);
+  for (int l = 0; l < pyramid.shape.level_count; ++l) checkLevel(pyramid, l);
+  assignImages();
+  assignSlices();
+}
+
+void SliceIndex::assignImages() {
+  const PyramidShape& shape = pyramid_.shape;
+  first_image_.push_back(0);
+  std::vector<std::uint32_t> next_slot(static_cast<std::size_t>(regions_) * regions_, 0);
+  for (int l = 0; l < shape.level_count; ++l) {
+    const PyramidGrid& grid = shape.levels[l];
+    for (int j = 0; j < grid.rows; ++j) {
+      for (int i = 0; i < grid.columns; ++i) {
+        const int region = regionOf(j, grid.stride, shape.height, regions_) * regions_ +
+                           regionOf(i, grid.stride, shape.width, regions_);
+        image_regions_.push_back(static_cast<std::uint16_t>(region));
+        slots_.push_back(static_cast<std::uint16_t>(next_slot[region]++));
+      }
+    }
+    first_image_.push_back(static_cast<std::uint32_t>(slots_.size()));
+  }
+  const std::uint32_t most = *std::max_element(next_slot.begin(), next_slot.end());
+  if (most > std::numeric_limits<std::uint16_t>::max() + 1u)
+    throw Error(ErrorCode::usage, "compress.regions", "", "",
+                "a region holds " + std::to_string(most) + " images, and 65536 is the limit", "ask for more regions");
+  words_per_cluster_ = static_cast<int>((most + 63) / 64);
+}
+
+void SliceIndex::assignSlices() {
+  const PyramidShape& shape = pyramid_.shape;
+  const std::size_t blocks = shape.blocksPerImage();
+  const std::size_t words = shape.maskWords();
+  // visit(cluster, image, block of the level) for every stored block, images in the order of their slots.
+  const auto forEachBlock = [&](auto visit) {
+    for (int l = 0; l < shape.level_count; ++l) {
+      const PyramidLevel& level = pyramid_.levels[l];
+      std::uint64_t block = 0;
+      for (std::size_t i = 0; i < shape.levels[l].imageCount(); ++i) {
+        const std::uint32_t image = first_image_[l] + static_cast<std::uint32_t>(i);
+        for (std::size_t w = 0; w < words; ++w)
+          for (std::uint64_t bits = level.masks[i * words + w]; bits != 0; bits &= bits - 1)
+            visit(image_regions_[image] * blocks + w * 64 + std::countr_zero(bits), image, block++);
+      }
+    }
+  };
+  first_slices_.assign(static_cast<std::size_t>(regions_) * regions_ * blocks + 1, 0);
+  forEachBlock([&](std::size_t cluster, std::uint32_t, std::uint64_t) { ++first_slices_[cluster + 1]; });
+  for (std::size_t c = 1; c < first_slices_.size(); ++c) first_slices_[c] += first_slices_[c - 1];
+  images_.resize(first_slices_.back());
+  blocks_.resize(first_slices_.back());
+  std::vector<std::uint64_t> next(first_slices_.begin(), first_slices_.end() - 1);
+  forEachBlock([&](std::size_t cluster, std::uint32_t image, std::uint64_t block) {
+    images_[next[cluster]] = image;
+    blocks_[next[cluster]++] = block;
+  });
+}
+
+const std::byte* SliceIndex::block(std::uint64_t slice) const {
+  const auto level = std::upper_bound(first_image_.begin(), first_image_.end(), images_[slice]) - first_image_.begin() - 1;
+  const std::size_t pixel_bytes = pyramid_.precision == BlockPrecision::f16 ? 2 : 4;
+  return static_cast<const std::byte*>(pyramid_.levels[level].pixels) + blocks_[slice] * kBlockPixels * pixel_bytes;
+}
+
+void SliceIndex::load(std::size_t cluster, int first, int count, float factor, float* out) const {
+  for (int s = 0; s < count; ++s, out += kSliceStride) {
+    const std::byte* source = block(first_slices_[cluster] + first + s);
+    if (pyramid_.precision == BlockPrecision::f16)
+      halfToFloat(reinterpret_cast<const std::uint16_t*>(source), kBlockPixels, out);
+    else
+      std::copy_n(reinterpret_cast<const float*>(source), kBlockPixels, out);
+    if (factor != 1)
+      for (int p = 0; p < kBlockPixels; ++p) out[p] *= factor;
+  }
+}
+
+void SliceIndex::describe(CompressedNdfData& data) const {
+  CompressedNdf& header = data.header;
+  header.shape = pyramid_.shape;
+  header.region_columns = header.region_rows = regions_;
+  header.words_per_cluster = words_per_cluster_;
+  std::copy(first_image_.begin(), first_image_.end() - 1, header.first_image);
+  data.image_regions = image_regions_;
+  data.image_slots = slots_;
+  data.masks.assign(clusterCount() * words_per_cluster_, 0);
+  data.mask_ranks.assign(data.masks.size(), 0);
+  for (std::size_t c = 0; c < clusterCount(); ++c) {
+    std::uint64_t* mask = data.masks.data() + c * words_per_cluster_;
+    for (std::uint64_t s = first_slices_[c]; s < first_slices_[c + 1]; ++s) {
+      const std::uint16_t slot = slots_[images_[s]];
+      mask[slot / 64] |= std::uint64_t{1} << (slot % 64);
+    }
+    std::uint32_t count = 0;
+    for (int w = 0; w < words_per_cluster_; ++w) {
+      data.mask_ranks[c * words_per_cluster_ + w] = count;
+      count += static_cast<std::uint32_t>(std::popcount(mask[w]));
+    }
+  }
+}
+
+}  // namespace glint::bake

@@ -1,0 +1,204 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "common/files.h"
+#include "common/suggest.h"
+#include "common/tool.h"
+
+namespace glint::apps {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using nlohmann::json;
+
+/// What a run printed and returned.
+struct Outcome {
+  int code;
+  std::string out;
+  std::string err;
+};
+
+class ToolRun : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = std::filesystem::path(::testing::TempDir()) / ("glint_cli_" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+    std::ofstream(path("in.png")) << "pixels";
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  Outcome run(std::vector<std::string> arguments, const std::function<void(Tool&)>& work = [](Tool&) {}) {
+    Tool tool({"glint-test", "Tests the flags", "glint-test in.png -o out.glint"});
+    const InputFile input(tool, "an image");
+    const OutputFile output(tool, OutputFormat::asset, "an asset");
+    tool.option("--alpha", alpha_, "roughness").range(0, 1);
+    tool.option("--levels", levels_, "levels");
+    tool.choice("--surface", surface_, {{"flat", 0}, {"smooth", 1}}, "surface");
+    arguments.insert(arguments.begin(), "glint-test");
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    ::testing::internal::CaptureStdout();
+    ::testing::internal::CaptureStderr();
+    const int code = tool.run(static_cast<int>(argv.size()), argv.data(), [&] { work(tool); });
+    return {code, ::testing::internal::GetCapturedStdout(), ::testing::internal::GetCapturedStderr()};
+  }
+
+  std::vector<std::string> good() const { return {path("in.png"), "-o", path("out.glint")}; }
+  std::vector<std::string> goodWith(std::vector<std::string> more) const {
+    std::vector<std::string> all = good();
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+
+  std::filesystem::path folder_;
+  float alpha_ = 0.3f;
+  std::vector<int> levels_ = {1};
+  int surface_ = 0;
+};
+
+TEST_F(ToolRun, SucceedsSilently) {
+  const Outcome outcome = run(good());
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(outcome.err, "");
+}
+
+TEST_F(ToolRun, ParsesListsWithoutSwallowingInputs) {
+  const Outcome outcome = run({"--levels", "1,2,3", path("in.png"), "-o", path("out.glint")});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(levels_, (std::vector<int>{1, 2, 3}));
+}
+
+TEST_F(ToolRun, RecordsEveryParameterThatChangesTheResult) {
+  std::string command;
+  run(goodWith({"--surface", "smooth", "--seed", "7", "--threads", "1"}), [&](Tool& tool) {
+    tool.seed();
+    command = tool.commandJson();
+  });
+  EXPECT_EQ(command, R"({"alpha":0.3,"levels":[1],"seed":7,"surface":"smooth"})");
+}
+
+TEST_F(ToolRun, LeavesAnUnusedSeedOutOfTheRecord) {
+  std::string command;
+  run(goodWith({"--seed", "7"}), [&](Tool& tool) { command = tool.commandJson(); });
+  EXPECT_FALSE(json::parse(command).contains("seed"));
+}
+
+TEST_F(ToolRun, SuggestsTheNearestOption) {
+  const Outcome outcome = run({path("in.png"), "--ouptut", path("out.glint")});
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("unknown option --ouptut; did you mean --output?"));
+}
+
+TEST_F(ToolRun, SuggestsTheNearestWord) {
+  const Outcome outcome = run(goodWith({"--surface", "smoth"}));
+  EXPECT_EQ(outcome.code, 1);
+  EXPECT_THAT(outcome.err, HasSubstr("did you mean 'smooth'?"));
+}
+
+TEST_F(ToolRun, RefusesNumbersOutOfRangeAndNotFinite) {
+  for (const char* value : {"1.5", "-0.1", "nan", "inf", "abc", "", "0.5x"}) {
+    const Outcome outcome = run(goodWith({"--alpha", value}));
+    EXPECT_EQ(outcome.code, 1) << value;
+    EXPECT_THAT(outcome.err, StartsWith("glint-test: error: ")) << value;
+  }
+}
+
+TEST_F(ToolRun, TurnsErrorsIntoMessageAndExitCode) {
+  const Outcome outcome = run(good(), [](Tool&) {
+    throw Error(ErrorCode::invalid_input, "normals.finite", "a.png", "texel (3, 7)", "is not finite", "repair it");
+  });
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(outcome.err, "glint-test: error: a.png: texel (3, 7): is not finite; repair it\n");
+  EXPECT_EQ(outcome.out, "");
+}
+
+TEST_F(ToolRun, TellsOfExhaustedMemory) {
+  const Outcome outcome = run(good(), [](Tool&) { throw std::bad_alloc(); });
+  EXPECT_EQ(outcome.code, 4);
+  EXPECT_THAT(outcome.err, HasSubstr("out of memory; use"));
+}
+
+TEST_F(ToolRun, PrintsResultsAndErrorsAsJson) {
+  const Outcome fine = run(goodWith({"--json"}), [](Tool& tool) {
+    tool.setResult({{"texels", 4}});
+    tool.print("not for machines");
+  });
+  const json document = json::parse(fine.out);
+  EXPECT_EQ(document["schema"], 1);
+  EXPECT_EQ(document["status"], "ok");
+  EXPECT_EQ(document["result"]["texels"], 4);
+
+  const Outcome bad = run(goodWith({"--json", "--alpha", "7"}));
+  EXPECT_EQ(bad.code, 1);
+  EXPECT_EQ(json::parse(bad.out)["error"]["code"], "usage");
+}
+
+TEST_F(ToolRun, ChecksPathsBeforeTheWork) {
+  bool worked = false;
+  const auto work = [&](Tool&) { worked = true; };
+  EXPECT_EQ(run({path("none.png"), "-o", path("out.glint")}, work).code, 2);
+  EXPECT_EQ(run({path("in.png"), "-o", path("no/such/out.glint")}, work).code, 2);
+  EXPECT_EQ(run({path("in.png"), "-o", folder_.string()}, work).code, 2);
+  EXPECT_EQ(run({path("in.png"), "-o", "/dev/null"}, work).code, 2);
+  EXPECT_EQ(run(goodWith({"--depfile", path("no/such/out.d")}), work).code, 2);
+  EXPECT_FALSE(worked);
+}
+
+TEST_F(ToolRun, ReplacesOnlyItsOwnKindWithoutForce) {
+  std::ofstream(path("out.glint")) << "a letter to a friend";
+  EXPECT_EQ(run(good()).code, 1);
+  EXPECT_EQ(run(goodWith({"--force"})).code, 0);
+  std::ofstream(path("out.glint")) << "\x89HDF\r\n\x1a\n and more";
+  EXPECT_EQ(run(good()).code, 0);
+  EXPECT_EQ(run({path("in.png"), "-o", path("in.png")}).code, 1);
+}
+
+TEST_F(ToolRun, ReadsAConfigurationFileAndRefusesUnknownKeys) {
+  std::ofstream(path("run.toml")) << "alpha = 0.5\nsurface = \"smooth\"\n";
+  EXPECT_EQ(run(goodWith({"--config", path("run.toml"), "--alpha", "0.25"})).code, 0);
+  EXPECT_EQ(alpha_, 0.25f);
+  EXPECT_EQ(surface_, 1);
+  std::ofstream(path("wrong.toml")) << "alhpa = 0.5\n";
+  EXPECT_EQ(run(goodWith({"--config", path("wrong.toml")})).code, 1);
+  EXPECT_EQ(run(goodWith({"--config", path("none.toml")})).code, 2);
+}
+
+TEST_F(ToolRun, WritesADepfile) {
+  std::ofstream(path("run.toml")) << "alpha = 0.5\n";
+  ASSERT_EQ(run(goodWith({"--depfile", path("out.d"), "--config", path("run.toml")})).code, 0);
+  std::ifstream file(path("out.d"));
+  const std::string text((std::istreambuf_iterator<char>(file)), {});
+  EXPECT_THAT(text, StartsWith(path("out.glint") + ":"));
+  EXPECT_THAT(text, HasSubstr(path("in.png") + ":\n"));
+  EXPECT_THAT(text, HasSubstr(path("run.toml") + ":\n"));
+}
+
+TEST(Depfile, EscapesWhatMakeWouldTakeApart) {
+  EXPECT_EQ(makeDepfile({"a b.glint"}, {"c$d.png", "e#f:g%h"}),
+            "a\\ b.glint: \\\n  c$$d.png \\\n  e\\#f\\:g\\%h\n\nc$$d.png:\n\ne\\#f\\:g\\%h:\n");
+  EXPECT_THROW(makeDepfile({"a"}, {"b\nc"}), Error);
+}
+
+TEST(Files, HashIsXxh3Of128Bits) {
+  const std::string path = ::testing::TempDir() + "/glint_hash_empty";
+  std::ofstream(path).flush();
+  EXPECT_EQ(hashFile(path), "99aa06d3014798d86001c324468d497f");  // published value of XXH3-128 of no bytes
+  std::filesystem::remove(path);
+}
+
+TEST(Suggest, KeepsQuietWhenNothingIsNear) {
+  EXPECT_EQ(nearestName("--thread", {"--threads", "--seed"}), "--threads");
+  EXPECT_EQ(nearestName("--unrelated", {"--threads", "--seed"}), "");
+}
+
+}  // namespace
+}  // namespace glint::apps
