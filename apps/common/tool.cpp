@@ -94,6 +94,11 @@ Option& Option::range(double low, double high) {
   return *this;
 }
 
+Option& Option::count(int values) {
+  option_->expected(values);
+  return *this;
+}
+
 Option& Option::excludes(const Option& other) {
   option_->excludes(other.option_);
   return *this;

@@ -35,6 +35,8 @@ class Option {
   Option& required();
   /// Numbers outside [low, high] are a usage error. Applies to each element of a list.
   Option& range(double low, double high);
+  /// A list of exactly so many values, given as `a b c` or `a,b,c`.
+  Option& count(int values);
   Option& excludes(const Option& other);
   Option& needs(const Option& other);
   /// Leaves the option out of the `command` record: it does not change the result.

@@ -4,13 +4,13 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <mutex>
 #include <string>
 
 #include "glint/bake/direction_bins.h"
 #include "glint/bake/flat_scatter.h"
+#include "glint/bake/pyramid_agreement.h"
 #include "glint/bake/simd.h"
 #include "glint/bake/smooth_scatter.h"
 #include "glint/model/error.h"
@@ -190,6 +190,14 @@ std::vector<std::vector<PackedImage>> buildSmooth(const NormalMap& map, const Py
 }
 
 
+/// Drops the coarsest levels while the level below them says the same.
+void dropAgreeingLevels(NdfPyramidData& pyramid) {
+  while (pyramid.shape.level_count > 1 && levelDisagreement(pyramid.view(), pyramid.shape.level_count - 2) < kAgreement) {
+    pyramid.levels.pop_back();
+    pyramid.shape.levels[--pyramid.shape.level_count] = {};
+  }
+}
+
 }  // namespace
 
 NdfPyramid NdfPyramidData::view() const {
@@ -242,6 +250,7 @@ NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options,
   auto images = options.surface == Surface::flat ? buildFlat(map, pyramid.shape, packer, subdivision, margin, progress)
                                                  : buildSmooth(map, pyramid.shape, packer, subdivision, margin, progress);
   for (auto& level : images) pyramid.levels.push_back(packLevel(level, options.precision));
+  if (options.levels == 0) dropAgreeingLevels(pyramid);
   return pyramid;
 }
 

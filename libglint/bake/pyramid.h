@@ -18,7 +18,7 @@ struct PyramidOptions {
   BlockPrecision precision = BlockPrecision::f16;
 };
 
-/// Level l + 1 is not needed when it differs from the blend of its neighbours in level l by less than this (rel_l2 over the level).
+/// With automatic levels, the coarsest level is dropped while `levelDisagreement` with the one below is less than this.
 inline constexpr double kAgreement = 0.01;
 
 /// Blocks that hold less than this share of their image are not stored.

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <bit>
-#include <optional>
 
 #include "glint/model/compressed_ndf.h"
 #include "glint/query/cluster_basis.h"
@@ -33,7 +32,7 @@ class CpNdf {
 
   GLINT_HD float signedDensity(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    if (below_ && isotropicSigma(shape(), p) < finestSigma(shape())) return below_->density(p, h);
+    if (below_.hasMap() && isotropicSigma(shape(), p) < finestSigma(shape())) return below_.density(p, h);
     const PyramidSlices chosen = selectSlices(shape(), p);
     const PixelPlace place = pixelPlace(shape(), h);
     return blockValue(chosen, place.block, [&](const auto& projector, const NdfCluster& cluster, float* projection) {
@@ -43,7 +42,7 @@ class CpNdf {
 
   GLINT_HD float signedMean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
-    if (below_ && isotropicSigma(shape(), p) < finestSigma(shape())) return below_->mean(p, range);
+    if (below_.hasMap() && isotropicSigma(shape(), p) < finestSigma(shape())) return below_.mean(p, range);
     const PyramidSlices chosen = selectSlices(shape(), p);
     double sum = 0;
     forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
@@ -83,7 +82,7 @@ class CpNdf {
   }
 
   CompressedNdf ndf_;
-  std::optional<Reference> below_;
+  Reference below_;
 };
 
 static_assert(NdfModel<CpNdf>);

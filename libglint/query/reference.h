@@ -22,10 +22,14 @@ class Reference {
  public:
   enum class Search { exhaustive, pruned };
 
+  /// Has no map; may only be asked `hasMap`.
+  Reference() = default;
   GLINT_HD Reference(const NormalMap& map, float sigma_r, Surface surface = Surface::flat, Boundary boundary = Boundary::wrap,
                      Search search = Search::exhaustive)
       : map_(map), sigma_r_(sigma_r), surface_(surface), boundary_(boundary),
         search_(map.bounds_level_count > 0 ? search : Search::exhaustive) {}
+
+  GLINT_HD bool hasMap() const { return map_.width > 0; }
 
   /// Density towards h, per unit projected area; >= 0, finite.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
@@ -198,10 +202,10 @@ class Reference {
   }
 
   NormalMap map_;
-  float sigma_r_;
-  Surface surface_;
-  Boundary boundary_;
-  Search search_;
+  float sigma_r_ = 0;
+  Surface surface_ = Surface::flat;
+  Boundary boundary_ = Boundary::wrap;
+  Search search_ = Search::exhaustive;
 };
 
 static_assert(NdfModel<Reference>);

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+namespace glint::apps {
+
+/// Throws Error usage unless the name ends in .exr or .png.
+void checkPictureName(const std::string& path);
+
+/// Writes an NDF image. As .exr: the densities, one float channel. As .png: colours (inferno) of log(1 + density), from 0 to the
+/// image's largest value, so that sparse glints and broad lobes are both seen.
+/// @param densities  [size][size], bottom row first
+void writeNdfPicture(const std::string& path, int size, std::span<const float> densities);
+
+/// The colours of writeNdfPicture.
+/// @param largest  density that gets the brightest colour
+/// @return [size][size][3] in 0..1
+std::vector<float> ndfColours(int size, std::span<const float> densities, float largest);
+
+}  // namespace glint::apps

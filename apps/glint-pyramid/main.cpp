@@ -1,0 +1,29 @@
+#include <nlohmann/json.hpp>
+
+#include "common/files.h"
+#include "common/tool.h"
+#include "glint-pyramid/pyramid_options.h"
+#include "glint/bake/pyramid.h"
+#include "glint/formats/asset_reader.h"
+#include "glint/formats/asset_writer.h"
+
+using namespace glint;
+
+int main(int argc, char** argv) {
+  apps::Tool tool({"glint-pyramid",
+                   "Computes the NDF images of a normal map for footprints of every size and position: the level of detail of its "
+                   "glints, ready to be queried or compressed.",
+                   "glint-pyramid flakes.glint -o flakes.pyramid.glint --stride 32 --sigma-r 0.005"});
+  const apps::InputFile input(tool, "asset of kind normals, from glint-ingest", "NORMALS");
+  const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind ndf-pyramid");
+  apps::PyramidCommand command(tool);
+
+  return tool.run(argc, argv, [&] {
+    const formats::Asset asset = formats::Asset::open(input.path());
+    const formats::Provenance provenance = tool.provenance();
+    const bake::NdfPyramidData pyramid = bake::buildPyramid(asset.normals(), command.options(), tool.progress("images"));
+    formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
+    tool.setResult(apps::pyramidJson(pyramid));
+    tool.summary(apps::pyramidText(pyramid));
+  });
+}

@@ -1,0 +1,62 @@
+#include "glint-pyramid/pyramid_options.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <nlohmann/json.hpp>
+
+namespace glint::apps {
+
+PyramidCommand::PyramidCommand(Tool& tool) {
+  tool.option("--stride", options_.stride, "texels between the footprints of the finest level").range(2, 65536);
+  tool.option("--resolution", options_.resolution, "pixels of an NDF image along each axis, a multiple of 16").range(32, 1024);
+  tool.option("--sigma-r", options_.sigma_r, "intrinsic roughness: standard deviation of a facet's lobe, disk units");
+  tool.choice("--surface", options_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
+              "each texel is a facet (flat), or normals are interpolated between texels (smooth)");
+  tool.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
+              "whether the map repeats or ends at its border");
+  tool.option("--levels", levels_, "number of levels; auto: until levels agree to 1 % or the stride reaches the map");
+  tool.choice("--precision", options_.precision, {{"half", BlockPrecision::f16}, {"float", BlockPrecision::f32}}, "of stored pixels");
+}
+
+bake::PyramidOptions PyramidCommand::options() const {
+  bake::PyramidOptions options = options_;
+  if (levels_ == "auto") return options;
+  const char* end = levels_.data() + levels_.size();
+  const auto [stop, error] = std::from_chars(levels_.data(), end, options.levels);
+  if (error != std::errc() || stop != end || options.levels < 1)
+    throw Error(ErrorCode::usage, "option.range", {}, "--levels", "'" + levels_ + "' is not a number of levels", "give auto, or 1 or more");
+  return options;
+}
+
+nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid) {
+  nlohmann::json levels = nlohmann::json::array();
+  std::size_t bytes = 0;
+  for (int l = 0; l < pyramid.shape.level_count; ++l) {
+    const PyramidGrid& grid = pyramid.shape.levels[l];
+    const std::size_t blocks = pyramid.levels[l].block_means.size();
+    const std::size_t level_bytes = blocks * kBlockPixels * (pyramid.precision == BlockPrecision::f16 ? 2 : 4);
+    bytes += level_bytes;
+    levels.push_back({{"stride_texels", grid.stride},
+                      {"columns", grid.columns},
+                      {"rows", grid.rows},
+                      {"blocks", blocks},
+                      {"occupied", static_cast<double>(blocks) / (static_cast<double>(grid.imageCount()) * pyramid.shape.blocksPerImage())},
+                      {"size_bytes", level_bytes}});
+  }
+  return {{"levels", levels}, {"size_bytes", bytes}, {"resolution", pyramid.shape.resolution}, {"sigma_r", pyramid.shape.sigma_r}};
+}
+
+std::string pyramidText(const bake::NdfPyramidData& pyramid) {
+  std::string text = fmt::format("{:>5} {:>8} {:>11} {:>9} {:>9} {:>9}\n", "level", "stride", "images", "blocks", "occupied", "MB");
+  const nlohmann::json json = pyramidJson(pyramid);
+  int l = 0;
+  for (const auto& level : json["levels"]) {
+    text += fmt::format("{:>5} {:>8.0f} {:>5} x {:<3} {:>9} {:>8.1f}% {:>9.2f}\n", l++, level["stride_texels"].get<double>(),
+                        level["columns"].get<int>(), level["rows"].get<int>(), level["blocks"].get<std::size_t>(),
+                        100 * level["occupied"].get<double>(), 1e-6 * level["size_bytes"].get<double>());
+  }
+  return text + fmt::format("total {:.2f} MB\n", 1e-6 * json["size_bytes"].get<double>());
+}
+
+}  // namespace glint::apps

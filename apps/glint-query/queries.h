@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/ndf_models.h"
+#include "glint/model/footprint.h"
+
+namespace glint::apps {
+
+/// What is asked at a footprint: the density towards a half vector, or its mean over a box of half vectors.
+struct Query {
+  Footprint footprint;
+  std::optional<Vec2> half;
+  std::optional<Box2> range;
+};
+
+/// Answer of a model to one query.
+float answer(const AnyNdf& model, const Query& query);
+
+/// Answers to many queries, in their order; parallel.
+std::vector<float> answerAll(const AnyNdf& model, std::span<const Query> queries);
+
+/// Median nanoseconds of a query over `repeats` runs of one thread.
+double nanosecondsPerQuery(const AnyNdf& model, const Query& query, int repeats);
+
+/// Pixel means of the density over [-1, 1]^2, [resolution][resolution], bottom row first.
+std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int resolution, const bake::ProgressFn& progress);
+
+/// A table of queries: the header names columns u, v; sigma or sxx, sxy, syy or ax, ay, bx, by; hx, hy or x0, y0, x1, y1. Further
+/// columns are kept.
+class QueryTable {
+ public:
+  /// @throws Error io; invalid_input that names the line and the column
+  static QueryTable read(const std::string& path);
+
+  const std::vector<Query>& queries() const { return queries_; }
+
+  /// The table with one more column: `density` or `mean`.
+  std::string withAnswers(std::span<const float> answers) const;
+
+ private:
+  std::vector<std::vector<std::string>> rows_;  // the header first
+  std::vector<Query> queries_;
+};
+
+}  // namespace glint::apps

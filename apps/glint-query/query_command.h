@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/ndf_models.h"
+#include "common/tool.h"
+#include "glint-query/queries.h"
+
+namespace glint::apps {
+
+/// The options of glint-query and what they ask for.
+class QueryCommand {
+ public:
+  explicit QueryCommand(Tool& tool);
+
+  /// Answers what was asked: one query, a table of them, an image, or the time of a query.
+  void run(NdfAsset& asset);
+
+ private:
+  void check() const;
+  Footprint footprint() const;
+  Query query() const;
+  void answerTable(NdfAsset& asset);
+  void answerOne(NdfAsset& asset);
+  void writePicture(NdfAsset& asset);
+
+  Tool& tool_;
+  std::vector<float> uv_, covariance_, box_, half_, range_;
+  float sigma_ = 0;
+  std::string image_, csv_, output_;
+  int image_size_ = 0;
+  int repeat_ = 0;
+  Option *uv_option_, *sigma_option_, *covariance_option_, *box_option_, *half_option_, *range_option_, *csv_option_, *output_option_;
+};
+
+}  // namespace glint::apps
