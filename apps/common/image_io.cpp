@@ -3,7 +3,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <array>
@@ -115,6 +115,8 @@ std::vector<unsigned char> encode(const std::string& path, const OIIO::ImageSpec
 
 Image readImage(const std::string& path) {
   checkReadable(path);
+  // OpenImageIO has threads of its own, which --threads is to limit as well.
+  OIIO::attribute("threads", static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   const auto input = OIIO::ImageInput::open(path, &config);
@@ -164,7 +166,5 @@ bool isWritableImageName(const std::string& path) {
   if (!output) (void)OIIO::geterror();  // an error nobody fetches is printed at exit
   return output && output->supports("ioproxy");
 }
-
-void setImageThreads(int threads) { OIIO::attribute("threads", threads); }
 
 }  // namespace glint::apps

@@ -39,7 +39,4 @@ void writeImage(const std::string& path, int width, int height, int channels, st
 /// Whether some image format has this file name extension and can be written.
 bool isWritableImageName(const std::string& path);
 
-/// Limits the threads of OpenImageIO.
-void setImageThreads(int threads);
-
 }  // namespace glint::apps

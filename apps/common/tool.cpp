@@ -16,7 +16,6 @@
 #include <system_error>
 
 #include "common/files.h"
-#include "common/image_io.h"
 #include "common/progress_reporter.h"
 #include "common/suggest.h"
 #include "glint/formats/hash.h"
@@ -328,7 +327,6 @@ int Tool::work(const std::function<void()>& body) {
   for (const auto& check : s.checks) check();
   if (!s.depfile.empty()) checkWritable(s.depfile);
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads()));
-  setImageThreads(threads());
   body();
   s.reporter.reset();
   if (!s.depfile.empty()) {

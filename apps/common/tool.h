@@ -107,7 +107,7 @@ class Tool {
   bool verbose() const;
   bool wantsJson() const;
   bool force() const;
-  /// Value of --threads; all the processor's when it was not given. oneTBB and OpenImageIO are limited to it already.
+  /// Value of --threads; all the processor's when it was not given. oneTBB is limited to it already.
   int threads() const;
   /// Value of --seed. Calling this records the seed in `command`, so call it before provenance().
   std::uint64_t seed();

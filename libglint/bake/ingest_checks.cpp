@@ -11,10 +11,11 @@ namespace {
 
 /// At most this many texels, evenly spread, are looked at to find the encoding.
 constexpr std::size_t kSampleTexels = 65536;
-/// Vectors this far from unit length are not a normal map's.
+/// Vectors this far from unit length are not a normal map's, and nor are those that point down.
 constexpr double kFarFromUnit = 0.25;
-/// A photograph has most of its vectors far from unit length; filtered normal maps have few.
-constexpr double kMostFar = 0.1;
+/// Maps of flakes that were filtered have up to an eighth of such vectors; of colours spread over the cube it would be three
+/// quarters.
+constexpr double kMostFar = 0.3;
 /// 0.5 becomes 0.735 when encoded as sRGB (a component of +0.47) and 0.214 when decoded (-0.57).
 constexpr double kSrgbBias = 0.25;
 
@@ -131,8 +132,8 @@ EncodingEvidence weighEncoding(const PixelArray& image, int channels) {
     e.srgb_redone += error([](double c) { return 2 * linearToSrgb(c) - 1; });
     e.mean_x += 2 * v[0] - 1;
     e.mean_y += 2 * v[1] - 1;
-    far_unorm += unorm > kFarFromUnit ? 1 : 0;
-    far_snorm += snorm > kFarFromUnit ? 1 : 0;
+    far_unorm += unorm > kFarFromUnit || 2 * v[2] - 1 <= 0 ? 1 : 0;
+    far_snorm += snorm > kFarFromUnit || v[2] <= 0 ? 1 : 0;
     count += 1;
   }
   if (count == 0) return e;
@@ -157,8 +158,8 @@ void checkEncoding(const EncodingEvidence& e, Encoding encoding, int channels, c
   const double far = encoding == Encoding::unorm ? e.far_unorm : e.far_snorm;
   if (channels > 2 && far > kMostFar) {
     throwInvalid("normals.unit", name, "",
-                 std::to_string(std::lround(100 * far)) + " % of the vectors are far from unit length: this is no normal map",
-                 "give the normal map rather than the colour map, or set --encoding");
+                 std::to_string(std::lround(100 * far)) + " % of the vectors point down or are far from unit length: this is no tangent-space normal map",
+                 "give the normal map rather than the colour map or an object-space map, or set --encoding");
   }
 }
 

@@ -30,7 +30,7 @@ struct EncodingEvidence {
   double mean_x = 0;        ///< of the components under unorm
   double mean_y = 0;
   bool negative = false;    ///< some pixel value is below 0, as no unorm value is
-  double far_unorm = 0;     ///< fraction of vectors whose length is off by more than a quarter
+  double far_unorm = 0;     ///< fraction of vectors that point down or whose length is off by more than a quarter
   double far_snorm = 0;
 };
 
