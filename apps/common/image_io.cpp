@@ -150,6 +150,7 @@ void writeImage(const std::string& path, int width, int height, int channels, st
   OIIO::ImageSpec spec(width, height, channels, fileType(format));
   if (channels == 1) spec.channelnames = {"Y"};
   spec.attribute("compression", "zip");
+  if (format == PixelFormat::f16 || format == PixelFormat::f32) spec.attribute("DateTime", "");  // or OpenEXR files hold the time
   std::vector<unsigned char> bytes;
   if (format == PixelFormat::u8) {
     bytes = encode<std::uint8_t>(path, spec, toCodes<std::uint8_t>(pixels, path));

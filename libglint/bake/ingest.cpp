@@ -68,7 +68,10 @@ struct Decoder {
     const float half = static_cast<float>((std::numeric_limits<T>::max() + 1) / 2);
     return {1 / (half - 1), -half / (half - 1), -1};
   }
-  float operator()(float value) const { return std::max(floor, scale * value + offset); }
+  float operator()(float value) const {
+    const float n = scale * value + offset;
+    return n < floor ? floor : n;  // not std::max, which would turn NaN into a number
+  }
 };
 
 /// A row of pixels to normals; unusable texels become NaN and are counted.

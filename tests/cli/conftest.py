@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-BIN = pathlib.Path(os.environ.get("GLINT_BIN_DIR", pathlib.Path(__file__).parents[2] / "build" / "bin"))
+BIN = pathlib.Path(os.environ.get("GLINT_BIN_DIR", pathlib.Path(__file__).parents[2] / "build" / "bin")).resolve()
 
 
 @pytest.fixture
