@@ -254,7 +254,7 @@ TEST(Dequantize, FillsTheCombWithoutMovingTheMean) {
     }
     return on / static_cast<double>(normals.size());
   };
-  EXPECT_GT(onTeeth(raw.normals), 0.7);            // normalising blurs the teeth of tilted normals a little
+  EXPECT_GT(onTeeth(raw.normals), 0.7);               // normalising blurs the teeth of tilted normals a little
   EXPECT_NEAR(onTeeth(dithered.normals), 0.5, 0.02);  // no teeth: half of the values; scatter 0.5 / 256
 
   // 65536 draws of deviation 2/255/sqrt(6): the mean is good to 1.3e-5 (5 deviations: 6e-5).

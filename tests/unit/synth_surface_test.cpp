@@ -92,7 +92,8 @@ TEST(SynthFlakes, TiltsFollowTheGtrDistribution) {
     double distance = 0;
     for (std::size_t i = 0; i < tilts.size(); ++i) {
       const auto bin = static_cast<std::size_t>(std::clamp(tilts[i] / last, 0.0, 1.0) * kSteps);
-      distance = std::max(distance, std::abs(cdf[bin] / cdf.back() - (static_cast<double>(i) + 0.5) / static_cast<double>(tilts.size())));
+      distance = std::max(distance,
+                          std::abs(cdf[bin] / cdf.back() - (static_cast<double>(i) + 0.5) / static_cast<double>(tilts.size())));
     }
     constexpr double kKolmogorov = 1.95;  // exceeded by chance once in a thousand seeds
     ASSERT_GT(tilts.size(), 10000u);
