@@ -1,0 +1,66 @@
+#include "glint-synth/synth_options.h"
+
+#include <charconv>
+
+namespace glint::apps {
+namespace {
+
+using bake::SynthKind;
+
+/// "N" or "NxM".
+void parseSize(const std::string& text, int& width, int& height) {
+  const char* end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, width);
+  height = width;
+  auto last = first;
+  if (first.ec == std::errc() && first.ptr != end && *first.ptr == 'x') last = std::from_chars(first.ptr + 1, end, height);
+  if (first.ec != std::errc() || last.ec != std::errc() || last.ptr != end) {
+    throw Error(ErrorCode::usage, "cli.size", "", "--size", "'" + text + "' is not a size", "write N or NxM, for example 1024x512");
+  }
+}
+
+}  // namespace
+
+SynthOptions::SynthOptions(Tool& tool) {
+  bake::SynthParameters& p = parameters_;
+  const std::string per_kind = "depends on KIND";
+  tool.choice("KIND", p.kind,
+              {{"isotropic", SynthKind::isotropic},
+               {"brushed", SynthKind::brushed},
+               {"flakes", SynthKind::flakes},
+               {"scratches", SynthKind::scratches},
+               {"leather", SynthKind::leather},
+               {"weave", SynthKind::weave},
+               {"sawtooth", SynthKind::sawtooth},
+               {"flat", SynthKind::flat}},
+              "the surface to make")
+      .required();
+  tool.option("--size", size_, "N or NxM texels");
+  alpha_ = &tool.option("--alpha", p.alpha, "Beckmann roughness of the noise; GTR roughness of flakes").range(0, 2);
+  gamma_ = &tool.option("--gamma", p.gamma, "exponent of the GTR distribution of flakes; 2: GGX").range(0.1, 20);
+  correlation_ = &tool.option("--correlation", p.correlation_texels, "correlation length of the noise, texels").range(0, 65536);
+  streak_ = &tool.option("--streak", p.streak_texels, "length of the streaks of brushed, texels").range(0, 65536);
+  feature_ = &tool.option("--flake-size,--feature-size", p.feature_texels,
+                          "size of a flake, pebble, thread or tooth, or width of a scratch, texels")
+                  .range(1, 65536);
+  density_ = &tool.option("--density", p.density, "scratches in 64x64 texels").range(1e-3, 64);
+  slope_ = &tool.option("--slope", p.slope, "steepest slope of scratches, leather, weave, sawtooth").range(0, 10);
+  for (Option* option : {alpha_, correlation_, feature_, slope_}) option->defaultText(per_kind);
+}
+
+const bake::SynthParameters& SynthOptions::resolve(Tool& tool) {
+  bake::SynthParameters& p = parameters_;
+  const bake::SynthParameters defaults = bake::defaultSynthParameters(p.kind);
+  if (!alpha_->given()) p.alpha = defaults.alpha;
+  if (!gamma_->given()) p.gamma = defaults.gamma;
+  if (!correlation_->given()) p.correlation_texels = defaults.correlation_texels;
+  if (!streak_->given()) p.streak_texels = defaults.streak_texels;
+  if (!feature_->given()) p.feature_texels = defaults.feature_texels;
+  if (!density_->given()) p.density = defaults.density;
+  if (!slope_->given()) p.slope = defaults.slope;
+  parseSize(size_, p.width, p.height);
+  p.seed = tool.seed();
+  return p;
+}
+
+}  // namespace glint::apps

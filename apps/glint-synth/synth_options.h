@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+
+#include "common/tool.h"
+#include "glint/bake/synth.h"
+
+namespace glint::apps {
+
+/// The options of glint-synth. Declared with "unset" values; resolve() replaces those by the defaults of the chosen kind.
+class SynthOptions {
+ public:
+  explicit SynthOptions(Tool& tool);
+
+  /// Complete parameters. Call after parsing; the `command` record then holds the values that were used.
+  /// @throws Error usage for a malformed size
+  const bake::SynthParameters& resolve(Tool& tool);
+
+ private:
+  bake::SynthParameters parameters_;
+  std::string size_ = "512";
+  Option* alpha_;
+  Option* gamma_;
+  Option* correlation_;
+  Option* streak_;
+  Option* feature_;
+  Option* density_;
+  Option* slope_;
+};
+
+}  // namespace glint::apps

@@ -1,0 +1,338 @@
+#include "glint/bake/ingest.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "glint/bake/counter_random.h"
+#include "glint/bake/ingest_checks.h"
+#include "glint/bake/slopes.h"
+#include "glint/model/error.h"
+
+namespace glint::bake {
+namespace {
+
+constexpr std::uint64_t kDitherStream = 5;
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kDegreesPerRadian = 180 / std::numbers::pi_v<float>;
+/// Normals on the rim of the disk have no nz > 0; they are moved to this radius (a tilt of 89.9 degrees).
+constexpr float kRimRadius = 0.9999985f;
+/// A float counts as unit length within this. 8-bit codes add their rounding, sqrt(3) / 255.
+constexpr float kUnitTolerance = 0.01f;
+constexpr std::size_t kNoTexel = std::numeric_limits<std::size_t>::max();
+
+/// Faults of some texels, and where the first was.
+struct Faults {
+  std::size_t non_finite = 0;
+  std::size_t downward = 0;
+  std::size_t clipped = 0;
+  std::size_t non_unit = 0;
+  std::size_t first_non_finite = kNoTexel;
+  std::size_t first_downward = kNoTexel;
+
+  void add(const Faults& o) {
+    non_finite += o.non_finite;
+    downward += o.downward;
+    clipped += o.clipped;
+    non_unit += o.non_unit;
+    first_non_finite = std::min(first_non_finite, o.first_non_finite);
+    first_downward = std::min(first_downward, o.first_downward);
+  }
+};
+
+/// Two independent values of triangular density on (-1, 1), one for each of x and y.
+Vec2 triangularNoise(std::uint64_t seed, std::size_t texel) {
+  constexpr float kScale = 1.0f / 65536;
+  const std::uint64_t bits = randomBits(seed, kDitherStream, texel);
+  const auto part = [&](int shift) { return static_cast<float>((bits >> shift) & 0xffff) * kScale; };
+  return {part(0) - part(16), part(32) - part(48)};
+}
+
+template <class T>
+constexpr float kCodes = std::is_floating_point_v<T> ? 1.0f : static_cast<float>(std::numeric_limits<T>::max());
+
+/// Maps pixel values to components of a vector: n = scale * value + offset. One code is `scale` wide.
+struct Decoder {
+  float scale = 2;
+  float offset = -1;
+  float floor = -std::numeric_limits<float>::max();  ///< the lowest code of snorm means -1, as in every graphics interface
+
+  template <class T>
+  static Decoder of(Encoding encoding) {
+    if (encoding == Encoding::unorm) return {2 / kCodes<T>, -1};
+    if constexpr (std::is_floating_point_v<T>) return {1, 0};
+    const float half = static_cast<float>((std::numeric_limits<T>::max() + 1) / 2);
+    return {1 / (half - 1), -half / (half - 1), -1};
+  }
+  float operator()(float value) const { return std::max(floor, scale * value + offset); }
+};
+
+/// A row of pixels to normals; unusable texels become NaN and are counted.
+template <class T>
+struct NormalDecoder {
+  const PixelArray& image;
+  const IngestParameters& parameters;
+  std::span<const T> pixels;
+  Decoder decode;
+  bool dither = false;
+  float rounding = 0;  ///< largest error of a component
+
+  NormalDecoder(const PixelArray& array, const IngestParameters& p, Encoding encoding, bool dithered)
+      : image(array),
+        parameters(p),
+        pixels(std::get<std::span<const T>>(array.pixels)),
+        decode(Decoder::of<T>(encoding)),
+        dither(dithered),
+        rounding(std::is_floating_point_v<T> ? 1e-6f : decode.scale) {}
+
+  Vec2 texel(std::size_t t, Faults& faults) const {
+    const T* pixel = pixels.data() + t * static_cast<std::size_t>(image.channels);
+    float x = decode(static_cast<float>(pixel[0]));
+    float y = decode(static_cast<float>(pixel[1]));
+    float z = image.channels > 2 ? decode(static_cast<float>(pixel[2])) : 0;
+    if (!std::isfinite(x + y + z)) {
+      if (faults.non_finite++ == 0) faults.first_non_finite = t;
+      return {kNaN, kNaN};
+    }
+    if (image.channels > 2) {
+      const float length = std::sqrt(x * x + y * y + z * z);
+      if (std::abs(length - 1) > kUnitTolerance + 1.7320508f * rounding) ++faults.non_unit;
+      if (z <= 0 && z >= -rounding && length > 0.5f) return onRim(x, y, faults);
+      if (z <= 0) return downward(t, faults);
+    } else if (const float r2 = x * x + y * y; r2 >= 1) {
+      const float limit = 1 + rounding;
+      return r2 <= limit * limit ? onRim(x, y, faults) : downward(t, faults);
+    }
+    if (dither) {
+      const Vec2 noise = decode.scale * triangularNoise(parameters.seed, t);
+      const Vec2 moved = {x + noise.x, y + noise.y};
+      if (image.channels > 2 || dot(moved, moved) < 1) x = moved.x, y = moved.y;
+    }
+    if (image.channels > 2) {
+      const float scale = 1 / std::sqrt(x * x + y * y + z * z);
+      x *= scale;
+      y *= scale;
+      if (x * x + y * y >= 1) return onRim(x, y, faults);
+    }
+    return {x, y};
+  }
+
+ private:
+  static Vec2 onRim(float x, float y, Faults& faults) {
+    ++faults.clipped;
+    return kRimRadius / std::sqrt(x * x + y * y) * Vec2{x, y};
+  }
+  static Vec2 downward(std::size_t t, Faults& faults) {
+    if (faults.downward++ == 0) faults.first_downward = t;
+    return {kNaN, kNaN};
+  }
+};
+
+template <class T>
+std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestParameters& p, Encoding encoding, bool dither, Faults& faults) {
+  const NormalDecoder<T> decoder(image, p, encoding, dither);
+  const float green = p.convention == Convention::directx ? -1.0f : 1.0f;
+  std::vector<Vec2> normals(static_cast<std::size_t>(image.width) * image.height);
+  std::vector<Faults> rows(static_cast<std::size_t>(image.height));
+  tbb::parallel_for(0, image.height, [&](int j) {
+    const std::size_t first = static_cast<std::size_t>(j) * image.width;
+    Faults found;
+    for (std::size_t t = first; t < first + static_cast<std::size_t>(image.width); ++t) {
+      const Vec2 n = decoder.texel(t, found);
+      normals[t] = {n.x, green * n.y};
+    }
+    rows[static_cast<std::size_t>(j)] = found;
+  });
+  // Image viewers count rows from the top, so the first texel at fault is in the last row that has one.
+  for (auto row = rows.rbegin(); row != rows.rend(); ++row) {
+    if (faults.first_non_finite != kNoTexel) row->first_non_finite = kNoTexel;
+    if (faults.first_downward != kNoTexel) row->first_downward = kNoTexel;
+    faults.add(*row);
+  }
+  return normals;
+}
+
+/// @throws Error invalid_input for texels that only fix_invalid makes usable
+void checkFaults(const PixelArray& image, const IngestParameters& p, const Faults& faults) {
+  if (p.fix_invalid) return;
+  const auto plural = [](std::size_t n) { return n == 1 ? std::string("1 texel is ") : std::to_string(n) + " texels are "; };
+  if (faults.non_finite > 0) {
+    throw Error(ErrorCode::invalid_input, "map.finite", p.name, texelName(image, faults.first_non_finite),
+                plural(faults.non_finite) + "not finite, this is the first", "repair them with glint-ingest --fix-invalid");
+  }
+  if (faults.downward > 0) {
+    const bool three = image.channels > 2;
+    throw Error(ErrorCode::invalid_input, three ? "normals.upward" : "normals.disk", p.name, texelName(image, faults.first_downward),
+                plural(faults.downward) + (three ? "not above the surface (z <= 0)" : "outside the unit disk (x^2 + y^2 > 1)") +
+                    ", this is the first",
+                three ? "export a tangent-space map or set --encoding, or repair them with glint-ingest --fix-invalid"
+                      : "set --encoding, or repair them with glint-ingest --fix-invalid");
+  }
+}
+
+bool dithers(const PixelArray& image, Dequantize wanted) {
+  if (wanted == Dequantize::automatic) return std::holds_alternative<std::span<const std::uint8_t>>(image.pixels);
+  return wanted == Dequantize::tpdf && !std::holds_alternative<std::span<const float>>(image.pixels);
+}
+
+template <class T>
+std::vector<float> decodeHeights(const PixelArray& image, const IngestParameters& p, bool dither, Faults& faults) {
+  const auto pixels = std::get<std::span<const T>>(image.pixels);
+  const float scale = p.height_scale / kCodes<T>;
+  std::vector<float> heights(static_cast<std::size_t>(image.width) * image.height);
+  tbb::parallel_for(0, image.height, [&](int j) {
+    const std::size_t first = static_cast<std::size_t>(j) * image.width;
+    for (std::size_t t = first; t < first + static_cast<std::size_t>(image.width); ++t) {
+      const float noise = dither ? triangularNoise(p.seed, t).x : 0;
+      heights[t] = scale * (static_cast<float>(pixels[t * static_cast<std::size_t>(image.channels)]) + noise);
+    }
+  });
+  for (int j = image.height - 1; j >= 0; --j) {
+    for (int i = 0; i < image.width; ++i) {
+      const std::size_t t = static_cast<std::size_t>(j) * image.width + static_cast<std::size_t>(i);
+      if (!std::isfinite(heights[t]) && faults.non_finite++ == 0) faults.first_non_finite = t;
+    }
+  }
+  return heights;
+}
+
+/// @throws Error invalid_input if the colour channels differ, as in a photograph or a normal map
+void checkGrey(const PixelArray& image, const IngestParameters& p) {
+  if (image.channels < 3) return;
+  const std::size_t texels = static_cast<std::size_t>(image.width) * image.height;
+  for (std::size_t t = 0; t < texels; ++t) {
+    const float first = pixelValue(image, t, 0);
+    for (int c = 1; c < 3; ++c) {
+      const float other = pixelValue(image, t, c);
+      if (first == other || (std::isnan(first) && std::isnan(other))) continue;
+      throw Error(ErrorCode::invalid_input, "heights.grey", p.name, texelName(image, t), "red, green and blue differ: this is no height field",
+                  "read normal maps with --kind normal; export heights as one channel");
+    }
+  }
+}
+
+/// Sums over one row, then over rows in order.
+struct Moments {
+  double n[2] = {};
+  double tilt = 0;
+  double slope[2] = {};
+  double slope2[3] = {};
+  float lowest_z = 1;
+};
+
+Moments rowMoments(std::span<const Vec2> normals) {
+  Moments m;
+  for (const Vec2 n : normals) {
+    const float z = std::sqrt(std::max(1e-12f, 1 - dot(n, n)));
+    const float p = -n.x / z;
+    const float q = -n.y / z;
+    m.n[0] += n.x;
+    m.n[1] += n.y;
+    m.tilt += std::acos(z);
+    m.slope[0] += p;
+    m.slope[1] += q;
+    m.slope2[0] += p * p;
+    m.slope2[1] += p * q;
+    m.slope2[2] += q * q;
+    m.lowest_z = std::min(m.lowest_z, z);
+  }
+  return m;
+}
+
+}  // namespace
+
+IngestReport describeNormals(int width, int height, std::span<const Vec2> normals) {
+  std::vector<Moments> rows(static_cast<std::size_t>(height));
+  tbb::parallel_for(0, height, [&](int j) {
+    rows[static_cast<std::size_t>(j)] =
+        rowMoments(normals.subspan(static_cast<std::size_t>(j) * width, static_cast<std::size_t>(width)));
+  });
+  Moments sum;
+  for (const Moments& row : rows) {
+    for (int k = 0; k < 2; ++k) sum.n[k] += row.n[k], sum.slope[k] += row.slope[k];
+    for (int k = 0; k < 3; ++k) sum.slope2[k] += row.slope2[k];
+    sum.tilt += row.tilt;
+    sum.lowest_z = std::min(sum.lowest_z, row.lowest_z);
+  }
+  const auto count = static_cast<double>(normals.size());
+  const double mean[2] = {sum.slope[0] / count, sum.slope[1] / count};
+  IngestReport report;
+  report.texels = normals.size();
+  report.mean_normal = {static_cast<float>(sum.n[0] / count), static_cast<float>(sum.n[1] / count)};
+  report.mean_tilt_deg = kDegreesPerRadian * sum.tilt / count;
+  report.steepest_tilt_deg = kDegreesPerRadian * std::acos(sum.lowest_z);
+  report.slope_covariance[0] = sum.slope2[0] / count - mean[0] * mean[0];
+  report.slope_covariance[1] = sum.slope2[1] / count - mean[0] * mean[1];
+  report.slope_covariance[2] = sum.slope2[2] / count - mean[1] * mean[1];
+  return report;
+}
+
+IngestedNormals ingestNormals(const PixelArray& image, const IngestParameters& p) {
+  checkShape(image, p.name);
+  if (image.channels < 2) {
+    throw Error(ErrorCode::invalid_input, "normals.channels", p.name, "", "has one channel, and normals need three (or two)",
+                "read heights with --kind height");
+  }
+  const int channels = std::min(image.channels, 3);
+  const bool floating = std::holds_alternative<std::span<const float>>(image.pixels);
+  const EncodingEvidence evidence = weighEncoding(image, channels);
+  Encoding encoding = p.encoding;
+  if (encoding == Encoding::automatic) {
+    encoding = floating && looksSigned(evidence) ? Encoding::snorm : Encoding::unorm;
+  }
+  checkEncoding(evidence, encoding, channels, p.name);
+
+  const bool dither = dithers(image, p.dequantize);
+  Faults faults;
+  IngestedNormals result;
+  result.normals = std::visit(
+      [&](const auto& pixels) {
+        using T = std::remove_const_t<typename std::decay_t<decltype(pixels)>::element_type>;
+        return decodeNormals<T>(image, p, encoding, dither, faults);
+      },
+      image.pixels);
+  checkFaults(image, p, faults);
+  std::size_t repaired = 0;
+  if (faults.non_finite + faults.downward > 0) repaired = fillHoles(image.width, image.height, result.normals, p.name);
+  if (!p.allow_constant) checkNotConstant(image, channels, p.name);
+
+  result.report = describeNormals(image.width, image.height, result.normals);
+  result.report.encoding = encoding;
+  result.report.dequantized = dither;
+  result.report.non_finite = faults.non_finite;
+  result.report.downward = faults.downward;
+  result.report.clipped = faults.clipped;
+  result.report.non_unit = faults.non_unit;
+  result.report.repaired = repaired;
+  return result;
+}
+
+IngestedHeights ingestHeights(const PixelArray& image, const IngestParameters& p) {
+  checkShape(image, p.name);
+  checkGrey(image, p);
+  if (!p.allow_constant) checkNotConstant(image, 1, p.name);
+  const bool dither = dithers(image, p.dequantize);
+  Faults faults;
+  IngestedHeights result;
+  result.heights = std::visit(
+      [&](const auto& pixels) {
+        using T = std::remove_const_t<typename std::decay_t<decltype(pixels)>::element_type>;
+        return decodeHeights<T>(image, p, dither, faults);
+      },
+      image.pixels);
+  checkFaults(image, p, faults);
+  std::size_t repaired = 0;
+  if (faults.non_finite > 0) repaired = fillHoles(image.width, image.height, result.heights, p.name);
+  const std::vector<Vec2> normals = normalsFromHeights(image.width, image.height, result.heights);
+  result.report = describeNormals(image.width, image.height, normals);
+  result.report.dequantized = dither;
+  result.report.non_finite = faults.non_finite;
+  result.report.repaired = repaired;
+  return result;
+}
+
+}  // namespace glint::bake

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "glint/model/normal_map.h"
+
+namespace glint::bake {
+
+/// Pixels as they came from a file, bottom row first: [height][width][channels].
+struct PixelArray {
+  int width = 0;
+  int height = 0;
+  int channels = 0;
+  std::variant<std::span<const std::uint8_t>, std::span<const std::uint16_t>, std::span<const float>> pixels;
+};
+
+/// Which way green points in the file.
+enum class Convention : std::uint8_t { opengl, directx };
+
+/// How a component n of a normal is stored as a pixel value.
+enum class Encoding : std::uint8_t {
+  automatic,  ///< integers: unorm; floats: the one that makes the vectors nearer to unit length
+  unorm,      ///< (n + 1) / 2; an integer code c of b bits is c / (2^b - 1)
+  snorm,      ///< n itself; an integer code c of b bits is (c - 2^(b-1)) / (2^(b-1) - 1), so that 128 of 8 bits is 0
+};
+
+/// What to do about the steps of integer codes, which put a comb into the normal distribution.
+enum class Dequantize : std::uint8_t {
+  automatic,  ///< tpdf for 8-bit pixels, none for others
+  none,
+  tpdf,  ///< add triangular noise of +-1 code (integer pixels; none for floats)
+};
+
+/// How pixels become normals or heights.
+struct IngestParameters {
+  std::string name;  ///< of the image, for error messages
+  Convention convention = Convention::opengl;
+  Encoding encoding = Encoding::automatic;
+  Dequantize dequantize = Dequantize::automatic;
+  bool fix_invalid = false;     ///< replace unusable texels by the mean of their usable neighbours instead of failing
+  bool allow_constant = false;  ///< accept a map of a single value
+  float height_scale = 1;       ///< height in texels of a pixel value of 1 (the largest code of an integer)
+  std::uint64_t seed = 1;       ///< of the noise
+};
+
+/// What a map was found to be. Moments are of the result.
+struct IngestReport {
+  Encoding encoding = Encoding::unorm;
+  bool dequantized = false;
+  std::size_t texels = 0;
+  std::size_t non_finite = 0;  ///< NaN or infinite pixels
+  std::size_t downward = 0;    ///< z <= 0 by more than rounding, or x^2 + y^2 > 1 without z
+  std::size_t clipped = 0;     ///< z <= 0 or x^2 + y^2 > 1 by rounding only: moved to just inside the disk
+  std::size_t non_unit = 0;    ///< length differs from 1 by more than rounding explains; normalised
+  std::size_t repaired = 0;    ///< texels that fix_invalid replaced
+  Vec2 mean_normal;            ///< mean of (nx, ny)
+  double mean_tilt_deg = 0;    ///< mean angle between normal and z
+  double slope_covariance[3] = {};  ///< xx, xy, yy of the slopes (-nx/nz, -ny/nz) about their mean
+  float steepest_tilt_deg = 0;
+};
+
+struct IngestedNormals {
+  std::vector<Vec2> normals;  ///< [height][width]
+  IngestReport report;
+};
+
+struct IngestedHeights {
+  std::vector<float> heights;  ///< [height][width], texels
+  IngestReport report;         ///< moments are of the normals of these heights
+};
+
+/// Normals of a normal map. x, y (and z) are the first channels; a map of two has z reconstructed. (x, y, z) is normalised.
+/// @throws Error invalid_input, naming the first texel at fault by column and row from the top left as image viewers count:
+///         one channel, a constant map, values that were converted to or from sRGB, vectors far from unit length (a photograph),
+///         texels that are not finite or point below the surface (unless fix_invalid)
+IngestedNormals ingestNormals(const PixelArray& image, const IngestParameters& parameters);
+
+/// Heights of a height field: the first channel times height_scale.
+/// @throws Error invalid_input: channels that differ, a constant map, texels that are not finite (unless fix_invalid)
+IngestedHeights ingestHeights(const PixelArray& image, const IngestParameters& parameters);
+
+/// Moments and counts of a map of normals: everything of the report that does not need the pixels.
+IngestReport describeNormals(int width, int height, std::span<const Vec2> normals);
+
+}  // namespace glint::bake
