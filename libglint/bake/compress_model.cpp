@@ -17,10 +17,10 @@ namespace {
 constexpr float kSmallestPeak = 1e-30f;
 
 // Eigenvalues that float cannot tell from rounding, relative to the largest.
-constexpr float kEigenvalueFloor = 1e-7f;
+constexpr float kEigenvalueFloor = 4e-7f;
 
 // Ranks at which cp is tried for a tolerance. Each costs a decomposition.
-constexpr int kCpRanks[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96};
+constexpr int kCpRanks[] = {1, 2, 4, 8, 16, 32, 64};
 
 /// Slices of a cluster, divided by its peak, a panel at a time: visit(panel, slices).
 template <class Visit>

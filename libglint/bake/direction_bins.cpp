@@ -10,58 +10,73 @@ namespace glint::bake {
 
 DirectionBins::DirectionBins(int resolution, int subdivision, int margin)
     : resolution_(resolution),
-      blocks_(resolution / kBlockSize),
       subdivision_(subdivision),
+      tiles_(resolution / (kBlockSize / 4)),
       margin_(margin),
       pitch_(resolution * subdivision + 2 * margin) {
   bins_.assign(static_cast<std::size_t>(pitch_) * pitch_, 0.0f);
-  touched_.assign(static_cast<std::size_t>(blocks_) * blocks_, 0);
+  touched_.assign(static_cast<std::size_t>(tiles_) * tiles_, 0);
 }
 
-bool DirectionBins::touchedNear(int block, int distance) const {
-  const int bx = block % blocks_, by = block / blocks_;
-  for (int y = std::max(by - distance, 0); y <= std::min(by + distance, blocks_ - 1); ++y)
-    for (int x = std::max(bx - distance, 0); x <= std::min(bx + distance, blocks_ - 1); ++x)
-      if (touched_[y * blocks_ + x]) return true;
+bool DirectionBins::touchedNear(int block_x, int block_y, int distance) const {
+  const int reach = (distance + tileSize() - 1) / tileSize();
+  const auto first = [&](int block) { return std::max(4 * block - reach, 0); };
+  const auto last = [&](int block) { return std::min(4 * block + 4 + reach, tiles_); };
+  for (int y = first(block_y); y < last(block_y); ++y) {
+    const std::uint8_t* row = touched_.data() + static_cast<std::size_t>(y) * tiles_;
+    if (std::any_of(row + first(block_x), row + last(block_x), [](std::uint8_t t) { return t != 0; })) return true;
+  }
   return false;
 }
 
-DirectionBins::Region DirectionBins::region(int block) const {
-  const int size = kBlockSize * subdivision_, x = block % blocks_, y = block / blocks_;
-  return {x == 0 ? -margin_ : x * size, x == blocks_ - 1 ? pitch_ - margin_ : (x + 1) * size,
-          y == 0 ? -margin_ : y * size, y == blocks_ - 1 ? pitch_ - margin_ : (y + 1) * size};
+template <class Visitor>
+void DirectionBins::forEachTouchedRow(Visitor&& visitor) const {
+  // A splat reaches one bin past the tile of its centre, so rows of tiles are widened by a tile each way; bins past the border
+  // of the square belong to the outermost tiles.
+  const int size = tileSize();
+  const auto begin = [&](int tile) { return tile == 0 ? -margin_ : tile * size; };
+  const auto end = [&](int tile) { return tile == tiles_ - 1 ? pitch_ - margin_ : (tile + 1) * size; };
+  std::vector<std::uint8_t> columns(tiles_);
+  for (int ty = 0; ty < tiles_; ++ty) {
+    std::fill(columns.begin(), columns.end(), std::uint8_t{0});
+    for (int y = std::max(ty - 1, 0); y <= std::min(ty + 1, tiles_ - 1); ++y)
+      for (int x = 0; x < tiles_; ++x) columns[x] |= touched_[static_cast<std::size_t>(y) * tiles_ + x];
+    for (int tx = 0; tx < tiles_; ++tx) {
+      if (!(columns[tx] || (tx > 0 && columns[tx - 1]) || (tx + 1 < tiles_ && columns[tx + 1]))) continue;
+      for (int y = begin(ty); y < end(ty); ++y) visitor(static_cast<std::ptrdiff_t>(y) * pitch_ + begin(tx), end(tx) - begin(tx));
+    }
+  }
 }
 
 void DirectionBins::clear() {
-  for (int b = 0; b < blocks_ * blocks_; ++b) {
-    if (!touchedNear(b, 1)) continue;
-    const Region r = region(b);
-    for (int y = r.y0; y < r.y1; ++y) std::fill_n(origin() + static_cast<std::ptrdiff_t>(y) * pitch_ + r.x0, r.x1 - r.x0, 0.0f);
-  }
+  float* bins = origin();
+  forEachTouchedRow([&](std::ptrdiff_t first, int count) { std::fill_n(bins + first, count, 0.0f); });
   std::fill(touched_.begin(), touched_.end(), std::uint8_t{0});
 }
 
 void DirectionBins::addTo(DirectionBins& other) const {
   const float* from = bins_.data() + static_cast<std::ptrdiff_t>(margin_) * pitch_ + margin_;
-  for (int b = 0; b < blocks_ * blocks_; ++b) {
-    other.touched_[b] |= touched_[b];
-    if (!touchedNear(b, 1)) continue;
-    const Region r = region(b);
-    for (int y = r.y0; y < r.y1; ++y) {
-      const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(y) * pitch_;
-      for (int x = r.x0; x < r.x1; ++x) other.origin()[row + x] += from[row + x];
-    }
-  }
+  float* to = other.origin();
+  forEachTouchedRow([&](std::ptrdiff_t first, int count) {
+    for (int k = 0; k < count; ++k) to[first + k] += from[first + k];
+  });
+  for (std::size_t k = 0; k < touched_.size(); ++k) other.touched_[k] |= touched_[k];
 }
 
 PixelFilter::PixelFilter(float sigma_pixels, int subdivision, float spread) : subdivision_(subdivision) {
   const double bin = 1.0 / subdivision;
   const double sigma = std::sqrt(std::max(1e-6, double{sigma_pixels} * sigma_pixels - spread * bin * bin));
-  radius_ = static_cast<int>(std::ceil(5 * sigma * subdivision));
+  radius_ = static_cast<int>(std::ceil(kFilterReach * sigma * subdivision));
   const auto cumulative = [&](double x) { return 0.5 * std::erf(x / (sigma * std::sqrt(2.0))); };
   for (int t = -radius_; t < subdivision + radius_; ++t) {
     const double x = (t + 0.5) * bin;  // centre of the bin, in pixels from the left side of the pixel
     taps_.push_back(static_cast<float>(cumulative(1 - x) - cumulative(-x)));
+  }
+  // Each bin gives all of its mass: over the pixels it reaches, its shares are taps a subdivision apart.
+  for (int phase = 0; phase < subdivision; ++phase) {
+    double sum = 0;
+    for (std::size_t t = phase; t < taps_.size(); t += subdivision) sum += taps_[t];
+    for (std::size_t t = phase; t < taps_.size(); t += subdivision) taps_[t] = static_cast<float>(taps_[t] / sum);
   }
 }
 
@@ -69,31 +84,38 @@ namespace {
 
 /// Largest filter: 16 pixels and five deviations on either side, at the largest roughness and resolution (see PyramidOptions).
 constexpr int kMaxColumns = 2048;
+/// Columns filtered at once; their sums stay in registers.
+constexpr int kStrip = 8;
 
-/// rows[p][c] = sum over t of taps[t] * bins[p * step + t][c], for 16 rows of `columns` values.
+/// rows[p][c] = sum over t of taps[t] * bins[p * step + t][c], for 16 rows of `columns` values, a multiple of kStrip.
 GLINT_MULTIVERSION void filterRows(const float* bins, int pitch, int step, const float* taps, int tap_count, int columns,
                                    float* rows) {
-  for (int p = 0; p < kBlockSize; ++p) {
-    float* out = rows + static_cast<std::size_t>(p) * columns;
-    std::fill_n(out, columns, 0.0f);
-    for (int t = 0; t < tap_count; ++t) {
-      const float* in = bins + static_cast<std::ptrdiff_t>(p * step + t) * pitch;
-      const float tap = taps[t];
-      for (int c = 0; c < columns; ++c) out[c] += tap * in[c];
+  for (int c = 0; c < columns; c += kStrip) {
+    for (int p = 0; p < kBlockSize; ++p) {
+      const float* in = bins + static_cast<std::ptrdiff_t>(p * step) * pitch + c;
+      float sum[kStrip] = {};
+      for (int t = 0; t < tap_count; ++t, in += pitch)
+        for (int k = 0; k < kStrip; ++k) sum[k] += taps[t] * in[k];
+      std::copy_n(sum, kStrip, rows + static_cast<std::size_t>(p) * columns + c);
     }
   }
 }
 
-/// pixels[p][x] = sum over t of taps[t] * rows[p][x * step + t]; works on the transpose, so that the inner loop is contiguous.
+/// pixels[p][x] = sum over t of taps[t] * rows[p][x * step + t]. Every step-th value of a row is gathered first, so that the sums
+/// run over neighbours.
 GLINT_MULTIVERSION void filterColumns(const float* rows, int columns, int step, const float* taps, int tap_count, float* pixels) {
-  static thread_local float transposed[kMaxColumns][kBlockSize];
-  for (int p = 0; p < kBlockSize; ++p)
-    for (int c = 0; c < columns; ++c) transposed[c][p] = rows[static_cast<std::size_t>(p) * columns + c];
-  for (int x = 0; x < kBlockSize; ++x) {
+  float phases[kMaxColumns + kBlockSize];
+  const int phase_size = (columns + step - 1) / step;
+  for (int p = 0; p < kBlockSize; ++p) {
+    const float* row = rows + static_cast<std::size_t>(p) * columns;
+    for (int phase = 0; phase < step; ++phase)
+      for (int k = 0, c = phase; c < columns; ++k, c += step) phases[phase * phase_size + k] = row[c];
     float sum[kBlockSize] = {};
-    for (int t = 0; t < tap_count; ++t)
-      for (int p = 0; p < kBlockSize; ++p) sum[p] += taps[t] * transposed[x * step + t][p];
-    for (int p = 0; p < kBlockSize; ++p) pixels[p * kBlockSize + x] = sum[p];
+    for (int t = 0; t < tap_count; ++t) {
+      const float* in = phases + t % step * phase_size + t / step;
+      for (int x = 0; x < kBlockSize; ++x) sum[x] += taps[t] * in[x];
+    }
+    std::copy_n(sum, kBlockSize, pixels + p * kBlockSize);
   }
 }
 
@@ -101,7 +123,7 @@ GLINT_MULTIVERSION void filterColumns(const float* rows, int columns, int step, 
 
 void PixelFilter::filterBlock(const float* bins, int pitch, float* pixels) const {
   const int tap_count = static_cast<int>(taps_.size());
-  const int columns = (kBlockSize - 1) * subdivision_ + tap_count;
+  const int columns = ((kBlockSize - 1) * subdivision_ + tap_count + kStrip - 1) / kStrip * kStrip;
   float rows[kBlockSize * kMaxColumns];
   const float* corner = bins - static_cast<std::ptrdiff_t>(radius_) * pitch - radius_;
   filterRows(corner, pitch, subdivision_, taps_.data(), tap_count, columns, rows);

@@ -4,13 +4,15 @@
 #include <cstdint>
 #include <vector>
 
+#include "glint/model/ndf_pyramid.h"
+
 namespace glint::bake {
 
 /// A grid of bins over the square [-1, 1]^2 of directions, finer than the pixels of an NDF image by an integer factor.
 ///
 /// A facet is added with quadratic B-spline weights, 3x3 bins: these keep its mass and mean, and spread it by exactly a quarter of
 /// a squared bin wherever it lies, which the filter that makes pixels takes off again (`PixelFilter`). Bins are kept all zero
-/// between images; only those of touched blocks are ever read or cleared.
+/// between images; only those of touched tiles are ever cleared.
 class DirectionBins {
  public:
   /// @param resolution  pixels along each axis of the image
@@ -25,12 +27,13 @@ class DirectionBins {
   int pitch() const { return pitch_; }
   /// Bin (0, 0) of the square; rows and columns down to -margin may be read.
   float* origin() { return bins_.data() + static_cast<std::size_t>(margin_) * pitch_ + margin_; }
-  int blocksPerAxis() const { return blocks_; }
-  /// One flag for each angular block of the image: the centre of a splat fell into it.
-  std::vector<std::uint8_t>& touched() { return touched_; }
-  const std::vector<std::uint8_t>& touched() const { return touched_; }
-  /// Whether a block within `distance` blocks was touched.
-  bool touchedNear(int block, int distance) const;
+  /// Bins along each side of a tile: a quarter of an angular block.
+  int tileSize() const { return kBlockSize / 4 * subdivision_; }
+  int tilesPerAxis() const { return tiles_; }
+  /// One flag for each tile: the centre of a splat fell into it.
+  std::uint8_t* touched() { return touched_.data(); }
+  /// Whether anything was added within `distance` bins of an angular block.
+  bool touchedNear(int block_x, int block_y, int distance) const;
 
   /// Zeroes what was added, and the flags.
   void clear();
@@ -38,16 +41,17 @@ class DirectionBins {
   void addTo(DirectionBins& other) const;
 
  private:
-  struct Region {
-    int x0, x1, y0, y1;
-  };
-  /// Bins of a block; blocks at the border also own the margin beside them.
-  Region region(int block) const;
+  /// Calls visitor(first bin, count) for every row of bins that may hold something; each bin once.
+  template <class Visitor>
+  void forEachTouchedRow(Visitor&& visitor) const;
 
-  int resolution_, blocks_, subdivision_, margin_, pitch_;
+  int resolution_, subdivision_, tiles_, margin_, pitch_;
   std::vector<float> bins_;
   std::vector<std::uint8_t> touched_;
 };
+
+/// Filters are cut at this many deviations, 6e-5 of the mass on either axis, and normalised.
+inline constexpr double kFilterReach = 4;
 
 /// Blurs bins by the intrinsic roughness and averages over pixels, a separable filter.
 class PixelFilter {
@@ -64,7 +68,7 @@ class PixelFilter {
 
  private:
   int subdivision_, radius_;
-  std::vector<float> taps_;
+  std::vector<float> taps_;  // taps_[t]: share of the bin t - radius from the left side of the pixel, t < subdivision + 2 radius
 };
 
 /// Bins per pixel side that keep the error of binning small for a lobe of the given deviation.

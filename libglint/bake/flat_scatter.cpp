@@ -17,9 +17,9 @@ struct Target {
   float* bins;
   std::uint8_t* touched;
   int pitch;
-  int blocks;
-  float bins_per_unit;    // bins in half the square
-  float blocks_per_unit;  // angular blocks in half the square
+  int tiles;
+  float bins_per_unit;   // bins in half the square
+  float tiles_per_unit;  // tiles in half the square
 };
 
 using Float4 = float __attribute__((vector_size(16), aligned(4), may_alias));
@@ -27,16 +27,16 @@ using Float4 = float __attribute__((vector_size(16), aligned(4), may_alias));
 /// Adds `count` <= kChunk neighbouring texels with weights row_weight * weights[k].
 GLINT_MULTIVERSION void splat(const Vec2* normals, const float* weights, float row_weight, int count, const Target& target) {
   float fx[kChunk], fy[kChunk];
-  std::int32_t offset[kChunk], block[kChunk];
+  std::int32_t offset[kChunk], tile[kChunk];
   for (int k = 0; k < count; ++k) {
     const float x = (normals[k].x + 1) * target.bins_per_unit, y = (normals[k].y + 1) * target.bins_per_unit;
     const int ix = static_cast<int>(x), iy = static_cast<int>(y);
     fx[k] = x - static_cast<float>(ix);
     fy[k] = y - static_cast<float>(iy);
     offset[k] = (iy - 1) * target.pitch + ix - 1;
-    const int bx = std::min(static_cast<int>((normals[k].x + 1) * target.blocks_per_unit), target.blocks - 1);
-    const int by = std::min(static_cast<int>((normals[k].y + 1) * target.blocks_per_unit), target.blocks - 1);
-    block[k] = by * target.blocks + bx;
+    const int tx = std::min(static_cast<int>((normals[k].x + 1) * target.tiles_per_unit), target.tiles - 1);
+    const int ty = std::min(static_cast<int>((normals[k].y + 1) * target.tiles_per_unit), target.tiles - 1);
+    tile[k] = ty * target.tiles + tx;
   }
   for (int k = 0; k < count; ++k) {
     const float w = row_weight * weights[k];
@@ -50,7 +50,7 @@ GLINT_MULTIVERSION void splat(const Vec2* normals, const float* weights, float r
     *row0 += across * (0.5f * ry * ry);
     *row1 += across * (0.5f + y * ry);
     *row2 += across * (0.5f * y * y);
-    target.touched[block[k]] = 1;
+    target.touched[tile[k]] = 1;
   }
 }
 
@@ -80,8 +80,8 @@ std::vector<float> gaussianWeights(Range range, float centre, float sigma) {
 
 Target targetOf(DirectionBins& bins) {
   const float half = 0.5f * static_cast<float>(bins.resolution());
-  return {bins.origin(), bins.touched().data(), bins.pitch(), bins.blocksPerAxis(), half * static_cast<float>(bins.subdivision()),
-          half / static_cast<float>(kBlockSize)};
+  return {bins.origin(), bins.touched(), bins.pitch(), bins.tilesPerAxis(), half * static_cast<float>(bins.subdivision()),
+          0.5f * static_cast<float>(bins.tilesPerAxis())};
 }
 
 }  // namespace

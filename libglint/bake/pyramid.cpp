@@ -52,8 +52,7 @@ GLINT_MULTIVERSION void toHalf(const float* from, float scale, std::uint16_t* to
 class ImagePacker {
  public:
   ImagePacker(const PyramidShape& shape, BlockPrecision precision, float value_scale, const PixelFilter& filter, int subdivision)
-      : shape_(shape), precision_(precision), filter_(filter), subdivision_(subdivision),
-        dilation_((filter.radius() + 1 + kBlockSize * subdivision - 1) / (kBlockSize * subdivision)) {
+      : shape_(shape), precision_(precision), filter_(filter), subdivision_(subdivision) {
     const float pixels_per_unit = 0.5f * static_cast<float>(shape.resolution);
     to_stored_ = pixels_per_unit * pixels_per_unit / value_scale;
     value_scale_ = value_scale;
@@ -64,7 +63,7 @@ class ImagePacker {
     image.mask.assign(shape_.maskWords(), 0);
     const int blocks = shape_.blocksPerAxis(), size = kBlockSize * subdivision_;
     for (int b = 0; b < blocks * blocks; ++b) {
-      if (!bins.touchedNear(b, dilation_)) continue;
+      if (!bins.touchedNear(b % blocks, b / blocks, filter_.radius() + 1)) continue;
       float pixels[kBlockPixels];
       filter_.filterBlock(bins.origin() + static_cast<std::ptrdiff_t>(b / blocks) * size * bins.pitch() + b % blocks * size, bins.pitch(), pixels);
       float mass = 0;
@@ -95,7 +94,6 @@ class ImagePacker {
   BlockPrecision precision_;
   const PixelFilter& filter_;
   int subdivision_;
-  int dilation_;  // blocks
   float to_stored_;
   float value_scale_;
 };
@@ -165,13 +163,13 @@ std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const Pyra
 void unpackBins(const BlockBins& sparse, DirectionBins& bins) {
   constexpr int kTile = BlockBins::kTile;
   const int tiles = bins.resolution() * bins.subdivision() / kTile + 2;  // with the margin
-  const int tiles_per_block = kBlockSize * bins.subdivision() / kTile;
   for (std::size_t k = 0; k < sparse.tiles().size(); ++k) {
     const int tx = sparse.tiles()[k] % tiles - 1, ty = sparse.tiles()[k] / tiles - 1;
     float* corner = bins.origin() + static_cast<std::ptrdiff_t>(ty) * kTile * bins.pitch() + tx * kTile;
     for (int y = 0; y < kTile; ++y) std::copy_n(sparse.values(k) + y * kTile, kTile, corner + static_cast<std::ptrdiff_t>(y) * bins.pitch());
-    const int bx = std::clamp(tx / tiles_per_block, 0, bins.blocksPerAxis() - 1), by = std::clamp(ty / tiles_per_block, 0, bins.blocksPerAxis() - 1);
-    bins.touched()[by * bins.blocksPerAxis() + bx] = 1;
+    const auto touchedTile = [&](int tile) { return std::clamp(tile * kTile / bins.tileSize(), 0, bins.tilesPerAxis() - 1); };
+    for (const int x : {touchedTile(tx), touchedTile(tx + 1)})  // tiles here may be larger than those flags
+      for (const int y : {touchedTile(ty), touchedTile(ty + 1)}) bins.touched()[y * bins.tilesPerAxis() + x] = 1;
   }
 }
 
@@ -245,7 +243,7 @@ NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options,
   const float sigma_pixels = 0.5f * options.sigma_r * static_cast<float>(options.resolution);
   const int subdivision = subdivisionFor(sigma_pixels);
   const PixelFilter filter(sigma_pixels, subdivision, 0.25f);
-  const int margin = std::max(filter.radius(), BlockBins::kTile) + 2;
+  const int margin = std::max(filter.radius(), BlockBins::kTile) + 16;  // filters read up to two strips past their reach
   const ImagePacker packer(pyramid.shape, options.precision, pyramid.value_scale, filter, subdivision);
   auto images = options.surface == Surface::flat ? buildFlat(map, pyramid.shape, packer, subdivision, margin, progress)
                                                  : buildSmooth(map, pyramid.shape, packer, subdivision, margin, progress);

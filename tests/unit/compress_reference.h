@@ -1,0 +1,145 @@
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <random>
+#include <vector>
+
+#include <Eigen/Dense>
+
+#include "glint/model/compressed_ndf.h"
+
+namespace glint::test {
+
+/// An IEEE half, by its definition.
+inline double decodeHalf(std::uint16_t bits) {
+  const int exponent = (bits >> 10) & 31;
+  const double fraction = (bits & 1023) / 1024.0;
+  const double magnitude = exponent == 0 ? std::ldexp(fraction, -14) : std::ldexp(1 + fraction, exponent - 15);
+  return bits >> 15 ? -magnitude : magnitude;
+}
+
+/// Element of an array that is stored as the first type that applies.
+inline double basisElement(const CompressedNdf& c, std::uint64_t i) {
+  if (c.coefficient_type == CoefficientType::f32) return static_cast<const float*>(c.basis)[i];
+  if (c.method == CompressionMethod::pca) return static_cast<const std::int32_t*>(c.basis)[i];
+  return static_cast<const std::int16_t*>(c.basis)[i];
+}
+
+inline double coefficientElement(const CompressedNdf& c, std::uint64_t i) {
+  if (c.coefficient_type == CoefficientType::f32) return static_cast<const float*>(c.coefficients)[i];
+  if (c.coefficient_type == CoefficientType::f16) return decodeHalf(static_cast<const std::uint16_t*>(c.coefficients)[i]);
+  return static_cast<const std::int8_t*>(c.coefficients)[i];
+}
+
+/// Value of basis column k at a pixel, in stored units: differences of the prefix sums.
+inline double basisValue(const CompressedNdf& c, const NdfCluster& cluster, int k, int x, int y) {
+  const auto along = [&](std::uint64_t first, int columns, int column, int i) {
+    const double before = i > 0 ? basisElement(c, first + static_cast<std::uint64_t>(i - 1) * columns + column) : 0;
+    return basisElement(c, first + static_cast<std::uint64_t>(i) * columns + column) - before;
+  };
+  const int rx = cluster.rank_x;
+  const std::uint64_t y_first = cluster.first_basis + static_cast<std::uint64_t>(kBlockSize) * rx;
+  if (c.method == CompressionMethod::cp) return along(cluster.first_basis, rx, k, x) * along(y_first, rx, k, y);
+  if (c.method == CompressionMethod::tucker)
+    return along(cluster.first_basis, rx, k / cluster.rank_y, x) * along(y_first, cluster.rank_y, k % cluster.rank_y, y);
+  const auto sum = [&](int i, int j) {
+    return i < 0 || j < 0 ? 0.0 : basisElement(c, cluster.first_basis + static_cast<std::uint64_t>(j * kBlockSize + i) * rx + k);
+  };
+  return sum(x, y) - sum(x - 1, y) - sum(x, y - 1) + sum(x - 1, y - 1);
+}
+
+/// All pixels of an image, [resolution][resolution], densities. Plain loops after the comments of compressed_ndf.h.
+inline std::vector<double> decodeImage(const CompressedNdf& c, std::uint32_t image) {
+  const int n = c.shape.resolution;
+  const int blocks = c.shape.blocksPerAxis();
+  std::vector<double> pixels(static_cast<std::size_t>(n) * n, 0.0);
+  const int slot = c.image_slots[image];
+  for (int b = 0; b < blocks * blocks; ++b) {
+    const std::size_t index = static_cast<std::size_t>(c.image_regions[image]) * blocks * blocks + b;
+    const std::uint64_t* mask = c.masks.data() + index * c.words_per_cluster;
+    if (!(mask[slot / 64] >> (slot % 64) & 1)) continue;
+    int slice = 0;
+    for (int s = 0; s < slot; ++s) slice += mask[s / 64] >> (s % 64) & 1;
+    const NdfCluster& cluster = c.clusters[index];
+    const int columns = c.method == CompressionMethod::tucker ? cluster.rank_x * cluster.rank_y : cluster.rank_x;
+    for (int k = 0; k < columns; ++k) {
+      const double weight = c.image_scales[image] * c.scales[cluster.first_scale + k] *
+                            coefficientElement(c, cluster.first_coefficient + static_cast<std::uint64_t>(slice) * columns + k);
+      for (int y = 0; y < kBlockSize; ++y)
+        for (int x = 0; x < kBlockSize; ++x)
+          pixels[(b / blocks * kBlockSize + y) * n + b % blocks * kBlockSize + x] += weight * basisValue(c, cluster, k, x, y);
+    }
+  }
+  return pixels;
+}
+
+/// The same from the pyramid itself (f32 pixels).
+inline std::vector<double> storedImage(const NdfPyramid& p, int level, std::size_t image) {
+  const int n = p.shape.resolution;
+  const int blocks = p.shape.blocksPerAxis();
+  const PyramidLevel& l = p.levels[level];
+  std::vector<double> pixels(static_cast<std::size_t>(n) * n, 0.0);
+  std::uint64_t block = l.first_block[image];
+  for (int b = 0; b < blocks * blocks; ++b) {
+    if (!(l.masks[image * p.shape.maskWords() + b / 64] >> (b % 64) & 1)) continue;
+    const float* source = static_cast<const float*>(l.pixels) + block++ * kBlockPixels;
+    for (int i = 0; i < kBlockPixels; ++i)
+      pixels[(b / blocks * kBlockSize + i / kBlockSize) * n + b % blocks * kBlockSize + i % kBlockSize] =
+          static_cast<double>(p.value_scale) * source[i];
+  }
+  return pixels;
+}
+
+/// Textbook alternating least squares in double, with the three factors updated in turn from random starts.
+/// @param slices  [count][stride]
+/// @return squared error
+inline double referenceCp(const float* slices, int count, int stride, int rank, double min_improvement, int max_sweeps,
+                          unsigned seed) {
+  using Eigen::MatrixXd;
+  std::mt19937 random(seed);
+  std::normal_distribution<double> gaussian;
+  const auto randomMatrix = [&](int rows) {
+    MatrixXd m(rows, rank);
+    for (int i = 0; i < m.size(); ++i) m.data()[i] = gaussian(random);
+    return m;
+  };
+  MatrixXd x = randomMatrix(kBlockSize), y = randomMatrix(kBlockSize), z = randomMatrix(count);
+  const auto value = [&](int s, int j, int i) { return static_cast<double>(slices[s * stride + j * kBlockSize + i]); };
+  const auto solve = [&](const MatrixXd& a, const MatrixXd& b, const MatrixXd& products) -> MatrixXd {
+    MatrixXd gram = (a.transpose() * a).cwiseProduct(b.transpose() * b);
+    gram.diagonal().array() += 1e-6 * gram.trace() / rank;
+    return gram.ldlt().solve(products.transpose()).transpose();
+  };
+  double energy = 0;
+  for (int s = 0; s < count; ++s)
+    for (int p = 0; p < kBlockPixels; ++p) energy += static_cast<double>(slices[s * stride + p]) * slices[s * stride + p];
+  double error = energy;
+  for (int sweep = 0; sweep < max_sweeps; ++sweep) {
+    MatrixXd mx = MatrixXd::Zero(kBlockSize, rank), my = mx, mz = MatrixXd::Zero(count, rank);
+    const auto accumulate = [&](auto add) {
+      for (int s = 0; s < count; ++s)
+        for (int j = 0; j < kBlockSize; ++j)
+          for (int i = 0; i < kBlockSize; ++i) add(s, j, i, value(s, j, i));
+    };
+    accumulate([&](int s, int j, int i, double v) { mx.row(i) += v * y.row(j).cwiseProduct(z.row(s)); });
+    x = solve(y, z, mx);
+    accumulate([&](int s, int j, int i, double v) { my.row(j) += v * x.row(i).cwiseProduct(z.row(s)); });
+    y = solve(x, z, my);
+    accumulate([&](int s, int j, int i, double v) { mz.row(s) += v * x.row(i).cwiseProduct(y.row(j)); });
+    z = solve(x, y, mz);
+    double next = 0;
+    accumulate([&](int s, int j, int i, double v) {
+      const double e = v - x.row(i).cwiseProduct(y.row(j)).dot(z.row(s));
+      next += e * e;
+    });
+    const bool done = std::sqrt(error / energy) - std::sqrt(next / energy) < min_improvement;
+    error = next;
+    if (done) break;
+  }
+  return error;
+}
+
+}  // namespace glint::test

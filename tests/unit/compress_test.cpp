@@ -1,0 +1,387 @@
+#include "glint/bake/compress.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "glint/model/error.h"
+#include "unit/compress_fixture.h"
+#include "unit/compress_reference.h"
+
+namespace glint::bake {
+namespace {
+
+using test::TestPyramid;
+
+constexpr CompressionMethod kMethods[] = {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca};
+constexpr CoefficientType kTypes[] = {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32};
+
+// Decoding in double against sums in float over 256 pixels.
+constexpr double kFloatError = 1e-5;
+
+const TestPyramid& noise() {
+  static const TestPyramid pyramid = test::makePyramid(test::isotropicNoise(128, 0.2f, 1), test::makeShape(128, 64, 16, 3));
+  return pyramid;
+}
+
+const TestPyramid& flakes() {
+  static const TestPyramid pyramid = test::makePyramid(test::flakes(128, 5, 24, 2), test::makeShape(128, 64, 16, 3));
+  return pyramid;
+}
+
+CompressionOptions options(CompressionMethod method, CoefficientType type = CoefficientType::i8, int rank = 16, int regions = 2) {
+  CompressionOptions o;
+  o.method = method;
+  o.coefficient_type = type;
+  o.rank = rank;
+  o.regions = regions;
+  return o;
+}
+
+struct Measured {
+  std::vector<double> levels;
+  double total = 0;
+  double worst_integral = 0;  // |integral - 1| of any image
+};
+
+/// Error and energy of the decoded data, by the slow decoder.
+Measured measure(const NdfPyramid& pyramid, const CompressedNdf& compressed) {
+  Measured result;
+  double errors = 0, energies = 0;
+  for (int l = 0; l < pyramid.shape.level_count; ++l) {
+    double error = 0, energy = 0;
+    for (std::size_t i = 0; i < pyramid.shape.levels[l].imageCount(); ++i) {
+      const auto expected = test::storedImage(pyramid, l, i);
+      const auto decoded = test::decodeImage(compressed, compressed.first_image[l] + static_cast<std::uint32_t>(i));
+      double integral = 0;
+      for (std::size_t p = 0; p < decoded.size(); ++p) {
+        error += (decoded[p] - expected[p]) * (decoded[p] - expected[p]);
+        energy += expected[p] * expected[p];
+        integral += decoded[p] * 4 / static_cast<double>(decoded.size());
+      }
+      result.worst_integral = std::max(result.worst_integral, std::abs(integral - 1));
+    }
+    result.levels.push_back(energy > 0 ? std::sqrt(error / energy) : 0);
+    errors += error;
+    energies += energy;
+  }
+  result.total = energies > 0 ? std::sqrt(errors / energies) : 0;
+  return result;
+}
+
+/// One level of one image per given block, in a single angular block (resolution 16).
+TestPyramid singleBlocks(const std::vector<std::vector<float>>& images) {
+  TestPyramid p;
+  p.shape = test::makeShape(static_cast<int>(images.size()) * 16, 16, 16, 1);
+  p.shape.height = 16;
+  p.shape.levels[0].rows = 1;
+  for (const auto& image : images) p.addImage(0, image);
+  return p;
+}
+
+TEST(Compress, ReportsTheErrorOfTheDecodedData) {
+  for (const auto method : kMethods) {
+    for (const auto type : kTypes) {
+      CompressionReport report;
+      const NdfPyramid pyramid = flakes().view();
+      const auto data = compressPyramid(pyramid, options(method, type), &report);
+      const Measured measured = measure(pyramid, data.view());
+      EXPECT_NEAR(report.total.rel_l2, measured.total, kFloatError + 1e-4 * measured.total);
+      for (std::size_t l = 0; l < report.levels.size(); ++l)
+        EXPECT_NEAR(report.levels[l].rel_l2, measured.levels[l], kFloatError + 1e-4 * measured.levels[l]);
+      EXPECT_GT(measured.total, 0);
+      EXPECT_LT(measured.total, 0.5);
+    }
+  }
+}
+
+TEST(Compress, MakesEveryImageIntegrateToOne) {
+  for (const auto method : kMethods) {
+    CompressionReport report;
+    const auto data = compressPyramid(noise().view(), options(method), &report);
+    EXPECT_EQ(report.unscaled_images, 0u);
+    EXPECT_LT(measure(noise().view(), data.view()).worst_integral, kFloatError);
+  }
+}
+
+TEST(Compress, ReportsTheBytesThatItStores) {
+  for (const auto method : kMethods) {
+    CompressionReport report;
+    const auto data = compressPyramid(noise().view(), options(method), &report);
+    EXPECT_EQ(report.basis_bytes, data.basis.size());
+    EXPECT_EQ(report.coefficient_bytes, data.coefficients.size() + 4 * data.scales.size());
+    EXPECT_EQ(report.total_bytes, data.basis.size() + data.coefficients.size() + 4 * data.scales.size() +
+                                      2 * data.image_regions.size() + 2 * data.image_slots.size() + 4 * data.image_scales.size() +
+                                      32 * data.clusters.size() + 8 * data.masks.size() + 4 * data.mask_ranks.size());
+    std::uint64_t slices = 0, clusters = 0;
+    for (const NdfCluster& c : data.clusters) slices += c.slice_count;
+    for (const std::uint64_t count : report.rank_histogram) clusters += count;
+    EXPECT_EQ(report.total.slices, slices);
+    EXPECT_EQ(clusters, static_cast<std::uint64_t>(std::count_if(data.clusters.begin(), data.clusters.end(),
+                                                                 [](const NdfCluster& c) { return c.slice_count > 0; })));
+  }
+}
+
+TEST(Compress, GivesTheSameBytesForAnyNumberOfThreads) {
+  for (const auto method : kMethods) {
+    for (const double tolerance : {0.0, 0.2}) {
+      auto o = options(method, CoefficientType::i8, 8);
+      o.tolerance = tolerance;
+      const auto compress = [&](std::size_t threads) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+        return compressPyramid(noise().view(), o);
+      };
+      const auto one = compress(1);
+      const auto many = compress(4);
+      EXPECT_EQ(one.basis, many.basis);
+      EXPECT_EQ(one.coefficients, many.coefficients);
+      EXPECT_EQ(one.scales, many.scales);
+      EXPECT_EQ(one.image_scales, many.image_scales);
+    }
+  }
+}
+
+TEST(Compress, MeetsAToleranceAndIsNotFarBelowIt) {
+  for (const auto method : kMethods) {
+    for (const double tolerance : {0.3, 0.15}) {
+      auto o = options(method);
+      o.tolerance = tolerance;
+      const auto data = compressPyramid(noise().view(), o);
+      const double error = measure(noise().view(), data.view()).total;
+      EXPECT_LE(error, tolerance * (1 + kFloatError));
+      EXPECT_GE(error, tolerance * 0.98);
+    }
+  }
+}
+
+TEST(Compress, StoresTheErrorOfFixedRanksInAThirdOfTheBytes) {
+  auto fixed = options(CompressionMethod::cp, CoefficientType::i8, 16, 8);
+  CompressionReport cp;
+  compressPyramid(noise().view(), fixed, &cp);
+  auto chosen = options(CompressionMethod::tucker, CoefficientType::i8, 16, 0);
+  chosen.tolerance = cp.total.rel_l2;
+  CompressionReport tucker;
+  compressPyramid(noise().view(), chosen, &tucker);
+  EXPECT_LE(tucker.total.rel_l2, cp.total.rel_l2);
+  EXPECT_LE(3 * tucker.total_bytes, cp.total_bytes);
+}
+
+TEST(Compress, SpendsFewerBytesOnALargerTolerance) {
+  std::uint64_t previous = std::numeric_limits<std::uint64_t>::max();
+  for (const double tolerance : {0.05, 0.1, 0.2, 0.4, 0.8}) {
+    auto o = options(CompressionMethod::tucker);
+    o.tolerance = tolerance;
+    CompressionReport report;
+    compressPyramid(flakes().view(), o, &report);
+    EXPECT_LT(report.total_bytes, previous);
+    previous = report.total_bytes;
+  }
+}
+
+TEST(Compress, NamesTheBestErrorWhereAToleranceCannotBeReached) {
+  auto o = options(CompressionMethod::tucker);
+  o.tolerance = 1e-6;
+  try {
+    compressPyramid(noise().view(), o);
+    FAIL() << "a tolerance below the rounding of 8 bits was met";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::failed);
+    EXPECT_NE(std::string(error.what()).find("least error is 0.00"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Compress, KeepsFullRankUpToTheRoundingOfTheType) {
+  const double limits[] = {0.02, 0.002, 1e-4};
+  for (std::size_t t = 0; t < std::size(kTypes); ++t) {
+    for (const auto method : {CompressionMethod::tucker, CompressionMethod::pca}) {
+      CompressionReport report;
+      compressPyramid(noise().view(), options(method, kTypes[t], 256), &report);
+      EXPECT_LT(report.total.rel_l2, limits[t]);
+    }
+  }
+}
+
+TEST(Compress, LeavesTheTailOfTheSingularValuesWithPca) {
+  // Rank k leaves what the singular values from k on hold: the reference is an SVD in double of the same blocks.
+  const TestPyramid& p = noise();
+  constexpr int kRank = 6;
+  double tail = 0, energy = 0;
+  for (int b = 0; b < p.shape.blocksPerImage(); ++b) {
+    std::vector<double> slices;
+    for (int l = 0; l < p.shape.level_count; ++l) {
+      for (std::size_t i = 0; i < p.shape.levels[l].imageCount(); ++i) {
+        const auto image = test::storedImage(p.view(), l, i);
+        for (int q = 0; q < kBlockPixels; ++q)
+          slices.push_back(image[(b / 4 * 16 + q / 16) * 64 + b % 4 * 16 + q % 16]);
+      }
+    }
+    const Eigen::Map<const Eigen::MatrixXd> matrix(slices.data(), kBlockPixels, slices.size() / kBlockPixels);
+    const Eigen::VectorXd values = Eigen::BDCSVD<Eigen::MatrixXd>(matrix).singularValues();
+    energy += values.squaredNorm();
+    tail += values.tail(values.size() - kRank).squaredNorm();
+  }
+  CompressionReport report;
+  compressPyramid(p.view(), options(CompressionMethod::pca, CoefficientType::f32, kRank, 1), &report);
+  // The images are scaled to integrate to 1 afterwards, which moves the error off its minimum.
+  EXPECT_NEAR(report.total.rel_l2 / std::sqrt(tail / energy), 1, 0.01);
+}
+
+TEST(Compress, ExactlyKeepsAnImageThatNeverChanges) {
+  std::vector<float> image(256);
+  for (int p = 0; p < 256; ++p) image[p] = static_cast<float>(1 + p % 16) * static_cast<float>(1 + p / 16) / 4624 * 16;
+  for (const int count : {1, 2, 40}) {
+    const TestPyramid pyramid = singleBlocks(std::vector<std::vector<float>>(count, image));
+    for (const auto method : kMethods) {
+      CompressionReport report;
+      const auto data = compressPyramid(pyramid.view(), options(method, CoefficientType::i8, 16, 1), &report);
+      EXPECT_EQ(data.clusters[0].rank_x, 1);
+      // The ramp 1..16 in integers up to 2047.
+      EXPECT_LT(report.total.rel_l2, 1e-3);
+    }
+  }
+}
+
+TEST(Compress, TakesSinglePixelsAndUniformImages) {
+  std::vector<float> pixel(256, 0.0f);
+  pixel[37] = 64;
+  const TestPyramid p = singleBlocks({pixel, std::vector<float>(256, 0.25f)});
+  for (const auto method : kMethods) {
+    for (const auto type : kTypes) {
+      CompressionReport report;
+      const auto data = compressPyramid(p.view(), options(method, type, 16, 1), &report);
+      EXPECT_LT(report.total.rel_l2, 1e-2);
+      for (const float scale : data.image_scales) EXPECT_NEAR(scale, 1, 0.02);
+    }
+  }
+}
+
+TEST(Compress, StaysFiniteOverAHugeDynamicRange) {
+  std::vector<std::vector<float>> images;
+  for (int i = 0; i < 24; ++i) {
+    std::vector<float> image(256);
+    for (int p = 0; p < 256; ++p) image[p] = std::exp2(static_cast<float>((i * 37 + p * 11) % 220 - 110));
+    images.push_back(image);
+  }
+  images.push_back(std::vector<float>(256, std::numeric_limits<float>::denorm_min()));
+  images.push_back(std::vector<float>(256, 0.0f));
+  const TestPyramid pyramid = singleBlocks(images);
+  for (const auto method : kMethods) {
+    for (const auto type : kTypes) {
+      CompressionReport report;
+      const auto data = compressPyramid(pyramid.view(), options(method, type, 32, 1), &report);
+      EXPECT_TRUE(std::isfinite(report.total.rel_l2));
+      for (const float scale : data.scales) EXPECT_TRUE(std::isfinite(scale));
+      for (const float scale : data.image_scales) EXPECT_TRUE(std::isfinite(scale));
+    }
+  }
+}
+
+TEST(Compress, TakesAPyramidOfZeros) {
+  const TestPyramid pyramid = singleBlocks({std::vector<float>(256, 0.0f), std::vector<float>(256, 0.0f)});
+  for (const auto method : kMethods) {
+    for (const double tolerance : {0.0, 0.1}) {
+      auto o = options(method, CoefficientType::i8, 16, 1);
+      o.tolerance = tolerance;
+      CompressionReport report;
+      const auto data = compressPyramid(pyramid.view(), o, &report);
+      EXPECT_EQ(data.clusters[0].slice_count, 0u);
+      EXPECT_EQ(report.unscaled_images, 2u);
+      EXPECT_EQ(report.total.rel_l2, 0);
+    }
+  }
+}
+
+TEST(Compress, PutsImagesInTheRegionOfTheirCentre) {
+  const auto data = compressPyramid(noise().view(), options(CompressionMethod::tucker, CoefficientType::i8, 4, 3));
+  const CompressedNdf c = data.view();
+  std::vector<int> next(9, 0);
+  for (int l = 0; l < c.shape.level_count; ++l) {
+    const PyramidGrid& grid = c.shape.levels[l];
+    for (int j = 0; j < grid.rows; ++j) {
+      for (int i = 0; i < grid.columns; ++i) {
+        const std::uint32_t image = c.first_image[l] + j * grid.columns + i;
+        const auto region = [&](int k) { return std::min(2, static_cast<int>((k + 0.5) * grid.stride * 3 / 128)); };
+        EXPECT_EQ(c.image_regions[image], region(j) * 3 + region(i));
+        EXPECT_EQ(c.image_slots[image], next[c.image_regions[image]]++);
+      }
+    }
+  }
+}
+
+TEST(Compress, StoresIntegersOfTwelveBits) {
+  for (const auto method : kMethods) {
+    const auto data = compressPyramid(noise().view(), options(method));
+    const CompressedNdf c = data.view();
+    int checked = 0;
+    for (const NdfCluster& cluster : c.clusters) {
+      const int columns = method == CompressionMethod::tucker ? 0 : cluster.rank_x;
+      for (int k = 0; k < columns; ++k, ++checked) {
+        double largest = 0;
+        for (int y = 0; y < kBlockSize; ++y)
+          for (int x = 0; x < kBlockSize; ++x) largest = std::max(largest, std::abs(test::basisValue(c, cluster, k, x, y)));
+        EXPECT_EQ(largest, method == CompressionMethod::cp ? 2047.0 * 2047.0 : 2047.0);
+      }
+    }
+    EXPECT_EQ(checked > 0, method != CompressionMethod::tucker);
+  }
+}
+
+TEST(Compress, ReportsProgressToTheEnd) {
+  std::size_t last = 0, whole = 0;
+  bool falling = false;
+  compressPyramid(noise().view(), options(CompressionMethod::pca), nullptr, [&](std::size_t done, std::size_t total) {
+    falling |= done < last;
+    last = done;
+    whole = total;
+  });
+  EXPECT_FALSE(falling);
+  EXPECT_GT(whole, 0u);
+  EXPECT_EQ(last, whole);
+}
+
+TEST(Compress, RefusesOptionsOutOfRange) {
+  const auto refuses = [](auto change) {
+    CompressionOptions o;
+    change(o);
+    try {
+      compressPyramid(noise().view(), o);
+    } catch (const Error& error) {
+      return error.code() == ErrorCode::usage;
+    }
+    return false;
+  };
+  EXPECT_TRUE(refuses([](auto& o) { o.rank = 0; }));
+  EXPECT_TRUE(refuses([](auto& o) { o.rank = 257; }));
+  EXPECT_TRUE(refuses([](auto& o) { o.tolerance = -0.1; }));
+  EXPECT_TRUE(refuses([](auto& o) { o.tolerance = 1; }));
+  EXPECT_TRUE(refuses([](auto& o) { o.tolerance = std::nan(""); }));
+  EXPECT_TRUE(refuses([](auto& o) { o.regions = 256; }));
+  EXPECT_TRUE(refuses([](auto& o) { o.max_iterations = 0; }));
+  EXPECT_FALSE(refuses([](auto&) {}));
+}
+
+TEST(Compress, RefusesPyramidsThatContradictThemselves) {
+  const auto refuses = [](auto change) {
+    TestPyramid broken = noise();
+    change(broken);
+    try {
+      compressPyramid(broken.view(), options(CompressionMethod::tucker));
+    } catch (const Error& error) {
+      return error.code() == ErrorCode::invalid_input;
+    }
+    return false;
+  };
+  EXPECT_TRUE(refuses([](auto& p) { p.masks[1].pop_back(); }));
+  EXPECT_TRUE(refuses([](auto& p) { p.first_block[0].pop_back(); }));
+  EXPECT_TRUE(refuses([](auto& p) { p.masks[0][3] ^= 1; }));
+  EXPECT_TRUE(refuses([](auto& p) { p.pixels[0][77] = std::nanf(""); }));
+  EXPECT_TRUE(refuses([](auto& p) { p.pixels[0][77] = std::numeric_limits<float>::infinity(); }));
+  EXPECT_TRUE(refuses([](auto& p) { p.shape.resolution = 60; }));
+  EXPECT_FALSE(refuses([](auto&) {}));
+}
+
+}  // namespace
+}  // namespace glint::bake
