@@ -24,6 +24,7 @@ constexpr std::array kRules = {
     Rule{"file.hdf5", error, invalid_input, "HDF5 can read the file's metadata and its checksums hold", kDamaged},
     Rule{"group.depth", error, invalid_input, "groups are nested at most 4 deep", kHostile},
     Rule{"group.size", error, invalid_input, "a group has at most 1024 links with names of at most 255 bytes", kHostile},
+    Rule{"text.utf8", error, invalid_input, "names and texts are UTF-8 without control characters", kHostile},
     Rule{"link.hard", error, invalid_input, "every link is a hard link", kHostile},
     Rule{"link.single", error, invalid_input, "every object has exactly one link", kHostile},
     Rule{"object.type", error, invalid_input, "every object is a group or a dataset", kHostile},

@@ -70,6 +70,27 @@ void checkSuperblock(const Mapping& mapping) {
   }
 }
 
+/// Whether a text can be shown: well-formed UTF-8 without control characters (a name could otherwise drive a terminal).
+bool isPlainText(std::string_view text) {
+  for (std::size_t k = 0; k < text.size();) {
+    const auto lead = static_cast<unsigned char>(text[k++]);
+    if (lead < 0x80) {
+      if ((lead < 0x20 && lead != '\n' && lead != '\t' && lead != '\r') || lead == 0x7f) return false;
+      continue;
+    }
+    const int more = lead >= 0xc2 && lead < 0xe0 ? 1 : lead >= 0xe0 && lead < 0xf0 ? 2 : lead >= 0xf0 && lead < 0xf5 ? 3 : 0;
+    if (more == 0) return false;
+    std::uint32_t code = lead & (0x3fu >> more);
+    for (int i = 0; i < more; ++i) {
+      if (k >= text.size() || (static_cast<unsigned char>(text[k]) & 0xc0u) != 0x80) return false;
+      code = code << 6 | (static_cast<unsigned char>(text[k++]) & 0x3fu);
+    }
+    constexpr std::uint32_t kSmallest[] = {0, 0x80, 0x800, 0x10000};
+    if (code < kSmallest[more] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000) || code < 0xa0) return false;
+  }
+  return true;
+}
+
 /// Names and kinds of the links of a group, collected by HDF5's iteration.
 struct Links {
   std::vector<std::pair<std::string, bool>> entries;  // name, whether hard
@@ -136,6 +157,7 @@ class StructureReader {
     for (const auto& [name, hard] : links.entries) {
       const std::string path = prefix + name;
       attempt([&] {
+        if (!isPlainText(name)) throwBroken("text.utf8", here, "has a link whose name is no plain text");
         if (!hard) throwBroken("link.hard", "/" + path, "is a soft, external or user-defined link");
         readObject(group, name, path, depth);
       });
@@ -234,6 +256,7 @@ class StructureReader {
   }
 
   void readAttribute(hid_t object_id, const std::string& object, const std::string& name, Attributes& attributes) {
+    if (!isPlainText(name)) throwBroken("text.utf8", object, "has an attribute whose name is no plain text");
     const std::string place = object + "@" + name;
     const hdf5::Handle attribute(H5Aopen(object_id, name.c_str(), H5P_DEFAULT), "cannot be opened", place);
     const hdf5::Handle type(H5Aget_type(attribute), "type cannot be read", place);
@@ -262,6 +285,7 @@ class StructureReader {
       if (is_text) {
         const char* chars = reinterpret_cast<const char*>(at);
         value.texts.emplace_back(chars, ::strnlen(chars, element_bytes));
+        if (!isPlainText(value.texts.back())) throwBroken("text.utf8", place, "is no plain text");
       } else {
         value.numbers.push_back(toDouble(value.type, at));
       }

@@ -1,4 +1,6 @@
+#ifndef H5_USE_110_API
 #define H5_USE_110_API
+#endif
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hdf5.h>
@@ -163,6 +165,11 @@ std::vector<Fixture> linkFixtures() {
               }),
       patched("group.size", Base::heights,
               [](const Patch& patch) { H5Lcreate_soft("/heights", patch.file(), std::string(300, 'x').c_str(), 0, 0); }),
+      patched("text.utf8", Base::heights, [](const Patch& patch) { patch.setText("generator", "tool \xff 1.0"); }),
+      patched("text.utf8", Base::heights, [](const Patch& patch) { patch.setText("generator", "\x1b[2J"); }),
+      patched("text.utf8", Base::heights, [](const Patch& patch) { patch.setInteger("\xc3(", 1); }),
+      patched("text.utf8", Base::heights,
+              [](const Patch& patch) { H5Gclose(H5Gcreate2(patch.file(), "\x1b[31m", 0, 0, 0)); }),
       patched("link.hard", Base::heights,
               [](const Patch& patch) {
                 H5Lmove(patch.file(), "heights", patch.file(), "other", 0, 0);
