@@ -463,6 +463,30 @@ TEST(FormatRules, EveryFailingFileIsNamedByItsRule) {
   }
 }
 
+TEST(FormatRules, NothingOfHdf5StaysOpen) {
+  const test::TempFolder folder;
+  const auto open_objects = [] { return H5Fget_obj_count(static_cast<hid_t>(H5F_OBJ_ALL), H5F_OBJ_ALL); };
+  const auto open_types = [] {
+    hsize_t count = 0;
+    H5Inmembers(H5I_DATATYPE, &count);
+    return count;
+  };
+  writeBase(folder / "good.glint", Base::heights);
+  const auto objects = open_objects();
+  const Asset asset = Asset::open(folder / "good.glint");
+  EXPECT_EQ(open_objects(), objects);
+  int number = 0;
+  for (const Fixture& fixture : allFixtures()) {
+    const fs::path path = folder / ("bad" + std::to_string(number++) + ".glint");
+    writeBase(path, fixture.base);
+    fixture.damage(path);
+    const auto before = open_types();
+    validateAsset(path);
+    EXPECT_EQ(open_objects(), objects) << fixture.rule;
+    EXPECT_EQ(open_types(), before) << fixture.rule;
+  }
+}
+
 TEST(FormatVersions, ANewerMinorIsReadWithAWarning) {
   const test::TempFolder folder;
   writeBase(folder / "a.glint", Base::heights);
