@@ -65,8 +65,9 @@ void checkSuperblock(const Mapping& mapping) {
   }
   const auto end = load<std::uint64_t>(mapping.data() + 28);
   if (end > mapping.size()) {
-    throwBroken("file.truncated", {},
-                "has " + std::to_string(mapping.size()) + " bytes of the " + std::to_string(end) + " that its superblock declares");
+    throwBroken(
+        "file.truncated", {},
+        "has " + std::to_string(mapping.size()) + " bytes of the " + std::to_string(end) + " that its superblock declares");
   }
 }
 
@@ -114,14 +115,22 @@ herr_t collectAttribute(hid_t, const char* name, const H5A_info_t*, void* data) 
 
 double toDouble(ElementType type, const std::byte* at) {
   switch (type) {
-    case ElementType::i8: return load<std::int8_t>(at);
-    case ElementType::i16: return load<std::int16_t>(at);
-    case ElementType::i32: return load<std::int32_t>(at);
-    case ElementType::u16: return load<std::uint16_t>(at);
-    case ElementType::u32: return load<std::uint32_t>(at);
-    case ElementType::u64: return static_cast<double>(load<std::uint64_t>(at));
-    case ElementType::f32: return load<float>(at);
-    default: return 0;
+    case ElementType::i8:
+      return load<std::int8_t>(at);
+    case ElementType::i16:
+      return load<std::int16_t>(at);
+    case ElementType::i32:
+      return load<std::int32_t>(at);
+    case ElementType::u16:
+      return load<std::uint16_t>(at);
+    case ElementType::u32:
+      return load<std::uint32_t>(at);
+    case ElementType::u64:
+      return static_cast<double>(load<std::uint64_t>(at));
+    case ElementType::f32:
+      return load<float>(at);
+    default:
+      return 0;
   }
 }
 
@@ -168,8 +177,9 @@ class StructureReader {
     const std::string object = "/" + path;
     H5O_info_t info;
     // Reads the object's header only: opening a virtual or external dataset might already touch other files.
-    hdf5::check(H5Oget_info_by_name2(group, name.c_str(), &info, H5O_INFO_BASIC | H5O_INFO_NUM_ATTRS | H5O_INFO_HDR, H5P_DEFAULT),
-                "cannot be read", object);
+    hdf5::check(
+        H5Oget_info_by_name2(group, name.c_str(), &info, H5O_INFO_BASIC | H5O_INFO_NUM_ATTRS | H5O_INFO_HDR, H5P_DEFAULT),
+        "cannot be read", object);
     if (info.rc != 1 || !seen_.insert(info.addr).second) throwBroken("link.single", object, "has several links");
     if (info.type == H5O_TYPE_GROUP) {
       if (depth >= kMaxDepth) throwBroken("group.depth", object, "is nested too deep");
@@ -312,7 +322,8 @@ hdf5::Handle openInHdf5(const std::filesystem::path& path, const struct stat& ma
   void* descriptor = nullptr;
   hdf5::check(H5Fget_vfd_handle(file, access, &descriptor), "has no descriptor", {});
   struct stat opened = {};
-  if (::fstat(*static_cast<int*>(descriptor), &opened) != 0 || opened.st_dev != mapped.st_dev || opened.st_ino != mapped.st_ino) {
+  if (::fstat(*static_cast<int*>(descriptor), &opened) != 0 || opened.st_dev != mapped.st_dev ||
+      opened.st_ino != mapped.st_ino) {
     throwBroken("file.readable", {}, "was replaced while it was being opened");
   }
   return file;
