@@ -44,6 +44,9 @@ herr_t keepDeepest(unsigned, const H5E_error2_t* entry, void* text) {
 }  // namespace
 
 LibraryScope::LibraryScope() : lock_(libraryMutex()) {
+  // HDF5 leaks internally on some damaged files and then complains on stderr when the program ends. Nothing of ours is open by
+  // then, so its exit handler has nothing to do. No effect if the program has started HDF5 before.
+  [[maybe_unused]] static const herr_t once = H5dont_atexit();
   H5Eget_auto2(H5E_DEFAULT, &print_, &print_data_);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   H5PLget_loading_state(&plugins_);

@@ -1,0 +1,252 @@
+#include "glint-info/summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+namespace glint::apps {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json summarizeNormals(const NormalMap& map) {
+  double tilt = 0;
+  double steepest = 0;
+  Vec2 low{1, 1};
+  Vec2 high{-1, -1};
+  double sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
+  for (const Vec2 n : map.normals) {
+    const double nz = std::sqrt(std::max(1e-12, 1.0 - dot(n, n)));
+    const double theta = std::acos(nz) * 180 / std::numbers::pi;
+    tilt += theta;
+    steepest = std::max(steepest, theta);
+    low = {std::min(low.x, n.x), std::min(low.y, n.y)};
+    high = {std::max(high.x, n.x), std::max(high.y, n.y)};
+    const double x = -n.x / nz;
+    const double y = -n.y / nz;
+    sx += x, sy += y, sxx += x * x, sxy += x * y, syy += y * y;
+  }
+  const auto count = static_cast<double>(map.normals.size());
+  return {{"mean_tilt_deg", tilt / count},
+          {"max_tilt_deg", steepest},
+          {"normal_range_x", {low.x, high.x}},
+          {"normal_range_y", {low.y, high.y}},
+          {"mean_slope", {sx / count, sy / count}},
+          {"slope_covariance_xx", sxx / count - sx / count * sx / count},
+          {"slope_covariance_xy", sxy / count - sx / count * sy / count},
+          {"slope_covariance_yy", syy / count - sy / count * sy / count},
+          {"bounds_levels", map.bounds_level_count}};
+}
+
+ordered_json summarizeHeights(const HeightMap& map) {
+  double sum = 0;
+  double squares = 0;
+  const auto [low, high] = std::minmax_element(map.heights.begin(), map.heights.end());
+  for (const float h : map.heights) sum += h, squares += static_cast<double>(h) * h;
+  const auto count = static_cast<double>(map.heights.size());
+  const double mean = sum / count;
+  return {{"min_texels", *low},
+          {"max_texels", *high},
+          {"mean_texels", mean},
+          {"deviation_texels", std::sqrt(std::max(0.0, squares / count - mean * mean))}};
+}
+
+ordered_json shapeProperties(const PyramidShape& shape) {
+  return {{"width", shape.width},
+          {"height", shape.height},
+          {"resolution", shape.resolution},
+          {"sigma_r", shape.sigma_r},
+          {"surface", shape.surface == Surface::flat ? "flat" : "smooth"},
+          {"boundary", shape.boundary == Boundary::wrap ? "wrap" : "clamp"},
+          {"levels", shape.level_count}};
+}
+
+ordered_json levelJson(const PyramidGrid& grid) {
+  return {{"stride_texels", grid.stride}, {"columns", grid.columns}, {"rows", grid.rows}};
+}
+
+ordered_json summarizePyramid(const NdfPyramid& pyramid) {
+  ordered_json levels = ordered_json::array();
+  std::uint64_t blocks = 0;
+  std::uint64_t places = 0;
+  for (int l = 0; l < pyramid.shape.level_count; ++l) {
+    const PyramidGrid& grid = pyramid.shape.levels[l];
+    const std::uint64_t level_blocks = pyramid.levels[l].block_means.size();
+    const std::uint64_t level_places = grid.imageCount() * static_cast<std::uint64_t>(pyramid.shape.blocksPerImage());
+    levels.push_back(levelJson(grid));
+    levels.back()["blocks"] = level_blocks;
+    levels.back()["occupied_share"] = static_cast<double>(level_blocks) / static_cast<double>(level_places);
+    blocks += level_blocks;
+    places += level_places;
+  }
+  return {{"blocks", blocks},
+          {"occupied_share", static_cast<double>(blocks) / static_cast<double>(places)},
+          {"levels", std::move(levels)}};
+}
+
+ordered_json summarizeCompressed(const CompressedNdf& ndf, const formats::AssetInfo& info) {
+  std::map<std::pair<int, int>, std::uint64_t> ranks;
+  std::uint64_t slices = 0;
+  std::uint64_t empty = 0;
+  for (const NdfCluster& cluster : ndf.clusters) {
+    slices += cluster.slice_count;
+    if (cluster.slice_count == 0) {
+      ++empty;
+    } else {
+      ++ranks[{cluster.rank_x, cluster.rank_y}];
+    }
+  }
+  ordered_json histogram = ordered_json::array();
+  for (const auto& [rank, clusters] : ranks) {
+    histogram.push_back({{"rank", std::to_string(rank.first) + (rank.second > 0 ? "x" + std::to_string(rank.second) : "")}, {"clusters", clusters}});
+  }
+  std::uint64_t bytes = 0;
+  for (const formats::DatasetInfo& dataset : info.datasets) bytes += dataset.size_bytes;
+  ordered_json levels = ordered_json::array();
+  for (int l = 0; l < ndf.shape.level_count; ++l) levels.push_back(levelJson(ndf.shape.levels[l]));
+  return {{"clusters", ndf.clusters.size()},
+          {"empty_clusters", empty},
+          {"slices", slices},
+          {"bytes_per_slice", slices == 0 ? 0.0 : static_cast<double>(bytes) / static_cast<double>(slices)},
+          {"ranks", std::move(histogram)},
+          {"levels", std::move(levels)}};
+}
+
+void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json& statistics) {
+  if (asset.kind() == "normals") {
+    const NormalMap& map = asset.normals();
+    properties = {{"width", map.width}, {"height", map.height}, {"texel_size_um", map.texel_size_um}};
+    statistics = summarizeNormals(map);
+  } else if (asset.kind() == "heights") {
+    const HeightMap& map = asset.heights();
+    properties = {{"width", map.width}, {"height", map.height}, {"texel_size_um", map.texel_size_um}};
+    statistics = summarizeHeights(map);
+  } else if (asset.kind() == "ndf-pyramid") {
+    const NdfPyramid& pyramid = asset.pyramid();
+    properties = shapeProperties(pyramid.shape);
+    properties["precision"] = pyramid.precision == BlockPrecision::f16 ? "f16" : "f32";
+    properties["value_scale"] = pyramid.value_scale;
+    statistics = summarizePyramid(pyramid);
+  } else if (asset.kind() == "ndf-cp") {
+    const CompressedNdf& ndf = asset.compressed();
+    properties = shapeProperties(ndf.shape);
+    constexpr const char* kMethods[] = {"cp", "tucker", "pca"};
+    constexpr const char* kTypes[] = {"i8", "f16", "f32"};
+    properties["method"] = kMethods[static_cast<int>(ndf.method)];
+    properties["coefficient_type"] = kTypes[static_cast<int>(ndf.coefficient_type)];
+    properties["regions"] = std::to_string(ndf.region_columns) + "x" + std::to_string(ndf.region_rows);
+    statistics = summarizeCompressed(ndf, asset.info());
+  }
+}
+
+std::string listed(const ordered_json& dims) {
+  std::string text;
+  for (const auto& n : dims) text += (text.empty() ? "" : " x ") + n.dump();
+  return text;
+}
+
+/// A number with the digits that people read, a text without quotes, or a list of those.
+std::string plain(const ordered_json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_number_float()) {
+    char digits[32];
+    std::snprintf(digits, sizeof digits, "%.5g", value.get<double>());
+    return digits;
+  }
+  if (!value.is_array()) return value.dump();
+  std::string text;
+  for (const auto& element : value) text += (text.empty() ? "" : ", ") + plain(element);
+  return text;
+}
+
+std::string row(const std::string& name, const std::string& value) {
+  return "  " + name + std::string(name.size() < 22 ? 22 - name.size() : 1, ' ') + value + "\n";
+}
+
+/// Rows of objects with the same keys, in columns under their names.
+std::string table(const ordered_json& rows) {
+  std::vector<std::vector<std::string>> cells(1);
+  for (const auto& [key, value] : rows.at(0).items()) cells[0].push_back(key);
+  for (const auto& entry : rows) {
+    cells.emplace_back();
+    for (const auto& [key, value] : entry.items()) cells.back().push_back(key == "dims" ? listed(value) : plain(value));
+  }
+  std::vector<std::size_t> widths(cells[0].size());
+  for (const auto& line : cells) {
+    for (std::size_t c = 0; c < widths.size(); ++c) widths[c] = std::max(widths[c], line[c].size());
+  }
+  std::string text;
+  for (const auto& line : cells) {
+    text += " ";
+    for (std::size_t c = 0; c < widths.size(); ++c) text += " " + line[c] + std::string(c + 1 < widths.size() ? widths[c] - line[c].size() + 1 : 0, ' ');
+    text += "\n";
+  }
+  return text;
+}
+
+std::string section(const char* title, const ordered_json& values) {
+  std::string text = std::string(title) + "\n";
+  std::string tables;
+  for (const auto& [key, value] : values.items()) {
+    if (value.is_array() && !value.empty() && value[0].is_object()) {
+      tables += key + "\n" + table(value);
+    } else {
+      text += row(key, plain(value));
+    }
+  }
+  return text + tables;
+}
+
+}  // namespace
+
+ordered_json summarize(const formats::Asset& asset) {
+  const formats::AssetInfo& info = asset.info();
+  ordered_json inputs = ordered_json::array();
+  for (const formats::InputRecord& input : info.provenance.inputs) inputs.push_back({{"name", input.name}, {"hash", input.hash_hex}});
+  ordered_json datasets = ordered_json::array();
+  for (const formats::DatasetInfo& dataset : info.datasets) {
+    datasets.push_back({{"path", dataset.path},
+                        {"type", dataset.type},
+                        {"dims", dataset.dims},
+                        {"bytes", dataset.size_bytes},
+                        {"offset", dataset.offset},
+                        {"hash", dataset.hash_hex},
+                        {"units", dataset.units},
+                        {"long_name", dataset.long_name}});
+  }
+  // The command is JSON, but the file may hold anything: then it is shown as text.
+  ordered_json command = ordered_json::parse(info.provenance.command_json, nullptr, false);
+  if (command.is_discarded()) command = info.provenance.command_json;
+  ordered_json properties = ordered_json::object();
+  ordered_json statistics = ordered_json::object();
+  addKind(asset, properties, statistics);
+  return {{"schema_version", kSummarySchemaVersion},
+          {"kind", asset.kind()},
+          {"format_version", std::to_string(info.format_major) + "." + std::to_string(info.format_minor)},
+          {"file_bytes", info.file_bytes},
+          {"provenance", {{"generator", info.provenance.generator}, {"command", std::move(command)}, {"inputs", std::move(inputs)}}},
+          {"properties", std::move(properties)},
+          {"statistics", std::move(statistics)},
+          {"datasets", std::move(datasets)}};
+}
+
+std::string summaryText(const std::string& path, const ordered_json& summary) {
+  std::string text = path + "\n";
+  text += row("kind", plain(summary["kind"])) + row("format_version", plain(summary["format_version"])) +
+          row("file_bytes", plain(summary["file_bytes"]));
+  text += section("properties", summary["properties"]) + section("statistics", summary["statistics"]);
+  const ordered_json& provenance = summary["provenance"];
+  text += "provenance\n" + row("generator", plain(provenance["generator"])) + row("command", provenance["command"].dump());
+  for (const auto& input : provenance["inputs"]) text += row("input", plain(input["hash"]) + "  " + plain(input["name"]));
+  ordered_json parts = ordered_json::array();
+  for (const auto& dataset : summary["datasets"]) {
+    parts.push_back({{"path", dataset["path"]}, {"type", dataset["type"]}, {"dims", dataset["dims"]}, {"bytes", dataset["bytes"]},
+                     {"long_name", dataset["long_name"]}});
+  }
+  return parts.empty() ? text : text + "datasets\n" + table(parts);
+}
+
+}  // namespace glint::apps

@@ -1,0 +1,154 @@
+"""Reads every golden file with h5py and formats/SPEC.md only, and checks densities against sums that must be 1."""
+
+import pathlib
+
+import h5py
+import numpy as np
+import pytest
+
+GOLDEN = pathlib.Path(__file__).parent.parent / "golden" / "v1.0"
+INTEGRAL_TOLERANCE = 1e-3  # of the format: SPEC.md, rule pyramid.integral
+
+
+def text(value):
+    return value.decode("utf-8")
+
+
+def open_asset(name, kind):
+    file = h5py.File(GOLDEN / name, "r")
+    assert text(file.attrs["glint_format"]) == "glint"
+    assert file.attrs["format_major"] == 1
+    assert len(file.attrs["required_features"]) == 0
+    assert text(file.attrs["kind"]) == kind
+    return file
+
+
+def bits(words):
+    """All bits of an array of u64, lowest first."""
+    return np.array([(int(word) >> b) & 1 for word in np.ravel(words) for b in range(64)])
+
+
+def pyramid_image(file, level, i, j):
+    resolution = file.attrs["resolution"]
+    per_axis = resolution // 16
+    group = file[f"level_{level:02d}"]
+    occupied = bits(group["masks"][j, i])
+    first = int(group["first_block"][j * file.attrs["level_columns"][level] + i])
+    image = np.zeros((resolution, resolution))
+    for b in range(per_axis**2):
+        if occupied[b]:
+            block = group["pixels"][first + occupied[:b].sum()].astype(np.float64)
+            y, x = 16 * (b // per_axis), 16 * (b % per_axis)
+            image[y : y + 16, x : x + 16] = file.attrs["value_scale"] * block
+    return image
+
+
+def basis_images(method, basis, cluster):
+    """[K][16][16], rows y."""
+    p, rx, ry = int(cluster["first_basis"]), int(cluster["rank_x"]), int(cluster["rank_y"])
+
+    def functions(at, rank):
+        sums = basis[at : at + 16 * rank].astype(np.float64).reshape(16, rank)
+        return np.diff(sums, axis=0, prepend=0)
+
+    if method == "cp":
+        x, y = functions(p, rx), functions(p + 16 * rx, rx)
+        return np.einsum("xk,yk->kyx", x, y)
+    if method == "tucker":
+        u, v = functions(p, rx), functions(p + 16 * rx, ry)
+        return np.einsum("xa,yb->abyx", u, v).reshape(rx * ry, 16, 16)
+    sums = basis[p : p + 256 * rx].astype(np.float64).reshape(16, 16, rx)
+    return np.diff(np.diff(sums, axis=0, prepend=0), axis=1, prepend=0).transpose(2, 0, 1)
+
+
+def compressed_image(file, m):
+    resolution = file.attrs["resolution"]
+    per_axis = resolution // 16
+    method = text(file.attrs["method"])
+    region, slot = int(file["image_regions"][m]), int(file["image_slots"][m])
+    image = np.zeros((resolution, resolution))
+    for b in range(per_axis**2):
+        word = int(file["masks"][region, b, slot // 64])
+        if not (word >> (slot % 64)) & 1:
+            continue
+        below = bin(word & ((1 << (slot % 64)) - 1)).count("1")
+        slice_index = int(file["mask_ranks"][region, b, slot // 64]) + below
+        cluster = file["clusters"][region, b]
+        images = basis_images(method, file["basis"], cluster)
+        count = len(images)
+        first = int(cluster["first_coefficient"]) + slice_index * count
+        coefficients = file["coefficients"][first : first + count].astype(np.float64)
+        scales = file["scales"][int(cluster["first_scale"]) : int(cluster["first_scale"]) + count].astype(np.float64)
+        y, x = 16 * (b // per_axis), 16 * (b % per_axis)
+        image[y : y + 16, x : x + 16] = np.tensordot(scales * coefficients, images, axes=1)
+    return image * file["image_scales"][m]
+
+
+def integral(image):
+    return image.sum() * (2 / len(image)) ** 2
+
+
+def test_normals():
+    file = open_asset("normals.glint", "normals")
+    normals = file["normals"][...]
+    height, width = file.attrs["height"], file.attrs["width"]
+    assert normals.shape == (height, width, 2)
+    assert (np.square(normals).sum(axis=-1) < 1).all()
+    assert normals[3, 5, 0] == np.float32(0.194547504)
+    for level in range(file.attrs["bounds_level_count"]):
+        bounds = file[f"bounds/level_{level:02d}"][...]
+        size = 2 ** (level + 1)
+        for j, i in np.ndindex(bounds.shape[:2]):
+            rows = np.arange(j * size, min((j + 1) * size, height) + 1) % height
+            columns = np.arange(i * size, min((i + 1) * size, width) + 1) % width
+            block = normals[np.ix_(rows, columns)].reshape(-1, 2)
+            assert np.array_equal(bounds[j, i], np.concatenate([block.min(axis=0), block.max(axis=0)]))
+
+
+def test_heights():
+    file = open_asset("heights.glint", "heights")
+    assert file["heights"].shape == (file.attrs["height"], file.attrs["width"])
+    assert file["heights"][3, 5] == np.float32(0.0129489619)
+
+
+def test_pyramid():
+    file = open_asset("ndf-pyramid.glint", "ndf-pyramid")
+    for level in range(file.attrs["level_count"]):
+        for j in range(file.attrs["level_rows"][level]):
+            for i in range(file.attrs["level_columns"][level]):
+                assert abs(integral(pyramid_image(file, level, i, j)) - 1) < INTEGRAL_TOLERANCE
+        group = file[f"level_{level:02d}"]
+        means = group["pixels"][...].astype(np.float64).mean(axis=(1, 2)) * file.attrs["value_scale"]
+        np.testing.assert_allclose(group["block_means"][...], means, rtol=1e-3)
+    assert pyramid_image(file, 0, 1, 1)[33, 30] == np.float32(4.3046875)
+    assert pyramid_image(file, 1, 0, 1)[29, 35] == np.float32(4.7890625)
+
+
+@pytest.mark.parametrize(
+    "name, values",
+    [
+        ("cp-i8", (3.49882889, 3.00286174, 2.97668457)),
+        ("tucker-f16", (4.83468008, 3.82640028, 3.10592413)),
+        ("pca-i8", (3.49882889, 3.0028615, 2.97668457)),
+        ("cp-f32", (3.49453115, 3.00421071, 2.98451018)),
+    ],
+)
+def test_compressed(name, values):
+    file = open_asset(f"ndf-cp-{name}.glint", "ndf-cp")
+    images = [compressed_image(file, m) for m in range(len(file["image_regions"]))]
+    for image in images:
+        assert abs(integral(image) - 1) < INTEGRAL_TOLERANCE
+    recorded = (images[5][33, 30], images[18][29, 35], images[20][32, 24])
+    np.testing.assert_allclose(recorded, values, rtol=1e-5)
+
+
+@pytest.mark.parametrize("path", sorted(GOLDEN.glob("*.glint")), ids=lambda path: path.stem)
+def test_every_dataset_says_what_it_is(path):
+    def check(name, item):
+        if isinstance(item, h5py.Dataset):
+            assert text(item.attrs["long_name"]) and text(item.attrs["units"]), name
+            assert len(item.attrs["xxh3_128"]) == 32, name
+            assert item.chunks is None and item.id.get_offset() % 64 == 0, name
+
+    with h5py.File(path, "r") as file:
+        file.visititems(check)

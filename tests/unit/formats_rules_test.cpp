@@ -1,0 +1,521 @@
+#define H5_USE_110_API
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <hdf5.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <set>
+
+#include "glint/formats/asset_reader.h"
+#include "glint/formats/asset_writer.h"
+#include "glint/formats/validate.h"
+#include "support/sample_assets.h"
+#include "support/temp_folder.h"
+
+namespace glint::formats {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+enum class Base { normals, heights, pyramid, compressed, compressed_f32 };
+
+void writeBase(const fs::path& path, Base base) {
+  const Provenance provenance = test::sampleProvenance();
+  switch (base) {
+    case Base::normals: return writeAsset(path, test::sampleNormals(32, 32).map, provenance);
+    case Base::heights: return writeAsset(path, test::sampleHeights(16, 16).map, provenance);
+    case Base::pyramid: return writeAsset(path, test::samplePyramid(32, BlockPrecision::f32).pyramid, provenance);
+    case Base::compressed:
+      return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
+    case Base::compressed_f32:
+      return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
+  }
+}
+
+/// An asset opened for changes with plain HDF5.
+class Patch {
+ public:
+  explicit Patch(const fs::path& path, hsize_t alignment = 64) {
+    const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+    H5Pset_libver_bounds(access, H5F_LIBVER_V18, H5F_LIBVER_V110);
+    H5Pset_alignment(access, 1, alignment);
+    H5Pset_small_data_block_size(access, 0);
+    file_ = H5Fopen(path.c_str(), H5F_ACC_RDWR, access);
+    H5Pclose(access);
+  }
+  ~Patch() { H5Fclose(file_); }
+  Patch(const Patch&) = delete;
+  Patch& operator=(const Patch&) = delete;
+
+  hid_t file() const { return file_; }
+
+  void remove(const char* object, const char* attribute) const { H5Adelete_by_name(file_, object, attribute, H5P_DEFAULT); }
+
+  void set(const char* object, const char* attribute, hid_t type, hid_t memory_type, const void* value, hsize_t count = 0) const {
+    if (H5Aexists_by_name(file_, object, attribute, H5P_DEFAULT) > 0) remove(object, attribute);
+    const hid_t space = count == 0 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &count, nullptr);
+    const hid_t id = H5Acreate_by_name(file_, object, attribute, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    H5Awrite(id, memory_type, value);
+    H5Aclose(id);
+    H5Sclose(space);
+  }
+  void setInteger(const char* attribute, int value) const { set("/", attribute, H5T_STD_I32LE, H5T_NATIVE_INT, &value); }
+  void setReal(const char* attribute, float value) const { set("/", attribute, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, &value); }
+  void setText(const char* attribute, const std::string& value, hsize_t count = 0) const {
+    const hid_t type = H5Tcopy(H5T_C_S1);
+    H5Tset_size(type, value.size());
+    set("/", attribute, type, type, value.data(), count);
+    H5Tclose(type);
+  }
+
+  /// Changes element `index` of a dataset of T.
+  template <class T>
+  void change(const char* path, std::size_t index, const std::function<void(T&)>& edit) const {
+    const hid_t dataset = H5Dopen2(file_, path, H5P_DEFAULT);
+    const hid_t type = H5Dget_type(dataset);
+    std::vector<T> values(H5Dget_storage_size(dataset) / sizeof(T));
+    H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
+    edit(values.at(index));
+    H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data());
+    H5Tclose(type);
+    H5Dclose(dataset);
+  }
+
+  /// Replaces a dataset by a new one made with other properties; `prepare` may change them.
+  void replace(const char* path, hid_t type, std::vector<hsize_t> dims, bool write,
+               const std::function<void(hid_t)>& prepare = [](hid_t) {}) const {
+    if (H5Lexists(file_, path, H5P_DEFAULT) > 0) H5Ldelete(file_, path, H5P_DEFAULT);
+    const hid_t properties = H5Pcreate(H5P_DATASET_CREATE);
+    prepare(properties);
+    const hid_t space = H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr);
+    const hid_t dataset = H5Dcreate2(file_, path, type, space, H5P_DEFAULT, properties, H5P_DEFAULT);
+    hsize_t size = 16;
+    for (const hsize_t n : dims) size *= n;
+    const std::vector<char> zeros(write ? size : 0);
+    if (write) H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, zeros.data());
+    for (const char* name : {"long_name", "units", "xxh3_128"}) {
+      const hid_t text = H5Tcopy(H5T_C_S1);
+      H5Tset_size(text, 32);
+      set(path, name, text, text, "00000000000000000000000000000000");
+      H5Tclose(text);
+    }
+    H5Dclose(dataset);
+    H5Sclose(space);
+    H5Pclose(properties);
+  }
+
+ private:
+  hid_t file_;
+};
+
+struct Fixture {
+  const char* rule;
+  Base base;
+  std::function<void(const fs::path&)> damage;
+  bool opens = false;  ///< whether readers still accept the file
+};
+
+Fixture patched(const char* rule, Base base, std::function<void(const Patch&)> change, bool opens = false) {
+  return {rule, base, [change](const fs::path& path) { change(Patch(path)); }, opens};
+}
+
+void overwrite(const fs::path& path, std::streamoff offset, const std::string& bytes) {
+  std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+  file.seekp(offset);
+  file << bytes;
+}
+
+constexpr hsize_t kSize = 16;  // of Base::heights
+
+/// One failing file for every rule, and several where there are several ways to break it.
+std::vector<Fixture> fileFixtures() {
+  return {
+      {"file.readable", Base::heights, [](const fs::path& path) { fs::remove(path); }},
+      {"file.readable", Base::heights, [](const fs::path& path) { fs::remove(path), fs::create_directory(path); }},
+      {"file.signature", Base::heights, [](const fs::path& path) { overwrite(path, 0, "GIF89a"); }},
+      {"file.signature", Base::heights, [](const fs::path& path) { fs::resize_file(path, 0); }},
+      {"file.superblock", Base::heights,
+       [](const fs::path& path) {
+         H5Fclose(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));  // HDF5's default: version 0
+       }},
+      {"file.truncated", Base::heights, [](const fs::path& path) { fs::resize_file(path, fs::file_size(path) - 1); }},
+      {"file.hdf5", Base::heights, [](const fs::path& path) { overwrite(path, 44, "damaged checksum"); }},
+      {"file.hdf5", Base::heights, [](const fs::path& path) { overwrite(path, 70, "damaged header"); }},
+  };
+}
+
+std::vector<Fixture> linkFixtures() {
+  return {
+      patched("group.depth", Base::heights,
+              [](const Patch& patch) {
+                std::string path;
+                for (int k = 0; k < 6; ++k) H5Gclose(H5Gcreate2(patch.file(), (path += "/g").c_str(), 0, 0, 0));
+              }),
+      patched("group.size", Base::heights,
+              [](const Patch& patch) {
+                for (int k = 0; k < 1100; ++k) H5Lcreate_soft("/heights", patch.file(), ("l" + std::to_string(k)).c_str(), 0, 0);
+              }),
+      patched("group.size", Base::heights,
+              [](const Patch& patch) { H5Lcreate_soft("/heights", patch.file(), std::string(300, 'x').c_str(), 0, 0); }),
+      patched("link.hard", Base::heights,
+              [](const Patch& patch) {
+                H5Lmove(patch.file(), "heights", patch.file(), "other", 0, 0);
+                H5Lcreate_soft("/other", patch.file(), "heights", 0, 0);
+              }),
+      patched("link.hard", Base::heights,
+              [](const Patch& patch) { H5Lcreate_external("/etc/passwd", "/", patch.file(), "secrets", 0, 0); }),
+      patched("link.hard", Base::normals,
+              [](const Patch& patch) {
+                H5Ldelete(patch.file(), "bounds", 0);
+                H5Lcreate_external("other.glint", "/bounds", patch.file(), "bounds", 0, 0);
+              }),
+      patched("link.single", Base::heights,
+              [](const Patch& patch) { H5Lcreate_hard(patch.file(), "heights", patch.file(), "again", 0, 0); }),
+      patched("link.single", Base::normals,
+              [](const Patch& patch) { H5Lcreate_hard(patch.file(), "bounds", patch.file(), "bounds/loop", 0, 0); }),
+      patched("object.type", Base::heights,
+              [](const Patch& patch) {
+                const hid_t type = H5Tcopy(H5T_STD_I32LE);
+                H5Tcommit2(patch.file(), "type", type, 0, 0, 0);
+                H5Tclose(type);
+              }),
+      patched("object.attributes", Base::heights,
+              [](const Patch& patch) {
+                for (int k = 0; k < 80; ++k) patch.setInteger(("a" + std::to_string(k)).c_str(), k);
+              }),
+  };
+}
+
+std::vector<Fixture> attributeFixtures() {
+  return {
+      patched("attribute.fixed", Base::heights,
+              [](const Patch& patch) {
+                const hid_t type = H5Tcopy(H5T_C_S1);
+                H5Tset_size(type, H5T_VARIABLE);
+                const char* text = "tool 1.0";
+                patch.set("/", "generator", type, type, &text);
+                H5Tclose(type);
+              }),
+      patched("attribute.size", Base::heights, [](const Patch& patch) { patch.setText("command", std::string(100000, ' ')); }),
+      patched("attribute.missing", Base::heights, [](const Patch& patch) { patch.remove("/", "width"); }),
+      patched("attribute.missing", Base::heights, [](const Patch& patch) { patch.remove("/", "glint_format"); }),
+      patched("attribute.missing", Base::heights, [](const Patch& patch) { patch.remove("/heights", "units"); }),
+      patched("attribute.missing", Base::heights, [](const Patch& patch) { patch.remove("/heights", "xxh3_128"); }),
+      patched("attribute.type", Base::heights,
+              [](const Patch& patch) {
+                const double width = kSize;
+                patch.set("/", "width", H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, &width);
+              }),
+      patched("attribute.type", Base::heights, [](const Patch& patch) { patch.setReal("width", kSize); }),
+      patched("attribute.type", Base::heights,
+              [](const Patch& patch) {
+                const int widths[2] = {kSize, kSize};
+                patch.set("/", "width", H5T_STD_I32LE, H5T_NATIVE_INT, widths, 2);
+              }),
+      patched("attribute.type", Base::pyramid,
+              [](const Patch& patch) {
+                const int columns[2] = {4, 2};
+                patch.set("/", "level_columns", H5T_STD_I32LE, H5T_NATIVE_INT, columns, 2);
+              }),
+      patched("attribute.value", Base::heights, [](const Patch& patch) { patch.setInteger("width", 0); }),
+      patched("attribute.value", Base::heights, [](const Patch& patch) { patch.setInteger("height", -16); }),
+      patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setReal("sigma_r", kNan); }),
+      patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setReal("sigma_r", 0); }),
+      patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setReal("value_scale", INFINITY); }),
+      patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setInteger("resolution", 2048); }),
+      patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setInteger("level_count", 17); }),
+      patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setText("surface", "bumpy"); }),
+      patched("attribute.unknown", Base::heights, [](const Patch& patch) { patch.setInteger("answer", 42); }, true),
+      patched("format.name", Base::heights, [](const Patch& patch) { patch.setText("glint_format", "other"); }),
+      patched("format.major", Base::heights, [](const Patch& patch) { patch.setInteger("format_major", 2); }),
+      patched("format.minor", Base::heights, [](const Patch& patch) { patch.setInteger("format_minor", 7); }, true),
+      patched("format.feature", Base::heights, [](const Patch& patch) { patch.setText("required_features", "zstd", 1); }),
+      patched("format.kind", Base::heights, [](const Patch& patch) { patch.setText("kind", "hologram"); }),
+  };
+}
+
+std::vector<Fixture> datasetFixtures() {
+  const auto external = [](hid_t properties) { H5Pset_external(properties, "/etc/passwd", 0, kSize * kSize * 4); };
+  const auto chunked = [](hid_t properties) {
+    const hsize_t chunk[2] = {4, 4};
+    H5Pset_chunk(properties, 2, chunk);
+    H5Pset_deflate(properties, 1);
+  };
+  const auto compact = [](hid_t properties) { H5Pset_layout(properties, H5D_COMPACT); };
+  const auto virtually = [](hid_t properties) {
+    const hsize_t dims[2] = {kSize, kSize};
+    const hid_t space = H5Screate_simple(2, dims, nullptr);
+    H5Pset_virtual(properties, space, "other.glint", "/heights", space);
+    H5Sclose(space);
+  };
+  return {
+      patched("dataset.vlen", Base::heights,
+              [](const Patch& patch) {
+                const hid_t type = H5Tvlen_create(H5T_IEEE_F32LE);
+                patch.replace("heights", type, {kSize, kSize}, false);
+                H5Tclose(type);
+              }),
+      patched("dataset.virtual", Base::heights,
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually); }),
+      patched("dataset.external", Base::heights,
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external); }),
+      patched("dataset.layout", Base::heights,
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked); }),
+      patched("dataset.layout", Base::heights,
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact); }),
+      patched("dataset.storage", Base::heights,
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false); }),
+      patched("dataset.storage", Base::heights,
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false); }),
+      {"dataset.alignment", Base::heights,
+       [](const fs::path& path) { Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }},
+      {"dataset.alignment_64", Base::heights,
+       [](const fs::path& path) { Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }, true},
+      patched("dataset.unknown", Base::heights,
+              [](const Patch& patch) { patch.replace("extra", H5T_IEEE_F32LE, {kSize}, true); }, true),
+      patched("dataset.missing", Base::heights, [](const Patch& patch) { H5Ldelete(patch.file(), "heights", 0); }),
+      patched("dataset.missing", Base::pyramid, [](const Patch& patch) { H5Ldelete(patch.file(), "level_01/masks", 0); }),
+      patched("dataset.type", Base::heights,
+              [](const Patch& patch) { patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true); }),
+      patched("dataset.type", Base::heights,
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true); }),
+      patched("dataset.type", Base::pyramid, [](const Patch& patch) { patch.setText("precision", "f16"); }),
+      patched("dataset.type", Base::compressed,
+              [](const Patch& patch) { patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true); }),
+      patched("dataset.type", Base::heights,
+              [](const Patch& patch) {
+                const hid_t type = H5Tcopy(H5T_IEEE_F32LE);
+                H5Tcommit2(patch.file(), "type", type, 0, 0, 0);
+                patch.replace("heights", type, {kSize, kSize}, true);
+                H5Ldelete(patch.file(), "type", 0);
+                H5Tclose(type);
+              }),
+      patched("dataset.dims", Base::heights,
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true); }),
+      patched("dataset.dims", Base::heights,
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize * kSize}, true); }),
+      patched("dataset.dims", Base::heights, [](const Patch& patch) { patch.setInteger("width", kSize + 1); }),
+      patched("dataset.dims", Base::pyramid,
+              [](const Patch& patch) { patch.replace("level_00/block_means", H5T_IEEE_F32LE, {3}, true); }),
+      patched("dataset.dims", Base::compressed,
+              [](const Patch& patch) { patch.replace("image_slots", H5T_STD_U16LE, {20}, true); }),
+      patched("dataset.hash", Base::heights,
+              [](const Patch& patch) { patch.change<float>("heights", 3, [](float& h) { h += 1; }); }, true),
+  };
+}
+
+std::vector<Fixture> indexFixtures() {
+  return {
+      patched("shape.resolution", Base::pyramid, [](const Patch& patch) { patch.setInteger("resolution", 65); }),
+      patched("shape.strides", Base::pyramid,
+              [](const Patch& patch) {
+                const float strides[3] = {8, 16.5f, 32};
+                patch.set("/", "level_strides", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, strides, 3);
+              }),
+      patched("shape.grid", Base::pyramid, [](const Patch& patch) { patch.setInteger("width", 64); }),
+      patched("shape.grid", Base::compressed, [](const Patch& patch) { patch.setInteger("height", 31 * 2); }),
+      patched("normals.bounds_levels", Base::normals,
+              [](const Patch& patch) {
+                patch.setInteger("bounds_level_count", 4);
+                H5Ldelete(patch.file(), "bounds/level_04", 0);
+              }),
+      patched("pyramid.masks", Base::pyramid,
+              [](const Patch& patch) { patch.change<std::uint64_t>("level_00/masks", 2, [](auto& mask) { mask |= 1ull << 16; }); }),
+      patched("pyramid.first_block", Base::pyramid,
+              [](const Patch& patch) { patch.change<std::uint64_t>("level_00/first_block", 2, [](auto& first) { first += 1; }); }),
+      patched("pyramid.first_block", Base::pyramid,
+              [](const Patch& patch) { patch.change<std::uint64_t>("level_02/first_block", 1, [](auto& first) { first = ~0ull; }); }),
+      patched("pyramid.first_block", Base::pyramid,
+              [](const Patch& patch) { patch.change<std::uint64_t>("level_01/masks", 1, [](auto& mask) { mask ^= 1; }); }),
+      patched("compressed.images", Base::compressed,
+              [](const Patch& patch) {
+                for (const char* path : {"image_regions", "image_slots"}) patch.replace(path, H5T_STD_U16LE, {20}, true);
+                patch.replace("image_scales", H5T_IEEE_F32LE, {20}, true);
+              }),
+      patched("compressed.slots", Base::compressed,
+              [](const Patch& patch) { patch.change<std::uint16_t>("image_regions", 5, [](auto& region) { region = 2; }); }),
+      patched("compressed.slots", Base::compressed,
+              [](const Patch& patch) { patch.change<std::uint16_t>("image_slots", 5, [](auto& slot) { slot = 40; }); }),
+      patched("compressed.slots", Base::compressed,
+              [](const Patch& patch) { patch.change<std::uint16_t>("image_slots", 5, [](auto& slot) { slot ^= 1; }); }),
+      patched("compressed.masks", Base::compressed,
+              [](const Patch& patch) { patch.change<std::uint64_t>("masks", 5, [](auto& mask) { mask |= 1ull << 40; }); }),
+      patched("compressed.masks", Base::compressed,
+              [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.slice_count += 1; }); }),
+      patched("compressed.mask_ranks", Base::compressed,
+              [](const Patch& patch) { patch.change<std::uint32_t>("mask_ranks", 5, [](auto& rank) { rank = 1; }); }),
+      patched("compressed.ranks", Base::compressed,
+              [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.rank_x = 60000; }); }),
+      patched("compressed.ranks", Base::compressed,
+              [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.rank_y = 1; }); }),
+      patched("compressed.ranges", Base::compressed,
+              [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_basis = ~0ull; }); }),
+      patched("compressed.ranges", Base::compressed,
+              [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_coefficient += 1000; }); }),
+      patched("compressed.ranges", Base::compressed,
+              [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_scale = 1000; }); }),
+  };
+}
+
+std::vector<Fixture> dataFixtures() {
+  return {
+      patched("normals.finite", Base::normals,
+              [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n.y = kNan; }); }, true),
+      patched("normals.disk", Base::normals,
+              [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.8f, -0.7f}; }); }, true),
+      patched("normals.bounds", Base::normals,
+              [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.7f, -0.7f}; }); }, true),
+      patched("normals.bounds", Base::normals,
+              [](const Patch& patch) { patch.change<NormalBounds>("bounds/level_02", 3, [](auto& node) { node.high_x = -1; }); }, true),
+      patched("heights.finite", Base::heights,
+              [](const Patch& patch) { patch.change<float>("heights", 7, [](float& h) { h = -INFINITY; }); }, true),
+      patched("pyramid.pixels", Base::pyramid,
+              [](const Patch& patch) { patch.change<float>("level_00/pixels", 99, [](float& d) { d = -1; }); }, true),
+      patched("pyramid.pixels", Base::pyramid,
+              [](const Patch& patch) { patch.change<float>("level_00/pixels", 99, [](float& d) { d = kNan; }); }, true),
+      patched("pyramid.block_means", Base::pyramid,
+              [](const Patch& patch) { patch.change<float>("level_01/block_means", 2, [](float& mean) { mean *= 1.01f; }); }, true),
+      patched("pyramid.integral", Base::pyramid,
+              [](const Patch& patch) { patch.change<float>("level_00/pixels", 99, [](float& d) { d += 100; }); }, true),
+      patched("compressed.image_scales", Base::compressed,
+              [](const Patch& patch) { patch.change<float>("image_scales", 3, [](float& scale) { scale = 0; }); }, true),
+      patched("compressed.scales", Base::compressed,
+              [](const Patch& patch) { patch.change<float>("scales", 3, [](float& scale) { scale = kNan; }); }, true),
+      patched("compressed.factors", Base::compressed_f32,
+              [](const Patch& patch) { patch.change<float>("basis", 3, [](float& sum) { sum = kNan; }); }, true),
+      patched("compressed.factors", Base::compressed_f32,
+              [](const Patch& patch) { patch.change<float>("coefficients", 3, [](float& c) { c = INFINITY; }); }, true),
+      patched("compressed.integral", Base::compressed,
+              [](const Patch& patch) { patch.change<float>("image_scales", 3, [](float& scale) { scale *= 1.1f; }); }, true),
+  };
+}
+
+std::vector<Fixture> allFixtures() {
+  std::vector<Fixture> all;
+  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures()}) {
+    all.insert(all.end(), list.begin(), list.end());
+  }
+  return all;
+}
+
+TEST(FormatRules, EveryRuleHasAFailingFile) {
+  std::set<std::string_view> covered;
+  for (const Fixture& fixture : allFixtures()) covered.insert(fixture.rule);
+  for (const Rule& rule : rules()) EXPECT_TRUE(covered.contains(rule.id)) << rule.id;
+}
+
+TEST(FormatRules, IdsAreUnique) {
+  std::set<std::string_view> ids;
+  for (const Rule& rule : rules()) EXPECT_TRUE(ids.insert(rule.id).second) << rule.id;
+}
+
+TEST(FormatRules, GoodFilesBreakNoRule) {
+  const test::TempFolder folder;
+  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32}) {
+    const fs::path path = folder / (std::to_string(static_cast<int>(base)) + ".glint");
+    writeBase(path, base);
+    for (const Finding& finding : validateAsset(path).findings) {
+      ADD_FAILURE() << finding.rule << " " << finding.object << " " << finding.message;
+    }
+  }
+}
+
+TEST(FormatRules, EveryFailingFileIsNamedByItsRule) {
+  const test::TempFolder folder;
+  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32}) {
+    writeBase(folder / (std::to_string(static_cast<int>(base)) + ".glint"), base);
+  }
+  int number = 0;
+  for (const Fixture& fixture : allFixtures()) {
+    const fs::path path = folder / ("bad" + std::to_string(number++) + ".glint");
+    fs::copy_file(folder / (std::to_string(static_cast<int>(fixture.base)) + ".glint"), path);
+    fixture.damage(path);
+    const ValidationReport report = validateAsset(path);
+    std::string found;
+    for (const Finding& finding : report.findings) found += finding.rule + " (" + finding.object + ": " + finding.message + ") ";
+    SCOPED_TRACE("fixture " + std::to_string(number - 1) + " for " + fixture.rule + ", found " + found);
+    const auto hit = std::find_if(report.findings.begin(), report.findings.end(), [&](const Finding& f) { return f.rule == fixture.rule; });
+    ASSERT_NE(hit, report.findings.end());
+    EXPECT_EQ(hit->severity, findRule(fixture.rule).severity);
+    EXPECT_FALSE(hit->message.empty());
+    try {
+      Asset::open(path);
+      EXPECT_TRUE(fixture.opens);
+    } catch (const Error& error) {
+      EXPECT_FALSE(fixture.opens);
+      EXPECT_EQ(error.rule(), fixture.rule);
+      EXPECT_EQ(error.code(), findRule(fixture.rule).code);
+      EXPECT_EQ(error.path(), path.string());
+    }
+  }
+}
+
+TEST(FormatVersions, ANewerMinorIsReadWithAWarning) {
+  const test::TempFolder folder;
+  writeBase(folder / "a.glint", Base::heights);
+  Patch(folder / "a.glint").setInteger("format_minor", 9);
+  const Asset asset = Asset::open(folder / "a.glint");
+  ASSERT_EQ(asset.info().warnings.size(), 1u);
+  EXPECT_THAT(asset.info().warnings[0], testing::HasSubstr("1.9"));
+  EXPECT_EQ(asset.heights().width, static_cast<int>(kSize));
+}
+
+TEST(FormatVersions, ANewerMajorIsRefusedNamingBothVersions) {
+  const test::TempFolder folder;
+  writeBase(folder / "a.glint", Base::heights);
+  Patch(folder / "a.glint").setInteger("format_major", 3);
+  try {
+    Asset::open(folder / "a.glint");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::unsupported);
+    EXPECT_THAT(error.what(), testing::HasSubstr("3.0"));
+    EXPECT_THAT(error.what(), testing::HasSubstr("1.0"));
+  }
+}
+
+TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
+  const fs::path folder = fs::path(GLINT_SOURCE_DIR) / "tests/golden/v1.0";
+  std::size_t count = 0;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    EXPECT_TRUE(validateAsset(entry.path()).findings.empty()) << entry.path();
+    EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
+    ++count;
+  }
+  EXPECT_EQ(count, 7u);
+}
+
+TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
+  const fs::path folder = fs::path(GLINT_SOURCE_DIR) / "tests/golden/v1.0";
+  const Asset normals = Asset::open(folder / "normals.glint");
+  EXPECT_EQ(normals.normals().at(5, 3).x, 0.194547504f);
+  EXPECT_EQ(normals.normals().at(63, 47).y, -0.139912933f);
+  EXPECT_EQ(normals.normals().bounds[3].nodes[2].high_x, 0.283465505f);
+  EXPECT_EQ(Asset::open(folder / "heights.glint").heights().heights[3 * 64 + 5], 0.0129489619f);
+  const Asset pyramid = Asset::open(folder / "ndf-pyramid.glint");
+  EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 0, 5, 30, 33), 4.3046875f);
+  EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 1, 2, 35, 29), 4.7890625f);
+  EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 2, 0, 24, 32), 6.00390625f);
+  struct Recorded {
+    const char* file;
+    float values[3];
+  };
+  for (const Recorded& recorded : {Recorded{"cp-i8", {3.49882889f, 3.00286174f, 2.97668457f}},
+                                   Recorded{"tucker-f16", {4.83468008f, 3.82640028f, 3.10592413f}},
+                                   Recorded{"pca-i8", {3.49882889f, 3.0028615f, 2.97668457f}},
+                                   Recorded{"cp-f32", {3.49453115f, 3.00421071f, 2.98451018f}}}) {
+    const Asset asset = Asset::open(folder / ("ndf-cp-" + std::string(recorded.file) + ".glint"));
+    EXPECT_FLOAT_EQ(test::compressedPixel(asset.compressed(), 5, 30, 33), recorded.values[0]);
+    EXPECT_FLOAT_EQ(test::compressedPixel(asset.compressed(), 18, 35, 29), recorded.values[1]);
+    EXPECT_FLOAT_EQ(test::compressedPixel(asset.compressed(), 20, 24, 32), recorded.values[2]);
+  }
+}
+
+}  // namespace
+}  // namespace glint::formats
