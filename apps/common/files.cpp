@@ -72,8 +72,8 @@ bool mayReplace(const std::string& path, OutputFormat format) {
   if (format == OutputFormat::text) return head.find('\0') == std::string::npos;
   const std::string_view start = head;
   if (format == OutputFormat::asset) return start.starts_with("\x89HDF\r\n\x1a\n"sv);
-  static constexpr std::array kImages = {"\x89PNG"sv, "\x76\x2f\x31\x01"sv, "II*\0"sv, "MM\0*"sv,
-                                         "#?RADIANCE"sv, "PF\n"sv, "Pf\n"sv, "\xff\xd8\xff"sv};
+  static constexpr std::array kImages = {"\x89PNG"sv, "\x76\x2f\x31\x01"sv, "II*\0"sv, "MM\0*"sv, "#?RADIANCE"sv, "PF\n"sv,
+                                         "Pf\n"sv,    "\xff\xd8\xff"sv};
   return std::any_of(kImages.begin(), kImages.end(), [&](std::string_view magic) { return start.starts_with(magic); });
 }
 

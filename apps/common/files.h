@@ -62,8 +62,8 @@ void writeFileAtomically(const std::string& path, const std::string& text);
 /// @throws Error io
 std::vector<std::byte> readFile(const std::string& path);
 
-/// A Make rule "targets: prerequisites", then an empty rule for each prerequisite so that deleting one is no error (as gcc -MP).
-/// Blanks, '#', '%', ':' and '$' are escaped.
+/// A Make rule "targets: prerequisites", then an empty rule for each prerequisite so that deleting one is no error (as gcc
+/// -MP). Blanks, '#', '%', ':' and '$' are escaped.
 /// @throws Error usage if a name holds a line break, which Make cannot express
 std::string makeDepfile(const std::vector<std::string>& targets, const std::vector<std::string>& prerequisites);
 

@@ -3,7 +3,7 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
+#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <array>
@@ -67,7 +67,8 @@ std::vector<T> toCodes(std::span<const float> values, const std::string& path) {
   std::vector<T> codes(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!(values[i] >= 0 && values[i] <= 1)) {
-      throw Error(ErrorCode::usage, "image.range", path, "", fmt::format("the value {} does not fit an integer image", values[i]),
+      throw Error(ErrorCode::usage, "image.range", path, "",
+                  fmt::format("the value {} does not fit an integer image", values[i]),
                   "write a floating-point format such as .exr");
     }
     codes[i] = static_cast<T>(std::lround(values[i] * kFull));
@@ -77,10 +78,14 @@ std::vector<T> toCodes(std::span<const float> values, const std::string& path) {
 
 OIIO::TypeDesc fileType(PixelFormat format) {
   switch (format) {
-    case PixelFormat::u8: return OIIO::TypeDesc::UINT8;
-    case PixelFormat::u16: return OIIO::TypeDesc::UINT16;
-    case PixelFormat::f16: return OIIO::TypeDesc::HALF;
-    case PixelFormat::f32: return OIIO::TypeDesc::FLOAT;
+    case PixelFormat::u8:
+      return OIIO::TypeDesc::UINT8;
+    case PixelFormat::u16:
+      return OIIO::TypeDesc::UINT16;
+    case PixelFormat::f16:
+      return OIIO::TypeDesc::HALF;
+    case PixelFormat::f32:
+      return OIIO::TypeDesc::FLOAT;
   }
   return OIIO::TypeDesc::FLOAT;
 }
@@ -115,11 +120,14 @@ std::vector<unsigned char> encode(const std::string& path, const OIIO::ImageSpec
 
 Image readImage(const std::string& path) {
   checkReadable(path);
+  // OpenImageIO has threads of its own, which --threads is to limit as well.
+  OIIO::attribute("threads", static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   const auto input = OIIO::ImageInput::open(path, &config);
   if (!input) {
-    throw Error(ErrorCode::invalid_input, "image.readable", path, "", "cannot be read as an image: " + trimmed(OIIO::geterror()),
+    throw Error(ErrorCode::invalid_input, "image.readable", path, "",
+                "cannot be read as an image: " + trimmed(OIIO::geterror()),
                 "check that the file is complete and in a format that oiiotool --info can read");
   }
   const OIIO::ImageSpec& spec = input->spec();
@@ -144,10 +152,13 @@ Image readImage(const std::string& path) {
   return image;
 }
 
-void writeImage(const std::string& path, int width, int height, int channels, std::span<const float> pixels, PixelFormat format) {
+void writeImage(const std::string& path, int width, int height, int channels, std::span<const float> pixels,
+                PixelFormat format) {
   OIIO::ImageSpec spec(width, height, channels, fileType(format));
   if (channels == 1) spec.channelnames = {"Y"};
   spec.attribute("compression", "zip");
+  if (format == PixelFormat::f16 || format == PixelFormat::f32)
+    spec.attribute("DateTime", "");  // or OpenEXR files hold the time
   std::vector<unsigned char> bytes;
   if (format == PixelFormat::u8) {
     bytes = encode<std::uint8_t>(path, spec, toCodes<std::uint8_t>(pixels, path));
@@ -164,7 +175,5 @@ bool isWritableImageName(const std::string& path) {
   if (!output) (void)OIIO::geterror();  // an error nobody fetches is printed at exit
   return output && output->supports("ioproxy");
 }
-
-void setImageThreads(int threads) { OIIO::attribute("threads", threads); }
 
 }  // namespace glint::apps

@@ -19,8 +19,8 @@ struct Image {
   std::string colour_space;  ///< "oiio:ColorSpace"; for most formats OpenImageIO's guess from the file type, not a fact
   int bits = 0;              ///< bits of a channel in the file: 1 to 16 (integers), 16 or 32 (floating point)
   bool floating = false;
-  /// [height][width][channels]. Unsigned integers of up to 8 and 16 bits keep their codes (full range 255 and 65535); everything
-  /// else becomes float (integers of more bits scaled to 0..1).
+  /// [height][width][channels]. Unsigned integers of up to 8 and 16 bits keep their codes (full range 255 and 65535);
+  /// everything else becomes float (integers of more bits scaled to 0..1).
   std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>> pixels;
 };
 
@@ -33,13 +33,12 @@ enum class PixelFormat : std::uint8_t { u8, u16, f16, f32 };
 
 /// Writes an image whose format follows from the extension, atomically. Same bytes every time.
 /// @param pixels  [height][width][channels], bottom row first. Integer formats: 0..1, rounded to the nearest code
-/// @throws Error usage if a value is outside 0..1 for an integer format, or the extension is unknown; io if it cannot be written
-void writeImage(const std::string& path, int width, int height, int channels, std::span<const float> pixels, PixelFormat format);
+/// @throws Error usage if a value is outside 0..1 for an integer format, or the extension is unknown; io if it cannot be
+/// written
+void writeImage(const std::string& path, int width, int height, int channels, std::span<const float> pixels,
+                PixelFormat format);
 
 /// Whether some image format has this file name extension and can be written.
 bool isWritableImageName(const std::string& path);
-
-/// Limits the threads of OpenImageIO.
-void setImageThreads(int threads);
 
 }  // namespace glint::apps

@@ -36,7 +36,8 @@ int pixelBits(const std::string& path, int wanted) {
   const bool floating = isFloatImageName(path);
   if (wanted == 0) return floating ? 32 : 8;
   if (wanted == 16 || wanted == (floating ? 32 : 8)) return wanted;
-  throw Error(ErrorCode::usage, "image.bits", path, "", "the format does not hold " + std::to_string(wanted) + " bits a channel",
+  throw Error(ErrorCode::usage, "image.bits", path, "",
+              "the format does not hold " + std::to_string(wanted) + " bits a channel",
               floating ? "use --bits 16 or 32" : "use --bits 8 or 16, or name the output .exr");
 }
 
@@ -47,8 +48,8 @@ PixelFormat pixelFormat(const std::string& path, int bits) {
 
 void requireFloatImage(const std::string& path, bool needed, const std::string& what) {
   if (!needed || isFloatImageName(path)) return;
-  throw Error(ErrorCode::usage, "image.float", path, "", "the format holds 0 to 1 only, and " + what + " are not confined to it",
-              "name the output .exr");
+  throw Error(ErrorCode::usage, "image.float", path, "",
+              "the format holds 0 to 1 only, and " + what + " are not confined to it", "name the output .exr");
 }
 
 }  // namespace glint::apps

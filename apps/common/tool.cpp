@@ -16,7 +16,6 @@
 #include <system_error>
 
 #include "common/files.h"
-#include "common/image_io.h"
 #include "common/progress_reporter.h"
 #include "common/suggest.h"
 #include "glint/formats/hash.h"
@@ -62,12 +61,18 @@ std::string finiteNumber(const std::string& text) {
 
 const char* codeName(ErrorCode code) {
   switch (code) {
-    case ErrorCode::usage: return "usage";
-    case ErrorCode::io: return "io";
-    case ErrorCode::invalid_input: return "invalid_input";
-    case ErrorCode::failed: return "failed";
-    case ErrorCode::unsupported: return "unsupported";
-    case ErrorCode::differs: return "differs";
+    case ErrorCode::usage:
+      return "usage";
+    case ErrorCode::io:
+      return "io";
+    case ErrorCode::invalid_input:
+      return "invalid_input";
+    case ErrorCode::failed:
+      return "failed";
+    case ErrorCode::unsupported:
+      return "unsupported";
+    case ErrorCode::differs:
+      return "differs";
   }
   return "failed";
 }
@@ -119,7 +124,7 @@ bool Option::given() const { return option_->count() > 0; }
 struct Tool::State {
   ToolInfo info;
   CLI::App app;
-  std::deque<Option> options;  // deque: references handed out stay valid
+  std::deque<Option> options;                                            // deque: references handed out stay valid
   std::vector<std::pair<std::string, std::function<json()>>> recorders;  // one for each option, same order
   std::vector<std::function<void()>> checks;
   std::vector<std::string> inputs;
@@ -328,7 +333,6 @@ int Tool::work(const std::function<void()>& body) {
   for (const auto& check : s.checks) check();
   if (!s.depfile.empty()) checkWritable(s.depfile);
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads()));
-  setImageThreads(threads());
   body();
   s.reporter.reset();
   if (!s.depfile.empty()) {

@@ -56,9 +56,9 @@ class Option {
 /// Declare inputs and outputs with the mix-ins of files.h and parameters with option(), flag() and choice(); then
 /// `return tool.run(argc, argv, [&] { ... });`. References passed in must outlive run().
 ///
-/// With --json, stdout holds exactly one JSON document: {"schema", "tool", "version", "status": "ok", "result", "warnings"}, or on
-/// failure {..., "status": "error", "error": {"code", "rule", "path", "object", "message", "remedy"}}. The message for people
-/// is on stderr in both cases.
+/// With --json, stdout holds exactly one JSON document: {"schema", "tool", "version", "status": "ok", "result", "warnings"}, or
+/// on failure {..., "status": "error", "error": {"code", "rule", "path", "object", "message", "remedy"}}. The message for
+/// people is on stderr in both cases.
 class Tool {
  public:
   explicit Tool(ToolInfo info);
@@ -87,7 +87,8 @@ class Tool {
       names.emplace_back(word);
       values.push_back(word_value);
     }
-    return choiceOf(name, names, current, [&value, values](std::size_t index) { value = values[index]; }, help);
+    return choiceOf(
+        name, names, current, [&value, values](std::size_t index) { value = values[index]; }, help);
   }
 
   /// The parser, for what the functions above do not cover. Options declared here are not in the `command` record.
@@ -107,7 +108,7 @@ class Tool {
   bool verbose() const;
   bool wantsJson() const;
   bool force() const;
-  /// Value of --threads; all the processor's when it was not given. oneTBB and OpenImageIO are limited to it already.
+  /// Value of --threads; all the processor's when it was not given. oneTBB is limited to it already.
   int threads() const;
   /// Value of --seed. Calling this records the seed in `command`, so call it before provenance().
   std::uint64_t seed();

@@ -26,13 +26,13 @@ IngestOptions::IngestOptions(Tool& tool) {
               "what to write; normals of heights are central differences, wrapped");
   tool.choice("--convention", p.convention, {{"opengl", Convention::opengl}, {"directx", Convention::directx}},
               "opengl: green is up; directx: green is down");
-  tool.choice("--encoding", p.encoding,
-              {{"auto", Encoding::automatic}, {"unorm", Encoding::unorm}, {"snorm", Encoding::snorm}},
+  tool.choice("--encoding", p.encoding, {{"auto", Encoding::automatic}, {"unorm", Encoding::unorm}, {"snorm", Encoding::snorm}},
               "unorm: 0..1 means -1..1 (zero is 127.5 of 255); snorm: -1..1 as they are (zero is code 128)");
-  Option& scale = tool.option("--height-scale", p.height_scale,
-                              "height, in texels, of a value of 1 (of integers: of the largest code)")
-                      .range(-1e6, 1e6);
-  Option& texel_size = tool.option("--texel-size-um", texel_size_um_, "size of a texel in micrometres; 0: unknown").range(0, 1e9);
+  Option& scale =
+      tool.option("--height-scale", p.height_scale, "height, in texels, of a value of 1 (of integers: of the largest code)")
+          .range(-1e6, 1e6);
+  Option& texel_size =
+      tool.option("--texel-size-um", texel_size_um_, "size of a texel in micrometres; 0: unknown").range(0, 1e9);
   height_scale_um_option_ = &tool.option("--height-scale-um", height_scale_um_, "--height-scale in micrometres instead")
                                  .range(-1e9, 1e9)
                                  .excludes(scale)
@@ -44,7 +44,8 @@ IngestOptions::IngestOptions(Tool& tool) {
               "tpdf: triangular noise of +-1 code hides the steps of integers; auto: for 8 bits only");
   tool.addCheck([this] {
     if (kind_ == Kind::normal && to_ == To::heights) {
-      throw Error(ErrorCode::usage, "cli.usage", "", "--to", "heights cannot be made from normals", "add --kind height or use --to normals");
+      throw Error(ErrorCode::usage, "cli.usage", "", "--to", "heights cannot be made from normals",
+                  "add --kind height or use --to normals");
     }
     if (height_scale_um_option_->given() && texel_size_um_ <= 0) {
       throw Error(ErrorCode::usage, "cli.usage", "", "--height-scale-um", "needs the size of a texel", "give --texel-size-um");
@@ -94,17 +95,19 @@ std::string reportText(const std::string& name, const Image& image, const bake::
 }
 
 void warnAbout(Tool& tool, const std::string& name, const bake::IngestReport& r) {
-  if (r.repaired > 0) tool.warn(fmt::format("{}: {} unusable texels were replaced by their neighbours' mean", name, r.repaired));
+  if (r.repaired > 0)
+    tool.warn(fmt::format("{}: {} unusable texels were replaced by their neighbours' mean", name, r.repaired));
   if (r.clipped > 0) tool.warn(fmt::format("{}: {} texels on the rim of the disk were moved just inside it", name, r.clipped));
   if (r.non_unit > 0) {
     tool.warn(fmt::format("{}: {} of {} vectors were not of unit length and were normalised", name, r.non_unit, r.texels));
   }
   if (std::max(std::abs(r.mean_normal.x), std::abs(r.mean_normal.y)) > kSuspiciousMeanTilt) {
-    tool.warn(fmt::format("{}: the mean normal ({:.2f}, {:.2f}) is far from up; is this a tangent-space map?", name, r.mean_normal.x,
-                          r.mean_normal.y));
+    tool.warn(fmt::format("{}: the mean normal ({:.2f}, {:.2f}) is far from up; is this a tangent-space map?", name,
+                          r.mean_normal.x, r.mean_normal.y));
   }
   if (r.steepest_tilt_deg > kSuspiciousSteepness_deg && r.clipped == 0) {
-    tool.warn(fmt::format("{}: the steepest normal leans {:.1f} degrees; check --height-scale or --encoding", name, r.steepest_tilt_deg));
+    tool.warn(fmt::format("{}: the steepest normal leans {:.1f} degrees; check --height-scale or --encoding", name,
+                          r.steepest_tilt_deg));
   }
 }
 

@@ -10,17 +10,19 @@
 using namespace glint;
 
 int main(int argc, char** argv) {
-  apps::Tool tool({"glint-synth",
-                   "Makes a tileable procedural normal map or height field, as an image (.exr, .png, ...). Normals are encoded 0..1 "
-                   "with green up (OpenGL); heights are in texels.",
-                   "glint-synth flakes -o flakes.exr --size 1024 --alpha 0.2 --flake-size 6 --seed 7"});
+  apps::Tool tool(
+      {"glint-synth",
+       "Makes a tileable procedural normal map or height field, as an image (.exr, .png, ...). Normals are encoded 0..1 "
+       "with green up (OpenGL); heights are in texels.",
+       "glint-synth flakes -o flakes.exr --size 1024 --alpha 0.2 --flake-size 6 --seed 7"});
   apps::SynthOptions options(tool);
   const apps::OutputFile output(tool, apps::OutputFormat::image, "image; the extension gives the format");
   bool heights = false;
   int bits = 0;
   tool.flag("--height", heights, "write heights in texels instead of normals");
-  const apps::Option& bits_option =
-      tool.option("--bits", bits, "of a channel: 8 or 16 (png), 16 or 32 (exr)").range(8, 32).defaultText("8 for png, 32 for exr");
+  const apps::Option& bits_option = tool.option("--bits", bits, "of a channel: 8 or 16 (png), 16 or 32 (exr)")
+                                        .range(8, 32)
+                                        .defaultText("8 for png, 32 for exr");
   tool.addCheck([&] {
     bits = apps::pixelBits(output.path(), bits_option.given() ? bits : 0);
     apps::requireFloatImage(output.path(), heights, "heights");

@@ -15,7 +15,8 @@ void parseSize(const std::string& text, int& width, int& height) {
   auto last = first;
   if (first.ec == std::errc() && first.ptr != end && *first.ptr == 'x') last = std::from_chars(first.ptr + 1, end, height);
   if (first.ec != std::errc() || last.ec != std::errc() || last.ptr != end) {
-    throw Error(ErrorCode::usage, "cli.size", "", "--size", "'" + text + "' is not a size", "write N or NxM, for example 1024x512");
+    throw Error(ErrorCode::usage, "cli.size", "", "--size", "'" + text + "' is not a size",
+                "write N or NxM, for example 1024x512");
   }
 }
 

@@ -8,8 +8,8 @@
 
 namespace glint::bake {
 
-/// 64 random bits for element `index` of stream `stream`: SplitMix64's finaliser over a counter, so that any thread can draw the
-/// numbers of any element and results do not depend on the order of the work.
+/// 64 random bits for element `index` of stream `stream`: SplitMix64's finaliser over a counter, so that any thread can draw
+/// the numbers of any element and results do not depend on the order of the work.
 inline std::uint64_t randomBits(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) {
   const auto mix = [](std::uint64_t z) {
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;

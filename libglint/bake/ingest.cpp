@@ -68,7 +68,10 @@ struct Decoder {
     const float half = static_cast<float>((std::numeric_limits<T>::max() + 1) / 2);
     return {1 / (half - 1), -half / (half - 1), -1};
   }
-  float operator()(float value) const { return std::max(floor, scale * value + offset); }
+  float operator()(float value) const {
+    const float n = scale * value + offset;
+    return n < floor ? floor : n;  // not std::max, which would turn NaN into a number
+  }
 };
 
 /// A row of pixels to normals; unusable texels become NaN and are counted.
@@ -133,7 +136,8 @@ struct NormalDecoder {
 };
 
 template <class T>
-std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestParameters& p, Encoding encoding, bool dither, Faults& faults) {
+std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestParameters& p, Encoding encoding, bool dither,
+                                Faults& faults) {
   const NormalDecoder<T> decoder(image, p, encoding, dither);
   const float green = p.convention == Convention::directx ? -1.0f : 1.0f;
   std::vector<Vec2> normals(static_cast<std::size_t>(image.width) * image.height);
@@ -166,7 +170,8 @@ void checkFaults(const PixelArray& image, const IngestParameters& p, const Fault
   }
   if (faults.downward > 0) {
     const bool three = image.channels > 2;
-    throw Error(ErrorCode::invalid_input, three ? "normals.upward" : "normals.disk", p.name, texelName(image, faults.first_downward),
+    throw Error(ErrorCode::invalid_input, three ? "normals.upward" : "normals.disk", p.name,
+                texelName(image, faults.first_downward),
                 plural(faults.downward) + (three ? "not above the surface (z <= 0)" : "outside the unit disk (x^2 + y^2 > 1)") +
                     ", this is the first",
                 three ? "export a tangent-space map or set --encoding, or repair them with glint-ingest --fix-invalid"
@@ -209,7 +214,8 @@ void checkGrey(const PixelArray& image, const IngestParameters& p) {
     for (int c = 1; c < 3; ++c) {
       const float other = pixelValue(image, t, c);
       if (first == other || (std::isnan(first) && std::isnan(other))) continue;
-      throw Error(ErrorCode::invalid_input, "heights.grey", p.name, texelName(image, t), "red, green and blue differ: this is no height field",
+      throw Error(ErrorCode::invalid_input, "heights.grey", p.name, texelName(image, t),
+                  "red, green and blue differ: this is no height field",
                   "read normal maps with --kind normal; export heights as one channel");
     }
   }

@@ -52,13 +52,13 @@ struct IngestReport {
   Encoding encoding = Encoding::unorm;
   bool dequantized = false;
   std::size_t texels = 0;
-  std::size_t non_finite = 0;  ///< NaN or infinite pixels
-  std::size_t downward = 0;    ///< z <= 0 by more than rounding, or x^2 + y^2 > 1 without z
-  std::size_t clipped = 0;     ///< z <= 0 or x^2 + y^2 > 1 by rounding only: moved to just inside the disk
-  std::size_t non_unit = 0;    ///< length differs from 1 by more than rounding explains; normalised
-  std::size_t repaired = 0;    ///< texels that fix_invalid replaced
-  Vec2 mean_normal;            ///< mean of (nx, ny)
-  double mean_tilt_deg = 0;    ///< mean angle between normal and z
+  std::size_t non_finite = 0;       ///< NaN or infinite pixels
+  std::size_t downward = 0;         ///< z <= 0 by more than rounding, or x^2 + y^2 > 1 without z
+  std::size_t clipped = 0;          ///< z <= 0 or x^2 + y^2 > 1 by rounding only: moved to just inside the disk
+  std::size_t non_unit = 0;         ///< length differs from 1 by more than rounding explains; normalised
+  std::size_t repaired = 0;         ///< texels that fix_invalid replaced
+  Vec2 mean_normal;                 ///< mean of (nx, ny)
+  double mean_tilt_deg = 0;         ///< mean angle between normal and z
   double slope_covariance[3] = {};  ///< xx, xy, yy of the slopes (-nx/nz, -ny/nz) about their mean
   float steepest_tilt_deg = 0;
 };
@@ -75,8 +75,8 @@ struct IngestedHeights {
 
 /// Normals of a normal map. x, y (and z) are the first channels; a map of two has z reconstructed. (x, y, z) is normalised.
 /// @throws Error invalid_input, naming the first texel at fault by column and row from the top left as image viewers count:
-///         one channel, a constant map, values that were converted to or from sRGB, vectors far from unit length (a photograph),
-///         texels that are not finite or point below the surface (unless fix_invalid)
+///         one channel, a constant map, values that were converted to or from sRGB, vectors far from unit length (a
+///         photograph), texels that are not finite or point below the surface (unless fix_invalid)
 IngestedNormals ingestNormals(const PixelArray& image, const IngestParameters& parameters);
 
 /// Heights of a height field: the first channel times height_scale.

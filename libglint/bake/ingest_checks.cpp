@@ -11,18 +11,19 @@ namespace {
 
 /// At most this many texels, evenly spread, are looked at to find the encoding.
 constexpr std::size_t kSampleTexels = 65536;
-/// Vectors this far from unit length are not a normal map's.
+/// Vectors this far from unit length are not a normal map's, and nor are those that point down.
 constexpr double kFarFromUnit = 0.25;
-/// A photograph has most of its vectors far from unit length; filtered normal maps have few.
-constexpr double kMostFar = 0.1;
+/// Maps of flakes that were filtered have up to an eighth of such vectors; of colours spread over the cube it would be three
+/// quarters.
+constexpr double kMostFar = 0.3;
 /// 0.5 becomes 0.735 when encoded as sRGB (a component of +0.47) and 0.214 when decoded (-0.57).
 constexpr double kSrgbBias = 0.25;
 
 double srgbToLinear(double v) { return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4); }
 double linearToSrgb(double v) { return v <= 0.0031308 ? v * 12.92 : 1.055 * std::pow(v, 1 / 2.4) - 0.055; }
 
-[[noreturn]] void throwInvalid(const std::string& rule, const std::string& name, const std::string& object, const std::string& what,
-                               const std::string& remedy) {
+[[noreturn]] void throwInvalid(const std::string& rule, const std::string& name, const std::string& object,
+                               const std::string& what, const std::string& remedy) {
   throw Error(ErrorCode::invalid_input, rule, name, object, what, remedy);
 }
 
@@ -39,7 +40,8 @@ std::size_t fillHolesOf(int width, int height, std::vector<T>& values, const std
   }
   const std::size_t count = holes.size();
   if (2 * count > values.size()) {
-    throwInvalid("map.repairable", name, "", std::to_string(count) + " of " + std::to_string(values.size()) + " texels are unusable",
+    throwInvalid("map.repairable", name, "",
+                 std::to_string(count) + " of " + std::to_string(values.size()) + " texels are unusable",
                  "more than half cannot be repaired; export the map again");
   }
   std::vector<std::pair<std::size_t, T>> filled;
@@ -78,7 +80,8 @@ void checkShape(const PixelArray& image, const std::string& name) {
   const auto count = std::visit([](const auto& pixels) { return pixels.size(); }, image.pixels);
   const bool fits = image.width > 0 && image.height > 0 && image.channels > 0 &&
                     count == static_cast<std::size_t>(image.width) * image.height * image.channels;
-  if (!fits) throwInvalid("image.shape", name, "", "the image has no pixels or not as many as its size says", "export it again");
+  if (!fits)
+    throwInvalid("image.shape", name, "", "the image has no pixels or not as many as its size says", "export it again");
 }
 
 void checkNotConstant(const PixelArray& image, int channels, const std::string& name) {
@@ -86,13 +89,15 @@ void checkNotConstant(const PixelArray& image, int channels, const std::string& 
       [&](const auto& pixels) {
         const std::size_t stride = static_cast<std::size_t>(image.channels);
         for (std::size_t t = stride; t < pixels.size(); t += stride) {
-          if (!std::equal(pixels.begin(), pixels.begin() + channels, pixels.begin() + static_cast<std::ptrdiff_t>(t))) return false;
+          if (!std::equal(pixels.begin(), pixels.begin() + channels, pixels.begin() + static_cast<std::ptrdiff_t>(t)))
+            return false;
         }
         return true;
       },
       image.pixels);
   if (constant) {
-    throwInvalid("map.varies", name, "", "every texel has the same value", "check the image, or pass --allow-constant if it is meant");
+    throwInvalid("map.varies", name, "", "every texel has the same value",
+                 "check the image, or pass --allow-constant if it is meant");
   }
 }
 
@@ -131,8 +136,8 @@ EncodingEvidence weighEncoding(const PixelArray& image, int channels) {
     e.srgb_redone += error([](double c) { return 2 * linearToSrgb(c) - 1; });
     e.mean_x += 2 * v[0] - 1;
     e.mean_y += 2 * v[1] - 1;
-    far_unorm += unorm > kFarFromUnit ? 1 : 0;
-    far_snorm += snorm > kFarFromUnit ? 1 : 0;
+    far_unorm += unorm > kFarFromUnit || 2 * v[2] - 1 <= 0 ? 1 : 0;
+    far_snorm += snorm > kFarFromUnit || v[2] <= 0 ? 1 : 0;
     count += 1;
   }
   if (count == 0) return e;
@@ -150,15 +155,17 @@ void checkEncoding(const EncodingEvidence& e, Encoding encoding, int channels, c
                    "export the map as non-colour (raw, linear) data");
     }
     if (std::max(e.mean_x, e.mean_y) < -kSrgbBias && (!three || e.srgb_redone < 0.5 * e.unorm)) {
-      throwInvalid("normals.linear", name, "", "the colours were converted from sRGB to linear: flat texels are near 0.214 instead of 0.5",
+      throwInvalid("normals.linear", name, "",
+                   "the colours were converted from sRGB to linear: flat texels are near 0.214 instead of 0.5",
                    "export the map as non-colour (raw) data");
     }
   }
   const double far = encoding == Encoding::unorm ? e.far_unorm : e.far_snorm;
   if (channels > 2 && far > kMostFar) {
     throwInvalid("normals.unit", name, "",
-                 std::to_string(std::lround(100 * far)) + " % of the vectors are far from unit length: this is no normal map",
-                 "give the normal map rather than the colour map, or set --encoding");
+                 std::to_string(std::lround(100 * far)) +
+                     " % of the vectors point down or are far from unit length: this is no tangent-space normal map",
+                 "give the normal map rather than the colour map or an object-space map, or set --encoding");
   }
 }
 

@@ -25,12 +25,12 @@ float pixelValue(const PixelArray& image, std::size_t texel, int channel);
 struct EncodingEvidence {
   double unorm = 0;
   double snorm = 0;
-  double srgb_undone = 0;   ///< unorm after undoing an sRGB encoding
-  double srgb_redone = 0;   ///< unorm after undoing an sRGB decoding
-  double mean_x = 0;        ///< of the components under unorm
+  double srgb_undone = 0;  ///< unorm after undoing an sRGB encoding
+  double srgb_redone = 0;  ///< unorm after undoing an sRGB decoding
+  double mean_x = 0;       ///< of the components under unorm
   double mean_y = 0;
-  bool negative = false;    ///< some pixel value is below 0, as no unorm value is
-  double far_unorm = 0;     ///< fraction of vectors whose length is off by more than a quarter
+  bool negative = false;  ///< some pixel value is below 0, as no unorm value is
+  double far_unorm = 0;   ///< fraction of vectors that point down or whose length is off by more than a quarter
   double far_snorm = 0;
 };
 

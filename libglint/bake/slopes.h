@@ -10,8 +10,8 @@ namespace glint::bake {
 /// Normal of the surface z = h(x, y) with these slopes: (-p, -q, 1) normalised, projected on the disk.
 Vec2 normalFromSlopes(float dh_dx, float dh_dy);
 
-/// Normals of a periodic height field. Slopes are central differences, (h[i+1] - h[i-1]) / 2, wrapped: the exact derivative of the
-/// field that is quadratic between neighbours, and the scheme of every tool that turns heights into normals.
+/// Normals of a periodic height field. Slopes are central differences, (h[i+1] - h[i-1]) / 2, wrapped: the exact derivative of
+/// the field that is quadratic between neighbours, and the scheme of every tool that turns heights into normals.
 /// @param heights  [height][width], texels, bottom row first
 /// @return [height][width]; texels whose neighbours are not finite have NaN
 std::vector<Vec2> normalsFromHeights(int width, int height, std::span<const float> heights);

@@ -44,11 +44,16 @@ std::vector<float> scaledNoise(const SynthParameters& p) {
 
 std::vector<float> pattern(const SynthParameters& p) {
   switch (p.kind) {
-    case SynthKind::scratches: return scratchHeights(p);
-    case SynthKind::leather: return leatherHeights(p);
-    case SynthKind::weave: return weaveHeights(p);
-    case SynthKind::sawtooth: return sawtoothHeights(p);
-    default: return std::vector<float>(static_cast<std::size_t>(p.width) * p.height, 0.0f);
+    case SynthKind::scratches:
+      return scratchHeights(p);
+    case SynthKind::leather:
+      return leatherHeights(p);
+    case SynthKind::weave:
+      return weaveHeights(p);
+    case SynthKind::sawtooth:
+      return sawtoothHeights(p);
+    default:
+      return std::vector<float>(static_cast<std::size_t>(p.width) * p.height, 0.0f);
   }
 }
 
@@ -58,14 +63,29 @@ SynthParameters defaultSynthParameters(SynthKind kind) {
   SynthParameters p;
   p.kind = kind;
   switch (kind) {
-    case SynthKind::isotropic: break;
-    case SynthKind::brushed: p.alpha = 0.15f, p.correlation_texels = 2; break;
-    case SynthKind::flakes: p.alpha = 0.15f; break;
-    case SynthKind::scratches: p.alpha = 0.01f, p.feature_texels = 4; break;
-    case SynthKind::leather: p.alpha = 0.05f, p.feature_texels = 32; break;
-    case SynthKind::weave: p.alpha = 0.03f, p.feature_texels = 32, p.slope = 2; break;
-    case SynthKind::sawtooth: p.alpha = 0, p.feature_texels = 16; break;
-    case SynthKind::flat: p.alpha = 0; break;
+    case SynthKind::isotropic:
+      break;
+    case SynthKind::brushed:
+      p.alpha = 0.15f, p.correlation_texels = 2;
+      break;
+    case SynthKind::flakes:
+      p.alpha = 0.15f;
+      break;
+    case SynthKind::scratches:
+      p.alpha = 0.01f, p.feature_texels = 4;
+      break;
+    case SynthKind::leather:
+      p.alpha = 0.05f, p.feature_texels = 32;
+      break;
+    case SynthKind::weave:
+      p.alpha = 0.03f, p.feature_texels = 32, p.slope = 2;
+      break;
+    case SynthKind::sawtooth:
+      p.alpha = 0, p.feature_texels = 16;
+      break;
+    case SynthKind::flat:
+      p.alpha = 0;
+      break;
   }
   return p;
 }
@@ -73,8 +93,8 @@ SynthParameters defaultSynthParameters(SynthKind kind) {
 std::vector<float> synthHeights(const SynthParameters& p) {
   check(p);
   if (p.kind == SynthKind::flakes) {
-    throw Error(ErrorCode::unsupported, "synth.flakes_height", "", "", "flakes are separate facets without a common height field",
-                "make their normals instead, or another kind");
+    throw Error(ErrorCode::unsupported, "synth.flakes_height", "", "",
+                "flakes are separate facets without a common height field", "make their normals instead, or another kind");
   }
   if (p.kind == SynthKind::isotropic || p.kind == SynthKind::brushed) return scaledNoise(p);
   std::vector<float> heights = pattern(p);

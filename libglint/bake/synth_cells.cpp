@@ -27,8 +27,8 @@ class JitteredGrid {
   }
 
   struct Site {
-    int cell;         ///< row * columns + column, wrapped
-    Vec2 position;    ///< texels, not wrapped
+    int cell;       ///< row * columns + column, wrapped
+    Vec2 position;  ///< texels, not wrapped
   };
 
   /// Calls visit(site) for the 5 x 5 cells around a point, which are sure to hold its nearest two sites.
@@ -41,7 +41,8 @@ class JitteredGrid {
       for (int x = column - 2; x <= column + 2; ++x) {
         const int cell = wrapped_row * columns_ + wrap(x, columns_);
         const Vec2 jitter = sites_[static_cast<std::size_t>(cell)];
-        visit(Site{cell, {(static_cast<float>(x) + jitter.x) * cell_width_, (static_cast<float>(y) + jitter.y) * cell_height_}});
+        visit(
+            Site{cell, {(static_cast<float>(x) + jitter.x) * cell_width_, (static_cast<float>(y) + jitter.y) * cell_height_}});
       }
     }
   }

@@ -56,7 +56,8 @@ std::vector<Scratch> drawScratches(const SynthParameters& p) {
   return scratches;
 }
 
-/// Cuts one scratch, moved by (shift_x, shift_y), into rows [first_row, last_row). The deepest cut wins, so order does not matter.
+/// Cuts one scratch, moved by (shift_x, shift_y), into rows [first_row, last_row). The deepest cut wins, so order does not
+/// matter.
 void carve(const SynthParameters& p, Scratch scratch, int shift_x, int shift_y, int first_row, int last_row,
            std::vector<float>& heights) {
   scratch.start = scratch.start + Vec2{static_cast<float>(shift_x), static_cast<float>(shift_y)};

@@ -13,9 +13,9 @@
 namespace glint::apps {
 namespace {
 
+using nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
-using nlohmann::json;
 
 /// What a run printed and returned.
 struct Outcome {
@@ -35,7 +35,8 @@ class ToolRun : public ::testing::Test {
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
-  Outcome run(std::vector<std::string> arguments, const std::function<void(Tool&)>& work = [](Tool&) {}) {
+  Outcome run(
+      std::vector<std::string> arguments, const std::function<void(Tool&)>& work = [](Tool&) {}) {
     Tool tool({"glint-test", "Tests the flags", "glint-test in.png -o out.glint"});
     const InputFile input(tool, "an image");
     const OutputFile output(tool, OutputFormat::asset, "an asset");

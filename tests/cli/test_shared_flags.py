@@ -1,0 +1,80 @@
+"""Every tool has the same flags, messages and exit codes."""
+
+import json
+import pathlib
+import shlex
+import subprocess
+
+import pytest
+from conftest import BIN
+
+APPS = pathlib.Path(__file__).parents[2] / "apps"
+TOOLS = sorted(path.parent.name.removeprefix("glint-") for path in APPS.glob("glint-*/main.cpp"))
+SHARED = ["--threads", "--seed", "--json", "--progress", "--quiet", "--force", "--depfile", "--config", "--version", "--help"]
+
+
+def test_there_are_tools():
+    assert {"ingest", "synth"} <= set(TOOLS)
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_help_lists_shared_flags_and_an_example(glint, tool):
+    process = glint(tool, "--help")
+    assert process.returncode == 0
+    assert process.stderr == ""
+    for flag in SHARED:
+        assert flag in process.stdout
+    assert f"Example:\n  glint-{tool} " in process.stdout
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_version_names_the_tool(glint, tool):
+    process = glint(tool, "--version")
+    assert process.returncode == 0
+    assert process.stdout.startswith(f"glint-{tool} ")
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_unknown_option_is_a_usage_error_with_a_suggestion(glint, tool):
+    process = glint(tool, "--thread", "2")
+    assert process.returncode == 1
+    assert process.stdout == ""
+    assert process.stderr.startswith(f"glint-{tool}: error: unknown option --thread; did you mean --threads?")
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_usage_error_is_json_too(glint, tool):
+    process = glint(tool, "--nonsense-option", "--json")
+    assert process.returncode == 1
+    assert json.loads(process.stdout)["error"]["code"] == "usage"
+
+
+def test_full_disk_of_stdout_is_an_error(glint):
+    with open("/dev/full", "w") as full:
+        command = [BIN / "glint-synth", "flat", "--size", "4", "-o", "a.exr", "--json"]
+        process = subprocess.run(command, cwd=glint.folder, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert process.returncode == 2
+    assert "stdout" in process.stderr
+
+
+def test_depfile_is_read_by_make(glint):
+    name = "in put#1$.png"
+    glint("synth", "flakes", "--size", "16", "-o", name)
+    output = "out.glint"
+    assert glint("ingest", name, "-o", output, "--depfile", "out.d").returncode == 0
+    makefile = glint.folder / "Makefile"
+    makefile.write_text(f"include out.d\n{output}:\n\t@echo made\n")
+    make = ["make", "-s", output]
+    assert subprocess.run(make, cwd=glint.folder, capture_output=True, text=True).stdout == ""
+    subprocess.run(["touch", "-d", "1 minute", name], cwd=glint.folder, check=True)
+    assert subprocess.run(make, cwd=glint.folder, capture_output=True, text=True).stdout == "made\n"
+    (glint.folder / name).unlink()  # a deleted input is remade, not a missing rule
+    assert subprocess.run(make, cwd=glint.folder, capture_output=True, text=True).returncode == 0
+
+
+def test_examples_in_help_parse(glint):
+    glint("synth", "flakes", "--size", "16", "-o", "flakes.png")
+    for tool in ("synth", "ingest"):
+        example = glint(tool, "--help").stdout.split("Example:\n  ")[1].splitlines()[0]
+        process = glint(tool, *shlex.split(example)[1:])
+        assert process.returncode == 0, process.stderr
