@@ -33,7 +33,8 @@ template <class Model>
 const Model& Asset::get(std::string_view wanted) const {
   if (const Model* model = std::get_if<Model>(&state_->loaded.model)) return *model;
   throw Error(ErrorCode::unsupported, "format.kind", state_->path, {},
-              "is of kind " + state_->loaded.info.kind + ", not " + std::string(wanted), "pass an asset of kind " + std::string(wanted));
+              "is of kind " + state_->loaded.info.kind + ", not " + std::string(wanted),
+              "pass an asset of kind " + std::string(wanted));
 }
 
 const NormalMap& Asset::normals() const { return get<NormalMap>("normals"); }

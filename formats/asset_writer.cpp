@@ -22,11 +22,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxTextBytes = 60000;      // an object header message holds less than 64 KiB
-constexpr std::uint64_t kBigBytes = 64 << 10;     // datasets from here on start on a page
+constexpr std::size_t kMaxTextBytes = 60000;   // an object header message holds less than 64 KiB
+constexpr std::uint64_t kBigBytes = 64 << 10;  // datasets from here on start on a page
 constexpr hsize_t kPageBytes = 4096;
-constexpr hsize_t kLineBytes = 64;                // a cache line: where all other datasets start
-constexpr std::size_t kWriteBytes = 8 << 20;      // of one write call
+constexpr hsize_t kLineBytes = 64;            // a cache line: where all other datasets start
+constexpr std::size_t kWriteBytes = 8 << 20;  // of one write call
 
 [[noreturn]] void throwIo(const fs::path& path, const std::string& what, int error) {
   const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
@@ -101,7 +101,8 @@ void writeAttribute(hid_t object, const std::string& name, const AttributeValue&
   constexpr ErrorCode io = ErrorCode::io;
   const std::string place = "@" + name;
   const hsize_t count = value.count();
-  const hdf5::Handle space(value.scalar ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &count, nullptr), "cannot be written", place, io);
+  const hdf5::Handle space(value.scalar ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &count, nullptr), "cannot be written",
+                           place, io);
   if (value.type == ElementType::text) {
     std::size_t width = 1;
     bool ascii = true;
@@ -110,7 +111,8 @@ void writeAttribute(hid_t object, const std::string& name, const AttributeValue&
       ascii &= std::all_of(text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < 128; });
     }
     if (width * std::max<std::size_t>(value.texts.size(), 1) > kMaxTextBytes || [&] {
-          return std::any_of(value.texts.begin(), value.texts.end(), [](const std::string& t) { return t.find('\0') != t.npos; });
+          return std::any_of(value.texts.begin(), value.texts.end(),
+                             [](const std::string& t) { return t.find('\0') != t.npos; });
         }()) {
       throw Error(ErrorCode::usage, "attribute.size", {}, "/" + place, "is longer than 60000 bytes or holds a NUL");
     }
@@ -120,7 +122,8 @@ void writeAttribute(hid_t object, const std::string& name, const AttributeValue&
     hdf5::check(H5Tset_cset(type, ascii ? H5T_CSET_ASCII : H5T_CSET_UTF8), "cannot be written", place, io);
     std::string bytes;
     for (const std::string& text : value.texts) bytes += text + std::string(width - text.size(), '\0');
-    const hdf5::Handle attribute(H5Acreate2(object, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), "cannot be written", place, io);
+    const hdf5::Handle attribute(H5Acreate2(object, name.c_str(), type, space, H5P_DEFAULT, H5P_DEFAULT), "cannot be written",
+                                 place, io);
     if (count > 0) hdf5::check(H5Awrite(attribute, type, bytes.data()), "cannot be written", place, io);
     return;
   }
@@ -150,9 +153,10 @@ Attributes commonValues(std::string_view kind, const Provenance& provenance) {
 const DatasetSchema& schemaOf(const KindSchema& kind, const std::string& path) {
   for (const DatasetSchema& dataset : kind.datasets) {
     const std::size_t place = dataset.path.find("{l}");
-    if (place == std::string_view::npos ? path == dataset.path
-                                        : path.size() == dataset.path.size() - 1 && path.starts_with(dataset.path.substr(0, place)) &&
-                                              path.ends_with(dataset.path.substr(place + 3))) {
+    if (place == std::string_view::npos
+            ? path == dataset.path
+            : path.size() == dataset.path.size() - 1 && path.starts_with(dataset.path.substr(0, place)) &&
+                  path.ends_with(dataset.path.substr(place + 3))) {
       return dataset;
     }
   }
@@ -198,7 +202,8 @@ class MetadataWriter {
     hdf5::check(H5Pset_libver_bounds(properties, H5F_LIBVER_V18, H5F_LIBVER_V110), "cannot set properties", {}, kIo);
     hdf5::check(H5Pset_file_locking(properties, false, true), "cannot set properties", {}, kIo);
     // Small metadata need not be aligned; datasets below the threshold come from blocks that are switched off here.
-    hdf5::check(H5Pset_alignment(properties, alignment == kLineBytes ? 1 : alignment, alignment), "cannot set properties", {}, kIo);
+    hdf5::check(H5Pset_alignment(properties, alignment == kLineBytes ? 1 : alignment, alignment), "cannot set properties", {},
+                kIo);
     hdf5::check(H5Pset_small_data_block_size(properties, 0), "cannot set properties", {}, kIo);
     return properties;
   }
@@ -213,7 +218,8 @@ class MetadataWriter {
   }
 
   hdf5::Handle create() const {
-    return hdf5::Handle(H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, creation(H5P_FILE_CREATE), access(kLineBytes)), "cannot be created", {}, kIo);
+    return hdf5::Handle(H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, creation(H5P_FILE_CREATE), access(kLineBytes)),
+                        "cannot be created", {}, kIo);
   }
 
   void createGroups(hid_t file) const {
@@ -244,9 +250,11 @@ class MetadataWriter {
     hdf5::check(H5Pset_alloc_time(properties, H5D_ALLOC_TIME_EARLY), "cannot set properties", object, kIo);
     hdf5::check(H5Pset_fill_time(properties, H5D_FILL_TIME_NEVER), "cannot set properties", object, kIo);
     const std::vector<hsize_t> dims(array.dims.begin(), array.dims.end());
-    const hdf5::Handle space(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr), "cannot be written", object, kIo);
-    const hdf5::Handle dataset(H5Dcreate2(file, array.path.c_str(), types[array.type], space, H5P_DEFAULT, properties, H5P_DEFAULT),
-                               "cannot be written", object, kIo);
+    const hdf5::Handle space(H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr), "cannot be written", object,
+                             kIo);
+    const hdf5::Handle dataset(
+        H5Dcreate2(file, array.path.c_str(), types[array.type], space, H5P_DEFAULT, properties, H5P_DEFAULT),
+        "cannot be written", object, kIo);
     const DatasetSchema& schema = schemaOf(*findKindSchema(packed_.kind), array.path);
     writeAttribute(dataset, "long_name", text(std::string(schema.long_name)), types);
     writeAttribute(dataset, "units", text(std::string(schema.units)), types);

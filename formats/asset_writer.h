@@ -14,10 +14,11 @@ struct WriteOptions {
   bool overwrite = false;  ///< replace a file that exists
 };
 
-/// Writes an asset. The file appears whole or not at all: it is written under a temporary name in the target's folder, read back
-/// and checked as a reader would, flushed to the disk and renamed. On failure the temporary file is removed and an old file stays.
-/// The same arguments give the same bytes.
-/// @throws Error  io: cannot be written, or exists and may not be replaced; usage: an array does not have the size that the struct
+/// Writes an asset. The file appears whole or not at all: it is written under a temporary name in the target's folder, read
+/// back and checked as a reader would, flushed to the disk and renamed. On failure the temporary file is removed and an old
+/// file stays. The same arguments give the same bytes.
+/// @throws Error  io: cannot be written, or exists and may not be replaced; usage: an array does not have the size that the
+/// struct
 ///                says; failed: the struct breaks a rule of the format (its id is in the error)
 void writeAsset(const std::filesystem::path& path, const NormalMap& map, const Provenance& provenance,
                 const WriteOptions& options = {});

@@ -74,8 +74,9 @@ bool checkAttribute(const Attributes& attributes, const std::string& object, con
   const auto in_range = [&](double number) { return number >= schema.minimum && number <= schema.maximum; };
   if (!std::all_of(value.numbers.begin(), value.numbers.end(), in_range)) {
     const double bad = *std::find_if_not(value.numbers.begin(), value.numbers.end(), in_range);
-    findings.add("attribute.value", place,
-                 "is " + std::to_string(bad) + ", outside " + std::to_string(schema.minimum) + " to " + std::to_string(schema.maximum));
+    findings.add(
+        "attribute.value", place,
+        "is " + std::to_string(bad) + ", outside " + std::to_string(schema.minimum) + " to " + std::to_string(schema.maximum));
     return false;
   }
   for (const std::string& text : value.texts) {
@@ -129,7 +130,8 @@ void checkDataset(const DatasetRecord& record, const std::string& path, const Da
     checkAttribute(record.attributes, object, attribute, scope, findings);
   }
   warnOfUnknown(record.attributes, object, datasetAttributes(), {}, findings);
-  const auto type = std::find_if(schema.types.begin(), schema.types.end(), [&](const TypeChoice& c) { return holds(c.when, root); });
+  const auto type =
+      std::find_if(schema.types.begin(), schema.types.end(), [&](const TypeChoice& c) { return holds(c.when, root); });
   if (type == schema.types.end() || !record.known_type || record.type != type->type) {
     findings.add("dataset.type", object,
                  "has elements of type " + std::string(record.known_type ? name(record.type) : "unknown") + ", not " +
@@ -172,7 +174,8 @@ const KindSchema* checkHeader(const FileStructure& structure, Findings& findings
   const AttributeValue* major = attribute("format_major");
   const AttributeValue* minor = attribute("format_minor");
   if (major == nullptr || minor == nullptr) return nullptr;
-  const std::string version = std::to_string(static_cast<int>(major->numbers[0])) + "." + std::to_string(static_cast<int>(minor->numbers[0]));
+  const std::string version =
+      std::to_string(static_cast<int>(major->numbers[0])) + "." + std::to_string(static_cast<int>(minor->numbers[0]));
   const std::string own = std::to_string(kFormatMajor) + "." + std::to_string(kFormatMinor);
   if (major->numbers[0] != kFormatMajor) {
     findings.add("format.major", "/@format_major", "has format version " + version + ", this reader knows " + own);
@@ -190,7 +193,8 @@ const KindSchema* checkHeader(const FileStructure& structure, Findings& findings
   const AttributeValue* kind = attribute("kind");
   if (kind == nullptr || !features->texts.empty()) return nullptr;
   const KindSchema* schema = findKindSchema(kind->texts[0]);
-  if (schema == nullptr) findings.add("format.kind", "/@kind", "is \"" + kind->texts[0] + "\", a kind that this reader does not know");
+  if (schema == nullptr)
+    findings.add("format.kind", "/@kind", "is \"" + kind->texts[0] + "\", a kind that this reader does not know");
   return schema;
 }
 

@@ -19,11 +19,13 @@ constexpr std::string_view kUpdate = "read it with a newer version of glint";
 constexpr std::array kRules = {
     Rule{"file.readable", error, io, "the file can be opened, read and mapped", "check the path and its permissions"},
     Rule{"file.signature", error, invalid_input, "the file starts with the HDF5 signature", kForeign},
-    Rule{"file.superblock", error, invalid_input, "the superblock is version 2 or 3 with base address 0 and no extension", kForeign},
+    Rule{"file.superblock", error, invalid_input, "the superblock is version 2 or 3 with base address 0 and no extension",
+         kForeign},
     Rule{"file.truncated", error, invalid_input, "the file is as long as its superblock says", kDamaged},
     Rule{"file.hdf5", error, invalid_input, "HDF5 can read the file's metadata and its checksums hold", kDamaged},
     Rule{"group.depth", error, invalid_input, "groups are nested at most 4 deep", kHostile},
     Rule{"group.size", error, invalid_input, "a group has at most 1024 links with names of at most 255 bytes", kHostile},
+    Rule{"text.utf8", error, invalid_input, "names and texts are UTF-8 without control characters", kHostile},
     Rule{"link.hard", error, invalid_input, "every link is a hard link", kHostile},
     Rule{"link.single", error, invalid_input, "every object has exactly one link", kHostile},
     Rule{"object.type", error, invalid_input, "every object is a group or a dataset", kHostile},
@@ -33,7 +35,8 @@ constexpr std::array kRules = {
     Rule{"attribute.missing", error, invalid_input, "every required attribute exists", kForeign},
     Rule{"attribute.type", error, invalid_input, "an attribute has the type and number of elements of the schema", kForeign},
     Rule{"attribute.value", error, invalid_input, "an attribute's value is in the range of the schema", kForeign},
-    Rule{"attribute.unknown", warning, invalid_input, "every attribute is in the schema", "ignore it, or read with a newer version"},
+    Rule{"attribute.unknown", warning, invalid_input, "every attribute is in the schema",
+         "ignore it, or read with a newer version"},
     Rule{"format.name", error, invalid_input, "root attribute glint_format is \"glint\"", kForeign},
     Rule{"format.major", error, unsupported, "the major version is the reader's", kUpdate},
     Rule{"format.minor", warning, unsupported, "the minor version is not newer than the reader's", kUpdate},
@@ -45,8 +48,10 @@ constexpr std::array kRules = {
     Rule{"dataset.layout", error, invalid_input, "every dataset is contiguous without filters", kForeign},
     Rule{"dataset.storage", error, invalid_input, "a dataset's bytes all lie inside the file", kDamaged},
     Rule{"dataset.alignment", error, invalid_input, "a dataset's offset is a multiple of 8", kForeign},
-    Rule{"dataset.alignment_64", warning, invalid_input, "a dataset's offset is a multiple of 64", "write with H5Pset_alignment"},
-    Rule{"dataset.unknown", warning, invalid_input, "every dataset is in the schema", "ignore it, or read with a newer version"},
+    Rule{"dataset.alignment_64", warning, invalid_input, "a dataset's offset is a multiple of 64",
+         "write with H5Pset_alignment"},
+    Rule{"dataset.unknown", warning, invalid_input, "every dataset is in the schema",
+         "ignore it, or read with a newer version"},
     Rule{"dataset.missing", error, invalid_input, "every required dataset exists", kForeign},
     Rule{"dataset.type", error, invalid_input, "a dataset has the element type of the schema", kForeign},
     Rule{"dataset.dims", error, invalid_input, "a dataset has the sizes of the schema", kForeign},
@@ -58,13 +63,15 @@ constexpr std::array kRules = {
     Rule{"pyramid.first_block", error, invalid_input, "first_block is the running count of occupancy bits", kMakeAgain},
     Rule{"compressed.images", error, invalid_input, "there is one record for each image of each level", kMakeAgain},
     Rule{"compressed.slots", error, invalid_input, "images have valid regions, and slots 0..n-1 in each region", kMakeAgain},
-    Rule{"compressed.masks", error, invalid_input, "mask bits are slots of the region and their number is slice_count", kMakeAgain},
+    Rule{"compressed.masks", error, invalid_input, "mask bits are slots of the region and their number is slice_count",
+         kMakeAgain},
     Rule{"compressed.mask_ranks", error, invalid_input, "mask_ranks is the running count of mask bits", kMakeAgain},
     Rule{"compressed.ranks", error, invalid_input, "cluster ranks are valid for the method", kMakeAgain},
     Rule{"compressed.ranges", error, invalid_input, "every cluster's factors lie inside their arrays", kMakeAgain},
     Rule{"dataset.hash", error, invalid_input, "a dataset's bytes have the hash of its attribute xxh3_128", kDamaged},
     Rule{"normals.finite", error, invalid_input, "normals are finite", "repair them with glint-ingest --fix-invalid"},
-    Rule{"normals.disk", error, invalid_input, "normals lie inside the unit disk", "repair them with glint-ingest --fix-invalid"},
+    Rule{"normals.disk", error, invalid_input, "normals lie inside the unit disk",
+         "repair them with glint-ingest --fix-invalid"},
     Rule{"normals.bounds", error, invalid_input, "bounds hold the normals that they cover", kMakeAgain},
     Rule{"heights.finite", error, invalid_input, "heights are finite", "repair them with glint-ingest --fix-invalid"},
     Rule{"pyramid.pixels", error, invalid_input, "pixels are finite and not negative", kMakeAgain},
@@ -80,9 +87,12 @@ constexpr std::array kRules = {
 
 std::string_view name(Severity severity) {
   switch (severity) {
-    case error: return "error";
-    case warning: return "warning";
-    case info: return "info";
+    case error:
+      return "error";
+    case warning:
+      return "warning";
+    case info:
+      return "info";
   }
   return "error";
 }

@@ -34,16 +34,17 @@ std::vector<AttributeSchema> mapSize() {
 
 /// Attributes of glint::PyramidShape.
 std::vector<AttributeSchema> pyramidShape() {
-  return {integer("width", 1, kMaxMapSize, "texel", "width of the normal map"),
-          integer("height", 1, kMaxMapSize, "texel", "height of the normal map"),
-          integer("resolution", kBlockSize, 1024, "pixel", "pixels of an NDF image along each axis; a multiple of 16"),
-          real("sigma_r", FLT_MIN, 1, "1", "intrinsic roughness: standard deviation in disk units"),
-          choice("surface", "flat|smooth", "normals between texel centres"),
-          choice("boundary", "wrap|clamp", "what lies beyond the border of the map"),
-          integer("level_count", 1, kMaxPyramidLevels, "1", "number of levels"),
-          {"level_strides", f32, "level_count", "texel", "distance between footprint centres of each level", FLT_MIN, kMaxMapSize},
-          {"level_columns", i32, "level_count", "1", "footprints along u of each level", 1, kMaxMapSize},
-          {"level_rows", i32, "level_count", "1", "footprints along v of each level", 1, kMaxMapSize}};
+  return {
+      integer("width", 1, kMaxMapSize, "texel", "width of the normal map"),
+      integer("height", 1, kMaxMapSize, "texel", "height of the normal map"),
+      integer("resolution", kBlockSize, 1024, "pixel", "pixels of an NDF image along each axis; a multiple of 16"),
+      real("sigma_r", FLT_MIN, 1, "1", "intrinsic roughness: standard deviation in disk units"),
+      choice("surface", "flat|smooth", "normals between texel centres"),
+      choice("boundary", "wrap|clamp", "what lies beyond the border of the map"),
+      integer("level_count", 1, kMaxPyramidLevels, "1", "number of levels"),
+      {"level_strides", f32, "level_count", "texel", "distance between footprint centres of each level", FLT_MIN, kMaxMapSize},
+      {"level_columns", i32, "level_count", "1", "footprints along u of each level", 1, kMaxMapSize},
+      {"level_rows", i32, "level_count", "1", "footprints along v of each level", 1, kMaxMapSize}};
 }
 
 std::vector<AttributeSchema> joined(std::vector<AttributeSchema> a, const std::vector<AttributeSchema>& b) {
@@ -101,37 +102,45 @@ KindSchema ndfPyramidSchema() {
 }
 
 KindSchema ndfCpSchema() {
-  return {"ndf-cp",
-          "Compressed pyramid of NDF images",
-          joined(pyramidShape(),
-                 {choice("method", "cp|tucker|pca", "how the basis images of a cluster are made"),
-                  choice("coefficient_type", "i8|f16|f32", "type of the stored coefficients"),
-                  integer("region_columns", 1, 65535, "1", "spatial regions along u"),
-                  integer("region_rows", 1, 65535, "1", "spatial regions along v"),
-                  integer("words_per_cluster", 1, 1024, "1", "64-bit words of slot mask of a cluster")}),
-          {{"blocks_per_image", "ceil_div(resolution * resolution, 256)", "angular blocks of an image"},
-           {"regions", "region_columns * region_rows", "spatial regions"}},
-          {{"image_regions", "", {{"", u16}}, {"images"}, "1", "region that an image belongs to"},
-           {"image_slots", "", {{"", u16}}, {"images"}, "1", "slot of an image in its region"},
-           {"image_scales", "", {{"", f32}}, {"images"}, "1", "factor that makes an image integrate to 1"},
-           {"clusters", "", {{"", ndf_cluster}}, {"regions", "blocks_per_image"}, "1", "place and size of each cluster's factors"},
-           {"masks", "", {{"", u64}}, {"regions", "blocks_per_image", "words_per_cluster"}, "1",
-            "bit b of word w: slot 64 w + b has a slice in the cluster"},
-           {"mask_ranks", "", {{"", u32}}, {"regions", "blocks_per_image", "words_per_cluster"}, "1",
-            "set bits of the cluster before this word"},
-           {"basis",
-            "",
-            {{"coefficient_type=f32", f32}, {"method=cp|tucker", i16}, {"method=pca", i32}},
-            {"basis_count"},
-            "1",
-            "inclusive prefix sums of each cluster's basis, columns fastest"},
-           {"coefficients",
-            "",
-            {{"coefficient_type=i8", i8}, {"coefficient_type=f16", f16}, {"coefficient_type=f32", f32}},
-            {"coefficient_count"},
-            "1",
-            "coefficients of each cluster, [slices][columns]"},
-           {"scales", "", {{"", f32}}, {"scale_count"}, "1", "scale of each column of each cluster"}}};
+  return {
+      "ndf-cp",
+      "Compressed pyramid of NDF images",
+      joined(pyramidShape(), {choice("method", "cp|tucker|pca", "how the basis images of a cluster are made"),
+                              choice("coefficient_type", "i8|f16|f32", "type of the stored coefficients"),
+                              integer("region_columns", 1, 65535, "1", "spatial regions along u"),
+                              integer("region_rows", 1, 65535, "1", "spatial regions along v"),
+                              integer("words_per_cluster", 1, 1024, "1", "64-bit words of slot mask of a cluster")}),
+      {{"blocks_per_image", "ceil_div(resolution * resolution, 256)", "angular blocks of an image"},
+       {"regions", "region_columns * region_rows", "spatial regions"}},
+      {{"image_regions", "", {{"", u16}}, {"images"}, "1", "region that an image belongs to"},
+       {"image_slots", "", {{"", u16}}, {"images"}, "1", "slot of an image in its region"},
+       {"image_scales", "", {{"", f32}}, {"images"}, "1", "factor that makes an image integrate to 1"},
+       {"clusters", "", {{"", ndf_cluster}}, {"regions", "blocks_per_image"}, "1", "place and size of each cluster's factors"},
+       {"masks",
+        "",
+        {{"", u64}},
+        {"regions", "blocks_per_image", "words_per_cluster"},
+        "1",
+        "bit b of word w: slot 64 w + b has a slice in the cluster"},
+       {"mask_ranks",
+        "",
+        {{"", u32}},
+        {"regions", "blocks_per_image", "words_per_cluster"},
+        "1",
+        "set bits of the cluster before this word"},
+       {"basis",
+        "",
+        {{"coefficient_type=f32", f32}, {"method=cp|tucker", i16}, {"method=pca", i32}},
+        {"basis_count"},
+        "1",
+        "inclusive prefix sums of each cluster's basis, columns fastest"},
+       {"coefficients",
+        "",
+        {{"coefficient_type=i8", i8}, {"coefficient_type=f16", f16}, {"coefficient_type=f32", f32}},
+        {"coefficient_count"},
+        "1",
+        "coefficients of each cluster, [slices][columns]"},
+       {"scales", "", {{"", f32}}, {"scale_count"}, "1", "scale of each column of each cluster"}}};
 }
 
 /// Recursive descent over one size expression.
@@ -230,32 +239,48 @@ class SizeParser {
 
 std::string_view name(ElementType type) {
   switch (type) {
-    case i8: return "i8";
-    case i16: return "i16";
-    case i32: return "i32";
-    case u16: return "u16";
-    case u32: return "u32";
-    case u64: return "u64";
-    case f16: return "f16";
-    case f32: return "f32";
-    case text: return "text";
-    case ndf_cluster: return "ndf_cluster";
+    case i8:
+      return "i8";
+    case i16:
+      return "i16";
+    case i32:
+      return "i32";
+    case u16:
+      return "u16";
+    case u32:
+      return "u32";
+    case u64:
+      return "u64";
+    case f16:
+      return "f16";
+    case f32:
+      return "f32";
+    case text:
+      return "text";
+    case ndf_cluster:
+      return "ndf_cluster";
   }
   return "unknown";
 }
 
 std::size_t sizeBytes(ElementType type) {
   switch (type) {
-    case i8: return 1;
+    case i8:
+      return 1;
     case i16:
     case u16:
-    case f16: return 2;
+    case f16:
+      return 2;
     case i32:
     case u32:
-    case f32: return 4;
-    case u64: return 8;
-    case ndf_cluster: return sizeof(NdfCluster);
-    case text: return 0;
+    case f32:
+      return 4;
+    case u64:
+      return 8;
+    case ndf_cluster:
+      return sizeof(NdfCluster);
+    case text:
+      return 0;
   }
   return 0;
 }

@@ -27,11 +27,11 @@ std::size_t sizeBytes(ElementType type);
 struct AttributeSchema {
   std::string_view name;
   ElementType type = ElementType::i32;
-  std::string_view count;      ///< expression of the number of elements; empty for a scalar, "*" for any number
-  std::string_view units;      ///< "1" when dimensionless
-  std::string_view long_name;  ///< what it means
-  double minimum = 0;          ///< smallest valid number
-  double maximum = 0;          ///< largest valid number
+  std::string_view count;        ///< expression of the number of elements; empty for a scalar, "*" for any number
+  std::string_view units;        ///< "1" when dimensionless
+  std::string_view long_name;    ///< what it means
+  double minimum = 0;            ///< smallest valid number
+  double maximum = 0;            ///< largest valid number
   std::string_view values = {};  ///< valid texts, separated by '|'; empty for any
 };
 

@@ -65,9 +65,31 @@ void checkSuperblock(const Mapping& mapping) {
   }
   const auto end = load<std::uint64_t>(mapping.data() + 28);
   if (end > mapping.size()) {
-    throwBroken("file.truncated", {},
-                "has " + std::to_string(mapping.size()) + " bytes of the " + std::to_string(end) + " that its superblock declares");
+    throwBroken(
+        "file.truncated", {},
+        "has " + std::to_string(mapping.size()) + " bytes of the " + std::to_string(end) + " that its superblock declares");
   }
+}
+
+/// Whether a text can be shown: well-formed UTF-8 without control characters (a name could otherwise drive a terminal).
+bool isPlainText(std::string_view text) {
+  for (std::size_t k = 0; k < text.size();) {
+    const auto lead = static_cast<unsigned char>(text[k++]);
+    if (lead < 0x80) {
+      if ((lead < 0x20 && lead != '\n' && lead != '\t' && lead != '\r') || lead == 0x7f) return false;
+      continue;
+    }
+    const int more = lead >= 0xc2 && lead < 0xe0 ? 1 : lead >= 0xe0 && lead < 0xf0 ? 2 : lead >= 0xf0 && lead < 0xf5 ? 3 : 0;
+    if (more == 0) return false;
+    std::uint32_t code = lead & (0x3fu >> more);
+    for (int i = 0; i < more; ++i) {
+      if (k >= text.size() || (static_cast<unsigned char>(text[k]) & 0xc0u) != 0x80) return false;
+      code = code << 6 | (static_cast<unsigned char>(text[k++]) & 0x3fu);
+    }
+    constexpr std::uint32_t kSmallest[] = {0, 0x80, 0x800, 0x10000};
+    if (code < kSmallest[more] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000) || code < 0xa0) return false;
+  }
+  return true;
 }
 
 /// Names and kinds of the links of a group, collected by HDF5's iteration.
@@ -93,14 +115,22 @@ herr_t collectAttribute(hid_t, const char* name, const H5A_info_t*, void* data) 
 
 double toDouble(ElementType type, const std::byte* at) {
   switch (type) {
-    case ElementType::i8: return load<std::int8_t>(at);
-    case ElementType::i16: return load<std::int16_t>(at);
-    case ElementType::i32: return load<std::int32_t>(at);
-    case ElementType::u16: return load<std::uint16_t>(at);
-    case ElementType::u32: return load<std::uint32_t>(at);
-    case ElementType::u64: return static_cast<double>(load<std::uint64_t>(at));
-    case ElementType::f32: return load<float>(at);
-    default: return 0;
+    case ElementType::i8:
+      return load<std::int8_t>(at);
+    case ElementType::i16:
+      return load<std::int16_t>(at);
+    case ElementType::i32:
+      return load<std::int32_t>(at);
+    case ElementType::u16:
+      return load<std::uint16_t>(at);
+    case ElementType::u32:
+      return load<std::uint32_t>(at);
+    case ElementType::u64:
+      return static_cast<double>(load<std::uint64_t>(at));
+    case ElementType::f32:
+      return load<float>(at);
+    default:
+      return 0;
   }
 }
 
@@ -136,6 +166,7 @@ class StructureReader {
     for (const auto& [name, hard] : links.entries) {
       const std::string path = prefix + name;
       attempt([&] {
+        if (!isPlainText(name)) throwBroken("text.utf8", here, "has a link whose name is no plain text");
         if (!hard) throwBroken("link.hard", "/" + path, "is a soft, external or user-defined link");
         readObject(group, name, path, depth);
       });
@@ -146,8 +177,9 @@ class StructureReader {
     const std::string object = "/" + path;
     H5O_info_t info;
     // Reads the object's header only: opening a virtual or external dataset might already touch other files.
-    hdf5::check(H5Oget_info_by_name2(group, name.c_str(), &info, H5O_INFO_BASIC | H5O_INFO_NUM_ATTRS | H5O_INFO_HDR, H5P_DEFAULT),
-                "cannot be read", object);
+    hdf5::check(
+        H5Oget_info_by_name2(group, name.c_str(), &info, H5O_INFO_BASIC | H5O_INFO_NUM_ATTRS | H5O_INFO_HDR, H5P_DEFAULT),
+        "cannot be read", object);
     if (info.rc != 1 || !seen_.insert(info.addr).second) throwBroken("link.single", object, "has several links");
     if (info.type == H5O_TYPE_GROUP) {
       if (depth >= kMaxDepth) throwBroken("group.depth", object, "is nested too deep");
@@ -234,6 +266,7 @@ class StructureReader {
   }
 
   void readAttribute(hid_t object_id, const std::string& object, const std::string& name, Attributes& attributes) {
+    if (!isPlainText(name)) throwBroken("text.utf8", object, "has an attribute whose name is no plain text");
     const std::string place = object + "@" + name;
     const hdf5::Handle attribute(H5Aopen(object_id, name.c_str(), H5P_DEFAULT), "cannot be opened", place);
     const hdf5::Handle type(H5Aget_type(attribute), "type cannot be read", place);
@@ -262,6 +295,7 @@ class StructureReader {
       if (is_text) {
         const char* chars = reinterpret_cast<const char*>(at);
         value.texts.emplace_back(chars, ::strnlen(chars, element_bytes));
+        if (!isPlainText(value.texts.back())) throwBroken("text.utf8", place, "is no plain text");
       } else {
         value.numbers.push_back(toDouble(value.type, at));
       }
@@ -288,7 +322,8 @@ hdf5::Handle openInHdf5(const std::filesystem::path& path, const struct stat& ma
   void* descriptor = nullptr;
   hdf5::check(H5Fget_vfd_handle(file, access, &descriptor), "has no descriptor", {});
   struct stat opened = {};
-  if (::fstat(*static_cast<int*>(descriptor), &opened) != 0 || opened.st_dev != mapped.st_dev || opened.st_ino != mapped.st_ino) {
+  if (::fstat(*static_cast<int*>(descriptor), &opened) != 0 || opened.st_dev != mapped.st_dev ||
+      opened.st_ino != mapped.st_ino) {
     throwBroken("file.readable", {}, "was replaced while it was being opened");
   }
   return file;

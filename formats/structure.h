@@ -57,16 +57,16 @@ struct DatasetRecord {
   ElementType type = ElementType::f32;
   std::vector<std::uint64_t> dims;
   std::uint64_t size_bytes = 0;
-  std::uint64_t offset = 0;            ///< from the start of the file; 0 if empty
-  const std::byte* data = nullptr;     ///< in the mapping; not null unless empty
+  std::uint64_t offset = 0;         ///< from the start of the file; 0 if empty
+  const std::byte* data = nullptr;  ///< in the mapping; not null unless empty
   Attributes attributes;
 };
 
 /// Everything that a file holds, apart from what it means.
 struct FileStructure {
   Mapping mapping;
-  Attributes attributes;                             ///< of the root
-  std::map<std::string, DatasetRecord> datasets;     ///< by path without the leading '/'
+  Attributes attributes;                          ///< of the root
+  std::map<std::string, DatasetRecord> datasets;  ///< by path without the leading '/'
 };
 
 /// Reads a file's structure. Broken rules are added to `findings`; what can still be read is returned.

@@ -101,7 +101,8 @@ ordered_json summarizeCompressed(const CompressedNdf& ndf, const formats::AssetI
   }
   ordered_json histogram = ordered_json::array();
   for (const auto& [rank, clusters] : ranks) {
-    histogram.push_back({{"rank", std::to_string(rank.first) + (rank.second > 0 ? "x" + std::to_string(rank.second) : "")}, {"clusters", clusters}});
+    histogram.push_back({{"rank", std::to_string(rank.first) + (rank.second > 0 ? "x" + std::to_string(rank.second) : "")},
+                         {"clusters", clusters}});
   }
   std::uint64_t bytes = 0;
   for (const formats::DatasetInfo& dataset : info.datasets) bytes += dataset.size_bytes;
@@ -181,7 +182,8 @@ std::string table(const ordered_json& rows) {
   std::string text;
   for (const auto& line : cells) {
     text += " ";
-    for (std::size_t c = 0; c < widths.size(); ++c) text += " " + line[c] + std::string(c + 1 < widths.size() ? widths[c] - line[c].size() + 1 : 0, ' ');
+    for (std::size_t c = 0; c < widths.size(); ++c)
+      text += " " + line[c] + std::string(c + 1 < widths.size() ? widths[c] - line[c].size() + 1 : 0, ' ');
     text += "\n";
   }
   return text;
@@ -205,7 +207,8 @@ std::string section(const char* title, const ordered_json& values) {
 ordered_json summarize(const formats::Asset& asset) {
   const formats::AssetInfo& info = asset.info();
   ordered_json inputs = ordered_json::array();
-  for (const formats::InputRecord& input : info.provenance.inputs) inputs.push_back({{"name", input.name}, {"hash", input.hash_hex}});
+  for (const formats::InputRecord& input : info.provenance.inputs)
+    inputs.push_back({{"name", input.name}, {"hash", input.hash_hex}});
   ordered_json datasets = ordered_json::array();
   for (const formats::DatasetInfo& dataset : info.datasets) {
     datasets.push_back({{"path", dataset.path},
@@ -227,7 +230,8 @@ ordered_json summarize(const formats::Asset& asset) {
           {"kind", asset.kind()},
           {"format_version", std::to_string(info.format_major) + "." + std::to_string(info.format_minor)},
           {"file_bytes", info.file_bytes},
-          {"provenance", {{"generator", info.provenance.generator}, {"command", std::move(command)}, {"inputs", std::move(inputs)}}},
+          {"provenance",
+           {{"generator", info.provenance.generator}, {"command", std::move(command)}, {"inputs", std::move(inputs)}}},
           {"properties", std::move(properties)},
           {"statistics", std::move(statistics)},
           {"datasets", std::move(datasets)}};
@@ -243,7 +247,10 @@ std::string summaryText(const std::string& path, const ordered_json& summary) {
   for (const auto& input : provenance["inputs"]) text += row("input", plain(input["hash"]) + "  " + plain(input["name"]));
   ordered_json parts = ordered_json::array();
   for (const auto& dataset : summary["datasets"]) {
-    parts.push_back({{"path", dataset["path"]}, {"type", dataset["type"]}, {"dims", dataset["dims"]}, {"bytes", dataset["bytes"]},
+    parts.push_back({{"path", dataset["path"]},
+                     {"type", dataset["type"]},
+                     {"dims", dataset["dims"]},
+                     {"bytes", dataset["bytes"]},
                      {"long_name", dataset["long_name"]}});
   }
   return parts.empty() ? text : text + "datasets\n" + table(parts);

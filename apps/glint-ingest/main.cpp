@@ -1,7 +1,6 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
-#include "common/image_io.h"
 #include "glint-ingest/ingest_options.h"
 #include "glint/bake/normal_bounds.h"
 #include "glint/bake/slopes.h"
@@ -10,7 +9,6 @@
 using namespace glint;
 
 namespace {
-
 /// Adds the min-max pyramid and writes the asset.
 void writeNormals(const apps::OutputFile& output, const apps::Image& image, float texel_size_um, std::span<const Vec2> normals,
                   const formats::Provenance& provenance) {
@@ -23,14 +21,12 @@ void writeNormals(const apps::OutputFile& output, const apps::Image& image, floa
   bake::attachBounds(map, bounds);
   formats::writeAsset(output.path(), map, provenance, output.writeOptions());
 }
-
 }  // namespace
 
 int main(int argc, char** argv) {
   apps::Tool tool(
       {"glint-ingest",
-       "Reads a normal map or height field from any image that OpenImageIO knows and writes it as an asset, with the "
-       "min-max pyramid that queries use. Wrong inputs are refused, not clamped.",
+       "Turns any image of normals or heights into an asset. Wrong inputs are refused, not clamped.",
        "glint-ingest flakes.png -o flakes.glint --convention directx"});
   const apps::InputFile input(tool, "image of normals or heights", "IMAGE");
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of normals or heights");

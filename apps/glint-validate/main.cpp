@@ -6,10 +6,11 @@
 using namespace glint;
 
 int main(int argc, char** argv) {
-  apps::Tool tool({"glint-validate",
-                   "Checks assets against every rule of the format: structure, indices, hashes and values. Prints what is wrong "
-                   "and what to do; valid files are silent. Exit code 0: valid; 2: unreadable; 3: invalid; 5: unsupported.",
-                   "glint-validate flakes.glint --warnings-as-errors"});
+  apps::Tool tool(
+      {"glint-validate",
+       "Checks assets against every rule of the format: structure, indices, hashes and values. Prints what is wrong "
+       "and what to do; valid files are silent. Exit code 0: valid; 2: unreadable; 3: invalid; 5: unsupported.",
+       "glint-validate flakes.glint --warnings-as-errors"});
   const apps::InputFiles inputs(tool, "assets (.glint)", "FILE");
   bool warnings_as_errors = false;
   bool quick = false;

@@ -54,8 +54,9 @@ void PackedAsset::array(std::string path, ElementType type, std::vector<std::uin
   std::uint64_t expected = 1;
   for (const std::uint64_t n : dims) expected *= n;
   if (expected != count || (count != 0 && data == nullptr)) {
-    throw Error(ErrorCode::usage, "dataset.dims", {}, "/" + path,
-                "holds " + std::to_string(data == nullptr ? 0 : count) + " elements where its sizes need " + std::to_string(expected));
+    throw Error(
+        ErrorCode::usage, "dataset.dims", {}, "/" + path,
+        "holds " + std::to_string(data == nullptr ? 0 : count) + " elements where its sizes need " + std::to_string(expected));
   }
   arrays.push_back({std::move(path), type, std::move(dims), data, count * sizeBytes(type)});
 }

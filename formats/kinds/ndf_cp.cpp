@@ -19,9 +19,12 @@ ElementType basisType(const CompressedNdf& ndf) {
 
 ElementType coefficientElement(CoefficientType type) {
   switch (type) {
-    case CoefficientType::i8: return ElementType::i8;
-    case CoefficientType::f16: return ElementType::f16;
-    default: return ElementType::f32;
+    case CoefficientType::i8:
+      return ElementType::i8;
+    case CoefficientType::f16:
+      return ElementType::f16;
+    default:
+      return ElementType::f32;
   }
 }
 
@@ -32,11 +35,16 @@ Enum fromText(const std::string_view (&names)[N], const std::string& text) {
 
 double element(ElementType type, const void* data, std::uint64_t index) {
   switch (type) {
-    case ElementType::i8: return static_cast<const std::int8_t*>(data)[index];
-    case ElementType::i16: return static_cast<const std::int16_t*>(data)[index];
-    case ElementType::i32: return static_cast<const std::int32_t*>(data)[index];
-    case ElementType::f16: return halfToFloat(static_cast<const std::uint16_t*>(data)[index]);
-    default: return static_cast<const float*>(data)[index];
+    case ElementType::i8:
+      return static_cast<const std::int8_t*>(data)[index];
+    case ElementType::i16:
+      return static_cast<const std::int16_t*>(data)[index];
+    case ElementType::i32:
+      return static_cast<const std::int32_t*>(data)[index];
+    case ElementType::f16:
+      return halfToFloat(static_cast<const std::uint16_t*>(data)[index]);
+    default:
+      return static_cast<const float*>(data)[index];
   }
 }
 
@@ -46,9 +54,12 @@ std::uint64_t columnCount(const CompressedNdf& ndf, const NdfCluster& cluster) {
 
 std::uint64_t basisSize(const CompressedNdf& ndf, const NdfCluster& cluster) {
   switch (ndf.method) {
-    case CompressionMethod::cp: return std::uint64_t{2} * kBlockSize * cluster.rank_x;
-    case CompressionMethod::tucker: return std::uint64_t{kBlockSize} * (cluster.rank_x + cluster.rank_y);
-    default: return std::uint64_t{kBlockPixels} * cluster.rank_x;
+    case CompressionMethod::cp:
+      return std::uint64_t{2} * kBlockSize * cluster.rank_x;
+    case CompressionMethod::tucker:
+      return std::uint64_t{kBlockSize} * (cluster.rank_x + cluster.rank_y);
+    default:
+      return std::uint64_t{kBlockPixels} * cluster.rank_x;
   }
 }
 
@@ -79,7 +90,8 @@ std::vector<std::uint32_t> checkImages(const CompressedNdf& ndf, Findings& findi
   std::vector<std::uint32_t> slots(regions);
   for (const std::uint16_t region : ndf.image_regions) {
     if (region >= regions) {
-      findings.add("compressed.slots", "/image_regions", "names region " + std::to_string(region) + " of " + std::to_string(regions));
+      findings.add("compressed.slots", "/image_regions",
+                   "names region " + std::to_string(region) + " of " + std::to_string(regions));
       return {};
     }
     ++slots[region];
@@ -93,7 +105,8 @@ std::vector<std::uint32_t> checkImages(const CompressedNdf& ndf, Findings& findi
     const std::uint16_t slot = ndf.image_slots[k];
     if (slot >= slots[region] || slot >= std::uint64_t{64} * static_cast<std::uint64_t>(ndf.words_per_cluster) ||
         used[first[region] + slot]) {
-      findings.add("compressed.slots", "/image_slots", "image " + std::to_string(k) + " has an invalid or used slot " + std::to_string(slot));
+      findings.add("compressed.slots", "/image_slots",
+                   "image " + std::to_string(k) + " has an invalid or used slot " + std::to_string(slot));
       return {};
     }
     used[first[region] + slot] = true;
@@ -108,7 +121,9 @@ std::string_view checkMask(const CompressedNdf& ndf, std::size_t cluster, std::u
   for (std::size_t w = 0; w < words; ++w) {
     const std::uint64_t mask = ndf.masks[cluster * words + w];
     if (ndf.mask_ranks[cluster * words + w] != count) return "compressed.mask_ranks";
-    const std::uint64_t valid = slots <= 64 * w ? 0 : slots - 64 * w >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << (slots - 64 * w)) - 1;
+    const std::uint64_t valid = slots <= 64 * w        ? 0
+                                : slots - 64 * w >= 64 ? ~std::uint64_t{0}
+                                                       : (std::uint64_t{1} << (slots - 64 * w)) - 1;
     if ((mask & ~valid) != 0) return "compressed.masks";
     count += static_cast<std::uint32_t>(std::popcount(mask));
   }
@@ -121,10 +136,13 @@ double blockSum(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64
   const std::uint64_t rank_x = cluster.rank_x;
   const std::uint64_t rank_y = cluster.rank_y;
   switch (ndf.method) {
-    case CompressionMethod::cp: return at((kBlockSize - 1) * rank_x + column) * at((2 * kBlockSize - 1) * rank_x + column);
+    case CompressionMethod::cp:
+      return at((kBlockSize - 1) * rank_x + column) * at((2 * kBlockSize - 1) * rank_x + column);
     case CompressionMethod::tucker:
-      return at((kBlockSize - 1) * rank_x + column / rank_y) * at(kBlockSize * rank_x + (kBlockSize - 1) * rank_y + column % rank_y);
-    default: return at((kBlockPixels - 1) * rank_x + column);
+      return at((kBlockSize - 1) * rank_x + column / rank_y) *
+             at(kBlockSize * rank_x + (kBlockSize - 1) * rank_y + column % rank_y);
+    default:
+      return at((kBlockPixels - 1) * rank_x + column);
   }
 }
 
@@ -145,7 +163,8 @@ std::vector<double> slotIntegrals(const CompressedNdf& ndf, const std::vector<st
     for (std::size_t w = 0; w < words; ++w) {
       for (std::uint64_t mask = ndf.masks[c * words + w]; mask != 0; mask &= mask - 1) {
         const std::size_t slot = 64 * w + static_cast<std::size_t>(std::countr_zero(mask));
-        for (std::uint64_t k = 0; k < columns; ++k) integrals[first[c / blocks] + slot] += weights[k] * element(type, ndf.coefficients, coefficient++);
+        for (std::uint64_t k = 0; k < columns; ++k)
+          integrals[first[c / blocks] + slot] += weights[k] * element(type, ndf.coefficients, coefficient++);
       }
     }
   }
@@ -174,13 +193,15 @@ void checkIntegrals(const CompressedNdf& ndf, Findings& findings) {
 }
 
 template <class Condition>
-void checkAll(std::uint64_t count, Condition holds, std::string_view rule, const char* object, const char* what, Findings& findings) {
+void checkAll(std::uint64_t count, Condition holds, std::string_view rule, const char* object, const char* what,
+              Findings& findings) {
   std::uint64_t bad = 0;
   std::uint64_t first = 0;
   for (std::uint64_t k = 0; k < count; ++k) {
     if (!holds(k) && bad++ == 0) first = k;
   }
-  if (bad > 0) findings.add(rule, object, std::to_string(bad) + " values are " + what + " (first at " + std::to_string(first) + ")");
+  if (bad > 0)
+    findings.add(rule, object, std::to_string(bad) + " values are " + what + " (first at " + std::to_string(first) + ")");
 }
 
 }  // namespace
@@ -211,7 +232,8 @@ PackedAsset pack(const CompressedNdf& ndf) {
   packed.array("masks", ElementType::u64, {regions, blocks, words}, ndf.masks.data(), ndf.masks.size());
   packed.array("mask_ranks", ElementType::u32, {regions, blocks, words}, ndf.mask_ranks.data(), ndf.mask_ranks.size());
   packed.array("basis", basisType(ndf), {ndf.basis_count}, ndf.basis, ndf.basis_count);
-  packed.array("coefficients", coefficientElement(ndf.coefficient_type), {ndf.coefficient_count}, ndf.coefficients, ndf.coefficient_count);
+  packed.array("coefficients", coefficientElement(ndf.coefficient_type), {ndf.coefficient_count}, ndf.coefficients,
+               ndf.coefficient_count);
   packed.array("scales", ElementType::f32, {ndf.scales.size()}, ndf.scales.data(), ndf.scales.size());
   return packed;
 }
@@ -253,8 +275,9 @@ void checkIndex(const CompressedNdf& ndf, Findings& findings) {
     }
     if (cluster.slice_count == 0) continue;
     if (!ranksHold(ndf, cluster)) {
-      findings.add("compressed.ranks", "/clusters",
-                   clusterName(ndf, c) + " has ranks " + std::to_string(cluster.rank_x) + ", " + std::to_string(cluster.rank_y));
+      findings.add(
+          "compressed.ranks", "/clusters",
+          clusterName(ndf, c) + " has ranks " + std::to_string(cluster.rank_x) + ", " + std::to_string(cluster.rank_y));
       continue;
     }
     const std::uint64_t columns = columnCount(ndf, cluster);
@@ -267,18 +290,22 @@ void checkIndex(const CompressedNdf& ndf, Findings& findings) {
 }
 
 void checkData(const CompressedNdf& ndf, Findings& findings) {
-  checkAll(ndf.image_scales.size(), [&](std::uint64_t k) { return std::isfinite(ndf.image_scales[k]) && ndf.image_scales[k] > 0; },
-           "compressed.image_scales", "/image_scales", "not finite and positive", findings);
-  checkAll(ndf.scales.size(), [&](std::uint64_t k) { return std::isfinite(ndf.scales[k]); }, "compressed.scales", "/scales",
-           "not finite", findings);
+  checkAll(
+      ndf.image_scales.size(), [&](std::uint64_t k) { return std::isfinite(ndf.image_scales[k]) && ndf.image_scales[k] > 0; },
+      "compressed.image_scales", "/image_scales", "not finite and positive", findings);
+  checkAll(
+      ndf.scales.size(), [&](std::uint64_t k) { return std::isfinite(ndf.scales[k]); }, "compressed.scales", "/scales",
+      "not finite", findings);
   if (ndf.coefficient_type != CoefficientType::i8) {
     const ElementType type = coefficientElement(ndf.coefficient_type);
-    checkAll(ndf.coefficient_count, [&](std::uint64_t k) { return std::isfinite(element(type, ndf.coefficients, k)); },
-             "compressed.factors", "/coefficients", "not finite", findings);
+    checkAll(
+        ndf.coefficient_count, [&](std::uint64_t k) { return std::isfinite(element(type, ndf.coefficients, k)); },
+        "compressed.factors", "/coefficients", "not finite", findings);
   }
   if (basisType(ndf) == ElementType::f32) {
-    checkAll(ndf.basis_count, [&](std::uint64_t k) { return std::isfinite(element(ElementType::f32, ndf.basis, k)); },
-             "compressed.factors", "/basis", "not finite", findings);
+    checkAll(
+        ndf.basis_count, [&](std::uint64_t k) { return std::isfinite(element(ElementType::f32, ndf.basis, k)); },
+        "compressed.factors", "/basis", "not finite", findings);
   }
   checkIntegrals(ndf, findings);
 }

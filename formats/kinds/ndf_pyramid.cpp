@@ -37,12 +37,14 @@ std::vector<double> checkBlocks(const NdfPyramid& pyramid, int l, Findings& find
     if (!(std::abs(mean - level.block_means[b]) <= tolerance) && bad_means++ == 0) first_mean = b;
   }
   if (bad_pixels > 0) {
-    findings.add("pyramid.pixels", levelObject(l, "pixels"),
-                 std::to_string(bad_pixels) + " pixels are negative or not finite (first in block " + std::to_string(first_pixel) + ")");
+    findings.add(
+        "pyramid.pixels", levelObject(l, "pixels"),
+        std::to_string(bad_pixels) + " pixels are negative or not finite (first in block " + std::to_string(first_pixel) + ")");
   }
   if (bad_means > 0) {
-    findings.add("pyramid.block_means", levelObject(l, "block_means"),
-                 std::to_string(bad_means) + " means differ from the pixels' (first in block " + std::to_string(first_mean) + ")");
+    findings.add(
+        "pyramid.block_means", levelObject(l, "block_means"),
+        std::to_string(bad_means) + " means differ from the pixels' (first in block " + std::to_string(first_mean) + ")");
   }
   return sums;
 }
@@ -63,7 +65,8 @@ PackedAsset pack(const NdfPyramid& pyramid) {
     const std::uint64_t blocks = level.block_means.size();
     packed.array(path("masks"), ElementType::u64, {rows, columns, static_cast<std::uint64_t>(shape.maskWords())},
                  level.masks.data(), level.masks.size());
-    packed.array(path("first_block"), ElementType::u64, {rows * columns + 1}, level.first_block.data(), level.first_block.size());
+    packed.array(path("first_block"), ElementType::u64, {rows * columns + 1}, level.first_block.data(),
+                 level.first_block.size());
     packed.array(path("block_means"), ElementType::f32, {blocks}, level.block_means.data(), blocks);
     // The pixels are a bare pointer: the running count is the only witness of how many there are.
     packed.array(path("pixels"), pyramid.precision == BlockPrecision::f16 ? ElementType::f16 : ElementType::f32,

@@ -1,13 +1,15 @@
 """Every tool has the same flags, messages and exit codes."""
 
 import json
+import pathlib
 import shlex
 import subprocess
 
 import pytest
 from conftest import BIN
 
-TOOLS = sorted(path.name.removeprefix("glint-") for path in BIN.glob("glint-*") if not path.name.endswith("-tests"))
+APPS = pathlib.Path(__file__).parents[2] / "apps"
+TOOLS = sorted(path.parent.name.removeprefix("glint-") for path in APPS.glob("glint-*/main.cpp"))
 SHARED = ["--threads", "--seed", "--json", "--progress", "--quiet", "--force", "--depfile", "--config", "--version", "--help"]
 
 

@@ -23,14 +23,19 @@ Bytes mutate(Bytes bytes, std::mt19937& random) {
     if (bytes.empty()) return bytes;
     const std::size_t at = below(3) == 0 ? below(bytes.size()) : below(std::min<std::size_t>(bytes.size(), 8192));
     switch (below(6)) {
-      case 0: bytes[at] ^= static_cast<std::uint8_t>(1u << below(8)); break;
-      case 1: bytes[at] = static_cast<std::uint8_t>(random()); break;
+      case 0:
+        bytes[at] ^= static_cast<std::uint8_t>(1u << below(8));
+        break;
+      case 1:
+        bytes[at] = static_cast<std::uint8_t>(random());
+        break;
       case 2:
         for (std::size_t b = at; b < std::min(at + 8, bytes.size()); ++b) bytes[b] = 0xff;
         break;
       case 3: {
         const std::size_t from = below(bytes.size());
-        for (std::size_t b = 0; b < 16 && at + b < bytes.size() && from + b < bytes.size(); ++b) bytes[at + b] = bytes[from + b];
+        for (std::size_t b = 0; b < 16 && at + b < bytes.size() && from + b < bytes.size(); ++b)
+          bytes[at + b] = bytes[from + b];
         break;
       }
       case 4:

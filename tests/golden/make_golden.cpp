@@ -1,5 +1,5 @@
-// Writes the golden files of format version 1.0: small assets made from formulas (support/sample_assets.cpp), one for each kind and
-// each way to store it. Files of a released version are frozen: run this only for a new version, into its own folder.
+// Writes the golden files of format version 1.0: small assets made from formulas (support/sample_assets.cpp), one for each kind
+// and each way to store it. Files of a released version are frozen: run this only for a new version, into its own folder.
 
 #include <cstdio>
 #include <filesystem>

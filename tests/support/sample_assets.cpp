@@ -83,7 +83,8 @@ std::vector<Image> levelImages(const NormalMap& map, const PyramidGrid& grid) {
   std::vector<Image> images;
   for (int j = 0; j < grid.rows; ++j) {
     for (int i = 0; i < grid.columns; ++i) {
-      images.push_back(footprintImage(map, (i + 0.5) * grid.stride, (j + 0.5) * grid.stride, kFootprintPerStride * grid.stride));
+      images.push_back(
+          footprintImage(map, (i + 0.5) * grid.stride, (j + 0.5) * grid.stride, kFootprintPerStride * grid.stride));
     }
   }
   return images;
@@ -182,9 +183,15 @@ void addCoefficients(SampleCompressed& sample, const std::vector<std::vector<dou
     for (std::size_t c = 0; c < columns; ++c) {
       const double value = slice[c] / steps[c];
       switch (sample.ndf.coefficient_type) {
-        case CoefficientType::i8: sample.coefficients_i8.push_back(static_cast<std::int8_t>(std::lround(value))); break;
-        case CoefficientType::f16: sample.coefficients_f16.push_back(floatToHalf(static_cast<float>(value))); break;
-        case CoefficientType::f32: sample.coefficients_f32.push_back(static_cast<float>(value)); break;
+        case CoefficientType::i8:
+          sample.coefficients_i8.push_back(static_cast<std::int8_t>(std::lround(value)));
+          break;
+        case CoefficientType::f16:
+          sample.coefficients_f16.push_back(floatToHalf(static_cast<float>(value)));
+          break;
+        case CoefficientType::f32:
+          sample.coefficients_f32.push_back(static_cast<float>(value));
+          break;
       }
     }
   }
@@ -264,9 +271,12 @@ double basisElement(const CompressedNdf& ndf, std::uint64_t index) {
 
 double coefficientElement(const CompressedNdf& ndf, std::uint64_t index) {
   switch (ndf.coefficient_type) {
-    case CoefficientType::i8: return static_cast<const std::int8_t*>(ndf.coefficients)[index];
-    case CoefficientType::f16: return halfToFloat(static_cast<const std::uint16_t*>(ndf.coefficients)[index]);
-    default: return static_cast<const float*>(ndf.coefficients)[index];
+    case CoefficientType::i8:
+      return static_cast<const std::int8_t*>(ndf.coefficients)[index];
+    case CoefficientType::f16:
+      return halfToFloat(static_cast<const std::uint16_t*>(ndf.coefficients)[index]);
+    default:
+      return static_cast<const float*>(ndf.coefficients)[index];
   }
 }
 
@@ -300,7 +310,8 @@ SampleNormals sampleNormals(int width, int height, bool with_bounds) {
   for (int j = 0; j < height; ++j) {
     for (int i = 0; i < width; ++i) {
       const double wave = 0.25 * std::sin(6.283185307 * (3.0 * i / width + 2.0 * j / height));
-      sample.normals.push_back({static_cast<float>(wave + 0.1 * (noise(i, j) - 0.5)), static_cast<float>(0.3 * (noise(j, i + 7) - 0.5))});
+      sample.normals.push_back(
+          {static_cast<float>(wave + 0.1 * (noise(i, j) - 0.5)), static_cast<float>(0.3 * (noise(j, i + 7) - 0.5))});
     }
   }
   sample.map.width = width;
@@ -320,7 +331,8 @@ SampleNormals sampleNormals(int width, int height, bool with_bounds) {
         for (int y = j * block; y <= std::min((j + 1) * block, height); ++y) {
           for (int x = i * block; x <= std::min((i + 1) * block, width); ++x) {
             const Vec2 n = sample.map.at(x % width, y % height);
-            node = {std::min(node.low_x, n.x), std::min(node.low_y, n.y), std::max(node.high_x, n.x), std::max(node.high_y, n.y)};
+            node = {std::min(node.low_x, n.x), std::min(node.low_y, n.y), std::max(node.high_x, n.x),
+                    std::max(node.high_y, n.y)};
           }
         }
         nodes.push_back(node);
@@ -407,21 +419,25 @@ SampleCompressed sampleCompressed(int size, CompressionMethod method, Coefficien
   linkSpans(sample);
   for (std::size_t k = 0; k < images.size(); ++k) {
     double sum = 0;
-    for (int p = 0; p < kResolution * kResolution; ++p) sum += compressedPixel(ndf, static_cast<int>(k), p % kResolution, p / kResolution);
+    for (int p = 0; p < kResolution * kResolution; ++p)
+      sum += compressedPixel(ndf, static_cast<int>(k), p % kResolution, p / kResolution);
     sample.image_scales[k] = static_cast<float>(kResolution * kResolution / 4 / sum);
   }
   return sample;
 }
 
 formats::Provenance sampleProvenance() {
-  return {"sample_assets 1.0", R"({"size":64})", {{"flakes.png", "00112233445566778899aabbccddeeff"}, {"b\u00e4r.exr", "ffeeddccbbaa99887766554433221100"}}};
+  return {"sample_assets 1.0",
+          R"({"size":64})",
+          {{"flakes.png", "00112233445566778899aabbccddeeff"}, {"b\u00e4r.exr", "ffeeddccbbaa99887766554433221100"}}};
 }
 
 std::uint16_t floatToHalf(float value) {
   const auto bits = std::bit_cast<std::uint32_t>(value);
   const auto sign = static_cast<std::uint16_t>(bits >> 16 & 0x8000u);
   const float magnitude = std::abs(value);
-  if (magnitude < 0x1p-14f) return static_cast<std::uint16_t>(sign | static_cast<std::uint16_t>(std::lrint(magnitude * 0x1p24f)));
+  if (magnitude < 0x1p-14f)
+    return static_cast<std::uint16_t>(sign | static_cast<std::uint16_t>(std::lrint(magnitude * 0x1p24f)));
   const std::uint32_t rebased = (bits & 0x7fffffffu) - (112u << 23);
   const std::uint32_t rounded = rebased + 0xfffu + (rebased >> 13 & 1u);
   return static_cast<std::uint16_t>(sign | std::min(rounded >> 13, 0x7c00u));
@@ -437,13 +453,15 @@ float halfToFloat(std::uint16_t bits) {
 float pyramidPixel(const NdfPyramid& pyramid, int level, int image, int x, int y) {
   const PyramidLevel& data = pyramid.levels[level];
   const int block = y / kBlockSize * pyramid.shape.blocksPerAxis() + x / kBlockSize;
-  const std::uint64_t* mask = &data.masks[static_cast<std::size_t>(image) * static_cast<std::size_t>(pyramid.shape.maskWords())];
+  const std::uint64_t* mask =
+      &data.masks[static_cast<std::size_t>(image) * static_cast<std::size_t>(pyramid.shape.maskWords())];
   if ((mask[block / 64] >> (block % 64) & 1u) == 0) return 0;
   std::uint64_t index = data.first_block[static_cast<std::size_t>(image)];
   for (int b = 0; b < block; ++b) index += mask[b / 64] >> (b % 64) & 1u;
   index = index * kBlockPixels + static_cast<std::uint64_t>(y % kBlockSize * kBlockSize + x % kBlockSize);
-  const float stored = pyramid.precision == BlockPrecision::f16 ? halfToFloat(static_cast<const std::uint16_t*>(data.pixels)[index])
-                                                                : static_cast<const float*>(data.pixels)[index];
+  const float stored = pyramid.precision == BlockPrecision::f16
+                           ? halfToFloat(static_cast<const std::uint16_t*>(data.pixels)[index])
+                           : static_cast<const float*>(data.pixels)[index];
   return pyramid.value_scale * stored;
 }
 

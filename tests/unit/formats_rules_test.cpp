@@ -1,4 +1,6 @@
+#ifndef H5_USE_110_API
 #define H5_USE_110_API
+#endif
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hdf5.h>
@@ -28,9 +30,12 @@ enum class Base { normals, heights, pyramid, compressed, compressed_f32 };
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
   switch (base) {
-    case Base::normals: return writeAsset(path, test::sampleNormals(32, 32).map, provenance);
-    case Base::heights: return writeAsset(path, test::sampleHeights(16, 16).map, provenance);
-    case Base::pyramid: return writeAsset(path, test::samplePyramid(32, BlockPrecision::f32).pyramid, provenance);
+    case Base::normals:
+      return writeAsset(path, test::sampleNormals(32, 32).map, provenance);
+    case Base::heights:
+      return writeAsset(path, test::sampleHeights(16, 16).map, provenance);
+    case Base::pyramid:
+      return writeAsset(path, test::samplePyramid(32, BlockPrecision::f32).pyramid, provenance);
     case Base::compressed:
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
     case Base::compressed_f32:
@@ -57,7 +62,8 @@ class Patch {
 
   void remove(const char* object, const char* attribute) const { H5Adelete_by_name(file_, object, attribute, H5P_DEFAULT); }
 
-  void set(const char* object, const char* attribute, hid_t type, hid_t memory_type, const void* value, hsize_t count = 0) const {
+  void set(const char* object, const char* attribute, hid_t type, hid_t memory_type, const void* value,
+           hsize_t count = 0) const {
     if (H5Aexists_by_name(file_, object, attribute, H5P_DEFAULT) > 0) remove(object, attribute);
     const hid_t space = count == 0 ? H5Screate(H5S_SCALAR) : H5Screate_simple(1, &count, nullptr);
     const hid_t id = H5Acreate_by_name(file_, object, attribute, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
@@ -88,8 +94,9 @@ class Patch {
   }
 
   /// Replaces a dataset by a new one made with other properties; `prepare` may change them.
-  void replace(const char* path, hid_t type, std::vector<hsize_t> dims, bool write,
-               const std::function<void(hid_t)>& prepare = [](hid_t) {}) const {
+  void replace(
+      const char* path, hid_t type, std::vector<hsize_t> dims, bool write,
+      const std::function<void(hid_t)>& prepare = [](hid_t) {}) const {
     if (H5Lexists(file_, path, H5P_DEFAULT) > 0) H5Ldelete(file_, path, H5P_DEFAULT);
     const hid_t properties = H5Pcreate(H5P_DATASET_CREATE);
     prepare(properties);
@@ -159,10 +166,15 @@ std::vector<Fixture> linkFixtures() {
               }),
       patched("group.size", Base::heights,
               [](const Patch& patch) {
-                for (int k = 0; k < 1100; ++k) H5Lcreate_soft("/heights", patch.file(), ("l" + std::to_string(k)).c_str(), 0, 0);
+                for (int k = 0; k < 1100; ++k)
+                  H5Lcreate_soft("/heights", patch.file(), ("l" + std::to_string(k)).c_str(), 0, 0);
               }),
       patched("group.size", Base::heights,
               [](const Patch& patch) { H5Lcreate_soft("/heights", patch.file(), std::string(300, 'x').c_str(), 0, 0); }),
+      patched("text.utf8", Base::heights, [](const Patch& patch) { patch.setText("generator", "tool \xff 1.0"); }),
+      patched("text.utf8", Base::heights, [](const Patch& patch) { patch.setText("generator", "\x1b[2J"); }),
+      patched("text.utf8", Base::heights, [](const Patch& patch) { patch.setInteger("\xc3(", 1); }),
+      patched("text.utf8", Base::heights, [](const Patch& patch) { H5Gclose(H5Gcreate2(patch.file(), "\x1b[31m", 0, 0, 0)); }),
       patched("link.hard", Base::heights,
               [](const Patch& patch) {
                 H5Lmove(patch.file(), "heights", patch.file(), "other", 0, 0);
@@ -231,10 +243,12 @@ std::vector<Fixture> attributeFixtures() {
       patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setInteger("resolution", 2048); }),
       patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setInteger("level_count", 17); }),
       patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setText("surface", "bumpy"); }),
-      patched("attribute.unknown", Base::heights, [](const Patch& patch) { patch.setInteger("answer", 42); }, true),
+      patched(
+          "attribute.unknown", Base::heights, [](const Patch& patch) { patch.setInteger("answer", 42); }, true),
       patched("format.name", Base::heights, [](const Patch& patch) { patch.setText("glint_format", "other"); }),
       patched("format.major", Base::heights, [](const Patch& patch) { patch.setInteger("format_major", 2); }),
-      patched("format.minor", Base::heights, [](const Patch& patch) { patch.setInteger("format_minor", 7); }, true),
+      patched(
+          "format.minor", Base::heights, [](const Patch& patch) { patch.setInteger("format_minor", 7); }, true),
       patched("format.feature", Base::heights, [](const Patch& patch) { patch.setText("required_features", "zstd", 1); }),
       patched("format.kind", Base::heights, [](const Patch& patch) { patch.setText("kind", "hologram"); }),
   };
@@ -262,32 +276,56 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.virtual", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually);
+              }),
       patched("dataset.external", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external);
+              }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked);
+              }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact);
+              }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false);
+              }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false);
+              }),
       {"dataset.alignment", Base::heights,
-       [](const fs::path& path) { Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }},
+       [](const fs::path& path) {
+         Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
+       }},
       {"dataset.alignment_64", Base::heights,
-       [](const fs::path& path) { Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }, true},
-      patched("dataset.unknown", Base::heights,
-              [](const Patch& patch) { patch.replace("extra", H5T_IEEE_F32LE, {kSize}, true); }, true),
+       [](const fs::path& path) {
+         Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
+       },
+       true},
+      patched(
+          "dataset.unknown", Base::heights, [](const Patch& patch) { patch.replace("extra", H5T_IEEE_F32LE, {kSize}, true); },
+          true),
       patched("dataset.missing", Base::heights, [](const Patch& patch) { H5Ldelete(patch.file(), "heights", 0); }),
       patched("dataset.missing", Base::pyramid, [](const Patch& patch) { H5Ldelete(patch.file(), "level_01/masks", 0); }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true);
+              }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true);
+              }),
       patched("dataset.type", Base::pyramid, [](const Patch& patch) { patch.setText("precision", "f16"); }),
       patched("dataset.type", Base::compressed,
-              [](const Patch& patch) { patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true); }),
+              [](const Patch& patch) {
+                patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true);
+              }),
       patched("dataset.type", Base::heights,
               [](const Patch& patch) {
                 const hid_t type = H5Tcopy(H5T_IEEE_F32LE);
@@ -297,7 +335,9 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.dims", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true);
+              }),
       patched("dataset.dims", Base::heights,
               [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize * kSize}, true); }),
       patched("dataset.dims", Base::heights, [](const Patch& patch) { patch.setInteger("width", kSize + 1); }),
@@ -305,8 +345,9 @@ std::vector<Fixture> datasetFixtures() {
               [](const Patch& patch) { patch.replace("level_00/block_means", H5T_IEEE_F32LE, {3}, true); }),
       patched("dataset.dims", Base::compressed,
               [](const Patch& patch) { patch.replace("image_slots", H5T_STD_U16LE, {20}, true); }),
-      patched("dataset.hash", Base::heights,
-              [](const Patch& patch) { patch.change<float>("heights", 3, [](float& h) { h += 1; }); }, true),
+      patched(
+          "dataset.hash", Base::heights,
+          [](const Patch& patch) { patch.change<float>("heights", 3, [](float& h) { h += 1; }); }, true),
   };
 }
 
@@ -325,12 +366,16 @@ std::vector<Fixture> indexFixtures() {
                 patch.setInteger("bounds_level_count", 4);
                 H5Ldelete(patch.file(), "bounds/level_04", 0);
               }),
-      patched("pyramid.masks", Base::pyramid,
-              [](const Patch& patch) { patch.change<std::uint64_t>("level_00/masks", 2, [](auto& mask) { mask |= 1ull << 16; }); }),
+      patched(
+          "pyramid.masks", Base::pyramid,
+          [](const Patch& patch) { patch.change<std::uint64_t>("level_00/masks", 2, [](auto& mask) { mask |= 1ull << 16; }); }),
+      patched(
+          "pyramid.first_block", Base::pyramid,
+          [](const Patch& patch) { patch.change<std::uint64_t>("level_00/first_block", 2, [](auto& first) { first += 1; }); }),
       patched("pyramid.first_block", Base::pyramid,
-              [](const Patch& patch) { patch.change<std::uint64_t>("level_00/first_block", 2, [](auto& first) { first += 1; }); }),
-      patched("pyramid.first_block", Base::pyramid,
-              [](const Patch& patch) { patch.change<std::uint64_t>("level_02/first_block", 1, [](auto& first) { first = ~0ull; }); }),
+              [](const Patch& patch) {
+                patch.change<std::uint64_t>("level_02/first_block", 1, [](auto& first) { first = ~0ull; });
+              }),
       patched("pyramid.first_block", Base::pyramid,
               [](const Patch& patch) { patch.change<std::uint64_t>("level_01/masks", 1, [](auto& mask) { mask ^= 1; }); }),
       patched("compressed.images", Base::compressed,
@@ -346,53 +391,80 @@ std::vector<Fixture> indexFixtures() {
               [](const Patch& patch) { patch.change<std::uint16_t>("image_slots", 5, [](auto& slot) { slot ^= 1; }); }),
       patched("compressed.masks", Base::compressed,
               [](const Patch& patch) { patch.change<std::uint64_t>("masks", 5, [](auto& mask) { mask |= 1ull << 40; }); }),
-      patched("compressed.masks", Base::compressed,
-              [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.slice_count += 1; }); }),
+      patched(
+          "compressed.masks", Base::compressed,
+          [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.slice_count += 1; }); }),
       patched("compressed.mask_ranks", Base::compressed,
               [](const Patch& patch) { patch.change<std::uint32_t>("mask_ranks", 5, [](auto& rank) { rank = 1; }); }),
-      patched("compressed.ranks", Base::compressed,
-              [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.rank_x = 60000; }); }),
+      patched(
+          "compressed.ranks", Base::compressed,
+          [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.rank_x = 60000; }); }),
       patched("compressed.ranks", Base::compressed,
               [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.rank_y = 1; }); }),
       patched("compressed.ranges", Base::compressed,
-              [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_basis = ~0ull; }); }),
+              [](const Patch& patch) {
+                patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_basis = ~0ull; });
+              }),
       patched("compressed.ranges", Base::compressed,
-              [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_coefficient += 1000; }); }),
+              [](const Patch& patch) {
+                patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_coefficient += 1000; });
+              }),
       patched("compressed.ranges", Base::compressed,
-              [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_scale = 1000; }); }),
+              [](const Patch& patch) {
+                patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_scale = 1000; });
+              }),
   };
 }
 
 std::vector<Fixture> dataFixtures() {
   return {
-      patched("normals.finite", Base::normals,
-              [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n.y = kNan; }); }, true),
-      patched("normals.disk", Base::normals,
-              [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.8f, -0.7f}; }); }, true),
-      patched("normals.bounds", Base::normals,
-              [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.7f, -0.7f}; }); }, true),
-      patched("normals.bounds", Base::normals,
-              [](const Patch& patch) { patch.change<NormalBounds>("bounds/level_02", 3, [](auto& node) { node.high_x = -1; }); }, true),
-      patched("heights.finite", Base::heights,
-              [](const Patch& patch) { patch.change<float>("heights", 7, [](float& h) { h = -INFINITY; }); }, true),
-      patched("pyramid.pixels", Base::pyramid,
-              [](const Patch& patch) { patch.change<float>("level_00/pixels", 99, [](float& d) { d = -1; }); }, true),
-      patched("pyramid.pixels", Base::pyramid,
-              [](const Patch& patch) { patch.change<float>("level_00/pixels", 99, [](float& d) { d = kNan; }); }, true),
-      patched("pyramid.block_means", Base::pyramid,
-              [](const Patch& patch) { patch.change<float>("level_01/block_means", 2, [](float& mean) { mean *= 1.01f; }); }, true),
-      patched("pyramid.integral", Base::pyramid,
-              [](const Patch& patch) { patch.change<float>("level_00/pixels", 99, [](float& d) { d += 100; }); }, true),
-      patched("compressed.image_scales", Base::compressed,
-              [](const Patch& patch) { patch.change<float>("image_scales", 3, [](float& scale) { scale = 0; }); }, true),
-      patched("compressed.scales", Base::compressed,
-              [](const Patch& patch) { patch.change<float>("scales", 3, [](float& scale) { scale = kNan; }); }, true),
-      patched("compressed.factors", Base::compressed_f32,
-              [](const Patch& patch) { patch.change<float>("basis", 3, [](float& sum) { sum = kNan; }); }, true),
-      patched("compressed.factors", Base::compressed_f32,
-              [](const Patch& patch) { patch.change<float>("coefficients", 3, [](float& c) { c = INFINITY; }); }, true),
-      patched("compressed.integral", Base::compressed,
-              [](const Patch& patch) { patch.change<float>("image_scales", 3, [](float& scale) { scale *= 1.1f; }); }, true),
+      patched(
+          "normals.finite", Base::normals,
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n.y = kNan; }); }, true),
+      patched(
+          "normals.disk", Base::normals,
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
+                                     n = {0.8f, -0.7f};
+                                   }); }, true),
+      patched(
+          "normals.bounds", Base::normals,
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
+                                     n = {0.7f, -0.7f};
+                                   }); }, true),
+      patched(
+          "normals.bounds", Base::normals,
+          [](const Patch& patch) { patch.change<NormalBounds>("bounds/level_02", 3, [](auto& node) { node.high_x = -1; }); },
+          true),
+      patched(
+          "heights.finite", Base::heights,
+          [](const Patch& patch) { patch.change<float>("heights", 7, [](float& h) { h = -INFINITY; }); }, true),
+      patched(
+          "pyramid.pixels", Base::pyramid,
+          [](const Patch& patch) { patch.change<float>("level_00/pixels", 99, [](float& d) { d = -1; }); }, true),
+      patched(
+          "pyramid.pixels", Base::pyramid,
+          [](const Patch& patch) { patch.change<float>("level_00/pixels", 99, [](float& d) { d = kNan; }); }, true),
+      patched(
+          "pyramid.block_means", Base::pyramid,
+          [](const Patch& patch) { patch.change<float>("level_01/block_means", 2, [](float& mean) { mean *= 1.01f; }); }, true),
+      patched(
+          "pyramid.integral", Base::pyramid,
+          [](const Patch& patch) { patch.change<float>("level_00/pixels", 99, [](float& d) { d += 100; }); }, true),
+      patched(
+          "compressed.image_scales", Base::compressed,
+          [](const Patch& patch) { patch.change<float>("image_scales", 3, [](float& scale) { scale = 0; }); }, true),
+      patched(
+          "compressed.scales", Base::compressed,
+          [](const Patch& patch) { patch.change<float>("scales", 3, [](float& scale) { scale = kNan; }); }, true),
+      patched(
+          "compressed.factors", Base::compressed_f32,
+          [](const Patch& patch) { patch.change<float>("basis", 3, [](float& sum) { sum = kNan; }); }, true),
+      patched(
+          "compressed.factors", Base::compressed_f32,
+          [](const Patch& patch) { patch.change<float>("coefficients", 3, [](float& c) { c = INFINITY; }); }, true),
+      patched(
+          "compressed.integral", Base::compressed,
+          [](const Patch& patch) { patch.change<float>("image_scales", 3, [](float& scale) { scale *= 1.1f; }); }, true),
   };
 }
 
@@ -438,9 +510,11 @@ TEST(FormatRules, EveryFailingFileIsNamedByItsRule) {
     fixture.damage(path);
     const ValidationReport report = validateAsset(path);
     std::string found;
-    for (const Finding& finding : report.findings) found += finding.rule + " (" + finding.object + ": " + finding.message + ") ";
+    for (const Finding& finding : report.findings)
+      found += finding.rule + " (" + finding.object + ": " + finding.message + ") ";
     SCOPED_TRACE("fixture " + std::to_string(number - 1) + " for " + fixture.rule + ", found " + found);
-    const auto hit = std::find_if(report.findings.begin(), report.findings.end(), [&](const Finding& f) { return f.rule == fixture.rule; });
+    const auto hit =
+        std::find_if(report.findings.begin(), report.findings.end(), [&](const Finding& f) { return f.rule == fixture.rule; });
     ASSERT_NE(hit, report.findings.end());
     EXPECT_EQ(hit->severity, findRule(fixture.rule).severity);
     EXPECT_FALSE(hit->message.empty());
@@ -453,6 +527,23 @@ TEST(FormatRules, EveryFailingFileIsNamedByItsRule) {
       EXPECT_EQ(error.code(), findRule(fixture.rule).code);
       EXPECT_EQ(error.path(), path.string());
     }
+  }
+}
+
+TEST(FormatRules, NothingOfHdf5StaysOpen) {
+  const test::TempFolder folder;
+  const auto open_objects = [] { return H5Fget_obj_count(static_cast<hid_t>(H5F_OBJ_ALL), H5F_OBJ_ALL); };
+  writeBase(folder / "good.glint", Base::heights);
+  const auto objects = open_objects();
+  const Asset asset = Asset::open(folder / "good.glint");
+  EXPECT_EQ(open_objects(), objects);
+  int number = 0;
+  for (const Fixture& fixture : allFixtures()) {
+    const fs::path path = folder / ("bad" + std::to_string(number++) + ".glint");
+    writeBase(path, fixture.base);
+    fixture.damage(path);
+    validateAsset(path);
+    EXPECT_EQ(open_objects(), objects) << fixture.rule;
   }
 }
 

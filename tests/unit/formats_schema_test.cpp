@@ -25,7 +25,8 @@ TEST(Schema, CommittedJsonIsTheTable) {
 TEST(Schema, SpecNamesEveryRuleKindAndDataset) {
   const std::string spec = readText("formats/SPEC.md");
   for (const Rule& rule : rules()) {
-    const std::string line = "| `" + std::string(rule.id) + "` | " + std::string(name(rule.severity)) + " | " + std::string(rule.summary) + " |";
+    const std::string line =
+        "| `" + std::string(rule.id) + "` | " + std::string(name(rule.severity)) + " | " + std::string(rule.summary) + " |";
     EXPECT_NE(spec.find(line), std::string::npos) << line;
   }
   for (const KindSchema& kind : kindSchemas()) {
@@ -56,7 +57,8 @@ TEST(Schema, SizeExpressionsThatCannotBeEvaluatedGiveNothing) {
   SizeScope scope;
   scope.values = {{"rows", {4}}, {"huge", {1ull << 40}}};
   scope.level = 1;
-  for (const char* bad : {"", "unknown", "rows[l]", "1 +", "ceil_div(1, 0)", "pow2(80)", "huge * huge", "(1", "1)", "rows rows", "-1"}) {
+  for (const char* bad :
+       {"", "unknown", "rows[l]", "1 +", "ceil_div(1, 0)", "pow2(80)", "huge * huge", "(1", "1)", "rows rows", "-1"}) {
     EXPECT_EQ(evaluateSize(bad, scope), std::nullopt) << bad;
   }
 }
