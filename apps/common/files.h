@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/tool.h"
+#include "glint/formats/asset_writer.h"
 
 namespace glint::apps {
 
@@ -45,14 +46,12 @@ class OutputFile {
  public:
   OutputFile(Tool& tool, OutputFormat format, const std::string& help, const std::string& name = "-o,--output");
   const std::string& path() const { return path_; }
+  /// For writeAsset: what may be replaced was decided by the check before the work.
+  formats::WriteOptions writeOptions() const { return {.overwrite = true}; }
 
  private:
   std::string path_;
 };
-
-/// XXH3-128 of a file's contents as 32 hexadecimal digits.
-/// @throws Error io
-std::string hashFile(const std::string& path);
 
 /// Replaces a file by these bytes: unique temporary file in the same folder, fsync, rename. A failure leaves the old file.
 /// @throws Error io

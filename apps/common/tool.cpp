@@ -19,6 +19,7 @@
 #include "common/image_io.h"
 #include "common/progress_reporter.h"
 #include "common/suggest.h"
+#include "glint/formats/hash.h"
 
 namespace glint::apps {
 namespace {
@@ -284,12 +285,12 @@ std::string Tool::commandJson() const {
   return command.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
 }
 
-std::vector<InputRecord> Tool::inputRecords() const {
-  std::vector<InputRecord> records;
+formats::Provenance Tool::provenance() const {
+  formats::Provenance provenance{generator(), commandJson(), {}};
   for (const std::string& path : state_->inputs) {
-    records.push_back({std::filesystem::path(path).filename().string(), hashFile(path)});
+    provenance.inputs.push_back({std::filesystem::path(path).filename().string(), formats::hashFile(path)});
   }
-  return records;
+  return provenance;
 }
 
 bool Tool::parse(int argc, char** argv) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "glint/bake/progress.h"
+#include "glint/formats/provenance.h"
 #include "glint/model/error.h"
 
 namespace CLI {
@@ -26,12 +27,6 @@ struct ToolInfo {
   std::string name;     ///< "glint-pyramid"
   std::string summary;  ///< one or two sentences: what it reads and what it makes
   std::string example;  ///< one command line that works, shown at the end of the help text
-};
-
-/// One file that the result depends on. Same contents as the record in an asset.
-struct InputRecord {
-  std::string name;  ///< file name without its folder, so that outputs do not depend on where a build runs
-  std::string hash_hex;  ///< XXH3-128 of the contents, 32 lower-case hexadecimal digits
 };
 
 /// A declared option, for the constraints that are checked while the command line is parsed.
@@ -114,7 +109,7 @@ class Tool {
   bool force() const;
   /// Value of --threads; all the processor's when it was not given. oneTBB and OpenImageIO are limited to it already.
   int threads() const;
-  /// Value of --seed. Calling this records the seed in `command`, so call it before commandJson().
+  /// Value of --seed. Calling this records the seed in `command`, so call it before provenance().
   std::uint64_t seed();
   /// Progress of a named stage, as --progress asks. The reporter lives until the next call or the end of the run.
   bake::ProgressFn progress(const std::string& stage);
@@ -140,9 +135,10 @@ class Tool {
   std::string generator() const;
   /// JSON object of every recorded parameter, defaults included, keys sorted.
   std::string commandJson() const;
-  /// Name and hash of every input. Reads the files.
-  /// @throws Error io if one cannot be read
-  std::vector<InputRecord> inputRecords() const;
+  /// What an asset records about this run: generator, command, and name (without folder, so that outputs do not depend on where
+  /// a build runs) and hash of every input. Reads the inputs. Call after seed(), if the seed matters.
+  /// @throws Error io if an input cannot be read
+  formats::Provenance provenance() const;
 
  private:
   struct State;

@@ -28,8 +28,9 @@ static_assert(sizeof(NormalBounds) == 16);
 
 /// One level of the min-max pyramid of a normal map.
 ///
-/// Node (i, j) of level k bounds the texels [i 2^k, (i+1) 2^k] x [j 2^k, (j+1) 2^k]: its block and one more row and column
-/// (wrapped), so that the bounds also hold for the triangles of a smooth surface that start in the block.
+/// With b = 2^(k+1) texels, node (i, j) of `bounds[k]` bounds the texels [i b, (i+1) b] x [j b, (j+1) b], both ends included
+/// (wrapped): its block and one more row and column, so that it also bounds the triangles of a smooth surface that start there.
+/// columns = ceil(width / b), rows = ceil(height / b).
 struct NormalBoundsLevel {
   int columns = 0;
   int rows = 0;

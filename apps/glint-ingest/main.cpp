@@ -1,0 +1,62 @@
+#include <nlohmann/json.hpp>
+
+#include "common/files.h"
+#include "common/image_io.h"
+#include "glint-ingest/ingest_options.h"
+#include "glint/bake/normal_bounds.h"
+#include "glint/bake/slopes.h"
+#include "glint/formats/asset_writer.h"
+
+using namespace glint;
+
+namespace {
+
+/// Adds the min-max pyramid and writes the asset.
+void writeNormals(const apps::OutputFile& output, const apps::Image& image, float texel_size_um, std::span<const Vec2> normals,
+                  const formats::Provenance& provenance) {
+  NormalMap map;
+  map.width = image.width;
+  map.height = image.height;
+  map.texel_size_um = texel_size_um;
+  map.normals = normals;
+  const auto bounds = bake::buildNormalBounds(map.width, map.height, map.normals);
+  bake::attachBounds(map, bounds);
+  formats::writeAsset(output.path(), map, provenance, output.writeOptions());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  apps::Tool tool({"glint-ingest",
+                   "Reads a normal map or height field from any image that OpenImageIO knows and writes it as an asset, with the "
+                   "min-max pyramid that queries use. Wrong inputs are refused, not clamped.",
+                   "glint-ingest flakes.png -o flakes.glint --convention directx"});
+  const apps::InputFile input(tool, "image of normals or heights", "IMAGE");
+  const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of normals or heights");
+  const apps::IngestOptions options(tool);
+
+  return tool.run(argc, argv, [&] {
+    const apps::Image image = apps::readImage(input.path());
+    const bake::IngestParameters parameters = options.parameters(tool, input.path());
+    const formats::Provenance provenance = tool.provenance();
+    bake::IngestReport report;
+    if (!options.readsHeights()) {
+      const bake::IngestedNormals result = bake::ingestNormals(apps::pixelArray(image), parameters);
+      report = result.report;
+      writeNormals(output, image, options.texelSize(), result.normals, provenance);
+    } else {
+      const bake::IngestedHeights result = bake::ingestHeights(apps::pixelArray(image), parameters);
+      report = result.report;
+      if (options.writesHeights()) {
+        const HeightMap map{image.width, image.height, options.texelSize(), result.heights};
+        formats::writeAsset(output.path(), map, provenance, output.writeOptions());
+      } else {
+        const auto normals = bake::normalsFromHeights(image.width, image.height, result.heights);
+        writeNormals(output, image, options.texelSize(), normals, provenance);
+      }
+    }
+    apps::warnAbout(tool, input.path(), report);
+    tool.setResult(apps::reportJson(report));
+    tool.summary(apps::reportText(input.path(), image, report));
+  });
+}

@@ -1,0 +1,129 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "glint/model/footprint.h"
+#include "glint/model/ndf_pyramid.h"
+#include "glint/query/footprint_weights.h"
+
+namespace glint {
+
+/// One NDF image of a pyramid and its share in an answer.
+struct PyramidSlice {
+  int level;
+  std::uint32_t image;  ///< index in its level, row * columns + column
+  float weight;
+};
+
+/// The images that answer a footprint: four neighbours in each of two levels. Weights are >= 0 and sum to 1.
+struct PyramidSlices {
+  static constexpr int kMost = 8;
+  PyramidSlice slices[kMost];
+  int count = 0;
+};
+
+/// Deviation (texels) of the isotropic Gaussian with the same mean square size as a footprint.
+inline GLINT_HD float isotropicSigma(const PyramidShape& shape, const Footprint& p) {
+  const Covariance c = usableCovariance(p.covariance, shape.width, shape.height);
+  return std::sqrt(0.5f * (c.xx + c.yy));
+}
+
+/// Footprint of level 0, texels. Narrower ones are answered from the texels themselves where these are at hand.
+inline GLINT_HD float finestSigma(const PyramidShape& shape) { return kFootprintPerStride * shape.levels[0].stride; }
+
+/// Two neighbouring centres of a level along one axis, and the position between them.
+struct CentreNeighbours {
+  int low, high;
+  float t;
+};
+
+/// @param u       coordinate of texture space, in [0, 1)
+/// @param size    of the map along this axis, texels
+/// @param stride  texels
+/// @param count   centres along this axis
+inline GLINT_HD CentreNeighbours centreNeighbours(float u, int size, float stride, int count, Boundary boundary) {
+  const auto extent = static_cast<float>(size);
+  float x = u * extent;
+  if (boundary == Boundary::clamp) {
+    const float t = std::clamp(x / stride - 0.5f, 0.0f, static_cast<float>(count - 1));
+    const int low = static_cast<int>(t);
+    return {low, std::min(low + 1, count - 1), t - static_cast<float>(low)};
+  }
+  if (x < 0.5f * stride) x += extent;
+  const float t = x / stride - 0.5f;
+  const int low = static_cast<int>(t);
+  if (low < count - 1) return {low, low + 1, t - static_cast<float>(low)};
+  // From the last centre round to the first; this gap is shorter when the stride does not divide the map.
+  const float gap = extent - static_cast<float>(count - 1) * stride;
+  return {count - 1, 0, std::clamp((x - (static_cast<float>(count) - 0.5f) * stride) / gap, 0.0f, 1.0f)};
+}
+
+/// Trilinear choice of images: bilinear between centres, linear in log2 of the footprint's size between levels. Footprints
+/// below the finest or above the coarsest level get that level.
+inline GLINT_HD PyramidSlices selectSlices(const PyramidShape& shape, const Footprint& p) {
+  const float octave = std::log2(isotropicSigma(shape, p) / finestSigma(shape));
+  const float level = std::clamp(octave, 0.0f, static_cast<float>(shape.level_count - 1));
+  const int first = std::min(static_cast<int>(level), shape.level_count - 1);
+  const float t = level - static_cast<float>(first);
+  const float u = wrapUnit(p.centre.x), v = wrapUnit(p.centre.y);
+  PyramidSlices out;
+  for (int l = first; l < std::min(first + 2, shape.level_count); ++l) {
+    const float level_weight = l == first ? 1 - t : t;
+    if (level_weight <= 0) continue;
+    const PyramidGrid& grid = shape.levels[l];
+    const CentreNeighbours x = centreNeighbours(u, shape.width, grid.stride, grid.columns, shape.boundary);
+    const CentreNeighbours y = centreNeighbours(v, shape.height, grid.stride, grid.rows, shape.boundary);
+    for (int k = 0; k < 4; ++k) {
+      const float w = level_weight * (k & 1 ? x.t : 1 - x.t) * (k & 2 ? y.t : 1 - y.t);
+      if (w <= 0) continue;
+      const int column = k & 1 ? x.high : x.low, row = k & 2 ? y.high : y.low;
+      out.slices[out.count++] = {l, static_cast<std::uint32_t>(row * grid.columns + column), w};
+    }
+  }
+  return out;
+}
+
+/// A box of pixels within one angular block: [x0, x1] x [y0, y1] in [0, 16]^2.
+struct BlockBox {
+  float x0, y0, x1, y1;
+};
+
+/// The pixel that holds a half vector: its block, and its place there. Valid for |h.x|, |h.y| <= 1.
+struct PixelPlace {
+  int block, x, y;
+};
+inline GLINT_HD PixelPlace pixelPlace(const PyramidShape& shape, Vec2 h) {
+  const float half = 0.5f * static_cast<float>(shape.resolution);
+  const int x = std::min(static_cast<int>((h.x + 1) * half), shape.resolution - 1);
+  const int y = std::min(static_cast<int>((h.y + 1) * half), shape.resolution - 1);
+  return {y / kBlockSize * shape.blocksPerAxis() + x / kBlockSize, x % kBlockSize, y % kBlockSize};
+}
+
+inline GLINT_HD bool insideSquare(Vec2 h) { return std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1; }
+
+/// Splits a range of half vectors at the borders of angular blocks: visitor(block, BlockBox). Nothing outside [-1, 1]^2.
+template <class Visitor>
+GLINT_HD void forEachBlock(const PyramidShape& shape, const Box2& range, Visitor&& visitor) {
+  const float half = 0.5f * static_cast<float>(shape.resolution);
+  const auto pixel = [&](float h) { return std::clamp((h + 1) * half, 0.0f, 2 * half); };
+  const float x0 = pixel(range.low.x), x1 = pixel(range.high.x), y0 = pixel(range.low.y), y1 = pixel(range.high.y);
+  if (!(x0 < x1 && y0 < y1)) return;
+  const int blocks = shape.blocksPerAxis();
+  const auto last = [&](float end) { return std::min(static_cast<int>(std::ceil(end / kBlockSize)), blocks); };
+  for (int by = static_cast<int>(y0) / kBlockSize; by < last(y1); ++by) {
+    for (int bx = static_cast<int>(x0) / kBlockSize; bx < last(x1); ++bx) {
+      const auto ox = static_cast<float>(bx * kBlockSize), oy = static_cast<float>(by * kBlockSize);
+      visitor(by * blocks + bx, BlockBox{std::max(x0 - ox, 0.0f), std::max(y0 - oy, 0.0f), std::min(x1 - ox, static_cast<float>(kBlockSize)),
+                                         std::min(y1 - oy, static_cast<float>(kBlockSize))});
+    }
+  }
+}
+
+/// Pixels of a range of half vectors: what a sum over pixels is divided by to become a mean. Parts outside the square count.
+inline GLINT_HD float areaInPixels(const PyramidShape& shape, const Box2& range) {
+  const float half = 0.5f * static_cast<float>(shape.resolution);
+  return range.area() * half * half;
+}
+
+}  // namespace glint

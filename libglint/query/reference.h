@@ -1,0 +1,209 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "glint/model/normal_map.h"
+#include "glint/query/footprint_weights.h"
+#include "glint/query/gaussian.h"
+#include "glint/query/ndf_model.h"
+#include "glint/query/triangle_lobe.h"
+
+namespace glint {
+
+/// The ground truth: the NDF summed over the texels (Deng 2022, Eq. 2, with normalised footprint weights).
+///
+/// Exact for Gaussian and box footprints, flat and smooth surfaces. `Search::exhaustive` visits every texel of the footprint:
+/// O(footprint area). `Search::pruned` descends the map's min-max pyramid of normals and skips blocks whose normals are out of
+/// the lobe's reach (kLobeReach): the same to 3e-7 of a lobe's peak, and sublinear; it needs `map.bounds`.
+/// With Boundary::clamp a footprint sees only texels of the map.
+/// Thread-safe, allocates nothing; the map must outlive it.
+class Reference {
+ public:
+  enum class Search { exhaustive, pruned };
+
+  GLINT_HD Reference(const NormalMap& map, float sigma_r, Surface surface = Surface::flat, Boundary boundary = Boundary::wrap,
+                     Search search = Search::exhaustive)
+      : map_(map), sigma_r_(sigma_r), surface_(surface), boundary_(boundary),
+        search_(map.bounds_level_count > 0 ? search : Search::exhaustive) {}
+
+  /// Density towards h, per unit projected area; >= 0, finite.
+  GLINT_HD float density(const Footprint& p, Vec2 h) const {
+    if (!(std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1)) return 0;
+    return static_cast<float>(average(p, PointLobe{h, sigma_r_}));
+  }
+
+  /// Average density over a box of half vectors; 0 if the box is empty.
+  GLINT_HD float mean(const Footprint& p, const Box2& range) const {
+    const Box2 box = {{std::max(range.low.x, -1.0f), std::max(range.low.y, -1.0f)},
+                      {std::min(range.high.x, 1.0f), std::min(range.high.y, 1.0f)}};
+    if (!(box.width() > 0 && box.height() > 0)) return 0;
+    return static_cast<float>(average(p, BoxLobe{box, sigma_r_}) / range.area());
+  }
+
+  /// Visits every facet in a footprint: visitor(weight, normal) on a flat surface. Weights sum to the returned total.
+  template <class Visitor>
+  GLINT_HD double forEachTexel(const Footprint& p, Visitor&& visitor) const {
+    const FootprintWeights weights(p, map_.width, map_.height);
+    double total = 0;
+    forEachCell(weights, [&](int i, int j) {
+      const float w = weights.texel(i, j);
+      if (w <= 0) return;
+      total += w;
+      visitor(w, normal(i, j));
+    });
+    return total;
+  }
+
+  /// Visits every triangle in a footprint: visitor(weight, n0, n1, n2) on a smooth surface. Weights sum to the returned total.
+  template <class Visitor>
+  GLINT_HD double forEachTriangle(const Footprint& p, Visitor&& visitor) const {
+    const FootprintWeights weights(p, map_.width, map_.height);
+    double total = 0;
+    forEachCell(weights, [&](int i, int j) {
+      if (!hasCell(i, j)) return;
+      for (int half = 0; half < 2; ++half) {
+        const float w = weights.triangle(i, j, half);
+        if (w <= 0) continue;
+        total += w;
+        visitor(w, normal(i, j), half == 0 ? normal(i + 1, j) : normal(i, j + 1), normal(i + 1, j + 1));
+      }
+    });
+    return total;
+  }
+
+ private:
+  struct PointLobe {
+    Vec2 h;
+    float sigma;
+    GLINT_HD Box2 support() const { return {h, h}; }
+    GLINT_HD float facet(Vec2 n) const { return gaussianDensity(n - h, sigma); }
+    GLINT_HD float triangle(Vec2 a, Vec2 b, Vec2 c) const { return triangleDensity(a, b, c, h, sigma); }
+  };
+  struct BoxLobe {
+    Box2 box;
+    float sigma;
+    GLINT_HD Box2 support() const { return box; }
+    GLINT_HD float facet(Vec2 n) const { return lobeMass(box, n, sigma); }
+    GLINT_HD float triangle(Vec2 a, Vec2 b, Vec2 c) const { return triangleMass(a, b, c, box, sigma); }
+  };
+
+  template <class Lobe>
+  GLINT_HD double average(const Footprint& p, const Lobe& lobe) const {
+    if (search_ == Search::pruned) return averagePruned(p, lobe);
+    double sum = 0;
+    const double total = surface_ == Surface::flat
+                             ? forEachTexel(p, [&](float w, Vec2 n) { sum += double{w} * lobe.facet(n); })
+                             : forEachTriangle(p, [&](float w, Vec2 a, Vec2 b, Vec2 c) { sum += double{w} * lobe.triangle(a, b, c); });
+    return total > 0 ? sum / total : 0;
+  }
+
+  template <class Lobe>
+  GLINT_HD double averagePruned(const Footprint& p, const Lobe& lobe) const {
+    const FootprintWeights weights(p, map_.width, map_.height);
+    const Box2 support = lobe.support();
+    const float reach = kLobeReach * sigma_r_;
+    double sum = 0;
+    const auto leaf = [&](int i, int j) {  // texel (i, j) of the endless plane
+      const Vec2 n = normal(i, j);
+      if (surface_ == Surface::flat) {
+        if (near(support, n, n, reach)) sum += double{weights.texel(i, j)} * lobe.facet(n);
+      } else if (hasCell(i, j)) {
+        const Vec2 right = normal(i + 1, j), up = normal(i, j + 1), far = normal(i + 1, j + 1);
+        sum += double{weights.triangle(i, j, 0)} * lobe.triangle(n, right, far);
+        sum += double{weights.triangle(i, j, 1)} * lobe.triangle(n, up, far);
+      }
+    };
+    forEachPeriod(weights, [&](const Window& w) { descend(w, support, reach, leaf); });
+    const double total = boundary_ == Boundary::wrap && weights.hasClosedFormTotal() ? weights.closedFormTotal() : totalWeight(p);
+    return total > 0 ? sum / total : 0;
+  }
+
+  GLINT_HD double totalWeight(const Footprint& p) const {
+    return surface_ == Surface::flat ? forEachTexel(p, [](float, Vec2) {}) : forEachTriangle(p, [](float, Vec2, Vec2, Vec2) {});
+  }
+
+  /// Texels [column_begin, column_end) x [row_begin, row_end) of the map, seen in the copy that starts at (offset_x, offset_y).
+  struct Window {
+    int offset_x, offset_y, column_begin, column_end, row_begin, row_end;
+  };
+
+  template <class Visitor>
+  GLINT_HD void forEachPeriod(const FootprintWeights& weights, Visitor&& visitor) const {
+    const bool wrap = boundary_ == Boundary::wrap;
+    const int first_x = wrap ? floorTo(weights.column_begin, map_.width) : 0, last_x = wrap ? weights.column_end : map_.width;
+    const int first_y = wrap ? floorTo(weights.row_begin, map_.height) : 0, last_y = wrap ? weights.row_end : map_.height;
+    for (int y = first_y; y < last_y; y += map_.height) {
+      for (int x = first_x; x < last_x; x += map_.width) {
+        const Window w = {x, y, std::max(weights.column_begin - x, 0), std::min(weights.column_end - x, map_.width),
+                          std::max(weights.row_begin - y, 0), std::min(weights.row_end - y, map_.height)};
+        if (w.column_begin < w.column_end && w.row_begin < w.row_end) visitor(w);
+      }
+    }
+  }
+
+  template <class Visitor>
+  GLINT_HD void forEachCell(const FootprintWeights& weights, Visitor&& visitor) const {
+    forEachPeriod(weights, [&](const Window& w) {
+      for (int j = w.row_begin; j < w.row_end; ++j)
+        for (int i = w.column_begin; i < w.column_end; ++i) visitor(w.offset_x + i, w.offset_y + j);
+    });
+  }
+
+  /// Visits the texels of a window whose block bounds come near the lobe.
+  template <class Leaf>
+  GLINT_HD void descend(const Window& w, const Box2& support, float reach, Leaf&& leaf) const {
+    struct Node {
+      int level, i, j;
+    };
+    Node stack[4 * NormalMap::kMaxBoundsLevels + 4];
+    int count = 0;
+    const int extent = std::max(w.column_end - w.column_begin, w.row_end - w.row_begin);
+    int top = 0;
+    while (top + 1 < map_.bounds_level_count && (2 << top) < extent) ++top;
+    for (int j = w.row_begin >> (top + 1); j <= (w.row_end - 1) >> (top + 1); ++j)
+      for (int i = w.column_begin >> (top + 1); i <= (w.column_end - 1) >> (top + 1); ++i) stack[count++] = {top, i, j};
+    while (count > 0) {
+      const Node node = stack[--count];
+      const NormalBoundsLevel& level = map_.bounds[node.level];
+      const NormalBounds& box = level.nodes.data()[static_cast<std::size_t>(node.j) * level.columns + node.i];
+      if (!near(support, {box.low_x, box.low_y}, {box.high_x, box.high_y}, reach)) continue;
+      for (int dj = 0; dj < 2; ++dj) {
+        for (int di = 0; di < 2; ++di) {
+          const int i = 2 * node.i + di, j = 2 * node.j + dj;
+          const int shift = node.level;  // children cover 2^shift texels
+          if ((i << shift) >= w.column_end || ((i + 1) << shift) <= w.column_begin) continue;
+          if ((j << shift) >= w.row_end || ((j + 1) << shift) <= w.row_begin) continue;
+          if (node.level > 0)
+            stack[count++] = {node.level - 1, i, j};
+          else
+            leaf(w.offset_x + i, w.offset_y + j);
+        }
+      }
+    }
+  }
+
+  static GLINT_HD int floorTo(int value, int step) {
+    const int remainder = value % step;
+    return value - (remainder < 0 ? remainder + step : remainder);
+  }
+  static GLINT_HD int wrapIndex(int i, int n) {
+    const int r = i % n;
+    return r < 0 ? r + n : r;
+  }
+  GLINT_HD Vec2 normal(int i, int j) const { return map_.at(wrapIndex(i, map_.width), wrapIndex(j, map_.height)); }
+  /// Cells of the last row and column reach over the border, so they exist only on the endless plane.
+  GLINT_HD bool hasCell(int i, int j) const {
+    return boundary_ == Boundary::wrap || (i + 1 < map_.width && j + 1 < map_.height);
+  }
+
+  NormalMap map_;
+  float sigma_r_;
+  Surface surface_;
+  Boundary boundary_;
+  Search search_;
+};
+
+static_assert(NdfModel<Reference>);
+
+}  // namespace glint

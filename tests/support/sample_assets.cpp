@@ -1,0 +1,471 @@
+#include "support/sample_assets.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace glint::test {
+namespace {
+
+constexpr int kResolution = 64;
+constexpr float kSigmaR = 0.05f;
+constexpr double kBasisUnit = 1000;  // integer bases store basis * kBasisUnit
+
+double noise(int i, int j) {
+  auto h = static_cast<std::uint32_t>(i) * 0x9e3779b1u ^ static_cast<std::uint32_t>(j) * 0x85ebca77u;
+  h ^= h >> 15;
+  h *= 0x2c1b3c6du;
+  h ^= h >> 12;
+  return h * 0x1p-32;
+}
+
+using Image = std::vector<double>;  // [kResolution][kResolution] densities
+
+Image blurred(const Image& image) {
+  const double sigma_pixels = kSigmaR * kResolution / 2;
+  const int radius = static_cast<int>(std::ceil(3 * sigma_pixels));
+  Image rows(image.size());
+  Image both(image.size());
+  for (int pass = 0; pass < 2; ++pass) {
+    const Image& from = pass == 0 ? image : rows;
+    Image& to = pass == 0 ? rows : both;
+    for (int y = 0; y < kResolution; ++y) {
+      for (int x = 0; x < kResolution; ++x) {
+        for (int d = -radius; d <= radius; ++d) {
+          const int sx = pass == 0 ? x + d : x;
+          const int sy = pass == 0 ? y : y + d;
+          if (sx < 0 || sy < 0 || sx >= kResolution || sy >= kResolution) continue;
+          to[static_cast<std::size_t>(y * kResolution + x)] +=
+              std::exp(-0.5 * d * d / (sigma_pixels * sigma_pixels)) * from[static_cast<std::size_t>(sy * kResolution + sx)];
+        }
+      }
+    }
+  }
+  return both;
+}
+
+/// The NDF image of the Gaussian footprint around (u, v) in texels, normalised.
+Image footprintImage(const NormalMap& map, double u, double v, double sigma) {
+  Image image(kResolution * kResolution);
+  for (int j = 0; j < map.height; ++j) {
+    for (int i = 0; i < map.width; ++i) {
+      const double du = std::remainder(i + 0.5 - u, map.width);
+      const double dv = std::remainder(j + 0.5 - v, map.height);
+      const Vec2 n = map.at(i, j);
+      const int x = static_cast<int>((n.x + 1) * kResolution / 2);
+      const int y = static_cast<int>((n.y + 1) * kResolution / 2);
+      image[static_cast<std::size_t>(y * kResolution + x)] += std::exp(-0.5 * (du * du + dv * dv) / (sigma * sigma));
+    }
+  }
+  image = blurred(image);
+  // Drop the tail so that some blocks are empty.
+  const double peak = *std::max_element(image.begin(), image.end());
+  double sum = 0;
+  for (double& d : image) sum += d = d < 1e-3 * peak ? 0 : d;
+  for (double& d : image) d /= sum * 4 / (kResolution * kResolution);
+  return image;
+}
+
+PyramidShape sampleShape(int size) {
+  PyramidShape shape;
+  shape.width = shape.height = size;
+  shape.resolution = kResolution;
+  shape.sigma_r = kSigmaR;
+  shape.level_count = 3;
+  for (int l = 0; l < 3; ++l) {
+    const int side = 4 >> l;
+    shape.levels[l] = {static_cast<float>(size) / static_cast<float>(side), side, side};
+  }
+  return shape;
+}
+
+std::vector<Image> levelImages(const NormalMap& map, const PyramidGrid& grid) {
+  std::vector<Image> images;
+  for (int j = 0; j < grid.rows; ++j) {
+    for (int i = 0; i < grid.columns; ++i) {
+      images.push_back(footprintImage(map, (i + 0.5) * grid.stride, (j + 0.5) * grid.stride, kFootprintPerStride * grid.stride));
+    }
+  }
+  return images;
+}
+
+double blockPixel(const Image& image, int block, int x, int y) {
+  const int bx = block % (kResolution / kBlockSize);
+  const int by = block / (kResolution / kBlockSize);
+  return image[static_cast<std::size_t>((by * kBlockSize + y) * kResolution + bx * kBlockSize + x)];
+}
+
+double blockMean(const Image& image, int block) {
+  double sum = 0;
+  for (int y = 0; y < kBlockSize; ++y) {
+    for (int x = 0; x < kBlockSize; ++x) sum += blockPixel(image, block, x, y);
+  }
+  return sum / kBlockPixels;
+}
+
+/// Two functions along an axis of a block, orthogonal: a constant and a slope.
+double axisFunction(int k, int x) { return k == 0 ? 1 : (x - 7.5) / 7.5; }
+
+/// The functions along x and y of a column of the basis: cp and pca know (k, l) = 00, 10, 01; tucker all four.
+void columnFunctions(CompressionMethod method, int column, int& k, int& l) {
+  k = method == CompressionMethod::tucker ? column / 2 : column == 1;
+  l = method == CompressionMethod::tucker ? column % 2 : column == 2;
+}
+
+/// Coefficient of a block for a column: projection on the product of its functions.
+double projection(const Image& image, int block, int k, int l) {
+  double dot = 0;
+  double norm = 0;
+  for (int y = 0; y < kBlockSize; ++y) {
+    for (int x = 0; x < kBlockSize; ++x) {
+      const double f = axisFunction(k, x) * axisFunction(l, y);
+      dot += f * blockPixel(image, block, x, y);
+      norm += f * f;
+    }
+  }
+  return dot / norm;
+}
+
+/// Prefix sums of the basis of one cluster, in units of kBasisUnit per axis (pca: per image).
+std::vector<double> basisSums(CompressionMethod method) {
+  std::vector<double> sums;
+  const auto axis = [&](bool along_y, int columns) {
+    for (int x = 0; x < kBlockSize; ++x) {
+      for (int c = 0; c < columns; ++c) {
+        int k = c;
+        int l = c;
+        if (method == CompressionMethod::cp) columnFunctions(method, c, k, l);
+        double sum = 0;
+        for (int t = 0; t <= x; ++t) sum += std::round(kBasisUnit * axisFunction(along_y ? l : k, t));
+        sums.push_back(sum);
+      }
+    }
+  };
+  if (method != CompressionMethod::pca) {
+    const int columns = method == CompressionMethod::cp ? 3 : 2;
+    axis(false, columns);
+    axis(true, columns);
+    return sums;
+  }
+  for (int y = 0; y < kBlockSize; ++y) {
+    for (int x = 0; x < kBlockSize; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        int k = 0;
+        int l = 0;
+        columnFunctions(method, c, k, l);
+        double sum = 0;
+        for (int t = 0; t <= y; ++t) {
+          for (int s = 0; s <= x; ++s) sum += std::round(kBasisUnit * axisFunction(k, s) * axisFunction(l, t));
+        }
+        sums.push_back(sum);
+      }
+    }
+  }
+  return sums;
+}
+
+int columnsOf(CompressionMethod method) { return method == CompressionMethod::tucker ? 4 : 3; }
+
+/// Adds the coefficients of one cluster, [slices][columns], and its scales.
+void addCoefficients(SampleCompressed& sample, const std::vector<std::vector<double>>& slices) {
+  const CompressionMethod method = sample.ndf.method;
+  const double unit = method == CompressionMethod::pca ? kBasisUnit : kBasisUnit * kBasisUnit;
+  const auto columns = static_cast<std::size_t>(columnsOf(method));
+  std::vector<double> steps(columns, 1);
+  for (std::size_t c = 0; c < columns; ++c) {
+    double most = 0;
+    for (const auto& slice : slices) most = std::max(most, std::abs(slice[c]));
+    if (sample.ndf.coefficient_type == CoefficientType::i8) steps[c] = most > 0 ? most / 127 : 1;
+    sample.scales.push_back(static_cast<float>(steps[c] / unit));
+  }
+  for (const auto& slice : slices) {
+    for (std::size_t c = 0; c < columns; ++c) {
+      const double value = slice[c] / steps[c];
+      switch (sample.ndf.coefficient_type) {
+        case CoefficientType::i8: sample.coefficients_i8.push_back(static_cast<std::int8_t>(std::lround(value))); break;
+        case CoefficientType::f16: sample.coefficients_f16.push_back(floatToHalf(static_cast<float>(value))); break;
+        case CoefficientType::f32: sample.coefficients_f32.push_back(static_cast<float>(value)); break;
+      }
+    }
+  }
+}
+
+std::uint64_t coefficientCount(const SampleCompressed& sample) {
+  return sample.coefficients_i8.size() + sample.coefficients_f16.size() + sample.coefficients_f32.size();
+}
+
+void addBasis(SampleCompressed& sample) {
+  for (const double sum : basisSums(sample.ndf.method)) {
+    if (sample.ndf.coefficient_type == CoefficientType::f32) {
+      sample.basis_f32.push_back(static_cast<float>(sum));
+    } else if (sample.ndf.method == CompressionMethod::pca) {
+      sample.basis_i32.push_back(static_cast<std::int32_t>(sum));
+    } else {
+      sample.basis_i16.push_back(static_cast<std::int16_t>(sum));
+    }
+  }
+}
+
+void addCluster(SampleCompressed& sample, const std::vector<const Image*>& slots, int block) {
+  NdfCluster cluster;
+  cluster.first_basis = sample.basis_i16.size() + sample.basis_i32.size() + sample.basis_f32.size();
+  cluster.first_coefficient = coefficientCount(sample);
+  cluster.first_scale = sample.scales.size();
+  std::vector<std::vector<double>> slices;
+  std::uint64_t mask = 0;
+  for (std::size_t slot = 0; slot < slots.size(); ++slot) {
+    if (blockMean(*slots[slot], block) == 0) continue;
+    mask |= std::uint64_t{1} << slot;
+    std::vector<double> slice;
+    for (int c = 0; c < columnsOf(sample.ndf.method); ++c) {
+      int k = 0;
+      int l = 0;
+      columnFunctions(sample.ndf.method, c, k, l);
+      slice.push_back(projection(*slots[slot], block, k, l));
+    }
+    slices.push_back(slice);
+  }
+  cluster.slice_count = static_cast<std::uint32_t>(slices.size());
+  if (!slices.empty()) {
+    cluster.rank_x = sample.ndf.method == CompressionMethod::tucker ? 2 : 3;
+    cluster.rank_y = sample.ndf.method == CompressionMethod::tucker ? 2 : 0;
+    addBasis(sample);
+    addCoefficients(sample, slices);
+  }
+  sample.clusters.push_back(cluster);
+  sample.masks.push_back(mask);
+  sample.mask_ranks.push_back(0);
+}
+
+void linkSpans(SampleCompressed& sample) {
+  CompressedNdf& ndf = sample.ndf;
+  ndf.image_regions = sample.image_regions;
+  ndf.image_slots = sample.image_slots;
+  ndf.image_scales = sample.image_scales;
+  ndf.clusters = sample.clusters;
+  ndf.masks = sample.masks;
+  ndf.mask_ranks = sample.mask_ranks;
+  ndf.scales = sample.scales;
+  ndf.basis = !sample.basis_i16.empty()   ? static_cast<const void*>(sample.basis_i16.data())
+              : !sample.basis_i32.empty() ? static_cast<const void*>(sample.basis_i32.data())
+                                          : sample.basis_f32.data();
+  ndf.basis_count = sample.basis_i16.size() + sample.basis_i32.size() + sample.basis_f32.size();
+  ndf.coefficients = !sample.coefficients_i8.empty()    ? static_cast<const void*>(sample.coefficients_i8.data())
+                     : !sample.coefficients_f16.empty() ? static_cast<const void*>(sample.coefficients_f16.data())
+                                                        : sample.coefficients_f32.data();
+  ndf.coefficient_count = coefficientCount(sample);
+}
+
+double basisElement(const CompressedNdf& ndf, std::uint64_t index) {
+  if (ndf.coefficient_type == CoefficientType::f32) return static_cast<const float*>(ndf.basis)[index];
+  if (ndf.method == CompressionMethod::pca) return static_cast<const std::int32_t*>(ndf.basis)[index];
+  return static_cast<const std::int16_t*>(ndf.basis)[index];
+}
+
+double coefficientElement(const CompressedNdf& ndf, std::uint64_t index) {
+  switch (ndf.coefficient_type) {
+    case CoefficientType::i8: return static_cast<const std::int8_t*>(ndf.coefficients)[index];
+    case CoefficientType::f16: return halfToFloat(static_cast<const std::uint16_t*>(ndf.coefficients)[index]);
+    default: return static_cast<const float*>(ndf.coefficients)[index];
+  }
+}
+
+/// Value of a column's basis image at a pixel of its block: differences of the prefix sums.
+double basisValue(const CompressedNdf& ndf, const NdfCluster& cluster, int column, int x, int y) {
+  const auto sum = [&](std::uint64_t index) { return basisElement(ndf, cluster.first_basis + index); };
+  const auto at = [&](std::uint64_t first, int rank, int t, int c) {
+    const auto here = sum(first + static_cast<std::uint64_t>(t * rank + c));
+    return t == 0 ? here : here - sum(first + static_cast<std::uint64_t>((t - 1) * rank + c));
+  };
+  const int rx = cluster.rank_x;
+  const int ry = cluster.rank_y;
+  switch (ndf.method) {
+    case CompressionMethod::cp:
+      return at(0, rx, x, column) * at(static_cast<std::uint64_t>(kBlockSize * rx), rx, y, column);
+    case CompressionMethod::tucker:
+      return at(0, rx, x, column / ry) * at(static_cast<std::uint64_t>(kBlockSize * rx), ry, y, column % ry);
+    default: {
+      const auto table = [&](int tx, int ty) {
+        return tx < 0 || ty < 0 ? 0.0 : sum(static_cast<std::uint64_t>((ty * kBlockSize + tx) * rx + column));
+      };
+      return table(x, y) - table(x - 1, y) - table(x, y - 1) + table(x - 1, y - 1);
+    }
+  }
+}
+
+}  // namespace
+
+SampleNormals sampleNormals(int width, int height, bool with_bounds) {
+  SampleNormals sample;
+  for (int j = 0; j < height; ++j) {
+    for (int i = 0; i < width; ++i) {
+      const double wave = 0.25 * std::sin(6.283185307 * (3.0 * i / width + 2.0 * j / height));
+      sample.normals.push_back({static_cast<float>(wave + 0.1 * (noise(i, j) - 0.5)), static_cast<float>(0.3 * (noise(j, i + 7) - 0.5))});
+    }
+  }
+  sample.map.width = width;
+  sample.map.height = height;
+  sample.map.texel_size_um = 2.5f;
+  sample.map.normals = sample.normals;
+  if (!with_bounds) return sample;
+  sample.bounds.reserve(NormalMap::kMaxBoundsLevels);
+  for (int k = 1;; ++k) {
+    const int block = 1 << k;
+    const int columns = (width + block - 1) / block;
+    const int rows = (height + block - 1) / block;
+    std::vector<NormalBounds> nodes;
+    for (int j = 0; j < rows; ++j) {
+      for (int i = 0; i < columns; ++i) {
+        NormalBounds node{2, 2, -2, -2};
+        for (int y = j * block; y <= std::min((j + 1) * block, height); ++y) {
+          for (int x = i * block; x <= std::min((i + 1) * block, width); ++x) {
+            const Vec2 n = sample.map.at(x % width, y % height);
+            node = {std::min(node.low_x, n.x), std::min(node.low_y, n.y), std::max(node.high_x, n.x), std::max(node.high_y, n.y)};
+          }
+        }
+        nodes.push_back(node);
+      }
+    }
+    sample.bounds.push_back(std::move(nodes));
+    sample.map.bounds[sample.map.bounds_level_count++] = {columns, rows, sample.bounds.back()};
+    if (columns == 1 && rows == 1) return sample;
+  }
+}
+
+SampleHeights sampleHeights(int width, int height) {
+  SampleHeights sample;
+  for (int j = 0; j < height; ++j) {
+    for (int i = 0; i < width; ++i) sample.heights.push_back(static_cast<float>(noise(i, j) - 0.5));
+  }
+  sample.map.width = width;
+  sample.map.height = height;
+  sample.map.heights = sample.heights;
+  return sample;
+}
+
+SamplePyramid samplePyramid(int size, BlockPrecision precision) {
+  SamplePyramid sample;
+  const SampleNormals normals = sampleNormals(size, size, false);
+  NdfPyramid& pyramid = sample.pyramid;
+  pyramid.shape = sampleShape(size);
+  pyramid.precision = precision;
+  pyramid.value_scale = 4;
+  sample.levels.resize(static_cast<std::size_t>(pyramid.shape.level_count));
+  for (int l = 0; l < pyramid.shape.level_count; ++l) {
+    SamplePyramid::Level& level = sample.levels[static_cast<std::size_t>(l)];
+    for (const Image& image : levelImages(normals.map, pyramid.shape.levels[l])) {
+      level.first_block.push_back(level.block_means.size());
+      level.masks.push_back(0);
+      for (int block = 0; block < pyramid.shape.blocksPerImage(); ++block) {
+        const double mean = blockMean(image, block);
+        if (mean == 0) continue;
+        level.masks.back() |= std::uint64_t{1} << block;
+        level.block_means.push_back(static_cast<float>(mean));
+        for (int k = 0; k < kBlockPixels; ++k) {
+          const double stored = blockPixel(image, block, k % kBlockSize, k / kBlockSize) / pyramid.value_scale;
+          level.halves.push_back(floatToHalf(static_cast<float>(stored)));
+          level.floats.push_back(static_cast<float>(stored));
+        }
+      }
+    }
+    level.first_block.push_back(level.block_means.size());
+    const void* pixels = precision == BlockPrecision::f16 ? static_cast<const void*>(level.halves.data()) : level.floats.data();
+    pyramid.levels[l] = {level.masks, level.first_block, level.block_means, pixels};
+  }
+  return sample;
+}
+
+SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type) {
+  SampleCompressed sample;
+  const SampleNormals normals = sampleNormals(size, size, false);
+  CompressedNdf& ndf = sample.ndf;
+  ndf.shape = sampleShape(size);
+  ndf.method = method;
+  ndf.coefficient_type = type;
+  ndf.region_columns = 2;
+  ndf.words_per_cluster = 1;
+  std::vector<Image> images;
+  std::vector<std::vector<std::size_t>> region_images(2);
+  for (int l = 0; l < ndf.shape.level_count; ++l) {
+    ndf.first_image[l] = static_cast<std::uint32_t>(images.size());
+    const PyramidGrid& grid = ndf.shape.levels[l];
+    for (Image& image : levelImages(normals.map, grid)) {
+      const int column = static_cast<int>(images.size() - ndf.first_image[l]) % grid.columns;
+      const std::size_t region = (column + 0.5) * grid.stride * 2 >= ndf.shape.width;
+      sample.image_regions.push_back(static_cast<std::uint16_t>(region));
+      sample.image_slots.push_back(static_cast<std::uint16_t>(region_images[region].size()));
+      region_images[region].push_back(images.size());
+      images.push_back(std::move(image));
+    }
+  }
+  for (const auto& members : region_images) {
+    std::vector<const Image*> slots;
+    for (const std::size_t image : members) slots.push_back(&images[image]);
+    for (int block = 0; block < ndf.shape.blocksPerImage(); ++block) addCluster(sample, slots, block);
+  }
+  sample.image_scales.assign(images.size(), 1);
+  linkSpans(sample);
+  for (std::size_t k = 0; k < images.size(); ++k) {
+    double sum = 0;
+    for (int p = 0; p < kResolution * kResolution; ++p) sum += compressedPixel(ndf, static_cast<int>(k), p % kResolution, p / kResolution);
+    sample.image_scales[k] = static_cast<float>(kResolution * kResolution / 4 / sum);
+  }
+  return sample;
+}
+
+formats::Provenance sampleProvenance() {
+  return {"sample_assets 1.0", R"({"size":64})", {{"flakes.png", "00112233445566778899aabbccddeeff"}, {"b\u00e4r.exr", "ffeeddccbbaa99887766554433221100"}}};
+}
+
+std::uint16_t floatToHalf(float value) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  const auto sign = static_cast<std::uint16_t>(bits >> 16 & 0x8000u);
+  const float magnitude = std::abs(value);
+  if (magnitude < 0x1p-14f) return static_cast<std::uint16_t>(sign | static_cast<std::uint16_t>(std::lrint(magnitude * 0x1p24f)));
+  const std::uint32_t rebased = (bits & 0x7fffffffu) - (112u << 23);
+  const std::uint32_t rounded = rebased + 0xfffu + (rebased >> 13 & 1u);
+  return static_cast<std::uint16_t>(sign | std::min(rounded >> 13, 0x7c00u));
+}
+
+float halfToFloat(std::uint16_t bits) {
+  const int exponent = bits >> 10 & 31;
+  const float mantissa = static_cast<float>(bits & 0x3ff);
+  const float magnitude = exponent == 0 ? mantissa * 0x1p-24f : std::ldexp(1024 + mantissa, exponent - 25);
+  return (bits & 0x8000) != 0 ? -magnitude : magnitude;
+}
+
+float pyramidPixel(const NdfPyramid& pyramid, int level, int image, int x, int y) {
+  const PyramidLevel& data = pyramid.levels[level];
+  const int block = y / kBlockSize * pyramid.shape.blocksPerAxis() + x / kBlockSize;
+  const std::uint64_t* mask = &data.masks[static_cast<std::size_t>(image) * static_cast<std::size_t>(pyramid.shape.maskWords())];
+  if ((mask[block / 64] >> (block % 64) & 1u) == 0) return 0;
+  std::uint64_t index = data.first_block[static_cast<std::size_t>(image)];
+  for (int b = 0; b < block; ++b) index += mask[b / 64] >> (b % 64) & 1u;
+  index = index * kBlockPixels + static_cast<std::uint64_t>(y % kBlockSize * kBlockSize + x % kBlockSize);
+  const float stored = pyramid.precision == BlockPrecision::f16 ? halfToFloat(static_cast<const std::uint16_t*>(data.pixels)[index])
+                                                                : static_cast<const float*>(data.pixels)[index];
+  return pyramid.value_scale * stored;
+}
+
+float compressedPixel(const CompressedNdf& ndf, int image, int x, int y) {
+  const auto k = static_cast<std::size_t>(image);
+  const int block = y / kBlockSize * ndf.shape.blocksPerAxis() + x / kBlockSize;
+  const auto c = static_cast<std::size_t>(ndf.image_regions[k] * ndf.shape.blocksPerImage() + block);
+  const int slot = ndf.image_slots[k];
+  const std::size_t word = c * static_cast<std::size_t>(ndf.words_per_cluster) + static_cast<std::size_t>(slot / 64);
+  if ((ndf.masks[word] >> (slot % 64) & 1u) == 0) return 0;
+  const std::uint64_t below = ndf.masks[word] & ((std::uint64_t{1} << (slot % 64)) - 1);
+  const auto slice = ndf.mask_ranks[word] + static_cast<std::uint64_t>(std::popcount(below));
+  const NdfCluster& cluster = ndf.clusters[c];
+  const int columns = ndf.method == CompressionMethod::tucker ? cluster.rank_x * cluster.rank_y : cluster.rank_x;
+  double density = 0;
+  for (int column = 0; column < columns; ++column) {
+    const auto at = static_cast<std::uint64_t>(column);
+    density += ndf.scales[cluster.first_scale + at] *
+               coefficientElement(ndf, cluster.first_coefficient + slice * static_cast<std::uint64_t>(columns) + at) *
+               basisValue(ndf, cluster, column, x % kBlockSize, y % kBlockSize);
+  }
+  return static_cast<float>(density * ndf.image_scales[k]);
+}
+
+}  // namespace glint::test

@@ -1,0 +1,360 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+#include "glint/formats/asset_reader.h"
+#include "glint/formats/asset_writer.h"
+#include "glint/formats/validate.h"
+#include "support/sample_assets.h"
+#include "support/temp_folder.h"
+
+namespace glint::formats {
+namespace {
+
+using test::TempFolder;
+using testing::HasSubstr;
+namespace fs = std::filesystem;
+
+std::string readBytes(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+void writeBytes(const fs::path& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
+
+template <class T>
+std::string bytesOf(std::span<const T> span) {
+  return {reinterpret_cast<const char*>(span.data()), span.size_bytes()};
+}
+
+template <class T>
+void expectSame(std::span<const T> a, std::span<const T> b) {
+  EXPECT_EQ(bytesOf(a), bytesOf(b));
+}
+
+void expectSame(const PyramidShape& a, const PyramidShape& b) {
+  EXPECT_EQ(a.width, b.width);
+  EXPECT_EQ(a.height, b.height);
+  EXPECT_EQ(a.resolution, b.resolution);
+  EXPECT_EQ(a.sigma_r, b.sigma_r);
+  EXPECT_EQ(a.surface, b.surface);
+  EXPECT_EQ(a.boundary, b.boundary);
+  ASSERT_EQ(a.level_count, b.level_count);
+  for (int l = 0; l < a.level_count; ++l) {
+    EXPECT_EQ(a.levels[l].stride, b.levels[l].stride);
+    EXPECT_EQ(a.levels[l].columns, b.levels[l].columns);
+    EXPECT_EQ(a.levels[l].rows, b.levels[l].rows);
+  }
+}
+
+std::size_t bytesPerCoefficient(CoefficientType type) {
+  return type == CoefficientType::i8 ? 1 : type == CoefficientType::f16 ? 2 : 4;
+}
+
+/// The id of the rule that opening breaks; empty if it opens.
+std::string brokenRule(const fs::path& path, const OpenOptions& options = {}) {
+  try {
+    Asset::open(path, options);
+    return {};
+  } catch (const Error& error) {
+    return error.rule();
+  }
+}
+
+TEST(AssetRoundTrip, NormalsComeBackBitExact) {
+  const TempFolder folder;
+  for (const auto [width, height, bounds] : {std::tuple{64, 48, true}, {37, 5, true}, {1, 1, false}, {16, 16, false}}) {
+    const auto sample = test::sampleNormals(width, height, bounds);
+    writeAsset(folder / "a.glint", sample.map, test::sampleProvenance(), {.overwrite = true});
+    const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
+    EXPECT_EQ(asset.kind(), "normals");
+    const NormalMap& map = asset.normals();
+    EXPECT_EQ(map.width, width);
+    EXPECT_EQ(map.height, height);
+    EXPECT_EQ(map.texel_size_um, 2.5f);
+    expectSame(map.normals, sample.map.normals);
+    ASSERT_EQ(map.bounds_level_count, sample.map.bounds_level_count);
+    for (int k = 0; k < map.bounds_level_count; ++k) {
+      EXPECT_EQ(map.bounds[k].columns, sample.map.bounds[k].columns);
+      EXPECT_EQ(map.bounds[k].rows, sample.map.bounds[k].rows);
+      expectSame(map.bounds[k].nodes, sample.map.bounds[k].nodes);
+    }
+    EXPECT_TRUE(validateAsset(folder / "a.glint").findings.empty());
+  }
+}
+
+TEST(AssetRoundTrip, HeightsComeBackBitExact) {
+  const TempFolder folder;
+  const auto sample = test::sampleHeights(31, 7);
+  writeAsset(folder / "a.glint", sample.map, test::sampleProvenance());
+  const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
+  EXPECT_EQ(asset.heights().width, 31);
+  EXPECT_EQ(asset.heights().height, 7);
+  expectSame(asset.heights().heights, sample.map.heights);
+  EXPECT_TRUE(validateAsset(folder / "a.glint").findings.empty());
+}
+
+TEST(AssetRoundTrip, PyramidsComeBackBitExact) {
+  const TempFolder folder;
+  for (const BlockPrecision precision : {BlockPrecision::f16, BlockPrecision::f32}) {
+    const auto sample = test::samplePyramid(32, precision);
+    writeAsset(folder / "a.glint", sample.pyramid, test::sampleProvenance(), {.overwrite = true});
+    const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
+    const NdfPyramid& pyramid = asset.pyramid();
+    expectSame(pyramid.shape, sample.pyramid.shape);
+    EXPECT_EQ(pyramid.precision, precision);
+    EXPECT_EQ(pyramid.value_scale, 4);
+    for (int l = 0; l < pyramid.shape.level_count; ++l) {
+      const PyramidLevel& wanted = sample.pyramid.levels[l];
+      expectSame(pyramid.levels[l].masks, wanted.masks);
+      expectSame(pyramid.levels[l].first_block, wanted.first_block);
+      expectSame(pyramid.levels[l].block_means, wanted.block_means);
+      const std::size_t bytes = wanted.block_means.size() * kBlockPixels * (precision == BlockPrecision::f16 ? 2 : 4);
+      EXPECT_EQ(std::memcmp(pyramid.levels[l].pixels, wanted.pixels, bytes), 0);
+    }
+    const ValidationReport report = validateAsset(folder / "a.glint");
+    EXPECT_TRUE(report.findings.empty()) << report.findings[0].rule << " " << report.findings[0].message;
+  }
+}
+
+TEST(AssetRoundTrip, CompressedPyramidsOfEveryMethodAndTypeComeBackBitExact) {
+  const TempFolder folder;
+  for (const CompressionMethod method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
+    for (const CoefficientType type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
+      const auto sample = test::sampleCompressed(32, method, type);
+      writeAsset(folder / "a.glint", sample.ndf, test::sampleProvenance(), {.overwrite = true});
+      const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
+      const CompressedNdf& ndf = asset.compressed();
+      expectSame(ndf.shape, sample.ndf.shape);
+      EXPECT_EQ(ndf.method, method);
+      EXPECT_EQ(ndf.coefficient_type, type);
+      EXPECT_EQ(ndf.region_columns, 2);
+      EXPECT_EQ(ndf.region_rows, 1);
+      EXPECT_EQ(ndf.words_per_cluster, 1);
+      for (int l = 0; l < ndf.shape.level_count; ++l) EXPECT_EQ(ndf.first_image[l], sample.ndf.first_image[l]);
+      expectSame(ndf.image_regions, sample.ndf.image_regions);
+      expectSame(ndf.image_slots, sample.ndf.image_slots);
+      expectSame(ndf.image_scales, sample.ndf.image_scales);
+      expectSame(ndf.clusters, sample.ndf.clusters);
+      expectSame(ndf.masks, sample.ndf.masks);
+      expectSame(ndf.mask_ranks, sample.ndf.mask_ranks);
+      expectSame(ndf.scales, sample.ndf.scales);
+      ASSERT_EQ(ndf.basis_count, sample.ndf.basis_count);
+      ASSERT_EQ(ndf.coefficient_count, sample.ndf.coefficient_count);
+      const std::size_t basis_bytes = type == CoefficientType::f32 || method == CompressionMethod::pca ? 4 : 2;
+      EXPECT_EQ(std::memcmp(ndf.basis, sample.ndf.basis, ndf.basis_count * basis_bytes), 0);
+      EXPECT_EQ(std::memcmp(ndf.coefficients, sample.ndf.coefficients, ndf.coefficient_count * bytesPerCoefficient(type)), 0);
+      const ValidationReport report = validateAsset(folder / "a.glint");
+      EXPECT_TRUE(report.findings.empty()) << report.findings[0].rule << " " << report.findings[0].message;
+    }
+  }
+}
+
+TEST(AssetRoundTrip, ProvenanceComesBack) {
+  const TempFolder folder;
+  for (const Provenance& provenance : {test::sampleProvenance(), Provenance{"", "{}", {}}}) {
+    writeAsset(folder / "a.glint", test::sampleHeights(4, 4).map, provenance, {.overwrite = true});
+    const Asset asset = Asset::open(folder / "a.glint");
+    EXPECT_EQ(asset.info().provenance, provenance);
+    EXPECT_EQ(asset.info().format_major, kFormatMajor);
+    EXPECT_EQ(asset.info().format_minor, kFormatMinor);
+    EXPECT_TRUE(asset.info().warnings.empty());
+  }
+}
+
+TEST(AssetRoundTrip, BigDatasetsStartOnPagesAndSmallOnesOnCacheLines) {
+  const TempFolder folder;
+  writeAsset(folder / "a.glint", test::sampleNormals(256, 256).map, test::sampleProvenance());
+  const Asset asset = Asset::open(folder / "a.glint");
+  for (const DatasetInfo& dataset : asset.info().datasets) {
+    EXPECT_EQ(dataset.offset % (dataset.size_bytes >= 65536 ? 4096 : 64), 0u) << dataset.path;
+  }
+  // Alignment must not cost more than a few pages.
+  EXPECT_LT(asset.info().file_bytes, 256 * 256 * 8 + 256 * 256 / 3 * 16 + 48 * 1024);
+}
+
+TEST(AssetRoundTrip, AskingForAnotherKindNamesBoth) {
+  const TempFolder folder;
+  writeAsset(folder / "a.glint", test::sampleHeights(4, 4).map, {});
+  const Asset asset = Asset::open(folder / "a.glint");
+  try {
+    asset.pyramid();
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::unsupported);
+    EXPECT_THAT(error.what(), HasSubstr("heights"));
+    EXPECT_THAT(error.what(), HasSubstr("ndf-pyramid"));
+  }
+}
+
+TEST(AssetRoundTrip, MovedAssetsKeepTheirData) {
+  const TempFolder folder;
+  const auto sample = test::sampleHeights(9, 9);
+  writeAsset(folder / "a.glint", sample.map, {});
+  Asset first = Asset::open(folder / "a.glint");
+  const float* data = first.heights().heights.data();
+  const Asset second = std::move(first);
+  EXPECT_EQ(second.heights().heights.data(), data);
+  fs::remove(folder / "a.glint");
+  expectSame(second.heights().heights, sample.map.heights);
+}
+
+TEST(AssetWriter, TwoRunsGiveTheSameBytes) {
+  const TempFolder folder;
+  const auto sample = test::samplePyramid(32, BlockPrecision::f16);
+  writeAsset(folder / "a.glint", sample.pyramid, test::sampleProvenance());
+  ::usleep(1100000);  // HDF5 stores times in whole seconds, if it stores any
+  writeAsset(folder / "b.glint", sample.pyramid, test::sampleProvenance());
+  EXPECT_EQ(readBytes(folder / "a.glint"), readBytes(folder / "b.glint"));
+}
+
+TEST(AssetWriter, DoesNotReplaceAFileUnlessAsked) {
+  const TempFolder folder;
+  writeBytes(folder / "a.glint", "precious");
+  const auto sample = test::sampleHeights(4, 4);
+  EXPECT_THROW(writeAsset(folder / "a.glint", sample.map, {}), Error);
+  EXPECT_EQ(readBytes(folder / "a.glint"), "precious");
+  writeAsset(folder / "a.glint", sample.map, {}, {.overwrite = true});
+  EXPECT_EQ(brokenRule(folder / "a.glint"), "");
+}
+
+std::size_t fileCount(const fs::path& folder) {
+  return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+}
+
+TEST(AssetWriter, InvalidStructsLeaveNoFile) {
+  const TempFolder folder;
+  auto sample = test::samplePyramid(32, BlockPrecision::f16);
+  sample.levels[0].first_block[3] += 1;
+  try {
+    writeAsset(folder / "a.glint", sample.pyramid, {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.rule(), "pyramid.first_block");
+    EXPECT_EQ(error.path(), (folder / "a.glint").string());
+  }
+  sample.levels[0].first_block[3] -= 1;
+  sample.pyramid.levels[1].block_means = sample.pyramid.levels[1].block_means.first(3);
+  EXPECT_THROW(writeAsset(folder / "a.glint", sample.pyramid, {}), Error);
+  auto map = test::sampleHeights(4, 4);
+  map.map.width = 5;
+  EXPECT_THROW(writeAsset(folder / "a.glint", map.map, {}), Error);
+  EXPECT_EQ(fileCount(folder.path()), 0u);
+}
+
+TEST(AssetWriter, FailsCleanlyWithoutSpace) {
+  const TempFolder folder;
+  writeAsset(folder / "a.glint", test::sampleHeights(4, 4).map, {});
+  const std::string old = readBytes(folder / "a.glint");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const rlimit limit = {100000, 100000};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    std::signal(SIGXFSZ, SIG_IGN);
+    int status = 1;
+    try {
+      writeAsset(folder / "a.glint", test::sampleHeights(300, 300).map, {}, {.overwrite = true});
+    } catch (const Error& error) {
+      status = error.code() == ErrorCode::io ? 0 : 2;
+    }
+    ::_exit(status);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  EXPECT_EQ(readBytes(folder / "a.glint"), old);
+  EXPECT_EQ(fileCount(folder.path()), 1u);
+}
+
+TEST(AssetWriter, AKilledRunLeavesTheOldFile) {
+  const TempFolder folder;
+  writeAsset(folder / "a.glint", test::sampleHeights(4, 4).map, {});
+  const std::string old = readBytes(folder / "a.glint");
+  const std::vector<float> heights(4 << 20);
+  const HeightMap big{2048, 2048, 0, heights};
+  for (const int delay_us : {500, 2000, 5000}) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      for (;;) writeAsset(folder / "b.glint", big, {}, {.overwrite = true});
+    }
+    ::usleep(static_cast<useconds_t>(delay_us));
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    // Either no file or a whole one, whenever the kill came.
+    if (fs::exists(folder / "b.glint")) EXPECT_EQ(brokenRule(folder / "b.glint", {.verify_hashes = true}), "");
+  }
+  EXPECT_EQ(readBytes(folder / "a.glint"), old);
+}
+
+TEST(AssetWriter, NamesTheFolderThatIsMissing) {
+  try {
+    writeAsset("/nonexistent/folder/a.glint", test::sampleHeights(4, 4).map, {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::io);
+    EXPECT_THAT(error.what(), HasSubstr("/nonexistent/folder/a.glint"));
+    EXPECT_THAT(error.what(), HasSubstr("No such file"));
+  }
+}
+
+TEST(DamagedAsset, EveryPrefixIsRefused) {
+  const TempFolder folder;
+  writeAsset(folder / "a.glint", test::sampleHeights(16, 16).map, test::sampleProvenance());
+  const std::string bytes = readBytes(folder / "a.glint");
+  for (std::size_t size = 0; size < bytes.size(); size += size < 256 ? 1 : 61) {
+    writeBytes(folder / "b.glint", bytes.substr(0, size));
+    const std::string rule = brokenRule(folder / "b.glint");
+    EXPECT_TRUE(rule == "file.truncated" || rule == "file.signature") << size << " " << rule;
+  }
+}
+
+TEST(DamagedAsset, EveryFlippedByteIsFoundByValidation) {
+  const TempFolder folder;
+  writeAsset(folder / "a.glint", test::sampleHeights(16, 16).map, test::sampleProvenance());
+  const std::string bytes = readBytes(folder / "a.glint");
+  const ValidationReport good = validateAsset(folder / "a.glint");
+  ASSERT_TRUE(good.findings.empty());
+  const Asset asset = Asset::open(folder / "a.glint");
+  std::mt19937 random(7);
+  std::size_t unnoticed = 0;
+  constexpr int kFlips = 1500;
+  for (int k = 0; k < kFlips; ++k) {
+    std::string flipped = bytes;
+    flipped[random() % bytes.size()] ^= static_cast<char>(1 << random() % 8);
+    writeBytes(folder / "b.glint", flipped);
+    const ValidationReport report = validateAsset(folder / "b.glint");
+    if (!report.valid()) continue;
+    ++unnoticed;
+    // What nobody notices must be a gap between objects: the asset is the same.
+    const Asset other = Asset::open(folder / "b.glint", {.verify_hashes = true});
+    expectSame(other.heights().heights, asset.heights().heights);
+    EXPECT_EQ(other.info().provenance, asset.info().provenance);
+  }
+  EXPECT_LT(unnoticed, static_cast<std::size_t>(kFlips / 2));
+}
+
+TEST(DamagedAsset, AFlippedBitOfDataIsFoundWhenHashesAreVerified) {
+  const TempFolder folder;
+  writeAsset(folder / "a.glint", test::sampleHeights(16, 16).map, {});
+  const std::uint64_t offset = Asset::open(folder / "a.glint").info().datasets.at(0).offset;
+  std::string bytes = readBytes(folder / "a.glint");
+  bytes[offset + 100] ^= 1;
+  writeBytes(folder / "a.glint", bytes);
+  EXPECT_EQ(brokenRule(folder / "a.glint"), "");
+  EXPECT_EQ(brokenRule(folder / "a.glint", {.verify_hashes = true}), "dataset.hash");
+  const ValidationReport report = validateAsset(folder / "a.glint");
+  ASSERT_EQ(report.findings.size(), 1u);
+  EXPECT_EQ(report.findings[0].rule, "dataset.hash");
+  EXPECT_EQ(report.findings[0].object, "/heights");
+}
+
+}  // namespace
+}  // namespace glint::formats
