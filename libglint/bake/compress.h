@@ -12,7 +12,7 @@ namespace glint::bake {
 
 /// What compressPyramid() makes.
 struct CompressionOptions {
-  CompressionMethod method = CompressionMethod::pca;
+  CompressionMethod method = CompressionMethod::tucker;
 
   /// Columns of every cluster, 1..256 (fewer where a cluster has no more to give). tucker: the best rank_x * rank_y <= rank.
   /// Not used when a tolerance is given.
