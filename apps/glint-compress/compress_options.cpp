@@ -30,8 +30,9 @@ CompressOptions::CompressOptions(Tool& tool) {
   tool.choice("--quantize", options_.coefficient_type,
               {{"f32", CoefficientType::f32}, {"f16", CoefficientType::f16}, {"i8", CoefficientType::i8}},
               "type of the coefficients");
-  tool.option("--regions", options_.regions, "regions of the map along each axis").range(1, 255).defaultText(
-      "8 for cp, otherwise 1");
+  tool.option("--regions", options_.regions, "regions of the map along each axis")
+      .range(1, 255)
+      .defaultText("8 for cp, otherwise 1");
   tool.option("--min-improvement", options_.min_improvement, "cp: end when a sweep improves the relative error by less")
       .range(0, 0.99);
   tool.option("--max-iterations", options_.max_iterations, "cp: sweeps at most").range(1, 1e6);
@@ -56,9 +57,9 @@ nlohmann::json compressionJson(const bake::CompressionReport& report) {
 }
 
 std::string compressionText(const bake::CompressionReport& report) {
-  std::string text = format("%.2f MB, 1 : %.1f of the pyramid as stored, 1 : %.1f of dense images; relative error %.4f\n",
-                            static_cast<double>(report.total_bytes) / 1e6, report.ratio_to_stored, report.ratio_to_dense,
-                            report.total.rel_l2);
+  std::string text =
+      format("%.2f MB, 1 : %.1f of the pyramid as stored, 1 : %.1f of dense images; relative error %.4f\n",
+             static_cast<double>(report.total_bytes) / 1e6, report.ratio_to_stored, report.ratio_to_dense, report.total.rel_l2);
   for (std::size_t l = 0; l < report.levels.size(); ++l)
     text += format("level %zu: %llu slices, relative error %.4f\n", l, static_cast<unsigned long long>(report.levels[l].slices),
                    report.levels[l].rel_l2);

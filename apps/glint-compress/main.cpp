@@ -25,7 +25,8 @@ int main(int argc, char** argv) {
     formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
     if (report.unscaled_images > 0)
       tool.warn(std::to_string(report.unscaled_images) +
-                " images decode to half of their energy or less and are not normalised; ask for a higher rank or a smaller tolerance");
+                " images decode to half of their energy or less and are not normalised; ask for a higher rank or a smaller "
+                "tolerance");
     tool.setResult(apps::compressionJson(report));
     tool.summary(tool.name() + ": " + apps::compressionText(report));
   });
