@@ -1,5 +1,7 @@
 #include "glint/bake/compress.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -7,8 +9,6 @@
 #include <optional>
 #include <string>
 #include <type_traits>
-
-#include <tbb/parallel_for.h>
 
 #include "glint/bake/compress_encode.h"
 #include "glint/bake/compress_model.h"
@@ -97,14 +97,13 @@ class Compressor {
 
   template <class Work>
   void forEachCluster(Work work) {
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, index_.clusterCount(), 1),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-          for (std::size_t c = range.begin(); c != range.end(); ++c) {
-            work(c);
-            progress_.advance();
-          }
-        });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, index_.clusterCount(), 1),
+                      [&](const tbb::blocked_range<std::size_t>& range) {
+                        for (std::size_t c = range.begin(); c != range.end(); ++c) {
+                          work(c);
+                          progress_.advance();
+                        }
+                      });
   }
 
   void decompose() {
@@ -112,7 +111,8 @@ class Compressor {
     const double budget = options_.tolerance * options_.tolerance * energy_;
     forEachCluster([&](std::size_t c) {
       // Finishing all clusters to this error leaves 1 part in 400 of the budget: further columns are not worth their memory.
-      const double share = static_cast<double>(index_.sliceCount(c)) / static_cast<double>(std::max<std::uint64_t>(1, index_.totalSlices()));
+      const double share =
+          static_cast<double>(index_.sliceCount(c)) / static_cast<double>(std::max<std::uint64_t>(1, index_.totalSlices()));
       models[c].emplace(index_, c, statistics_[c], options_, 0.0025 * budget * share);
     });
     models_.reserve(models.size());
@@ -195,7 +195,8 @@ class Compressor {
     least = totalError();
     if (least > budget)
       throw Error(ErrorCode::failed, "compress.tolerance", "", "",
-                  "the tolerance " + std::to_string(options_.tolerance) + " cannot be reached with this method and type of coefficient; the least error is " +
+                  "the tolerance " + std::to_string(options_.tolerance) +
+                      " cannot be reached with this method and type of coefficient; the least error is " +
                       std::to_string(std::sqrt(least / energy_)),
                   "ask for a larger tolerance, or for coefficients of more bits");
   }
@@ -275,7 +276,8 @@ class Compressor {
     report.total_bytes = report.basis_bytes + report.coefficient_bytes + report.index_bytes;
     const double pixels = static_cast<double>(pyramid_.shape.resolution) * pyramid_.shape.resolution;
     const double dense = static_cast<double>(index_.imageCount()) * pixels * sizeof(float);
-    double stored = static_cast<double>(index_.totalSlices()) * kBlockPixels * (pyramid_.precision == BlockPrecision::f16 ? 2 : 4);
+    double stored =
+        static_cast<double>(index_.totalSlices()) * kBlockPixels * (pyramid_.precision == BlockPrecision::f16 ? 2 : 4);
     for (int l = 0; l < pyramid_.shape.level_count; ++l) {
       const PyramidLevel& level = pyramid_.levels[l];
       stored += static_cast<double>(level.masks.size_bytes() + level.first_block.size_bytes() + level.block_means.size_bytes());

@@ -12,7 +12,7 @@ namespace glint::bake {
 
 /// What compressPyramid() makes.
 struct CompressionOptions {
-  CompressionMethod method = CompressionMethod::pca;
+  CompressionMethod method = CompressionMethod::tucker;
 
   /// Columns of every cluster, 1..256 (fewer where a cluster has no more to give). tucker: the best rank_x * rank_y <= rank.
   /// Not used when a tolerance is given.
@@ -24,7 +24,8 @@ struct CompressionOptions {
 
   CoefficientType coefficient_type = CoefficientType::i8;
 
-  /// Regions along each axis of the map, 1..255. 0: the default of the method, 8 for cp (Deng 2022, section 4.2) and 1 otherwise.
+  /// Regions along each axis of the map, 1..255. 0: the default of the method, 8 for cp (Deng 2022, section 4.2) and 1
+  /// otherwise.
   int regions = 0;
 
   double min_improvement = 1e-4;  ///< cp: stop when a sweep improves the relative error of a cluster by less, >= 0
@@ -34,7 +35,7 @@ struct CompressionOptions {
 /// One level of the pyramid, or all of them.
 struct CompressionLevelReport {
   std::uint64_t slices = 0;  ///< stored blocks
-  double rel_l2 = 0;         ///< ||D' - D|| / ||D|| over the pixels of these slices, D' as a reader decodes it; 0 for an empty level
+  double rel_l2 = 0;  ///< ||D' - D|| / ||D|| over the pixels of these slices, D' as a reader decodes it; 0 for an empty level
 };
 
 /// What compressPyramid() achieved. Bytes are those of the arrays, without the overhead of a file.
@@ -45,8 +46,8 @@ struct CompressionReport {
   std::uint64_t coefficient_bytes = 0;  ///< with the scale of every column
   std::uint64_t index_bytes = 0;        ///< clusters, masks, regions, slots and scales of images
   std::uint64_t total_bytes = 0;
-  double ratio_to_dense = 0;   ///< bytes of the uncompressed f32 images, empty blocks included, over total_bytes
-  double ratio_to_stored = 0;  ///< bytes of the pyramid as it is stored, over total_bytes
+  double ratio_to_dense = 0;                  ///< bytes of the uncompressed f32 images, empty blocks included, over total_bytes
+  double ratio_to_stored = 0;                 ///< bytes of the pyramid as it is stored, over total_bytes
   std::vector<std::uint64_t> rank_histogram;  ///< [columns]: occupied clusters that have so many columns
   std::uint64_t unscaled_images = 0;  ///< images that decode to half their energy or less, so that they cannot be normalised
 };
@@ -78,8 +79,8 @@ int coefficientElementBytes(CoefficientType type);
 /// Compresses the images of a pyramid (Deng 2022, section 4.2).
 ///
 /// The blocks of all images that share an angular block and a spatial region are the slices of a 16x16xL tensor. Each tensor is
-/// decomposed (`cp`: alternating least squares, Eq. 5; `tucker`, `pca`: eigenvectors), the bases are quantised, the coefficients
-/// are solved again for the quantised bases and quantised, and each image is scaled to integrate to 1.
+/// decomposed (`cp`: alternating least squares, Eq. 5; `tucker`, `pca`: eigenvectors), the bases are quantised, the
+/// coefficients are solved again for the quantised bases and quantised, and each image is scaled to integrate to 1.
 /// @param pyramid   f16 or f32; densities must be finite
 /// @param report    filled when not null
 /// @param progress  units of work, several per cluster; may be empty

@@ -1,11 +1,10 @@
 #include "glint/bake/compress_cp.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
-
-#include <Eigen/Eigenvalues>
 
 #include "glint/bake/compress_kernels.h"
 
@@ -15,7 +14,7 @@ namespace {
 constexpr int kSize = kBlockSize;
 
 // Weight of the ridge (third factor) and of the proximal term (first two), relative to the mean diagonal of the normal
-// equations. Without it rank 32 diverges on some tensors; the ridge costs less than 0.1 % of error.
+// equations. It bounds nearly parallel columns. Ten times less moves the error on noise by under 0.5 % at ranks 16 to 48.
 constexpr float kRegularisation = 1e-3f;
 
 // Extrapolation: start, growth after a good sweep, limit, and shrinkage after a sweep that was taken back.
@@ -102,7 +101,9 @@ class CpSolver {
   std::size_t square() const { return static_cast<std::size_t>(stride_) * stride_; }
 
   /// out = A^T A of a matrix with `stride_` columns.
-  void gramOf(const float* a, int rows, float* out) const { multiply({a, 1, stride_}, a, stride_, out, stride_, stride_, stride_, rows); }
+  void gramOf(const float* a, int rows, float* out) const {
+    multiply({a, 1, stride_}, a, stride_, out, stride_, stride_, stride_, rows);
+  }
 
   /// Solves the third factor for the current X and Y, in the form that back() needs.
   /// @return squared error; infinity where the normal equations are not positive
@@ -111,8 +112,8 @@ class CpSolver {
     gramOf(x_.data(), kSize, overlap_x_.data());
     gramOf(y_.data(), kSize, overlap_y_.data());
     if (tensor_.slices) {
-      multiply({tensor_.slices, kSliceStride, 1}, khatri_rao_.data(), stride_, projection_.data(), stride_, tensor_.count, stride_,
-               kBlockPixels);
+      multiply({tensor_.slices, kSliceStride, 1}, khatri_rao_.data(), stride_, projection_.data(), stride_, tensor_.count,
+               stride_, kBlockPixels);
       gramOf(projection_.data(), tensor_.count, moments_.data());
     } else {
       multiply({tensor_.gram, kBlockPixels, 1}, khatri_rao_.data(), stride_, projection_.data(), stride_, kBlockPixels, stride_,
@@ -138,11 +139,13 @@ class CpSolver {
   /// back_ = T^T Z: [256][stride].
   void contractThird() {
     if (tensor_.slices) {
-      multiply({projection_.data(), stride_, 1}, inverse_.data(), stride_, third_.data(), stride_, tensor_.count, stride_, stride_);
+      multiply({projection_.data(), stride_, 1}, inverse_.data(), stride_, third_.data(), stride_, tensor_.count, stride_,
+               stride_);
       multiply({tensor_.slices, 1, kSliceStride}, third_.data(), stride_, back_.data(), stride_, kBlockPixels, stride_,
                tensor_.count);
     } else {
-      multiply({projection_.data(), stride_, 1}, inverse_.data(), stride_, back_.data(), stride_, kBlockPixels, stride_, stride_);
+      multiply({projection_.data(), stride_, 1}, inverse_.data(), stride_, back_.data(), stride_, kBlockPixels, stride_,
+               stride_);
     }
   }
 
@@ -156,7 +159,8 @@ class CpSolver {
     solveFactor(overlap_x_.data(), y_);
   }
 
-  /// factor = (solved_ + mu factor) (third_gram o overlap + mu)^-1, columns normalised. Columns without energy stay as they are.
+  /// factor = (solved_ + mu factor) (third_gram o overlap + mu)^-1, columns normalised. Columns without energy stay as they
+  /// are.
   void solveFactor(const float* overlap, std::vector<float>& factor) {
     float trace = 0;
     for (std::size_t i = 0; i < square(); ++i) scratch_[i] = third_gram_[i] * overlap[i];
@@ -196,13 +200,13 @@ class CpSolver {
   const CpTensor& tensor_;
   int rank_;
   int stride_;
-  std::vector<float> x_, y_;          // [16][stride]
-  std::vector<float> khatri_rao_;     // [256][stride]
-  std::vector<float> projection_;     // M = T (X o Y): [L][stride], or Gram times (X o Y): [256][stride]
-  std::vector<float> third_;          // Z: [L][stride]
-  std::vector<float> back_;           // T^T Z: [256][stride]
+  std::vector<float> x_, y_;       // [16][stride]
+  std::vector<float> khatri_rao_;  // [256][stride]
+  std::vector<float> projection_;  // M = T (X o Y): [L][stride], or Gram times (X o Y): [256][stride]
+  std::vector<float> third_;       // Z: [L][stride]
+  std::vector<float> back_;        // T^T Z: [256][stride]
   std::vector<float> overlap_x_, overlap_y_, inverse_, moments_, third_gram_, scratch_;  // [stride][stride]
-  std::vector<float> solved_;         // [16][stride]
+  std::vector<float> solved_;                                                            // [16][stride]
 };
 
 }  // namespace

@@ -8,8 +8,8 @@ namespace glint::bake {
 
 /// Second moments of a 16x16xL tensor along its first two modes.
 struct TuckerAxes {
-  float u[kBlockPixels];  ///< [x][a]: orthonormal columns, most energy first
-  float v[kBlockPixels];  ///< [y][b]
+  float u[kBlockPixels];                       ///< [x][a]: orthonormal columns, most energy first
+  float v[kBlockPixels];                       ///< [y][b]
   double energy[kBlockSize][kBlockSize] = {};  ///< [a][b]: sum over slices of (u_a^T slice v_b)^2
 };
 
@@ -60,9 +60,9 @@ struct CpFactors {
 
 /// Canonical polyadic decomposition by alternating least squares (Deng 2022, Eq. 5).
 ///
-/// Starts from the pairs of HOSVD axes with the largest energy. The third factor is eliminated: each sweep solves it exactly for the
-/// current X and Y. X and Y are solved with a proximal term, so that nearly parallel columns stay stable, and extrapolated; a
-/// sweep that makes the error worse is taken back and repeated without extrapolation, so the error never rises.
+/// Starts from the pairs of HOSVD axes with the largest energy. The third factor is eliminated: each sweep solves it exactly
+/// for the current X and Y. X and Y are solved with a proximal term, so that nearly parallel columns stay stable, and
+/// extrapolated; a sweep that makes the error worse is taken back and repeated without extrapolation, so the error never rises.
 /// @return at most min(rank, 16 L, number of axis pairs that hold energy) columns; none for a tensor of zeros
 CpFactors decomposeCp(const CpTensor& tensor, const TuckerAxes& axes, const CpLimits& limits);
 

@@ -1,12 +1,11 @@
 #include "glint/bake/compress_encode.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
-
-#include <Eigen/Cholesky>
 
 #include "glint/bake/compress_kernels.h"
 
@@ -19,8 +18,8 @@ constexpr float kBasisPeak = 2047;
 // Largest coefficient of a column of i8.
 constexpr float kCoefficientPeak = 127;
 
-// Ridge of the coefficients, relative to the mean square norm of a basis image. Nearly parallel columns of cp would otherwise get
-// large coefficients of opposite signs, and lose more in quantisation than the ridge costs.
+// Ridge of the coefficients, relative to the mean square norm of a basis image. Nearly parallel columns of cp would otherwise
+// get large coefficients of opposite signs, and lose more in quantisation than the ridge costs.
 constexpr double kCpRidge = 1e-3;
 constexpr double kOrthogonalRidge = 1e-9;
 
@@ -101,10 +100,10 @@ void writeAreaSums(std::vector<float>& values, int columns, std::vector<std::byt
 /// Quantised basis images and what solves for their coefficients.
 struct DecodedBasis {
   int columns = 0;
-  int stride = 0;                   // columns, padded
-  std::vector<float> images;        // [columns][256]
-  std::vector<float> dual;          // [256][stride]: coefficients = slice * dual
-  std::vector<float> scales;        // [columns]: of the stored integers
+  int stride = 0;             // columns, padded
+  std::vector<float> images;  // [columns][256]
+  std::vector<float> dual;    // [256][stride]: coefficients = slice * dual
+  std::vector<float> scales;  // [columns]: of the stored integers
 };
 
 /// Basis images from factors: cp pairs columns, tucker combines all.
@@ -115,8 +114,7 @@ void combineFactors(const QuantizedFactor& x, const QuantizedFactor& y, int rank
       const float scale = x.scales[a] * y.scales[b];
       out.scales.push_back(scale);
       for (int j = 0; j < kBlockSize; ++j)
-        for (int i = 0; i < kBlockSize; ++i)
-          out.images.push_back(scale * x.values[i * rank_x + a] * y.values[j * rank_y + b]);
+        for (int i = 0; i < kBlockSize; ++i) out.images.push_back(scale * x.values[i * rank_x + a] * y.values[j * rank_y + b]);
     }
   }
 }
@@ -154,7 +152,8 @@ DecodedBasis encodeBasis(const ClusterBasis& basis, CompressionMethod method, Co
     const int rank_y = tucker ? basis.rank_y : basis.rank_x;
     QuantizedFactor x = quantizeFactor(basis.x, kBlockSize, basis.rank_x, integers);
     QuantizedFactor y = quantizeFactor(basis.y, kBlockSize, rank_y, integers);
-    integers ? writePrefixSums<std::int16_t>(x.values, basis.rank_x, bytes) : writePrefixSums<float>(x.values, basis.rank_x, bytes);
+    integers ? writePrefixSums<std::int16_t>(x.values, basis.rank_x, bytes)
+             : writePrefixSums<float>(x.values, basis.rank_x, bytes);
     integers ? writePrefixSums<std::int16_t>(y.values, rank_y, bytes) : writePrefixSums<float>(y.values, rank_y, bytes);
     combineFactors(x, y, basis.rank_x, rank_y, tucker, out);
   }

@@ -149,23 +149,15 @@ void addGram(const float* a, std::ptrdiff_t a_stride, int rows, int n, float* c,
   HWY_DYNAMIC_DISPATCH(AddGram)(a, a_stride, rows, n, c, c_stride);
 }
 
-void khatriRao(const float* x, const float* y, int columns, float* out) {
-  HWY_DYNAMIC_DISPATCH(KhatriRao)(x, y, columns, out);
-}
+void khatriRao(const float* x, const float* y, int columns, float* out) { HWY_DYNAMIC_DISPATCH(KhatriRao)(x, y, columns, out); }
 
-void contractY(const float* w, const float* y, int columns, float* out) {
-  HWY_DYNAMIC_DISPATCH(ContractY)(w, y, columns, out);
-}
+void contractY(const float* w, const float* y, int columns, float* out) { HWY_DYNAMIC_DISPATCH(ContractY)(w, y, columns, out); }
 
-void contractX(const float* w, const float* x, int columns, float* out) {
-  HWY_DYNAMIC_DISPATCH(ContractX)(w, x, columns, out);
-}
+void contractX(const float* w, const float* x, int columns, float* out) { HWY_DYNAMIC_DISPATCH(ContractX)(w, x, columns, out); }
 
 bool invertPositive(float* a, int n, int stride) { return HWY_DYNAMIC_DISPATCH(InvertPositive)(a, n, stride); }
 
-void halfToFloat(const std::uint16_t* in, std::size_t count, float* out) {
-  HWY_DYNAMIC_DISPATCH(HalfToFloat)(in, count, out);
-}
+void halfToFloat(const std::uint16_t* in, std::size_t count, float* out) { HWY_DYNAMIC_DISPATCH(HalfToFloat)(in, count, out); }
 
 }  // namespace glint::bake
 #endif

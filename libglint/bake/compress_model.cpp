@@ -1,11 +1,10 @@
 #include "glint/bake/compress_model.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
-
-#include <Eigen/Eigenvalues>
 
 #include "glint/bake/compress_kernels.h"
 #include "glint/model/error.h"
@@ -46,7 +45,7 @@ std::vector<float> gramMatrix(const SliceIndex& index, std::size_t cluster, floa
 }
 
 struct Components {
-  std::vector<float> images;   // [K][256]
+  std::vector<float> images;    // [K][256]
   std::vector<float> energies;  // [K], falling
 };
 
@@ -137,7 +136,7 @@ ClusterModel::ClusterModel(const SliceIndex& index, std::size_t cluster, const C
 
 void ClusterModel::addChoice(int rank_x, int rank_y, double error) {
   const int columns = method_ == CompressionMethod::tucker ? rank_x * rank_y : rank_x;
-  const int basis_elements = method_ == CompressionMethod::pca ? kBlockPixels * rank_x
+  const int basis_elements = method_ == CompressionMethod::pca  ? kBlockPixels * rank_x
                              : method_ == CompressionMethod::cp ? 2 * kBlockSize * rank_x
                                                                 : kBlockSize * (rank_x + rank_y);
   const std::uint64_t bytes = static_cast<std::uint64_t>(basis_elements) * basisElementBytes(method_, type_) +

@@ -36,7 +36,8 @@ ClusterStatistics measureCluster(const SliceIndex& index, std::size_t cluster);
 /// A decomposed cluster: the ranks worth choosing, and the basis of each.
 class ClusterModel {
  public:
-  /// @param options     a tolerance of 0 gives one choice, `options.rank`; else the choices on the lower convex hull of (bytes, error),
+  /// @param options     a tolerance of 0 gives one choice, `options.rank`; else the choices on the lower convex hull of (bytes,
+  /// error),
   ///                    starting with no column at all
   /// @param negligible  squared error in stored units below which more columns are of no interest (for a tolerance)
   ClusterModel(const SliceIndex& index, std::size_t cluster, const ClusterStatistics& statistics,

@@ -16,7 +16,8 @@ RankAllocator::RankAllocator(const std::vector<ClusterModel>& models) : models_(
     }
   }
   // Gains fall along a hull, so a stable sort keeps the steps of a cluster in order.
-  std::stable_sort(steps_.begin(), steps_.end(), [](const Step& a, const Step& b) { return a.gain_per_byte > b.gain_per_byte; });
+  std::stable_sort(steps_.begin(), steps_.end(),
+                   [](const Step& a, const Step& b) { return a.gain_per_byte > b.gain_per_byte; });
   errors_.push_back(error);
   for (const Step& step : steps_) {
     const auto& choices = models[step.cluster].choices();

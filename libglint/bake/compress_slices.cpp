@@ -30,7 +30,8 @@ void checkLevel(const NdfPyramid& pyramid, int level) {
   const std::size_t words = shape.maskWords();
   if (!(shape.levels[level].stride > 0)) rejectLevel(level, "the stride is not positive");
   if (data.masks.size() != images * words) rejectLevel(level, "the masks do not fit the number of images");
-  if (data.first_block.size() != images + 1) rejectLevel(level, "the running count of blocks does not fit the number of images");
+  if (data.first_block.size() != images + 1)
+    rejectLevel(level, "the running count of blocks does not fit the number of images");
   const int spare_bits = static_cast<int>(words) * 64 - shape.blocksPerImage();
   for (std::size_t i = 0; i < images; ++i) {
     std::uint64_t count = 0;
@@ -69,8 +70,8 @@ void SliceIndex::assignImages() {
     const PyramidGrid& grid = shape.levels[l];
     for (int j = 0; j < grid.rows; ++j) {
       for (int i = 0; i < grid.columns; ++i) {
-        const int region = regionOf(j, grid.stride, shape.height, regions_) * regions_ +
-                           regionOf(i, grid.stride, shape.width, regions_);
+        const int region =
+            regionOf(j, grid.stride, shape.height, regions_) * regions_ + regionOf(i, grid.stride, shape.width, regions_);
         image_regions_.push_back(static_cast<std::uint16_t>(region));
         slots_.push_back(static_cast<std::uint16_t>(next_slot[region]++));
       }

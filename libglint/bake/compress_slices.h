@@ -25,14 +25,11 @@ class SliceIndex {
   std::size_t clusterCount() const { return first_slices_.size() - 1; }
   std::size_t imageCount() const { return slots_.size(); }
   /// @return slices of one cluster
-  int sliceCount(std::size_t cluster) const {
-    return static_cast<int>(first_slices_[cluster + 1] - first_slices_[cluster]);
-  }
+  int sliceCount(std::size_t cluster) const { return static_cast<int>(first_slices_[cluster + 1] - first_slices_[cluster]); }
   std::uint64_t totalSlices() const { return first_slices_.back(); }
   std::uint64_t firstSlice(std::size_t cluster) const { return first_slices_[cluster]; }
   /// @return image of a slice, numbered over all levels
   std::uint32_t image(std::uint64_t slice) const { return images_[slice]; }
-
 
   /// Converts slices first..first+count-1 of a cluster, multiplied by `factor`.
   /// @param out  [count][kSliceStride]; the padding is not written
@@ -49,12 +46,12 @@ class SliceIndex {
   const NdfPyramid& pyramid_;
   int regions_;
   int words_per_cluster_ = 0;
-  std::vector<std::uint32_t> first_image_;      // [levels + 1]
-  std::vector<std::uint16_t> image_regions_;    // [images]
-  std::vector<std::uint16_t> slots_;            // [images]
-  std::vector<std::uint64_t> first_slices_;     // [clusters + 1]
-  std::vector<std::uint32_t> images_;           // [slices]
-  std::vector<std::uint64_t> blocks_;           // [slices]: number of the block in its level
+  std::vector<std::uint32_t> first_image_;    // [levels + 1]
+  std::vector<std::uint16_t> image_regions_;  // [images]
+  std::vector<std::uint16_t> slots_;          // [images]
+  std::vector<std::uint64_t> first_slices_;   // [clusters + 1]
+  std::vector<std::uint32_t> images_;         // [slices]
+  std::vector<std::uint64_t> blocks_;         // [slices]: number of the block in its level
 };
 
 }  // namespace glint::bake

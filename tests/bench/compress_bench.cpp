@@ -41,7 +41,8 @@ void cpTensor(benchmark::State& state) {
     analysis.addMoments(slices.data(), count);
     analysis.solveAxes();
     analysis.addEnergies(slices.data(), count);
-    factors = decomposeCp({slices.data(), count, nullptr, energy}, analysis.axes(), {static_cast<int>(state.range(0)), 1e-4, 500});
+    factors =
+        decomposeCp({slices.data(), count, nullptr, energy}, analysis.axes(), {static_cast<int>(state.range(0)), 1e-4, 500});
     benchmark::DoNotOptimize(factors);
   }
   state.counters["slices"] = count;

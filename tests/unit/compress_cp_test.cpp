@@ -92,8 +92,7 @@ CpFactors decompose(const Tensor& t, int rank, double min_improvement = 1e-4, bo
 double residual(const Tensor& t, const CpFactors& f) {
   Eigen::MatrixXd basis(kBlockPixels, f.rank);
   for (int p = 0; p < kBlockPixels; ++p)
-    for (int r = 0; r < f.rank; ++r)
-      basis(p, r) = static_cast<double>(f.x[p % 16 * f.rank + r]) * f.y[p / 16 * f.rank + r];
+    for (int r = 0; r < f.rank; ++r) basis(p, r) = static_cast<double>(f.x[p % 16 * f.rank + r]) * f.y[p / 16 * f.rank + r];
   const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(basis);
   double sum = 0;
   for (int s = 0; s < t.count; ++s) {

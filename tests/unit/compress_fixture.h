@@ -26,8 +26,7 @@ struct TestPyramid {
     p.shape = shape;
     p.precision = BlockPrecision::f32;
     p.value_scale = value_scale;
-    for (int l = 0; l < shape.level_count; ++l)
-      p.levels[l] = {masks[l], first_block[l], block_means[l], pixels[l].data()};
+    for (int l = 0; l < shape.level_count; ++l) p.levels[l] = {masks[l], first_block[l], block_means[l], pixels[l].data()};
     return p;
   }
 
@@ -87,8 +86,7 @@ inline void addLobe(std::vector<float>& image, int resolution, Vec2 h, float sig
   const int x0 = profile(h.x, px);
   const int y0 = profile(h.y, py);
   for (std::size_t y = 0; y < py.size(); ++y)
-    for (std::size_t x = 0; x < px.size(); ++x)
-      image[(y0 + y) * resolution + x0 + x] += weight * py[y] * px[x];
+    for (std::size_t x = 0; x < px.size(); ++x) image[(y0 + y) * resolution + x0 + x] += weight * py[y] * px[x];
 }
 
 /// Normals of a square map, [size][size].

@@ -1,13 +1,12 @@
 #pragma once
 
+#include <Eigen/Dense>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <random>
 #include <vector>
-
-#include <Eigen/Dense>
 
 #include "glint/model/compressed_ndf.h"
 
@@ -46,7 +45,8 @@ inline double basisValue(const CompressedNdf& c, const NdfCluster& cluster, int 
   if (c.method == CompressionMethod::tucker)
     return along(cluster.first_basis, rx, k / cluster.rank_y, x) * along(y_first, cluster.rank_y, k % cluster.rank_y, y);
   const auto sum = [&](int i, int j) {
-    return i < 0 || j < 0 ? 0.0 : basisElement(c, cluster.first_basis + static_cast<std::uint64_t>(j * kBlockSize + i) * rx + k);
+    return i < 0 || j < 0 ? 0.0
+                          : basisElement(c, cluster.first_basis + static_cast<std::uint64_t>(j * kBlockSize + i) * rx + k);
   };
   return sum(x, y) - sum(x - 1, y) - sum(x, y - 1) + sum(x - 1, y - 1);
 }

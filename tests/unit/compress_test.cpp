@@ -32,7 +32,8 @@ const TestPyramid& flakes() {
   return pyramid;
 }
 
-CompressionOptions options(CompressionMethod method, CoefficientType type = CoefficientType::i8, int rank = 16, int regions = 2) {
+CompressionOptions options(CompressionMethod method, CoefficientType type = CoefficientType::i8, int rank = 16,
+                           int regions = 2) {
   CompressionOptions o;
   o.method = method;
   o.coefficient_type = type;
@@ -114,8 +115,9 @@ TEST(Compress, ReportsTheBytesThatItStores) {
     EXPECT_EQ(report.basis_bytes, data.basis.size());
     EXPECT_EQ(report.coefficient_bytes, data.coefficients.size() + 4 * data.scales.size());
     EXPECT_EQ(report.total_bytes, data.basis.size() + data.coefficients.size() + 4 * data.scales.size() +
-                                      2 * data.image_regions.size() + 2 * data.image_slots.size() + 4 * data.image_scales.size() +
-                                      32 * data.clusters.size() + 8 * data.masks.size() + 4 * data.mask_ranks.size());
+                                      2 * data.image_regions.size() + 2 * data.image_slots.size() +
+                                      4 * data.image_scales.size() + 32 * data.clusters.size() + 8 * data.masks.size() +
+                                      4 * data.mask_ranks.size());
     std::uint64_t slices = 0, clusters = 0;
     for (const NdfCluster& c : data.clusters) slices += c.slice_count;
     for (const std::uint64_t count : report.rank_histogram) clusters += count;
@@ -214,8 +216,7 @@ TEST(Compress, LeavesTheTailOfTheSingularValuesWithPca) {
     for (int l = 0; l < p.shape.level_count; ++l) {
       for (std::size_t i = 0; i < p.shape.levels[l].imageCount(); ++i) {
         const auto image = test::storedImage(p.view(), l, i);
-        for (int q = 0; q < kBlockPixels; ++q)
-          slices.push_back(image[(b / 4 * 16 + q / 16) * 64 + b % 4 * 16 + q % 16]);
+        for (int q = 0; q < kBlockPixels; ++q) slices.push_back(image[(b / 4 * 16 + q / 16) * 64 + b % 4 * 16 + q % 16]);
       }
     }
     const Eigen::Map<const Eigen::MatrixXd> matrix(slices.data(), kBlockPixels, slices.size() / kBlockPixels);

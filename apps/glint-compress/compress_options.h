@@ -1,0 +1,29 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "common/tool.h"
+#include "glint/bake/compress.h"
+
+namespace glint::apps {
+
+/// Mix-in: what glint-compress lets the user choose.
+class CompressOptions {
+ public:
+  explicit CompressOptions(Tool& tool);
+
+  /// What was asked for. Valid after parsing.
+  const bake::CompressionOptions& options() const { return options_; }
+
+ private:
+  bake::CompressionOptions options_;
+};
+
+/// The report as --json prints it. Sizes in bytes, errors relative.
+nlohmann::json compressionJson(const bake::CompressionReport& report);
+
+/// The report for people: one line for the whole and one for each level.
+std::string compressionText(const bake::CompressionReport& report);
+
+}  // namespace glint::apps

@@ -1,0 +1,33 @@
+#include <nlohmann/json.hpp>
+#include <variant>
+
+#include "common/files.h"
+#include "glint-compress/compress_options.h"
+#include "glint/formats/asset_reader.h"
+#include "glint/formats/asset_writer.h"
+
+using namespace glint;
+
+int main(int argc, char** argv) {
+  apps::Tool tool({"glint-compress",
+                   "Compresses a pyramid of NDF images, so that densities and range means are still answered in constant time "
+                   "from the compressed data.",
+                   "glint-compress flakes-pyramid.glint -o flakes-cp.glint --method tucker --tolerance 0.1"});
+  const apps::InputFile input(tool, "pyramid of NDF images (.glint)", "PYRAMID");
+  const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of compressed NDF images");
+  const apps::CompressOptions options(tool);
+
+  return tool.run(argc, argv, [&] {
+    const formats::Asset asset = formats::Asset::open(input.path());
+    const formats::Provenance provenance = tool.provenance();
+    bake::CompressionReport report;
+    const auto data = bake::compressPyramid(asset.pyramid(), options.options(), &report, tool.progress("compress"));
+    formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
+    if (report.unscaled_images > 0)
+      tool.warn(std::to_string(report.unscaled_images) +
+                " images decode to half of their energy or less and are not normalised; ask for a higher rank or a smaller "
+                "tolerance");
+    tool.setResult(apps::compressionJson(report));
+    tool.summary(tool.name() + ": " + apps::compressionText(report));
+  });
+}
