@@ -110,7 +110,10 @@ class Chain:
         path = self.folder / "query.exr"
         sigma_r = [] if kind else ["--sigma-r", self.sigma_r]
         self.tools.run("query", self.path(kind), "--uv", footprint.u, footprint.v, "--sigma", footprint.sigma, "--image", path, *sigma_r)
-        pixels = np.asarray(oiio.ImageBuf(str(path)).get_pixels(oiio.FLOAT))[:, :, 0]
+        # Not ImageBuf: it remembers files by name.
+        image = oiio.ImageInput.open(str(path))
+        pixels = image.read_image(oiio.FLOAT)[:, :, 0]
+        image.close()
         path.unlink()
         return pixels
 
