@@ -152,7 +152,7 @@ def draw(chain, path):
     sizes = {kind: readable_bytes(chain.path(kind).stat().st_size) for kind in ("pyramid", "cp", "pca-same") if chain.path(kind).exists()}
     titles = {"": "Reference", "pyramid": f"Pyramid\n{sizes['pyramid']}", "cp": f"CP, rank 16\n{sizes['cp']}"}
     if "pca-same" in sizes:
-        titles["pca-same"] = f"PCA\n{sizes['pca-same']}"
+        titles["pca-same"] = f"PCA, same bytes\n{sizes['pca-same']}"
     images = {title: [chain.ndf(kind, p) for p in footprints] for kind, title in titles.items()}
     picture.draw(images, [f"footprint {p.sigma:.0f} texels" for p in footprints], path)
 

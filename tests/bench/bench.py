@@ -84,11 +84,12 @@ class Bench:
 
     def pyramids(self):
         peak = 0
+        levels = ["--levels", self.size.bit_length() - 6]  # strides from 32 to half the map; 6 levels of 2K^2
         for name, paper in (("isotropic", ""), ("brushed", "37 min, 40 cores"), ("flakes", "43 min, 40 cores")):
-            run = self.process(f"pyramid, flat, {name}", "pyramid", self.path(name), "-o", self.path(name, "pyramid"), "--levels", 6, target=2,
+            run = self.process(f"pyramid, flat, {name}", "pyramid", self.path(name), "-o", self.path(name, "pyramid"), *levels, target=2,
                                paper=paper, design="0.9 s, 1 thread")
             peak = max(peak, run.peak_mb)
-        run = self.process("pyramid, smooth, isotropic", "pyramid", self.path("isotropic"), "-o", self.path("isotropic", "smooth"), "--levels", 6,
+        run = self.process("pyramid, smooth, isotropic", "pyramid", self.path("isotropic"), "-o", self.path("isotropic", "smooth"), *levels,
                            "--surface", "smooth", target=10)
         self.table.add("peak memory of the pyramids", max(peak, run.peak_mb) / 1024, "GiB", target=2)
 
