@@ -1,10 +1,13 @@
 """A grid of NDF images: one row for each model, one column for each footprint."""
 
+import io
+
 import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+import PIL.Image
 
 CELL_INCHES = 1.95
 KEPT_MASS = 0.97
@@ -51,4 +54,7 @@ def draw(images, columns, path):
                 ha="right", va="bottom", fontsize=7.5, color="0.35")
     figure.subplots_adjust(left=0.19, right=0.995, top=1 - 0.28 / figure.get_figheight(), bottom=0.25 / figure.get_figheight(), wspace=0.03,
                            hspace=0.03)
-    figure.savefig(path, dpi=100, metadata={"Software": None}, pil_kwargs={"optimize": True})
+    # 256 colours are enough for one colour map, and a third of the bytes.
+    pixels = io.BytesIO()
+    figure.savefig(pixels, dpi=100)
+    PIL.Image.open(pixels).convert("RGB").quantize(256).save(path, optimize=True)
