@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <numbers>
 
@@ -105,18 +106,25 @@ TEST(Pyramid, RefusesOptionsOutOfRangeByName) {
 }
 
 TEST(Pyramid, EveryImageIntegratesToOneOnSteepMaps) {
-  const OwnedMap rough(150, 100, test::roughSurface(150, 100, 1.0f));
-  const OwnedMap flakes(128, 96, test::synthesised(SynthKind::flakes, 128, 96, 0.5f));
+  const OwnedMap rough(75, 50, test::roughSurface(75, 50, 1.0f));
+  const OwnedMap flakes(64, 48, test::synthesised(SynthKind::flakes, 64, 48, 0.5f));
   for (const OwnedMap* owned : {&rough, &flakes}) {
     for (const Surface surface : {Surface::flat, Surface::smooth}) {
       for (const BlockPrecision precision : {BlockPrecision::f16, BlockPrecision::f32}) {
         for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
-          PyramidOptions o = withLevels(options(16, 64, 0.008f, surface, boundary), 3);
+          PyramidOptions o = withLevels(options(8, 64, 0.008f, surface, boundary), 3);
           o.precision = precision;
           const NdfPyramidData data = buildPyramid(owned->map(), o);
           const NdfPyramid pyramid = data.view();
+          const Reference reference(owned->map(), o.sigma_r, surface, boundary);
           forEachImage(data.shape, [&](int l, int i, int j) {
-            EXPECT_NEAR(test::momentsOf(storedImage(pyramid, l, i, j), 64).integral, 1, kEnergyError) << l << ' ' << i << ' ' << j;
+            const double integral = test::momentsOf(storedImage(pyramid, l, i, j), 64).integral;
+            EXPECT_LE(integral, 1 + kEnergyError);
+            // Lobes of flakes that lean 85 degrees reach over the border of the square.
+            if (integral < 1 - kEnergyError) {
+              EXPECT_NEAR(integral, 4 * reference.mean(footprintOf(data.shape, l, i, j), {{-1, -1}, {1, 1}}), kEnergyError);
+            }
+            EXPECT_GT(integral, 0.99) << l << ' ' << i << ' ' << j;
           });
         }
       }
@@ -218,15 +226,18 @@ TEST(Pyramid, LevelsThatAgreeAreDropped) {
 }
 
 TEST(Pyramid, RepeatedMapsHaveTheSameImagesInEveryTile) {
-  // Texel coordinates are larger in the second tile: weights differ in the last places, and so do halves in their last one.
+  // Texel coordinates are larger in the second tile, so weights differ in the last places. Footprints are shorter than the map:
+  // where one wraps onto itself, weights below the cut of a footprint are added before they are cut (smooth surfaces, 1e-3).
   constexpr double kLastPlace = 2e-4;
-  const OwnedMap one(64, 32, test::roughSurface(64, 32, 0.3f)), four(128, 64, test::repeated(one.normals(), 64, 32, 2));
+  const OwnedMap one(64, 64, test::roughSurface(64, 64, 0.3f)), four(128, 128, test::repeated(one.normals(), 64, 64, 2));
   for (const Surface surface : {Surface::flat, Surface::smooth}) {
-    const PyramidOptions o = withLevels(options(16, 64, 0.02f, surface), 2);
+    PyramidOptions o = withLevels(options(8, 64, 0.02f, surface), 2);
+    o.precision = BlockPrecision::f32;
     const NdfPyramidData single = buildPyramid(one.map(), o), tiled = buildPyramid(four.map(), o);
     forEachImage(tiled.shape, [&](int l, int i, int j) {
       const PyramidGrid& grid = single.shape.levels[l];
-      EXPECT_LT(test::relL2(storedImage(tiled.view(), l, i, j), storedImage(single.view(), l, i % grid.columns, j % grid.rows)), kLastPlace);
+      const double difference = test::relL2(storedImage(tiled.view(), l, i, j), storedImage(single.view(), l, i % grid.columns, j % grid.rows));
+      EXPECT_LT(difference, kLastPlace) << "surface " << int(surface) << " level " << l << " image " << i << ' ' << j;
     });
   }
 }
@@ -235,26 +246,25 @@ TEST(Pyramid, ImagesAreTheExactOnesAtTheirCentres) {
   // What binning, filters cut at 4 and footprints cut at 3.5 deviations cost together.
   constexpr double kImageError = 0.01;
   struct Case {
-    int width, height, resolution;
-    float stride, alpha, sigma_r;
+    int width, height, levels, resolution;
+    float stride, alpha, correlation, sigma_r;
     Surface surface;
   };
   // Smooth maps are small for narrow lobes: the exact image takes (edge / sigma_r)^2 points in each triangle.
-  const Case cases[] = {{350, 200, 256, 32, 0.2f, 0.005f, Surface::flat},  {350, 200, 256, 32, 0.2f, 0.0012f, Surface::flat},
-                        {350, 200, 128, 32, 0.2f, 0.02f, Surface::flat},   {45, 70, 64, 6.5f, 0.2f, 0.02f, Surface::flat},
-                        {350, 200, 128, 32, 0.2f, 0.02f, Surface::smooth}, {90, 50, 256, 16, 0.2f, 0.005f, Surface::smooth},
-                        {35, 20, 256, 8, 0.1f, 0.0012f, Surface::smooth},  {45, 70, 64, 6.5f, 0.2f, 0.02f, Surface::smooth}};
+  const Case cases[] = {{350, 200, 4, 256, 32, 0.2f, 4, 0.005f, Surface::flat},  {140, 72, 4, 256, 16, 0.2f, 4, 0.0012f, Surface::flat},
+                        {140, 72, 4, 128, 16, 0.2f, 4, 0.02f, Surface::flat},    {45, 70, 4, 64, 6.5f, 0.2f, 4, 0.02f, Surface::flat},
+                        {70, 41, 3, 64, 8, 0.1f, 4, 0.02f, Surface::smooth},     {45, 70, 3, 64, 6.5f, 0.1f, 4, 0.02f, Surface::smooth},
+                        {27, 15, 2, 256, 6, 0.1f, 8, 0.005f, Surface::smooth},   {27, 15, 1, 256, 6, 0.05f, 8, 0.0012f, Surface::smooth}};
   for (const Case& c : cases) {
-    const OwnedMap owned(c.width, c.height, test::roughSurface(c.width, c.height, c.alpha));
+    const OwnedMap owned(c.width, c.height, test::roughSurface(c.width, c.height, c.alpha, c.correlation));
     for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
-      const int fitting = pyramidShape(c.width, c.height, options(c.stride, c.resolution, c.sigma_r)).level_count;
-      PyramidOptions o = withLevels(options(c.stride, c.resolution, c.sigma_r, c.surface, boundary), fitting);
+      PyramidOptions o = withLevels(options(c.stride, c.resolution, c.sigma_r, c.surface, boundary), c.levels);
       const NdfPyramidData data = buildPyramid(owned.map(), o);
       const PyramidNdf model(data.view());
       double worst = 0;
       for (int l = 0; l < data.shape.level_count; ++l) {
         const PyramidGrid& grid = data.shape.levels[l];
-        for (const auto& [i, j] : {std::pair{0, 0}, {grid.columns / 2, grid.rows / 3}, {grid.columns - 1, grid.rows - 1}}) {
+        for (const auto& [i, j] : {std::pair{0, 0}, {grid.columns - 1, grid.rows / 2}}) {
           const Footprint p = footprintOf(data.shape, l, i, j);
           if (boundary == Boundary::clamp && (p.centre.x >= 1 || p.centre.y >= 1)) continue;  // a footprint cannot be centred there
           const auto exact = referenceImage(owned.map(), c.sigma_r, c.surface, boundary, p, c.resolution);
