@@ -114,7 +114,8 @@ class Halver {
  public:
   Halver(Axis x, Axis y, int tiles) : x_(x), y_(y), scratch_([tiles] { return BlockBins(tiles); }) {}
 
-  /// Keeps a fine row; calls give(row, nodes) for each coarse row that it completes. Row 0 of a wrapping lattice comes last.
+  /// Keeps a fine row; calls give(row, nodes) for each coarse row that it completes. Rows come in order, but row 0 of a wrapping
+  /// lattice may come last, and coarse row 0 of one does.
   template <class Give>
   void push(int r, std::shared_ptr<const NodeRow> row, Give&& give) {
     if (r == 0) first_ = row;
@@ -124,7 +125,7 @@ class Halver {
     if (odd && r == 1 && y_.wrap) second_ = row;
     if (odd) before_ = row;
     else middle_ = row;
-    if (r + 1 < y_.nodes()) return;
+    if (++pushed_ < y_.nodes()) return;
     if (y_.wrap) give(0, combine(before_.get(), first_.get(), second_ ? second_.get() : before_.get()));
     else give(y_.cells / 2, combine(before_.get(), middle_.get(), nullptr));
   }
@@ -156,6 +157,7 @@ class Halver {
   Axis x_, y_;
   tbb::enumerable_thread_specific<BlockBins> scratch_;
   std::shared_ptr<const NodeRow> first_, second_, before_, middle_;
+  int pushed_ = 0;  // rows so far
 };
 
 /// Rasterises the cells of the map into the corners of lattice cells.
