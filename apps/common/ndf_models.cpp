@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "common/files.h"
+#include "glint/bake/reference_image.h"
 #include "glint/formats/hash.h"
 
 namespace glint::apps {
@@ -46,6 +47,11 @@ int NdfAsset::resolution() const {
   if (const auto* pyramid = std::get_if<PyramidNdf>(&*model_)) return pyramid->shape().resolution;
   if (const auto* compressed = std::get_if<CpNdf>(&*model_)) return compressed->shape().resolution;
   return kReferenceResolution;
+}
+
+std::optional<std::vector<float>> NdfAsset::scatteredImage(const Footprint& footprint, int size) const {
+  if (!std::holds_alternative<Reference>(*model_) || surface_ != Surface::flat) return std::nullopt;
+  return bake::referenceImage(asset_->normals(), sigma_r_, surface_, boundary_, footprint, size);
 }
 
 void NdfAsset::requireAnswerable(const Footprint& footprint) const {

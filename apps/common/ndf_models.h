@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "common/tool.h"
 #include "glint/formats/asset_reader.h"
@@ -28,6 +29,10 @@ class NdfAsset {
 
   /// Pixels along each axis of the asset's NDF images; 256 for normals.
   int resolution() const;
+
+  /// The NDF image of a footprint where there is a faster way than asking for every pixel: normals of a flat surface.
+  /// @return [size][size] pixel means, bottom row first
+  std::optional<std::vector<float>> scatteredImage(const Footprint& footprint, int size) const;
 
   /// Throws Error usage for footprints that the asset cannot answer without --normals.
   void requireAnswerable(const Footprint& footprint) const;

@@ -94,7 +94,9 @@ void QueryCommand::answerOne(NdfAsset& asset) {
 
 void QueryCommand::writePicture(NdfAsset& asset) {
   const int size = image_size_ > 0 ? image_size_ : asset.resolution();
-  writeNdfPicture(image_, size, ndfImage(asset.model(), footprint(), size, tool_.progress("rows")));
+  auto densities = asset.scatteredImage(footprint(), size);
+  if (!densities) densities = ndfImage(asset.model(), footprint(), size, tool_.progress("rows"));
+  writeNdfPicture(image_, size, *densities);
   tool_.setResult({{"image", image_}, {"image_size", size}});
 }
 

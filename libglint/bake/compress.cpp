@@ -222,8 +222,18 @@ class Compressor {
       data.basis.insert(data.basis.end(), e.basis.begin(), e.basis.end());
       data.coefficients.insert(data.coefficients.end(), e.coefficients.begin(), e.coefficients.end());
       data.scales.insert(data.scales.end(), e.scales.begin(), e.scales.end());
+      if (e.rank_x == 0) makeEmpty(data, c);
     }
     return data;
+  }
+
+  /// A cluster that a tolerance leaves without columns decodes to 0: for readers, it is empty.
+  static void makeEmpty(CompressedNdfData& data, std::size_t cluster) {
+    const auto words = static_cast<std::ptrdiff_t>(data.header.words_per_cluster);
+    const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(cluster) * words;
+    std::fill_n(data.masks.begin() + first, words, 0);
+    std::fill_n(data.mask_ranks.begin() + first, words, 0);
+    data.clusters[cluster].slice_count = 0;
   }
 
   CompressionReport makeReport(const CompressedNdfData& data) const {

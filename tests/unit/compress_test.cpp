@@ -183,6 +183,17 @@ TEST(Compress, SpendsFewerBytesOnALargerTolerance) {
   }
 }
 
+TEST(Compress, EmptiesClustersThatAToleranceLeavesWithoutColumns) {
+  auto o = options(CompressionMethod::pca);
+  o.tolerance = 0.8;
+  CompressionReport report;
+  const auto data = compressPyramid(flakes().view(), o, &report);
+  ASSERT_FALSE(report.rank_histogram.empty());
+  ASSERT_GT(report.rank_histogram[0], 0u) << "the tolerance is too small for this test to see anything";
+  for (const NdfCluster& cluster : data.clusters) EXPECT_EQ(cluster.slice_count > 0, cluster.rank_x > 0);
+  EXPECT_NEAR(measure(flakes().view(), data.view()).total, report.total.rel_l2, kFloatError + 1e-4 * report.total.rel_l2);
+}
+
 TEST(Compress, NamesTheBestErrorWhereAToleranceCannotBeReached) {
   auto o = options(CompressionMethod::tucker);
   o.tolerance = 1e-6;

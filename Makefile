@@ -1,0 +1,66 @@
+# The front door: `make demo` and `make test` need nothing but a Debian 12 machine, as root or with sudo.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+.DEFAULT_GOAL := help
+MAKEFLAGS += --no-print-directory
+
+JOBS ?= $(shell nproc)
+PYTHON := /usr/bin/python3
+packages := $(shell sed 's/#.*//' packages.txt)
+
+.PHONY: help
+help:  ## list the targets
+	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
+
+.PHONY: demo
+demo: build  ## run every tool on the sample maps and draw demo/ndf-before-after.png (DEMO_MAP=image.png adds yours)
+	@$(PYTHON) pipelines/demo/demo.py --bin build/bin --out demo $(if $(DEMO_MAP),--map '$(DEMO_MAP)')
+
+.PHONY: test
+test: build  ## build and run the tests, except slow ones
+	ctest --preset release --parallel $(JOBS) --label-exclude '^slow$$' --no-label-summary
+
+.PHONY: test-all
+test-all: build  ## the same with the slow ones: fuzzing, large maps
+	ctest --preset release --parallel $(JOBS) --no-label-summary
+
+.PHONY: bench
+bench: build  ## time whole commands and queries on 2K^2 maps; writes build/bench/results.json
+	@$(PYTHON) tests/bench/bench.py --bin build/bin --out build/bench
+
+.PHONY: bench-report
+bench-report: bench  ## the same, and write docs/BENCHMARKS.md and its charts
+	@$(PYTHON) tests/bench/report.py build/bench/results.json --docs docs
+
+.PHONY: build
+build: build/build.ninja  ## the optimised build, in build/
+	cmake --build --preset release --parallel $(JOBS)
+
+.PHONY: debug
+debug: build-debug/build.ninja  ## a debug build, in build-debug/
+	cmake --build --preset debug --parallel $(JOBS)
+
+build/build.ninja: CMakePresets.json packages.txt | packages
+	cmake --preset release
+	@touch $@
+
+build-debug/build.ninja: CMakePresets.json packages.txt | packages
+	cmake --preset debug
+	@touch $@
+
+# apt-get is not called at all when dpkg has everything.
+.PHONY: packages
+packages:  ## install what is missing of packages.txt
+	@command -v dpkg-query >/dev/null || { echo 'This is not Debian: install the likes of packages.txt yourself.' >&2; exit 0; }; \
+	have=$$(dpkg-query --show --showformat='$${db:Status-Status} $${Package}\n' $(packages) 2>/dev/null | sed -n 's/^installed //p' || true); \
+	missing=$$(comm -23 <(printf '%s\n' $(packages) | sort -u) <(sort -u <<<"$$have") | xargs); \
+	[[ -z $$missing ]] && exit 0; \
+	echo "Installing $$missing"; \
+	as_root=$$([[ $$(id -u) == 0 ]] || echo sudo); \
+	$$as_root apt-get -q -o Acquire::Retries=3 update; \
+	$$as_root env DEBIAN_FRONTEND=noninteractive apt-get -q -y -o Acquire::Retries=3 install --no-install-recommends $$missing
+
+.PHONY: clean
+clean:  ## remove everything that was built
+	rm -rf build build-* demo

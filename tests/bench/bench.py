@@ -1,0 +1,199 @@
+"""Times whole commands and queries on 2K^2 maps, and measures errors; prints one table and writes results.json.
+
+Normally run by `make bench`. Every figure is the median of several runs, in a file cache that the first run warmed.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import platform
+import subprocess
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "pipelines/demo"))
+from processes import Tools  # noqa: E402
+
+# Inputs: name -> arguments of glint-synth.
+MAPS = {
+    "isotropic": ["isotropic", "--alpha", 0.2, "--seed", 1],
+    "brushed": ["brushed", "--seed", 2],
+    "flakes": ["flakes", "--flake-size", 6, "--alpha", 0.2, "--seed", 3],
+}
+MB = 1e6
+
+
+class Table:
+    """The figures: what, measured, unit, and what to hold it against."""
+
+    def __init__(self):
+        self.rows = []
+
+    def add(self, figure, value, unit, target=None, paper="", design="", **details):
+        """@param target  the value must not be more"""
+        self.rows.append({"figure": figure, "value": value, "unit": unit, "target": target, "paper": paper, "design": design, "details": details})
+        print_row(self.rows[-1])
+
+
+def print_row(row):
+    target = "" if row["target"] is None else f"<= {row['target']:g} {row['unit']}"
+    verdict = "" if row["target"] is None else "ok" if row["value"] <= row["target"] else "OVER"
+    value = f"{row['value']:.4g} {row['unit']}"
+    print(f"{row['figure']:<46} {value:>13} {target:>13} {verdict:<5} {row['paper']:<19} {row['design']}", flush=True)
+
+
+def print_header():
+    print(f"{'figure':<46} {'measured':>13} {'target':>13} {'':<5} {'paper':<19} design's floor")
+
+
+class Bench:
+    def __init__(self, arguments):
+        self.tools = Tools(arguments.bin)
+        self.folder = arguments.out
+        self.repeats = arguments.repeats
+        self.size = arguments.size
+        self.table = Table()
+        self.folder.mkdir(parents=True, exist_ok=True)
+
+    def path(self, name, kind=""):
+        return self.folder / (f"{name}.{kind}.glint" if kind else f"{name}.glint")
+
+    def process(self, figure, tool, *arguments, **against):
+        """Times a tool and adds its wall time; returns the run."""
+        run = self.tools.repeat(self.repeats, tool, *arguments)
+        self.table.add(figure, run.wall_s, "s", cpu_s=run.cpu_s, peak_mb=run.peak_mb, **against)
+        return run
+
+    def make_maps(self):
+        """PNGs of 8 bits, as maps come from artists. Made once: they depend on nothing but these arguments."""
+        for name, flags in MAPS.items():
+            image = self.folder / f"{name}.png"
+            stamp = self.folder / f"{name}.args"
+            arguments = " ".join(map(str, [*flags, "--size", self.size]))
+            if not image.exists() or not stamp.exists() or stamp.read_text() != arguments:
+                self.tools.run("synth", *flags, "--size", self.size, "-o", image)
+                stamp.write_text(arguments)
+
+    def synth_and_ingest(self):
+        self.process("synth flakes", "synth", *MAPS["flakes"], "--size", self.size, "-o", self.folder / "timed.exr")
+        self.process("synth isotropic", "synth", *MAPS["isotropic"], "--size", self.size, "-o", self.folder / "timed.exr")
+        (self.folder / "timed.exr").unlink()
+        self.process("ingest an 8-bit PNG", "ingest", self.folder / "flakes.png", "-o", self.path("flakes"), target=0.6)
+        for name in ("isotropic", "brushed"):
+            self.tools.run("ingest", self.folder / f"{name}.png", "-o", self.path(name))
+
+    def pyramids(self):
+        peak = 0
+        levels = ["--levels", self.size.bit_length() - 6]  # strides from 32 to half the map; 6 levels of 2K^2
+        for name, paper in (("isotropic", ""), ("brushed", "37 min, 40 cores"), ("flakes", "43 min, 40 cores")):
+            run = self.process(f"pyramid, flat, {name}", "pyramid", self.path(name), "-o", self.path(name, "pyramid"), *levels, target=2,
+                               paper=paper, design="0.9 s, 1 thread")
+            peak = max(peak, run.peak_mb)
+        run = self.process("pyramid, smooth, isotropic", "pyramid", self.path("isotropic"), "-o", self.path("isotropic", "smooth"), *levels,
+                           "--surface", "smooth", target=10)
+        self.table.add("peak memory of the pyramids", max(peak, run.peak_mb) / 1024, "GiB", target=2)
+
+    def compress(self, figure, name, kind, *flags, **against):
+        run = self.process(figure, "compress", self.path(name, "pyramid"), "-o", self.path(name, kind), *flags, **against)
+        return run.result["total"]["rel_l2"], run.result["total_bytes"]
+
+    def compressions(self):
+        cp16 = {}
+        for name, limit, paper in (("brushed", 8, "10 min, 40 cores"), ("isotropic", None, "")):
+            cp16[name] = self.compress(f"compress, cp 16, {name}", name, "cp16", "--method", "cp", "--rank", 16, target=limit, paper=paper)
+        cp16["flakes"] = self.compress("compress, cp 32, flakes", "flakes", "cp32", "--method", "cp", "--rank", 32, target=40,
+                                       paper="60 min, 40 cores")
+        for name, (error, size) in cp16.items():
+            kind = "cp 32" if name == "flakes" else "cp 16"
+            design = {"isotropic": 0.171}.get(name)
+            self.table.add(f"relative error, {kind}, {name}", error, "", target=design, design=f"{design}" if design else "")
+            self.table.add(f"bytes, {kind}, {name}", size / MB, "MB", paper={"flakes": "107 MB", "brushed": "15 MB"}.get(name, ""))
+            for method in ("tucker", "pca"):
+                reached, bytes_used = self.compress(f"compress, {method} to the error of {kind}, {name}", name, f"{method}-tolerance", "--method",
+                                                    method, "--tolerance", error, target=4)
+                self.table.add(f"bytes over those of {kind}, {method}, {name}", bytes_used / size, "", target=1 / 3, rel_l2=reached, bytes=bytes_used)
+
+    def assets(self, name):
+        cp = "cp32" if name == "flakes" else "cp16"
+        return [self.path(name, kind) for kind in ("pyramid", cp, "tucker-tolerance", "pca-tolerance")]
+
+    def queries(self):
+        """Google Benchmark in one process for each map; nanoseconds, and milliseconds to open."""
+        for name in MAPS:
+            output = self.folder / f"{name}.queries.json"
+            command = [self.tools.folder / "glint-query-bench", self.path(name), *self.assets(name), f"--benchmark_out={output}",
+                       "--benchmark_out_format=json", f"--benchmark_repetitions={self.repeats}", "--benchmark_report_aggregates_only=true"]
+            call(command)
+            for entry in json.loads(output.read_text())["benchmarks"]:
+                if entry.get("aggregate_name") != "median":
+                    continue
+                what, file = entry["run_name"].split("/")
+                kind = f"{name} {file.removeprefix(name + '.').removesuffix('.glint')}"
+                if what == "open":
+                    # The target is for 100 MB; smaller files have to keep it too.
+                    self.table.add(f"open {kind.removesuffix(' glint')}, {entry['file_bytes'] / MB:.0f} MB", entry["real_time"], "ms", target=5)
+                else:
+                    self.table.add(f"{what.replace('_', ', ')}, {kind}", entry["cpu_time"], "ns", target=150 if what == "density_warm" else None)
+
+    def query_command(self):
+        asset = self.path("flakes", "cp32")
+        run = self.tools.repeat(self.repeats, "query", asset, "--uv", 0.3, 0.7, "--sigma", 40, "--half", 0.1, -0.05, "--repeat", 300000)
+        self.table.add("density, warm, by glint-query --repeat", run.result["nanoseconds"], "ns", target=150)
+
+    def accuracy(self, samples):
+        for name in MAPS:
+            text = call([self.tools.folder / "glint-accuracy", self.path(name), *self.assets(name), "--samples", samples])
+            (self.folder / f"{name}.accuracy.json").write_text(text)
+            for asset in json.loads(text):
+                kind = pathlib.Path(asset["asset"]).name.removeprefix(name + ".").removesuffix(".glint")
+                worst = lambda place, figure: max(abs(level[place][figure]) for level in asset["levels"] if place in level)
+                pyramid = kind == "pyramid"
+                for figure, limit in (("rel_l2", 0.01), ("tv", None), ("energy", 1e-3)):
+                    self.table.add(f"{figure} at centres, worst octave, {name} {kind}", worst("centres", figure), "",
+                                   target=limit if pyramid else None, levels=asset["levels"])
+                self.table.add(f"rel_l2 at random, worst octave, {name} {kind}", worst("random", "rel_l2"), "")
+
+    def write(self):
+        results = {"machine": machine(), "size_texels": self.size, "repeats": self.repeats, "rows": self.table.rows}
+        (self.folder / "results.json").write_text(json.dumps(results, indent=1) + "\n")
+        over = [row["figure"] for row in self.table.rows if row["target"] is not None and row["value"] > row["target"]]
+        print(f"\n{len(self.table.rows)} figures, {len(over)} over their target; all in {self.folder}/results.json")
+
+
+def call(command):
+    process = subprocess.run([str(word) for word in command], stdout=subprocess.PIPE, text=True)
+    if process.returncode != 0:
+        sys.exit(f"failed with exit code {process.returncode}: {' '.join(map(str, command))}")
+    return process.stdout
+
+
+def machine():
+    model = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), platform.machine())
+    revision = subprocess.run(["git", "describe", "--always", "--dirty"], capture_output=True, text=True, cwd=pathlib.Path(__file__).parent)
+    return {"processor": model, "cores": os.cpu_count(), "system": platform.platform(), "load": os.getloadavg()[0],
+            "revision": revision.stdout.strip()}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--bin", type=pathlib.Path, default="build/bin", help="folder of the programs")
+    parser.add_argument("--out", type=pathlib.Path, default="build/bench", help="folder for maps, assets and results")
+    parser.add_argument("--size", type=int, default=2048, help="texels of the maps along each axis; targets are for 2048")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--samples", type=int, default=8, help="footprints of each octave for errors")
+    bench = Bench(parser.parse_args())
+    if os.getloadavg()[0] > 0.5 * os.cpu_count():
+        print(f"warning: the machine is busy (load {os.getloadavg()[0]:.1f}); times will be too long", file=sys.stderr)
+    bench.make_maps()
+    print_header()
+    bench.synth_and_ingest()
+    bench.pyramids()
+    bench.compressions()
+    bench.queries()
+    bench.query_command()
+    bench.accuracy(parser.parse_args().samples)
+    bench.write()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""The rooms of the project: which part may include which, held by reading the include graph of the sources."""
+
+import pathlib
+import re
+
+import pytest
+
+ROOT = pathlib.Path(__file__).parents[2]
+ROOMS = {"model": ROOT / "libglint/model", "query": ROOT / "libglint/query", "bake": ROOT / "libglint/bake", "formats": ROOT / "formats"}
+APPS = ROOT / "apps"
+MAX_MAIN_LINES = 60
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^">]+)[">]', re.MULTILINE)
+SOURCES = {".h", ".hpp", ".inl", ".cpp", ".cc", ".c", ".cu"}
+
+# What each room may include of ours. The apps may include everything.
+MAY_USE = {
+    "model": {"model"},
+    "query": {"query", "model"},
+    "bake": {"bake", "query", "model"},
+    "formats": {"formats", "model"},
+}
+
+# Headers of others that are kept in few places: pattern -> folders, relative to the root.
+KEPT_IN = {
+    r"^(hdf5|H5\w*)(\.h|\.hpp)$|^highfive/": ["formats"],
+    r"^OpenImageIO/|^OpenEXR/|^Imath/|^Imf\w*\.h$": ["apps"],
+    r"^CLI/": ["apps"],
+    r"^Eigen/|^fftw3|^hwy/": ["libglint/bake"],
+    r"^(tbb|oneapi)/": ["libglint/bake", "apps"],
+}
+
+
+def sources(folder):
+    return sorted(path for path in folder.rglob("*") if path.suffix in SOURCES)
+
+
+def includes(path):
+    """(bracket, name) of every include of a file, leaving out comments."""
+    text = re.sub(r"/\*.*?\*/|//[^\n]*", "", path.read_text(), flags=re.DOTALL)
+    return INCLUDE.findall(text)
+
+
+def room_of(path, name):
+    """The room of an included header, or None when it is not one of ours."""
+    if match := re.match(r"glint/(model|query|bake|formats)/", name):
+        return match[1]
+    resolved = (path.parent / name).resolve()
+    for room, folder in ROOMS.items():
+        if resolved.is_relative_to(folder) and resolved.exists():
+            return room
+    if name.startswith("common/") or resolved.is_relative_to(APPS) or re.match(r"glint-\w+/", name):
+        return "apps"
+    return None
+
+
+def name_of(path):
+    return str(path.relative_to(ROOT))
+
+
+def test_headers_that_a_room_includes_exist():
+    missing = []
+    for path in [p for folder in (*ROOMS.values(), APPS) for p in sources(folder)]:
+        for _, name in includes(path):
+            if match := re.match(r"glint/(model|query|bake|formats)/(.+)", name):
+                if not (ROOMS[match[1]] / match[2]).exists():
+                    missing.append(f"{name_of(path)}: {name}")
+    assert missing == []
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_room_includes_only_the_rooms_below_it(room):
+    files = sources(ROOMS[room])
+    assert files, f"{room} is empty: was it moved?"
+    wrong = []
+    for path in files:
+        for _, name in includes(path):
+            used = room_of(path, name)
+            if used is not None and used not in MAY_USE[room]:
+                wrong.append(f"{name_of(path)} includes {name}")
+    assert wrong == []
+
+
+@pytest.mark.parametrize("room", ["model", "query"])
+def test_room_needs_only_the_standard_library(room):
+    """These compile into renderers and device code: nothing but our headers and those of the standard library (no dot, no slash)."""
+    wrong = []
+    for path in sources(ROOMS[room]):
+        for bracket, name in includes(path):
+            if bracket == "<" and not re.fullmatch(r"[a-z_0-9]+", name):
+                wrong.append(f"{name_of(path)} includes <{name}>")
+    assert wrong == []
+
+
+@pytest.mark.parametrize("room", ["model", "query"])
+def test_room_is_header_only(room):
+    assert [name_of(path) for path in sources(ROOMS[room]) if path.suffix not in {".h", ".inl"}] == []
+
+
+@pytest.mark.parametrize("pattern", KEPT_IN)
+def test_library_stays_in_its_room(pattern):
+    homes = [ROOT / folder for folder in KEPT_IN[pattern]]
+    wrong = []
+    for path in [p for folder in (ROOT / "libglint", ROOT / "formats", APPS) for p in sources(folder)]:
+        if any(path.is_relative_to(home) for home in homes):
+            continue
+        wrong += [f"{name_of(path)} includes {name}" for _, name in includes(path) if re.search(pattern, name)]
+    assert wrong == []
+
+
+def test_reader_does_not_show_hdf5_to_those_who_include_it():
+    """A renderer needs HDF5 to link, not its headers: they are in .cpp files and one header that is private to formats/."""
+    users = {name_of(p) for p in sources(ROOMS["formats"]) if any(re.match(r"hdf5|H5", name) for _, name in includes(p))}
+    assert users
+    assert {name for name in users if name.endswith(".h")} <= {"formats/hdf5_handle.h"}
+
+
+def mains():
+    return sorted(APPS.glob("glint-*/main.cpp"))
+
+
+def test_there_are_mains():
+    assert mains()
+
+
+@pytest.mark.parametrize("path", mains(), ids=lambda path: path.parent.name)
+def test_main_is_short(path):
+    assert len(path.read_text().splitlines()) < MAX_MAIN_LINES
+
+
+def test_reading_the_graph_sees_what_it_should(tmp_path):
+    """A guard against a parser that finds nothing and so passes everything."""
+    file = tmp_path / "x.h"
+    file.write_text('#include "glint/bake/a.h"\n  #  include <hdf5.h>\n// #include <no>\n/* #include "no.h"\n*/\n#include <Eigen/Core>  // x\n')
+    assert includes(file) == [('"', "glint/bake/a.h"), ("<", "hdf5.h"), ("<", "Eigen/Core")]
+    assert room_of(file, "glint/bake/a.h") == "bake"
+    assert room_of(ROOMS["query"] / "x.h", "../bake/ingest.h") == "bake"
