@@ -4,7 +4,6 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <numbers>
 
@@ -242,42 +241,43 @@ TEST(Pyramid, RepeatedMapsHaveTheSameImagesInEveryTile) {
   }
 }
 
-TEST(Pyramid, ImagesAreTheExactOnesAtTheirCentres) {
-  // What binning, filters cut at 4 and footprints cut at 3.5 deviations cost together.
+struct CentreCase {
+  int width, height, levels, resolution;
+  float stride, alpha, correlation, sigma_r;
+};
+
+/// Compares two images of every level with the exact ones.
+void expectExactCentres(const CentreCase& c, Surface surface) {
+  // What binning, filters cut at 4 and footprints cut at 3.5 deviations cost together. Measured: flat 0.35 %, smooth 0.91 %.
   constexpr double kImageError = 0.01;
-  struct Case {
-    int width, height, levels, resolution;
-    float stride, alpha, correlation, sigma_r;
-    Surface surface;
-  };
-  // Smooth maps are small for narrow lobes: the exact image takes (edge / sigma_r)^2 points in each triangle.
-  const Case cases[] = {{350, 200, 4, 256, 32, 0.2f, 4, 0.005f, Surface::flat},  {140, 72, 4, 256, 16, 0.2f, 4, 0.0012f, Surface::flat},
-                        {140, 72, 4, 128, 16, 0.2f, 4, 0.02f, Surface::flat},    {45, 70, 4, 64, 6.5f, 0.2f, 4, 0.02f, Surface::flat},
-                        {70, 41, 3, 64, 8, 0.1f, 4, 0.02f, Surface::smooth},     {45, 70, 3, 64, 6.5f, 0.1f, 4, 0.02f, Surface::smooth},
-                        {27, 15, 2, 256, 6, 0.1f, 8, 0.005f, Surface::smooth},   {27, 15, 1, 256, 6, 0.05f, 8, 0.0012f, Surface::smooth}};
-  for (const Case& c : cases) {
-    const OwnedMap owned(c.width, c.height, test::roughSurface(c.width, c.height, c.alpha, c.correlation));
-    for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
-      PyramidOptions o = withLevels(options(c.stride, c.resolution, c.sigma_r, c.surface, boundary), c.levels);
-      const NdfPyramidData data = buildPyramid(owned.map(), o);
-      const PyramidNdf model(data.view());
-      double worst = 0;
-      for (int l = 0; l < data.shape.level_count; ++l) {
-        const PyramidGrid& grid = data.shape.levels[l];
-        for (const auto& [i, j] : {std::pair{0, 0}, {grid.columns - 1, grid.rows / 2}}) {
-          const Footprint p = footprintOf(data.shape, l, i, j);
-          if (boundary == Boundary::clamp && (p.centre.x >= 1 || p.centre.y >= 1)) continue;  // a footprint cannot be centred there
-          const auto exact = referenceImage(owned.map(), c.sigma_r, c.surface, boundary, p, c.resolution);
-          const double error = test::relL2(test::imageOf(model, p, c.resolution), exact);
-          EXPECT_LE(error, kImageError) << c.width << 'x' << c.height << " sigma_r " << c.sigma_r << " surface " << int(c.surface) << " boundary "
-                                        << int(boundary) << " level " << l << " image " << i << ' ' << j;
-          worst = std::max(worst, error);
-        }
+  const OwnedMap owned(c.width, c.height, test::roughSurface(c.width, c.height, c.alpha, c.correlation));
+  for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
+    const NdfPyramidData data = buildPyramid(owned.map(), withLevels(options(c.stride, c.resolution, c.sigma_r, surface, boundary), c.levels));
+    const PyramidNdf model(data.view());
+    for (int l = 0; l < data.shape.level_count; ++l) {
+      const PyramidGrid& grid = data.shape.levels[l];
+      for (const auto& [i, j] : {std::pair{0, 0}, {grid.columns - 1, grid.rows / 2}}) {
+        const Footprint p = footprintOf(data.shape, l, i, j);
+        if (boundary == Boundary::clamp && (p.centre.x >= 1 || p.centre.y >= 1)) continue;  // a footprint cannot be centred there
+        const auto exact = referenceImage(owned.map(), c.sigma_r, surface, boundary, p, c.resolution);
+        EXPECT_LE(test::relL2(test::imageOf(model, p, c.resolution), exact), kImageError)
+            << c.width << 'x' << c.height << " sigma_r " << c.sigma_r << " boundary " << int(boundary) << " level " << l << " image " << i << ' ' << j;
       }
-      ::testing::Test::RecordProperty("rel_l2", std::to_string(worst));
-      if (std::getenv("GLINT_SHOW")) printf("worst %d %g surface %d boundary %d: %.5f\n", c.width, c.sigma_r, int(c.surface), int(boundary), worst);
     }
   }
+}
+
+TEST(Pyramid, FlatImagesAreTheExactOnesAtTheirCentres) {
+  for (const CentreCase& c : {CentreCase{350, 200, 3, 256, 32, 0.2f, 4, 0.005f}, CentreCase{140, 72, 3, 256, 16, 0.2f, 4, 0.0012f},
+                              CentreCase{140, 72, 3, 128, 16, 0.2f, 4, 0.02f}, CentreCase{45, 70, 4, 64, 6.5f, 0.2f, 4, 0.02f}})
+    expectExactCentres(c, Surface::flat);
+}
+
+TEST(Pyramid, SmoothImagesAreTheExactOnesAtTheirCentres) {
+  // Small maps for narrow lobes: the exact image takes (edge / sigma_r)^2 points in each triangle.
+  for (const CentreCase& c : {CentreCase{70, 41, 3, 64, 8, 0.1f, 4, 0.02f}, CentreCase{45, 70, 3, 64, 6.5f, 0.1f, 4, 0.02f},
+                              CentreCase{27, 15, 2, 256, 6, 0.1f, 8, 0.005f}, CentreCase{27, 15, 1, 256, 6, 0.05f, 8, 0.0012f}})
+    expectExactCentres(c, Surface::smooth);
 }
 
 /// One image of the level above against the mean of its four children.
@@ -292,9 +292,9 @@ double parentToChildren(const NdfPyramidData& data, int level, int i, int j) {
 }
 
 TEST(Pyramid, ALevelAgreesWithTheMeanOfItsChildren) {
-  // Four footprints around a centre weigh texels much as the larger one: as continuous weights, half the integral of their
-  // difference is 0.22 (their variance is 0.44 strides^2 against 0.75). That bounds the difference of the images, whatever the map.
-  constexpr double kWeightsDiffer = 0.26;
+  // Four footprints around a centre weigh texels much as the larger one does, but not as widely: their variance is 0.44 strides^2
+  // against 0.75. Measured on these maps: a total variation of 0.058.
+  constexpr double kWeightsDiffer = 0.08;
   for (const Surface surface : {Surface::flat, Surface::smooth}) {
     const OwnedMap noise(128, 128, test::randomNormals(128, 128, 0.5f, 5)), rough(128, 128, test::roughSurface(128, 128, 0.2f));
     double worst = 0;
@@ -306,7 +306,6 @@ TEST(Pyramid, ALevelAgreesWithTheMeanOfItsChildren) {
     }
     EXPECT_LT(worst, kWeightsDiffer);
     EXPECT_GT(worst, 0.01);
-    if (std::getenv("GLINT_SHOW")) printf("children tv %.4f\n", worst);
   }
 }
 
@@ -329,7 +328,7 @@ std::vector<Vec2> upsampled(const NormalMap& map, int factor) {
 
 TEST(Pyramid, FlatImagesOfFinerMapsConvergeToTheSmoothOne) {
   constexpr int kResolution = 64;
-  const OwnedMap coarse(48, 48, test::roughSurface(48, 48, 0.3f));
+  const OwnedMap coarse(48, 48, test::roughSurface(48, 48, 0.2f));
   const auto smooth = referenceImage(coarse.map(), 0.02f, Surface::smooth, Boundary::wrap, Footprint::isotropic({0.4f, 0.6f}, 5), kResolution);
   const NdfPyramidData smooth_pyramid = buildPyramid(coarse.map(), withLevels(options(12, kResolution, 0.02f, Surface::smooth), 1));
   double previous = 1, previous_pyramid = 1;
@@ -341,7 +340,6 @@ TEST(Pyramid, FlatImagesOfFinerMapsConvergeToTheSmoothOne) {
     const NdfPyramidData flat_pyramid = buildPyramid(fine.map(), withLevels(options(12.0f * static_cast<float>(factor), kResolution, 0.02f), 1));
     const double pyramid_error = test::relL2(storedImage(flat_pyramid.view(), 0, 1, 2), storedImage(smooth_pyramid.view(), 0, 1, 2));
     EXPECT_LT(pyramid_error, 0.6 * previous_pyramid) << factor;
-    if (std::getenv("GLINT_SHOW")) printf("upsample %d: %.5f %.5f\n", factor, error, pyramid_error);
     previous = error;
     previous_pyramid = pyramid_error;
   }
@@ -349,7 +347,7 @@ TEST(Pyramid, FlatImagesOfFinerMapsConvergeToTheSmoothOne) {
 }
 
 TEST(Pyramid, DoesNotDependOnTheNumberOfThreads) {
-  const OwnedMap owned(150, 100, test::roughSurface(150, 100, 0.3f));
+  const OwnedMap owned(80, 56, test::roughSurface(80, 56, 0.2f));
   for (const Surface surface : {Surface::flat, Surface::smooth}) {
     for (const BlockPrecision precision : {BlockPrecision::f16, BlockPrecision::f32}) {
       PyramidOptions o = withLevels(options(8, 64, 0.01f, surface), 4);
@@ -384,7 +382,7 @@ TEST(Pyramid, SmallestMapsAndFootprintsLargerThanTheMapWork) {
         const NdfPyramidData data = buildPyramid(owned.map(), options(stride, 64, 0.05f, surface));
         forEachImage(data.shape, [&](int l, int i, int j) {
           const test::ImageMoments m = test::momentsOf(storedImage(data.view(), l, i, j), 64);
-          EXPECT_NEAR(m.integral, 1, kEnergyError) << width << 'x' << height << " stride " << stride << " surface " << int(surface);
+          ASSERT_NEAR(m.integral, 1, kEnergyError) << width << 'x' << height << " stride " << stride << " surface " << int(surface) << " level " << l << " image " << i << ' ' << j;
           EXPECT_NEAR(m.mean_x, 0.1, 1e-3);
           EXPECT_NEAR(m.mean_y, 0.2, 1e-3);
         });
