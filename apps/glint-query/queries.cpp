@@ -53,11 +53,23 @@ std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int
   return image;
 }
 
+namespace {
+
+/// A field of a CSV table, quoted where RFC 4180 asks for it.
+std::string csvField(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
+}  // namespace
+
 std::string QueryTable::withAnswers(std::span<const float> answers) const {
   std::string text;
   const bool ranges = !queries_.empty() && queries_.front().range;
   for (std::size_t r = 0; r < rows_.size(); ++r) {
-    for (const std::string& field : rows_[r]) text += field + ",";
+    for (const std::string& field : rows_[r]) text += csvField(field) + ",";
     text += r == 0 ? (ranges ? "mean" : "density") : fmt::format("{:.9g}", answers[r - 1]);
     text += "\n";
   }

@@ -5,20 +5,33 @@
 namespace glint::bake {
 namespace {
 
-GLINT_MULTIVERSION void addScaled(const float* from, float weight, float* to) {
-  for (int k = 0; k < BlockBins::kTileBins; ++k) to[k] += weight * from[k];
+/// to[slots[k]] += weight * from[k] for tiles of 64 values.
+GLINT_MULTIVERSION void addTiles(const std::int32_t* slots, std::size_t count, const float* from, std::size_t step, float weight, float* to) {
+  for (std::size_t k = 0; k < count; ++k, from += step) {
+    float* tile = to + static_cast<std::size_t>(slots[k]) * BlockBins::kTileBins;
+    for (int i = 0; i < BlockBins::kTileBins; ++i) tile[i] += weight * from[i];
+  }
 }
 
 }  // namespace
 
-void BlockBins::add(std::int32_t tile, const float* values, float weight) {
-  std::int32_t& slot = slots_[tile];
-  if (slot < 0) {
-    slot = static_cast<std::int32_t>(tiles_.size());
-    tiles_.push_back(tile);
-    values_.resize(values_.size() + kTileBins, 0.0f);
+void BlockBins::add(const std::vector<std::int32_t>& tiles, const float* values, std::size_t step, float weight) {
+  scratch_.resize(tiles.size());
+  for (std::size_t k = 0; k < tiles.size(); ++k) {
+    std::int32_t& slot = slots_[tiles[k]];
+    if (slot < 0) {
+      slot = static_cast<std::int32_t>(tiles_.size());
+      tiles_.push_back(tiles[k]);
+    }
+    scratch_[k] = slot;
   }
-  addScaled(values, weight, values_.data() + static_cast<std::size_t>(slot) * kTileBins);
+  values_.resize(tiles_.size() * kTileBins, 0.0f);
+  addTiles(scratch_.data(), tiles.size(), values, step, weight, values_.data());
+}
+
+void CornerBins::addTo(BlockBins& bins, int corner) const {
+  bins.add(tiles, values.data() + corner * BlockBins::kTileBins, 4 * BlockBins::kTileBins, 1);
+  bins.addMass(mass[corner]);
 }
 
 void BlockBins::clear() {
@@ -29,7 +42,7 @@ void BlockBins::clear() {
 }
 
 void PackedBins::addTo(BlockBins& bins, float weight) const {
-  for (std::size_t k = 0; k < tiles.size(); ++k) bins.add(tiles[k], values.data() + k * BlockBins::kTileBins, weight);
+  bins.add(tiles, values.data(), BlockBins::kTileBins, weight);
   bins.addMass(weight * mass);
 }
 

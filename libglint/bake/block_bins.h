@@ -21,8 +21,8 @@ class BlockBins {
   /// Weight of the surface that was added, per unit of mass.
   double mass() const { return mass_; }
 
-  /// Adds weight * (64 values) to a tile.
-  void add(std::int32_t tile, const float* values, float weight);
+  /// Adds weight * (64 values) to each of some tiles. Values of neighbouring tiles are `step` floats apart.
+  void add(const std::vector<std::int32_t>& tiles, const float* values, std::size_t step, float weight);
   void addMass(double mass) { mass_ += mass; }
   void clear();
 
@@ -30,10 +30,20 @@ class BlockBins {
   std::vector<std::int32_t> slots_;  // of each tile of the grid: its place in tiles_, or -1
   std::vector<std::int32_t> tiles_;
   std::vector<float> values_;
+  std::vector<std::int32_t> scratch_;
   double mass_ = 0;
 };
 
-/// The same, frozen: compact and without the lookup table.
+/// Four histograms over the same tiles, one for each corner of a lattice cell.
+struct CornerBins {
+  std::vector<std::int32_t> tiles;
+  std::vector<float> values;  ///< [tiles][4][64]
+  double mass[4] = {};
+
+  void addTo(BlockBins& bins, int corner) const;
+};
+
+/// The same as BlockBins, frozen: compact and without the lookup table.
 struct PackedBins {
   std::vector<std::int32_t> tiles;
   std::vector<float> values;  ///< [tiles][64]

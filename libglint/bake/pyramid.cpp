@@ -41,6 +41,16 @@ struct PackedImage {
   std::vector<float> float_pixels;
 };
 
+/// Sum of the pixels of a block: of each column first, which the processor adds side by side.
+GLINT_MULTIVERSION float sumBlock(const float* pixels) {
+  float columns[kBlockSize] = {};
+  for (int y = 0; y < kBlockSize; ++y)
+    for (int x = 0; x < kBlockSize; ++x) columns[x] += pixels[y * kBlockSize + x];
+  float sum = 0;
+  for (const float c : columns) sum += c;
+  return sum;
+}
+
 GLINT_MULTIVERSION void toHalf(const float* from, float scale, std::uint16_t* to, float* rounded) {
   for (int k = 0; k < kBlockPixels; ++k) {
     to[k] = floatToHalf(scale * from[k]);
@@ -66,9 +76,7 @@ class ImagePacker {
       if (!bins.touchedNear(b % blocks, b / blocks, filter_.radius() + 1)) continue;
       float pixels[kBlockPixels];
       filter_.filterBlock(bins.origin() + static_cast<std::ptrdiff_t>(b / blocks) * size * bins.pitch() + b % blocks * size, bins.pitch(), pixels);
-      float mass = 0;
-      for (const float p : pixels) mass += p;
-      if (mass * inverse_mass <= kBlockMassThreshold) continue;
+      if (sumBlock(pixels) * inverse_mass <= kBlockMassThreshold) continue;
       image.mask[b / 64] |= std::uint64_t{1} << (b % 64);
       store(pixels, inverse_mass, image);
     }
@@ -85,9 +93,7 @@ class ImagePacker {
       for (int k = 0; k < kBlockPixels; ++k) stored[k] = to_stored_ * inverse_mass * pixels[k];
       image.float_pixels.insert(image.float_pixels.end(), stored, stored + kBlockPixels);
     }
-    double sum = 0;
-    for (const float v : stored) sum += v;
-    image.means.push_back(static_cast<float>(value_scale_ * sum / kBlockPixels));
+    image.means.push_back(value_scale_ * sumBlock(stored) / kBlockPixels);
   }
 
   const PyramidShape& shape_;

@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -16,9 +15,10 @@ namespace glint::bake {
 namespace {
 
 /// Lattice nodes per stride: the weights of a footprint are interpolated linearly between nodes.
-constexpr int kNodesPerStride = 8;
+constexpr int kNodesPerStride = 6;
 
-using NodeRow = std::vector<PackedBins>;  // one entry a column of the lattice
+using NodeRow = std::vector<PackedBins>;  // one entry a node of the lattice
+using CellRow = std::vector<CornerBins>;  // one entry a cell of the lattice
 
 /// The lattice of one level along one axis. With wrap, node k and node k + count are the same.
 struct Axis {
@@ -114,7 +114,8 @@ class Halver {
  public:
   Halver(Axis x, Axis y, int tiles) : x_(x), y_(y), scratch_([tiles] { return BlockBins(tiles); }) {}
 
-  /// Keeps a fine row; calls give(row, nodes) for each coarse row that it completes. Row 0 of a wrapping lattice comes last.
+  /// Keeps a fine row; calls give(row, nodes) for each coarse row that it completes. Rows come in order, but row 0 of a wrapping
+  /// lattice may come last, and coarse row 0 of one does.
   template <class Give>
   void push(int r, std::shared_ptr<const NodeRow> row, Give&& give) {
     if (r == 0) first_ = row;
@@ -124,7 +125,7 @@ class Halver {
     if (odd && r == 1 && y_.wrap) second_ = row;
     if (odd) before_ = row;
     else middle_ = row;
-    if (r + 1 < y_.nodes()) return;
+    if (++pushed_ < y_.nodes()) return;
     if (y_.wrap) give(0, combine(before_.get(), first_.get(), second_ ? second_.get() : before_.get()));
     else give(y_.cells / 2, combine(before_.get(), middle_.get(), nullptr));
   }
@@ -156,30 +157,28 @@ class Halver {
   Axis x_, y_;
   tbb::enumerable_thread_specific<BlockBins> scratch_;
   std::shared_ptr<const NodeRow> first_, second_, before_, middle_;
+  int pushed_ = 0;  // rows so far
 };
 
 /// Rasterises the cells of the map into the corners of lattice cells.
 class Rasteriser {
  public:
-  Rasteriser(const NormalMap& map, Axis x, Axis y, int bins_per_axis)
-      : map_(map), x_(x), y_(y), tiles_(bins_per_axis / BlockBins::kTile), scratch_([bins_per_axis] { return Scratch(bins_per_axis); }) {}
+  Rasteriser(const NormalMap& map, Axis x, Axis y, int bins_per_axis, float sigma_bins)
+      : map_(map), x_(x), y_(y), tiles_(bins_per_axis / BlockBins::kTile),
+        splatters_([=] { return TriangleSplatter(bins_per_axis, sigma_bins); }) {}
 
-  /// Corner histograms of a row of lattice cells: [cell][corner], corner = 2 * upper + right.
-  std::vector<std::array<PackedBins, 4>> row(int b) {
-    std::vector<std::array<PackedBins, 4>> out(x_.cells);
+  /// Corner histograms of a row of lattice cells; corner = 2 * upper + right.
+  CellRow row(int b) {
+    CellRow out(x_.cells);
     tbb::parallel_for(0, x_.cells, [&](int a) {
-      Scratch& s = scratch_.local();
+      TriangleSplatter& splatter = splatters_.local();
       double mass[4] = {};
       const auto [j0, j1] = cellsIn(y_, b, map_.height);
       const auto [i0, i1] = cellsIn(x_, a, map_.width);
       for (int j = j0; j < j1; ++j)
-        for (int i = i0; i < i1; ++i) addCell(i, j, a, b, s.splatter, mass);
-      s.splatter.extract(s.corners.data());
-      for (int k = 0; k < 4; ++k) {
-        s.corners[k].addMass(mass[k]);
-        out[a][k] = pack(s.corners[k]);
-        s.corners[k].clear();
-      }
+        for (int i = i0; i < i1; ++i) addCell(i, j, a, b, splatter, mass);
+      out[a] = splatter.extract();
+      std::copy_n(mass, 4, out[a].mass);
     });
     return out;
   }
@@ -187,12 +186,6 @@ class Rasteriser {
   int tiles() const { return tiles_; }
 
  private:
-  struct Scratch {
-    explicit Scratch(int bins_per_axis) : splatter(bins_per_axis) { corners.fill(BlockBins(bins_per_axis / BlockBins::kTile)); }
-    TriangleSplatter splatter;
-    std::array<BlockBins, 4> corners;
-  };
-
   /// Cells of four texel centres whose middle (i + 1) lies in lattice cell `a`; the last cell of a map that does not wrap is none.
   static std::pair<int, int> cellsIn(const Axis& axis, int a, int size) {
     const auto first = [&](int cell) {
@@ -220,20 +213,19 @@ class Rasteriser {
   const NormalMap& map_;
   Axis x_, y_;
   int tiles_;
-  tbb::enumerable_thread_specific<Scratch> scratch_;
+  tbb::enumerable_thread_specific<TriangleSplatter> splatters_;
 };
 
 /// Node (k, r) gathers a corner of each of the four lattice cells around it. `below` and `above` are rows of lattice cells.
-NodeRow gatherNodes(const Axis& x, const std::vector<std::array<PackedBins, 4>>* below,
-                    const std::vector<std::array<PackedBins, 4>>* above, int tiles) {
+NodeRow gatherNodes(const Axis& x, const CellRow* below, const CellRow* above, int tiles) {
   NodeRow nodes(x.nodes());
   tbb::enumerable_thread_specific<BlockBins> scratch([tiles] { return BlockBins(tiles); });
   tbb::parallel_for(0, x.nodes(), [&](int k) {
     BlockBins& sum = scratch.local();
     const int left = k > 0 ? k - 1 : x.wrap ? x.cells - 1 : -1;
     const int right = k < x.cells ? k : -1;
-    const auto add = [&](const auto* row, int cell, int corner) {
-      if (row && cell >= 0) (*row)[cell][corner].addTo(sum, 1);
+    const auto add = [&](const CellRow* row, int cell, int corner) {
+      if (row && cell >= 0) (*row)[cell].addTo(sum, corner);
     };
     add(below, left, 3);
     add(below, right, 2);
@@ -247,11 +239,13 @@ NodeRow gatherNodes(const Axis& x, const std::vector<std::array<PackedBins, 4>>*
 
 }  // namespace
 
-void scatterSmooth(const NormalMap& map, const PyramidShape& shape, int subdivision, const ImageSink& sink, const ProgressFn& progress) {
+void scatterSmooth(const NormalMap& map, const PyramidShape& shape, int subdivision, const ImageSink& sink,
+                   const ProgressFn& progress) {
   const bool wrap = shape.boundary == Boundary::wrap;
   Axis x = finestAxis(map.width, shape.levels[0].stride, shape.level_count, wrap);
   Axis y = finestAxis(map.height, shape.levels[0].stride, shape.level_count, wrap);
-  Rasteriser rasteriser(map, x, y, shape.resolution * subdivision);
+  const int bins_per_axis = shape.resolution * subdivision;
+  Rasteriser rasteriser(map, x, y, bins_per_axis, 0.5f * shape.sigma_r * static_cast<float>(bins_per_axis));
 
   std::vector<Level> levels;
   std::vector<std::unique_ptr<Halver>> halvers;
@@ -268,7 +262,6 @@ void scatterSmooth(const NormalMap& map, const PyramidShape& shape, int subdivis
     halvers[l]->push(r, std::make_shared<const NodeRow>(std::move(nodes)), [&](int coarse, NodeRow row) { push(l + 1, coarse, std::move(row)); });
   };
 
-  using CellRow = std::vector<std::array<PackedBins, 4>>;
   const auto cells = [&](int b) { return rasteriser.row(b); };
   CellRow below = wrap ? cells(finest_y.cells - 1) : CellRow();
   CellRow last = below;

@@ -1,0 +1,336 @@
+"""glint-pyramid, glint-compress and glint-query, from an image to answers."""
+
+import csv
+import io
+import json
+import struct
+
+import pytest
+from conftest import BIN
+
+# Shell answers are printed with nine digits.
+PRINTED = 1e-6
+FOOTPRINT = ["--uv", "0.3", "0.7", "--sigma", "20"]
+
+
+@pytest.fixture(scope="session")
+def assets(tmp_path_factory):
+    """A map of 256 x 256, its pyramid of four levels (the finest: 13.9 texels), and what it compresses to. Paths by kind."""
+    import subprocess
+
+    folder = tmp_path_factory.mktemp("assets")
+
+    def run(name, *arguments):
+        process = subprocess.run([BIN / f"glint-{name}", *arguments], cwd=folder, capture_output=True, text=True, timeout=120)
+        assert process.returncode == 0, process.stderr
+
+    run("synth", "isotropic", "--size", "256", "-o", "map.exr")
+    run("ingest", "map.exr", "-o", "normals.glint")
+    run("pyramid", "normals.glint", "-o", "pyramid.glint", "--stride", "32", "--resolution", "64", "--sigma-r", "0.02", "--levels", "3")
+    run("synth", "isotropic", "--size", "256", "--seed", "9", "-o", "other.exr")
+    run("ingest", "other.exr", "-o", "other.glint")
+    kinds = {"normals": folder / "normals.glint", "other": folder / "other.glint", "pyramid": folder / "pyramid.glint"}
+    if (BIN / "glint-compress").exists():
+        run("compress", "pyramid.glint", "-o", "compressed.glint")
+        kinds["compressed"] = folder / "compressed.glint"
+    return kinds
+
+
+@pytest.fixture
+def ask(glint, assets):
+    """Runs glint-query on an asset by kind."""
+
+    def run(kind, *arguments):
+        if kind not in assets:
+            pytest.skip("glint-compress is not built")
+        return glint("query", assets[kind], *arguments)
+
+    run.folder = glint.folder
+    return run
+
+
+def number(process):
+    assert process.returncode == 0, process.stderr
+    return float(process.stdout.split()[0])
+
+
+MODELS = ["normals", "pyramid", "compressed"]
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_density_and_mean_are_printed_and_in_json(ask, kind):
+    density = number(ask(kind, *FOOTPRINT, "--half", "0.02", "-0.03"))
+    assert density > 0
+    result = json.loads(ask(kind, *FOOTPRINT, "--half", "0.02", "-0.03", "--json").stdout)["result"]
+    assert result["density"] == pytest.approx(density, rel=PRINTED)
+    whole = ask(kind, *FOOTPRINT, "--range", "-1", "-1", "1", "1")
+    assert number(whole) == pytest.approx(0.25, rel=2e-3)
+    result = json.loads(ask(kind, *FOOTPRINT, "--range", "-1", "-1", "1", "1", "--json").stdout)["result"]
+    assert result["mean"] == pytest.approx(0.25, rel=2e-3)
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_models_agree_on_the_same_question(ask, kind):
+    # At the centre of an image of the finest level the pyramid is exact; compression keeps a few percent of error.
+    question = ["--uv", "0.3125", "0.6875", "--sigma", "13.8564", "--range", "-0.0625", "-0.0625", "0.0625", "0.0625"]
+    exact = number(ask("normals", *question, "--sigma-r", "0.02"))
+    assert number(ask(kind, *question, *(["--sigma-r", "0.02"] if kind == "normals" else []))) == pytest.approx(exact, rel=0.05)
+
+
+@pytest.mark.parametrize("kind", MODELS)
+def test_kinds_of_footprints_with_the_same_moments_answer_alike(ask, kind):
+    sigma, half = 20.0, ["--half", "0.01", "0.02"]
+    uv = ["--uv", "0.3", "0.7"]
+    isotropic = number(ask(kind, *uv, "--sigma", sigma, *half))
+    assert number(ask(kind, *uv, "--cov", sigma**2, 0, sigma**2, *half)) == pytest.approx(isotropic, rel=1e-5)
+    axis = sigma * 3**0.5
+    box = number(ask(kind, *uv, "--box", axis, 0, 0, axis, *half))
+    # The texels know a box from a Gaussian; pyramids do not.
+    assert box == pytest.approx(isotropic, rel=0.5 if kind == "normals" else 1e-4)
+
+
+def test_repeat_prints_nanoseconds(ask):
+    process = ask("pyramid", *FOOTPRINT, "--half", "0", "0", "--repeat", "1500")
+    assert process.returncode == 0
+    lines = process.stdout.splitlines()
+    assert len(lines) == 2 and lines[1].endswith(" ns per query") and float(lines[1].split()[0]) > 0
+    result = json.loads(ask("pyramid", *FOOTPRINT, "--half", "0", "0", "--repeat", "1500", "--json").stdout)["result"]
+    assert result["nanoseconds"] > 0
+
+
+def png_size(path):
+    data = path.read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    return struct.unpack(">II", data[16:24])
+
+
+def exr_size(path):
+    data = path.read_bytes()
+    assert struct.unpack("<I", data[:4])[0] == 20000630
+    at = data.index(b"dataWindow\0box2i\0") + len(b"dataWindow\0box2i\0") + 4
+    x0, y0, x1, y1 = struct.unpack("<4i", data[at : at + 16])
+    return x1 - x0 + 1, y1 - y0 + 1
+
+
+@pytest.mark.parametrize("kind, size", [("normals", 256), ("pyramid", 64), ("compressed", 64)])
+def test_image_has_the_assets_own_size_or_the_given_one(ask, kind, size):
+    for name, read in (("a.png", png_size), ("a.exr", exr_size)):
+        assert ask(kind, *FOOTPRINT, "--image", name).returncode == 0
+        assert read(ask.folder / name) == (size, size)
+        assert ask(kind, *FOOTPRINT, "--image", name, "--image-size", "40").returncode == 0
+        assert read(ask.folder / name) == (40, 40)
+
+
+def test_image_of_another_kind_is_a_usage_error(ask):
+    assert ask("pyramid", *FOOTPRINT, "--image", "a.jpg").returncode == 1
+    assert ask("pyramid", *FOOTPRINT, "--image", "missing/a.png").returncode in (1, 2)
+
+
+HEADERS = {
+    "u,v,sigma,hx,hy": "0.3,0.7,20,0.02,-0.03",
+    "u,v,sigma,x0,y0,x1,y1": "0.3,0.7,20,-0.1,-0.1,0.1,0.1",
+    "u,v,sxx,sxy,syy,hx,hy": "0.3,0.7,400,50,300,0.02,-0.03",
+    "u,v,sxx,sxy,syy,x0,y0,x1,y1": "0.3,0.7,400,50,300,-0.1,-0.1,0.1,0.1",
+    "u,v,ax,ay,bx,by,hx,hy": "0.3,0.7,30,5,-5,40,0.02,-0.03",
+    "u,v,ax,ay,bx,by,x0,y0,x1,y1": "0.3,0.7,30,5,-5,40,-0.1,-0.1,0.1,0.1",
+}
+
+
+@pytest.mark.parametrize("kind", MODELS)
+@pytest.mark.parametrize("header", HEADERS)
+def test_every_header_answers_as_the_options_do(ask, kind, header):
+    row = HEADERS[header]
+    (ask.folder / "q.csv").write_text(f"{header}\n{row}\n{row}\n")
+    process = ask(kind, "--csv", "q.csv", "-o", "a.csv")
+    assert (process.returncode, process.stdout, process.stderr) == (0, "", "")
+    rows = list(csv.reader(io.StringIO((ask.folder / "a.csv").read_text())))
+    answer = "density" if "hx" in header else "mean"
+    assert rows[0] == header.split(",") + [answer]
+    assert [r[:-1] for r in rows[1:]] == [row.split(",")] * 2
+    values = dict(zip(header.split(","), row.split(",")))
+    option = ["--uv", values["u"], values["v"]]
+    for name, columns in (
+        ("--sigma", ["sigma"]),
+        ("--cov", ["sxx", "sxy", "syy"]),
+        ("--box", ["ax", "ay", "bx", "by"]),
+        ("--half", ["hx", "hy"]),
+        ("--range", ["x0", "y0", "x1", "y1"]),
+    ):
+        if columns[0] in values:
+            option += [name, *(values[c] for c in columns)]
+    expected = number(ask(kind, *option))
+    assert [float(r[-1]) for r in rows[1:]] == pytest.approx([expected] * 2, rel=PRINTED)
+    assert ask(kind, "--csv", "q.csv", "-o", "-").stdout == (ask.folder / "a.csv").read_text()
+
+
+def test_other_columns_are_kept_in_their_order_and_quoted_fields_survive(ask):
+    table = [
+        ["name", "hy", "hx", "sigma", "v", "u", "re, mark"],
+        ["plain", "-0.03", "0.02", "20", "0.7", "0.3", ""],
+        ["with, comma", "-0.03", "0.02", "20", "0.7", "0.3", 'a "quoted" word'],
+        ["two\nlines", "0", "0", "30", "0.1", "0.2", " spaces "],
+    ]
+    with open(ask.folder / "q.csv", "w", newline="") as file:
+        csv.writer(file).writerows(table)
+    assert ask("pyramid", "--csv", "q.csv", "-o", "a.csv").returncode == 0
+    with open(ask.folder / "a.csv", newline="") as file:
+        rows = list(csv.reader(file))
+    assert [r[:-1] for r in rows] == table
+    assert rows[0][-1] == "density"
+    assert float(rows[1][-1]) == float(rows[2][-1]) > 0
+    assert float(rows[3][-1]) > 0
+
+
+def test_answers_of_a_table_can_be_asked_again(ask):
+    (ask.folder / "q.csv").write_text("u,v,sigma,hx,hy\n0.3,0.7,20,0,0\n")
+    assert ask("pyramid", "--csv", "q.csv", "-o", "a.csv").returncode == 0
+    assert ask("pyramid", "--csv", "a.csv", "-o", "b.csv").returncode == 0
+    last = (ask.folder / "b.csv").read_text().splitlines()[1].split(",")
+    assert last[-1] == last[-2]
+
+
+@pytest.mark.parametrize(
+    "table, where",
+    [
+        ("u,v,sigma,hx,hy\n0.3,0.7,20,0,0\n0.3,0.7,20,0,zero\n", ["row 2", "column hy"]),
+        ("u,v,sigma,hx,hy\n0.3,0.7,nan,0,0\n", ["row 1", "column sigma"]),
+        ("u,v,sigma,hx,hy\n0.3,,20,0,0\n", ["row 1", "column v"]),
+        ("u,v,sigma,hx,hy\n0.3,0.7,20,0\n", ["row 1"]),
+        ("u,v,sigma,hx,hy\n0.3,0.7,20,0,0,0\n", ["row 1"]),
+        ("u,v,hx,hy\n0.3,0.7,0,0\n", ["header"]),
+        ("u,v,sigma\n0.3,0.7,20\n", ["header"]),
+        ("u,v,sigma,sxx,sxy,syy,hx,hy\n0,0,20,1,0,1,0,0\n", ["header"]),
+        ("u,v,sigma,hx,hy,x0,y0,x1,y1\n0,0,20,0,0,0,0,1,1\n", ["header"]),
+        ("u,sigma,hx,hy\n0.3,20,0,0\n", ["header"]),
+        ('u,v,sigma,hx,hy\n0.3,"0.7,20,0,0\n', ["row"]),
+        ("", []),
+    ],
+)
+def test_tables_that_cannot_be_read_are_invalid_input_with_the_place(ask, table, where):
+    (ask.folder / "q.csv").write_text(table)
+    process = ask("pyramid", "--csv", "q.csv", "-o", "a.csv")
+    assert process.returncode == 3, process.stderr
+    assert "q.csv" in process.stderr
+    for place in where:
+        assert place in process.stderr
+    assert not (ask.folder / "a.csv").exists()
+
+
+@pytest.mark.parametrize("kind", ["pyramid", "compressed"])
+def test_below_the_finest_level_needs_the_normals(ask, assets, kind):
+    question = ["--uv", "0.3", "0.7", "--sigma", "3", "--half", "0.02", "-0.03"]
+    process = ask(kind, *question)
+    assert process.returncode == 1
+    assert "--normals" in process.stderr
+    with_normals = number(ask(kind, *question, "--normals", assets["normals"]))
+    assert with_normals == pytest.approx(number(ask("normals", *question, "--sigma-r", "0.02")), rel=PRINTED)
+    (ask.folder / "q.csv").write_text("u,v,sigma,hx,hy\n0.3,0.7,3,0.02,-0.03\n")
+    assert ask(kind, "--csv", "q.csv", "-o", "a.csv").returncode == 1
+    assert ask(kind, "--csv", "q.csv", "-o", "a.csv", "--normals", assets["normals"]).returncode == 0
+
+
+def test_normals_of_another_map_are_invalid_input(ask, assets, glint):
+    question = ["--uv", "0.3", "0.7", "--sigma", "3", "--half", "0", "0"]
+    assert ask("pyramid", *question, "--normals", assets["other"]).returncode == 3
+    glint("synth", "isotropic", "--size", "64", "-o", "small.exr")
+    glint("ingest", "small.exr", "-o", "small.glint")
+    for kind in ("pyramid", "compressed"):
+        if kind in assets:
+            assert ask(kind, *question, "--normals", "small.glint").returncode == 3
+    assert ask("pyramid", *question, "--normals", assets["pyramid"]).returncode == 5  # another kind of asset
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["--uv", "0.3", "0.7", "--half", "0", "0"],
+        ["--uv", "0.3", "0.7", "--sigma", "20"],
+        ["--uv", "0.3", "--sigma", "20", "--half", "0", "0"],
+        ["--uv", "0.3", "0.7", "--sigma", "-1", "--half", "0", "0"],
+        ["--uv", "0.3", "0.7", "--sigma", "nan", "--half", "0", "0"],
+        ["--uv", "0.3", "0.7", "--sigma", "20", "--cov", "1", "0", "1", "--half", "0", "0"],
+        [*FOOTPRINT, "--half", "0", "0", "--range", "0", "0", "1", "1"],
+        [*FOOTPRINT, "--range", "0", "0", "1"],
+        [*FOOTPRINT, "--half", "0", "0", "--repeat", "-1"],
+        [*FOOTPRINT, "--image", "a.png", "--image-size", "9999"],
+        ["--csv", "q.csv"],
+    ],
+)
+def test_questions_that_make_no_sense_are_usage_errors(ask, arguments):
+    (ask.folder / "q.csv").write_text("u,v,sigma,hx,hy\n")
+    process = ask("pyramid", *arguments)
+    assert process.returncode == 1, process.stderr
+    assert process.stdout == ""
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--levels", "99"],
+        ["--levels", "0"],
+        ["--levels", "two"],
+        ["--stride", "1"],
+        ["--stride", "1e9"],
+        ["--resolution", "40"],
+        ["--resolution", "16"],
+        ["--sigma-r", "0"],
+        ["--sigma-r", "0.5"],
+        ["--surface", "rough"],
+        ["--precision", "double"],
+    ],
+)
+def test_pyramid_options_out_of_range_are_usage_errors(glint, assets, options):
+    process = glint("pyramid", assets["normals"], "-o", "p.glint", *options)
+    assert process.returncode == 1, process.stderr
+    assert not (glint.folder / "p.glint").exists()
+
+
+def test_pyramid_reads_normals_only(glint, assets):
+    assert glint("pyramid", assets["pyramid"], "-o", "p.glint").returncode == 5
+    assert glint("pyramid", "missing.glint", "-o", "p.glint").returncode == 2
+
+
+@pytest.mark.parametrize("kind", MODELS)
+@pytest.mark.parametrize("kept", [0.1, 0.5, 0.999])
+def test_truncated_assets_are_invalid_input(glint, assets, kind, kept):
+    if kind not in assets:
+        pytest.skip("glint-compress is not built")
+    whole = assets[kind].read_bytes()
+    (glint.folder / "cut.glint").write_bytes(whole[: int(kept * len(whole))])
+    process = glint("query", "cut.glint", *FOOTPRINT, "--half", "0", "0")
+    assert process.returncode == 3, process.stderr
+    assert "cut.glint" in process.stderr
+    if kind == "normals":
+        assert glint("pyramid", "cut.glint", "-o", "p.glint").returncode == 3
+
+
+@pytest.mark.parametrize("surface", ["flat", "smooth"])
+def test_pyramids_do_not_depend_on_threads(glint, assets, surface):
+    options = ["--stride", "32", "--resolution", "64", "--sigma-r", "0.02", "--surface", surface]
+    for threads in ("1", "2"):
+        process = glint("pyramid", assets["normals"], "-o", f"p{threads}.glint", *options, "--threads", threads)
+        assert (process.returncode, process.stdout, process.stderr) == (0, "", "")
+    assert (glint.folder / "p1.glint").read_bytes() == (glint.folder / "p2.glint").read_bytes()
+
+
+def test_compressed_files_do_not_depend_on_threads(glint, assets):
+    if "compressed" not in assets:
+        pytest.skip("glint-compress is not built")
+    for threads in ("1", "2"):
+        assert glint("compress", assets["pyramid"], "-o", f"c{threads}.glint", "--threads", threads).returncode == 0
+    assert (glint.folder / "c1.glint").read_bytes() == (glint.folder / "c2.glint").read_bytes()
+
+
+def test_json_of_a_pyramid_lists_its_levels(glint, assets):
+    options = ["--stride", "32", "--resolution", "64", "--sigma-r", "0.02", "--levels", "3", "--json"]
+    result = json.loads(glint("pyramid", assets["normals"], "-o", "p.glint", *options).stdout)["result"]
+    assert [level["stride_texels"] for level in result["levels"]] == [32, 64, 128]
+    assert [level["columns"] * level["rows"] for level in result["levels"]] == [64, 16, 4]
+    assert result["size_bytes"] == sum(level["size_bytes"] for level in result["levels"])
+
+
+def test_pyramid_and_compressed_files_are_valid(glint, assets):
+    for kind in ("pyramid", "compressed"):
+        if kind in assets:
+            assert glint("validate", assets[kind]).returncode == 0

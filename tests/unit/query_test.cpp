@@ -1,0 +1,409 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <random>
+#include <tuple>
+
+#include "glint/bake/compress.h"
+#include "glint/bake/pyramid.h"
+#include "glint/query/cp_ndf.h"
+#include "glint/query/pyramid_ndf.h"
+#include "support/test_maps.h"
+#include "unit/compress_reference.h"
+
+namespace glint {
+namespace {
+
+using bake::CompressedNdfData;
+using bake::NdfPyramidData;
+using test::OwnedMap;
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr int kResolution = 64;
+
+/// Sums of up to 64^2 float terms, relative to the sum of their magnitudes.
+constexpr double kSumError = 1e-5;
+
+const OwnedMap& map() {
+  static const OwnedMap owned(100, 72, test::roughSurface(100, 72, 0.3f));
+  return owned;
+}
+
+/// Strides 16, 32 and 64 divide neither side.
+const NdfPyramidData& pyramid(Boundary boundary = Boundary::wrap, BlockPrecision precision = BlockPrecision::f16) {
+  static std::map<std::pair<Boundary, BlockPrecision>, NdfPyramidData> built;
+  const auto key = std::pair{boundary, precision};
+  if (!built.contains(key)) {
+    bake::PyramidOptions o;
+    o.stride = 16;
+    o.resolution = kResolution;
+    o.sigma_r = 0.02f;
+    o.boundary = boundary;
+    o.levels = 3;
+    o.precision = precision;
+    built[key] = bake::buildPyramid(map().map(), o);
+  }
+  return built[key];
+}
+
+const CompressedNdfData& compressed(CompressionMethod method, CoefficientType type) {
+  static std::map<std::pair<CompressionMethod, CoefficientType>, CompressedNdfData> built;
+  const auto key = std::pair{method, type};
+  if (!built.contains(key)) {
+    bake::CompressionOptions o;
+    o.method = method;
+    o.coefficient_type = type;
+    o.rank = 6;  // coarse enough to have values below zero
+    o.regions = 2;
+    built[key] = bake::compressPyramid(pyramid().view(), o);
+  }
+  return built[key];
+}
+
+/// Calls visitor(CpNdf, data) for every method and coefficient type.
+template <class Visitor>
+void forEachCompression(Visitor&& visitor) {
+  for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
+    for (const auto type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
+      SCOPED_TRACE("method " + std::to_string(int(method)) + " type " + std::to_string(int(type)));
+      visitor(CpNdf(compressed(method, type).view()), compressed(method, type));
+    }
+  }
+}
+
+class RandomQueries {
+ public:
+  explicit RandomQueries(unsigned seed) : random_(seed) {}
+  float unit() { return std::uniform_real_distribution<float>(0, 1)(random_); }
+  int below(int n) { return std::uniform_int_distribution<int>(0, n - 1)(random_); }
+  Footprint footprint(float low = 5, float high = 60) { return Footprint::isotropic({unit(), unit()}, low * std::pow(high / low, unit())); }
+  /// Whole pixels [x0, x1) x [y0, y1) of an image, at random.
+  std::array<int, 4> pixels() {
+    const int x = below(kResolution), y = below(kResolution);
+    return {x, y, x + 1 + below(kResolution - x), y + 1 + below(kResolution - y)};
+  }
+
+ private:
+  std::mt19937 random_;
+};
+
+float toHalfVector(int pixel) { return -1 + static_cast<float>(pixel) * 2 / kResolution; }
+
+/// Mean over whole pixels, from point queries, and the mean of their magnitudes.
+template <class Density>
+std::pair<double, double> meanOfPoints(const std::array<int, 4>& p, const Density& density) {
+  double sum = 0, magnitude = 0;
+  for (int y = p[1]; y < p[3]; ++y) {
+    for (int x = p[0]; x < p[2]; ++x) {
+      const double d = density(Vec2{toHalfVector(x) + 1.0f / kResolution, toHalfVector(y) + 1.0f / kResolution});
+      sum += d;
+      magnitude += std::abs(d);
+    }
+  }
+  const double count = (p[2] - p[0]) * (p[3] - p[1]);
+  return {sum / count, magnitude / count};
+}
+
+Box2 boxOf(const std::array<int, 4>& p) { return {{toHalfVector(p[0]), toHalfVector(p[1])}, {toHalfVector(p[2]), toHalfVector(p[3])}}; }
+
+TEST(PyramidNdf, MeanOverPixelsIsTheMeanOfPointQueries) {
+  RandomQueries random(1);
+  for (const BlockPrecision precision : {BlockPrecision::f16, BlockPrecision::f32}) {
+    const PyramidNdf model(pyramid(Boundary::wrap, precision).view());
+    for (int k = 0; k < 200; ++k) {
+      const Footprint p = random.footprint();
+      const auto pixels = random.pixels();
+      const auto [mean, magnitude] = meanOfPoints(pixels, [&](Vec2 h) { return model.density(p, h); });
+      EXPECT_NEAR(model.mean(p, boxOf(pixels)), mean, kSumError * magnitude);
+    }
+  }
+}
+
+TEST(PyramidNdf, PartsOfPixelsCountByTheirArea) {
+  const PyramidNdf model(pyramid().view());
+  RandomQueries random(2);
+  for (int k = 0; k < 100; ++k) {
+    const Footprint p = random.footprint();
+    // A box of 2x2 pixels around a pixel corner, moved by (a, b) of a pixel.
+    const int x = 1 + random.below(kResolution - 3), y = 1 + random.below(kResolution - 3);
+    const double a = random.below(64) / 64.0, b = random.below(64) / 64.0;
+    double expected = 0;
+    for (int j = 0; j < 3; ++j)
+      for (int i = 0; i < 3; ++i) {
+        const double wx = i == 0 ? 1 - a : i == 1 ? 1 : a, wy = j == 0 ? 1 - b : j == 1 ? 1 : b;
+        expected += wx * wy * model.density(p, {toHalfVector(x + i) + 1.0f / kResolution, toHalfVector(y + j) + 1.0f / kResolution}) / 4;
+      }
+    const Vec2 low = {toHalfVector(x) + static_cast<float>(a) * 2 / kResolution, toHalfVector(y) + static_cast<float>(b) * 2 / kResolution};
+    EXPECT_NEAR(model.mean(p, {low, low + Vec2{4.0f / kResolution, 4.0f / kResolution}}), expected, kSumError * (expected + 1));
+  }
+}
+
+TEST(CpNdf, SignedMeanOverPixelsIsTheMeanOfSignedPointQueries) {
+  forEachCompression([](const CpNdf& model, const CompressedNdfData&) {
+    RandomQueries random(3);
+    int negative = 0;
+    for (int k = 0; k < 60; ++k) {
+      const Footprint p = random.footprint();
+      const auto pixels = random.pixels();
+      const auto [mean, magnitude] = meanOfPoints(pixels, [&](Vec2 h) {
+        const double d = model.signedDensity(p, h);
+        negative += d < 0;
+        return d;
+      });
+      // Columns of a few times the size of the result cancel.
+      EXPECT_NEAR(model.signedMean(p, boxOf(pixels)), mean, kSumError * (10 * magnitude + 1));
+      EXPECT_EQ(model.mean(p, boxOf(pixels)), std::max(0.0f, model.signedMean(p, boxOf(pixels))));
+    }
+    EXPECT_GT(negative, 0);  // otherwise nothing was said about signs
+  });
+}
+
+TEST(CpNdf, EqualsASlowDecoderAtItsCentres) {
+  constexpr double kFactorError = 1e-5;  // of the largest value: products of floats
+  forEachCompression([](const CpNdf& model, const CompressedNdfData& data) {
+    const CompressedNdf view = data.view();
+    for (int l = 0; l < view.shape.level_count; ++l) {
+      const PyramidGrid& grid = view.shape.levels[l];
+      for (const auto& [i, j] : {std::pair{0, 0}, {grid.columns / 2, grid.rows - 1}}) {
+        const Footprint p = Footprint::isotropic({(static_cast<float>(i) + 0.5f) * grid.stride / 100, (static_cast<float>(j) + 0.5f) * grid.stride / 72},
+                                                 kFootprintPerStride * grid.stride);
+        const auto expected = test::decodeImage(view, view.first_image[l] + static_cast<std::uint32_t>(j * grid.columns + i));
+        const double largest = *std::max_element(expected.begin(), expected.end());
+        ASSERT_GT(largest, 1);
+        for (std::size_t k = 0; k < expected.size(); ++k) {
+          const Vec2 h = test::pixelCentre(k, kResolution);
+          ASSERT_NEAR(model.signedDensity(p, h), expected[k], 10 * kFactorError * largest) << l << ' ' << i << ' ' << j << " pixel " << k;
+          ASSERT_EQ(model.density(p, h), std::max(0.0f, model.signedDensity(p, h)));
+        }
+      }
+    }
+  });
+}
+
+TEST(CpNdf, AFullRankBasisReproducesThePyramid) {
+  // 64 columns of a block's 256 pixels hold almost all of it; quantised bases have 12 bits and more.
+  constexpr double kBasisError = 0.02;
+  bake::CompressionOptions o;
+  o.method = CompressionMethod::pca;
+  o.coefficient_type = CoefficientType::f32;
+  o.rank = 64;
+  const CompressedNdfData data = bake::compressPyramid(pyramid().view(), o);
+  const PyramidNdf exact(pyramid().view());
+  const CpNdf model(data.view());
+  RandomQueries random(4);
+  for (int k = 0; k < 10; ++k) {
+    const Footprint p = random.footprint(7, 30);
+    EXPECT_LT(test::relL2(test::imageOf(model, p, kResolution), test::imageOf(exact, p, kResolution)), kBasisError);
+  }
+}
+
+/// Checks that hold for every model of a pyramid.
+template <class Model>
+void expectEnergyOfOne(const Model& model, double tolerance) {
+  RandomQueries random(5);
+  for (int k = 0; k < 40; ++k) {
+    const Footprint p = random.footprint(1, 500);
+    EXPECT_NEAR(model(p, Box2{{-1, -1}, {1, 1}}), 0.25, 0.25 * tolerance);
+    EXPECT_NEAR(model(p, Box2{{-1, -1}, {3, 1}}), 0.125, 0.125 * tolerance);  // 0 outside the square
+  }
+}
+
+TEST(PyramidNdf, MeanOverTheWholeSquareIsAQuarter) {
+  for (const Boundary boundary : {Boundary::wrap, Boundary::clamp})
+    expectEnergyOfOne([model = PyramidNdf(pyramid(boundary).view())](const Footprint& p, const Box2& b) { return model.mean(p, b); }, 1e-3);
+}
+
+TEST(CpNdf, MeanOverTheWholeSquareIsAQuarter) {
+  forEachCompression([](const CpNdf& model, const CompressedNdfData&) {
+    expectEnergyOfOne([&](const Footprint& p, const Box2& b) { return model.signedMean(p, b); }, 1e-4);
+  });
+}
+
+/// Weight of every image, as a sparse vector.
+std::map<std::pair<int, std::uint32_t>, double> weightsOf(const PyramidShape& shape, const Footprint& p) {
+  std::map<std::pair<int, std::uint32_t>, double> weights;
+  const PyramidSlices chosen = selectSlices(shape, p);
+  for (int k = 0; k < chosen.count; ++k) {
+    const PyramidSlice& s = chosen.slices[k];
+    EXPECT_GE(s.weight, 0);
+    EXPECT_LT(s.level, shape.level_count);
+    EXPECT_LT(s.image, shape.levels[s.level].imageCount());
+    weights[{s.level, s.image}] += s.weight;
+  }
+  return weights;
+}
+
+double distance(const std::map<std::pair<int, std::uint32_t>, double>& a, std::map<std::pair<int, std::uint32_t>, double> b) {
+  for (const auto& [image, w] : a) b[image] -= w;
+  double sum = 0;
+  for (const auto& [image, w] : b) sum += std::abs(w);
+  return sum;
+}
+
+TEST(PyramidSlices, WeightsAreNotNegativeAndSumToOne) {
+  RandomQueries random(6);
+  for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
+    for (int k = 0; k < 5000; ++k) {
+      double sum = 0;
+      for (const auto& [image, w] : weightsOf(pyramid(boundary).shape, random.footprint(0.1f, 1e4f))) sum += w;
+      ASSERT_NEAR(sum, 1, 1e-6);
+    }
+  }
+}
+
+TEST(PyramidSlices, WeightsAreContinuousInPositionAndSize) {
+  // Bilinear weights change by 2 a gap and axis. The shortest gap between centres of a wrapping level is what is left over when the
+  // stride does not divide the map: at stride 16 it is 4 of 100 texels, at 64 36.
+  constexpr double kShortestGap = 4, kStep = 0.02;  // texels
+  constexpr double kMostPerStep = 2 * kStep / kShortestGap + 1e-4;
+  for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
+    const PyramidShape& shape = pyramid(boundary).shape;
+    for (const float sigma : {3.0f, 6.93f, 9.0f, 13.86f, 20.0f, 27.7f, 100.0f}) {
+      for (const bool along_v : {false, true}) {
+        const int extent = along_v ? shape.height : shape.width;
+        const int steps = static_cast<int>(extent / kStep);
+        const auto at = [&](int k) {
+          const auto u = static_cast<float>(static_cast<double>(k % steps) / steps);
+          return weightsOf(shape, Footprint::isotropic(along_v ? Vec2{0.37f, u} : Vec2{u, 0.37f}, sigma));
+        };
+        auto previous = at(0);
+        for (int k = 1; k <= (boundary == Boundary::wrap ? steps : steps - 1); ++k) {  // with wrap, round to where it started
+          auto next = at(k);
+          ASSERT_LT(distance(previous, next), kMostPerStep) << "sigma " << sigma << " step " << k;
+          previous = std::move(next);
+        }
+      }
+    }
+    auto previous = weightsOf(shape, Footprint::isotropic({0.61f, 0.83f}, 2));
+    for (float octave = 1; octave < 7; octave += 0.01f) {  // linear in octaves: 2 for each
+      auto next = weightsOf(shape, Footprint::isotropic({0.61f, 0.83f}, std::exp2(octave)));
+      ASSERT_LT(distance(previous, next), 0.021) << octave;
+      previous = std::move(next);
+    }
+  }
+}
+
+TEST(PyramidSlices, CentresGetTheirOwnImage) {
+  constexpr double kCentreError = 1e-4;  // a centre as uv is rounded: 1e-5 of the gap between centres
+  for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
+    const PyramidShape& shape = pyramid(boundary).shape;
+    for (int l = 0; l < shape.level_count; ++l) {
+      const PyramidGrid& grid = shape.levels[l];
+      for (int j = 0; j < grid.rows; ++j) {
+        for (int i = 0; i < grid.columns; ++i) {
+          const Vec2 uv = {(static_cast<float>(i) + 0.5f) * grid.stride / 100, (static_cast<float>(j) + 0.5f) * grid.stride / 72};
+          if (boundary == Boundary::clamp && (uv.x >= 1 || uv.y >= 1)) continue;
+          auto weights = weightsOf(shape, Footprint::isotropic(uv, kFootprintPerStride * grid.stride));
+          EXPECT_NEAR((weights[{l, static_cast<std::uint32_t>(j * grid.columns + i)}]), 1, kCentreError) << l << ' ' << i << ' ' << j;
+        }
+      }
+    }
+  }
+}
+
+/// Checks that hold for every model of a pyramid, in the way that a user sees them.
+template <class Model>
+void expectLevelsAreExtended(const Model& model, const Model& with_normals, const Boundary boundary) {
+  RandomQueries random(7);
+  const Reference exact(map().map(), 0.02f, Surface::flat, boundary, Reference::Search::pruned);
+  const float finest = finestSigma(model.shape()), coarsest = 4 * finest;
+  int positive = 0;
+  for (int k = 0; k < 200; ++k) {
+    const Vec2 uv = {random.unit(), random.unit()};
+    const Vec2 h = {random.unit() - 0.5f, random.unit() - 0.5f};
+    const Box2 range = {h, h + Vec2{0.1f, 0.2f}};
+    for (const float sigma : {0.0f, 0.3f, 0.99f * finest}) {
+      const Footprint p = Footprint::isotropic(uv, sigma), level0 = Footprint::isotropic(uv, finest);
+      EXPECT_EQ(with_normals.density(p, h), exact.density(p, h));
+      EXPECT_EQ(with_normals.mean(p, range), exact.mean(p, range));
+      EXPECT_NEAR(model.density(p, h), model.density(level0, h), 1e-4 * (1 + model.density(level0, h)));
+      EXPECT_NEAR(model.mean(p, range), model.mean(level0, range), 1e-4);
+      positive += exact.density(p, h) > 0.1f;
+    }
+    for (const float sigma : {1.01f * coarsest, 1e3f, 1e10f}) {
+      const Footprint p = Footprint::isotropic(uv, sigma), last = Footprint::isotropic(uv, coarsest);
+      EXPECT_NEAR(model.density(p, h), model.density(last, h), 1e-4 * (1 + model.density(last, h)));
+      EXPECT_EQ(with_normals.density(p, h), model.density(p, h));
+    }
+  }
+  EXPECT_GT(positive, 20);
+}
+
+TEST(PyramidNdf, BelowTheFinestLevelTheTexelsAnswerAndAboveTheLastItStays) {
+  for (const Boundary boundary : {Boundary::wrap, Boundary::clamp})
+    expectLevelsAreExtended(PyramidNdf(pyramid(boundary).view()), PyramidNdf(pyramid(boundary).view(), map().map()), boundary);
+}
+
+TEST(CpNdf, BelowTheFinestLevelTheTexelsAnswerAndAboveTheLastItStays) {
+  const CompressedNdf view = compressed(CompressionMethod::tucker, CoefficientType::f16).view();
+  expectLevelsAreExtended(CpNdf(view), CpNdf(view, map().map()), Boundary::wrap);
+}
+
+template <class Model>
+void expectDegenerateQueriesAreAnswered(const Model& model) {
+  const Vec2 uv = {0.3f, 0.7f};
+  const Footprint p = Footprint::isotropic(uv, 10);
+  const Box2 whole = {{-1, -1}, {1, 1}};
+  for (const Vec2 h : {Vec2{1.001f, 0}, Vec2{0, -1.001f}, Vec2{kNan, 0}, Vec2{0, kNan}, Vec2{kInfinity, 0}}) EXPECT_EQ(model.density(p, h), 0);
+  for (const Vec2 h : {Vec2{1, 1}, Vec2{-1, -1}, Vec2{1, -1}}) EXPECT_GE(model.density(p, h), 0);  // corners are read inside the image
+  for (const Box2 range : {Box2{{0, 0}, {0, 1}}, Box2{{0.5f, 0}, {-0.5f, 1}}, Box2{{kNan, 0}, {1, 1}}, Box2{{0, 0}, {1, kNan}}, Box2{{2, 2}, {3, 3}},
+                           Box2{{-kInfinity, -kInfinity}, {kInfinity, kInfinity}}})
+    EXPECT_EQ(model.mean(p, range), 0) << range.low.x << ' ' << range.high.x;
+
+  // Too narrow or not finite: the narrowest footprint.
+  const float narrowest = model.density(Footprint::isotropic(uv, kMinSigmaTexels), {0, 0});
+  EXPECT_TRUE(std::isfinite(narrowest));
+  for (const Footprint& q : {Footprint::isotropic(uv, 0), Footprint::isotropic(uv, kNan), Footprint::gaussian(uv, {-4, 0, -4}),
+                             Footprint::gaussian(uv, {kInfinity, 0, 1}), Footprint::box(uv, {0, 0}, {0, 0}), Footprint::box(uv, {kNan, 0}, {0, 1})})
+    EXPECT_EQ(model.density(q, {0, 0}), narrowest);
+  // A centre that is not finite counts as 0.
+  EXPECT_EQ(model.density(Footprint::isotropic({kNan, -kInfinity}, 10), {0, 0}), model.density(Footprint::isotropic({0, 0}, 10), {0, 0}));
+  // Larger than the map: the coarsest level.
+  const float coarsest = model.density(Footprint::isotropic(uv, 1e4f), {0.1f, 0});
+  EXPECT_GT(coarsest, 0);
+  for (const Footprint& q : {Footprint::isotropic(uv, 1e18f), Footprint::box(uv, {1e9f, 0}, {0, 1e9f}), Footprint::box(uv, {1e18f, 0}, {0, 1e18f})})
+    EXPECT_EQ(model.density(q, {0.1f, 0}), coarsest);
+  for (const float thickness : {0.0f, 1e-6f, 1e-3f, 0.1f})
+    EXPECT_NEAR(model.mean(Footprint::box(uv, {9, 3}, {-thickness, thickness}), whole), 0.25, 0.01);
+}
+
+TEST(PyramidNdf, DegenerateQueriesHaveDocumentedAnswers) {
+  for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
+    expectDegenerateQueriesAreAnswered(PyramidNdf(pyramid(boundary).view()));
+    expectDegenerateQueriesAreAnswered(PyramidNdf(pyramid(boundary).view(), map().map()));
+  }
+}
+
+TEST(CpNdf, DegenerateQueriesHaveDocumentedAnswers) {
+  forEachCompression([](const CpNdf& model, const CompressedNdfData& data) {
+    expectDegenerateQueriesAreAnswered(model);
+    expectDegenerateQueriesAreAnswered(CpNdf(data.view(), map().map()));
+  });
+}
+
+TEST(PyramidNdf, TexturePlaneIsPeriodic) {
+  const PyramidNdf model(pyramid().view());
+  RandomQueries random(8);
+  for (int k = 0; k < 100; ++k) {
+    const Vec2 uv = {static_cast<float>(random.below(64)) / 64, static_cast<float>(random.below(64)) / 64};  // exact far away
+    const float sigma = 5 + 50 * random.unit();
+    const Vec2 h = {random.unit() - 0.5f, random.unit() - 0.5f};
+    for (const Vec2 far : {Vec2{1, -1}, Vec2{-7, 3}, Vec2{4096, -100000}})
+      EXPECT_EQ(model.density(Footprint::isotropic(uv + far, sigma), h), model.density(Footprint::isotropic(uv, sigma), h));
+  }
+}
+
+TEST(PyramidNdf, BoxesAndAnisotropicFootprintsAreAnsweredByTheirMeanSquareSize) {
+  const PyramidNdf model(pyramid().view());
+  const Vec2 uv = {0.4f, 0.2f}, h = {0.1f, 0.05f};
+  const float expected = model.density(Footprint::isotropic(uv, std::sqrt(0.5f * (100 + 400))), h);
+  EXPECT_NEAR(model.density(Footprint::gaussian(uv, {100, 50, 400}), h), expected, 1e-5 * expected);
+  const float a = std::sqrt(300.0f), b = std::sqrt(1200.0f);  // half axes: three times the variance
+  EXPECT_NEAR(model.density(Footprint::box(uv, {a, 0}, {0, b}), h), expected, 1e-4 * expected);
+}
+
+}  // namespace
+}  // namespace glint
