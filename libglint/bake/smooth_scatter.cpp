@@ -15,7 +15,7 @@ namespace glint::bake {
 namespace {
 
 /// Lattice nodes per stride: the weights of a footprint are interpolated linearly between nodes.
-constexpr int kNodesPerStride = 6;
+constexpr int kNodesPerStride = 8;
 
 using NodeRow = std::vector<PackedBins>;  // one entry a node of the lattice
 using CellRow = std::vector<CornerBins>;  // one entry a cell of the lattice

@@ -12,8 +12,8 @@ namespace glint::bake {
 ///
 /// A triangle is cut into columns on its longest edge and these into pieces; every piece adds its share at its centre with
 /// quadratic B-spline weights (see DirectionBins). Pieces are moved outwards a little, so that the spread along the longest edge
-/// is the triangle's own. So triangles of any shape keep their mass, mean and extent, down to a segment or a point; and the blur
-/// that follows flattens pieces of up to 1.4 of its deviations to 2e-4.
+/// is the triangle's own. So triangles of any shape keep their mass, mean and extent, down to a segment or a point; the blur that
+/// follows flattens the pieces.
 class TriangleSplatter {
  public:
   /// @param bins_per_axis  of the square [-1, 1]^2; a multiple of BlockBins::kTile
@@ -33,7 +33,7 @@ class TriangleSplatter {
     int pitch;  // bins
     int tiles;  // per axis, with the margin
   };
-  static void splatPoints(const Vec2* points, const float* shares, int count, const float weights[4], const Raster& raster);
+  static void splatPoint(Vec2 point, float share, const float weights[4], const Raster& raster);
 
   float half_;   // bins in half the square
   float piece_;  // longest piece, bins
@@ -41,8 +41,6 @@ class TriangleSplatter {
   int pitch_;
   std::vector<float> bins_;
   std::vector<std::uint8_t> touched_;
-  std::vector<Vec2> points_;
-  std::vector<float> shares_;
 };
 
 }  // namespace glint::bake

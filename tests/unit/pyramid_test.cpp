@@ -339,7 +339,7 @@ TEST(Pyramid, FlatImagesOfFinerMapsConvergeToTheSmoothOne) {
     EXPECT_LT(error, 0.5 * previous) << factor;
     const NdfPyramidData flat_pyramid = buildPyramid(fine.map(), withLevels(options(12.0f * static_cast<float>(factor), kResolution, 0.02f), 1));
     const double pyramid_error = test::relL2(storedImage(flat_pyramid.view(), 0, 1, 2), storedImage(smooth_pyramid.view(), 0, 1, 2));
-    EXPECT_LT(pyramid_error, 0.6 * previous_pyramid) << factor;
+    EXPECT_LT(pyramid_error, std::max(0.6 * previous_pyramid, 0.5 * kImageError)) << factor;  // down to the builders' own error
     previous = error;
     previous_pyramid = pyramid_error;
   }
