@@ -14,6 +14,13 @@ if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
 endif()
 
+# Our own programs may use POPCNT and SSE4.2, which every x86 processor has had since 2009; kernels for newer ones are chosen at run
+# time. The query headers take whatever the including program is compiled for.
+set(GLINT_ARCH "x86-64-v2" CACHE STRING "-march of the programs and libraries on x86-64")
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  add_compile_options(-march=${GLINT_ARCH})
+endif()
+
 # In the tree as in an installed package, headers are included as "glint/<room>/<header>.h".
 set(GLINT_INCLUDE_DIR ${PROJECT_BINARY_DIR}/include)
 file(MAKE_DIRECTORY ${GLINT_INCLUDE_DIR}/glint)

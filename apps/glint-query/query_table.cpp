@@ -20,6 +20,7 @@ Rows parseCsv(const std::string& path) {
   csv_parser parser;
   if (csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI) != 0) throw std::bad_alloc();
   const std::unique_ptr<csv_parser, void (*)(csv_parser*)> guard(&parser, csv_free);
+  csv_set_space_func(&parser, [](unsigned char) { return 0; });  // keeps fields as they are
   struct State {
     Rows rows;
     std::vector<std::string> row;
@@ -61,9 +62,10 @@ class Columns {
   std::size_t find(const std::string& name) const { return std::find(header_.begin(), header_.end(), name) - header_.begin(); }
 
   float number(const std::string& text, const char* column, std::size_t line) const {
+    const std::size_t first = std::min(text.find_first_not_of(" \t"), text.size()), last = text.find_last_not_of(" \t") + 1;
     float value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value))
+    const auto [end, error] = std::from_chars(text.data() + first, text.data() + last, value);
+    if (error != std::errc() || end != text.data() + last || !std::isfinite(value))
       throw Error(ErrorCode::invalid_input, "csv.number", path_, fmt::format("row {}, column {}", line, column),
                   "'" + text + "' is not a finite number", "correct it");
     return value;

@@ -48,10 +48,17 @@ struct Footprint {
     p.centre = centre_uv;
     p.axis_a = half_axis_a;
     p.axis_b = half_axis_b;
-    p.covariance = {(half_axis_a.x * half_axis_a.x + half_axis_b.x * half_axis_b.x) / 3,
-                    (half_axis_a.x * half_axis_a.y + half_axis_b.x * half_axis_b.y) / 3,
-                    (half_axis_a.y * half_axis_a.y + half_axis_b.y * half_axis_b.y) / 3};
+    p.covariance = {secondMoment(half_axis_a.x, half_axis_a.x, half_axis_b.x, half_axis_b.x),
+                    secondMoment(half_axis_a.x, half_axis_a.y, half_axis_b.x, half_axis_b.y),
+                    secondMoment(half_axis_a.y, half_axis_a.y, half_axis_b.y, half_axis_b.y)};
     return p;
+  }
+
+ private:
+  /// (a0 a1 + b0 b1) / 3, at most 1e30: enormous boxes are still large, not undefined.
+  static GLINT_HD constexpr float secondMoment(float a0, float a1, float b0, float b1) {
+    const double moment = (double{a0} * a1 + double{b0} * b1) / 3;
+    return static_cast<float>(moment > 1e30 ? 1e30 : moment < -1e30 ? -1e30 : moment);
   }
 };
 

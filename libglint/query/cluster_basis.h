@@ -77,7 +77,7 @@ GLINT_HD void valueOfImage(const T* prefix, int columns, int x, int y, float* va
   }
 }
 
-/// Sums over a part of a block of every basis image of a cluster, scaled: density = dot(projection, coefficients of a slice).
+/// Sums over a part of a block of every basis image of a cluster, scaled: density = dotProduct(projection, coefficients of a slice).
 template <class T>
 struct BasisProjector {
   const CompressedNdf& ndf;
@@ -139,26 +139,35 @@ GLINT_HD int withProjector(const CompressedNdf& ndf, Visitor&& visitor) {
   return visitor(BasisProjector<std::int16_t>{ndf});
 }
 
-/// Dot product of a projection with the coefficients of a slice that start at element `first`.
-inline GLINT_HD float dotCoefficients(const CompressedNdf& ndf, std::uint64_t first, const float* projection, int columns) {
-  float sum = 0;
+/// blend[k] += weight * coefficient k of the slice that starts at element `first`.
+inline GLINT_HD void addCoefficients(const CompressedNdf& ndf, std::uint64_t first, float weight, int columns, float* blend) {
   switch (ndf.coefficient_type) {
     case CoefficientType::i8: {
       const auto* c = static_cast<const std::int8_t*>(ndf.coefficients) + first;
-      for (int k = 0; k < columns; ++k) sum += projection[k] * static_cast<float>(c[k]);
+      for (int k = 0; k < columns; ++k) blend[k] += weight * static_cast<float>(c[k]);
       break;
     }
     case CoefficientType::f16: {
       const auto* c = static_cast<const std::uint16_t*>(ndf.coefficients) + first;
-      for (int k = 0; k < columns; ++k) sum += projection[k] * halfToFloat(c[k]);
+      for (int k = 0; k < columns; ++k) blend[k] += weight * halfToFloat(c[k]);
       break;
     }
     case CoefficientType::f32: {
       const auto* c = static_cast<const float*>(ndf.coefficients) + first;
-      for (int k = 0; k < columns; ++k) sum += projection[k] * c[k];
+      for (int k = 0; k < columns; ++k) blend[k] += weight * c[k];
       break;
     }
   }
+}
+
+/// Dot product of a projection with blended coefficients, in four sums side by side: one would wait for each addition.
+inline GLINT_HD float dotProduct(const float* a, const float* b, int columns) {
+  float sums[4] = {};
+  int k = 0;
+  for (; k + 4 <= columns; k += 4)
+    for (int lane = 0; lane < 4; ++lane) sums[lane] += a[k + lane] * b[k + lane];
+  float sum = (sums[0] + sums[2]) + (sums[1] + sums[3]);
+  for (; k < columns; ++k) sum += a[k] * b[k];
   return sum;
 }
 

@@ -32,7 +32,7 @@ class CpNdf {
 
   GLINT_HD float signedDensity(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    if (below_.hasMap() && isotropicSigma(shape(), p) < finestSigma(shape())) return below_.density(p, h);
+    if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
     const PyramidSlices chosen = selectSlices(shape(), p);
     const PixelPlace place = pixelPlace(shape(), h);
     return blockValue(chosen, place.block, [&](const auto& projector, const NdfCluster& cluster, float* projection) {
@@ -42,7 +42,7 @@ class CpNdf {
 
   GLINT_HD float signedMean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
-    if (below_.hasMap() && isotropicSigma(shape(), p) < finestSigma(shape())) return below_.mean(p, range);
+    if (below_.hasMap() && belowFinest(shape(), p)) return below_.mean(p, range);
     const PyramidSlices chosen = selectSlices(shape(), p);
     double sum = 0;
     forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
@@ -54,13 +54,21 @@ class CpNdf {
   }
 
  private:
-  /// Weighted sum over slices of one block. Slices of the same cluster share its projection; neighbours mostly do.
+  /// Weighted sum over slices of one block. The coefficients of slices of the same cluster, as neighbours mostly are, are blended
+  /// first and meet the cluster's projection once.
   template <class Project>
   GLINT_HD float blockValue(const PyramidSlices& chosen, int block, Project&& project) const {
-    float projection[kMaxColumns];
-    std::size_t projected = ~std::size_t{0};
-    int columns = 0;
+    constexpr std::size_t kNone = ~std::size_t{0};
+    float blend[kMaxColumns];
+    std::size_t current = kNone;
     float sum = 0;
+    const auto finishCluster = [&] {
+      if (current == kNone) return;
+      const NdfCluster& cluster = ndf_.clusters.data()[current];
+      float projection[kMaxColumns];
+      const int columns = withProjector(ndf_, [&](const auto& projector) { return project(projector, cluster, projection); });
+      sum += dotProduct(projection, blend, columns);
+    };
     for (int k = 0; k < chosen.count; ++k) {
       const PyramidSlice& slice = chosen.slices[k];
       const std::size_t image = ndf_.first_image[slice.level] + slice.image;
@@ -70,14 +78,16 @@ class CpNdf {
       const std::uint64_t mask = ndf_.masks.data()[word], bit = std::uint64_t{1} << (slot % 64);
       if (!(mask & bit)) continue;
       const NdfCluster& cluster = ndf_.clusters.data()[at];
-      if (at != projected) {
-        projected = at;
-        columns = withProjector(ndf_, [&](const auto& projector) { return project(projector, cluster, projection); });
+      const int columns = columnCount(ndf_, cluster);
+      if (at != current) {
+        finishCluster();
+        current = at;
+        std::fill(blend, blend + columns, 0.0f);
       }
       const std::uint64_t row = ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(std::popcount(mask & (bit - 1)));
-      sum += slice.weight * ndf_.image_scales.data()[image] *
-             dotCoefficients(ndf_, cluster.first_coefficient + row * columns, projection, columns);
+      addCoefficients(ndf_, cluster.first_coefficient + row * columns, slice.weight * ndf_.image_scales.data()[image], columns, blend);
     }
+    finishCluster();
     return sum;
   }
 

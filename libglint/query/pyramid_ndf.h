@@ -26,7 +26,7 @@ class PyramidNdf {
   /// Density towards h, >= 0; O(1): one pixel in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    if (below_.hasMap() && isotropicSigma(shape(), p) < finestSigma(shape())) return below_.density(p, h);
+    if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
     const PyramidSlices chosen = selectSlices(shape(), p);
     const PixelPlace place = pixelPlace(shape(), h);
     float sum = 0;
@@ -42,7 +42,7 @@ class PyramidNdf {
   /// their mean stored, others sum at most 256 pixels.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
-    if (below_.hasMap() && isotropicSigma(shape(), p) < finestSigma(shape())) return below_.mean(p, range);
+    if (below_.hasMap() && belowFinest(shape(), p)) return below_.mean(p, range);
     const PyramidSlices chosen = selectSlices(shape(), p);
     double sum = 0;
     forEachBlock(shape(), range, [&](int block, const BlockBox& box) {

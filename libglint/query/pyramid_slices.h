@@ -23,14 +23,26 @@ struct PyramidSlices {
   int count = 0;
 };
 
-/// Deviation (texels) of the isotropic Gaussian with the same mean square size as a footprint.
-inline GLINT_HD float isotropicSigma(const PyramidShape& shape, const Footprint& p) {
-  const Covariance c = usableCovariance(p.covariance, shape.width, shape.height);
-  return std::sqrt(0.5f * (c.xx + c.yy));
+/// Variance (texels^2) of the isotropic Gaussian with the same mean square size as a footprint, which is first shortened to the
+/// map along u and v and widened to kMinSigmaTexels; a size that is not finite counts as the smallest.
+inline GLINT_HD float isotropicVariance(const PyramidShape& shape, const Footprint& p) {
+  constexpr float kLowest = kMinSigmaTexels * kMinSigmaTexels;
+  const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
+  if (!std::isfinite(p.covariance.xx + p.covariance.xy + p.covariance.yy)) return kLowest;
+  const float variance = 0.5f * (std::min(p.covariance.xx, width * width) + std::min(p.covariance.yy, height * height));
+  return std::max(variance, kLowest);
 }
+
+/// Its deviation, texels.
+inline GLINT_HD float isotropicSigma(const PyramidShape& shape, const Footprint& p) { return std::sqrt(isotropicVariance(shape, p)); }
 
 /// Footprint of level 0, texels. Narrower ones are answered from the texels themselves where these are at hand.
 inline GLINT_HD float finestSigma(const PyramidShape& shape) { return kFootprintPerStride * shape.levels[0].stride; }
+
+/// Whether a footprint is narrower than those of level 0.
+inline GLINT_HD bool belowFinest(const PyramidShape& shape, const Footprint& p) {
+  return isotropicVariance(shape, p) < finestSigma(shape) * finestSigma(shape);
+}
 
 /// Two neighbouring centres of a level along one axis, and the position between them.
 struct CentreNeighbours {
@@ -62,7 +74,8 @@ inline GLINT_HD CentreNeighbours centreNeighbours(float u, int size, float strid
 /// Trilinear choice of images: bilinear between centres, linear in log2 of the footprint's size between levels. Footprints
 /// below the finest or above the coarsest level get that level.
 inline GLINT_HD PyramidSlices selectSlices(const PyramidShape& shape, const Footprint& p) {
-  const float octave = std::log2(isotropicSigma(shape, p) / finestSigma(shape));
+  const float finest = finestSigma(shape);
+  const float octave = 0.5f * std::log2(isotropicVariance(shape, p) / (finest * finest));
   const float level = std::clamp(octave, 0.0f, static_cast<float>(shape.level_count - 1));
   const int first = std::min(static_cast<int>(level), shape.level_count - 1);
   const float t = level - static_cast<float>(first);
