@@ -18,9 +18,12 @@ constexpr int kReferenceResolution = 256;
 
 NdfAsset::NdfAsset(Tool& tool) : tool_(tool) {
   tool.option("ASSET", path_, "asset of kind normals, ndf-pyramid or ndf-cp").required();
-  tool.option("--normals", normals_path_, "asset of kind normals that the pyramid was made from, for footprints below its finest level");
-  tool.choice("--surface", surface_, {{"flat", Surface::flat}, {"smooth", Surface::smooth}}, "how normals behave between texels (kind normals)");
-  tool.choice("--boundary", boundary_, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}}, "beyond the border of the map (kind normals)");
+  tool.option("--normals", normals_path_,
+              "asset of kind normals that the pyramid was made from, for footprints below its finest level");
+  tool.choice("--surface", surface_, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
+              "how normals behave between texels (kind normals)");
+  tool.choice("--boundary", boundary_, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
+              "beyond the border of the map (kind normals)");
   tool.option("--sigma-r", sigma_r_, "intrinsic roughness, disk units (kind normals)").range(1e-4, 0.25);
   tool.addCheck([this] {
     checkReadable(path_);
@@ -37,10 +40,12 @@ void NdfAsset::open() {
     requireSameMap(view.shape, asset_->info());
     return Model(view, normals_->normals());
   };
-  if (asset_->kind() == "ndf-pyramid") model_ = make(asset_->pyramid(), std::type_identity<PyramidNdf>());
-  else if (asset_->kind() == "ndf-cp") model_ = make(asset_->compressed(), std::type_identity<CpNdf>());
-  else model_ = Reference(asset_->normals(), sigma_r_, surface_, boundary_, Reference::Search::pruned);
-
+  if (asset_->kind() == "ndf-pyramid")
+    model_ = make(asset_->pyramid(), std::type_identity<PyramidNdf>());
+  else if (asset_->kind() == "ndf-cp")
+    model_ = make(asset_->compressed(), std::type_identity<CpNdf>());
+  else
+    model_ = Reference(asset_->normals(), sigma_r_, surface_, boundary_, Reference::Search::pruned);
 }
 
 int NdfAsset::resolution() const {
@@ -75,8 +80,8 @@ void NdfAsset::requireSameMap(const PyramidShape& shape, const formats::AssetInf
   const bool named = hash.empty() || inputs.empty() ||
                      std::any_of(inputs.begin(), inputs.end(), [&](const auto& input) { return input.hash_hex == hash; });
   if (named && map.width == shape.width && map.height == shape.height) return;
-  throw Error(ErrorCode::invalid_input, "query.normals", normals_path_, "", "this is not the map that " + path_ + " was made from",
-              "give the asset that glint-pyramid read");
+  throw Error(ErrorCode::invalid_input, "query.normals", normals_path_, "",
+              "this is not the map that " + path_ + " was made from", "give the asset that glint-pyramid read");
 }
 
 }  // namespace glint::apps

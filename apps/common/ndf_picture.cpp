@@ -15,13 +15,15 @@ namespace glint::apps {
 void checkPictureName(const std::string& path) {
   const std::string extension = std::filesystem::path(path).extension().string();
   if (extension == ".exr" || extension == ".png") return;
-  throw Error(ErrorCode::usage, "image.extension", path, "", "an NDF image is written as .exr (densities) or .png (colours)", "change the extension");
+  throw Error(ErrorCode::usage, "image.extension", path, "", "an NDF image is written as .exr (densities) or .png (colours)",
+              "change the extension");
 }
 
 std::vector<float> ndfColours(int size, std::span<const float> densities, float largest) {
   std::vector<float> grey(densities.size());
   const float scale = largest > 0 ? 1 / std::log1p(largest) : 0;
-  std::transform(densities.begin(), densities.end(), grey.begin(), [&](float d) { return scale * std::log1p(std::max(0.0f, d)); });
+  std::transform(densities.begin(), densities.end(), grey.begin(),
+                 [&](float d) { return scale * std::log1p(std::max(0.0f, d)); });
   const OIIO::ImageSpec grey_spec(size, size, 1, OIIO::TypeDesc::FLOAT), colour_spec(size, size, 3, OIIO::TypeDesc::FLOAT);
   const OIIO::ImageBuf source(grey_spec, grey.data());
   std::vector<float> colours(3 * densities.size());

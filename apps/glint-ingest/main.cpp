@@ -24,10 +24,9 @@ void writeNormals(const apps::OutputFile& output, const apps::Image& image, floa
 }  // namespace
 
 int main(int argc, char** argv) {
-  apps::Tool tool(
-      {"glint-ingest",
-       "Turns any image of normals or heights into an asset. Wrong inputs are refused, not clamped.",
-       "glint-ingest flakes.png -o flakes.glint --convention directx"});
+  apps::Tool tool({"glint-ingest",
+                   "Turns any image of normals or heights into an asset. Wrong inputs are refused, not clamped.",
+                   "glint-ingest flakes.png -o flakes.glint --convention directx"});
   const apps::InputFile input(tool, "image of normals or heights", "IMAGE");
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of normals or heights");
   const apps::IngestOptions options(tool);

@@ -10,10 +10,11 @@
 using namespace glint;
 
 int main(int argc, char** argv) {
-  apps::Tool tool({"glint-pyramid",
-                   "Computes the NDF images of a normal map for footprints of every size and position: the level of detail of its "
-                   "glints, ready to be queried or compressed.",
-                   "glint-pyramid flakes.glint -o flakes.pyramid.glint --stride 32 --sigma-r 0.005"});
+  apps::Tool tool(
+      {"glint-pyramid",
+       "Computes the NDF images of a normal map for footprints of every size and position: the level of detail of its "
+       "glints, ready to be queried or compressed.",
+       "glint-pyramid flakes.glint -o flakes.pyramid.glint --stride 32 --sigma-r 0.005"});
   const apps::InputFile input(tool, "asset of kind normals, from glint-ingest", "NORMALS");
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind ndf-pyramid");
   apps::PyramidCommand command(tool);

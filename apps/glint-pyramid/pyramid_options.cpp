@@ -16,7 +16,8 @@ PyramidCommand::PyramidCommand(Tool& tool) {
   tool.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
               "whether the map repeats or ends at its border");
   tool.option("--levels", levels_, "number of levels; auto: until levels agree to 1 % or the stride reaches the map");
-  tool.choice("--precision", options_.precision, {{"half", BlockPrecision::f16}, {"float", BlockPrecision::f32}}, "of stored pixels");
+  tool.choice("--precision", options_.precision, {{"half", BlockPrecision::f16}, {"float", BlockPrecision::f32}},
+              "of stored pixels");
 }
 
 bake::PyramidOptions PyramidCommand::options() const {
@@ -25,7 +26,8 @@ bake::PyramidOptions PyramidCommand::options() const {
   const char* end = levels_.data() + levels_.size();
   const auto [stop, error] = std::from_chars(levels_.data(), end, options.levels);
   if (error != std::errc() || stop != end || options.levels < 1)
-    throw Error(ErrorCode::usage, "option.range", {}, "--levels", "'" + levels_ + "' is not a number of levels", "give auto, or 1 or more");
+    throw Error(ErrorCode::usage, "option.range", {}, "--levels", "'" + levels_ + "' is not a number of levels",
+                "give auto, or 1 or more");
   return options;
 }
 
@@ -37,18 +39,21 @@ nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid) {
     const std::size_t blocks = pyramid.levels[l].block_means.size();
     const std::size_t level_bytes = blocks * kBlockPixels * (pyramid.precision == BlockPrecision::f16 ? 2 : 4);
     bytes += level_bytes;
-    levels.push_back({{"stride_texels", grid.stride},
-                      {"columns", grid.columns},
-                      {"rows", grid.rows},
-                      {"blocks", blocks},
-                      {"occupied", static_cast<double>(blocks) / (static_cast<double>(grid.imageCount()) * pyramid.shape.blocksPerImage())},
-                      {"size_bytes", level_bytes}});
+    levels.push_back(
+        {{"stride_texels", grid.stride},
+         {"columns", grid.columns},
+         {"rows", grid.rows},
+         {"blocks", blocks},
+         {"occupied", static_cast<double>(blocks) / (static_cast<double>(grid.imageCount()) * pyramid.shape.blocksPerImage())},
+         {"size_bytes", level_bytes}});
   }
-  return {{"levels", levels}, {"size_bytes", bytes}, {"resolution", pyramid.shape.resolution}, {"sigma_r", pyramid.shape.sigma_r}};
+  return {
+      {"levels", levels}, {"size_bytes", bytes}, {"resolution", pyramid.shape.resolution}, {"sigma_r", pyramid.shape.sigma_r}};
 }
 
 std::string pyramidText(const bake::NdfPyramidData& pyramid) {
-  std::string text = fmt::format("{:>5} {:>8} {:>11} {:>9} {:>9} {:>9}\n", "level", "stride", "images", "blocks", "occupied", "MB");
+  std::string text =
+      fmt::format("{:>5} {:>8} {:>11} {:>9} {:>9} {:>9}\n", "level", "stride", "images", "blocks", "occupied", "MB");
   const nlohmann::json json = pyramidJson(pyramid);
   int l = 0;
   for (const auto& level : json["levels"]) {

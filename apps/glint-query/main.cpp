@@ -5,10 +5,11 @@
 using namespace glint;
 
 int main(int argc, char** argv) {
-  apps::Tool tool({"glint-query",
-                   "Asks an asset how the normals inside a footprint are distributed: the density towards a half vector, its mean over "
-                   "a range of them, or a picture of the whole distribution.",
-                   "glint-query flakes.pyramid.glint --uv 0.3 0.7 --sigma 20 --half 0.1 -0.05"});
+  apps::Tool tool(
+      {"glint-query",
+       "Asks an asset how the normals inside a footprint are distributed: the density towards a half vector, its mean over "
+       "a range of them, or a picture of the whole distribution.",
+       "glint-query flakes.pyramid.glint --uv 0.3 0.7 --sigma 20 --half 0.1 -0.05"});
   apps::NdfAsset asset(tool);
   apps::QueryCommand command(tool);
 

@@ -10,8 +10,11 @@
 namespace glint::apps {
 
 float answer(const AnyNdf& model, const Query& query) {
-  return std::visit([&](const auto& m) { return query.range ? m.mean(query.footprint, *query.range) : m.density(query.footprint, *query.half); },
-                    model);
+  return std::visit(
+      [&](const auto& m) {
+        return query.range ? m.mean(query.footprint, *query.range) : m.density(query.footprint, *query.half);
+      },
+      model);
 }
 
 std::vector<float> answerAll(const AnyNdf& model, std::span<const Query> queries) {
@@ -44,8 +47,11 @@ std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int
   tbb::parallel_for(0, resolution, [&](int y) {
     for (int x = 0; x < resolution; ++x) {
       const Vec2 low = {-1 + static_cast<float>(x) * pixel, -1 + static_cast<float>(y) * pixel};
-      image[static_cast<std::size_t>(y) * resolution + x] =
-          std::visit([&](const auto& m) { return m.mean(footprint, {low, low + Vec2{pixel, pixel}}); }, model);
+      image[static_cast<std::size_t>(y) * resolution + x] = std::visit(
+          [&](const auto& m) {
+            return m.mean(footprint, {low, low + Vec2{pixel, pixel}});
+          },
+          model);
     }
     const std::scoped_lock lock(mutex);
     if (progress) progress(++done, resolution);

@@ -18,9 +18,12 @@ QueryCommand::QueryCommand(Tool& tool) : tool_(tool) {
   half_option_ = &tool.option("--half", half_, "ask for the density towards a half vector HX HY").count(2);
   range_option_ = &tool.option("--range", range_, "ask for the mean density over a box X0 Y0 X1 Y1 of half vectors").count(4);
   tool.option("--image", image_, "write the NDF image: densities as .exr, colours as .png");
-  tool.option("--image-size", image_size_, "pixels of the image along each axis").range(1, 4096).defaultText("the asset's own, or 256");
-  csv_option_ = &tool.option("--csv", csv_, "answer a table of queries; its header names u,v; sigma or sxx,sxy,syy or ax,ay,bx,by; "
-                                            "hx,hy or x0,y0,x1,y1");
+  tool.option("--image-size", image_size_, "pixels of the image along each axis")
+      .range(1, 4096)
+      .defaultText("the asset's own, or 256");
+  csv_option_ = &tool.option("--csv", csv_,
+                             "answer a table of queries; its header names u,v; sigma or sxx,sxy,syy or ax,ay,bx,by; "
+                             "hx,hy or x0,y0,x1,y1");
   output_option_ = &tool.option("-o,--output", output_, "where the answered table goes; - for stdout").needs(*csv_option_);
   tool.option("--repeat", repeat_, "time the query: nanoseconds, median of 15 runs of N / 15").range(1, 1000000000);
   sigma_option_->excludes(*covariance_option_).excludes(*box_option_);
@@ -30,9 +33,12 @@ QueryCommand::QueryCommand(Tool& tool) : tool_(tool) {
 }
 
 void QueryCommand::check() const {
-  const auto usage = [](const std::string& what, const std::string& remedy) { throw Error(ErrorCode::usage, "query.arguments", "", "", what, remedy); };
+  const auto usage = [](const std::string& what, const std::string& remedy) {
+    throw Error(ErrorCode::usage, "query.arguments", "", "", what, remedy);
+  };
   if (csv_option_->given()) {
-    if (uv_option_->given() || !image_.empty() || half_option_->given() || range_option_->given()) usage("--csv asks its own queries", "leave out the others");
+    if (uv_option_->given() || !image_.empty() || half_option_->given() || range_option_->given())
+      usage("--csv asks its own queries", "leave out the others");
     if (!output_option_->given()) usage("--csv needs a place for the answers", "add -o OUT.csv, or -o - for stdout");
     checkReadable(csv_);
     if (output_ != "-") checkWritable(output_);
@@ -41,7 +47,8 @@ void QueryCommand::check() const {
   if (!uv_option_->given()) usage("no footprint was given", "add --uv U V, or --csv TABLE");
   if (!sigma_option_->given() && !covariance_option_->given() && !box_option_->given())
     usage("the footprint has no size", "add --sigma S, --cov SXX SXY SYY or --box AX AY BX BY");
-  if (image_.empty() && !half_option_->given() && !range_option_->given()) usage("nothing was asked", "add --half, --range or --image");
+  if (image_.empty() && !half_option_->given() && !range_option_->given())
+    usage("nothing was asked", "add --half, --range or --image");
   if (!image_.empty()) {
     checkWritable(image_);
     checkPictureName(image_);
@@ -74,8 +81,10 @@ void QueryCommand::answerTable(NdfAsset& asset) {
   const QueryTable table = QueryTable::read(csv_);
   for (const Query& query : table.queries()) asset.requireAnswerable(query.footprint);
   const std::string text = table.withAnswers(answerAll(asset.model(), table.queries()));
-  if (output_ == "-") tool_.print(text);
-  else writeFileAtomically(output_, text);
+  if (output_ == "-")
+    tool_.print(text);
+  else
+    writeFileAtomically(output_, text);
   tool_.setResult({{"queries", table.queries().size()}});
 }
 

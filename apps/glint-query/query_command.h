@@ -31,7 +31,8 @@ class QueryCommand {
   std::string image_, csv_, output_;
   int image_size_ = 0;
   int repeat_ = 0;
-  Option *uv_option_, *sigma_option_, *covariance_option_, *box_option_, *half_option_, *range_option_, *csv_option_, *output_option_;
+  Option *uv_option_, *sigma_option_, *covariance_option_, *box_option_, *half_option_, *range_option_, *csv_option_,
+      *output_option_;
 };
 
 }  // namespace glint::apps

@@ -33,11 +33,14 @@ Rows parseCsv(const std::string& path) {
     st->rows.push_back(std::move(st->row));
     st->row.clear();
   };
-  const bool ok = csv_parse(&parser, bytes.data(), bytes.size(), onField, onRow, &state) == bytes.size() && csv_fini(&parser, onField, onRow, &state) == 0;
+  const bool ok = csv_parse(&parser, bytes.data(), bytes.size(), onField, onRow, &state) == bytes.size() &&
+                  csv_fini(&parser, onField, onRow, &state) == 0;
   if (!ok)
-    throw Error(ErrorCode::invalid_input, "csv.syntax", path, fmt::format("row {}", state.rows.size() + 1), csv_strerror(csv_error(&parser)),
-                "quote fields as RFC 4180 says");
-  if (state.rows.empty()) throw Error(ErrorCode::invalid_input, "csv.empty", path, "", "the table is empty", "give a header and a row for each query");
+    throw Error(ErrorCode::invalid_input, "csv.syntax", path, fmt::format("row {}", state.rows.size() + 1),
+                csv_strerror(csv_error(&parser)), "quote fields as RFC 4180 says");
+  if (state.rows.empty())
+    throw Error(ErrorCode::invalid_input, "csv.empty", path, "", "the table is empty",
+                "give a header and a row for each query");
   return std::move(state.rows);
 }
 
@@ -52,7 +55,8 @@ class Columns {
   }
 
   template <std::size_t N>
-  std::array<float, N> read(const std::array<const char*, N>& names, const std::vector<std::string>& row, std::size_t line) const {
+  std::array<float, N> read(const std::array<const char*, N>& names, const std::vector<std::string>& row,
+                            std::size_t line) const {
     std::array<float, N> values;
     for (std::size_t k = 0; k < N; ++k) values[k] = number(row[find(names[k])], names[k], line);
     return values;
@@ -122,7 +126,8 @@ QueryTable QueryTable::read(const std::string& path) {
   requireColumns(path, columns);
   for (std::size_t r = 1; r < table.rows_.size(); ++r) {
     if (table.rows_[r].size() != header.size())
-      throw Error(ErrorCode::invalid_input, "csv.row", path, fmt::format("row {}", r), fmt::format("{} fields where the header has {}", table.rows_[r].size(), header.size()),
+      throw Error(ErrorCode::invalid_input, "csv.row", path, fmt::format("row {}", r),
+                  fmt::format("{} fields where the header has {}", table.rows_[r].size(), header.size()),
                   "give every row as many fields");
     table.queries_.push_back(readQuery(columns, table.rows_[r], r));
   }

@@ -6,7 +6,8 @@ namespace glint::bake {
 namespace {
 
 /// to[slots[k]] += weight * from[k] for tiles of 64 values.
-GLINT_MULTIVERSION void addTiles(const std::int32_t* slots, std::size_t count, const float* from, std::size_t step, float weight, float* to) {
+GLINT_MULTIVERSION void addTiles(const std::int32_t* slots, std::size_t count, const float* from, std::size_t step,
+                                 float weight, float* to) {
   for (std::size_t k = 0; k < count; ++k, from += step) {
     float* tile = to + static_cast<std::size_t>(slots[k]) * BlockBins::kTileBins;
     for (int i = 0; i < BlockBins::kTileBins; ++i) tile[i] += weight * from[i];

@@ -13,7 +13,8 @@ class BlockBins {
   static constexpr int kTileBins = kTile * kTile;
 
   /// @param tiles_per_axis  of the square, without the margin
-  explicit BlockBins(int tiles_per_axis = 0) : slots_(static_cast<std::size_t>(tiles_per_axis + 2) * (tiles_per_axis + 2), -1) {}
+  explicit BlockBins(int tiles_per_axis = 0)
+      : slots_(static_cast<std::size_t>(tiles_per_axis + 2) * (tiles_per_axis + 2), -1) {}
 
   /// Tiles in use, in the order of their first use.
   const std::vector<std::int32_t>& tiles() const { return tiles_; }

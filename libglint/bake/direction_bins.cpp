@@ -43,7 +43,8 @@ void DirectionBins::forEachTouchedRow(Visitor&& visitor) const {
       for (int x = 0; x < tiles_; ++x) columns[x] |= touched_[static_cast<std::size_t>(y) * tiles_ + x];
     for (int tx = 0; tx < tiles_; ++tx) {
       if (!(columns[tx] || (tx > 0 && columns[tx - 1]) || (tx + 1 < tiles_ && columns[tx + 1]))) continue;
-      for (int y = begin(ty); y < end(ty); ++y) visitor(static_cast<std::ptrdiff_t>(y) * pitch_ + begin(tx), end(tx) - begin(tx));
+      for (int y = begin(ty); y < end(ty); ++y)
+        visitor(static_cast<std::ptrdiff_t>(y) * pitch_ + begin(tx), end(tx) - begin(tx));
     }
   }
 }
@@ -103,7 +104,8 @@ GLINT_MULTIVERSION void filterRows(const float* bins, int pitch, int step, const
 
 /// pixels[p][x] = sum over t of taps[t] * rows[p][x * step + t]. Every step-th value of a row is gathered first, so that the sums
 /// run over neighbours.
-GLINT_MULTIVERSION void filterColumns(const float* rows, int columns, int step, const float* taps, int tap_count, float* pixels) {
+GLINT_MULTIVERSION void filterColumns(const float* rows, int columns, int step, const float* taps, int tap_count,
+                                      float* pixels) {
   float phases[kMaxColumns + kBlockSize];
   const int phase_size = (columns + step - 1) / step;
   for (int p = 0; p < kBlockSize; ++p) {

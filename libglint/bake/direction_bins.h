@@ -68,7 +68,8 @@ class PixelFilter {
 
  private:
   int subdivision_, radius_;
-  std::vector<float> taps_;  // taps_[t]: share of the bin t - radius from the left side of the pixel, t < subdivision + 2 radius
+  std::vector<float>
+      taps_;  // taps_[t]: share of the bin t - radius from the left side of the pixel, t < subdivision + 2 radius
 };
 
 /// Bins per pixel side that keep the error of binning small for a lobe of the given deviation.

@@ -80,7 +80,11 @@ std::vector<float> gaussianWeights(Range range, float centre, float sigma) {
 
 Target targetOf(DirectionBins& bins) {
   const float half = 0.5f * static_cast<float>(bins.resolution());
-  return {bins.origin(), bins.touched(), bins.pitch(), bins.tilesPerAxis(), half * static_cast<float>(bins.subdivision()),
+  return {bins.origin(),
+          bins.touched(),
+          bins.pitch(),
+          bins.tilesPerAxis(),
+          half * static_cast<float>(bins.subdivision()),
           0.5f * static_cast<float>(bins.tilesPerAxis())};
 }
 

@@ -25,7 +25,8 @@ void require(bool ok, const char* option, const std::string& range) {
 
 void checkOptions(const NormalMap& map, const PyramidOptions& o) {
   require(o.stride >= 2 && o.stride <= 65536, "--stride", "2 to 65536 texels");
-  require(o.resolution >= 32 && o.resolution <= 1024 && o.resolution % kBlockSize == 0, "--resolution", "a multiple of 16 from 32 to 1024");
+  require(o.resolution >= 32 && o.resolution <= 1024 && o.resolution % kBlockSize == 0, "--resolution",
+          "a multiple of 16 from 32 to 1024");
   const float pixel = 2.0f / static_cast<float>(o.resolution);
   require(o.sigma_r >= 0.1f * pixel && o.sigma_r <= 0.25f, "--sigma-r",
           std::to_string(0.1f * pixel) + " (a tenth of a pixel; raise --resolution for less) to 0.25");
@@ -61,7 +62,8 @@ GLINT_MULTIVERSION void toHalf(const float* from, float scale, std::uint16_t* to
 /// Filters bins into pixels and keeps the blocks that hold something.
 class ImagePacker {
  public:
-  ImagePacker(const PyramidShape& shape, BlockPrecision precision, float value_scale, const PixelFilter& filter, int subdivision)
+  ImagePacker(const PyramidShape& shape, BlockPrecision precision, float value_scale, const PixelFilter& filter,
+              int subdivision)
       : shape_(shape), precision_(precision), filter_(filter), subdivision_(subdivision) {
     const float pixels_per_unit = 0.5f * static_cast<float>(shape.resolution);
     to_stored_ = pixels_per_unit * pixels_per_unit / value_scale;
@@ -75,7 +77,8 @@ class ImagePacker {
     for (int b = 0; b < blocks * blocks; ++b) {
       if (!bins.touchedNear(b % blocks, b / blocks, filter_.radius() + 1)) continue;
       float pixels[kBlockPixels];
-      filter_.filterBlock(bins.origin() + static_cast<std::ptrdiff_t>(b / blocks) * size * bins.pitch() + b % blocks * size, bins.pitch(), pixels);
+      filter_.filterBlock(bins.origin() + static_cast<std::ptrdiff_t>(b / blocks) * size * bins.pitch() + b % blocks * size,
+                          bins.pitch(), pixels);
       if (sumBlock(pixels) * inverse_mass <= kBlockMassThreshold) continue;
       image.mask[b / 64] |= std::uint64_t{1} << (b % 64);
       store(pixels, inverse_mass, image);
@@ -110,7 +113,8 @@ NdfPyramidData::Level packLevel(std::vector<PackedImage>& images, BlockPrecision
   level.first_block.push_back(0);
   for (const PackedImage& image : images) level.first_block.push_back(blocks += image.means.size());
   level.block_means.reserve(blocks);
-  (precision == BlockPrecision::f16 ? level.half_pixels.reserve(blocks * kBlockPixels) : level.float_pixels.reserve(blocks * kBlockPixels));
+  (precision == BlockPrecision::f16 ? level.half_pixels.reserve(blocks * kBlockPixels)
+                                    : level.float_pixels.reserve(blocks * kBlockPixels));
   const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
   for (PackedImage& image : images) {
     append(level.masks, image.mask);
@@ -141,7 +145,8 @@ class ImageCounter {
 };
 
 struct Scratch {
-  Scratch(int resolution, int subdivision, int margin) : bins(resolution, subdivision, margin), band(resolution, subdivision, margin) {}
+  Scratch(int resolution, int subdivision, int margin)
+      : bins(resolution, subdivision, margin), band(resolution, subdivision, margin) {}
   DirectionBins bins, band;
 };
 
@@ -155,7 +160,8 @@ std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const Pyra
     images[l].resize(grid.imageCount());
     tbb::parallel_for(std::size_t{0}, grid.imageCount(), [&](std::size_t k) {
       Scratch& s = scratch.local();
-      const Vec2 centre = {(static_cast<float>(k % grid.columns) + 0.5f) * grid.stride, (static_cast<float>(k / grid.columns) + 0.5f) * grid.stride};
+      const Vec2 centre = {(static_cast<float>(k % grid.columns) + 0.5f) * grid.stride,
+                           (static_cast<float>(k / grid.columns) + 0.5f) * grid.stride};
       scatterFlatFootprint(map, shape.boundary, centre, kFootprintPerStride * grid.stride, s.bins, s.band);
       images[l][k] = packer.pack(s.bins, 1);
       s.bins.clear();
@@ -172,7 +178,8 @@ void unpackBins(const BlockBins& sparse, DirectionBins& bins) {
   for (std::size_t k = 0; k < sparse.tiles().size(); ++k) {
     const int tx = sparse.tiles()[k] % tiles - 1, ty = sparse.tiles()[k] / tiles - 1;
     float* corner = bins.origin() + static_cast<std::ptrdiff_t>(ty) * kTile * bins.pitch() + tx * kTile;
-    for (int y = 0; y < kTile; ++y) std::copy_n(sparse.values(k) + y * kTile, kTile, corner + static_cast<std::ptrdiff_t>(y) * bins.pitch());
+    for (int y = 0; y < kTile; ++y)
+      std::copy_n(sparse.values(k) + y * kTile, kTile, corner + static_cast<std::ptrdiff_t>(y) * bins.pitch());
     const auto touchedTile = [&](int tile) { return std::clamp(tile * kTile / bins.tileSize(), 0, bins.tilesPerAxis() - 1); };
     for (const int x : {touchedTile(tx), touchedTile(tx + 1)})  // tiles here may be larger than those flags
       for (const int y : {touchedTile(ty), touchedTile(ty + 1)}) bins.touched()[y * bins.tilesPerAxis() + x] = 1;
@@ -184,15 +191,18 @@ std::vector<std::vector<PackedImage>> buildSmooth(const NormalMap& map, const Py
   tbb::enumerable_thread_specific<DirectionBins> scratch([&] { return DirectionBins(shape.resolution, subdivision, margin); });
   std::vector<std::vector<PackedImage>> images(shape.level_count);
   for (int l = 0; l < shape.level_count; ++l) images[l].resize(shape.levels[l].imageCount());
-  scatterSmooth(map, shape, subdivision, [&](int level, int i, int j, const BlockBins& sparse) {
-    DirectionBins& bins = scratch.local();
-    unpackBins(sparse, bins);
-    images[level][static_cast<std::size_t>(j) * shape.levels[level].columns + i] = packer.pack(bins, static_cast<float>(1 / sparse.mass()));
-    bins.clear();
-  }, progress);
+  scatterSmooth(
+      map, shape, subdivision,
+      [&](int level, int i, int j, const BlockBins& sparse) {
+        DirectionBins& bins = scratch.local();
+        unpackBins(sparse, bins);
+        images[level][static_cast<std::size_t>(j) * shape.levels[level].columns + i] =
+            packer.pack(bins, static_cast<float>(1 / sparse.mass()));
+        bins.clear();
+      },
+      progress);
   return images;
 }
-
 
 /// Drops the coarsest levels while the level below them says the same.
 void dropAgreeingLevels(NdfPyramidData& pyramid) {
@@ -211,7 +221,8 @@ NdfPyramid NdfPyramidData::view() const {
   v.value_scale = value_scale;
   for (std::size_t l = 0; l < levels.size(); ++l) {
     const Level& level = levels[l];
-    const void* pixels = precision == BlockPrecision::f16 ? static_cast<const void*>(level.half_pixels.data()) : level.float_pixels.data();
+    const void* pixels =
+        precision == BlockPrecision::f16 ? static_cast<const void*>(level.half_pixels.data()) : level.float_pixels.data();
     v.levels[l] = {level.masks, level.first_block, level.block_means, pixels};
   }
   return v;
@@ -233,7 +244,8 @@ PyramidShape pyramidShape(int width, int height, const PyramidOptions& o) {
                                          static_cast<int>(std::ceil(static_cast<float>(height) / stride))};
   }
   if (shape.level_count < o.levels)
-    throw Error(ErrorCode::usage, "option.range", {}, "--levels", std::to_string(o.levels) + " levels do not fit: the stride reaches the map",
+    throw Error(ErrorCode::usage, "option.range", {}, "--levels",
+                std::to_string(o.levels) + " levels do not fit: the stride reaches the map",
                 "give at most " + std::to_string(shape.level_count) + ", or auto");
   return shape;
 }
@@ -244,7 +256,8 @@ NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options,
   pyramid.shape = pyramidShape(map.width, map.height, options);
   pyramid.precision = options.precision;
   // Pixel means reach (resolution / 2)^2; half precision ends at 65504.
-  pyramid.value_scale = options.resolution > 256 ? static_cast<float>(options.resolution * options.resolution) / (256 * 256) : 1;
+  pyramid.value_scale =
+      options.resolution > 256 ? static_cast<float>(options.resolution * options.resolution) / (256 * 256) : 1;
 
   const float sigma_pixels = 0.5f * options.sigma_r * static_cast<float>(options.resolution);
   const int subdivision = subdivisionFor(sigma_pixels);

@@ -32,7 +32,9 @@ class LobeImage {
     const float longest = std::sqrt(std::max({dot(b - a, b - a), dot(c - b, c - b), dot(a - c, a - c)}));
     const int n = std::max(1, static_cast<int>(std::ceil(longest / (0.4f * sigma_))));
     const double share = weight / (double(n) * n);
-    const auto point = [&](float u, float v) { return a + (u / static_cast<float>(n)) * (b - a) + (v / static_cast<float>(n)) * (c - a); };
+    const auto point = [&](float u, float v) {
+      return a + (u / static_cast<float>(n)) * (b - a) + (v / static_cast<float>(n)) * (c - a);
+    };
     for (int u = 0; u < n; ++u) {
       for (int v = 0; v < n - u; ++v) {
         addPoint(share, point(static_cast<float>(u) + 1.0f / 3, static_cast<float>(v) + 1.0f / 3));
@@ -70,8 +72,8 @@ class LobeImage {
 
 }  // namespace
 
-std::vector<float> referenceImage(const NormalMap& map, float sigma_r, Surface surface, Boundary boundary, const Footprint& footprint,
-                                  int resolution) {
+std::vector<float> referenceImage(const NormalMap& map, float sigma_r, Surface surface, Boundary boundary,
+                                  const Footprint& footprint, int resolution) {
   const Reference reference(map, sigma_r, surface, boundary);
   LobeImage image(resolution, sigma_r);
   const double total =

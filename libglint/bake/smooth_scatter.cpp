@@ -57,8 +57,14 @@ Axis finestAxis(int size, float stride, int levels, bool wrap) {
 class Level {
  public:
   Level(const PyramidShape& shape, int level, Axis x, Axis y, int subdivision, const ImageSink& sink)
-      : grid_(shape.levels[level]), level_(level), tiles_(shape.resolution * subdivision / BlockBins::kTile), x_(x), y_(y), sink_(sink),
-        image_rows_(grid_.rows), rows_left_(grid_.rows) {
+      : grid_(shape.levels[level]),
+        level_(level),
+        tiles_(shape.resolution * subdivision / BlockBins::kTile),
+        x_(x),
+        y_(y),
+        sink_(sink),
+        image_rows_(grid_.rows),
+        rows_left_(grid_.rows) {
     const float sigma = kFootprintPerStride * grid_.stride;
     row_weights_.resize(static_cast<std::size_t>(grid_.rows) * y_.nodes());
     for (int j = 0; j < grid_.rows; ++j) {
@@ -123,11 +129,15 @@ class Halver {
     if (odd && r > 1) give(r / 2, combine(before_.get(), middle_.get(), row.get()));
     if (odd && r == 1 && !y_.wrap) give(0, combine(nullptr, first_.get(), row.get()));
     if (odd && r == 1 && y_.wrap) second_ = row;
-    if (odd) before_ = row;
-    else middle_ = row;
+    if (odd)
+      before_ = row;
+    else
+      middle_ = row;
     if (++pushed_ < y_.nodes()) return;
-    if (y_.wrap) give(0, combine(before_.get(), first_.get(), second_ ? second_.get() : before_.get()));
-    else give(y_.cells / 2, combine(before_.get(), middle_.get(), nullptr));
+    if (y_.wrap)
+      give(0, combine(before_.get(), first_.get(), second_ ? second_.get() : before_.get()));
+    else
+      give(y_.cells / 2, combine(before_.get(), middle_.get(), nullptr));
   }
 
  private:
@@ -164,8 +174,9 @@ class Halver {
 class Rasteriser {
  public:
   Rasteriser(const NormalMap& map, Axis x, Axis y, int bins_per_axis, float sigma_bins)
-      : map_(map), x_(x), y_(y), tiles_(bins_per_axis / BlockBins::kTile),
-        splatters_([=] { return TriangleSplatter(bins_per_axis, sigma_bins); }) {}
+      : map_(map), x_(x), y_(y), tiles_(bins_per_axis / BlockBins::kTile), splatters_([=] {
+          return TriangleSplatter(bins_per_axis, sigma_bins);
+        }) {}
 
   /// Corner histograms of a row of lattice cells; corner = 2 * upper + right.
   CellRow row(int b) {
@@ -259,7 +270,8 @@ void scatterSmooth(const NormalMap& map, const PyramidShape& shape, int subdivis
   const std::function<void(int, int, NodeRow)> push = [&](int l, int r, NodeRow nodes) {
     levels[l].addRow(r, nodes);
     if (l + 1 == shape.level_count) return;
-    halvers[l]->push(r, std::make_shared<const NodeRow>(std::move(nodes)), [&](int coarse, NodeRow row) { push(l + 1, coarse, std::move(row)); });
+    halvers[l]->push(r, std::make_shared<const NodeRow>(std::move(nodes)),
+                     [&](int coarse, NodeRow row) { push(l + 1, coarse, std::move(row)); });
   };
 
   const auto cells = [&](int b) { return rasteriser.row(b); };

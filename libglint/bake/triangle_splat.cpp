@@ -56,8 +56,10 @@ GLINT_MULTIVERSION void TriangleSplatter::add(Vec2 a, Vec2 b, Vec2 c, const floa
     const Vec2 middle = (1.0f / 3) * (p[0] + p[1] + p[2]);
     return splatPoint(middle, 1, weights, raster);
   }
-  if (longest == e1) std::rotate(p, p + 1, p + 3);
-  else if (longest == e2) std::rotate(p, p + 2, p + 3);
+  if (longest == e1)
+    std::rotate(p, p + 1, p + 3);
+  else if (longest == e2)
+    std::rotate(p, p + 2, p + 3);
   const Vec2 base = p[1] - p[0], side = p[2] - p[0];
   const float apex = std::clamp(dot(side, base) / longest, 0.0f, 1.0f);  // where the third corner stands on the base
   const Vec2 rise = side - apex * base;                                  // from the base to the third corner
@@ -94,7 +96,8 @@ CornerBins TriangleSplatter::extract() {
   out.values.resize(out.tiles.size() * 4 * BlockBins::kTileBins);
   float* values = out.values.data();
   for (const std::int32_t tile : out.tiles) {
-    const std::size_t corner = (static_cast<std::size_t>(tile / tiles_) * kTile * pitch_ + static_cast<std::size_t>(tile % tiles_) * kTile) * 4;
+    const std::size_t corner =
+        (static_cast<std::size_t>(tile / tiles_) * kTile * pitch_ + static_cast<std::size_t>(tile % tiles_) * kTile) * 4;
     for (int y = 0; y < kTile; ++y) {
       float* row = bins_.data() + corner + static_cast<std::size_t>(y) * pitch_ * 4;
       for (int k = 0; k < 4; ++k)

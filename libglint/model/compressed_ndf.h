@@ -39,7 +39,7 @@ struct CompressedNdf {
   CoefficientType coefficient_type = CoefficientType::i8;
   int region_columns = 1;
   int region_rows = 1;
-  int words_per_cluster = 0;  ///< 64-bit words of slot mask in each cluster
+  int words_per_cluster = 0;                          ///< 64-bit words of slot mask in each cluster
   std::uint32_t first_image[kMaxPyramidLevels] = {};  ///< index of the first image of each level
 
   std::span<const std::uint16_t> image_regions;  ///< [images]

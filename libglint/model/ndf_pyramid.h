@@ -47,10 +47,11 @@ enum class BlockPrecision : std::uint8_t { f16, f32 };
 
 /// The NDF images of one level. Only blocks that hold something are stored.
 struct PyramidLevel {
-  std::span<const std::uint64_t> masks;        ///< [rows][columns][maskWords]; bit b: block b = by * blocksPerAxis + bx is stored
-  std::span<const std::uint64_t> first_block;  ///< [rows][columns + 1 in total]: running count of stored blocks, imageCount() + 1 values
-  std::span<const float> block_means;          ///< [blocks]: mean density of each stored block
-  const void* pixels = nullptr;                ///< [blocks][16][16] of f16 or f32: density (pixel means) / value_scale
+  std::span<const std::uint64_t> masks;  ///< [rows][columns][maskWords]; bit b: block b = by * blocksPerAxis + bx is stored
+  std::span<const std::uint64_t>
+      first_block;  ///< [rows][columns + 1 in total]: running count of stored blocks, imageCount() + 1 values
+  std::span<const float> block_means;  ///< [blocks]: mean density of each stored block
+  const void* pixels = nullptr;        ///< [blocks][16][16] of f16 or f32: density (pixel means) / value_scale
 };
 
 /// NDF images at every footprint size. Pixels hold the mean of the density over the pixel.

@@ -43,9 +43,9 @@ struct NormalBoundsLevel {
 struct NormalMap {
   static constexpr int kMaxBoundsLevels = 20;
 
-  int width = 0;   ///< texels
-  int height = 0;  ///< texels
-  float texel_size_um = 0;  ///< 0 when unknown
+  int width = 0;                  ///< texels
+  int height = 0;                 ///< texels
+  float texel_size_um = 0;        ///< 0 when unknown
   std::span<const Vec2> normals;  ///< [height][width]
 
   /// Min-max pyramid from the finest level (2x2 texels) to the coarsest (one node); empty when not built.
@@ -59,7 +59,7 @@ struct NormalMap {
 struct HeightMap {
   int width = 0;
   int height = 0;
-  float texel_size_um = 0;  ///< 0 when unknown
+  float texel_size_um = 0;         ///< 0 when unknown
   std::span<const float> heights;  ///< [height][width], texels
 };
 

@@ -85,7 +85,8 @@ class CpNdf {
         std::fill(blend, blend + columns, 0.0f);
       }
       const std::uint64_t row = ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(std::popcount(mask & (bit - 1)));
-      addCoefficients(ndf_, cluster.first_coefficient + row * columns, slice.weight * ndf_.image_scales.data()[image], columns, blend);
+      addCoefficients(ndf_, cluster.first_coefficient + row * columns, slice.weight * ndf_.image_scales.data()[image], columns,
+                      blend);
     }
     finishCluster();
     return sum;

@@ -75,7 +75,8 @@ class FootprintWeights {
  public:
   GLINT_HD FootprintWeights(const Footprint& p, int width, int height) {
     centre_ = {wrapUnit(p.centre.x) * static_cast<float>(width), wrapUnit(p.centre.y) * static_cast<float>(height)};
-    is_box_ = p.kind == Footprint::Kind::box && setBox(p, {2.0f * static_cast<float>(width), 2.0f * static_cast<float>(height)});
+    is_box_ =
+        p.kind == Footprint::Kind::box && setBox(p, {2.0f * static_cast<float>(width), 2.0f * static_cast<float>(height)});
     if (!is_box_) setGaussian(usableCovariance(p.covariance, width, height));
   }
 

@@ -32,7 +32,8 @@ inline GLINT_HD float lobeMass(const Box2& box, Vec2 normal, float sigma) {
 
 /// Whether the lobe of any normal within `reach` of `box` can matter: false means that it is farther away on some axis.
 inline GLINT_HD bool near(const Box2& box, Vec2 low, Vec2 high, float reach) {
-  return low.x <= box.high.x + reach && high.x >= box.low.x - reach && low.y <= box.high.y + reach && high.y >= box.low.y - reach;
+  return low.x <= box.high.x + reach && high.x >= box.low.x - reach && low.y <= box.high.y + reach &&
+         high.y >= box.low.y - reach;
 }
 
 }  // namespace glint

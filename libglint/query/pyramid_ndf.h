@@ -19,7 +19,8 @@ class PyramidNdf {
   GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid) : pyramid_(pyramid) {}
   GLINT_HD PyramidNdf(const NdfPyramid& pyramid, const NormalMap& normals)
       : pyramid_(pyramid),
-        below_(Reference(normals, pyramid.shape.sigma_r, pyramid.shape.surface, pyramid.shape.boundary, Reference::Search::pruned)) {}
+        below_(Reference(normals, pyramid.shape.sigma_r, pyramid.shape.surface, pyramid.shape.boundary,
+                         Reference::Search::pruned)) {}
 
   const PyramidShape& shape() const { return pyramid_.shape; }
 
@@ -70,8 +71,9 @@ class PyramidNdf {
 
   GLINT_HD float pixel(int level, std::int64_t block, int k) const {
     const std::size_t at = static_cast<std::size_t>(block) * kBlockPixels + k;
-    return pyramid_.precision == BlockPrecision::f16 ? halfToFloat(static_cast<const std::uint16_t*>(pyramid_.levels[level].pixels)[at])
-                                                     : static_cast<const float*>(pyramid_.levels[level].pixels)[at];
+    return pyramid_.precision == BlockPrecision::f16
+               ? halfToFloat(static_cast<const std::uint16_t*>(pyramid_.levels[level].pixels)[at])
+               : static_cast<const float*>(pyramid_.levels[level].pixels)[at];
   }
 
   /// Sum of the densities of the pixels in a box, in pixels.

@@ -34,7 +34,9 @@ inline GLINT_HD float isotropicVariance(const PyramidShape& shape, const Footpri
 }
 
 /// Its deviation, texels.
-inline GLINT_HD float isotropicSigma(const PyramidShape& shape, const Footprint& p) { return std::sqrt(isotropicVariance(shape, p)); }
+inline GLINT_HD float isotropicSigma(const PyramidShape& shape, const Footprint& p) {
+  return std::sqrt(isotropicVariance(shape, p));
+}
 
 /// Footprint of level 0, texels. Narrower ones are answered from the texels themselves where these are at hand.
 inline GLINT_HD float finestSigma(const PyramidShape& shape) { return kFootprintPerStride * shape.levels[0].stride; }
@@ -127,8 +129,9 @@ GLINT_HD void forEachBlock(const PyramidShape& shape, const Box2& range, Visitor
   for (int by = static_cast<int>(y0) / kBlockSize; by < last(y1); ++by) {
     for (int bx = static_cast<int>(x0) / kBlockSize; bx < last(x1); ++bx) {
       const auto ox = static_cast<float>(bx * kBlockSize), oy = static_cast<float>(by * kBlockSize);
-      visitor(by * blocks + bx, BlockBox{std::max(x0 - ox, 0.0f), std::max(y0 - oy, 0.0f), std::min(x1 - ox, static_cast<float>(kBlockSize)),
-                                         std::min(y1 - oy, static_cast<float>(kBlockSize))});
+      visitor(by * blocks + bx,
+              BlockBox{std::max(x0 - ox, 0.0f), std::max(y0 - oy, 0.0f), std::min(x1 - ox, static_cast<float>(kBlockSize)),
+                       std::min(y1 - oy, static_cast<float>(kBlockSize))});
     }
   }
 }

@@ -26,7 +26,10 @@ class Reference {
   Reference() = default;
   GLINT_HD Reference(const NormalMap& map, float sigma_r, Surface surface = Surface::flat, Boundary boundary = Boundary::wrap,
                      Search search = Search::exhaustive)
-      : map_(map), sigma_r_(sigma_r), surface_(surface), boundary_(boundary),
+      : map_(map),
+        sigma_r_(sigma_r),
+        surface_(surface),
+        boundary_(boundary),
         search_(map.bounds_level_count > 0 ? search : Search::exhaustive) {}
 
   GLINT_HD bool hasMap() const { return map_.width > 0; }
@@ -96,9 +99,10 @@ class Reference {
   GLINT_HD double average(const Footprint& p, const Lobe& lobe) const {
     if (search_ == Search::pruned) return averagePruned(p, lobe);
     double sum = 0;
-    const double total = surface_ == Surface::flat
-                             ? forEachTexel(p, [&](float w, Vec2 n) { sum += double{w} * lobe.facet(n); })
-                             : forEachTriangle(p, [&](float w, Vec2 a, Vec2 b, Vec2 c) { sum += double{w} * lobe.triangle(a, b, c); });
+    const double total =
+        surface_ == Surface::flat
+            ? forEachTexel(p, [&](float w, Vec2 n) { sum += double{w} * lobe.facet(n); })
+            : forEachTriangle(p, [&](float w, Vec2 a, Vec2 b, Vec2 c) { sum += double{w} * lobe.triangle(a, b, c); });
     return total > 0 ? sum / total : 0;
   }
 
@@ -119,7 +123,8 @@ class Reference {
       }
     };
     forEachPeriod(weights, [&](const Window& w) { descend(w, support, reach, leaf); });
-    const double total = boundary_ == Boundary::wrap && weights.hasClosedFormTotal() ? weights.closedFormTotal() : totalWeight(p);
+    const double total =
+        boundary_ == Boundary::wrap && weights.hasClosedFormTotal() ? weights.closedFormTotal() : totalWeight(p);
     return total > 0 ? sum / total : 0;
   }
 
@@ -139,8 +144,12 @@ class Reference {
     const int first_y = wrap ? floorTo(weights.row_begin, map_.height) : 0, last_y = wrap ? weights.row_end : map_.height;
     for (int y = first_y; y < last_y; y += map_.height) {
       for (int x = first_x; x < last_x; x += map_.width) {
-        const Window w = {x, y, std::max(weights.column_begin - x, 0), std::min(weights.column_end - x, map_.width),
-                          std::max(weights.row_begin - y, 0), std::min(weights.row_end - y, map_.height)};
+        const Window w = {x,
+                          y,
+                          std::max(weights.column_begin - x, 0),
+                          std::min(weights.column_end - x, map_.width),
+                          std::max(weights.row_begin - y, 0),
+                          std::min(weights.row_end - y, map_.height)};
         if (w.column_begin < w.column_end && w.row_begin < w.row_end) visitor(w);
       }
     }

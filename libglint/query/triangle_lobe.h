@@ -14,7 +14,10 @@ namespace glint {
 inline GLINT_HD float triangleDensity(Vec2 n0, Vec2 n1, Vec2 n2, Vec2 h, float sigma) {
   const float inverse_sigma = 1 / sigma;
   Vec2 p[3] = {inverse_sigma * (n0 - h), inverse_sigma * (n1 - h), inverse_sigma * (n2 - h)};
-  const auto squaredEdge = [&](int k) { const Vec2 e = p[(k + 1) % 3] - p[k]; return dot(e, e); };
+  const auto squaredEdge = [&](int k) {
+    const Vec2 e = p[(k + 1) % 3] - p[k];
+    return dot(e, e);
+  };
   const int longest = squaredEdge(0) >= squaredEdge(1) ? (squaredEdge(0) >= squaredEdge(2) ? 0 : 2)
                                                        : (squaredEdge(1) >= squaredEdge(2) ? 1 : 2);
   const Vec2 a = p[longest], b = p[(longest + 1) % 3], apex = p[(longest + 2) % 3];
@@ -45,9 +48,10 @@ inline GLINT_HD float triangleDensity(Vec2 n0, Vec2 n1, Vec2 n2, Vec2 h, float s
       const float chord = right - left;
       // Mean of the standard normal density along the chord; its midpoint value when the chord is too short for a difference.
       const float middle = 0.5f * (left + right);
-      const float mean_along = chord > 0.05f ? 0.5f * (std::erf(right * kInvSqrt2) - std::erf(left * kInvSqrt2)) / chord
-                                             : std::exp(-0.5f * middle * middle) * (1 - chord * chord * (1 - middle * middle) / 24) *
-                                                   (0.5f * std::sqrt(2 / kPi));
+      const float mean_along = chord > 0.05f
+                                   ? 0.5f * (std::erf(right * kInvSqrt2) - std::erf(left * kInvSqrt2)) / chord
+                                   : std::exp(-0.5f * middle * middle) * (1 - chord * chord * (1 - middle * middle) / 24) *
+                                         (0.5f * std::sqrt(2 / kPi));
       sum += kWeight[q] * (1 - s) * mean_along * std::exp(-0.5f * y * y);
     }
   }
@@ -75,7 +79,8 @@ inline GLINT_HD float triangleMass(Vec2 n0, Vec2 n1, Vec2 n2, const Box2& box, f
     const Vec2 low = {std::min({t.a.x, t.b.x, t.c.x}), std::min({t.a.y, t.b.y, t.c.y})};
     const Vec2 high = {std::max({t.a.x, t.b.x, t.c.x}), std::max({t.a.y, t.b.y, t.c.y})};
     if (!near(box, low, high, reach)) continue;
-    if (low.x >= box.low.x + reach && high.x <= box.high.x - reach && low.y >= box.low.y + reach && high.y <= box.high.y - reach) {
+    if (low.x >= box.low.x + reach && high.x <= box.high.x - reach && low.y >= box.low.y + reach &&
+        high.y <= box.high.y - reach) {
       mass += t.share;
       continue;
     }

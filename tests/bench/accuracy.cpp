@@ -121,8 +121,9 @@ nlohmann::ordered_json errorsOf(const Truth& truth, const formats::Asset& asset)
 }
 
 bool sameGrid(const PyramidShape& a, const PyramidShape& b) {
-  return a.width == b.width && a.height == b.height && a.resolution == b.resolution && a.sigma_r == b.sigma_r && a.surface == b.surface &&
-         a.boundary == b.boundary && a.level_count == b.level_count && a.levels[0].stride == b.levels[0].stride;
+  return a.width == b.width && a.height == b.height && a.resolution == b.resolution && a.sigma_r == b.sigma_r &&
+         a.surface == b.surface && a.boundary == b.boundary && a.level_count == b.level_count &&
+         a.levels[0].stride == b.levels[0].stride;
 }
 
 nlohmann::ordered_json measure(const std::string& normals_path, const std::vector<std::string>& paths, int samples) {
@@ -132,17 +133,20 @@ nlohmann::ordered_json measure(const std::string& normals_path, const std::vecto
   nlohmann::ordered_json result = nlohmann::ordered_json::array();
   for (const std::string& path : paths) {
     assets.push_back(formats::Asset::open(path));
-    if (!sameGrid(shapeOf(assets.front()), shapeOf(assets.back()))) throw std::runtime_error(path + ": not of the same grid as " + paths[0]);
+    if (!sameGrid(shapeOf(assets.front()), shapeOf(assets.back())))
+      throw std::runtime_error(path + ": not of the same grid as " + paths[0]);
     if (shapeOf(assets.back()).width != map.width || shapeOf(assets.back()).height != map.height)
       throw std::runtime_error(path + ": not made of " + normals_path);
-    result.push_back({{"asset", path}, {"size_bytes", assets.back().info().file_bytes}, {"levels", nlohmann::ordered_json::array()}});
+    result.push_back(
+        {{"asset", path}, {"size_bytes", assets.back().info().file_bytes}, {"levels", nlohmann::ordered_json::array()}});
   }
   const PyramidShape& shape = shapeOf(assets.front());
   for (int level = 0; level < shape.level_count; ++level) {
     const Truth own(map, shape, centresOf(shape, level, samples));
     const Truth random(map, shape, randomFootprints(shape, level, level + 1 < shape.level_count ? samples : 0));
     for (std::size_t a = 0; a < assets.size(); ++a) {
-      nlohmann::ordered_json entry = {{"sigma_texels", kFootprintPerStride * shape.levels[level].stride}, {"centres", errorsOf(own, assets[a])}};
+      nlohmann::ordered_json entry = {{"sigma_texels", kFootprintPerStride * shape.levels[level].stride},
+                                      {"centres", errorsOf(own, assets[a])}};
       if (level + 1 < shape.level_count) entry["random"] = errorsOf(random, assets[a]);
       result[a]["levels"].push_back(entry);
     }

@@ -91,13 +91,18 @@ int main(int argc, char** argv) {
       const std::string path = argv[k], name = std::filesystem::path(path).filename().string();
       addOpenBenchmark(path, name);
       const formats::Asset& asset = assets.emplace_back(formats::Asset::open(path));
-      if (asset.kind() == "ndf-cp") models.emplace_back(CpNdf(asset.compressed()));
-      else models.emplace_back(PyramidNdf(asset.pyramid()));
-      std::visit([&](const auto& model) {
-        const PyramidShape& shape = model.shape();
-        const float finest = finestSigma(shape), coarsest = kFootprintPerStride * shape.levels[shape.level_count - 1].stride;
-        addModelBenchmarks(name, model, queries.emplace_back(randomQueries(normals.normals(), finest, coarsest)));
-      }, models.back());
+      if (asset.kind() == "ndf-cp")
+        models.emplace_back(CpNdf(asset.compressed()));
+      else
+        models.emplace_back(PyramidNdf(asset.pyramid()));
+      std::visit(
+          [&](const auto& model) {
+            const PyramidShape& shape = model.shape();
+            const float finest = finestSigma(shape),
+                        coarsest = kFootprintPerStride * shape.levels[shape.level_count - 1].stride;
+            addModelBenchmarks(name, model, queries.emplace_back(randomQueries(normals.normals(), finest, coarsest)));
+          },
+          models.back());
     }
     addOpenBenchmark(argv[1], std::filesystem::path(argv[1]).filename().string());
     benchmark::RunSpecifiedBenchmarks();

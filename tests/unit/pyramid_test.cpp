@@ -22,7 +22,8 @@ using test::OwnedMap;
 /// pixels in half precision.
 constexpr double kEnergyError = 1e-3;
 
-PyramidOptions options(float stride, int resolution, float sigma_r, Surface surface = Surface::flat, Boundary boundary = Boundary::wrap) {
+PyramidOptions options(float stride, int resolution, float sigma_r, Surface surface = Surface::flat,
+                       Boundary boundary = Boundary::wrap) {
   PyramidOptions o;
   o.stride = stride;
   o.resolution = resolution;
@@ -64,9 +65,11 @@ std::vector<float> storedImage(const NdfPyramid& pyramid, int level, int i, int 
     if (!(data.masks[image * shape.maskWords() + b / 64] >> (b % 64) & 1)) continue;
     for (int k = 0; k < kBlockPixels; ++k) {
       const std::size_t at = stored * kBlockPixels + k;
-      const float value = pyramid.precision == BlockPrecision::f16 ? halfToFloat(static_cast<const std::uint16_t*>(data.pixels)[at])
-                                                                   : static_cast<const float*>(data.pixels)[at];
-      const int x = b % shape.blocksPerAxis() * kBlockSize + k % kBlockSize, y = b / shape.blocksPerAxis() * kBlockSize + k / kBlockSize;
+      const float value = pyramid.precision == BlockPrecision::f16
+                              ? halfToFloat(static_cast<const std::uint16_t*>(data.pixels)[at])
+                              : static_cast<const float*>(data.pixels)[at];
+      const int x = b % shape.blocksPerAxis() * kBlockSize + k % kBlockSize,
+                y = b / shape.blocksPerAxis() * kBlockSize + k / kBlockSize;
       pixels[static_cast<std::size_t>(y) * shape.resolution + x] = pyramid.value_scale * value;
     }
     ++stored;
@@ -91,9 +94,9 @@ TEST(PyramidShape, StridesDoubleWhileTheyAreShorterThanTheMap) {
 TEST(Pyramid, RefusesOptionsOutOfRangeByName) {
   const OwnedMap owned(16, 16, test::roughSurface(16, 16, 0.1f));
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  for (const PyramidOptions& o : {options(1, 64, 0.02f), options(nan, 64, 0.02f), options(8, 40, 0.02f), options(8, 16, 0.02f), options(8, 2048, 0.02f),
-                                  options(8, 64, 1e-4f), options(8, 64, 0.3f), options(8, 64, nan), withLevels(options(8, 64, 0.02f), -1),
-                                  withLevels(options(8, 64, 0.02f), 17)}) {
+  for (const PyramidOptions& o : {options(1, 64, 0.02f), options(nan, 64, 0.02f), options(8, 40, 0.02f), options(8, 16, 0.02f),
+                                  options(8, 2048, 0.02f), options(8, 64, 1e-4f), options(8, 64, 0.3f), options(8, 64, nan),
+                                  withLevels(options(8, 64, 0.02f), -1), withLevels(options(8, 64, 0.02f), 17)}) {
     try {
       buildPyramid(owned.map(), o);
       ADD_FAILURE() << "accepted " << o.stride << ' ' << o.resolution << ' ' << o.sigma_r << ' ' << o.levels;
@@ -149,7 +152,8 @@ TEST(Pyramid, BlockMeansAreTheMeansOfStoredPixelsAndEmptyBlocksAreLeftOut) {
         if (!(data.levels[l].masks[index * data.shape.maskWords() + b / 64] >> (b % 64) & 1)) continue;
         double sum = 0;
         for (int y = 0; y < kBlockSize; ++y)
-          for (int x = 0; x < kBlockSize; ++x) sum += image[static_cast<std::size_t>(b / 8 * kBlockSize + y) * 128 + b % 8 * kBlockSize + x];
+          for (int x = 0; x < kBlockSize; ++x)
+            sum += image[static_cast<std::size_t>(b / 8 * kBlockSize + y) * 128 + b % 8 * kBlockSize + x];
         EXPECT_NEAR(data.levels[l].block_means[stored++], sum / kBlockPixels, 1e-5 * sum / kBlockPixels);
         EXPECT_GT(sum, 0);
       }
@@ -189,7 +193,8 @@ TEST(Pyramid, TheNdfOfAGaussianSurfaceIsBeckmann) {
   EXPECT_LT(test::totalVariation(image, beckmannImage(alpha, kResolution)), kSampleError);
   EXPECT_GT(test::totalVariation(image, beckmannImage(1.1 * alpha, kResolution)), kOtherRoughness);
   EXPECT_GT(test::totalVariation(image, beckmannImage(0.9 * alpha, kResolution)), kOtherRoughness);
-  const auto exact = referenceImage(owned.map(), sigma_r, Surface::flat, Boundary::wrap, footprintOf(data.shape, 0, 0, 0), kResolution);
+  const auto exact =
+      referenceImage(owned.map(), sigma_r, Surface::flat, Boundary::wrap, footprintOf(data.shape, 0, 0, 0), kResolution);
   EXPECT_LT(test::totalVariation(exact, beckmannImage(alpha, kResolution)), kSampleError);
 }
 
@@ -235,7 +240,8 @@ TEST(Pyramid, RepeatedMapsHaveTheSameImagesInEveryTile) {
     const NdfPyramidData single = buildPyramid(one.map(), o), tiled = buildPyramid(four.map(), o);
     forEachImage(tiled.shape, [&](int l, int i, int j) {
       const PyramidGrid& grid = single.shape.levels[l];
-      const double difference = test::relL2(storedImage(tiled.view(), l, i, j), storedImage(single.view(), l, i % grid.columns, j % grid.rows));
+      const double difference =
+          test::relL2(storedImage(tiled.view(), l, i, j), storedImage(single.view(), l, i % grid.columns, j % grid.rows));
       EXPECT_LT(difference, kLastPlace) << "surface " << int(surface) << " level " << l << " image " << i << ' ' << j;
     });
   }
@@ -252,24 +258,28 @@ void expectExactCentres(const CentreCase& c, Surface surface) {
   constexpr double kImageError = 0.01;
   const OwnedMap owned(c.width, c.height, test::roughSurface(c.width, c.height, c.alpha, c.correlation));
   for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
-    const NdfPyramidData data = buildPyramid(owned.map(), withLevels(options(c.stride, c.resolution, c.sigma_r, surface, boundary), c.levels));
+    const NdfPyramidData data =
+        buildPyramid(owned.map(), withLevels(options(c.stride, c.resolution, c.sigma_r, surface, boundary), c.levels));
     const PyramidNdf model(data.view());
     for (int l = 0; l < data.shape.level_count; ++l) {
       const PyramidGrid& grid = data.shape.levels[l];
       for (const auto& [i, j] : {std::pair{0, 0}, {grid.columns - 1, grid.rows / 2}}) {
         const Footprint p = footprintOf(data.shape, l, i, j);
-        if (boundary == Boundary::clamp && (p.centre.x >= 1 || p.centre.y >= 1)) continue;  // a footprint cannot be centred there
+        if (boundary == Boundary::clamp && (p.centre.x >= 1 || p.centre.y >= 1))
+          continue;  // a footprint cannot be centred there
         const auto exact = referenceImage(owned.map(), c.sigma_r, surface, boundary, p, c.resolution);
         EXPECT_LE(test::relL2(test::imageOf(model, p, c.resolution), exact), kImageError)
-            << c.width << 'x' << c.height << " sigma_r " << c.sigma_r << " boundary " << int(boundary) << " level " << l << " image " << i << ' ' << j;
+            << c.width << 'x' << c.height << " sigma_r " << c.sigma_r << " boundary " << int(boundary) << " level " << l
+            << " image " << i << ' ' << j;
       }
     }
   }
 }
 
 TEST(Pyramid, FlatImagesAreTheExactOnesAtTheirCentres) {
-  for (const CentreCase& c : {CentreCase{350, 200, 3, 256, 32, 0.2f, 4, 0.005f}, CentreCase{140, 72, 3, 256, 16, 0.2f, 4, 0.0012f},
-                              CentreCase{140, 72, 3, 128, 16, 0.2f, 4, 0.02f}, CentreCase{45, 70, 4, 64, 6.5f, 0.2f, 4, 0.02f}})
+  for (const CentreCase& c :
+       {CentreCase{350, 200, 3, 256, 32, 0.2f, 4, 0.005f}, CentreCase{140, 72, 3, 256, 16, 0.2f, 4, 0.0012f},
+        CentreCase{140, 72, 3, 128, 16, 0.2f, 4, 0.02f}, CentreCase{45, 70, 4, 64, 6.5f, 0.2f, 4, 0.02f}})
     expectExactCentres(c, Surface::flat);
 }
 
@@ -315,7 +325,8 @@ std::vector<Vec2> upsampled(const NormalMap& map, int factor) {
   const auto wrap = [](int k, int n) { return ((k % n) + n) % n; };
   for (int j = 0; j < factor * map.height; ++j) {
     for (int i = 0; i < factor * map.width; ++i) {
-      const float x = (static_cast<float>(i) + 0.5f) / static_cast<float>(factor) - 0.5f, y = (static_cast<float>(j) + 0.5f) / static_cast<float>(factor) - 0.5f;
+      const float x = (static_cast<float>(i) + 0.5f) / static_cast<float>(factor) - 0.5f,
+                  y = (static_cast<float>(j) + 0.5f) / static_cast<float>(factor) - 0.5f;
       const int cx = static_cast<int>(std::floor(x)), cy = static_cast<int>(std::floor(y));
       const float s = x - static_cast<float>(cx), t = y - static_cast<float>(cy);
       const auto at = [&](int dx, int dy) { return map.at(wrap(cx + dx, map.width), wrap(cy + dy, map.height)); };
@@ -330,16 +341,21 @@ TEST(Pyramid, FlatImagesOfFinerMapsConvergeToTheSmoothOne) {
   constexpr int kResolution = 64;
   constexpr double kBuildersError = 0.005;  // two builders, each within half the 1 % of its images
   const OwnedMap coarse(48, 48, test::roughSurface(48, 48, 0.2f));
-  const auto smooth = referenceImage(coarse.map(), 0.02f, Surface::smooth, Boundary::wrap, Footprint::isotropic({0.4f, 0.6f}, 5), kResolution);
-  const NdfPyramidData smooth_pyramid = buildPyramid(coarse.map(), withLevels(options(12, kResolution, 0.02f, Surface::smooth), 1));
+  const auto smooth =
+      referenceImage(coarse.map(), 0.02f, Surface::smooth, Boundary::wrap, Footprint::isotropic({0.4f, 0.6f}, 5), kResolution);
+  const NdfPyramidData smooth_pyramid =
+      buildPyramid(coarse.map(), withLevels(options(12, kResolution, 0.02f, Surface::smooth), 1));
   double previous = 1, previous_pyramid = 1;
   for (const int factor : {1, 2, 4, 8}) {
     const OwnedMap fine(48 * factor, 48 * factor, upsampled(coarse.map(), factor));
-    const auto flat = referenceImage(fine.map(), 0.02f, Surface::flat, Boundary::wrap, Footprint::isotropic({0.4f, 0.6f}, 5.0f * static_cast<float>(factor)), kResolution);
+    const auto flat = referenceImage(fine.map(), 0.02f, Surface::flat, Boundary::wrap,
+                                     Footprint::isotropic({0.4f, 0.6f}, 5.0f * static_cast<float>(factor)), kResolution);
     const double error = test::relL2(flat, smooth);
     EXPECT_LT(error, 0.5 * previous) << factor;
-    const NdfPyramidData flat_pyramid = buildPyramid(fine.map(), withLevels(options(12.0f * static_cast<float>(factor), kResolution, 0.02f), 1));
-    const double pyramid_error = test::relL2(storedImage(flat_pyramid.view(), 0, 1, 2), storedImage(smooth_pyramid.view(), 0, 1, 2));
+    const NdfPyramidData flat_pyramid =
+        buildPyramid(fine.map(), withLevels(options(12.0f * static_cast<float>(factor), kResolution, 0.02f), 1));
+    const double pyramid_error =
+        test::relL2(storedImage(flat_pyramid.view(), 0, 1, 2), storedImage(smooth_pyramid.view(), 0, 1, 2));
     EXPECT_LT(pyramid_error, std::max(0.6 * previous_pyramid, kBuildersError)) << factor;  // down to the builders' own error
     previous = error;
     previous_pyramid = pyramid_error;
@@ -383,7 +399,8 @@ TEST(Pyramid, SmallestMapsAndFootprintsLargerThanTheMapWork) {
         const NdfPyramidData data = buildPyramid(owned.map(), options(stride, 64, 0.05f, surface));
         forEachImage(data.shape, [&](int l, int i, int j) {
           const test::ImageMoments m = test::momentsOf(storedImage(data.view(), l, i, j), 64);
-          ASSERT_NEAR(m.integral, 1, kEnergyError) << width << 'x' << height << " stride " << stride << " surface " << int(surface) << " level " << l << " image " << i << ' ' << j;
+          ASSERT_NEAR(m.integral, 1, kEnergyError) << width << 'x' << height << " stride " << stride << " surface "
+                                                   << int(surface) << " level " << l << " image " << i << ' ' << j;
           EXPECT_NEAR(m.mean_x, 0.1, 1e-3);
           EXPECT_NEAR(m.mean_y, 0.2, 1e-3);
         });

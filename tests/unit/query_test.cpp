@@ -79,7 +79,9 @@ class RandomQueries {
   explicit RandomQueries(unsigned seed) : random_(seed) {}
   float unit() { return std::uniform_real_distribution<float>(0, 1)(random_); }
   int below(int n) { return std::uniform_int_distribution<int>(0, n - 1)(random_); }
-  Footprint footprint(float low = 5, float high = 60) { return Footprint::isotropic({unit(), unit()}, low * std::pow(high / low, unit())); }
+  Footprint footprint(float low = 5, float high = 60) {
+    return Footprint::isotropic({unit(), unit()}, low * std::pow(high / low, unit()));
+  }
   /// Whole pixels [x0, x1) x [y0, y1) of an image, at random.
   std::array<int, 4> pixels() {
     const int x = below(kResolution), y = below(kResolution);
@@ -107,7 +109,9 @@ std::pair<double, double> meanOfPoints(const std::array<int, 4>& p, const Densit
   return {sum / count, magnitude / count};
 }
 
-Box2 boxOf(const std::array<int, 4>& p) { return {{toHalfVector(p[0]), toHalfVector(p[1])}, {toHalfVector(p[2]), toHalfVector(p[3])}}; }
+Box2 boxOf(const std::array<int, 4>& p) {
+  return {{toHalfVector(p[0]), toHalfVector(p[1])}, {toHalfVector(p[2]), toHalfVector(p[3])}};
+}
 
 TEST(PyramidNdf, MeanOverPixelsIsTheMeanOfPointQueries) {
   RandomQueries random(1);
@@ -134,9 +138,11 @@ TEST(PyramidNdf, PartsOfPixelsCountByTheirArea) {
     for (int j = 0; j < 3; ++j)
       for (int i = 0; i < 3; ++i) {
         const double wx = i == 0 ? 1 - a : i == 1 ? 1 : a, wy = j == 0 ? 1 - b : j == 1 ? 1 : b;
-        expected += wx * wy * model.density(p, {toHalfVector(x + i) + 1.0f / kResolution, toHalfVector(y + j) + 1.0f / kResolution}) / 4;
+        expected += wx * wy *
+                    model.density(p, {toHalfVector(x + i) + 1.0f / kResolution, toHalfVector(y + j) + 1.0f / kResolution}) / 4;
       }
-    const Vec2 low = {toHalfVector(x) + static_cast<float>(a) * 2 / kResolution, toHalfVector(y) + static_cast<float>(b) * 2 / kResolution};
+    const Vec2 low = {toHalfVector(x) + static_cast<float>(a) * 2 / kResolution,
+                      toHalfVector(y) + static_cast<float>(b) * 2 / kResolution};
     EXPECT_NEAR(model.mean(p, {low, low + Vec2{4.0f / kResolution, 4.0f / kResolution}}), expected, kSumError * (expected + 1));
   }
 }
@@ -168,14 +174,16 @@ TEST(CpNdf, EqualsASlowDecoderAtItsCentres) {
     for (int l = 0; l < view.shape.level_count; ++l) {
       const PyramidGrid& grid = view.shape.levels[l];
       for (const auto& [i, j] : {std::pair{0, 0}, {grid.columns / 2, grid.rows - 1}}) {
-        const Footprint p = Footprint::isotropic({(static_cast<float>(i) + 0.5f) * grid.stride / 100, (static_cast<float>(j) + 0.5f) * grid.stride / 72},
-                                                 kFootprintPerStride * grid.stride);
+        const Footprint p = Footprint::isotropic(
+            {(static_cast<float>(i) + 0.5f) * grid.stride / 100, (static_cast<float>(j) + 0.5f) * grid.stride / 72},
+            kFootprintPerStride * grid.stride);
         const auto expected = test::decodeImage(view, view.first_image[l] + static_cast<std::uint32_t>(j * grid.columns + i));
         const double largest = *std::max_element(expected.begin(), expected.end());
         ASSERT_GT(largest, 1);
         for (std::size_t k = 0; k < expected.size(); ++k) {
           const Vec2 h = test::pixelCentre(k, kResolution);
-          ASSERT_NEAR(model.signedDensity(p, h), expected[k], 10 * kFactorError * largest) << l << ' ' << i << ' ' << j << " pixel " << k;
+          ASSERT_NEAR(model.signedDensity(p, h), expected[k], 10 * kFactorError * largest)
+              << l << ' ' << i << ' ' << j << " pixel " << k;
           ASSERT_EQ(model.density(p, h), std::max(0.0f, model.signedDensity(p, h)));
         }
       }
@@ -213,7 +221,8 @@ void expectEnergyOfOne(const Model& model, double tolerance) {
 
 TEST(PyramidNdf, MeanOverTheWholeSquareIsAQuarter) {
   for (const Boundary boundary : {Boundary::wrap, Boundary::clamp})
-    expectEnergyOfOne([model = PyramidNdf(pyramid(boundary).view())](const Footprint& p, const Box2& b) { return model.mean(p, b); }, 1e-3);
+    expectEnergyOfOne(
+        [model = PyramidNdf(pyramid(boundary).view())](const Footprint& p, const Box2& b) { return model.mean(p, b); }, 1e-3);
 }
 
 TEST(CpNdf, MeanOverTheWholeSquareIsAQuarter) {
@@ -294,10 +303,12 @@ TEST(PyramidSlices, CentresGetTheirOwnImage) {
       const PyramidGrid& grid = shape.levels[l];
       for (int j = 0; j < grid.rows; ++j) {
         for (int i = 0; i < grid.columns; ++i) {
-          const Vec2 uv = {(static_cast<float>(i) + 0.5f) * grid.stride / 100, (static_cast<float>(j) + 0.5f) * grid.stride / 72};
+          const Vec2 uv = {(static_cast<float>(i) + 0.5f) * grid.stride / 100,
+                           (static_cast<float>(j) + 0.5f) * grid.stride / 72};
           if (boundary == Boundary::clamp && (uv.x >= 1 || uv.y >= 1)) continue;
           auto weights = weightsOf(shape, Footprint::isotropic(uv, kFootprintPerStride * grid.stride));
-          EXPECT_NEAR((weights[{l, static_cast<std::uint32_t>(j * grid.columns + i)}]), 1, kCentreError) << l << ' ' << i << ' ' << j;
+          EXPECT_NEAR((weights[{l, static_cast<std::uint32_t>(j * grid.columns + i)}]), 1, kCentreError)
+              << l << ' ' << i << ' ' << j;
         }
       }
     }
@@ -347,24 +358,29 @@ void expectDegenerateQueriesAreAnswered(const Model& model) {
   const Vec2 uv = {0.3f, 0.7f};
   const Footprint p = Footprint::isotropic(uv, 10);
   const Box2 whole = {{-1, -1}, {1, 1}};
-  for (const Vec2 h : {Vec2{1.001f, 0}, Vec2{0, -1.001f}, Vec2{kNan, 0}, Vec2{0, kNan}, Vec2{kInfinity, 0}}) EXPECT_EQ(model.density(p, h), 0);
-  for (const Vec2 h : {Vec2{1, 1}, Vec2{-1, -1}, Vec2{1, -1}}) EXPECT_GE(model.density(p, h), 0);  // corners are read inside the image
-  for (const Box2 range : {Box2{{0, 0}, {0, 1}}, Box2{{0.5f, 0}, {-0.5f, 1}}, Box2{{kNan, 0}, {1, 1}}, Box2{{0, 0}, {1, kNan}}, Box2{{2, 2}, {3, 3}},
-                           Box2{{-kInfinity, -kInfinity}, {kInfinity, kInfinity}}})
+  for (const Vec2 h : {Vec2{1.001f, 0}, Vec2{0, -1.001f}, Vec2{kNan, 0}, Vec2{0, kNan}, Vec2{kInfinity, 0}})
+    EXPECT_EQ(model.density(p, h), 0);
+  for (const Vec2 h : {Vec2{1, 1}, Vec2{-1, -1}, Vec2{1, -1}})
+    EXPECT_GE(model.density(p, h), 0);  // corners are read inside the image
+  for (const Box2 range : {Box2{{0, 0}, {0, 1}}, Box2{{0.5f, 0}, {-0.5f, 1}}, Box2{{kNan, 0}, {1, 1}}, Box2{{0, 0}, {1, kNan}},
+                           Box2{{2, 2}, {3, 3}}, Box2{{-kInfinity, -kInfinity}, {kInfinity, kInfinity}}})
     EXPECT_EQ(model.mean(p, range), 0) << range.low.x << ' ' << range.high.x;
 
   // Too narrow or not finite: the narrowest footprint.
   const float narrowest = model.density(Footprint::isotropic(uv, kMinSigmaTexels), {0, 0});
   EXPECT_TRUE(std::isfinite(narrowest));
-  for (const Footprint& q : {Footprint::isotropic(uv, 0), Footprint::isotropic(uv, kNan), Footprint::gaussian(uv, {-4, 0, -4}),
-                             Footprint::gaussian(uv, {kInfinity, 0, 1}), Footprint::box(uv, {0, 0}, {0, 0}), Footprint::box(uv, {kNan, 0}, {0, 1})})
+  for (const Footprint& q :
+       {Footprint::isotropic(uv, 0), Footprint::isotropic(uv, kNan), Footprint::gaussian(uv, {-4, 0, -4}),
+        Footprint::gaussian(uv, {kInfinity, 0, 1}), Footprint::box(uv, {0, 0}, {0, 0}), Footprint::box(uv, {kNan, 0}, {0, 1})})
     EXPECT_EQ(model.density(q, {0, 0}), narrowest);
   // A centre that is not finite counts as 0.
-  EXPECT_EQ(model.density(Footprint::isotropic({kNan, -kInfinity}, 10), {0, 0}), model.density(Footprint::isotropic({0, 0}, 10), {0, 0}));
+  EXPECT_EQ(model.density(Footprint::isotropic({kNan, -kInfinity}, 10), {0, 0}),
+            model.density(Footprint::isotropic({0, 0}, 10), {0, 0}));
   // Larger than the map: the coarsest level.
   const float coarsest = model.density(Footprint::isotropic(uv, 1e4f), {0.1f, 0});
   EXPECT_GT(coarsest, 0);
-  for (const Footprint& q : {Footprint::isotropic(uv, 1e18f), Footprint::box(uv, {1e9f, 0}, {0, 1e9f}), Footprint::box(uv, {1e18f, 0}, {0, 1e18f})})
+  for (const Footprint& q :
+       {Footprint::isotropic(uv, 1e18f), Footprint::box(uv, {1e9f, 0}, {0, 1e9f}), Footprint::box(uv, {1e18f, 0}, {0, 1e18f})})
     EXPECT_EQ(model.density(q, {0.1f, 0}), coarsest);
   for (const float thickness : {0.0f, 1e-6f, 1e-3f, 0.1f})
     EXPECT_NEAR(model.mean(Footprint::box(uv, {9, 3}, {-thickness, thickness}), whole), 0.25, 0.01);

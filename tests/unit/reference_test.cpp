@@ -52,11 +52,14 @@ class BruteForce {
 
   double mean(const Footprint& p, const Box2& range) const {
     const double area = (double{range.high.x} - range.low.x) * (double{range.high.y} - range.low.y);
-    return average(p, [&](Vec2 n) { return mass(range.low.x, range.high.x, n.x) * mass(range.low.y, range.high.y, n.y) / area; });
+    return average(p,
+                   [&](Vec2 n) { return mass(range.low.x, range.high.x, n.x) * mass(range.low.y, range.high.y, n.y) / area; });
   }
 
  private:
-  double mass(double low, double high, double n) const { return normalCdf((high - n) / sigma_r_) - normalCdf((low - n) / sigma_r_); }
+  double mass(double low, double high, double n) const {
+    return normalCdf((high - n) / sigma_r_) - normalCdf((low - n) / sigma_r_);
+  }
 
   template <class Value>
   double average(const Footprint& p, const Value& value) const {
@@ -86,7 +89,8 @@ class BruteForce {
   /// Covered area of the texel whose lower left corner lies at (x, y) from the centre, by midpoint lines.
   static double boxWeight(const Footprint& p, double x, double y) {
     const double ax = p.axis_a.x, ay = p.axis_a.y, bx = p.axis_b.x, by = p.axis_b.y;
-    const std::vector<std::pair<double, double>> corners = {{-ax - bx, -ay - by}, {ax - bx, ay - by}, {ax + bx, ay + by}, {bx - ax, by - ay}};
+    const std::vector<std::pair<double, double>> corners = {
+        {-ax - bx, -ay - by}, {ax - bx, ay - by}, {ax + bx, ay + by}, {bx - ax, by - ay}};
     constexpr int kLines = 128;
     double area = 0;
     for (int k = 0; k < kLines; ++k) area += chordLength(corners, x + (k + 0.5) / kLines, y, y + 1) / kLines;
@@ -119,7 +123,8 @@ class RandomQueries {
   /// A parallelogram whose angle is at least 30 degrees.
   Footprint box(float low, float high) {
     const float a = logBetween(low, high), b = logBetween(low, high), angle = between(0, 6.28f), turn = between(0.52f, 2.62f);
-    return Footprint::box(uv(), {a * std::cos(angle), a * std::sin(angle)}, {b * std::cos(angle + turn), b * std::sin(angle + turn)});
+    return Footprint::box(uv(), {a * std::cos(angle), a * std::sin(angle)},
+                          {b * std::cos(angle + turn), b * std::sin(angle + turn)});
   }
 
   Footprint any(int k, float low, float high) {
@@ -235,7 +240,8 @@ TEST(Reference, SmoothSurfacesAreTheMeanOfFinerAndFinerFlatOnes) {
           }
         }
       }
-      EXPECT_NEAR(Reference(map, sigma_r, Surface::smooth, boundary).density(p, h), sum / total, kFacetError * sum / total + 1e-4 * peakOf(sigma_r));
+      EXPECT_NEAR(Reference(map, sigma_r, Surface::smooth, boundary).density(p, h), sum / total,
+                  kFacetError * sum / total + 1e-4 * peakOf(sigma_r));
     }
   }
 }
@@ -248,10 +254,13 @@ TEST(Reference, PrunedSearchFindsWhatExhaustiveSearchFinds) {
   for (const OwnedMap* owned : kMaps) {
     for (const Surface surface : {Surface::flat, Surface::smooth}) {
       for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
-        const float largest = surface == Surface::flat ? 40.0f : owned == &noise() ? 1.0f : 5.0f;  // the exhaustive search takes seconds beyond
+        const float largest = surface == Surface::flat ? 40.0f
+                              : owned == &noise()      ? 1.0f
+                                                       : 5.0f;  // the exhaustive search takes seconds beyond
         for (int k = 0; k < 18; ++k) {
           const float sigma_r = kSigmas[k % 2];
-          const Reference exhaustive(owned->map(), sigma_r, surface, boundary), pruned(owned->map(), sigma_r, surface, boundary, Reference::Search::pruned);
+          const Reference exhaustive(owned->map(), sigma_r, surface, boundary),
+              pruned(owned->map(), sigma_r, surface, boundary, Reference::Search::pruned);
           const Footprint p = random.any(k, 0.3f, largest);
           const Vec2 h = random.half(owned->map(), p, 4 * sigma_r);
           const double density = exhaustive.density(p, h);
@@ -295,7 +304,8 @@ TEST(Reference, MeanOverTheWholeSquareIsAQuarter) {
   RandomQueries random(6);
   for (const Surface surface : {Surface::flat, Surface::smooth}) {
     for (int k = 0; k < 12; ++k) {
-      const Reference reference(rough().map(), 0.01f, surface, k % 2 ? Boundary::clamp : Boundary::wrap, Reference::Search::pruned);
+      const Reference reference(rough().map(), 0.01f, surface, k % 2 ? Boundary::clamp : Boundary::wrap,
+                                Reference::Search::pruned);
       EXPECT_NEAR(reference.mean(random.any(k, 0.3f, 10), {{-1, -1}, {1, 1}}), 0.25, 1e-5);
       EXPECT_NEAR(reference.mean(random.any(k, 0.3f, 10), {{-3, -1}, {1, 1}}), 0.125, 1e-5);  // 0 outside the square
     }
@@ -350,20 +360,25 @@ TEST(Reference, DegenerateFootprintsHaveDocumentedAnswers) {
     const float narrowest = reference.density(Footprint::isotropic(uv, kMinSigmaTexels), h);
     EXPECT_GT(narrowest, 1);
     // Too narrow, or not finite: the narrowest Gaussian.
-    for (const float sigma : {0.0f, 1e-30f, -0.1f, kNan}) EXPECT_EQ(reference.density(Footprint::isotropic(uv, sigma), h), narrowest) << sigma;
+    for (const float sigma : {0.0f, 1e-30f, -0.1f, kNan})
+      EXPECT_EQ(reference.density(Footprint::isotropic(uv, sigma), h), narrowest) << sigma;
     EXPECT_EQ(reference.density(Footprint::gaussian(uv, {-1, 0, -1}), h), narrowest);
     EXPECT_EQ(reference.density(Footprint::gaussian(uv, {1, kNan, 1}), h), narrowest);
     EXPECT_EQ(reference.density(Footprint::box(uv, {0, 0}, {0, 0}), h), narrowest);
     EXPECT_EQ(reference.density(Footprint::box(uv, {kNan, 0}, {0, 1}), h), narrowest);
     EXPECT_EQ(reference.density(Footprint::box(uv, {kInfinity, 0}, {0, 1}), h), narrowest);
     // A centre that is not finite counts as 0.
-    EXPECT_EQ(reference.density(Footprint::isotropic({kNan, 0.6f}, 2), h), reference.density(Footprint::isotropic({0, 0.6f}, 2), h));
-    EXPECT_EQ(reference.density(Footprint::isotropic({kInfinity, kNan}, 2), h), reference.density(Footprint::isotropic({0, 0}, 2), h));
+    EXPECT_EQ(reference.density(Footprint::isotropic({kNan, 0.6f}, 2), h),
+              reference.density(Footprint::isotropic({0, 0.6f}, 2), h));
+    EXPECT_EQ(reference.density(Footprint::isotropic({kInfinity, kNan}, 2), h),
+              reference.density(Footprint::isotropic({0, 0}, 2), h));
     // Larger than the map: an even mean of all of it, wherever the centre is.
     const float everywhere = reference.density(Footprint::isotropic(uv, 1e3f), h);
     EXPECT_GT(everywhere, 0);
-    for (const float sigma : {1e5f, 1e18f}) EXPECT_NEAR(reference.density(Footprint::isotropic({0.9f, 0.1f}, sigma), h), everywhere, 1e-4f * everywhere);
-    for (const float size : {1e6f, 1e20f}) EXPECT_NEAR(reference.density(Footprint::box(uv, {size, 0}, {0, size}), h), everywhere, 1e-4f * everywhere);
+    for (const float sigma : {1e5f, 1e18f})
+      EXPECT_NEAR(reference.density(Footprint::isotropic({0.9f, 0.1f}, sigma), h), everywhere, 1e-4f * everywhere);
+    for (const float size : {1e6f, 1e20f})
+      EXPECT_NEAR(reference.density(Footprint::box(uv, {size, 0}, {0, size}), h), everywhere, 1e-4f * everywhere);
   }
 }
 
@@ -392,9 +407,11 @@ TEST(Reference, HalfVectorsOutsideTheSquareAndEmptyRangesAreZero) {
     const Reference reference(rough().map(), 0.2f, surface);
     const Footprint p = Footprint::isotropic({0.5f, 0.5f}, 3);
     EXPECT_GT(reference.density(p, {1, 0}), 0);  // the border belongs to the square
-    for (const Vec2 h : {Vec2{1.001f, 0}, Vec2{0, -1.001f}, Vec2{kNan, 0}, Vec2{0, kNan}, Vec2{kInfinity, 0}}) EXPECT_EQ(reference.density(p, h), 0);
-    for (const Box2 range : {Box2{{0, 0}, {0, 1}}, Box2{{0.5f, 0}, {-0.5f, 1}}, Box2{{kNan, 0}, {1, 1}}, Box2{{0, 0}, {1, kNan}},
-                             Box2{{2, 2}, {3, 3}}, Box2{{-kInfinity, -kInfinity}, {kInfinity, kInfinity}}})
+    for (const Vec2 h : {Vec2{1.001f, 0}, Vec2{0, -1.001f}, Vec2{kNan, 0}, Vec2{0, kNan}, Vec2{kInfinity, 0}})
+      EXPECT_EQ(reference.density(p, h), 0);
+    for (const Box2 range :
+         {Box2{{0, 0}, {0, 1}}, Box2{{0.5f, 0}, {-0.5f, 1}}, Box2{{kNan, 0}, {1, 1}}, Box2{{0, 0}, {1, kNan}},
+          Box2{{2, 2}, {3, 3}}, Box2{{-kInfinity, -kInfinity}, {kInfinity, kInfinity}}})
       EXPECT_EQ(reference.mean(p, range), 0) << range.low.x << ' ' << range.high.x;
   }
 }
@@ -405,15 +422,18 @@ TEST(Reference, SmallestMapsWork) {
     for (const Surface surface : {Surface::flat, Surface::smooth}) {
       for (const auto search : {Reference::Search::pruned, Reference::Search::exhaustive}) {
         const Reference reference(owned.map(), 0.05f, surface, Boundary::wrap, search);
-        for (const Footprint& p : {Footprint::isotropic({0.3f, 0.9f}, 0), Footprint::isotropic({0.5f, 0}, 3), Footprint::box({0.1f, 0.2f}, {1, 2}, {-2, 1})})
+        for (const Footprint& p : {Footprint::isotropic({0.3f, 0.9f}, 0), Footprint::isotropic({0.5f, 0}, 3),
+                                   Footprint::box({0.1f, 0.2f}, {1, 2}, {-2, 1})})
           EXPECT_NEAR(reference.density(p, {0.1f, 0.2f}), peakOf(0.05), kFloatError * peakOf(0.05)) << width << 'x' << height;
       }
     }
     // On a map that ends at its border, a smooth surface needs two texels each way; without one, there is no surface.
     const Reference clamped(owned.map(), 0.05f, Surface::smooth, Boundary::clamp);
     const float density = clamped.density(Footprint::isotropic({0.5f, 0.5f}, 1), {0.1f, 0.2f});
-    if (width > 1 && height > 1) EXPECT_NEAR(density, peakOf(0.05), kFloatError * peakOf(0.05));
-    else EXPECT_EQ(density, 0);
+    if (width > 1 && height > 1)
+      EXPECT_NEAR(density, peakOf(0.05), kFloatError * peakOf(0.05));
+    else
+      EXPECT_EQ(density, 0);
   }
 }
 

@@ -74,7 +74,8 @@ double densityByRows(const Triangle& t, Vec2 h, double sigma) {
     const double along = normalCdf((right - h.x) / sigma) - normalCdf((left - h.x) / sigma);
     sum += along * std::exp(-(y - h.y) * (y - h.y) / (2 * sigma * sigma));
   }
-  const double area = 0.5 * std::abs((double{t.b.x} - t.a.x) * (double{t.c.y} - t.a.y) - (double{t.c.x} - t.a.x) * (double{t.b.y} - t.a.y));
+  const double area =
+      0.5 * std::abs((double{t.b.x} - t.a.x) * (double{t.c.y} - t.a.y) - (double{t.c.x} - t.a.x) * (double{t.b.y} - t.a.y));
   return sum * (high - low) / kRows / (sigma * std::sqrt(2 * std::numbers::pi)) / area;
 }
 
@@ -107,14 +108,15 @@ class RandomTriangles {
 void expectDensity(const Triangle& t, Vec2 h, float sigma) {
   const double expected = denseMean(t, sigma, [&](double x, double y) { return pointDensity(x, y, h, sigma); });
   ASSERT_NEAR(triangleDensity(t.a, t.b, t.c, h, sigma), expected, kRelative * expected + kOfPeak * peakOf(sigma))
-      << t.a.x << ' ' << t.a.y << ' ' << t.b.x << ' ' << t.b.y << ' ' << t.c.x << ' ' << t.c.y << " at " << h.x << ' ' << h.y << " sigma " << sigma;
+      << t.a.x << ' ' << t.a.y << ' ' << t.b.x << ' ' << t.b.y << ' ' << t.c.x << ' ' << t.c.y << " at " << h.x << ' ' << h.y
+      << " sigma " << sigma;
 }
 
 void expectMass(const Triangle& t, const Box2& box, float sigma) {
   const double expected = denseMean(t, sigma, [&](double x, double y) { return pointMass(x, y, box, sigma); });
   ASSERT_NEAR(triangleMass(t.a, t.b, t.c, box, sigma), expected, kRelative * expected + kOfPeak)
-      << t.a.x << ' ' << t.a.y << ' ' << t.b.x << ' ' << t.b.y << ' ' << t.c.x << ' ' << t.c.y << " box " << box.low.x << ' ' << box.low.y
-      << ' ' << box.high.x << ' ' << box.high.y << " sigma " << sigma;
+      << t.a.x << ' ' << t.a.y << ' ' << t.b.x << ' ' << t.b.y << ' ' << t.c.x << ' ' << t.c.y << " box " << box.low.x << ' '
+      << box.low.y << ' ' << box.high.x << ' ' << box.high.y << " sigma " << sigma;
 }
 
 Box2 randomBox(RandomTriangles& random, const Triangle& t, float size) {
@@ -145,7 +147,8 @@ TEST(TriangleLobe, DensityIsRightOnSliversSegmentsAndPoints) {
     expectDensity(segment, random.near(segment, 2 * sigma), sigma);
     const Vec2 p = random.point(0.5f);
     const Vec2 h = p + random.point(2 * sigma);
-    EXPECT_NEAR(triangleDensity(p, p, p, h, sigma), pointDensity(p.x, p.y, h, sigma), kRelative * pointDensity(p.x, p.y, h, sigma));
+    EXPECT_NEAR(triangleDensity(p, p, p, h, sigma), pointDensity(p.x, p.y, h, sigma),
+                kRelative * pointDensity(p.x, p.y, h, sigma));
   }
 }
 
@@ -220,7 +223,8 @@ TEST(TriangleLobe, MassOfATinyBoxIsTheDensityTimesItsArea) {
       const Vec2 h = random.near(t, 2 * sigma);
       const Box2 box = {h - Vec2{half, half}, h + Vec2{half, half}};
       const double density = triangleDensity(t.a, t.b, t.c, h, sigma);
-      EXPECT_NEAR(triangleMass(t.a, t.b, t.c, box, sigma) / box.area(), density, kRelative * density + kCurvature * peakOf(sigma));
+      EXPECT_NEAR(triangleMass(t.a, t.b, t.c, box, sigma) / box.area(), density,
+                  kRelative * density + kCurvature * peakOf(sigma));
     }
   }
 }
