@@ -26,8 +26,8 @@ class LobeImage {
     }
   }
 
-  /// n^2 equal triangles, each at its centroid, with edges of at most 0.4 deviations: a rule of degree 1 on a grid, good to 1e-3
-  /// of a lobe at its edges and far better inside.
+  /// n^2 equal triangles, each at its centroid, with edges of at most 0.4 deviations: a rule of degree 1 on a
+  /// grid, weakest at the borders of a triangle. Tests hold it against Reference::mean.
   void addTriangle(double weight, Vec2 a, Vec2 b, Vec2 c) {
     const float longest = std::sqrt(std::max({dot(b - a, b - a), dot(c - b, c - b), dot(a - c, a - c)}));
     const int n = std::max(1, static_cast<int>(std::ceil(longest / (0.4f * sigma_))));
