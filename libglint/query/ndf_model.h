@@ -7,6 +7,12 @@
 
 namespace glint {
 
+/// A half vector drawn from a distribution of normals.
+struct HalfVectorSample {
+  Vec2 h;
+  float pdf = 0;  ///< density of h per unit projected area: the model's density over its integral; 0 if nothing can be drawn
+};
+
 /// A distribution of microscopic normals, filtered over a footprint. Density is per unit projected area: its integral over the
 /// disk is 1, and its value is the usual microfacet D(omega).
 ///
