@@ -15,16 +15,15 @@ struct Image {
   int height = 0;
   int channels = 0;
   std::vector<std::string> channel_names;
-  std::string format;        ///< of the file, as OpenImageIO names it: "png", "openexr", ...
-  std::string colour_space;  ///< "oiio:ColorSpace"; for most formats OpenImageIO's guess from the file type, not a fact
-  int bits = 0;              ///< bits of a channel in the file: 1 to 16 (integers), 16 or 32 (floating point)
+  std::string format;  ///< of the file, as OpenImageIO names it: "png", "openexr", ...
+  int bits = 0;        ///< bits of a channel in the file: 1 to 16 (integers), 16 or 32 (floating point)
   bool floating = false;
   /// [height][width][channels]. Unsigned integers of up to 8 and 16 bits keep their codes (full range 255 and 65535);
   /// everything else becomes float (integers of more bits scaled to 0..1).
   std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>> pixels;
 };
 
-/// Reads the first image of a file in any format that OpenImageIO knows. Alpha is not multiplied into the other channels.
+/// Reads the first image of a file: PNG by libpng, every other format by OpenImageIO. Alpha is not multiplied into the other channels.
 /// @throws Error io if the file cannot be opened; invalid_input if it is no image, damaged or truncated
 Image readImage(const std::string& path);
 

@@ -1,12 +1,10 @@
 #include "common/ndf_picture.h"
 
-#include <OpenImageIO/imagebuf.h>
-#include <OpenImageIO/imagebufalgo.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 
+#include "common/image_formats.h"
 #include "common/image_io.h"
 #include "glint/model/error.h"
 
@@ -24,13 +22,7 @@ std::vector<float> ndfColours(int size, std::span<const float> densities, float 
   const float scale = largest > 0 ? 1 / std::log1p(largest) : 0;
   std::transform(densities.begin(), densities.end(), grey.begin(),
                  [&](float d) { return scale * std::log1p(std::max(0.0f, d)); });
-  const OIIO::ImageSpec grey_spec(size, size, 1, OIIO::TypeDesc::FLOAT), colour_spec(size, size, 3, OIIO::TypeDesc::FLOAT);
-  const OIIO::ImageBuf source(grey_spec, grey.data());
-  std::vector<float> colours(3 * densities.size());
-  OIIO::ImageBuf target(colour_spec, colours.data());
-  if (!OIIO::ImageBufAlgo::color_map(target, source, 0, "inferno"))
-    throw Error(ErrorCode::failed, "image.colours", "", "", target.geterror());
-  return colours;
+  return imageFormats().infernoColours(size, grey);
 }
 
 void writeNdfPicture(const std::string& path, int size, std::span<const float> densities) {

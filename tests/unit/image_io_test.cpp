@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "common/files.h"
+#include "common/image_formats.h"
 #include "common/normal_image.h"
 #include "glint/model/error.h"
 
@@ -42,6 +43,29 @@ TEST_F(ImageFile, IntegersKeepTheirCodes) {
   EXPECT_EQ(std::get<std::vector<std::uint8_t>>(readImage(path("a.png")).pixels)[3], 51);
   EXPECT_EQ(std::get<std::vector<std::uint16_t>>(readImage(path("b.png")).pixels)[3], 13107);
   EXPECT_EQ(readImage(path("b.png")).bits, 16);
+}
+
+/// PNGs of every colour type, read by libpng and by OpenImageIO: two readers, one answer.
+TEST_F(ImageFile, ReadsPngAsOpenImageIoDoes) {
+  std::vector<float> pixels;
+  for (int i = 0; i < 13 * 7 * 4; ++i) pixels.push_back(static_cast<float>((i * 7919) % 251) / 250);
+  for (int channels = 1; channels <= 4; ++channels) {
+    for (const PixelFormat format : {PixelFormat::u8, PixelFormat::u16}) {
+      writeImage(path("a.png"), 13, 7, channels, std::span(pixels).first(13 * 7 * channels), format);
+      const Image direct = readImage(path("a.png")), other = imageFormats().read(path("a.png"));
+      EXPECT_EQ(direct.channels, channels);
+      EXPECT_EQ(direct.channel_names, other.channel_names);
+      EXPECT_EQ(direct.bits, other.bits);
+      EXPECT_EQ(direct.format, other.format);
+      EXPECT_EQ(direct.pixels, other.pixels) << channels;
+    }
+  }
+}
+
+TEST_F(ImageFile, RefusesSizesThatTheFileCannotHold) {
+  writeImage(path("a.png"), 3, 2, 3, pixels_, PixelFormat::u8);
+  EXPECT_NO_THROW(checkDeclaredSize(path("a.png"), std::uint64_t{1} << 20));
+  EXPECT_THROW(checkDeclaredSize(path("a.png"), std::uint64_t{1} << 40), Error);
 }
 
 TEST_F(ImageFile, FilesStoreTheTopRowFirst) {

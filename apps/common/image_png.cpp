@@ -1,0 +1,97 @@
+#include <png.h>
+
+#include <bit>
+#include <csetjmp>
+#include <cstdio>
+#include <memory>
+
+#include "common/image_formats.h"
+
+namespace glint::apps {
+namespace {
+
+/// A PNG while it is read. libpng reports errors by a long jump to the `setjmp` of the step that is running, so each step is a function
+/// without objects that need destruction.
+struct PngReader {
+  std::FILE* file = nullptr;
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+  char message[128] = "";
+
+  explicit PngReader(const std::string& path) : file(std::fopen(path.c_str(), "rb")) {
+    png = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, fail, [](png_structp, png_const_charp) {});
+    info = png_create_info_struct(png);
+  }
+  ~PngReader() {
+    png_destroy_read_struct(&png, &info, nullptr);
+    if (file) std::fclose(file);
+  }
+  PngReader(const PngReader&) = delete;
+  PngReader& operator=(const PngReader&) = delete;
+
+  [[noreturn]] static void fail(png_structp png, png_const_charp text) {
+    auto* self = static_cast<PngReader*>(png_get_error_ptr(png));
+    std::snprintf(self->message, sizeof self->message, "%s", text);
+    png_longjmp(png, 1);
+  }
+
+  /// Reads the header and asks for whole samples in the order of this machine.
+  bool readHeader() {
+    if (setjmp(png_jmpbuf(png))) return false;
+    png_init_io(png, file);
+    png_read_info(png, info);
+    png_set_expand(png);
+    if constexpr (std::endian::native == std::endian::little) png_set_swap(png);
+    png_set_interlace_handling(png);
+    png_read_update_info(png, info);
+    return true;
+  }
+
+  bool readRows(png_bytepp rows) {
+    if (setjmp(png_jmpbuf(png))) return false;
+    png_read_image(png, rows);
+    png_read_end(png, nullptr);
+    return true;
+  }
+};
+
+template <class T>
+std::vector<T> readPixels(PngReader& reader, const Image& image, const std::string& path) {
+  const std::size_t row = static_cast<std::size_t>(image.width) * image.channels;
+  std::vector<T> pixels(row * image.height);
+  std::vector<png_bytep> rows(image.height);
+  for (int j = 0; j < image.height; ++j) rows[j] = reinterpret_cast<png_bytep>(pixels.data() + row * (image.height - 1 - j));
+  if (!reader.readRows(rows.data())) throwDamagedImage(path, reader.message);
+  return pixels;
+}
+
+}  // namespace
+
+bool isPng(const std::string& path) {
+  png_byte signature[8] = {};
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
+  return file && std::fread(signature, 1, sizeof signature, file.get()) == sizeof signature &&
+         png_sig_cmp(signature, 0, 8) == 0;
+}
+
+Image readPng(const std::string& path) {
+  PngReader reader(path);
+  if (!reader.file || !reader.info || !reader.readHeader()) throwDamagedImage(path, reader.message);
+  static const std::vector<std::string> kNames[] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
+  Image image;
+  image.width = static_cast<int>(png_get_image_width(reader.png, reader.info));
+  image.height = static_cast<int>(png_get_image_height(reader.png, reader.info));
+  image.channels = png_get_channels(reader.png, reader.info);
+  image.channel_names = kNames[image.channels - 1];
+  image.format = "png";
+  image.bits = png_get_bit_depth(reader.png, reader.info);
+  checkDeclaredSize(path, std::uint64_t{png_get_rowbytes(reader.png, reader.info)} * image.height);
+  if (image.bits == 16) {
+    image.pixels = readPixels<std::uint16_t>(reader, image, path);
+  } else {
+    image.pixels = readPixels<std::uint8_t>(reader, image, path);
+  }
+  return image;
+}
+
+}  // namespace glint::apps

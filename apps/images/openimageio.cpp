@@ -1,0 +1,168 @@
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imagebuf.h>
+#include <OpenImageIO/imagebufalgo.h>
+#include <OpenImageIO/imageio.h>
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/image_formats.h"
+#include "glint/model/error.h"
+
+namespace glint::apps {
+namespace {
+
+/// OpenImageIO sometimes appends a line break to its messages.
+std::string trimmed(std::string text) {
+  while (!text.empty() && (text.back() == '\n' || text.back() == ' ' || text.back() == '.')) text.pop_back();
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+/// Reads all pixels bottom row first: a negative stride writes the file's first row into the array's last.
+template <class T>
+std::vector<T> readFlipped(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, const std::string& path) {
+  const std::size_t row = static_cast<std::size_t>(spec.width) * spec.nchannels;
+  std::vector<T> pixels(row * spec.height);
+  const auto row_bytes = static_cast<OIIO::stride_t>(row * sizeof(T));
+  T* last_row = pixels.data() + row * (spec.height - 1);
+  const bool complete = input.read_image(0, 0, 0, spec.nchannels, type, last_row, OIIO::AutoStride, -row_bytes);
+  if (!complete || input.has_error()) throwDamagedImage(path, trimmed(input.geterror()));
+  return pixels;
+}
+
+void checkSize(const OIIO::ImageSpec& spec, const std::string& path) {
+  if (spec.depth > 1) {
+    throw Error(ErrorCode::unsupported, "image.planar", path, "", "volumes are not supported", "export one slice as an image");
+  }
+  if (spec.deep) {
+    throw Error(ErrorCode::unsupported, "image.planar", path, "", "deep images are not supported", "flatten the image first");
+  }
+  if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1) throwDamagedImage(path, "it has no pixels");
+  checkDeclaredSize(path, spec.image_bytes(true));
+}
+
+/// @throws Error usage if a value does not fit
+template <class T>
+std::vector<T> toCodes(std::span<const float> values, const std::string& path) {
+  constexpr float kFull = std::numeric_limits<T>::max();
+  std::vector<T> codes(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!(values[i] >= 0 && values[i] <= 1)) {
+      throw Error(ErrorCode::usage, "image.range", path, "",
+                  fmt::format("the value {} does not fit an integer image", values[i]),
+                  "write a floating-point format such as .exr");
+    }
+    codes[i] = static_cast<T>(std::lround(values[i] * kFull));
+  }
+  return codes;
+}
+
+OIIO::TypeDesc fileType(PixelFormat format) {
+  switch (format) {
+    case PixelFormat::u8:
+      return OIIO::TypeDesc::UINT8;
+    case PixelFormat::u16:
+      return OIIO::TypeDesc::UINT16;
+    case PixelFormat::f16:
+      return OIIO::TypeDesc::HALF;
+    case PixelFormat::f32:
+      return OIIO::TypeDesc::FLOAT;
+  }
+  return OIIO::TypeDesc::FLOAT;
+}
+
+/// Encodes one image in memory, so that the file can be replaced in one step.
+template <class T>
+std::vector<unsigned char> encode(const std::string& path, const OIIO::ImageSpec& wanted, std::span<const T> pixels) {
+  const auto output = OIIO::ImageOutput::create(path);
+  if (!output) {
+    throw Error(ErrorCode::usage, "image.format", path, "", "no image format has this extension: " + trimmed(OIIO::geterror()),
+                "name the output .exr or .png");
+  }
+  if (!output->supports("ioproxy")) {
+    throw Error(ErrorCode::unsupported, "image.format", path, "", "this image format cannot be written", "use .exr or .png");
+  }
+  std::vector<unsigned char> bytes;
+  OIIO::Filesystem::IOVecOutput memory(bytes);
+  output->set_ioproxy(&memory);
+  const auto type = OIIO::TypeDescFromC<T>::value();
+  const auto row_bytes = static_cast<OIIO::stride_t>(static_cast<std::size_t>(wanted.width) * wanted.nchannels * sizeof(T));
+  const T* last_row = pixels.data() + static_cast<std::size_t>(wanted.width) * wanted.nchannels * (wanted.height - 1);
+  if (!output->open(path, wanted) || output->spec().format != wanted.format ||
+      !output->write_image(type, last_row, OIIO::AutoStride, -row_bytes) || !output->close()) {
+    const std::string reason = output->has_error() ? trimmed(output->geterror()) : "it does not hold this type of pixel";
+    throw Error(ErrorCode::usage, "image.format", path, "", "the image cannot be written: " + reason,
+                "use .exr for floating point, .png for 8 or 16 bits");
+  }
+  return bytes;
+}
+
+Image readImageFile(const std::string& path) {
+  // OpenImageIO has threads of its own, which --threads is to limit as well.
+  OIIO::attribute("threads", static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
+  OIIO::ImageSpec config;
+  config.attribute("oiio:UnassociatedAlpha", 1);
+  const auto input = OIIO::ImageInput::open(path, &config);
+  if (!input) {
+    throw Error(ErrorCode::invalid_input, "image.readable", path, "",
+                "cannot be read as an image: " + trimmed(OIIO::geterror()),
+                "check that the file is complete and in a format that oiiotool --info can read");
+  }
+  const OIIO::ImageSpec& spec = input->spec();
+  checkSize(spec, path);
+  Image image;
+  image.width = spec.width;
+  image.height = spec.height;
+  image.channels = spec.nchannels;
+  image.channel_names.assign(spec.channelnames.begin(), spec.channelnames.end());
+  image.format = input->format_name();
+  image.bits = spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.basesize()) * 8);
+  image.floating = spec.format.is_floating_point();
+  if (spec.format == OIIO::TypeDesc::UINT8) {
+    image.pixels = readFlipped<std::uint8_t>(*input, spec, OIIO::TypeDesc::UINT8, path);
+  } else if (spec.format == OIIO::TypeDesc::UINT16) {
+    image.pixels = readFlipped<std::uint16_t>(*input, spec, OIIO::TypeDesc::UINT16, path);
+  } else {
+    image.pixels = readFlipped<float>(*input, spec, OIIO::TypeDesc::FLOAT, path);
+  }
+  return image;
+}
+
+std::vector<unsigned char> encodeImage(const std::string& path, int width, int height, int channels,
+                                       std::span<const float> pixels, PixelFormat format) {
+  OIIO::ImageSpec spec(width, height, channels, fileType(format));
+  if (channels == 1) spec.channelnames = {"Y"};
+  spec.attribute("compression", "zip");
+  if (format == PixelFormat::f16 || format == PixelFormat::f32)
+    spec.attribute("DateTime", "");  // or OpenEXR files hold the time
+  if (format == PixelFormat::u8) return encode<std::uint8_t>(path, spec, toCodes<std::uint8_t>(pixels, path));
+  if (format == PixelFormat::u16) return encode<std::uint16_t>(path, spec, toCodes<std::uint16_t>(pixels, path));
+  return encode<float>(path, spec, pixels);
+}
+
+bool isWritableName(const std::string& path) {
+  const auto output = OIIO::ImageOutput::create(path);
+  if (!output) (void)OIIO::geterror();  // an error nobody fetches is printed at exit
+  return output && output->supports("ioproxy");
+}
+
+std::vector<float> infernoColours(int size, std::span<const float> grey) {
+  const OIIO::ImageSpec grey_spec(size, size, 1, OIIO::TypeDesc::FLOAT), colour_spec(size, size, 3, OIIO::TypeDesc::FLOAT);
+  const OIIO::ImageBuf source(grey_spec, const_cast<float*>(grey.data()));
+  std::vector<float> colours(3 * grey.size());
+  OIIO::ImageBuf target(colour_spec, colours.data());
+  if (!OIIO::ImageBufAlgo::color_map(target, source, 0, "inferno"))
+    throw Error(ErrorCode::failed, "image.colours", "", "", target.geterror());
+  return colours;
+}
+
+}  // namespace
+}  // namespace glint::apps
+
+/// What imageFormats() looks up.
+extern "C" const glint::apps::ImageFormats glint_image_formats;
+const glint::apps::ImageFormats glint_image_formats = {glint::apps::readImageFile, glint::apps::encodeImage,
+                                                       glint::apps::isWritableName, glint::apps::infernoColours};
