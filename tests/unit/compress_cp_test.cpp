@@ -90,17 +90,13 @@ CpFactors decompose(const Tensor& t, int rank, double min_improvement = 1e-4, bo
 
 /// Squared error of the best third factor, in double.
 double residual(const Tensor& t, const CpFactors& f) {
-  Eigen::MatrixXd basis(kBlockPixels, f.rank);
-  for (int p = 0; p < kBlockPixels; ++p)
-    for (int r = 0; r < f.rank; ++r) basis(p, r) = static_cast<double>(f.x[p % 16 * f.rank + r]) * f.y[p / 16 * f.rank + r];
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(basis);
-  double sum = 0;
-  for (int s = 0; s < t.count; ++s) {
-    const Eigen::VectorXd slice =
-        Eigen::Map<const Eigen::VectorXf>(t.slices.data() + s * kSliceStride, kBlockPixels).cast<double>();
-    sum += (slice - basis * solver.solve(slice)).squaredNorm();
-  }
-  return sum;
+  std::vector<double> basis, slices;
+  for (int r = 0; r < f.rank; ++r)
+    for (int p = 0; p < kBlockPixels; ++p)
+      basis.push_back(static_cast<double>(f.x[p % 16 * f.rank + r]) * f.y[p / 16 * f.rank + r]);
+  for (int s = 0; s < t.count; ++s)
+    for (int p = 0; p < kBlockPixels; ++p) slices.push_back(t.slices[s * kSliceStride + p]);
+  return test::squaredResidual(basis, slices, kBlockPixels);
 }
 
 TEST(CompressCp, IsAsAccurateAsTextbookLeastSquares) {

@@ -1,11 +1,9 @@
 #pragma once
 
-#include <Eigen/Dense>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <random>
 #include <vector>
 
 #include "glint/model/compressed_ndf.h"
@@ -96,50 +94,15 @@ inline std::vector<double> storedImage(const NdfPyramid& p, int level, std::size
 /// Textbook alternating least squares in double, with the three factors updated in turn from random starts.
 /// @param slices  [count][stride]
 /// @return squared error
-inline double referenceCp(const float* slices, int count, int stride, int rank, double min_improvement, int max_sweeps,
-                          unsigned seed) {
-  using Eigen::MatrixXd;
-  std::mt19937 random(seed);
-  std::normal_distribution<double> gaussian;
-  const auto randomMatrix = [&](int rows) {
-    MatrixXd m(rows, rank);
-    for (int i = 0; i < m.size(); ++i) m.data()[i] = gaussian(random);
-    return m;
-  };
-  MatrixXd x = randomMatrix(kBlockSize), y = randomMatrix(kBlockSize), z = randomMatrix(count);
-  const auto value = [&](int s, int j, int i) { return static_cast<double>(slices[s * stride + j * kBlockSize + i]); };
-  const auto solve = [&](const MatrixXd& a, const MatrixXd& b, const MatrixXd& products) -> MatrixXd {
-    MatrixXd gram = (a.transpose() * a).cwiseProduct(b.transpose() * b);
-    gram.diagonal().array() += 1e-6 * gram.trace() / rank;
-    return gram.ldlt().solve(products.transpose()).transpose();
-  };
-  double energy = 0;
-  for (int s = 0; s < count; ++s)
-    for (int p = 0; p < kBlockPixels; ++p) energy += static_cast<double>(slices[s * stride + p]) * slices[s * stride + p];
-  double error = energy;
-  for (int sweep = 0; sweep < max_sweeps; ++sweep) {
-    MatrixXd mx = MatrixXd::Zero(kBlockSize, rank), my = mx, mz = MatrixXd::Zero(count, rank);
-    const auto accumulate = [&](auto add) {
-      for (int s = 0; s < count; ++s)
-        for (int j = 0; j < kBlockSize; ++j)
-          for (int i = 0; i < kBlockSize; ++i) add(s, j, i, value(s, j, i));
-    };
-    accumulate([&](int s, int j, int i, double v) { mx.row(i) += v * y.row(j).cwiseProduct(z.row(s)); });
-    x = solve(y, z, mx);
-    accumulate([&](int s, int j, int i, double v) { my.row(j) += v * x.row(i).cwiseProduct(z.row(s)); });
-    y = solve(x, z, my);
-    accumulate([&](int s, int j, int i, double v) { mz.row(s) += v * x.row(i).cwiseProduct(y.row(j)); });
-    z = solve(x, y, mz);
-    double next = 0;
-    accumulate([&](int s, int j, int i, double v) {
-      const double e = v - x.row(i).cwiseProduct(y.row(j)).dot(z.row(s));
-      next += e * e;
-    });
-    const bool done = std::sqrt(error / energy) - std::sqrt(next / energy) < min_improvement;
-    error = next;
-    if (done) break;
-  }
-  return error;
-}
+double referenceCp(const float* slices, int count, int stride, int rank, double min_improvement, int max_sweeps, unsigned seed);
+
+/// Squared singular values of a matrix, largest first.
+/// @param columns  column-major, `rows` elements each
+std::vector<double> squaredSingularValues(const std::vector<double>& columns, int rows);
+
+/// Squared distance of vectors from the span of others.
+/// @param basis    column-major, `rows` elements each
+/// @param vectors  the same
+double squaredResidual(const std::vector<double>& basis, const std::vector<double>& vectors, int rows);
 
 }  // namespace glint::test
