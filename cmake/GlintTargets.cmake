@@ -21,13 +21,14 @@ if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   add_compile_options(-march=${GLINT_ARCH})
 endif()
 
-# In the tree as in an installed package, headers are included as "glint/<room>/<header>.h".
+# In the tree as in an installed package, headers are included as "glint/<room>/<header>.h", and the C interface as "glint.h".
 set(GLINT_INCLUDE_DIR ${PROJECT_BINARY_DIR}/include)
 file(MAKE_DIRECTORY ${GLINT_INCLUDE_DIR}/glint)
-foreach(room model query bake)
+foreach(room model query api bake)
   file(CREATE_LINK ${PROJECT_SOURCE_DIR}/libglint/${room} ${GLINT_INCLUDE_DIR}/glint/${room} SYMBOLIC)
 endforeach()
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/formats ${GLINT_INCLUDE_DIR}/glint/formats SYMBOLIC)
+file(CREATE_LINK ${PROJECT_SOURCE_DIR}/libglint/api/glint.h ${GLINT_INCLUDE_DIR}/glint.h SYMBOLIC)
 
 add_library(glint_warnings INTERFACE)
 # -Wno-restrict: GCC 12 sees overlaps in std::string that are not there (its bug 105329).

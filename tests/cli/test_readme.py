@@ -63,6 +63,12 @@ def test_example_is_the_consumer_that_is_built():
     assert blocks("cmake")[0] in (ROOT / "tests/consumer/CMakeLists.txt").read_text()
 
 
+def test_c_example_is_the_program_that_is_built_against_an_installed_package():
+    assert blocks("c") == [(ROOT / "tests/consumer_installed/main.c").read_text()]
+    project = (ROOT / "tests/consumer_installed/CMakeLists.txt").read_text()
+    assert all(line in project for line in blocks("cmake")[1].splitlines())
+
+
 def test_links_lead_somewhere():
     for document in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"):
         text = (ROOT / document).read_text()

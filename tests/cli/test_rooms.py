@@ -6,7 +6,8 @@ import re
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
-ROOMS = {"model": ROOT / "libglint/model", "query": ROOT / "libglint/query", "bake": ROOT / "libglint/bake", "formats": ROOT / "formats"}
+ROOMS = {"model": ROOT / "libglint/model", "query": ROOT / "libglint/query", "api": ROOT / "libglint/api", "bake": ROOT / "libglint/bake",
+         "formats": ROOT / "formats"}
 APPS = ROOT / "apps"
 MAX_MAIN_LINES = 60
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^">]+)[">]', re.MULTILINE)
@@ -16,6 +17,7 @@ SOURCES = {".h", ".hpp", ".inl", ".cpp", ".cc", ".c", ".cu"}
 MAY_USE = {
     "model": {"model"},
     "query": {"query", "model"},
+    "api": {"api", "formats", "query", "model"},
     "bake": {"bake", "query", "model"},
     "formats": {"formats", "model"},
 }
@@ -42,7 +44,7 @@ def includes(path):
 
 def room_of(path, name):
     """The room of an included header, or None when it is not one of ours."""
-    if match := re.match(r"glint/(model|query|bake|formats)/", name):
+    if match := re.match(r"glint/(model|query|api|bake|formats)/", name):
         return match[1]
     resolved = (path.parent / name).resolve()
     for room, folder in ROOMS.items():
@@ -61,7 +63,7 @@ def test_headers_that_a_room_includes_exist():
     missing = []
     for path in [p for folder in (*ROOMS.values(), APPS) for p in sources(folder)]:
         for _, name in includes(path):
-            if match := re.match(r"glint/(model|query|bake|formats)/(.+)", name):
+            if match := re.match(r"glint/(model|query|api|bake|formats)/(.+)", name):
                 if not (ROOMS[match[1]] / match[2]).exists():
                     missing.append(f"{name_of(path)}: {name}")
     assert missing == []
@@ -112,6 +114,11 @@ def test_reader_does_not_show_hdf5_to_those_who_include_it():
     users = {name_of(p) for p in sources(ROOMS["formats"]) if any(re.match(r"hdf5|H5", name) for _, name in includes(p))}
     assert users
     assert {name for name in users if name.endswith(".h")} <= {"formats/hdf5_handle.h"}
+
+
+def test_c_header_is_c_and_needs_only_the_standard_library():
+    """A C compiler reads it: the installed consumer tests that; nothing else of ours may creep in."""
+    assert [name for _, name in includes(ROOMS["api"] / "glint.h")] == ["stddef.h", "stdint.h"]
 
 
 def mains():

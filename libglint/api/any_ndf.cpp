@@ -1,0 +1,66 @@
+#include "glint/api/any_ndf.h"
+
+#include <algorithm>
+#include <string>
+
+#include "glint/formats/hash.h"
+
+namespace glint::api {
+namespace {
+
+/// Pixels of a picture of a model that has no images of its own.
+constexpr int kReferenceResolution = 256;
+
+void requireSameMap(const formats::Asset& asset, const std::filesystem::path& path, const NdfInfo& info, const NormalMap& map,
+                    const std::filesystem::path& normals_path) {
+  // A pyramid names its map as an input; what was compressed from a pyramid names that, so only the size can be compared.
+  const auto& inputs = asset.info().provenance.inputs;
+  const std::string hash = asset.kind() == "ndf-pyramid" ? formats::hashFile(normals_path) : std::string();
+  const bool named = hash.empty() || inputs.empty() ||
+                     std::any_of(inputs.begin(), inputs.end(), [&](const auto& input) { return input.hash_hex == hash; });
+  if (named && map.width == info.width && map.height == info.height) return;
+  throw Error(ErrorCode::invalid_input, "query.normals", normals_path.string(), "",
+              "this is not the map that " + path.string() + " was made from", "give the asset that glint-pyramid read");
+}
+
+NdfInfo infoOf(const PyramidShape& shape) {
+  return {shape.width,   shape.height,   shape.resolution,  shape.sigma_r,
+          shape.surface, shape.boundary, shape.level_count, finestSigma(shape)};
+}
+
+NdfInfo infoOf(const NormalMap& map, const NdfOptions& options) {
+  return {map.width, map.height, kReferenceResolution, options.sigma_r, options.surface, options.boundary, 0, 0};
+}
+
+}  // namespace
+
+template <class Model, class View>
+void OpenedNdf::setPyramid(const View& view) {
+  model_ = normals_ ? Model(view, normals_->normals()) : Model(view);
+  info_ = infoOf(view.shape);
+}
+
+OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& options) {
+  const formats::OpenOptions open_options = {options.verify_hashes};
+  OpenedNdf opened(formats::Asset::open(path, open_options));
+  if (!options.normals.empty()) opened.normals_ = formats::Asset::open(options.normals, open_options);
+  const formats::Asset& asset = opened.asset_;
+
+  // A new kind is a line here, and its model in AnyNdf.
+  if (asset.kind() == "normals") {
+    opened.model_ = Reference(asset.normals(), options.sigma_r, options.surface, options.boundary, Reference::Search::pruned);
+    opened.info_ = infoOf(asset.normals(), options);
+  } else if (asset.kind() == "ndf-pyramid") {
+    opened.setPyramid<PyramidNdf>(asset.pyramid());
+  } else if (asset.kind() == "ndf-cp") {
+    opened.setPyramid<CpNdf>(asset.compressed());
+  } else {
+    throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",
+                "is of kind " + std::string(asset.kind()) + ", which holds no distribution of normals",
+                "pass an asset of kind normals, ndf-pyramid or ndf-cp");
+  }
+  if (opened.normals_) requireSameMap(asset, path, opened.info_, opened.normals_->normals(), options.normals);
+  return opened;
+}
+
+}  // namespace glint::api

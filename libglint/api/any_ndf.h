@@ -1,0 +1,64 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <variant>
+
+#include "glint/formats/asset_reader.h"
+#include "glint/query/cp_ndf.h"
+#include "glint/query/pyramid_ndf.h"
+#include "glint/query/reference.h"
+
+namespace glint::api {
+
+/// Any model of the NDF that an asset can hold.
+using AnyNdf = std::variant<Reference, PyramidNdf, CpNdf>;
+
+/// What an asset does not say itself about how it is asked.
+struct NdfOptions {
+  std::filesystem::path normals;       ///< asset that the pyramid was made from, for footprints below level 0; empty: none
+  Surface surface = Surface::flat;     ///< kind normals: how they behave between texels
+  Boundary boundary = Boundary::wrap;  ///< kind normals: beyond the border of the map
+  float sigma_r = 0.005f;              ///< kind normals: intrinsic roughness, disk units
+  bool verify_hashes = false;          ///< also compare every dataset with its hash; reads the whole file
+};
+
+/// What models of every kind have in common.
+struct NdfInfo {
+  int width = 0;       ///< of the normal map, texels
+  int height = 0;      ///< of the normal map, texels
+  int resolution = 0;  ///< pixels of an NDF image along each axis; 256 where the model has none
+  float sigma_r = 0;   ///< intrinsic roughness, disk units
+  Surface surface = Surface::flat;
+  Boundary boundary = Boundary::wrap;
+  int level_count = 0;            ///< footprint sizes that are stored; 0: every size is answered from the texels
+  float finest_sigma_texels = 0;  ///< deviation of the footprints of level 0; 0 where there are no levels
+};
+
+/// An asset and the model that answers from it, of whichever kind it is.
+class OpenedNdf {
+ public:
+  /// Opens an asset of a kind that answers an NDF.
+  /// @throws Error  as formats::Asset::open; unsupported for other kinds; invalid_input if `options.normals` is not the map that
+  ///                the asset was made from
+  static OpenedNdf open(const std::filesystem::path& path, const NdfOptions& options = {});
+
+  /// Points into the mapped asset: lives as long as this object, also when that is moved.
+  const AnyNdf& model() const { return model_; }
+  const NdfInfo& info() const { return info_; }
+  const formats::Asset& asset() const { return asset_; }
+  /// Whether footprints below level 0 are answered from the texels.
+  bool hasNormals() const { return normals_.has_value(); }
+
+ private:
+  explicit OpenedNdf(formats::Asset asset) : asset_(std::move(asset)) {}
+  template <class Model, class View>
+  void setPyramid(const View& view);
+
+  formats::Asset asset_;
+  std::optional<formats::Asset> normals_;
+  AnyNdf model_;
+  NdfInfo info_;
+};
+
+}  // namespace glint::api

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+
+#include "glint/api/any_ndf.h"
+#include "glint/model/footprint.h"
+
+namespace glint::api {
+
+/// Floats at equal distances: an array, one member of an array of structs, or (stride 0) one value for all queries.
+struct StridedFloats {
+  const float* data = nullptr;  ///< nullptr: not given
+  std::ptrdiff_t stride_bytes = sizeof(float);
+
+  float operator[](std::size_t k) const {
+    float value;
+    std::memcpy(&value, reinterpret_cast<const char*>(data) + static_cast<std::ptrdiff_t>(k) * stride_bytes, sizeof value);
+    return value;
+  }
+};
+
+/// Footprints as a structure of arrays: centres, and one of the three ways to give a size. Where several are given, the first
+/// of them counts.
+struct FootprintArrays {
+  StridedFloats u, v;            ///< centres, uv; required
+  StridedFloats sigma;           ///< isotropic Gaussians: deviation, texels
+  StridedFloats xx, xy, yy;      ///< Gaussians: covariance, texels^2; xy not given: 0
+  StridedFloats ax, ay, bx, by;  ///< boxes: half axes, texels
+
+  Footprint operator[](std::size_t k) const {
+    const Vec2 centre = {u[k], v[k]};
+    if (sigma.data) return Footprint::isotropic(centre, sigma[k]);
+    if (xx.data) return Footprint::gaussian(centre, {xx[k], xy.data ? xy[k] : 0.0f, yy[k]});
+    return Footprint::box(centre, {ax[k], ay[k]}, {bx[k], by[k]});
+  }
+};
+
+/// Half vectors as a structure of arrays.
+struct HalfVectorArrays {
+  StridedFloats x, y;
+  Vec2 operator[](std::size_t k) const { return {x[k], y[k]}; }
+};
+
+/// Boxes of half vectors as a structure of arrays.
+struct RangeArrays {
+  StridedFloats x0, y0, x1, y1;
+  Box2 operator[](std::size_t k) const { return {{x0[k], y0[k]}, {x1[k], y1[k]}}; }
+};
+
+/// out[k] = density of query k, for k < count. The same values as asking one by one, and the same rules for what is degenerate.
+/// @note thread-safe, allocates nothing; split a batch over threads as you like
+void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
+               float* out);
+
+/// out[k] = mean density over the box of query k.
+void means(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges, float* out);
+
+}  // namespace glint::api

@@ -1,0 +1,352 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "glint.h"
+#include "glint/api/any_ndf.h"
+#include "glint/formats/asset_writer.h"
+#include "support/sample_assets.h"
+#include "support/temp_folder.h"
+
+namespace glint {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr int kSize = 64;
+/// Batches may sum in another order.
+constexpr float kBatchError = 1e-6f;
+
+/// Files of every kind, with their maps.
+class Assets {
+ public:
+  Assets() {
+    const auto normals = test::sampleNormals(kSize, kSize);
+    formats::writeAsset(path("normals"), normals.map, test::sampleProvenance());
+    const auto pyramid = test::samplePyramid(kSize, BlockPrecision::f16);
+    formats::writeAsset(path("ndf-pyramid"), pyramid.pyramid, test::sampleProvenance());
+    const auto compressed = test::sampleCompressed(kSize, CompressionMethod::cp, CoefficientType::i8);
+    formats::writeAsset(path("ndf-cp"), compressed.ndf, test::sampleProvenance());
+    formats::writeAsset(path("heights"), test::sampleHeights(kSize, kSize).map, test::sampleProvenance());
+  }
+  std::string path(const std::string& kind) const { return (folder_.path() / (kind + ".glint")).string(); }
+
+ private:
+  test::TempFolder folder_;
+};
+
+const Assets& assets() {
+  static const Assets files;
+  return files;
+}
+
+struct Closer {
+  void operator()(glint_ndf* ndf) const { glint_ndf_close(ndf); }
+};
+using Handle = std::unique_ptr<glint_ndf, Closer>;
+
+Handle openHandle(const std::string& kind, const glint_open_options* options = nullptr) {
+  glint_ndf* ndf = nullptr;
+  EXPECT_EQ(glint_ndf_open(assets().path(kind).c_str(), options, &ndf), GLINT_OK) << glint_error_message();
+  return Handle(ndf);
+}
+
+constexpr const char* kKinds[] = {"normals", "ndf-pyramid", "ndf-cp"};
+
+/// Random queries of every size, with a few that are degenerate.
+struct Queries {
+  explicit Queries(std::size_t count, unsigned seed = 1) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> unit(0, 1);
+    for (std::size_t k = 0; k < count; ++k) {
+      u.push_back(unit(random) * 3 - 1);
+      v.push_back(unit(random));
+      sigma.push_back(std::exp2(unit(random) * 7 - 2));
+      hx.push_back(unit(random) - 0.5f);
+      hy.push_back(unit(random) - 0.5f);
+      if (k % 23 == 5) u.back() = kNan;
+      if (k % 29 == 7) sigma.back() = k % 2 ? kNan : 0;
+      if (k % 31 == 3) hx.back() = k % 2 ? kNan : 1.5f;
+    }
+  }
+  std::vector<float> u, v, sigma, hx, hy;
+};
+
+glint_floats contiguous(const std::vector<float>& values) { return {values.data(), sizeof(float)}; }
+
+glint_footprints isotropic(const Queries& q) {
+  glint_footprints p = {};
+  p.u = contiguous(q.u);
+  p.v = contiguous(q.v);
+  p.sigma = contiguous(q.sigma);
+  return p;
+}
+
+void expectSame(float actual, float expected, std::size_t k) {
+  EXPECT_NEAR(actual, expected, kBatchError * expected) << "query " << k;
+}
+
+TEST(CApi, AnswersAsTheModelsDo) {
+  for (const char* kind : kKinds) {
+    SCOPED_TRACE(kind);
+    const Handle ndf = openHandle(kind);
+    const auto opened = api::OpenedNdf::open(assets().path(kind));
+    const Queries q(100);
+    int positive = 0;
+    for (std::size_t k = 0; k < q.u.size(); ++k) {
+      const glint_footprint p = glint_footprint_isotropic(q.u[k], q.v[k], q.sigma[k]);
+      const glint_footprint box = {GLINT_FOOTPRINT_BOX, q.u[k], q.v[k], {q.sigma[k], 1, -1, q.sigma[k]}};
+      const auto expected = [&](auto&& ask) { return std::visit(ask, opened.model()); };
+      float density = -1, mean = -1, in_box = -1;
+      ASSERT_EQ(glint_density(ndf.get(), &p, q.hx[k], q.hy[k], &density), GLINT_OK);
+      ASSERT_EQ(glint_mean(ndf.get(), &p, -0.1f, q.hy[k], 0.3f, 0.5f, &mean), GLINT_OK);
+      ASSERT_EQ(glint_density(ndf.get(), &box, q.hx[k], q.hy[k], &in_box), GLINT_OK);
+      const Footprint footprint = Footprint::isotropic({q.u[k], q.v[k]}, q.sigma[k]);
+      EXPECT_EQ(density, expected([&](const auto& m) { return m.density(footprint, {q.hx[k], q.hy[k]}); }));
+      EXPECT_EQ(mean, expected([&](const auto& m) { return m.mean(footprint, {{-0.1f, q.hy[k]}, {0.3f, 0.5f}}); }));
+      EXPECT_EQ(in_box, expected([&](const auto& m) {
+                  return m.density(Footprint::box({q.u[k], q.v[k]}, {q.sigma[k], 1}, {-1, q.sigma[k]}), {q.hx[k], q.hy[k]});
+                }));
+      EXPECT_TRUE(std::isfinite(density) && density >= 0);
+      positive += density > 0;
+    }
+    EXPECT_GT(positive, 5);
+  }
+}
+
+TEST(CApi, BatchesEqualSingleQueries) {
+  for (const char* kind : kKinds) {
+    SCOPED_TRACE(kind);
+    const Handle ndf = openHandle(kind);
+    for (const std::size_t count : {std::size_t{1}, std::size_t{7}, std::size_t{64}, std::size_t{203}}) {
+      const Queries q(count, static_cast<unsigned>(count));
+      const glint_footprints p = isotropic(q);
+      std::vector<float> densities(count, -1), means(count, -1);
+      const float low = -0.2f;
+      const std::vector<float> high(count, 0.3f);
+      ASSERT_EQ(glint_density_batch(ndf.get(), count, &p, contiguous(q.hx), contiguous(q.hy), densities.data()), GLINT_OK);
+      ASSERT_EQ(
+          glint_mean_batch(ndf.get(), count, &p, {&low, 0}, contiguous(q.hy), contiguous(high), contiguous(high), means.data()),
+          GLINT_OK);
+      for (std::size_t k = 0; k < count; ++k) {
+        const glint_footprint one = glint_footprint_isotropic(q.u[k], q.v[k], q.sigma[k]);
+        float density = -1, mean = -1;
+        glint_density(ndf.get(), &one, q.hx[k], q.hy[k], &density);
+        glint_mean(ndf.get(), &one, low, q.hy[k], high[k], high[k], &mean);
+        expectSame(densities[k], density, k);
+        expectSame(means[k], mean, k);
+      }
+    }
+  }
+}
+
+TEST(CApi, BatchesTakeCovariancesBoxesAndAnyStride) {
+  struct Row {
+    float xx, u, xy, v, yy;
+  };
+  const Queries q(100);
+  std::vector<Row> rows;
+  for (std::size_t k = 0; k < q.u.size(); ++k) rows.push_back({q.sigma[k] * q.sigma[k], q.u[k], 3, q.v[k], 900});
+  const auto column = [&](const float& first) { return glint_floats{&first, sizeof(Row)}; };
+  for (const char* kind : kKinds) {
+    SCOPED_TRACE(kind);
+    const Handle ndf = openHandle(kind);
+    std::vector<float> gaussians(rows.size()), backwards(rows.size()), boxes(rows.size());
+    glint_footprints p = {};
+    p.u = column(rows[0].u);
+    p.v = column(rows[0].v);
+    p.xx = column(rows[0].xx);
+    p.xy = column(rows[0].xy);
+    p.yy = column(rows[0].yy);
+    ASSERT_EQ(glint_density_batch(ndf.get(), rows.size(), &p, contiguous(q.hx), contiguous(q.hy), gaussians.data()), GLINT_OK);
+    glint_footprints reversed = {};
+    reversed.u = {&rows.back().u, -static_cast<std::ptrdiff_t>(sizeof(Row))};
+    reversed.v = {&rows.back().v, -static_cast<std::ptrdiff_t>(sizeof(Row))};
+    reversed.xx = {&rows.back().xx, -static_cast<std::ptrdiff_t>(sizeof(Row))};
+    reversed.yy = {&rows.back().yy, -static_cast<std::ptrdiff_t>(sizeof(Row))};
+    const glint_floats back_x = {&q.hx.back(), -4}, back_y = {&q.hy.back(), -4};
+    ASSERT_EQ(glint_density_batch(ndf.get(), rows.size(), &reversed, back_x, back_y, backwards.data()), GLINT_OK);
+    const float length = 9, none = 0;
+    glint_footprints box = {};
+    box.u = p.u;
+    box.v = p.v;
+    box.ax = box.by = {&length, 0};
+    box.ay = box.bx = {&none, 0};
+    ASSERT_EQ(glint_density_batch(ndf.get(), rows.size(), &box, contiguous(q.hx), contiguous(q.hy), boxes.data()), GLINT_OK);
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      float one = -1;
+      const glint_footprint gaussian = {
+          GLINT_FOOTPRINT_GAUSSIAN, rows[k].u, rows[k].v, {rows[k].xx, rows[k].xy, rows[k].yy, 0}};
+      glint_density(ndf.get(), &gaussian, q.hx[k], q.hy[k], &one);
+      expectSame(gaussians[k], one, k);
+      const glint_footprint straight = {GLINT_FOOTPRINT_GAUSSIAN, rows[k].u, rows[k].v, {rows[k].xx, 0, rows[k].yy, 0}};
+      glint_density(ndf.get(), &straight, q.hx[k], q.hy[k], &one);
+      expectSame(backwards[rows.size() - 1 - k], one, k);
+      const glint_footprint square = {GLINT_FOOTPRINT_BOX, rows[k].u, rows[k].v, {9, 0, 0, 9}};
+      glint_density(ndf.get(), &square, q.hx[k], q.hy[k], &one);
+      expectSame(boxes[k], one, k);
+    }
+  }
+}
+
+TEST(CApi, NullAndMissingArgumentsAreErrorsThatTouchNothing) {
+  const Handle ndf = openHandle("ndf-cp");
+  const Queries q(3);
+  const glint_footprints complete = isotropic(q);
+  const glint_floats h = contiguous(q.hx), none = {nullptr, 4};
+  std::vector<float> out(3, -7);
+  const auto refused = [&](glint_status status) {
+    EXPECT_EQ(status, GLINT_ERROR_USAGE);
+    EXPECT_STRNE(glint_error_message(), "");
+    EXPECT_STREQ(glint_error_rule(), "api.arguments");
+    EXPECT_EQ(out, std::vector<float>(3, -7));
+  };
+  refused(glint_density_batch(nullptr, 3, &complete, h, h, out.data()));
+  refused(glint_density_batch(ndf.get(), 3, nullptr, h, h, out.data()));
+  refused(glint_density_batch(ndf.get(), 3, &complete, h, h, nullptr));
+  refused(glint_density_batch(ndf.get(), 3, &complete, none, h, out.data()));
+  refused(glint_density_batch(ndf.get(), 3, &complete, h, none, out.data()));
+  refused(glint_mean_batch(ndf.get(), 3, &complete, h, h, h, none, out.data()));
+  for (auto member : {&glint_footprints::u, &glint_footprints::v, &glint_footprints::sigma}) {
+    glint_footprints p = complete;
+    p.*member = none;
+    refused(glint_density_batch(ndf.get(), 3, &p, h, h, out.data()));
+  }
+  glint_footprints half = complete;  // a covariance without yy is none
+  half.sigma = none;
+  half.xx = h;
+  refused(glint_density_batch(ndf.get(), 3, &half, h, h, out.data()));
+  EXPECT_EQ(glint_density_batch(nullptr, 0, nullptr, none, none, nullptr), GLINT_OK);
+  EXPECT_EQ(glint_mean_batch(nullptr, 0, nullptr, none, none, none, none, nullptr), GLINT_OK);
+  refused(glint_ndf_get_info(ndf.get(), nullptr));
+  glint_ndf_info info = {};
+  refused(glint_ndf_get_info(ndf.get(), &info));
+}
+
+TEST(CApi, InfoSaysWhatTheHandleIs) {
+  for (const char* kind : kKinds) {
+    const Handle ndf = openHandle(kind);
+    glint_ndf_info info = {};
+    info.struct_size = sizeof info;
+    ASSERT_EQ(glint_ndf_get_info(ndf.get(), &info), GLINT_OK);
+    EXPECT_STREQ(info.kind, kind);
+    EXPECT_EQ(info.width, kSize);
+    EXPECT_EQ(info.height, kSize);
+    const bool normals = std::string(kind) == "normals";
+    EXPECT_EQ(info.resolution, normals ? 256 : 64);
+    EXPECT_EQ(info.level_count, normals ? 0 : 3);
+    EXPECT_FLOAT_EQ(info.sigma_r, normals ? 0.005f : 0.05f);
+    EXPECT_FLOAT_EQ(info.finest_sigma_texels, normals ? 0 : kFootprintPerStride * kSize / 4);
+    EXPECT_EQ(info.has_normals, 0);
+    EXPECT_GT(info.file_bytes, 0u);
+  }
+}
+
+TEST(CApi, StructsOfAnOlderOrNewerHeaderAreUnderstood) {
+  const Handle ndf = openHandle("ndf-cp");
+  struct {
+    glint_ndf_info info;
+    char beyond[16];
+  } grown = {};
+  grown.info.struct_size = sizeof grown;
+  std::memset(grown.beyond, 0x5a, sizeof grown.beyond);
+  ASSERT_EQ(glint_ndf_get_info(ndf.get(), &grown.info), GLINT_OK);
+  EXPECT_EQ(grown.info.width, kSize);
+  EXPECT_EQ(grown.beyond[0], 0x5a);
+  glint_ndf_info small = {};
+  small.struct_size = offsetof(glint_ndf_info, height);
+  small.height = -3;
+  ASSERT_EQ(glint_ndf_get_info(ndf.get(), &small), GLINT_OK);
+  EXPECT_EQ(small.width, kSize);
+  EXPECT_EQ(small.height, -3);
+
+  struct {
+    glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+    char beyond[16] = {};
+  } newer;
+  newer.options.struct_size = sizeof newer;
+  EXPECT_TRUE(openHandle("ndf-cp", &newer.options));
+  newer.beyond[3] = 1;
+  glint_ndf* refused = nullptr;
+  EXPECT_EQ(glint_ndf_open(assets().path("ndf-cp").c_str(), &newer.options, &refused), GLINT_ERROR_USAGE);
+  EXPECT_EQ(refused, nullptr);
+}
+
+TEST(CApi, OptionsReachTheModel) {
+  glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+  options.sigma_r = 0.1f;
+  options.surface = GLINT_SURFACE_SMOOTH;
+  options.boundary = GLINT_BOUNDARY_CLAMP;
+  options.verify_hashes = 1;
+  const Handle rough = openHandle("normals", &options);
+  const glint_footprint p = glint_footprint_isotropic(0.1f, 0.9f, 5);
+  float density = -1;
+  glint_density(rough.get(), &p, 0.05f, 0.1f, &density);
+  const auto map = test::sampleNormals(kSize, kSize);
+  const Reference same(map.map, 0.1f, Surface::smooth, Boundary::clamp, Reference::Search::pruned);
+  EXPECT_EQ(density, same.density(Footprint::isotropic({0.1f, 0.9f}, 5), {0.05f, 0.1f}));
+
+  const std::string normals = assets().path("normals");
+  glint_open_options below = GLINT_OPEN_OPTIONS_INIT;
+  below.normals_path = normals.c_str();
+  const Handle with_normals = openHandle("ndf-cp", &below);
+  const glint_footprint narrow = glint_footprint_isotropic(0.1f, 0.9f, 2);
+  glint_density(with_normals.get(), &narrow, 0.05f, 0.1f, &density);
+  EXPECT_EQ(density, Reference(map.map, 0.05f, Surface::flat, Boundary::wrap, Reference::Search::pruned)
+                         .density(Footprint::isotropic({0.1f, 0.9f}, 2), {0.05f, 0.1f}));
+  glint_ndf_info info = {};
+  info.struct_size = sizeof info;
+  glint_ndf_get_info(with_normals.get(), &info);
+  EXPECT_EQ(info.has_normals, 1);
+}
+
+TEST(CApi, FailedOpeningSaysWhy) {
+  glint_ndf* ndf = nullptr;
+  EXPECT_EQ(glint_ndf_open("/no/such.glint", nullptr, &ndf), GLINT_ERROR_IO);
+  EXPECT_NE(std::string(glint_error_message()).find("/no/such.glint"), std::string::npos);
+  EXPECT_EQ(glint_ndf_open(assets().path("heights").c_str(), nullptr, &ndf), GLINT_ERROR_UNSUPPORTED);
+  EXPECT_STREQ(glint_error_rule(), "format.kind");
+  EXPECT_EQ(glint_ndf_open(GLINT_SOURCE_DIR "/README.md", nullptr, &ndf), GLINT_ERROR_INVALID_INPUT);
+  const std::string endless(100000, 'x');  // the message is cut, not lost
+  EXPECT_EQ(glint_ndf_open(endless.c_str(), nullptr, &ndf), GLINT_ERROR_IO);
+  EXPECT_GT(std::strlen(glint_error_message()), 500u);
+  EXPECT_EQ(ndf, nullptr);
+  std::string elsewhere = "unset";
+  std::thread([&] { elsewhere = glint_error_message(); }).join();
+  EXPECT_EQ(elsewhere, "");
+}
+
+TEST(CApi, EightThreadsGetTheAnswersOfOne) {
+  constexpr int kThreads = 8;
+  constexpr std::size_t kCount = 50;  // sums over texels are slow in the sanitizers
+  for (const char* kind : kKinds) {
+    SCOPED_TRACE(kind);
+    const Handle ndf = openHandle(kind);
+    const Queries q(kCount);
+    const glint_footprints p = isotropic(q);
+    const auto answers = [&] {
+      std::vector<float> out(2 * kCount);
+      glint_density_batch(ndf.get(), kCount, &p, contiguous(q.hx), contiguous(q.hy), out.data());
+      for (std::size_t k = 0; k < kCount; ++k) {
+        const glint_footprint one = glint_footprint_isotropic(q.u[k], q.v[k], q.sigma[k]);
+        glint_mean(ndf.get(), &one, -0.1f, -0.1f, 0.2f, 0.3f, &out[kCount + k]);
+      }
+      return out;
+    };
+    const std::vector<float> alone = answers();
+    std::vector<std::vector<float>> together(kThreads);
+    std::vector<std::thread> threads;
+    for (auto& out : together) threads.emplace_back([&] { out = answers(); });
+    for (std::thread& thread : threads) thread.join();
+    for (const auto& out : together) EXPECT_EQ(out, alone);
+  }
+}
+
+}  // namespace
+}  // namespace glint
