@@ -57,6 +57,7 @@ constexpr std::array kRules = {
     Rule{"dataset.dims", error, invalid_input, "a dataset has the sizes of the schema", kForeign},
     Rule{"shape.resolution", error, invalid_input, "the image resolution is a multiple of 16", kMakeAgain},
     Rule{"shape.strides", error, invalid_input, "each level's stride is twice the one before", kMakeAgain},
+    Rule{"shape.slopes", error, invalid_input, "slope_covariance is a covariance", kMakeAgain},
     Rule{"shape.grid", error, invalid_input, "a level's grid is ceil(size / stride)", kMakeAgain},
     Rule{"normals.bounds_levels", error, invalid_input, "the coarsest level of bounds is one node", kMakeAgain},
     Rule{"pyramid.masks", error, invalid_input, "no occupancy bit lies beyond the image's blocks", kMakeAgain},

@@ -12,6 +12,7 @@ namespace {
 using enum ElementType;
 
 constexpr double kMaxMapSize = 1 << 20;  // texels along an axis; keeps every product of sizes far below 2^63
+constexpr double kMaxSlope = 1e6;        // float normals inside the unit disk have slopes up to 4096
 constexpr double kMaxText = 0;           // texts have no numeric range
 
 AttributeSchema integer(std::string_view name, double low, double high, std::string_view units, std::string_view long_name) {
@@ -44,7 +45,10 @@ std::vector<AttributeSchema> pyramidShape() {
       integer("level_count", 1, kMaxPyramidLevels, "1", "number of levels"),
       {"level_strides", f32, "level_count", "texel", "distance between footprint centres of each level", FLT_MIN, kMaxMapSize},
       {"level_columns", i32, "level_count", "1", "footprints along u of each level", 1, kMaxMapSize},
-      {"level_rows", i32, "level_count", "1", "footprints along v of each level", 1, kMaxMapSize}};
+      {"level_rows", i32, "level_count", "1", "footprints along v of each level", 1, kMaxMapSize},
+      {"slope_mean", f32, "2", "1", "mean slope of the map's texels along u and v", -kMaxSlope, kMaxSlope},
+      {"slope_covariance", f32, "3", "1", "uu, uv, vv of the slopes of the map's texels", -kMaxSlope * kMaxSlope,
+       kMaxSlope * kMaxSlope}};
 }
 
 std::vector<AttributeSchema> joined(std::vector<AttributeSchema> a, const std::vector<AttributeSchema>& b) {

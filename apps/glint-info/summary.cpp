@@ -61,7 +61,11 @@ ordered_json shapeProperties(const PyramidShape& shape) {
           {"sigma_r", shape.sigma_r},
           {"surface", shape.surface == Surface::flat ? "flat" : "smooth"},
           {"boundary", shape.boundary == Boundary::wrap ? "wrap" : "clamp"},
-          {"levels", shape.level_count}};
+          {"levels", shape.level_count},
+          {"mean_slope", {shape.slopes.mean.x, shape.slopes.mean.y}},
+          {"slope_covariance_xx", shape.slopes.covariance.xx},
+          {"slope_covariance_xy", shape.slopes.covariance.xy},
+          {"slope_covariance_yy", shape.slopes.covariance.yy}};
 }
 
 ordered_json levelJson(const PyramidGrid& grid) {

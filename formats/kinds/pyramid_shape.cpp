@@ -5,6 +5,25 @@
 
 namespace glint::formats {
 
+void packSlopes(const MapSlopes& slopes, PackedAsset& packed) {
+  packed.reals("slope_mean", {slopes.mean.x, slopes.mean.y});
+  packed.reals("slope_covariance", {slopes.covariance.xx, slopes.covariance.xy, slopes.covariance.yy});
+}
+
+MapSlopes unpackSlopes(const Content& content) {
+  return {{content.real("slope_mean", 0), content.real("slope_mean", 1)},
+          {content.real("slope_covariance", 0), content.real("slope_covariance", 1), content.real("slope_covariance", 2)}};
+}
+
+void checkSlopes(const MapSlopes& slopes, Findings& findings) {
+  constexpr double kRounding = 1e-6;  // of three floats
+  const Covariance& c = slopes.covariance;
+  const double square = double{c.xy} * c.xy;
+  if (c.xx >= 0 && c.yy >= 0 && square <= (1 + kRounding) * c.xx * c.yy) return;
+  findings.add("shape.slopes", "/@slope_covariance",
+               "is not a covariance: a variance is negative, or the covariance too large");
+}
+
 void packShape(const PyramidShape& shape, PackedAsset& packed) {
   if (shape.level_count < 1 || shape.level_count > kMaxPyramidLevels) {
     throw Error(ErrorCode::usage, "attribute.value", {}, "/@level_count",
@@ -28,6 +47,7 @@ void packShape(const PyramidShape& shape, PackedAsset& packed) {
   packed.reals("level_strides", std::move(strides));
   packed.integers("level_columns", std::move(columns));
   packed.integers("level_rows", std::move(rows));
+  packSlopes(shape.slopes, packed);
 }
 
 void unpackShape(const Content& content, PyramidShape& shape) {
@@ -41,12 +61,14 @@ void unpackShape(const Content& content, PyramidShape& shape) {
   for (int l = 0; l < shape.level_count; ++l) {
     shape.levels[l] = {content.real("level_strides", l), content.integer("level_columns", l), content.integer("level_rows", l)};
   }
+  shape.slopes = unpackSlopes(content);
 }
 
 void checkShape(const PyramidShape& shape, Findings& findings) {
   if (shape.resolution % kBlockSize != 0) {
     findings.add("shape.resolution", "/@resolution", "is " + std::to_string(shape.resolution) + ", not a multiple of 16");
   }
+  checkSlopes(shape.slopes, findings);
   for (int l = 0; l < shape.level_count; ++l) {
     const PyramidGrid& grid = shape.levels[l];
     if (l > 0 && grid.stride != 2 * shape.levels[l - 1].stride) {

@@ -12,6 +12,7 @@
 #include "glint/bake/flat_scatter.h"
 #include "glint/bake/pyramid_agreement.h"
 #include "glint/bake/simd.h"
+#include "glint/bake/slopes.h"
 #include "glint/bake/smooth_scatter.h"
 #include "glint/model/error.h"
 #include "glint/query/half.h"
@@ -254,6 +255,7 @@ NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options,
   checkOptions(map, options);
   NdfPyramidData pyramid;
   pyramid.shape = pyramidShape(map.width, map.height, options);
+  pyramid.shape.slopes = mapSlopes(map);
   pyramid.precision = options.precision;
   // Pixel means reach (resolution / 2)^2; half precision ends at 65504.
   pyramid.value_scale =

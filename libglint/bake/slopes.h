@@ -3,6 +3,8 @@
 #include <span>
 #include <vector>
 
+#include "glint/model/map_slopes.h"
+#include "glint/model/normal_map.h"
 #include "glint/model/vec.h"
 
 namespace glint::bake {
@@ -23,5 +25,8 @@ struct SlopeMoments {
   float steepest = 0;  ///< largest length of (p, q)
 };
 SlopeMoments slopeMoments(int width, int height, std::span<const float> heights);
+
+/// Mean and covariance of the slopes of all texels of a map. The same for any number of threads.
+MapSlopes mapSlopes(const NormalMap& map);
 
 }  // namespace glint::bake

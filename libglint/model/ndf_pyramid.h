@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "glint/model/map_slopes.h"
 #include "glint/model/normal_map.h"
 
 namespace glint {
@@ -33,6 +34,7 @@ struct PyramidShape {
   Boundary boundary = Boundary::wrap;
   int level_count = 0;
   PyramidGrid levels[kMaxPyramidLevels];
+  MapSlopes slopes;  ///< of the normal map's texels, without sigma_r
 
   GLINT_HD constexpr int blocksPerAxis() const { return resolution / kBlockSize; }
   GLINT_HD constexpr int blocksPerImage() const { return blocksPerAxis() * blocksPerAxis(); }

@@ -17,6 +17,20 @@ struct Vec2 {
 
 GLINT_HD constexpr float dot(Vec2 a, Vec2 b) { return a.x * b.x + a.y * b.y; }
 
+/// A direction of the tangent frame: x along dp/du, y along dp/dv, z out of the surface.
+struct Vec3 {
+  float x = 0;
+  float y = 0;
+  float z = 0;
+
+  friend GLINT_HD constexpr Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+  friend GLINT_HD constexpr Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  friend GLINT_HD constexpr Vec3 operator*(float s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
+  friend constexpr bool operator==(Vec3, Vec3) = default;
+};
+
+GLINT_HD constexpr float dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
 /// Axis-aligned box [low.x, high.x] x [low.y, high.y].
 struct Box2 {
   Vec2 low;

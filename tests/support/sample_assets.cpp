@@ -72,6 +72,7 @@ PyramidShape sampleShape(int size) {
   shape.resolution = kResolution;
   shape.sigma_r = kSigmaR;
   shape.level_count = 3;
+  shape.slopes = {{0.01f, -0.02f}, {0.03f, -0.004f, 0.01f}};
   for (int l = 0; l < 3; ++l) {
     const int side = 4 >> l;
     shape.levels[l] = {static_cast<float>(size) / static_cast<float>(side), side, side};

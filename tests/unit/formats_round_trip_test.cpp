@@ -47,6 +47,10 @@ void expectSame(const PyramidShape& a, const PyramidShape& b) {
   EXPECT_EQ(a.sigma_r, b.sigma_r);
   EXPECT_EQ(a.surface, b.surface);
   EXPECT_EQ(a.boundary, b.boundary);
+  EXPECT_EQ(a.slopes.mean, b.slopes.mean);
+  EXPECT_EQ(a.slopes.covariance.xx, b.slopes.covariance.xx);
+  EXPECT_EQ(a.slopes.covariance.xy, b.slopes.covariance.xy);
+  EXPECT_EQ(a.slopes.covariance.yy, b.slopes.covariance.yy);
   ASSERT_EQ(a.level_count, b.level_count);
   for (int l = 0; l < a.level_count; ++l) {
     EXPECT_EQ(a.levels[l].stride, b.levels[l].stride);

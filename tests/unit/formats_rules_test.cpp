@@ -359,6 +359,16 @@ std::vector<Fixture> indexFixtures() {
                 const float strides[3] = {8, 16.5f, 32};
                 patch.set("/", "level_strides", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, strides, 3);
               }),
+      patched("shape.slopes", Base::pyramid,
+              [](const Patch& patch) {
+                const float covariance[3] = {0.1f, 0.2f, 0.1f};
+                patch.set("/", "slope_covariance", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, covariance, 3);
+              }),
+      patched("shape.slopes", Base::compressed,
+              [](const Patch& patch) {
+                const float covariance[3] = {-0.1f, 0, 0.1f};
+                patch.set("/", "slope_covariance", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, covariance, 3);
+              }),
       patched("shape.grid", Base::pyramid, [](const Patch& patch) { patch.setInteger("width", 64); }),
       patched("shape.grid", Base::compressed, [](const Patch& patch) { patch.setInteger("height", 31 * 2); }),
       patched("normals.bounds_levels", Base::normals,

@@ -1,0 +1,14 @@
+#pragma once
+
+#include "glint/model/footprint.h"
+#include "glint/model/vec.h"
+
+namespace glint {
+
+/// Mean and covariance of the slopes (dz/dx, dz/dy) = (-nx/nz, -ny/nz) of a map's texels: what shadowing needs to know of it.
+struct MapSlopes {
+  Vec2 mean;
+  Covariance covariance;  ///< of slopes, dimensionless
+};
+
+}  // namespace glint
