@@ -101,6 +101,7 @@ TypeTable::TypeTable() {
   set(ElementType::i8, copy(H5T_STD_I8LE));
   set(ElementType::i16, copy(H5T_STD_I16LE));
   set(ElementType::i32, copy(H5T_STD_I32LE));
+  set(ElementType::u8, copy(H5T_STD_U8LE));
   set(ElementType::u16, copy(H5T_STD_U16LE));
   set(ElementType::u32, copy(H5T_STD_U32LE));
   set(ElementType::u64, copy(H5T_STD_U64LE));

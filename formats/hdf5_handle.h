@@ -77,7 +77,7 @@ class TypeTable {
   bool find(hid_t type, ElementType& found) const;
 
  private:
-  std::array<Handle, 10> types_;
+  std::array<Handle, static_cast<std::size_t>(ElementType::ndf_cluster) + 1> types_;
 };
 
 }  // namespace glint::formats::hdf5

@@ -115,10 +115,35 @@ KindSchema ndfCpSchema() {
                               integer("region_rows", 1, 65535, "1", "spatial regions along v"),
                               integer("words_per_cluster", 1, 1024, "1", "64-bit words of slot mask of a cluster")}),
       {{"blocks_per_image", "ceil_div(resolution * resolution, 256)", "angular blocks of an image"},
+       {"mask_words", "ceil_div(resolution * resolution, 16384)", "64-bit words of occupancy bits of an image"},
        {"regions", "region_columns * region_rows", "spatial regions"}},
       {{"image_regions", "", {{"", u16}}, {"images"}, "1", "region that an image belongs to"},
        {"image_slots", "", {{"", u16}}, {"images"}, "1", "slot of an image in its region"},
        {"image_scales", "", {{"", f32}}, {"images"}, "1", "factor that makes an image integrate to 1"},
+       {"density_scales",
+        "",
+        {{"", f32}},
+        {"images"},
+        "1",
+        "factor that makes an image without its negative parts integrate to 1"},
+       {"block_masks",
+        "",
+        {{"", u64}},
+        {"images", "mask_words"},
+        "1",
+        "bit b of word w: block 64 w + b of the image has a slice"},
+       {"first_block",
+        "",
+        {{"", u32}},
+        {"images + 1"},
+        "1",
+        "slices of all images before this one; the last value is their total"},
+       {"block_masses",
+        "",
+        {{"", u8}},
+        {"slice_total"},
+        "1",
+        "share of each slice in its image, rounded up: bits 6 to 13 of a half-precision number"},
        {"clusters", "", {{"", ndf_cluster}}, {"regions", "blocks_per_image"}, "1", "place and size of each cluster's factors"},
        {"masks",
         "",
@@ -249,6 +274,8 @@ std::string_view name(ElementType type) {
       return "i16";
     case i32:
       return "i32";
+    case u8:
+      return "u8";
     case u16:
       return "u16";
     case u32:
@@ -270,6 +297,7 @@ std::string_view name(ElementType type) {
 std::size_t sizeBytes(ElementType type) {
   switch (type) {
     case i8:
+    case u8:
       return 1;
     case i16:
     case u16:

@@ -16,7 +16,7 @@ inline constexpr int kFormatMajor = 1;
 inline constexpr int kFormatMinor = 0;
 
 /// Element of a dataset or attribute. All are little-endian; `ndf_cluster` is a compound of 32 bytes.
-enum class ElementType : std::uint8_t { i8, i16, i32, u16, u32, u64, f16, f32, text, ndf_cluster };
+enum class ElementType : std::uint8_t { i8, i16, i32, u8, u16, u32, u64, f16, f32, text, ndf_cluster };
 
 /// Name of the type as SPEC.md and schema.json write it, e.g. "f32".
 std::string_view name(ElementType type);

@@ -121,6 +121,8 @@ double toDouble(ElementType type, const std::byte* at) {
       return load<std::int16_t>(at);
     case ElementType::i32:
       return load<std::int32_t>(at);
+    case ElementType::u8:
+      return load<std::uint8_t>(at);
     case ElementType::u16:
       return load<std::uint16_t>(at);
     case ElementType::u32:

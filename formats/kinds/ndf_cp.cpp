@@ -114,6 +114,22 @@ std::vector<std::uint32_t> checkImages(const CompressedNdf& ndf, Findings& findi
   return slots;
 }
 
+void checkFirstBlock(const CompressedNdf& ndf, Findings& findings) {
+  const auto words = static_cast<std::size_t>(ndf.shape.maskWords());
+  const int tail_bits = ndf.shape.blocksPerImage() % 64;
+  const std::uint64_t beyond = tail_bits == 0 ? 0 : ~std::uint64_t{0} << tail_bits;
+  std::uint64_t count = 0;
+  bool holds = true;
+  for (std::size_t image = 0; image < ndf.image_slots.size(); ++image) {
+    holds &= ndf.first_block[image] == count;
+    const std::uint64_t* mask = &ndf.block_masks[image * words];
+    for (std::size_t w = 0; w < words; ++w) count += static_cast<std::uint64_t>(std::popcount(mask[w]));
+    holds &= (mask[words - 1] & beyond) == 0;
+  }
+  holds &= ndf.first_block[ndf.image_slots.size()] == count && count == ndf.block_masses.size();
+  if (!holds) findings.add("compressed.first_block", "/first_block", "is not the running count of the bits in block_masks");
+}
+
 /// Checks the mask of one cluster. Returns the broken rule, or nothing.
 std::string_view checkMask(const CompressedNdf& ndf, std::size_t cluster, std::uint32_t slots) {
   const auto words = static_cast<std::size_t>(ndf.words_per_cluster);
@@ -171,11 +187,115 @@ std::vector<double> slotIntegrals(const CompressedNdf& ndf, const std::vector<st
   return integrals;
 }
 
-void checkIntegrals(const CompressedNdf& ndf, Findings& findings) {
+/// Number of the first slot of each region, in one list of the slots of all regions.
+std::vector<std::size_t> firstSlots(const CompressedNdf& ndf) {
   const auto regions = static_cast<std::size_t>(ndf.region_columns) * static_cast<std::size_t>(ndf.region_rows);
   std::vector<std::size_t> first(regions + 1);
   for (const std::uint16_t region : ndf.image_regions) ++first[region + 1u];
   for (std::size_t r = 0; r < regions; ++r) first[r + 1] += first[r];
+  return first;
+}
+
+/// Basis images of a cluster with their scales, [columns][256].
+std::vector<float> basisImages(const CompressedNdf& ndf, const NdfCluster& cluster) {
+  const auto at = [&](std::uint64_t index) { return element(basisType(ndf), ndf.basis, cluster.first_basis + index); };
+  const std::uint64_t rx = cluster.rank_x, ry = ndf.method == CompressionMethod::tucker ? cluster.rank_y : rx;
+  const auto along = [&](std::uint64_t first, std::uint64_t rank, std::uint64_t k, int t) {
+    const auto row = [&](int r) { return at(first + static_cast<std::uint64_t>(r) * rank + k); };
+    return t > 0 ? row(t) - row(t - 1) : row(0);
+  };
+  const std::uint64_t columns = columnCount(ndf, cluster);
+  std::vector<float> images(columns * kBlockPixels);
+  for (std::uint64_t k = 0; k < columns; ++k) {
+    const bool tucker = ndf.method == CompressionMethod::tucker;
+    const auto table = [&](int x, int y) {
+      return x < 0 || y < 0 ? 0.0 : at(static_cast<std::uint64_t>(y * kBlockSize + x) * rx + k);
+    };
+    for (int p = 0; p < kBlockPixels; ++p) {
+      const int x = p % kBlockSize, y = p / kBlockSize;
+      const double value = ndf.method == CompressionMethod::pca
+                               ? table(x, y) - table(x - 1, y) - table(x, y - 1) + table(x - 1, y - 1)
+                               : along(0, rx, tucker ? k / ry : k, x) * along(kBlockSize * rx, ry, tucker ? k % ry : k, y);
+      images[k * kBlockPixels + static_cast<std::size_t>(p)] = static_cast<float>(ndf.scales[cluster.first_scale + k] * value);
+    }
+  }
+  return images;
+}
+
+/// The positive part of a slice: the sum of its pixels, negative ones taken as 0.
+double positivePart(const CompressedNdf& ndf, const std::vector<float>& images, std::uint64_t first_coefficient) {
+  float pixels[kBlockPixels] = {};
+  for (std::size_t k = 0; k * kBlockPixels < images.size(); ++k) {
+    const auto c =
+        static_cast<float>(element(coefficientElement(ndf.coefficient_type), ndf.coefficients, first_coefficient + k));
+    for (int p = 0; p < kBlockPixels; ++p) pixels[p] += c * images[k * kBlockPixels + static_cast<std::size_t>(p)];
+  }
+  double sum = 0;
+  for (const float pixel : pixels) sum += std::max(0.0f, pixel);
+  return sum;
+}
+
+/// Positive parts of all slices in the order of block_masses. Empty, with a finding, if block_masks contradict the clusters.
+std::vector<double> positiveParts(const CompressedNdf& ndf, Findings& findings) {
+  const std::vector<std::size_t> first = firstSlots(ndf);
+  std::vector<std::size_t> image_of(ndf.image_slots.size());
+  for (std::size_t i = 0; i < image_of.size(); ++i) image_of[first[ndf.image_regions[i]] + ndf.image_slots[i]] = i;
+  const auto blocks = static_cast<std::size_t>(ndf.shape.blocksPerImage());
+  const auto words = static_cast<std::size_t>(ndf.words_per_cluster),
+             image_words = static_cast<std::size_t>(ndf.shape.maskWords());
+  std::vector<double> parts(ndf.block_masses.size(), -1);
+  for (std::size_t c = 0; c < ndf.clusters.size(); ++c) {
+    const NdfCluster& cluster = ndf.clusters[c];
+    if (cluster.slice_count == 0) continue;
+    const std::vector<float> images = basisImages(ndf, cluster);
+    const std::size_t block = c % blocks;
+    std::uint64_t coefficient = cluster.first_coefficient;
+    for (std::size_t slot = 0; slot < 64 * words; ++slot) {
+      if ((ndf.masks[c * words + slot / 64] >> (slot % 64) & 1u) == 0) continue;
+      const std::size_t image = image_of[first[c / blocks] + slot];
+      const std::uint64_t* mask = &ndf.block_masks[image * image_words];
+      std::size_t rank = ndf.first_block[image];
+      for (std::size_t w = 0; w < block / 64; ++w) rank += static_cast<std::size_t>(std::popcount(mask[w]));
+      const std::uint64_t bit = std::uint64_t{1} << (block % 64);
+      rank += static_cast<std::size_t>(std::popcount(mask[block / 64] & (bit - 1)));
+      if ((mask[block / 64] & bit) != 0) parts[rank] = positivePart(ndf, images, coefficient);
+      coefficient += columnCount(ndf, cluster);
+    }
+  }
+  std::uint64_t slices = 0;
+  for (const NdfCluster& cluster : ndf.clusters) slices += cluster.slice_count;
+  if (slices == parts.size() && std::find(parts.begin(), parts.end(), -1.0) == parts.end()) return parts;
+  findings.add("compressed.block_masks", "/block_masks", "does not name the slices of the clusters");
+  return {};
+}
+
+/// Checks what sampling and densities rest on: the scale of each image's positive part and the shares of its blocks.
+void checkDensities(const CompressedNdf& ndf, Findings& findings) {
+  constexpr double kRounding = 1e-3;  // of sums of float products
+  const std::vector<double> parts = positiveParts(ndf, findings);
+  if (parts.empty()) return;
+  const double pixel_area = 4.0 / (static_cast<double>(ndf.shape.resolution) * ndf.shape.resolution);
+  std::size_t bad_images = 0, bad_masses = 0;
+  for (std::size_t i = 0; i < ndf.density_scales.size(); ++i) {
+    const double scale = ndf.density_scales[i] * pixel_area;
+    double integral = 0;
+    for (std::uint32_t b = ndf.first_block[i]; b < ndf.first_block[i + 1]; ++b) {
+      const double mass = parts[b] * scale, most = halfToFloat(static_cast<std::uint16_t>(ndf.block_masses[b] << 6));
+      integral += mass;
+      bad_masses += !(mass <= most * (1 + kRounding) && most <= mass * (1.0625 + kRounding) + 0x1p-17);
+    }
+    bad_images += !(std::abs(integral - 1) <= kIntegralTolerance) && !(scale == 0 && integral == 0);
+  }
+  if (bad_images > 0)
+    findings.add("compressed.density_scales", "/density_scales",
+                 std::to_string(bad_images) + " images do not integrate to 1 without their negative parts");
+  if (bad_masses > 0)
+    findings.add("compressed.block_masses", "/block_masses",
+                 std::to_string(bad_masses) + " masses are not the slices' shares of their images, rounded up");
+}
+
+void checkIntegrals(const CompressedNdf& ndf, Findings& findings) {
+  const std::vector<std::size_t> first = firstSlots(ndf);
   const std::vector<double> integrals = slotIntegrals(ndf, first);
   const double pixel_area = 4.0 / (static_cast<double>(ndf.shape.resolution) * ndf.shape.resolution);
   std::size_t bad = 0;
@@ -228,6 +348,11 @@ PackedAsset pack(const CompressedNdf& ndf) {
   packed.array("image_regions", ElementType::u16, {images}, ndf.image_regions.data(), images);
   packed.array("image_slots", ElementType::u16, {images}, ndf.image_slots.data(), ndf.image_slots.size());
   packed.array("image_scales", ElementType::f32, {images}, ndf.image_scales.data(), ndf.image_scales.size());
+  packed.array("density_scales", ElementType::f32, {images}, ndf.density_scales.data(), ndf.density_scales.size());
+  packed.array("block_masks", ElementType::u64, {images, static_cast<std::uint64_t>(ndf.shape.maskWords())},
+               ndf.block_masks.data(), ndf.block_masks.size());
+  packed.array("first_block", ElementType::u32, {images + 1}, ndf.first_block.data(), ndf.first_block.size());
+  packed.array("block_masses", ElementType::u8, {ndf.block_masses.size()}, ndf.block_masses.data(), ndf.block_masses.size());
   packed.array("clusters", ElementType::ndf_cluster, {regions, blocks}, ndf.clusters.data(), ndf.clusters.size());
   packed.array("masks", ElementType::u64, {regions, blocks, words}, ndf.masks.data(), ndf.masks.size());
   packed.array("mask_ranks", ElementType::u32, {regions, blocks, words}, ndf.mask_ranks.data(), ndf.mask_ranks.size());
@@ -253,6 +378,10 @@ void unpack(const Content& content, CompressedNdf& ndf) {
   ndf.image_regions = content.array<std::uint16_t>("image_regions");
   ndf.image_slots = content.array<std::uint16_t>("image_slots");
   ndf.image_scales = content.array<float>("image_scales");
+  ndf.density_scales = content.array<float>("density_scales");
+  ndf.block_masks = content.array<std::uint64_t>("block_masks");
+  ndf.first_block = content.array<std::uint32_t>("first_block");
+  ndf.block_masses = content.array<std::uint8_t>("block_masses");
   ndf.clusters = content.array<NdfCluster>("clusters");
   ndf.masks = content.array<std::uint64_t>("masks");
   ndf.mask_ranks = content.array<std::uint32_t>("mask_ranks");
@@ -267,6 +396,7 @@ void checkIndex(const CompressedNdf& ndf, Findings& findings) {
   checkShape(ndf.shape, findings);
   const std::vector<std::uint32_t> slots = checkImages(ndf, findings);
   if (slots.empty()) return;
+  checkFirstBlock(ndf, findings);
   const auto blocks = static_cast<std::size_t>(ndf.shape.blocksPerImage());
   for (std::size_t c = 0; c < ndf.clusters.size(); ++c) {
     const NdfCluster& cluster = ndf.clusters[c];
@@ -308,6 +438,7 @@ void checkData(const CompressedNdf& ndf, Findings& findings) {
         "compressed.factors", "/basis", "not finite", findings);
   }
   checkIntegrals(ndf, findings);
+  checkDensities(ndf, findings);
 }
 
 }  // namespace glint::formats

@@ -15,6 +15,7 @@
 #include "glint/bake/compress_ranks.h"
 #include "glint/bake/compress_slices.h"
 #include "glint/model/error.h"
+#include "glint/query/block_mass.h"
 
 namespace glint::bake {
 namespace {
@@ -73,7 +74,8 @@ class Compressor {
         statistics_(index_.clusterCount()),
         encoded_(index_.clusterCount()),
         selection_(index_.clusterCount(), -1),
-        image_scales_(index_.imageCount(), 1.0f) {}
+        image_scales_(index_.imageCount(), 1.0f),
+        density_scales_(index_.imageCount(), 0.0f) {}
 
   CompressedNdfData run(CompressionReport* report) {
     forEachCluster([&](std::size_t c) { statistics_[c] = measureCluster(index_, c); });
@@ -132,9 +134,14 @@ class Compressor {
 
   void scaleImages() {
     std::vector<double> sums(index_.imageCount(), 0.0);
-    for (std::size_t c = 0; c < index_.clusterCount(); ++c)
-      for (int s = 0; s < index_.sliceCount(c); ++s)
-        sums[index_.image(index_.firstSlice(c) + s)] += static_cast<double>(encoded_[c].slices[s].sum) * statistics_[c].peak;
+    std::vector<double> positive(index_.imageCount(), 0.0);
+    for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
+      for (int s = 0; s < index_.sliceCount(c); ++s) {
+        const std::uint32_t image = index_.image(index_.firstSlice(c) + s);
+        sums[image] += static_cast<double>(encoded_[c].slices[s].sum) * statistics_[c].peak;
+        positive[image] += static_cast<double>(encoded_[c].slices[s].positive) * statistics_[c].peak;
+      }
+    }
     const double pixel = 2.0 / pyramid_.shape.resolution;
     unscaled_images_ = 0;
     for (std::size_t i = 0; i < sums.size(); ++i) {
@@ -142,6 +149,8 @@ class Compressor {
       const bool scaled = integral > kLeastEnergy;
       image_scales_[i] = scaled ? static_cast<float>(1 / integral) : 1.0f;
       unscaled_images_ += !scaled;
+      const auto density_scale = static_cast<float>(1 / (positive[i] * pyramid_.value_scale * pixel * pixel));
+      density_scales_[i] = std::isfinite(density_scale) ? density_scale : 0.0f;
     }
   }
 
@@ -207,6 +216,7 @@ class Compressor {
     data.header.method = options_.method;
     data.header.coefficient_type = options_.coefficient_type;
     data.image_scales = image_scales_;
+    data.density_scales = density_scales_;
     const int basis_bytes = basisElementBytes(options_.method, options_.coefficient_type);
     const int coefficient_bytes = coefficientElementBytes(options_.coefficient_type);
     for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
@@ -224,7 +234,37 @@ class Compressor {
       data.scales.insert(data.scales.end(), e.scales.begin(), e.scales.end());
       if (e.rank_x == 0) makeEmpty(data, c);
     }
+    packBlockMasses(data);
     return data;
+  }
+
+  /// The blocks of every image and their shares of it, from the slices of all clusters.
+  void packBlockMasses(CompressedNdfData& data) const {
+    // A reader adds up the pixels in another order: its share must not exceed the stored one.
+    constexpr float kRounding = 1 + 1e-5f;
+    const std::size_t images = index_.imageCount(), words = pyramid_.shape.maskWords(),
+                      blocks = pyramid_.shape.blocksPerImage();
+    const double pixel = 2.0 / pyramid_.shape.resolution;
+    std::vector<float> masses(images * blocks, -1);
+    for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
+      if (data.clusters[c].slice_count == 0) continue;
+      const double unit = pixel * pixel * pyramid_.value_scale * statistics_[c].peak;
+      for (int s = 0; s < index_.sliceCount(c); ++s) {
+        const std::size_t image = index_.image(index_.firstSlice(c) + s);
+        masses[image * blocks + c % blocks] =
+            static_cast<float>(unit * encoded_[c].slices[s].positive * density_scales_[image]) * kRounding;
+      }
+    }
+    data.block_masks.assign(images * words, 0);
+    data.first_block.assign(1, 0);
+    for (std::size_t image = 0; image < images; ++image) {
+      for (std::size_t b = 0; b < blocks; ++b) {
+        if (masses[image * blocks + b] < 0) continue;
+        data.block_masks[image * words + b / 64] |= std::uint64_t{1} << (b % 64);
+        data.block_masses.push_back(blockMassCode(masses[image * blocks + b]));
+      }
+      data.first_block.push_back(static_cast<std::uint32_t>(data.block_masses.size()));
+    }
   }
 
   /// A cluster that a tolerance leaves without columns decodes to 0: for readers, it is empty.
@@ -282,7 +322,8 @@ class Compressor {
     report.basis_bytes = bytes(data.basis);
     report.coefficient_bytes = bytes(data.coefficients) + bytes(data.scales);
     report.index_bytes = bytes(data.image_regions) + bytes(data.image_slots) + bytes(data.image_scales) + bytes(data.clusters) +
-                         bytes(data.masks) + bytes(data.mask_ranks);
+                         bytes(data.masks) + bytes(data.mask_ranks) + bytes(data.density_scales) + bytes(data.block_masks) +
+                         bytes(data.first_block) + bytes(data.block_masses);
     report.total_bytes = report.basis_bytes + report.coefficient_bytes + report.index_bytes;
     const double pixels = static_cast<double>(pyramid_.shape.resolution) * pyramid_.shape.resolution;
     const double dense = static_cast<double>(index_.imageCount()) * pixels * sizeof(float);
@@ -306,6 +347,7 @@ class Compressor {
   std::vector<EncodedCluster> encoded_;
   std::vector<int> selection_;
   std::vector<float> image_scales_;
+  std::vector<float> density_scales_;
   std::uint64_t unscaled_images_ = 0;
 };
 
@@ -316,6 +358,10 @@ CompressedNdf CompressedNdfData::view() const {
   v.image_regions = image_regions;
   v.image_slots = image_slots;
   v.image_scales = image_scales;
+  v.density_scales = density_scales;
+  v.block_masks = block_masks;
+  v.first_block = first_block;
+  v.block_masses = block_masses;
   v.clusters = clusters;
   v.masks = masks;
   v.mask_ranks = mask_ranks;

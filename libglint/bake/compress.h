@@ -44,7 +44,7 @@ struct CompressionReport {
   CompressionLevelReport total;
   std::uint64_t basis_bytes = 0;
   std::uint64_t coefficient_bytes = 0;  ///< with the scale of every column
-  std::uint64_t index_bytes = 0;        ///< clusters, masks, regions, slots and scales of images
+  std::uint64_t index_bytes = 0;        ///< clusters, masks; regions, slots, scales and block masses of images
   std::uint64_t total_bytes = 0;
   double ratio_to_dense = 0;                  ///< bytes of the uncompressed f32 images, empty blocks included, over total_bytes
   double ratio_to_stored = 0;                 ///< bytes of the pyramid as it is stored, over total_bytes
@@ -59,6 +59,10 @@ class CompressedNdfData {
   std::vector<std::uint16_t> image_regions;
   std::vector<std::uint16_t> image_slots;
   std::vector<float> image_scales;
+  std::vector<float> density_scales;
+  std::vector<std::uint64_t> block_masks;
+  std::vector<std::uint32_t> first_block;
+  std::vector<std::uint8_t> block_masses;
   std::vector<NdfCluster> clusters;
   std::vector<std::uint64_t> masks;
   std::vector<std::uint32_t> mask_ranks;

@@ -235,6 +235,7 @@ std::vector<SliceError> measureSlices(const SliceIndex& index, std::size_t clust
         r.cross += e * d;
         r.power += d * d;
         r.sum += d;
+        r.positive += std::max(0.0f, d);
       }
     }
   }

@@ -9,10 +9,11 @@ namespace glint::bake {
 
 /// What the decoded slice and its error are, in units of the peak of the cluster.
 struct SliceError {
-  float error = 0;  ///< sum of (slice - decoded)^2
-  float cross = 0;  ///< sum of (slice - decoded) decoded
-  float power = 0;  ///< sum of decoded^2
-  float sum = 0;    ///< sum of decoded
+  float error = 0;     ///< sum of (slice - decoded)^2
+  float cross = 0;     ///< sum of (slice - decoded) decoded
+  float power = 0;     ///< sum of decoded^2
+  float sum = 0;       ///< sum of decoded
+  float positive = 0;  ///< sum of decoded where it is positive
 };
 
 /// A cluster as CompressedNdf stores it.

@@ -45,9 +45,15 @@ struct CompressedNdf {
   std::span<const std::uint16_t> image_regions;  ///< [images]
   std::span<const std::uint16_t> image_slots;    ///< [images]
   std::span<const float> image_scales;           ///< [images]: factor that makes the image integrate to 1
+  std::span<const float> density_scales;         ///< [images]: the same, negative pixels taken as 0; 0 if nothing is positive
   std::span<const NdfCluster> clusters;          ///< [regions][blocksPerImage]
   std::span<const std::uint64_t> masks;          ///< [regions][blocksPerImage][words_per_cluster]
   std::span<const std::uint32_t> mask_ranks;     ///< same shape as masks: set bits of the cluster before this word
+
+  /// What sampling chooses a block of an image by: the blocks that have a slice, and at least their shares of the image.
+  std::span<const std::uint64_t> block_masks;  ///< [images][maskWords]; bit b: block b has a slice
+  std::span<const std::uint32_t> first_block;  ///< [images + 1]: running count of these bits
+  std::span<const std::uint8_t> block_masses;  ///< [slices], by image and block: codes of block_mass.h, rounded up
 
   /// Prefix sums along each block axis, inclusive, columns fastest.
   /// cp: X[16][R] then Y[16][R]; tucker: U[16][rx] then V[16][ry]; pca: [16][16][K], summed over both axes.

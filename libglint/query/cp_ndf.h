@@ -3,18 +3,24 @@
 #include <bit>
 
 #include "glint/model/compressed_ndf.h"
+#include "glint/query/block_mass.h"
 #include "glint/query/cluster_basis.h"
+#include "glint/query/cluster_slices.h"
 #include "glint/query/pyramid_slices.h"
 #include "glint/query/reference.h"
+#include "glint/query/sampling.h"
 
 namespace glint {
 
 /// The NDF from a compressed pyramid: tensor rank (CP), Tucker-2 or PCA (Deng 2022, sections 4.2 to 4.4).
 ///
 /// Chooses images as PyramidNdf does. Pixels are sums of products of few factors, and so are sums over boxes of pixels, from
-/// prefix sums (Eq. 6 and 7). Images are scaled to integrate to 1. What the approximation takes below zero is answered as 0, by
-/// `density` and `mean` alike; `signedDensity` and `signedMean` give it as it is, and of those the mean is the exact average.
-/// The density is constant over a pixel. Thread-safe, allocates nothing; the arrays must outlive it.
+/// prefix sums (Eq. 6 and 7).
+///
+/// The density of an image is what the approximation leaves above zero, scaled to integrate to 1, and constant over a pixel. The
+/// mean is a difference of prefix sums, so it counts what lies below zero, is scaled to integrate to 1 with that, and only the
+/// result is clamped: it is the exact average of `signedDensity`, and of `density` where nothing is negative.
+/// Thread-safe, allocates nothing; the arrays must outlive it.
 class CpNdf {
  public:
   GLINT_HD explicit CpNdf(const CompressedNdf& ndf) : ndf_(ndf) {}
@@ -25,9 +31,39 @@ class CpNdf {
   const PyramidShape& shape() const { return ndf_.shape; }
 
   /// Density towards h, >= 0; O(columns) in each of 8 images.
-  GLINT_HD float density(const Footprint& p, Vec2 h) const { return std::max(0.0f, signedDensity(p, h)); }
+  GLINT_HD float density(const Footprint& p, Vec2 h) const {
+    if (!insideSquare(h)) return 0;
+    if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
+    const PyramidSlices chosen = selectSlices(shape(), p);
+    const PixelPlace place = pixelPlace(shape(), h);
+    return withReader(ndf_, [&](const auto& reader) { return pixelDensity(reader, chosen, place); });
+  }
 
-  /// Average density over a box of half vectors, >= 0, 0 if the box is empty; O(columns) for each block that the box covers.
+  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly inside, as
+  /// the density is constant there: exactly in proportion to the density, which is the pdf.
+  ///
+  /// Stored masses are rounded up by at most a sixteenth; a block is kept with the ratio of the mass that its pixels have to the
+  /// stored one, else another is drawn from the digits of `xi` that are left (one in forty on average). O(columns * 256).
+  GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+    xi = clampUnit(xi);
+    if (below_.hasMap() && belowFinest(shape(), p)) return below_.sample(p, xi);
+    const PyramidSlices chosen = selectSlices(shape(), p);
+    float weights[PyramidSlices::kMost];
+    float total = 0;  // images of which nothing was kept have no density
+    for (int k = 0; k < chosen.count; ++k) {
+      weights[k] = ndf_.density_scales.data()[imageOf(chosen.slices[k])] > 0 ? chosen.slices[k].weight : 0.0f;
+      total += weights[k];
+    }
+    const int k = chooseIndex(chosen.count, total, [&](int i) { return weights[i]; }, xi.x);
+    if (k < 0) return {};
+    return withReader(ndf_, [&](const auto& reader) -> HalfVectorSample {
+      const PixelPlace place = choosePlace(reader, imageOf(chosen.slices[k]), xi);
+      if (place.x < 0) return {};
+      return {pointInPixel(shape(), place, xi), pixelDensity(reader, chosen, place) / total};
+    });
+  }
+
+  /// Average over a box of half vectors, >= 0, 0 if the box is empty; O(columns) for each block that the box covers.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const { return std::max(0.0f, signedMean(p, range)); }
 
   GLINT_HD float signedDensity(const Footprint& p, Vec2 h) const {
@@ -54,7 +90,89 @@ class CpNdf {
   }
 
  private:
-  /// Weighted sum over slices of one block. The coefficients of slices of the same cluster, as neighbours mostly are, are blended
+  /// A slice of a cluster. cluster: ~0 when the image has nothing in the block.
+  struct SlicePlace {
+    std::size_t cluster = ~std::size_t{0};
+    std::uint64_t slice = 0;
+  };
+
+  GLINT_HD std::size_t imageOf(const PyramidSlice& slice) const {
+    return std::size_t{ndf_.first_image[slice.level]} + slice.image;
+  }
+
+  GLINT_HD SlicePlace findSlice(std::size_t image, int block) const {
+    const std::size_t at = static_cast<std::size_t>(ndf_.image_regions.data()[image]) * shape().blocksPerImage() + block;
+    const int slot = ndf_.image_slots.data()[image];
+    const std::size_t word = at * ndf_.words_per_cluster + slot / 64;
+    const std::uint64_t mask = ndf_.masks.data()[word], bit = std::uint64_t{1} << (slot % 64);
+    if (!(mask & bit)) return {};
+    return {at, ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(std::popcount(mask & (bit - 1)))};
+  }
+
+  /// Weighted sum over the chosen images. Slices of the same cluster, as those of neighbours mostly are, share its projection.
+  template <class Reader>
+  GLINT_HD float pixelDensity(const Reader& reader, const PyramidSlices& chosen, const PixelPlace& place) const {
+    SlicePlace places[PyramidSlices::kMost];
+    float weights[PyramidSlices::kMost];
+    for (int k = 0; k < chosen.count; ++k) {
+      const std::size_t image = imageOf(chosen.slices[k]);
+      places[k] = findSlice(image, place.block);
+      weights[k] = chosen.slices[k].weight * ndf_.density_scales.data()[image];
+    }
+    constexpr std::size_t kNone = ~std::size_t{0};
+    float projection[kMaxColumns];
+    float sum = 0;
+    for (int first = 0; first < chosen.count; ++first) {
+      const std::size_t at = places[first].cluster;
+      if (at == kNone) continue;
+      const NdfCluster& cluster = ndf_.clusters.data()[at];
+      const int columns = columnCount(ndf_, cluster);
+      reader.pixel(cluster, place.x, place.y, projection);
+      const Float4 last = reader.lastColumns(projection, columns);
+      for (int k = first; k < chosen.count; ++k) {
+        if (places[k].cluster != at) continue;
+        sum +=
+            weights[k] * std::max(0.0f, reader.dot(projection, last, reader.row(cluster, places[k].slice, columns), columns));
+        places[k].cluster = kNone;
+      }
+    }
+    return sum;
+  }
+
+  /// A pixel of an image, in proportion to the image's density. x = -1 if there is none.
+  template <class Reader>
+  GLINT_HD PixelPlace choosePlace(const Reader& reader, std::size_t image, Vec2& xi) const {
+    constexpr int kTries = 4;  // the last is kept: one in a million
+    const std::uint32_t* first = ndf_.first_block.data() + image;
+    const std::uint8_t* codes = ndf_.block_masses.data() + first[0];
+    const auto mass = [&](int begin, int end) {
+      std::uint32_t units = 0;
+      for (int k = begin; k < end; ++k) units += blockMassUnits(codes[k]);
+      return static_cast<float>(units);
+    };
+    const float total = mass(0, static_cast<int>(first[1] - first[0]));
+    const std::uint64_t* mask = ndf_.block_masks.data() + image * shape().maskWords();
+    const float to_units = 0x1p18f * 4 * ndf_.density_scales.data()[image] /
+                           (static_cast<float>(shape().resolution) * static_cast<float>(shape().resolution));
+    for (int tries = 1;; ++tries) {
+      const BlockChoice choice = chooseBlock(mask, shape().blocksPerAxis(), total, mass, xi);
+      const SlicePlace at = choice.block < 0 ? SlicePlace{} : findSlice(image, choice.block);
+      if (at.cluster == ~std::size_t{0}) return {0, -1, -1};
+      const NdfCluster& cluster = ndf_.clusters.data()[at.cluster];
+      const int columns = columnCount(ndf_, cluster);
+      float pixels[kBlockPixels];
+      reader.block(cluster, reader.row(cluster, at.slice, columns), columns, pixels);
+      const BlockSums sums = sumRows(pixels);
+      const float kept = std::min(1.0f, sums.total * to_units / static_cast<float>(blockMassUnits(codes[choice.rank])));
+      if (xi.y < kept || tries == kTries) {
+        xi.y = clampUnit(xi.y / kept);
+        return choosePixel(pixels, sums, choice.block, xi);
+      }
+      xi.y = clampUnit((xi.y - kept) / (1 - kept));
+    }
+  }
+
+  /// Signed: weighted sum over slices of one block. The coefficients of slices of the same cluster, as neighbours mostly are, are blended
   /// first and meet the cluster's projection once.
   template <class Project>
   GLINT_HD float blockValue(const PyramidSlices& chosen, int block, Project&& project) const {
@@ -71,12 +189,9 @@ class CpNdf {
     };
     for (int k = 0; k < chosen.count; ++k) {
       const PyramidSlice& slice = chosen.slices[k];
-      const std::size_t image = ndf_.first_image[slice.level] + slice.image;
-      const std::size_t at = static_cast<std::size_t>(ndf_.image_regions.data()[image]) * shape().blocksPerImage() + block;
-      const int slot = ndf_.image_slots.data()[image];
-      const std::size_t word = at * ndf_.words_per_cluster + slot / 64;
-      const std::uint64_t mask = ndf_.masks.data()[word], bit = std::uint64_t{1} << (slot % 64);
-      if (!(mask & bit)) continue;
+      const std::size_t image = imageOf(slice);
+      const auto [at, row] = findSlice(image, block);
+      if (at == kNone) continue;
       const NdfCluster& cluster = ndf_.clusters.data()[at];
       const int columns = columnCount(ndf_, cluster);
       if (at != current) {
@@ -84,7 +199,6 @@ class CpNdf {
         current = at;
         std::fill(blend, blend + columns, 0.0f);
       }
-      const std::uint64_t row = ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(std::popcount(mask & (bit - 1)));
       addCoefficients(ndf_, cluster.first_coefficient + row * columns, slice.weight * ndf_.image_scales.data()[image], columns,
                       blend);
     }

@@ -37,30 +37,49 @@ inline GLINT_HD Covariance usableCovariance(Covariance c, int width, int height)
   return {static_cast<float>(a + shift), static_cast<float>(b), static_cast<float>(d + shift)};
 }
 
-/// Area of the part of a convex polygon that lies in the square [-1, 1]^2. `points` holds `count` <= 4 corners.
-inline GLINT_HD float areaInsideUnitBox(const Vec2* points, int count) {
-  Vec2 a[12], b[12];
+/// A convex polygon of few corners.
+struct SmallPolygon {
+  Vec2 corners[12];
+  int count = 0;
+
+  /// Twice the area, positive if the corners go round counterclockwise.
+  GLINT_HD float twiceSignedArea() const {
+    float twice = 0;
+    for (int k = 0; k < count; ++k) {
+      const Vec2 p = corners[k], q = corners[(k + 1) % count];
+      twice += p.x * q.y - p.y * q.x;
+    }
+    return twice;
+  }
+};
+
+/// The part of a convex polygon that lies in the square [-1, 1]^2. `points` holds `count` <= 4 corners.
+inline GLINT_HD SmallPolygon clipToUnitBox(const Vec2* points, int count) {
+  SmallPolygon polygon;
+  polygon.count = count;
+  Vec2* a = polygon.corners;
+  Vec2 b[12];
   for (int k = 0; k < count; ++k) a[k] = points[k];
-  for (int side = 0; side < 4 && count > 0; ++side) {
+  for (int side = 0; side < 4 && polygon.count > 0; ++side) {
     const float sign = side & 1 ? -1.0f : 1.0f;
     const bool along_y = side >= 2;
     const auto inside = [&](Vec2 p) { return 1 - sign * (along_y ? p.y : p.x); };  // >= 0 inside
     int kept = 0;
-    for (int k = 0; k < count; ++k) {
-      const Vec2 p = a[k], q = a[(k + 1) % count];
+    for (int k = 0; k < polygon.count; ++k) {
+      const Vec2 p = a[k], q = a[(k + 1) % polygon.count];
       const float dp = inside(p), dq = inside(q);
       if (dp >= 0) b[kept++] = p;
       if ((dp >= 0) != (dq >= 0)) b[kept++] = p + (dp / (dp - dq)) * (q - p);
     }
     for (int k = 0; k < kept; ++k) a[k] = b[k];
-    count = kept;
+    polygon.count = kept;
   }
-  float twice = 0;
-  for (int k = 0; k < count; ++k) {
-    const Vec2 p = a[k], q = a[(k + 1) % count];
-    twice += p.x * q.y - p.y * q.x;
-  }
-  return 0.5f * std::fabs(twice);
+  return polygon;
+}
+
+/// Area of the part of a convex polygon that lies in the square [-1, 1]^2. `points` holds `count` <= 4 corners.
+inline GLINT_HD float areaInsideUnitBox(const Vec2* points, int count) {
+  return 0.5f * std::fabs(clipToUnitBox(points, count).twiceSignedArea());
 }
 
 /// A footprint made ready for sums over texels.
@@ -99,6 +118,34 @@ class FootprintWeights {
     const Vec2 other = half == 0 ? Vec2{d.x + 1, d.y} : Vec2{d.x, d.y + 1};
     const Vec2 corners[3] = {local(d), local(other), local({d.x + 1, d.y + 1})};
     return areaInsideUnitBox(corners, 3);
+  }
+
+  GLINT_HD bool isBox() const { return is_box_; }
+  GLINT_HD Vec2 centre() const { return centre_; }
+
+  /// A Gaussian along one line of texel space, y = const: where it peaks, its deviation, and the integral over the line relative
+  /// to that over the line through the centre.
+  struct Line {
+    float mean, sigma, share;
+  };
+  GLINT_HD Line gaussianLine(float y) const {
+    const float dy = y - centre_.y, tilt = inverse_.xy / inverse_.xx;
+    return {centre_.x - tilt * dy, 1 / std::sqrt(inverse_.xx),
+            std::exp(-0.5f * std::max(0.0f, inverse_.yy - tilt * inverse_.xy) * dy * dy)};
+  }
+
+  /// The parallelogram of a box, or its part inside a rectangle of texel space, in the frame where it is [-1, 1]^2.
+  GLINT_HD SmallPolygon localShape(const Box2* clip) const {
+    const Vec2 whole[4] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+    if (!clip) return clipToUnitBox(whole, 4);
+    const Vec2 corners[4] = {local(clip->low - centre_), local(Vec2{clip->high.x, clip->low.y} - centre_),
+                             local(clip->high - centre_), local(Vec2{clip->low.x, clip->high.y} - centre_)};
+    return clipToUnitBox(corners, 4);
+  }
+  /// Back from that frame to texel space.
+  GLINT_HD Vec2 fromLocal(Vec2 s) const {
+    const float det = row_x_.x * row_y_.y - row_x_.y * row_y_.x;
+    return centre_ + (1 / det) * Vec2{row_y_.y * s.x - row_x_.y * s.y, row_x_.x * s.y - row_y_.x * s.x};
   }
 
   /// Whether the sum of all texel weights has a closed form, that of `closedFormTotal`, to float precision.

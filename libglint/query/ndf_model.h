@@ -19,10 +19,13 @@ struct HalfVectorSample {
 /// Half vectors are points of [-1, 1]^2, the square that NDF images cover; only those with |h| < 1 are directions. A facet's blur
 /// may spill a little past the unit circle; it is kept there, so that sums stay exact. Outside the square the density is 0.
 /// `mean` is the average of the density over a box, counting 0 outside the square.
+/// `sample` draws half vectors in proportion to the density from two numbers in [0, 1). Its warp keeps stratification: equal areas
+/// of [0, 1)^2 go to equal masses, neighbours mostly to neighbours. Numbers outside [0, 1) are clamped to it, NaN counts as 0.
 template <class M>
-concept NdfModel = requires(const M& m, const Footprint& p, Vec2 h, Box2 range) {
+concept NdfModel = requires(const M& m, const Footprint& p, Vec2 h, Box2 range, Vec2 xi) {
   { m.density(p, h) } -> std::same_as<float>;
   { m.mean(p, range) } -> std::same_as<float>;
+  { m.sample(p, xi) } -> std::same_as<HalfVectorSample>;
 };
 
 }  // namespace glint

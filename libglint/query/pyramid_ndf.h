@@ -3,9 +3,11 @@
 #include <bit>
 
 #include "glint/model/ndf_pyramid.h"
+#include "glint/query/float4.h"
 #include "glint/query/half.h"
 #include "glint/query/pyramid_slices.h"
 #include "glint/query/reference.h"
+#include "glint/query/sampling.h"
 
 namespace glint {
 
@@ -28,15 +30,26 @@ class PyramidNdf {
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
+    return pixelDensity(selectSlices(shape(), p), pixelPlace(shape(), h));
+  }
+
+  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly inside, as
+  /// the density is constant there. The pdf is the density, which integrates to what the images do: 1 within 1e-3 by the format,
+  /// 1e-5 as they are built. O(stored blocks of one image + 256).
+  GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+    xi = clampUnit(xi);
+    if (below_.hasMap() && belowFinest(shape(), p)) return below_.sample(p, xi);
     const PyramidSlices chosen = selectSlices(shape(), p);
-    const PixelPlace place = pixelPlace(shape(), h);
-    float sum = 0;
-    for (int k = 0; k < chosen.count; ++k) {
-      const PyramidSlice& slice = chosen.slices[k];
-      const std::int64_t block = storedBlock(slice, place.block);
-      if (block >= 0) sum += slice.weight * pixel(slice.level, block, place.y * kBlockSize + place.x);
-    }
-    return pyramid_.value_scale * sum;
+    const int k = chooseIndex(chosen.count, 1, [&](int i) { return chosen.slices[i].weight; }, xi.x);
+    if (k < 0) return {};
+    const BlockChoice block = chooseStoredBlock(chosen.slices[k], xi);
+    if (block.block < 0) return {};
+    const PyramidLevel& level = pyramid_.levels[chosen.slices[k].level];
+    float pixels[kBlockPixels];
+    loadBlock(level, level.first_block.data()[chosen.slices[k].image] + static_cast<std::uint64_t>(block.rank), pixels);
+    const PixelPlace place = choosePixel(pixels, sumRows(pixels), block.block, xi);
+    if (place.x < 0) return {};
+    return {pointInPixel(shape(), place, xi), pixelDensity(chosen, place)};
   }
 
   /// Average density over a box of half vectors, 0 if it is empty. O(1) for each block that the box covers: whole blocks have
@@ -56,6 +69,45 @@ class PyramidNdf {
   }
 
  private:
+  GLINT_HD float pixelDensity(const PyramidSlices& chosen, const PixelPlace& place) const {
+    float sum = 0;
+    for (int k = 0; k < chosen.count; ++k) {
+      const PyramidSlice& slice = chosen.slices[k];
+      const std::int64_t block = storedBlock(slice, place.block);
+      if (block >= 0) sum += slice.weight * pixel(slice.level, block, place.y * kBlockSize + place.x);
+    }
+    return pyramid_.value_scale * sum;
+  }
+
+  GLINT_HD BlockChoice chooseStoredBlock(const PyramidSlice& slice, Vec2& xi) const {
+    const PyramidLevel& level = pyramid_.levels[slice.level];
+    const std::uint64_t* first = level.first_block.data() + slice.image;
+    const float* means = level.block_means.data() + first[0];
+    const auto mass = [&](int begin, int end) {
+      float sums[4] = {};
+      int k = begin;
+      for (; k + 4 <= end; k += 4)
+        for (int lane = 0; lane < 4; ++lane) sums[lane] += means[k + lane];
+      float sum = (sums[0] + sums[2]) + (sums[1] + sums[3]);
+      for (; k < end; ++k) sum += means[k];
+      return sum;
+    };
+    const std::uint64_t* mask = level.masks.data() + static_cast<std::size_t>(slice.image) * shape().maskWords();
+    return chooseBlock(mask, shape().blocksPerAxis(), mass(0, static_cast<int>(first[1] - first[0])), mass, xi);
+  }
+
+  /// The pixels of a stored block, in any unit.
+  GLINT_HD void loadBlock(const PyramidLevel& level, std::uint64_t block, float* pixels) const {
+    const std::size_t first = static_cast<std::size_t>(block) * kBlockPixels;
+    if (pyramid_.precision == BlockPrecision::f16) {
+      const auto* stored = static_cast<const std::uint16_t*>(level.pixels) + first;
+      for (int k = 0; k < kBlockPixels; k += 4) Float4::load(stored + k).store(pixels + k);
+    } else {
+      const auto* stored = static_cast<const float*>(level.pixels) + first;
+      for (int k = 0; k < kBlockPixels; ++k) pixels[k] = stored[k];
+    }
+  }
+
   /// Index of a block of an image among the stored blocks of its level, or -1.
   GLINT_HD std::int64_t storedBlock(const PyramidSlice& slice, int block) const {
     const PyramidLevel& level = pyramid_.levels[slice.level];

@@ -7,6 +7,8 @@
 #include "glint/query/footprint_weights.h"
 #include "glint/query/gaussian.h"
 #include "glint/query/ndf_model.h"
+#include "glint/query/sampling.h"
+#include "glint/query/texel_choice.h"
 #include "glint/query/triangle_lobe.h"
 
 namespace glint {
@@ -46,6 +48,28 @@ class Reference {
                       {std::min(range.high.x, 1.0f), std::min(range.high.y, 1.0f)}};
     if (!(box.width() > 0 && box.height() > 0)) return 0;
     return static_cast<float>(average(p, BoxLobe{box, sigma_r_}) / range.area());
+  }
+
+  /// Draws a texel (or triangle) by its weight in the footprint, a normal of it and the lobe's blur around that. The pdf is the
+  /// density; half vectors that the blur takes out of [-1, 1]^2 have pdf 0.
+  ///
+  /// O(rows + columns) of the footprint for Gaussians (O(area) if they are rotated and the boundary is clamped), O(1) for boxes, and
+  /// the density. A choice uses up leading digits of `xi` and the next one those below, so 24 bits are enough for one sample.
+  GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+    xi = clampUnit(xi);
+    const FootprintWeights weights(p, map_.width, map_.height);
+    const TexelChoice texel = chooseTexel(weights, {map_.width, map_.height, surface_, boundary_}, xi);
+    if (!texel.found) return {};
+    Vec2 n = normal(texel.i, texel.j);
+    if (surface_ == Surface::smooth) {
+      const Vec2 side = texel.half == 0 ? normal(texel.i + 1, texel.j) : normal(texel.i, texel.j + 1);
+      const Vec2 far = normal(texel.i + 1, texel.j + 1);
+      const float r = std::sqrt(xi.y);  // even in the triangle
+      n = (1 - r) * n + (r * (1 - xi.x)) * side + (r * xi.x) * far;
+      xi = {lowerDigits(xi.x, 7), lowerDigits(xi.y, 7)};
+    }
+    const Vec2 h = n + sigma_r_ * Vec2{normalQuantile(xi.x), normalQuantile(xi.y)};
+    return {h, density(p, h)};
   }
 
   /// Visits every facet in a footprint: visitor(weight, normal) on a flat surface. Weights sum to the returned total.

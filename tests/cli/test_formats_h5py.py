@@ -84,6 +84,18 @@ def compressed_image(file, m):
     return image * file["image_scales"][m]
 
 
+def block_shares(file, m):
+    """Stored shares of the blocks of an image, by block."""
+    blocks = (file.attrs["resolution"] // 16) ** 2
+    bits = [b for b in range(blocks) if int(file["block_masks"][m, b // 64]) >> (b % 64) & 1]
+    first, last = (int(file["first_block"][k]) for k in (m, m + 1))
+    codes = file["block_masses"][first:last].astype(np.uint16) * 64
+    assert len(bits) == len(codes)
+    shares = np.zeros(blocks)
+    shares[bits] = codes.view(np.float16)
+    return shares
+
+
 def integral(image):
     return image.sum() * (2 / len(image)) ** 2
 
@@ -136,8 +148,14 @@ def test_pyramid():
 def test_compressed(name, values):
     file = open_asset(f"ndf-cp-{name}.glint", "ndf-cp")
     images = [compressed_image(file, m) for m in range(len(file["image_regions"]))]
-    for image in images:
+    for m, image in enumerate(images):
         assert abs(integral(image) - 1) < INTEGRAL_TOLERANCE
+        density = np.maximum(image, 0) / file["image_scales"][m] * file["density_scales"][m]
+        assert abs(integral(density) - 1) < INTEGRAL_TOLERANCE
+        per_axis = len(image) // 16
+        shares = density.reshape(per_axis, 16, per_axis, 16).sum(axis=(1, 3)).ravel() * (2 / len(image)) ** 2
+        stored = block_shares(file, m)
+        assert (stored >= shares).all() and (stored <= shares * 1.0626 + 2**-17).all()
     recorded = (images[5][33, 30], images[18][29, 35], images[20][32, 24])
     np.testing.assert_allclose(recorded, values, rtol=1e-5)
 

@@ -250,6 +250,10 @@ void linkSpans(SampleCompressed& sample) {
   ndf.image_regions = sample.image_regions;
   ndf.image_slots = sample.image_slots;
   ndf.image_scales = sample.image_scales;
+  ndf.density_scales = sample.density_scales;
+  ndf.block_masks = sample.block_masks;
+  ndf.first_block = sample.first_block;
+  ndf.block_masses = sample.block_masses;
   ndf.clusters = sample.clusters;
   ndf.masks = sample.masks;
   ndf.mask_ranks = sample.mask_ranks;
@@ -301,6 +305,35 @@ double basisValue(const CompressedNdf& ndf, const NdfCluster& cluster, int colum
       };
       return table(x, y) - table(x - 1, y) - table(x, y - 1) + table(x - 1, y - 1);
     }
+  }
+}
+
+/// The share of each block in the positive part of its image, rounded up to a code: the first that is not below.
+void addBlockMasses(SampleCompressed& sample) {
+  const CompressedNdf& ndf = sample.ndf;
+  const int blocks = ndf.shape.blocksPerImage();
+  sample.first_block.push_back(0);
+  for (std::size_t image = 0; image < sample.image_scales.size(); ++image) {
+    std::vector<double> sums(static_cast<std::size_t>(blocks));
+    double total = 0;
+    for (int p = 0; p < kResolution * kResolution; ++p) {
+      const int x = p % kResolution, y = p / kResolution;
+      const double value = std::max(0.0f, compressedPixel(ndf, static_cast<int>(image), x, y)) / sample.image_scales[image];
+      sums[static_cast<std::size_t>(y / kBlockSize * ndf.shape.blocksPerAxis() + x / kBlockSize)] += value;
+      total += value;
+    }
+    sample.density_scales.push_back(static_cast<float>(kResolution * kResolution / 4 / total));
+    sample.block_masks.push_back(0);
+    for (int block = 0; block < blocks; ++block) {
+      const auto cluster = static_cast<std::size_t>(sample.image_regions[image] * blocks + block);
+      if ((sample.masks[cluster] >> sample.image_slots[image] & 1u) == 0) continue;
+      sample.block_masks.back() |= std::uint64_t{1} << block;
+      const double share = sums[static_cast<std::size_t>(block)] / total * (1 + 1e-5);
+      int code = 0;
+      while (code < 255 && halfToFloat(static_cast<std::uint16_t>(code << 6)) < share) ++code;
+      sample.block_masses.push_back(static_cast<std::uint8_t>(code));
+    }
+    sample.first_block.push_back(static_cast<std::uint32_t>(sample.block_masses.size()));
   }
 }
 
@@ -424,6 +457,8 @@ SampleCompressed sampleCompressed(int size, CompressionMethod method, Coefficien
       sum += compressedPixel(ndf, static_cast<int>(k), p % kResolution, p / kResolution);
     sample.image_scales[k] = static_cast<float>(kResolution * kResolution / 4 / sum);
   }
+  addBlockMasses(sample);
+  linkSpans(sample);
   return sample;
 }
 

@@ -38,6 +38,10 @@ struct SampleCompressed {
   std::vector<std::uint16_t> image_regions;
   std::vector<std::uint16_t> image_slots;
   std::vector<float> image_scales;
+  std::vector<float> density_scales;
+  std::vector<std::uint64_t> block_masks;
+  std::vector<std::uint32_t> first_block;
+  std::vector<std::uint8_t> block_masses;
   std::vector<NdfCluster> clusters;
   std::vector<std::uint64_t> masks;
   std::vector<std::uint32_t> mask_ranks;

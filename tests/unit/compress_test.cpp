@@ -118,7 +118,8 @@ TEST(Compress, ReportsTheBytesThatItStores) {
     EXPECT_EQ(report.total_bytes, data.basis.size() + data.coefficients.size() + 4 * data.scales.size() +
                                       2 * data.image_regions.size() + 2 * data.image_slots.size() +
                                       4 * data.image_scales.size() + 32 * data.clusters.size() + 8 * data.masks.size() +
-                                      4 * data.mask_ranks.size());
+                                      4 * data.mask_ranks.size() + 4 * data.density_scales.size() +
+                                      8 * data.block_masks.size() + 4 * data.first_block.size() + data.block_masses.size());
     std::uint64_t slices = 0, clusters = 0;
     for (const NdfCluster& c : data.clusters) slices += c.slice_count;
     for (const std::uint64_t count : report.rank_histogram) clusters += count;

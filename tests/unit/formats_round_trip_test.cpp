@@ -147,6 +147,10 @@ TEST(AssetRoundTrip, CompressedPyramidsOfEveryMethodAndTypeComeBackBitExact) {
       expectSame(ndf.image_regions, sample.ndf.image_regions);
       expectSame(ndf.image_slots, sample.ndf.image_slots);
       expectSame(ndf.image_scales, sample.ndf.image_scales);
+      expectSame(ndf.density_scales, sample.ndf.density_scales);
+      expectSame(ndf.block_masks, sample.ndf.block_masks);
+      expectSame(ndf.first_block, sample.ndf.first_block);
+      expectSame(ndf.block_masses, sample.ndf.block_masses);
       expectSame(ndf.clusters, sample.ndf.clusters);
       expectSame(ndf.masks, sample.ndf.masks);
       expectSame(ndf.mask_ranks, sample.ndf.mask_ranks);

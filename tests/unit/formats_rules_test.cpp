@@ -391,7 +391,9 @@ std::vector<Fixture> indexFixtures() {
       patched("compressed.images", Base::compressed,
               [](const Patch& patch) {
                 for (const char* path : {"image_regions", "image_slots"}) patch.replace(path, H5T_STD_U16LE, {20}, true);
-                patch.replace("image_scales", H5T_IEEE_F32LE, {20}, true);
+                for (const char* path : {"image_scales", "density_scales"}) patch.replace(path, H5T_IEEE_F32LE, {20}, true);
+                patch.replace("block_masks", H5T_STD_U64LE, {20, 1}, true);
+                patch.replace("first_block", H5T_STD_U32LE, {21}, true);
               }),
       patched("compressed.slots", Base::compressed,
               [](const Patch& patch) { patch.change<std::uint16_t>("image_regions", 5, [](auto& region) { region = 2; }); }),
@@ -406,6 +408,12 @@ std::vector<Fixture> indexFixtures() {
           [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.slice_count += 1; }); }),
       patched("compressed.mask_ranks", Base::compressed,
               [](const Patch& patch) { patch.change<std::uint32_t>("mask_ranks", 5, [](auto& rank) { rank = 1; }); }),
+      patched("compressed.first_block", Base::compressed,
+              [](const Patch& patch) { patch.change<std::uint32_t>("first_block", 5, [](auto& first) { first = ~0u; }); }),
+      patched("compressed.first_block", Base::compressed,
+              [](const Patch& patch) { patch.change<std::uint64_t>("block_masks", 5, [](auto& mask) { mask ^= 1; }); }),
+      patched("compressed.first_block", Base::compressed,
+              [](const Patch& patch) { patch.replace("block_masses", H5T_STD_U8LE, {20}, true); }),
       patched(
           "compressed.ranks", Base::compressed,
           [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.rank_x = 60000; }); }),
@@ -463,6 +471,25 @@ std::vector<Fixture> dataFixtures() {
       patched(
           "compressed.image_scales", Base::compressed,
           [](const Patch& patch) { patch.change<float>("image_scales", 3, [](float& scale) { scale = 0; }); }, true),
+      patched(
+          "compressed.density_scales", Base::compressed,
+          [](const Patch& patch) { patch.change<float>("density_scales", 3, [](float& scale) { scale *= 1.01f; }); }, true),
+      patched(
+          "compressed.density_scales", Base::compressed,
+          [](const Patch& patch) { patch.change<float>("density_scales", 3, [](float& scale) { scale = kNan; }); }, true),
+      patched(
+          "compressed.block_masks", Base::compressed,
+          [](const Patch& patch) {
+            // As many bits as before, one of them elsewhere.
+            patch.change<std::uint64_t>("block_masks", 5, [](auto& mask) { mask = (mask & (mask - 1)) | (~mask & (mask + 1)); });
+          },
+          true),
+      patched(
+          "compressed.block_masses", Base::compressed,
+          [](const Patch& patch) { patch.change<std::uint8_t>("block_masses", 3, [](auto& code) { code -= 2; }); }, true),
+      patched(
+          "compressed.block_masses", Base::compressed,
+          [](const Patch& patch) { patch.change<std::uint8_t>("block_masses", 3, [](auto& code) { code += 2; }); }, true),
       patched(
           "compressed.scales", Base::compressed,
           [](const Patch& patch) { patch.change<float>("scales", 3, [](float& scale) { scale = kNan; }); }, true),

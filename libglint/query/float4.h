@@ -1,0 +1,97 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+
+#include "glint/model/device.h"
+#include "glint/query/half.h"
+
+#if defined(__SSE4_1__) && !defined(__CUDACC__)
+#include <smmintrin.h>
+#endif
+
+namespace glint {
+
+/// Four floats side by side, from SSE4.1 where the program is compiled for it. Results are the same bits without it.
+struct Float4 {
+#if defined(__SSE4_1__) && !defined(__CUDACC__)
+  __m128 v;
+
+  static Float4 zero() { return {_mm_setzero_ps()}; }
+  static Float4 all(float x) { return {_mm_set1_ps(x)}; }
+  static Float4 load(const float* p) { return {_mm_loadu_ps(p)}; }
+  static Float4 load(const std::int8_t* p) {
+    std::int32_t four;
+    std::memcpy(&four, p, sizeof four);
+    return {_mm_cvtepi32_ps(_mm_cvtepi8_epi32(_mm_cvtsi32_si128(four)))};
+  }
+  static Float4 load(const std::int16_t* p) {
+    return {_mm_cvtepi32_ps(_mm_cvtepi16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))))};
+  }
+  static Float4 load(const std::int32_t* p) { return {_mm_cvtepi32_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))}; }
+  /// Half-precision numbers.
+  static Float4 load(const std::uint16_t* p) {
+    const __m128i bits = _mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
+    const __m128i magnitude = _mm_slli_epi32(_mm_and_si128(bits, _mm_set1_epi32(0x7fff)), 13);
+    const __m128i sign = _mm_slli_epi32(_mm_and_si128(bits, _mm_set1_epi32(0x8000)), 16);
+    return {_mm_or_ps(_mm_mul_ps(_mm_castsi128_ps(magnitude), _mm_set1_ps(0x1p112f)), _mm_castsi128_ps(sign))};
+  }
+  void store(float* p) const { _mm_storeu_ps(p, v); }
+
+  friend Float4 operator+(Float4 a, Float4 b) { return {_mm_add_ps(a.v, b.v)}; }
+  friend Float4 operator-(Float4 a, Float4 b) { return {_mm_sub_ps(a.v, b.v)}; }
+  friend Float4 operator*(Float4 a, Float4 b) { return {_mm_mul_ps(a.v, b.v)}; }
+  /// Negative numbers and NaN become 0.
+  Float4 positive() const { return {_mm_max_ps(v, _mm_setzero_ps())}; }
+  /// (0 + 2) + (1 + 3).
+  float sum() const {
+    const __m128 pairs = _mm_add_ps(v, _mm_movehl_ps(v, v));
+    return _mm_cvtss_f32(_mm_add_ss(pairs, _mm_shuffle_ps(pairs, pairs, 1)));
+  }
+#else
+  float v[4];
+
+  static GLINT_HD Float4 zero() { return {{0, 0, 0, 0}}; }
+  static GLINT_HD Float4 all(float x) { return {{x, x, x, x}}; }
+  template <class T>
+  static GLINT_HD Float4 load(const T* p) {
+    return {{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]), static_cast<float>(p[3])}};
+  }
+  /// Half-precision numbers.
+  static GLINT_HD Float4 load(const std::uint16_t* p) {
+    return {{halfToFloat(p[0]), halfToFloat(p[1]), halfToFloat(p[2]), halfToFloat(p[3])}};
+  }
+  GLINT_HD void store(float* p) const {
+    for (int k = 0; k < 4; ++k) p[k] = v[k];
+  }
+
+  friend GLINT_HD Float4 operator+(Float4 a, Float4 b) {
+    return {{a.v[0] + b.v[0], a.v[1] + b.v[1], a.v[2] + b.v[2], a.v[3] + b.v[3]}};
+  }
+  friend GLINT_HD Float4 operator-(Float4 a, Float4 b) {
+    return {{a.v[0] - b.v[0], a.v[1] - b.v[1], a.v[2] - b.v[2], a.v[3] - b.v[3]}};
+  }
+  friend GLINT_HD Float4 operator*(Float4 a, Float4 b) {
+    return {{a.v[0] * b.v[0], a.v[1] * b.v[1], a.v[2] * b.v[2], a.v[3] * b.v[3]}};
+  }
+  /// Negative numbers and NaN become 0.
+  GLINT_HD Float4 positive() const {
+    return {{v[0] > 0 ? v[0] : 0, v[1] > 0 ? v[1] : 0, v[2] > 0 ? v[2] : 0, v[3] > 0 ? v[3] : 0}};
+  }
+  /// (0 + 2) + (1 + 3).
+  GLINT_HD float sum() const { return (v[0] + v[2]) + (v[1] + v[3]); }
+#endif
+};
+
+/// Sums of four vectors, each over its lanes.
+inline GLINT_HD Float4 sumsOf(Float4 a, Float4 b, Float4 c, Float4 d) {
+#if defined(__SSE4_1__) && !defined(__CUDACC__)
+  _MM_TRANSPOSE4_PS(a.v, b.v, c.v, d.v);
+  return (a + c) + (b + d);
+#else
+  return {{a.sum(), b.sum(), c.sum(), d.sum()}};
+#endif
+}
+
+}  // namespace glint

@@ -1,0 +1,70 @@
+// Counts allocations by replacing operator new for the whole program. Sanitizers replace it themselves.
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <new>
+
+#include "glint/bake/compress.h"
+#include "glint/bake/counter_random.h"
+#include "glint/bake/pyramid.h"
+#include "glint/query/cp_ndf.h"
+#include "glint/query/pyramid_ndf.h"
+#include "support/test_maps.h"
+
+namespace {
+thread_local long allocations = 0;
+}
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size > 0 ? size : 1)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace glint {
+namespace {
+
+template <class Model>
+void expectNoAllocation(const Model& model) {
+  const long before = allocations;
+  float sum = 0;
+  for (int k = 0; k < 12; ++k) {
+    const Vec2 xi = bake::randomPair(1, 0, k), h = bake::randomPair(1, 1, k);
+    const Footprint p = k % 2 == 0 ? Footprint::isotropic(xi, 0.5f + 0.7f * static_cast<float>(k))
+                                   : Footprint::box(xi, {static_cast<float>(k), 1}, {-1, 2});
+    sum += model.density(p, h) + model.mean(p, {h - Vec2{0.2f, 0.1f}, h}) + model.sample(p, xi).pdf;
+  }
+  EXPECT_EQ(allocations, before);
+  EXPECT_GT(sum, 0);
+}
+
+TEST(Queries, AllocateNothing) {
+  const long before = allocations;
+  const test::OwnedMap map(32, 24, test::roughSurface(32, 24, 0.3f));
+  EXPECT_GT(allocations, before);  // the counter counts
+  bake::PyramidOptions options;
+  options.stride = 8;
+  options.resolution = 64;
+  options.sigma_r = 0.02f;
+  const bake::NdfPyramidData pyramid = bake::buildPyramid(map.map(), options);
+  for (const Surface surface : {Surface::flat, Surface::smooth})
+    for (const auto search : {Reference::Search::exhaustive, Reference::Search::pruned})
+      expectNoAllocation(Reference(map.map(), 0.02f, surface, Boundary::wrap, search));
+  expectNoAllocation(PyramidNdf(pyramid.view()));
+  expectNoAllocation(PyramidNdf(pyramid.view(), map.map()));
+  for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
+    bake::CompressionOptions o;
+    o.method = method;
+    const bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), o);
+    expectNoAllocation(CpNdf(data.view()));
+  }
+}
+
+}  // namespace
+}  // namespace glint
+
+#endif
