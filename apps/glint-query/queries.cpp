@@ -5,7 +5,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <mutex>
+
+#include "glint/bake/counter_random.h"
 
 namespace glint::apps {
 
@@ -47,16 +50,37 @@ std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int
   tbb::parallel_for(0, resolution, [&](int y) {
     for (int x = 0; x < resolution; ++x) {
       const Vec2 low = {-1 + static_cast<float>(x) * pixel, -1 + static_cast<float>(y) * pixel};
-      image[static_cast<std::size_t>(y) * resolution + x] = std::visit(
-          [&](const auto& m) {
-            return m.mean(footprint, {low, low + Vec2{pixel, pixel}});
-          },
-          model);
+      image[static_cast<std::size_t>(y) * resolution + x] =
+          std::visit([&](const auto& m) { return m.mean(footprint, {low, low + Vec2{pixel, pixel}}); }, model);
     }
     const std::scoped_lock lock(mutex);
     if (progress) progress(++done, resolution);
   });
   return image;
+}
+
+std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& footprint, int count, std::uint64_t seed) {
+  std::vector<HalfVectorSample> samples(static_cast<std::size_t>(count));
+  const int rows = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(count))));
+  const auto rowBegin = [&](int row) { return static_cast<std::size_t>(count) * static_cast<std::size_t>(row) / rows; };
+  tbb::parallel_for(0, rows, [&](int row) {
+    const std::size_t begin = rowBegin(row), end = rowBegin(row + 1);
+    for (std::size_t k = begin; k < end; ++k) {
+      const Vec2 jitter = bake::randomPair(seed, 0, k);
+      // Rows are as high as they have cells.
+      const double x = (static_cast<double>(k - begin) + jitter.x) / static_cast<double>(end - begin);
+      const double y = (static_cast<double>(begin) + jitter.y * static_cast<double>(end - begin)) / count;
+      const Vec2 xi = {static_cast<float>(x), static_cast<float>(y)};
+      samples[k] = std::visit([&](const auto& m) { return m.sample(footprint, xi); }, model);
+    }
+  });
+  return samples;
+}
+
+std::string sampleTable(std::span<const HalfVectorSample> samples) {
+  std::string text = "hx,hy,pdf\n";
+  for (const HalfVectorSample& s : samples) text += fmt::format("{:.9g},{:.9g},{:.9g}\n", s.h.x, s.h.y, s.pdf);
+  return text;
 }
 
 namespace {

@@ -46,4 +46,11 @@ class QueryTable {
   std::vector<Query> queries_;
 };
 
+/// Half vectors drawn from the distribution inside a footprint, from stratified random numbers: the unit square is split in `count`
+/// cells of equal area, each with one number that depends only on the seed and the cell.
+std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& footprint, int count, std::uint64_t seed);
+
+/// Samples as a CSV table with the columns hx, hy and pdf.
+std::string sampleTable(std::span<const HalfVectorSample> samples);
+
 }  // namespace glint::apps

@@ -24,7 +24,9 @@ QueryCommand::QueryCommand(Tool& tool) : tool_(tool) {
   csv_option_ = &tool.option("--csv", csv_,
                              "answer a table of queries; its header names u,v; sigma or sxx,sxy,syy or ax,ay,bx,by; "
                              "hx,hy or x0,y0,x1,y1");
-  output_option_ = &tool.option("-o,--output", output_, "where the answered table goes; - for stdout").needs(*csv_option_);
+  tool.option("--samples", samples_, "draw half vectors in proportion to the density: a table of hx,hy,pdf")
+      .range(1, 100000000);
+  output_option_ = &tool.option("-o,--output", output_, "where the table of --csv or --samples goes; - for stdout");
   tool.option("--repeat", repeat_, "time the query: nanoseconds, median of 15 runs of N / 15").range(1, 1000000000);
   sigma_option_->excludes(*covariance_option_).excludes(*box_option_);
   covariance_option_->excludes(*box_option_);
@@ -36,19 +38,23 @@ void QueryCommand::check() const {
   const auto usage = [](const std::string& what, const std::string& remedy) {
     throw Error(ErrorCode::usage, "query.arguments", "", "", what, remedy);
   };
+  const bool makes_table = csv_option_->given() || samples_ > 0;
+  if (makes_table && !output_option_->given())
+    usage(csv_option_->given() ? "--csv needs a place for the answers" : "--samples needs a place for them",
+          "add -o OUT.csv, or -o - for stdout");
+  if (!makes_table && output_option_->given()) usage("-o is for tables", "add --csv or --samples, or leave it out");
+  if (makes_table && output_ != "-") checkWritable(output_);
   if (csv_option_->given()) {
-    if (uv_option_->given() || !image_.empty() || half_option_->given() || range_option_->given())
+    if (uv_option_->given() || samples_ > 0 || !image_.empty() || half_option_->given() || range_option_->given())
       usage("--csv asks its own queries", "leave out the others");
-    if (!output_option_->given()) usage("--csv needs a place for the answers", "add -o OUT.csv, or -o - for stdout");
     checkReadable(csv_);
-    if (output_ != "-") checkWritable(output_);
     return;
   }
   if (!uv_option_->given()) usage("no footprint was given", "add --uv U V, or --csv TABLE");
   if (!sigma_option_->given() && !covariance_option_->given() && !box_option_->given())
     usage("the footprint has no size", "add --sigma S, --cov SXX SXY SYY or --box AX AY BX BY");
-  if (image_.empty() && !half_option_->given() && !range_option_->given())
-    usage("nothing was asked", "add --half, --range or --image");
+  if (image_.empty() && !half_option_->given() && !range_option_->given() && samples_ == 0)
+    usage("nothing was asked", "add --half, --range, --samples or --image");
   if (!image_.empty()) {
     checkWritable(image_);
     checkPictureName(image_);
@@ -74,6 +80,7 @@ void QueryCommand::run(NdfAsset& asset) {
   if (csv_option_->given()) return answerTable(asset);
   asset.requireAnswerable(footprint());
   if (!image_.empty()) writePicture(asset);
+  if (samples_ > 0) writeSamples(asset);
   if (half_option_->given() || range_option_->given()) answerOne(asset);
 }
 
@@ -81,11 +88,21 @@ void QueryCommand::answerTable(NdfAsset& asset) {
   const QueryTable table = QueryTable::read(csv_);
   for (const Query& query : table.queries()) asset.requireAnswerable(query.footprint);
   const std::string text = table.withAnswers(answerAll(asset.model(), table.queries()));
+  writeTable(text);
+  tool_.setResult({{"queries", table.queries().size()}});
+}
+
+void QueryCommand::writeTable(const std::string& text) {
   if (output_ == "-")
     tool_.print(text);
   else
     writeFileAtomically(output_, text);
-  tool_.setResult({{"queries", table.queries().size()}});
+}
+
+void QueryCommand::writeSamples(NdfAsset& asset) {
+  const std::vector<HalfVectorSample> samples = drawSamples(asset.model(), footprint(), samples_, tool_.seed());
+  writeTable(sampleTable(samples));
+  tool_.setResult({{"samples", samples.size()}});
 }
 
 void QueryCommand::answerOne(NdfAsset& asset) {

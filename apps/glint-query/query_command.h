@@ -23,6 +23,8 @@ class QueryCommand {
   Query query() const;
   void answerTable(NdfAsset& asset);
   void answerOne(NdfAsset& asset);
+  void writeSamples(NdfAsset& asset);
+  void writeTable(const std::string& text);
   void writePicture(NdfAsset& asset);
 
   Tool& tool_;
@@ -31,6 +33,7 @@ class QueryCommand {
   std::string image_, csv_, output_;
   int image_size_ = 0;
   int repeat_ = 0;
+  int samples_ = 0;
   Option *uv_option_, *sigma_option_, *covariance_option_, *box_option_, *half_option_, *range_option_, *csv_option_,
       *output_option_;
 };

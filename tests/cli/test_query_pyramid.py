@@ -216,6 +216,34 @@ def test_tables_that_cannot_be_read_are_invalid_input_with_the_place(ask, table,
     assert not (ask.folder / "a.csv").exists()
 
 
+@pytest.mark.parametrize("kind", MODELS)
+def test_samples_follow_the_density(ask, kind):
+    count, limits = 5000, (-0.2, -0.1, 0.0, 0.1, 0.2)
+    process = ask(kind, *FOOTPRINT, "--samples", str(count), "--seed", "3", "-o", "s.csv")
+    assert process.returncode == 0, process.stderr
+    text = (ask.folder / "s.csv").read_text()
+    rows = list(csv.reader(io.StringIO(text)))
+    assert rows[0] == ["hx", "hy", "pdf"] and len(rows) == count + 1
+    samples = [tuple(map(float, row)) for row in rows[1:]]
+    for hx, hy, pdf in samples[::500]:
+        assert pdf == pytest.approx(number(ask(kind, *FOOTPRINT, "--half", str(hx), str(hy))), rel=PRINTED)
+    # Shares of boxes of half vectors, within five deviations of independent samples (these are stratified).
+    for x0, x1 in zip(limits, limits[1:]):
+        mean = number(ask(kind, *FOOTPRINT, "--range", str(x0), "-0.1", str(x1), "0.15"))
+        share = mean * (x1 - x0) * 0.25
+        found = sum(x0 <= hx < x1 and -0.1 <= hy < 0.15 for hx, hy, _ in samples) / count
+        assert abs(found - share) < 5 * (share / count) ** 0.5 + 0.01
+    again = ask(kind, *FOOTPRINT, "--samples", str(count), "--seed", "3", "--threads", "1", "-o", "-")
+    assert again.stdout == text
+    assert ask(kind, *FOOTPRINT, "--samples", str(count), "--seed", "4", "-o", "-").stdout != text
+
+
+def test_samples_need_a_place(ask):
+    for arguments in (["--samples", "10"], ["--samples", "0", "-o", "s.csv"], ["--half", "0", "0", "-o", "s.csv"]):
+        assert ask("pyramid", *FOOTPRINT, *arguments).returncode == 1
+    assert not (ask.folder / "s.csv").exists()
+
+
 @pytest.mark.parametrize("kind", ["pyramid", "compressed"])
 def test_below_the_finest_level_needs_the_normals(ask, assets, kind):
     question = ["--uv", "0.3", "0.7", "--sigma", "3", "--half", "0.02", "-0.03"]
