@@ -133,12 +133,18 @@ class Bench:
                 if entry.get("aggregate_name", "median") != "median":
                     continue
                 what, file = entry["run_name"].split("/")
+                if what.startswith("ratio_"):
+                    # To a plain microfacet model in the same run.
+                    asked = what.removeprefix("ratio_").replace("_", ", ")
+                    self.table.add(f"{asked} over plain GGX, {name} {file.removeprefix(name + '.').removesuffix('.glint')}", entry["ratio"], "x",
+                                   target=4 if asked.startswith("density") else 6)
+                    continue
                 kind = f"{name} {file.removeprefix(name + '.').removesuffix('.glint')}"
                 if what == "open":
                     # The target is for 100 MB; smaller files have to keep it too.
                     self.table.add(f"open {kind.removesuffix(' glint')}, {entry['file_bytes'] / MB:.0f} MB", entry["real_time"], "ms", target=5)
                 else:
-                    self.table.add(f"{what.replace('_', ', ')}, {kind}", entry["cpu_time"], "ns", target=150 if what == "density_warm" else None)
+                    self.table.add(f"{what.replace('_', ', ')}, {kind}", entry["cpu_time"], "ns", target=150 if what == "density_warm" and file != "ggx" else None)
 
     def query_command(self):
         asset = self.path("flakes", "cp32")

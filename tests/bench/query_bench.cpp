@@ -1,10 +1,13 @@
 // Opening assets and asking them:
 //   glint-query-bench NORMALS.glint ASSET.glint... [--benchmark_format=json ...]
 // Names are WHAT/FILE. `random`: footprints of every size anywhere, towards normals of the map, so that most queries miss the
-// caches on big assets. `warm`: one such query again and again.
+// caches on big assets. `warm`: one such query again and again. A plain microfacet model (GGX) is timed in the same run, as a function
+// and as a sampler of half vectors, and ratio_* give the ratios of densities and samples to it: median of alternating runs.
 
 #include <benchmark/benchmark.h>
+#include <time.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <list>
@@ -26,10 +29,63 @@ constexpr std::size_t kQueries = 1 << 15;
 /// Half width of the range that `mean` is asked for: a light of about 6 degrees.
 constexpr float kRangeReach = 0.05f;
 
+struct Vector {
+  float x, y, z;
+};
+
+float dot(Vector a, Vector b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Vector normalized(Vector v) {
+  const float s = 1 / std::sqrt(dot(v, v));
+  return {s * v.x, s * v.y, s * v.z};
+}
+
+/// What a renderer without glints does: anisotropic GGX, height-correlated Smith masking, and a conductor's Fresnel term at three
+/// wavelengths.
+struct PlainGgx {
+  float alpha_x = 0.2f, alpha_y = 0.3f;
+
+  float distribution(Vector h) const {
+    const float x = h.x / alpha_x, y = h.y / alpha_y, s = x * x + y * y + h.z * h.z;
+    return 1 / (kPi * alpha_x * alpha_y * s * s);
+  }
+  float lambda(Vector w) const {
+    const float x = w.x * alpha_x, y = w.y * alpha_y;
+    return 0.5f * (std::sqrt(1 + (x * x + y * y) / (w.z * w.z)) - 1);
+  }
+  static float conductor(float cosine, float eta, float k) {
+    const float c2 = cosine * cosine, s2 = 1 - c2, t0 = eta * eta - k * k - s2;
+    const float ab = std::sqrt(t0 * t0 + 4 * eta * eta * k * k), a = std::sqrt(0.5f * (ab + t0));
+    const float t1 = ab + c2, t2 = 2 * cosine * a, rs = (t1 - t2) / (t1 + t2);
+    const float t3 = c2 * ab + s2 * s2, t4 = t2 * s2;
+    return 0.5f * rs * (1 + (t3 - t4) / (t3 + t4));
+  }
+  float evaluate(Vector wi, Vector wo) const {
+    const Vector h = normalized({wi.x + wo.x, wi.y + wo.y, wi.z + wo.z});
+    const float c = dot(wi, h);
+    const float fresnel = conductor(c, 0.20f, 3.9f) + conductor(c, 0.92f, 2.5f) + conductor(c, 1.1f, 2.4f);
+    return distribution(h) * fresnel / ((1 + lambda(wi) + lambda(wo)) * 4 * wi.z);
+  }
+  /// A visible normal (Heitz 2018) and its pdf.
+  float sample(Vector wi, Vec2 xi) const {
+    const Vector v = normalized({alpha_x * wi.x, alpha_y * wi.y, wi.z});
+    const float length2 = v.x * v.x + v.y * v.y, inverse = length2 > 0 ? 1 / std::sqrt(length2) : 0;
+    const Vector t1 = length2 > 0 ? Vector{-v.y * inverse, v.x * inverse, 0} : Vector{1, 0, 0};
+    const Vector t2 = {-v.z * t1.y, v.z * t1.x, v.x * t1.y - v.y * t1.x};
+    const float r = std::sqrt(xi.x), phi = 2 * kPi * xi.y, p1 = r * std::cos(phi), s = 0.5f * (1 + v.z);
+    const float p2 = (1 - s) * std::sqrt(1 - p1 * p1) + s * r * std::sin(phi);
+    const float p3 = std::sqrt(std::max(0.0f, 1 - p1 * p1 - p2 * p2));
+    const Vector h = normalized({alpha_x * (p1 * t1.x + p2 * t2.x + p3 * v.x), alpha_y * (p1 * t1.y + p2 * t2.y + p3 * v.y),
+                                 std::max(0.0f, p2 * t2.z + p3 * v.z)});
+    return distribution(h) * std::max(0.0f, dot(wi, h)) / ((1 + lambda(wi)) * wi.z) + h.x;
+  }
+};
+
 struct Query {
   Footprint footprint;
   Vec2 half;
   Box2 range;
+  Vec2 xi;
+  Vector wi, wo;  ///< for the plain model
 };
 
 /// Uniform over the map; sizes log-uniform from `finest` to `coarsest` texels.
@@ -41,6 +97,11 @@ std::vector<Query> randomQueries(const NormalMap& map, float finest, float coars
     const float u = unit(), v = unit();
     query.footprint = Footprint::isotropic({u, v}, finest * std::pow(coarsest / finest, unit()));
     query.half = map.normals[random() % map.normals.size()];
+    query.xi = {unit(), unit()};
+    const float nz = std::sqrt(std::max(0.01f, 1 - glint::dot(query.half, query.half)));
+    query.wi = normalized({unit() - 0.5f, unit() - 0.5f, 0.3f + unit()});
+    const float along = 2 * dot(query.wi, {query.half.x, query.half.y, nz});
+    query.wo = normalized({along * query.half.x - query.wi.x, along * query.half.y - query.wi.y, along * nz - query.wi.z});
     query.range = {query.half - Vec2{kRangeReach, kRangeReach}, query.half + Vec2{kRangeReach, kRangeReach}};
   }
   return queries;
@@ -48,6 +109,46 @@ std::vector<Query> randomQueries(const NormalMap& map, float finest, float coars
 
 float density(const auto& model, const Query& query) { return model.density(query.footprint, query.half); }
 float mean(const auto& model, const Query& query) { return model.mean(query.footprint, query.range); }
+float sample(const auto& model, const Query& query) {
+  const HalfVectorSample s = model.sample(query.footprint, query.xi);
+  return s.pdf + s.h.x + s.h.y;
+}
+float plainDensity(const Query& query) { return PlainGgx().evaluate(query.wi, query.wo); }
+float plainSample(const Query& query) { return PlainGgx().sample(query.wi, query.xi); }
+
+double threadSeconds() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+/// Median over alternating runs of the time of `ask` over that of `plain`, on the same queries.
+template <class Ask, class Plain>
+void addRatio(const std::string& what, const std::string& name, const std::vector<Query>& queries, Ask ask, Plain plain) {
+  for (const bool warm : {true, false}) {
+    benchmark::RegisterBenchmark(
+        ("ratio_" + what + (warm ? "_warm/" : "_random/") + name).c_str(),
+        [&queries, ask, plain, warm](benchmark::State& state) {
+          constexpr int kRuns = 31, kPerRun = 1000;
+          std::vector<double> ratios;
+          std::size_t next = 0;
+          const auto time = [&](const auto& function, std::size_t first) {
+            const double start = threadSeconds();
+            for (int k = 0; k < kPerRun; ++k) benchmark::DoNotOptimize(function(queries[warm ? 0 : (first + k) % kQueries]));
+            return threadSeconds() - start;
+          };
+          for (auto _ : state) {
+            for (int run = 0; run < kRuns; ++run, next += kPerRun) {
+              const double base = time(plain, next);
+              ratios.push_back(time(ask, next) / base);
+            }
+          }
+          std::nth_element(ratios.begin(), ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2), ratios.end());
+          state.counters["ratio"] = ratios[ratios.size() / 2];
+        })
+        ->Iterations(1);
+  }
+}
 
 template <class Ask>
 void addQueryBenchmarks(const std::string& what, const std::string& name, const std::vector<Query>& queries, Ask ask) {
@@ -64,6 +165,9 @@ template <class Model>
 void addModelBenchmarks(const std::string& name, const Model& model, const std::vector<Query>& queries) {
   addQueryBenchmarks("density", name, queries, [&model](const Query& query) { return density(model, query); });
   addQueryBenchmarks("mean", name, queries, [&model](const Query& query) { return mean(model, query); });
+  addQueryBenchmarks("sample", name, queries, [&model](const Query& query) { return sample(model, query); });
+  addRatio("density", name, queries, [&model](const Query& query) { return density(model, query); }, plainDensity);
+  addRatio("sample", name, queries, [&model](const Query& query) { return sample(model, query); }, plainSample);
 }
 
 void addOpenBenchmark(const std::string& path, const std::string& name) {
@@ -104,6 +208,8 @@ int main(int argc, char** argv) {
           },
           models.back());
     }
+    addQueryBenchmarks("density", "ggx", queries.front(), plainDensity);
+    addQueryBenchmarks("sample", "ggx", queries.front(), plainSample);
     addOpenBenchmark(argv[1], std::filesystem::path(argv[1]).filename().string());
     benchmark::RunSpecifiedBenchmarks();
   } catch (const std::exception& error) {
