@@ -1,0 +1,129 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "glint/query/footprint_weights.h"
+#include "glint/query/ndf_model.h"
+
+namespace glint {
+
+/// A Gaussian footprint as a sum of isotropic ones of equal size along its long axis. Weights are > 0 and sum to 1.
+struct IsotropicParts {
+  static constexpr int kMost = 16;
+  Footprint footprints[kMost];
+  float weights[kMost];
+  int count = 0;
+};
+
+/// Deviations along the axes of a covariance, and the direction of the longer one.
+struct PrincipalAxes {
+  float longest = 0, shortest = 0;
+  Vec2 direction;
+};
+inline GLINT_HD PrincipalAxes principalAxes(const Covariance& c) {
+  const float mean = 0.5f * (c.xx + c.yy), half = 0.5f * (c.xx - c.yy);
+  const float root = std::sqrt(half * half + c.xy * c.xy);
+  const float low = root < mean ? (c.xx * c.yy - c.xy * c.xy) / (mean + root) : 0;
+  const float angle = 0.5f * std::atan2(c.xy, half);
+  return {std::sqrt(mean + root), std::sqrt(std::max(0.0f, low)), {std::cos(angle), std::sin(angle)}};
+}
+
+/// Splits a footprint along its long axis so that the first and second moments of the parts together are its own.
+///
+/// The size is made usable first (usableCovariance). The parts have the short deviation, or `narrowest_sigma` where that is larger,
+/// and neighbours are at most kPartGap deviations apart, until IsotropicParts::kMost are not enough: above an
+/// aspect of 7 there are gaps between them, 4.4 deviations at an aspect of 16. Boxes are split as the Gaussian of the same moments.
+/// @param narrowest_sigma  texels; what the model that is asked cannot tell apart, e.g. finestSigma(shape) of a pyramid without normals
+/// @return 1 part for round footprints, else 2 to 16
+inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int height, float narrowest_sigma = 0) {
+  constexpr float kPartGap = 2;    // in deviations of a part: the sum of neighbours ripples by 1 %
+  constexpr float kReach = 2.2f;   // parts out to this many deviations
+  constexpr float kRound = 0.05f;  // a variance larger by less is no length
+  const PrincipalAxes axes = principalAxes(usableCovariance(p.covariance, width, height));
+  const float sigma = std::max(axes.shortest, narrowest_sigma);
+  const float along2 = axes.longest * axes.longest - sigma * sigma;
+  IsotropicParts parts;
+  if (!(along2 > kRound * sigma * sigma)) {
+    parts.footprints[0] = Footprint::isotropic(p.centre, std::max(sigma, axes.longest));
+    parts.weights[0] = 1;
+    parts.count = 1;
+    return parts;
+  }
+  const float along = std::sqrt(along2);
+  parts.count = std::clamp(static_cast<int>(std::ceil(2 * kReach * along / (kPartGap * sigma))), 2, IsotropicParts::kMost);
+  const float step = 2 * kReach / static_cast<float>(parts.count), middle = 0.5f * static_cast<float>(parts.count - 1);
+  float total = 0, moment = 0;
+  for (int k = 0; k < parts.count; ++k) {
+    const float x = step * (static_cast<float>(k) - middle);
+    parts.weights[k] = std::exp(-0.5f * x * x);
+    total += parts.weights[k];
+    moment += parts.weights[k] * x * x;
+  }
+  const float stretch = along * std::sqrt(total / moment);
+  const Vec2 unit = {axes.direction.x / static_cast<float>(width), axes.direction.y / static_cast<float>(height)};
+  const Vec2 centre = {wrapUnit(p.centre.x), wrapUnit(p.centre.y)};
+  for (int k = 0; k < parts.count; ++k) {
+    const float x = step * (static_cast<float>(k) - middle);
+    parts.footprints[k] = Footprint::isotropic(centre + (stretch * x) * unit, sigma);
+    parts.weights[k] /= total;
+  }
+  return parts;
+}
+
+/// Answers stretched footprints from a model that knows only round ones (PyramidNdf, CpNdf): each as the sum of up to 16 round ones
+/// along its long axis, at that many times the cost. Round footprints cost what they did.
+///
+/// Holds a pointer to the model, which must outlive it. Thread-safe, allocates nothing.
+template <NdfModel M>
+class AnisotropicNdf {
+ public:
+  /// @param width, height    of the map, texels
+  /// @param narrowest_sigma  as for isotropicParts
+  GLINT_HD AnisotropicNdf(const M& model, int width, int height, float narrowest_sigma = 0)
+      : model_(&model), width_(width), height_(height), narrowest_sigma_(narrowest_sigma) {}
+  /// For a model of a pyramid.
+  GLINT_HD explicit AnisotropicNdf(const M& model, float narrowest_sigma = 0)
+    requires requires { model.shape(); }
+      : AnisotropicNdf(model, model.shape().width, model.shape().height, narrowest_sigma) {}
+
+  GLINT_HD IsotropicParts parts(const Footprint& p) const { return isotropicParts(p, width_, height_, narrowest_sigma_); }
+
+  /// Density towards h, >= 0.
+  GLINT_HD float density(const Footprint& p, Vec2 h) const {
+    return summed(parts(p), [&](const Footprint& part) { return model_->density(part, h); });
+  }
+
+  /// Average density over a box of half vectors.
+  GLINT_HD float mean(const Footprint& p, const Box2& range) const {
+    return summed(parts(p), [&](const Footprint& part) { return model_->mean(part, range); });
+  }
+
+  /// Draws one of the parts by its weight, and from it. The pdf is the density of all parts.
+  GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+    const IsotropicParts all = parts(p);
+    int chosen = 0;
+    float left = xi.x > 0 ? xi.x : 0;
+    while (chosen + 1 < all.count && left >= all.weights[chosen]) left -= all.weights[chosen++];
+    const float rescaled = std::min(left / all.weights[chosen], 0x1.fffffep-1f);
+    const HalfVectorSample drawn = model_->sample(all.footprints[chosen], {rescaled, xi.y});
+    return drawn.pdf > 0
+               ? HalfVectorSample{drawn.h, summed(all, [&](const Footprint& part) { return model_->density(part, drawn.h); })}
+               : HalfVectorSample{};
+  }
+
+ private:
+  template <class Value>
+  static GLINT_HD float summed(const IsotropicParts& all, Value&& value) {
+    float sum = 0;
+    for (int k = 0; k < all.count; ++k) sum += all.weights[k] * value(all.footprints[k]);
+    return sum;
+  }
+
+  const M* model_;
+  int width_;
+  int height_;
+  float narrowest_sigma_;
+};
+
+}  // namespace glint

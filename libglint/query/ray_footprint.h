@@ -1,0 +1,89 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "glint/model/footprint.h"
+
+namespace glint {
+
+/// Deviation of the pixel filter that `footprintFromDifferentials` assumes, in pixels: that of renderers' usual Gaussian filter.
+inline constexpr float kPixelFilterSigma = 0.5f;
+/// Half axes are cut to this length (texels), so that their squares are finite.
+inline constexpr float kLongestAxis = 1e15f;
+
+/// A vector of texels with finite components, at most kLongestAxis each; components that are NaN become 0.
+inline GLINT_HD Vec2 finiteAxis(Vec2 a) {
+  const auto finite = [](float x) { return x == x ? std::clamp(x, -kLongestAxis, kLongestAxis) : 0.0f; };
+  return {finite(a.x), finite(a.y)};
+}
+
+/// The Gaussian footprint of a pixel from a renderer's ray differentials.
+///
+/// Its covariance is filter_sigma^2 (a a^T + b b^T), where a and b are the texels that neighbouring pixels along x and y are apart:
+/// the image of a round pixel filter in texture space. What is not a number counts as 0, infinite lengths as kLongestAxis, and a
+/// footprint without extent is answered as the narrowest: every input gives a footprint that every model answers.
+/// @param uv             centre; the texture is periodic
+/// @param duvdx, duvdy   change of uv from one pixel to the next
+/// @param width, height  of the map, texels
+/// @param filter_sigma   deviation of the pixel filter, pixels
+inline GLINT_HD Footprint footprintFromDifferentials(Vec2 uv, Vec2 duvdx, Vec2 duvdy, int width, int height,
+                                                     float filter_sigma = kPixelFilterSigma) {
+  const float to_x = filter_sigma * static_cast<float>(width), to_y = filter_sigma * static_cast<float>(height);
+  const Vec2 a = finiteAxis({to_x * duvdx.x, to_y * duvdx.y}), b = finiteAxis({to_x * duvdy.x, to_y * duvdy.y});
+  return Footprint::gaussian(uv, {a.x * a.x + b.x * b.x, a.x * a.y + b.x * b.y, a.y * a.y + b.y * b.y});
+}
+
+/// Change of uv for a step on the surface, by least squares: what a renderer needs that has dp/du and dp/dv only.
+/// @param dpdu, dpdv  derivatives of the position, any units
+/// @param step        on the tangent plane, e.g. dp/dx of a ray differential, same units
+/// @return 0 where dpdu and dpdv are parallel, 0 or not finite
+inline GLINT_HD Vec2 uvDifferential(Vec3 dpdu, Vec3 dpdv, Vec3 step) {
+  const float uu = dot(dpdu, dpdu), uv = dot(dpdu, dpdv), vv = dot(dpdv, dpdv);
+  const float determinant = uu * vv - uv * uv;
+  constexpr float kParallel = 1e-6f;  // sine^2 of the angle between them that floats still tell from 0
+  if (!(determinant > kParallel * uu * vv)) return {};
+  const float su = dot(dpdu, step), sv = dot(dpdv, step);
+  const Vec2 d = {(vv * su - uv * sv) / determinant, (uu * sv - uv * su) / determinant};
+  return std::isfinite(d.x) && std::isfinite(d.y) ? d : Vec2{};
+}
+
+/// A path's beam as it widens: what indirect bounces need, where there are no ray differentials (Deng 2022, section 5.3).
+/// Deviations of a Gaussian beam; the filter of a pixel gives the first.
+struct RayCone {
+  float width = 0;   ///< at the last hit, across the ray, scene units
+  float spread = 0;  ///< of directions, radians
+};
+
+/// The beam after a distance: both causes add as variances.
+inline GLINT_HD RayCone propagated(RayCone cone, float distance) {
+  const float widening = cone.spread * distance;
+  return {std::sqrt(cone.width * cone.width + widening * widening), cone.spread};
+}
+
+/// The beam after it was reflected by facets whose slopes deviate by `slope_sigma` per axis: directions deviate by twice the angle.
+/// With alpha of a GGX or Beckmann lobe slope_sigma is alpha / sqrt(2); with a map's slopes and sigma_r, sqrt(mean variance + sigma_r^2).
+/// The spread is at most that of the whole hemisphere.
+inline GLINT_HD RayCone bounced(RayCone cone, float slope_sigma) {
+  constexpr float kHemisphere = 0.75f;  // radians: RMS angle per axis of a hemisphere seen evenly by projected area
+  const float turned = 2 * std::atan(slope_sigma);
+  return {cone.width, std::min(std::sqrt(cone.spread * cone.spread + turned * turned), kHemisphere)};
+}
+
+/// The footprint of a beam on a surface.
+/// @param uv              centre
+/// @param direction       unit vector of the tangent frame towards the ray's origin: the footprint is stretched along it by 1 / z
+/// @param texels_per_unit texels in one scene unit, > 0
+/// @note sizes that are NaN count as 0, infinite ones as kLongestAxis; grazing rays stretch at most kMostStretch times
+inline GLINT_HD Footprint footprintOfCone(RayCone cone, Vec2 uv, Vec3 direction, float texels_per_unit) {
+  constexpr float kMostStretch = 64;
+  const float size = finiteAxis({cone.width * texels_per_unit, 0}).x;
+  const float across = size * size, length2 = direction.x * direction.x + direction.y * direction.y;
+  if (!(length2 > 0)) return Footprint::gaussian(uv, {across, 0, across});
+  const float cosine = direction.z > 1 / kMostStretch ? std::min(direction.z, 1.0f) : 1 / kMostStretch;
+  const float more = across * (1 / (cosine * cosine) - 1) / length2;
+  return Footprint::gaussian(uv, {across + more * direction.x * direction.x, more * direction.x * direction.y,
+                                  across + more * direction.y * direction.y});
+}
+
+}  // namespace glint

@@ -1,0 +1,218 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "glint/bake/compress.h"
+#include "glint/bake/pyramid.h"
+#include "glint/bake/reference_image.h"
+#include "glint/query/anisotropic_ndf.h"
+#include "glint/query/cp_ndf.h"
+#include "glint/query/pyramid_ndf.h"
+#include "support/directions.h"
+#include "support/test_maps.h"
+
+namespace glint {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr int kSize = 256, kResolution = 64;
+
+class Random {
+ public:
+  explicit Random(unsigned seed) : random_(seed) {}
+  float unit() { return std::uniform_real_distribution<float>(0, 1)(random_); }
+  Vec2 pair() { return {unit(), unit()}; }
+  /// A Gaussian of the given deviations, turned at random.
+  Footprint stretched(float longest, float shortest) {
+    const float angle = 3.14159265f * unit(), c = std::cos(angle), s = std::sin(angle);
+    const float a = longest * longest, b = shortest * shortest;
+    return Footprint::gaussian(pair(), {c * c * a + s * s * b, c * s * (a - b), s * s * a + c * c * b});
+  }
+
+ private:
+  std::mt19937 random_;
+};
+
+TEST(IsotropicParts, HaveTheMomentsOfTheFootprint) {
+  constexpr float kRounding = 2e-4f;  // of the largest moment: offsets in uv, times the map
+  Random random(1);
+  for (const float aspect : {1.05f, 1.5f, 2.0f, 4.0f, 7.0f, 16.0f}) {
+    for (int k = 0; k < 50; ++k) {
+      const float shortest = 1 + 4 * random.unit();
+      const Footprint p = random.stretched(aspect * shortest, shortest);
+      const IsotropicParts parts = isotropicParts(p, kSize, 200);
+      ASSERT_GE(parts.count, 1);
+      ASSERT_LE(parts.count, IsotropicParts::kMost);
+      double weight = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+      for (int i = 0; i < parts.count; ++i) {
+        const Footprint& part = parts.footprints[i];
+        EXPECT_GT(parts.weights[i], 0);
+        EXPECT_EQ(part.covariance.xx, part.covariance.yy);
+        EXPECT_EQ(part.covariance.xy, 0);
+        const double w = parts.weights[i], dx = (double{part.centre.x} - p.centre.x) * kSize,
+                     dy = (double{part.centre.y} - p.centre.y) * 200;
+        weight += w, x += w * dx, y += w * dy;
+        xx += w * (dx * dx + part.covariance.xx), xy += w * dx * dy, yy += w * (dy * dy + part.covariance.yy);
+      }
+      const double scale = kRounding * (p.covariance.xx + p.covariance.yy);
+      EXPECT_NEAR(weight, 1, 1e-5);
+      EXPECT_NEAR(x, 0, 1e-3);
+      EXPECT_NEAR(y, 0, 1e-3);
+      if (parts.count == 1) continue;  // round: aspect 1.05 by design
+      EXPECT_NEAR(xx, p.covariance.xx, scale) << aspect;
+      EXPECT_NEAR(xy, p.covariance.xy, scale) << aspect;
+      EXPECT_NEAR(yy, p.covariance.yy, scale) << aspect;
+    }
+  }
+}
+
+TEST(IsotropicParts, AreOneForRoundFootprintsAndNeverNarrowerThanAsked) {
+  const auto count = [](const Footprint& p, float narrowest = 0) { return isotropicParts(p, kSize, kSize, narrowest).count; };
+  Random random(2);
+  EXPECT_EQ(count(Footprint::isotropic({0.5f, 0.5f}, 5)), 1);
+  EXPECT_EQ(count(Footprint::box({0.5f, 0.5f}, {3, 3}, {-3, 3})), 1);
+  EXPECT_EQ(count(random.stretched(6, 2)), 7);
+  EXPECT_EQ(count(random.stretched(6, 2), 6), 1);
+  EXPECT_EQ(isotropicParts(random.stretched(6, 2), kSize, kSize, 4).footprints[0].covariance.xx, 16);
+  EXPECT_EQ(isotropicParts(random.stretched(6, 2), kSize, kSize, 7).footprints[0].covariance.xx, 49);
+}
+
+/// A model whose NDF is one lobe that leans as far as the footprint is to the right: what a mixture draws from is known.
+struct LeaningLobe {
+  static constexpr float kSigma = 0.05f;
+  static Vec2 lean(const Footprint& p) { return {p.centre.x - 0.5f, 0.2f}; }
+  float density(const Footprint& p, Vec2 h) const { return gaussianDensity(h - lean(p), kSigma); }
+  float mean(const Footprint& p, const Box2& range) const { return lobeMass(range, lean(p), kSigma) / range.area(); }
+  HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+    const float r = kSigma * std::sqrt(-2 * std::log1p(-xi.x)), angle = 2 * kPi * xi.y;
+    const Vec2 h = lean(p) + Vec2{r * std::cos(angle), r * std::sin(angle)};
+    return {h, density(p, h)};
+  }
+};
+
+TEST(AnisotropicNdf, SamplesFollowTheDensity) {
+  constexpr int kCells = 24, kSamples = 100000;
+  constexpr double kSignificance = 1e-4;
+  const LeaningLobe lobe;
+  const AnisotropicNdf ndf(lobe, kSize, kSize);
+  const Footprint p = Footprint::gaussian({0.5f, 0.5f}, {900, 0, 36});
+  ASSERT_GT(ndf.parts(p).count, 8);
+  std::vector<double> counts(kCells * kCells + 1), expected(kCells * kCells + 1);
+  Random random(3);
+  for (int k = 0; k < kSamples; ++k) {
+    const HalfVectorSample s = ndf.sample(p, random.pair());
+    EXPECT_NEAR(s.pdf, ndf.density(p, s.h), 1e-4f * s.pdf);
+    const int x = static_cast<int>((s.h.x + 0.5f) * kCells), y = static_cast<int>((s.h.y + 0.3f) * kCells);
+    const bool inside = x >= 0 && x < kCells && y >= 0 && y < kCells;
+    ++counts[static_cast<std::size_t>(inside ? y * kCells + x : kCells * kCells)];
+  }
+  double rest = kSamples;
+  for (int y = 0; y < kCells; ++y) {
+    for (int x = 0; x < kCells; ++x) {
+      const float size = 1.0f / kCells, left = -0.5f + size * static_cast<float>(x), low = -0.3f + size * static_cast<float>(y);
+      double& cell = expected[static_cast<std::size_t>(y * kCells + x)];
+      cell = double{ndf.mean(p, {{left, low}, {left + size, low + size}})} * size * size * kSamples;
+      rest -= cell;
+    }
+  }
+  expected.back() = std::max(0.0, rest);
+  const double fit = test::goodnessOfFit(counts, expected);
+  RecordProperty("p", std::to_string(fit));
+  EXPECT_GT(fit, kSignificance);
+}
+
+struct Baked {
+  Baked(bake::SynthKind kind, float stride) : map(kSize, kSize, test::synthesised(kind, kSize, kSize, 0.2f)) {
+    bake::PyramidOptions options;
+    options.stride = stride;
+    options.resolution = kResolution;
+    options.sigma_r = 0.04f;
+    options.levels = 4;
+    pyramid = bake::buildPyramid(map.map(), options);
+  }
+  test::OwnedMap map;
+  bake::NdfPyramidData pyramid;
+};
+
+TEST(AnisotropicNdf, MeanOverPixelsIsTheMeanOfPointQueries) {
+  const Baked baked(bake::SynthKind::isotropic, 8);
+  const PyramidNdf round(baked.pyramid.view());
+  const AnisotropicNdf ndf(round);
+  const Footprint p = Random(4).stretched(30, 6);
+  const float pixel = 2.0f / kResolution;
+  double sum = 0;
+  for (int y = 0; y < 6; ++y)
+    for (int x = 0; x < 9; ++x)
+      sum += ndf.density(p, {-0.125f + (static_cast<float>(x) + 0.5f) * pixel, (static_cast<float>(y) + 0.5f) * pixel});
+  EXPECT_NEAR(ndf.mean(p, {{-0.125f, 0}, {-0.125f + 9 * pixel, 6 * pixel}}), sum / 54, 1e-4 * sum / 54);
+  EXPECT_NEAR(ndf.mean(p, {{-1, -1}, {1, 1}}), 0.25, 1e-3);
+}
+
+TEST(AnisotropicNdf, IsClearlyCloserToTheTexelsThanARoundFootprint) {
+  // Mean relative errors over three footprints of short deviation 4 to 8 texels at each aspect, beside those of the round footprint of
+  // the same mean square size. Recorded as properties: the chart of issue 3. What is left is the pyramid's own error.
+  for (const auto& [kind, name] : {std::pair{bake::SynthKind::isotropic, "isotropic"},
+                                   {bake::SynthKind::flakes, "flakes"},
+                                   {bake::SynthKind::brushed, "brushed"}}) {
+    const Baked baked(kind, 8);
+    const PyramidNdf round(baked.pyramid.view(), baked.map.map());
+    const AnisotropicNdf stretched(round);
+    for (const int aspect : {1, 2, 4, 8, 16}) {
+      Random random(5);
+      double round_error = 0, error = 0;
+      for (int k = 0; k < 3; ++k) {
+        const float shortest = 4 + 4 * random.unit();
+        const Footprint p = random.stretched(static_cast<float>(aspect) * shortest, shortest);
+        const auto exact = bake::referenceImage(baked.map.map(), 0.04f, Surface::flat, Boundary::wrap, p, kResolution);
+        round_error += test::relL2(test::imageOf(round, p, kResolution), exact) / 3;
+        error += test::relL2(test::imageOf(stretched, p, kResolution), exact) / 3;
+      }
+      RecordProperty(std::string(name) + "_aspect_" + std::to_string(aspect),
+                     std::to_string(error) + " instead of " + std::to_string(round_error));
+      if (aspect == 1) {
+        EXPECT_NEAR(error, round_error, 1e-4);
+      } else {
+        EXPECT_LT(error, 0.75 * round_error) << name << ' ' << aspect;
+      }
+    }
+  }
+}
+
+TEST(AnisotropicNdf, AnswersCompressedModelsAlike) {
+  const Baked baked(bake::SynthKind::flakes, 8);
+  bake::CompressionOptions options;
+  options.tolerance = 0.05;
+  const bake::CompressedNdfData data = bake::compressPyramid(baked.pyramid.view(), options);
+  const CpNdf round(data.view(), baked.map.map());
+  const AnisotropicNdf ndf(round);
+  const Footprint p = Random(6).stretched(40, 5);
+  const auto exact = bake::referenceImage(baked.map.map(), 0.04f, Surface::flat, Boundary::wrap, p, kResolution);
+  EXPECT_LT(test::relL2(test::imageOf(ndf, p, kResolution), exact),
+            0.6 * test::relL2(test::imageOf(round, p, kResolution), exact));
+}
+
+TEST(AnisotropicNdf, DegenerateFootprintsHaveFiniteAnswers) {
+  const Baked baked(bake::SynthKind::isotropic, 8);
+  const PyramidNdf round(baked.pyramid.view());
+  const AnisotropicNdf ndf(round);
+  const Vec2 uv = {0.3f, 0.7f};
+  for (const Footprint& p :
+       {Footprint::isotropic(uv, 0), Footprint::isotropic(uv, kNan), Footprint::gaussian(uv, {kInfinity, 0, 1}),
+        Footprint::gaussian(uv, {1e30f, 0, 0}), Footprint::gaussian(uv, {1e30f, 1e30f, 1e30f}),
+        Footprint::gaussian(uv, {4, 100, 4}), Footprint::gaussian(uv, {-1, 0, 5}), Footprint::box(uv, {1e18f, 0}, {0, 1e-18f}),
+        Footprint::gaussian({kNan, 1e30f}, {100, 0, 1}), Footprint::gaussian({-1e7f, 12345.5f}, {100, 50, 90})}) {
+    const IsotropicParts parts = ndf.parts(p);
+    EXPECT_TRUE(parts.count >= 1 && parts.count <= IsotropicParts::kMost);
+    const float density = ndf.density(p, {0.05f, 0});
+    EXPECT_TRUE(std::isfinite(density) && density >= 0);
+    EXPECT_NEAR(ndf.mean(p, {{-1, -1}, {1, 1}}), 0.25f, 1e-3f);
+  }
+  EXPECT_EQ(ndf.density(Footprint::gaussian(uv, {100, 0, 4}), {kNan, 0}), 0);
+  EXPECT_EQ(ndf.density(Footprint::gaussian(uv, {100, 0, 4}), {1.5f, 0}), 0);
+}
+
+}  // namespace
+}  // namespace glint
