@@ -5,54 +5,58 @@
 namespace glint::bake {
 namespace {
 
-/// to[slots[k]] += weight * from[k] for tiles of 64 values.
-GLINT_MULTIVERSION void addTiles(const std::int32_t* slots, std::size_t count, const float* from, std::size_t step,
-                                 float weight, float* to) {
-  for (std::size_t k = 0; k < count; ++k, from += step) {
-    float* tile = to + static_cast<std::size_t>(slots[k]) * BlockBins::kTileBins;
-    for (int i = 0; i < BlockBins::kTileBins; ++i) tile[i] += weight * from[i];
+constexpr int kBins = BlockBins::kTileBins;
+
+/// to[c] += weight.mean * from[2c] + weight.slope * from[2c + 1] for channels c of 64 values.
+GLINT_MULTIVERSION void addTiles(const BlockBins& from, LinearWeight weight, int channels, BlockBins& to) {
+  for (std::size_t t = 0; t < from.tiles().size(); ++t) {
+    const float* in = from.values(t);
+    float* out = to.take(from.tiles()[t]);
+    for (int c = 0; c < channels; ++c, in += 2 * kBins, out += kBins)
+      for (int k = 0; k < kBins; ++k) out[k] += weight.mean * in[k] + weight.slope * in[kBins + k];
+  }
+}
+
+/// The quarter's x is x / 2 + cx in the cell, and so is y.
+GLINT_MULTIVERSION void addQuarterTiles(const BlockBins& from, float cx, float cy, BlockBins& to) {
+  const float half_cx = 0.5f * cx, half_cy = 0.5f * cy, both = cx * cy;
+  for (std::size_t t = 0; t < from.tiles().size(); ++t) {
+    const float* in = from.values(t);
+    float* out = to.take(from.tiles()[t]);
+    for (int k = 0; k < kBins; ++k) {
+      const float one = in[k], x = in[kBins + k], y = in[2 * kBins + k], xy = in[3 * kBins + k];
+      out[k] += one;
+      out[kBins + k] += 0.5f * x + cx * one;
+      out[2 * kBins + k] += 0.5f * y + cy * one;
+      out[3 * kBins + k] += 0.25f * xy + half_cy * x + half_cx * y + both * one;
+    }
   }
 }
 
 }  // namespace
 
-void BlockBins::add(const std::vector<std::int32_t>& tiles, const float* values, std::size_t step, float weight) {
-  scratch_.resize(tiles.size());
-  for (std::size_t k = 0; k < tiles.size(); ++k) {
-    std::int32_t& slot = slots_[tiles[k]];
-    if (slot < 0) {
-      slot = static_cast<std::int32_t>(tiles_.size());
-      tiles_.push_back(tiles[k]);
-    }
-    scratch_[k] = slot;
+double BlockBins::sum() const {
+  double sum = 0;
+  for (std::size_t k = 0; k < values_.size(); k += kTileBins) {
+    float tile = 0;
+    for (int i = 0; i < kTileBins; ++i) tile += values_[k + i];
+    sum += tile;
   }
-  values_.resize(tiles_.size() * kTileBins, 0.0f);
-  addTiles(scratch_.data(), tiles.size(), values, step, weight, values_.data());
-}
-
-void CornerBins::addTo(BlockBins& bins, int corner) const {
-  bins.add(tiles, values.data() + corner * BlockBins::kTileBins, 4 * BlockBins::kTileBins, 1);
-  bins.addMass(mass[corner]);
+  return sum;
 }
 
 void BlockBins::clear() {
   for (const std::int32_t tile : tiles_) slots_[tile] = -1;
   tiles_.clear();
   values_.clear();
-  mass_ = 0;
 }
 
-void PackedBins::addTo(BlockBins& bins, float weight) const {
-  bins.add(tiles, values.data(), BlockBins::kTileBins, weight);
-  bins.addMass(weight * mass);
-}
+void addAlongX(const BlockBins& moments, LinearWeight weight, BlockBins& sums) { addTiles(moments, weight, 2, sums); }
 
-PackedBins pack(const BlockBins& bins) {
-  PackedBins packed;
-  packed.tiles = bins.tiles();
-  packed.values.assign(bins.values(0), bins.values(bins.tiles().size()));
-  packed.mass = bins.mass();
-  return packed;
+void addAlongY(const BlockBins& sums, LinearWeight weight, BlockBins& bins) { addTiles(sums, weight, 1, bins); }
+
+void addQuarter(const BlockBins& quarter, bool right, bool upper, BlockBins& cell) {
+  addQuarterTiles(quarter, right ? 0.25f : -0.25f, upper ? 0.25f : -0.25f, cell);
 }
 
 }  // namespace glint::bake

@@ -5,54 +5,59 @@
 
 namespace glint::bake {
 
-/// Bins of directions in square tiles of kTile x kTile, of which only those in use are stored: the histogram of a patch of a
-/// surface. Tiles are numbered over a grid with one tile of margin around the square of directions.
+/// Bins of directions in square tiles of kTile x kTile, of which only those in use are stored: histograms of a patch of a
+/// surface, one or several over the same tiles.
 class BlockBins {
  public:
   static constexpr int kTile = 8;
   static constexpr int kTileBins = kTile * kTile;
 
-  /// @param tiles_per_axis  of the square, without the margin
-  explicit BlockBins(int tiles_per_axis = 0)
-      : slots_(static_cast<std::size_t>(tiles_per_axis + 2) * (tiles_per_axis + 2), -1) {}
+  /// @param tiles     that there are
+  /// @param channels  histograms
+  explicit BlockBins(std::size_t tiles = 0, int channels = 1)
+      : tile_floats_(static_cast<std::size_t>(channels) * kTileBins), slots_(tiles, -1) {}
 
   /// Tiles in use, in the order of their first use.
   const std::vector<std::int32_t>& tiles() const { return tiles_; }
-  const float* values(std::size_t k) const { return values_.data() + k * kTileBins; }
-  /// Weight of the surface that was added, per unit of mass.
-  double mass() const { return mass_; }
-
-  /// Adds weight * (64 values) to each of some tiles. Values of neighbouring tiles are `step` floats apart.
-  void add(const std::vector<std::int32_t>& tiles, const float* values, std::size_t step, float weight);
-  void addMass(double mass) { mass_ += mass; }
+  /// [channels][64] of the k-th tile in use.
+  const float* values(std::size_t k) const { return values_.data() + k * tile_floats_; }
+  /// The same of any tile, taken into use with zeros; valid until the next tile is.
+  float* take(std::int32_t tile) {
+    std::int32_t& slot = slots_[tile];
+    if (slot < 0) {
+      slot = static_cast<std::int32_t>(tiles_.size());
+      tiles_.push_back(tile);
+      values_.resize(values_.size() + tile_floats_);
+    }
+    return values_.data() + static_cast<std::size_t>(slot) * tile_floats_;
+  }
+  /// Sum of all values.
+  double sum() const;
+  /// Forgets all tiles and keeps the memory.
   void clear();
 
  private:
-  std::vector<std::int32_t> slots_;  // of each tile of the grid: its place in tiles_, or -1
+  std::size_t tile_floats_;
+  std::vector<std::int32_t> slots_;  // of each tile: its place in tiles_, or -1
   std::vector<std::int32_t> tiles_;
   std::vector<float> values_;
-  std::vector<std::int32_t> scratch_;
-  double mass_ = 0;
 };
 
-/// Four histograms over the same tiles, one for each corner of a lattice cell.
-struct CornerBins {
-  std::vector<std::int32_t> tiles;
-  std::vector<float> values;  ///< [tiles][4][64]
-  double mass[4] = {};
+/// Histograms of a surface patch, each weighted by one of the moments 1, x, y, xy of the position in a lattice cell: from them
+/// follows the histogram under any weight that is bilinear over the cell. Cells cover [-1/2, 1/2]^2.
+inline constexpr int kMoments = 4;
 
-  void addTo(BlockBins& bins, int corner) const;
+/// A weight that is linear over a cell: mean + slope * x.
+struct LinearWeight {
+  float mean, slope;
 };
 
-/// The same as BlockBins, frozen: compact and without the lookup table.
-struct PackedBins {
-  std::vector<std::int32_t> tiles;
-  std::vector<float> values;  ///< [tiles][64]
-  double mass = 0;
-
-  void addTo(BlockBins& bins, float weight) const;
-};
-
-PackedBins pack(const BlockBins& bins);
+/// Integrates x out: adds the moments 1 and y under a weight along x to two channels.
+void addAlongX(const BlockBins& moments, LinearWeight weight, BlockBins& sums);
+/// Integrates y out: adds two channels, the moments 1 and y, under a weight along y to one.
+void addAlongY(const BlockBins& sums, LinearWeight weight, BlockBins& bins);
+/// Adds the moments of a quarter to those of the cell of twice the size.
+/// @param right, upper  which quarter
+void addQuarter(const BlockBins& quarter, bool right, bool upper, BlockBins& cell);
 
 }  // namespace glint::bake

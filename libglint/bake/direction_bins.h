@@ -10,8 +10,8 @@ namespace glint::bake {
 
 /// A grid of bins over the square [-1, 1]^2 of directions, finer than the pixels of an NDF image by an integer factor.
 ///
-/// A facet is added with quadratic B-spline weights, 3x3 bins: these keep its mass and mean, and spread it by exactly a quarter of
-/// a squared bin wherever it lies, which the filter that makes pixels takes off again (`PixelFilter`). Bins are kept all zero
+/// A facet is added with quadratic B-spline weights, 3x3 bins: these keep its mass and mean, and spread it alike wherever it lies,
+/// which the filter that makes pixels allows for (`PixelFilter`). Bins are kept all zero
 /// between images; only those of touched tiles are ever cleared.
 class DirectionBins {
  public:
@@ -53,18 +53,24 @@ class DirectionBins {
 /// Filters are cut at this many deviations, 6e-5 of the mass on either axis, and normalised.
 inline constexpr double kFilterReach = 4;
 
-/// Blurs bins by the intrinsic roughness and averages over pixels, a separable filter.
+/// How facets are added to bins: with the weights of 3 or 4 bins along either axis.
+enum class Spline : std::uint8_t { quadratic, cubic };
+
+/// Blurs bins by the intrinsic roughness and averages over pixels, a separable filter: the one that comes closest to the blur of
+/// the facets themselves, given that they were added with the weights of a B-spline.
 class PixelFilter {
  public:
   /// @param sigma_pixels  deviation of a facet's lobe, pixels
-  /// @param spread        variance that binning added, in squared bins (1/4 for quadratic splats)
-  PixelFilter(float sigma_pixels, int subdivision, float spread);
+  PixelFilter(float sigma_pixels, int subdivision, Spline spline);
 
+  int subdivision() const { return subdivision_; }
   /// Bins on either side of a pixel that count.
   int radius() const { return radius_; }
+  /// Bins around the square that filters may read.
+  int margin() const;
 
-  /// One 16x16 block of pixels: mass per pixel, from the bins whose pixel (0, 0) of the block starts at `bins`.
-  void filterBlock(const float* bins, int pitch, float* pixels) const;
+  /// Adds one 16x16 block of pixels: mass per pixel (beside narrow lobes a little may be negative), from the bins whose pixel (0, 0) of the block starts at `bins`.
+  void addBlock(const float* bins, int pitch, float* pixels) const;
 
  private:
   int subdivision_, radius_;

@@ -3,9 +3,15 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
+#ifdef __x86_64__
+#include <immintrin.h>
+#endif
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <mutex>
+#include <span>
 #include <string>
 
 #include "glint/bake/direction_bins.h"
@@ -53,37 +59,78 @@ GLINT_MULTIVERSION float sumBlock(const float* pixels) {
   return sum;
 }
 
-GLINT_MULTIVERSION void toHalf(const float* from, float scale, std::uint16_t* to, float* rounded) {
+void toHalfPortably(const float* from, float scale, std::uint16_t* to, float* rounded) {
   for (int k = 0; k < kBlockPixels; ++k) {
     to[k] = floatToHalf(scale * from[k]);
     rounded[k] = halfToFloat(to[k]);
   }
 }
 
+#ifdef __x86_64__
+/// The same bits by the processor's own conversion, ten times faster.
+__attribute__((target("avx,f16c"))) void toHalfByInstruction(const float* from, float scale, std::uint16_t* to,
+                                                             float* rounded) {
+  const __m256 scales = _mm256_set1_ps(scale), largest = _mm256_set1_ps(65504);
+  for (int k = 0; k < kBlockPixels; k += 8) {
+    const __m256 values = _mm256_min_ps(_mm256_mul_ps(scales, _mm256_loadu_ps(from + k)), largest);
+    const __m128i halves = _mm256_cvtps_ph(values, _MM_FROUND_TO_NEAREST_INT);
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(to + k), halves);
+    _mm256_storeu_ps(rounded + k, _mm256_cvtph_ps(halves));
+  }
+}
+#endif
+
+/// Half-precision numbers of scale * from, not negative, and what they stand for.
+void toHalf(const float* from, float scale, std::uint16_t* to, float* rounded) {
+#ifdef __x86_64__
+  static const bool has_instruction = __builtin_cpu_supports("avx") && __builtin_cpu_supports("f16c");
+  if (has_instruction) return toHalfByInstruction(from, scale, to, rounded);
+#endif
+  toHalfPortably(from, scale, to, rounded);
+}
+
+struct Layer {
+  DirectionBins* bins;
+  const PixelFilter* filter;
+};
+
 /// Filters bins into pixels and keeps the blocks that hold something.
 class ImagePacker {
  public:
-  ImagePacker(const PyramidShape& shape, BlockPrecision precision, float value_scale, const PixelFilter& filter,
-              int subdivision)
-      : shape_(shape), precision_(precision), filter_(filter), subdivision_(subdivision) {
+  ImagePacker(const PyramidShape& shape, BlockPrecision precision, float value_scale) : shape_(shape), precision_(precision) {
     const float pixels_per_unit = 0.5f * static_cast<float>(shape.resolution);
     to_stored_ = pixels_per_unit * pixels_per_unit / value_scale;
     value_scale_ = value_scale;
   }
 
-  PackedImage pack(DirectionBins& bins, float inverse_mass) const {
+  /// @param layers  bins whose pixels are added
+  PackedImage pack(std::span<const Layer> layers, float inverse_mass) const {
     PackedImage image;
     image.mask.assign(shape_.maskWords(), 0);
-    const int blocks = shape_.blocksPerAxis(), size = kBlockSize * subdivision_;
+    const int blocks = shape_.blocksPerAxis();
+    std::vector<std::array<float, kBlockPixels>> stored;
+    float excess = 0;  // mass that clearing negative pixels adds
     for (int b = 0; b < blocks * blocks; ++b) {
-      if (!bins.touchedNear(b % blocks, b / blocks, filter_.radius() + 1)) continue;
-      float pixels[kBlockPixels];
-      filter_.filterBlock(bins.origin() + static_cast<std::ptrdiff_t>(b / blocks) * size * bins.pitch() + b % blocks * size,
-                          bins.pitch(), pixels);
-      if (sumBlock(pixels) * inverse_mass <= kBlockMassThreshold) continue;
+      std::array<float, kBlockPixels> pixels = {};
+      bool empty = true;
+      for (const auto& [bins, filter] : layers) {
+        if (!bins->touchedNear(b % blocks, b / blocks, filter->radius() + 1)) continue;
+        const int size = kBlockSize * bins->subdivision();
+        filter->addBlock(bins->origin() + static_cast<std::ptrdiff_t>(b / blocks) * size * bins->pitch() + b % blocks * size,
+                         bins->pitch(), pixels.data());
+        empty = false;
+      }
+      if (empty) continue;
+      const float mass = sumBlock(pixels.data());
+      for (float& pixel : pixels) pixel = std::max(pixel, 0.0f);
+      const float kept = sumBlock(pixels.data());
+      excess += kept - mass;
+      if (kept * inverse_mass <= kBlockMassThreshold) continue;
       image.mask[b / 64] |= std::uint64_t{1} << (b % 64);
-      store(pixels, inverse_mass, image);
+      stored.push_back(pixels);
     }
+    const float scale = inverse_mass / (1 + excess * inverse_mass);
+    for (const auto& pixels : stored) store(pixels.data(), scale, image);
     return image;
   }
 
@@ -102,8 +149,6 @@ class ImagePacker {
 
   const PyramidShape& shape_;
   BlockPrecision precision_;
-  const PixelFilter& filter_;
-  int subdivision_;
   float to_stored_;
   float value_scale_;
 };
@@ -146,15 +191,15 @@ class ImageCounter {
 };
 
 struct Scratch {
-  Scratch(int resolution, int subdivision, int margin)
-      : bins(resolution, subdivision, margin), band(resolution, subdivision, margin) {}
+  Scratch(int resolution, const PixelFilter& filter)
+      : bins(resolution, filter.subdivision(), filter.margin()), band(resolution, filter.subdivision(), filter.margin()) {}
   DirectionBins bins, band;
 };
 
 std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const PyramidShape& shape, const ImagePacker& packer,
-                                                int subdivision, int margin, const ProgressFn& progress) {
+                                                const PixelFilter& filter, const ProgressFn& progress) {
   ImageCounter counter(shape, progress);
-  tbb::enumerable_thread_specific<Scratch> scratch([&] { return Scratch(shape.resolution, subdivision, margin); });
+  tbb::enumerable_thread_specific<Scratch> scratch([&] { return Scratch(shape.resolution, filter); });
   std::vector<std::vector<PackedImage>> images(shape.level_count);
   for (int l = 0; l < shape.level_count; ++l) {
     const PyramidGrid& grid = shape.levels[l];
@@ -164,7 +209,8 @@ std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const Pyra
       const Vec2 centre = {(static_cast<float>(k % grid.columns) + 0.5f) * grid.stride,
                            (static_cast<float>(k / grid.columns) + 0.5f) * grid.stride};
       scatterFlatFootprint(map, shape.boundary, centre, kFootprintPerStride * grid.stride, s.bins, s.band);
-      images[l][k] = packer.pack(s.bins, 1);
+      const Layer layer = {&s.bins, &filter};
+      images[l][k] = packer.pack({&layer, 1}, 1);
       s.bins.clear();
       counter.count();
     });
@@ -173,33 +219,47 @@ std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const Pyra
 }
 
 /// Copies sparse bins to the raster that the filter reads.
-void unpackBins(const BlockBins& sparse, DirectionBins& bins) {
+void unpackBins(const BlockBins& sparse, const DirectionTiles::Grid& grid, DirectionBins& bins) {
   constexpr int kTile = BlockBins::kTile;
-  const int tiles = bins.resolution() * bins.subdivision() / kTile + 2;  // with the margin
+  const auto touchedTile = [&](int bin) { return std::clamp(bin / bins.tileSize(), 0, bins.tilesPerAxis() - 1); };
   for (std::size_t k = 0; k < sparse.tiles().size(); ++k) {
-    const int tx = sparse.tiles()[k] % tiles - 1, ty = sparse.tiles()[k] / tiles - 1;
-    float* corner = bins.origin() + static_cast<std::ptrdiff_t>(ty) * kTile * bins.pitch() + tx * kTile;
+    const int tile = sparse.tiles()[k] - grid.first;
+    if (tile < 0 || tile >= grid.end() - grid.first) continue;
+    const int left = (tile % grid.tilesPerAxis() - 1) * kTile, bottom = (tile / grid.tilesPerAxis() - 1) * kTile;
+    float* corner = bins.origin() + static_cast<std::ptrdiff_t>(bottom) * bins.pitch() + left;
     for (int y = 0; y < kTile; ++y)
       std::copy_n(sparse.values(k) + y * kTile, kTile, corner + static_cast<std::ptrdiff_t>(y) * bins.pitch());
-    const auto touchedTile = [&](int tile) { return std::clamp(tile * kTile / bins.tileSize(), 0, bins.tilesPerAxis() - 1); };
-    for (const int x : {touchedTile(tx), touchedTile(tx + 1)})  // tiles here may be larger than those flags
-      for (const int y : {touchedTile(ty), touchedTile(ty + 1)}) bins.touched()[y * bins.tilesPerAxis() + x] = 1;
+    for (int y = touchedTile(bottom); y <= touchedTile(bottom + kTile - 1); ++y)
+      for (int x = touchedTile(left); x <= touchedTile(left + kTile - 1); ++x) bins.touched()[y * bins.tilesPerAxis() + x] = 1;
   }
 }
 
 std::vector<std::vector<PackedImage>> buildSmooth(const NormalMap& map, const PyramidShape& shape, const ImagePacker& packer,
-                                                  int subdivision, int margin, const ProgressFn& progress) {
-  tbb::enumerable_thread_specific<DirectionBins> scratch([&] { return DirectionBins(shape.resolution, subdivision, margin); });
+                                                  int subdivision, const ProgressFn& progress) {
+  const float sigma_pixels = 0.5f * shape.sigma_r * static_cast<float>(shape.resolution);
+  const PixelFilter fine_filter(sigma_pixels, subdivision, Spline::cubic);
+  const PixelFilter coarse_filter(sigma_pixels, subdivision / 2, Spline::cubic);
+  const DirectionTiles tiles(shape.resolution * subdivision);
+  struct Rasters {
+    DirectionBins fine, coarse;
+  };
+  tbb::enumerable_thread_specific<Rasters> scratch([&] {
+    return Rasters{DirectionBins(shape.resolution, subdivision, fine_filter.margin()),
+                   DirectionBins(shape.resolution, subdivision / 2, coarse_filter.margin())};
+  });
   std::vector<std::vector<PackedImage>> images(shape.level_count);
   for (int l = 0; l < shape.level_count; ++l) images[l].resize(shape.levels[l].imageCount());
   scatterSmooth(
-      map, shape, subdivision,
+      map, shape, tiles,
       [&](int level, int i, int j, const BlockBins& sparse) {
-        DirectionBins& bins = scratch.local();
-        unpackBins(sparse, bins);
+        auto& [fine, coarse] = scratch.local();
+        unpackBins(sparse, tiles.fine, fine);
+        unpackBins(sparse, tiles.coarse, coarse);
+        const Layer layers[] = {{&fine, &fine_filter}, {&coarse, &coarse_filter}};
         images[level][static_cast<std::size_t>(j) * shape.levels[level].columns + i] =
-            packer.pack(bins, static_cast<float>(1 / sparse.mass()));
-        bins.clear();
+            packer.pack(layers, static_cast<float>(1 / sparse.sum()));
+        fine.clear();
+        coarse.clear();
       },
       progress);
   return images;
@@ -263,11 +323,11 @@ NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options,
 
   const float sigma_pixels = 0.5f * options.sigma_r * static_cast<float>(options.resolution);
   const int subdivision = subdivisionFor(sigma_pixels);
-  const PixelFilter filter(sigma_pixels, subdivision, 0.25f);
-  const int margin = std::max(filter.radius(), BlockBins::kTile) + 16;  // filters read up to two strips past their reach
-  const ImagePacker packer(pyramid.shape, options.precision, pyramid.value_scale, filter, subdivision);
-  auto images = options.surface == Surface::flat ? buildFlat(map, pyramid.shape, packer, subdivision, margin, progress)
-                                                 : buildSmooth(map, pyramid.shape, packer, subdivision, margin, progress);
+  const ImagePacker packer(pyramid.shape, options.precision, pyramid.value_scale);
+  // The coarse grid of smooth surfaces has half the bins.
+  auto images = options.surface == Surface::flat
+                    ? buildFlat(map, pyramid.shape, packer, PixelFilter(sigma_pixels, subdivision, Spline::quadratic), progress)
+                    : buildSmooth(map, pyramid.shape, packer, subdivision + subdivision % 2, progress);
   for (auto& level : images) pyramid.levels.push_back(packLevel(level, options.precision));
   if (options.levels == 0) dropAgreeingLevels(pyramid);
   return pyramid;

@@ -2,6 +2,8 @@
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,31 +16,35 @@
 namespace glint::bake {
 namespace {
 
-/// Lattice nodes per stride: the weights of a footprint are interpolated linearly between nodes.
-constexpr int kNodesPerStride = 8;
+constexpr int kCellsPerStride = 8;
 
-using NodeRow = std::vector<PackedBins>;  // one entry a node of the lattice
-using CellRow = std::vector<CornerBins>;  // one entry a cell of the lattice
+using CellRow = std::vector<BlockBins>;  // moments of each cell of a row of the lattice
+using RowSums = std::vector<BlockBins>;  // for each column of images: a row of cells, weighted along x
 
-/// The lattice of one level along one axis. With wrap, node k and node k + count are the same.
+/// The lattice of one level along one axis.
 struct Axis {
   float size;     // of the map, texels
   float spacing;  // texels
-  int cells;      // of the lattice; nodes: the same with wrap, one more without
+  int cells;
   bool wrap;
 
-  int nodes() const { return wrap ? cells : cells + 1; }
   Axis coarser() const { return {size, 2 * spacing, cells / 2, wrap}; }
 
-  /// Relative weight of node k in a Gaussian footprint: summed over its periodic copies, narrowed by what interpolation adds.
-  float weight(int k, float centre, float sigma) const {
-    const float variance = sigma * sigma - spacing * spacing / 6;
+  /// Best linear approximation over a cell of the relative weight in a Gaussian footprint, summed over its periodic copies.
+  LinearWeight weight(int cell, float centre, float sigma) const {
     const float reach = kPyramidReach * sigma;
-    float d = static_cast<float>(k) * spacing - centre;
-    float sum = 0;
+    float d = (static_cast<float>(cell) + 0.5f) * spacing - centre;
+    LinearWeight sum = {0, 0};
     if (wrap) d -= size * std::floor((d + reach) / size);  // first copy at or right of -reach
     for (; std::fabs(d) <= reach; d += size) {
-      sum += std::exp(-0.5f * d * d / variance);
+      for (int k = 0; k < 4; ++k) {  // Gauss and Legendre's rule on [-1/2, 1/2]
+        constexpr float kPlaces[4] = {-0.43056816f, -0.16999052f, 0.16999052f, 0.43056816f};
+        constexpr float kShares[4] = {0.17392742f, 0.32607258f, 0.32607258f, 0.17392742f};
+        const float x = (d + kPlaces[k] * spacing) / sigma;
+        const float w = kShares[k] * std::exp(-0.5f * x * x);
+        sum.mean += w;
+        sum.slope += 12 * kPlaces[k] * w;
+      }
       if (!wrap) break;
     }
     return sum;
@@ -48,157 +54,107 @@ struct Axis {
 Axis finestAxis(int size, float stride, int levels, bool wrap) {
   // Every level halves the lattice, so its count is a multiple of a power of two, and its spacing a little finer for it.
   const int multiple = 1 << (levels - 1);
-  const int wanted = static_cast<int>(std::ceil(static_cast<float>(size) * kNodesPerStride / stride));
+  const int wanted = static_cast<int>(std::ceil(static_cast<float>(size) * kCellsPerStride / stride));
   const int cells = (wanted + multiple - 1) / multiple * multiple;
   return {static_cast<float>(size), static_cast<float>(size) / static_cast<float>(cells), cells, wrap};
 }
 
-/// The node rows of one level and the images that they add to.
-class Level {
+/// The images of one level along one axis: their weights of the cells of the lattice.
+class AxisWeights {
  public:
-  Level(const PyramidShape& shape, int level, Axis x, Axis y, int subdivision, const ImageSink& sink)
-      : grid_(shape.levels[level]),
-        level_(level),
-        tiles_(shape.resolution * subdivision / BlockBins::kTile),
-        x_(x),
-        y_(y),
-        sink_(sink),
-        image_rows_(grid_.rows),
-        rows_left_(grid_.rows) {
-    const float sigma = kFootprintPerStride * grid_.stride;
-    row_weights_.resize(static_cast<std::size_t>(grid_.rows) * y_.nodes());
-    for (int j = 0; j < grid_.rows; ++j) {
-      for (int r = 0; r < y_.nodes(); ++r) {
-        const float w = y_.weight(r, centre(j), sigma);
-        row_weights_[static_cast<std::size_t>(j) * y_.nodes() + r] = w;
-        rows_left_[j] += w > 0;
+  struct Entry {
+    int index;
+    LinearWeight weight;
+  };
+
+  AxisWeights(const Axis& axis, int images, float stride) : images_of_(axis.cells), cells_of_(images) {
+    for (int i = 0; i < images; ++i) {
+      for (int c = 0; c < axis.cells; ++c) {
+        const LinearWeight w = axis.weight(c, (static_cast<float>(i) + 0.5f) * stride, kFootprintPerStride * stride);
+        if (w.mean <= 0) continue;
+        images_of_[c].push_back({i, w});
+        cells_of_[i].push_back({c, w});
       }
     }
-    column_weights_.resize(static_cast<std::size_t>(grid_.columns) * x_.nodes());
-    for (int i = 0; i < grid_.columns; ++i)
-      for (int k = 0; k < x_.nodes(); ++k)
-        column_weights_[static_cast<std::size_t>(i) * x_.nodes() + k] = x_.weight(k, centre(i), sigma);
   }
 
-  /// Adds one row of nodes to every open image and hands over those that are complete.
-  void addRow(int r, const NodeRow& nodes) {
-    for (int j = 0; j < grid_.rows; ++j) {
-      const float row_weight = row_weights_[static_cast<std::size_t>(j) * y_.nodes() + r];
-      if (row_weight <= 0) continue;
-      if (image_rows_[j].empty()) image_rows_[j].assign(grid_.columns, BlockBins(tiles_));
-      const bool complete = --rows_left_[j] == 0;
-      tbb::parallel_for(0, grid_.columns, [&](int i) {
-        BlockBins& image = image_rows_[j][i];
-        for (int k = 0; k < x_.nodes(); ++k) {
-          const float w = row_weight * column_weights_[static_cast<std::size_t>(i) * x_.nodes() + k];
-          if (w > kSmallestWeight) nodes[k].addTo(image, w);
-        }
-        if (complete) sink_(level_, i, j, image);
+  const std::vector<Entry>& imagesOf(int cell) const { return images_of_[cell]; }
+  const std::vector<Entry>& cellsOf(int image) const { return cells_of_[image]; }
+
+ private:
+  std::vector<std::vector<Entry>> images_of_, cells_of_;
+};
+
+/// The images of one level, open ones only.
+class Level {
+ public:
+  Level(const PyramidShape& shape, int level, const Axis& x, const Axis& y, std::size_t tiles, const ImageSink& sink)
+      : level_(level),
+        tiles_(tiles),
+        columns_(shape.levels[level].columns),
+        x_(x, columns_, shape.levels[level].stride),
+        y_(y, shape.levels[level].rows, shape.levels[level].stride),
+        sink_(sink),
+        image_rows_(shape.levels[level].rows) {}
+
+  RowSums emptySums() const { return RowSums(columns_, BlockBins(tiles_, 2)); }
+
+  /// Adds cell c of a row to the sums of every image that it is in.
+  void addCell(int c, const BlockBins& cell, RowSums& sums) const {
+    for (const auto& [i, weight] : x_.imagesOf(c)) addAlongX(cell, weight, sums[i]);
+  }
+
+  /// The same for a whole row.
+  RowSums sumsOf(const CellRow& row) const {
+    RowSums sums = emptySums();
+    tbb::parallel_for(0, columns_, [&](int i) {
+      for (const auto& [c, weight] : x_.cellsOf(i)) addAlongX(row[c], weight, sums[i]);
+    });
+    return sums;
+  }
+
+  /// Adds row r of cells to its images, and hands over those that are complete. Rows come in order.
+  void addRow(int r, const RowSums& sums) {
+    for (const auto& [j, weight] : y_.imagesOf(r)) {
+      std::vector<BlockBins>& images = image_rows_[j];
+      if (images.empty()) images.assign(columns_, BlockBins(tiles_));
+      const bool complete = y_.cellsOf(j).back().index == r;
+      tbb::parallel_for(0, columns_, [&, j = j, weight = weight](int i) {
+        addAlongY(sums[i], weight, images[i]);
+        if (complete) sink_(level_, i, j, images[i]);
       });
-      if (complete) std::vector<BlockBins>().swap(image_rows_[j]);
+      if (complete) std::vector<BlockBins>().swap(images);
     }
   }
 
  private:
-  /// Corners of the square around the circle of kPyramidReach deviations.
-  static constexpr float kSmallestWeight = 2.2e-3f;  // exp(-3.5^2 / 2)
-
-  float centre(int i) const { return (static_cast<float>(i) + 0.5f) * grid_.stride; }
-
-  PyramidGrid grid_;
   int level_;
-  int tiles_;
-  Axis x_, y_;
+  std::size_t tiles_;
+  int columns_;
+  AxisWeights x_, y_;
   const ImageSink& sink_;
   std::vector<std::vector<BlockBins>> image_rows_;
-  std::vector<int> rows_left_;
-  std::vector<float> row_weights_, column_weights_;
 };
 
-/// Halves a lattice: coarse node 2-D weights are the tensor square of (1/2, 1, 1/2). Takes fine rows in order, gives coarse rows.
-class Halver {
- public:
-  Halver(Axis x, Axis y, int tiles) : x_(x), y_(y), scratch_([tiles] { return BlockBins(tiles); }) {}
-
-  /// Keeps a fine row; calls give(row, nodes) for each coarse row that it completes. Rows come in order, but row 0 of a wrapping
-  /// lattice may come last, and coarse row 0 of one does.
-  template <class Give>
-  void push(int r, std::shared_ptr<const NodeRow> row, Give&& give) {
-    if (r == 0) first_ = row;
-    const bool odd = r % 2;
-    if (odd && r > 1) give(r / 2, combine(before_.get(), middle_.get(), row.get()));
-    if (odd && r == 1 && !y_.wrap) give(0, combine(nullptr, first_.get(), row.get()));
-    if (odd && r == 1 && y_.wrap) second_ = row;
-    if (odd)
-      before_ = row;
-    else
-      middle_ = row;
-    if (++pushed_ < y_.nodes()) return;
-    if (y_.wrap)
-      give(0, combine(before_.get(), first_.get(), second_ ? second_.get() : before_.get()));
-    else
-      give(y_.cells / 2, combine(before_.get(), middle_.get(), nullptr));
-  }
-
- private:
-  NodeRow combine(const NodeRow* below, const NodeRow* middle, const NodeRow* above) {
-    const Axis coarse = x_.coarser();
-    NodeRow out(coarse.nodes());
-    tbb::parallel_for(0, coarse.nodes(), [&](int k) {
-      BlockBins& sum = scratch_.local();
-      const auto addRow = [&](const NodeRow* row, float weight) {
-        if (!row) return;
-        for (int d = -1; d <= 1; ++d) {
-          int column = 2 * k + d;
-          if (x_.wrap) column = (column + x_.cells) % x_.cells;
-          if (column < 0 || column >= x_.nodes()) continue;
-          (*row)[column].addTo(sum, d == 0 ? weight : 0.5f * weight);
-        }
-      };
-      addRow(below, 0.5f);
-      addRow(middle, 1);
-      addRow(above, 0.5f);
-      out[k] = pack(sum);
-      sum.clear();
-    });
-    return out;
-  }
-
-  Axis x_, y_;
-  tbb::enumerable_thread_specific<BlockBins> scratch_;
-  std::shared_ptr<const NodeRow> first_, second_, before_, middle_;
-  int pushed_ = 0;  // rows so far
-};
-
-/// Rasterises the cells of the map into the corners of lattice cells.
+/// Rasterises the cells of the map into cells of the lattice.
 class Rasteriser {
  public:
-  Rasteriser(const NormalMap& map, Axis x, Axis y, int bins_per_axis, float sigma_bins)
-      : map_(map), x_(x), y_(y), tiles_(bins_per_axis / BlockBins::kTile), splatters_([=] {
-          return TriangleSplatter(bins_per_axis, sigma_bins);
-        }) {}
+  Rasteriser(const NormalMap& map, const Axis& x, const Axis& y, const DirectionTiles& tiles, float sigma_bins)
+      : map_(map), x_(x), y_(y), splatters_([=] { return TriangleSplatter(tiles, sigma_bins); }) {}
 
-  /// Corner histograms of a row of lattice cells; corner = 2 * upper + right.
-  CellRow row(int b) {
-    CellRow out(x_.cells);
-    tbb::parallel_for(0, x_.cells, [&](int a) {
-      TriangleSplatter& splatter = splatters_.local();
-      double mass[4] = {};
-      const auto [j0, j1] = cellsIn(y_, b, map_.height);
-      const auto [i0, i1] = cellsIn(x_, a, map_.width);
-      for (int j = j0; j < j1; ++j)
-        for (int i = i0; i < i1; ++i) addCell(i, j, a, b, splatter, mass);
-      out[a] = splatter.extract();
-      std::copy_n(mass, 4, out[a].mass);
-    });
-    return out;
+  /// Moments of the surface in cell (a, b) of the lattice are added to `cell`.
+  void addCell(int a, int b, BlockBins& cell) {
+    TriangleSplatter& splatter = splatters_.local();
+    const auto [j0, j1] = texelsIn(y_, b, map_.height);
+    const auto [i0, i1] = texelsIn(x_, a, map_.width);
+    for (int j = j0; j < j1; ++j)
+      for (int i = i0; i < i1; ++i) addSquare(i, j, a, b, splatter);
+    splatter.moveTo(cell);
   }
-
-  int tiles() const { return tiles_; }
 
  private:
   /// Cells of four texel centres whose middle (i + 1) lies in lattice cell `a`; the last cell of a map that does not wrap is none.
-  static std::pair<int, int> cellsIn(const Axis& axis, int a, int size) {
+  static std::pair<int, int> texelsIn(const Axis& axis, int a, int size) {
     const auto first = [&](int cell) {
       return cell >= axis.cells ? size : static_cast<int>(std::ceil(static_cast<float>(cell) * axis.spacing)) - 1;
     };
@@ -206,84 +162,112 @@ class Rasteriser {
     return {first(a), a + 1 >= axis.cells ? size - 1 : first(a + 1)};
   }
 
-  void addCell(int i, int j, int a, int b, TriangleSplatter& splatter, double mass[4]) const {
+  void addSquare(int i, int j, int a, int b, TriangleSplatter& splatter) const {
     const int left = i < 0 ? i + map_.width : i, bottom = j < 0 ? j + map_.height : j;
     const int right = left + 1 < map_.width ? left + 1 : 0, top = bottom + 1 < map_.height ? bottom + 1 : 0;
     const Vec2 n00 = map_.at(left, bottom), n10 = map_.at(right, bottom), n01 = map_.at(left, top), n11 = map_.at(right, top);
     for (int half = 0; half < 2; ++half) {
       // Centroids lie a sixth of a texel off the middle of the cell.
       const float sixth = 1.0f / 6, sign = half == 0 ? 1.0f : -1.0f;
-      const float tx = (static_cast<float>(i + 1) + sign * sixth) / x_.spacing - static_cast<float>(a);
-      const float ty = (static_cast<float>(j + 1) - sign * sixth) / y_.spacing - static_cast<float>(b);
-      const float weights[4] = {(1 - tx) * (1 - ty), tx * (1 - ty), (1 - tx) * ty, tx * ty};
-      for (int k = 0; k < 4; ++k) mass[k] += weights[k];
+      const float x = (static_cast<float>(i + 1) + sign * sixth) / x_.spacing - static_cast<float>(a) - 0.5f;
+      const float y = (static_cast<float>(j + 1) - sign * sixth) / y_.spacing - static_cast<float>(b) - 0.5f;
+      const float weights[kMoments] = {1, x, y, x * y};
       splatter.add(n00, half == 0 ? n10 : n01, n11, weights);
     }
   }
 
   const NormalMap& map_;
   Axis x_, y_;
-  int tiles_;
   tbb::enumerable_thread_specific<TriangleSplatter> splatters_;
 };
 
-/// Node (k, r) gathers a corner of each of the four lattice cells around it. `below` and `above` are rows of lattice cells.
-NodeRow gatherNodes(const Axis& x, const CellRow* below, const CellRow* above, int tiles) {
-  NodeRow nodes(x.nodes());
-  tbb::enumerable_thread_specific<BlockBins> scratch([tiles] { return BlockBins(tiles); });
-  tbb::parallel_for(0, x.nodes(), [&](int k) {
-    BlockBins& sum = scratch.local();
-    const int left = k > 0 ? k - 1 : x.wrap ? x.cells - 1 : -1;
-    const int right = k < x.cells ? k : -1;
-    const auto add = [&](const CellRow* row, int cell, int corner) {
-      if (row && cell >= 0) (*row)[cell].addTo(sum, corner);
-    };
-    add(below, left, 3);
-    add(below, right, 2);
-    add(above, left, 1);
-    add(above, right, 0);
-    nodes[k] = pack(sum);
-    sum.clear();
+/// Quarters of the cells of a row, added to the row of cells of twice the size.
+void addQuarters(const CellRow& row, bool upper, CellRow& coarser) {
+  tbb::parallel_for(std::size_t{0}, coarser.size(), [&](std::size_t c) {
+    for (const bool right : {false, true}) addQuarter(row[2 * c + right], right, upper, coarser[c]);
   });
-  return nodes;
 }
+
+/// Levels above the finest: rows of cells come in order, and go on in pairs.
+class CoarseLevels {
+ public:
+  CoarseLevels(std::vector<Level>& levels, std::size_t tiles) : levels_(levels), tiles_(tiles), halves_(levels.size()) {}
+
+  void addRow(std::size_t level, int r, const CellRow& row) {
+    levels_[level].addRow(r, levels_[level].sumsOf(row));
+    if (level + 1 == levels_.size()) return;
+    CellRow& coarser = halves_[level];
+    if (r % 2 == 0) coarser.assign(row.size() / 2, BlockBins(tiles_, kMoments));
+    addQuarters(row, r % 2, coarser);
+    if (r % 2) addRow(level + 1, r / 2, coarser);
+  }
+
+ private:
+  std::vector<Level>& levels_;
+  std::size_t tiles_;
+  std::vector<CellRow> halves_;  // of each level: the row of the next level that is not complete
+};
+
+/// What one task makes: a row of cells of the second level, and the sums of the two rows of the finest under it. With a single
+/// level there are no cells, and the second row may be missing.
+struct Band {
+  int index;
+  RowSums sums[2];
+  CellRow coarser;
+};
 
 }  // namespace
 
-void scatterSmooth(const NormalMap& map, const PyramidShape& shape, int subdivision, const ImageSink& sink,
-                   const ProgressFn& progress) {
+void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const DirectionTiles& direction_tiles,
+                   const ImageSink& sink, const ProgressFn& progress) {
   const bool wrap = shape.boundary == Boundary::wrap;
-  Axis x = finestAxis(map.width, shape.levels[0].stride, shape.level_count, wrap);
-  Axis y = finestAxis(map.height, shape.levels[0].stride, shape.level_count, wrap);
-  const int bins_per_axis = shape.resolution * subdivision;
-  Rasteriser rasteriser(map, x, y, bins_per_axis, 0.5f * shape.sigma_r * static_cast<float>(bins_per_axis));
+  const Axis finest_x = finestAxis(map.width, shape.levels[0].stride, shape.level_count, wrap);
+  const Axis finest_y = finestAxis(map.height, shape.levels[0].stride, shape.level_count, wrap);
+  const std::size_t tiles = direction_tiles.count();
+  const float sigma_bins = 0.5f * shape.sigma_r * static_cast<float>(direction_tiles.fine.bins_per_axis);
+  Rasteriser rasteriser(map, finest_x, finest_y, direction_tiles, sigma_bins);
 
   std::vector<Level> levels;
-  std::vector<std::unique_ptr<Halver>> halvers;
-  const Axis finest_x = x, finest_y = y;
-  for (int l = 0; l < shape.level_count; ++l) {
-    levels.emplace_back(shape, l, x, y, subdivision, sink);
-    halvers.push_back(std::make_unique<Halver>(x, y, rasteriser.tiles()));
-    x = x.coarser();
-    y = y.coarser();
-  }
-  const std::function<void(int, int, NodeRow)> push = [&](int l, int r, NodeRow nodes) {
-    levels[l].addRow(r, nodes);
-    if (l + 1 == shape.level_count) return;
-    halvers[l]->push(r, std::make_shared<const NodeRow>(std::move(nodes)),
-                     [&](int coarse, NodeRow row) { push(l + 1, coarse, std::move(row)); });
+  Axis x = finest_x, y = finest_y;
+  for (int l = 0; l < shape.level_count; ++l, x = x.coarser(), y = y.coarser())
+    levels.emplace_back(shape, l, x, y, tiles, sink);
+  CoarseLevels coarse(levels, tiles);
+  const bool has_coarser = shape.level_count > 1;
+
+  tbb::enumerable_thread_specific<BlockBins> scratch([=] { return BlockBins(tiles, kMoments); });
+  const auto makeBand = [&](int index) {
+    Band band = {index, {}, {}};
+    if (has_coarser) band.coarser.assign(finest_x.cells / 2, BlockBins(tiles, kMoments));
+    for (int upper = 0; upper < 2 && 2 * index + upper < finest_y.cells; ++upper) {
+      band.sums[upper] = levels[0].emptySums();
+      for (int a = 0; a < finest_x.cells; ++a) {
+        BlockBins& cell = scratch.local();
+        rasteriser.addCell(a, 2 * index + upper, cell);
+        levels[0].addCell(a, cell, band.sums[upper]);
+        if (has_coarser) addQuarter(cell, a % 2, upper, band.coarser[a / 2]);
+        cell.clear();
+      }
+    }
+    return std::make_shared<const Band>(std::move(band));
+  };
+  const auto addBand = [&](const Band& band) {
+    for (int upper = 0; upper < 2 && 2 * band.index + upper < finest_y.cells; ++upper)
+      levels[0].addRow(2 * band.index + upper, band.sums[upper]);
+    if (has_coarser) coarse.addRow(1, band.index, band.coarser);
+    if (progress) progress(band.index + 1, (finest_y.cells + 1) / 2);
   };
 
-  const auto cells = [&](int b) { return rasteriser.row(b); };
-  CellRow below = wrap ? cells(finest_y.cells - 1) : CellRow();
-  CellRow last = below;
-  for (int r = 0; r < finest_y.nodes(); ++r) {
-    const bool has_above = r < finest_y.cells;
-    CellRow above = !has_above ? CellRow() : wrap && r == finest_y.cells - 1 ? std::move(last) : cells(r);
-    push(0, r, gatherNodes(finest_x, below.empty() ? nullptr : &below, above.empty() ? nullptr : &above, rasteriser.tiles()));
-    below = std::move(above);
-    if (progress) progress(r + 1, finest_y.nodes());
-  }
+  using BandPtr = std::shared_ptr<const Band>;
+  int next = 0;
+  const auto source = [&](tbb::flow_control& control) {
+    if (2 * next >= finest_y.cells) control.stop();
+    return next++;
+  };
+  tbb::parallel_pipeline(
+      static_cast<std::size_t>(tbb::this_task_arena::max_concurrency()) + 1,
+      tbb::make_filter<void, int>(tbb::filter_mode::serial_in_order, source) &
+          tbb::make_filter<int, BandPtr>(tbb::filter_mode::parallel, makeBand) &
+          tbb::make_filter<BandPtr, void>(tbb::filter_mode::serial_in_order, [&](const BandPtr& band) { addBand(*band); }));
 }
 
 }  // namespace glint::bake

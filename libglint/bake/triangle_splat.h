@@ -8,39 +8,59 @@
 
 namespace glint::bake {
 
-/// Splats triangles of the disk into four histograms at once: one for each corner of a lattice cell.
+/// Numbers of the tiles of two grids over the square [-1, 1]^2 of directions, the coarse one of bins of twice the size. Each has
+/// one tile of margin.
+struct DirectionTiles {
+  struct Grid {
+    int bins_per_axis;  // of the square; a multiple of BlockBins::kTile
+    std::int32_t first;
+
+    int tilesPerAxis() const { return bins_per_axis / BlockBins::kTile + 2; }
+    std::int32_t end() const { return first + tilesPerAxis() * tilesPerAxis(); }
+  };
+  Grid fine, coarse;
+
+  /// @param bins_per_axis  of the fine grid: a multiple of 2 * kTile
+  explicit DirectionTiles(int bins_per_axis) : fine{bins_per_axis, 0}, coarse{bins_per_axis / 2, fine.end()} {}
+  std::size_t count() const { return static_cast<std::size_t>(coarse.end()); }
+};
+
+/// Splats triangles of the disk into the histograms of a lattice cell's moments at once.
 ///
 /// A triangle is cut into columns on its longest edge and these into pieces; every piece adds its share at its centre with
-/// quadratic B-spline weights (see DirectionBins). Pieces are moved outwards a little, so that the spread along the longest edge
+/// cubic B-spline weights (see PixelFilter). Pieces are moved outwards a little, so that the spread along the longest edge
 /// is the triangle's own. So triangles of any shape keep their mass, mean and extent, down to a segment or a point; the blur that
-/// follows flattens the pieces.
+/// follows flattens the pieces. Long triangles go to the coarse grid.
 class TriangleSplatter {
  public:
-  /// @param bins_per_axis  of the square [-1, 1]^2; a multiple of BlockBins::kTile
-  /// @param sigma_bins     deviation of the blur that follows, bins
-  TriangleSplatter(int bins_per_axis, float sigma_bins);
+  /// @param sigma_bins  deviation of the blur that follows, bins of the fine grid
+  TriangleSplatter(const DirectionTiles& tiles, float sigma_bins);
 
-  /// Adds a triangle of mass weights[corner] to each histogram.
-  void add(Vec2 a, Vec2 b, Vec2 c, const float weights[4]);
+  /// Adds a triangle of mass weights[moment] to each histogram.
+  void add(Vec2 a, Vec2 b, Vec2 c, const float weights[kMoments]);
 
-  /// Takes the histograms out, without their masses, and clears them.
-  CornerBins extract();
+  /// Adds the histograms to `moments`, of kMoments channels, and clears them.
+  void moveTo(BlockBins& moments);
 
  private:
   struct Raster {
-    float* bins;  // [row][column][corner], with a tile of margin
-    std::uint8_t* touched;
-    int pitch;  // bins
-    int tiles;  // per axis, with the margin
-  };
-  static void splatPoint(Vec2 point, float share, const float weights[4], const Raster& raster);
+    explicit Raster(const DirectionTiles::Grid& grid);
+    Vec2 place(Vec2 normal) const {
+      return {(normal.x + 1) * half + BlockBins::kTile, (normal.y + 1) * half + BlockBins::kTile};
+    }
+    void moveTo(BlockBins& moments);
 
-  float half_;   // bins in half the square
-  float piece_;  // longest piece, bins
-  int tiles_;
-  int pitch_;
-  std::vector<float> bins_;
-  std::vector<std::uint8_t> touched_;
+    float half;  // bins in half the square
+    std::int32_t first;
+    int tiles;                // per axis, with the margin
+    int pitch;                // bins
+    std::vector<float> bins;  // [row][column][moment], with a tile of margin
+    std::vector<std::uint8_t> touched;
+  };
+  static void splatPoint(Vec2 point, float share, const float weights[kMoments], Raster& raster);
+
+  Raster fine_, coarse_;
+  float piece_;  // longest piece, bins of the fine grid
 };
 
 }  // namespace glint::bake
