@@ -6,3 +6,14 @@
 #else
 #define GLINT_HD
 #endif
+
+namespace glint {
+
+/// Asks for a cache line that will be read soon. Any address is fine.
+inline GLINT_HD void prefetch([[maybe_unused]] const void* address) {
+#if defined(__GNUC__) && !defined(__CUDA_ARCH__)
+  __builtin_prefetch(address);
+#endif
+}
+
+}  // namespace glint
