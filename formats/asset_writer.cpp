@@ -328,4 +328,8 @@ void writeAsset(const fs::path& path, const CompressedNdf& ndf, const Provenance
   writeModel(path, ndf, provenance, options);
 }
 
+void writeAsset(const fs::path& path, const BinMap& map, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, map, provenance, options);
+}
+
 }  // namespace glint::formats

@@ -71,6 +71,13 @@ constexpr std::array kRules = {
          kMakeAgain},
     Rule{"compressed.ranks", error, invalid_input, "cluster ranks are valid for the method", kMakeAgain},
     Rule{"compressed.ranges", error, invalid_input, "every cluster's factors lie inside their arrays", kMakeAgain},
+    Rule{"bin_map.size", error, unsupported, "columns and rows of the map need at most 28 bits together", kMakeAgain},
+    Rule{"bin_map.masks", error, invalid_input,
+         "masks and grid_masks have no bits beyond their bins and agree with their counts", kMakeAgain},
+    Rule{"bin_map.bin_starts", error, invalid_input, "bin_starts rise from 0 to the number of texels", kMakeAgain},
+    Rule{"bin_map.grids", error, invalid_input, "every grid has a power of two of cells, which divide its bin's list",
+         kMakeAgain},
+    Rule{"bin_map.classes", error, invalid_input, "classes divide the bins, and every texel has one", kMakeAgain},
     Rule{"dataset.hash", error, invalid_input, "a dataset's bytes have the hash of its attribute xxh3_128", kDamaged},
     Rule{"normals.finite", error, invalid_input, "normals are finite", "repair them with glint-ingest --fix-invalid"},
     Rule{"normals.disk", error, invalid_input, "normals lie inside the unit disk",
@@ -88,6 +95,9 @@ constexpr std::array kRules = {
     Rule{"compressed.scales", error, invalid_input, "scales are finite", kMakeAgain},
     Rule{"compressed.factors", error, invalid_input, "bases and coefficients are finite", kMakeAgain},
     Rule{"compressed.integral", warning, invalid_input, "every image integrates to 1 within 1e-3", kMakeAgain},
+    Rule{"bin_map.texels", error, invalid_input, "every texel of the map is listed once, in its class and its cell",
+         kMakeAgain},
+    Rule{"bin_map.moments", error, invalid_input, "grid_moments are those of a distribution inside the bin", kMakeAgain},
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cfloat>
 #include <charconv>
 
+#include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
 
 namespace glint::formats {
@@ -172,6 +173,61 @@ KindSchema ndfCpSchema() {
        {"scales", "", {{"", f32}}, {"scale_count"}, "1", "scale of each column of each cluster"}}};
 }
 
+KindSchema binMapSchema() {
+  const auto shift = [](std::string_view name, std::string_view long_name) {
+    return integer(name, 0, CompactCounts::kMaxShift, "1", long_name);
+  };
+  return {
+      "bin-map",
+      "Inverse bin map",
+      {integer("width", 1, kMaxMapSize, "texel", "width of the normal map"),
+       integer("height", 1, kMaxMapSize, "texel", "height of the normal map"),
+       real("alpha", FLT_MIN, 1, "1", "Beckmann roughness of a facet"),
+       integer("bins_per_axis", 1, 4096, "1", "bins of directions along each axis of [-1, 1]^2"),
+       integer("leaf_size", 1, 1024, "texel", "texels of a cell, at least on average"),
+       shift("bin_starts_shift", "values of bin_starts that share a base, logarithm to base 2"),
+       shift("cell_starts_shift", "values of cell_starts that share a base, logarithm to base 2")},
+      {{"mask_words", "ceil_div(bins_per_axis * bins_per_axis, 64)", "64-bit words of one bit for each bin"}},
+      {{"masks", "", {{"", u64}}, {"mask_words"}, "1", "bit b of word w: bin 64 w + b is occupied"},
+       {"mask_ranks", "", {{"", u32}}, {"mask_words"}, "1", "occupied bins before the bins of this word"},
+       {"bin_starts/offsets",
+        "",
+        {{"", u16}},
+        {"bin_bounds"},
+        "1",
+        "first texel of each occupied bin and their end, less its base"},
+       {"bin_starts/bases", "", {{"", u64}}, {"ceil_div(bin_bounds, pow2(bin_starts_shift))"}, "1", "bases of bin_starts"},
+       {"grid_masks", "", {{"", u64}}, {"grid_words"}, "1", "bit b of word w: occupied bin 64 w + b has a grid"},
+       {"grid_ranks", "", {{"", u32}}, {"grid_words"}, "1", "grids before the bins of this word"},
+       {"grid_moments",
+        "",
+        {{"", f16}},
+        {"grids", "5"},
+        "1",
+        "mean x, y and covariance xx, xy, yy of the bin's normals, in bin sides from its lower left corner"},
+       {"grid_cells", "", {{"", u32}}, {"grids + 1"}, "1", "first value of cell_starts of each grid, and their number"},
+       {"cell_starts/offsets",
+        "",
+        {{"", u16}},
+        {"cell_bounds"},
+        "1",
+        "first texel of each cell and end of each grid, less its base"},
+       {"cell_starts/bases", "", {{"", u64}}, {"ceil_div(cell_bounds, pow2(cell_starts_shift))"}, "1", "bases of cell_starts"},
+       {"texels",
+        "",
+        {{"", u32}},
+        {"height * width"},
+        "1",
+        "column, row and place in its bin of each texel, listed by bin and cell"},
+       {"class_bins", "", {{"", u32}}, {"class_bounds"}, "1", "first bin of each class of bins, and the number of bins"},
+       {"texel_classes",
+        "",
+        {{"", u16}},
+        {"ceil_div(height * width * 12, 16)"},
+        "1",
+        "class of each texel of the map, 12 bits each"}}};
+}
+
 /// Recursive descent over one size expression.
 class SizeParser {
  public:
@@ -318,7 +374,8 @@ std::size_t sizeBytes(ElementType type) {
 }
 
 std::span<const KindSchema> kindSchemas() {
-  static const std::vector<KindSchema> table = {heightsSchema(), ndfCpSchema(), ndfPyramidSchema(), normalsSchema()};
+  static const std::vector<KindSchema> table = {binMapSchema(), heightsSchema(), ndfCpSchema(), ndfPyramidSchema(),
+                                                normalsSchema()};
   return table;
 }
 

@@ -462,6 +462,96 @@ SampleCompressed sampleCompressed(int size, CompressionMethod method, Coefficien
   return sample;
 }
 
+namespace {
+
+void addCompact(std::uint64_t value, int shift, std::vector<std::uint64_t>& bases, std::vector<std::uint16_t>& offsets) {
+  if (offsets.size() % (std::size_t{1} << shift) == 0) bases.push_back(value);
+  offsets.push_back(static_cast<std::uint16_t>(value - bases.back()));
+}
+
+/// Mean and covariance of places in a bin, in bin sides.
+void addMoments(const TexelCode& code, const std::vector<std::uint32_t>& texels, std::vector<std::uint16_t>& moments) {
+  const double step = 1.0 / (1 << code.place_bits), n = static_cast<double>(texels.size());
+  double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  for (const std::uint32_t t : texels) {
+    const double px = (code.placeX(t) + 0.5) * step, py = (code.placeY(t) + 0.5) * step;
+    x += px / n, y += py / n, xx += px * px / n, xy += px * py / n, yy += py * py / n;
+  }
+  for (const double v : {x, y, xx - x * x, xy - x * y, yy - y * y}) moments.push_back(floatToHalf(static_cast<float>(v)));
+}
+
+}  // namespace
+
+SampleBinMap sampleBinMap(int width, int height) {
+  constexpr int kBins = 9, kShift = 2, kCellBits = 2;
+  const SampleNormals normals = sampleNormals(width, height, false);
+  const TexelCode code = texelCode(width, height);
+  SampleBinMap sample;
+  std::vector<std::vector<std::uint32_t>> lists(kBins * kBins);
+  sample.texel_classes.assign((normals.normals.size() * BinMap::kClassBits + 15) / 16, 0);
+  for (std::size_t t = 0; t < normals.normals.size(); ++t) {
+    const double x = (normals.normals[t].x + 1.0) * kBins / 2, y = (normals.normals[t].y + 1.0) * kBins / 2;
+    const auto place = [&](double v) { return static_cast<std::uint32_t>((v - std::floor(v)) * (1 << code.place_bits)); };
+    const auto bin = static_cast<std::size_t>(y) * kBins + static_cast<std::size_t>(x);
+    lists[bin].push_back(code.pack(static_cast<std::uint32_t>(t) % static_cast<std::uint32_t>(width),
+                                   static_cast<std::uint32_t>(t) / static_cast<std::uint32_t>(width), place(x), place(y)));
+    for (std::size_t k = 0; k < BinMap::kClassBits; ++k) {
+      const std::size_t bit = t * BinMap::kClassBits + k;
+      sample.texel_classes[bit / 16] |= static_cast<std::uint16_t>((bin / 2 >> k & 1) << (bit % 16));
+    }
+  }
+  sample.masks.assign(2, 0);
+  for (std::size_t bin = 0; bin < lists.size(); ++bin) {
+    if (bin % 2 == 0) sample.class_bins.push_back(static_cast<std::uint32_t>(bin));
+    if (bin % 64 == 0) sample.mask_ranks.push_back(static_cast<std::uint32_t>(sample.bin_offsets.size()));
+    if (lists[bin].empty()) continue;
+    const std::size_t ordinal = sample.bin_offsets.size();
+    sample.masks[bin / 64] |= std::uint64_t{1} << (bin % 64);
+    if (ordinal % 64 == 0) {
+      sample.grid_masks.push_back(0);
+      sample.grid_ranks.push_back(static_cast<std::uint32_t>(sample.grid_cells.size()));
+    }
+    addCompact(sample.texels.size(), kShift, sample.bin_bases, sample.bin_offsets);
+    if (lists[bin].size() <= 64) {
+      sample.texels.insert(sample.texels.end(), lists[bin].begin(), lists[bin].end());
+      continue;
+    }
+    sample.grid_masks.back() |= std::uint64_t{1} << (ordinal % 64);
+    sample.grid_cells.push_back(static_cast<std::uint32_t>(sample.cell_offsets.size()));
+    addMoments(code, lists[bin], sample.grid_moments);
+    const CellGrid grid = cellGrid(code, kCellBits);
+    for (std::uint32_t cell = 0; cell < 1u << kCellBits; ++cell) {
+      addCompact(sample.texels.size(), kShift, sample.cell_bases, sample.cell_offsets);
+      for (const std::uint32_t t : lists[bin])
+        if ((code.row(t) >> grid.row_shift) * static_cast<std::uint32_t>(grid.columns) +
+                (code.column(t) >> grid.column_shift) ==
+            cell)
+          sample.texels.push_back(t);
+    }
+    addCompact(sample.texels.size(), kShift, sample.cell_bases, sample.cell_offsets);
+  }
+  addCompact(sample.texels.size(), kShift, sample.bin_bases, sample.bin_offsets);
+  sample.grid_cells.push_back(static_cast<std::uint32_t>(sample.cell_offsets.size()));
+  sample.class_bins.push_back(kBins * kBins);
+  sample.map = {width,
+                height,
+                0.4f,
+                kBins,
+                8,
+                sample.masks,
+                sample.mask_ranks,
+                {sample.bin_bases, sample.bin_offsets, kShift},
+                sample.grid_masks,
+                sample.grid_ranks,
+                sample.grid_cells,
+                sample.grid_moments,
+                {sample.cell_bases, sample.cell_offsets, kShift},
+                sample.texels,
+                sample.class_bins,
+                sample.texel_classes};
+  return sample;
+}
+
 formats::Provenance sampleProvenance() {
   return {"sample_assets 1.0",
           R"({"size":64})",

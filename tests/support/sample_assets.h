@@ -55,6 +55,13 @@ struct SampleCompressed {
   CompressedNdf ndf;
 };
 
+struct SampleBinMap {
+  std::vector<std::uint64_t> masks, bin_bases, grid_masks, cell_bases;
+  std::vector<std::uint32_t> mask_ranks, grid_ranks, grid_cells, texels, class_bins;
+  std::vector<std::uint16_t> bin_offsets, grid_moments, cell_offsets, texel_classes;
+  BinMap map;
+};
+
 /// Bumps in the disk; sizes need not be powers of two.
 SampleNormals sampleNormals(int width, int height, bool with_bounds = true);
 SampleHeights sampleHeights(int width, int height);
@@ -62,6 +69,9 @@ SampleHeights sampleHeights(int width, int height);
 SamplePyramid samplePyramid(int size, BlockPrecision precision);
 /// The same images, each block approximated by a constant and slopes; two regions.
 SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type);
+
+/// sampleNormals(width, height) in 9 x 9 bins; lists of more than 64 texels have grids of 4 cells. Every second bin starts a class.
+SampleBinMap sampleBinMap(int width, int height);
 
 formats::Provenance sampleProvenance();
 

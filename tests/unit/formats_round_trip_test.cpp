@@ -166,6 +166,34 @@ TEST(AssetRoundTrip, CompressedPyramidsOfEveryMethodAndTypeComeBackBitExact) {
   }
 }
 
+TEST(AssetRoundTrip, BinMapsComeBackBitExact) {
+  const TempFolder folder;
+  for (const auto& [width, height] : {std::pair{64, 48}, {37, 5}, {1, 1}}) {
+    const auto sample = test::sampleBinMap(width, height);
+    writeAsset(folder / "a.glint", sample.map, test::sampleProvenance(), {.overwrite = true});
+    const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
+    const BinMap& map = asset.binMap();
+    EXPECT_EQ(std::tuple(map.width, map.height, map.alpha, map.bins_per_axis, map.leaf_size),
+              std::tuple(width, height, sample.map.alpha, sample.map.bins_per_axis, sample.map.leaf_size));
+    expectSame(map.masks, sample.map.masks);
+    expectSame(map.mask_ranks, sample.map.mask_ranks);
+    expectSame(map.bin_starts.bases, sample.map.bin_starts.bases);
+    expectSame(map.bin_starts.offsets, sample.map.bin_starts.offsets);
+    EXPECT_EQ(map.bin_starts.shift, sample.map.bin_starts.shift);
+    expectSame(map.grid_masks, sample.map.grid_masks);
+    expectSame(map.grid_ranks, sample.map.grid_ranks);
+    expectSame(map.grid_cells, sample.map.grid_cells);
+    expectSame(map.grid_moments, sample.map.grid_moments);
+    expectSame(map.cell_starts.bases, sample.map.cell_starts.bases);
+    expectSame(map.cell_starts.offsets, sample.map.cell_starts.offsets);
+    EXPECT_EQ(map.cell_starts.shift, sample.map.cell_starts.shift);
+    expectSame(map.texels, sample.map.texels);
+    expectSame(map.class_bins, sample.map.class_bins);
+    expectSame(map.texel_classes, sample.map.texel_classes);
+    for (const Finding& finding : validateAsset(folder / "a.glint").findings) ADD_FAILURE() << finding.rule << finding.message;
+  }
+}
+
 TEST(AssetRoundTrip, ProvenanceComesBack) {
   const TempFolder folder;
   for (const Provenance& provenance : {test::sampleProvenance(), Provenance{"", "{}", {}}}) {

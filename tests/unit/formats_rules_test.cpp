@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-enum class Base { normals, heights, pyramid, compressed, compressed_f32 };
+enum class Base { normals, heights, pyramid, compressed, compressed_f32, bin_map };
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -40,6 +40,8 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
     case Base::compressed_f32:
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
+    case Base::bin_map:
+      return writeAsset(path, test::sampleBinMap(64, 48).map, provenance);
   }
 }
 
@@ -505,9 +507,58 @@ std::vector<Fixture> dataFixtures() {
   };
 }
 
+std::vector<Fixture> binMapFixtures() {
+  const auto changed = [](const char* rule, const char* path, std::size_t index, auto edit, bool opens = false) {
+    using T = std::remove_cvref_t<decltype(edit(0))>;
+    return patched(
+        rule, Base::bin_map, [=](const Patch& patch) { patch.change<T>(path, index, [=](T& value) { value = edit(value); }); },
+        opens);
+  };
+  const auto word = [](auto f) { return [=](std::uint64_t v) -> std::uint64_t { return f(v); }; };
+  const auto u32 = [](auto f) { return [=](std::uint32_t v) -> std::uint32_t { return f(v); }; };
+  const auto u16 = [](auto f) { return [=](std::uint16_t v) -> std::uint16_t { return static_cast<std::uint16_t>(f(v)); }; };
+  const auto flip = [](auto v) { return v ^ 1; };
+  const auto raise = [](auto v) { return v + 1; };
+  return {
+      patched("bin_map.size", Base::bin_map,
+              [](const Patch& patch) {
+                // 15 and 14 bits; the file has holes instead of texels.
+                constexpr hsize_t kWidth = (1 << 14) + 1, kHeight = (1 << 13) + 1;
+                const auto reserve = [](hid_t properties) {
+                  H5Pset_alloc_time(properties, H5D_ALLOC_TIME_EARLY);
+                  H5Pset_fill_time(properties, H5D_FILL_TIME_NEVER);
+                };
+                patch.setInteger("width", kWidth);
+                patch.setInteger("height", kHeight);
+                patch.replace("texels", H5T_STD_U32LE, {kWidth * kHeight}, false, reserve);
+                patch.replace("texel_classes", H5T_STD_U16LE, {(kWidth * kHeight * 12 + 15) / 16}, false, reserve);
+              }),
+      changed("bin_map.masks", "masks", 1, word([](auto v) { return v | 1ull << 40; })),
+      changed("bin_map.masks", "masks", 0, word([](auto v) { return v & (v - 1); })),
+      changed("bin_map.masks", "mask_ranks", 1, u32(raise)),
+      changed("bin_map.masks", "grid_masks", 0, word([](auto v) { return v | 1ull << 63; })),
+      changed("bin_map.masks", "grid_ranks", 0, u32(raise)),
+      changed("bin_map.bin_starts", "bin_starts/offsets", 0, u16(raise)),
+      changed("bin_map.bin_starts", "bin_starts/offsets", 2, u16([](auto) { return 0xffff; })),
+      changed("bin_map.bin_starts", "bin_starts/bases", 1, word([](auto) { return ~0ull; })),
+      changed("bin_map.grids", "grid_cells", 1, u32(raise)),
+      changed("bin_map.grids", "grid_cells", 1, u32([](auto) { return 0xffffffffu; })),
+      changed("bin_map.grids", "cell_starts/offsets", 1, u16([](auto) { return 0xffff; })),
+      changed("bin_map.grids", "cell_starts/offsets", 0, u16(raise)),
+      changed("bin_map.classes", "class_bins", 3, u32([](auto) { return 0u; })),
+      changed("bin_map.classes", "class_bins", 41, u32([](auto v) { return v + 1000; })),
+      changed("bin_map.classes", "texel_classes", 100, u16([](auto) { return 0xffff; })),
+      changed("bin_map.texels", "texels", 100, u32(flip), true),
+      changed("bin_map.texels", "texels", 100, u32([](auto) { return 0xffffffffu; }), true),
+      changed("bin_map.moments", "grid_moments", 2, u16([](auto) { return 0x7c00; }), true),
+      changed("bin_map.moments", "grid_moments", 0, u16([](auto) { return 0x8400; }), true),
+  };
+}
+
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
-  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures()}) {
+  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures(),
+                    binMapFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
@@ -526,7 +577,7 @@ TEST(FormatRules, IdsAreUnique) {
 
 TEST(FormatRules, GoodFilesBreakNoRule) {
   const test::TempFolder folder;
-  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32}) {
+  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::bin_map}) {
     const fs::path path = folder / (std::to_string(static_cast<int>(base)) + ".glint");
     writeBase(path, base);
     for (const Finding& finding : validateAsset(path).findings) {
@@ -537,7 +588,7 @@ TEST(FormatRules, GoodFilesBreakNoRule) {
 
 TEST(FormatRules, EveryFailingFileIsNamedByItsRule) {
   const test::TempFolder folder;
-  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32}) {
+  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::bin_map}) {
     writeBase(folder / (std::to_string(static_cast<int>(base)) + ".glint"), base);
   }
   int number = 0;
@@ -616,7 +667,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 7u);
+  EXPECT_EQ(count, 8u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
