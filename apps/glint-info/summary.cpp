@@ -120,6 +120,18 @@ ordered_json summarizeCompressed(const CompressedNdf& ndf, const formats::AssetI
           {"levels", std::move(levels)}};
 }
 
+ordered_json summarizeBinMap(const BinMap& map) {
+  std::uint64_t longest = 0;
+  for (std::size_t k = 0; k + 1 < map.bin_starts.size(); ++k)
+    longest = std::max(longest, map.bin_starts[k + 1] - map.bin_starts[k]);
+  return {{"occupied_bins", map.occupiedBins()},
+          {"occupied_share", static_cast<double>(map.occupiedBins()) / static_cast<double>(map.binCount())},
+          {"longest_list", longest},
+          {"bins_with_grid", map.grid_cells.size() - 1},
+          {"cells", map.cell_starts.size()},
+          {"classes", map.classCount()}};
+}
+
 void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json& statistics) {
   if (asset.kind() == "normals") {
     const NormalMap& map = asset.normals();
@@ -144,6 +156,14 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
     properties["coefficient_type"] = kTypes[static_cast<int>(ndf.coefficient_type)];
     properties["regions"] = std::to_string(ndf.region_columns) + "x" + std::to_string(ndf.region_rows);
     statistics = summarizeCompressed(ndf, asset.info());
+  } else if (asset.kind() == "bin-map") {
+    const BinMap& map = asset.binMap();
+    properties = {{"width", map.width},
+                  {"height", map.height},
+                  {"alpha", map.alpha},
+                  {"bins_per_axis", map.bins_per_axis},
+                  {"leaf_size", map.leaf_size}};
+    statistics = summarizeBinMap(map);
   }
 }
 

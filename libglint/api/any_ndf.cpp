@@ -54,10 +54,15 @@ OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& o
     opened.setPyramid<PyramidNdf>(asset.pyramid());
   } else if (asset.kind() == "ndf-cp") {
     opened.setPyramid<CpNdf>(asset.compressed());
+  } else if (asset.kind() == "bin-map") {
+    const BinMap& map = asset.binMap();
+    const BinMapNdf ndf(map);
+    opened.model_ = ndf;
+    opened.info_ = {map.width, map.height, kReferenceResolution, ndf.sigma(), Surface::flat, Boundary::wrap, 0, 0};
   } else {
     throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",
                 "is of kind " + std::string(asset.kind()) + ", which holds no distribution of normals",
-                "pass an asset of kind normals, ndf-pyramid or ndf-cp");
+                "pass an asset of kind normals, ndf-pyramid, ndf-cp or bin-map");
   }
   if (opened.normals_) requireSameMap(asset, path, opened.info_, opened.normals_->normals(), options.normals);
   return opened;

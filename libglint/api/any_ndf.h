@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "glint/formats/asset_reader.h"
+#include "glint/query/bin_map_ndf.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"
 #include "glint/query/reference.h"
@@ -12,7 +13,7 @@
 namespace glint::api {
 
 /// Any model of the NDF that an asset can hold.
-using AnyNdf = std::variant<Reference, PyramidNdf, CpNdf>;
+using AnyNdf = std::variant<Reference, PyramidNdf, CpNdf, BinMapNdf>;
 
 /// What an asset does not say itself about how it is asked.
 struct NdfOptions {
