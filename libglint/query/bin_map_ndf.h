@@ -8,6 +8,7 @@
 #include "glint/query/gaussian.h"
 #include "glint/query/half.h"
 #include "glint/query/ndf_model.h"
+#include "glint/query/sampling.h"
 
 namespace glint {
 
@@ -75,6 +76,7 @@ class BinMapNdf {
   /// A half vector with the density of the footprint (Atanasov 2021, section 5.3 and Eq. 18): a point of the footprint, the normal
   /// of its texel, and a point of its lobe. The leading digits of xi choose the point, the others the lobe.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+    xi = clampUnit(xi);
     const TexelCover cover(p, map().width, map().height);
     double x = 0, y = 0;
     cover.point(xi.x, xi.y, x, y);
@@ -180,27 +182,30 @@ class BinMapNdf {
     const double all = static_cast<double>(map().texels.size());
     const double cell = std::sqrt(all * 1.5 * map().leaf_size * bins / std::max(texels, 1.0));
     const double border = 2 * (cover.columns() + cover.rows()) * cell + 2 * cell * cell;
-    constexpr double kTexelCost = 2, kListCost = 1, kBinCost = 12;  // relative, measured
+    constexpr double kTexelCost = 5, kListCost = 0.8, kBinCost = 60;  // nanoseconds, about
     const double by_list = kListCost * texels / all * std::min(all, border) + kBinCost * bins;
     return kTexelCost * cover.columns() * cover.rows() < by_list;
   }
 
   /// Needs classes of one bin each: then a texel's class is the ordinal of its bin.
   GLINT_HD void weighByTexel(const TexelCover& cover, const RowWindow* rows, int row_count, BinWeights& result) const {
+    constexpr std::uint8_t kNone = 255;
+    std::uint8_t slots[BinMap::kMaxClasses];
+    std::fill(slots, slots + map().classCount(), kNone);
     for (int r = 0; r < row_count; ++r) {
       for (int k = 0; k < rows[r].count; ++k) {
-        result.bins[rows[r].slot + k] = rows[r].bins[k];
-        result.weights[rows[r].slot + k] = 0;
+        const int slot = rows[r].slot + k;
+        result.bins[slot] = rows[r].bins[k];
+        result.weights[slot] = 0;
+        slots[rows[r].ordinal + static_cast<std::uint32_t>(k)] = static_cast<std::uint8_t>(slot);
       }
       result.count += rows[r].count;
     }
     for (int y = 0, j = cover.originY(); y < cover.rows(); ++y, j = j + 1 < map().height ? j + 1 : 0) {
       const std::uint64_t row = static_cast<std::uint64_t>(j) * map().width;
       for (int x = 0, i = cover.originX(); x < cover.columns(); ++x, i = i + 1 < map().width ? i + 1 : 0) {
-        const std::uint32_t ordinal = lists_.texelClass(row + i);
-        for (int r = 0; r < row_count; ++r)
-          if (ordinal - rows[r].ordinal < static_cast<std::uint32_t>(rows[r].count))
-            result.weights[rows[r].slot + static_cast<int>(ordinal - rows[r].ordinal)] += cover.texel(x, y);
+        const int slot = slots[lists_.texelClass(row + static_cast<std::uint64_t>(i))];
+        if (slot != kNone) result.weights[slot] += cover.texel(x, y);
       }
     }
   }
