@@ -21,6 +21,18 @@ MAPS = {
     "flakes": ["flakes", "--flake-size", 6, "--alpha", 0.2, "--seed", 3],
 }
 MB = 1e6
+# Nanoseconds of the authors' inverse bin map for the 21 weights of a query: (map, alpha) -> footprints of 4^2, 16^2, 64^2, 256^2, 1024^2.
+BIN_MAP_AUTHORS = {
+    ("isotropic 1K", 0.0025): (2448, 2668, 3197, 7113),
+    ("isotropic 1K", 0.01): (3099, 3782, 8178, 27034),
+    ("isotropic 1K", 0.04): (4056, 8401, 27716, 105466),
+    ("isotropic 1K", 0.16): (4545, 12073, 40903, 154321),
+    ("Gaussian 2K", 0.0025): (2582, 2598, 2644, 3052, 4639),
+    ("Gaussian 2K", 0.01): (3544, 3420, 4047, 7661, 25625),
+    ("Gaussian 2K", 0.04): (4820, 5457, 9827, 30889, 98485),
+    ("Gaussian 2K", 0.16): (6043, 10739, 33897, 120403, 457324),
+    ("brushed 2K", 0.01): (4701, 5397, 9027, 27758, 83114),
+}
 # Relative errors that coefficients of these types reach on every map.
 LEAST_ERROR = {"i8": 0.01, "f16": 0.002, "f32": 0}
 
@@ -164,6 +176,29 @@ class Bench:
                                    target=limit if pyramid else None, levels=asset["levels"])
                 self.table.add(f"rel_l2 at random, worst octave, {name} {kind}", worst("random", "rel_l2"), "")
 
+    def bin_maps(self):
+        """Every cell of the authors' table beside ours, build times, bytes and errors. One process; see binmap_bench.cpp."""
+        text = call([self.tools.folder / "glint-binmap-bench"])
+        (self.folder / "binmap.json").write_text(text)
+        for run in json.loads(text):
+            name, alpha = run["map"], round(run["alpha"], 4)
+            two_k = run["size"] == 2048
+            self.table.add(f"bin map, build, {name}, {alpha}", run["build_ms"], "ms", target=80 if two_k else None, paper="180 to 310 ms" if two_k else "",
+                           cpu_ms=run["build_cpu_ms"])
+            self.table.add(f"bin map, bytes, {name}, {alpha}", run["bytes"] / 2**20, "MiB", target=24 if two_k else None, paper="35 to 42 MiB" if two_k else "")
+            for k, entry in enumerate(run["queries"]):
+                authors = BIN_MAP_AUTHORS.get((name, alpha), ())
+                figure = f"bin map, weights, {name}, {alpha}, {entry['side']:.0f}^2"
+                if k < len(authors):
+                    ratio = authors[k] / entry["weights_ns"]
+                    self.table.add(figure, entry["weights_ns"], "ns", target=authors[k] / 5, paper=f"{authors[k]} ns, {ratio:.1f} x", **entry)
+                else:
+                    self.table.add(figure, entry["weights_ns"], "ns", **entry)
+            limit = 0.05 if "8-bit" in name else 0.015
+            for entry in run["errors"]:
+                self.table.add(f"bin map, median error, {name}, {alpha}, {entry['side']:.0f}^2", entry["median"], "", target=limit)
+                self.table.add(f"bin map, energy, {name}, {alpha}, {entry['side']:.0f}^2", abs(entry["energy"]), "", target=0.005)
+
     def write(self):
         results = {"machine": machine(), "size_texels": self.size, "repeats": self.repeats, "rows": self.table.rows}
         (self.folder / "results.json").write_text(json.dumps(results, indent=1) + "\n")
@@ -202,6 +237,7 @@ def main():
     bench.compressions()
     bench.queries()
     bench.query_command()
+    bench.bin_maps()
     bench.accuracy(parser.parse_args().samples)
     bench.write()
 
