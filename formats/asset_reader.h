@@ -11,6 +11,7 @@
 #include "glint/formats/schema.h"
 #include "glint/model/compressed_ndf.h"
 #include "glint/model/error.h"
+#include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
 
@@ -70,6 +71,7 @@ class Asset {
   const HeightMap& heights() const;
   const NdfPyramid& pyramid() const;
   const CompressedNdf& compressed() const;
+  const HistogramSat& histograms() const;
 
  private:
   struct State;

@@ -328,4 +328,8 @@ void writeAsset(const fs::path& path, const CompressedNdf& ndf, const Provenance
   writeModel(path, ndf, provenance, options);
 }
 
+void writeAsset(const fs::path& path, const HistogramSat& sat, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, sat, provenance, options);
+}
+
 }  // namespace glint::formats

@@ -71,6 +71,10 @@ constexpr std::array kRules = {
          kMakeAgain},
     Rule{"compressed.ranks", error, invalid_input, "cluster ranks are valid for the method", kMakeAgain},
     Rule{"compressed.ranges", error, invalid_input, "every cluster's factors lie inside their arrays", kMakeAgain},
+    Rule{"histogram.bins", error, invalid_input, "bin_ids increase, below theta_bins * phi_bins, which is at most 2048",
+         kMakeAgain},
+    Rule{"histogram.strides", error, invalid_input, "coarse_stride is a multiple of stride", kMakeAgain},
+    Rule{"histogram.texels", error, invalid_input, "every texel's bin is below bin_count", kMakeAgain},
     Rule{"dataset.hash", error, invalid_input, "a dataset's bytes have the hash of its attribute xxh3_128", kDamaged},
     Rule{"normals.finite", error, invalid_input, "normals are finite", "repair them with glint-ingest --fix-invalid"},
     Rule{"normals.disk", error, invalid_input, "normals lie inside the unit disk",
@@ -88,6 +92,9 @@ constexpr std::array kRules = {
     Rule{"compressed.scales", error, invalid_input, "scales are finite", kMakeAgain},
     Rule{"compressed.factors", error, invalid_input, "bases and coefficients are finite", kMakeAgain},
     Rule{"compressed.integral", warning, invalid_input, "every image integrates to 1 within 1e-3", kMakeAgain},
+    Rule{"histogram.bin_normals", error, invalid_input, "the mean normals of bins lie inside the unit disk", kMakeAgain},
+    Rule{"histogram.totals", error, invalid_input, "bin_totals are the numbers of texels of each bin, above 0", kMakeAgain},
+    Rule{"histogram.sums", error, invalid_input, "the tables of sums count the texels of each bin", kMakeAgain},
 };
 
 }  // namespace

@@ -55,6 +55,15 @@ struct SampleCompressed {
   CompressedNdf ndf;
 };
 
+struct SampleHistograms {
+  std::vector<std::uint16_t> bin_ids;
+  std::vector<Vec2> bin_normals;
+  std::vector<std::uint64_t> bin_totals;
+  std::vector<std::uint16_t> texels, sums, row_sums, column_sums;
+  std::vector<std::uint32_t> coarse_sums;
+  HistogramSat sat;
+};
+
 /// Bumps in the disk; sizes need not be powers of two.
 SampleNormals sampleNormals(int width, int height, bool with_bounds = true);
 SampleHeights sampleHeights(int width, int height);
@@ -62,6 +71,9 @@ SampleHeights sampleHeights(int width, int height);
 SamplePyramid samplePyramid(int size, BlockPrecision precision);
 /// The same images, each block approximated by a constant and slopes; two regions.
 SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type);
+
+/// Histograms of sampleNormals(width, height) over 12 x 8 bins; strides 4, 8 and 16 texels.
+SampleHistograms sampleHistograms(int width, int height);
 
 formats::Provenance sampleProvenance();
 
