@@ -19,8 +19,8 @@ void SatOptions::readBins() {
   const char* end = bins_.data() + bins_.size();
   const auto [cross, first_error] = std::from_chars(bins_.data(), end, options_.theta_bins);
   const bool crossed = first_error == std::errc() && cross != end && *cross == 'x';
-  const auto [stop, second_error] = crossed ? std::from_chars(cross + 1, end, options_.phi_bins)
-                                            : std::from_chars_result{end, std::errc::invalid_argument};
+  const auto [stop, second_error] =
+      crossed ? std::from_chars(cross + 1, end, options_.phi_bins) : std::from_chars_result{end, std::errc::invalid_argument};
   const bool two = second_error == std::errc() && stop == end;
   if (two && options_.theta_bins >= 1 && options_.theta_bins <= HistogramSat::kMaxThetaBins && options_.phi_bins >= 1 &&
       options_.phi_bins <= HistogramSat::kMaxPhiBins && options_.theta_bins * options_.phi_bins <= HistogramSat::kMaxBins) {
@@ -50,7 +50,8 @@ nlohmann::json satJson(const bake::HistogramSatData& sat) {
 std::string satText(const bake::HistogramSatData& sat) {
   const nlohmann::json json = satJson(sat);
   std::string text = fmt::format("{} of {} directions occur\n", json["bins"].get<int>(), json["directions"].get<int>());
-  for (const auto& [name, bytes] : json["tables"].items()) text += fmt::format("{:<12} {:>9.2f} MB\n", name, 1e-6 * bytes.get<double>());
+  for (const auto& [name, bytes] : json["tables"].items())
+    text += fmt::format("{:<12} {:>9.2f} MB\n", name, 1e-6 * bytes.get<double>());
   return text + fmt::format("{:<12} {:>9.2f} MB\n", "total", 1e-6 * json["size_bytes"].get<double>());
 }
 

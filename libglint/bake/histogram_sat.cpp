@@ -29,8 +29,7 @@ void checkOptions(const NormalMap& map, const HistogramSatOptions& options) {
     if (!holds) throw Error(ErrorCode::usage, "option.range", {}, object, what, remedy);
   };
   require(options.theta_bins >= 1 && options.theta_bins <= HistogramSat::kMaxThetaBins && options.phi_bins >= 1 &&
-              options.phi_bins <= HistogramSat::kMaxPhiBins &&
-              options.theta_bins * options.phi_bins <= HistogramSat::kMaxBins,
+              options.phi_bins <= HistogramSat::kMaxPhiBins && options.theta_bins * options.phi_bins <= HistogramSat::kMaxBins,
           "bins", std::to_string(options.theta_bins) + "x" + std::to_string(options.phi_bins) + " is out of range",
           "give 1 to 64 rings of elevation, 1 to 256 sectors of azimuth, at most 2048 bins");
   require(options.stride >= 1 && options.stride <= HistogramSat::kMaxStride, "stride",

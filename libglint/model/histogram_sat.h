@@ -23,8 +23,8 @@ namespace glint {
 struct HistogramSat {
   static constexpr int kMaxThetaBins = 64;
   static constexpr int kMaxPhiBins = 256;
-  static constexpr int kMaxBins = 2048;     ///< theta_bins * phi_bins at most
-  static constexpr int kMaxStride = 128;    ///< of the fine and the coarse table: keeps a cell far below 2^16 texels
+  static constexpr int kMaxBins = 2048;   ///< theta_bins * phi_bins at most
+  static constexpr int kMaxStride = 128;  ///< of the fine and the coarse table: keeps a cell far below 2^16 texels
   static constexpr int kMaxLineStride = 4096;
   static constexpr int kTileSize = 8;       ///< texels are stored in tiles, so that columns cost no more than rows
   static constexpr int kRowAlignment = 16;  ///< counters

@@ -16,16 +16,20 @@ inline constexpr double kAreaUnits = 4294967296.0;
 struct BinCounts {
   /// Sums of texels are kept in four rows side by side, so that runs of texels of one bin need not wait for each addition.
   static constexpr int kLanes = 4;
-  static constexpr int kLaneStride = HistogramSat::kMaxBins + 24;  ///< not a multiple of 4 KiB, which processors take for a clash
-  double totals[HistogramSat::kMaxBins];                           ///< texels of each bin, once finished; >= 0
-  std::int64_t areas[kLanes * kLaneStride];                        ///< kAreaUnits
+  static constexpr int kLaneStride =
+      HistogramSat::kMaxBins + 24;           ///< not a multiple of 4 KiB, which processors take for a clash
+  double totals[HistogramSat::kMaxBins];     ///< texels of each bin, once finished; >= 0
+  std::int64_t areas[kLanes * kLaneStride];  ///< kAreaUnits
 };
 
 /// Sums the texels of every bin. Exact for whole texels, up to 2^53.
 class AllBins {
  public:
   GLINT_HD AllBins(const HistogramSat& sat, BinCounts& counts)
-      : totals_(counts.totals), areas_(counts.areas), bin_totals_(sat.bin_totals.data()), count_(sat.bin_count),
+      : totals_(counts.totals),
+        areas_(counts.areas),
+        bin_totals_(sat.bin_totals.data()),
+        count_(sat.bin_count),
         stride_(sat.rowLength()) {
     std::fill(totals_, totals_ + stride_, 0.0);
     for (int lane = 0; lane < BinCounts::kLanes; ++lane)
@@ -107,37 +111,53 @@ class RectangleSums {
   /// the map.
   GLINT_HD void add(double x0, double x1, double y0, double y1, double weight) {
     forEachPiece(y0, y1, sat_.height, [&](double b0, double b1, double times_y) {
-      forEachPiece(x0, x1, sat_.width, [&](double a0, double a1, double times_x) {
-        addInside(a0, a1, b0, b1, weight * times_x * times_y);
+      forEachPiece(x0, x1, sat_.width,
+                   [&](double a0, double a1, double times_x) { addInside(a0, a1, b0, b1, weight * times_x * times_y); });
+    });
+  }
+
+  /// Row of the map that row j of the endless plane repeats.
+  GLINT_HD int rowOf(int j) const { return wrapIndex(j, sat_.height); }
+
+  /// Texels [from, to) of a row of the map, along the endless plane.
+  GLINT_HD void addRow(int row, int from, int to, double weight) {
+    if (to - from > kDifferenceCost) {
+      return forEachPiece(from, to, sat_.width, [&](double a, double b, double times) {
+        addRun<false>(row, static_cast<int>(a), static_cast<int>(b), weight * times);
       });
-    });
+    }
+    for (int column = wrapIndex(from, sat_.width), count = to - from; count > 0; column = 0) {
+      const int part = std::min(count, sat_.width - column);
+      addRunTexels<false>(row, column, column + part, weight);
+      count -= part;
+    }
   }
 
-  /// Texels [from, to) of row j of the endless plane.
-  GLINT_HD void addRow(int j, double from, double to, double weight) {
-    const int row = wrapIndex(j, sat_.height);
-    forEachPiece(from, to, sat_.width, [&](double a, double b, double times) {
-      addRun<false>(row, static_cast<int>(a), static_cast<int>(b), weight * times);
-    });
+  /// Texels [from, to) of a row of the map, along the endless plane, with weight(texel).
+  template <class Weight>
+  GLINT_HD void addTexels(int row, int from, int to, Weight&& weight) {
+    constexpr int kSize = HistogramSat::kTileSize;
+    const std::uint16_t* texels = sat_.texels.data() + sat_.texelIndex(0, row);
+    for (int i = from, column = wrapIndex(from, sat_.width); i < to; ++i) {
+      sum_.addTexel(texels[column / kSize * (kSize * kSize) + column % kSize], column & 3, areaUnits(weight(i)));
+      if (++column == sat_.width) column = 0;
+    }
   }
 
-  /// One texel of the endless plane.
-  GLINT_HD void addTexel(int i, int j, double weight) {
-    const int column = wrapIndex(i, sat_.width), row = wrapIndex(j, sat_.height);
-    sum_.addTexel(sat_.texels.data()[sat_.texelIndex(column, row)], column & 3, areaUnits(weight));
+  /// Nearest point of the fine table along u, in texels of the endless plane.
+  GLINT_HD int nearestPointX(int x) const {
+    const int column = wrapIndex(x, sat_.width);
+    return x - column + texelOf(nearest(column, sat_.stride, sat_.width), sat_.stride, sat_.width);
   }
 
-  /// Nearest point of the fine table along u, in texels of the endless plane; `slabOf` gives those below and above a row.
-  GLINT_HD double nearestPointX(double x) const {
-    const double period = std::floor(x / sat_.width) * sat_.width;
-    return period + texelOf(nearest(x - period, sat_.stride, sat_.width), sat_.stride, sat_.width);
-  }
+  /// Rows between two points of the fine table, of some kSlabTexels texels.
   struct Slab {
     int begin, end;
   };
   GLINT_HD Slab slabOf(int j) const {
-    const int row = wrapIndex(j, sat_.height), begin = row / sat_.stride * sat_.stride;
-    return {j - row + begin, j - row + std::min(begin + sat_.stride, sat_.height)};
+    const int span = sat_.stride * std::max(1, kSlabTexels / sat_.stride);
+    const int row = wrapIndex(j, sat_.height), begin = row / span * span;
+    return {j - row + begin, j - row + std::min(begin + span, sat_.height)};
   }
 
  private:
@@ -145,6 +165,8 @@ class RectangleSums {
   static constexpr double kFewTexels = 96;
   /// What a difference of two points of row_sums costs, in texels.
   static constexpr int kDifferenceCost = 96;
+  /// Higher slabs leave more texels at their ends, lower ones make more rectangles.
+  static constexpr int kSlabTexels = 16;
   static constexpr std::int64_t kFineLimit = 65536;
   static constexpr int kCacheLine = 32;  // counters
 
@@ -230,8 +252,8 @@ class RectangleSums {
     const int ends = std::abs(from - begin) + std::abs(to - end);
     if (first >= last || ends + kDifferenceCost > to - from) return addRunTexels<kColumn>(line, from, to, weight);
     const int points = kColumn ? sat_.pointsY(stride) : sat_.pointsX(stride);
-    const std::uint16_t* sums = (kColumn ? sat_.column_sums : sat_.row_sums).data() +
-                                static_cast<std::size_t>(line) * points * sat_.rowLength();
+    const std::uint16_t* sums =
+        (kColumn ? sat_.column_sums : sat_.row_sums).data() + static_cast<std::size_t>(line) * points * sat_.rowLength();
     const int step = static_cast<int>(kFineLimit - 1) / stride;
     for (int k = first; k < last; k += step) {
       const int next = std::min(k + step, last);

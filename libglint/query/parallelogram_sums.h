@@ -23,17 +23,16 @@ class ParallelogramSums {
   GLINT_HD void add(double x, double y, double ax, double ay, double bx, double by, double weight) {
     const double turn = ax * by - ay * bx > 0 ? 1 : -1;  // counter-clockwise
     const double sx[4] = {-1, 1, 1, -1}, sy[4] = {-turn, -turn, turn, turn};
-    double low = y, high = y;
+    double corner_x[4], corner_y[4];
     for (int k = 0; k < 4; ++k) {
-      corner_x_[k] = x + sx[k] * ax + sy[k] * bx;
-      corner_y_[k] = y + sx[k] * ay + sy[k] * by;
-      low = std::min(low, corner_y_[k]);
-      high = std::max(high, corner_y_[k]);
+      corner_x[k] = x + sx[k] * ax + sy[k] * bx;
+      corner_y[k] = y + sx[k] * ay + sy[k] * by;
     }
+    for (int k = 0; k < 4; ++k) setEdge(edges_[k], corner_x[k], corner_y[k], corner_x[(k + 1) & 3], corner_y[(k + 1) & 3]);
     weight_ = weight;
-    const int end = static_cast<int>(std::ceil(high));
-    for (int j = static_cast<int>(std::floor(low)); j < end;) {
-      const RectangleSlab slab = sum_.slabOf(j);
+    const int end = static_cast<int>(std::ceil(std::max({corner_y[0], corner_y[1], corner_y[2], corner_y[3]})));
+    for (int j = static_cast<int>(std::floor(std::min({corner_y[0], corner_y[1], corner_y[2], corner_y[3]}))); j < end;) {
+      const Slab slab = sum_.slabOf(j);
       const int slab_end = std::min(slab.end, end);
       for (run_count_ = 0; j < slab_end; ++j) addEdges(j);
       addRuns(slab);
@@ -42,48 +41,56 @@ class ParallelogramSums {
   }
 
  private:
-  using RectangleSlab = typename RectangleSums<Sum>::Slab;
-  struct Run {
-    int row;
-    double begin, end;
+  using Slab = typename RectangleSums<Sum>::Slab;
+  struct Edge {
+    double x, low, high;  // x at the low end
+    double slope, sign;   // sign: what it adds to the texels on its right
   };
+  struct Run {
+    int row, begin, end;
+  };
+
+  static GLINT_HD void setEdge(Edge& edge, double x0, double y0, double x1, double y1) {
+    edge.sign = y1 < y0 ? 1 : -1;
+    edge.x = y1 < y0 ? x1 : x0;
+    edge.low = std::min(y0, y1);
+    edge.high = std::max(y0, y1);
+    edge.slope = y0 == y1 ? 0 : (x1 - x0) / (y1 - y0);
+  }
 
   /// Adds the texels of row j that edges cross, and what lies between them: as a run for later where it is whole.
   GLINT_HD void addEdges(int j) {
-    double ends[4], shares[4];  // right of ends[k], an edge adds shares[k] to every texel of the row
-    int count = 0;
-    for (int k = 0; k < 4; ++k) {
-      double x0 = corner_x_[k], y0 = corner_y_[k], x1 = corner_x_[(k + 1) & 3], y1 = corner_y_[(k + 1) & 3];
-      const double sign = y1 < y0 ? 1 : -1;
-      if (y1 < y0) {
-        std::swap(x0, x1);
-        std::swap(y0, y1);
-      }
-      const double low = std::max<double>(y0, j), high = std::min<double>(y1, j + 1);
+    const int row = sum_.rowOf(j);
+    int ends[4], count = 0;
+    double shares[4];  // right of ends[k], an edge adds shares[k] to every texel of the row
+    for (const Edge& edge : edges_) {
+      const double low = std::max<double>(edge.low, j), high = std::min<double>(edge.high, j + 1);
       if (!(high > low)) continue;
-      const double slope = (x1 - x0) / (y1 - y0), at_low = x0 + (low - y0) * slope, at_high = x0 + (high - y0) * slope;
-      ends[count] = addEdge(j, std::min(at_low, at_high), std::max(at_low, at_high), sign * (high - low));
-      shares[count++] = sign * (high - low);
+      const double at_low = edge.x + (low - edge.low) * edge.slope, at_high = edge.x + (high - edge.low) * edge.slope;
+      shares[count] = edge.sign * (high - low);
+      ends[count] = addEdge(row, std::min(at_low, at_high), std::max(at_low, at_high), shares[count]);
+      ++count;
     }
     if (count == 2) {
       const int left = shares[0] > 0 ? 0 : 1;
-      if (shares[left] >= 1 && ends[left] <= ends[1 - left] && run_count_ < HistogramSat::kMaxStride) {
-        runs_[run_count_++] = {j, ends[left], ends[1 - left]};
+      if (shares[left] >= 1 && ends[left] <= ends[1 - left]) {
+        runs_[run_count_++] = {row, ends[left], ends[1 - left]};
         return;
       }
     }
-    addShares(j, ends, shares, count);
+    addShares(row, ends, shares, count);
   }
 
-  /// Texels of row j that an edge crosses between columns left and right. Returns the first texel that lies wholly on its right.
-  GLINT_HD double addEdge(int j, double left, double right, double share) {
+  /// Texels of a row that an edge crosses between columns left and right. Returns the first texel that lies wholly on its right.
+  GLINT_HD int addEdge(int row, double left, double right, double share) {
     const int first = static_cast<int>(std::floor(left)), last = std::max(static_cast<int>(std::ceil(right)), first);
-    const double extent = right - left;
-    for (int i = first; i < last; ++i) {
-      const double covered = extent > 1e-6 ? (coveredBefore(i + 1 - left) - coveredBefore(i + 1 - right)) / extent
-                                           : std::clamp(i + 1 - 0.5 * (left + right), 0.0, 1.0);
-      sum_.addTexel(i, j, weight_ * share * covered);
+    if (last - first == 1) {
+      sum_.addTexels(row, first, last, [&](int i) { return weight_ * share * (i + 1 - 0.5 * (left + right)); });
+      return last;
     }
+    const double scale = weight_ * share / (right - left);
+    sum_.addTexels(row, first, last,
+                   [&](int i) { return scale * (coveredBefore(i + 1 - left) - coveredBefore(i + 1 - right)); });
     return last;
   }
 
@@ -91,10 +98,11 @@ class ParallelogramSums {
   static GLINT_HD double coveredBefore(double t) { return t <= 0 ? 0 : t < 1 ? 0.5 * t * t : t - 0.5; }
 
   /// What edges add to the texels on their right, which ends where all have been passed.
-  GLINT_HD void addShares(int j, const double* ends, const double* shares, int count) {
+  GLINT_HD void addShares(int row, const int* ends, const double* shares, int count) {
     for (int k = 0; k < count; ++k) {
       // Between each end and the next one in order, the shares of all edges that end before.
-      double next = ends[k], total = 0;
+      int next = ends[k];
+      double total = 0;
       bool last = true, first_of_equals = true;
       for (int e = 0; e < count; ++e) {
         if (ends[e] <= ends[k]) total += shares[e];
@@ -104,18 +112,18 @@ class ParallelogramSums {
           last = false;
         }
       }
-      if (!last && first_of_equals) sum_.addRow(j, ends[k], next, weight_ * total);
+      if (!last && first_of_equals) sum_.addRow(row, ends[k], next, weight_ * total);
     }
   }
 
   /// The runs of the rows of one slab: as a rectangle where all rows have one, cut to points of the fine table.
-  GLINT_HD void addRuns(const RectangleSlab& slab) {
+  GLINT_HD void addRuns(const Slab& slab) {
     if (run_count_ < slab.end - slab.begin) {
       for (int k = 0; k < run_count_; ++k) sum_.addRow(runs_[k].row, runs_[k].begin, runs_[k].end, weight_);
       return;
     }
     const Run& middle = runs_[run_count_ / 2];
-    const double left = sum_.nearestPointX(middle.begin), right = std::max(left, sum_.nearestPointX(middle.end));
+    const int left = sum_.nearestPointX(middle.begin), right = std::max(left, sum_.nearestPointX(middle.end));
     for (int k = 0; k < run_count_; ++k) {
       addBetween(runs_[k].row, runs_[k].begin, left, weight_);
       addBetween(runs_[k].row, right, runs_[k].end, weight_);
@@ -131,11 +139,11 @@ class ParallelogramSums {
     end_ = slab.end;
   }
 
-  GLINT_HD void addBetween(int j, double from, double to, double weight) {
+  GLINT_HD void addBetween(int row, int from, int to, double weight) {
     if (from < to)
-      sum_.addRow(j, from, to, weight);
+      sum_.addRow(row, from, to, weight);
     else if (to < from)
-      sum_.addRow(j, to, from, -weight);
+      sum_.addRow(row, to, from, -weight);
   }
 
   /// Adds the rectangle of slabs seen so far.
@@ -145,12 +153,11 @@ class ParallelogramSums {
   }
 
   RectangleSums<Sum> sum_;
-  double corner_x_[4], corner_y_[4];
+  Edge edges_[4];
   double weight_ = 1;
   Run runs_[HistogramSat::kMaxStride];
   int run_count_ = 0;
-  double left_ = 0, right_ = 0;
-  int begin_ = 0, end_ = 0;
+  int left_ = 0, right_ = 0, begin_ = 0, end_ = 0;
 };
 
 }  // namespace glint

@@ -501,7 +501,8 @@ SampleHistograms sampleHistograms(int width, int height) {
   };
   const auto tableOf = [&](auto& table, int stride) {
     for (int b = 0; b < sat.pointsY(stride); ++b)
-      for (int a = 0; a < sat.pointsX(stride); ++a) count(table, 0, 0, std::min(a * stride, width), std::min(b * stride, height));
+      for (int a = 0; a < sat.pointsX(stride); ++a)
+        count(table, 0, 0, std::min(a * stride, width), std::min(b * stride, height));
   };
   tableOf(sample.sums, sat.stride);
   tableOf(sample.coarse_sums, sat.coarse_stride);
