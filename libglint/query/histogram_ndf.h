@@ -9,6 +9,7 @@
 #include "glint/query/histogram_sums.h"
 #include "glint/query/ndf_model.h"
 #include "glint/query/parallelogram_sums.h"
+#include "glint/query/sampling.h"
 #include "glint/query/spherical_bins.h"
 
 namespace glint {
@@ -93,6 +94,7 @@ class HistogramNdf {
   /// Half vector with probability density `density`, which is its pdf: xi.x chooses the bin and what is left of it the azimuth in
   /// the bin, xi.y the radius, so that even xi stay even within bins.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+    xi = clampUnit(xi);
     BinCounts counts;
     histogram(p, counts);
     double total = 0;

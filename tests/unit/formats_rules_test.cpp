@@ -444,7 +444,7 @@ std::vector<Fixture> indexFixtures() {
       patched("histogram.strides", Base::histograms,
               [](const Patch& patch) {
                 patch.setInteger("coarse_stride", 9);
-                patch.replace("coarse_sums", H5T_STD_U32LE, {4, 4, 16}, true);
+                patch.replace("coarse_sums", H5T_STD_U32LE, {4, 4, 32}, true);
               }),
       patched("histogram.texels", Base::histograms,
               [](const Patch& patch) { patch.change<std::uint16_t>("texels", 70, [](auto& bin) { bin = 60000; }); }),
@@ -666,7 +666,12 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 1, 2, 35, 29), 4.7890625f);
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 2, 0, 24, 32), 6.00390625f);
   const Asset histograms = Asset::open(folder / "histogram-sat.glint");
-  EXPECT_EQ(histograms.histograms().bin_count, 0);
+  const HistogramSat& sat = histograms.histograms();
+  ASSERT_EQ(sat.bin_count, 20);
+  EXPECT_EQ(sat.bin_ids[9], 9);
+  EXPECT_EQ(sat.bin_totals[9], 3u);
+  EXPECT_FLOAT_EQ(sat.bin_normals[9].x, 0.0831450075f);
+  EXPECT_EQ(sat.sums[(4 * 7 + 5) * 32 + 9], 1);
   struct Recorded {
     const char* file;
     float values[3];

@@ -393,7 +393,11 @@ TEST(HistogramNdf, AnswersAnyFootprint) {
         built.ndf.forEachBin(p, [&](int, float w) { sum += w; });
         EXPECT_NEAR(sum, 1, 1e-5) << size << " " << u;
         EXPECT_TRUE(std::isfinite(built.ndf.density(p, {0.01f, 0.02f})));
-        EXPECT_GT(built.ndf.sample(p, {0.5f, 0.5f}).pdf, 0);
+        for (const Vec2 xi : {Vec2{0.5f, 0.5f}, {nan, inf}, {-1, 2}}) {
+          const HalfVectorSample s = built.ndf.sample(p, xi);
+          EXPECT_GT(s.pdf, 0);
+          EXPECT_LT(dot(s.h, s.h), 1);
+        }
       }
     }
   }
