@@ -31,7 +31,7 @@ def number(process):
 
 def test_asset_is_valid_and_says_what_it_is(glint, sat):
     assert glint("validate", sat).returncode == 0
-    summary = json.loads(glint("info", sat, "--json").stdout)["result"]["files"][0]
+    summary = json.loads(glint("info", sat, "--json").stdout)["result"]
     assert summary["kind"] == "histogram-sat"
     assert summary["properties"]["directions"] == "9x32"
     assert summary["properties"]["stride_texels"] == 4
