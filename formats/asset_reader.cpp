@@ -42,5 +42,6 @@ const HeightMap& Asset::heights() const { return get<HeightMap>("heights"); }
 const NdfPyramid& Asset::pyramid() const { return get<NdfPyramid>("ndf-pyramid"); }
 const CompressedNdf& Asset::compressed() const { return get<CompressedNdf>("ndf-cp"); }
 const BinMap& Asset::binMap() const { return get<BinMap>("bin-map"); }
+const HistogramSat& Asset::histograms() const { return get<HistogramSat>("histogram-sat"); }
 
 }  // namespace glint::formats

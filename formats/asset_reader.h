@@ -12,6 +12,7 @@
 #include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
 #include "glint/model/error.h"
+#include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
 
@@ -72,6 +73,7 @@ class Asset {
   const NdfPyramid& pyramid() const;
   const CompressedNdf& compressed() const;
   const BinMap& binMap() const;
+  const HistogramSat& histograms() const;
 
  private:
   struct State;

@@ -332,4 +332,8 @@ void writeAsset(const fs::path& path, const BinMap& map, const Provenance& prove
   writeModel(path, map, provenance, options);
 }
 
+void writeAsset(const fs::path& path, const HistogramSat& sat, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, sat, provenance, options);
+}
+
 }  // namespace glint::formats

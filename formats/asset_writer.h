@@ -6,6 +6,7 @@
 #include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
 #include "glint/model/error.h"
+#include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
 
@@ -30,6 +31,7 @@ void writeAsset(const std::filesystem::path& path, const NdfPyramid& pyramid, co
 void writeAsset(const std::filesystem::path& path, const CompressedNdf& ndf, const Provenance& provenance,
                 const WriteOptions& options = {});
 void writeAsset(const std::filesystem::path& path, const BinMap& map, const Provenance& provenance,
+void writeAsset(const std::filesystem::path& path, const HistogramSat& sat, const Provenance& provenance,
                 const WriteOptions& options = {});
 
 }  // namespace glint::formats

@@ -78,6 +78,10 @@ constexpr std::array kRules = {
     Rule{"bin_map.grids", error, invalid_input, "every grid has a power of two of cells, which divide its bin's list",
          kMakeAgain},
     Rule{"bin_map.classes", error, invalid_input, "classes divide the bins, and every texel has one", kMakeAgain},
+    Rule{"histogram.bins", error, invalid_input, "bin_ids increase, below theta_bins * phi_bins, which is at most 2048",
+         kMakeAgain},
+    Rule{"histogram.strides", error, invalid_input, "coarse_stride is a multiple of stride", kMakeAgain},
+    Rule{"histogram.texels", error, invalid_input, "every texel's bin is below bin_count", kMakeAgain},
     Rule{"dataset.hash", error, invalid_input, "a dataset's bytes have the hash of its attribute xxh3_128", kDamaged},
     Rule{"normals.finite", error, invalid_input, "normals are finite", "repair them with glint-ingest --fix-invalid"},
     Rule{"normals.disk", error, invalid_input, "normals lie inside the unit disk",
@@ -98,6 +102,9 @@ constexpr std::array kRules = {
     Rule{"bin_map.texels", error, invalid_input, "every texel of the map is listed once, in its class and its cell",
          kMakeAgain},
     Rule{"bin_map.moments", error, invalid_input, "grid_moments are those of a distribution inside the bin", kMakeAgain},
+    Rule{"histogram.bin_normals", error, invalid_input, "the mean normals of bins lie inside the unit disk", kMakeAgain},
+    Rule{"histogram.totals", error, invalid_input, "bin_totals are the numbers of texels of each bin, above 0", kMakeAgain},
+    Rule{"histogram.sums", error, invalid_input, "the tables of sums count the texels of each bin", kMakeAgain},
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
+#include "glint/model/histogram_sat.h"
 
 namespace glint::formats {
 namespace {
@@ -63,6 +64,51 @@ KindSchema heightsSchema() {
           mapSize(),
           {},
           {{"heights", "", {{"", f32}}, {"height", "width"}, "texel", "height over the base plane, bottom row first"}}};
+}
+
+KindSchema histogramSatSchema() {
+  constexpr double kStride = HistogramSat::kMaxStride;
+  return {
+      "histogram-sat",
+      "Accumulated histograms of normals",
+      {integer("width", 1, kMaxMapSize, "texel", "width of the normal map"),
+       integer("height", 1, kMaxMapSize, "texel", "height of the normal map"),
+       integer("theta_bins", 1, HistogramSat::kMaxThetaBins, "1", "rings of elevation"),
+       integer("phi_bins", 1, HistogramSat::kMaxPhiBins, "1", "sectors of azimuth"),
+       integer("bin_count", 1, HistogramSat::kMaxBins, "1", "bins that occur"),
+       integer("stride", 1, kStride, "texel", "distance between the points of sums"),
+       integer("coarse_stride", 1, kStride, "texel", "distance between the points of coarse_sums; a multiple of stride"),
+       integer("line_stride", 1, HistogramSat::kMaxLineStride, "texel",
+               "distance between the points of row_sums, column_sums")},
+      {{"row_length", "ceil_div(bin_count, 16) * 16", "counters of a point"}},
+      {{"bin_ids", "", {{"", u16}}, {"bin_count"}, "1", "ring * phi_bins + sector of each bin that occurs, increasing"},
+       {"bin_normals", "", {{"", f32}}, {"bin_count", "2"}, "1", "mean (nx, ny) of the texels of each bin"},
+       {"bin_totals", "", {{"", u64}}, {"bin_count"}, "1", "texels of each bin"},
+       {"texels", "", {{"", u16}}, {"ceil_div(height, 8)", "ceil_div(width, 8)", "8", "8"}, "1", "bin of each texel, in tiles"},
+       {"sums",
+        "",
+        {{"", u16}},
+        {"ceil_div(height, stride) + 1", "ceil_div(width, stride) + 1", "row_length"},
+        "1",
+        "texels of each bin below and left of each point, modulo 2^16"},
+       {"coarse_sums",
+        "",
+        {{"", u32}},
+        {"ceil_div(height, coarse_stride) + 1", "ceil_div(width, coarse_stride) + 1", "row_length"},
+        "1",
+        "texels of each bin below and left of each point, modulo 2^32"},
+       {"row_sums",
+        "",
+        {{"", u16}},
+        {"height", "ceil_div(width, line_stride) + 1", "row_length"},
+        "1",
+        "texels of each bin in a row left of each point, modulo 2^16"},
+       {"column_sums",
+        "",
+        {{"", u16}},
+        {"width", "ceil_div(height, line_stride) + 1", "row_length"},
+        "1",
+        "texels of each bin in a column below each point, modulo 2^16"}}};
 }
 
 KindSchema normalsSchema() {
@@ -374,7 +420,7 @@ std::size_t sizeBytes(ElementType type) {
 }
 
 std::span<const KindSchema> kindSchemas() {
-  static const std::vector<KindSchema> table = {binMapSchema(), heightsSchema(), ndfCpSchema(), ndfPyramidSchema(),
+  static const std::vector<KindSchema> table = {binMapSchema(), heightsSchema(), histogramSatSchema(), ndfCpSchema(), ndfPyramidSchema(),
                                                 normalsSchema()};
   return table;
 }

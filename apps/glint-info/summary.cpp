@@ -132,6 +132,17 @@ ordered_json summarizeBinMap(const BinMap& map) {
           {"classes", map.classCount()}};
 }
 
+ordered_json summarizeHistograms(const HistogramSat& sat, const formats::AssetInfo& info) {
+  std::uint64_t bytes = 0;
+  for (const formats::DatasetInfo& dataset : info.datasets) bytes += dataset.size_bytes;
+  const auto fullest = std::max_element(sat.bin_totals.begin(), sat.bin_totals.end());
+  const double texels = static_cast<double>(sat.width) * sat.height;
+  return {{"bins", sat.bin_count},
+          {"fullest_bin", sat.bin_ids[static_cast<std::size_t>(fullest - sat.bin_totals.begin())]},
+          {"fullest_share", static_cast<double>(*fullest) / texels},
+          {"bytes_per_texel", static_cast<double>(bytes) / texels}};
+}
+
 void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json& statistics) {
   if (asset.kind() == "normals") {
     const NormalMap& map = asset.normals();
@@ -164,6 +175,15 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
                   {"bins_per_axis", map.bins_per_axis},
                   {"leaf_size", map.leaf_size}};
     statistics = summarizeBinMap(map);
+  } else if (asset.kind() == "histogram-sat") {
+    const HistogramSat& sat = asset.histograms();
+    properties = {{"width", sat.width},
+                  {"height", sat.height},
+                  {"directions", std::to_string(sat.theta_bins) + "x" + std::to_string(sat.phi_bins)},
+                  {"stride_texels", sat.stride},
+                  {"coarse_stride_texels", sat.coarse_stride},
+                  {"line_stride_texels", sat.line_stride}};
+    statistics = summarizeHistograms(sat, asset.info());
   }
 }
 

@@ -158,6 +158,24 @@ class Bench:
                 else:
                     self.table.add(f"{what.replace('_', ', ')}, {kind}", entry["cpu_time"], "ns", target=150 if what == "density_warm" and file != "ggx" else None)
 
+    def histograms(self):
+        """Memory and time of accumulated histograms against the distance of the table's points."""
+        for name in MAPS:
+            strides = {4: 200, 8: None, 16: 40, 32: None}
+            for stride, megabytes in strides.items():
+                run = self.process(f"histograms, stride {stride}, {name}", "sat", self.path(name), "-o", self.path(name, f"sat{stride}"),
+                                   "--bins", "9x32", "--stride", stride, target=1.5, paper="9 s, 32 cores")
+                self.table.add(f"bytes of histograms, stride {stride}, {name}", run.result["size_bytes"] / MB, "MB", target=megabytes,
+                               paper="1.1 GB", bins=run.result["bins"])
+            text = call([self.tools.folder / "glint-sat-bench", *(self.path(name, f"sat{stride}") for stride in strides)])
+            for asset in json.loads(text):
+                for query in asset["queries"]:
+                    size, stride = query["size_texels"], asset["stride_texels"]
+                    kind = f"{size}^2{' rotated' if query['rotated'] else ''}"
+                    target = (3 if size <= 256 else 10) if stride == 4 else None
+                    self.table.add(f"histogram of {kind}, stride {stride}, {name}", query["histogram_ns"] / 1000, "us", target=target,
+                                   density_ns=query["density_ns"], bins=asset["bins"])
+
     def query_command(self):
         asset = self.path("flakes", "cp32")
         run = self.tools.repeat(self.repeats, "query", asset, "--uv", 0.3, 0.7, "--sigma", 40, "--half", 0.1, -0.05, "--repeat", 300000)
@@ -236,6 +254,7 @@ def main():
     bench.pyramids()
     bench.compressions()
     bench.queries()
+    bench.histograms()
     bench.query_command()
     bench.bin_maps()
     bench.accuracy(parser.parse_args().samples)

@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
     writeAsset(folder / "normals.glint", test::sampleNormals(64, 48).map, provenance);
     writeAsset(folder / "heights.glint", test::sampleHeights(64, 48).map, provenance);
     writeAsset(folder / "ndf-pyramid.glint", test::samplePyramid(64, BlockPrecision::f16).pyramid, provenance);
+    writeAsset(folder / "histogram-sat.glint", test::sampleHistograms(22, 19).sat, provenance);
     using enum CompressionMethod;
     writeAsset(folder / "ndf-cp-cp-i8.glint", test::sampleCompressed(64, cp, CoefficientType::i8).ndf, provenance);
     writeAsset(folder / "ndf-cp-tucker-f16.glint", test::sampleCompressed(64, tucker, CoefficientType::f16).ndf, provenance);

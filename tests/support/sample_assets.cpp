@@ -552,6 +552,60 @@ SampleBinMap sampleBinMap(int width, int height) {
   return sample;
 }
 
+SampleHistograms sampleHistograms(int width, int height) {
+  constexpr int kRings = 12;
+  constexpr int kSectors = 8;
+  constexpr double kPi = 3.14159265358979323846;
+  const SampleNormals map = sampleNormals(width, height, false);
+  const auto direction = [](Vec2 n) {
+    const double phi = std::atan2(double{n.y}, double{n.x});
+    const int ring = static_cast<int>(std::asin(std::sqrt(double{n.x} * n.x + double{n.y} * n.y)) / (kPi / 2) * kRings);
+    return ring * kSectors + std::min(static_cast<int>((phi < 0 ? phi + 2 * kPi : phi) / (2 * kPi) * kSectors), kSectors - 1);
+  };
+  SampleHistograms sample;
+  HistogramSat& sat = sample.sat;
+  sat.width = width, sat.height = height, sat.theta_bins = kRings, sat.phi_bins = kSectors;
+  sat.stride = 4, sat.coarse_stride = 8, sat.line_stride = 16;
+  sample.texels.resize(static_cast<std::size_t>(sat.tileRows()) * sat.tileColumns() * 64);
+  for (int id = 0; id < kRings * kSectors; ++id) {
+    double x = 0, y = 0;
+    std::uint64_t count = 0;
+    for (int j = 0; j < height; ++j) {
+      for (int i = 0; i < width; ++i) {
+        if (direction(map.map.at(i, j)) != id) continue;
+        sample.texels[sat.texelIndex(i, j)] = static_cast<std::uint16_t>(sample.bin_ids.size());
+        x += map.map.at(i, j).x, y += map.map.at(i, j).y, ++count;
+      }
+    }
+    if (count == 0) continue;
+    sample.bin_ids.push_back(static_cast<std::uint16_t>(id));
+    sample.bin_normals.push_back({static_cast<float>(x / count), static_cast<float>(y / count)});
+    sample.bin_totals.push_back(count);
+  }
+  sat.bin_count = static_cast<int>(sample.bin_ids.size());
+  const auto count = [&](auto& table, int x0, int y0, int x1, int y1) {
+    const std::size_t point = table.size();
+    table.resize(point + sat.rowLength());
+    for (int j = y0; j < y1; ++j)
+      for (int i = x0; i < x1; ++i) ++table[point + sample.texels[sat.texelIndex(i, j)]];
+  };
+  const auto tableOf = [&](auto& table, int stride) {
+    for (int b = 0; b < sat.pointsY(stride); ++b)
+      for (int a = 0; a < sat.pointsX(stride); ++a)
+        count(table, 0, 0, std::min(a * stride, width), std::min(b * stride, height));
+  };
+  tableOf(sample.sums, sat.stride);
+  tableOf(sample.coarse_sums, sat.coarse_stride);
+  for (int j = 0; j < height; ++j)
+    for (int a = 0; a < sat.pointsX(16); ++a) count(sample.row_sums, 0, j, std::min(a * 16, width), j + 1);
+  for (int i = 0; i < width; ++i)
+    for (int b = 0; b < sat.pointsY(16); ++b) count(sample.column_sums, i, 0, i + 1, std::min(b * 16, height));
+  sat.bin_ids = sample.bin_ids, sat.bin_normals = sample.bin_normals, sat.bin_totals = sample.bin_totals;
+  sat.texels = sample.texels, sat.sums = sample.sums, sat.coarse_sums = sample.coarse_sums;
+  sat.row_sums = sample.row_sums, sat.column_sums = sample.column_sums;
+  return sample;
+}
+
 formats::Provenance sampleProvenance() {
   return {"sample_assets 1.0",
           R"({"size":64})",

@@ -62,6 +62,15 @@ struct SampleBinMap {
   BinMap map;
 };
 
+struct SampleHistograms {
+  std::vector<std::uint16_t> bin_ids;
+  std::vector<Vec2> bin_normals;
+  std::vector<std::uint64_t> bin_totals;
+  std::vector<std::uint16_t> texels, sums, row_sums, column_sums;
+  std::vector<std::uint32_t> coarse_sums;
+  HistogramSat sat;
+};
+
 /// Bumps in the disk; sizes need not be powers of two.
 SampleNormals sampleNormals(int width, int height, bool with_bounds = true);
 SampleHeights sampleHeights(int width, int height);
@@ -72,6 +81,8 @@ SampleCompressed sampleCompressed(int size, CompressionMethod method, Coefficien
 
 /// sampleNormals(width, height) in 9 x 9 bins; lists of more than 64 texels have grids of 4 cells. Every second bin starts a class.
 SampleBinMap sampleBinMap(int width, int height);
+/// Histograms of sampleNormals(width, height) over 12 x 8 bins; strides 4, 8 and 16 texels.
+SampleHistograms sampleHistograms(int width, int height);
 
 formats::Provenance sampleProvenance();
 

@@ -25,7 +25,9 @@ namespace {
 namespace fs = std::filesystem;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-enum class Base { normals, heights, pyramid, compressed, compressed_f32, bin_map };
+enum class Base { normals, heights, pyramid, compressed, compressed_f32, bin_map, histograms };
+constexpr Base kBases[] = {Base::normals,        Base::heights, Base::pyramid,   Base::compressed,
+                           Base::compressed_f32, Base::bin_map, Base::histograms};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -42,6 +44,8 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
     case Base::bin_map:
       return writeAsset(path, test::sampleBinMap(64, 48).map, provenance);
+    case Base::histograms:
+      return writeAsset(path, test::sampleHistograms(22, 19).sat, provenance);
   }
 }
 
@@ -433,6 +437,21 @@ std::vector<Fixture> indexFixtures() {
               [](const Patch& patch) {
                 patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_scale = 1000; });
               }),
+      patched("histogram.bins", Base::histograms,
+              [](const Patch& patch) { patch.change<std::uint16_t>("bin_ids", 1, [](auto& id) { id = 0; }); }),
+      patched("histogram.bins", Base::histograms, [](const Patch& patch) { patch.setInteger("theta_bins", 1); }),
+      patched("histogram.bins", Base::histograms,
+              [](const Patch& patch) {
+                patch.setInteger("theta_bins", 64);
+                patch.setInteger("phi_bins", 256);
+              }),
+      patched("histogram.strides", Base::histograms,
+              [](const Patch& patch) {
+                patch.setInteger("coarse_stride", 9);
+                patch.replace("coarse_sums", H5T_STD_U32LE, {4, 4, 32}, true);
+              }),
+      patched("histogram.texels", Base::histograms,
+              [](const Patch& patch) { patch.change<std::uint16_t>("texels", 70, [](auto& bin) { bin = 60000; }); }),
   };
 }
 
@@ -504,6 +523,24 @@ std::vector<Fixture> dataFixtures() {
       patched(
           "compressed.integral", Base::compressed,
           [](const Patch& patch) { patch.change<float>("image_scales", 3, [](float& scale) { scale *= 1.1f; }); }, true),
+      patched(
+          "histogram.bin_normals", Base::histograms,
+          [](const Patch& patch) { patch.change<Vec2>("bin_normals", 1, [](Vec2& n) { n.x = kNan; }); }, true),
+      patched(
+          "histogram.totals", Base::histograms,
+          [](const Patch& patch) { patch.change<std::uint64_t>("bin_totals", 1, [](auto& total) { ++total; }); }, true),
+      patched(
+          "histogram.sums", Base::histograms,
+          [](const Patch& patch) { patch.change<std::uint16_t>("sums", 200, [](auto& sum) { ++sum; }); }, true),
+      patched(
+          "histogram.sums", Base::histograms,
+          [](const Patch& patch) { patch.change<std::uint32_t>("coarse_sums", 90, [](auto& sum) { ++sum; }); }, true),
+      patched(
+          "histogram.sums", Base::histograms,
+          [](const Patch& patch) { patch.change<std::uint16_t>("row_sums", 90, [](auto& sum) { --sum; }); }, true),
+      patched(
+          "histogram.sums", Base::histograms,
+          [](const Patch& patch) { patch.change<std::uint16_t>("column_sums", 0, [](auto& sum) { ++sum; }); }, true),
   };
 }
 
@@ -577,7 +614,7 @@ TEST(FormatRules, IdsAreUnique) {
 
 TEST(FormatRules, GoodFilesBreakNoRule) {
   const test::TempFolder folder;
-  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::bin_map}) {
+  for (const Base base : kBases) {
     const fs::path path = folder / (std::to_string(static_cast<int>(base)) + ".glint");
     writeBase(path, base);
     for (const Finding& finding : validateAsset(path).findings) {
@@ -588,7 +625,7 @@ TEST(FormatRules, GoodFilesBreakNoRule) {
 
 TEST(FormatRules, EveryFailingFileIsNamedByItsRule) {
   const test::TempFolder folder;
-  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::bin_map}) {
+  for (const Base base : kBases) {
     writeBase(folder / (std::to_string(static_cast<int>(base)) + ".glint"), base);
   }
   int number = 0;
@@ -681,6 +718,13 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 0, 5, 30, 33), 4.3046875f);
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 1, 2, 35, 29), 4.7890625f);
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 2, 0, 24, 32), 6.00390625f);
+  const Asset histograms = Asset::open(folder / "histogram-sat.glint");
+  const HistogramSat& sat = histograms.histograms();
+  ASSERT_EQ(sat.bin_count, 20);
+  EXPECT_EQ(sat.bin_ids[9], 9);
+  EXPECT_EQ(sat.bin_totals[9], 3u);
+  EXPECT_FLOAT_EQ(sat.bin_normals[9].x, 0.0831450075f);
+  EXPECT_EQ(sat.sums[(4 * 7 + 5) * 32 + 9], 1);
   struct Recorded {
     const char* file;
     float values[3];
