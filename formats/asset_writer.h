@@ -31,6 +31,7 @@ void writeAsset(const std::filesystem::path& path, const NdfPyramid& pyramid, co
 void writeAsset(const std::filesystem::path& path, const CompressedNdf& ndf, const Provenance& provenance,
                 const WriteOptions& options = {});
 void writeAsset(const std::filesystem::path& path, const BinMap& map, const Provenance& provenance,
+                const WriteOptions& options = {});
 void writeAsset(const std::filesystem::path& path, const HistogramSat& sat, const Provenance& provenance,
                 const WriteOptions& options = {});
 

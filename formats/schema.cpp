@@ -420,8 +420,8 @@ std::size_t sizeBytes(ElementType type) {
 }
 
 std::span<const KindSchema> kindSchemas() {
-  static const std::vector<KindSchema> table = {binMapSchema(), heightsSchema(), histogramSatSchema(), ndfCpSchema(), ndfPyramidSchema(),
-                                                normalsSchema()};
+  static const std::vector<KindSchema> table = {binMapSchema(), heightsSchema(),    histogramSatSchema(),
+                                                ndfCpSchema(),  ndfPyramidSchema(), normalsSchema()};
   return table;
 }
 

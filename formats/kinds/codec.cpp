@@ -17,9 +17,9 @@ constexpr Codec codecOf(std::string_view kind) {
           [](const AnyAsset& asset, Findings& findings) { checkData(std::get<Model>(asset), findings); }};
 }
 
-constexpr std::array kCodecs = {codecOf<BinMap>("bin-map"),           codecOf<HeightMap>("heights"),
-                                codecOf<HistogramSat>("histogram-sat"), codecOf<CompressedNdf>("ndf-cp"),
-                                codecOf<NdfPyramid>("ndf-pyramid"),   codecOf<NormalMap>("normals")};
+constexpr std::array kCodecs = {
+    codecOf<BinMap>("bin-map"),       codecOf<HeightMap>("heights"),      codecOf<HistogramSat>("histogram-sat"),
+    codecOf<CompressedNdf>("ndf-cp"), codecOf<NdfPyramid>("ndf-pyramid"), codecOf<NormalMap>("normals")};
 
 }  // namespace
 

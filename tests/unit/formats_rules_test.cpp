@@ -282,56 +282,33 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.virtual", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually); }),
       patched("dataset.external", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external); }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked); }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact); }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false); }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false); }),
       {"dataset.alignment", Base::heights,
-       [](const fs::path& path) {
-         Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
-       }},
+       [](const fs::path& path) { Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }},
       {"dataset.alignment_64", Base::heights,
-       [](const fs::path& path) {
-         Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
-       },
-       true},
+       [](const fs::path& path) { Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }, true},
       patched(
           "dataset.unknown", Base::heights, [](const Patch& patch) { patch.replace("extra", H5T_IEEE_F32LE, {kSize}, true); },
           true),
       patched("dataset.missing", Base::heights, [](const Patch& patch) { H5Ldelete(patch.file(), "heights", 0); }),
       patched("dataset.missing", Base::pyramid, [](const Patch& patch) { H5Ldelete(patch.file(), "level_01/masks", 0); }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true); }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true); }),
       patched("dataset.type", Base::pyramid, [](const Patch& patch) { patch.setText("precision", "f16"); }),
       patched("dataset.type", Base::compressed,
-              [](const Patch& patch) {
-                patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true);
-              }),
+              [](const Patch& patch) { patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true); }),
       patched("dataset.type", Base::heights,
               [](const Patch& patch) {
                 const hid_t type = H5Tcopy(H5T_IEEE_F32LE);
@@ -341,9 +318,7 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.dims", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true); }),
       patched("dataset.dims", Base::heights,
               [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize * kSize}, true); }),
       patched("dataset.dims", Base::heights, [](const Patch& patch) { patch.setInteger("width", kSize + 1); }),
@@ -462,14 +437,10 @@ std::vector<Fixture> dataFixtures() {
           [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n.y = kNan; }); }, true),
       patched(
           "normals.disk", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
-                                     n = {0.8f, -0.7f};
-                                   }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.8f, -0.7f}; }); }, true),
       patched(
           "normals.bounds", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
-                                     n = {0.7f, -0.7f};
-                                   }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.7f, -0.7f}; }); }, true),
       patched(
           "normals.bounds", Base::normals,
           [](const Patch& patch) { patch.change<NormalBounds>("bounds/level_02", 3, [](auto& node) { node.high_x = -1; }); },
@@ -502,7 +473,8 @@ std::vector<Fixture> dataFixtures() {
           "compressed.block_masks", Base::compressed,
           [](const Patch& patch) {
             // As many bits as before, one of them elsewhere.
-            patch.change<std::uint64_t>("block_masks", 5, [](auto& mask) { mask = (mask & (mask - 1)) | (~mask & (mask + 1)); });
+            patch.change<std::uint64_t>("block_masks", 5,
+                                        [](auto& mask) { mask = (mask & (mask - 1)) | (~mask & (mask + 1)); });
           },
           true),
       patched(
