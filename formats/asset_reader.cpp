@@ -41,5 +41,7 @@ const NormalMap& Asset::normals() const { return get<NormalMap>("normals"); }
 const HeightMap& Asset::heights() const { return get<HeightMap>("heights"); }
 const NdfPyramid& Asset::pyramid() const { return get<NdfPyramid>("ndf-pyramid"); }
 const CompressedNdf& Asset::compressed() const { return get<CompressedNdf>("ndf-cp"); }
+const ShLight& Asset::shLight() const { return get<ShLight>("sh-light"); }
+const ShLobes& Asset::shLobes() const { return get<ShLobes>("sh-lobes"); }
 
 }  // namespace glint::formats

@@ -13,6 +13,7 @@
 #include "glint/model/error.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
+#include "glint/model/sh.h"
 
 namespace glint::formats {
 
@@ -70,6 +71,8 @@ class Asset {
   const HeightMap& heights() const;
   const NdfPyramid& pyramid() const;
   const CompressedNdf& compressed() const;
+  const ShLight& shLight() const;
+  const ShLobes& shLobes() const;
 
  private:
   struct State;

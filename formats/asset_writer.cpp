@@ -328,4 +328,12 @@ void writeAsset(const fs::path& path, const CompressedNdf& ndf, const Provenance
   writeModel(path, ndf, provenance, options);
 }
 
+void writeAsset(const fs::path& path, const ShLight& light, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, light, provenance, options);
+}
+
+void writeAsset(const fs::path& path, const ShLobes& lobes, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, lobes, provenance, options);
+}
+
 }  // namespace glint::formats

@@ -7,6 +7,7 @@
 #include "glint/model/error.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
+#include "glint/model/sh.h"
 
 namespace glint::formats {
 
@@ -27,6 +28,10 @@ void writeAsset(const std::filesystem::path& path, const HeightMap& map, const P
 void writeAsset(const std::filesystem::path& path, const NdfPyramid& pyramid, const Provenance& provenance,
                 const WriteOptions& options = {});
 void writeAsset(const std::filesystem::path& path, const CompressedNdf& ndf, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const ShLight& light, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const ShLobes& lobes, const Provenance& provenance,
                 const WriteOptions& options = {});
 
 }  // namespace glint::formats

@@ -71,6 +71,7 @@ constexpr std::array kRules = {
          kMakeAgain},
     Rule{"compressed.ranks", error, invalid_input, "cluster ranks are valid for the method", kMakeAgain},
     Rule{"compressed.ranges", error, invalid_input, "every cluster's factors lie inside their arrays", kMakeAgain},
+    Rule{"sh.grid", error, invalid_input, "a grid is 0 x 0 (lobes only) or has at least 2 rows and 3 columns", kMakeAgain},
     Rule{"dataset.hash", error, invalid_input, "a dataset's bytes have the hash of its attribute xxh3_128", kDamaged},
     Rule{"normals.finite", error, invalid_input, "normals are finite", "repair them with glint-ingest --fix-invalid"},
     Rule{"normals.disk", error, invalid_input, "normals lie inside the unit disk",
@@ -88,6 +89,10 @@ constexpr std::array kRules = {
     Rule{"compressed.scales", error, invalid_input, "scales are finite", kMakeAgain},
     Rule{"compressed.factors", error, invalid_input, "bases and coefficients are finite", kMakeAgain},
     Rule{"compressed.integral", warning, invalid_input, "every image integrates to 1 within 1e-3", kMakeAgain},
+    Rule{"sh.finite", error, invalid_input, "coefficients, scales and norms are finite, the latter two not negative",
+         kMakeAgain},
+    Rule{"sh.zonal", warning, invalid_input, "lobes have the norm of the lobe along +z within 1e-2", kMakeAgain},
+    Rule{"sh.band_norms", error, invalid_input, "band_norms are the norms of the coefficients", kMakeAgain},
 };
 
 }  // namespace

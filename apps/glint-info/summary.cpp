@@ -120,6 +120,26 @@ ordered_json summarizeCompressed(const CompressedNdf& ndf, const formats::AssetI
           {"levels", std::move(levels)}};
 }
 
+ordered_json shProperties(int order, const ShGrid& grid, ShPrecision precision) {
+  return {{"order", order},
+          {"coefficients", shCount(order)},
+          {"grid", std::to_string(grid.rows) + "x" + std::to_string(grid.columns)},
+          {"precision", precision == ShPrecision::f16 ? "f16" : "f32"}};
+}
+
+/// How much of the light the bands hold, over all outgoing directions: shares of the sum of squares.
+ordered_json summarizeLight(const ShLight& light) {
+  const std::size_t bands = static_cast<std::size_t>(light.order) + 1;
+  double total = 0, first = 0, upper = 0;
+  for (std::size_t k = 0; k < light.band_norms.size(); ++k) {
+    const double square = double{light.band_norms[k]} * light.band_norms[k];
+    total += square;
+    if (k % bands == 0) first += square;
+    if (k % bands > bands / 2) upper += square;
+  }
+  return {{"share_of_band_0", total > 0 ? first / total : 0.0}, {"share_of_upper_half", total > 0 ? upper / total : 0.0}};
+}
+
 void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json& statistics) {
   if (asset.kind() == "normals") {
     const NormalMap& map = asset.normals();
@@ -144,6 +164,15 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
     properties["coefficient_type"] = kTypes[static_cast<int>(ndf.coefficient_type)];
     properties["regions"] = std::to_string(ndf.region_columns) + "x" + std::to_string(ndf.region_rows);
     statistics = summarizeCompressed(ndf, asset.info());
+  } else if (asset.kind() == "sh-lobes") {
+    const ShLobes& lobes = asset.shLobes();
+    properties = shProperties(lobes.order, lobes.grid, lobes.precision);
+    properties["sigma_r"] = lobes.sigma_r;
+    statistics = {{"mean", lobes.zonal[0]}, {"last_band", lobes.zonal.back()}};
+  } else if (asset.kind() == "sh-light") {
+    const ShLight& light = asset.shLight();
+    properties = shProperties(light.order, light.grid, light.precision);
+    statistics = summarizeLight(light);
   }
 }
 

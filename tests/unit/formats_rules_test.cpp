@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-enum class Base { normals, heights, pyramid, compressed, compressed_f32 };
+enum class Base { normals, heights, pyramid, compressed, compressed_f32, sh_lobes, sh_light };
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -40,6 +40,10 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
     case Base::compressed_f32:
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
+    case Base::sh_lobes:
+      return writeAsset(path, test::sampleShLobes().lobes, provenance);
+    case Base::sh_light:
+      return writeAsset(path, test::sampleShLight().light, provenance);
   }
 }
 
@@ -505,9 +509,43 @@ std::vector<Fixture> dataFixtures() {
   };
 }
 
+std::vector<Fixture> shFixtures() {
+  return {
+      patched("sh.grid", Base::sh_lobes,
+              [](const Patch& patch) {
+                patch.setInteger("grid_rows", 1);
+                patch.replace("lobes", H5T_IEEE_F32LE, {1, 4, 4}, true);
+              }),
+      patched("sh.grid", Base::sh_lobes,
+              [](const Patch& patch) {
+                patch.setInteger("grid_columns", 0);
+                patch.replace("lobes", H5T_IEEE_F32LE, {3, 0, 4}, false);
+              }),
+      patched(
+          "sh.finite", Base::sh_lobes,
+          [](const Patch& patch) { patch.change<float>("zonal", 1, [](float& f) { f = kNan; }); }, true),
+      patched(
+          "sh.finite", Base::sh_lobes,
+          [](const Patch& patch) { patch.change<float>("lobes", 9, [](float& c) { c = INFINITY; }); }, true),
+      patched(
+          "sh.finite", Base::sh_light,
+          [](const Patch& patch) { patch.change<float>("scales", 2, [](float& scale) { scale = -1; }); }, true),
+      patched(
+          "sh.finite", Base::sh_light,
+          [](const Patch& patch) { patch.change<std::uint16_t>("light", 40, [](auto& c) { c = 0x7e00; }); }, true),
+      patched(
+          "sh.zonal", Base::sh_lobes,
+          [](const Patch& patch) { patch.change<float>("lobes", 4, [](float& c) { c *= 2; }); }, true),
+      patched(
+          "sh.band_norms", Base::sh_light,
+          [](const Patch& patch) { patch.change<float>("band_norms", 4, [](float& norm) { norm *= 1.1f; }); }, true),
+  };
+}
+
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
-  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures()}) {
+  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures(),
+                    shFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
@@ -526,7 +564,8 @@ TEST(FormatRules, IdsAreUnique) {
 
 TEST(FormatRules, GoodFilesBreakNoRule) {
   const test::TempFolder folder;
-  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32}) {
+  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::sh_lobes,
+                          Base::sh_light}) {
     const fs::path path = folder / (std::to_string(static_cast<int>(base)) + ".glint");
     writeBase(path, base);
     for (const Finding& finding : validateAsset(path).findings) {
@@ -537,7 +576,8 @@ TEST(FormatRules, GoodFilesBreakNoRule) {
 
 TEST(FormatRules, EveryFailingFileIsNamedByItsRule) {
   const test::TempFolder folder;
-  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32}) {
+  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::sh_lobes,
+                          Base::sh_light}) {
     writeBase(folder / (std::to_string(static_cast<int>(base)) + ".glint"), base);
   }
   int number = 0;
@@ -616,7 +656,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 7u);
+  EXPECT_EQ(count, 9u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -630,6 +670,8 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 0, 5, 30, 33), 4.3046875f);
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 1, 2, 35, 29), 4.7890625f);
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 2, 0, 24, 32), 6.00390625f);
+  EXPECT_EQ(static_cast<const float*>(Asset::open(folder / "sh-lobes.glint").shLobes().coefficients)[5 * 4 + 3], 0.4f);
+  EXPECT_EQ(Asset::open(folder / "sh-light.glint").shLight().band_norms[7], 12.2799206f);
   struct Recorded {
     const char* file;
     float values[3];
