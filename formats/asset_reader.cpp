@@ -43,5 +43,7 @@ const NdfPyramid& Asset::pyramid() const { return get<NdfPyramid>("ndf-pyramid")
 const CompressedNdf& Asset::compressed() const { return get<CompressedNdf>("ndf-cp"); }
 const BinMap& Asset::binMap() const { return get<BinMap>("bin-map"); }
 const HistogramSat& Asset::histograms() const { return get<HistogramSat>("histogram-sat"); }
+const ShLight& Asset::shLight() const { return get<ShLight>("sh-light"); }
+const ShLobes& Asset::shLobes() const { return get<ShLobes>("sh-lobes"); }
 
 }  // namespace glint::formats

@@ -15,6 +15,7 @@
 #include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
+#include "glint/model/sh.h"
 
 namespace glint::formats {
 
@@ -74,6 +75,8 @@ class Asset {
   const CompressedNdf& compressed() const;
   const BinMap& binMap() const;
   const HistogramSat& histograms() const;
+  const ShLight& shLight() const;
+  const ShLobes& shLobes() const;
 
  private:
   struct State;

@@ -336,4 +336,12 @@ void writeAsset(const fs::path& path, const HistogramSat& sat, const Provenance&
   writeModel(path, sat, provenance, options);
 }
 
+void writeAsset(const fs::path& path, const ShLight& light, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, light, provenance, options);
+}
+
+void writeAsset(const fs::path& path, const ShLobes& lobes, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, lobes, provenance, options);
+}
+
 }  // namespace glint::formats

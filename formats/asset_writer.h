@@ -9,6 +9,7 @@
 #include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
+#include "glint/model/sh.h"
 
 namespace glint::formats {
 
@@ -33,6 +34,10 @@ void writeAsset(const std::filesystem::path& path, const CompressedNdf& ndf, con
 void writeAsset(const std::filesystem::path& path, const BinMap& map, const Provenance& provenance,
                 const WriteOptions& options = {});
 void writeAsset(const std::filesystem::path& path, const HistogramSat& sat, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const ShLight& light, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const ShLobes& lobes, const Provenance& provenance,
                 const WriteOptions& options = {});
 
 }  // namespace glint::formats

@@ -82,6 +82,7 @@ constexpr std::array kRules = {
          kMakeAgain},
     Rule{"histogram.strides", error, invalid_input, "coarse_stride is a multiple of stride", kMakeAgain},
     Rule{"histogram.texels", error, invalid_input, "every texel's bin is below bin_count", kMakeAgain},
+    Rule{"sh.grid", error, invalid_input, "a grid is 0 x 0 (lobes only) or has at least 2 rows and 3 columns", kMakeAgain},
     Rule{"dataset.hash", error, invalid_input, "a dataset's bytes have the hash of its attribute xxh3_128", kDamaged},
     Rule{"normals.finite", error, invalid_input, "normals are finite", "repair them with glint-ingest --fix-invalid"},
     Rule{"normals.disk", error, invalid_input, "normals lie inside the unit disk",
@@ -105,6 +106,10 @@ constexpr std::array kRules = {
     Rule{"histogram.bin_normals", error, invalid_input, "the mean normals of bins lie inside the unit disk", kMakeAgain},
     Rule{"histogram.totals", error, invalid_input, "bin_totals are the numbers of texels of each bin, above 0", kMakeAgain},
     Rule{"histogram.sums", error, invalid_input, "the tables of sums count the texels of each bin", kMakeAgain},
+    Rule{"sh.finite", error, invalid_input, "coefficients, scales and norms are finite, the latter two not negative",
+         kMakeAgain},
+    Rule{"sh.zonal", warning, invalid_input, "lobes have the norm of the lobe along +z within 1e-2", kMakeAgain},
+    Rule{"sh.band_norms", error, invalid_input, "band_norms are the norms of the coefficients", kMakeAgain},
 };
 
 }  // namespace

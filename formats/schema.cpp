@@ -7,6 +7,7 @@
 #include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
 #include "glint/model/histogram_sat.h"
+#include "glint/model/sh.h"
 
 namespace glint::formats {
 namespace {
@@ -274,6 +275,48 @@ KindSchema binMapSchema() {
         "class of each texel of the map, 12 bits each"}}};
 }
 
+/// Attributes of glint::ShGrid and the order.
+std::vector<AttributeSchema> shShape(double smallest_grid) {
+  return {integer("order", 0, kMaxShOrder, "1", "highest band of the spherical harmonics"),
+          integer("grid_rows", smallest_grid, 4096, "1", "polar angles of the grid of directions, both poles included"),
+          integer("grid_columns", smallest_grid, 8192, "1", "azimuths of the grid of directions"),
+          choice("precision", "f16|f32", "type of the stored coefficients")};
+}
+
+KindSchema shLobesSchema() {
+  return {"sh-lobes",
+          "Turned roughness lobes in spherical harmonics",
+          joined(shShape(0), {real("sigma_r", FLT_MIN, 1, "1", "intrinsic roughness: standard deviation in disk units")}),
+          {},
+          {{"zonal", "", {{"", f32}}, {"order + 1"}, "1", "coefficients f_l of the lobe along +z"},
+           {"lobes",
+            "",
+            {{"precision=f16", f16}, {"precision=f32", f32}},
+            {"grid_rows", "grid_columns", "(order + 1) * (order + 1)"},
+            "1",
+            "coefficients of the lobe towards each direction of the grid"}}};
+}
+
+KindSchema shLightSchema() {
+  return {"sh-light",
+          "Light for half vectors in spherical harmonics",
+          shShape(2),
+          {},
+          {{"scales", "", {{"", f32}}, {"grid_rows", "grid_columns"}, "1", "coefficient = scale * stored number"},
+           {"band_norms",
+            "",
+            {{"", f32}},
+            {"grid_rows", "grid_columns", "order + 1"},
+            "1",
+            "norm of each band's coefficients, the largest of red, green and blue"},
+           {"light",
+            "",
+            {{"precision=f16", f16}, {"precision=f32", f32}},
+            {"grid_rows", "grid_columns", "3", "(order + 1) * (order + 1)"},
+            "1",
+            "coefficients of red, green and blue for each outgoing direction of the grid, divided by its scale"}}};
+}
+
 /// Recursive descent over one size expression.
 class SizeParser {
  public:
@@ -420,8 +463,8 @@ std::size_t sizeBytes(ElementType type) {
 }
 
 std::span<const KindSchema> kindSchemas() {
-  static const std::vector<KindSchema> table = {binMapSchema(), heightsSchema(),    histogramSatSchema(),
-                                                ndfCpSchema(),  ndfPyramidSchema(), normalsSchema()};
+  static const std::vector<KindSchema> table = {binMapSchema(),     heightsSchema(), histogramSatSchema(), ndfCpSchema(),
+                                                ndfPyramidSchema(), normalsSchema(), shLightSchema(),      shLobesSchema()};
   return table;
 }
 

@@ -26,6 +26,8 @@ class NdfAsset {
   /// Pixels along each axis of the asset's NDF images; 256 for normals.
   int resolution() const { return opened_->info().resolution; }
 
+  const api::NdfInfo& info() const { return opened_->info(); }
+
   /// The NDF image of a footprint where there is a faster way than asking for every pixel: normals of a flat surface.
   /// @return [size][size] pixel means, bottom row first
   std::optional<std::vector<float>> scatteredImage(const Footprint& footprint, int size) const;

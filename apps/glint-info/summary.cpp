@@ -143,6 +143,26 @@ ordered_json summarizeHistograms(const HistogramSat& sat, const formats::AssetIn
           {"bytes_per_texel", static_cast<double>(bytes) / texels}};
 }
 
+ordered_json shProperties(int order, const ShGrid& grid, ShPrecision precision) {
+  return {{"order", order},
+          {"coefficients", shCount(order)},
+          {"grid", std::to_string(grid.rows) + "x" + std::to_string(grid.columns)},
+          {"precision", precision == ShPrecision::f16 ? "f16" : "f32"}};
+}
+
+/// How much of the light the bands hold, over all outgoing directions: shares of the sum of squares.
+ordered_json summarizeLight(const ShLight& light) {
+  const std::size_t bands = static_cast<std::size_t>(light.order) + 1;
+  double total = 0, first = 0, upper = 0;
+  for (std::size_t k = 0; k < light.band_norms.size(); ++k) {
+    const double square = double{light.band_norms[k]} * light.band_norms[k];
+    total += square;
+    if (k % bands == 0) first += square;
+    if (k % bands > bands / 2) upper += square;
+  }
+  return {{"share_of_band_0", total > 0 ? first / total : 0.0}, {"share_of_upper_half", total > 0 ? upper / total : 0.0}};
+}
+
 void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json& statistics) {
   if (asset.kind() == "normals") {
     const NormalMap& map = asset.normals();
@@ -184,6 +204,15 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
                   {"coarse_stride_texels", sat.coarse_stride},
                   {"line_stride_texels", sat.line_stride}};
     statistics = summarizeHistograms(sat, asset.info());
+  } else if (asset.kind() == "sh-lobes") {
+    const ShLobes& lobes = asset.shLobes();
+    properties = shProperties(lobes.order, lobes.grid, lobes.precision);
+    properties["sigma_r"] = lobes.sigma_r;
+    statistics = {{"mean", lobes.zonal[0]}, {"last_band", lobes.zonal.back()}};
+  } else if (asset.kind() == "sh-light") {
+    const ShLight& light = asset.shLight();
+    properties = shProperties(light.order, light.grid, light.precision);
+    statistics = summarizeLight(light);
   }
 }
 

@@ -25,6 +25,8 @@ int main(int argc, char** argv) {
     writeAsset(folder / "ndf-cp-pca-i8.glint", test::sampleCompressed(64, pca, CoefficientType::i8).ndf, provenance);
     writeAsset(folder / "ndf-cp-cp-f32.glint", test::sampleCompressed(64, cp, CoefficientType::f32).ndf, provenance);
     writeAsset(folder / "bin-map.glint", test::sampleBinMap(64, 48).map, provenance);
+    writeAsset(folder / "sh-lobes.glint", test::sampleShLobes().lobes, provenance);
+    writeAsset(folder / "sh-light.glint", test::sampleShLight().light, provenance);
   } catch (const Error& error) {
     std::fprintf(stderr, "glint-make-golden: error: %s\n", error.what());
     return static_cast<int>(error.code());

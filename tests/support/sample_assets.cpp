@@ -606,6 +606,43 @@ SampleHistograms sampleHistograms(int width, int height) {
   return sample;
 }
 
+SampleShLobes sampleShLobes() {
+  SampleShLobes s;
+  s.zonal = {0.28f, 0.4f};
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      // Directions along the axes: sqrt(4 pi / 3) y_1 is the direction itself, in the order z, x, y.
+      constexpr float kAzimuths[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
+      const float sine = row == 1 ? 1.0f : 0.0f, cosine = 1.0f - static_cast<float>(row);
+      s.coefficients.insert(s.coefficients.end(), {s.zonal[0], s.zonal[1] * cosine, s.zonal[1] * sine * kAzimuths[column][0],
+                                                   s.zonal[1] * sine * kAzimuths[column][1]});
+    }
+  }
+  s.lobes = {1, 0.1f, {3, 4}, ShPrecision::f32, s.zonal, s.coefficients.data()};
+  return s;
+}
+
+SampleShLight sampleShLight() {
+  SampleShLight s;
+  // Integrals of 4 z P_l(z) over z in [0, 1], times 2 pi sqrt((2l + 1) / (4 pi)).
+  constexpr double kPi = 3.14159265358979323846;
+  const double bands[3] = {2, 4.0 / 3, 0.5};
+  for (int direction = 0; direction < 12; ++direction) {
+    s.scales.push_back(0.5f);
+    for (int channel = 1; channel <= 3; ++channel) {
+      for (int l = 0; l < 3; ++l) {
+        const double zonal = bands[l] * 2 * kPi * std::sqrt((2 * l + 1) / (4 * kPi));
+        const std::uint16_t stored = floatToHalf(static_cast<float>(2 * channel * zonal));
+        s.coefficients.push_back(stored);
+        s.coefficients.insert(s.coefficients.end(), static_cast<std::size_t>(2 * l), 0);
+        if (channel == 3) s.band_norms.push_back(static_cast<float>(3 * zonal));
+      }
+    }
+  }
+  s.light = {2, {3, 4}, ShPrecision::f16, s.scales, s.band_norms, s.coefficients.data()};
+  return s;
+}
+
 formats::Provenance sampleProvenance() {
   return {"sample_assets 1.0",
           R"({"size":64})",

@@ -71,6 +71,19 @@ struct SampleHistograms {
   HistogramSat sat;
 };
 
+struct SampleShLobes {
+  std::vector<float> zonal;
+  std::vector<float> coefficients;
+  ShLobes lobes;
+};
+
+struct SampleShLight {
+  std::vector<float> scales;
+  std::vector<float> band_norms;
+  std::vector<std::uint16_t> coefficients;
+  ShLight light;
+};
+
 /// Bumps in the disk; sizes need not be powers of two.
 SampleNormals sampleNormals(int width, int height, bool with_bounds = true);
 SampleHeights sampleHeights(int width, int height);
@@ -83,6 +96,10 @@ SampleCompressed sampleCompressed(int size, CompressionMethod method, Coefficien
 SampleBinMap sampleBinMap(int width, int height);
 /// Histograms of sampleNormals(width, height) over 12 x 8 bins; strides 4, 8 and 16 texels.
 SampleHistograms sampleHistograms(int width, int height);
+/// A lobe of order 1 with the zonal coefficients 0.28 and 0.4, on a grid of 3 x 4 directions.
+SampleShLobes sampleShLobes();
+/// Constant light of radiance 1, 2 and 3 in red, green and blue, order 2, on a grid of 3 x 4 directions.
+SampleShLight sampleShLight();
 
 formats::Provenance sampleProvenance();
 

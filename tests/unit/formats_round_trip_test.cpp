@@ -223,6 +223,32 @@ TEST(AssetRoundTrip, BinMapsComeBackBitExact) {
   }
 }
 
+TEST(AssetRoundTrip, SphericalHarmonicsComeBackBitExact) {
+  const test::TempFolder folder;
+  const test::SampleShLobes lobes = test::sampleShLobes();
+  writeAsset(folder / "lobes.glint", lobes.lobes, test::sampleProvenance());
+  const Asset lobes_back = Asset::open(folder / "lobes.glint");
+  EXPECT_EQ(lobes_back.shLobes().order, 1);
+  EXPECT_EQ(lobes_back.shLobes().sigma_r, 0.1f);
+  EXPECT_EQ(lobes_back.shLobes().grid.columns, 4);
+  EXPECT_EQ(lobes_back.shLobes().precision, ShPrecision::f32);
+  EXPECT_EQ(std::memcmp(lobes_back.shLobes().coefficients, lobes.coefficients.data(), 4 * lobes.coefficients.size()), 0);
+  const test::SampleShLight light = test::sampleShLight();
+  writeAsset(folder / "light.glint", light.light, test::sampleProvenance());
+  const Asset light_back = Asset::open(folder / "light.glint");
+  EXPECT_EQ(light_back.shLight().precision, ShPrecision::f16);
+  EXPECT_TRUE(std::ranges::equal(light_back.shLight().scales, light.scales));
+  EXPECT_TRUE(std::ranges::equal(light_back.shLight().band_norms, light.band_norms));
+  EXPECT_EQ(std::memcmp(light_back.shLight().coefficients, light.coefficients.data(), 2 * light.coefficients.size()), 0);
+}
+
+TEST(AssetRoundTrip, LobesNeedNoTable) {
+  const test::TempFolder folder;
+  const std::vector<float> zonal = {0.28f, 0.4f};
+  writeAsset(folder / "zonal.glint", ShLobes{1, 0.1f, {}, ShPrecision::f16, zonal, nullptr}, test::sampleProvenance());
+  EXPECT_TRUE(std::ranges::equal(Asset::open(folder / "zonal.glint").shLobes().zonal, zonal));
+}
+
 TEST(AssetRoundTrip, ProvenanceComesBack) {
   const TempFolder folder;
   for (const Provenance& provenance : {test::sampleProvenance(), Provenance{"", "{}", {}}}) {

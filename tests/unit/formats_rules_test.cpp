@@ -25,9 +25,9 @@ namespace {
 namespace fs = std::filesystem;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-enum class Base { normals, heights, pyramid, compressed, compressed_f32, bin_map, histograms };
-constexpr Base kBases[] = {Base::normals,        Base::heights, Base::pyramid,   Base::compressed,
-                           Base::compressed_f32, Base::bin_map, Base::histograms};
+enum class Base { normals, heights, pyramid, compressed, compressed_f32, bin_map, histograms, sh_lobes, sh_light };
+constexpr Base kBases[] = {Base::normals, Base::heights,    Base::pyramid,  Base::compressed, Base::compressed_f32,
+                           Base::bin_map, Base::histograms, Base::sh_lobes, Base::sh_light};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -46,6 +46,10 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleBinMap(64, 48).map, provenance);
     case Base::histograms:
       return writeAsset(path, test::sampleHistograms(22, 19).sat, provenance);
+    case Base::sh_lobes:
+      return writeAsset(path, test::sampleShLobes().lobes, provenance);
+    case Base::sh_light:
+      return writeAsset(path, test::sampleShLight().light, provenance);
   }
 }
 
@@ -564,10 +568,43 @@ std::vector<Fixture> binMapFixtures() {
   };
 }
 
+std::vector<Fixture> shFixtures() {
+  return {
+      patched("sh.grid", Base::sh_lobes,
+              [](const Patch& patch) {
+                patch.setInteger("grid_rows", 1);
+                patch.replace("lobes", H5T_IEEE_F32LE, {1, 4, 4}, true);
+              }),
+      patched("sh.grid", Base::sh_lobes,
+              [](const Patch& patch) {
+                patch.setInteger("grid_columns", 0);
+                patch.replace("lobes", H5T_IEEE_F32LE, {3, 0, 4}, false);
+              }),
+      patched(
+          "sh.finite", Base::sh_lobes,
+          [](const Patch& patch) { patch.change<float>("zonal", 1, [](float& f) { f = kNan; }); }, true),
+      patched(
+          "sh.finite", Base::sh_lobes,
+          [](const Patch& patch) { patch.change<float>("lobes", 9, [](float& c) { c = INFINITY; }); }, true),
+      patched(
+          "sh.finite", Base::sh_light,
+          [](const Patch& patch) { patch.change<float>("scales", 2, [](float& scale) { scale = -1; }); }, true),
+      patched(
+          "sh.finite", Base::sh_light,
+          [](const Patch& patch) { patch.change<std::uint16_t>("light", 40, [](auto& c) { c = 0x7e00; }); }, true),
+      patched(
+          "sh.zonal", Base::sh_lobes,
+          [](const Patch& patch) { patch.change<float>("lobes", 4, [](float& c) { c *= 2; }); }, true),
+      patched(
+          "sh.band_norms", Base::sh_light,
+          [](const Patch& patch) { patch.change<float>("band_norms", 4, [](float& norm) { norm *= 1.1f; }); }, true),
+  };
+}
+
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
   for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures(),
-                    binMapFixtures()}) {
+                    binMapFixtures(), shFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
@@ -676,7 +713,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 8u);
+  EXPECT_EQ(count, 11u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -697,6 +734,8 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_EQ(sat.bin_totals[9], 3u);
   EXPECT_FLOAT_EQ(sat.bin_normals[9].x, 0.0831450075f);
   EXPECT_EQ(sat.sums[(4 * 7 + 5) * 32 + 9], 1);
+  EXPECT_EQ(static_cast<const float*>(Asset::open(folder / "sh-lobes.glint").shLobes().coefficients)[5 * 4 + 3], 0.4f);
+  EXPECT_EQ(Asset::open(folder / "sh-light.glint").shLight().band_norms[7], 12.2799206f);
   struct Recorded {
     const char* file;
     float values[3];
