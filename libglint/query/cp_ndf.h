@@ -1,8 +1,7 @@
 #pragma once
 
-#include <bit>
-
 #include "glint/model/compressed_ndf.h"
+#include "glint/query/bits.h"
 #include "glint/query/block_mass.h"
 #include "glint/query/cluster_basis.h"
 #include "glint/query/cluster_slices.h"
@@ -28,7 +27,7 @@ class CpNdf {
       : ndf_(ndf),
         below_(Reference(normals, ndf.shape.sigma_r, ndf.shape.surface, ndf.shape.boundary, Reference::Search::pruned)) {}
 
-  const PyramidShape& shape() const { return ndf_.shape; }
+  GLINT_HD const PyramidShape& shape() const { return ndf_.shape; }
 
   /// Density towards h, >= 0; O(columns) in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
@@ -106,7 +105,7 @@ class CpNdf {
     const std::size_t word = at * ndf_.words_per_cluster + slot / 64;
     const std::uint64_t mask = ndf_.masks.data()[word], bit = std::uint64_t{1} << (slot % 64);
     if (!(mask & bit)) return {};
-    return {at, ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(std::popcount(mask & (bit - 1)))};
+    return {at, ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(setBits(mask & (bit - 1)))};
   }
 
   /// Weighted sum over the chosen images. Slices of the same cluster, as those of neighbours mostly are, share its projection.
