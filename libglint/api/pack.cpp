@@ -37,6 +37,11 @@ class Packer {
     header_.surface = static_cast<std::uint32_t>(shape.surface);
     header_.boundary = static_cast<std::uint32_t>(shape.boundary);
     header_.level_count = shape.level_count;
+    header_.slope_mean[0] = shape.slopes.mean.x;
+    header_.slope_mean[1] = shape.slopes.mean.y;
+    header_.slope_covariance[0] = shape.slopes.covariance.xx;
+    header_.slope_covariance[1] = shape.slopes.covariance.xy;
+    header_.slope_covariance[2] = shape.slopes.covariance.yy;
     for (int l = 0; l < shape.level_count; ++l)
       header_.levels[l] = {shape.levels[l].stride, shape.levels[l].columns, shape.levels[l].rows, 0};
   }

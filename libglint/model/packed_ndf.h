@@ -12,8 +12,8 @@ namespace glint {
 // One linear buffer that holds all that the queries of one model read, so that a GPU (or another process) has it after one copy.
 // Nothing in it is an address: places are offsets from its first byte, so it may be copied anywhere that is aligned to 16 bytes.
 //
-//   0                      PackedHeader, 1856 bytes
-//   1856                   the arrays of the model, each at a multiple of 64 bytes, in the order of the header
+//   0                      PackedHeader, 1920 bytes
+//   1920                   the arrays of the model, each at a multiple of 64 bytes, in the order of the header
 //   header.size_bytes      end
 //
 // glint::api::pack makes it, glint/query/packed_ndf_view.h makes models of it. All is little-endian. It is made from an asset in
@@ -69,8 +69,12 @@ struct PackedHeader {
   std::int32_t bounds_rows[NormalMap::kMaxBoundsLevels];     //  416
   PackedArray normals;                                       //  496  Vec2; kind normals, or for footprints below level 0
   PackedArray bounds[NormalMap::kMaxBoundsLevels];           //  512  NormalBounds
-  /// 832. Pyramid: masks, first_block, block_means and pixels of level l at 4 l. Compressed: image_regions, image_slots,
-  /// image_scales, clusters, masks, mask_ranks, basis, coefficients, scales, density_scales, block_masks, first_block, block_masses.
+  float slope_mean[2];                                       //  832  of the map's texels, as MapSlopes
+  float slope_covariance[3];                                 //  840  xx, xy, yy
+  std::uint32_t reserved[11];                                //  852  0
+  /// 896. Pyramid: masks, first_block, block_means and pixels of level l at 4 l. Compressed: image_regions, image_slots,
+  /// image_scales, clusters, masks, mask_ranks, basis, coefficients, scales, density_scales,
+  /// block_masks, first_block, block_masses.
   PackedArray arrays[kPackedArrays];
 };
 static_assert(offsetof(PackedHeader, size_bytes) == 8 && offsetof(PackedHeader, kind) == 16);
@@ -78,7 +82,8 @@ static_assert(offsetof(PackedHeader, sigma_r) == 32 && offsetof(PackedHeader, el
 static_assert(offsetof(PackedHeader, region_rows) == 64 && offsetof(PackedHeader, levels) == 80);
 static_assert(offsetof(PackedHeader, bounds_columns) == 336 && offsetof(PackedHeader, bounds_rows) == 416);
 static_assert(offsetof(PackedHeader, normals) == 496 && offsetof(PackedHeader, bounds) == 512);
-static_assert(offsetof(PackedHeader, arrays) == 832 && sizeof(PackedHeader) == 1856 && sizeof(PackedHeader) % 64 == 0);
+static_assert(offsetof(PackedHeader, slope_mean) == 832 && offsetof(PackedHeader, arrays) == 896);
+static_assert(sizeof(PackedHeader) == 1920 && sizeof(PackedHeader) % kPackedAlignment == 0);
 
 /// Bytes of an element of the arrays that have no type of their own.
 GLINT_HD constexpr int pixelBytes(BlockPrecision precision) { return precision == BlockPrecision::f16 ? 2 : 4; }

@@ -103,6 +103,8 @@ class PackedNdfView {
     out.level_count = header_.level_count;
     for (int l = 0; l < header_.level_count; ++l)
       out.levels[l] = {header_.levels[l].stride, header_.levels[l].columns, header_.levels[l].rows};
+    out.slopes.mean = {header_.slope_mean[0], header_.slope_mean[1]};
+    out.slopes.covariance = {header_.slope_covariance[0], header_.slope_covariance[1], header_.slope_covariance[2]};
     return out;
   }
 

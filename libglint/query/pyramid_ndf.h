@@ -23,6 +23,9 @@ class PyramidNdf {
         below_(Reference(normals, pyramid.shape.sigma_r, pyramid.shape.surface, pyramid.shape.boundary,
                          Reference::Search::pruned)) {}
 
+  GLINT_HD const NdfPyramid& pyramid() const { return pyramid_; }
+  /// Whether footprints below level 0 are answered from the texels.
+  GLINT_HD bool hasNormals() const { return below_.hasMap(); }
   GLINT_HD const PyramidShape& shape() const { return pyramid_.shape; }
 
   /// Density towards h, >= 0; O(1): one pixel in each of 8 images.

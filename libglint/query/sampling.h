@@ -1,11 +1,11 @@
 #pragma once
 
 #include <algorithm>
-#include "glint/query/bits.h"
 #include <cmath>
 #include <cstdint>
 
 #include "glint/model/ndf_pyramid.h"
+#include "glint/query/bits.h"
 #include "glint/query/float4.h"
 #include "glint/query/ndf_model.h"
 #include "glint/query/pyramid_slices.h"
@@ -77,9 +77,7 @@ GLINT_HD BlockChoice chooseBlock(const std::uint64_t* mask, int blocks_per_axis,
   if (chosen_row < 0) return {};
   xi.y = clampUnit(rest / share);
   const int k = std::max(
-      chooseIndex(
-          setBits(chosen_bits), share, [&](int j) { return mass(chosen_begin + j, chosen_begin + j + 1); }, xi.x),
-      0);
+      chooseIndex(setBits(chosen_bits), share, [&](int j) { return mass(chosen_begin + j, chosen_begin + j + 1); }, xi.x), 0);
   for (int j = 0; j < k; ++j) chosen_bits &= chosen_bits - 1;
   return {chosen_row * blocks_per_axis + lowestBit(chosen_bits), chosen_begin + k};
 }

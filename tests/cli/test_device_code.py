@@ -15,7 +15,7 @@ BUILD = pathlib.Path(os.environ.get("GLINT_BUILD_DIR", ROOT / "build"))
 # Clang 14 crashes on std::span in device code.
 NAMES = ["clang++-16", "clang++-17", "clang++-18", "clang++-19", "clang++-15", "clang++"]
 # What CUDA has for device code under these names.
-CUDA_FUNCTIONS = {"memcpy", "memset", "sqrt", "sqrtf", "expf", "exp2f", "logf", "log2f", "powf", "erff", "erfinvf", "floorf", "ceilf", "fabsf",
+CUDA_FUNCTIONS = {"memcpy", "memset", "sqrt", "sqrtf", "expf", "exp2f", "logf", "log2f", "powf", "erff", "erfinvf", "floor", "floorf", "ceilf", "fabsf",
                   "sinf", "cosf", "tanf", "asinf", "acosf", "atanf", "atan2f", "hypotf", "fminf", "fmaxf", "copysignf", "__popcll", "__ffsll"}
 
 

@@ -106,6 +106,17 @@ TEST(PackedNdf, HeaderAndArraysMayBeInDifferentMemories) {
   EXPECT_EQ(view.masks.size(), sample.ndf.masks.size());
 }
 
+TEST(PackedNdf, CarriesTheSlopesOfTheMap) {
+  auto sample = test::samplePyramid(kSize, BlockPrecision::f16);
+  sample.pyramid.shape.slopes = {{0.25f, -0.5f}, {1, 2, 3}};
+  const Relocated moved(api::pack(sample.pyramid), 0);
+  const MapSlopes slopes = PackedNdfView(moved.data()).pyramid().shape.slopes;
+  EXPECT_EQ(slopes.mean, sample.pyramid.shape.slopes.mean);
+  EXPECT_EQ(slopes.covariance.xx, 1);
+  EXPECT_EQ(slopes.covariance.xy, 2);
+  EXPECT_EQ(slopes.covariance.yy, 3);
+}
+
 TEST(PackedNdf, LayoutIsAsDocumented) {
   const auto map = test::sampleNormals(kSize, kSize);
   const auto sample = test::samplePyramid(kSize, BlockPrecision::f16);

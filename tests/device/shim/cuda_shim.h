@@ -9,6 +9,7 @@
 
 extern "C" {
 __device__ double sqrt(double);
+__device__ double floor(double);
 __device__ void* memcpy(void*, const void*, __SIZE_TYPE__);
 __device__ int __popcll(unsigned long long);
 __device__ int __ffsll(long long);
