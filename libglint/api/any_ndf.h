@@ -52,6 +52,8 @@ class OpenedNdf {
   const formats::Asset& asset() const { return asset_; }
   /// Whether footprints below level 0 are answered from the texels.
   bool hasNormals() const { return normals_.has_value(); }
+  /// The map that answers them; nullptr if there is none.
+  const NormalMap* normals() const { return normals_ ? &normals_->normals() : nullptr; }
 
  private:
   explicit OpenedNdf(formats::Asset asset) : asset_(std::move(asset)) {}

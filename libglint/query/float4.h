@@ -7,7 +7,7 @@
 #include "glint/model/device.h"
 #include "glint/query/half.h"
 
-#if defined(__SSE4_1__) && !defined(__CUDACC__)
+#if defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(__CUDA__)
 #include <smmintrin.h>
 #endif
 
@@ -15,7 +15,7 @@ namespace glint {
 
 /// Four floats side by side, from SSE4.1 where the program is compiled for it. Results are the same bits without it.
 struct Float4 {
-#if defined(__SSE4_1__) && !defined(__CUDACC__)
+#if defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(__CUDA__)
   __m128 v;
 
   static Float4 zero() { return {_mm_setzero_ps()}; }
@@ -90,7 +90,7 @@ struct Float4 {
 
 /// Sums of four vectors, each over its lanes.
 inline GLINT_HD Float4 sumsOf(Float4 a, Float4 b, Float4 c, Float4 d) {
-#if defined(__SSE4_1__) && !defined(__CUDACC__)
+#if defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(__CUDA__)
   _MM_TRANSPOSE4_PS(a.v, b.v, c.v, d.v);
   return (a + c) + (b + d);
 #else
