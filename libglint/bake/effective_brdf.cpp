@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <mutex>
 #include <numbers>
@@ -20,6 +21,7 @@ constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::size_t kBlock = 128;   // samples of one call of a kernel: two rows of them stay in the cache
 constexpr std::size_t kChunk = 8192;  // samples whose sum is kept in float
 constexpr float kLeastThroughput = 1e-4f;
+constexpr double kMostCorrection = 1.25;  // of visible areas
 
 constexpr std::uint64_t kFacetStream = 101, kPointStream = 102, kTurnStream = 103;
 
@@ -39,7 +41,7 @@ struct Frame {
 class PatchFacets {
  public:
   PatchFacets(const PatchGrid& grid, int patch, std::size_t wanted)
-      : width_(grid.cells_x), column_(grid.firstColumn(patch % grid.columns)), row_(grid.firstRow(patch / grid.columns)) {
+      : width_(grid.width()), column_(grid.firstColumn(patch % grid.columns)), row_(grid.firstRow(patch / grid.columns)) {
     columns_ = static_cast<std::size_t>(grid.firstColumn(patch % grid.columns + 1) - column_);
     facets_ = 2 * columns_ * static_cast<std::size_t>(grid.firstRow(patch / grid.columns + 1) - row_);
     repeats_ = std::max<std::size_t>(1, wanted / facets_);
@@ -78,10 +80,25 @@ std::vector<Chunk> makeChunks(const std::vector<PatchFacets>& patches) {
   return chunks;
 }
 
-/// Light that was followed: all, scattered more than once, and over distant hops.
+/// What a chunk adds up.
+struct ChunkSums {
+  std::vector<float> pairs;  ///< [padded directions][padded directions]
+  std::vector<float> areas;  ///< [padded directions]: visible projected area
+};
+
+/// Light that was followed: all, scattered more than once, and over hops longer than each of the distances.
 struct Shares {
-  double all = 0, interreflected = 0, distant = 0;
-  void add(const Shares& other) { all += other.all, interreflected += other.interreflected, distant += other.distant; }
+  double all = 0, interreflected = 0;
+  std::array<double, kMaxDisplacementLevels> distant = {};
+
+  void addHop(double light, float longest, std::span<const float> distances) {
+    interreflected += light;
+    for (std::size_t k = 0; k < distances.size(); ++k) distant[k] += longest > distances[k] ? light : 0;
+  }
+  void add(const Shares& other) {
+    all += other.all, interreflected += other.interreflected;
+    for (std::size_t k = 0; k < distant.size(); ++k) distant[k] += other.distant[k];
+  }
 };
 
 /// Rows over all directions that a walk needs.
@@ -103,6 +120,7 @@ class Estimator {
         tracer_(surface) {
     result_.directions = directions_.count;
     sums_.resize(static_cast<std::size_t>(grid.count()) * directions_.count * directions_.count);
+    areas_.resize(directions_.count);
   }
 
   EffectiveBrdf diffuse();
@@ -113,13 +131,14 @@ class Estimator {
   void facingRow(std::size_t facet, float* row) const;
   Vec3 pointOf(std::size_t facet, std::uint64_t index) const;
   void diffuseWalk(std::size_t facet, std::uint64_t index, float* row, float* scratch, Shares& shares) const;
-  void diffuseChunk(const PatchFacets& facets, const Chunk& chunk, float* sums, Shares& shares) const;
-  void glossyChunk(const PatchFacets& facets, const Chunk& chunk, std::span<const Vec3> half, float* sums) const;
+  void diffuseChunk(const PatchFacets& facets, const Chunk& chunk, ChunkSums& sums, Shares& shares) const;
+  void glossyChunk(const PatchFacets& facets, const Chunk& chunk, std::span<const Vec3> half, ChunkSums& sums) const;
   Shares glossyView(const std::vector<PatchFacets>& facets, std::size_t view);
   void glossyWalk(std::size_t facet, std::size_t view, std::uint64_t index, float scale, Scratch& scratch,
                   Shares& shares) const;
-  void addChunk(const Chunk& chunk, const std::vector<float>& sums, double scale);
-  EffectiveBrdf finish();
+  void addChunk(const Chunk& chunk, const ChunkSums& sums, double samples, double scale);
+  ChunkSums emptySums() const;
+  EffectiveBrdf finish(const Shares& shares);
   void report(std::size_t total);
 
   double& sum(std::size_t patch, std::size_t i, std::size_t o) {
@@ -133,7 +152,8 @@ class Estimator {
   EffectiveOptions options_;
   const ProgressFn& progress_;
   HeightTracer tracer_;
-  std::vector<double> sums_;  ///< [patches][directions][directions]
+  std::vector<double> sums_;   ///< [patches][directions][directions]
+  std::vector<double> areas_;  ///< [directions]: visible projected area of the whole map
   EffectiveBrdf result_;
   std::mutex mutex_;
   std::size_t done_ = 0;
@@ -168,7 +188,7 @@ Vec3 Estimator::pointOf(std::size_t facet, std::uint64_t index) const {
 /// Follows light from a facet through diffuse reflections; adds the masked cosines of every facet on the way to `row`.
 void Estimator::diffuseWalk(std::size_t facet, std::uint64_t index, float* row, float* scratch, Shares& shares) const {
   float throughput = 1;
-  bool distant = false;
+  float longest = 0;
   Vec3 point = pointOf(facet, index);
   double first = 0;
   for (std::size_t d = 0; d < directions_.count; ++d) first += row[d];
@@ -181,15 +201,16 @@ void Estimator::diffuseWalk(std::size_t facet, std::uint64_t index, float* row, 
     if (!hit) return;
     facet = hit->facet, point = hit->point;
     throughput *= options_.base.albedo;
-    distant |= hit->distance > options_.distant_cells;
+    longest = std::max(longest, hit->distance);
     facingRow(facet, scratch);
     double light = 0;
     for (std::size_t d = 0; d < directions_.count; ++d) row[d] += throughput * scratch[d], light += throughput * scratch[d];
-    shares.all += light, shares.interreflected += light, shares.distant += distant ? light : 0;
+    shares.all += light;
+    shares.addHop(light, longest, options_.distant_cells);
   }
 }
 
-void Estimator::diffuseChunk(const PatchFacets& facets, const Chunk& chunk, float* sums, Shares& shares) const {
+void Estimator::diffuseChunk(const PatchFacets& facets, const Chunk& chunk, ChunkSums& sums, Shares& shares) const {
   const std::size_t size = directions_.padded;
   std::vector<float> views(kBlock * size), lights(kBlock * size), scratch(size);
   for (std::size_t start = chunk.first; start < chunk.last; start += kBlock) {
@@ -201,42 +222,46 @@ void Estimator::diffuseChunk(const PatchFacets& facets, const Chunk& chunk, floa
       float* light = &lights[k * size];
       facingRow(facet, light);
       const float area = 1 / surface_.normal(facet).z;
-      for (std::size_t d = 0; d < size; ++d) view[d] = area * light[d];
+      for (std::size_t d = 0; d < size; ++d) sums.areas[d] += view[d] = area * light[d];
       if (options_.bounces > 1) diffuseWalk(facet, index, light, scratch.data(), shares);
     }
-    addProducts(lights.data(), views.data(), count, size, sums);
+    addProducts(lights.data(), views.data(), count, size, sums.pairs.data());
   }
 }
 
-void Estimator::addChunk(const Chunk& chunk, const std::vector<float>& sums, double scale) {
-  for (std::size_t i = 0; i < directions_.count; ++i)
+ChunkSums Estimator::emptySums() const {
+  return {std::vector<float>(directions_.padded * directions_.padded), std::vector<float>(directions_.padded)};
+}
+
+void Estimator::addChunk(const Chunk& chunk, const ChunkSums& sums, double samples, double scale) {
+  for (std::size_t i = 0; i < directions_.count; ++i) {
+    areas_[i] += grid_.share(chunk.patch) * sums.areas[i] / samples;
     for (std::size_t o = 0; o < directions_.count; ++o)
-      sum(static_cast<std::size_t>(chunk.patch), i, o) += scale * sums[i * directions_.padded + o];
+      sum(static_cast<std::size_t>(chunk.patch), i, o) += scale / samples * sums.pairs[i * directions_.padded + o];
+  }
 }
 
 EffectiveBrdf Estimator::diffuse() {
   const std::vector<PatchFacets> patches = facets(options_.walks > 0 ? options_.walks : std::size_t{1} << 18);
   const std::vector<Chunk> chunks = makeChunks(patches);
-  std::vector<std::vector<float>> sums(chunks.size());
+  std::vector<ChunkSums> sums(chunks.size());
   std::vector<Shares> shares(chunks.size());
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
-    sums[c].resize(directions_.padded * directions_.padded);
-    diffuseChunk(patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], sums[c].data(), shares[c]);
+    sums[c] = emptySums();
+    diffuseChunk(patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], sums[c], shares[c]);
     report(chunks.size());
   });
   Shares total;
   for (std::size_t c = 0; c < chunks.size(); ++c) {
     const auto samples = static_cast<double>(patches[static_cast<std::size_t>(chunks[c].patch)].samples());
-    addChunk(chunks[c], sums[c], options_.base.albedo / (kPi * samples));
+    addChunk(chunks[c], sums[c], samples, options_.base.albedo / kPi);
     total.add(shares[c]);
   }
-  result_.interreflected = total.all > 0 ? total.interreflected / total.all : 0;
-  result_.distant = total.all > 0 ? total.distant / total.all : 0;
-  return finish();
+  return finish(total);
 }
 
 /// Quadrature of single reflections from GGX facets.
-void Estimator::glossyChunk(const PatchFacets& facets, const Chunk& chunk, std::span<const Vec3> half, float* sums) const {
+void Estimator::glossyChunk(const PatchFacets& facets, const Chunk& chunk, std::span<const Vec3> half, ChunkSums& sums) const {
   const std::size_t n = directions_.count;
   std::vector<float> x(kBlock), y(kBlock), z(kBlock), masked(n * kBlock), row(directions_.padded);
   for (std::size_t start = chunk.first; start < chunk.last; start += kBlock) {
@@ -253,8 +278,10 @@ void Estimator::glossyChunk(const PatchFacets& facets, const Chunk& chunk, std::
       const float root_area = padding ? 0 : std::sqrt(1 / normal.z);
       for (std::size_t d = 0; d < n; ++d)
         masked[d * used + k] = row[d] > 0 ? root_area * ggxMasking(row[d], options_.base.alpha) : 0.0f;
+      for (std::size_t d = 0; d < n; ++d) sums.areas[d] += root_area * root_area * row[d];
     }
-    addGgxPairs({x.data(), y.data(), z.data(), masked.data(), used}, half, n, options_.base.alpha, directions_.padded, sums);
+    addGgxPairs({x.data(), y.data(), z.data(), masked.data(), used}, half, n, options_.base.alpha, directions_.padded,
+                sums.pairs.data());
   }
 }
 
@@ -278,7 +305,7 @@ void Estimator::glossyWalk(std::size_t facet, std::size_t view, std::uint64_t in
                            Shares& shares) const {
   const BaseBrdf& base = options_.base;
   Vec3 point = pointOf(facet, index), back = directions_.at(view);
-  bool distant = false;
+  float longest = 0;
   float throughput = 1;
   for (int bounce = 1; bounce < options_.bounces && throughput > kLeastThroughput; ++bounce) {
     const Frame frame(surface_.normal(facet));
@@ -293,14 +320,14 @@ void Estimator::glossyWalk(std::size_t facet, std::size_t view, std::uint64_t in
     const auto hit = tracer_.trace(facet, point, direction);
     if (!hit) return;
     facet = hit->facet, point = hit->point, back = -1.0f * direction;
-    distant |= hit->distance > options_.distant_cells;
+    longest = std::max(longest, hit->distance);
     masks_.expand(facet, scratch.visible.data());
     std::fill(scratch.light.begin(), scratch.light.end(), 0.0f);
     addGgxLights(directions_, scratch.visible.data(), surface_.normal(facet), back, base, scale * throughput,
                  scratch.light.data());
     double light = 0;
     for (std::size_t d = 0; d < directions_.count; ++d) scratch.sum[d] += scratch.light[d], light += scratch.light[d];
-    shares.interreflected += light, shares.distant += distant ? light : 0;
+    shares.addHop(light, longest, options_.distant_cells);
   }
 }
 
@@ -345,22 +372,22 @@ EffectiveBrdf Estimator::glossy() {
   }
   const bool follow = options_.bounces > 1;
   const std::size_t work = chunks.size() + (follow ? n : 0);
-  std::vector<std::vector<float>> sums(chunks.size());
+  std::vector<ChunkSums> sums(chunks.size());
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
-    sums[c].resize(directions_.padded * directions_.padded);
-    glossyChunk(patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], half, sums[c].data());
+    sums[c] = emptySums();
+    glossyChunk(patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], half, sums[c]);
     report(work);
   });
   Shares total;
   for (std::size_t c = 0; c < chunks.size(); ++c) {
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t o = i; o < n; ++o) {
-        const float value = fresnel[i * n + o] * sums[c][i * directions_.padded + o];
-        sums[c][i * directions_.padded + o] = sums[c][o * directions_.padded + i] = value;
+        const float value = fresnel[i * n + o] * sums[c].pairs[i * directions_.padded + o];
+        sums[c].pairs[i * directions_.padded + o] = sums[c].pairs[o * directions_.padded + i] = value;
       }
     }
     const auto samples = static_cast<double>(patches[static_cast<std::size_t>(chunks[c].patch)].samples());
-    addChunk(chunks[c], sums[c], base.alpha * base.alpha / (4 * kPi * samples));
+    addChunk(chunks[c], sums[c], samples, base.alpha * base.alpha / (4 * kPi));
   }
   if (follow) {
     for (const double value : sums_) total.all += value;
@@ -373,19 +400,32 @@ EffectiveBrdf Estimator::glossy() {
     for (const Shares& share : shares) total.add(share);
     total.all += total.interreflected;
   }
-  result_.interreflected = total.all > 0 ? total.interreflected / total.all : 0;
-  result_.distant = total.all > 0 ? total.distant / total.all : 0;
-  return finish();
+  return finish(total);
 }
 
-/// Makes the estimates symmetric: both halves estimate the same function.
-EffectiveBrdf Estimator::finish() {
+/// Makes the estimates symmetric, since both halves estimate the same function, and their visible areas exact: the projected area
+/// that a periodic surface shows to a direction is its cosine (Wu 2019, Eq. 8), so what the masks show too much or too little of
+/// is known.
+EffectiveBrdf Estimator::finish(const Shares& shares) {
+  result_.interreflected = shares.all > 0 ? shares.interreflected / shares.all : 0;
+  for (std::size_t k = 0; k < options_.distant_cells.size(); ++k)
+    result_.distant.push_back(shares.all > 0 ? shares.distant[k] / shares.all : 0);
   const std::size_t n = directions_.count;
+  std::vector<double> correction(n, 1.0);
+  for (std::size_t d = 0; d < n; ++d)
+    if (areas_[d] > 0) correction[d] = std::clamp(directions_.z[d] / areas_[d], 1 / kMostCorrection, kMostCorrection);
   result_.values.resize(sums_.size());
-  for (std::size_t p = 0; p < static_cast<std::size_t>(grid_.count()); ++p)
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t o = 0; o < n; ++o)
-        result_.values[(p * n + i) * n + o] = static_cast<float>(0.5 * (sum(p, i, o) + sum(p, o, i)));
+  double difference = 0, norm = 0;
+  for (std::size_t p = 0; p < static_cast<std::size_t>(grid_.count()); ++p) {
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t o = 0; o < n; ++o) {
+        const double a = sum(p, i, o), b = sum(p, o, i);
+        difference += (a - b) * (a - b), norm += (a + b) * (a + b);
+        result_.values[(p * n + i) * n + o] = static_cast<float>(0.5 * correction[i] * correction[o] * (a + b));
+      }
+    }
+  }
+  result_.asymmetry = norm > 0 ? std::sqrt(difference / norm) : 0;
   return std::move(result_);
 }
 
@@ -397,14 +437,16 @@ std::vector<Vec3> angularDirections(int angular) {
   return directions;
 }
 
+double PatchGrid::share(int patch) const {
+  const int c = patch % columns, r = patch / columns;
+  return static_cast<double>(firstColumn(c + 1) - firstColumn(c)) * (firstRow(r + 1) - firstRow(r)) /
+         (static_cast<double>(coarse_x) * coarse_y * factor * factor);
+}
+
 std::vector<double> EffectiveBrdf::mean(const PatchGrid& grid) const {
   std::vector<double> mean(directions * directions);
-  for (int p = 0; p < grid.count(); ++p) {
-    const double cells = static_cast<double>(grid.firstColumn(p % grid.columns + 1) - grid.firstColumn(p % grid.columns)) *
-                         (grid.firstRow(p / grid.columns + 1) - grid.firstRow(p / grid.columns));
-    const double share = cells / (static_cast<double>(grid.cells_x) * grid.cells_y);
-    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += share * patch(static_cast<std::size_t>(p))[k];
-  }
+  for (int p = 0; p < grid.count(); ++p)
+    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += grid.share(p) * patch(static_cast<std::size_t>(p))[k];
   return mean;
 }
 

@@ -11,20 +11,24 @@
 
 namespace glint::bake {
 
-/// The map cut into columns x rows patches of whole cells.
+/// A map cut into columns x rows patches of whole cells of a coarser grid.
 struct PatchGrid {
   int columns = 1;
   int rows = 1;
-  int cells_x = 0;  ///< of the map
-  int cells_y = 0;
+  int coarse_x = 0;  ///< cells of the coarser grid
+  int coarse_y = 0;
+  int factor = 1;  ///< cells of the map along a side of a coarser cell
 
   int count() const { return columns * rows; }
-  int firstColumn(int c) const { return static_cast<int>((static_cast<std::int64_t>(c) * cells_x + columns - 1) / columns); }
-  int firstRow(int r) const { return static_cast<int>((static_cast<std::int64_t>(r) * cells_y + rows - 1) / rows); }
-  int patchOf(int i, int j) const {
-    return static_cast<int>(static_cast<std::int64_t>(j) * rows / cells_y) * columns +
-           static_cast<int>(static_cast<std::int64_t>(i) * columns / cells_x);
+  int width() const { return coarse_x * factor; }
+  /// First cell of the map in a column or row of patches.
+  int firstColumn(int c) const {
+    return factor * static_cast<int>((static_cast<std::int64_t>(c) * coarse_x + columns - 1) / columns);
   }
+  int firstRow(int r) const { return factor * static_cast<int>((static_cast<std::int64_t>(r) * coarse_y + rows - 1) / rows); }
+  /// Share of a patch in the cells of the map.
+  double share(int patch) const;
+  friend bool operator==(const PatchGrid&, const PatchGrid&) = default;
 };
 
 /// The directions of the angular grid of an asset: cells of equal solid angle.
@@ -37,7 +41,7 @@ struct EffectiveOptions {
   BaseBrdf base;
   int bounces = kAllBounces;  ///< scattering events of a path at most; 1: shadowing and masking only
   std::uint64_t seed = 1;
-  float distant_cells = 0;  ///< hops over a longer horizontal distance count as distant
+  std::vector<float> distant_cells;  ///< hops over a longer horizontal distance count as distant; at most 8
   /// Samples in all: facets whose light is summed exactly, and walks (ggx: walks of each view). 0: as many as the base needs.
   std::size_t facet_samples = 0;
   std::size_t walks = 0;
@@ -48,8 +52,9 @@ struct EffectiveOptions {
 struct EffectiveBrdf {
   std::size_t directions = 0;
   std::vector<float> values;  ///< [patches][directions][directions]
-  double interreflected = 0;  ///< share of the reflected light under an even sky that was scattered more than once
-  double distant = 0;         ///< share of the reflected light that made a distant hop
+  double asymmetry = 0;  ///< norm of the estimates' antisymmetric part over that of the rest, before it was removed; all noise
+  double interreflected = 0;    ///< share of the reflected light under an even sky that was scattered more than once
+  std::vector<double> distant;  ///< for each of distant_cells: share of the reflected light that made a longer hop
 
   std::span<const float> patch(std::size_t p) const { return {&values[p * directions * directions], directions * directions}; }
   /// Mean over the patches, weighted by their cells.

@@ -57,12 +57,18 @@ struct DisplacementLevel {
   int spatial_columns = 0;  ///< of T: at most `columns`
   int spatial_rows = 0;
 
-  std::span<const float> heights;                ///< [rows][columns] of the vertices, texels of the original
-  std::span<const VmfLobe> lobes;                ///< [rows][columns][lobe_count], largest amplitude first
-  std::span<const SlopeMoments> slopes;          ///< [rows][columns]
-  std::span<const float> fit_errors;             ///< [rows][columns]: relative error of the lobes, blurred by 8 degrees
-  std::span<const float> spatial_scale;          ///< T [spatial_rows][spatial_columns], mean 1
+  std::span<const float> heights;        ///< [rows][columns] of the vertices, texels of the original
+  std::span<const VmfLobe> lobes;        ///< [rows][columns][lobe_count], largest amplitude first
+  std::span<const SlopeMoments> slopes;  ///< [rows][columns]
+  std::span<const float> fit_errors;     ///< [rows][columns]: relative error of the lobes, both sides blurred by 8 degrees
+  std::span<const float> spatial_scale;  ///< T [spatial_rows][spatial_columns], mean 1 over the cells
   std::span<const std::uint16_t> angular_scale;  ///< S, half precision: element (i, o) with i <= o is at o (o + 1) / 2 + i
+
+  // How far the factorisation and its assumptions hold (below 75 degrees).
+  float rank1_residual = 0;        ///< |R - T S| / |R| of the scaling function R before it was factorised
+  float rank1_energy = 1;          ///< share of the largest singular value's square: what the best factorisation keeps
+  float interreflected_share = 0;  ///< of the reflected light
+  float distant_share = 0;         ///< of the reflected light: over hops longer than a cell, which T and S cannot place
 };
 
 /// A displacement map downsampled to several levels of detail, with what keeps its appearance (asset kind `displacement`,
