@@ -41,5 +41,6 @@ const NormalMap& Asset::normals() const { return get<NormalMap>("normals"); }
 const HeightMap& Asset::heights() const { return get<HeightMap>("heights"); }
 const NdfPyramid& Asset::pyramid() const { return get<NdfPyramid>("ndf-pyramid"); }
 const CompressedNdf& Asset::compressed() const { return get<CompressedNdf>("ndf-cp"); }
+const Displacement& Asset::displacement() const { return get<Displacement>("displacement"); }
 
 }  // namespace glint::formats

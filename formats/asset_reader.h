@@ -10,6 +10,7 @@
 #include "glint/formats/provenance.h"
 #include "glint/formats/schema.h"
 #include "glint/model/compressed_ndf.h"
+#include "glint/model/displacement.h"
 #include "glint/model/error.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
@@ -70,6 +71,7 @@ class Asset {
   const HeightMap& heights() const;
   const NdfPyramid& pyramid() const;
   const CompressedNdf& compressed() const;
+  const Displacement& displacement() const;
 
  private:
   struct State;

@@ -328,4 +328,9 @@ void writeAsset(const fs::path& path, const CompressedNdf& ndf, const Provenance
   writeModel(path, ndf, provenance, options);
 }
 
+void writeAsset(const fs::path& path, const Displacement& displacement, const Provenance& provenance,
+                const WriteOptions& options) {
+  writeModel(path, displacement, provenance, options);
+}
+
 }  // namespace glint::formats

@@ -4,6 +4,7 @@
 
 #include "glint/formats/provenance.h"
 #include "glint/model/compressed_ndf.h"
+#include "glint/model/displacement.h"
 #include "glint/model/error.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
@@ -27,6 +28,8 @@ void writeAsset(const std::filesystem::path& path, const HeightMap& map, const P
 void writeAsset(const std::filesystem::path& path, const NdfPyramid& pyramid, const Provenance& provenance,
                 const WriteOptions& options = {});
 void writeAsset(const std::filesystem::path& path, const CompressedNdf& ndf, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const Displacement& displacement, const Provenance& provenance,
                 const WriteOptions& options = {});
 
 }  // namespace glint::formats

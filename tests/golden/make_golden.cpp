@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
     const formats::Provenance provenance = test::sampleProvenance();
     writeAsset(folder / "normals.glint", test::sampleNormals(64, 48).map, provenance);
     writeAsset(folder / "heights.glint", test::sampleHeights(64, 48).map, provenance);
+    writeAsset(folder / "displacement.glint", test::sampleDisplacement(64).displacement, provenance);
     writeAsset(folder / "ndf-pyramid.glint", test::samplePyramid(64, BlockPrecision::f16).pyramid, provenance);
     using enum CompressionMethod;
     writeAsset(folder / "ndf-cp-cp-i8.glint", test::sampleCompressed(64, cp, CoefficientType::i8).ndf, provenance);

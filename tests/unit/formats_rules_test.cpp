@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-enum class Base { normals, heights, pyramid, compressed, compressed_f32 };
+enum class Base { normals, heights, pyramid, compressed, compressed_f32, displacement };
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -38,6 +38,8 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::samplePyramid(32, BlockPrecision::f32).pyramid, provenance);
     case Base::compressed:
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
+    case Base::displacement:
+      return writeAsset(path, test::sampleDisplacement(32).displacement, provenance);
     case Base::compressed_f32:
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
   }
@@ -276,56 +278,33 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.virtual", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually); }),
       patched("dataset.external", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external); }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked); }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact); }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false); }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false); }),
       {"dataset.alignment", Base::heights,
-       [](const fs::path& path) {
-         Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
-       }},
+       [](const fs::path& path) { Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }},
       {"dataset.alignment_64", Base::heights,
-       [](const fs::path& path) {
-         Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
-       },
-       true},
+       [](const fs::path& path) { Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }, true},
       patched(
           "dataset.unknown", Base::heights, [](const Patch& patch) { patch.replace("extra", H5T_IEEE_F32LE, {kSize}, true); },
           true),
       patched("dataset.missing", Base::heights, [](const Patch& patch) { H5Ldelete(patch.file(), "heights", 0); }),
       patched("dataset.missing", Base::pyramid, [](const Patch& patch) { H5Ldelete(patch.file(), "level_01/masks", 0); }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true); }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true); }),
       patched("dataset.type", Base::pyramid, [](const Patch& patch) { patch.setText("precision", "f16"); }),
       patched("dataset.type", Base::compressed,
-              [](const Patch& patch) {
-                patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true);
-              }),
+              [](const Patch& patch) { patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true); }),
       patched("dataset.type", Base::heights,
               [](const Patch& patch) {
                 const hid_t type = H5Tcopy(H5T_IEEE_F32LE);
@@ -335,9 +314,7 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.dims", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true); }),
       patched("dataset.dims", Base::heights,
               [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize * kSize}, true); }),
       patched("dataset.dims", Base::heights, [](const Patch& patch) { patch.setInteger("width", kSize + 1); }),
@@ -434,6 +411,42 @@ std::vector<Fixture> indexFixtures() {
   };
 }
 
+std::vector<Fixture> displacementFixtures() {
+  const auto nan = [](float& value) { value = kNan; };
+  return {
+      patched("displacement.levels", Base::displacement, [](const Patch& patch) { patch.setInteger("width", 33); }),
+      patched("displacement.levels", Base::displacement,
+              [](const Patch& patch) {
+                const int factors[2] = {4, 4};
+                patch.set("/", "level_factors", H5T_STD_I32LE, H5T_NATIVE_INT, factors, 2);
+              }),
+      patched(
+          "displacement.heights", Base::displacement,
+          [nan](const Patch& patch) { patch.change<float>("level_01/heights", 3, nan); }, true),
+      patched(
+          "displacement.lobes", Base::displacement,
+          [](const Patch& patch) { patch.change<float>("level_00/lobes", 0, [](float& mu) { mu = 1.5f; }); }, true),
+      patched(
+          "displacement.lobes", Base::displacement,
+          [](const Patch& patch) { patch.change<float>("level_00/lobes", 7, [](float& amplitude) { amplitude = -1; }); }, true),
+      patched(
+          "displacement.moments", Base::displacement,
+          [nan](const Patch& patch) { patch.change<float>("level_00/slopes", 8, nan); }, true),
+      patched(
+          "displacement.moments", Base::displacement,
+          [nan](const Patch& patch) { patch.change<float>("level_00/fit_errors", 8, nan); }, true),
+      patched(
+          "displacement.scales", Base::displacement,
+          [](const Patch& patch) { patch.change<float>("level_00/spatial_scale", 1, [](float& t) { t = -0.5f; }); }, true),
+      patched(
+          "displacement.scales", Base::displacement,
+          [](const Patch& patch) {
+            patch.change<std::uint16_t>("level_01/angular_scale", 44, [](std::uint16_t& s) { s = 0x7c00; });
+          },
+          true),
+  };
+}
+
 std::vector<Fixture> dataFixtures() {
   return {
       patched(
@@ -441,14 +454,10 @@ std::vector<Fixture> dataFixtures() {
           [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n.y = kNan; }); }, true),
       patched(
           "normals.disk", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
-                                     n = {0.8f, -0.7f};
-                                   }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.8f, -0.7f}; }); }, true),
       patched(
           "normals.bounds", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
-                                     n = {0.7f, -0.7f};
-                                   }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.7f, -0.7f}; }); }, true),
       patched(
           "normals.bounds", Base::normals,
           [](const Patch& patch) { patch.change<NormalBounds>("bounds/level_02", 3, [](auto& node) { node.high_x = -1; }); },
@@ -507,7 +516,8 @@ std::vector<Fixture> dataFixtures() {
 
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
-  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures()}) {
+  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures(),
+                    displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
@@ -526,7 +536,8 @@ TEST(FormatRules, IdsAreUnique) {
 
 TEST(FormatRules, GoodFilesBreakNoRule) {
   const test::TempFolder folder;
-  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32}) {
+  for (const Base base :
+       {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::displacement}) {
     const fs::path path = folder / (std::to_string(static_cast<int>(base)) + ".glint");
     writeBase(path, base);
     for (const Finding& finding : validateAsset(path).findings) {
@@ -537,7 +548,8 @@ TEST(FormatRules, GoodFilesBreakNoRule) {
 
 TEST(FormatRules, EveryFailingFileIsNamedByItsRule) {
   const test::TempFolder folder;
-  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32}) {
+  for (const Base base :
+       {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::displacement}) {
     writeBase(folder / (std::to_string(static_cast<int>(base)) + ".glint"), base);
   }
   int number = 0;
@@ -616,7 +628,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 7u);
+  EXPECT_EQ(count, 8u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
