@@ -129,10 +129,10 @@ TEST(Displace, DoesNotDependOnThreads) {
 }
 
 TEST(Displace, SpatialScaleFollowsTheReliefAndTheResidualSaysWhenItCannot) {
-  // Grooves on one half of the map only: the grooved half is darker than its lobes, so T falls below 1 there.
-  OwnedSurface map = test::grooves(64, 64, 4, 2);
+  // Grooves in one half of the map only, below the level of the other half: they are darker than their lobes.
+  OwnedSurface map = test::grooves(64, 64, 4, 1);
   for (int j = 0; j < 64; ++j)
-    for (int i = 32; i < 64; ++i) map.heights[static_cast<std::size_t>(j) * 64 + i] = 0;
+    for (int i = 32; i < 64; ++i) map.heights[static_cast<std::size_t>(j) * 64 + i] = 4;
   DisplaceOptions options = quick({8});
   options.bounces = 1;
   const Built built(map, options);
@@ -229,14 +229,16 @@ TEST_P(DisplacedBrdfQuery, SamplesFollowTheirDensity) {
     }
     const int n = 400;
     for (int d = 0; d < n * n; ++d) {
-      const Vec3 wi = gridDirection(d, n);
+      const Vec3 above = gridDirection(d, n);
       const double part = 2 * std::numbers::pi / (n * n);
-      even += part * brdf.evaluate(1, uv, wi, wo) * std::max(0.0f, dot(wi, brdf.normal(1, uv)));
-      mass += part * (brdf.pdf(1, uv, wi, wo) + brdf.pdf(1, uv, {wi.x, wi.y, -wi.z}, wo));
+      for (const Vec3 wi : {above, Vec3{above.x, above.y, -above.z}}) {  // a tilted facet is lit from below the horizon, too
+        even += part * brdf.evaluate(1, uv, wi, wo) * std::max(0.0f, dot(wi, brdf.normal(1, uv)));
+        mass += part * brdf.pdf(1, uv, wi, wo);
+      }
     }
     EXPECT_NEAR(sampled / count, even, 0.01 * even);  // noise of the samples
     EXPECT_LT(mass, 1.01);
-    EXPECT_GT(mass, 0.9);  // some normals turn light into the back side of their half vector
+    EXPECT_GT(mass, 0.8);  // normals that face away from the view reflect nothing
   }
 }
 
@@ -265,7 +267,7 @@ TEST_P(DisplacedBrdfQuery, RepeatsBeyondTheMap) {
 INSTANTIATE_TEST_SUITE_P(Bases, DisplacedBrdfQuery,
                          testing::Values(BaseBrdf{BaseBrdf::Kind::diffuse, 0.8f, 0, 1, 0},
                                          BaseBrdf{BaseBrdf::Kind::ggx, 1, 0.3f, 0.2f, 3.9f}),
-                         [](const auto& info) { return info.param.kind == BaseBrdf::Kind::diffuse ? "Diffuse" : "Ggx"; });
+                         [](const auto& test) { return test.param.kind == BaseBrdf::Kind::diffuse ? "Diffuse" : "Ggx"; });
 
 TEST(DisplacedBrdf, OneBeckmannLobeIsRightForAGaussianSurface) {
   // A Gaussian field's slopes are what LEADR assumes; its single lobe and the six lobes must then nearly agree before scaling.
