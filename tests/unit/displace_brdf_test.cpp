@@ -89,7 +89,7 @@ double furnaceDeviation(const EffectiveBrdf& e, std::span<const Vec3> directions
 }
 
 TEST(EffectiveBrdf, KeepsTheLightOfAWhiteFurnaceWithInterreflectionsOnly) {
-  const auto directions = angularDirections(15);
+  const auto directions = angularDirections(9);
   for (const SynthKind kind : {SynthKind::isotropic, SynthKind::weave, SynthKind::scratches, SynthKind::sawtooth}) {
     const OwnedSurface map = test::synthSurface(kind, 128, 192);
     EffectiveOptions options;
