@@ -95,7 +95,7 @@ void unpack(const Content& content, Displacement& displacement) {
     level.distant_share = content.real("level_distant", l);
     level.heights = content.array<float>(pathOf(l, "heights"));
     level.lobes = content.array<VmfLobe>(pathOf(l, "lobes"));
-    level.slopes = content.array<SlopeMoments>(pathOf(l, "slopes"));
+    level.slopes = content.array<MapSlopes>(pathOf(l, "slopes"));
     level.fit_errors = content.array<float>(pathOf(l, "fit_errors"));
     level.spatial_scale = content.array<float>(pathOf(l, "spatial_scale"));
     level.angular_scale = content.array<std::uint16_t>(pathOf(l, "angular_scale"));
@@ -128,8 +128,8 @@ void checkData(const Displacement& displacement, Findings& findings) {
     });
     report(findings, "displacement.moments", l, "slopes", level.slopes.size(), "cells have moments that are not finite",
            [&](std::size_t k) {
-             const SlopeMoments& m = level.slopes[k];
-             return !std::isfinite(m.mean.x + m.mean.y + m.variance_xx + m.variance_xy + m.variance_yy);
+             const MapSlopes& m = level.slopes[k];
+             return !std::isfinite(m.mean.x + m.mean.y + m.covariance.xx + m.covariance.xy + m.covariance.yy);
            });
     report(findings, "displacement.moments", l, "fit_errors", level.fit_errors.size(), "errors are not finite",
            [&](std::size_t k) { return !std::isfinite(level.fit_errors[k]); });

@@ -72,7 +72,7 @@ void checkMap(const HeightMap& map, const DisplaceOptions& options) {
 
 /// Weighted normals and slope moments of one cell.
 void collectCell(const HeightSurface& surface, int factor, int column, int row, std::vector<WeightedNormal>& normals,
-                 SlopeMoments& moments) {
+                 MapSlopes& moments) {
   normals.clear();
   const float share = 0.5f / (static_cast<float>(factor) * static_cast<float>(factor));
   double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
@@ -89,9 +89,9 @@ void collectCell(const HeightSurface& surface, int factor, int column, int row, 
   }
   x *= share, y *= share;
   moments.mean = {static_cast<float>(x), static_cast<float>(y)};
-  moments.variance_xx = static_cast<float>(std::max(0.0, share * xx - x * x));
-  moments.variance_xy = static_cast<float>(share * xy - x * y);
-  moments.variance_yy = static_cast<float>(std::max(0.0, share * yy - y * y));
+  moments.covariance.xx = static_cast<float>(std::max(0.0, share * xx - x * x));
+  moments.covariance.xy = static_cast<float>(share * xy - x * y);
+  moments.covariance.yy = static_cast<float>(std::max(0.0, share * yy - y * y));
 }
 
 /// Downsampled heights in cells.

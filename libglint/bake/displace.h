@@ -29,7 +29,7 @@ class DisplacementData {
   struct Level {
     std::vector<float> heights;
     std::vector<VmfLobe> lobes;
-    std::vector<SlopeMoments> slopes;
+    std::vector<MapSlopes> slopes;
     std::vector<float> fit_errors;
     std::vector<float> spatial_scale;
     std::vector<std::uint16_t> angular_scale;

@@ -17,6 +17,17 @@ struct HeightTracer::Ray {
   Vec3 origin;
   Vec3 direction;
   float heightAt(float t) const { return origin.z + t * direction.z; }
+
+  /// Starts again in the next copy of the map, with small coordinates, if cell (i, j) is outside. Returns whether it was.
+  bool wrap(Vec3 exit, int width, int height, int& i, int& j) {
+    if (i >= 0 && i < width && j >= 0 && j < height) return false;
+    origin = exit;
+    origin.x += static_cast<float>(i < 0 ? width : i >= width ? -width : 0);
+    origin.y += static_cast<float>(j < 0 ? height : j >= height ? -height : 0);
+    i = i < 0 ? width - 1 : i >= width ? 0 : i;
+    j = j < 0 ? height - 1 : j >= height ? 0 : j;
+    return true;
+  }
 };
 
 HeightTracer::HeightTracer(const HeightSurface& surface) : surface_(surface) {
@@ -73,6 +84,7 @@ std::optional<SurfaceHit> HeightTracer::trace(std::size_t facet, Vec3 origin, Ve
   const float inverse_x = 1 / direction.x, inverse_y = 1 / direction.y;
   const int width = surface_.width(), height = surface_.height();
   const float top = levels_.back().highest[0];
+  const float horizontal = std::sqrt(direction.x * direction.x + direction.y * direction.y);
   int i = static_cast<int>((facet / 2) % static_cast<std::size_t>(width)),
       j = static_cast<int>((facet / 2) / static_cast<std::size_t>(width));
   float t = 0, travelled = 0;
@@ -98,7 +110,7 @@ std::optional<SurfaceHit> HeightTracer::trace(std::size_t facet, Vec3 origin, Ve
       const float t_hit = hitCell(ray, i, j, t, t_out, hit);
       if (t_hit != kNever) {
         const Vec3 point = ray.origin + t_hit * direction;
-        return SurfaceHit{hit, point, travelled + t_hit * std::sqrt(direction.x * direction.x + direction.y * direction.y)};
+        return SurfaceHit{hit, point, travelled + t_hit * horizontal};
       }
     }
     // Leave the block.
@@ -111,14 +123,8 @@ std::optional<SurfaceHit> HeightTracer::trace(std::size_t facet, Vec3 origin, Ve
       i = std::clamp(static_cast<int>(std::floor(exit.x)), x0, x1 - 1);
     }
     t = t_out;
-    if (i < 0 || i >= width || j < 0 || j >= height) {
-      // Start again in the next copy of the map, with small coordinates.
-      travelled += t * std::sqrt(direction.x * direction.x + direction.y * direction.y);
-      ray.origin = exit;
-      ray.origin.x += static_cast<float>(i < 0 ? width : i >= width ? -width : 0);
-      ray.origin.y += static_cast<float>(j < 0 ? height : j >= height ? -height : 0);
-      i = i < 0 ? width - 1 : i >= width ? 0 : i;
-      j = j < 0 ? height - 1 : j >= height ? 0 : j;
+    if (ray.wrap(exit, width, height, i, j)) {
+      travelled += t * horizontal;
       t = 0;
       ++wraps;
     }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "glint/model/map_slopes.h"
 #include "glint/model/vec.h"
 
 namespace glint {
@@ -36,15 +37,7 @@ struct VmfLobe {
   float amplitude = 0;  ///< >= 0
 };
 static_assert(sizeof(VmfLobe) == 16);
-
-/// Moments of the slopes dh/dx, dh/dy of a cell, for the single-lobe variant.
-struct SlopeMoments {
-  Vec2 mean;
-  float variance_xx = 0;
-  float variance_xy = 0;
-  float variance_yy = 0;
-};
-static_assert(sizeof(SlopeMoments) == 20);
+static_assert(sizeof(MapSlopes) == 20);
 
 /// One level of detail.
 ///
@@ -59,7 +52,7 @@ struct DisplacementLevel {
 
   std::span<const float> heights;        ///< [rows][columns] of the vertices, texels of the original
   std::span<const VmfLobe> lobes;        ///< [rows][columns][lobe_count], largest amplitude first
-  std::span<const SlopeMoments> slopes;  ///< [rows][columns]
+  std::span<const MapSlopes> slopes;     ///< [rows][columns], for the single-lobe variant
   std::span<const float> fit_errors;     ///< [rows][columns]: relative error of the lobes, both sides blurred by 8 degrees
   std::span<const float> spatial_scale;  ///< T [spatial_rows][spatial_columns], mean 1 over the cells
   std::span<const std::uint16_t> angular_scale;  ///< S, half precision: element (i, o) with i <= o is at o (o + 1) / 2 + i

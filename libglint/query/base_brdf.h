@@ -3,23 +3,16 @@
 #include <cmath>
 
 #include "glint/model/displacement.h"
+#include "glint/query/fresnel.h"
 
 namespace glint {
 
 inline constexpr float kInversePi = 0.318309886183790672f;
 
-/// Reflectance of a conductor, unpolarised.
+/// Share of light that a conductor reflects; exactly 1 for eta 1 and k 0, which stands for a perfect mirror.
 /// @param cosine  of the angle between light and half vector, 0 to 1
-/// @note exactly 1 for eta 1 and k 0, which stands for a perfect mirror
 inline GLINT_HD float conductorFresnel(float cosine, float eta, float k) {
-  if (eta == 1 && k == 0) return 1;
-  const float c2 = cosine * cosine, s2 = 1 - c2;
-  const float e = eta * eta - k * k - s2;
-  const float ab = std::sqrt(e * e + 4 * eta * eta * k * k);
-  const float a = std::sqrt(std::fmax(0.0f, 0.5f * (ab + e)));
-  const float rs = (ab + c2 - 2 * cosine * a) / (ab + c2 + 2 * cosine * a);
-  const float t = ab * c2 + s2 * s2, u = 2 * cosine * a * s2;
-  return 0.5f * rs * (1 + (t - u) / (t + u));
+  return eta == 1 && k == 0 ? 1.0f : fresnelConductor(cosine, eta, k);
 }
 
 /// GGX distribution of normals around an axis; c is the cosine to it. Per unit projected area on the plane across the axis.

@@ -7,6 +7,7 @@
 #include "glint/query/base_brdf.h"
 #include "glint/query/concentric_map.h"
 #include "glint/query/half.h"
+#include "glint/query/smith.h"
 #include "glint/query/vmf_lobe.h"
 
 namespace glint {
@@ -232,24 +233,13 @@ class DisplacedBrdf {
     return sine * std::cos(angle) * s + sine * std::sin(angle) * t + cosine * axis;
   }
 
-  /// Smith's Lambda of a surface with normally distributed slopes.
-  static GLINT_HD float beckmannLambda(const SlopeMoments& m, float widening, Vec3 w) {
-    const float sine = std::sqrt(std::max(1e-12f, w.x * w.x + w.y * w.y));
-    const float x = w.x / sine, y = w.y / sine;
-    const float variance = x * x * (m.variance_xx + widening) + 2 * x * y * m.variance_xy + y * y * (m.variance_yy + widening);
-    const float mean = x * m.mean.x + y * m.mean.y;
-    const float deviation = std::sqrt(std::max(1e-12f, variance));
-    const float nu = (w.z / sine - mean) / (1.41421356237f * deviation);
-    return std::max(0.0f, 0.5f * (std::exp(-nu * nu) / (1.77245385091f * nu) - std::erfc(nu))) * (nu > 0 ? 1.0f : 0.0f) +
-           (nu > 0 ? 0.0f : 1e6f);
-  }
-
   /// The same integral for one Beckmann lobe with the cell's slope moments, shadowed by its own Smith term (Dupuy et al. 2013).
-  GLINT_HD float singleLobe(const SlopeMoments& m, Vec3 wi, Vec3 wo) const {
+  GLINT_HD float singleLobe(const MapSlopes& m, Vec3 wi, Vec3 wo) const {
+    if (wi.z <= 0 || wo.z <= 0) return 0;
     const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
     const float widening = diffuse ? 1e-8f : 0.5f * asset_.base.alpha * asset_.base.alpha;
-    const float xx = m.variance_xx + widening, yy = m.variance_yy + widening, xy = m.variance_xy;
-    const float shadowing = 1 / (1 + beckmannLambda(m, widening, wi) + beckmannLambda(m, widening, wo));
+    const float xx = m.covariance.xx + widening, yy = m.covariance.yy + widening, xy = m.covariance.xy;
+    const float shadowing = SmithMasking(m, std::sqrt(widening)).g2(wi, wo);
     if (!diffuse) {
       const Vec3 sum = wi + wo;
       const float length = std::sqrt(std::max(1e-20f, dot(sum, sum)));

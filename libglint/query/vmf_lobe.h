@@ -5,6 +5,7 @@
 
 #include "glint/model/displacement.h"
 #include "glint/query/base_brdf.h"
+#include "glint/query/gaussian.h"
 
 namespace glint {
 
@@ -53,7 +54,7 @@ inline GLINT_HD LobeFacing lobeFacing(const LobeMoments& moments, Vec3 centre, V
   const float mean = moments.mean * facing.cosine;
   const float deviation = std::sqrt(std::max(1e-12f, moments.spread + moments.bias * facing.cosine * facing.cosine));
   const float t = mean / deviation;
-  constexpr float kInvSqrt2 = 0.707106781186547524f, kInvSqrt2Pi = 0.398942280401432678f;
+  constexpr float kInvSqrt2Pi = 0.398942280401432678f;
   facing.visible = 0.5f * (1 + std::erf(kInvSqrt2 * t));
   facing.lit = std::max(0.0f, mean * facing.visible + deviation * kInvSqrt2Pi * std::exp(-0.5f * t * t));
   return facing;

@@ -408,7 +408,7 @@ SampleDisplacement sampleDisplacement(int size) {
         from.heights.push_back(4 * bump);
         from.lobes.push_back({{0.5f * bump, 0.25f}, 20 + 10 * bump, 0.75f});
         from.lobes.push_back({{-0.25f, bump}, kMaxKappa, 0.375f});
-        from.slopes.push_back({{bump, -0.125f}, 0.25f, 0.0625f * bump, 0.5f});
+        from.slopes.push_back({{bump, -0.125f}, {0.25f, 0.0625f * bump, 0.5f}});
         from.fit_errors.push_back(0.125f + 0.125f * bump);
       }
     }

@@ -26,7 +26,7 @@ struct SampleDisplacement {
   struct Level {
     std::vector<float> heights;
     std::vector<VmfLobe> lobes;
-    std::vector<SlopeMoments> slopes;
+    std::vector<MapSlopes> slopes;
     std::vector<float> fit_errors;
     std::vector<float> spatial_scale;
     std::vector<std::uint16_t> angular_scale;
