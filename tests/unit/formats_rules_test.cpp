@@ -278,33 +278,56 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.virtual", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually);
+              }),
       patched("dataset.external", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external);
+              }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked);
+              }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact);
+              }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false);
+              }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false);
+              }),
       {"dataset.alignment", Base::heights,
-       [](const fs::path& path) { Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }},
+       [](const fs::path& path) {
+         Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
+       }},
       {"dataset.alignment_64", Base::heights,
-       [](const fs::path& path) { Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }, true},
+       [](const fs::path& path) {
+         Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
+       },
+       true},
       patched(
           "dataset.unknown", Base::heights, [](const Patch& patch) { patch.replace("extra", H5T_IEEE_F32LE, {kSize}, true); },
           true),
       patched("dataset.missing", Base::heights, [](const Patch& patch) { H5Ldelete(patch.file(), "heights", 0); }),
       patched("dataset.missing", Base::pyramid, [](const Patch& patch) { H5Ldelete(patch.file(), "level_01/masks", 0); }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true);
+              }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true);
+              }),
       patched("dataset.type", Base::pyramid, [](const Patch& patch) { patch.setText("precision", "f16"); }),
       patched("dataset.type", Base::compressed,
-              [](const Patch& patch) { patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true); }),
+              [](const Patch& patch) {
+                patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true);
+              }),
       patched("dataset.type", Base::heights,
               [](const Patch& patch) {
                 const hid_t type = H5Tcopy(H5T_IEEE_F32LE);
@@ -314,7 +337,9 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.dims", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true);
+              }),
       patched("dataset.dims", Base::heights,
               [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize * kSize}, true); }),
       patched("dataset.dims", Base::heights, [](const Patch& patch) { patch.setInteger("width", kSize + 1); }),
@@ -454,10 +479,14 @@ std::vector<Fixture> dataFixtures() {
           [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n.y = kNan; }); }, true),
       patched(
           "normals.disk", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.8f, -0.7f}; }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
+                                     n = {0.8f, -0.7f};
+                                   }); }, true),
       patched(
           "normals.bounds", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.7f, -0.7f}; }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
+                                     n = {0.7f, -0.7f};
+                                   }); }, true),
       patched(
           "normals.bounds", Base::normals,
           [](const Patch& patch) { patch.change<NormalBounds>("bounds/level_02", 3, [](auto& node) { node.high_x = -1; }); },
@@ -536,8 +565,7 @@ TEST(FormatRules, IdsAreUnique) {
 
 TEST(FormatRules, GoodFilesBreakNoRule) {
   const test::TempFolder folder;
-  for (const Base base :
-       {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::displacement}) {
+  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::displacement}) {
     const fs::path path = folder / (std::to_string(static_cast<int>(base)) + ".glint");
     writeBase(path, base);
     for (const Finding& finding : validateAsset(path).findings) {
@@ -548,8 +576,7 @@ TEST(FormatRules, GoodFilesBreakNoRule) {
 
 TEST(FormatRules, EveryFailingFileIsNamedByItsRule) {
   const test::TempFolder folder;
-  for (const Base base :
-       {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::displacement}) {
+  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32, Base::displacement}) {
     writeBase(folder / (std::to_string(static_cast<int>(base)) + ".glint"), base);
   }
   int number = 0;
@@ -638,6 +665,10 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_EQ(normals.normals().at(63, 47).y, -0.139912933f);
   EXPECT_EQ(normals.normals().bounds[3].nodes[2].high_x, 0.283465505f);
   EXPECT_EQ(Asset::open(folder / "heights.glint").heights().heights[3 * 64 + 5], 0.0129489619f);
+  const Asset displacement = Asset::open(folder / "displacement.glint");
+  EXPECT_EQ(displacement.displacement().base.eta, 1.5f);
+  EXPECT_EQ(displacement.displacement().levels[1].lobes[1].amplitude, 0.375f);
+  EXPECT_EQ(displacement.displacement().levels[1].angular_scale[44], 0x3f80);  // 1.875
   const Asset pyramid = Asset::open(folder / "ndf-pyramid.glint");
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 0, 5, 30, 33), 4.3046875f);
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 1, 2, 35, 29), 4.7890625f);
