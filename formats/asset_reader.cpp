@@ -45,5 +45,6 @@ const BinMap& Asset::binMap() const { return get<BinMap>("bin-map"); }
 const HistogramSat& Asset::histograms() const { return get<HistogramSat>("histogram-sat"); }
 const ShLight& Asset::shLight() const { return get<ShLight>("sh-light"); }
 const ShLobes& Asset::shLobes() const { return get<ShLobes>("sh-lobes"); }
+const Displacement& Asset::displacement() const { return get<Displacement>("displacement"); }
 
 }  // namespace glint::formats

@@ -11,6 +11,7 @@
 #include "glint/formats/schema.h"
 #include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
+#include "glint/model/displacement.h"
 #include "glint/model/error.h"
 #include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_pyramid.h"
@@ -77,6 +78,7 @@ class Asset {
   const HistogramSat& histograms() const;
   const ShLight& shLight() const;
   const ShLobes& shLobes() const;
+  const Displacement& displacement() const;
 
  private:
   struct State;

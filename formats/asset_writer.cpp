@@ -344,4 +344,9 @@ void writeAsset(const fs::path& path, const ShLobes& lobes, const Provenance& pr
   writeModel(path, lobes, provenance, options);
 }
 
+void writeAsset(const fs::path& path, const Displacement& displacement, const Provenance& provenance,
+                const WriteOptions& options) {
+  writeModel(path, displacement, provenance, options);
+}
+
 }  // namespace glint::formats

@@ -5,6 +5,7 @@
 #include "glint/formats/provenance.h"
 #include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
+#include "glint/model/displacement.h"
 #include "glint/model/error.h"
 #include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_pyramid.h"
@@ -38,6 +39,8 @@ void writeAsset(const std::filesystem::path& path, const HistogramSat& sat, cons
 void writeAsset(const std::filesystem::path& path, const ShLight& light, const Provenance& provenance,
                 const WriteOptions& options = {});
 void writeAsset(const std::filesystem::path& path, const ShLobes& lobes, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const Displacement& displacement, const Provenance& provenance,
                 const WriteOptions& options = {});
 
 }  // namespace glint::formats

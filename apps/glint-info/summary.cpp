@@ -163,6 +163,45 @@ ordered_json summarizeLight(const ShLight& light) {
   return {{"share_of_band_0", total > 0 ? first / total : 0.0}, {"share_of_upper_half", total > 0 ? upper / total : 0.0}};
 }
 
+ordered_json displacementProperties(const Displacement& d) {
+  ordered_json properties = {{"width", d.width}, {"height", d.height}, {"texel_size_um", d.texel_size_um}};
+  if (d.base.kind == BaseBrdf::Kind::diffuse) {
+    properties["base"] = "diffuse";
+    properties["albedo"] = d.base.albedo;
+  } else {
+    properties["base"] = "ggx";
+    properties["alpha"] = d.base.alpha;
+    properties["eta"] = d.base.eta;
+    properties["k"] = d.base.k;
+  }
+  properties["lobes"] = d.lobe_count;
+  properties["angular"] = d.angular;
+  properties["levels"] = d.level_count;
+  return properties;
+}
+
+ordered_json summarizeDisplacement(const Displacement& d) {
+  ordered_json levels = ordered_json::array();
+  for (int l = 0; l < d.level_count; ++l) {
+    const DisplacementLevel& level = d.levels[l];
+    double error = 0;
+    for (const float e : level.fit_errors) error += e;
+    const auto [low, high] = std::minmax_element(level.spatial_scale.begin(), level.spatial_scale.end());
+    levels.push_back({{"factor", level.factor},
+                      {"columns", level.columns},
+                      {"rows", level.rows},
+                      {"mean_fit_error", error / static_cast<double>(level.fit_errors.size())},
+                      {"min_T", *low},
+                      {"max_T", *high},
+                      {"rank1_residual", level.rank1_residual},
+                      {"rank1_energy", level.rank1_energy},
+                      {"interreflected_share", level.interreflected_share},
+                      {"distant_share", level.distant_share},
+                      {"scale_bytes", level.spatial_scale.size_bytes() + level.angular_scale.size_bytes()}});
+  }
+  return {{"reliable_within_deg", 75}, {"levels", std::move(levels)}};
+}
+
 void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json& statistics) {
   if (asset.kind() == "normals") {
     const NormalMap& map = asset.normals();
@@ -178,6 +217,9 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
     properties["precision"] = pyramid.precision == BlockPrecision::f16 ? "f16" : "f32";
     properties["value_scale"] = pyramid.value_scale;
     statistics = summarizePyramid(pyramid);
+  } else if (asset.kind() == "displacement") {
+    properties = displacementProperties(asset.displacement());
+    statistics = summarizeDisplacement(asset.displacement());
   } else if (asset.kind() == "ndf-cp") {
     const CompressedNdf& ndf = asset.compressed();
     properties = shapeProperties(ndf.shape);

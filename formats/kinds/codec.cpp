@@ -18,9 +18,9 @@ constexpr Codec codecOf(std::string_view kind) {
 }
 
 constexpr std::array kCodecs = {
-    codecOf<BinMap>("bin-map"),         codecOf<HeightMap>("heights"),      codecOf<HistogramSat>("histogram-sat"),
-    codecOf<CompressedNdf>("ndf-cp"),   codecOf<NdfPyramid>("ndf-pyramid"), codecOf<NormalMap>("normals"),
-    codecOf<ShLight>("sh-light"),       codecOf<ShLobes>("sh-lobes")};
+    codecOf<BinMap>("bin-map"),             codecOf<Displacement>("displacement"), codecOf<HeightMap>("heights"),
+    codecOf<HistogramSat>("histogram-sat"), codecOf<CompressedNdf>("ndf-cp"),      codecOf<NdfPyramid>("ndf-pyramid"),
+    codecOf<NormalMap>("normals"),          codecOf<ShLight>("sh-light"),          codecOf<ShLobes>("sh-lobes")};
 
 }  // namespace
 

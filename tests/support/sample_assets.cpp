@@ -389,6 +389,37 @@ SampleHeights sampleHeights(int width, int height) {
   return sample;
 }
 
+SampleDisplacement sampleDisplacement(int size) {
+  SampleDisplacement sample;
+  Displacement& d = sample.displacement;
+  d.width = size, d.height = size / 2, d.texel_size_um = 2.5f;
+  d.base = {BaseBrdf::Kind::ggx, 1, 0.25f, 1.5f, 3};
+  d.lobe_count = 2, d.angular = 3, d.level_count = 2;
+  sample.levels.resize(2);
+  for (int l = 0; l < 2; ++l) {
+    SampleDisplacement::Level& from = sample.levels[static_cast<std::size_t>(l)];
+    DisplacementLevel& to = d.levels[l];
+    to.factor = 4 << l, to.columns = d.width / to.factor, to.rows = d.height / to.factor;
+    to.spatial_columns = 2, to.spatial_rows = 1;
+    to.rank1_residual = 0.125f, to.rank1_energy = 0.75f, to.interreflected_share = 0.25f, to.distant_share = 0.0625f;
+    for (int j = 0; j < to.rows; ++j) {
+      for (int i = 0; i < to.columns; ++i) {
+        const auto bump = static_cast<float>(noise(i, j + 100 * l) - 0.5);
+        from.heights.push_back(4 * bump);
+        from.lobes.push_back({{0.5f * bump, 0.25f}, 20 + 10 * bump, 0.75f});
+        from.lobes.push_back({{-0.25f, bump}, kMaxKappa, 0.375f});
+        from.slopes.push_back({{bump, -0.125f}, {0.25f, 0.0625f * bump, 0.5f}});
+        from.fit_errors.push_back(0.125f + 0.125f * bump);
+      }
+    }
+    from.spatial_scale = {0.75f, 1.25f};
+    for (int k = 0; k < 45; ++k) from.angular_scale.push_back(floatToHalf(0.5f + 0.03125f * static_cast<float>(k)));
+    to.heights = from.heights, to.lobes = from.lobes, to.slopes = from.slopes, to.fit_errors = from.fit_errors;
+    to.spatial_scale = from.spatial_scale, to.angular_scale = from.angular_scale;
+  }
+  return sample;
+}
+
 SamplePyramid samplePyramid(int size, BlockPrecision precision) {
   SamplePyramid sample;
   const SampleNormals normals = sampleNormals(size, size, false);

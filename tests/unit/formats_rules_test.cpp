@@ -25,9 +25,20 @@ namespace {
 namespace fs = std::filesystem;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-enum class Base { normals, heights, pyramid, compressed, compressed_f32, bin_map, histograms, sh_lobes, sh_light };
+enum class Base {
+  normals,
+  heights,
+  pyramid,
+  compressed,
+  compressed_f32,
+  bin_map,
+  histograms,
+  sh_lobes,
+  sh_light,
+  displacement
+};
 constexpr Base kBases[] = {Base::normals, Base::heights,    Base::pyramid,  Base::compressed, Base::compressed_f32,
-                           Base::bin_map, Base::histograms, Base::sh_lobes, Base::sh_light};
+                           Base::bin_map, Base::histograms, Base::sh_lobes, Base::sh_light,   Base::displacement};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -40,6 +51,8 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::samplePyramid(32, BlockPrecision::f32).pyramid, provenance);
     case Base::compressed:
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
+    case Base::displacement:
+      return writeAsset(path, test::sampleDisplacement(32).displacement, provenance);
     case Base::compressed_f32:
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
     case Base::bin_map:
@@ -434,6 +447,42 @@ std::vector<Fixture> indexFixtures() {
   };
 }
 
+std::vector<Fixture> displacementFixtures() {
+  const auto nan = [](float& value) { value = kNan; };
+  return {
+      patched("displacement.levels", Base::displacement, [](const Patch& patch) { patch.setInteger("width", 33); }),
+      patched("displacement.levels", Base::displacement,
+              [](const Patch& patch) {
+                const int factors[2] = {4, 4};
+                patch.set("/", "level_factors", H5T_STD_I32LE, H5T_NATIVE_INT, factors, 2);
+              }),
+      patched(
+          "displacement.heights", Base::displacement,
+          [nan](const Patch& patch) { patch.change<float>("level_01/heights", 3, nan); }, true),
+      patched(
+          "displacement.lobes", Base::displacement,
+          [](const Patch& patch) { patch.change<float>("level_00/lobes", 0, [](float& mu) { mu = 1.5f; }); }, true),
+      patched(
+          "displacement.lobes", Base::displacement,
+          [](const Patch& patch) { patch.change<float>("level_00/lobes", 7, [](float& amplitude) { amplitude = -1; }); }, true),
+      patched(
+          "displacement.moments", Base::displacement,
+          [nan](const Patch& patch) { patch.change<float>("level_00/slopes", 8, nan); }, true),
+      patched(
+          "displacement.moments", Base::displacement,
+          [nan](const Patch& patch) { patch.change<float>("level_00/fit_errors", 8, nan); }, true),
+      patched(
+          "displacement.scales", Base::displacement,
+          [](const Patch& patch) { patch.change<float>("level_00/spatial_scale", 1, [](float& t) { t = -0.5f; }); }, true),
+      patched(
+          "displacement.scales", Base::displacement,
+          [](const Patch& patch) {
+            patch.change<std::uint16_t>("level_01/angular_scale", 44, [](std::uint16_t& s) { s = 0x7c00; });
+          },
+          true),
+  };
+}
+
 std::vector<Fixture> dataFixtures() {
   return {
       patched(
@@ -604,7 +653,7 @@ std::vector<Fixture> shFixtures() {
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
   for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures(),
-                    binMapFixtures(), shFixtures()}) {
+                    binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
@@ -713,7 +762,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 11u);
+  EXPECT_EQ(count, 12u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -723,6 +772,10 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_EQ(normals.normals().at(63, 47).y, -0.139912933f);
   EXPECT_EQ(normals.normals().bounds[3].nodes[2].high_x, 0.283465505f);
   EXPECT_EQ(Asset::open(folder / "heights.glint").heights().heights[3 * 64 + 5], 0.0129489619f);
+  const Asset displacement = Asset::open(folder / "displacement.glint");
+  EXPECT_EQ(displacement.displacement().base.eta, 1.5f);
+  EXPECT_EQ(displacement.displacement().levels[1].lobes[1].amplitude, 0.375f);
+  EXPECT_EQ(displacement.displacement().levels[1].angular_scale[44], 0x3f80);  // 1.875
   const Asset pyramid = Asset::open(folder / "ndf-pyramid.glint");
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 0, 5, 30, 33), 4.3046875f);
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 1, 2, 35, 29), 4.7890625f);
