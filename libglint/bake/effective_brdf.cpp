@@ -391,7 +391,7 @@ EffectiveBrdf Estimator::glossy() {
   }
   if (follow) {
     for (const double value : sums_) total.all += value;
-    const std::vector<PatchFacets> starts = facets(options_.walks > 0 ? options_.walks : std::size_t{1} << (13 + detail));
+    const std::vector<PatchFacets> starts = facets(options_.walks > 0 ? options_.walks : std::size_t{1} << (13 + 2 * detail));
     std::vector<Shares> shares(n);
     tbb::parallel_for(std::size_t{0}, n, [&](std::size_t view) {
       shares[view] = glossyView(starts, view);

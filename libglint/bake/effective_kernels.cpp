@@ -84,7 +84,8 @@ GLINT_MULTIVERSION void addGgxLights(const DirectionTable& directions, const flo
     const float ci = std::max(0.0f, x[d] * normal.x + y[d] * normal.y + z[d] * normal.z);
     const float squared = std::max(1e-6f, 2 + 2 * (x[d] * view.x + y[d] * view.y + z[d] * view.z));
     const float ch = ci + cosine_view;
-    const float t = 1 + (a2 - 1) * ch * ch / squared;
+    // At least alpha^2: behind the facet the cosine to the half vector is not one, and 0 there may not become 0 / 0.
+    const float t = std::max(a2, 1 + (a2 - 1) * ch * ch / squared);
     const float masking = 2 * ci / (ci + std::sqrt(a2 + (1 - a2) * ci * ci));
     out[d] +=
         factor * visible[d] * masking / (t * t) * (mirror ? 1 : conductorFresnel(0.5f * std::sqrt(squared), base.eta, base.k));

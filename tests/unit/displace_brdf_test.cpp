@@ -123,6 +123,14 @@ TEST(EffectiveBrdf, GlossyPathsLoseNoMoreThanTheirFacetsDo) {
   EXPECT_LT(part * light_all, 1.01);  // quadrature of 81 directions
 }
 
+TEST(EffectiveBrdf, NarrowLobesStayFinite) {
+  const auto directions = angularDirections(15);
+  EffectiveOptions options{{BaseBrdf::Kind::ggx, 1, 0.1f, 1, 0}, kAllBounces, 1, {}, 4096, 8192};
+  const EffectiveBrdf e = effective(test::synthSurface(SynthKind::isotropic, 128, 128), options, directions);
+  for (const float value : e.values) ASSERT_TRUE(std::isfinite(value) && value >= 0);
+  EXPECT_GT(e.interreflected, 0.02);
+}
+
 TEST(EffectiveBrdf, NoiseIsBelowOnePercentOfEachEntry) {
   const auto directions = angularDirections(15);
   const OwnedSurface map = test::synthSurface(SynthKind::isotropic, 256, 256);
