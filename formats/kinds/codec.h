@@ -14,8 +14,8 @@
 #include "glint/formats/structure.h"
 #include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
-#include "glint/model/histogram_sat.h"
 #include "glint/model/displacement.h"
+#include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
 #include "glint/model/sh.h"
@@ -23,8 +23,8 @@
 namespace glint::formats {
 
 /// The model struct of any kind. Its spans point into a Mapping.
-using AnyAsset = std::variant<std::monostate, NormalMap, HeightMap, NdfPyramid, CompressedNdf, BinMap, HistogramSat, ShLight, ShLobes,
-                              Displacement>;
+using AnyAsset = std::variant<std::monostate, NormalMap, HeightMap, NdfPyramid, CompressedNdf, BinMap, HistogramSat, ShLight,
+                              ShLobes, Displacement>;
 
 /// Typed access to a file that has passed the checks against its schema.
 class Content {

@@ -12,8 +12,6 @@
 namespace glint::api {
 namespace {
 
-inline void prefetch(const void* address) { __builtin_prefetch(address); }
-
 constexpr int kSlices = PyramidSlices::kMost;
 
 /// Where the slices of a chunk are stored. Every step reads what the step before has asked the memory for, so that the misses of a

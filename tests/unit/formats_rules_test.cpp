@@ -630,8 +630,8 @@ std::vector<Fixture> shFixtures() {
                 patch.replace("lobes", H5T_IEEE_F32LE, {3, 0, 4}, false);
               }),
       patched(
-          "sh.finite", Base::sh_lobes,
-          [](const Patch& patch) { patch.change<float>("zonal", 1, [](float& f) { f = kNan; }); }, true),
+          "sh.finite", Base::sh_lobes, [](const Patch& patch) { patch.change<float>("zonal", 1, [](float& f) { f = kNan; }); },
+          true),
       patched(
           "sh.finite", Base::sh_lobes,
           [](const Patch& patch) { patch.change<float>("lobes", 9, [](float& c) { c = INFINITY; }); }, true),
@@ -642,8 +642,8 @@ std::vector<Fixture> shFixtures() {
           "sh.finite", Base::sh_light,
           [](const Patch& patch) { patch.change<std::uint16_t>("light", 40, [](auto& c) { c = 0x7e00; }); }, true),
       patched(
-          "sh.zonal", Base::sh_lobes,
-          [](const Patch& patch) { patch.change<float>("lobes", 4, [](float& c) { c *= 2; }); }, true),
+          "sh.zonal", Base::sh_lobes, [](const Patch& patch) { patch.change<float>("lobes", 4, [](float& c) { c *= 2; }); },
+          true),
       patched(
           "sh.band_norms", Base::sh_light,
           [](const Patch& patch) { patch.change<float>("band_norms", 4, [](float& norm) { norm *= 1.1f; }); }, true),
