@@ -316,167 +316,167 @@ KindSchema shLightSchema() {
             {"grid_rows", "grid_columns", "3", "(order + 1) * (order + 1)"},
             "1",
             "coefficients of red, green and blue for each outgoing direction of the grid, divided by its scale"}}};
-  AttributeSchema levelIntegers(std::string_view name, double low, double high, std::string_view units,
-                                std::string_view long_name) {
-    return {name, i32, "level_count", units, long_name, low, high};
+}
+
+AttributeSchema levelIntegers(std::string_view name, double low, double high, std::string_view units,
+                              std::string_view long_name) {
+  return {name, i32, "level_count", units, long_name, low, high};
+}
+
+AttributeSchema levelReals(std::string_view name, double low, double high, std::string_view long_name) {
+  return {name, f32, "level_count", "1", long_name, low, high};
+}
+
+KindSchema displacementSchema() {
+  return {"displacement",
+          "Downsampled displacement map that keeps its appearance",
+          joined(mapSize(),
+                 {choice("base", "diffuse|ggx", "reflectance of a facet of the original surface"),
+                  real("albedo", 0, 1, "1", "diffuse: albedo; ggx: 1"), real("alpha", 0, 1, "1", "ggx: roughness; diffuse: 0"),
+                  real("eta", FLT_MIN, 100, "1", "ggx: refractive index of the conductor"),
+                  real("k", 0, 100, "1", "ggx: extinction of the conductor; with eta 1 and k 0 it reflects all light"),
+                  integer("lobe_count", 1, kMaxLobes, "1", "lobes of a cell"),
+                  integer("angular", 3, 25, "1", "cells of the concentric map along each axis, for either direction"),
+                  integer("level_count", 1, kMaxDisplacementLevels, "1", "levels of detail"),
+                  levelIntegers("level_factors", 2, kMaxMapSize, "texel", "side of a cell of each level"),
+                  levelIntegers("level_columns", 1, kMaxMapSize, "1", "cells along u of each level"),
+                  levelIntegers("level_rows", 1, kMaxMapSize, "1", "cells along v of each level"),
+                  levelIntegers("level_spatial_columns", 1, 16, "1", "patches of the spatial scale along u"),
+                  levelIntegers("level_spatial_rows", 1, 16, "1", "patches of the spatial scale along v"),
+                  levelReals("level_rank1_residuals", 0, FLT_MAX, "norm of R - T S over that of R"),
+                  levelReals("level_rank1_energies", 0, 1, "share of the largest singular value's square of R"),
+                  levelReals("level_interreflected", 0, 1, "share of the reflected light that was scattered more than once"),
+                  levelReals("level_distant", 0, 1, "share of the reflected light that hopped farther than a cell")}),
+          {{"angular_pairs", "ceil_div(angular * angular * (angular * angular + 1), 2)", "pairs of directions"}},
+          {{"level_{l}/heights",
+            "level_count",
+            {{"", f32}},
+            {"level_rows[l]", "level_columns[l]"},
+            "texel",
+            "height of each vertex"},
+           {"level_{l}/lobes",
+            "level_count",
+            {{"", f32}},
+            {"level_rows[l]", "level_columns[l]", "lobe_count", "4"},
+            "1",
+            "centre (x, y) on the disk, bandwidth and amplitude of each lobe of each cell"},
+           {"level_{l}/slopes",
+            "level_count",
+            {{"", f32}},
+            {"level_rows[l]", "level_columns[l]", "5"},
+            "1",
+            "mean slope along u and v, variances uu, uv, vv of each cell"},
+           {"level_{l}/fit_errors",
+            "level_count",
+            {{"", f32}},
+            {"level_rows[l]", "level_columns[l]"},
+            "1",
+            "relative error of each cell's lobes, blurred by 8 degrees"},
+           {"level_{l}/spatial_scale",
+            "level_count",
+            {{"", f32}},
+            {"level_spatial_rows[l]", "level_spatial_columns[l]"},
+            "1",
+            "T: factor of each patch"},
+           {"level_{l}/angular_scale",
+            "level_count",
+            {{"", f16}},
+            {"angular_pairs"},
+            "1",
+            "S: factor of each pair of directions i <= o at o (o + 1) / 2 + i"}}};
+}
+
+/// Recursive descent over one size expression.
+class SizeParser {
+ public:
+  SizeParser(std::string_view source, const SizeScope& scope) : rest_(source), scope_(scope) {}
+
+  std::optional<std::uint64_t> parse() {
+    const auto value = sum();
+    skipSpace();
+    return rest_.empty() ? value : std::nullopt;
   }
 
-  AttributeSchema levelReals(std::string_view name, double low, double high, std::string_view long_name) {
-    return {name, f32, "level_count", "1", long_name, low, high};
+ private:
+  using Value = std::optional<std::uint64_t>;
+
+  void skipSpace() {
+    while (!rest_.empty() && rest_.front() == ' ') rest_.remove_prefix(1);
+  }
+  bool take(char c) {
+    skipSpace();
+    if (rest_.empty() || rest_.front() != c) return false;
+    rest_.remove_prefix(1);
+    return true;
   }
 
-  KindSchema displacementSchema() {
-    return {
-        "displacement",
-        "Downsampled displacement map that keeps its appearance",
-        joined(mapSize(),
-               {choice("base", "diffuse|ggx", "reflectance of a facet of the original surface"),
-                real("albedo", 0, 1, "1", "diffuse: albedo; ggx: 1"), real("alpha", 0, 1, "1", "ggx: roughness; diffuse: 0"),
-                real("eta", FLT_MIN, 100, "1", "ggx: refractive index of the conductor"),
-                real("k", 0, 100, "1", "ggx: extinction of the conductor; with eta 1 and k 0 it reflects all light"),
-                integer("lobe_count", 1, kMaxLobes, "1", "lobes of a cell"),
-                integer("angular", 3, 25, "1", "cells of the concentric map along each axis, for either direction"),
-                integer("level_count", 1, kMaxDisplacementLevels, "1", "levels of detail"),
-                levelIntegers("level_factors", 2, kMaxMapSize, "texel", "side of a cell of each level"),
-                levelIntegers("level_columns", 1, kMaxMapSize, "1", "cells along u of each level"),
-                levelIntegers("level_rows", 1, kMaxMapSize, "1", "cells along v of each level"),
-                levelIntegers("level_spatial_columns", 1, 16, "1", "patches of the spatial scale along u"),
-                levelIntegers("level_spatial_rows", 1, 16, "1", "patches of the spatial scale along v"),
-                levelReals("level_rank1_residuals", 0, FLT_MAX, "norm of R - T S over that of R"),
-                levelReals("level_rank1_energies", 0, 1, "share of the largest singular value's square of R"),
-                levelReals("level_interreflected", 0, 1, "share of the reflected light that was scattered more than once"),
-                levelReals("level_distant", 0, 1, "share of the reflected light that hopped farther than a cell")}),
-        {{"angular_pairs", "ceil_div(angular * angular * (angular * angular + 1), 2)", "pairs of directions"}},
-        {{"level_{l}/heights",
-          "level_count",
-          {{"", f32}},
-          {"level_rows[l]", "level_columns[l]"},
-          "texel",
-          "height of each vertex"},
-         {"level_{l}/lobes",
-          "level_count",
-          {{"", f32}},
-          {"level_rows[l]", "level_columns[l]", "lobe_count", "4"},
-          "1",
-          "centre (x, y) on the disk, bandwidth and amplitude of each lobe of each cell"},
-         {"level_{l}/slopes",
-          "level_count",
-          {{"", f32}},
-          {"level_rows[l]", "level_columns[l]", "5"},
-          "1",
-          "mean slope along u and v, variances uu, uv, vv of each cell"},
-         {"level_{l}/fit_errors",
-          "level_count",
-          {{"", f32}},
-          {"level_rows[l]", "level_columns[l]"},
-          "1",
-          "relative error of each cell's lobes, blurred by 8 degrees"},
-         {"level_{l}/spatial_scale",
-          "level_count",
-          {{"", f32}},
-          {"level_spatial_rows[l]", "level_spatial_columns[l]"},
-          "1",
-          "T: factor of each patch"},
-         {"level_{l}/angular_scale",
-          "level_count",
-          {{"", f16}},
-          {"angular_pairs"},
-          "1",
-          "S: factor of each pair of directions i <= o at o (o + 1) / 2 + i"}}};
+  Value sum() {
+    Value left = product();
+    while (left && take('+')) {
+      const Value right = product();
+      std::uint64_t total = 0;
+      if (!right || __builtin_add_overflow(*left, *right, &total)) return std::nullopt;
+      left = total;
+    }
+    return left;
   }
 
-  /// Recursive descent over one size expression.
-  class SizeParser {
-   public:
-    SizeParser(std::string_view source, const SizeScope& scope) : rest_(source), scope_(scope) {}
-
-    std::optional<std::uint64_t> parse() {
-      const auto value = sum();
-      skipSpace();
-      return rest_.empty() ? value : std::nullopt;
+  Value product() {
+    Value left = factor();
+    while (left && take('*')) {
+      const Value right = factor();
+      std::uint64_t total = 0;
+      if (!right || __builtin_mul_overflow(*left, *right, &total)) return std::nullopt;
+      left = total;
     }
+    return left;
+  }
 
-   private:
-    using Value = std::optional<std::uint64_t>;
-
-    void skipSpace() {
-      while (!rest_.empty() && rest_.front() == ' ') rest_.remove_prefix(1);
+  Value factor() {
+    if (take('(')) {
+      const Value value = sum();
+      return take(')') ? value : std::nullopt;
     }
-    bool take(char c) {
-      skipSpace();
-      if (rest_.empty() || rest_.front() != c) return false;
-      rest_.remove_prefix(1);
-      return true;
+    std::size_t length = 0;
+    while (length < rest_.size() && (std::isalnum(static_cast<unsigned char>(rest_[length])) || rest_[length] == '_')) ++length;
+    const std::string_view word = rest_.substr(0, length);
+    rest_.remove_prefix(length);
+    if (word.empty()) return std::nullopt;
+    if (std::isdigit(static_cast<unsigned char>(word.front()))) {
+      std::uint64_t number = 0;
+      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+      return error == std::errc() && end == word.data() + word.size() ? Value(number) : std::nullopt;
     }
+    if (word == "ceil_div" || word == "pow2") return call(word);
+    return lookUp(word);
+  }
 
-    Value sum() {
-      Value left = product();
-      while (left && take('+')) {
-        const Value right = product();
-        std::uint64_t total = 0;
-        if (!right || __builtin_add_overflow(*left, *right, &total)) return std::nullopt;
-        left = total;
-      }
-      return left;
+  Value call(std::string_view function) {
+    if (!take('(')) return std::nullopt;
+    const Value a = sum();
+    if (function == "pow2") return a && *a < 63 && take(')') ? Value(std::uint64_t{1} << *a) : std::nullopt;
+    if (!a || !take(',')) return std::nullopt;
+    const Value b = sum();
+    if (!b || *b == 0 || !take(')')) return std::nullopt;
+    return *a / *b + (*a % *b != 0);
+  }
+
+  Value lookUp(std::string_view word) {
+    if (word == "l") return scope_.level;
+    const auto found = scope_.values.find(word);
+    std::uint64_t index = 0;
+    if (take('[')) {
+      const Value at = sum();
+      if (!at || !take(']')) return std::nullopt;
+      index = *at;
     }
+    if (found == scope_.values.end() || index >= found->second.size()) return std::nullopt;
+    return found->second[index];
+  }
 
-    Value product() {
-      Value left = factor();
-      while (left && take('*')) {
-        const Value right = factor();
-        std::uint64_t total = 0;
-        if (!right || __builtin_mul_overflow(*left, *right, &total)) return std::nullopt;
-        left = total;
-      }
-      return left;
-    }
-
-    Value factor() {
-      if (take('(')) {
-        const Value value = sum();
-        return take(')') ? value : std::nullopt;
-      }
-      std::size_t length = 0;
-      while (length < rest_.size() && (std::isalnum(static_cast<unsigned char>(rest_[length])) || rest_[length] == '_'))
-        ++length;
-      const std::string_view word = rest_.substr(0, length);
-      rest_.remove_prefix(length);
-      if (word.empty()) return std::nullopt;
-      if (std::isdigit(static_cast<unsigned char>(word.front()))) {
-        std::uint64_t number = 0;
-        const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-        return error == std::errc() && end == word.data() + word.size() ? Value(number) : std::nullopt;
-      }
-      if (word == "ceil_div" || word == "pow2") return call(word);
-      return lookUp(word);
-    }
-
-    Value call(std::string_view function) {
-      if (!take('(')) return std::nullopt;
-      const Value a = sum();
-      if (function == "pow2") return a && *a < 63 && take(')') ? Value(std::uint64_t{1} << *a) : std::nullopt;
-      if (!a || !take(',')) return std::nullopt;
-      const Value b = sum();
-      if (!b || *b == 0 || !take(')')) return std::nullopt;
-      return *a / *b + (*a % *b != 0);
-    }
-
-    Value lookUp(std::string_view word) {
-      if (word == "l") return scope_.level;
-      const auto found = scope_.values.find(word);
-      std::uint64_t index = 0;
-      if (take('[')) {
-        const Value at = sum();
-        if (!at || !take(']')) return std::nullopt;
-        index = *at;
-      }
-      if (found == scope_.values.end() || index >= found->second.size()) return std::nullopt;
-      return found->second[index];
-    }
-
-    std::string_view rest_;
-    const SizeScope& scope_;
-  };
+  std::string_view rest_;
+  const SizeScope& scope_;
+};
 
 }  // namespace
 

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include "glint/model/bin_map.h"
+#include "glint/query/bits.h"
 #include "glint/query/texel_cover.h"
 
 namespace glint {
@@ -64,14 +64,14 @@ class BinLists {
       if (word == first / 64) bits &= ~std::uint64_t{0} << (first % 64);
       if (word == (end - 1) / 64 && end % 64 != 0) bits &= (std::uint64_t{1} << (end % 64)) - 1;
       if (bits == 0) continue;
-      auto ordinal = map_.mask_ranks.data()[word] + static_cast<std::uint32_t>(std::popcount(mask & ((bits & -bits) - 1)));
+      auto ordinal = map_.mask_ranks.data()[word] + static_cast<std::uint32_t>(setBits(mask & ((bits & -bits) - 1)));
       for (; bits != 0; bits &= bits - 1) visitor(64 * word + static_cast<std::uint32_t>(std::countr_zero(bits)), ordinal++);
     }
   }
 
   GLINT_HD BinList list(std::uint32_t bin, std::uint32_t ordinal) const {
     const std::uint64_t mask = map_.grid_masks.data()[ordinal / 64], bit = std::uint64_t{1} << (ordinal % 64);
-    const std::int64_t grid = std::int64_t{map_.grid_ranks.data()[ordinal / 64]} + std::popcount(mask & (bit - 1));
+    const std::int64_t grid = std::int64_t{map_.grid_ranks.data()[ordinal / 64]} + setBits(mask & (bit - 1));
     return {bin, ordinal, mask & bit ? grid : -1, map_.bin_starts[ordinal], map_.bin_starts[ordinal + 1]};
   }
 
