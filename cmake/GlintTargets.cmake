@@ -18,7 +18,7 @@ endif()
 # time. The query headers take whatever the including program is compiled for.
 set(GLINT_ARCH "x86-64-v2" CACHE STRING "-march of the programs and libraries on x86-64")
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
-  add_compile_options(-march=${GLINT_ARCH})
+  add_compile_options($<$<COMPILE_LANGUAGE:C,CXX>:-march=${GLINT_ARCH}>)
 endif()
 
 # In the tree as in an installed package, headers are included as "glint/<room>/<header>.h", and the C interface as "glint.h".

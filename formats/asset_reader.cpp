@@ -41,5 +41,10 @@ const NormalMap& Asset::normals() const { return get<NormalMap>("normals"); }
 const HeightMap& Asset::heights() const { return get<HeightMap>("heights"); }
 const NdfPyramid& Asset::pyramid() const { return get<NdfPyramid>("ndf-pyramid"); }
 const CompressedNdf& Asset::compressed() const { return get<CompressedNdf>("ndf-cp"); }
+const BinMap& Asset::binMap() const { return get<BinMap>("bin-map"); }
+const HistogramSat& Asset::histograms() const { return get<HistogramSat>("histogram-sat"); }
+const ShLight& Asset::shLight() const { return get<ShLight>("sh-light"); }
+const ShLobes& Asset::shLobes() const { return get<ShLobes>("sh-lobes"); }
+const Displacement& Asset::displacement() const { return get<Displacement>("displacement"); }
 
 }  // namespace glint::formats

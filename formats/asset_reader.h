@@ -9,10 +9,14 @@
 
 #include "glint/formats/provenance.h"
 #include "glint/formats/schema.h"
+#include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
+#include "glint/model/displacement.h"
 #include "glint/model/error.h"
+#include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
+#include "glint/model/sh.h"
 
 namespace glint::formats {
 
@@ -70,6 +74,11 @@ class Asset {
   const HeightMap& heights() const;
   const NdfPyramid& pyramid() const;
   const CompressedNdf& compressed() const;
+  const BinMap& binMap() const;
+  const HistogramSat& histograms() const;
+  const ShLight& shLight() const;
+  const ShLobes& shLobes() const;
+  const Displacement& displacement() const;
 
  private:
   struct State;

@@ -328,4 +328,25 @@ void writeAsset(const fs::path& path, const CompressedNdf& ndf, const Provenance
   writeModel(path, ndf, provenance, options);
 }
 
+void writeAsset(const fs::path& path, const BinMap& map, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, map, provenance, options);
+}
+
+void writeAsset(const fs::path& path, const HistogramSat& sat, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, sat, provenance, options);
+}
+
+void writeAsset(const fs::path& path, const ShLight& light, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, light, provenance, options);
+}
+
+void writeAsset(const fs::path& path, const ShLobes& lobes, const Provenance& provenance, const WriteOptions& options) {
+  writeModel(path, lobes, provenance, options);
+}
+
+void writeAsset(const fs::path& path, const Displacement& displacement, const Provenance& provenance,
+                const WriteOptions& options) {
+  writeModel(path, displacement, provenance, options);
+}
+
 }  // namespace glint::formats

@@ -3,10 +3,14 @@
 #include <filesystem>
 
 #include "glint/formats/provenance.h"
+#include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
+#include "glint/model/displacement.h"
 #include "glint/model/error.h"
+#include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
+#include "glint/model/sh.h"
 
 namespace glint::formats {
 
@@ -27,6 +31,16 @@ void writeAsset(const std::filesystem::path& path, const HeightMap& map, const P
 void writeAsset(const std::filesystem::path& path, const NdfPyramid& pyramid, const Provenance& provenance,
                 const WriteOptions& options = {});
 void writeAsset(const std::filesystem::path& path, const CompressedNdf& ndf, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const BinMap& map, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const HistogramSat& sat, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const ShLight& light, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const ShLobes& lobes, const Provenance& provenance,
+                const WriteOptions& options = {});
+void writeAsset(const std::filesystem::path& path, const Displacement& displacement, const Provenance& provenance,
                 const WriteOptions& options = {});
 
 }  // namespace glint::formats

@@ -4,7 +4,11 @@
 #include <cfloat>
 #include <charconv>
 
+#include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
+#include "glint/model/displacement.h"
+#include "glint/model/histogram_sat.h"
+#include "glint/model/sh.h"
 
 namespace glint::formats {
 namespace {
@@ -62,6 +66,51 @@ KindSchema heightsSchema() {
           mapSize(),
           {},
           {{"heights", "", {{"", f32}}, {"height", "width"}, "texel", "height over the base plane, bottom row first"}}};
+}
+
+KindSchema histogramSatSchema() {
+  constexpr double kStride = HistogramSat::kMaxStride;
+  return {
+      "histogram-sat",
+      "Accumulated histograms of normals",
+      {integer("width", 1, kMaxMapSize, "texel", "width of the normal map"),
+       integer("height", 1, kMaxMapSize, "texel", "height of the normal map"),
+       integer("theta_bins", 1, HistogramSat::kMaxThetaBins, "1", "rings of elevation"),
+       integer("phi_bins", 1, HistogramSat::kMaxPhiBins, "1", "sectors of azimuth"),
+       integer("bin_count", 1, HistogramSat::kMaxBins, "1", "bins that occur"),
+       integer("stride", 1, kStride, "texel", "distance between the points of sums"),
+       integer("coarse_stride", 1, kStride, "texel", "distance between the points of coarse_sums; a multiple of stride"),
+       integer("line_stride", 1, HistogramSat::kMaxLineStride, "texel",
+               "distance between the points of row_sums, column_sums")},
+      {{"row_length", "ceil_div(bin_count, 16) * 16", "counters of a point"}},
+      {{"bin_ids", "", {{"", u16}}, {"bin_count"}, "1", "ring * phi_bins + sector of each bin that occurs, increasing"},
+       {"bin_normals", "", {{"", f32}}, {"bin_count", "2"}, "1", "mean (nx, ny) of the texels of each bin"},
+       {"bin_totals", "", {{"", u64}}, {"bin_count"}, "1", "texels of each bin"},
+       {"texels", "", {{"", u16}}, {"ceil_div(height, 8)", "ceil_div(width, 8)", "8", "8"}, "1", "bin of each texel, in tiles"},
+       {"sums",
+        "",
+        {{"", u16}},
+        {"ceil_div(height, stride) + 1", "ceil_div(width, stride) + 1", "row_length"},
+        "1",
+        "texels of each bin below and left of each point, modulo 2^16"},
+       {"coarse_sums",
+        "",
+        {{"", u32}},
+        {"ceil_div(height, coarse_stride) + 1", "ceil_div(width, coarse_stride) + 1", "row_length"},
+        "1",
+        "texels of each bin below and left of each point, modulo 2^32"},
+       {"row_sums",
+        "",
+        {{"", u16}},
+        {"height", "ceil_div(width, line_stride) + 1", "row_length"},
+        "1",
+        "texels of each bin in a row left of each point, modulo 2^16"},
+       {"column_sums",
+        "",
+        {{"", u16}},
+        {"width", "ceil_div(height, line_stride) + 1", "row_length"},
+        "1",
+        "texels of each bin in a column below each point, modulo 2^16"}}};
 }
 
 KindSchema normalsSchema() {
@@ -170,6 +219,171 @@ KindSchema ndfCpSchema() {
         "1",
         "coefficients of each cluster, [slices][columns]"},
        {"scales", "", {{"", f32}}, {"scale_count"}, "1", "scale of each column of each cluster"}}};
+}
+
+KindSchema binMapSchema() {
+  const auto shift = [](std::string_view name, std::string_view long_name) {
+    return integer(name, 0, CompactCounts::kMaxShift, "1", long_name);
+  };
+  return {
+      "bin-map",
+      "Inverse bin map",
+      {integer("width", 1, kMaxMapSize, "texel", "width of the normal map"),
+       integer("height", 1, kMaxMapSize, "texel", "height of the normal map"),
+       real("alpha", FLT_MIN, 1, "1", "Beckmann roughness of a facet"),
+       integer("bins_per_axis", 1, 4096, "1", "bins of directions along each axis of [-1, 1]^2"),
+       integer("leaf_size", 1, 1024, "texel", "texels of a cell, at least on average"),
+       shift("bin_starts_shift", "values of bin_starts that share a base, logarithm to base 2"),
+       shift("cell_starts_shift", "values of cell_starts that share a base, logarithm to base 2")},
+      {{"mask_words", "ceil_div(bins_per_axis * bins_per_axis, 64)", "64-bit words of one bit for each bin"}},
+      {{"masks", "", {{"", u64}}, {"mask_words"}, "1", "bit b of word w: bin 64 w + b is occupied"},
+       {"mask_ranks", "", {{"", u32}}, {"mask_words"}, "1", "occupied bins before the bins of this word"},
+       {"bin_starts/offsets",
+        "",
+        {{"", u16}},
+        {"bin_bounds"},
+        "1",
+        "first texel of each occupied bin and their end, less its base"},
+       {"bin_starts/bases", "", {{"", u64}}, {"ceil_div(bin_bounds, pow2(bin_starts_shift))"}, "1", "bases of bin_starts"},
+       {"grid_masks", "", {{"", u64}}, {"grid_words"}, "1", "bit b of word w: occupied bin 64 w + b has a grid"},
+       {"grid_ranks", "", {{"", u32}}, {"grid_words"}, "1", "grids before the bins of this word"},
+       {"grid_moments",
+        "",
+        {{"", f16}},
+        {"grids", "5"},
+        "1",
+        "mean x, y and covariance xx, xy, yy of the bin's normals, in bin sides from its lower left corner"},
+       {"grid_cells", "", {{"", u32}}, {"grids + 1"}, "1", "first value of cell_starts of each grid, and their number"},
+       {"cell_starts/offsets",
+        "",
+        {{"", u16}},
+        {"cell_bounds"},
+        "1",
+        "first texel of each cell and end of each grid, less its base"},
+       {"cell_starts/bases", "", {{"", u64}}, {"ceil_div(cell_bounds, pow2(cell_starts_shift))"}, "1", "bases of cell_starts"},
+       {"texels",
+        "",
+        {{"", u32}},
+        {"height * width"},
+        "1",
+        "column, row and place in its bin of each texel, listed by bin and cell"},
+       {"class_bins", "", {{"", u32}}, {"class_bounds"}, "1", "first bin of each class of bins, and the number of bins"},
+       {"texel_classes",
+        "",
+        {{"", u16}},
+        {"ceil_div(height * width * 12, 16)"},
+        "1",
+        "class of each texel of the map, 12 bits each"}}};
+}
+
+/// Attributes of glint::ShGrid and the order.
+std::vector<AttributeSchema> shShape(double smallest_grid) {
+  return {integer("order", 0, kMaxShOrder, "1", "highest band of the spherical harmonics"),
+          integer("grid_rows", smallest_grid, 4096, "1", "polar angles of the grid of directions, both poles included"),
+          integer("grid_columns", smallest_grid, 8192, "1", "azimuths of the grid of directions"),
+          choice("precision", "f16|f32", "type of the stored coefficients")};
+}
+
+KindSchema shLobesSchema() {
+  return {"sh-lobes",
+          "Turned roughness lobes in spherical harmonics",
+          joined(shShape(0), {real("sigma_r", FLT_MIN, 1, "1", "intrinsic roughness: standard deviation in disk units")}),
+          {},
+          {{"zonal", "", {{"", f32}}, {"order + 1"}, "1", "coefficients f_l of the lobe along +z"},
+           {"lobes",
+            "",
+            {{"precision=f16", f16}, {"precision=f32", f32}},
+            {"grid_rows", "grid_columns", "(order + 1) * (order + 1)"},
+            "1",
+            "coefficients of the lobe towards each direction of the grid"}}};
+}
+
+KindSchema shLightSchema() {
+  return {"sh-light",
+          "Light for half vectors in spherical harmonics",
+          shShape(2),
+          {},
+          {{"scales", "", {{"", f32}}, {"grid_rows", "grid_columns"}, "1", "coefficient = scale * stored number"},
+           {"band_norms",
+            "",
+            {{"", f32}},
+            {"grid_rows", "grid_columns", "order + 1"},
+            "1",
+            "norm of each band's coefficients, the largest of red, green and blue"},
+           {"light",
+            "",
+            {{"precision=f16", f16}, {"precision=f32", f32}},
+            {"grid_rows", "grid_columns", "3", "(order + 1) * (order + 1)"},
+            "1",
+            "coefficients of red, green and blue for each outgoing direction of the grid, divided by its scale"}}};
+}
+
+AttributeSchema levelIntegers(std::string_view name, double low, double high, std::string_view units,
+                              std::string_view long_name) {
+  return {name, i32, "level_count", units, long_name, low, high};
+}
+
+AttributeSchema levelReals(std::string_view name, double low, double high, std::string_view long_name) {
+  return {name, f32, "level_count", "1", long_name, low, high};
+}
+
+KindSchema displacementSchema() {
+  return {"displacement",
+          "Downsampled displacement map that keeps its appearance",
+          joined(mapSize(),
+                 {choice("base", "diffuse|ggx", "reflectance of a facet of the original surface"),
+                  real("albedo", 0, 1, "1", "diffuse: albedo; ggx: 1"), real("alpha", 0, 1, "1", "ggx: roughness; diffuse: 0"),
+                  real("eta", FLT_MIN, 100, "1", "ggx: refractive index of the conductor"),
+                  real("k", 0, 100, "1", "ggx: extinction of the conductor; with eta 1 and k 0 it reflects all light"),
+                  integer("lobe_count", 1, kMaxLobes, "1", "lobes of a cell"),
+                  integer("angular", 3, 25, "1", "cells of the concentric map along each axis, for either direction"),
+                  integer("level_count", 1, kMaxDisplacementLevels, "1", "levels of detail"),
+                  levelIntegers("level_factors", 2, kMaxMapSize, "texel", "side of a cell of each level"),
+                  levelIntegers("level_columns", 1, kMaxMapSize, "1", "cells along u of each level"),
+                  levelIntegers("level_rows", 1, kMaxMapSize, "1", "cells along v of each level"),
+                  levelIntegers("level_spatial_columns", 1, 16, "1", "patches of the spatial scale along u"),
+                  levelIntegers("level_spatial_rows", 1, 16, "1", "patches of the spatial scale along v"),
+                  levelReals("level_rank1_residuals", 0, FLT_MAX, "norm of R - T S over that of R"),
+                  levelReals("level_rank1_energies", 0, 1, "share of the largest singular value's square of R"),
+                  levelReals("level_interreflected", 0, 1, "share of the reflected light that was scattered more than once"),
+                  levelReals("level_distant", 0, 1, "share of the reflected light that hopped farther than a cell")}),
+          {{"angular_pairs", "ceil_div(angular * angular * (angular * angular + 1), 2)", "pairs of directions"}},
+          {{"level_{l}/heights",
+            "level_count",
+            {{"", f32}},
+            {"level_rows[l]", "level_columns[l]"},
+            "texel",
+            "height of each vertex"},
+           {"level_{l}/lobes",
+            "level_count",
+            {{"", f32}},
+            {"level_rows[l]", "level_columns[l]", "lobe_count", "4"},
+            "1",
+            "centre (x, y) on the disk, bandwidth and amplitude of each lobe of each cell"},
+           {"level_{l}/slopes",
+            "level_count",
+            {{"", f32}},
+            {"level_rows[l]", "level_columns[l]", "5"},
+            "1",
+            "mean slope along u and v, variances uu, uv, vv of each cell"},
+           {"level_{l}/fit_errors",
+            "level_count",
+            {{"", f32}},
+            {"level_rows[l]", "level_columns[l]"},
+            "1",
+            "relative error of each cell's lobes, blurred by 8 degrees"},
+           {"level_{l}/spatial_scale",
+            "level_count",
+            {{"", f32}},
+            {"level_spatial_rows[l]", "level_spatial_columns[l]"},
+            "1",
+            "T: factor of each patch"},
+           {"level_{l}/angular_scale",
+            "level_count",
+            {{"", f16}},
+            {"angular_pairs"},
+            "1",
+            "S: factor of each pair of directions i <= o at o (o + 1) / 2 + i"}}};
 }
 
 /// Recursive descent over one size expression.
@@ -318,7 +532,9 @@ std::size_t sizeBytes(ElementType type) {
 }
 
 std::span<const KindSchema> kindSchemas() {
-  static const std::vector<KindSchema> table = {heightsSchema(), ndfCpSchema(), ndfPyramidSchema(), normalsSchema()};
+  static const std::vector<KindSchema> table = {binMapSchema(),       displacementSchema(), heightsSchema(),
+                                                histogramSatSchema(), ndfCpSchema(),        ndfPyramidSchema(),
+                                                normalsSchema(),      shLightSchema(),      shLobesSchema()};
   return table;
 }
 

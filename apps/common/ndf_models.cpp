@@ -8,7 +8,7 @@
 namespace glint::apps {
 
 NdfAsset::NdfAsset(Tool& tool) {
-  tool.option("ASSET", path_, "asset of kind normals, ndf-pyramid or ndf-cp").required();
+  tool.option("ASSET", path_, "asset of kind normals, ndf-pyramid, ndf-cp, bin-map or histogram-sat").required();
   tool.option("--normals", normals_path_,
               "asset of kind normals that the pyramid was made from, for footprints below its finest level");
   tool.choice("--surface", options_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
@@ -16,6 +16,8 @@ NdfAsset::NdfAsset(Tool& tool) {
   tool.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
               "beyond the border of the map (kind normals)");
   tool.option("--sigma-r", options_.sigma_r, "intrinsic roughness, disk units (kind normals)").range(1e-4, 0.25);
+  tool.choice("--gaussian-boxes", options_.gaussian_boxes, {{"1", GaussianBoxes::one}, {"3", GaussianBoxes::three}},
+              "boxes that stand for a Gaussian footprint (kind histogram-sat)");
   tool.addCheck([this] {
     checkReadable(path_);
     if (!normals_path_.empty()) checkReadable(normals_path_);

@@ -12,7 +12,8 @@ namespace glint::apps {
 using api::AnyNdf;
 
 /// Mix-in: the asset that a tool asks, and the options that say how. Normals are answered by Reference with --surface, --sigma-r and
-/// --boundary; pyramids and compressed ones by their own parameters, and by Reference below level 0 where --normals is given.
+/// --boundary; pyramids and compressed ones by their own parameters, and by Reference below level 0 where --normals is given; bin
+/// maps by their own, at any size.
 class NdfAsset {
  public:
   explicit NdfAsset(Tool& tool);
@@ -24,6 +25,8 @@ class NdfAsset {
 
   /// Pixels along each axis of the asset's NDF images; 256 for normals.
   int resolution() const { return opened_->info().resolution; }
+
+  const api::NdfInfo& info() const { return opened_->info(); }
 
   /// The NDF image of a footprint where there is a faster way than asking for every pixel: normals of a flat surface.
   /// @return [size][size] pixel means, bottom row first

@@ -120,6 +120,88 @@ ordered_json summarizeCompressed(const CompressedNdf& ndf, const formats::AssetI
           {"levels", std::move(levels)}};
 }
 
+ordered_json summarizeBinMap(const BinMap& map) {
+  std::uint64_t longest = 0;
+  for (std::size_t k = 0; k + 1 < map.bin_starts.size(); ++k)
+    longest = std::max(longest, map.bin_starts[k + 1] - map.bin_starts[k]);
+  return {{"occupied_bins", map.occupiedBins()},
+          {"occupied_share", static_cast<double>(map.occupiedBins()) / static_cast<double>(map.binCount())},
+          {"longest_list", longest},
+          {"bins_with_grid", map.grid_cells.size() - 1},
+          {"cells", map.cell_starts.size()},
+          {"classes", map.classCount()}};
+}
+
+ordered_json summarizeHistograms(const HistogramSat& sat, const formats::AssetInfo& info) {
+  std::uint64_t bytes = 0;
+  for (const formats::DatasetInfo& dataset : info.datasets) bytes += dataset.size_bytes;
+  const auto fullest = std::max_element(sat.bin_totals.begin(), sat.bin_totals.end());
+  const double texels = static_cast<double>(sat.width) * sat.height;
+  return {{"bins", sat.bin_count},
+          {"fullest_bin", sat.bin_ids[static_cast<std::size_t>(fullest - sat.bin_totals.begin())]},
+          {"fullest_share", static_cast<double>(*fullest) / texels},
+          {"bytes_per_texel", static_cast<double>(bytes) / texels}};
+}
+
+ordered_json shProperties(int order, const ShGrid& grid, ShPrecision precision) {
+  return {{"order", order},
+          {"coefficients", shCount(order)},
+          {"grid", std::to_string(grid.rows) + "x" + std::to_string(grid.columns)},
+          {"precision", precision == ShPrecision::f16 ? "f16" : "f32"}};
+}
+
+/// How much of the light the bands hold, over all outgoing directions: shares of the sum of squares.
+ordered_json summarizeLight(const ShLight& light) {
+  const std::size_t bands = static_cast<std::size_t>(light.order) + 1;
+  double total = 0, first = 0, upper = 0;
+  for (std::size_t k = 0; k < light.band_norms.size(); ++k) {
+    const double square = double{light.band_norms[k]} * light.band_norms[k];
+    total += square;
+    if (k % bands == 0) first += square;
+    if (k % bands > bands / 2) upper += square;
+  }
+  return {{"share_of_band_0", total > 0 ? first / total : 0.0}, {"share_of_upper_half", total > 0 ? upper / total : 0.0}};
+}
+
+ordered_json displacementProperties(const Displacement& d) {
+  ordered_json properties = {{"width", d.width}, {"height", d.height}, {"texel_size_um", d.texel_size_um}};
+  if (d.base.kind == BaseBrdf::Kind::diffuse) {
+    properties["base"] = "diffuse";
+    properties["albedo"] = d.base.albedo;
+  } else {
+    properties["base"] = "ggx";
+    properties["alpha"] = d.base.alpha;
+    properties["eta"] = d.base.eta;
+    properties["k"] = d.base.k;
+  }
+  properties["lobes"] = d.lobe_count;
+  properties["angular"] = d.angular;
+  properties["levels"] = d.level_count;
+  return properties;
+}
+
+ordered_json summarizeDisplacement(const Displacement& d) {
+  ordered_json levels = ordered_json::array();
+  for (int l = 0; l < d.level_count; ++l) {
+    const DisplacementLevel& level = d.levels[l];
+    double error = 0;
+    for (const float e : level.fit_errors) error += e;
+    const auto [low, high] = std::minmax_element(level.spatial_scale.begin(), level.spatial_scale.end());
+    levels.push_back({{"factor", level.factor},
+                      {"columns", level.columns},
+                      {"rows", level.rows},
+                      {"mean_fit_error", error / static_cast<double>(level.fit_errors.size())},
+                      {"min_T", *low},
+                      {"max_T", *high},
+                      {"rank1_residual", level.rank1_residual},
+                      {"rank1_energy", level.rank1_energy},
+                      {"interreflected_share", level.interreflected_share},
+                      {"distant_share", level.distant_share},
+                      {"scale_bytes", level.spatial_scale.size_bytes() + level.angular_scale.size_bytes()}});
+  }
+  return {{"reliable_within_deg", 75}, {"levels", std::move(levels)}};
+}
+
 void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json& statistics) {
   if (asset.kind() == "normals") {
     const NormalMap& map = asset.normals();
@@ -135,6 +217,9 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
     properties["precision"] = pyramid.precision == BlockPrecision::f16 ? "f16" : "f32";
     properties["value_scale"] = pyramid.value_scale;
     statistics = summarizePyramid(pyramid);
+  } else if (asset.kind() == "displacement") {
+    properties = displacementProperties(asset.displacement());
+    statistics = summarizeDisplacement(asset.displacement());
   } else if (asset.kind() == "ndf-cp") {
     const CompressedNdf& ndf = asset.compressed();
     properties = shapeProperties(ndf.shape);
@@ -144,6 +229,32 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
     properties["coefficient_type"] = kTypes[static_cast<int>(ndf.coefficient_type)];
     properties["regions"] = std::to_string(ndf.region_columns) + "x" + std::to_string(ndf.region_rows);
     statistics = summarizeCompressed(ndf, asset.info());
+  } else if (asset.kind() == "bin-map") {
+    const BinMap& map = asset.binMap();
+    properties = {{"width", map.width},
+                  {"height", map.height},
+                  {"alpha", map.alpha},
+                  {"bins_per_axis", map.bins_per_axis},
+                  {"leaf_size", map.leaf_size}};
+    statistics = summarizeBinMap(map);
+  } else if (asset.kind() == "histogram-sat") {
+    const HistogramSat& sat = asset.histograms();
+    properties = {{"width", sat.width},
+                  {"height", sat.height},
+                  {"directions", std::to_string(sat.theta_bins) + "x" + std::to_string(sat.phi_bins)},
+                  {"stride_texels", sat.stride},
+                  {"coarse_stride_texels", sat.coarse_stride},
+                  {"line_stride_texels", sat.line_stride}};
+    statistics = summarizeHistograms(sat, asset.info());
+  } else if (asset.kind() == "sh-lobes") {
+    const ShLobes& lobes = asset.shLobes();
+    properties = shProperties(lobes.order, lobes.grid, lobes.precision);
+    properties["sigma_r"] = lobes.sigma_r;
+    statistics = {{"mean", lobes.zonal[0]}, {"last_band", lobes.zonal.back()}};
+  } else if (asset.kind() == "sh-light") {
+    const ShLight& light = asset.shLight();
+    properties = shProperties(light.order, light.grid, light.precision);
+    statistics = summarizeLight(light);
   }
 }
 

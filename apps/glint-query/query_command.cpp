@@ -10,7 +10,7 @@
 
 namespace glint::apps {
 
-QueryCommand::QueryCommand(Tool& tool) : tool_(tool) {
+QueryCommand::QueryCommand(Tool& tool) : tool_(tool), light_(tool) {
   uv_option_ = &tool.option("--uv", uv_, "centre of the footprint, texture space").count(2);
   sigma_option_ = &tool.option("--sigma", sigma_, "footprint: deviation of an isotropic Gaussian, texels").range(1e-6, 1e9);
   covariance_option_ = &tool.option("--cov", covariance_, "footprint: covariance SXX SXY SYY of a Gaussian, texels^2").count(3);
@@ -45,7 +45,8 @@ void QueryCommand::check() const {
   if (!makes_table && output_option_->given()) usage("-o is for tables", "add --csv or --samples, or leave it out");
   if (makes_table && output_ != "-") checkWritable(output_);
   if (csv_option_->given()) {
-    if (uv_option_->given() || samples_ > 0 || !image_.empty() || half_option_->given() || range_option_->given())
+    if (uv_option_->given() || samples_ > 0 || !image_.empty() || half_option_->given() || range_option_->given() ||
+        light_.asked())
       usage("--csv asks its own queries", "leave out the others");
     checkReadable(csv_);
     return;
@@ -53,8 +54,8 @@ void QueryCommand::check() const {
   if (!uv_option_->given()) usage("no footprint was given", "add --uv U V, or --csv TABLE");
   if (!sigma_option_->given() && !covariance_option_->given() && !box_option_->given())
     usage("the footprint has no size", "add --sigma S, --cov SXX SXY SYY or --box AX AY BX BY");
-  if (image_.empty() && !half_option_->given() && !range_option_->given() && samples_ == 0)
-    usage("nothing was asked", "add --half, --range, --samples or --image");
+  if (image_.empty() && !half_option_->given() && !range_option_->given() && samples_ == 0 && !light_.asked())
+    usage("nothing was asked", "add --half, --range, --samples, --image or --light");
   if (!image_.empty()) {
     checkWritable(image_);
     checkPictureName(image_);
@@ -81,6 +82,7 @@ void QueryCommand::run(NdfAsset& asset) {
   asset.requireAnswerable(footprint());
   if (!image_.empty()) writePicture(asset);
   if (samples_ > 0) writeSamples(asset);
+  if (light_.asked()) return light_.run(asset.model(), asset.info(), footprint());
   if (half_option_->given() || range_option_->given()) answerOne(asset);
 }
 

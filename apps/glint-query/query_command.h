@@ -5,6 +5,7 @@
 
 #include "common/ndf_models.h"
 #include "common/tool.h"
+#include "glint-query/light_query.h"
 #include "glint-query/queries.h"
 
 namespace glint::apps {
@@ -28,6 +29,7 @@ class QueryCommand {
   void writePicture(NdfAsset& asset);
 
   Tool& tool_;
+  LightQuery light_;
   std::vector<float> uv_, covariance_, box_, half_, range_;
   float sigma_ = 0;
   std::string image_, csv_, output_;

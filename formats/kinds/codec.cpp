@@ -17,8 +17,11 @@ constexpr Codec codecOf(std::string_view kind) {
           [](const AnyAsset& asset, Findings& findings) { checkData(std::get<Model>(asset), findings); }};
 }
 
-constexpr std::array kCodecs = {codecOf<HeightMap>("heights"), codecOf<CompressedNdf>("ndf-cp"),
-                                codecOf<NdfPyramid>("ndf-pyramid"), codecOf<NormalMap>("normals")};
+constexpr std::array kCodecs = {codecOf<BinMap>("bin-map"),       codecOf<Displacement>("displacement"),
+                                codecOf<HeightMap>("heights"),    codecOf<HistogramSat>("histogram-sat"),
+                                codecOf<CompressedNdf>("ndf-cp"), codecOf<NdfPyramid>("ndf-pyramid"),
+                                codecOf<NormalMap>("normals"),    codecOf<ShLight>("sh-light"),
+                                codecOf<ShLobes>("sh-lobes")};
 
 }  // namespace
 

@@ -12,14 +12,19 @@
 
 #include "glint/formats/findings.h"
 #include "glint/formats/structure.h"
+#include "glint/model/bin_map.h"
 #include "glint/model/compressed_ndf.h"
+#include "glint/model/displacement.h"
+#include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
+#include "glint/model/sh.h"
 
 namespace glint::formats {
 
 /// The model struct of any kind. Its spans point into a Mapping.
-using AnyAsset = std::variant<std::monostate, NormalMap, HeightMap, NdfPyramid, CompressedNdf>;
+using AnyAsset = std::variant<std::monostate, NormalMap, HeightMap, NdfPyramid, CompressedNdf, BinMap, HistogramSat, ShLight,
+                              ShLobes, Displacement>;
 
 /// Typed access to a file that has passed the checks against its schema.
 class Content {
@@ -76,23 +81,43 @@ PackedAsset pack(const NormalMap& map);
 PackedAsset pack(const HeightMap& map);
 PackedAsset pack(const NdfPyramid& pyramid);
 PackedAsset pack(const CompressedNdf& ndf);
+PackedAsset pack(const BinMap& map);
+PackedAsset pack(const HistogramSat& sat);
+PackedAsset pack(const ShLight& light);
+PackedAsset pack(const ShLobes& lobes);
+PackedAsset pack(const Displacement& displacement);
 
 void unpack(const Content& content, NormalMap& map);
 void unpack(const Content& content, HeightMap& map);
 void unpack(const Content& content, NdfPyramid& pyramid);
 void unpack(const Content& content, CompressedNdf& ndf);
+void unpack(const Content& content, BinMap& map);
+void unpack(const Content& content, HistogramSat& sat);
+void unpack(const Content& content, ShLight& light);
+void unpack(const Content& content, ShLobes& lobes);
+void unpack(const Content& content, Displacement& displacement);
 
 // checkIndex: everything that a query follows, so that no query can read out of bounds. Cost: the bytes of the index arrays.
 void checkIndex(const NormalMap& map, Findings& findings);
 void checkIndex(const HeightMap& map, Findings& findings);
 void checkIndex(const NdfPyramid& pyramid, Findings& findings);
 void checkIndex(const CompressedNdf& ndf, Findings& findings);
+void checkIndex(const BinMap& map, Findings& findings);
+void checkIndex(const HistogramSat& sat, Findings& findings);
+void checkIndex(const ShLight& light, Findings& findings);
+void checkIndex(const ShLobes& lobes, Findings& findings);
+void checkIndex(const Displacement& displacement, Findings& findings);
 
 // checkData: the values. Called after checkIndex has passed.
 void checkData(const NormalMap& map, Findings& findings);
 void checkData(const HeightMap& map, Findings& findings);
 void checkData(const NdfPyramid& pyramid, Findings& findings);
 void checkData(const CompressedNdf& ndf, Findings& findings);
+void checkData(const BinMap& map, Findings& findings);
+void checkData(const HistogramSat& sat, Findings& findings);
+void checkData(const ShLight& light, Findings& findings);
+void checkData(const ShLobes& lobes, Findings& findings);
+void checkData(const Displacement& displacement, Findings& findings);
 
 /// The functions of one kind.
 struct Codec {

@@ -32,6 +32,10 @@ NdfInfo infoOf(const NormalMap& map, const NdfOptions& options) {
   return {map.width, map.height, kReferenceResolution, options.sigma_r, options.surface, options.boundary, 0, 0};
 }
 
+NdfInfo infoOf(const HistogramSat& sat) {
+  return {sat.width, sat.height, kReferenceResolution, 0, Surface::flat, Boundary::wrap, 0, 0};
+}
+
 }  // namespace
 
 template <class Model, class View>
@@ -54,10 +58,18 @@ OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& o
     opened.setPyramid<PyramidNdf>(asset.pyramid());
   } else if (asset.kind() == "ndf-cp") {
     opened.setPyramid<CpNdf>(asset.compressed());
+  } else if (asset.kind() == "bin-map") {
+    const BinMap& map = asset.binMap();
+    const BinMapNdf ndf(map);
+    opened.model_ = ndf;
+    opened.info_ = {map.width, map.height, kReferenceResolution, ndf.sigma(), Surface::flat, Boundary::wrap, 0, 0};
+  } else if (asset.kind() == "histogram-sat") {
+    opened.model_ = HistogramNdf(asset.histograms(), options.gaussian_boxes);
+    opened.info_ = infoOf(asset.histograms());
   } else {
     throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",
                 "is of kind " + std::string(asset.kind()) + ", which holds no distribution of normals",
-                "pass an asset of kind normals, ndf-pyramid or ndf-cp");
+                "pass an asset of kind normals, ndf-pyramid, ndf-cp, bin-map or histogram-sat");
   }
   if (opened.normals_) requireSameMap(asset, path, opened.info_, opened.normals_->normals(), options.normals);
   return opened;

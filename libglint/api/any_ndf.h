@@ -5,14 +5,16 @@
 #include <variant>
 
 #include "glint/formats/asset_reader.h"
+#include "glint/query/bin_map_ndf.h"
 #include "glint/query/cp_ndf.h"
+#include "glint/query/histogram_ndf.h"
 #include "glint/query/pyramid_ndf.h"
 #include "glint/query/reference.h"
 
 namespace glint::api {
 
 /// Any model of the NDF that an asset can hold.
-using AnyNdf = std::variant<Reference, PyramidNdf, CpNdf>;
+using AnyNdf = std::variant<Reference, PyramidNdf, CpNdf, BinMapNdf, HistogramNdf>;
 
 /// What an asset does not say itself about how it is asked.
 struct NdfOptions {
@@ -20,7 +22,8 @@ struct NdfOptions {
   Surface surface = Surface::flat;     ///< kind normals: how they behave between texels
   Boundary boundary = Boundary::wrap;  ///< kind normals: beyond the border of the map
   float sigma_r = 0.005f;              ///< kind normals: intrinsic roughness, disk units
-  bool verify_hashes = false;          ///< also compare every dataset with its hash; reads the whole file
+  GaussianBoxes gaussian_boxes = GaussianBoxes::one;  ///< kind histogram-sat: boxes that stand for a Gaussian footprint
+  bool verify_hashes = false;                         ///< also compare every dataset with its hash; reads the whole file
 };
 
 /// What models of every kind have in common.
@@ -28,10 +31,10 @@ struct NdfInfo {
   int width = 0;       ///< of the normal map, texels
   int height = 0;      ///< of the normal map, texels
   int resolution = 0;  ///< pixels of an NDF image along each axis; 256 where the model has none
-  float sigma_r = 0;   ///< intrinsic roughness, disk units
+  float sigma_r = 0;   ///< intrinsic roughness, disk units; 0 where the model has none
   Surface surface = Surface::flat;
   Boundary boundary = Boundary::wrap;
-  int level_count = 0;            ///< footprint sizes that are stored; 0: every size is answered from the texels
+  int level_count = 0;            ///< footprint sizes that are stored; 0: every size is answered from the texels or their sums
   float finest_sigma_texels = 0;  ///< deviation of the footprints of level 0; 0 where there are no levels
 };
 
@@ -49,6 +52,8 @@ class OpenedNdf {
   const formats::Asset& asset() const { return asset_; }
   /// Whether footprints below level 0 are answered from the texels.
   bool hasNormals() const { return normals_.has_value(); }
+  /// The map that answers them; nullptr if there is none.
+  const NormalMap* normals() const { return normals_ ? &normals_->normals() : nullptr; }
 
  private:
   explicit OpenedNdf(formats::Asset asset) : asset_(std::move(asset)) {}

@@ -83,7 +83,7 @@ typedef struct glint_open_options {
 #define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0 }
 /* clang-format on */
 
-/* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp.
+/* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat.
  *
  * The file is checked, then mapped; what queries read is not copied. Safe on untrusted files. A file must not be changed in
  * place while it is open (the tools never do: they replace files).

@@ -1,4 +1,3 @@
-#include <fftw3.h>
 #include <tbb/parallel_for.h>
 
 #include <cmath>
@@ -8,26 +7,13 @@
 #include <numbers>
 
 #include "glint/bake/counter_random.h"
+#include "glint/bake/fftw_plan.h"
 #include "glint/bake/synth_kinds.h"
 
 namespace glint::bake {
 namespace {
 
 constexpr std::uint64_t kNoiseStream = 1;
-
-struct FftwFree {
-  void operator()(void* memory) const { fftw_free(memory); }
-};
-struct DestroyPlan {
-  void operator()(fftw_plan plan) const { fftw_destroy_plan(plan); }
-};
-using Plan = std::unique_ptr<std::remove_pointer_t<fftw_plan>, DestroyPlan>;
-
-/// FFTW's planner, unlike its execution, is not thread-safe.
-std::mutex& plannerMutex() {
-  static std::mutex mutex;
-  return mutex;
-}
 
 }  // namespace
 
@@ -39,10 +25,10 @@ std::vector<float> noiseHeights(const SynthParameters& p, float correlation_x, f
   if (!memory) throw std::bad_alloc();
   auto* field = memory.get();
   auto* spectrum = reinterpret_cast<fftw_complex*>(field);
-  Plan forward, backward;
+  FftwPlan forward, backward;
   {
     // FFTW_ESTIMATE: measuring would choose algorithms, and so roundings, by the clock.
-    const std::lock_guard lock(plannerMutex());
+    const std::lock_guard lock(fftwPlannerMutex());
     forward.reset(fftw_plan_dft_r2c_2d(p.height, p.width, field, spectrum, FFTW_ESTIMATE));
     backward.reset(fftw_plan_dft_c2r_2d(p.height, p.width, spectrum, field, FFTW_ESTIMATE));
   }

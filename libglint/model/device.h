@@ -1,8 +1,20 @@
 #pragma once
 
 /// Marks a function that also compiles as CUDA device code. The only macro of the public headers.
-#if defined(__CUDACC__)
+/// Device code calls constexpr functions of the standard library: nvcc needs --expt-relaxed-constexpr; clang allows it by itself.
+#if defined(__CUDACC__) || defined(__CUDA__)
 #define GLINT_HD __host__ __device__
 #else
 #define GLINT_HD
 #endif
+
+namespace glint {
+
+/// Asks for a cache line that will be read soon. Any address is fine.
+inline GLINT_HD void prefetch([[maybe_unused]] const void* address) {
+#if defined(__GNUC__) && !defined(__CUDA_ARCH__)
+  __builtin_prefetch(address);
+#endif
+}
+
+}  // namespace glint

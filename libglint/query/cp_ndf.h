@@ -1,8 +1,7 @@
 #pragma once
 
-#include <bit>
-
 #include "glint/model/compressed_ndf.h"
+#include "glint/query/bits.h"
 #include "glint/query/block_mass.h"
 #include "glint/query/cluster_basis.h"
 #include "glint/query/cluster_slices.h"
@@ -28,7 +27,10 @@ class CpNdf {
       : ndf_(ndf),
         below_(Reference(normals, ndf.shape.sigma_r, ndf.shape.surface, ndf.shape.boundary, Reference::Search::pruned)) {}
 
-  const PyramidShape& shape() const { return ndf_.shape; }
+  GLINT_HD const CompressedNdf& compressed() const { return ndf_; }
+  /// Whether footprints below level 0 are answered from the texels.
+  GLINT_HD bool hasNormals() const { return below_.hasMap(); }
+  GLINT_HD const PyramidShape& shape() const { return ndf_.shape; }
 
   /// Density towards h, >= 0; O(columns) in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
@@ -44,24 +46,7 @@ class CpNdf {
   ///
   /// Stored masses are rounded up by at most a sixteenth; a block is kept with the ratio of the mass that its pixels have to the
   /// stored one, else another is drawn from the digits of `xi` that are left (one in forty on average). O(columns * 256).
-  GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
-    xi = clampUnit(xi);
-    if (below_.hasMap() && belowFinest(shape(), p)) return below_.sample(p, xi);
-    const PyramidSlices chosen = selectSlices(shape(), p);
-    float weights[PyramidSlices::kMost];
-    float total = 0;  // images of which nothing was kept have no density
-    for (int k = 0; k < chosen.count; ++k) {
-      weights[k] = ndf_.density_scales.data()[imageOf(chosen.slices[k])] > 0 ? chosen.slices[k].weight : 0.0f;
-      total += weights[k];
-    }
-    const int k = chooseIndex(chosen.count, total, [&](int i) { return weights[i]; }, xi.x);
-    if (k < 0) return {};
-    return withReader(ndf_, [&](const auto& reader) -> HalfVectorSample {
-      const PixelPlace place = choosePlace(reader, imageOf(chosen.slices[k]), xi);
-      if (place.x < 0) return {};
-      return {pointInPixel(shape(), place, xi), pixelDensity(reader, chosen, place) / total};
-    });
-  }
+  GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const;
 
   /// Average over a box of half vectors, >= 0, 0 if the box is empty; O(columns) for each block that the box covers.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const { return std::max(0.0f, signedMean(p, range)); }
@@ -106,7 +91,7 @@ class CpNdf {
     const std::size_t word = at * ndf_.words_per_cluster + slot / 64;
     const std::uint64_t mask = ndf_.masks.data()[word], bit = std::uint64_t{1} << (slot % 64);
     if (!(mask & bit)) return {};
-    return {at, ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(std::popcount(mask & (bit - 1)))};
+    return {at, ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(setBits(mask & (bit - 1)))};
   }
 
   /// Weighted sum over the chosen images. Slices of the same cluster, as those of neighbours mostly are, share its projection.
@@ -209,6 +194,26 @@ class CpNdf {
   CompressedNdf ndf_;
   Reference below_;
 };
+
+// Behind the class: clang instantiates the templates that it calls only once it has read them.
+inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) const {
+  xi = clampUnit(xi);
+  if (below_.hasMap() && belowFinest(shape(), p)) return below_.sample(p, xi);
+  const PyramidSlices chosen = selectSlices(shape(), p);
+  float weights[PyramidSlices::kMost];
+  float total = 0;  // images of which nothing was kept have no density
+  for (int k = 0; k < chosen.count; ++k) {
+    weights[k] = ndf_.density_scales.data()[imageOf(chosen.slices[k])] > 0 ? chosen.slices[k].weight : 0.0f;
+    total += weights[k];
+  }
+  const int k = chooseIndex(chosen.count, total, [&](int i) { return weights[i]; }, xi.x);
+  if (k < 0) return {};
+  return withReader(ndf_, [&](const auto& reader) -> HalfVectorSample {
+    const PixelPlace place = choosePlace(reader, imageOf(chosen.slices[k]), xi);
+    if (place.x < 0) return {};
+    return {pointInPixel(shape(), place, xi), pixelDensity(reader, chosen, place) / total};
+  });
+}
 
 static_assert(NdfModel<CpNdf>);
 

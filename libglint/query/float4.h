@@ -7,7 +7,7 @@
 #include "glint/model/device.h"
 #include "glint/query/half.h"
 
-#if defined(__SSE4_1__) && !defined(__CUDACC__)
+#if defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(__CUDA__)
 #include <smmintrin.h>
 #endif
 
@@ -15,7 +15,7 @@ namespace glint {
 
 /// Four floats side by side, from SSE4.1 where the program is compiled for it. Results are the same bits without it.
 struct Float4 {
-#if defined(__SSE4_1__) && !defined(__CUDACC__)
+#if defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(__CUDA__)
   __m128 v;
 
   static Float4 zero() { return {_mm_setzero_ps()}; }
@@ -33,9 +33,13 @@ struct Float4 {
   /// Half-precision numbers.
   static Float4 load(const std::uint16_t* p) {
     const __m128i bits = _mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
-    const __m128i magnitude = _mm_slli_epi32(_mm_and_si128(bits, _mm_set1_epi32(0x7fff)), 13);
+    const __m128i magnitude = _mm_and_si128(bits, _mm_set1_epi32(0x7fff));
     const __m128i sign = _mm_slli_epi32(_mm_and_si128(bits, _mm_set1_epi32(0x8000)), 16);
-    return {_mm_or_ps(_mm_mul_ps(_mm_castsi128_ps(magnitude), _mm_set1_ps(0x1p112f)), _mm_castsi128_ps(sign))};
+    const __m128i normal = _mm_add_epi32(_mm_slli_epi32(magnitude, 13), _mm_set1_epi32(112 << 23));
+    // As integers: arithmetic on subnormal floats takes a hundred cycles.
+    const __m128 subnormal = _mm_mul_ps(_mm_cvtepi32_ps(magnitude), _mm_set1_ps(0x1p-24f));
+    const __m128 is_subnormal = _mm_castsi128_ps(_mm_cmplt_epi32(magnitude, _mm_set1_epi32(0x400)));
+    return {_mm_or_ps(_mm_blendv_ps(_mm_castsi128_ps(normal), subnormal, is_subnormal), _mm_castsi128_ps(sign))};
   }
   void store(float* p) const { _mm_storeu_ps(p, v); }
 
@@ -86,7 +90,7 @@ struct Float4 {
 
 /// Sums of four vectors, each over its lanes.
 inline GLINT_HD Float4 sumsOf(Float4 a, Float4 b, Float4 c, Float4 d) {
-#if defined(__SSE4_1__) && !defined(__CUDACC__)
+#if defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(__CUDA__)
   _MM_TRANSPOSE4_PS(a.v, b.v, c.v, d.v);
   return (a + c) + (b + d);
 #else

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <bit>
-
 #include "glint/model/ndf_pyramid.h"
+#include "glint/query/bits.h"
 #include "glint/query/float4.h"
 #include "glint/query/half.h"
 #include "glint/query/pyramid_slices.h"
@@ -24,7 +23,10 @@ class PyramidNdf {
         below_(Reference(normals, pyramid.shape.sigma_r, pyramid.shape.surface, pyramid.shape.boundary,
                          Reference::Search::pruned)) {}
 
-  const PyramidShape& shape() const { return pyramid_.shape; }
+  GLINT_HD const NdfPyramid& pyramid() const { return pyramid_; }
+  /// Whether footprints below level 0 are answered from the texels.
+  GLINT_HD bool hasNormals() const { return below_.hasMap(); }
+  GLINT_HD const PyramidShape& shape() const { return pyramid_.shape; }
 
   /// Density towards h, >= 0; O(1): one pixel in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
@@ -116,8 +118,8 @@ class PyramidNdf {
     const int word = block / 64;
     const std::uint64_t bit = std::uint64_t{1} << (block % 64);
     if (!(mask[word] & bit)) return -1;
-    int rank = std::popcount(mask[word] & (bit - 1));
-    for (int w = 0; w < word; ++w) rank += std::popcount(mask[w]);
+    int rank = setBits(mask[word] & (bit - 1));
+    for (int w = 0; w < word; ++w) rank += setBits(mask[w]);
     return static_cast<std::int64_t>(level.first_block.data()[slice.image]) + rank;
   }
 

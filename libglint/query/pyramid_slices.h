@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 
 #include "glint/model/footprint.h"
 #include "glint/model/ndf_pyramid.h"
@@ -73,11 +75,26 @@ inline GLINT_HD CentreNeighbours centreNeighbours(float u, int size, float strid
   return {count - 1, 0, std::clamp((x - (static_cast<float>(count) - 0.5f) * stride) / gap, 0.0f, 1.0f)};
 }
 
+/// log2 of a positive, finite number, to 2e-7. Plain arithmetic, so that batches and device code choose the same levels to the bit.
+inline GLINT_HD float log2Of(float x) {
+  constexpr std::uint32_t kSqrtHalf = 0x3f3504f3u;
+  std::uint32_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  const auto exponent = static_cast<std::int32_t>(bits - kSqrtHalf) >> 23;
+  const std::uint32_t mantissa_bits = bits - (static_cast<std::uint32_t>(exponent) << 23);
+  float mantissa;  // [sqrt(1/2), sqrt(2))
+  std::memcpy(&mantissa, &mantissa_bits, sizeof mantissa);
+  const float s = (mantissa - 1) / (mantissa + 1), z = s * s;  // log((1 + s) / (1 - s)) = 2 (s + s^3 / 3 + ...)
+  constexpr float kTwoOverLn2 = 2.885390081777927f;
+  const float series = 1 + z * (1.0f / 3 + z * (1.0f / 5 + z * (1.0f / 7 + z * (1.0f / 9))));
+  return static_cast<float>(exponent) + kTwoOverLn2 * s * series;
+}
+
 /// Trilinear choice of images: bilinear between centres, linear in log2 of the footprint's size between levels. Footprints
 /// below the finest or above the coarsest level get that level.
 inline GLINT_HD PyramidSlices selectSlices(const PyramidShape& shape, const Footprint& p) {
   const float finest = finestSigma(shape);
-  const float octave = 0.5f * std::log2(isotropicVariance(shape, p) / (finest * finest));
+  const float octave = 0.5f * log2Of(isotropicVariance(shape, p) / (finest * finest));
   const float level = std::clamp(octave, 0.0f, static_cast<float>(shape.level_count - 1));
   const int first = std::min(static_cast<int>(level), shape.level_count - 1);
   const float t = level - static_cast<float>(first);

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 
 #include "glint/model/ndf_pyramid.h"
+#include "glint/query/bits.h"
 #include "glint/query/float4.h"
 #include "glint/query/ndf_model.h"
 #include "glint/query/pyramid_slices.h"
@@ -62,7 +62,7 @@ GLINT_HD BlockChoice chooseBlock(const std::uint64_t* mask, int blocks_per_axis,
   for (int row = 0; row < blocks_per_axis; ++row) {
     const std::uint64_t bits = blockRowBits(mask, blocks_per_axis, row);
     if (bits == 0) continue;
-    const int end = begin + std::popcount(bits);
+    const int end = begin + setBits(bits);
     const float w = mass(begin, end);
     if (w > 0) {
       if (chosen_row >= 0) rest -= share;
@@ -77,11 +77,9 @@ GLINT_HD BlockChoice chooseBlock(const std::uint64_t* mask, int blocks_per_axis,
   if (chosen_row < 0) return {};
   xi.y = clampUnit(rest / share);
   const int k = std::max(
-      chooseIndex(
-          std::popcount(chosen_bits), share, [&](int j) { return mass(chosen_begin + j, chosen_begin + j + 1); }, xi.x),
-      0);
+      chooseIndex(setBits(chosen_bits), share, [&](int j) { return mass(chosen_begin + j, chosen_begin + j + 1); }, xi.x), 0);
   for (int j = 0; j < k; ++j) chosen_bits &= chosen_bits - 1;
-  return {chosen_row * blocks_per_axis + std::countr_zero(chosen_bits), chosen_begin + k};
+  return {chosen_row * blocks_per_axis + lowestBit(chosen_bits), chosen_begin + k};
 }
 
 /// The sums that a choice among the pixels of a block needs.

@@ -21,6 +21,18 @@ MAPS = {
     "flakes": ["flakes", "--flake-size", 6, "--alpha", 0.2, "--seed", 3],
 }
 MB = 1e6
+# Nanoseconds of the authors' inverse bin map for the 21 weights of a query: (map, alpha) -> footprints of 4^2, 16^2, 64^2, 256^2, 1024^2.
+BIN_MAP_AUTHORS = {
+    ("isotropic 1K", 0.0025): (2448, 2668, 3197, 7113),
+    ("isotropic 1K", 0.01): (3099, 3782, 8178, 27034),
+    ("isotropic 1K", 0.04): (4056, 8401, 27716, 105466),
+    ("isotropic 1K", 0.16): (4545, 12073, 40903, 154321),
+    ("Gaussian 2K", 0.0025): (2582, 2598, 2644, 3052, 4639),
+    ("Gaussian 2K", 0.01): (3544, 3420, 4047, 7661, 25625),
+    ("Gaussian 2K", 0.04): (4820, 5457, 9827, 30889, 98485),
+    ("Gaussian 2K", 0.16): (6043, 10739, 33897, 120403, 457324),
+    ("brushed 2K", 0.01): (4701, 5397, 9027, 27758, 83114),
+}
 # Relative errors that coefficients of these types reach on every map.
 LEAST_ERROR = {"i8": 0.01, "f16": 0.002, "f32": 0}
 
@@ -95,6 +107,22 @@ class Bench:
                            "--surface", "smooth", target=10)
         self.table.add("peak memory of the pyramids", max(peak, run.peak_mb) / 1024, "GiB", target=2)
 
+    def displacements(self):
+        """Targets are for 1K^2 (and 4K^2, diffuse) on two cores, whatever the size of the other maps."""
+        size = self.size // 2
+        runs = [(size, "diffuse:0.8", 5), (size, "ggx:0.3", 12), (size, "ggx:0.1", 30), (4 * size, "diffuse:0.8", 60)]
+        for side, base, target in runs:
+            name = f"height{side}"
+            if not self.path(name).exists():
+                image = self.folder / f"{name}.exr"
+                self.tools.run("synth", "isotropic", "--alpha", 0.5, "--height", "--size", side, "-o", image)
+                self.tools.run("ingest", image, "--kind", "height", "--to", "heights", "-o", self.path(name))
+            run = self.process(f"displace, factor 16, {base}, {side}^2", "displace", self.path(name), "-o", self.path(name, "displaced"),
+                               "--factor", 16, "--base", base, "--quiet", target=target, paper="22 to 36 min, 6 cores")
+            if side == size:
+                self.table.add(f"peak memory, displace {base}, {side}^2", run.peak_mb / 1024, "GiB", target=1)
+        self.table.add("bytes of T and S", run.result["levels"][0]["scale_bytes"] / 1000, "KB", target=250, paper="202 to 589 KB")
+
     def compress(self, figure, name, kind, *flags, **against):
         run = self.process(figure, "compress", self.path(name, "pyramid"), "-o", self.path(name, kind), *flags, **against)
         return run.result["total"]["rel_l2"], run.result["total_bytes"]
@@ -146,6 +174,24 @@ class Bench:
                 else:
                     self.table.add(f"{what.replace('_', ', ')}, {kind}", entry["cpu_time"], "ns", target=150 if what == "density_warm" and file != "ggx" else None)
 
+    def histograms(self):
+        """Memory and time of accumulated histograms against the distance of the table's points."""
+        for name in MAPS:
+            strides = {4: 200, 8: None, 16: 40, 32: None}
+            for stride, megabytes in strides.items():
+                run = self.process(f"histograms, stride {stride}, {name}", "sat", self.path(name), "-o", self.path(name, f"sat{stride}"),
+                                   "--bins", "9x32", "--stride", stride, target=1.5, paper="9 s, 32 cores")
+                self.table.add(f"bytes of histograms, stride {stride}, {name}", run.result["size_bytes"] / MB, "MB", target=megabytes,
+                               paper="1.1 GB", bins=run.result["bins"])
+            text = call([self.tools.folder / "glint-sat-bench", *(self.path(name, f"sat{stride}") for stride in strides)])
+            for asset in json.loads(text):
+                for query in asset["queries"]:
+                    size, stride = query["size_texels"], asset["stride_texels"]
+                    kind = f"{size}^2{' rotated' if query['rotated'] else ''}"
+                    target = (3 if size <= 256 else 10) if stride == 4 else None
+                    self.table.add(f"histogram of {kind}, stride {stride}, {name}", query["histogram_ns"] / 1000, "us", target=target,
+                                   density_ns=query["density_ns"], bins=asset["bins"])
+
     def query_command(self):
         asset = self.path("flakes", "cp32")
         run = self.tools.repeat(self.repeats, "query", asset, "--uv", 0.3, 0.7, "--sigma", 40, "--half", 0.1, -0.05, "--repeat", 300000)
@@ -163,6 +209,29 @@ class Bench:
                     self.table.add(f"{figure} at centres, worst octave, {name} {kind}", worst("centres", figure), "",
                                    target=limit if pyramid else None, levels=asset["levels"])
                 self.table.add(f"rel_l2 at random, worst octave, {name} {kind}", worst("random", "rel_l2"), "")
+
+    def bin_maps(self):
+        """Every cell of the authors' table beside ours, build times, bytes and errors. One process; see binmap_bench.cpp."""
+        text = call([self.tools.folder / "glint-binmap-bench"])
+        (self.folder / "binmap.json").write_text(text)
+        for run in json.loads(text):
+            name, alpha = run["map"], round(run["alpha"], 4)
+            two_k = run["size"] == 2048
+            self.table.add(f"bin map, build, {name}, {alpha}", run["build_ms"], "ms", target=80 if two_k else None, paper="180 to 310 ms" if two_k else "",
+                           cpu_ms=run["build_cpu_ms"])
+            self.table.add(f"bin map, bytes, {name}, {alpha}", run["bytes"] / 2**20, "MiB", target=24 if two_k else None, paper="35 to 42 MiB" if two_k else "")
+            for k, entry in enumerate(run["queries"]):
+                authors = BIN_MAP_AUTHORS.get((name, alpha), ())
+                figure = f"bin map, weights, {name}, {alpha}, {entry['side']:.0f}^2"
+                if k < len(authors):
+                    ratio = authors[k] / entry["weights_ns"]
+                    self.table.add(figure, entry["weights_ns"], "ns", target=authors[k] / 5, paper=f"{authors[k]} ns, {ratio:.1f} x", **entry)
+                else:
+                    self.table.add(figure, entry["weights_ns"], "ns", **entry)
+            limit = 0.05 if "8-bit" in name else 0.015
+            for entry in run["errors"]:
+                self.table.add(f"bin map, median error, {name}, {alpha}, {entry['side']:.0f}^2", entry["median"], "", target=limit)
+                self.table.add(f"bin map, energy, {name}, {alpha}, {entry['side']:.0f}^2", abs(entry["energy"]), "", target=0.005)
 
     def write(self):
         results = {"machine": machine(), "size_texels": self.size, "repeats": self.repeats, "rows": self.table.rows}
@@ -199,9 +268,12 @@ def main():
     print_header()
     bench.synth_and_ingest()
     bench.pyramids()
+    bench.displacements()
     bench.compressions()
     bench.queries()
+    bench.histograms()
     bench.query_command()
+    bench.bin_maps()
     bench.accuracy(parser.parse_args().samples)
     bench.write()
 

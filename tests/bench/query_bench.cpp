@@ -3,6 +3,7 @@
 // Names are WHAT/FILE. `random`: footprints of every size anywhere, towards normals of the map, so that most queries miss the
 // caches on big assets. `warm`: one such query again and again. A plain microfacet model (GGX) is timed in the same run, as a function
 // and as a sampler of half vectors, and ratio_* give the ratios of densities and samples to it: median of alternating runs.
+// `few`: the same 64 queries again and again, which stay in the caches. `batch`: those of `random` and `few` in batches, for each query.
 
 #include <benchmark/benchmark.h>
 #include <time.h>
@@ -16,6 +17,7 @@
 #include <variant>
 #include <vector>
 
+#include "glint/api/batch.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"
@@ -26,6 +28,8 @@ using namespace glint;
 
 /// Enough that their blocks do not fit a cache of a few megabytes.
 constexpr std::size_t kQueries = 1 << 15;
+/// Few enough that all they read stays in the nearest caches; and as many queries as a batch has.
+constexpr std::size_t kFew = 64;
 /// Half width of the range that `mean` is asked for: a light of about 6 degrees.
 constexpr float kRangeReach = 0.05f;
 
@@ -161,9 +165,50 @@ void addQueryBenchmarks(const std::string& what, const std::string& name, const 
   });
 }
 
+/// The queries as a renderer's wavefront has them.
+struct QueryArrays {
+  explicit QueryArrays(const std::vector<Query>& queries) {
+    for (const Query& query : queries) {
+      u.push_back(query.footprint.centre.x);
+      v.push_back(query.footprint.centre.y);
+      sigma.push_back(std::sqrt(query.footprint.covariance.xx));
+      hx.push_back(query.half.x);
+      hy.push_back(query.half.y);
+    }
+  }
+  std::vector<float> u, v, sigma, hx, hy;
+};
+
+template <class Model>
+void addBatchBenchmarks(const std::string& name, const Model& model, const std::vector<Query>& queries) {
+  for (const bool few : {false, true}) {
+    const std::string what = few ? "density_batch_few/" : "density_batch_random/";
+    benchmark::RegisterBenchmark(
+        (what + name).c_str(), [any = api::AnyNdf(model), arrays = QueryArrays(queries), few](benchmark::State& state) {
+          std::vector<float> answers(kFew);
+          std::size_t first = 0;
+          while (state.KeepRunningBatch(kFew)) {
+            api::FootprintArrays footprints;
+            footprints.u = {&arrays.u[first]};
+            footprints.v = {&arrays.v[first]};
+            footprints.sigma = {&arrays.sigma[first]};
+            api::densities(any, kFew, footprints, {{&arrays.hx[first]}, {&arrays.hy[first]}}, answers.data());
+            benchmark::DoNotOptimize(answers.data());
+            benchmark::ClobberMemory();
+            if (!few) first = (first + kFew) % kQueries;
+          }
+        });
+  }
+}
+
 template <class Model>
 void addModelBenchmarks(const std::string& name, const Model& model, const std::vector<Query>& queries) {
   addQueryBenchmarks("density", name, queries, [&model](const Query& query) { return density(model, query); });
+  benchmark::RegisterBenchmark(("density_few/" + name).c_str(), [&model, &queries](benchmark::State& state) {
+    std::size_t k = 0;
+    for (auto _ : state) benchmark::DoNotOptimize(density(model, queries[k++ % kFew]));
+  });
+  addBatchBenchmarks(name, model, queries);
   addQueryBenchmarks("mean", name, queries, [&model](const Query& query) { return mean(model, query); });
   addQueryBenchmarks("sample", name, queries, [&model](const Query& query) { return sample(model, query); });
   addRatio("density", name, queries, [&model](const Query& query) { return density(model, query); }, plainDensity);

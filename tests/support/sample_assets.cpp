@@ -389,6 +389,37 @@ SampleHeights sampleHeights(int width, int height) {
   return sample;
 }
 
+SampleDisplacement sampleDisplacement(int size) {
+  SampleDisplacement sample;
+  Displacement& d = sample.displacement;
+  d.width = size, d.height = size / 2, d.texel_size_um = 2.5f;
+  d.base = {BaseBrdf::Kind::ggx, 1, 0.25f, 1.5f, 3};
+  d.lobe_count = 2, d.angular = 3, d.level_count = 2;
+  sample.levels.resize(2);
+  for (int l = 0; l < 2; ++l) {
+    SampleDisplacement::Level& from = sample.levels[static_cast<std::size_t>(l)];
+    DisplacementLevel& to = d.levels[l];
+    to.factor = 4 << l, to.columns = d.width / to.factor, to.rows = d.height / to.factor;
+    to.spatial_columns = 2, to.spatial_rows = 1;
+    to.rank1_residual = 0.125f, to.rank1_energy = 0.75f, to.interreflected_share = 0.25f, to.distant_share = 0.0625f;
+    for (int j = 0; j < to.rows; ++j) {
+      for (int i = 0; i < to.columns; ++i) {
+        const auto bump = static_cast<float>(noise(i, j + 100 * l) - 0.5);
+        from.heights.push_back(4 * bump);
+        from.lobes.push_back({{0.5f * bump, 0.25f}, 20 + 10 * bump, 0.75f});
+        from.lobes.push_back({{-0.25f, bump}, kMaxKappa, 0.375f});
+        from.slopes.push_back({{bump, -0.125f}, {0.25f, 0.0625f * bump, 0.5f}});
+        from.fit_errors.push_back(0.125f + 0.125f * bump);
+      }
+    }
+    from.spatial_scale = {0.75f, 1.25f};
+    for (int k = 0; k < 45; ++k) from.angular_scale.push_back(floatToHalf(0.5f + 0.03125f * static_cast<float>(k)));
+    to.heights = from.heights, to.lobes = from.lobes, to.slopes = from.slopes, to.fit_errors = from.fit_errors;
+    to.spatial_scale = from.spatial_scale, to.angular_scale = from.angular_scale;
+  }
+  return sample;
+}
+
 SamplePyramid samplePyramid(int size, BlockPrecision precision) {
   SamplePyramid sample;
   const SampleNormals normals = sampleNormals(size, size, false);
@@ -460,6 +491,187 @@ SampleCompressed sampleCompressed(int size, CompressionMethod method, Coefficien
   addBlockMasses(sample);
   linkSpans(sample);
   return sample;
+}
+
+namespace {
+
+void addCompact(std::uint64_t value, int shift, std::vector<std::uint64_t>& bases, std::vector<std::uint16_t>& offsets) {
+  if (offsets.size() % (std::size_t{1} << shift) == 0) bases.push_back(value);
+  offsets.push_back(static_cast<std::uint16_t>(value - bases.back()));
+}
+
+/// Mean and covariance of places in a bin, in bin sides.
+void addMoments(const TexelCode& code, const std::vector<std::uint32_t>& texels, std::vector<std::uint16_t>& moments) {
+  const double step = 1.0 / (1 << code.place_bits), n = static_cast<double>(texels.size());
+  double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  for (const std::uint32_t t : texels) {
+    const double px = (code.placeX(t) + 0.5) * step, py = (code.placeY(t) + 0.5) * step;
+    x += px / n, y += py / n, xx += px * px / n, xy += px * py / n, yy += py * py / n;
+  }
+  for (const double v : {x, y, xx - x * x, xy - x * y, yy - y * y}) moments.push_back(floatToHalf(static_cast<float>(v)));
+}
+
+}  // namespace
+
+SampleBinMap sampleBinMap(int width, int height) {
+  constexpr int kBins = 9, kShift = 2, kCellBits = 2;
+  const SampleNormals normals = sampleNormals(width, height, false);
+  const TexelCode code = texelCode(width, height);
+  SampleBinMap sample;
+  std::vector<std::vector<std::uint32_t>> lists(kBins * kBins);
+  sample.texel_classes.assign((normals.normals.size() * BinMap::kClassBits + 15) / 16, 0);
+  for (std::size_t t = 0; t < normals.normals.size(); ++t) {
+    const double x = (normals.normals[t].x + 1.0) * kBins / 2, y = (normals.normals[t].y + 1.0) * kBins / 2;
+    const auto place = [&](double v) { return static_cast<std::uint32_t>((v - std::floor(v)) * (1 << code.place_bits)); };
+    const auto bin = static_cast<std::size_t>(y) * kBins + static_cast<std::size_t>(x);
+    lists[bin].push_back(code.pack(static_cast<std::uint32_t>(t) % static_cast<std::uint32_t>(width),
+                                   static_cast<std::uint32_t>(t) / static_cast<std::uint32_t>(width), place(x), place(y)));
+    for (std::size_t k = 0; k < BinMap::kClassBits; ++k) {
+      const std::size_t bit = t * BinMap::kClassBits + k;
+      sample.texel_classes[bit / 16] |= static_cast<std::uint16_t>((bin / 2 >> k & 1) << (bit % 16));
+    }
+  }
+  sample.masks.assign(2, 0);
+  for (std::size_t bin = 0; bin < lists.size(); ++bin) {
+    if (bin % 2 == 0) sample.class_bins.push_back(static_cast<std::uint32_t>(bin));
+    if (bin % 64 == 0) sample.mask_ranks.push_back(static_cast<std::uint32_t>(sample.bin_offsets.size()));
+    if (lists[bin].empty()) continue;
+    const std::size_t ordinal = sample.bin_offsets.size();
+    sample.masks[bin / 64] |= std::uint64_t{1} << (bin % 64);
+    if (ordinal % 64 == 0) {
+      sample.grid_masks.push_back(0);
+      sample.grid_ranks.push_back(static_cast<std::uint32_t>(sample.grid_cells.size()));
+    }
+    addCompact(sample.texels.size(), kShift, sample.bin_bases, sample.bin_offsets);
+    if (lists[bin].size() <= 64) {
+      sample.texels.insert(sample.texels.end(), lists[bin].begin(), lists[bin].end());
+      continue;
+    }
+    sample.grid_masks.back() |= std::uint64_t{1} << (ordinal % 64);
+    sample.grid_cells.push_back(static_cast<std::uint32_t>(sample.cell_offsets.size()));
+    addMoments(code, lists[bin], sample.grid_moments);
+    const CellGrid grid = cellGrid(code, kCellBits);
+    for (std::uint32_t cell = 0; cell < 1u << kCellBits; ++cell) {
+      addCompact(sample.texels.size(), kShift, sample.cell_bases, sample.cell_offsets);
+      for (const std::uint32_t t : lists[bin])
+        if ((code.row(t) >> grid.row_shift) * static_cast<std::uint32_t>(grid.columns) +
+                (code.column(t) >> grid.column_shift) ==
+            cell)
+          sample.texels.push_back(t);
+    }
+    addCompact(sample.texels.size(), kShift, sample.cell_bases, sample.cell_offsets);
+  }
+  addCompact(sample.texels.size(), kShift, sample.bin_bases, sample.bin_offsets);
+  sample.grid_cells.push_back(static_cast<std::uint32_t>(sample.cell_offsets.size()));
+  sample.class_bins.push_back(kBins * kBins);
+  sample.map = {width,
+                height,
+                0.4f,
+                kBins,
+                8,
+                sample.masks,
+                sample.mask_ranks,
+                {sample.bin_bases, sample.bin_offsets, kShift},
+                sample.grid_masks,
+                sample.grid_ranks,
+                sample.grid_cells,
+                sample.grid_moments,
+                {sample.cell_bases, sample.cell_offsets, kShift},
+                sample.texels,
+                sample.class_bins,
+                sample.texel_classes};
+  return sample;
+}
+
+SampleHistograms sampleHistograms(int width, int height) {
+  constexpr int kRings = 12;
+  constexpr int kSectors = 8;
+  constexpr double kPi = 3.14159265358979323846;
+  const SampleNormals map = sampleNormals(width, height, false);
+  const auto direction = [](Vec2 n) {
+    const double phi = std::atan2(double{n.y}, double{n.x});
+    const int ring = static_cast<int>(std::asin(std::sqrt(double{n.x} * n.x + double{n.y} * n.y)) / (kPi / 2) * kRings);
+    return ring * kSectors + std::min(static_cast<int>((phi < 0 ? phi + 2 * kPi : phi) / (2 * kPi) * kSectors), kSectors - 1);
+  };
+  SampleHistograms sample;
+  HistogramSat& sat = sample.sat;
+  sat.width = width, sat.height = height, sat.theta_bins = kRings, sat.phi_bins = kSectors;
+  sat.stride = 4, sat.coarse_stride = 8, sat.line_stride = 16;
+  sample.texels.resize(static_cast<std::size_t>(sat.tileRows()) * sat.tileColumns() * 64);
+  for (int id = 0; id < kRings * kSectors; ++id) {
+    double x = 0, y = 0;
+    std::uint64_t count = 0;
+    for (int j = 0; j < height; ++j) {
+      for (int i = 0; i < width; ++i) {
+        if (direction(map.map.at(i, j)) != id) continue;
+        sample.texels[sat.texelIndex(i, j)] = static_cast<std::uint16_t>(sample.bin_ids.size());
+        x += map.map.at(i, j).x, y += map.map.at(i, j).y, ++count;
+      }
+    }
+    if (count == 0) continue;
+    sample.bin_ids.push_back(static_cast<std::uint16_t>(id));
+    sample.bin_normals.push_back({static_cast<float>(x / count), static_cast<float>(y / count)});
+    sample.bin_totals.push_back(count);
+  }
+  sat.bin_count = static_cast<int>(sample.bin_ids.size());
+  const auto count = [&](auto& table, int x0, int y0, int x1, int y1) {
+    const std::size_t point = table.size();
+    table.resize(point + sat.rowLength());
+    for (int j = y0; j < y1; ++j)
+      for (int i = x0; i < x1; ++i) ++table[point + sample.texels[sat.texelIndex(i, j)]];
+  };
+  const auto tableOf = [&](auto& table, int stride) {
+    for (int b = 0; b < sat.pointsY(stride); ++b)
+      for (int a = 0; a < sat.pointsX(stride); ++a)
+        count(table, 0, 0, std::min(a * stride, width), std::min(b * stride, height));
+  };
+  tableOf(sample.sums, sat.stride);
+  tableOf(sample.coarse_sums, sat.coarse_stride);
+  for (int j = 0; j < height; ++j)
+    for (int a = 0; a < sat.pointsX(16); ++a) count(sample.row_sums, 0, j, std::min(a * 16, width), j + 1);
+  for (int i = 0; i < width; ++i)
+    for (int b = 0; b < sat.pointsY(16); ++b) count(sample.column_sums, i, 0, i + 1, std::min(b * 16, height));
+  sat.bin_ids = sample.bin_ids, sat.bin_normals = sample.bin_normals, sat.bin_totals = sample.bin_totals;
+  sat.texels = sample.texels, sat.sums = sample.sums, sat.coarse_sums = sample.coarse_sums;
+  sat.row_sums = sample.row_sums, sat.column_sums = sample.column_sums;
+  return sample;
+}
+
+SampleShLobes sampleShLobes() {
+  SampleShLobes s;
+  s.zonal = {0.28f, 0.4f};
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      // Directions along the axes: sqrt(4 pi / 3) y_1 is the direction itself, in the order z, x, y.
+      constexpr float kAzimuths[4][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
+      const float sine = row == 1 ? 1.0f : 0.0f, cosine = 1.0f - static_cast<float>(row);
+      s.coefficients.insert(s.coefficients.end(), {s.zonal[0], s.zonal[1] * cosine, s.zonal[1] * sine * kAzimuths[column][0],
+                                                   s.zonal[1] * sine * kAzimuths[column][1]});
+    }
+  }
+  s.lobes = {1, 0.1f, {3, 4}, ShPrecision::f32, s.zonal, s.coefficients.data()};
+  return s;
+}
+
+SampleShLight sampleShLight() {
+  SampleShLight s;
+  // Integrals of 4 z P_l(z) over z in [0, 1], times 2 pi sqrt((2l + 1) / (4 pi)).
+  constexpr double kPi = 3.14159265358979323846;
+  const double bands[3] = {2, 4.0 / 3, 0.5};
+  for (int direction = 0; direction < 12; ++direction) {
+    s.scales.push_back(0.5f);
+    for (int channel = 1; channel <= 3; ++channel) {
+      for (int l = 0; l < 3; ++l) {
+        const double zonal = bands[l] * 2 * kPi * std::sqrt((2 * l + 1) / (4 * kPi));
+        const std::uint16_t stored = floatToHalf(static_cast<float>(2 * channel * zonal));
+        s.coefficients.push_back(stored);
+        s.coefficients.insert(s.coefficients.end(), static_cast<std::size_t>(2 * l), 0);
+        if (channel == 3) s.band_norms.push_back(static_cast<float>(3 * zonal));
+      }
+    }
+  }
+  s.light = {2, {3, 4}, ShPrecision::f16, s.scales, s.band_norms, s.coefficients.data()};
+  return s;
 }
 
 formats::Provenance sampleProvenance() {

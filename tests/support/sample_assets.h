@@ -22,6 +22,19 @@ struct SampleHeights {
   HeightMap map;
 };
 
+struct SampleDisplacement {
+  struct Level {
+    std::vector<float> heights;
+    std::vector<VmfLobe> lobes;
+    std::vector<MapSlopes> slopes;
+    std::vector<float> fit_errors;
+    std::vector<float> spatial_scale;
+    std::vector<std::uint16_t> angular_scale;
+  };
+  std::vector<Level> levels;
+  Displacement displacement;
+};
+
 struct SamplePyramid {
   struct Level {
     std::vector<std::uint64_t> masks;
@@ -55,13 +68,53 @@ struct SampleCompressed {
   CompressedNdf ndf;
 };
 
+struct SampleBinMap {
+  std::vector<std::uint64_t> masks, bin_bases, grid_masks, cell_bases;
+  std::vector<std::uint32_t> mask_ranks, grid_ranks, grid_cells, texels, class_bins;
+  std::vector<std::uint16_t> bin_offsets, grid_moments, cell_offsets, texel_classes;
+  BinMap map;
+};
+
+struct SampleHistograms {
+  std::vector<std::uint16_t> bin_ids;
+  std::vector<Vec2> bin_normals;
+  std::vector<std::uint64_t> bin_totals;
+  std::vector<std::uint16_t> texels, sums, row_sums, column_sums;
+  std::vector<std::uint32_t> coarse_sums;
+  HistogramSat sat;
+};
+
+struct SampleShLobes {
+  std::vector<float> zonal;
+  std::vector<float> coefficients;
+  ShLobes lobes;
+};
+
+struct SampleShLight {
+  std::vector<float> scales;
+  std::vector<float> band_norms;
+  std::vector<std::uint16_t> coefficients;
+  ShLight light;
+};
+
 /// Bumps in the disk; sizes need not be powers of two.
 SampleNormals sampleNormals(int width, int height, bool with_bounds = true);
 SampleHeights sampleHeights(int width, int height);
 /// NDF images of sampleNormals(size, size) at strides size/4, size/2 and size, 64^2 pixels, sigma_r 0.05.
+/// Two levels (factors 4 and 8) over bumps, with lobes and scales from formulas; angular 3, two lobes.
+SampleDisplacement sampleDisplacement(int size);
 SamplePyramid samplePyramid(int size, BlockPrecision precision);
 /// The same images, each block approximated by a constant and slopes; two regions.
 SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type);
+
+/// sampleNormals(width, height) in 9 x 9 bins; lists of more than 64 texels have grids of 4 cells. Every second bin starts a class.
+SampleBinMap sampleBinMap(int width, int height);
+/// Histograms of sampleNormals(width, height) over 12 x 8 bins; strides 4, 8 and 16 texels.
+SampleHistograms sampleHistograms(int width, int height);
+/// A lobe of order 1 with the zonal coefficients 0.28 and 0.4, on a grid of 3 x 4 directions.
+SampleShLobes sampleShLobes();
+/// Constant light of radiance 1, 2 and 3 in red, green and blue, order 2, on a grid of 3 x 4 directions.
+SampleShLight sampleShLight();
 
 formats::Provenance sampleProvenance();
 

@@ -137,6 +137,25 @@ struct Baked {
   bake::NdfPyramidData pyramid;
 };
 
+TEST(AnisotropicNdf, SamplesOfAPyramidAverageToItsMeans) {
+  constexpr int kSamples = 20000;
+  const Baked baked(bake::SynthKind::flakes, 8);
+  const PyramidNdf round(baked.pyramid.view());
+  const AnisotropicNdf ndf(round);
+  static_assert(NdfModel<AnisotropicNdf<PyramidNdf>>);
+  Random random(7);
+  const Footprint p = random.stretched(40, 5);
+  const Box2 range = {{-0.05f, -0.1f}, {0.1f, 0.2f}};
+  int inside = 0;
+  for (int k = 0; k < kSamples; ++k) {
+    const HalfVectorSample s = ndf.sample(p, random.pair());
+    ASSERT_NEAR(s.pdf, ndf.density(p, s.h), 1e-4f * s.pdf);
+    inside += s.h.x > range.low.x && s.h.x < range.high.x && s.h.y > range.low.y && s.h.y < range.high.y;
+  }
+  const double share = ndf.mean(p, range) * range.area();
+  EXPECT_NEAR(static_cast<double>(inside) / kSamples, share, 4 * std::sqrt(share * (1 - share) / kSamples) + 1e-3);
+}
+
 TEST(AnisotropicNdf, MeanOverPixelsIsTheMeanOfPointQueries) {
   const Baked baked(bake::SynthKind::isotropic, 8);
   const PyramidNdf round(baked.pyramid.view());

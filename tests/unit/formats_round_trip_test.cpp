@@ -106,6 +106,33 @@ TEST(AssetRoundTrip, HeightsComeBackBitExact) {
   EXPECT_TRUE(validateAsset(folder / "a.glint").findings.empty());
 }
 
+TEST(AssetRoundTrip, DisplacementsComeBackBitExact) {
+  const TempFolder folder;
+  const auto sample = test::sampleDisplacement(32);
+  writeAsset(folder / "a.glint", sample.displacement, test::sampleProvenance());
+  const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
+  const Displacement& d = asset.displacement();
+  EXPECT_EQ(std::tuple(d.width, d.height, d.texel_size_um, d.lobe_count, d.angular, d.level_count),
+            std::tuple(32, 16, 2.5f, 2, 3, 2));
+  EXPECT_EQ(d.base.kind, BaseBrdf::Kind::ggx);
+  EXPECT_EQ(std::tuple(d.base.albedo, d.base.alpha, d.base.eta, d.base.k), std::tuple(1.0f, 0.25f, 1.5f, 3.0f));
+  for (int l = 0; l < 2; ++l) {
+    const DisplacementLevel& level = d.levels[l];
+    const DisplacementLevel& wanted = sample.displacement.levels[l];
+    EXPECT_EQ(std::tuple(level.factor, level.columns, level.rows, level.spatial_columns, level.spatial_rows),
+              std::tuple(4 << l, 8 >> l, 4 >> l, 2, 1));
+    EXPECT_EQ(std::tuple(level.rank1_residual, level.rank1_energy, level.interreflected_share, level.distant_share),
+              std::tuple(0.125f, 0.75f, 0.25f, 0.0625f));
+    expectSame(level.heights, wanted.heights);
+    expectSame(level.lobes, wanted.lobes);
+    expectSame(level.slopes, wanted.slopes);
+    expectSame(level.fit_errors, wanted.fit_errors);
+    expectSame(level.spatial_scale, wanted.spatial_scale);
+    expectSame(level.angular_scale, wanted.angular_scale);
+  }
+  EXPECT_TRUE(validateAsset(folder / "a.glint").findings.empty());
+}
+
 TEST(AssetRoundTrip, PyramidsComeBackBitExact) {
   const TempFolder folder;
   for (const BlockPrecision precision : {BlockPrecision::f16, BlockPrecision::f32}) {
@@ -124,6 +151,35 @@ TEST(AssetRoundTrip, PyramidsComeBackBitExact) {
       const std::size_t bytes = wanted.block_means.size() * kBlockPixels * (precision == BlockPrecision::f16 ? 2 : 4);
       EXPECT_EQ(std::memcmp(pyramid.levels[l].pixels, wanted.pixels, bytes), 0);
     }
+    const ValidationReport report = validateAsset(folder / "a.glint");
+    EXPECT_TRUE(report.findings.empty()) << report.findings[0].rule << " " << report.findings[0].message;
+  }
+}
+
+TEST(AssetRoundTrip, HistogramsComeBackBitExact) {
+  const TempFolder folder;
+  for (const auto& [width, height] : {std::pair{22, 19}, {1, 1}, {40, 3}}) {
+    const auto sample = test::sampleHistograms(width, height);
+    writeAsset(folder / "a.glint", sample.sat, test::sampleProvenance(), {.overwrite = true});
+    const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
+    EXPECT_EQ(asset.kind(), "histogram-sat");
+    const HistogramSat& sat = asset.histograms();
+    EXPECT_EQ(sat.width, width);
+    EXPECT_EQ(sat.height, height);
+    EXPECT_EQ(sat.theta_bins, 12);
+    EXPECT_EQ(sat.phi_bins, 8);
+    EXPECT_EQ(sat.bin_count, sample.sat.bin_count);
+    EXPECT_EQ(sat.stride, 4);
+    EXPECT_EQ(sat.coarse_stride, 8);
+    EXPECT_EQ(sat.line_stride, 16);
+    expectSame(sat.bin_ids, sample.sat.bin_ids);
+    expectSame(sat.bin_normals, sample.sat.bin_normals);
+    expectSame(sat.bin_totals, sample.sat.bin_totals);
+    expectSame(sat.texels, sample.sat.texels);
+    expectSame(sat.sums, sample.sat.sums);
+    expectSame(sat.coarse_sums, sample.sat.coarse_sums);
+    expectSame(sat.row_sums, sample.sat.row_sums);
+    expectSame(sat.column_sums, sample.sat.column_sums);
     const ValidationReport report = validateAsset(folder / "a.glint");
     EXPECT_TRUE(report.findings.empty()) << report.findings[0].rule << " " << report.findings[0].message;
   }
@@ -164,6 +220,60 @@ TEST(AssetRoundTrip, CompressedPyramidsOfEveryMethodAndTypeComeBackBitExact) {
       EXPECT_TRUE(report.findings.empty()) << report.findings[0].rule << " " << report.findings[0].message;
     }
   }
+}
+
+TEST(AssetRoundTrip, BinMapsComeBackBitExact) {
+  const TempFolder folder;
+  for (const auto& [width, height] : {std::pair{64, 48}, {37, 5}, {1, 1}}) {
+    const auto sample = test::sampleBinMap(width, height);
+    writeAsset(folder / "a.glint", sample.map, test::sampleProvenance(), {.overwrite = true});
+    const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
+    const BinMap& map = asset.binMap();
+    EXPECT_EQ(std::tuple(map.width, map.height, map.alpha, map.bins_per_axis, map.leaf_size),
+              std::tuple(width, height, sample.map.alpha, sample.map.bins_per_axis, sample.map.leaf_size));
+    expectSame(map.masks, sample.map.masks);
+    expectSame(map.mask_ranks, sample.map.mask_ranks);
+    expectSame(map.bin_starts.bases, sample.map.bin_starts.bases);
+    expectSame(map.bin_starts.offsets, sample.map.bin_starts.offsets);
+    EXPECT_EQ(map.bin_starts.shift, sample.map.bin_starts.shift);
+    expectSame(map.grid_masks, sample.map.grid_masks);
+    expectSame(map.grid_ranks, sample.map.grid_ranks);
+    expectSame(map.grid_cells, sample.map.grid_cells);
+    expectSame(map.grid_moments, sample.map.grid_moments);
+    expectSame(map.cell_starts.bases, sample.map.cell_starts.bases);
+    expectSame(map.cell_starts.offsets, sample.map.cell_starts.offsets);
+    EXPECT_EQ(map.cell_starts.shift, sample.map.cell_starts.shift);
+    expectSame(map.texels, sample.map.texels);
+    expectSame(map.class_bins, sample.map.class_bins);
+    expectSame(map.texel_classes, sample.map.texel_classes);
+    for (const Finding& finding : validateAsset(folder / "a.glint").findings) ADD_FAILURE() << finding.rule << finding.message;
+  }
+}
+
+TEST(AssetRoundTrip, SphericalHarmonicsComeBackBitExact) {
+  const test::TempFolder folder;
+  const test::SampleShLobes lobes = test::sampleShLobes();
+  writeAsset(folder / "lobes.glint", lobes.lobes, test::sampleProvenance());
+  const Asset lobes_back = Asset::open(folder / "lobes.glint");
+  EXPECT_EQ(lobes_back.shLobes().order, 1);
+  EXPECT_EQ(lobes_back.shLobes().sigma_r, 0.1f);
+  EXPECT_EQ(lobes_back.shLobes().grid.columns, 4);
+  EXPECT_EQ(lobes_back.shLobes().precision, ShPrecision::f32);
+  EXPECT_EQ(std::memcmp(lobes_back.shLobes().coefficients, lobes.coefficients.data(), 4 * lobes.coefficients.size()), 0);
+  const test::SampleShLight light = test::sampleShLight();
+  writeAsset(folder / "light.glint", light.light, test::sampleProvenance());
+  const Asset light_back = Asset::open(folder / "light.glint");
+  EXPECT_EQ(light_back.shLight().precision, ShPrecision::f16);
+  EXPECT_TRUE(std::ranges::equal(light_back.shLight().scales, light.scales));
+  EXPECT_TRUE(std::ranges::equal(light_back.shLight().band_norms, light.band_norms));
+  EXPECT_EQ(std::memcmp(light_back.shLight().coefficients, light.coefficients.data(), 2 * light.coefficients.size()), 0);
+}
+
+TEST(AssetRoundTrip, LobesNeedNoTable) {
+  const test::TempFolder folder;
+  const std::vector<float> zonal = {0.28f, 0.4f};
+  writeAsset(folder / "zonal.glint", ShLobes{1, 0.1f, {}, ShPrecision::f16, zonal, nullptr}, test::sampleProvenance());
+  EXPECT_TRUE(std::ranges::equal(Asset::open(folder / "zonal.glint").shLobes().zonal, zonal));
 }
 
 TEST(AssetRoundTrip, ProvenanceComesBack) {

@@ -25,7 +25,20 @@ namespace {
 namespace fs = std::filesystem;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-enum class Base { normals, heights, pyramid, compressed, compressed_f32 };
+enum class Base {
+  normals,
+  heights,
+  pyramid,
+  compressed,
+  compressed_f32,
+  bin_map,
+  histograms,
+  sh_lobes,
+  sh_light,
+  displacement
+};
+constexpr Base kBases[] = {Base::normals, Base::heights,    Base::pyramid,  Base::compressed, Base::compressed_f32,
+                           Base::bin_map, Base::histograms, Base::sh_lobes, Base::sh_light,   Base::displacement};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -38,8 +51,18 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::samplePyramid(32, BlockPrecision::f32).pyramid, provenance);
     case Base::compressed:
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
+    case Base::displacement:
+      return writeAsset(path, test::sampleDisplacement(32).displacement, provenance);
     case Base::compressed_f32:
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
+    case Base::bin_map:
+      return writeAsset(path, test::sampleBinMap(64, 48).map, provenance);
+    case Base::histograms:
+      return writeAsset(path, test::sampleHistograms(22, 19).sat, provenance);
+    case Base::sh_lobes:
+      return writeAsset(path, test::sampleShLobes().lobes, provenance);
+    case Base::sh_light:
+      return writeAsset(path, test::sampleShLight().light, provenance);
   }
 }
 
@@ -276,56 +299,33 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.virtual", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually); }),
       patched("dataset.external", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external); }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked); }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact);
-              }),
+              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact); }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false); }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false); }),
       {"dataset.alignment", Base::heights,
-       [](const fs::path& path) {
-         Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
-       }},
+       [](const fs::path& path) { Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }},
       {"dataset.alignment_64", Base::heights,
-       [](const fs::path& path) {
-         Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
-       },
-       true},
+       [](const fs::path& path) { Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }, true},
       patched(
           "dataset.unknown", Base::heights, [](const Patch& patch) { patch.replace("extra", H5T_IEEE_F32LE, {kSize}, true); },
           true),
       patched("dataset.missing", Base::heights, [](const Patch& patch) { H5Ldelete(patch.file(), "heights", 0); }),
       patched("dataset.missing", Base::pyramid, [](const Patch& patch) { H5Ldelete(patch.file(), "level_01/masks", 0); }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true); }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true); }),
       patched("dataset.type", Base::pyramid, [](const Patch& patch) { patch.setText("precision", "f16"); }),
       patched("dataset.type", Base::compressed,
-              [](const Patch& patch) {
-                patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true);
-              }),
+              [](const Patch& patch) { patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true); }),
       patched("dataset.type", Base::heights,
               [](const Patch& patch) {
                 const hid_t type = H5Tcopy(H5T_IEEE_F32LE);
@@ -335,9 +335,7 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.dims", Base::heights,
-              [](const Patch& patch) {
-                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true);
-              }),
+              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true); }),
       patched("dataset.dims", Base::heights,
               [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize * kSize}, true); }),
       patched("dataset.dims", Base::heights, [](const Patch& patch) { patch.setInteger("width", kSize + 1); }),
@@ -431,6 +429,57 @@ std::vector<Fixture> indexFixtures() {
               [](const Patch& patch) {
                 patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_scale = 1000; });
               }),
+      patched("histogram.bins", Base::histograms,
+              [](const Patch& patch) { patch.change<std::uint16_t>("bin_ids", 1, [](auto& id) { id = 0; }); }),
+      patched("histogram.bins", Base::histograms, [](const Patch& patch) { patch.setInteger("theta_bins", 1); }),
+      patched("histogram.bins", Base::histograms,
+              [](const Patch& patch) {
+                patch.setInteger("theta_bins", 64);
+                patch.setInteger("phi_bins", 256);
+              }),
+      patched("histogram.strides", Base::histograms,
+              [](const Patch& patch) {
+                patch.setInteger("coarse_stride", 9);
+                patch.replace("coarse_sums", H5T_STD_U32LE, {4, 4, 32}, true);
+              }),
+      patched("histogram.texels", Base::histograms,
+              [](const Patch& patch) { patch.change<std::uint16_t>("texels", 70, [](auto& bin) { bin = 60000; }); }),
+  };
+}
+
+std::vector<Fixture> displacementFixtures() {
+  const auto nan = [](float& value) { value = kNan; };
+  return {
+      patched("displacement.levels", Base::displacement, [](const Patch& patch) { patch.setInteger("width", 33); }),
+      patched("displacement.levels", Base::displacement,
+              [](const Patch& patch) {
+                const int factors[2] = {4, 4};
+                patch.set("/", "level_factors", H5T_STD_I32LE, H5T_NATIVE_INT, factors, 2);
+              }),
+      patched(
+          "displacement.heights", Base::displacement,
+          [nan](const Patch& patch) { patch.change<float>("level_01/heights", 3, nan); }, true),
+      patched(
+          "displacement.lobes", Base::displacement,
+          [](const Patch& patch) { patch.change<float>("level_00/lobes", 0, [](float& mu) { mu = 1.5f; }); }, true),
+      patched(
+          "displacement.lobes", Base::displacement,
+          [](const Patch& patch) { patch.change<float>("level_00/lobes", 7, [](float& amplitude) { amplitude = -1; }); }, true),
+      patched(
+          "displacement.moments", Base::displacement,
+          [nan](const Patch& patch) { patch.change<float>("level_00/slopes", 8, nan); }, true),
+      patched(
+          "displacement.moments", Base::displacement,
+          [nan](const Patch& patch) { patch.change<float>("level_00/fit_errors", 8, nan); }, true),
+      patched(
+          "displacement.scales", Base::displacement,
+          [](const Patch& patch) { patch.change<float>("level_00/spatial_scale", 1, [](float& t) { t = -0.5f; }); }, true),
+      patched(
+          "displacement.scales", Base::displacement,
+          [](const Patch& patch) {
+            patch.change<std::uint16_t>("level_01/angular_scale", 44, [](std::uint16_t& s) { s = 0x7c00; });
+          },
+          true),
   };
 }
 
@@ -441,14 +490,10 @@ std::vector<Fixture> dataFixtures() {
           [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n.y = kNan; }); }, true),
       patched(
           "normals.disk", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
-                                     n = {0.8f, -0.7f};
-                                   }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.8f, -0.7f}; }); }, true),
       patched(
           "normals.bounds", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
-                                     n = {0.7f, -0.7f};
-                                   }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.7f, -0.7f}; }); }, true),
       patched(
           "normals.bounds", Base::normals,
           [](const Patch& patch) { patch.change<NormalBounds>("bounds/level_02", 3, [](auto& node) { node.high_x = -1; }); },
@@ -481,7 +526,8 @@ std::vector<Fixture> dataFixtures() {
           "compressed.block_masks", Base::compressed,
           [](const Patch& patch) {
             // As many bits as before, one of them elsewhere.
-            patch.change<std::uint64_t>("block_masks", 5, [](auto& mask) { mask = (mask & (mask - 1)) | (~mask & (mask + 1)); });
+            patch.change<std::uint64_t>("block_masks", 5,
+                                        [](auto& mask) { mask = (mask & (mask - 1)) | (~mask & (mask + 1)); });
           },
           true),
       patched(
@@ -502,12 +548,112 @@ std::vector<Fixture> dataFixtures() {
       patched(
           "compressed.integral", Base::compressed,
           [](const Patch& patch) { patch.change<float>("image_scales", 3, [](float& scale) { scale *= 1.1f; }); }, true),
+      patched(
+          "histogram.bin_normals", Base::histograms,
+          [](const Patch& patch) { patch.change<Vec2>("bin_normals", 1, [](Vec2& n) { n.x = kNan; }); }, true),
+      patched(
+          "histogram.totals", Base::histograms,
+          [](const Patch& patch) { patch.change<std::uint64_t>("bin_totals", 1, [](auto& total) { ++total; }); }, true),
+      patched(
+          "histogram.sums", Base::histograms,
+          [](const Patch& patch) { patch.change<std::uint16_t>("sums", 200, [](auto& sum) { ++sum; }); }, true),
+      patched(
+          "histogram.sums", Base::histograms,
+          [](const Patch& patch) { patch.change<std::uint32_t>("coarse_sums", 90, [](auto& sum) { ++sum; }); }, true),
+      patched(
+          "histogram.sums", Base::histograms,
+          [](const Patch& patch) { patch.change<std::uint16_t>("row_sums", 90, [](auto& sum) { --sum; }); }, true),
+      patched(
+          "histogram.sums", Base::histograms,
+          [](const Patch& patch) { patch.change<std::uint16_t>("column_sums", 0, [](auto& sum) { ++sum; }); }, true),
+  };
+}
+
+std::vector<Fixture> binMapFixtures() {
+  const auto changed = [](const char* rule, const char* path, std::size_t index, auto edit, bool opens = false) {
+    using T = std::remove_cvref_t<decltype(edit(0))>;
+    return patched(
+        rule, Base::bin_map, [=](const Patch& patch) { patch.change<T>(path, index, [=](T& value) { value = edit(value); }); },
+        opens);
+  };
+  const auto word = [](auto f) { return [=](std::uint64_t v) -> std::uint64_t { return f(v); }; };
+  const auto u32 = [](auto f) { return [=](std::uint32_t v) -> std::uint32_t { return f(v); }; };
+  const auto u16 = [](auto f) { return [=](std::uint16_t v) -> std::uint16_t { return static_cast<std::uint16_t>(f(v)); }; };
+  const auto flip = [](auto v) { return v ^ 1; };
+  const auto raise = [](auto v) { return v + 1; };
+  return {
+      patched("bin_map.size", Base::bin_map,
+              [](const Patch& patch) {
+                // 15 and 14 bits; the file has holes instead of texels.
+                constexpr hsize_t kWidth = (1 << 14) + 1, kHeight = (1 << 13) + 1;
+                const auto reserve = [](hid_t properties) {
+                  H5Pset_alloc_time(properties, H5D_ALLOC_TIME_EARLY);
+                  H5Pset_fill_time(properties, H5D_FILL_TIME_NEVER);
+                };
+                patch.setInteger("width", kWidth);
+                patch.setInteger("height", kHeight);
+                patch.replace("texels", H5T_STD_U32LE, {kWidth * kHeight}, false, reserve);
+                patch.replace("texel_classes", H5T_STD_U16LE, {(kWidth * kHeight * 12 + 15) / 16}, false, reserve);
+              }),
+      changed("bin_map.masks", "masks", 1, word([](auto v) { return v | 1ull << 40; })),
+      changed("bin_map.masks", "masks", 0, word([](auto v) { return v & (v - 1); })),
+      changed("bin_map.masks", "mask_ranks", 1, u32(raise)),
+      changed("bin_map.masks", "grid_masks", 0, word([](auto v) { return v | 1ull << 63; })),
+      changed("bin_map.masks", "grid_ranks", 0, u32(raise)),
+      changed("bin_map.bin_starts", "bin_starts/offsets", 0, u16(raise)),
+      changed("bin_map.bin_starts", "bin_starts/offsets", 2, u16([](auto) { return 0xffff; })),
+      changed("bin_map.bin_starts", "bin_starts/bases", 1, word([](auto) { return ~0ull; })),
+      changed("bin_map.grids", "grid_cells", 1, u32(raise)),
+      changed("bin_map.grids", "grid_cells", 1, u32([](auto) { return 0xffffffffu; })),
+      changed("bin_map.grids", "cell_starts/offsets", 1, u16([](auto) { return 0xffff; })),
+      changed("bin_map.grids", "cell_starts/offsets", 0, u16(raise)),
+      changed("bin_map.classes", "class_bins", 3, u32([](auto) { return 0u; })),
+      changed("bin_map.classes", "class_bins", 41, u32([](auto v) { return v + 1000; })),
+      changed("bin_map.classes", "texel_classes", 100, u16([](auto) { return 0xffff; })),
+      changed("bin_map.texels", "texels", 100, u32(flip), true),
+      changed("bin_map.texels", "texels", 100, u32([](auto) { return 0xffffffffu; }), true),
+      changed("bin_map.moments", "grid_moments", 2, u16([](auto) { return 0x7c00; }), true),
+      changed("bin_map.moments", "grid_moments", 0, u16([](auto) { return 0x8400; }), true),
+  };
+}
+
+std::vector<Fixture> shFixtures() {
+  return {
+      patched("sh.grid", Base::sh_lobes,
+              [](const Patch& patch) {
+                patch.setInteger("grid_rows", 1);
+                patch.replace("lobes", H5T_IEEE_F32LE, {1, 4, 4}, true);
+              }),
+      patched("sh.grid", Base::sh_lobes,
+              [](const Patch& patch) {
+                patch.setInteger("grid_columns", 0);
+                patch.replace("lobes", H5T_IEEE_F32LE, {3, 0, 4}, false);
+              }),
+      patched(
+          "sh.finite", Base::sh_lobes, [](const Patch& patch) { patch.change<float>("zonal", 1, [](float& f) { f = kNan; }); },
+          true),
+      patched(
+          "sh.finite", Base::sh_lobes,
+          [](const Patch& patch) { patch.change<float>("lobes", 9, [](float& c) { c = INFINITY; }); }, true),
+      patched(
+          "sh.finite", Base::sh_light,
+          [](const Patch& patch) { patch.change<float>("scales", 2, [](float& scale) { scale = -1; }); }, true),
+      patched(
+          "sh.finite", Base::sh_light,
+          [](const Patch& patch) { patch.change<std::uint16_t>("light", 40, [](auto& c) { c = 0x7e00; }); }, true),
+      patched(
+          "sh.zonal", Base::sh_lobes, [](const Patch& patch) { patch.change<float>("lobes", 4, [](float& c) { c *= 2; }); },
+          true),
+      patched(
+          "sh.band_norms", Base::sh_light,
+          [](const Patch& patch) { patch.change<float>("band_norms", 4, [](float& norm) { norm *= 1.1f; }); }, true),
   };
 }
 
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
-  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures()}) {
+  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures(),
+                    binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
@@ -526,7 +672,7 @@ TEST(FormatRules, IdsAreUnique) {
 
 TEST(FormatRules, GoodFilesBreakNoRule) {
   const test::TempFolder folder;
-  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32}) {
+  for (const Base base : kBases) {
     const fs::path path = folder / (std::to_string(static_cast<int>(base)) + ".glint");
     writeBase(path, base);
     for (const Finding& finding : validateAsset(path).findings) {
@@ -537,7 +683,7 @@ TEST(FormatRules, GoodFilesBreakNoRule) {
 
 TEST(FormatRules, EveryFailingFileIsNamedByItsRule) {
   const test::TempFolder folder;
-  for (const Base base : {Base::normals, Base::heights, Base::pyramid, Base::compressed, Base::compressed_f32}) {
+  for (const Base base : kBases) {
     writeBase(folder / (std::to_string(static_cast<int>(base)) + ".glint"), base);
   }
   int number = 0;
@@ -616,7 +762,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 7u);
+  EXPECT_EQ(count, 12u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -626,10 +772,23 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_EQ(normals.normals().at(63, 47).y, -0.139912933f);
   EXPECT_EQ(normals.normals().bounds[3].nodes[2].high_x, 0.283465505f);
   EXPECT_EQ(Asset::open(folder / "heights.glint").heights().heights[3 * 64 + 5], 0.0129489619f);
+  const Asset displacement = Asset::open(folder / "displacement.glint");
+  EXPECT_EQ(displacement.displacement().base.eta, 1.5f);
+  EXPECT_EQ(displacement.displacement().levels[1].lobes[1].amplitude, 0.375f);
+  EXPECT_EQ(displacement.displacement().levels[1].angular_scale[44], 0x3f80);  // 1.875
   const Asset pyramid = Asset::open(folder / "ndf-pyramid.glint");
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 0, 5, 30, 33), 4.3046875f);
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 1, 2, 35, 29), 4.7890625f);
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 2, 0, 24, 32), 6.00390625f);
+  const Asset histograms = Asset::open(folder / "histogram-sat.glint");
+  const HistogramSat& sat = histograms.histograms();
+  ASSERT_EQ(sat.bin_count, 20);
+  EXPECT_EQ(sat.bin_ids[9], 9);
+  EXPECT_EQ(sat.bin_totals[9], 3u);
+  EXPECT_FLOAT_EQ(sat.bin_normals[9].x, 0.0831450075f);
+  EXPECT_EQ(sat.sums[(4 * 7 + 5) * 32 + 9], 1);
+  EXPECT_EQ(static_cast<const float*>(Asset::open(folder / "sh-lobes.glint").shLobes().coefficients)[5 * 4 + 3], 0.4f);
+  EXPECT_EQ(Asset::open(folder / "sh-light.glint").shLight().band_norms[7], 12.2799206f);
   struct Recorded {
     const char* file;
     float values[3];

@@ -330,6 +330,47 @@ TEST(MicrofacetBrdf, OfAMapIsReciprocal) {
   });
 }
 
+TEST(MicrofacetBrdf, OfAMapSamplesAverageToTheIntegral) {
+  constexpr int kSamples = 20000;
+  const SmithMasking masking = mapModels().masking();
+  mapModels().forEach([&](const auto& model, const char* name) {
+    Random random(11);
+    const Footprint p = randomFootprint(random);
+    const MicrofacetBrdf brdf(model, p, masking, Fresnel::mirror());
+    for (const Vec3& wo : {direction(0.9, 1), direction(0.3, 4)}) {
+      double sum = 0, squares = 0;
+      int found = 0, drawn = 0;
+      for (int k = 0; k < kSamples; ++k) {
+        const BrdfSample s = brdf.sample(wo, random.pair());
+        sum += s.weight.r, squares += double{s.weight.r} * s.weight.r;
+        if (k % 10 != 0 || s.pdf == 0) continue;
+        ++drawn;  // at the border of a pixel the half vector of wi may fall on the other side
+        found += std::abs(brdf.pdf(s.wi, wo) - s.pdf) <= 2e-3f * s.pdf;
+      }
+      EXPECT_GE(found, drawn - drawn / 100) << name;
+      const double mean = sum / kSamples, deviation = std::sqrt((squares / kSamples - mean * mean) / kSamples);
+      const double exact = test::integrateDisk(std::string(name) == "Reference" ? 60 : 160, [&](Vec2 disk) {
+        const HalfVector h = halfVectorAt(disk, wo);
+        const Vec3 wi = reflected(wo, h);
+        return h.towards > 0 ? brdf.evaluate(wi, wo).r * double{wi.z} / projectedToIncident(1, h) : 0.0;
+      });
+      EXPECT_NEAR(mean, exact, 4 * deviation + 2 * kQuadratureError) << name << ' ' << wo.z;
+    }
+  });
+}
+
+TEST(MicrofacetBrdf, OfAMapDirectionsFollowThePdf) {
+  // Of Reference, whose pdf is smooth enough to be integrated over cells with few points.
+  mapModels().forEach([](const auto& model, const char* name) {
+    if (std::string(name) != "Reference") return;
+    Random random(12);
+    const MicrofacetBrdf brdf(model, randomFootprint(random), mapModels().masking(), Fresnel::mirror());
+    const double p = directionFit(brdf, direction(0.7, 2), 20000, 8, 13);
+    RecordProperty("p", std::to_string(p));
+    EXPECT_GT(p, 1e-4);
+  });
+}
+
 /// What spills over the rim of the disk: everything is drawn outside.
 struct Spilled {
   float density(const Footprint&, Vec2) const { return 1; }

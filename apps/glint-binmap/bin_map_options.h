@@ -1,0 +1,33 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "common/tool.h"
+#include "glint/bake/bin_map.h"
+
+namespace glint::apps {
+
+/// A bin map and how long the work took, without reading and writing files.
+struct BuiltBinMap {
+  bake::BinMapData data;
+  double seconds = 0;
+};
+
+/// The options of glint-binmap.
+class BinMapCommand {
+ public:
+  explicit BinMapCommand(Tool& tool);
+
+  /// @throws what bake::buildBinMap throws
+  BuiltBinMap build(const NormalMap& map, const bake::ProgressFn& progress) const;
+
+ private:
+  bake::BinMapOptions options_;
+};
+
+/// Bins, grids, bytes and time of the work.
+nlohmann::json binMapJson(const BuiltBinMap& built);
+std::string binMapText(const BuiltBinMap& built);
+
+}  // namespace glint::apps

@@ -1,0 +1,30 @@
+#include <nlohmann/json.hpp>
+
+#include "common/files.h"
+#include "common/tool.h"
+#include "glint-binmap/bin_map_options.h"
+#include "glint/bake/bin_map.h"
+#include "glint/formats/asset_reader.h"
+#include "glint/formats/asset_writer.h"
+
+using namespace glint;
+
+int main(int argc, char** argv) {
+  apps::Tool tool(
+      {"glint-binmap",
+       "Lists the texels of a normal map by the direction of their normals, so that the glints inside any parallelogram "
+       "are found at once: a preparation of milliseconds in the memory of the map.",
+       "glint-binmap flakes.glint -o flakes.bins.glint --alpha 0.01"});
+  const apps::InputFile input(tool, "asset of kind normals, from glint-ingest", "NORMALS");
+  const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind bin-map");
+  apps::BinMapCommand command(tool);
+
+  return tool.run(argc, argv, [&] {
+    const formats::Asset asset = formats::Asset::open(input.path());
+    const formats::Provenance provenance = tool.provenance();
+    const apps::BuiltBinMap built = command.build(asset.normals(), tool.progress("passes"));
+    formats::writeAsset(output.path(), built.data.view(), provenance, output.writeOptions());
+    tool.setResult(apps::binMapJson(built));
+    tool.summary(apps::binMapText(built));
+  });
+}

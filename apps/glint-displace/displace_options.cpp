@@ -1,0 +1,140 @@
+#include "glint-displace/displace_options.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace glint::apps {
+namespace {
+
+/// Above these a level is worth a warning.
+constexpr float kResidual = 0.1f;
+constexpr float kDistant = 0.02f;
+constexpr double kFitError = 0.2;
+
+double number(const std::string& text, const std::string& whole) {
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || stop != end || !std::isfinite(value))
+    throw Error(ErrorCode::usage, "option.base", {}, "--base", "'" + whole + "' has '" + text + "' where a number should be",
+                "give diffuse:RHO, ggx:ALPHA or ggx:ALPHA:ETA,K");
+  return value;
+}
+
+double meanFitError(const bake::DisplacementData::Level& level) {
+  double sum = 0;
+  for (const float error : level.fit_errors) sum += error;
+  return sum / static_cast<double>(level.fit_errors.size());
+}
+
+}  // namespace
+
+DisplaceCommand::DisplaceCommand(Tool& tool) {
+  const Option& factor =
+      tool.option("--factor", factor_, "texels of the map along a side of a downsampled cell").range(2, 65536);
+  factors_given_ =
+      &tool.option("--factors", factors_, "several levels of detail, e.g. 4,16,64").range(2, 65536).excludes(factor);
+  tool.option("--base", base_,
+              "reflectance of the surface: diffuse:RHO (albedo above 0, at most 1), ggx:ALPHA (0.05 to 1; reflects "
+              "all light) or ggx:ALPHA:ETA,K (a conductor)");
+  tool.option("--lobes", options_.lobes, "lobes of normals in each cell").range(1, kMaxLobes);
+  tool.option("--angular", options_.angular, "directions of light and view: the square of this").range(3, 25);
+  tool.option("--spatial", options_.spatial, "patches of the spatial factor along each axis").range(1, 16);
+  tool.option("--bounces", bounces_,
+              "reflections of a light path at most; 1: shadowing and masking only; auto: until it escapes");
+}
+
+BaseBrdf parseBase(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  const std::string kind = text.substr(0, colon), rest = colon == std::string::npos ? "" : text.substr(colon + 1);
+  BaseBrdf base;
+  if (kind == "diffuse") {
+    base.albedo = static_cast<float>(number(rest, text));
+    return base;
+  }
+  if (kind != "ggx")
+    throw Error(ErrorCode::usage, "option.base", {}, "--base", "'" + text + "' is no known reflectance",
+                "give diffuse:RHO, ggx:ALPHA or ggx:ALPHA:ETA,K");
+  base.kind = BaseBrdf::Kind::ggx;
+  const std::size_t second = rest.find(':');
+  base.alpha = static_cast<float>(number(rest.substr(0, second), text));
+  if (second == std::string::npos) return base;
+  const std::string conductor = rest.substr(second + 1);
+  const std::size_t comma = conductor.find(',');
+  base.eta = static_cast<float>(number(conductor.substr(0, comma), text));
+  base.k = static_cast<float>(number(comma == std::string::npos ? "" : conductor.substr(comma + 1), text));
+  return base;
+}
+
+bake::DisplaceOptions DisplaceCommand::options() const {
+  bake::DisplaceOptions options = options_;
+  options.factors = factors_given_->given() ? factors_ : std::vector<int>{factor_};
+  options.base = parseBase(base_);
+  if (bounces_ == "auto") return options;
+  const char* end = bounces_.data() + bounces_.size();
+  const auto [stop, error] = std::from_chars(bounces_.data(), end, options.bounces);
+  if (error != std::errc() || stop != end || options.bounces < 1 || options.bounces > bake::kAllBounces)
+    throw Error(ErrorCode::usage, "option.range", {}, "--bounces", "'" + bounces_ + "' is not a number of reflections",
+                fmt::format("give auto, or 1 to {}", bake::kAllBounces));
+  return options;
+}
+
+void warnAbout(Tool& tool, const bake::DisplacementData& data) {
+  for (std::size_t l = 0; l < data.levels.size(); ++l) {
+    const DisplacementLevel& level = data.shape.levels[l];
+    const auto warn = [&](const std::string& what) { tool.warn(fmt::format("factor {}: {}", level.factor, what)); };
+    if (level.rank1_residual > kResidual)
+      warn(fmt::format(
+          "the scaling differs between parts of the map: T S leaves {:.0f} % of it (the best product would leave {:.0f} %)",
+          100 * level.rank1_residual, 100 * std::sqrt(1 - level.rank1_energy)));
+    if (level.distant_share > kDistant)
+      warn(
+          fmt::format("{:.1f} % of the reflected light hops farther than a cell; it is kept in the mean but not in its place. "
+                      "Take a larger "
+                      "factor, or let the renderer trace it on a finer level",
+                      100 * level.distant_share));
+    if (const double error = meanFitError(data.levels[l]); error > kFitError)
+      warn(fmt::format("lobes miss the distributions of normals by {:.0f} % on average; take more lobes or a smaller factor",
+                       100 * error));
+  }
+}
+
+nlohmann::json displacementJson(const bake::DisplacementData& data) {
+  nlohmann::json levels = nlohmann::json::array();
+  for (std::size_t l = 0; l < data.levels.size(); ++l) {
+    const DisplacementLevel& shape = data.shape.levels[l];
+    const bake::DisplacementData::Level& level = data.levels[l];
+    levels.push_back({{"factor", shape.factor},
+                      {"columns", shape.columns},
+                      {"rows", shape.rows},
+                      {"mean_fit_error", meanFitError(level)},
+                      {"spatial_scale", level.spatial_scale},
+                      {"rank1_residual", shape.rank1_residual},
+                      {"rank1_energy", shape.rank1_energy},
+                      {"interreflected_share", shape.interreflected_share},
+                      {"distant_share", shape.distant_share},
+                      {"height_bytes", level.heights.size() * sizeof(float)},
+                      {"lobe_bytes", level.lobes.size() * sizeof(VmfLobe)},
+                      {"scale_bytes", level.spatial_scale.size() * sizeof(float) + level.angular_scale.size() * 2}});
+  }
+  return {{"levels", levels}};
+}
+
+std::string displacementText(const bake::DisplacementData& data) {
+  std::string text = fmt::format("{:>6} {:>11} {:>9} {:>9} {:>9} {:>14} {:>8} {:>9} {:>9}\n", "factor", "cells", "lobe fit",
+                                 "T S fit", "rank 1", "interreflected", "distant", "lobe KB", "scale KB");
+  const nlohmann::json json = displacementJson(data);
+  for (const auto& level : json["levels"])
+    text += fmt::format("{:>6} {:>5} x {:<3} {:>8.1f}% {:>8.1f}% {:>8.2f}% {:>13.1f}% {:>7.2f}% {:>9.1f} {:>9.1f}\n",
+                        level["factor"].get<int>(), level["columns"].get<int>(), level["rows"].get<int>(),
+                        100 * level["mean_fit_error"].get<double>(), 100 * level["rank1_residual"].get<double>(),
+                        100 * level["rank1_energy"].get<double>(), 100 * level["interreflected_share"].get<double>(),
+                        100 * level["distant_share"].get<double>(), 1e-3 * level["lobe_bytes"].get<double>(),
+                        1e-3 * level["scale_bytes"].get<double>());
+  return text;
+}
+
+}  // namespace glint::apps

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "common/tool.h"
+#include "glint/bake/displace.h"
+
+namespace glint::apps {
+
+/// The options of glint-displace.
+class DisplaceCommand {
+ public:
+  explicit DisplaceCommand(Tool& tool);
+
+  /// Valid after parsing. @throws Error usage if --base or --bounces cannot be read
+  bake::DisplaceOptions options() const;
+
+ private:
+  int factor_ = 16;
+  std::vector<int> factors_;
+  std::string base_ = "diffuse:0.8";
+  std::string bounces_ = "auto";
+  bake::DisplaceOptions options_;
+  const Option* factors_given_ = nullptr;
+};
+
+/// Reads `diffuse:RHO`, `ggx:ALPHA` or `ggx:ALPHA:ETA,K`.
+/// @throws Error usage if it is none of these, or an albedo or roughness is out of range
+BaseBrdf parseBase(const std::string& text);
+
+/// Warns where the model's assumptions do not hold: T S is not R, light hops between cells, or lobes do not fit.
+void warnAbout(Tool& tool, const bake::DisplacementData& data);
+
+/// Levels with their cells, bytes and measures.
+nlohmann::json displacementJson(const bake::DisplacementData& data);
+std::string displacementText(const bake::DisplacementData& data);
+
+}  // namespace glint::apps

@@ -1,0 +1,32 @@
+#include <nlohmann/json.hpp>
+
+#include "common/files.h"
+#include "common/tool.h"
+#include "glint-displace/displace_options.h"
+#include "glint/formats/asset_reader.h"
+#include "glint/formats/asset_writer.h"
+
+using namespace glint;
+
+int main(int argc, char** argv) {
+  apps::Tool tool({"glint-displace",
+                   "Downsamples a displacement map and keeps its appearance: normals become lobes for each cell, and "
+                   "shadowing, masking and "
+                   "interreflections become factors for pairs of directions.",
+                   "glint-displace weave.glint -o weave.displaced.glint --factor 16 --base diffuse:0.8"});
+  const apps::InputFile input(tool, "asset of kind heights, from glint-ingest --kind height --to heights", "HEIGHTS");
+  const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind displacement");
+  apps::DisplaceCommand command(tool);
+
+  return tool.run(argc, argv, [&] {
+    const formats::Asset asset = formats::Asset::open(input.path());
+    bake::DisplaceOptions options = command.options();
+    options.seed = tool.seed();
+    const formats::Provenance provenance = tool.provenance();
+    const bake::DisplacementData data = bake::displace(asset.heights(), options, tool.progress("levels"));
+    formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
+    apps::warnAbout(tool, data);
+    tool.setResult(apps::displacementJson(data));
+    tool.summary(apps::displacementText(data));
+  });
+}

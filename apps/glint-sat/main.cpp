@@ -1,0 +1,29 @@
+#include <nlohmann/json.hpp>
+
+#include "common/files.h"
+#include "common/tool.h"
+#include "glint-sat/sat_options.h"
+#include "glint/formats/asset_reader.h"
+#include "glint/formats/asset_writer.h"
+
+using namespace glint;
+
+int main(int argc, char** argv) {
+  apps::Tool tool(
+      {"glint-sat",
+       "Accumulates histograms of the normals of a map over bins of directions: tables that give the histogram of any "
+       "footprint at once, exactly.",
+       "glint-sat flakes.glint -o flakes.sat.glint --bins 9x32 --stride 8"});
+  const apps::InputFile input(tool, "asset of kind normals, from glint-ingest", "NORMALS");
+  const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind histogram-sat");
+  apps::SatOptions options(tool);
+
+  return tool.run(argc, argv, [&] {
+    const formats::Asset asset = formats::Asset::open(input.path());
+    const formats::Provenance provenance = tool.provenance();
+    const bake::HistogramSatData sat = bake::buildHistogramSat(asset.normals(), options.get(), tool.progress("tables"));
+    formats::writeAsset(output.path(), sat.view(), provenance, output.writeOptions());
+    tool.setResult(apps::satJson(sat));
+    tool.summary(apps::satText(sat));
+  });
+}

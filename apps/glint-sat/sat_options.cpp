@@ -1,0 +1,58 @@
+#include "glint-sat/sat_options.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <nlohmann/json.hpp>
+
+namespace glint::apps {
+
+SatOptions::SatOptions(Tool& tool) {
+  tool.option("--bins", bins_, "rings of elevation x sectors of azimuth: 1 to 64 x 1 to 256, at most 2048 together");
+  tool.option("--stride", options_.stride,
+              "texels between the points of the table: bytes go down with its square, the time of a query goes up with it")
+      .range(1, HistogramSat::kMaxStride);
+  tool.addCheck([this] { readBins(); });
+}
+
+void SatOptions::readBins() {
+  const char* end = bins_.data() + bins_.size();
+  const auto [cross, first_error] = std::from_chars(bins_.data(), end, options_.theta_bins);
+  const bool crossed = first_error == std::errc() && cross != end && *cross == 'x';
+  const auto [stop, second_error] =
+      crossed ? std::from_chars(cross + 1, end, options_.phi_bins) : std::from_chars_result{end, std::errc::invalid_argument};
+  const bool two = second_error == std::errc() && stop == end;
+  if (two && options_.theta_bins >= 1 && options_.theta_bins <= HistogramSat::kMaxThetaBins && options_.phi_bins >= 1 &&
+      options_.phi_bins <= HistogramSat::kMaxPhiBins && options_.theta_bins * options_.phi_bins <= HistogramSat::kMaxBins) {
+    return;
+  }
+  throw Error(ErrorCode::usage, "option.range", {}, "--bins",
+              two ? "'" + bins_ + "' is out of range" : "'" + bins_ + "' is not two numbers joined by x",
+              "give 1 to 64 rings x 1 to 256 sectors, at most 2048 together, for example 9x32");
+}
+
+nlohmann::json satJson(const bake::HistogramSatData& sat) {
+  const HistogramSat view = sat.view();
+  return {{"bins", view.bin_count},
+          {"directions", view.theta_bins * view.phi_bins},
+          {"stride_texels", view.stride},
+          {"coarse_stride_texels", view.coarse_stride},
+          {"line_stride_texels", view.line_stride},
+          {"size_bytes", sat.sizeBytes()},
+          {"tables",
+           {{"texels", view.texels.size_bytes()},
+            {"sums", view.sums.size_bytes()},
+            {"coarse_sums", view.coarse_sums.size_bytes()},
+            {"row_sums", view.row_sums.size_bytes()},
+            {"column_sums", view.column_sums.size_bytes()}}}};
+}
+
+std::string satText(const bake::HistogramSatData& sat) {
+  const nlohmann::json json = satJson(sat);
+  std::string text = fmt::format("{} of {} directions occur\n", json["bins"].get<int>(), json["directions"].get<int>());
+  for (const auto& [name, bytes] : json["tables"].items())
+    text += fmt::format("{:<12} {:>9.2f} MB\n", name, 1e-6 * bytes.get<double>());
+  return text + fmt::format("{:<12} {:>9.2f} MB\n", "total", 1e-6 * json["size_bytes"].get<double>());
+}
+
+}  // namespace glint::apps

@@ -1,0 +1,141 @@
+#include "glint-shlobes/light_file.h"
+
+#include <cmath>
+#include <filesystem>
+#include <initializer_list>
+#include <nlohmann/json.hpp>
+
+#include "common/files.h"
+#include "common/image_io.h"
+
+namespace glint::apps {
+namespace {
+
+using nlohmann::json;
+
+float linearFromSrgb(float code) { return code <= 0.04045f ? code / 12.92f : std::pow((code + 0.055f) / 1.055f, 2.4f); }
+
+/// RGB of an image; grey images have the same in all three.
+std::vector<float> linearRgb(const Image& image, const std::string& path) {
+  if (image.channels == 2)
+    throw Error(ErrorCode::invalid_input, "light.channels", path, "", "has 2 channels",
+                "give an image of 1, 3 or more channels");
+  const std::size_t pixels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  std::vector<float> rgb(3 * pixels);
+  const auto channels = static_cast<std::size_t>(image.channels);
+  std::visit(
+      [&](const auto& codes) {
+        using Code = typename std::decay_t<decltype(codes)>::value_type;
+        for (std::size_t p = 0; p < pixels; ++p) {
+          for (std::size_t c = 0; c < 3; ++c) {
+            const Code code = codes[p * channels + (channels == 1 ? 0 : c)];
+            if constexpr (std::is_floating_point_v<Code>)
+              rgb[3 * p + c] = code;
+            else
+              rgb[3 * p + c] = linearFromSrgb(static_cast<float>(code) / static_cast<float>(std::numeric_limits<Code>::max()));
+          }
+        }
+      },
+      image.pixels);
+  return rgb;
+}
+
+/// One light of the JSON, whose members are taken one after the other; what is left is unknown.
+class LightReader {
+ public:
+  LightReader(const json& light, std::size_t index, const std::string& path, Tool& tool)
+      : light_(light), place_("light " + std::to_string(index)), path_(path), tool_(tool) {
+    if (!light_.is_object()) fail("is no object");
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(ErrorCode::invalid_input, "light.json", path_, place_, what,
+                "see glint-shlobes --help for the members of a light");
+  }
+
+  std::string text(const char* name) const {
+    if (!light_.contains(name) || !light_[name].is_string()) fail(std::string("needs a text \"") + name + "\"");
+    return light_[name].get<std::string>();
+  }
+  float number(const char* name) const {
+    if (!light_.contains(name) || !light_[name].is_number()) fail(std::string("needs a number \"") + name + "\"");
+    return light_[name].get<float>();
+  }
+  Vec3 vector(const char* name) const {
+    if (!light_.contains(name) || !light_[name].is_array() || light_[name].size() != 3)
+      fail(std::string("needs three numbers \"") + name + "\"");
+    for (const json& v : light_[name])
+      if (!v.is_number()) fail(std::string("needs three numbers \"") + name + "\"");
+    return {light_[name][0].get<float>(), light_[name][1].get<float>(), light_[name][2].get<float>()};
+  }
+  void allowOnly(std::initializer_list<const char*> names) const {
+    for (const auto& [key, value] : light_.items())
+      if (std::find(names.begin(), names.end(), key) == names.end()) fail("has an unknown member \"" + key + "\"");
+  }
+  template <class Light>
+  void readSurface(Light& light) const {
+    const Vec3 radiance = vector("radiance");
+    light.radiance[0] = radiance.x, light.radiance[1] = radiance.y, light.radiance[2] = radiance.z;
+    if (!light_.contains("texture")) return;
+    const std::string texture = (std::filesystem::path(path_).parent_path() / text("texture")).string();
+    const Image image = readImage(texture);
+    tool_.addInput(texture);
+    light.texture_width = image.width;
+    light.texture_height = image.height;
+    light.texture = linearRgb(image, texture);
+  }
+
+ private:
+  const json& light_;
+  std::string place_;
+  const std::string& path_;
+  Tool& tool_;
+};
+
+bake::Environment readAreaLights(Tool& tool, const std::string& path, const AreaLightOptions& options) {
+  const std::vector<std::byte> bytes = readFile(path);
+  const auto* text = reinterpret_cast<const char*>(bytes.data());
+  const json document = json::parse(text, text + bytes.size(), nullptr, false);
+  if (document.is_discarded() || !document.is_object() || !document.contains("lights") || !document["lights"].is_array() ||
+      document.size() != 1)
+    throw Error(ErrorCode::invalid_input, "light.json", path, "", "is no JSON object with a list \"lights\" alone",
+                "write {\"lights\": [...]}");
+  std::vector<bake::RectangleLight> rectangles;
+  std::vector<bake::SphereLight> spheres;
+  for (std::size_t k = 0; k < document["lights"].size(); ++k) {
+    const LightReader reader(document["lights"][k], k, path, tool);
+    const std::string type = reader.text("type");
+    if (type == "rectangle") {
+      reader.allowOnly({"type", "centre", "axis_u", "axis_v", "radiance", "texture"});
+      bake::RectangleLight& light = rectangles.emplace_back();
+      light.centre = reader.vector("centre");
+      light.axis_u = reader.vector("axis_u");
+      light.axis_v = reader.vector("axis_v");
+      reader.readSurface(light);
+    } else if (type == "sphere") {
+      reader.allowOnly({"type", "centre", "radius", "radiance", "texture"});
+      bake::SphereLight& light = spheres.emplace_back();
+      light.centre = reader.vector("centre");
+      light.radius = reader.number("radius");
+      reader.readSurface(light);
+    } else {
+      reader.fail("is of type \"" + type + "\", which is not rectangle or sphere");
+    }
+  }
+  return bake::renderAreaLights(rectangles, spheres, options.height, options.samples);
+}
+
+}  // namespace
+
+bake::Environment readLight(Tool& tool, const std::string& path, const AreaLightOptions& options) {
+  if (std::filesystem::path(path).extension() == ".json") return readAreaLights(tool, path, options);
+  const Image image = readImage(path);
+  if (!image.floating)
+    throw Error(ErrorCode::invalid_input, "light.range", path, "", "holds integers, which cut off bright light",
+                "give an image of floating-point radiance, such as .exr or .hdr");
+  bake::Environment environment{image.width, image.height, linearRgb(image, path)};
+  bake::requireUsable(environment, path);
+  return environment;
+}
+
+}  // namespace glint::apps

@@ -1,0 +1,112 @@
+#include "glint-shlobes/shlobes_options.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "common/files.h"
+
+namespace glint::apps {
+namespace {
+
+/// "65x128", or "none" for 0 x 0.
+ShGrid parseGrid(const std::string& text) {
+  ShGrid grid;
+  int length = 0;
+  if (text == "none") return grid;
+  if (std::sscanf(text.c_str(), "%6dx%6d%n", &grid.rows, &grid.columns, &length) == 2 &&
+      length == static_cast<int>(text.size()) && grid.rows > 0 && grid.columns > 0)
+    return grid;
+  throw Error(ErrorCode::usage, "arguments", "", "--grid", "\"" + text + "\" is no grid of directions",
+              "give rows x columns, such as 65x128");
+}
+
+}  // namespace
+
+ShLobesCommand::ShLobesCommand(Tool& tool) {
+  sigma_option_ = &tool.option("--sigma-r", sigma_r_, "lobes: intrinsic roughness, disk units").range(1e-6, 1);
+  tool.option("--light", light_,
+              "instead of lobes: light, as a 2:1 latitude-longitude image (.exr, .hdr; z up, first column at +x towards +y), "
+              "or area "
+              "lights (.json)")
+      .excludes(*sigma_option_)
+      .defaultText("none");
+  tool.option("--order", order_, "highest band of the spherical harmonics").range(0, kMaxShOrder);
+  tool.option("--grid", grid_, "directions, ROWSxCOLUMNS; lobes: none for no table").defaultText("65x128; --light: 17x32");
+  tool.choice("--precision", precision_, {{"f16", ShPrecision::f16}, {"f32", ShPrecision::f32}}, "type of the coefficients");
+  tool.option("--max-memory", max_memory_, "refuse larger tables, GB").range(0, 1e6).unrecorded();
+  tool.option("--band-limit", band_limit_, "--light: highest band of the environment itself")
+      .range(0, 10000)
+      .defaultText("3 order + 24");
+  tool.option("--area-height", area_lights_.height,
+              "area lights: pixels of the image that they are drawn to, from pole to pole")
+      .range(1, 4096);
+  tool.option("--area-samples", area_lights_.samples, "area lights: rays of a pixel along each axis").range(1, 64);
+  tool.addCheck([this, &tool] { check(tool); });
+}
+
+void ShLobesCommand::check(Tool& tool) {
+  grid({});
+  if (light_.empty()) {
+    if (!sigma_option_->given())
+      throw Error(ErrorCode::usage, "arguments", "", "", "nothing was asked for", "add --sigma-r S for lobes, or --light FILE");
+    return;
+  }
+  checkReadable(light_);
+  tool.addInput(light_);
+}
+
+ShGrid ShLobesCommand::grid(ShGrid other) const { return grid_.empty() ? other : parseGrid(grid_); }
+
+bake::ShLobesOptions ShLobesCommand::lobesOptions() const {
+  bake::ShLobesOptions options;
+  options.sigma_r = sigma_r_;
+  options.order = order_;
+  options.grid = grid(options.grid);
+  options.precision = precision_;
+  options.max_bytes = maxBytes();
+  return options;
+}
+
+bake::ShLightOptions ShLobesCommand::lightOptions() const {
+  bake::ShLightOptions options;
+  options.order = order_;
+  options.grid = grid(options.grid);
+  options.band_limit = band_limit_;
+  options.precision = precision_;
+  options.max_bytes = maxBytes();
+  return options;
+}
+
+nlohmann::json lobesJson(const ShLobes& lobes) {
+  const double bytes = static_cast<double>(lobes.grid.directionCount() * shCount(lobes.order));
+  return {{"kind", "sh-lobes"},
+          {"order", lobes.order},
+          {"grid_rows", lobes.grid.rows},
+          {"grid_columns", lobes.grid.columns},
+          {"table_bytes", bytes * (lobes.precision == ShPrecision::f16 ? 2 : 4)},
+          {"last_band_relative", lobes.zonal.back() / lobes.zonal.front() / std::sqrt(2 * lobes.order + 1.0)}};
+}
+
+nlohmann::json lightJson(const ShLight& light) {
+  const double bytes = static_cast<double>(3 * light.grid.directionCount() * shCount(light.order));
+  return {{"kind", "sh-light"},
+          {"order", light.order},
+          {"grid_rows", light.grid.rows},
+          {"grid_columns", light.grid.columns},
+          {"table_bytes", bytes * (light.precision == ShPrecision::f16 ? 2 : 4)}};
+}
+
+std::string tableText(const nlohmann::json& table) {
+  std::string text = fmt::format("{} of order {}, {} x {} directions, {:.1f} MB\n", table["kind"].get<std::string>(),
+                                 table["order"].get<int>(), table["grid_rows"].get<int>(), table["grid_columns"].get<int>(),
+                                 table["table_bytes"].get<double>() / 1e6);
+  if (table.contains("last_band_relative"))
+    text += fmt::format("the last band has {:.3g} of the first: where this is not small, light that is sharper rings\n",
+                        table["last_band_relative"].get<double>());
+  return text;
+}
+
+}  // namespace glint::apps

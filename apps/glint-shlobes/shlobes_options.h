@@ -1,0 +1,44 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "common/tool.h"
+#include "glint-shlobes/light_file.h"
+#include "glint/bake/sh_light.h"
+#include "glint/bake/sh_lobes.h"
+
+namespace glint::apps {
+
+/// Mix-in: what glint-shlobes lets the user choose.
+class ShLobesCommand {
+ public:
+  explicit ShLobesCommand(Tool& tool);
+
+  /// File of the light; empty when lobes are asked for.
+  const std::string& light() const { return light_; }
+  const AreaLightOptions& areaLights() const { return area_lights_; }
+  bake::ShLobesOptions lobesOptions() const;
+  bake::ShLightOptions lightOptions() const;
+
+ private:
+  void check(Tool& tool);
+  ShGrid grid(ShGrid other) const;
+  std::uint64_t maxBytes() const { return static_cast<std::uint64_t>(max_memory_ * 1e9); }
+
+  std::string light_, grid_;
+  float sigma_r_ = 0;
+  int order_ = 60, band_limit_ = 0;
+  double max_memory_ = 4;
+  ShPrecision precision_ = ShPrecision::f16;
+  AreaLightOptions area_lights_;
+  Option* sigma_option_;
+};
+
+nlohmann::json lobesJson(const ShLobes& lobes);
+nlohmann::json lightJson(const ShLight& light);
+/// For people: one line from what the functions above give.
+std::string tableText(const nlohmann::json& table);
+
+}  // namespace glint::apps

@@ -1,0 +1,164 @@
+#include "glint/api/batch_slices.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "glint/api/multiversion.h"
+#include "glint/query/pyramid_slices.h"
+
+namespace glint::api {
+namespace {
+
+/// Queries in registers' order. Loops over lanes have no branches, so that compilers turn them into vectors.
+struct Lanes {
+  alignas(64) float u[kChunk], v[kChunk], xx[kChunk], xy[kChunk], yy[kChunk], hx[kChunk], hy[kChunk];
+  alignas(64) float t[kChunk];
+};
+
+void load(const FootprintArrays& footprints, const HalfVectorArrays& halves, std::size_t first, int count, Lanes& lanes) {
+  for (int k = 0; k < kChunk; ++k) {
+    const std::size_t at = first + static_cast<std::size_t>(std::min(k, count - 1));
+    const Footprint p = footprints[at];
+    const Vec2 h = halves[at];
+    lanes.u[k] = p.centre.x;
+    lanes.v[k] = p.centre.y;
+    lanes.xx[k] = p.covariance.xx;
+    lanes.xy[k] = p.covariance.xy;
+    lanes.yy[k] = p.covariance.yy;
+    lanes.hx[k] = h.x;
+    lanes.hy[k] = h.y;
+  }
+}
+
+/// As isotropicVariance, belowFinest, and the choice of levels in selectSlices.
+GLINT_API_MULTIVERSION void chooseLevels(const PyramidShape& shape, Lanes& lanes, SliceChunk& chunk) {
+  constexpr float kLowest = kMinSigmaTexels * kMinSigmaTexels;
+  const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
+  const float finest = finestSigma(shape), finest_variance = finest * finest;
+  const int last = shape.level_count - 1;
+  for (int k = 0; k < kChunk; ++k) {
+    const float sum = lanes.xx[k] + lanes.xy[k] + lanes.yy[k];
+    const float mean = 0.5f * (std::min(lanes.xx[k], width * width) + std::min(lanes.yy[k], height * height));
+    const float widened = std::max(mean, kLowest);
+    const float variance = std::fabs(sum) <= std::numeric_limits<float>::max() ? widened : kLowest;
+    const float octave = 0.5f * log2Of(variance / finest_variance);
+    const float level = std::min(std::max(octave, 0.0f), static_cast<float>(last));
+    const int lower = std::min(static_cast<int>(level), last);
+    chunk.below[k] = variance < finest_variance ? 1 : 0;
+    chunk.levels[0][k] = lower;
+    chunk.levels[1][k] = std::min(lower + 1, last);  // with weight 0 at the last
+    lanes.t[k] = level - static_cast<float>(lower);
+  }
+}
+
+/// One level of every lane along one axis, looked up first: loads by index and arithmetic in one loop do not become vectors.
+struct AxisLevels {
+  alignas(64) float stride[kChunk], count[kChunk];
+};
+
+/// Neighbouring centres along one axis, in floats: counts and indices are far below 2^24.
+struct Neighbours {
+  alignas(64) float low[kChunk], high[kChunk], t[kChunk];
+};
+
+/// centreNeighbours without branches.
+template <bool kWrap>
+inline void findNeighbours(const float* __restrict coordinates, float extent, const AxisLevels& axis,
+                           Neighbours& __restrict out) {
+  for (int k = 0; k < kChunk; ++k) {
+    const float wrapped = coordinates[k] - std::floor(coordinates[k]);
+    const float u = wrapped >= 0 && wrapped < 1 ? wrapped : 0.0f;
+    const float stride = axis.stride[k], count = axis.count[k], last = count - 1;
+    const float x = u * extent;
+    if constexpr (kWrap) {
+      const float unrolled = x + (x < 0.5f * stride ? extent : 0.0f);
+      const float t = unrolled / stride - 0.5f;
+      const float low = std::floor(t);
+      const float gap = extent - last * stride;
+      const float round = (unrolled - (count - 0.5f) * stride) / gap;
+      const float between = t - low, across = std::min(std::max(round, 0.0f), 1.0f);
+      const bool inner = low < last;
+      out.low[k] = inner ? low : last;
+      out.high[k] = inner ? low + 1 : 0.0f;
+      out.t[k] = inner ? between : across;
+    } else {
+      const float t = std::min(std::max(x / stride - 0.5f, 0.0f), last);
+      const float low = std::floor(t);
+      out.low[k] = low;
+      out.high[k] = std::min(low + 1, last);
+      out.t[k] = t - low;
+    }
+  }
+}
+
+/// Slices of one corner of one level.
+inline void setCorner(int corner, const float* __restrict level_weights, const Neighbours& x, const Neighbours& y,
+                      const AxisLevels& columns, float* __restrict weights, std::uint32_t* __restrict images) {
+  const float* xs = corner & 1 ? x.high : x.low;
+  const float* ys = corner & 2 ? y.high : y.low;
+  for (int k = 0; k < kChunk; ++k) {
+    const float wx = corner & 1 ? x.t[k] : 1 - x.t[k], wy = corner & 2 ? y.t[k] : 1 - y.t[k];
+    weights[k] = level_weights[k] * wx * wy;
+    images[k] = static_cast<std::uint32_t>(static_cast<std::int32_t>(ys[k]) * static_cast<std::int32_t>(columns.count[k]) +
+                                           static_cast<std::int32_t>(xs[k]));
+  }
+}
+
+template <bool kWrap>
+inline void chooseImages(const PyramidShape& shape, const Lanes& lanes, SliceChunk& chunk) {
+  for (int step = 0; step < 2; ++step) {
+    AxisLevels columns, rows;
+    alignas(64) float level_weights[kChunk];
+    for (int k = 0; k < kChunk; ++k) {
+      const PyramidGrid& grid = shape.levels[chunk.levels[step][k]];
+      columns.stride[k] = rows.stride[k] = grid.stride;
+      columns.count[k] = static_cast<float>(grid.columns);
+      rows.count[k] = static_cast<float>(grid.rows);
+    }
+    for (int k = 0; k < kChunk; ++k) level_weights[k] = step == 0 ? 1 - lanes.t[k] : lanes.t[k];
+    Neighbours x, y;
+    findNeighbours<kWrap>(lanes.u, static_cast<float>(shape.width), columns, x);
+    findNeighbours<kWrap>(lanes.v, static_cast<float>(shape.height), rows, y);
+    for (int corner = 0; corner < 4; ++corner)
+      setCorner(corner, level_weights, x, y, columns, chunk.weights[4 * step + corner], chunk.images[4 * step + corner]);
+  }
+}
+
+GLINT_API_MULTIVERSION void chooseWrapping(const PyramidShape& shape, const Lanes& lanes, SliceChunk& chunk) {
+  chooseImages<true>(shape, lanes, chunk);
+}
+GLINT_API_MULTIVERSION void chooseClamped(const PyramidShape& shape, const Lanes& lanes, SliceChunk& chunk) {
+  chooseImages<false>(shape, lanes, chunk);
+}
+
+/// As insideSquare and pixelPlace; lanes outside get a pixel that can be read.
+GLINT_API_MULTIVERSION void choosePixels(const PyramidShape& shape, const Lanes& lanes, SliceChunk& chunk) {
+  const float half = 0.5f * static_cast<float>(shape.resolution);
+  const int last = shape.resolution - 1, blocks = shape.blocksPerAxis();
+  for (int k = 0; k < kChunk; ++k) {
+    const bool inside = std::fabs(lanes.hx[k]) <= 1 && std::fabs(lanes.hy[k]) <= 1;
+    const float hx = inside ? lanes.hx[k] : 0.0f, hy = inside ? lanes.hy[k] : 0.0f;
+    const int x = std::min(static_cast<int>((hx + 1) * half), last), y = std::min(static_cast<int>((hy + 1) * half), last);
+    static_assert(kBlockSize == 16);
+    chunk.inside[k] = inside ? 1 : 0;
+    chunk.blocks[k] = (y >> 4) * blocks + (x >> 4);
+    chunk.pixels[k] = (y & 15) * kBlockSize + (x & 15);
+  }
+}
+
+}  // namespace
+
+void selectChunk(const PyramidShape& shape, const FootprintArrays& footprints, const HalfVectorArrays& halves,
+                 std::size_t first, int count, SliceChunk& chunk) {
+  Lanes lanes;
+  load(footprints, halves, first, count, lanes);
+  chooseLevels(shape, lanes, chunk);
+  if (shape.boundary == Boundary::wrap)
+    chooseWrapping(shape, lanes, chunk);
+  else
+    chooseClamped(shape, lanes, chunk);
+  choosePixels(shape, lanes, chunk);
+}
+
+}  // namespace glint::api

@@ -1,0 +1,31 @@
+#pragma once
+
+// Private to libglint/api.
+
+#include <cstdint>
+
+#include "glint/api/batch.h"
+
+namespace glint::api {
+
+/// Queries that a batch works on at once: enough to keep many cache misses in flight, few enough to stay in the nearest cache.
+inline constexpr int kChunk = 32;
+
+/// The images that answer a chunk of queries, as selectSlices chooses them, and the pixels that are asked. Lane k is a query;
+/// lanes beyond the last query repeat harmless ones.
+struct SliceChunk {
+  /// Slice j of a query: corner j % 4 (x in bit 0, y in bit 1) of level first + j / 4.
+  alignas(64) float weights[8][kChunk];  ///< 0: the slice does not count, and its image is one that can be read
+  alignas(64) std::uint32_t images[8][kChunk];
+  alignas(64) std::int32_t levels[2][kChunk];
+  alignas(64) std::int32_t blocks[kChunk];
+  alignas(64) std::int32_t pixels[kChunk];  ///< y * kBlockSize + x in the block
+  alignas(64) std::int32_t inside[kChunk];  ///< 1: the half vector is in the square, else the density is 0
+  alignas(64) std::int32_t below[kChunk];   ///< 1: the footprint is below level 0
+};
+
+/// Fills a chunk with queries [first, first + count), count <= kChunk.
+void selectChunk(const PyramidShape& shape, const FootprintArrays& footprints, const HalfVectorArrays& halves,
+                 std::size_t first, int count, SliceChunk& chunk);
+
+}  // namespace glint::api

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "glint/api/any_ndf.h"
+#include "glint/model/packed_ndf.h"
+
+namespace glint::api {
+
+/// A model and all that its queries read as one linear buffer, ready to be uploaded: see glint/model/packed_ndf.h for the layout,
+/// and PackedNdfView for asking it. Same bytes for the same model.
+/// @param normals  map for footprints below level 0; nullptr: left out
+std::vector<std::byte> pack(const NdfPyramid& pyramid, const NormalMap* normals = nullptr);
+std::vector<std::byte> pack(const CompressedNdf& compressed, const NormalMap* normals = nullptr);
+/// @param sigma_r  intrinsic roughness that it is asked with, disk units
+std::vector<std::byte> pack(const NormalMap& normals, float sigma_r, Surface surface = Surface::flat,
+                            Boundary boundary = Boundary::wrap);
+
+/// Whatever was opened, with the normals that it was opened with.
+std::vector<std::byte> pack(const OpenedNdf& opened);
+
+}  // namespace glint::api

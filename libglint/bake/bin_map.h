@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "glint/bake/progress.h"
+#include "glint/model/bin_map.h"
+#include "glint/model/normal_map.h"
+
+namespace glint::bake {
+
+struct BinMapOptions {
+  float alpha = 0.01f;  ///< Beckmann roughness of the facets, kMinBinAlpha to 1
+  int leaf_size = 8;    ///< texels of a cell of a bin's grid, at least on average, 1 to 1024
+};
+
+/// Smallest roughness: the number of bins grows with 1 / alpha^2.
+inline constexpr float kMinBinAlpha = 5e-4f;
+/// Bins along each axis at most, reached near the smallest roughness.
+inline constexpr int kMaxBinsPerAxis = 4096;
+/// Bins with more texels than this many leaves get a grid.
+inline constexpr int kGridLeaves = 8;
+
+/// Bins along each axis for a roughness: 5 / sin(arctan(3 sigma)), so that five bins span six deviations (Atanasov 2021, Eq. 16 and
+/// table 4, which rounds down).
+int binsPerAxis(float alpha);
+
+/// A CompactCounts that owns its arrays.
+struct CompactCountsData {
+  std::vector<std::uint64_t> bases;
+  std::vector<std::uint16_t> offsets;
+  int shift = 0;
+
+  CompactCounts view() const { return {bases, offsets, shift}; }
+};
+
+/// Packs a non-decreasing sequence, with as few bases as its steps allow.
+CompactCountsData compactCounts(const std::vector<std::uint64_t>& values);
+
+/// A BinMap that owns its arrays.
+struct BinMapData {
+  int width = 0, height = 0;
+  float alpha = 0;
+  int bins_per_axis = 0, leaf_size = 0;
+  std::vector<std::uint64_t> masks, grid_masks;
+  std::vector<std::uint32_t> mask_ranks, grid_ranks, grid_cells;
+  std::vector<std::uint16_t> grid_moments;
+  CompactCountsData bin_starts, cell_starts;
+  std::vector<std::uint32_t> texels, class_bins;
+  std::vector<std::uint16_t> texel_classes;
+
+  /// Spans over the arrays; valid while this object lives and is not changed.
+  BinMap view() const;
+  /// Bytes of all arrays, the same in memory and in a file.
+  std::size_t sizeBytes() const;
+};
+
+/// Sorts the texels of a normal map by the bins of their normals (Atanasov 2021, section 5.4), each list by cells.
+///
+/// Two passes: into at most 512 buckets of neighbouring bins, then each bucket by bin and cell in the cache. O(texels + bins).
+/// @throws Error usage for options out of range; invalid_input for normals outside the disk; unsupported for maps whose columns and
+///         rows need more than 28 bits together (16384 x 16384)
+BinMapData buildBinMap(const NormalMap& map, const BinMapOptions& options, const ProgressFn& progress = {});
+
+}  // namespace glint::bake

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "glint/model/map_slopes.h"
+#include "glint/model/vec.h"
+
+namespace glint {
+
+/// Most levels of detail of a displacement asset.
+inline constexpr int kMaxDisplacementLevels = 8;
+/// Most lobes of a cell.
+inline constexpr int kMaxLobes = 6;
+/// Bandwidth of a lobe around normals that are all the same.
+inline constexpr float kMaxKappa = 1e6f;
+
+/// Reflectance of a facet of the original surface.
+struct BaseBrdf {
+  enum class Kind : std::uint8_t {
+    diffuse,  ///< albedo / pi
+    ggx,      ///< D G1 G1 F / (4 cos cos), roughness alpha
+  };
+  Kind kind = Kind::diffuse;
+  float albedo = 1;  ///< diffuse: 0 < albedo <= 1
+  float alpha = 0;   ///< ggx: roughness
+  float eta = 1;     ///< ggx: refractive index and extinction of a conductor; eta 1 and k 0: F = 1
+  float k = 0;
+};
+
+/// One lobe of a cell's distribution of normals: amplitude * kappa / (4 pi sinh kappa) exp(kappa dot(mu, n)) (Wu 2019, Eq. 4).
+/// Amplitudes add up to the area of the original surface over each unit of projected area. Empty lobes have amplitude 0.
+struct VmfLobe {
+  Vec2 mu;              ///< projection of the centre on the disk; z > 0
+  float kappa = 0;      ///< bandwidth, 0 to kMaxKappa
+  float amplitude = 0;  ///< >= 0
+};
+static_assert(sizeof(VmfLobe) == 16);
+static_assert(sizeof(MapSlopes) == 20);
+
+/// One level of detail.
+///
+/// Vertex (I, J) lies over texel (I factor, J factor) of the original; cell (I, J) is the square between vertices (I, J) and
+/// (I + 1, J + 1), wrapped. All arrays have J slowest.
+struct DisplacementLevel {
+  int factor = 0;           ///< texels of the original along a side of a cell
+  int columns = 0;          ///< width / factor
+  int rows = 0;             ///< height / factor
+  int spatial_columns = 0;  ///< of T: at most `columns`
+  int spatial_rows = 0;
+
+  std::span<const float> heights;        ///< [rows][columns] of the vertices, texels of the original
+  std::span<const VmfLobe> lobes;        ///< [rows][columns][lobe_count], largest amplitude first
+  std::span<const MapSlopes> slopes;     ///< [rows][columns], for the single-lobe variant
+  std::span<const float> fit_errors;     ///< [rows][columns]: relative error of the lobes, both sides blurred by 8 degrees
+  std::span<const float> spatial_scale;  ///< T [spatial_rows][spatial_columns], mean 1 over the cells
+  std::span<const std::uint16_t> angular_scale;  ///< S, half precision: element (i, o) with i <= o is at o (o + 1) / 2 + i
+
+  // How far the factorisation and its assumptions hold (below 75 degrees).
+  float rank1_residual = 0;        ///< |R - T S| / |R| of the scaling function R before it was factorised
+  float rank1_energy = 1;          ///< share of the largest singular value's square: what the best factorisation keeps
+  float interreflected_share = 0;  ///< of the reflected light
+  float distant_share = 0;         ///< of the reflected light: over hops longer than a cell, which T and S cannot place
+};
+
+/// A displacement map downsampled to several levels of detail, with what keeps its appearance (asset kind `displacement`,
+/// Wu 2019): f_low(x, wi, wo) = T(x) S(wi, wo) f'_low(x, wi, wo).
+struct Displacement {
+  int width = 0;   ///< of the original, texels
+  int height = 0;  ///< of the original, texels
+  float texel_size_um = 0;
+  BaseBrdf base;
+  int lobe_count = 0;  ///< lobes of each cell, 1 to kMaxLobes
+  int angular = 0;     ///< N: S has N^2 directions of either kind, the cells of concentric_map.h
+  int level_count = 0;
+  DisplacementLevel levels[kMaxDisplacementLevels];
+};
+
+}  // namespace glint

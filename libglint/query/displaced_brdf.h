@@ -1,0 +1,273 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "glint/model/displacement.h"
+#include "glint/query/base_brdf.h"
+#include "glint/query/concentric_map.h"
+#include "glint/query/half.h"
+#include "glint/query/smith.h"
+#include "glint/query/vmf_lobe.h"
+
+namespace glint {
+
+/// What of the prefiltered model is evaluated.
+enum class DisplacedVariant : std::uint8_t {
+  full,    ///< T S f'_low
+  lobes,   ///< f'_low alone: no shadowing, no interreflections
+  single,  ///< one Beckmann lobe from the moments of the slopes with Smith's shadowing, as LEADR mapping does
+};
+
+/// Two neighbouring levels and the weight of the second.
+struct LevelBlend {
+  int first = 0;
+  int second = 0;
+  float weight = 0;
+};
+
+/// A direction drawn for a shading point.
+struct DirectionSample {
+  Vec3 direction;
+  float pdf = 0;  ///< per solid angle; 0 if nothing was drawn
+};
+
+/// The prefiltered BRDF of a downsampled displacement map (Wu 2019, Eq. 11 and 18), in the map's tangent frame.
+///
+/// f'_low(wi, wo) = n_z / (cos(wi) cos(wo)) * integral of f cos(n', wi) cos(n', wo) D(n') over the normals n' of the cell, with
+/// the cosines in front those of the facet n of the downsampled surface. Unlike Eq. 5 it counts the area that normals show to
+/// wo: so it is reciprocal, and with one normal it is the base itself. Renderers use it on the downsampled surface, with their
+/// own visibility; that of smaller scale is in S.
+///
+/// Thread-safe, allocates nothing.
+class DisplacedBrdf {
+ public:
+  GLINT_HD explicit DisplacedBrdf(const Displacement& asset) : asset_(asset) {}
+
+  GLINT_HD const Displacement& asset() const { return asset_; }
+
+  /// Levels for a footprint of this diameter: linear in its logarithm between the factors of the levels, clamped.
+  GLINT_HD LevelBlend levelsFor(float diameter_texels) const {
+    int first = 0;
+    while (first + 1 < asset_.level_count && static_cast<float>(asset_.levels[first + 1].factor) <= diameter_texels) ++first;
+    const int second = std::min(first + 1, asset_.level_count - 1);
+    if (first == second) return {first, second, 0};
+    const float low = static_cast<float>(asset_.levels[first].factor), high = static_cast<float>(asset_.levels[second].factor);
+    const float place = std::log(std::max(diameter_texels, low) / low) / std::log(high / low);
+    return {first, second, std::clamp(place, 0.0f, 1.0f)};
+  }
+
+  /// Normal of the downsampled surface: of one of the two triangles of the cell.
+  GLINT_HD Vec3 normal(int level, Vec2 uv) const {
+    const DisplacementLevel& l = asset_.levels[level];
+    const Place p = place(l, uv);
+    const int i1 = p.i + 1 == l.columns ? 0 : p.i + 1, j1 = p.j + 1 == l.rows ? 0 : p.j + 1;
+    const auto height = [&](int i, int j) { return l.heights[static_cast<std::size_t>(j) * l.columns + i]; };
+    const float h00 = height(p.i, p.j), h10 = height(i1, p.j), h01 = height(p.i, j1), h11 = height(i1, j1);
+    const float scale = 1 / static_cast<float>(l.factor);
+    const bool lower = p.x + p.y < 1;
+    const float sx = scale * (lower ? h10 - h00 : h11 - h01), sy = scale * (lower ? h01 - h00 : h11 - h10);
+    const float z = 1 / std::sqrt(1 + sx * sx + sy * sy);
+    return {-sx * z, -sy * z, z};
+  }
+
+  /// BRDF at a point of the downsampled surface, per steradian; 0 if a direction is behind its facet.
+  GLINT_HD float evaluate(int level, Vec2 uv, Vec3 wi, Vec3 wo, DisplacedVariant variant = DisplacedVariant::full) const {
+    const Vec3 n = normal(level, uv);
+    const float ci = dot(n, wi), co = dot(n, wo);
+    if (ci <= 0 || co <= 0) return 0;
+    const DisplacementLevel& l = asset_.levels[level];
+    const Place p = place(l, uv);
+    if (variant == DisplacedVariant::single) return n.z / (ci * co) * singleLobe(l.slopes[p.cell], wi, wo);
+    const float scale = variant == DisplacedVariant::full ? spatialScale(level, uv) * angularScale(level, wi, wo) : 1;
+    return scale * n.z / (ci * co) * timesCosines(l, p.cell, wi, wo);
+  }
+
+  /// Light reflected from wi to wo, BRDF times cosine, blended between levels. Each level has its own facet.
+  GLINT_HD float reflected(const LevelBlend& blend, Vec2 uv, Vec3 wi, Vec3 wo,
+                           DisplacedVariant variant = DisplacedVariant::full) const {
+    const auto at = [&](int level) {
+      return evaluate(level, uv, wi, wo, variant) * std::max(0.0f, dot(normal(level, uv), wi));
+    };
+    const float first = at(blend.first);
+    return blend.weight > 0 ? first + blend.weight * (at(blend.second) - first) : first;
+  }
+
+  /// Draws wi for a view wo: a lobe by its amplitude, then a cosine around its centre (diffuse), or a normal of the widened lobe
+  /// to reflect at (ggx).
+  /// @param xi  uniform in [0, 1)^2
+  GLINT_HD DirectionSample sample(int level, Vec2 uv, Vec3 wo, Vec2 xi) const {
+    const DisplacementLevel& l = asset_.levels[level];
+    const VmfLobe* lobes = &l.lobes[place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count)];
+    float left = xi.x * totalAmplitude(lobes);
+    int chosen = 0;
+    while (chosen + 1 < asset_.lobe_count && lobes[chosen + 1].amplitude > 0 && left >= lobes[chosen].amplitude)
+      left -= lobes[chosen++].amplitude;
+    const float unit = std::clamp(left / std::max(lobes[chosen].amplitude, 1e-20f), 0.0f, 0.99999994f);
+    const Vec3 axis = lobeCentre(lobes[chosen]);
+    const float angle = 6.28318530717958648f * xi.y;
+    Vec3 wi;
+    if (asset_.base.kind == BaseBrdf::Kind::diffuse) {
+      wi = around(axis, std::sqrt(1 - unit), angle);
+    } else {
+      const float a = spreadRoughness(asset_.base.alpha, lobes[chosen].kappa);
+      const Vec3 h = around(axis, std::sqrt((1 - unit) / (1 + (a * a - 1) * unit)), angle);
+      const float c = dot(h, wo);
+      if (c <= 0) return {};
+      wi = 2 * c * h - wo;
+    }
+    return {wi, pdf(level, uv, wi, wo)};
+  }
+
+  /// Density of `sample` per solid angle. Directions below the horizon can be drawn; `evaluate` is 0 there.
+  GLINT_HD float pdf(int level, Vec2 uv, Vec3 wi, Vec3 wo) const {
+    const DisplacementLevel& l = asset_.levels[level];
+    const VmfLobe* lobes = &l.lobes[place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count)];
+    const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
+    const Vec3 sum = wi + wo;
+    const float length = std::sqrt(std::max(1e-20f, dot(sum, sum)));
+    const Vec3 h = (1 / length) * sum;
+    float density = 0;
+    for (int k = 0; k < asset_.lobe_count; ++k) {
+      const Vec3 axis = lobeCentre(lobes[k]);
+      const float c = dot(axis, diffuse ? wi : h);
+      if (c <= 0) continue;
+      density +=
+          lobes[k].amplitude *
+          (diffuse ? c * kInversePi : ggxDensity(c, spreadRoughness(asset_.base.alpha, lobes[k].kappa)) * c / (2 * length));
+    }
+    return density / totalAmplitude(lobes);
+  }
+
+  /// T, linear between the centres of its patches; periodic.
+  GLINT_HD float spatialScale(int level, Vec2 uv) const {
+    const DisplacementLevel& l = asset_.levels[level];
+    const auto axis = [](float coordinate, int n, int& low, int& high) {
+      const float x = (coordinate - std::floor(coordinate)) * static_cast<float>(n) - 0.5f;
+      const float whole = std::floor(x);
+      low = (static_cast<int>(whole) + n) % n, high = (low + 1) % n;
+      return x - whole;
+    };
+    // Patches begin at vertex 0, over the centre of texel 0.
+    int i0, i1, j0, j1;
+    const float fx = axis(uv.x - 0.5f / static_cast<float>(asset_.width), l.spatial_columns, i0, i1);
+    const float fy = axis(uv.y - 0.5f / static_cast<float>(asset_.height), l.spatial_rows, j0, j1);
+    const auto at = [&](int i, int j) { return l.spatial_scale[static_cast<std::size_t>(j) * l.spatial_columns + i]; };
+    const float low = at(i0, j0) + fx * (at(i1, j0) - at(i0, j0)), high = at(i0, j1) + fx * (at(i1, j1) - at(i0, j1));
+    return low + fy * (high - low);
+  }
+
+  /// S, linear in both directions on the concentric map.
+  GLINT_HD float angularScale(int level, Vec3 wi, Vec3 wo) const {
+    const DisplacementLevel& l = asset_.levels[level];
+    const GridPlace a = gridPlace(wi, asset_.angular), b = gridPlace(wo, asset_.angular);
+    float sum = 0;
+    for (int i = 0; i < 4; ++i) {
+      for (int o = 0; o < 4; ++o) {
+        const auto low = static_cast<std::size_t>(std::min(a.cell[i], b.cell[o]));
+        const auto high = static_cast<std::size_t>(std::max(a.cell[i], b.cell[o]));
+        sum += a.weight[i] * b.weight[o] * halfToFloat(l.angular_scale[high * (high + 1) / 2 + low]);
+      }
+    }
+    return sum;
+  }
+
+  /// Integral of f cos(wi) cos(wo) D over the normals of a cell: f'_low without the facet's terms.
+  GLINT_HD float timesCosines(const DisplacementLevel& l, std::size_t cell, Vec3 wi, Vec3 wo) const {
+    const VmfLobe* lobes = &l.lobes[cell * static_cast<std::size_t>(asset_.lobe_count)];
+    const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
+    const float cosine = dot(wi, wo);
+    const Vec3 sum = wi + wo;
+    const float length = std::sqrt(std::max(1e-20f, dot(sum, sum)));
+    const Vec3 h = (1 / length) * sum;
+    const float fresnel = diffuse ? 1 : conductorFresnel(0.5f * length, asset_.base.eta, asset_.base.k);
+    float total = 0;
+    for (int k = 0; k < asset_.lobe_count && lobes[k].amplitude > 0; ++k) {
+      const Vec3 axis = lobeCentre(lobes[k]);
+      if (diffuse) {
+        const LobeMoments moments = lobeMoments(lobes[k].kappa);
+        total +=
+            lobes[k].amplitude * lobeCosines(moments, lobeFacing(moments, axis, wi), lobeFacing(moments, axis, wo), cosine);
+      } else {
+        total += lobes[k].amplitude * ggxLobe(asset_.base, axis, lobes[k].kappa, wi, wo, h, fresnel);
+      }
+    }
+    return std::max(0.0f, diffuse ? asset_.base.albedo * kInversePi * total : total);
+  }
+
+ private:
+  /// A cell and the place in it.
+  struct Place {
+    int i, j;
+    float x, y;
+    std::size_t cell;
+  };
+
+  GLINT_HD Place place(const DisplacementLevel& l, Vec2 uv) const {
+    const auto axis = [](float coordinate, int texels, int cells, float& part) {
+      const float x = (coordinate - std::floor(coordinate)) * static_cast<float>(texels) - 0.5f;
+      float in_cells = x * static_cast<float>(cells) / static_cast<float>(texels);
+      if (in_cells < 0) in_cells += static_cast<float>(cells);
+      const int cell = std::clamp(static_cast<int>(in_cells), 0, cells - 1);
+      part = std::clamp(in_cells - static_cast<float>(cell), 0.0f, 1.0f);
+      return cell;
+    };
+    Place p{};
+    p.i = axis(uv.x, asset_.width, l.columns, p.x);
+    p.j = axis(uv.y, asset_.height, l.rows, p.y);
+    p.cell = static_cast<std::size_t>(p.j) * static_cast<std::size_t>(l.columns) + static_cast<std::size_t>(p.i);
+    return p;
+  }
+
+  GLINT_HD float totalAmplitude(const VmfLobe* lobes) const {
+    float total = 1e-20f;
+    for (int k = 0; k < asset_.lobe_count; ++k) total += lobes[k].amplitude;
+    return total;
+  }
+
+  /// The direction at this cosine and azimuth around an axis with z > 0.
+  static GLINT_HD Vec3 around(Vec3 axis, float cosine, float angle) {
+    const float a = -1 / (1 + axis.z), b = axis.x * axis.y * a;
+    const Vec3 s = {1 + axis.x * axis.x * a, b, -axis.x}, t = {b, 1 + axis.y * axis.y * a, -axis.y};
+    const float sine = std::sqrt(std::max(0.0f, 1 - cosine * cosine));
+    return sine * std::cos(angle) * s + sine * std::sin(angle) * t + cosine * axis;
+  }
+
+  /// The same integral for one Beckmann lobe with the cell's slope moments, shadowed by its own Smith term (Dupuy et al. 2013).
+  GLINT_HD float singleLobe(const MapSlopes& m, Vec3 wi, Vec3 wo) const {
+    if (wi.z <= 0 || wo.z <= 0) return 0;
+    const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
+    const float widening = diffuse ? 1e-8f : 0.5f * asset_.base.alpha * asset_.base.alpha;
+    const float xx = m.covariance.xx + widening, yy = m.covariance.yy + widening, xy = m.covariance.xy;
+    const float shadowing = SmithMasking(m, std::sqrt(widening)).g2(wi, wo);
+    if (!diffuse) {
+      const Vec3 sum = wi + wo;
+      const float length = std::sqrt(std::max(1e-20f, dot(sum, sum)));
+      const Vec3 h = (1 / length) * sum;
+      if (h.z <= 0) return 0;
+      const float sx = -h.x / h.z - m.mean.x, sy = -h.y / h.z - m.mean.y;
+      const float determinant = std::max(1e-20f, xx * yy - xy * xy);
+      const float exponent = (yy * sx * sx - 2 * xy * sx * sy + xx * sy * sy) / determinant;
+      const float h2 = h.z * h.z;
+      const float density = std::exp(-0.5f * exponent) * 0.5f * kInversePi / (std::sqrt(determinant) * h2 * h2);
+      return 0.25f * conductorFresnel(0.5f * length, asset_.base.eta, asset_.base.k) * density * shadowing;
+    }
+    // Gauss and Hermite's five points along each principal direction of the slopes, by the Cholesky factor.
+    constexpr float kNode[5] = {-2.85697001387f, -1.35562617997f, 0, 1.35562617997f, 2.85697001387f};
+    constexpr float kWeight[5] = {0.0112574113f, 0.2220759220f, 0.5333333333f, 0.2220759220f, 0.0112574113f};
+    const float l11 = std::sqrt(std::max(0.0f, xx)), l21 = xy / l11, l22 = std::sqrt(std::max(0.0f, yy - l21 * l21));
+    float total = 0;
+    for (int a = 0; a < 5; ++a) {
+      for (int b = 0; b < 5; ++b) {
+        const float sx = m.mean.x + l11 * kNode[a], sy = m.mean.y + l21 * kNode[a] + l22 * kNode[b];
+        const float ci = std::max(0.0f, wi.z - sx * wi.x - sy * wi.y), co = std::max(0.0f, wo.z - sx * wo.x - sy * wo.y);
+        total += kWeight[a] * kWeight[b] * ci * co / std::sqrt(1 + sx * sx + sy * sy);
+      }
+    }
+    return asset_.base.albedo * kInversePi * total * shadowing;
+  }
+
+  const Displacement& asset_;
+};
+
+}  // namespace glint

@@ -1,0 +1,195 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "glint/model/histogram_sat.h"
+#include "glint/query/footprint_weights.h"
+#include "glint/query/histogram_sums.h"
+#include "glint/query/ndf_model.h"
+#include "glint/query/parallelogram_sums.h"
+#include "glint/query/sampling.h"
+#include "glint/query/spherical_bins.h"
+
+namespace glint {
+
+/// How many nested boxes stand for a Gaussian footprint.
+enum class GaussianBoxes : std::uint8_t {
+  one = 1,    ///< the box of the same second moments
+  three = 3,  ///< three boxes of the same second moments in sum, with least squared difference from the Gaussian
+};
+
+/// The NDF from accumulated histograms of normals (Gamboa 2018, section 4.1).
+///
+/// Box footprints are exact whatever their size and angle: texels count by their covered area, the plane is periodic. Gaussian ones
+/// are answered as the parallelogram of the same covariance, or three of them. Inside a bin of directions the density is
+/// even over the bin's area of the disk: the histogram knows no more. Bins are some ten degrees wide, far wider than the intrinsic
+/// roughness, so there is no further blur, and the density integrates to 1 over the disk.
+/// Cost: a few texels for each texel along the border of an axis-aligned box (and none beyond some hundreds), four rows of
+/// counters; rotated boxes O(stride * border). Thread-safe, allocates nothing; the arrays must outlive it.
+class HistogramNdf {
+ public:
+  GLINT_HD explicit HistogramNdf(const HistogramSat& sat, GaussianBoxes gaussian = GaussianBoxes::one)
+      : sat_(sat), bins_(sat.theta_bins, sat.phi_bins), gaussian_(gaussian) {}
+
+  GLINT_HD const HistogramSat& sat() const { return sat_; }
+  GLINT_HD const SphericalBins& bins() const { return bins_; }
+  /// Bins that occur in the map.
+  GLINT_HD int binCount() const { return sat_.bin_count; }
+  /// Mean normal of the texels of a bin over the whole map: the direction that stands for it.
+  GLINT_HD Vec2 binNormal(int bin) const { return sat_.bin_normals.data()[bin]; }
+  /// Middle of a bin in elevation and azimuth: the direction that stands for it in the paper.
+  GLINT_HD Vec2 binCentre(int bin) const { return bins_.centre(sat_.bin_ids.data()[bin]); }
+
+  /// Whole histogram of a footprint: visitor(int bin, float weight) for every bin with weight > 0, in increasing order, 0 <= bin <
+  /// binCount(). Weights are shares of the footprint and sum to 1.
+  template <class Visitor>
+  GLINT_HD void forEachBin(const Footprint& p, Visitor&& visitor) const {
+    BinCounts counts;
+    const double scale = 1 / histogram(p, counts);
+    for (int bin = 0; bin < sat_.bin_count; ++bin)
+      if (counts.totals[bin] > 0) visitor(bin, static_cast<float>(scale * counts.totals[bin]));
+  }
+
+  /// Number of texels of each bin in [x0, x1) x [y0, y1) of the endless plane, exact for sides of up to 64 periods:
+  /// visitor(int bin, int64 count) for every bin that occurs there.
+  template <class Visitor>
+  GLINT_HD void countTexels(std::int64_t x0, std::int64_t y0, std::int64_t x1, std::int64_t y1, Visitor&& visitor) const {
+    BinCounts counts;
+    AllBins sum(sat_, counts);
+    RectangleSums<AllBins>(sat_, sum).add(static_cast<double>(x0), static_cast<double>(x1), static_cast<double>(y0),
+                                          static_cast<double>(y1), 1);
+    sum.finish();
+    for (int bin = 0; bin < sat_.bin_count; ++bin)
+      if (counts.totals[bin] > 0) visitor(bin, static_cast<std::int64_t>(counts.totals[bin]));
+  }
+
+  /// Density towards h, >= 0: the share of its bin over the bin's area; 0 outside the unit disk.
+  GLINT_HD float density(const Footprint& p, Vec2 h) const {
+    if (!(dot(h, h) <= 1)) return 0;
+    const int id = bins_.find(h), bin = binOf(id);
+    if (bin < 0) return 0;
+    OneBin sum(sat_, bin);
+    const double area = addFootprint(p, sum);
+    return static_cast<float>(sum.count() / (area * bins_.area(id)));
+  }
+
+  /// Average density over a box of half vectors, the exact average of `density`; 0 if the box is empty.
+  GLINT_HD float mean(const Footprint& p, const Box2& range) const {
+    const Box2 box = {{std::max(range.low.x, -1.0f), std::max(range.low.y, -1.0f)},
+                      {std::min(range.high.x, 1.0f), std::min(range.high.y, 1.0f)}};
+    if (!(box.width() > 0 && box.height() > 0)) return 0;
+    BinCounts counts;
+    const double total = histogram(p, counts);
+    double mass = 0;
+    for (int bin = 0; bin < sat_.bin_count; ++bin) {
+      if (counts.totals[bin] <= 0) continue;
+      const int id = sat_.bin_ids.data()[bin];
+      mass += counts.totals[bin] * (bins_.areaInside(id, box) / bins_.area(id));
+    }
+    return static_cast<float>(mass / (total * range.area()));
+  }
+
+  /// Half vector with probability density `density`, which is its pdf: xi.x chooses the bin and what is left of it the azimuth in
+  /// the bin, xi.y the radius, so that even xi stay even within bins.
+  GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+    xi = clampUnit(xi);
+    BinCounts counts;
+    histogram(p, counts);
+    double total = 0;
+    for (int bin = 0; bin < sat_.bin_count; ++bin) total += counts.totals[bin];
+    if (!(total > 0)) return {};
+    double rest = total * static_cast<double>(xi.x);
+    int chosen = -1;
+    for (int bin = 0; bin < sat_.bin_count; ++bin) {
+      if (counts.totals[bin] <= 0) continue;
+      if (chosen >= 0) rest -= counts.totals[chosen];
+      chosen = bin;
+      if (rest < counts.totals[bin]) break;
+    }
+    const int id = sat_.bin_ids.data()[chosen];
+    const auto within = static_cast<float>(std::clamp(rest / counts.totals[chosen], 0.0, 0.99999994));
+    return {bins_.point(id, {within, xi.y}), static_cast<float>(counts.totals[chosen] / (total * bins_.area(id)))};
+  }
+
+ private:
+  /// Counts of all bins, times a factor. Returns their sum: the area that was counted, texels^2.
+  GLINT_HD double histogram(const Footprint& p, BinCounts& counts) const {
+    AllBins sum(sat_, counts);
+    const double area = addFootprint(p, sum);
+    sum.finish();
+    return area;
+  }
+
+  /// Place of a bin among those that occur, or -1.
+  GLINT_HD int binOf(int id) const {
+    const std::uint16_t* ids = sat_.bin_ids.data();
+    const std::uint16_t* found = std::lower_bound(ids, ids + sat_.bin_count, id);
+    return found != ids + sat_.bin_count && *found == id ? static_cast<int>(found - ids) : -1;
+  }
+
+  /// Adds the texels of a footprint. Returns the area that they cover together.
+  template <class Sum>
+  GLINT_HD double addFootprint(const Footprint& p, Sum& sum) const {
+    if (p.kind == Footprint::Kind::box) {
+      const double area = addBox(p, sum);
+      if (area > 0) return area;
+    }
+    // Half axes of the parallelogram of the same covariance, two of its sides upright: Cholesky's factor times sqrt(3).
+    const Covariance c = usableCovariance(p.covariance, sat_.width, sat_.height);
+    const double xx = c.xx, xy = c.xy, yy = c.yy;
+    const double ax = std::sqrt(3 * xx), ay = xy * std::sqrt(3 / xx), by = std::sqrt(3 * std::max(yy - xy * xy / xx, 1e-6));
+    if (gaussian_ == GaussianBoxes::one) return addParallelogram(p.centre, ax, ay, 0, by, 1, sum), 4 * ax * by;
+    for (int k = 0; k < 3; ++k) {
+      const double s = kBoxScales[k];
+      addParallelogram(p.centre, s * ax, s * ay, 0, s * by, kBoxShares[k] / (4 * s * s * ax * by), sum);
+    }
+    return 1;
+  }
+
+  /// Adds a box as it is. Returns its area; 0 if it cannot be answered, as where it has none or no finite size.
+  template <class Sum>
+  GLINT_HD double addBox(const Footprint& p, Sum& sum) const {
+    double ax = p.axis_a.x, ay = p.axis_a.y, bx = p.axis_b.x, by = p.axis_b.y;
+    const double reach_x = std::fabs(ax) + std::fabs(bx), reach_y = std::fabs(ay) + std::fabs(by);
+    const bool aligned = (ay == 0 && bx == 0) || (ax == 0 && by == 0);
+    if (!(std::isfinite(reach_x) && std::isfinite(reach_y))) return 0;
+    // Where it is a hundred periods long, or at an angle and four, the rest makes no difference that is worth its cost.
+    const double most = aligned ? kMostPeriods : 2;
+    const double sx = std::min(1.0, most * sat_.width / std::max(reach_x, 1e-30));
+    const double sy = std::min(1.0, most * sat_.height / std::max(reach_y, 1e-30));
+    ax *= sx, bx *= sx, ay *= sy, by *= sy;
+    const double area = 4 * std::fabs(ax * by - ay * bx);
+    const double longest = 2 * std::max(std::hypot(ax, ay), std::hypot(bx, by));
+    if (!(area > 2 * double{kMinBoxThickness} * longest)) return 0;
+    addParallelogram(p.centre, ax, ay, bx, by, 1, sum);
+    return area;
+  }
+
+  template <class Sum>
+  GLINT_HD void addParallelogram(Vec2 centre_uv, double ax, double ay, double bx, double by, double weight, Sum& sum) const {
+    const double x = double{wrapUnit(centre_uv.x)} * sat_.width, y = double{wrapUnit(centre_uv.y)} * sat_.height;
+    if ((ay == 0 && bx == 0) || (ax == 0 && by == 0)) {
+      const double rx = std::fabs(ax) + std::fabs(bx), ry = std::fabs(ay) + std::fabs(by);
+      RectangleSums<Sum>(sat_, sum).add(x - rx, x + rx, y - ry, y + ry, weight);
+    } else {
+      ParallelogramSums<Sum>(sat_, sum).add(x, y, ax, ay, bx, by, weight);
+    }
+  }
+
+  /// Longest half axis in periods of the map: sums of areas stay below 2^63.
+  static constexpr double kMostPeriods = 64;
+  /// Nested boxes for a Gaussian: sizes relative to the box of its covariance, and shares. Fitted: least squared difference under
+  /// sum of shares 1, sum of shares * scales^2 1.
+  static constexpr double kBoxScales[3] = {0.508447702070, 0.812387977981, 1.239504002977};
+  static constexpr double kBoxShares[3] = {0.179460940730, 0.350350560935, 0.470188498334};
+
+  HistogramSat sat_;
+  SphericalBins bins_;
+  GaussianBoxes gaussian_;
+};
+
+static_assert(NdfModel<HistogramNdf>);
+
+}  // namespace glint

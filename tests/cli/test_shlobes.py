@@ -1,0 +1,232 @@
+"""glint-shlobes, and glint-query --light, as a pipeline runs them."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+oiio = pytest.importorskip("OpenImageIO")
+
+HEIGHT = 16
+
+
+def write_exr(path, pixels):
+    height, width, channels = pixels.shape
+    image = oiio.ImageOutput.create(str(path))
+    assert image.open(str(path), oiio.ImageSpec(width, height, channels, "float"))
+    image.write_image(np.ascontiguousarray(pixels, dtype=np.float32))
+    image.close()
+
+
+def constant(value, height=HEIGHT, width=None):
+    return np.full((height, width or 2 * height, 3), value, dtype=np.float32)
+
+
+@pytest.fixture
+def folder(glint):
+    return glint.folder
+
+
+def test_lobes_and_light_are_valid_assets(glint, folder):
+    write_exr(folder / "env.exr", constant(1))
+    assert glint("shlobes", "-o", "lobes.glint", "--sigma-r", 0.1, "--order", 12).returncode == 0
+    process = glint("shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 12, "--grid", "5x8", "--json")
+    assert process.returncode == 0, process.stderr
+    result = json.loads(process.stdout)["result"]
+    assert (result["kind"], result["order"], result["grid_rows"], result["grid_columns"]) == ("sh-light", 12, 5, 8)
+    assert result["table_bytes"] == 5 * 8 * 3 * 13 * 13 * 2
+    assert glint("validate", "lobes.glint", "light.glint").returncode == 0
+    info = json.loads(glint("info", "lobes.glint", "--json").stdout)["result"]
+    assert info["properties"]["order"] == 12
+
+
+def test_same_bytes_with_any_number_of_threads(glint, folder):
+    write_exr(folder / "env.exr", np.random.default_rng(1).uniform(0, 3, (HEIGHT, 2 * HEIGHT, 3)))
+    for threads in (1, 2):
+        for name, arguments in {"light": ["--light", "env.exr", "--grid", "5x8"], "lobes": ["--sigma-r", 0.05]}.items():
+            assert glint("shlobes", *arguments, "--order", 10, "--threads", threads, "-o", f"{name}{threads}.glint").returncode == 0
+    for name in ("light", "lobes"):
+        assert (folder / f"{name}1.glint").read_bytes() == (folder / f"{name}2.glint").read_bytes()
+
+
+def ask(glint, *arguments):
+    process = glint("query", *arguments, "--json")
+    assert process.returncode == 0, process.stderr
+    return json.loads(process.stdout)["result"]
+
+
+def test_flat_mirror_under_constant_light_reflects_it(glint, folder):
+    """A flat map with F = G = 1 reflects constant light L as L cos / cos: the half vectors' 4 (wo . h) over 4 cos(wo)."""
+    write_exr(folder / "env.exr", constant(2))
+    assert glint("synth", "flat", "-o", "flat.png", "--size", 16).returncode == 0
+    assert glint("ingest", "flat.png", "-o", "flat.glint", "--allow-constant").returncode == 0
+    assert glint("shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 20).returncode == 0
+    for tilt in (0.0, 0.5, 0.9):
+        wo = [math.sin(tilt), 0, math.cos(tilt)]
+        arguments = ["flat.glint", "--uv", 0.5, 0.5, "--sigma", 2, "--sigma-r", 0.05, "--light", "light.glint", "--wo", *wo]
+        result = ask(glint, *arguments)
+        # The lobe's blur of half a degree squared, and the ringing of the cut at the horizon, far away.
+        assert result["radiance"] == pytest.approx([2, 2, 2], rel=0.02)
+        assert result["light_integral"][0] == pytest.approx(8 * math.cos(tilt), rel=0.02)
+        assert not result["clamped"]
+        half = ask(glint, *arguments, "--fresnel", 1, 0.5, 0, "--shadowing", 0.5)
+        assert half["radiance"] == pytest.approx([1, 0.5, 0], rel=0.02)
+
+
+def test_light_comes_from_where_the_image_says(glint, folder):
+    """Bright towards +x (first column), seen by a facet that mirrors it from -x."""
+    pixels = constant(0)
+    pixels[HEIGHT // 4 : HEIGHT // 2, 0, :] = pixels[HEIGHT // 4 : HEIGHT // 2, -1, :] = 100  # image rows from the top: upper half
+    write_exr(folder / "env.exr", pixels)
+    glint("synth", "flat", "-o", "flat.png", "--size", 16)
+    glint("ingest", "flat.png", "-o", "flat.glint", "--allow-constant")
+    assert glint("shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 30, "--grid", "17x32").returncode == 0
+    values = [
+        ask(glint, "flat.glint", "--uv", 0.5, 0.5, "--sigma", 2, "--sigma-r", 0.1, "--light", "light.glint", "--wo", x, y, 0.5)["radiance"][0]
+        for x, y in ((-0.8, 0), (0.8, 0), (0, 0.8), (0, -0.8))
+    ]
+    assert values[0] > 5
+    assert max(values[1:]) < 0.05 * values[0]
+
+
+def test_clamped_light_says_so(glint, folder):
+    pixels = constant(0, 64)
+    pixels[2, 5, :] = 1e5
+    write_exr(folder / "env.exr", pixels)
+    glint("synth", "flat", "-o", "flat.png", "--size", 16)
+    glint("ingest", "flat.png", "-o", "flat.glint", "--allow-constant")
+    glint("shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 20, "--grid", "9x16")
+    clamped = 0
+    for tilt in np.linspace(0.2, 1.2, 8):
+        process = glint("query", "flat.glint", "--uv", 0.5, 0.5, "--sigma", 2, "--light", "light.glint", "--wo", math.sin(tilt), 0, math.cos(tilt), "--json")
+        document = json.loads(process.stdout)
+        result = document["result"]
+        assert min(result["light_integral"]) >= 0
+        assert result["clamped"] == (min(result["signed_light_integral"]) < 0) == any("clamped" in w for w in document["warnings"])
+        clamped += result["clamped"]
+    assert clamped > 0
+
+
+def test_area_lights(glint, folder):
+    write_exr(folder / "checks.exr", np.ones((2, 2, 3)))
+    lights = {
+        "lights": [
+            {"type": "rectangle", "centre": [0, 0, 2], "axis_u": [1, 0, 0], "axis_v": [0, -1, 0], "radiance": [4, 4, 4], "texture": "checks.exr"},
+            {"type": "sphere", "centre": [3, 0, 1], "radius": 0.5, "radiance": [9, 0, 0]},
+        ]
+    }
+    (folder / "lights.json").write_text(json.dumps(lights))
+    process = glint("shlobes", "--light", "lights.json", "-o", "light.glint", "--order", 20, "--grid", "9x16", "--depfile", "light.d")
+    assert process.returncode == 0, process.stderr
+    assert "checks.exr" in (folder / "light.d").read_text()
+    glint("synth", "flat", "-o", "flat.png", "--size", 16)
+    glint("ingest", "flat.png", "-o", "flat.glint", "--allow-constant")
+    up = ask(glint, "flat.glint", "--uv", 0.5, 0.5, "--sigma", 2, "--sigma-r", 0.05, "--light", "light.glint", "--wo", 0, 0, 1)
+    assert up["radiance"] == pytest.approx([4, 4, 4], rel=0.1)
+
+
+BAD_LIGHTS = {
+    "not JSON": "{",
+    "no list": "{}",
+    "unknown type": '{"lights": [{"type": "disk"}]}',
+    "unknown member": '{"lights": [{"type": "sphere", "centre": [0,0,2], "radius": 1, "radiance": [1,1,1], "colour": 1}]}',
+    "missing member": '{"lights": [{"type": "sphere", "centre": [0,0,2], "radiance": [1,1,1]}]}',
+    "around the point": '{"lights": [{"type": "sphere", "centre": [0,0,1], "radius": 2, "radiance": [1,1,1]}]}',
+    "negative": '{"lights": [{"type": "sphere", "centre": [0,0,2], "radius": 1, "radiance": [1,-1,1]}]}',
+    "no area": '{"lights": [{"type": "rectangle", "centre": [0,0,2], "axis_u": [1,0,0], "axis_v": [2,0,0], "radiance": [1,1,1]}]}',
+    "wrong vector": '{"lights": [{"type": "sphere", "centre": [0,0], "radius": 1, "radiance": [1,1,1]}]}',
+}
+
+
+@pytest.mark.parametrize("name", BAD_LIGHTS)
+def test_bad_area_lights_are_refused(glint, folder, name):
+    (folder / "bad.json").write_text(BAD_LIGHTS[name])
+    process = glint("shlobes", "--light", "bad.json", "-o", "x.glint", "--order", 4)
+    assert process.returncode == 3
+    assert "bad.json" in process.stderr or "light" in process.stderr or "sphere" in process.stderr
+    assert not (folder / "x.glint").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda e: e.__setitem__((3, 4, 1), np.nan), "not finite"),
+        (lambda e: e.__setitem__((3, 4, 1), np.inf), "not finite"),
+        (lambda e: e.__setitem__((3, 4, 1), -1), "negative"),
+    ],
+)
+def test_bad_pixels_are_refused(glint, folder, change, words):
+    pixels = constant(1)
+    change(pixels)
+    write_exr(folder / "env.exr", pixels)
+    process = glint("shlobes", "--light", "env.exr", "-o", "x.glint", "--order", 4)
+    assert process.returncode == 3
+    assert "env.exr" in process.stderr and "1 pixels" in process.stderr and words in process.stderr
+    assert f"column 4, row {HEIGHT - 1 - 3}" in process.stderr
+    assert not (folder / "x.glint").exists()
+
+
+def test_other_shapes_and_types_are_refused(glint, folder):
+    write_exr(folder / "square.exr", constant(1, 8, 8))
+    process = glint("shlobes", "--light", "square.exr", "-o", "x.glint")
+    assert process.returncode == 3 and "8 x 8" in process.stderr
+    (folder / "empty.exr").write_bytes(b"")
+    assert glint("shlobes", "--light", "empty.exr", "-o", "x.glint").returncode == 3
+    glint("synth", "flat", "-o", "flat.png", "--size", 16)
+    process = glint("shlobes", "--light", "flat.png", "-o", "x.glint")
+    assert process.returncode == 3 and "integers" in process.stderr
+    assert glint("shlobes", "--light", "missing.exr", "-o", "x.glint").returncode == 2
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["--sigma-r", 0],
+        ["--sigma-r", 0.1, "--order", -1],
+        ["--sigma-r", 0.1, "--order", 1001],
+        ["--sigma-r", 0.1, "--order", 1000],
+        ["--sigma-r", 0.1, "--grid", "1x8"],
+        ["--sigma-r", 0.1, "--grid", "8"],
+        ["--sigma-r", 0.1, "--grid", "8x9x"],
+        ["--light", "env.exr", "--sigma-r", 0.1],
+        ["--light", "env.exr", "--order", 1000],
+        ["--light", "env.exr", "--grid", "none"],
+        ["--light", "env.exr", "--order", 10, "--band-limit", 5],
+    ],
+)
+def test_wrong_arguments_are_usage_errors(glint, folder, arguments):
+    write_exr(folder / "env.exr", constant(1))
+    process = glint("shlobes", *arguments, "-o", "x.glint")
+    assert process.returncode == 1, process.stderr
+    assert not (folder / "x.glint").exists()
+
+
+def test_order_1000_says_how_much_memory_it_needs(glint):
+    process = glint("shlobes", "--sigma-r", 0.1, "--order", 1000, "-o", "x.glint")
+    assert "16.7 GB" in process.stderr and "order 489 fits" in process.stderr
+    assert glint("shlobes", "--sigma-r", 0.1, "--order", 1000, "--grid", "none", "-o", "x.glint").returncode == 0
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_lowest_orders(glint, folder, order):
+    write_exr(folder / "env.exr", constant(1))
+    assert glint("shlobes", "--sigma-r", 0.1, "--order", order, "-o", "lobes.glint").returncode == 0
+    assert glint("shlobes", "--light", "env.exr", "--order", order, "-o", "light.glint").returncode == 0
+    assert glint("validate", "lobes.glint", "light.glint").returncode == 0
+
+
+def test_light_of_other_models_and_kinds_is_refused(glint, folder):
+    write_exr(folder / "env.exr", constant(1))
+    glint("synth", "flakes", "-o", "flakes.png", "--size", 64)
+    glint("ingest", "flakes.png", "-o", "flakes.glint")
+    glint("pyramid", "flakes.glint", "-o", "pyramid.glint")
+    glint("shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 4, "--grid", "3x4")
+    asked = ["--uv", 0.5, 0.5, "--sigma", 20, "--light", "light.glint", "--wo", 0, 0, 1]
+    assert glint("query", "flakes.glint", *asked).returncode == 0
+    assert glint("query", "flakes.glint", *asked, "--surface", "smooth").returncode == 5
+    assert glint("query", "pyramid.glint", *asked).returncode == 5
+    assert glint("query", "flakes.glint", *asked[:-5], "flakes.glint", "--wo", 0, 0, 1).returncode == 5
+    assert glint("query", "flakes.glint", *asked[:-1], -1).returncode == 1
+    assert glint("query", "flakes.glint", *asked[:-4]).returncode == 1

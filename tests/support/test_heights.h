@@ -1,0 +1,41 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "glint/bake/height_surface.h"
+#include "glint/bake/synth.h"
+
+namespace glint::test {
+
+/// A height map and the surface over it.
+struct OwnedSurface {
+  int width;
+  int height;
+  std::vector<float> heights;
+  bake::HeightSurface surface() const { return {width, height, heights}; }
+};
+
+inline OwnedSurface synthSurface(bake::SynthKind kind, int width, int height, float scale = 1) {
+  bake::SynthParameters p = bake::defaultSynthParameters(kind);
+  p.width = width, p.height = height;
+  if (kind == bake::SynthKind::isotropic) p.alpha = 0.5f;
+  if (kind == bake::SynthKind::scratches) p.density = 4;
+  if (kind == bake::SynthKind::weave) p.feature_texels = 16, p.slope = 1.5f;
+  OwnedSurface out{width, height, bake::synthHeights(p)};
+  for (float& h : out.heights) h *= scale;
+  return out;
+}
+
+/// Grooves along y with walls of this slope, `half_width` cells from ridge to valley.
+inline OwnedSurface grooves(int width, int height, int half_width, float slope) {
+  OwnedSurface out{width, height, std::vector<float>(static_cast<std::size_t>(width) * height)};
+  for (std::size_t k = 0; k < out.heights.size(); ++k) {
+    const int phase = static_cast<int>(k) % width % (2 * half_width);
+    out.heights[k] = slope * static_cast<float>(std::min(phase, 2 * half_width - phase));
+  }
+  return out;
+}
+
+}  // namespace glint::test

@@ -1,0 +1,122 @@
+#include "glint/api/batch.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "glint/bake/compress.h"
+#include "glint/bake/pyramid.h"
+#include "support/sample_assets.h"
+#include "support/test_maps.h"
+
+namespace glint {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr int kSize = 64;
+/// Batches do the same operations in the same order; only a compiler that fuses products and sums in single queries differs.
+constexpr float kBatchError = 1e-6f;
+
+struct Queries {
+  std::vector<float> u, v, sigma, hx, hy;
+
+  Queries(std::size_t count, unsigned seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> unit(0, 1);
+    for (std::size_t k = 0; k < count; ++k) {
+      u.push_back(3 * unit(random) - 1);
+      v.push_back(k % 7 == 0 ? static_cast<float>(random() % 9) / 8 : unit(random));  // centres and borders too
+      sigma.push_back(std::exp2(12 * unit(random) - 3));
+      hx.push_back(1.2f * unit(random) - 0.6f);
+      hy.push_back(1.2f * unit(random) - 0.6f);
+      if (k % 41 == 1) u.back() = kNan;
+      if (k % 43 == 2) sigma.back() = kNan;
+      if (k % 47 == 3) hx.back() = k % 2 ? kNan : 1.01f;
+      if (k % 53 == 4) hx.back() = hy.back() = k % 2 ? 1.0f : -1.0f;
+      if (k % 59 == 5) sigma.back() = 1e20f;
+    }
+  }
+
+  api::FootprintArrays footprints() const {
+    api::FootprintArrays arrays;
+    arrays.u = {u.data()};
+    arrays.v = {v.data()};
+    arrays.sigma = {sigma.data()};
+    return arrays;
+  }
+};
+
+template <class Model>
+void expectBatchesEqualSingleQueries(const Model& model, std::size_t most = 1000) {
+  const api::AnyNdf any(model);
+  std::size_t positive = 0;
+  for (const std::size_t count : {std::size_t{1}, std::size_t{31}, std::size_t{32}, std::size_t{33}, most}) {
+    const Queries q(count, static_cast<unsigned>(count));
+    std::vector<float> answers(count + 1, -7);
+    api::densities(any, count, q.footprints(), {{q.hx.data()}, {q.hy.data()}}, answers.data());
+    EXPECT_EQ(answers[count], -7);  // nothing is written beyond the last
+    for (std::size_t k = 0; k < count; ++k) {
+      const float one = model.density(Footprint::isotropic({q.u[k], q.v[k]}, q.sigma[k]), {q.hx[k], q.hy[k]});
+      ASSERT_NEAR(answers[k], one, kBatchError * one) << "query " << k << " of " << count;
+      positive += one > 0;
+    }
+  }
+  EXPECT_GT(positive, most / 10);
+}
+
+TEST(Batch, DensitiesOfPyramidsAreThoseOfSingleQueries) {
+  for (const auto precision : {BlockPrecision::f16, BlockPrecision::f32}) {
+    for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
+      auto sample = test::samplePyramid(kSize, precision);
+      sample.pyramid.shape.boundary = boundary;
+      expectBatchesEqualSingleQueries(PyramidNdf(sample.pyramid));
+    }
+  }
+}
+
+TEST(Batch, DensitiesOfCompressedPyramidsAreThoseOfSingleQueries) {
+  for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
+    for (const auto type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
+      SCOPED_TRACE("method " + std::to_string(int(method)) + " type " + std::to_string(int(type)));
+      const auto sample = test::sampleCompressed(kSize, method, type);
+      expectBatchesEqualSingleQueries(CpNdf(sample.ndf));
+    }
+  }
+}
+
+TEST(Batch, DensitiesOfAnyRankAreThoseOfSingleQueries) {
+  const test::OwnedMap map(100, 72, test::roughSurface(100, 72, 0.3f));
+  bake::PyramidOptions o;
+  o.stride = 16;
+  o.resolution = 64;
+  o.sigma_r = 0.02f;
+  o.levels = 3;
+  const bake::NdfPyramidData pyramid = bake::buildPyramid(map.map(), o);
+  for (const int rank : {4, 8, 13, 16}) {  // kernels take eight columns, then four, then one
+    for (const auto type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
+      SCOPED_TRACE("rank " + std::to_string(rank) + " type " + std::to_string(int(type)));
+      bake::CompressionOptions c;
+      c.method = CompressionMethod::cp;
+      c.coefficient_type = type;
+      c.rank = rank;
+      c.regions = 2;
+      const bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), c);
+      expectBatchesEqualSingleQueries(CpNdf(data.view()));
+    }
+  }
+}
+
+TEST(Batch, FootprintsBelowTheFinestLevelAreAnsweredFromTheTexels) {
+  const auto map = test::sampleNormals(kSize, kSize);
+  const auto pyramid = test::samplePyramid(kSize, BlockPrecision::f16);
+  expectBatchesEqualSingleQueries(PyramidNdf(pyramid.pyramid, map.map), 60);
+  const auto compressed = test::sampleCompressed(kSize, CompressionMethod::cp, CoefficientType::i8);
+  expectBatchesEqualSingleQueries(CpNdf(compressed.ndf, map.map), 60);
+}
+
+}  // namespace
+}  // namespace glint

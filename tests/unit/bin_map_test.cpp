@@ -1,0 +1,538 @@
+#include "glint/bake/bin_map.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <map>
+#include <random>
+#include <tuple>
+#include <vector>
+
+#include "glint/model/error.h"
+#include "glint/query/bin_map_ndf.h"
+#include "glint/query/reference.h"
+#include "support/test_maps.h"
+
+namespace glint {
+namespace {
+
+/// What issue and paper ask: shares of the footprint, from sums of areas that are exact to double or float rounding of each texel.
+constexpr double kWeightTolerance = 1e-6;
+/// Normals are kept to 1/2^p of a bin, p at least 5 here: 1.2 deviations / 2^6 at most, at a slope of the lobe of 1.
+constexpr double kLobeTolerance = 0.02;
+/// Acceptance: median error of the density on noise, on a map of 8 bits, and of all densities together.
+constexpr double kNoiseTolerance = 0.015, kByteTolerance = 0.05, kEnergyTolerance = 0.005;
+
+class OwnedBinMap {
+ public:
+  OwnedBinMap(const test::OwnedMap& map, float alpha, int leaf_size = 8)
+      : data_(bake::buildBinMap(map.map(), {alpha, leaf_size})), ndf_(data_.view()) {}
+  const bake::BinMapData& data() const { return data_; }
+  const BinMapNdf& ndf() const { return ndf_; }
+
+ private:
+  bake::BinMapData data_;
+  BinMapNdf ndf_;
+};
+
+struct Point {
+  double x, y;
+};
+
+/// Part of a polygon with a x + b y <= c.
+std::vector<Point> clipped(const std::vector<Point>& polygon, double a, double b, double c) {
+  std::vector<Point> kept;
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const Point p = polygon[k], q = polygon[(k + 1) % polygon.size()];
+    const double dp = c - a * p.x - b * p.y, dq = c - a * q.x - b * q.y;
+    if (dp >= 0) kept.push_back(p);
+    if ((dp >= 0) != (dq >= 0)) kept.push_back({p.x + dp / (dp - dq) * (q.x - p.x), p.y + dp / (dp - dq) * (q.y - p.y)});
+  }
+  return kept;
+}
+
+double areaOf(const std::vector<Point>& polygon) {
+  double twice = 0;
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const Point p = polygon[k], q = polygon[(k + 1) % polygon.size()];
+    twice += (p.x - polygon[0].x) * (q.y - polygon[0].y) - (p.y - polygon[0].y) * (q.x - polygon[0].x);
+  }
+  return 0.5 * std::abs(twice);
+}
+
+/// Corners of a box footprint on the endless plane, texels.
+std::vector<Point> cornersOf(const Footprint& p, int width, int height) {
+  const Point c = {double{p.centre.x} * width, double{p.centre.y} * height};
+  std::vector<Point> corners;
+  for (const auto& [s, t] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}})
+    corners.push_back(
+        {c.x + s * double{p.axis_a.x} + t * double{p.axis_b.x}, c.y + s * double{p.axis_a.y} + t * double{p.axis_b.y}});
+  return corners;
+}
+
+/// Share of the footprint in every bin, by cutting the parallelogram at the sides of every texel.
+std::map<std::uint32_t, double> bruteWeights(const NormalMap& map, int bins, const Footprint& p) {
+  const std::vector<Point> polygon = cornersOf(p, map.width, map.height);
+  double low_x = 1e30, low_y = 1e30, high_x = -1e30, high_y = -1e30;
+  for (const Point q : polygon) {
+    low_x = std::min(low_x, q.x), high_x = std::max(high_x, q.x);
+    low_y = std::min(low_y, q.y), high_y = std::max(high_y, q.y);
+  }
+  const double total = areaOf(polygon);
+  std::map<std::uint32_t, double> weights;
+  for (int y = static_cast<int>(std::floor(low_y)); y < high_y; ++y) {
+    const std::vector<Point> row = clipped(clipped(polygon, 0, 1, y + 1), 0, -1, -y);
+    for (int x = static_cast<int>(std::floor(low_x)); x < high_x; ++x) {
+      const std::vector<Point> part = clipped(clipped(row, 1, 0, x + 1), -1, 0, -x);
+      if (part.size() < 3) continue;
+      const auto wrapped = [](int i, int n) { return ((i % n) + n) % n; };
+      const Vec2 n = map.at(wrapped(x, map.width), wrapped(y, map.height));
+      const auto bin = [&](float v) { return std::min(static_cast<int>((v + 1) * 0.5f * static_cast<float>(bins)), bins - 1); };
+      weights[static_cast<std::uint32_t>(bin(n.y) * bins + bin(n.x))] += areaOf(part) / total;
+    }
+  }
+  return weights;
+}
+
+/// Compares the weights around h with brute force: the right 21 bins, at the border of the square too.
+void expectWeights(const NormalMap& map, const BinMapNdf& ndf, const Footprint& p, Vec2 h) {
+  const int bins = ndf.map().bins_per_axis;
+  auto expected = bruteWeights(map, bins, p);
+  const BinWeights weights = ndf.weights(p, h);
+  ASSERT_LE(weights.count, BinWeights::kMost);
+  const int column = std::min(static_cast<int>((h.x + 1) * 0.5f * static_cast<float>(bins)), bins - 1);
+  const int row = std::min(static_cast<int>((h.y + 1) * 0.5f * static_cast<float>(bins)), bins - 1);
+  for (int k = 0; k < weights.count; ++k) {
+    const int dx = static_cast<int>(weights.bins[k]) % bins - column, dy = static_cast<int>(weights.bins[k]) / bins - row;
+    EXPECT_TRUE(std::abs(dx) <= 2 && std::abs(dy) <= 2 && std::abs(dx * dy) < 4) << dx << " " << dy;
+    EXPECT_NEAR(weights.weights[k], expected[weights.bins[k]], kWeightTolerance) << "bin " << weights.bins[k];
+    expected.erase(weights.bins[k]);
+  }
+  for (const auto& [bin, weight] : expected) {
+    const int dx = static_cast<int>(bin) % bins - column, dy = static_cast<int>(bin) / bins - row;
+    if (std::abs(dx) <= 2 && std::abs(dy) <= 2 && std::abs(dx * dy) < 4) {
+      EXPECT_NEAR(weight, 0, kWeightTolerance) << "bin " << bin << " was not found";
+    }
+  }
+}
+
+class Random {
+ public:
+  explicit Random(unsigned seed) : engine_(seed) {}
+  float unit() { return static_cast<float>(engine_() >> 8) * 0x1p-24f; }
+  float between(float low, float high) { return low + (high - low) * unit(); }
+  Vec2 direction(float length) {
+    const float a = 2 * kPi * unit();
+    return {length * std::cos(a), length * std::sin(a)};
+  }
+  std::size_t below(std::size_t n) { return engine_() % n; }
+
+ private:
+  std::mt19937 engine_;
+};
+
+Footprint randomBox(Random& random, float longest) {
+  const float a = longest * std::exp2(-8 * random.unit()), b = longest * std::exp2(-8 * random.unit());
+  const Vec2 centre = {random.unit(), random.unit()};
+  if (random.unit() < 0.3f) return Footprint::box(centre, {a, 0}, {0, b});
+  if (random.unit() < 0.2f) return Footprint::box(centre, {0, a}, {-b, 0});
+  Vec2 u = random.direction(a), v = random.direction(b);
+  while (std::abs(u.x * v.y - u.y * v.x) < 0.05f * a * b) v = random.direction(b);
+  return Footprint::box(centre, u, v);
+}
+
+// Map sizes, roughness, cells: powers of two and not, lists with and without grids.
+class BinMapWeights : public testing::TestWithParam<std::tuple<int, int, float, int>> {};
+
+TEST_P(BinMapWeights, EqualBruteForceOnRandomParallelograms) {
+  const auto [width, height, alpha, leaf_size] = GetParam();
+  const test::OwnedMap map(width, height, test::randomNormals(width, height, 0.9f, 3));
+  const OwnedBinMap bins(map, alpha, leaf_size);
+  Random random(11);
+  for (int k = 0; k < 60; ++k) {
+    const Footprint p = randomBox(random, 0.4f * static_cast<float>(std::min(width, height)));
+    expectWeights(map.map(), bins.ndf(), p, map.normals()[random.below(map.normals().size())]);
+    if (HasFailure()) FAIL() << "query " << k;
+  }
+}
+
+TEST_P(BinMapWeights, EqualBruteForceForFootprintsLargerThanTheMap) {
+  const auto [width, height, alpha, leaf_size] = GetParam();
+  if (width * height > 5000) GTEST_SKIP() << "brute force would take long";
+  const test::OwnedMap map(width, height, test::randomNormals(width, height, 0.9f, 3));
+  const OwnedBinMap bins(map, alpha, leaf_size);
+  Random random(12);
+  for (int k = 0; k < 20; ++k) {
+    const Footprint p = randomBox(random, 0.9f * static_cast<float>(std::min(width, height)));
+    expectWeights(map.map(), bins.ndf(), p, map.normals()[random.below(map.normals().size())]);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, BinMapWeights,
+                         testing::Values(std::tuple{64, 64, 0.16f, 8}, std::tuple{64, 64, 0.01f, 8},
+                                         std::tuple{64, 64, 0.5f, 1}, std::tuple{50, 37, 0.3f, 2}, std::tuple{7, 300, 0.2f, 1},
+                                         std::tuple{300, 7, 0.2f, 4}, std::tuple{1, 1, 0.1f, 8}, std::tuple{256, 256, 0.16f, 8},
+                                         std::tuple{256, 200, 0.4f, 1}));
+
+TEST(BinMapNdf, WeightsAreRightAtTheBorderOfTheSquare) {
+  std::vector<Vec2> normals(64 * 64);
+  Random random(5);
+  for (Vec2& n : normals) n = random.direction(random.between(0.97f, 0.9999f));
+  const test::OwnedMap map(64, 64, normals);
+  for (const float alpha : {0.02f, 0.16f, 0.8f}) {
+    const OwnedBinMap bins(map, alpha);
+    for (int k = 0; k < 40; ++k) {
+      expectWeights(map.map(), bins.ndf(), randomBox(random, 20), random.direction(random.between(0.9f, 1.0f)));
+      if (HasFailure()) FAIL() << "query " << k;
+    }
+    expectWeights(map.map(), bins.ndf(), Footprint::box({0.5f, 0.5f}, {20, 0}, {0, 20}), {1, 0});
+    expectWeights(map.map(), bins.ndf(), Footprint::box({0.5f, 0.5f}, {20, 0}, {0, 20}), {-1, 1});
+    EXPECT_EQ(bins.ndf().weights(Footprint::box({0, 0}, {2, 0}, {0, 2}), {1.5f, 0}).count, 0);
+  }
+}
+
+TEST(BinMapNdf, TinyBoxesSeeTheTexelsTheyTouch) {
+  const test::OwnedMap map(32, 32, test::randomNormals(32, 32, 0.9f, 3));
+  const OwnedBinMap bins(map, 0.1f);
+  Random random(6);
+  for (const float side : {0.002f, 0.02f, 0.3f}) {
+    for (int k = 0; k < 40; ++k) {
+      const Vec2 centre = {random.unit(), random.unit()};
+      const Vec2 h = map.map().at(static_cast<int>(centre.x * 32), static_cast<int>(centre.y * 32));
+      expectWeights(map.map(), bins.ndf(), Footprint::box(centre, {side, 0}, {0, side}), h);
+      expectWeights(map.map(), bins.ndf(), Footprint::box(centre, {side, side}, {-side, 0.5f * side}), h);
+    }
+  }
+}
+
+TEST(BinMap, ConstantMapIsOneBin) {
+  const test::OwnedMap map(96, 64, std::vector<Vec2>(96 * 64, Vec2{0.3f, -0.2f}));
+  for (const float alpha : {0.0025f, 0.16f}) {
+    const OwnedBinMap bins(map, alpha);
+    EXPECT_EQ(bins.data().view().occupiedBins(), 1u);
+    Random random(3);
+    for (int k = 0; k < 20; ++k) {
+      const BinWeights weights = bins.ndf().weights(randomBox(random, 300), {0.3f, -0.2f});
+      ASSERT_EQ(weights.count, 1);
+      EXPECT_NEAR(weights.weights[0], 1, kWeightTolerance);
+    }
+    // A facet's lobe, wherever one looks: its normal is kept to a fraction of a bin.
+    const Reference reference(map.map(), bins.ndf().sigma());
+    for (const float side : {1.0f, 10.0f, 60.0f}) {
+      const Footprint p = Footprint::box({0.4f, 0.7f}, {side, 0}, {0, side});
+      for (const float d : {0.0f, 0.5f, 1.0f}) {
+        const Vec2 h = {0.3f + d * bins.ndf().sigma(), -0.2f};
+        const float expected = reference.density(p, h);
+        EXPECT_NEAR(bins.ndf().density(p, h), expected, 0.02f * expected) << side << " " << d;
+      }
+    }
+  }
+}
+
+TEST(BinMap, OneTexelMapAnswersItsLobe) {
+  const test::OwnedMap map(1, 1, {{0.1f, 0.2f}});
+  const OwnedBinMap bins(map, 0.05f);
+  const Reference reference(map.map(), bins.ndf().sigma());
+  for (const Footprint& p : {Footprint::box({0.3f, 0.9f}, {5, 1}, {0, 3}), Footprint::box({0.5f, 0.5f}, {0.2f, 0}, {0, 0.2f}),
+                             Footprint::isotropic({0, 0}, 3)}) {
+    const float expected = reference.density(p, {0.11f, 0.2f});
+    EXPECT_NEAR(bins.ndf().density(p, {0.11f, 0.2f}), expected, kLobeTolerance * expected);
+  }
+}
+
+TEST(BinMap, BadOptionsAreUsageErrors) {
+  const test::OwnedMap map(8, 8, test::randomNormals(8, 8, 0.9f, 3));
+  for (const float alpha : {0.0f, -0.1f, 1e-5f, 1.01f, 1e30f, std::nanf("")}) {
+    try {
+      bake::buildBinMap(map.map(), {alpha, 8});
+      FAIL() << alpha;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::usage);
+    }
+  }
+  EXPECT_THROW(bake::buildBinMap(map.map(), {0.1f, 0}), Error);
+}
+
+TEST(BinMap, NormalsOutsideTheDiskAreNamed) {
+  std::vector<Vec2> normals(16 * 16);
+  normals[3 * 16 + 5] = {0.9f, 0.9f};
+  normals[4 * 16 + 5] = {std::nanf(""), 0};
+  NormalMap map;
+  map.width = map.height = 16;
+  map.normals = normals;
+  try {
+    bake::buildBinMap(map, {0.1f, 8});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::invalid_input);
+    EXPECT_NE(std::string(error.what()).find("2 normals"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("column 5, row 3"), std::string::npos) << error.what();
+  }
+}
+
+TEST(BinMap, MapsTooLargeForTheirCodesAreUnsupported) {
+  EXPECT_EQ(texelCode(16384, 16384).place_bits, 2);
+  EXPECT_EQ(texelCode(1 << 20, 256).place_bits, 2);
+  EXPECT_LT(texelCode(16385, 16384).place_bits, 0);
+  EXPECT_LT(texelCode(1 << 20, 1 << 20).place_bits, 0);
+  const std::vector<Vec2> row(1);
+  NormalMap map;
+  map.width = 16385;
+  map.height = 16384;
+  map.normals = row;  // refused by its size alone
+  try {
+    bake::buildBinMap(map, {0.1f, 8});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::unsupported);
+  }
+}
+
+TEST(BinMap, CoordinatesMayNeedMoreThanSixteenBits) {
+  constexpr int kWidth = 1 << 18;
+  const test::OwnedMap map(kWidth, 4, test::randomNormals(kWidth, 4, 0.9f, 3));
+  const OwnedBinMap bins(map, 0.2f);
+  Random random(4);
+  for (int k = 0; k < 20; ++k) {
+    const Vec2 centre = {random.between(0.9f, 1.0f), random.unit()};
+    const Footprint p = Footprint::box(centre, {random.between(1, 40), 0.1f}, {0, 1.5f});
+    expectWeights(map.map(), bins.ndf(), p, map.normals()[random.below(map.normals().size())]);
+  }
+}
+
+TEST(BinMap, ResolutionsAreThoseOfThePaper) {
+  // Table 4 of Atanasov 2021.
+  EXPECT_EQ(bake::binsPerAxis(0.0025f), 942);
+  EXPECT_EQ(bake::binsPerAxis(0.01f), 235);
+  EXPECT_EQ(bake::binsPerAxis(0.04f), 59);
+  EXPECT_EQ(bake::binsPerAxis(0.16f), 15);
+}
+
+TEST(BinMap, DoesNotDependOnThreads) {
+  const test::OwnedMap map(200, 150, test::roughSurface(200, 150, 0.3f));
+  std::vector<bake::BinMapData> built;
+  for (const std::size_t threads : {1, 2, 7}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    built.push_back(bake::buildBinMap(map.map(), {0.02f, 4}));
+  }
+  for (const bake::BinMapData& other : built) {
+    EXPECT_EQ(other.texels, built[0].texels);
+    EXPECT_EQ(other.texel_classes, built[0].texel_classes);
+    EXPECT_EQ(other.cell_starts.offsets, built[0].cell_starts.offsets);
+    EXPECT_EQ(other.grid_moments, built[0].grid_moments);
+    EXPECT_EQ(other.masks, built[0].masks);
+  }
+}
+
+TEST(BinMap, CompactCountsAreExactForAnySteps) {
+  for (const std::uint64_t step : {1ull, 1000ull, 70000ull, 1ull << 33}) {
+    std::vector<std::uint64_t> values;
+    for (std::uint64_t k = 0; k < 500; ++k) values.push_back(k * step + (step > 3 ? k % 3 : 0));
+    const bake::CompactCountsData data = bake::compactCounts(values);
+    const CompactCounts counts = data.view();
+    ASSERT_EQ(counts.size(), values.size());
+    for (std::size_t k = 0; k < values.size(); ++k) EXPECT_EQ(counts[k], values[k]);
+  }
+}
+
+std::vector<Vec2> eightBits(std::vector<Vec2> normals) {
+  for (Vec2& n : normals) n = {std::round((n.x + 1) * 127.5f) / 127.5f - 1, std::round((n.y + 1) * 127.5f) / 127.5f - 1};
+  return normals;
+}
+
+struct DensityErrors {
+  double median = 0, energy = 0;
+};
+
+/// Errors at normals of the footprint, as a renderer asks where there is a glint.
+DensityErrors densityErrors(const test::OwnedMap& map, const BinMapNdf& ndf, float side, bool turned, int count) {
+  const Reference reference(map.map(), ndf.sigma());
+  Random random(21);
+  std::vector<double> errors;
+  double sum = 0, truth_sum = 0;
+  for (int k = 0; k < count; ++k) {
+    const Vec2 a = turned ? random.direction(0.5f * side) : Vec2{0.5f * side, 0};
+    const Vec2 centre = {random.unit(), random.unit()};
+    const Vec2 h = map.map().at(static_cast<int>(centre.x * static_cast<float>(map.map().width)),
+                                static_cast<int>(centre.y * static_cast<float>(map.map().height))) +
+                   random.direction(2 * ndf.sigma() * random.unit());
+    const Footprint p = Footprint::box(centre, a, {-a.y, a.x});
+    const double truth = reference.density(p, h), value = ndf.density(p, h);
+    errors.push_back(std::abs(value / truth - 1));
+    sum += value, truth_sum += truth;
+  }
+  std::nth_element(errors.begin(), errors.begin() + count / 2, errors.end());
+  return {errors[static_cast<std::size_t>(count / 2)], sum / truth_sum - 1};
+}
+
+TEST(BinMapNdf, DensityIsThatOfReference) {
+  const auto rough = test::roughSurface(256, 256, 0.3f);
+  const test::OwnedMap noise(256, 256, rough), bytes(256, 256, eightBits(rough)),
+      independent(256, 256, test::randomNormals(256, 256, 0.8f, 4));
+  for (const auto& [map, tolerance] :
+       {std::pair{&noise, kNoiseTolerance}, {&bytes, kByteTolerance}, {&independent, kNoiseTolerance}}) {
+    for (const float alpha : {0.01f, 0.04f, 0.16f}) {
+      const OwnedBinMap bins(*map, alpha);
+      for (const float side : {4.0f, 16.0f, 64.0f, 200.0f}) {
+        const DensityErrors errors = densityErrors(*map, bins.ndf(), side, side < 100, side < 50 ? 200 : side < 100 ? 60 : 10);
+        EXPECT_LT(errors.median, tolerance) << alpha << " " << side;
+        EXPECT_LT(std::abs(errors.energy), kEnergyTolerance) << alpha << " " << side;
+      }
+    }
+  }
+}
+
+TEST(BinMapNdf, MergedBinsKeepTheError) {
+  // Footprints with thousands of texels of a bin: its mean and covariance stand for them.
+  const test::OwnedMap map(512, 512, test::roughSurface(512, 512, 0.3f));
+  const OwnedBinMap bins(map, 0.16f);
+  const DensityErrors errors = densityErrors(map, bins.ndf(), 300, true, 10);
+  EXPECT_LT(errors.median, kNoiseTolerance);
+  EXPECT_LT(std::abs(errors.energy), kEnergyTolerance);
+}
+
+TEST(BinMapNdf, ConvergesToReferenceAsBinsShrink) {
+  // The same lobe over finer and finer bins: what remains is the rounding of normals, which halves with the bins.
+  const test::OwnedMap map(256, 256, test::roughSurface(256, 256, 0.3f));
+  constexpr double kRounding = 1e-4;  // single precision, and lobes that end at five deviations
+  double last = 1;
+  for (const float finer : {1.0f, 4.0f, 16.0f}) {
+    bake::BinMapData data = bake::buildBinMap(map.map(), {0.16f / finer, 8});
+    data.alpha = 0.16f;
+    const BinMapNdf ndf(data.view());
+    const double error = densityErrors(map, ndf, 6, true, 200).median;
+    EXPECT_LT(error, std::max(0.5 * last, kRounding)) << finer;
+    last = error;
+  }
+  EXPECT_LT(last, 1e-3);
+}
+
+TEST(BinMapNdf, DensityIsContinuous) {
+  // Lobes are smooth over a deviation; a step of 1/200 of it, or of a texel, must not show. Three sizes: texel by texel, blended, merged.
+  const test::OwnedMap map(512, 512, test::roughSurface(512, 512, 0.2f));
+  const OwnedBinMap bins(map, 0.1f);
+  const float step = bins.ndf().sigma() / 200;
+  for (const float side : {20.0f, 90.0f, 130.0f, 300.0f}) {
+    float last = 0, peak = 0, worst = 0;
+    for (int k = 0; k < 200; ++k) {
+      const float value = bins.ndf().density(Footprint::box({0.4f, 0.3f}, {0.5f * side, 2}, {-2, 0.5f * side}),
+                                             {-0.05f + static_cast<float>(k) * step, 0.03f});
+      if (k > 0) worst = std::max(worst, std::abs(value - last));
+      peak = std::max(peak, value);
+      last = value;
+    }
+    EXPECT_LT(worst, 0.01f * peak) << side;  // steepest slope of a lobe: 0.6 of its peak in a deviation
+    const float area_step = 1.0f / 4096;
+    for (int k = 0; k < 60; ++k) {
+      const float value =
+          bins.ndf().density(Footprint::box({0.4f + static_cast<float>(k) * area_step / 8, 0.3f},
+                                            {0.5f * side * (1 + area_step * static_cast<float>(k)), 2}, {-2, 0.5f * side}),
+                             {0.01f, 0.03f});
+      // An eighth of a texel moves less than 2 / side of the footprint.
+      if (k > 0) {
+        EXPECT_LT(std::abs(value - last), 1.5f / side * peak + 1e-3f * peak) << side << " " << k;
+      }
+      last = value;
+    }
+  }
+}
+
+TEST(BinMapNdf, IntegratesToOne) {
+  const test::OwnedMap map(128, 128, test::roughSurface(128, 128, 0.3f));
+  const OwnedBinMap bins(map, 0.1f);
+  const OwnedBinMap rough(map, 0.16f);
+  for (const BinMapNdf* ndf : {&bins.ndf(), &rough.ndf()}) {
+    for (const float side : {0.7f, 5.0f, 60.0f, 150.0f}) {
+      const Footprint p = Footprint::box({0.2f, 0.8f}, {side, 0.3f}, {-0.1f, side});
+      constexpr int kResolution = 40;  // pixels of 0.7 deviations: sums of Gaussians are exact to 1e-9
+      double sum = 0;
+      for (std::size_t k = 0; k < kResolution * kResolution; ++k) sum += ndf->density(p, test::pixelCentre(k, kResolution));
+      EXPECT_NEAR(sum * 4 / (kResolution * kResolution), 1, 1e-3) << side;
+      EXPECT_NEAR(ndf->mean(p, {{-1, -1}, {1, 1}}), 0.25, 1e-4) << side;
+    }
+  }
+}
+
+TEST(BinMapNdf, MeanIsTheAverageOfTheDensity) {
+  const test::OwnedMap map(256, 256, test::roughSurface(256, 256, 0.3f));
+  const OwnedBinMap bins(map, 0.1f);
+  Random random(8);
+  for (const float side : {10.0f, 200.0f}) {
+    for (int k = 0; k < 10; ++k) {
+      const Footprint p = Footprint::box({random.unit(), random.unit()}, {0.5f * side, 0}, {1, 0.5f * side});
+      const Vec2 low = {random.between(-0.3f, 0.1f), random.between(-0.3f, 0.1f)};
+      const Box2 range = {low, low + Vec2{random.between(0.01f, 0.3f), random.between(0.01f, 0.3f)}};
+      constexpr int kSteps = 16;
+      double sum = 0;
+      for (int y = 0; y < kSteps; ++y)
+        for (int x = 0; x < kSteps; ++x)
+          sum += bins.ndf().density(p, range.low + Vec2{(static_cast<float>(x) + 0.5f) / kSteps * range.width(),
+                                                        (static_cast<float>(y) + 0.5f) / kSteps * range.height()});
+      const double expected = sum / (kSteps * kSteps);
+      EXPECT_NEAR(bins.ndf().mean(p, range), expected, 2e-3 * expected + 1e-3);
+    }
+    EXPECT_EQ(bins.ndf().mean(Footprint::isotropic({0, 0}, side), {{0.1f, 0}, {0.1f, 1}}), 0);
+  }
+}
+
+TEST(BinMapNdf, DegenerateFootprintsAreGaussiansOfTheirMoments) {
+  const test::OwnedMap map(64, 64, test::roughSurface(64, 64, 0.3f));
+  const OwnedBinMap bins(map, 0.1f);
+  const Vec2 h = {0.05f, 0};
+  const auto density = [&](const Footprint& p) { return bins.ndf().density(p, h); };
+  // No area: the narrowest Gaussian, the box of the same moments, 2 sqrt(3) deviations wide.
+  const float half = std::sqrt(3.0f) * kMinSigmaTexels;
+  EXPECT_FLOAT_EQ(density(Footprint::box({0.4f, 0.4f}, {0, 0}, {0, 0})),
+                  density(Footprint::box({0.4f, 0.4f}, {half, 0}, {0, half})));
+  EXPECT_FLOAT_EQ(density(Footprint::isotropic({0.4f, 0.4f}, 5)),
+                  density(Footprint::box({0.4f, 0.4f}, {5 * std::sqrt(3.0f), 0}, {0, 5 * std::sqrt(3.0f)})));
+  const float line = density(Footprint::box({0.4f, 0.4f}, {10, 5}, {10, 5}));
+  EXPECT_TRUE(std::isfinite(line) && line >= 0);
+  for (const float bad : {INFINITY, NAN, 1e30f, -1e30f}) {
+    for (const Footprint& p :
+         {Footprint::box({0.4f, 0.4f}, {bad, 0}, {0, 3}), Footprint::box({bad, bad}, {3, 0}, {0, 3}),
+          Footprint::gaussian({0.4f, 0.4f}, {bad, 0, bad}), Footprint::box({0, 0}, {bad, bad}, {bad, -bad})}) {
+      EXPECT_TRUE(std::isfinite(density(p)) && density(p) >= 0);
+      EXPECT_LE(bins.ndf().weights(p, h).count, BinWeights::kMost);
+    }
+    EXPECT_EQ(bins.ndf().density(Footprint::isotropic({0, 0}, 4), {bad, 0}), 0);
+  }
+}
+
+TEST(BinMapNdf, SamplesFollowTheDensity) {
+  const test::OwnedMap map(128, 128, test::roughSurface(128, 128, 0.3f));
+  Random random(17);
+  for (const float alpha : {0.1f, 0.02f}) {
+    const OwnedBinMap bins(map, alpha);
+    for (const Footprint& p : {Footprint::box({0.02f, 0.6f}, {9, 2}, {-3, 12}), Footprint::isotropic({0.5f, 0.5f}, 20)}) {
+      constexpr int kCells = 24, kSamples = 12000;
+      std::vector<double> counts(kCells * kCells);
+      for (int k = 0; k < kSamples; ++k) {
+        const HalfVectorSample s = bins.ndf().sample(p, {random.unit(), random.unit()});
+        if (std::abs(s.h.x) >= 1 || std::abs(s.h.y) >= 1) continue;
+        if (k < 100) {
+          EXPECT_FLOAT_EQ(s.pdf, bins.ndf().density(p, s.h));
+        }
+        ++counts[static_cast<std::size_t>((s.h.y + 1) * kCells / 2) * kCells +
+                 static_cast<std::size_t>((s.h.x + 1) * kCells / 2)];
+      }
+      double chi_squared = 0;
+      int cells = 0;
+      for (std::size_t k = 0; k < counts.size(); ++k) {
+        const Vec2 low = test::pixelCentre(k, kCells) - Vec2{1.0f / kCells, 1.0f / kCells};
+        const double expected =
+            kSamples * bins.ndf().mean(p, {low, low + Vec2{2.0f / kCells, 2.0f / kCells}}) * 4 / (kCells * kCells);
+        if (expected < 10) continue;
+        chi_squared += (counts[k] - expected) * (counts[k] - expected) / expected;
+        ++cells;
+      }
+      ASSERT_GT(cells, 8);
+      // Five deviations of chi-squared: one failure in millions.
+      EXPECT_LT(chi_squared, cells + 5 * std::sqrt(2.0 * cells)) << alpha << " cells " << cells;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace glint

@@ -1,0 +1,288 @@
+#include "glint/bake/displace.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cstring>
+#include <limits>
+#include <numbers>
+#include <random>
+
+#include "glint/model/error.h"
+#include "glint/query/displaced_brdf.h"
+#include "support/test_heights.h"
+
+namespace glint::bake {
+namespace {
+
+using test::OwnedSurface;
+constexpr float kHalf = 0x1p-11f;  // relative rounding of stored factors
+
+/// An asset and the memory behind it.
+struct Built {
+  DisplacementData data;
+  Displacement asset;
+  Built(const OwnedSurface& map, const DisplaceOptions& options)
+      : data(displace({map.width, map.height, 0, map.heights}, options)), asset(data.view()) {}
+};
+
+DisplaceOptions quick(std::vector<int> factors, BaseBrdf base = {}) {
+  DisplaceOptions options;
+  options.factors = std::move(factors);
+  options.base = base;
+  options.angular = 7;
+  options.spatial = 2;
+  return options;
+}
+
+BaseBrdf ggx(float alpha) { return {BaseBrdf::Kind::ggx, 1, alpha, 1, 0}; }
+
+Vec3 towards(float degrees, float azimuth) {
+  const float t = degrees * std::numbers::pi_v<float> / 180;
+  return {std::sin(t) * std::cos(azimuth), std::sin(t) * std::sin(azimuth), std::cos(t)};
+}
+
+TEST(Displace, FlatMapsNeedNoScaling) {
+  const OwnedSurface flat{32, 16, std::vector<float>(32 * 16, 1.5f)};
+  for (const BaseBrdf& base : {BaseBrdf{}, ggx(0.3f)}) {
+    const Built built(flat, quick({4, 8}, base));
+    for (int l = 0; l < 2; ++l) {
+      const DisplacementLevel& level = built.asset.levels[l];
+      for (const float t : level.spatial_scale) EXPECT_NEAR(t, 1, 1e-4f);
+      // Half precision; and the glossy lobe of bandwidth 1e6 is a little wider than the facet's own.
+      for (const std::uint16_t s : level.angular_scale) EXPECT_NEAR(halfToFloat(s), 1, 2e-3f);
+      for (const float h : level.heights) EXPECT_NEAR(h, 1.5f, 1e-5f);
+      EXPECT_LT(level.rank1_residual, 1e-3f);
+      EXPECT_EQ(level.distant_share, 0);
+    }
+    const DisplacedBrdf brdf(built.asset);
+    const Vec3 wi = towards(40, 1), wo = towards(20, 3);
+    EXPECT_NEAR(brdf.evaluate(0, {0.3f, 0.6f}, wi, wo), baseTimesCosines(base, {0, 0, 1}, wi, wo) / (wi.z * wo.z), 1e-3f);
+  }
+}
+
+/// What the asset reflects as a whole where its smooth surface hides nothing: the mean over its cells of the answers of the query.
+double meanOfQueries(const DisplacedBrdf& brdf, int level, Vec3 wi, Vec3 wo) {
+  const DisplacementLevel& l = brdf.asset().levels[level];
+  double sum = 0;
+  for (int j = 0; j < l.rows; ++j) {
+    for (int i = 0; i < l.columns; ++i) {
+      for (const float inside : {0.25f, 0.75f}) {  // one point of each triangle
+        const auto f = static_cast<float>(l.factor);
+        const Vec2 uv = {((static_cast<float>(i) + inside) * f + 0.5f) / static_cast<float>(brdf.asset().width),
+                         ((static_cast<float>(j) + inside) * f + 0.5f) / static_cast<float>(brdf.asset().height)};
+        const Vec3 n = brdf.normal(level, uv);
+        sum += brdf.evaluate(level, uv, wi, wo) * dot(n, wi) * dot(n, wo) / n.z;
+      }
+    }
+  }
+  return sum / (2.0 * l.columns * l.rows);
+}
+
+TEST(Displace, QueriesAddUpToTheEffectiveBrdfOfTheOriginal) {
+  for (const BaseBrdf& base : {BaseBrdf{BaseBrdf::Kind::diffuse, 0.8f, 0, 1, 0}, ggx(0.4f)}) {
+    for (const SynthKind kind : {SynthKind::isotropic, SynthKind::weave}) {
+      const OwnedSurface map = test::synthSurface(kind, 128, 64);
+      DisplaceOptions options = quick({8}, base);
+      options.spatial = 1;
+      const Built built(map, options);
+      const DisplacedBrdf brdf(built.asset);
+      const auto surface = map.surface();
+      const auto directions = angularDirections(options.angular);
+      const VisibilityMasks masks(surface, directions);
+      const EffectiveBrdf original =
+          effectiveBrdf(surface, masks, directions, {1, 1, 16, 8, 8}, {base, kAllBounces, options.seed, {}, 0, 0});
+      for (std::size_t i = 0; i < directions.size(); ++i) {
+        for (std::size_t o = 0; o < directions.size(); ++o) {
+          if (directions[i].z < 0.6f || directions[o].z < 0.6f) continue;  // where cells of the weave begin to hide each other
+          const double wanted = original.values[i * directions.size() + o];
+          EXPECT_NEAR(meanOfQueries(brdf, 0, directions[i], directions[o]), wanted, 0.01 * wanted) << i << " " << o;
+        }
+      }
+    }
+  }
+}
+
+TEST(Displace, LevelsOfOneRunAreThoseOfSeparateRuns) {
+  const OwnedSurface map = test::synthSurface(SynthKind::scratches, 64, 64);
+  const Built both(map, quick({4, 8})), second(map, quick({8}));
+  EXPECT_EQ(both.data.levels[1].heights, second.data.levels[0].heights);
+  EXPECT_EQ(both.data.levels[1].angular_scale, second.data.levels[0].angular_scale);
+  EXPECT_EQ(both.asset.levels[1].distant_share, second.asset.levels[0].distant_share);
+  EXPECT_LE(both.asset.levels[1].distant_share, both.asset.levels[0].distant_share);
+}
+
+TEST(Displace, DoesNotDependOnThreads) {
+  const OwnedSurface map = test::synthSurface(SynthKind::isotropic, 64, 48);
+  for (const BaseBrdf& base : {BaseBrdf{}, ggx(0.3f)}) {
+    const Built many(map, quick({8}, base));
+    const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+    const Built single(map, quick({8}, base));
+    const auto& a = many.data.levels[0];
+    const auto& b = single.data.levels[0];
+    EXPECT_EQ(a.angular_scale, b.angular_scale);
+    EXPECT_EQ(a.spatial_scale, b.spatial_scale);
+    ASSERT_EQ(a.lobes.size(), b.lobes.size());
+    EXPECT_EQ(std::memcmp(a.lobes.data(), b.lobes.data(), a.lobes.size() * sizeof(VmfLobe)), 0);
+  }
+}
+
+TEST(Displace, SpatialScaleFollowsTheReliefAndTheResidualSaysWhenItCannot) {
+  // Grooves in one half of the map only, below the level of the other half: they are darker than their lobes.
+  OwnedSurface map = test::grooves(64, 64, 4, 1);
+  for (int j = 0; j < 64; ++j)
+    for (int i = 32; i < 64; ++i) map.heights[static_cast<std::size_t>(j) * 64 + i] = 4;
+  DisplaceOptions options = quick({8});
+  options.bounces = 1;
+  const Built built(map, options);
+  const DisplacementLevel& level = built.asset.levels[0];
+  ASSERT_EQ(level.spatial_columns, 2);
+  EXPECT_LT(level.spatial_scale[0], 0.95f * level.spatial_scale[1]);
+  EXPECT_GT(level.rank1_residual, 0.05f);
+  EXPECT_GE(level.rank1_residual * level.rank1_residual + 1e-3f,
+            1 - level.rank1_energy);  // the singular value is the best there is
+  options.spatial = 1;
+  EXPECT_LT(Built(map, options).asset.levels[0].rank1_residual, 1e-3f);
+}
+
+TEST(Displace, SmallLevelsHaveFewerPatches) {
+  const Built built(test::synthSurface(SynthKind::isotropic, 32, 16), quick({16}));
+  EXPECT_EQ(built.asset.levels[0].spatial_columns, 2);
+  EXPECT_EQ(built.asset.levels[0].spatial_rows, 1);
+  EXPECT_EQ(built.asset.levels[0].rows, 1);
+}
+
+TEST(Displace, GrazingAnglesStayFinite) {
+  const Built built(test::synthSurface(SynthKind::weave, 64, 64, 1.5f), quick({8}, ggx(0.1f)));
+  for (const std::uint16_t s : built.asset.levels[0].angular_scale) EXPECT_LT(halfToFloat(s), 1001);
+  const DisplacedBrdf brdf(built.asset);
+  for (const float degrees : {80.0f, 88.0f, 89.99f, 90.0f}) {
+    for (float azimuth = 0; azimuth < 6; azimuth += 0.5f) {
+      for (const DisplacedVariant variant : {DisplacedVariant::full, DisplacedVariant::lobes, DisplacedVariant::single}) {
+        const float value = brdf.evaluate(0, {0.1f * azimuth, 0.3f}, towards(degrees, azimuth), towards(89, 1), variant);
+        EXPECT_TRUE(std::isfinite(value) && value >= 0) << degrees;
+      }
+    }
+  }
+}
+
+TEST(Displace, RefusesWhatItCannotUse) {
+  const OwnedSurface good = test::synthSurface(SynthKind::isotropic, 48, 32);
+  const auto refused = [](const OwnedSurface& map, const DisplaceOptions& options) {
+    try {
+      displace({map.width, map.height, 0, map.heights}, options);
+    } catch (const Error& error) {
+      return error.rule();
+    }
+    return std::string("accepted");
+  };
+  EXPECT_EQ(refused(good, quick({8})), "accepted");
+  EXPECT_EQ(refused(good, quick({5})), "displace.factor");
+  EXPECT_EQ(refused(good, quick({16, 8})), "displace.range");
+  EXPECT_EQ(refused(good, quick({1})), "displace.range");
+  EXPECT_EQ(refused(good, quick({8}, {BaseBrdf::Kind::diffuse, 1.1f, 0, 1, 0})), "displace.range");
+  EXPECT_EQ(refused(good, quick({8}, {BaseBrdf::Kind::diffuse, 0, 0, 1, 0})), "displace.range");
+  EXPECT_EQ(refused(good, quick({8}, ggx(0.01f))), "displace.range");
+  OwnedSurface bad = good;
+  bad.heights[40] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(refused(bad, quick({8})), "heights.finite");
+  bad = good;
+  for (float& h : bad.heights) h *= 100;
+  EXPECT_EQ(refused(bad, quick({8})), "displace.steep");
+}
+
+class DisplacedBrdfQuery : public testing::TestWithParam<BaseBrdf> {
+ protected:
+  DisplacedBrdfQuery() : built_(test::synthSurface(SynthKind::isotropic, 64, 64), quick({8, 16}, GetParam())) {}
+  Built built_;
+};
+
+TEST_P(DisplacedBrdfQuery, IsReciprocal) {
+  const DisplacedBrdf brdf(built_.asset);
+  for (const DisplacedVariant variant : {DisplacedVariant::full, DisplacedVariant::lobes, DisplacedVariant::single}) {
+    for (int k = 0; k < 50; ++k) {
+      const Vec3 wi = gridDirection(k * 31 % 225, 15), wo = gridDirection(k * 53 % 225, 15);
+      const Vec2 uv = {0.37f * static_cast<float>(k), 0.11f * static_cast<float>(k)};
+      const float there = brdf.evaluate(0, uv, wi, wo, variant), back = brdf.evaluate(0, uv, wo, wi, variant);
+      EXPECT_NEAR(there, back, 1e-4f * (there + 1e-3f));
+    }
+  }
+}
+
+TEST_P(DisplacedBrdfQuery, SamplesFollowTheirDensity) {
+  // The mean of f cos / pdf over samples is the integral of f cos, which the same integrand over even directions also gives.
+  const DisplacedBrdf brdf(built_.asset);
+  const Vec2 uv = {0.4f, 0.7f};
+  std::mt19937 random(9);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  for (const Vec3 wo : {towards(10, 2), towards(55, 0.3f)}) {
+    double sampled = 0, even = 0, mass = 0;
+    const int count = 200000;
+    for (int k = 0; k < count; ++k) {
+      const DirectionSample s = brdf.sample(1, uv, wo, {uniform(random), uniform(random)});
+      if (s.pdf > 0) {
+        EXPECT_NEAR(s.pdf, brdf.pdf(1, uv, s.direction, wo), 1e-6f * s.pdf);
+        EXPECT_NEAR(dot(s.direction, s.direction), 1, 1e-4f);
+        sampled += brdf.evaluate(1, uv, s.direction, wo) * std::max(0.0f, dot(s.direction, brdf.normal(1, uv))) / s.pdf;
+      }
+    }
+    const int n = 400;
+    for (int d = 0; d < n * n; ++d) {
+      const Vec3 above = gridDirection(d, n);
+      const double part = 2 * std::numbers::pi / (n * n);
+      for (const Vec3 wi : {above, Vec3{above.x, above.y, -above.z}}) {  // a tilted facet is lit from below the horizon, too
+        even += part * brdf.evaluate(1, uv, wi, wo) * std::max(0.0f, dot(wi, brdf.normal(1, uv)));
+        mass += part * brdf.pdf(1, uv, wi, wo);
+      }
+    }
+    EXPECT_NEAR(sampled / count, even, 0.01 * even);  // noise of the samples
+    EXPECT_LT(mass, 1.01);
+    EXPECT_GT(mass, 0.8);  // normals that face away from the view reflect nothing
+  }
+}
+
+TEST_P(DisplacedBrdfQuery, BlendsBetweenLevels) {
+  const DisplacedBrdf brdf(built_.asset);
+  EXPECT_EQ(brdf.levelsFor(1).weight, 0);
+  EXPECT_EQ(brdf.levelsFor(8).weight, 0);
+  EXPECT_NEAR(brdf.levelsFor(8 * std::sqrt(2.0f)).weight, 0.5f, 1e-5f);
+  EXPECT_EQ(brdf.levelsFor(1e6f).first, 1);
+  const Vec3 wi = towards(30, 1), wo = towards(40, 2);
+  const Vec2 uv = {0.2f, 0.9f};
+  const float a = brdf.reflected({0, 0, 0}, uv, wi, wo), b = brdf.reflected({1, 1, 0}, uv, wi, wo);
+  EXPECT_NEAR(brdf.reflected({0, 1, 0.25f}, uv, wi, wo), 0.75f * a + 0.25f * b, 1e-5f * (a + b));
+  EXPECT_NE(a, b);
+}
+
+TEST_P(DisplacedBrdfQuery, RepeatsBeyondTheMap) {
+  const DisplacedBrdf brdf(built_.asset);
+  const Vec3 wi = towards(30, 1), wo = towards(40, 2);
+  for (const Vec2 uv : {Vec2{0.001f, 0.002f}, Vec2{0.5f, 0.9999f}, Vec2{0.3f, 0.3f}}) {
+    const float here = brdf.evaluate(0, uv, wi, wo);
+    EXPECT_NEAR(brdf.evaluate(0, {uv.x + 2, uv.y - 1}, wi, wo), here, 1e-3f * here);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Bases, DisplacedBrdfQuery,
+                         testing::Values(BaseBrdf{BaseBrdf::Kind::diffuse, 0.8f, 0, 1, 0},
+                                         BaseBrdf{BaseBrdf::Kind::ggx, 1, 0.3f, 0.2f, 3.9f}),
+                         [](const auto& test) { return test.param.kind == BaseBrdf::Kind::diffuse ? "Diffuse" : "Ggx"; });
+
+TEST(DisplacedBrdf, OneBeckmannLobeIsRightForAGaussianSurface) {
+  // A Gaussian field's slopes are what LEADR assumes; its single lobe and the six lobes must then nearly agree before scaling.
+  OwnedSurface map = test::synthSurface(SynthKind::isotropic, 256, 256, 0.3f);
+  DisplaceOptions options = quick({64}, ggx(0.3f));
+  const Built built(map, options);
+  const DisplacedBrdf brdf(built.asset);
+  for (const float degrees : {0.0f, 15.0f, 30.0f}) {
+    const float single =
+        brdf.evaluate(0, {0.4f, 0.4f}, towards(degrees, 0), towards(degrees, 3.1415927f), DisplacedVariant::single);
+    const float lobes =
+        brdf.evaluate(0, {0.4f, 0.4f}, towards(degrees, 0), towards(degrees, 3.1415927f), DisplacedVariant::lobes);
+    EXPECT_NEAR(single, lobes, 0.2f * lobes) << degrees;  // Beckmann against GGX tails
+  }
+}
+
+}  // namespace
+}  // namespace glint::bake
