@@ -8,6 +8,7 @@
 #   all: $(GLINT_OUT)/flakes.cp.glint $(GLINT_OUT)/dunes.pca.glint
 #
 #   image (png, exr, tif, jpg, ...)  ->  NAME.glint  ->  NAME.pyramid.glint  ->  NAME.cp.glint | NAME.tucker.glint | NAME.pca.glint
+#                                                    ->  NAME.binmap.glint | NAME.sat.glint
 #
 # Assets are made again when an image, an asset they come from, or a file in GLINT_SETTINGS changes. Every tool writes
 # its inputs to a depfile beside the asset. Works with `make -j`; GLINT_THREADS limits what one tool takes.
@@ -26,6 +27,8 @@ GLINT_PYRAMID_FLAGS ?=
 GLINT_CP_FLAGS ?= --rank 16
 GLINT_TUCKER_FLAGS ?= --rank 25
 GLINT_PCA_FLAGS ?= --rank 16
+GLINT_BINMAP_FLAGS ?= --alpha 0.02
+GLINT_SAT_FLAGS ?=
 
 glint_tool = $(if $(GLINT_BIN),$(GLINT_BIN)/)$(1) $(if $(GLINT_THREADS),--threads $(GLINT_THREADS)) --quiet
 glint_flags = $($(1)) $($(1)_$*)
@@ -35,14 +38,19 @@ $(GLINT_OUT)/%.glint: $(GLINT_MAPS)/%.$(1) $(GLINT_SETTINGS) | $(GLINT_OUT)
 	$$(call glint_tool,glint-ingest) $$< -o $$@ --depfile $$@.d $$(call glint_flags,GLINT_INGEST_FLAGS)
 endef
 
+define glint_normals_rule
+$(GLINT_OUT)/%.$(1).glint: $(GLINT_OUT)/%.glint $(GLINT_SETTINGS)
+	$$(call glint_tool,glint-$(1)) $$< -o $$@ --depfile $$@.d $$(call glint_flags,$(2))
+endef
+
 define glint_compress_rule
 $(GLINT_OUT)/%.$(1).glint: $(GLINT_OUT)/%.pyramid.glint $(GLINT_SETTINGS)
 	$$(call glint_tool,glint-compress) $$< -o $$@ --depfile $$@.d --method $(1) $$(call glint_flags,$(2))
 endef
 
-$(GLINT_OUT)/%.pyramid.glint: $(GLINT_OUT)/%.glint $(GLINT_SETTINGS)
-	$(call glint_tool,glint-pyramid) $< -o $@ --depfile $@.d $(call glint_flags,GLINT_PYRAMID_FLAGS)
-
+$(eval $(call glint_normals_rule,pyramid,GLINT_PYRAMID_FLAGS))
+$(eval $(call glint_normals_rule,binmap,GLINT_BINMAP_FLAGS))
+$(eval $(call glint_normals_rule,sat,GLINT_SAT_FLAGS))
 $(eval $(call glint_compress_rule,cp,GLINT_CP_FLAGS))
 $(eval $(call glint_compress_rule,tucker,GLINT_TUCKER_FLAGS))
 $(eval $(call glint_compress_rule,pca,GLINT_PCA_FLAGS))

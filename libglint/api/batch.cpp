@@ -320,4 +320,18 @@ void means(const AnyNdf& model, std::size_t count, const FootprintArrays& footpr
       model);
 }
 
+void samples(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
+             const SampleArrays& out) {
+  std::visit(
+      [&](const auto& m) {
+        for (std::size_t k = 0; k < count; ++k) {
+          const HalfVectorSample drawn = m.sample(footprints[k], xi[k]);
+          out.x[k] = drawn.h.x;
+          out.y[k] = drawn.h.y;
+          out.pdf[k] = drawn.pdf;
+        }
+      },
+      model);
+}
+
 }  // namespace glint::api

@@ -48,6 +48,11 @@ struct RangeArrays {
   Box2 operator[](std::size_t k) const { return {{x0[k], y0[k]}, {x1[k], y1[k]}}; }
 };
 
+/// Half vectors that are drawn, and their pdfs; all contiguous.
+struct SampleArrays {
+  float *x, *y, *pdf;
+};
+
 /// out[k] = density of query k, for k < count. The same values as asking one by one, and the same rules for what is degenerate.
 /// @note thread-safe, allocates nothing; split a batch over threads as you like
 void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
@@ -55,5 +60,9 @@ void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& fo
 
 /// out[k] = mean density over the box of query k.
 void means(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges, float* out);
+
+/// Draws the half vector of query k from its footprint's density, with xi[k] in [0, 1)^2.
+void samples(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
+             const SampleArrays& out);
 
 }  // namespace glint::api

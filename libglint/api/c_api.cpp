@@ -200,6 +200,18 @@ glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, 
   return GLINT_OK;
 }
 
+glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint, float xi1, float xi2, float* hx, float* hy,
+                          float* pdf) {
+  if (ndf == nullptr || footprint == nullptr || hx == nullptr || hy == nullptr || pdf == nullptr)
+    return usage("glint_sample: an argument is null");
+  const HalfVectorSample drawn =
+      std::visit([&](const auto& model) { return model.sample(footprintOf(*footprint), {xi1, xi2}); }, ndf->opened.model());
+  *hx = drawn.h.x;
+  *hy = drawn.h.y;
+  *pdf = drawn.pdf;
+  return GLINT_OK;
+}
+
 glint_status glint_density_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints, glint_floats hx,
                                  glint_floats hy, float* densities) {
   if (count == 0) return GLINT_OK;
@@ -216,5 +228,15 @@ glint_status glint_mean_batch(const glint_ndf* ndf, size_t count, const glint_fo
   if (x0.data == nullptr || y0.data == nullptr || x1.data == nullptr || y1.data == nullptr)
     return usage("glint_mean_batch: x0, y0, x1 and y1 must be given");
   api::means(ndf->opened.model(), count, arraysOf(*footprints), {arrayOf(x0), arrayOf(y0), arrayOf(x1), arrayOf(y1)}, means);
+  return GLINT_OK;
+}
+
+glint_status glint_sample_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints, glint_floats xi1,
+                                glint_floats xi2, float* hx, float* hy, float* pdfs) {
+  if (count == 0) return GLINT_OK;
+  if (const char* fault = faultOf(ndf, footprints, pdfs)) return usage(fault);
+  if (xi1.data == nullptr || xi2.data == nullptr) return usage("glint_sample_batch: xi1 and xi2 must be given");
+  if (hx == nullptr || hy == nullptr) return usage("glint_sample_batch: hx and hy must be given");
+  api::samples(ndf->opened.model(), count, arraysOf(*footprints), {arrayOf(xi1), arrayOf(xi2)}, {hx, hy, pdfs});
   return GLINT_OK;
 }

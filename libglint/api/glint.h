@@ -140,6 +140,15 @@ GLINT_API glint_status glint_density(const glint_ndf* ndf, const glint_footprint
 GLINT_API glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, float x0, float y0, float x1,
                                   float y1, float* mean);
 
+/* Draws a half vector in proportion to the density.
+ *
+ * (xi1, xi2): random numbers in [0, 1), stratified ones stay stratified; others are clamped, NaN counts as 0.
+ * (hx, hy): the half vector. It may lie outside the unit disk, where facets near the horizon blur to: no direction.
+ * pdf: its density per unit projected area, the density over its integral; 0 if nothing can be drawn, and hx = hy = 0 then. Multiply by the
+ * half vector's z for a density per unit solid angle of half vectors. Footprints and status as for glint_density. */
+GLINT_API glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint, float xi1, float xi2, float* hx,
+                                    float* hy, float* pdf);
+
 /* Floats of a batch: element k is at data + k * stride bytes. A contiguous array has the stride sizeof(float), a member of an
  * array of structs that of the struct; with stride 0 all queries share one value. Every address must be that of a float. */
 typedef struct glint_floats {
@@ -166,6 +175,10 @@ GLINT_API glint_status glint_density_batch(const glint_ndf* ndf, size_t count, c
 /* means[k] = glint_mean of query k; as glint_density_batch. */
 GLINT_API glint_status glint_mean_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints, glint_floats x0,
                                         glint_floats y0, glint_floats x1, glint_floats y1, float* means);
+
+/* (hx[k], hy[k]) and pdfs[k] = glint_sample of query k; the three arrays are contiguous. Else as glint_density_batch. */
+GLINT_API glint_status glint_sample_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints,
+                                          glint_floats xi1, glint_floats xi2, float* hx, float* hy, float* pdfs);
 
 #ifdef __cplusplus
 }

@@ -15,7 +15,7 @@ GLINT_MAPS := maps
 GLINT_OUT := assets
 GLINT_PYRAMID_FLAGS := --resolution 64 --sigma-r 0.02
 GLINT_INGEST_FLAGS_dunes := --kind height
-all: $(foreach method,cp tucker pca,assets/flakes.$(method).glint) assets/dunes.pca.glint
+all: $(foreach method,cp tucker pca binmap sat,assets/flakes.$(method).glint) assets/dunes.pca.glint
 include {root}/pipelines/glint.mk
 """
 
@@ -49,9 +49,10 @@ def later(path):
 
 def test_images_become_assets_and_only_changes_are_made_again(project):
     first = tools(project("-j2"))
-    assert first == ["glint-compress"] * 4 + ["glint-ingest"] * 2 + ["glint-pyramid"] * 2
+    assert first == ["glint-binmap"] + ["glint-compress"] * 4 + ["glint-ingest"] * 2 + ["glint-pyramid"] * 2 + ["glint-sat"]
     made = {p.name for p in (project.folder / "assets").glob("*.glint")}
-    assert made == {f"{n}.glint" for n in ("flakes", "flakes.pyramid", "flakes.cp", "flakes.tucker", "flakes.pca", "dunes", "dunes.pyramid", "dunes.pca")}
+    assert made == {f"{n}.glint" for n in ("flakes", "flakes.pyramid", "flakes.cp", "flakes.tucker", "flakes.pca", "flakes.binmap",
+                                                 "flakes.sat", "dunes", "dunes.pyramid", "dunes.pca")}
     assert subprocess.run([BIN / "glint-validate", *(project.folder / "assets").glob("*.glint")]).returncode == 0
 
     assert tools(project("-j2")) == []

@@ -33,6 +33,8 @@ class Assets {
     formats::writeAsset(path("ndf-pyramid"), pyramid.pyramid, test::sampleProvenance());
     const auto compressed = test::sampleCompressed(kSize, CompressionMethod::cp, CoefficientType::i8);
     formats::writeAsset(path("ndf-cp"), compressed.ndf, test::sampleProvenance());
+    formats::writeAsset(path("bin-map"), test::sampleBinMap(kSize, kSize).map, test::sampleProvenance());
+    formats::writeAsset(path("histogram-sat"), test::sampleHistograms(kSize, kSize).sat, test::sampleProvenance());
     formats::writeAsset(path("heights"), test::sampleHeights(kSize, kSize).map, test::sampleProvenance());
   }
   std::string path(const std::string& kind) const { return (folder_.path() / (kind + ".glint")).string(); }
@@ -118,6 +120,35 @@ TEST(CApi, AnswersAsTheModelsDo) {
     }
     EXPECT_GT(positive, 5);
   }
+}
+
+TEST(CApi, SamplesHaveThePdfOfTheDensityAlsoInBatches) {
+  // Compressed images integrate to 1 in half precision; single bins of a histogram are asked at their borders.
+  constexpr float kPdfError = 2e-3f;
+  constexpr std::size_t kCount = 64;
+  for (const char* kind : {"normals", "ndf-pyramid", "ndf-cp", "bin-map", "histogram-sat"}) {
+    const Handle ndf = openHandle(kind);
+    ASSERT_TRUE(ndf);
+    const Queries q(kCount);
+    glint_footprints p = {};
+    p.u = {q.u.data(), sizeof(float)}, p.v = {q.v.data(), sizeof(float)}, p.sigma = {q.sigma.data(), sizeof(float)};
+    std::vector<float> x(kCount), y(kCount), pdf(kCount);
+    ASSERT_EQ(glint_sample_batch(ndf.get(), kCount, &p, p.v, p.u, x.data(), y.data(), pdf.data()), GLINT_OK);
+    for (std::size_t k = 0; k < kCount; ++k) {
+      const glint_footprint one = glint_footprint_isotropic(q.u[k], q.v[k], q.sigma[k]);
+      float hx = -9, hy = -9, single = -9, density = 0;
+      ASSERT_EQ(glint_sample(ndf.get(), &one, q.v[k], q.u[k], &hx, &hy, &single), GLINT_OK);
+      EXPECT_EQ(hx, x[k]) << kind << k;
+      EXPECT_EQ(hy, y[k]) << kind << k;
+      EXPECT_EQ(single, pdf[k]) << kind << k;
+      ASSERT_EQ(glint_density(ndf.get(), &one, hx, hy, &density), GLINT_OK);
+      if (single > 0 && std::fabs(hx) < 1 && std::fabs(hy) < 1) {
+        EXPECT_NEAR(density / single, 1, kPdfError) << kind << k;
+      }
+    }
+  }
+  float unused = 0;
+  EXPECT_EQ(glint_sample(nullptr, nullptr, 0, 0, &unused, &unused, &unused), GLINT_ERROR_USAGE);
 }
 
 TEST(CApi, BatchesEqualSingleQueries) {
