@@ -60,12 +60,16 @@ def print_header():
     print(f"{'figure':<46} {'measured':>13} {'target':>13} {'':<5} {'paper':<19} design's floor")
 
 
+SECTIONS = ["synth_and_ingest", "pyramids", "compressions", "queries", "query_command", "displacements", "histograms", "bin_maps", "accuracy"]
+
+
 class Bench:
     def __init__(self, arguments):
         self.tools = Tools(arguments.bin)
         self.folder = arguments.out
         self.repeats = arguments.repeats
         self.size = arguments.size
+        self.samples = arguments.samples
         self.table = Table()
         self.folder.mkdir(parents=True, exist_ok=True)
 
@@ -197,9 +201,9 @@ class Bench:
         run = self.tools.repeat(self.repeats, "query", asset, "--uv", 0.3, 0.7, "--sigma", 40, "--half", 0.1, -0.05, "--repeat", 300000)
         self.table.add("density, warm, by glint-query --repeat", run.result["nanoseconds"], "ns", target=150)
 
-    def accuracy(self, samples):
+    def accuracy(self):
         for name in MAPS:
-            text = call([self.tools.folder / "glint-accuracy", self.path(name), *self.assets(name), "--samples", samples])
+            text = call([self.tools.folder / "glint-accuracy", self.path(name), *self.assets(name), "--samples", self.samples])
             (self.folder / f"{name}.accuracy.json").write_text(text)
             for asset in json.loads(text):
                 kind = pathlib.Path(asset["asset"]).name.removeprefix(name + ".").removesuffix(".glint")
@@ -234,10 +238,17 @@ class Bench:
                 self.table.add(f"bin map, energy, {name}, {alpha}, {entry['side']:.0f}^2", abs(entry["energy"]), "", target=0.005)
 
     def write(self):
-        results = {"machine": machine(), "size_texels": self.size, "repeats": self.repeats, "rows": self.table.rows}
-        (self.folder / "results.json").write_text(json.dumps(results, indent=1) + "\n")
+        """Figures of an earlier run at this size stay where this one has not measured them."""
+        path = self.folder / "results.json"
+        earlier = json.loads(path.read_text()) if path.exists() else {"size_texels": self.size, "rows": []}
+        measured = {row["figure"] for row in self.table.rows}
+        kept = [row for row in earlier["rows"] if row["figure"] not in measured] if earlier["size_texels"] == self.size else []
+        results = {"machine": machine(), "size_texels": self.size, "repeats": self.repeats, "rows": kept + self.table.rows}
+        path.write_text(json.dumps(results, indent=1) + "\n")
+
+    def summarize(self):
         over = [row["figure"] for row in self.table.rows if row["target"] is not None and row["value"] > row["target"]]
-        print(f"\n{len(self.table.rows)} figures, {len(over)} over their target; all in {self.folder}/results.json")
+        print(f"\n{len(self.table.rows)} figures measured, {len(over)} over their target; all in {self.folder}/results.json")
 
 
 def call(command, stderr=None):
@@ -261,21 +272,18 @@ def main():
     parser.add_argument("--size", type=int, default=2048, help="texels of the maps along each axis; targets are for 2048")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--samples", type=int, default=8, help="footprints of each octave for errors")
-    bench = Bench(parser.parse_args())
+    parser.add_argument("--only", nargs="+", choices=SECTIONS, default=SECTIONS, metavar="SECTION",
+                        help=f"run some sections, with the assets that an earlier run left: {', '.join(SECTIONS)}")
+    arguments = parser.parse_args()
+    bench = Bench(arguments)
     if os.getloadavg()[0] > 0.5 * os.cpu_count():
         print(f"warning: the machine is busy (load {os.getloadavg()[0]:.1f}); times will be too long", file=sys.stderr)
     bench.make_maps()
     print_header()
-    bench.synth_and_ingest()
-    bench.pyramids()
-    bench.displacements()
-    bench.compressions()
-    bench.queries()
-    bench.histograms()
-    bench.query_command()
-    bench.bin_maps()
-    bench.accuracy(parser.parse_args().samples)
-    bench.write()
+    for section in arguments.only:
+        getattr(bench, section)()
+        bench.write()  # what was measured stays when a later section is stopped
+    bench.summarize()
 
 
 if __name__ == "__main__":

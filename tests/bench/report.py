@@ -18,8 +18,9 @@ Written by `make bench-report`; do not edit. Repeat with `make bench`, which pri
 
 {machine}
 Maps are {size}^2 texels, made by glint-synth and stored as 8-bit PNG (arguments: `tests/bench/bench.py`). Times are of whole
-processes, reading and writing files included: the median of {repeats} runs. The paper is Deng 2022, its figures its own (40 cores at
-2.39 GHz, other maps of the same kinds); the last column is what a throw-away version of the same idea reached on a machine like this.
+processes, reading and writing files included: the median of {repeats} runs. Papers' figures are their own, on their machines (Deng
+2022: 40 cores at 2.39 GHz, other maps of the same kinds); the last column is what a throw-away version of the same idea reached on a
+machine like this.
 """
 
 
