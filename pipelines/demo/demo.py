@@ -68,7 +68,16 @@ class Chain:
         self.compress("tucker", "tucker, 5 x 5", "--method", "tucker", "--rank", 25)
         self.compress("pca", "pca, rank 16", "--method", "pca", "--rank", 16)
         self.compress("tolerance", "pca, error of cp", "--method", "pca", "--tolerance", cp.result["total"]["rel_l2"])
+        self.make("bin map", "binmap", "--alpha", self.sigma_r * 2**0.5)
+        self.make("histograms", "sat")
+        if kind:
+            heights = self.path("heights")
+            self.tools.run("ingest", self.image, "-o", heights, *kind, "--to", "heights", *self.ingest_flags)
+            self.make("displacement, 1 / 16", "displace", "--factor", 16, "--base", "diffuse:0.8", source=heights)
         return self
+
+    def make(self, step, tool, *flags, source=None):
+        self.add(step, self.tools.run(tool, source or self.path(), "-o", self.path(tool), *flags), self.path(tool))
 
     def compress(self, kind, step, *flags):
         run = self.tools.run("compress", self.path("pyramid"), "-o", self.path(kind), *flags)

@@ -610,7 +610,8 @@ SampleHistograms sampleHistograms(int width, int height) {
     }
     if (count == 0) continue;
     sample.bin_ids.push_back(static_cast<std::uint16_t>(id));
-    sample.bin_normals.push_back({static_cast<float>(x / count), static_cast<float>(y / count)});
+    const auto texels = static_cast<double>(count);
+    sample.bin_normals.push_back({static_cast<float>(x / texels), static_cast<float>(y / texels)});
     sample.bin_totals.push_back(count);
   }
   sat.bin_count = static_cast<int>(sample.bin_ids.size());

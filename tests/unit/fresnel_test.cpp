@@ -28,8 +28,9 @@ TEST(Fresnel, AgreesWithComplexArithmetic) {
     const float cosine = unit(random), eta = 0.05f + 4 * unit(random), absorption = 8 * unit(random);
     ASSERT_NEAR(fresnelConductor(cosine, eta, absorption), exactReflectance(cosine, {eta, absorption}), kRounding)
         << cosine << ' ' << eta << ' ' << absorption;
-    if (1 - cosine * cosine < 0.999f * eta * eta)
+    if (1 - cosine * cosine < 0.999f * eta * eta) {
       ASSERT_NEAR(fresnelDielectric(cosine, eta), exactReflectance(cosine, eta), kRounding) << cosine << ' ' << eta;
+    }
   }
 }
 
