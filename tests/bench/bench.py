@@ -164,7 +164,7 @@ class Bench:
                 # Google Benchmark has no median of a single run.
                 if entry.get("aggregate_name", "median") != "median":
                     continue
-                what, file = entry["run_name"].split("/")
+                what, file = entry["run_name"].split("/")[:2]  # then its settings
                 if what.startswith("ratio_"):
                     # To a plain microfacet model in the same run.
                     asked = what.removeprefix("ratio_").replace("_", ", ")
