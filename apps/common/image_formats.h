@@ -9,8 +9,8 @@
 
 namespace glint::apps {
 
-/// The formats of OpenImageIO, in a shared object of their own: loading that library and the hundreds that it links to takes a
-/// quarter of a second, which programs and inputs that do not need it must not pay.
+/// The formats of OpenImageIO, in a shared object of their own: programs and inputs that do not need that library must not wait until
+/// it and the hundreds that it links to are loaded.
 struct ImageFormats {
   /// @throws Error invalid_input, unsupported
   Image (*read)(const std::string& path);

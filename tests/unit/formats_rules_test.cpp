@@ -429,21 +429,6 @@ std::vector<Fixture> indexFixtures() {
               [](const Patch& patch) {
                 patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_scale = 1000; });
               }),
-      patched("histogram.bins", Base::histograms,
-              [](const Patch& patch) { patch.change<std::uint16_t>("bin_ids", 1, [](auto& id) { id = 0; }); }),
-      patched("histogram.bins", Base::histograms, [](const Patch& patch) { patch.setInteger("theta_bins", 1); }),
-      patched("histogram.bins", Base::histograms,
-              [](const Patch& patch) {
-                patch.setInteger("theta_bins", 64);
-                patch.setInteger("phi_bins", 256);
-              }),
-      patched("histogram.strides", Base::histograms,
-              [](const Patch& patch) {
-                patch.setInteger("coarse_stride", 9);
-                patch.replace("coarse_sums", H5T_STD_U32LE, {4, 4, 32}, true);
-              }),
-      patched("histogram.texels", Base::histograms,
-              [](const Patch& patch) { patch.change<std::uint16_t>("texels", 70, [](auto& bin) { bin = 60000; }); }),
   };
 }
 
@@ -548,6 +533,26 @@ std::vector<Fixture> dataFixtures() {
       patched(
           "compressed.integral", Base::compressed,
           [](const Patch& patch) { patch.change<float>("image_scales", 3, [](float& scale) { scale *= 1.1f; }); }, true),
+  };
+}
+
+std::vector<Fixture> histogramFixtures() {
+  return {
+      patched("histogram.bins", Base::histograms,
+              [](const Patch& patch) { patch.change<std::uint16_t>("bin_ids", 1, [](auto& id) { id = 0; }); }),
+      patched("histogram.bins", Base::histograms, [](const Patch& patch) { patch.setInteger("theta_bins", 1); }),
+      patched("histogram.bins", Base::histograms,
+              [](const Patch& patch) {
+                patch.setInteger("theta_bins", 64);
+                patch.setInteger("phi_bins", 256);
+              }),
+      patched("histogram.strides", Base::histograms,
+              [](const Patch& patch) {
+                patch.setInteger("coarse_stride", 9);
+                patch.replace("coarse_sums", H5T_STD_U32LE, {4, 4, 32}, true);
+              }),
+      patched("histogram.texels", Base::histograms,
+              [](const Patch& patch) { patch.change<std::uint16_t>("texels", 70, [](auto& bin) { bin = 60000; }); }),
       patched(
           "histogram.bin_normals", Base::histograms,
           [](const Patch& patch) { patch.change<Vec2>("bin_normals", 1, [](Vec2& n) { n.x = kNan; }); }, true),
@@ -653,7 +658,7 @@ std::vector<Fixture> shFixtures() {
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
   for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures(),
-                    binMapFixtures(), shFixtures(), displacementFixtures()}) {
+                    histogramFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
