@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <random>
 #include <vector>
 
 #include "glint/model/vec.h"
@@ -14,6 +15,18 @@ inline Vec3 direction(double z, double phi) {
   const double r = std::sqrt(std::max(0.0, 1 - z * z));
   return {static_cast<float>(r * std::cos(phi)), static_cast<float>(r * std::sin(phi)), static_cast<float>(z)};
 }
+
+/// Random numbers and directions above the horizon.
+class Random {
+ public:
+  explicit Random(unsigned seed) : random_(seed) {}
+  float unit() { return std::uniform_real_distribution<float>(0, 1)(random_); }
+  Vec2 pair() { return {unit(), unit()}; }
+  Vec3 above(double lowest_z = 0.01) { return direction(lowest_z + (1 - lowest_z) * unit(), 2 * std::numbers::pi * unit()); }
+
+ private:
+  std::mt19937 random_;
+};
 
 /// Integral over solid angle of value(w) for z in [z0, z1], phi in [phi0, phi1], by the midpoints of nz x np equal cells.
 template <class Value>

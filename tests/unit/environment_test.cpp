@@ -18,21 +18,11 @@ namespace {
 
 using test::BeckmannNdf;
 using test::direction;
+using test::Random;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr MapSlopes kSlopes = {{0, 0}, {0.05f, 0.01f, 0.03f}};
-
-class Random {
- public:
-  explicit Random(unsigned seed) : random_(seed) {}
-  float unit() { return std::uniform_real_distribution<float>(0, 1)(random_); }
-  Vec2 pair() { return {unit(), unit()}; }
-  Vec3 above(double lowest_z) { return direction(lowest_z + (1 - lowest_z) * unit(), 6.283185 * unit()); }
-
- private:
-  std::mt19937 random_;
-};
 
 TEST(SphericalGaussian, CompactSupportIsWhereItFallsToEpsilon) {
   for (const float sharpness : {3.0f, 30.0f, 300.0f}) {

@@ -19,6 +19,7 @@ namespace {
 
 using test::BeckmannNdf;
 using test::direction;
+using test::Random;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -37,17 +38,6 @@ MicrofacetBrdf<BeckmannNdf> brdfOf(const BeckmannNdf& ndf, const MapSlopes& slop
                                    const Fresnel& fresnel = Fresnel::mirror()) {
   return {ndf, Footprint{}, SmithMasking(slopes, 0), fresnel};
 }
-
-class Random {
- public:
-  explicit Random(unsigned seed) : random_(seed) {}
-  float unit() { return std::uniform_real_distribution<float>(0, 1)(random_); }
-  Vec2 pair() { return {unit(), unit()}; }
-  Vec3 above(double lowest_z = 0.01) { return direction(lowest_z + (1 - lowest_z) * unit(), 6.283185 * unit()); }
-
- private:
-  std::mt19937 random_;
-};
 
 TEST(HalfVector, OfADirectionAndItsMirrorImageIsTheFacet) {
   Random random(1);
