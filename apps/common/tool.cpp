@@ -13,6 +13,7 @@
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <system_error>
 
 #include "common/files.h"
@@ -77,6 +78,33 @@ const char* codeName(ErrorCode code) {
   return "failed";
 }
 
+/// Help texts that say in words what an option takes: `--wo FLOAT FLOAT FLOAT (needs --light)`.
+class HelpFormatter : public CLI::Formatter {
+ public:
+  std::string make_option_opts(const CLI::Option* option) const override {
+    const std::string type = option->get_type_name();  // "FLOAT:0 to 1": with what its checks say
+    const std::size_t colon = std::min(type.find(':'), type.size());
+    std::string text;
+    for (int k = 0; k < std::clamp(option->get_expected_min(), 1, 8) && colon > 0; ++k) text += " " + type.substr(0, colon);
+    std::vector<std::string> notes;
+    if (colon < type.size()) notes.push_back(type.substr(colon + 1));
+    if (option->get_required())
+      notes.push_back("required");
+    else if (!option->get_default_str().empty())
+      notes.push_back("default " + option->get_default_str());
+    if (!option->get_needs().empty()) notes.push_back("needs " + names(option->get_needs()));
+    if (!option->get_excludes().empty()) notes.push_back("not with " + names(option->get_excludes()));
+    return notes.empty() ? text : fmt::format("{} ({})", text, fmt::join(notes, ", "));
+  }
+
+ private:
+  static std::string names(const std::set<CLI::Option*>& options) {
+    std::set<std::string> sorted;  // the set's own order is that of addresses
+    for (const CLI::Option* option : options) sorted.insert(option->get_name());
+    return fmt::format("{}", fmt::join(sorted, ", "));
+  }
+};
+
 /// Paths may hold any bytes; JSON must be UTF-8.
 std::string dump(const json& document) { return document.dump(2, ' ', false, json::error_handler_t::replace); }
 
@@ -96,6 +124,8 @@ Option& Option::range(double low, double high) {
         return number >= low && number <= high ? std::string() : value + " is not in the range " + text;
       },
       text, "range"));
+  double number = 0;
+  if (CLI::detail::lexical_cast(option_->get_default_str(), number) && !(number >= low && number <= high)) option_->default_str("");
   return *this;
 }
 
@@ -129,6 +159,7 @@ bool Option::given() const { return option_->count() > 0; }
 struct Tool::State {
   ToolInfo info;
   CLI::App app;
+  std::string section = "Options";
   std::deque<Option> options;                                            // deque: references handed out stay valid
   std::vector<std::pair<std::string, std::function<json()>>> recorders;  // one for each option, same order
   std::vector<std::function<void()>> checks;
@@ -151,7 +182,8 @@ struct Tool::State {
 
   Option& add(CLI::Option* option, const std::string& name, std::function<json()> value) {
     options.emplace_back();
-    options.back().option_ = option;
+    options.back().option_ = option->group(section);
+    if (option->get_default_str() == "[]") option->default_str("");
     recorders.emplace_back(recordKey(name), std::move(value));
     return options.back();
   }
@@ -164,18 +196,21 @@ Tool::Tool(ToolInfo info) : state_(std::make_unique<State>()) {
   app.name(state_->info.name);
   app.footer("Example:\n  " + state_->info.example +
              "\n\nExit codes: 0 ok, 1 usage, 2 input/output, 3 invalid input, 4 failed, 5 unsupported, 7 differs");
+  app.formatter(std::make_shared<HelpFormatter>());
   app.get_formatter()->column_width(34);
   app.option_defaults()->always_capture_default();
   app.allow_config_extras(CLI::config_extras_mode::error);
-  addStandardOptions();
 }
 
 Tool::~Tool() = default;
+
+void Tool::section(const std::string& title) { state_->section = title; }
 
 void Tool::addStandardOptions() {
   State& s = *state_;
   CLI::App& app = s.app;
   const std::string group = "Shared by every tool";
+  section(group);
   app.set_help_flag("-h,--help", "print this help and exit")->group(group);
   app.set_version_flag("--version", generator(), "print the version and exit")->group(group);
   app.set_config("--config", "", "read options from a TOML or INI file; the command line has precedence")
@@ -184,14 +219,13 @@ void Tool::addStandardOptions() {
   app.add_option("--threads", s.threads, "most threads to use; 0: all that the machine has")
       ->group(group)
       ->type_name("N")
-      ->check(CLI::Range(0, kMaxThreads));
+      ->check(CLI::Range(0, kMaxThreads).description(fmt::format("0 to {}", kMaxThreads)));
   app.add_option("--seed", s.seed, "seed of every random choice")->group(group)->type_name("N");
   app.add_flag("--json", s.json_result, "print the result, or the error, as one JSON document on stdout")->group(group);
   choice("--progress", s.progress_mode,
          {{"auto", ProgressMode::automatic}, {"none", ProgressMode::none}, {"json", ProgressMode::json}},
          "progress on stderr; auto: a bar, on a terminal only")
-      .unrecorded()
-      .option_->group(group);
+      .unrecorded();
   CLI::Option* quiet = app.add_flag("--quiet,-q", s.quiet, "no warnings and no progress")->group(group);
   app.add_flag("--verbose,-v", s.verbose, "print a summary of the result")->group(group)->excludes(quiet);
   app.add_flag("--force,-f", s.force, "replace an output that is an input or of another kind")->group(group);
@@ -387,6 +421,7 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   try {
     // Parsing stops at the first error, which may come before --json is seen.
     for (int i = 1; i < argc; ++i) state_->json_result |= std::string(argv[i]) == "--json";
+    addStandardOptions();  // last, so that the help begins with what is the tool's own
     if (!parse(argc, argv)) return 0;
     return work(body);
   } catch (const Error& error) {

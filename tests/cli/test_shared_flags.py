@@ -27,6 +27,15 @@ def test_help_lists_shared_flags_and_an_example(glint, tool):
     assert f"Example:\n  glint-{tool} " in process.stdout
 
 
+def test_help_says_in_words_what_an_option_takes(glint):
+    text = glint("query", "--help").stdout
+    assert "--uv FLOAT FLOAT " in text
+    assert "--sigma FLOAT (1e-06 to 1e+09, not with --box, --cov)" in text  # it has no default that could be meant
+    assert "--sigma-r FLOAT (0.0001 to 0.25, default 0.005)" in text
+    assert "--depfile FILE " in text
+    assert text.index("--uv") < text.index("--threads"), "the tool's own options come first"
+
+
 @pytest.mark.parametrize("tool", TOOLS)
 def test_version_names_the_tool(glint, tool):
     process = glint(tool, "--version")
