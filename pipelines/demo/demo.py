@@ -13,13 +13,17 @@ import numpy as np
 import OpenImageIO as oiio
 
 import picture
-from processes import Tools, readable_bytes
+from processes import Tools, readable_bytes, readable_time
 
 SAMPLES = pathlib.Path(__file__).parents[2] / "data-samples"
 STRIDE = 32
 # Images of the finest level along each axis of a region: as many as 8 x 8 regions of a 2K^2 map have (Deng 2022, section 4.2).
 IMAGES_PER_REGION = 8
 PICTURE_LEVELS = (0, 1, 3)
+# Columns of the picture of all models -> kind in the file's name.
+MODELS = {"Reference": "", "pyramid": "pyramid", "cp, rank 16": "cp", "tucker, 5 x 5": "tucker", "pca, rank 16": "pca", "bin map": "binmap",
+          "histograms": "sat"}
+NOT_DRAWN = {"flakes_256"}  # flakes_1k is
 
 
 @dataclasses.dataclass
@@ -126,13 +130,22 @@ class Chain:
         path.unlink()
         return pixels
 
+    def nanoseconds(self, kind, footprint, half):
+        """Time of a density query."""
+        sigma_r = [] if kind else ["--sigma-r", self.sigma_r]
+        run = self.tools.run("query", self.path(kind), "--uv", footprint.u, footprint.v, "--sigma", footprint.sigma, "--half", *half, "--repeat",
+                             3000, *sigma_r)
+        return run.result["nanoseconds"]
+
     def error(self, kind):
         """Against the Reference, mean over the two finest levels at their own centres."""
-        return float(np.mean([relative(self.ndf(kind, p), self.ndf("", p)) for p in map(self.footprint, range(min(2, len(self.levels))))]))
+        return float(np.mean([picture.relative(self.ndf(kind, p), self.ndf("", p)) for p in map(self.footprint, range(min(2, len(self.levels))))]))
 
 
-def relative(image, truth):
-    return float(np.linalg.norm(image - truth) / np.linalg.norm(truth))
+def brightest(image):
+    """The half vector of the largest density of an NDF image, top row first."""
+    row, column = np.unravel_index(np.argmax(image), image.shape)
+    return (2 * column + 1) / image.shape[1] - 1, 1 - (2 * row + 1) / image.shape[0]
 
 
 def table_text(rows):
@@ -153,7 +166,7 @@ def table_text(rows):
     return "\n".join(lines) + "\n"
 
 
-def draw(chain, path):
+def draw_footprints(chain, path):
     """The chain's images at three footprint sizes, before and after compression."""
     chain.compress_to_bytes_of("pca-same", "cp", "pca")
     levels = sorted({min(level, len(chain.levels) - 1) for level in PICTURE_LEVELS})
@@ -163,7 +176,19 @@ def draw(chain, path):
     if "pca-same" in sizes:
         titles["pca-same"] = f"PCA, same bytes\n{sizes['pca-same']}"
     images = {title: [chain.ndf(kind, p) for p in footprints] for kind, title in titles.items()}
-    picture.draw(images, [f"footprint {p.sigma:.0f} texels" for p in footprints], path)
+    picture.draw_footprints(images, [f"footprint {p.sigma:.0f} texels" for p in footprints], path)
+
+
+def draw_models(chains, path):
+    """Every model's answer to the same question: the NDF of a footprint at a centre of the finest level."""
+    maps = {}
+    for chain in chains:
+        footprint = chain.footprint(0)
+        images = {kind: chain.ndf(kind, footprint) for kind in MODELS.values()}
+        half = brightest(images[""])
+        note = lambda kind: f"{readable_bytes(chain.path(kind).stat().st_size)}, {readable_time(chain.nanoseconds(kind, footprint, half))}"
+        maps[chain.name.replace("_", "\n")] = {title: (images[kind], note(kind)) for title, kind in MODELS.items()}
+    picture.draw_models(maps, path)
 
 
 def main():
@@ -186,13 +211,14 @@ def main():
     for image in [*maps, *([arguments.map] if arguments.map else [])]:
         print(f"{image}", file=sys.stderr, flush=True)
         chains.append(Chain(tools, image, assets, arguments.ingest_flags.split() if image == arguments.map else ()).run())
-    draw(chains[-1], arguments.out / "ndf-before-after.png")
+    draw_footprints(chains[-1], arguments.out / "ndf-before-after.png")
+    draw_models([chain for chain in chains if chain.name not in NOT_DRAWN], arguments.out / "ndf-models.png")
 
     rows = [row for chain in chains for row in chain.rows]
     text = table_text(rows)
     (arguments.out / "table.txt").write_text(text)
     (arguments.out / "table.json").write_text(json.dumps([dataclasses.asdict(row) for row in rows], indent=1) + "\n")
-    print(f"\n{text}\nassets: {assets}/   table: {arguments.out}/table.txt, .json   picture: {arguments.out}/ndf-before-after.png")
+    print(f"\n{text}\nassets: {assets}/   table: {arguments.out}/table.txt, .json   pictures: {arguments.out}/ndf-before-after.png, ndf-models.png")
 
 
 if __name__ == "__main__":

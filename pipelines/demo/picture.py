@@ -5,6 +5,7 @@ import io
 import matplotlib
 
 matplotlib.use("Agg")
+import matplotlib.patheffects as patheffects
 import matplotlib.pyplot as plt
 import numpy as np
 import PIL.Image
@@ -23,38 +24,70 @@ def crop(images):
     return 0, 1.0
 
 
-def draw(images, columns, path):
-    """
+def relative(image, truth):
+    """Relative L2 distance."""
+    return float(np.linalg.norm(image - truth) / np.linalg.norm(truth))
+
+
+def show(axis, image, truth, margin, note=""):
+    """An image without its margin, in the colours of the truth's densities."""
+    size = truth.shape[0]
+    axis.imshow(np.log1p(image[margin : size - margin, margin : size - margin]), cmap="inferno", vmin=0, vmax=np.log1p(truth.max()),
+                interpolation="nearest")
+    axis.set_xticks([])
+    axis.set_yticks([])
+    axis.spines[:].set_visible(False)
+    axis.text(0.97, 0.03, note, transform=axis.transAxes, ha="right", va="bottom", fontsize=8, color="white", linespacing=1.3,
+              path_effects=[patheffects.withStroke(linewidth=2, foreground="black")])
+
+
+def grid(rows, columns, left=0.19):
+    """Axes of a grid of images, titles of rows at the left and of columns above."""
+    figure, axes = plt.subplots(len(rows), len(columns), squeeze=False, figsize=(CELL_INCHES * len(columns) + 1.35, CELL_INCHES * len(rows) + 0.5))
+    for c, title in enumerate(columns):
+        axes[0, c].set_title(title, fontsize=10)
+    for r, title in enumerate(rows):
+        axes[r, 0].set_ylabel(title, fontsize=10, rotation=0, ha="right", va="center", labelpad=8)
+    figure.subplots_adjust(left=left, right=0.995, top=1 - 0.28 / figure.get_figheight(), bottom=0.25 / figure.get_figheight(), wspace=0.03,
+                           hspace=0.03)
+    return figure, axes
+
+
+def save(figure, note, path):
+    figure.text(0.995, 0.004, note, ha="right", va="bottom", fontsize=7.5, color="0.35")
+    # 256 colours are enough for one colour map, and a third of the bytes.
+    pixels = io.BytesIO()
+    figure.savefig(pixels, dpi=100)
+    plt.close(figure)
+    PIL.Image.open(pixels).convert("RGB").quantize(256).save(path, optimize=True)
+
+
+def draw_footprints(images, columns, path):
+    """One map: a row for each model, a column for each footprint.
+
     @param images   title of a row -> image for each column, top row first; the first row is the truth
     @param columns  title of each column
     """
     truth = next(iter(images.values()))
     margin, reach = crop(truth)
-    size = truth[0].shape[0]
-    figure, axes = plt.subplots(len(images), len(columns), squeeze=False,
-                                figsize=(CELL_INCHES * len(columns) + 1.35, CELL_INCHES * len(images) + 0.5))
-    for r, (title, row) in enumerate(images.items()):
+    figure, axes = grid(list(images), columns)
+    for r, row in enumerate(images.values()):
         for c, image in enumerate(row):
-            axis = axes[r, c]
             # One scale for a column, so that its rows can be compared.
-            axis.imshow(np.log1p(image[margin : size - margin, margin : size - margin]), cmap="inferno", vmin=0,
-                        vmax=np.log1p(truth[c].max()), extent=(-reach, reach, -reach, reach), interpolation="nearest")
-            axis.set_xticks([])
-            axis.set_yticks([])
-            for spine in axis.spines.values():
-                spine.set_visible(False)
-            if r == 0:
-                axis.set_title(columns[c], fontsize=10)
-            else:
-                error = np.linalg.norm(image - truth[c]) / np.linalg.norm(truth[c])
-                axis.text(0.97, 0.03, f"error {100 * error:.1f} %", transform=axis.transAxes, ha="right", va="bottom", fontsize=8,
-                          color="white")
-        axes[r, 0].set_ylabel(title, fontsize=10, rotation=0, ha="right", va="center", labelpad=8)
-    figure.text(0.995, 0.004, f"half vectors within $\\pm${reach:.2f}; log(1 + density); error: relative L2 from the reference",
-                ha="right", va="bottom", fontsize=7.5, color="0.35")
-    figure.subplots_adjust(left=0.19, right=0.995, top=1 - 0.28 / figure.get_figheight(), bottom=0.25 / figure.get_figheight(), wspace=0.03,
-                           hspace=0.03)
-    # 256 colours are enough for one colour map, and a third of the bytes.
-    pixels = io.BytesIO()
-    figure.savefig(pixels, dpi=100)
-    PIL.Image.open(pixels).convert("RGB").quantize(256).save(path, optimize=True)
+            show(axes[r, c], image, truth[c], margin, f"error {100 * relative(image, truth[c]):.1f} %" if r else "")
+    save(figure, f"half vectors within $\\pm${reach:.2f}; log(1 + density); error: relative L2 from the reference", path)
+
+
+def draw_models(maps, path):
+    """One footprint: a row for each map, a column for each model.
+
+    @param maps  title of a row -> {title of a column: (image, note)}; the first column is the truth
+    """
+    figure, axes = grid(list(maps), list(next(iter(maps.values()))), left=0.075)
+    for r, models in enumerate(maps.values()):
+        truth = next(iter(models.values()))[0]
+        margin, _ = crop([truth])
+        for c, (image, note) in enumerate(models.values()):
+            show(axes[r, c], image, truth, margin, f"error {100 * relative(image, truth):.1f} %\n{note}" if c else note)
+    save(figure, "log(1 + density) over half vectors inside one Gaussian footprint (bin map, histograms: the box of its second moments); "
+         "error: relative L2 from the reference; bytes of the file; time of a density query", path)

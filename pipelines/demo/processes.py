@@ -56,3 +56,7 @@ class Tools:
 
 def readable_bytes(size):
     return f"{size / 1e6:.2f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
+
+
+def readable_time(nanoseconds):
+    return f"{nanoseconds:.0f} ns" if nanoseconds < 1e3 else f"{nanoseconds / 1e3:.1f} us"
