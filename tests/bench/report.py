@@ -175,12 +175,14 @@ def main():
     machine = "{processor}, {cores} cores; load {load:.1f} before the run; revision {revision}.".format(**results["machine"])
     data = points(accuracy, results["rows"])
     arguments.docs.mkdir(exist_ok=True)
-    chart(data, 0, "MB", arguments.docs / "error-bytes.png")
-    chart(data, 2, "nanoseconds of a density query, random", arguments.docs / "error-time.png")
-    text = HEADER.format(machine=machine, size=results["size_texels"], repeats=results["repeats"])
-    text += f"\n{table(results['rows'])}\n\n## Error against bytes and time\n\n![Error against bytes](error-bytes.png)\n![Error against time](error-time.png)\n"
+    text = HEADER.format(machine=machine, size=results["size_texels"], repeats=results["repeats"]) + f"\n{table(results['rows'])}\n"
+    if data:
+        chart(data, 0, "MB", arguments.docs / "error-bytes.png")
+        chart(data, 2, "nanoseconds of a density query, random", arguments.docs / "error-time.png")
+        text += "\n## Error against bytes and time\n\n![Error against bytes](error-bytes.png)\n![Error against time](error-time.png)\n"
     text += light_section(results, arguments.results.parent, arguments.docs)
-    text += f"\n## Errors of every octave\n\nAgainst brute force over the texels, at footprints on the centres of a level and at random ones of its octave.\n\n{level_tables(accuracy)}"
+    if data:
+        text += f"\n## Errors of every octave\n\nAgainst brute force over the texels, at footprints on the centres of a level and at random ones of its octave.\n\n{level_tables(accuracy)}"
     (arguments.docs / "BENCHMARKS.md").write_text(text.rstrip() + "\n")
     print(f"wrote {arguments.docs}/BENCHMARKS.md and its charts")
 
