@@ -104,14 +104,14 @@ LightQuery::Lobe LightQuery::lobe(const NdfAsset& asset, int order) const {
 }
 
 Rgb LightQuery::transfer(const NdfAsset& asset, float sigma_r, Vec3 wo) const {
-  const Fresnel fresnel = ior_ > 0       ? Fresnel::dielectric(ior_)
-                          : !eta_.empty() ? Fresnel::conductor({eta_[0], eta_[1], eta_[2]}, {k_[0], k_[1], k_[2]})
-                                          : Fresnel::mirror();
-  const Rgb reflectance = Rgb{fresnel_[0], fresnel_[1], fresnel_[2]} * fresnel.reflectance(wo.z);
-  if (!smith_) return transferFactor(1, shadowing_, wo.z) * reflectance;
-  const MapSlopes slopes = asset.asset().kind() == "histogram-sat" ? asset.asset().histograms().slopes
-                                                                  : bake::mapSlopes(asset.asset().normals());
-  return Rgb{fresnel_[0], fresnel_[1], fresnel_[2]} * transferFactor(fresnel, SmithMasking(slopes, sigma_r), wo);
+  const Rgb given = {fresnel_[0], fresnel_[1], fresnel_[2]};
+  Fresnel fresnel = Fresnel::mirror();
+  if (ior_ > 0) fresnel = Fresnel::dielectric(ior_);
+  if (!eta_.empty()) fresnel = Fresnel::conductor({eta_[0], eta_[1], eta_[2]}, {k_[0], k_[1], k_[2]});
+  if (!smith_) return transferFactor(1, shadowing_, wo.z) * (given * fresnel.reflectance(wo.z));
+  const formats::Asset& map = asset.asset();
+  const MapSlopes slopes = map.kind() == "histogram-sat" ? map.histograms().slopes : bake::mapSlopes(map.normals());
+  return given * transferFactor(fresnel, SmithMasking(slopes, sigma_r), wo);
 }
 
 void LightQuery::report(const ShLightIntegral& integral, Rgb transfer) {

@@ -117,7 +117,8 @@ void requireTableFits(int order, double bytes_per_coefficient, std::uint64_t max
   std::snprintf(what, sizeof what, "a table of order %d needs %.1f GB, more than the limit of %.1f GB", order, bytes / 1e9,
                 static_cast<double>(max_bytes) / 1e9);
   throw Error(ErrorCode::usage, "sh.memory", {}, "order", what,
-              (fits >= 0 ? "order " + std::to_string(fits) + " fits; " : std::string()) + "ask for a smaller grid or order, or allow more memory");
+              (fits >= 0 ? "order " + std::to_string(fits) + " fits; " : std::string()) +
+                  "ask for a smaller grid or order, or allow more memory");
 }
 
 ShLobesData buildShLobes(const ShLobesOptions& options, const ProgressFn& progress) {

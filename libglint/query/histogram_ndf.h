@@ -33,7 +33,8 @@ inline constexpr float kSlantTolerance = 0.06f;
 /// even over the bin's area of the disk: the histogram knows no more. Bins are some ten degrees wide, far wider than the intrinsic
 /// roughness, so there is no further blur, and the density integrates to 1 over the disk.
 /// Cost: a few texels for each texel along the border of an axis-aligned box (and none beyond some hundreds), four rows of
-/// counters; at an angle that for some 1 / tolerance strips, and exactly O(stride * border). Thread-safe, allocates nothing; the arrays must outlive it.
+/// counters; at an angle that for some 1 / tolerance strips, and exactly O(stride * border).
+/// Thread-safe, allocates nothing; the arrays must outlive it.
 class HistogramNdf {
  public:
   /// @param slant_tolerance  share of a footprint with slanted sides that may be misplaced, >= 0; 0: none, all boxes are exact

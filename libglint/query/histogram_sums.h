@@ -330,7 +330,7 @@ class RectangleSums {
     for (; k < to; ++k) sum_.addTexel(tile[k % kSize * kStep], k & 3, area);
   }
 
-  /// The largest rectangle of points of the coarse table inside one of the fine table, in points of both; empty if c0 >= c1 or d0 >= d1.
+  /// The largest rectangle of the coarse table inside one of the fine table, in points of both; empty if c0 >= c1 or d0 >= d1.
   struct Inner {
     int c0, c1, d0, d1;
     int a0, a1, b0, b1;

@@ -15,12 +15,12 @@ struct StripPlan {
   double misplaced = 0;  ///< largest share of the parallelogram that they may count in a wrong place
 };
 
-/// The fewest strips that misplace no more than a share of a parallelogram.
+/// Strips of one height, the highest that misplace no more than a share of a parallelogram.
 ///
-/// In a strip of height h a side that runs over r texels along u is off its mean by 8/27 r h at most, on average over the strip (by r h / 4
-/// where it has no corner). Over all strips that adds up to 32/27 h (|ax| + |bx|); half of it is misplaced: what one side has too
-/// much lacks elsewhere. Moving the ends to points `snap` apart moves 1/2 snap * height of area on each side, which counts twice since
-/// shares of a changed area are taken.
+/// In a strip of height h, a side that runs over r texels along u and its mean enclose an area of 8/27 r h at most (r h / 4 where it
+/// has no corner): over all strips, 32/27 h (|ax| + |bx|). Half of that is misplaced, since what is too much here lacks there.
+/// Moving the ends to points `snap` apart moves an area of 1/2 snap * height on each side, which counts twice since shares are taken of
+/// an area that has changed.
 /// @param ax, ay, bx, by  half axes, texels
 GLINT_HD inline StripPlan planStrips(const HistogramSat& sat, double ax, double ay, double bx, double by, double tolerance) {
   const double area = 4 * std::fabs(ax * by - ay * bx), height = 2 * (std::fabs(ay) + std::fabs(by));

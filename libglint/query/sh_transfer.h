@@ -23,7 +23,8 @@ GLINT_HD inline float transferFactor(float fresnel, float shadowing, float wo_do
 ///   const HistogramNdf ndf(asset.histograms());
 ///   const SmithMasking masking(asset.histograms().slopes, sigma_r);
 ///   const ShLightIntegral light = query.integral(ndf, footprint, frame, wo_world, {}, scratch);
-///   const Rgb radiance = transferFactor(Fresnel::conductor(eta, k), masking, wo) * Rgb{light.value[0], light.value[1], light.value[2]};
+///   const Rgb integral = {light.value[0], light.value[1], light.value[2]};
+///   const Rgb radiance = transferFactor(Fresnel::conductor(eta, k), masking, wo) * integral;
 ///
 /// @param wo  outgoing direction in the tangent frame, unit; the result is 0 at and below the surface
 GLINT_HD inline Rgb transferFactor(const Fresnel& fresnel, const SmithMasking& masking, Vec3 wo) {

@@ -179,6 +179,7 @@ def test_clamped_light_says_so(glint, folder):
         process = glint("query", "flat.glint", "--uv", 0.5, 0.5, "--sigma", 2, "--light", "light.glint", "--wo", math.sin(tilt), 0, math.cos(tilt), "--json")
         document = json.loads(process.stdout)
         result = document["result"]
+        assert result["clamped"] == ("clamped" in process.stderr)
         assert min(result["light_integral"]) >= 0
         assert result["clamped"] == (min(result["signed_light_integral"]) < 0) == any("clamped" in w for w in document["warnings"])
         clamped += result["clamped"]
@@ -292,6 +293,11 @@ def test_lowest_orders(glint, folder, order):
     assert glint("shlobes", "--sigma-r", 0.1, "--order", order, "-o", "lobes.glint").returncode == 0
     assert glint("shlobes", "--light", "env.exr", "--order", order, "-o", "light.glint").returncode == 0
     assert glint("validate", "lobes.glint", "light.glint").returncode == 0
+    for command in (["synth", "isotropic", "--size", 32, "-o", "map.exr"], ["ingest", "map.exr", "-o", "n.glint"], ["sat", "n.glint", "-o", "s.glint"]):
+        assert glint(*command).returncode == 0
+    asked = ["s.glint", "--uv", 0.5, 0.5, "--sigma", 4, "--light", "light.glint", "--lobes", "lobes.glint", "--wo", 0.2, 0, 0.9]
+    result = ask(glint, *asked)
+    assert result["order"] == order and min(result["radiance"]) > 0
 
 
 def test_light_of_other_models_and_kinds_is_refused(glint, folder):

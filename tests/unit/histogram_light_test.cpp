@@ -99,7 +99,8 @@ class Chain {
     double error = 0, norm = 0;
     for (std::size_t d = 0; d < truth.size(); ++d) {
       const ShLightIntegral answer = ask(ndf, p, directions()[d]);
-      for (std::size_t c = 0; c < 3; ++c) error += std::pow(answer.value[c] - truth[d][c], 2), norm += truth[d][c] * truth[d][c];
+      for (std::size_t c = 0; c < 3; ++c)
+        error += std::pow(answer.value[c] - truth[d][c], 2), norm += truth[d][c] * truth[d][c];
     }
     return std::sqrt(error / norm);
   }

@@ -274,7 +274,8 @@ TEST(HistogramSat, StripsChangeSmoothlyAsABoxMoves) {
   const HistogramNdf ndf(built.data.view());
   constexpr float kStep = 1.0f / 64;  // texel
   const auto at = [](int k) {
-    return Footprint::box({0.3f + static_cast<float>(k) * kStep / 64, 0.4f + 0.3f * static_cast<float>(k) * kStep / 64}, {14, 9}, {-9, 14});
+    const float moved = static_cast<float>(k) * kStep / 64;
+    return Footprint::box({0.3f + moved, 0.4f + 0.3f * moved}, {14, 9}, {-9, 14});
   };
   ASSERT_GT(stripPlanBound(built.data.view(), at(0), kSlantTolerance), 0);
   std::vector<double> before = sharesByTable(ndf, at(0));
