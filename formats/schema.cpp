@@ -37,6 +37,14 @@ std::vector<AttributeSchema> mapSize() {
           real("texel_size_um", 0, FLT_MAX, "um", "width of a texel; 0 when unknown")};
 }
 
+AttributeSchema slopeMean() {
+  return {"slope_mean", f32, "2", "1", "mean slope of the map's texels along u and v", -kMaxSlope, kMaxSlope};
+}
+AttributeSchema slopeCovariance() {
+  constexpr double kMost = kMaxSlope * kMaxSlope;
+  return {"slope_covariance", f32, "3", "1", "uu, uv, vv of the slopes of the map's texels", -kMost, kMost};
+}
+
 /// Attributes of glint::PyramidShape.
 std::vector<AttributeSchema> pyramidShape() {
   return {
@@ -50,9 +58,8 @@ std::vector<AttributeSchema> pyramidShape() {
       {"level_strides", f32, "level_count", "texel", "distance between footprint centres of each level", FLT_MIN, kMaxMapSize},
       {"level_columns", i32, "level_count", "1", "footprints along u of each level", 1, kMaxMapSize},
       {"level_rows", i32, "level_count", "1", "footprints along v of each level", 1, kMaxMapSize},
-      {"slope_mean", f32, "2", "1", "mean slope of the map's texels along u and v", -kMaxSlope, kMaxSlope},
-      {"slope_covariance", f32, "3", "1", "uu, uv, vv of the slopes of the map's texels", -kMaxSlope * kMaxSlope,
-       kMaxSlope * kMaxSlope}};
+      slopeMean(),
+      slopeCovariance()};
 }
 
 std::vector<AttributeSchema> joined(std::vector<AttributeSchema> a, const std::vector<AttributeSchema>& b) {
@@ -81,7 +88,8 @@ KindSchema histogramSatSchema() {
        integer("stride", 1, kStride, "texel", "distance between the points of sums"),
        integer("coarse_stride", 1, kStride, "texel", "distance between the points of coarse_sums; a multiple of stride"),
        integer("line_stride", 1, HistogramSat::kMaxLineStride, "texel",
-               "distance between the points of row_sums, column_sums")},
+               "distance between the points of row_sums, column_sums"),
+       slopeMean(), slopeCovariance()},
       {{"row_length", "ceil_div(bin_count, 16) * 16", "counters of a point"}},
       {{"bin_ids", "", {{"", u16}}, {"bin_count"}, "1", "ring * phi_bins + sector of each bin that occurs, increasing"},
        {"bin_normals", "", {{"", f32}}, {"bin_count", "2"}, "1", "mean (nx, ny) of the texels of each bin"},

@@ -15,9 +15,13 @@ NdfAsset::NdfAsset(Tool& tool) {
               "how normals behave between texels (kind normals)");
   tool.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
               "beyond the border of the map (kind normals)");
-  tool.option("--sigma-r", options_.sigma_r, "intrinsic roughness, disk units (kind normals)").range(1e-4, 0.25);
+  tool.option("--sigma-r", options_.sigma_r, "intrinsic roughness, disk units (kind normals; histogram-sat with --light)")
+      .range(1e-4, 0.25);
   tool.choice("--gaussian-boxes", options_.gaussian_boxes, {{"1", GaussianBoxes::one}, {"3", GaussianBoxes::three}},
               "boxes that stand for a Gaussian footprint (kind histogram-sat)");
+  tool.option("--slant-tolerance", options_.slant_tolerance,
+              "share of a footprint with slanted sides that may be misplaced; 0: exact, and slower (kind histogram-sat)")
+      .range(0, 1);
   tool.addCheck([this] {
     checkReadable(path_);
     if (!normals_path_.empty()) checkReadable(normals_path_);

@@ -27,6 +27,9 @@ class NdfAsset {
   int resolution() const { return opened_->info().resolution; }
 
   const api::NdfInfo& info() const { return opened_->info(); }
+  const formats::Asset& asset() const { return opened_->asset(); }
+  /// Intrinsic roughness of the facets: the asset's own, or --sigma-r where it has none.
+  float facetRoughness() const { return info().sigma_r > 0 ? info().sigma_r : options_.sigma_r; }
 
   /// The NDF image of a footprint where there is a faster way than asking for every pixel: normals of a flat surface.
   /// @return [size][size] pixel means, bottom row first

@@ -54,18 +54,23 @@ ordered_json summarizeHeights(const HeightMap& map) {
           {"deviation_texels", std::sqrt(std::max(0.0, squares / count - mean * mean))}};
 }
 
+void addSlopes(const MapSlopes& slopes, ordered_json& properties) {
+  properties["mean_slope"] = {slopes.mean.x, slopes.mean.y};
+  properties["slope_covariance_xx"] = slopes.covariance.xx;
+  properties["slope_covariance_xy"] = slopes.covariance.xy;
+  properties["slope_covariance_yy"] = slopes.covariance.yy;
+}
+
 ordered_json shapeProperties(const PyramidShape& shape) {
-  return {{"width", shape.width},
-          {"height", shape.height},
-          {"resolution", shape.resolution},
-          {"sigma_r", shape.sigma_r},
-          {"surface", shape.surface == Surface::flat ? "flat" : "smooth"},
-          {"boundary", shape.boundary == Boundary::wrap ? "wrap" : "clamp"},
-          {"levels", shape.level_count},
-          {"mean_slope", {shape.slopes.mean.x, shape.slopes.mean.y}},
-          {"slope_covariance_xx", shape.slopes.covariance.xx},
-          {"slope_covariance_xy", shape.slopes.covariance.xy},
-          {"slope_covariance_yy", shape.slopes.covariance.yy}};
+  ordered_json properties = {{"width", shape.width},
+                             {"height", shape.height},
+                             {"resolution", shape.resolution},
+                             {"sigma_r", shape.sigma_r},
+                             {"surface", shape.surface == Surface::flat ? "flat" : "smooth"},
+                             {"boundary", shape.boundary == Boundary::wrap ? "wrap" : "clamp"},
+                             {"levels", shape.level_count}};
+  addSlopes(shape.slopes, properties);
+  return properties;
 }
 
 ordered_json levelJson(const PyramidGrid& grid) {
@@ -245,6 +250,7 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
                   {"stride_texels", sat.stride},
                   {"coarse_stride_texels", sat.coarse_stride},
                   {"line_stride_texels", sat.line_stride}};
+    addSlopes(sat.slopes, properties);
     statistics = summarizeHistograms(sat, asset.info());
   } else if (asset.kind() == "sh-lobes") {
     const ShLobes& lobes = asset.shLobes();

@@ -9,8 +9,8 @@
 
 #include "common/files.h"
 #include "glint/bake/sh_lobes.h"
+#include "glint/bake/slopes.h"
 #include "glint/formats/asset_reader.h"
-#include "glint/query/sh_transfer.h"
 
 namespace glint::apps {
 namespace {
@@ -62,12 +62,26 @@ LightQuery::LightQuery(Tool& tool) : tool_(tool) {
   tool.option("--tolerance", options_.tolerance, "--light: leave out bands that change less than this share of the mean light")
       .range(0, 1)
       .needs(light);
-  tool.option("--fresnel", fresnel_, "--light: reflectance R G B at the angle of --wo")
-      .count(3)
-      .range(0, 1)
-      .defaultText("1 1 1")
-      .needs(light);
-  tool.option("--shadowing", shadowing_, "--light: G of --wo and its mirror direction").range(0, 1).needs(light);
+  const Option& fresnel = tool.option("--fresnel", fresnel_, "--light: reflectance R G B at the angle of --wo")
+                              .count(3)
+                              .range(0, 1)
+                              .defaultText("1 1 1")
+                              .needs(light);
+  const Option& ior = tool.option("--ior", ior_, "--light: instead of --fresnel, refractive index of a dielectric")
+                          .range(1e-3, 1e3)
+                          .defaultText("none")
+                          .needs(light)
+                          .excludes(fresnel);
+  Option& eta = tool.option("--eta", eta_, "--light: instead of --fresnel, refractive index R G B of a metal; needs --k")
+                    .count(3)
+                    .range(0, 1e3)
+                    .needs(light)
+                    .excludes(fresnel)
+                    .excludes(ior);
+  eta.needs(tool.option("--k", k_, "--light: extinction R G B of a metal").count(3).range(0, 1e3).needs(eta));
+  const Option& shadowing =
+      tool.option("--shadowing", shadowing_, "--light: G of --wo and its mirror direction").range(0, 1).needs(light);
+  tool.flag("--smith", smith_, "--light: instead of --shadowing, G by the slopes of the map").needs(light).excludes(shadowing);
   tool.addCheck([this] { check(); });
 }
 
@@ -80,26 +94,51 @@ void LightQuery::check() const {
                 "add --wo X Y Z with Z > 0");
 }
 
-void LightQuery::run(const AnyNdf& model, const api::NdfInfo& info, const Footprint& footprint) {
-  if (info.surface != Surface::flat)
-    throw Error(ErrorCode::unsupported, "query.light", "", "--surface", "light is summed over facets, not over smooth surfaces",
-                "leave out --surface smooth");
-  float sigma_r = info.sigma_r;
-  const formats::Asset asset = formats::Asset::open(path_);
-  const ShLight& light = asset.shLight();
-  std::vector<float> zonal;
+LightQuery::Lobe LightQuery::lobe(const NdfAsset& asset, int order) const {
   if (!lobes_path_.empty()) {
     const formats::Asset lobes = formats::Asset::open(lobes_path_);
-    zonal.assign(lobes.shLobes().zonal.begin(), lobes.shLobes().zonal.end());
-    sigma_r = lobes.shLobes().sigma_r;
-  } else {
-    const std::vector<double> f = bake::zonalLobe(sigma_r, light.order);
-    zonal.assign(f.begin(), f.end());
+    return {{lobes.shLobes().zonal.begin(), lobes.shLobes().zonal.end()}, lobes.shLobes().sigma_r};
   }
+  const std::vector<double> f = bake::zonalLobe(asset.facetRoughness(), order);
+  return {{f.begin(), f.end()}, asset.facetRoughness()};
+}
+
+Rgb LightQuery::transfer(const NdfAsset& asset, float sigma_r, Vec3 wo) const {
+  const Rgb given = {fresnel_[0], fresnel_[1], fresnel_[2]};
+  Fresnel fresnel = Fresnel::mirror();
+  if (ior_ > 0) fresnel = Fresnel::dielectric(ior_);
+  if (!eta_.empty()) fresnel = Fresnel::conductor({eta_[0], eta_[1], eta_[2]}, {k_[0], k_[1], k_[2]});
+  if (!smith_) return transferFactor(1, shadowing_, wo.z) * (given * fresnel.reflectance(wo.z));
+  const formats::Asset& map = asset.asset();
+  const MapSlopes slopes = map.kind() == "histogram-sat" ? map.histograms().slopes : bake::mapSlopes(map.normals());
+  return given * transferFactor(fresnel, SmithMasking(slopes, sigma_r), wo);
+}
+
+void LightQuery::report(const ShLightIntegral& integral, Rgb transfer) {
+  const Rgb value = {integral.value[0], integral.value[1], integral.value[2]}, radiance = transfer * value;
+  tool_.print(fmt::format("{:.6g} {:.6g} {:.6g}\n", radiance.r, radiance.g, radiance.b));
+  if (integral.clamped)
+    tool_.warn("the series falls below zero and was clamped: ask for a higher order or for --window lanczos");
+  tool_.setResult({{"radiance", {radiance.r, radiance.g, radiance.b}},
+                   {"transfer", {transfer.r, transfer.g, transfer.b}},
+                   {"light_integral", integral.value},
+                   {"signed_light_integral", integral.signed_value},
+                   {"clamped", integral.clamped},
+                   {"order", integral.order}});
+}
+
+void LightQuery::run(const NdfAsset& asset, const Footprint& footprint) {
+  if (asset.info().surface != Surface::flat)
+    throw Error(ErrorCode::unsupported, "query.light", "", "--surface", "light is summed over facets, not over smooth surfaces",
+                "leave out --surface smooth");
+  const formats::Asset light_asset = formats::Asset::open(path_);
+  const ShLight& light = light_asset.shLight();
+  const Lobe lobe = this->lobe(asset, light.order);
   const Vec3 given = {wo_[0], wo_[1], wo_[2]}, wo = 1 / std::sqrt(dot(given, given)) * given;
   const auto ask = [&](const auto& histogram) {
-    return light.order <= kShFloatOrder ? integrate<float>(light, zonal, sigma_r, histogram, footprint, wo, options_)
-                                        : integrate<double>(light, zonal, sigma_r, histogram, footprint, wo, options_);
+    return light.order <= kShFloatOrder
+               ? integrate<float>(light, lobe.zonal, lobe.sigma_r, histogram, footprint, wo, options_)
+               : integrate<double>(light, lobe.zonal, lobe.sigma_r, histogram, footprint, wo, options_);
   };
   const ShLightIntegral integral = std::visit(
       [&](const auto& m) -> ShLightIntegral {
@@ -112,23 +151,8 @@ void LightQuery::run(const AnyNdf& model, const api::NdfInfo& info, const Footpr
           throw Error(ErrorCode::unsupported, "query.light", "", "",
                       "this kind of asset cannot list the normals of a footprint", "ask the normals, or a histogram of them");
       },
-      model);
-
-  nlohmann::json radiance = nlohmann::json::array(), signed_integral = nlohmann::json::array(), value = nlohmann::json::array();
-  for (std::size_t c = 0; c < 3; ++c) {
-    value.push_back(integral.value[c]);
-    signed_integral.push_back(integral.signed_value[c]);
-    radiance.push_back(transferFactor(fresnel_[c], shadowing_, wo.z) * integral.value[c]);
-  }
-  tool_.print(
-      fmt::format("{:.6g} {:.6g} {:.6g}\n", radiance[0].get<float>(), radiance[1].get<float>(), radiance[2].get<float>()));
-  if (integral.clamped)
-    tool_.warn("the series falls below zero and was clamped: ask for a higher order or for --window lanczos");
-  tool_.setResult({{"radiance", radiance},
-                   {"light_integral", value},
-                   {"signed_light_integral", signed_integral},
-                   {"clamped", integral.clamped},
-                   {"order", integral.order}});
+      asset.model());
+  report(integral, transfer(asset, lobe.sigma_r, wo));
 }
 
 }  // namespace glint::apps

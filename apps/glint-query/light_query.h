@@ -6,6 +6,7 @@
 #include "common/ndf_models.h"
 #include "common/tool.h"
 #include "glint/query/sh_light_query.h"
+#include "glint/query/sh_transfer.h"
 
 namespace glint::apps {
 
@@ -17,18 +18,28 @@ class LightQuery {
   /// Whether --light was given.
   bool asked() const { return !path_.empty(); }
 
-  /// Integrates the light against the asset's normals and prints the result.
-  /// @param info  its roughness is that of the facets, unless --lobes says it
+  /// Integrates the light against the asset's normals and prints the result. Facets are as rough as the asset says, or --lobes.
   /// @throws Error unsupported if the model cannot list the normals of a footprint, or they are not facets
-  void run(const AnyNdf& model, const api::NdfInfo& info, const Footprint& footprint);
+  void run(const NdfAsset& asset, const Footprint& footprint);
 
  private:
+  /// The roughness lobe of the facets.
+  struct Lobe {
+    std::vector<float> zonal;
+    float sigma_r;
+  };
+
   void check() const;
+  Lobe lobe(const NdfAsset& asset, int order) const;
+  /// F G / (4 cos) towards wo.
+  Rgb transfer(const NdfAsset& asset, float sigma_r, Vec3 wo) const;
+  void report(const ShLightIntegral& integral, Rgb transfer);
 
   Tool& tool_;
   std::string path_, lobes_path_;
-  std::vector<float> wo_, fresnel_ = {1, 1, 1};
-  float shadowing_ = 1;
+  std::vector<float> wo_, fresnel_ = {1, 1, 1}, eta_, k_;
+  float shadowing_ = 1, ior_ = 0;
+  bool smith_ = false;
   ShLightOptions options_;
   Option* wo_option_;
 };

@@ -82,7 +82,7 @@ void QueryCommand::run(NdfAsset& asset) {
   asset.requireAnswerable(footprint());
   if (!image_.empty()) writePicture(asset);
   if (samples_ > 0) writeSamples(asset);
-  if (light_.asked()) return light_.run(asset.model(), asset.info(), footprint());
+  if (light_.asked()) return light_.run(asset, footprint());
   if (half_option_->given() || range_option_->given()) answerOne(asset);
 }
 

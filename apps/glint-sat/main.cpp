@@ -11,8 +11,8 @@ using namespace glint;
 int main(int argc, char** argv) {
   apps::Tool tool(
       {"glint-sat",
-       "Accumulates histograms of the normals of a map over bins of directions: tables that give the histogram of any "
-       "footprint at once, exactly.",
+       "Accumulates histograms of the normals of a map over bins of directions: tables that give the histogram of a "
+       "footprint of any size at once.",
        "glint-sat flakes.glint -o flakes.sat.glint --bins 9x32 --stride 8"});
   const apps::InputFile input(tool, "asset of kind normals, from glint-ingest", "NORMALS");
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind histogram-sat");

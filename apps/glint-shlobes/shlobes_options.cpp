@@ -39,7 +39,7 @@ ShLobesCommand::ShLobesCommand(Tool& tool) {
   tool.option("--max-memory", max_memory_, "refuse larger tables, GB").range(0, 1e6).unrecorded();
   tool.option("--band-limit", band_limit_, "--light: highest band of the environment itself")
       .range(0, 10000)
-      .defaultText("3 order + 24");
+      .defaultText("3 order + 24; below order 60 the least of 6 order + 24 and 204");
   tool.option("--area-height", area_lights_.height,
               "area lights: pixels of the image that they are drawn to, from pole to pole")
       .range(1, 4096);

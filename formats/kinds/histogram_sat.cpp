@@ -2,7 +2,7 @@
 #include <array>
 #include <cmath>
 
-#include "glint/formats/kinds/codec.h"
+#include "glint/formats/kinds/pyramid_shape.h"
 
 namespace glint::formats {
 namespace {
@@ -99,6 +99,7 @@ PackedAsset pack(const HistogramSat& sat) {
   packed.integer("stride", sat.stride);
   packed.integer("coarse_stride", sat.coarse_stride);
   packed.integer("line_stride", sat.line_stride);
+  packSlopes(sat.slopes, packed);
   const std::uint64_t bins = size(sat.bin_count);
   const std::uint64_t length = size(sat.rowLength());
   const std::uint64_t tile = HistogramSat::kTileSize;
@@ -129,6 +130,7 @@ void unpack(const Content& content, HistogramSat& sat) {
   sat.stride = content.integer("stride");
   sat.coarse_stride = content.integer("coarse_stride");
   sat.line_stride = content.integer("line_stride");
+  sat.slopes = unpackSlopes(content);
   sat.bin_ids = content.array<std::uint16_t>("bin_ids");
   sat.bin_normals = content.array<Vec2>("bin_normals");
   sat.bin_totals = content.array<std::uint64_t>("bin_totals");
@@ -157,6 +159,7 @@ void checkIndex(const HistogramSat& sat, Findings& findings) {
     findings.add("histogram.texels", "/texels",
                  "name bin " + std::to_string(*highest) + " of " + std::to_string(sat.bin_count));
   }
+  checkSlopes(sat.slopes, findings);
 }
 
 void checkData(const HistogramSat& sat, Findings& findings) {

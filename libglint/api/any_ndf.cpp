@@ -64,7 +64,7 @@ OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& o
     opened.model_ = ndf;
     opened.info_ = {map.width, map.height, kReferenceResolution, ndf.sigma(), Surface::flat, Boundary::wrap, 0, 0};
   } else if (asset.kind() == "histogram-sat") {
-    opened.model_ = HistogramNdf(asset.histograms(), options.gaussian_boxes);
+    opened.model_ = HistogramNdf(asset.histograms(), options.gaussian_boxes, options.slant_tolerance);
     opened.info_ = infoOf(asset.histograms());
   } else {
     throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",

@@ -23,6 +23,7 @@ struct NdfOptions {
   Boundary boundary = Boundary::wrap;  ///< kind normals: beyond the border of the map
   float sigma_r = 0.005f;              ///< kind normals: intrinsic roughness, disk units
   GaussianBoxes gaussian_boxes = GaussianBoxes::one;  ///< kind histogram-sat: boxes that stand for a Gaussian footprint
+  float slant_tolerance = kSlantTolerance;            ///< kind histogram-sat: share of a slanted footprint that may be misplaced
   bool verify_hashes = false;                         ///< also compare every dataset with its hash; reads the whole file
 };
 

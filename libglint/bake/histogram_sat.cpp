@@ -9,6 +9,7 @@
 #include <mutex>
 #include <string>
 
+#include "glint/bake/slopes.h"
 #include "glint/model/error.h"
 #include "glint/query/spherical_bins.h"
 
@@ -231,6 +232,7 @@ HistogramSatData buildHistogramSat(const NormalMap& map, const HistogramSatOptio
   checkOptions(map, options);
   HistogramSatData sat;
   sat.shape = shapeFor(map, options);
+  sat.shape.slopes = mapSlopes(map);
   const HistogramSat& shape = sat.shape;
   sat.texels.allocate(static_cast<std::size_t>(shape.tileColumns()) * shape.tileRows() * kTile * kTile);
   const SphericalBins bins(options.theta_bins, options.phi_bins);

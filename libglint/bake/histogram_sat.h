@@ -35,7 +35,7 @@ struct CounterArray {
 /// A HistogramSat that owns its arrays.
 class HistogramSatData {
  public:
-  HistogramSat shape;  ///< sizes and strides; its spans are empty
+  HistogramSat shape;  ///< sizes, strides and slopes; its spans are empty
   std::vector<std::uint16_t> bin_ids;
   std::vector<Vec2> bin_normals;
   std::vector<std::uint64_t> bin_totals;

@@ -153,7 +153,7 @@ class LightTask {
 void requireUsableOptions(const ShLightOptions& options) {
   if (options.order < 0 || options.order > kMaxShLightOrder)
     throw Error(
-        ErrorCode::usage, "sh.order", {}, {},
+        ErrorCode::usage, "sh.order", {}, "order",
         "light tables of order " + std::to_string(options.order) + " are not made: the time grows with the cube of the order",
         "give an order of 0 .. 300");
   requireUsableGrid(options.grid);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -37,9 +38,11 @@ struct ShLightData {
 
 /// Band of the environment up to which a table of an order can tell it apart. A half vector turns half as fast as the direction that it
 /// mirrors to, so `order` bands would do at normal incidence; around the direction opposite to the outgoing one, where whole rings of
-/// half vectors see one spot, no limit is enough. At 3 order + 24 the light of a single direction is right to 2e-7 of its norm up to 120
-/// degrees from the outgoing direction, and to 1e-3 up to 150 degrees (order 60).
-constexpr int lightBandLimit(int order) { return 3 * order + 24; }
+/// half vectors see one spot, no limit is enough: there the light of a direction turns as fast as half vectors turn about the rim. With
+/// this limit the light of a single direction is right to 1e-6 of its norm up to 120 degrees from the outgoing direction, and to
+/// 1e-3 up to 150 degrees (orders 20 to 60); with twice the limit to 1e-6 up to 140 (order 30). Facets that reflect by more have
+/// wo . h below 0.35.
+constexpr int lightBandLimit(int order) { return std::max(3 * order + 24, std::min(6 * order + 24, 204)); }
 
 /// Weight of band l of an environment: 1 up to half of the band limit, then smoothly to 0.
 double lightTaper(int l, int band_limit);

@@ -25,7 +25,8 @@ constexpr double kLobeReachSigmas = 9;
 
 void requireOrder(int order) {
   if (order >= 0 && order <= kMaxShOrder) return;
-  throw Error(ErrorCode::usage, "sh.order", {}, {}, "the order " + std::to_string(order) + " is not in 0 .. 1000");
+  throw Error(ErrorCode::usage, "sh.order", {}, "order", std::to_string(order) + " is not in 0 .. 1000",
+              "give an order in that range");
 }
 
 /// The table's directions of one polar angle.
@@ -115,8 +116,9 @@ void requireTableFits(int order, double bytes_per_coefficient, std::uint64_t max
   char what[160];
   std::snprintf(what, sizeof what, "a table of order %d needs %.1f GB, more than the limit of %.1f GB", order, bytes / 1e9,
                 static_cast<double>(max_bytes) / 1e9);
-  throw Error(ErrorCode::usage, "sh.memory", {}, {}, what,
-              (fits >= 0 ? "order " + std::to_string(fits) + " fits; " : std::string()) + "ask for a smaller grid or order");
+  throw Error(ErrorCode::usage, "sh.memory", {}, "order", what,
+              (fits >= 0 ? "order " + std::to_string(fits) + " fits; " : std::string()) +
+                  "ask for a smaller grid or order, or allow more memory");
 }
 
 ShLobesData buildShLobes(const ShLobesOptions& options, const ProgressFn& progress) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "glint/model/map_slopes.h"
 #include "glint/model/vec.h"
 
 namespace glint {
@@ -37,6 +38,7 @@ struct HistogramSat {
   int stride = 0;         ///< texels, 1..kMaxStride
   int coarse_stride = 0;  ///< texels; a multiple of stride, at most kMaxStride
   int line_stride = 0;    ///< texels, 1..kMaxLineStride
+  MapSlopes slopes;       ///< of the normal map's texels
 
   std::span<const std::uint16_t> bin_ids;      ///< [bin_count]: ring * phi_bins + sector, increasing
   std::span<const Vec2> bin_normals;           ///< [bin_count]: mean of (nx, ny) over the texels of a bin

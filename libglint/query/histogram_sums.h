@@ -19,6 +19,7 @@ struct BinCounts {
   static constexpr int kLaneStride =
       HistogramSat::kMaxBins + 24;           ///< not a multiple of 4 KiB, which processors take for a clash
   double totals[HistogramSat::kMaxBins];     ///< texels of each bin, once finished; >= 0
+  std::uint32_t whole[HistogramSat::kMaxBins];
   std::int64_t areas[kLanes * kLaneStride];  ///< kAreaUnits
 };
 
@@ -27,11 +28,13 @@ class AllBins {
  public:
   GLINT_HD AllBins(const HistogramSat& sat, BinCounts& counts)
       : totals_(counts.totals),
+        whole_(counts.whole),
         areas_(counts.areas),
         bin_totals_(sat.bin_totals.data()),
         count_(sat.bin_count),
         stride_(sat.rowLength()) {
-    std::fill(totals_, totals_ + stride_, 0.0);
+    std::fill_n(totals_, stride_, 0.0);
+    std::fill_n(whole_, stride_, 0u);
     for (int lane = 0; lane < BinCounts::kLanes; ++lane)
       std::fill_n(areas_ + lane * BinCounts::kLaneStride, stride_, std::int64_t{0});
   }
@@ -42,8 +45,20 @@ class AllBins {
   /// Adds weight * (a - b - c + d), all modulo the counters' type.
   template <class Counter>
   GLINT_HD void addCorners(const Counter* a, const Counter* b, const Counter* c, const Counter* d, double weight) {
+    if constexpr (sizeof(Counter) == sizeof(std::uint16_t))
+      if (weight == 1) return addWhole([=](int k) { return static_cast<std::uint16_t>(a[k] - b[k] - c[k] + d[k]); });
     for (int k = 0; k < stride_; ++k)
       totals_[k] += weight * static_cast<double>(static_cast<Counter>(a[k] - b[k] - c[k] + d[k]));
+  }
+  /// Adds weight times what lies between an outer and an inner rectangle, modulo 2^16. Corners as in addCorners.
+  GLINT_HD void addFrame(const std::uint16_t* const (&outer)[4], const std::uint16_t* const (&inner)[4], double weight) {
+    const std::uint16_t *a = outer[0], *b = outer[1], *c = outer[2], *d = outer[3];
+    const std::uint16_t *e = inner[0], *f = inner[1], *g = inner[2], *h = inner[3];
+    const auto between = [=](int k) {
+      return static_cast<std::uint16_t>((a[k] - b[k] - c[k] + d[k]) - (e[k] - f[k] - g[k] + h[k]));
+    };
+    if (weight == 1) return addWhole(between);
+    for (int k = 0; k < stride_; ++k) totals_[k] += weight * static_cast<double>(between(k));
   }
   GLINT_HD void addDifference(const std::uint16_t* after, const std::uint16_t* before, double weight) {
     for (int k = 0; k < stride_; ++k)
@@ -58,17 +73,37 @@ class AllBins {
     for (int k = 0; k < stride_; ++k) {
       constexpr int kLane = BinCounts::kLaneStride;
       const std::int64_t area = (areas_[k] + areas_[kLane + k]) + (areas_[2 * kLane + k] + areas_[3 * kLane + k]);
-      const double total = totals_[k] + static_cast<double>(area) * (1 / kAreaUnits);
+      const double total = totals_[k] + static_cast<double>(whole_[k]) + static_cast<double>(area) * (1 / kAreaUnits);
       totals_[k] = total > 0 ? total : 0;
     }
   }
 
  private:
+  /// So many differences of 16 bits fit a sum of 32.
+  static constexpr int kMostDifferences = 65536;
+
+  /// Adds difference(bin) of 16 bits: eight bins at a time, in vectors.
+  template <class Difference>
+  GLINT_HD void addWhole(Difference difference) {
+    if (differences_ == kMostDifferences) {
+      for (int k = 0; k < stride_; ++k) totals_[k] += static_cast<double>(whole_[k]);
+      std::fill_n(whole_, stride_, 0u);
+      differences_ = 0;
+    }
+    ++differences_;
+    // In local variables, which the sums cannot overwrite.
+    std::uint32_t* sums = whole_;
+    const int count = stride_;
+    for (int k = 0; k < count; ++k) sums[k] += difference(k);
+  }
+
   double* totals_;
+  std::uint32_t* whole_;
   std::int64_t* areas_;
   const std::uint64_t* bin_totals_;
   int count_;
   int stride_;
+  int differences_ = 0;
 };
 
 /// Sums the texels of one bin.
@@ -80,6 +115,10 @@ class OneBin {
   template <class Counter>
   GLINT_HD void addCorners(const Counter* a, const Counter* b, const Counter* c, const Counter* d, double weight) {
     total_ += weight * static_cast<double>(static_cast<Counter>(a[bin_] - b[bin_] - c[bin_] + d[bin_]));
+  }
+  GLINT_HD void addFrame(const std::uint16_t* const (&outer)[4], const std::uint16_t* const (&inner)[4], double weight) {
+    const auto inside = [&](const std::uint16_t* const(&c)[4]) { return c[0][bin_] - c[1][bin_] - c[2][bin_] + c[3][bin_]; };
+    total_ += weight * static_cast<double>(static_cast<std::uint16_t>(inside(outer) - inside(inner)));
   }
   GLINT_HD void addDifference(const std::uint16_t* after, const std::uint16_t* before, double weight) {
     total_ += weight * static_cast<double>(static_cast<std::uint16_t>(after[bin_] - before[bin_]));
@@ -100,8 +139,8 @@ class OneBin {
 /// Adds rectangles of texels to a sum over bins. Each texel counts by its covered area.
 ///
 /// A rectangle is moved to the nearest points of the fine table on all sides, and the strips between are added or taken off texel by
-/// texel, long ones from the sums along their rows and columns. Rectangles of 2^16 texels or more take their middle from the
-/// coarse table, whose counters are modulo 2^32, and the frame around it from the fine one in pieces below 2^16 texels.
+/// texel, long ones from the sums along their rows and columns. Rectangles of several times 2^16 texels take their middle from the
+/// coarse table, whose counters are modulo 2^32, and the frame around it from the fine one: at once, or in pieces, below 2^16 texels.
 template <class Sum>
 class RectangleSums {
  public:
@@ -114,6 +153,12 @@ class RectangleSums {
       forEachPiece(x0, x1, sat_.width,
                    [&](double a0, double a1, double times_x) { addInside(a0, a1, b0, b1, weight * times_x * times_y); });
     });
+  }
+
+  /// Starts to fetch what `add` needs, where the rectangle does not cross a border of the map.
+  GLINT_HD void prefetchWithin(double x0, double x1, double y0, double y1) const {
+    const double x = std::floor(x0 / sat_.width) * sat_.width, y = std::floor(y0 / sat_.height) * sat_.height;
+    if (x0 < x1 && x1 - x <= sat_.width && y1 - y <= sat_.height) prefetchInside(x0 - x, x1 - x, y0 - y, y1 - y);
   }
 
   /// Row of the map that row j of the endless plane repeats.
@@ -144,18 +189,18 @@ class RectangleSums {
     }
   }
 
-  /// Nearest point of the fine table along u, in texels of the endless plane.
-  GLINT_HD int nearestPointX(int x) const {
-    const int column = wrapIndex(x, sat_.width);
-    return x - column + texelOf(nearest(column, sat_.stride, sat_.width), sat_.stride, sat_.width);
+  /// Nearest point along u of a table of that stride, in texels of the endless plane.
+  GLINT_HD double nearestPointX(double x, int stride) const {
+    const double period = std::floor(x / sat_.width) * sat_.width;
+    return period + texelOf(nearest(x - period, stride, sat_.width), stride, sat_.width);
   }
 
-  /// Rows between two points of the fine table, of some kSlabTexels texels.
+  /// Rows between two points of the fine table.
   struct Slab {
     int begin, end;
   };
-  GLINT_HD Slab slabOf(int j) const {
-    const int span = sat_.stride * std::max(1, kSlabTexels / sat_.stride);
+  /// The slab around row j. Its height is a multiple of the fine table's stride.
+  GLINT_HD Slab slabOf(int j, int span) const {
     const int row = wrapIndex(j, sat_.height), begin = row / span * span;
     return {j - row + begin, j - row + std::min(begin + span, sat_.height)};
   }
@@ -165,9 +210,10 @@ class RectangleSums {
   static constexpr double kFewTexels = 96;
   /// What a difference of two points of row_sums costs, in texels.
   static constexpr int kDifferenceCost = 96;
-  /// Higher slabs leave more texels at their ends, lower ones make more rectangles.
-  static constexpr int kSlabTexels = 16;
   static constexpr std::int64_t kFineLimit = 65536;
+  /// Rectangles of less than so many times kFineLimit are added in pieces. With more, their shorter side times the largest stride
+  /// could exceed kFineLimit.
+  static constexpr int kMostPieces = 3;
   static constexpr int kCacheLine = 32;  // counters
 
   static GLINT_HD std::int64_t areaUnits(double area) { return static_cast<std::int64_t>(area * kAreaUnits); }
@@ -197,24 +243,28 @@ class RectangleSums {
     return x - texelOf(low, stride, size) <= texelOf(low + 1, stride, size) - x ? low : low + 1;
   }
 
+  /// The rectangle of points of the fine table that lies nearest to a rectangle of the map.
+  struct Points {
+    int a0, a1, b0, b1;
+  };
+  GLINT_HD Points nearestPoints(double x0, double x1, double y0, double y1) const {
+    return {nearest(x0, sat_.stride, sat_.width), nearest(x1, sat_.stride, sat_.width), nearest(y0, sat_.stride, sat_.height),
+            nearest(y1, sat_.stride, sat_.height)};
+  }
+
   /// A rectangle of the map itself.
   GLINT_HD void addInside(double x0, double x1, double y0, double y1, double weight) {
     if ((std::ceil(x1) - std::floor(x0)) * (std::ceil(y1) - std::floor(y0)) <= kFewTexels) {
       return forEachCovered(y0, y1, [&](int j, double covered) { addLine<false>(j, x0, x1, weight * covered); });
     }
-    const int stride = sat_.stride, width = sat_.width, height = sat_.height;
-    const int a0 = nearest(x0, stride, width), a1 = nearest(x1, stride, width);
-    const int b0 = nearest(y0, stride, height), b1 = nearest(y1, stride, height);
-    const double left = texelOf(a0, stride, width), right = texelOf(a1, stride, width);
-    prefetchLine<false>(y0, left, right);
-    prefetchLine<true>(x0, y0, y1);
-    prefetchLine<true>(x1, y0, y1);
-    prefetchLine<false>(y1, left, right);
-    prefetchCorners(a0, a1, b0, b1);
+    prefetchInside(x0, x1, y0, y1);
+    const auto [a0, a1, b0, b1] = nearestPoints(x0, x1, y0, y1);
+    const double left = texelOf(a0, sat_.stride, sat_.width), right = texelOf(a1, sat_.stride, sat_.width);
+    const double bottom = texelOf(b0, sat_.stride, sat_.height), top = texelOf(b1, sat_.stride, sat_.height);
     addStrip<true>(x0, left, y0, y1, weight);
     addStrip<true>(right, x1, y0, y1, weight);
-    addStrip<false>(y0, texelOf(b0, stride, height), left, right, weight);
-    addStrip<false>(texelOf(b1, stride, height), y1, left, right, weight);
+    addStrip<false>(y0, bottom, left, right, weight);
+    addStrip<false>(top, y1, left, right, weight);
     addPoints(a0, a1, b0, b1, weight);
   }
 
@@ -280,33 +330,55 @@ class RectangleSums {
     for (; k < to; ++k) sum_.addTexel(tile[k % kSize * kStep], k & 3, area);
   }
 
+  /// The largest rectangle of the coarse table inside one of the fine table, in points of both; empty if c0 >= c1 or d0 >= d1.
+  struct Inner {
+    int c0, c1, d0, d1;
+    int a0, a1, b0, b1;
+  };
+  GLINT_HD Inner innerOf(int a0, int a1, int b0, int b1) const {
+    const int last_a = sat_.pointsX(sat_.stride) - 1, last_b = sat_.pointsY(sat_.stride) - 1;
+    const int ratio = sat_.coarse_stride / sat_.stride;
+    Inner inner;
+    inner.c0 = (a0 + ratio - 1) / ratio;
+    inner.c1 = a1 == last_a ? sat_.pointsX(sat_.coarse_stride) - 1 : a1 / ratio;
+    inner.d0 = (b0 + ratio - 1) / ratio;
+    inner.d1 = b1 == last_b ? sat_.pointsY(sat_.coarse_stride) - 1 : b1 / ratio;
+    inner.a0 = std::min(inner.c0 * ratio, last_a), inner.a1 = std::min(inner.c1 * ratio, last_a);
+    inner.b0 = std::min(inner.d0 * ratio, last_b), inner.b1 = std::min(inner.d1 * ratio, last_b);
+    return inner;
+  }
+
   /// The rectangle between points (a0, b0) and (a1, b1) of the fine table.
   GLINT_HD void addPoints(int a0, int a1, int b0, int b1, double weight) {
     if (a0 >= a1 || b0 >= b1) return;
-    if (texels(a0, a1, b0, b1) < kFineLimit) return addFine(a0, a1, b0, b1, weight);
-    const int last_a = sat_.pointsX(sat_.stride) - 1, last_b = sat_.pointsY(sat_.stride) - 1;
-    if (a0 == 0 && b0 == 0 && a1 == last_a && b1 == last_b) return sum_.addMap(weight);  // may be all of 2^32 texels
-    const int ratio = sat_.coarse_stride / sat_.stride;
-    const int coarse_a = sat_.pointsX(sat_.coarse_stride) - 1, coarse_b = sat_.pointsY(sat_.coarse_stride) - 1;
-    const int c0 = (a0 + ratio - 1) / ratio, c1 = a1 == last_a ? coarse_a : a1 / ratio;
-    const int d0 = (b0 + ratio - 1) / ratio, d1 = b1 == last_b ? coarse_b : b1 / ratio;
-    if (c0 >= c1 || d0 >= d1) return addThin(a0, a1, b0, b1, weight);
-    const int inner_a0 = std::min(c0 * ratio, last_a), inner_a1 = std::min(c1 * ratio, last_a);
-    const int inner_b0 = std::min(d0 * ratio, last_b), inner_b1 = std::min(d1 * ratio, last_b);
-    addThin(a0, inner_a0, b0, b1, weight);
-    addThin(inner_a1, a1, b0, b1, weight);
-    addThin(inner_a0, inner_a1, b0, inner_b0, weight);
-    addThin(inner_a0, inner_a1, inner_b1, b1, weight);
-    const auto at = [&](int a, int b) { return point(sat_.coarse_sums.data(), sat_.pointsX(sat_.coarse_stride), a, b); };
-    sum_.addCorners(at(c1, d1), at(c0, d1), at(c1, d0), at(c0, d0), weight);
+    const std::int64_t all = texels(a0, a1, b0, b1);
+    if (all < kMostPieces * kFineLimit) return addPieces(a0, a1, b0, b1, weight);
+    if (a0 == 0 && b0 == 0 && a1 == sat_.pointsX(sat_.stride) - 1 && b1 == sat_.pointsY(sat_.stride) - 1)
+      return sum_.addMap(weight);  // may be all of 2^32 texels
+    const Inner inner = innerOf(a0, a1, b0, b1);
+    if (inner.c0 >= inner.c1 || inner.d0 >= inner.d1) return addPieces(a0, a1, b0, b1, weight);
+    sum_.addCorners(coarsePoint(inner.c1, inner.d1), coarsePoint(inner.c0, inner.d1), coarsePoint(inner.c1, inner.d0),
+                    coarsePoint(inner.c0, inner.d0), weight);
+    const std::int64_t frame = all - texels(inner.a0, inner.a1, inner.b0, inner.b1);
+    if (frame == 0) return;
+    if (frame < kFineLimit) {
+      const std::uint16_t* outer_corners[4] = {finePoint(a1, b1), finePoint(a0, b1), finePoint(a1, b0), finePoint(a0, b0)};
+      const std::uint16_t* inner_corners[4] = {finePoint(inner.a1, inner.b1), finePoint(inner.a0, inner.b1),
+                                               finePoint(inner.a1, inner.b0), finePoint(inner.a0, inner.b0)};
+      return sum_.addFrame(outer_corners, inner_corners, weight);
+    }
+    addPieces(a0, inner.a0, b0, b1, weight);
+    addPieces(inner.a1, a1, b0, b1, weight);
+    addPieces(inner.a0, inner.a1, b0, inner.b0, weight);
+    addPieces(inner.a0, inner.a1, inner.b1, b1, weight);
   }
 
-  /// A rectangle that is less than twice coarse_stride wide or high, in pieces that the fine table can tell.
-  GLINT_HD void addThin(int a0, int a1, int b0, int b1, double weight) {
+  /// A rectangle whose shorter side times the stride is below kFineLimit, in pieces that the fine table can tell.
+  GLINT_HD void addPieces(int a0, int a1, int b0, int b1, double weight) {
     if (a0 >= a1 || b0 >= b1) return;
     const bool along_a = a1 - a0 >= b1 - b0;
-    const int thickness = (along_a ? b1 - b0 : a1 - a0) * sat_.stride;
-    const int step = std::max(1, static_cast<int>(kFineLimit - 1) / (thickness * sat_.stride));
+    const std::int64_t thickness = std::int64_t{along_a ? b1 - b0 : a1 - a0} * sat_.stride;
+    const int step = static_cast<int>(std::max<std::int64_t>(1, (kFineLimit - 1) / (thickness * sat_.stride)));
     for (int k = along_a ? a0 : b0, end = along_a ? a1 : b1; k < end; k += step) {
       const int next = std::min(k + step, end);
       along_a ? addFine(k, next, b0, b1, weight) : addFine(a0, a1, k, next, weight);
@@ -331,6 +403,9 @@ class RectangleSums {
   GLINT_HD const std::uint16_t* finePoint(int a, int b) const {
     return point(sat_.sums.data(), sat_.pointsX(sat_.stride), a, b);
   }
+  GLINT_HD const std::uint32_t* coarsePoint(int c, int d) const {
+    return point(sat_.coarse_sums.data(), sat_.pointsX(sat_.coarse_stride), c, d);
+  }
 
   /// Starts to fetch a cache line.
   static GLINT_HD void prefetch([[maybe_unused]] const std::uint16_t* at) {
@@ -339,9 +414,26 @@ class RectangleSums {
 #endif
   }
 
-  /// Starts to fetch the corners, which are wanted after the strips.
+  /// Starts to fetch what a rectangle of the map needs.
+  GLINT_HD void prefetchInside(double x0, double x1, double y0, double y1) const {
+    const auto [a0, a1, b0, b1] = nearestPoints(x0, x1, y0, y1);
+    const double left = texelOf(a0, sat_.stride, sat_.width), right = texelOf(a1, sat_.stride, sat_.width);
+    if (y0 != texelOf(b0, sat_.stride, sat_.height)) prefetchLine<false>(y0, left, right);
+    if (x0 != left) prefetchLine<true>(x0, y0, y1);
+    if (x1 != right) prefetchLine<true>(x1, y0, y1);
+    if (y1 != texelOf(b1, sat_.stride, sat_.height)) prefetchLine<false>(y1, left, right);
+    prefetchPoints(a0, a1, b0, b1);
+  }
+
+  /// Starts to fetch the corners of the fine table.
+  GLINT_HD void prefetchPoints(int a0, int a1, int b0, int b1) const {
+    if (a0 >= a1 || b0 >= b1) return;
+    prefetchCorners(a0, a1, b0, b1);
+    if (texels(a0, a1, b0, b1) < kMostPieces * kFineLimit) return;
+    const Inner inner = innerOf(a0, a1, b0, b1);
+    if (inner.c0 < inner.c1 && inner.d0 < inner.d1) prefetchCorners(inner.a0, inner.a1, inner.b0, inner.b1);
+  }
   GLINT_HD void prefetchCorners(int a0, int a1, int b0, int b1) const {
-    if (texels(a0, a1, b0, b1) >= kFineLimit) return;
     for (const std::uint16_t* row : {finePoint(a0, b0), finePoint(a1, b0), finePoint(a0, b1), finePoint(a1, b1)})
       for (int k = 0; k < sat_.rowLength(); k += kCacheLine) prefetch(row + k);
   }

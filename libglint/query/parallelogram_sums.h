@@ -7,6 +7,47 @@
 
 namespace glint {
 
+/// The sides of a parallelogram.
+class ParallelogramEdges {
+ public:
+  struct Edge {
+    double x, low, high;  ///< x at the low end
+    double slope, sign;   ///< sign: what it adds to the area on its right
+  };
+
+  /// @param x, y    centre
+  /// @param ax, ay  one half axis; b: the other
+  GLINT_HD ParallelogramEdges(double x, double y, double ax, double ay, double bx, double by) {
+    const double turn = ax * by - ay * bx > 0 ? 1 : -1;  // counter-clockwise
+    const double sx[4] = {-1, 1, 1, -1}, sy[4] = {-turn, -turn, turn, turn};
+    double corner_x[4], corner_y[4];
+    for (int k = 0; k < 4; ++k) {
+      corner_x[k] = x + sx[k] * ax + sy[k] * bx;
+      corner_y[k] = y + sx[k] * ay + sy[k] * by;
+    }
+    for (int k = 0; k < 4; ++k) set(edges_[k], corner_x[k], corner_y[k], corner_x[(k + 1) & 3], corner_y[(k + 1) & 3]);
+    low_ = std::min({corner_y[0], corner_y[1], corner_y[2], corner_y[3]});
+    high_ = std::max({corner_y[0], corner_y[1], corner_y[2], corner_y[3]});
+  }
+
+  GLINT_HD const Edge* begin() const { return edges_; }
+  GLINT_HD const Edge* end() const { return edges_ + 4; }
+  GLINT_HD double low() const { return low_; }
+  GLINT_HD double high() const { return high_; }
+
+ private:
+  static GLINT_HD void set(Edge& edge, double x0, double y0, double x1, double y1) {
+    edge.sign = y1 < y0 ? 1 : -1;
+    edge.x = y1 < y0 ? x1 : x0;
+    edge.low = std::min(y0, y1);
+    edge.high = std::max(y0, y1);
+    edge.slope = y0 == y1 ? 0 : (x1 - x0) / (y1 - y0);
+  }
+
+  Edge edges_[4];
+  double low_, high_;
+};
+
 /// Adds a parallelogram of texels to a sum over bins, each texel by its covered area: exact, whatever the angle.
 ///
 /// A row of texels sees the area on the right of the edges that go down less that on the right of those that go up. The texels that
@@ -16,25 +57,17 @@ namespace glint {
 template <class Sum>
 class ParallelogramSums {
  public:
-  GLINT_HD ParallelogramSums(const HistogramSat& sat, Sum& sum) : sum_(sat, sum) {}
+  GLINT_HD ParallelogramSums(const HistogramSat& sat, Sum& sum)
+      : sum_(sat, sum), stride_(sat.stride), slab_span_(sat.stride * std::max(1, kSlabTexels / sat.stride)) {}
 
-  /// @param x, y    centre, texels of the endless plane
-  /// @param ax, ay  one half axis, texels; b: the other
-  GLINT_HD void add(double x, double y, double ax, double ay, double bx, double by, double weight) {
-    const double turn = ax * by - ay * bx > 0 ? 1 : -1;  // counter-clockwise
-    const double sx[4] = {-1, 1, 1, -1}, sy[4] = {-turn, -turn, turn, turn};
-    double corner_x[4], corner_y[4];
-    for (int k = 0; k < 4; ++k) {
-      corner_x[k] = x + sx[k] * ax + sy[k] * bx;
-      corner_y[k] = y + sx[k] * ay + sy[k] * by;
-    }
-    for (int k = 0; k < 4; ++k) setEdge(edges_[k], corner_x[k], corner_y[k], corner_x[(k + 1) & 3], corner_y[(k + 1) & 3]);
+  /// @param edges  in texels of the endless plane
+  GLINT_HD void add(const ParallelogramEdges& edges, double weight) {
     weight_ = weight;
-    const int end = static_cast<int>(std::ceil(std::max({corner_y[0], corner_y[1], corner_y[2], corner_y[3]})));
-    for (int j = static_cast<int>(std::floor(std::min({corner_y[0], corner_y[1], corner_y[2], corner_y[3]}))); j < end;) {
-      const Slab slab = sum_.slabOf(j);
+    const int end = static_cast<int>(std::ceil(edges.high()));
+    for (int j = static_cast<int>(std::floor(edges.low())); j < end;) {
+      const Slab slab = sum_.slabOf(j, slab_span_);
       const int slab_end = std::min(slab.end, end);
-      for (run_count_ = 0; j < slab_end; ++j) addEdges(j);
+      for (run_count_ = 0; j < slab_end; ++j) addEdges(edges, j);
       addRuns(slab);
     }
     flush();
@@ -42,28 +75,16 @@ class ParallelogramSums {
 
  private:
   using Slab = typename RectangleSums<Sum>::Slab;
-  struct Edge {
-    double x, low, high;  // x at the low end
-    double slope, sign;   // sign: what it adds to the texels on its right
-  };
   struct Run {
     int row, begin, end;
   };
 
-  static GLINT_HD void setEdge(Edge& edge, double x0, double y0, double x1, double y1) {
-    edge.sign = y1 < y0 ? 1 : -1;
-    edge.x = y1 < y0 ? x1 : x0;
-    edge.low = std::min(y0, y1);
-    edge.high = std::max(y0, y1);
-    edge.slope = y0 == y1 ? 0 : (x1 - x0) / (y1 - y0);
-  }
-
   /// Adds the texels of row j that edges cross, and what lies between them: as a run for later where it is whole.
-  GLINT_HD void addEdges(int j) {
+  GLINT_HD void addEdges(const ParallelogramEdges& edges, int j) {
     const int row = sum_.rowOf(j);
     int ends[4], count = 0;
     double shares[4];  // right of ends[k], an edge adds shares[k] to every texel of the row
-    for (const Edge& edge : edges_) {
+    for (const ParallelogramEdges::Edge& edge : edges) {
       const double low = std::max<double>(edge.low, j), high = std::min<double>(edge.high, j + 1);
       if (!(high > low)) continue;
       const double at_low = edge.x + (low - edge.low) * edge.slope, at_high = edge.x + (high - edge.low) * edge.slope;
@@ -123,7 +144,8 @@ class ParallelogramSums {
       return;
     }
     const Run& middle = runs_[run_count_ / 2];
-    const int left = sum_.nearestPointX(middle.begin), right = std::max(left, sum_.nearestPointX(middle.end));
+    const int left = static_cast<int>(sum_.nearestPointX(middle.begin, stride_));
+    const int right = std::max(left, static_cast<int>(sum_.nearestPointX(middle.end, stride_)));
     for (int k = 0; k < run_count_; ++k) {
       addBetween(runs_[k].row, runs_[k].begin, left, weight_);
       addBetween(runs_[k].row, right, runs_[k].end, weight_);
@@ -152,8 +174,11 @@ class ParallelogramSums {
     begin_ = end_ = 0;
   }
 
+  /// Higher slabs leave more texels at their ends, lower ones make more rectangles.
+  static constexpr int kSlabTexels = 16;
+
   RectangleSums<Sum> sum_;
-  Edge edges_[4];
+  int stride_, slab_span_;
   double weight_ = 1;
   Run runs_[HistogramSat::kMaxStride];
   int run_count_ = 0;

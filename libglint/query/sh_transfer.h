@@ -3,6 +3,8 @@
 #include <algorithm>
 
 #include "glint/model/vec.h"
+#include "glint/query/fresnel.h"
+#include "glint/query/smith.h"
 
 namespace glint {
 
@@ -13,6 +15,21 @@ namespace glint {
 /// @param wo_dot_normal  cosine of the outgoing direction; the result is 0 at and below the surface
 GLINT_HD inline float transferFactor(float fresnel, float shadowing, float wo_dot_normal) {
   return wo_dot_normal > 0 ? fresnel * shadowing / (4 * wo_dot_normal) : 0.0f;
+}
+
+/// The same from what a surface is made of and how rough its map is: Fresnel at the angle of wo, G of wo and its mirror direction with
+/// heights correlated. All that a renderer needs for a pixel that sees `footprint` of an asset of kind histogram-sat:
+///
+///   const HistogramNdf ndf(asset.histograms());
+///   const SmithMasking masking(asset.histograms().slopes, sigma_r);
+///   const ShLightIntegral light = query.integral(ndf, footprint, frame, wo_world, {}, scratch);
+///   const Rgb integral = {light.value[0], light.value[1], light.value[2]};
+///   const Rgb radiance = transferFactor(Fresnel::conductor(eta, k), masking, wo) * integral;
+///
+/// @param wo  outgoing direction in the tangent frame, unit; the result is 0 at and below the surface
+GLINT_HD inline Rgb transferFactor(const Fresnel& fresnel, const SmithMasking& masking, Vec3 wo) {
+  if (!(wo.z > 0)) return {};
+  return wo.z * masking.visibility({-wo.x, -wo.y, wo.z}, wo) * fresnel.reflectance(wo.z);
 }
 
 /// Shadowed light from an exact unshadowed one: unshadowed * (sampled shadowed) / (sampled unshadowed), colour by colour (Gamboa 2018,

@@ -33,6 +33,16 @@ BIN_MAP_AUTHORS = {
     ("Gaussian 2K", 0.16): (6043, 10739, 33897, 120403, 457324),
     ("brushed 2K", 0.01): (4701, 5397, 9027, 27758, 83114),
 }
+# Share of a slanted box that HistogramNdf may misplace by default (kSlantTolerance).
+SLANT_TOLERANCE = 0.06
+# Roughness of the lobes whose light is in the table; the chart has others.
+LIGHT_SIGMA = 0.05
+# Area lights, so that no image is needed: a window and two lamps.
+STUDIO = {"lights": [
+    {"type": "rectangle", "centre": [2, -1, 1.5], "axis_u": [-0.3, -0.7, 0], "axis_v": [0, 0, 0.6], "radiance": [6, 7, 8]},
+    {"type": "sphere", "centre": [-1, 2, 3], "radius": 0.3, "radiance": [60, 50, 40]},
+    {"type": "sphere", "centre": [-3, -2, 2], "radius": 0.1, "radiance": [900, 900, 900]},
+]}
 # Relative errors that coefficients of these types reach on every map.
 LEAST_ERROR = {"i8": 0.01, "f16": 0.002, "f32": 0}
 
@@ -60,7 +70,7 @@ def print_header():
     print(f"{'figure':<46} {'measured':>13} {'target':>13} {'':<5} {'paper':<19} design's floor")
 
 
-SECTIONS = ["synth_and_ingest", "pyramids", "compressions", "queries", "query_command", "displacements", "histograms", "bin_maps", "accuracy"]
+SECTIONS = ["synth_and_ingest", "pyramids", "compressions", "queries", "query_command", "displacements", "histograms", "light", "bin_maps", "accuracy"]
 
 
 class Bench:
@@ -193,8 +203,33 @@ class Bench:
                     size, stride = query["size_texels"], asset["stride_texels"]
                     kind = f"{size}^2{' rotated' if query['rotated'] else ''}"
                     target = (3 if size <= 256 else 10) if stride == 4 else None
-                    self.table.add(f"histogram of {kind}, stride {stride}, {name}", query["histogram_ns"] / 1000, "us", target=target,
-                                   density_ns=query["density_ns"], bins=asset["bins"])
+                    self.table.add(f"histogram of {kind}, stride {stride}, {name}", query["histogram_ns"] / 1000, "us", target=target, stride=stride, **query)
+                    if query["rotated"] and stride == 4:
+                        self.table.add(f"histogram of {kind}, exactly, {name}", query["exact_ns"] / 1000, "us")
+                        self.table.add(f"mean variation of {kind} from exact, {name}", query["variation"]["mean"], "", target=SLANT_TOLERANCE,
+                                       largest=query["variation"]["largest"])
+
+    def light(self):
+        """Tables of spherical harmonics by their tools; errors and times of the product integral by sh_light.cpp."""
+        lights = self.folder / "studio.json"
+        lights.write_text(json.dumps(STUDIO))
+        paper = "7 min, 32 cores"
+        self.process("SH lobes, order 60, 65x128", "shlobes", "--sigma-r", 0.05, "--order", 60, "--grid", "65x128", "-o", self.folder / "lobes.glint",
+                     target=2, paper=paper)
+        for grid, target in (("17x32", None), ("33x64", None), ("65x128", 15)):
+            self.process(f"SH light, order 60, {grid}", "shlobes", "--light", lights, "--order", 60, "--grid", grid, "-o", self.folder / "light.glint",
+                         target=target, paper=paper if target else "")
+        text = call([self.tools.folder / "glint-sh-bench"])
+        (self.folder / "light.json").write_text(text)
+        results = json.loads(text)
+        for row in results["errors_by_order"]:
+            if round(row["sigma_r"], 4) == LIGHT_SIGMA and row["order"] in (10, 30, 60, 100):
+                self.table.add(f"light, error, {row['light']}, order {row['order']}", row["none"], "", **row)
+        for row in results["times_at_equal_error"]:
+            name = f"{row['light']}, order {row['order']}"
+            ours = row["nearest"]
+            self.table.add(f"light, product integral, {name}", ours["us"], "us", error=ours["error"])
+            self.table.add(f"light, Monte Carlo at equal error, {name}", ours["monte_carlo_us"], "us", samples=ours["monte_carlo_samples"])
 
     def query_command(self):
         asset = self.path("flakes", "cp32")

@@ -36,6 +36,7 @@ def test_asset_is_valid_and_says_what_it_is(glint, sat):
     assert summary["properties"]["directions"] == "9x32"
     assert summary["properties"]["stride_texels"] == 4
     assert 1 < summary["statistics"]["bins"] <= 288
+    assert summary["properties"]["slope_covariance_xx"] > 0
 
 
 def test_json_tells_the_bytes_of_the_file(glint, normals):
@@ -64,6 +65,17 @@ def test_gaussian_boxes_change_gaussian_footprints_only(glint, sat):
     assert number(glint("query", sat, *gaussian)) != number(glint("query", sat, *gaussian, "--gaussian-boxes", "3"))
     box = [*BOX, "--half", "0.05", "0.08"]
     assert number(glint("query", sat, *box)) == number(glint("query", sat, *box, "--gaussian-boxes", "3"))
+
+
+def test_slanted_boxes_are_as_exact_as_asked(glint, normals, sat):
+    slanted = ["--uv", "0.3", "0.7", "--box", "30", "17", "-17", "30", "--range", "0", "0", "0.9", "0.9"]
+    exact = number(glint("query", normals, *slanted, "--sigma-r", "0.001"))
+    ours = number(glint("query", sat, *slanted, "--slant-tolerance", "0"))
+    assert ours == pytest.approx(exact, rel=0.02)
+    strips = number(glint("query", sat, *slanted))
+    assert strips != ours
+    assert strips == pytest.approx(ours, rel=0.06)  # the default tolerance
+    assert glint("query", sat, *slanted, "--slant-tolerance", "-1").returncode == 1
 
 
 def test_bytes_do_not_depend_on_threads(glint, normals):

@@ -3,6 +3,7 @@
 import json
 import math
 
+import h5py
 import numpy as np
 import pytest
 
@@ -74,6 +75,82 @@ def test_flat_mirror_under_constant_light_reflects_it(glint, folder):
         assert half["radiance"] == pytest.approx([1, 0.5, 0], rel=0.02)
 
 
+def bins_of(normals, rings=9, sectors=32):
+    ring = np.floor(np.arcsin(np.hypot(normals[..., 0], normals[..., 1])) / (np.pi / 2) * rings).astype(int)
+    sector = np.floor(np.arctan2(normals[..., 1], normals[..., 0]) % (2 * np.pi) / (2 * np.pi) * sectors).astype(int)
+    return ring * sectors + np.minimum(sector, sectors - 1)
+
+
+def light_by_quadrature(facets, weights, sigma, wo, light, steps=64):
+    """Integral of L(wi) D(h) dwi: directions around every facet, weighted by its lobe. light: [height][width][3], image rows from the top."""
+    theta = (np.arange(steps) + 0.5) / steps * 6 * sigma
+    phi = (np.arange(2 * steps) + 0.5) / steps * np.pi
+    sine, lobe = np.sin(theta), np.exp(-0.5 * (np.sin(theta) / sigma) ** 2) / (2 * np.pi * sigma**2)
+    total = np.zeros(3)
+    for (x, y), weight in zip(facets, weights):
+        m = np.array([x, y, math.sqrt(1 - x * x - y * y)])
+        u = np.cross(m, [0, 1, 0])
+        u /= np.linalg.norm(u)
+        h = np.cos(theta)[:, None, None] * m + sine[:, None, None] * (np.cos(phi)[:, None] * u + np.sin(phi)[:, None] * np.cross(m, u))
+        ho = h @ wo
+        wi = 2 * ho[..., None] * h - wo
+        above = (ho > 0) & (wi[..., 2] > 0)
+        rows = np.clip((np.arccos(np.clip(wi[..., 2], -1, 1)) / np.pi * light.shape[0]).astype(int), 0, light.shape[0] - 1)
+        columns = (np.arctan2(wi[..., 1], wi[..., 0]) % (2 * np.pi) / (2 * np.pi) * light.shape[1]).astype(int) % light.shape[1]
+        share = weight / m[2] * above * 4 * ho * (lobe * sine)[:, None] * (6 * sigma / steps) * (np.pi / steps)
+        total += (share[..., None] * light[rows, columns]).sum(axis=(0, 1))
+    return total
+
+
+def test_histograms_reflect_what_a_quadrature_over_their_normals_does(glint, folder):
+    """The whole chain on an asset of kind histogram-sat, against numpy: counts of the texels' bins, mean normals, and the lobes around them."""
+    sigma, wo = 0.08, np.array([0.3, -0.2, 0.9])
+    wo /= np.linalg.norm(wo)
+    random = np.random.default_rng(5)
+    env = random.uniform(0.2, 1, (32, 64, 3)) + 20 * (random.uniform(size=(32, 64, 1)) > 0.97)
+    write_exr(folder / "env.exr", env)
+    for command in (["synth", "isotropic", "--size", 64, "--alpha", 0.3, "-o", "map.exr"], ["ingest", "map.exr", "-o", "n.glint"],
+                    ["sat", "n.glint", "-o", "s.glint", "--stride", 4],
+                    ["shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 50, "--grid", "17x32"]):
+        assert glint(*command).returncode == 0
+    with h5py.File(folder / "n.glint") as file:
+        normals = file["normals"][...].astype(float)
+    ids = bins_of(normals)
+    # Texels 10 to 40 along u, 7 to 29 along v.
+    counts = np.bincount(ids[7:29, 10:40].ravel(), minlength=288)
+    seen = np.flatnonzero(counts)
+    means = [normals[ids == b].mean(axis=0) for b in seen]
+    expected = light_by_quadrature(means, counts[seen] / counts.sum(), sigma, wo, env)
+    arguments = ["s.glint", "--uv", 25 / 64, 18 / 64, "--box", 15, 0, 0, 11, "--sigma-r", sigma, "--light", "light.glint", "--wo", *wo]
+    result = ask(glint, *arguments)
+    # Order 50 of lobes of 4.6 degrees, and the blend between outgoing directions.
+    assert result["light_integral"] == pytest.approx(expected, rel=0.03)
+    assert result["light_integral"][0] != pytest.approx(env[..., 0].mean() * 4 * wo[2], rel=0.03)
+    lobes = ["shlobes", "--sigma-r", sigma, "--order", 50, "--grid", "none", "-o", "lobes.glint"]
+    assert glint(*lobes).returncode == 0
+    assert ask(glint, *arguments[:9], *arguments[11:], "--lobes", "lobes.glint")["light_integral"] == pytest.approx(result["light_integral"], rel=1e-5)
+
+
+def test_optics_of_the_surface(glint, folder):
+    """--ior, --eta with --k, and --smith are Fresnel and G of the mirror direction; 4 % at normal incidence for 1.5."""
+    write_exr(folder / "env.exr", constant(1))
+    for command in (["synth", "isotropic", "--size", 32, "--alpha", 0.4, "-o", "map.exr"], ["ingest", "map.exr", "-o", "n.glint"],
+                    ["sat", "n.glint", "-o", "s.glint"], ["shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 10, "--grid", "5x8"]):
+        assert glint(*command).returncode == 0
+    common = ["--uv", 0.5, 0.5, "--box", 16, 0, 0, 16, "--sigma-r", 0.1, "--light", "light.glint"]
+    up, slanted = ["--wo", 0, 0, 1], ["--wo", 0.8, 0, 0.6]
+    assert ask(glint, "s.glint", *common, *up, "--ior", 1.5)["transfer"] == pytest.approx([0.04 / 4] * 3, rel=1e-5)
+    metal = ask(glint, "s.glint", *common, *up, "--eta", 0.2, 0.4, 1.4, "--k", 3, 2, 1)["transfer"]
+    assert metal == pytest.approx([((n - 1) ** 2 + k**2) / ((n + 1) ** 2 + k**2) / 4 for n, k in ((0.2, 3), (0.4, 2), (1.4, 1))], rel=1e-5)
+    smith = ask(glint, "s.glint", *common, *slanted, "--smith")["transfer"]
+    assert 0.5 / (4 * 0.6) < smith[0] < 0.999 / (4 * 0.6)
+    # The map's slopes are the same, stored or taken from the texels.
+    assert ask(glint, "n.glint", *common, *slanted, "--smith")["transfer"] == pytest.approx(smith, rel=1e-5)
+    assert glint("query", "s.glint", *common, *up, "--eta", 1, 1, 1).returncode == 1
+    assert glint("query", "s.glint", *common, *up, "--ior", 1.5, "--fresnel", 1, 1, 1).returncode == 1
+    assert glint("query", "s.glint", *common, *up, "--smith", "--shadowing", 0.5).returncode == 1
+
+
 def test_light_comes_from_where_the_image_says(glint, folder):
     """Bright towards +x (first column), seen by a facet that mirrors it from -x."""
     pixels = constant(0)
@@ -102,6 +179,7 @@ def test_clamped_light_says_so(glint, folder):
         process = glint("query", "flat.glint", "--uv", 0.5, 0.5, "--sigma", 2, "--light", "light.glint", "--wo", math.sin(tilt), 0, math.cos(tilt), "--json")
         document = json.loads(process.stdout)
         result = document["result"]
+        assert result["clamped"] == ("clamped" in process.stderr)
         assert min(result["light_integral"]) >= 0
         assert result["clamped"] == (min(result["signed_light_integral"]) < 0) == any("clamped" in w for w in document["warnings"])
         clamped += result["clamped"]
@@ -215,6 +293,11 @@ def test_lowest_orders(glint, folder, order):
     assert glint("shlobes", "--sigma-r", 0.1, "--order", order, "-o", "lobes.glint").returncode == 0
     assert glint("shlobes", "--light", "env.exr", "--order", order, "-o", "light.glint").returncode == 0
     assert glint("validate", "lobes.glint", "light.glint").returncode == 0
+    for command in (["synth", "isotropic", "--size", 32, "-o", "map.exr"], ["ingest", "map.exr", "-o", "n.glint"], ["sat", "n.glint", "-o", "s.glint"]):
+        assert glint(*command).returncode == 0
+    asked = ["s.glint", "--uv", 0.5, 0.5, "--sigma", 4, "--light", "light.glint", "--lobes", "lobes.glint", "--wo", 0.2, 0, 0.9]
+    result = ask(glint, *asked)
+    assert result["order"] == order and min(result["radiance"]) > 0
 
 
 def test_light_of_other_models_and_kinds_is_refused(glint, folder):

@@ -597,6 +597,7 @@ SampleHistograms sampleHistograms(int width, int height) {
   HistogramSat& sat = sample.sat;
   sat.width = width, sat.height = height, sat.theta_bins = kRings, sat.phi_bins = kSectors;
   sat.stride = 4, sat.coarse_stride = 8, sat.line_stride = 16;
+  sat.slopes = {{0.125f, -0.0625f}, {0.25f, 0.03125f, 0.5f}};
   sample.texels.resize(static_cast<std::size_t>(sat.tileRows()) * sat.tileColumns() * 64);
   for (int id = 0; id < kRings * kSectors; ++id) {
     double x = 0, y = 0;

@@ -40,6 +40,13 @@ void expectSame(std::span<const T> a, std::span<const T> b) {
   EXPECT_EQ(bytesOf(a), bytesOf(b));
 }
 
+void expectSame(const MapSlopes& a, const MapSlopes& b) {
+  EXPECT_EQ(a.mean, b.mean);
+  EXPECT_EQ(a.covariance.xx, b.covariance.xx);
+  EXPECT_EQ(a.covariance.xy, b.covariance.xy);
+  EXPECT_EQ(a.covariance.yy, b.covariance.yy);
+}
+
 void expectSame(const PyramidShape& a, const PyramidShape& b) {
   EXPECT_EQ(a.width, b.width);
   EXPECT_EQ(a.height, b.height);
@@ -47,10 +54,7 @@ void expectSame(const PyramidShape& a, const PyramidShape& b) {
   EXPECT_EQ(a.sigma_r, b.sigma_r);
   EXPECT_EQ(a.surface, b.surface);
   EXPECT_EQ(a.boundary, b.boundary);
-  EXPECT_EQ(a.slopes.mean, b.slopes.mean);
-  EXPECT_EQ(a.slopes.covariance.xx, b.slopes.covariance.xx);
-  EXPECT_EQ(a.slopes.covariance.xy, b.slopes.covariance.xy);
-  EXPECT_EQ(a.slopes.covariance.yy, b.slopes.covariance.yy);
+  expectSame(a.slopes, b.slopes);
   ASSERT_EQ(a.level_count, b.level_count);
   for (int l = 0; l < a.level_count; ++l) {
     EXPECT_EQ(a.levels[l].stride, b.levels[l].stride);
@@ -172,6 +176,7 @@ TEST(AssetRoundTrip, HistogramsComeBackBitExact) {
     EXPECT_EQ(sat.stride, 4);
     EXPECT_EQ(sat.coarse_stride, 8);
     EXPECT_EQ(sat.line_stride, 16);
+    expectSame(sat.slopes, sample.sat.slopes);
     expectSame(sat.bin_ids, sample.sat.bin_ids);
     expectSame(sat.bin_normals, sample.sat.bin_normals);
     expectSame(sat.bin_totals, sample.sat.bin_totals);

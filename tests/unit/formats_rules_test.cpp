@@ -551,6 +551,11 @@ std::vector<Fixture> histogramFixtures() {
                 patch.setInteger("coarse_stride", 9);
                 patch.replace("coarse_sums", H5T_STD_U32LE, {4, 4, 32}, true);
               }),
+      patched("shape.slopes", Base::histograms,
+              [](const Patch& patch) {
+                const float covariance[3] = {0.1f, 0.2f, 0.1f};
+                patch.set("/", "slope_covariance", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, covariance, 3);
+              }),
       patched("histogram.texels", Base::histograms,
               [](const Patch& patch) { patch.change<std::uint16_t>("texels", 70, [](auto& bin) { bin = 60000; }); }),
       patched(
@@ -792,6 +797,7 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_EQ(sat.bin_totals[9], 3u);
   EXPECT_FLOAT_EQ(sat.bin_normals[9].x, 0.0831450075f);
   EXPECT_EQ(sat.sums[(4 * 7 + 5) * 32 + 9], 1);
+  EXPECT_EQ(sat.slopes.covariance.xy, 0.03125f);
   EXPECT_EQ(static_cast<const float*>(Asset::open(folder / "sh-lobes.glint").shLobes().coefficients)[5 * 4 + 3], 0.4f);
   EXPECT_EQ(Asset::open(folder / "sh-light.glint").shLight().band_norms[7], 12.2799206f);
   struct Recorded {

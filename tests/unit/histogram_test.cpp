@@ -50,12 +50,14 @@ double sumOfDifferences(const std::vector<double>& a, const std::vector<double>&
 
 struct BuiltMap {
   BuiltMap(int width, int height, std::vector<Vec2> normals, bake::HistogramSatOptions options = {})
-      : map(width, height, std::move(normals)), data(bake::buildHistogramSat(map.map(), options)), ndf(data.view()) {
+      : map(width, height, std::move(normals)),
+        data(bake::buildHistogramSat(map.map(), options)),
+        ndf(data.view(), GaussianBoxes::one, 0) {
     for (const Vec2 n : map.normals()) ids.push_back(ndf.bins().find(n));
   }
   test::OwnedMap map;
   bake::HistogramSatData data;
-  HistogramNdf ndf;
+  HistogramNdf ndf;       ///< exact at any angle
   std::vector<int> ids;  ///< direction of every texel, from the map itself
 };
 
@@ -201,6 +203,91 @@ TEST(HistogramSat, BoxesAtAnyAngleCountTexelsByCoveredArea) {
           << "angle " << angle << " axes " << a << " " << b << " skew " << skew << " map " << width;
     }
   }
+}
+
+double stripPlanBound(const HistogramSat& sat, const Footprint& p, double tolerance) {
+  return planStrips(sat, p.axis_a.x, p.axis_a.y, p.axis_b.x, p.axis_b.y, tolerance).misplaced;
+}
+
+/// Total variation from the exact histogram against the bound of the plan, for boxes of all sizes and angles. Where every texel has a bin
+/// of its own, it is the share that is misplaced.
+void expectStripsWithinBound(const BuiltMap& built, float largest, int boxes, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> unit(0, 1);
+  const HistogramSat sat = built.data.view();
+  int with_strips = 0, moved = 0;
+  double sum = 0, bounds = 0;
+  for (int k = 0; k < boxes; ++k) {
+    const float tolerance = k % 3 == 0 ? 0.03f : k % 3 == 1 ? kSlantTolerance : 0.2f;
+    const float angle = k % 4 == 0 ? 0.02f : 6.3f * unit(random), skew = k % 2 ? 0.5f * unit(random) : 0;
+    const float a = largest * (0.2f + 0.8f * unit(random)), b = k % 5 == 0 ? 0.3f * a : largest * (0.2f + 0.8f * unit(random));
+    const Footprint p = Footprint::box({unit(random), unit(random)}, {a * std::cos(angle), a * std::sin(angle)},
+                                       {-b * std::sin(angle + skew), b * std::cos(angle + skew)});
+    const double bound = stripPlanBound(sat, p, tolerance);
+    const double off = 0.5 * sumOfDifferences(sharesByTable(HistogramNdf(sat, GaussianBoxes::one, tolerance), p),
+                                              sharesByTable(built.ndf, p));
+    EXPECT_LE(bound, tolerance);
+    EXPECT_LE(off, bound + kFloatAreas) << "tolerance " << tolerance << " angle " << angle << " axes " << a << " " << b;
+    with_strips += bound > 0, moved += off > kFloatAreas;
+    sum += off, bounds += bound;
+  }
+  EXPECT_GT(with_strips, boxes / 3);
+  EXPECT_EQ(moved, with_strips);  // otherwise they are not strips, and the test shows nothing
+  EXPECT_LT(sum, 0.8 * bounds);
+}
+
+TEST(HistogramSat, StripsMisplaceNoMoreThanTheirBound) {
+  const SphericalBins bins(44, 46);
+  std::vector<Vec2> normals;
+  for (int id = 0; id < bins.count(); ++id) normals.push_back(bins.centre(id));
+  for (const int stride : {1, 2, 4}) {
+    const BuiltMap built(46, 44, normals, {44, 46, stride});
+    ASSERT_EQ(built.ndf.binCount(), 44 * 46);
+    expectStripsWithinBound(built, 22, 120, 21);
+  }
+}
+
+/// Large boxes have their ends moved to points of the tables, and cross the borders of the map.
+TEST(HistogramSat, StripsOfLargeBoxesKeepTheirBound) {
+  for (const int stride : {4, 7}) {
+    const BuiltMap built(900, 700, test::synthesised(bake::SynthKind::flakes, 900, 700, 0.3f), {9, 32, stride});
+    expectStripsWithinBound(built, 800, 40, 22);
+  }
+}
+
+TEST(HistogramSat, StripsHaveThePlansThatTheirSizeAllows) {
+  const BuiltMap built(256, 256, test::roughSurface(256, 256, 0.3f), strideOf(4));
+  const HistogramSat sat = built.data.view();
+  const auto plan = [&](double half, double tolerance) { return planStrips(sat, half, half, -half, half, tolerance); };
+  EXPECT_EQ(plan(100, 0).rows, 0);
+  EXPECT_EQ(plan(4, kSlantTolerance).rows, 0);
+  EXPECT_EQ(plan(22, kSlantTolerance).snap, 0);
+  EXPECT_GT(plan(22, kSlantTolerance).rows, 0);
+  EXPECT_EQ(plan(90, kSlantTolerance).snap, sat.stride);
+  EXPECT_EQ(plan(1000, kSlantTolerance).snap, sat.coarse_stride);
+  for (const double half : {22.0, 90.0, 1000.0}) EXPECT_EQ(plan(half, kSlantTolerance).rows % sat.stride, 0);
+}
+
+/// A box that moves by a small step changes no more than the texels along its border do.
+TEST(HistogramSat, StripsChangeSmoothlyAsABoxMoves) {
+  const BuiltMap built(64, 64, test::randomNormals(64, 64, 0.9f, 23), strideOf(4));
+  const HistogramNdf ndf(built.data.view());
+  constexpr float kStep = 1.0f / 64;  // texel
+  const auto at = [](int k) {
+    const float moved = static_cast<float>(k) * kStep / 64;
+    return Footprint::box({0.3f + moved, 0.4f + 0.3f * moved}, {14, 9}, {-9, 14});
+  };
+  ASSERT_GT(stripPlanBound(built.data.view(), at(0), kSlantTolerance), 0);
+  std::vector<double> before = sharesByTable(ndf, at(0));
+  double most = 0;
+  for (int k = 1; k < 400; ++k) {
+    std::vector<double> here = sharesByTable(ndf, at(k));
+    most = std::max(most, sumOfDifferences(before, here));
+    before = std::move(here);
+  }
+  // Every side moves by a step at most: 2 * 46 texels of it and as much of the steps, twice, over 4 * 277 texels.
+  EXPECT_GT(most, 0);
+  EXPECT_LT(most, 4 * 46 * kStep * 1.5 / (4 * 277));
 }
 
 TEST(HistogramSat, ConstantMapsHaveOneBin) {

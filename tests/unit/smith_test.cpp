@@ -5,6 +5,7 @@
 #include <random>
 
 #include "glint/bake/compress.h"
+#include "glint/bake/histogram_sat.h"
 #include "glint/bake/pyramid.h"
 #include "glint/bake/slopes.h"
 #include "glint/query/reference.h"
@@ -135,6 +136,16 @@ TEST(MapSlopes, AreTheMomentsOfTheTexels) {
   const MapSlopes level = bake::mapSlopes(test::OwnedMap(16, 16, std::vector<Vec2>(256, Vec2{0.3f, -0.1f})).map());
   EXPECT_EQ(level.covariance.xx, 0);
   EXPECT_EQ(level.covariance.xy, 0);
+}
+
+TEST(MapSlopes, ReachHistograms) {
+  const auto owned = test::OwnedMap(32, 32, test::roughSurface(32, 32, 0.3f));
+  const MapSlopes expected = bake::mapSlopes(owned.map()), stored = bake::buildHistogramSat(owned.map(), {}).view().slopes;
+  EXPECT_GT(expected.covariance.xx, 0.01f);
+  EXPECT_EQ(stored.mean, expected.mean);
+  EXPECT_EQ(stored.covariance.xx, expected.covariance.xx);
+  EXPECT_EQ(stored.covariance.xy, expected.covariance.xy);
+  EXPECT_EQ(stored.covariance.yy, expected.covariance.yy);
 }
 
 TEST(MapSlopes, ReachThePyramidAndWhatIsCompressedFromIt) {
