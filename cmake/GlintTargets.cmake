@@ -14,6 +14,15 @@ if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
 endif()
 
+# The gold linker is quicker with dozens of programs full of debug information.
+if(CMAKE_BUILD_TYPE STREQUAL "Debug")
+  include(CheckLinkerFlag)
+  check_linker_flag(CXX "-fuse-ld=gold" GLINT_HAS_GOLD)
+  if(GLINT_HAS_GOLD)
+    add_link_options(-fuse-ld=gold)
+  endif()
+endif()
+
 # Our own programs may use POPCNT and SSE4.2, which every x86 processor has had since 2009; kernels for newer ones are chosen at run
 # time. The query headers take whatever the including program is compiled for.
 set(GLINT_ARCH "x86-64-v2" CACHE STRING "-march of the programs and libraries on x86-64")
@@ -54,11 +63,29 @@ function(glint_add_library room)
   set_target_properties(glint_${room} PROPERTIES EXPORT_NAME ${room} CXX_EXTENSIONS OFF)
 endfunction()
 
-# Large headers that most sources of a target include are parsed once: a full build in half the time. Off by default, because ccache
-# does not keep objects that were compiled with them.
-option(GLINT_PRECOMPILE_HEADERS "Precompile large headers" OFF)
-function(glint_precompile_headers target)
-  if(GLINT_PRECOMPILE_HEADERS)
-    target_precompile_headers(${target} ${ARGN})
+# For full builds: large headers are parsed once, and sources of a target that agree on names are compiled together. Off by default,
+# because ccache does not keep objects that were compiled with precompiled headers.
+option(GLINT_FAST_FULL_BUILD "Precompile headers and compile sources together" OFF)
+
+# Of headers that make each source that does not need them slower (CLI11, nlohmann-json): only where most sources do.
+function(glint_precompile_headers owner)
+  if(GLINT_FAST_FULL_BUILD)
+    target_precompile_headers(${owner} PRIVATE ${ARGN})
+  endif()
+endfunction()
+
+# Targets use the precompiled headers of the first one. They must be compiled with all of its definitions.
+function(glint_share_precompiled_headers owner)
+  if(GLINT_FAST_FULL_BUILD)
+    foreach(target IN LISTS ARGN)
+      target_precompile_headers(${target} REUSE_FROM ${owner})
+    endforeach()
+  endif()
+endfunction()
+
+# All sources of a target become one, but for those with options of their own.
+function(glint_compile_together)
+  if(GLINT_FAST_FULL_BUILD)
+    set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
   endif()
 endfunction()

@@ -1,6 +1,7 @@
 #include "glint/formats/asset_writer.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -34,20 +35,26 @@ constexpr std::size_t kWriteBytes = 8 << 20;  // of one write call
               full ? "free some space or write to another disk" : "check the folder and its permissions");
 }
 
-/// A file under a unique name beside the target, removed unless it was renamed to it.
+/// A file under a unique hidden name beside the target, removed unless it was renamed to it. It is locked as long as its writer
+/// lives: what killed writers of the same target have left is not, and is removed by the next one.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const fs::path& target) : target_(target) {
     static std::atomic<unsigned> counter{0};
     const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+    removeStale(folder);
     for (int attempt = 0;; ++attempt) {
       const auto ticks = static_cast<unsigned long long>(std::chrono::steady_clock::now().time_since_epoch().count());
       char suffix[64];
-      std::snprintf(suffix, sizeof suffix, ".%d-%u-%llx.tmp", static_cast<int>(::getpid()), counter++, ticks);
-      path_ = folder / ("." + target.filename().string() + suffix);
+      std::snprintf(suffix, sizeof suffix, "%d-%u-%llx%s", static_cast<int>(::getpid()), counter++, ticks, kSuffix);
+      path_ = folder / (prefix() + suffix);
       file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-      if (file_ >= 0) return;
-      if (errno != EEXIST || attempt > 100) throwIo(target, "cannot be created", errno);
+      if (file_ < 0 && (errno != EEXIST || attempt > 100)) throwIo(target, "cannot be created", errno);
+      if (file_ < 0) continue;
+      // Where there are no locks, nobody removes what is not locked. Another writer may have done so before this lock.
+      struct stat status;
+      if (::flock(file_, LOCK_EX) != 0 || ::fstat(file_, &status) != 0 || status.st_nlink > 0) return;
+      ::close(file_);
     }
   }
   TemporaryFile(const TemporaryFile&) = delete;
@@ -91,6 +98,26 @@ class TemporaryFile {
   }
 
  private:
+  static constexpr const char* kSuffix = ".tmp";
+  std::string prefix() const { return "." + target_.filename().string() + "."; }
+
+  bool isTemporary(const std::string& name) const {
+    if (!name.starts_with(prefix()) || !name.ends_with(kSuffix)) return false;
+    return name.find_first_not_of("0123456789abcdef-", prefix().size()) == name.size() - std::strlen(kSuffix);
+  }
+
+  void removeStale(const fs::path& folder) const {
+    std::error_code error;
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+      const std::string name = entry->path().filename().string();
+      if (!isTemporary(name)) continue;
+      const int file = ::open(entry->path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+      if (file < 0) continue;
+      if (::flock(file, LOCK_EX | LOCK_NB) == 0) ::unlink(entry->path().c_str());
+      ::close(file);
+    }
+  }
+
   fs::path target_;
   fs::path path_;
   int file_ = -1;

@@ -20,6 +20,6 @@ inline constexpr float kPyramidReach = 3.5f;
 void scatterFlatFootprint(const NormalMap& map, Boundary boundary, Vec2 centre, float sigma_texels, DirectionBins& bins,
                           DirectionBins& band);
 
-inline constexpr int kBandTexels = 32768;
+inline constexpr int kBandTexels = 131072;
 
 }  // namespace glint::bake

@@ -130,6 +130,9 @@ class ImagePacker {
       stored.push_back(pixels);
     }
     const float scale = inverse_mass / (1 + excess * inverse_mass);
+    image.means.reserve(stored.size());
+    (precision_ == BlockPrecision::f16 ? image.half_pixels.reserve(stored.size() * kBlockPixels)
+                                       : image.float_pixels.reserve(stored.size() * kBlockPixels));
     for (const auto& pixels : stored) store(pixels.data(), scale, image);
     return image;
   }
@@ -328,7 +331,9 @@ NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options,
   auto images = options.surface == Surface::flat
                     ? buildFlat(map, pyramid.shape, packer, PixelFilter(sigma_pixels, subdivision, Spline::quadratic), progress)
                     : buildSmooth(map, pyramid.shape, packer, subdivision + subdivision % 2, progress);
-  for (auto& level : images) pyramid.levels.push_back(packLevel(level, options.precision));
+  pyramid.levels.resize(images.size());
+  tbb::parallel_for(std::size_t{0}, images.size(),
+                    [&](std::size_t l) { pyramid.levels[l] = packLevel(images[l], options.precision); });
   if (options.levels == 0) dropAgreeingLevels(pyramid);
   return pyramid;
 }

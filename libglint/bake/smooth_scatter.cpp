@@ -7,7 +7,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include "glint/bake/flat_scatter.h"
@@ -20,6 +22,33 @@ constexpr int kCellsPerStride = 8;
 
 using CellRow = std::vector<BlockBins>;  // moments of each cell of a row of the lattice
 using RowSums = std::vector<BlockBins>;  // for each column of images: a row of cells, weighted along x
+
+/// Rows of empty bins that keep the memory of their last use.
+class SpareRows {
+ public:
+  SpareRows(int size, std::size_t tiles, int channels) : size_(size), tiles_(tiles), channels_(channels) {}
+
+  std::vector<BlockBins> take() {
+    const std::scoped_lock lock(mutex_);
+    if (rows_.empty()) return std::vector<BlockBins>(size_, BlockBins(tiles_, channels_));
+    std::vector<BlockBins> row = std::move(rows_.back());
+    rows_.pop_back();
+    return row;
+  }
+  void give(std::vector<BlockBins>& row) {
+    for (BlockBins& bins : row) bins.clear();
+    const std::scoped_lock lock(mutex_);
+    rows_.push_back(std::move(row));
+    row.clear();
+  }
+
+ private:
+  int size_;
+  std::size_t tiles_;
+  int channels_;
+  std::mutex mutex_;
+  std::vector<std::vector<BlockBins>> rows_;
+};
 
 /// The lattice of one level along one axis.
 struct Axis {
@@ -90,14 +119,16 @@ class Level {
  public:
   Level(const PyramidShape& shape, int level, const Axis& x, const Axis& y, std::size_t tiles, const ImageSink& sink)
       : level_(level),
-        tiles_(tiles),
         columns_(shape.levels[level].columns),
         x_(x, columns_, shape.levels[level].stride),
         y_(y, shape.levels[level].rows, shape.levels[level].stride),
         sink_(sink),
-        image_rows_(shape.levels[level].rows) {}
+        image_rows_(shape.levels[level].rows),
+        spare_images_(columns_, tiles, 1),
+        spare_sums_(columns_, tiles, 2) {}
 
-  RowSums emptySums() const { return RowSums(columns_, BlockBins(tiles_, 2)); }
+  RowSums takeSums() { return spare_sums_.take(); }
+  void giveSums(RowSums& sums) { spare_sums_.give(sums); }
 
   /// Adds cell c of a row to the sums of every image that it is in.
   void addCell(int c, const BlockBins& cell, RowSums& sums) const {
@@ -105,8 +136,8 @@ class Level {
   }
 
   /// The same for a whole row.
-  RowSums sumsOf(const CellRow& row) const {
-    RowSums sums = emptySums();
+  RowSums sumsOf(const CellRow& row) {
+    RowSums sums = takeSums();
     tbb::parallel_for(0, columns_, [&](int i) {
       for (const auto& [c, weight] : x_.cellsOf(i)) addAlongX(row[c], weight, sums[i]);
     });
@@ -117,23 +148,23 @@ class Level {
   void addRow(int r, const RowSums& sums) {
     for (const auto& [j, weight] : y_.imagesOf(r)) {
       std::vector<BlockBins>& images = image_rows_[j];
-      if (images.empty()) images.assign(columns_, BlockBins(tiles_));
+      if (images.empty()) images = spare_images_.take();
       const bool complete = y_.cellsOf(j).back().index == r;
       tbb::parallel_for(0, columns_, [&, j = j, weight = weight](int i) {
         addAlongY(sums[i], weight, images[i]);
         if (complete) sink_(level_, i, j, images[i]);
       });
-      if (complete) std::vector<BlockBins>().swap(images);
+      if (complete) spare_images_.give(images);
     }
   }
 
  private:
   int level_;
-  std::size_t tiles_;
   int columns_;
   AxisWeights x_, y_;
   const ImageSink& sink_;
   std::vector<std::vector<BlockBins>> image_rows_;
+  SpareRows spare_images_, spare_sums_;
 };
 
 /// Rasterises the cells of the map into cells of the lattice.
@@ -191,19 +222,23 @@ void addQuarters(const CellRow& row, bool upper, CellRow& coarser) {
 /// Levels above the finest: rows of cells come in order, and go on in pairs.
 class CoarseLevels {
  public:
-  CoarseLevels(std::vector<Level>& levels, std::size_t tiles) : levels_(levels), tiles_(tiles), halves_(levels.size()) {}
+  CoarseLevels(std::deque<Level>& levels, std::size_t tiles) : levels_(levels), tiles_(tiles), halves_(levels.size()) {}
 
   void addRow(std::size_t level, int r, const CellRow& row) {
-    levels_[level].addRow(r, levels_[level].sumsOf(row));
+    RowSums sums = levels_[level].sumsOf(row);
+    levels_[level].addRow(r, sums);
+    levels_[level].giveSums(sums);
     if (level + 1 == levels_.size()) return;
     CellRow& coarser = halves_[level];
-    if (r % 2 == 0) coarser.assign(row.size() / 2, BlockBins(tiles_, kMoments));
+    if (coarser.empty()) coarser.assign(row.size() / 2, BlockBins(tiles_, kMoments));
     addQuarters(row, r % 2, coarser);
-    if (r % 2) addRow(level + 1, r / 2, coarser);
+    if (r % 2 == 0) return;
+    addRow(level + 1, r / 2, coarser);
+    for (BlockBins& cell : coarser) cell.clear();
   }
 
  private:
-  std::vector<Level>& levels_;
+  std::deque<Level>& levels_;
   std::size_t tiles_;
   std::vector<CellRow> halves_;  // of each level: the row of the next level that is not complete
 };
@@ -227,19 +262,20 @@ void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const Direct
   const float sigma_bins = 0.5f * shape.sigma_r * static_cast<float>(direction_tiles.fine.bins_per_axis);
   Rasteriser rasteriser(map, finest_x, finest_y, direction_tiles, sigma_bins);
 
-  std::vector<Level> levels;
+  std::deque<Level> levels;  // they do not move
   Axis x = finest_x, y = finest_y;
   for (int l = 0; l < shape.level_count; ++l, x = x.coarser(), y = y.coarser())
     levels.emplace_back(shape, l, x, y, tiles, sink);
   CoarseLevels coarse(levels, tiles);
   const bool has_coarser = shape.level_count > 1;
+  SpareRows spare_cells(finest_x.cells / 2, tiles, kMoments);
 
   tbb::enumerable_thread_specific<BlockBins> scratch([=] { return BlockBins(tiles, kMoments); });
   const auto makeBand = [&](int index) {
     Band band = {index, {}, {}};
-    if (has_coarser) band.coarser.assign(finest_x.cells / 2, BlockBins(tiles, kMoments));
+    if (has_coarser) band.coarser = spare_cells.take();
     for (int upper = 0; upper < 2 && 2 * index + upper < finest_y.cells; ++upper) {
-      band.sums[upper] = levels[0].emptySums();
+      band.sums[upper] = levels[0].takeSums();
       for (int a = 0; a < finest_x.cells; ++a) {
         BlockBins& cell = scratch.local();
         rasteriser.addCell(a, 2 * index + upper, cell);
@@ -248,16 +284,21 @@ void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const Direct
         cell.clear();
       }
     }
-    return std::make_shared<const Band>(std::move(band));
+    return std::make_shared<Band>(std::move(band));
   };
-  const auto addBand = [&](const Band& band) {
-    for (int upper = 0; upper < 2 && 2 * band.index + upper < finest_y.cells; ++upper)
+  const auto addBand = [&](Band& band) {
+    for (int upper = 0; upper < 2 && 2 * band.index + upper < finest_y.cells; ++upper) {
       levels[0].addRow(2 * band.index + upper, band.sums[upper]);
-    if (has_coarser) coarse.addRow(1, band.index, band.coarser);
+      levels[0].giveSums(band.sums[upper]);
+    }
+    if (has_coarser) {
+      coarse.addRow(1, band.index, band.coarser);
+      spare_cells.give(band.coarser);
+    }
     if (progress) progress(band.index + 1, (finest_y.cells + 1) / 2);
   };
 
-  using BandPtr = std::shared_ptr<const Band>;
+  using BandPtr = std::shared_ptr<Band>;
   int next = 0;
   const auto source = [&](tbb::flow_control& control) {
     if (2 * next >= finest_y.cells) control.stop();

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "glint/bake/block_bins.h"
+#include "glint/bake/triangle_splat_kernels.h"
 #include "glint/model/vec.h"
 
 namespace glint::bake {
@@ -27,10 +28,10 @@ struct DirectionTiles {
 
 /// Splats triangles of the disk into the histograms of a lattice cell's moments at once.
 ///
-/// A triangle is cut into columns on its longest edge and these into pieces; every piece adds its share at its centre with
-/// cubic B-spline weights (see PixelFilter). Pieces are moved outwards a little, so that the spread along the longest edge
-/// is the triangle's own. So triangles of any shape keep their mass, mean and extent, down to a segment or a point; the blur that
-/// follows flattens the pieces. Long triangles go to the coarse grid.
+/// A thin triangle is cut into columns on its longest edge and these into pieces; every piece adds its share at its centre with
+/// cubic B-spline weights (see PixelFilter). A fat one is cut into rows, of which each is exact along x. Columns and rows are
+/// moved a little, so that mean and spread across them are the triangle's own. So triangles of any shape keep their mass, mean
+/// and extent, down to a segment or a point; the blur that follows flattens the pieces. Long triangles go to the coarse grid.
 class TriangleSplatter {
  public:
   /// @param sigma_bins  deviation of the blur that follows, bins of the fine grid
@@ -48,6 +49,7 @@ class TriangleSplatter {
     Vec2 place(Vec2 normal) const {
       return {(normal.x + 1) * half + BlockBins::kTile, (normal.y + 1) * half + BlockBins::kTile};
     }
+    SplatRaster view() { return {bins.data(), pitch, touched.data(), tiles}; }
     void moveTo(BlockBins& moments);
 
     float half;  // bins in half the square
@@ -57,9 +59,9 @@ class TriangleSplatter {
     std::vector<float> bins;  // [row][column][moment], with a tile of margin
     std::vector<std::uint8_t> touched;
   };
-  static void splatPoint(Vec2 point, float share, const float weights[kMoments], Raster& raster);
 
   Raster fine_, coarse_;
+  SplatPatch patch_;
   float piece_;  // longest piece, bins of the fine grid
 };
 

@@ -1,5 +1,7 @@
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -417,6 +419,42 @@ TEST(AssetWriter, AKilledRunLeavesTheOldFile) {
     }
   }
   EXPECT_EQ(readBytes(folder / "a.glint"), old);
+}
+
+TEST(AssetWriter, TheNextRunRemovesWhatKilledOnesLeft) {
+  const TempFolder folder;
+  const std::vector<float> heights(4 << 20);
+  const HeightMap big{2048, 2048, 0, heights};
+  std::size_t left = 0;
+  for (int attempt = 0; attempt < 50 && left == 0; ++attempt) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      for (;;) writeAsset(folder / "a.glint", big, {}, {.overwrite = true});
+    }
+    ::usleep(3000);
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    left = fileCount(folder.path()) - (fs::exists(folder / "a.glint") ? 1 : 0);
+  }
+  ASSERT_GT(left, 0u);
+  writeBytes(folder / ".b.glint.1-2-3.tmp", "another target's");
+  writeBytes(folder / ".a.glint.notes.tmp", "the user's");
+  writeAsset(folder / "a.glint", test::sampleHeights(4, 4).map, {}, {.overwrite = true});
+  EXPECT_TRUE(fs::exists(folder / ".b.glint.1-2-3.tmp"));
+  EXPECT_TRUE(fs::exists(folder / ".a.glint.notes.tmp"));
+  EXPECT_EQ(fileCount(folder.path()), 3u);
+}
+
+TEST(AssetWriter, LeavesTheFilesOfLivingWritersAlone) {
+  const TempFolder folder;
+  writeBytes(folder / ".a.glint.1-2-3.tmp", "in work");
+  const int other = ::open((folder / ".a.glint.1-2-3.tmp").c_str(), O_RDWR);
+  ASSERT_EQ(::flock(other, LOCK_EX), 0);
+  writeAsset(folder / "a.glint", test::sampleHeights(4, 4).map, {});
+  EXPECT_EQ(readBytes(folder / ".a.glint.1-2-3.tmp"), "in work");
+  ::close(other);
+  writeAsset(folder / "a.glint", test::sampleHeights(4, 4).map, {}, {.overwrite = true});
+  EXPECT_FALSE(fs::exists(folder / ".a.glint.1-2-3.tmp"));
 }
 
 TEST(AssetWriter, NamesTheFolderThatIsMissing) {
