@@ -72,6 +72,7 @@ constexpr std::array kRules = {
     Rule{"compressed.ranks", error, invalid_input, "cluster ranks are valid for the method", kMakeAgain},
     Rule{"compressed.ranges", error, invalid_input, "every cluster's factors lie inside their arrays", kMakeAgain},
     Rule{"bin_map.size", error, unsupported, "columns and rows of the map need at most 28 bits together", kMakeAgain},
+    Rule{"bin_map.alpha", error, invalid_input, "alpha is between alpha_min and alpha_max", kMakeAgain},
     Rule{"bin_map.masks", error, invalid_input,
          "masks and grid_masks have no bits beyond their bins and agree with their counts", kMakeAgain},
     Rule{"bin_map.bin_starts", error, invalid_input, "bin_starts rise from 0 to the number of texels", kMakeAgain},

@@ -37,6 +37,7 @@ std::vector<AttributeSchema> mapSize() {
           real("texel_size_um", 0, FLT_MAX, "um", "width of a texel; 0 when unknown")};
 }
 
+/// Attributes of glint::MapSlopes.
 AttributeSchema slopeMean() {
   return {"slope_mean", f32, "2", "1", "mean slope of the map's texels along u and v", -kMaxSlope, kMaxSlope};
 }
@@ -238,7 +239,9 @@ KindSchema binMapSchema() {
       "Inverse bin map",
       {integer("width", 1, kMaxMapSize, "texel", "width of the normal map"),
        integer("height", 1, kMaxMapSize, "texel", "height of the normal map"),
-       real("alpha", FLT_MIN, 1, "1", "Beckmann roughness of a facet"),
+       real("alpha", FLT_MIN, 1, "1", "Beckmann roughness that the bins are made for"),
+       real("alpha_min", FLT_MIN, 1, "1", "smallest Beckmann roughness of a facet"),
+       real("alpha_max", FLT_MIN, 1, "1", "largest Beckmann roughness of a facet"), slopeMean(), slopeCovariance(),
        integer("bins_per_axis", 1, 4096, "1", "bins of directions along each axis of [-1, 1]^2"),
        integer("leaf_size", 1, 1024, "texel", "texels of a cell, at least on average"),
        shift("bin_starts_shift", "values of bin_starts that share a base, logarithm to base 2"),

@@ -17,6 +17,9 @@ NdfAsset::NdfAsset(Tool& tool) {
               "beyond the border of the map (kind normals)");
   tool.option("--sigma-r", options_.sigma_r, "intrinsic roughness, disk units (kind normals; histogram-sat with --light)")
       .range(1e-4, 0.25);
+  tool.option("--alpha", options_.alpha, "Beckmann roughness, in the range of the asset (kind bin-map)")
+      .range(1e-4, 1)
+      .defaultText("the smallest of the asset");
   tool.choice("--gaussian-boxes", options_.gaussian_boxes, {{"1", GaussianBoxes::one}, {"3", GaussianBoxes::three}},
               "boxes that stand for a Gaussian footprint (kind histogram-sat)");
   tool.option("--slant-tolerance", options_.slant_tolerance,

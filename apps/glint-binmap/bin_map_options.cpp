@@ -2,13 +2,40 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "glint/model/error.h"
+
 namespace glint::apps {
 
+namespace {
+
+/// Reads A or A:B.
+void parseAlpha(const std::string& text, bake::BinMapOptions& options) {
+  const char* const end = text.data() + text.size();
+  const auto fail = [&] {
+    throw Error(ErrorCode::usage, "option.value", {}, "--alpha", '"' + text + "\" is neither a number nor a range",
+                "give a roughness, as 0.01, or the smallest and the largest, as 0.01:0.16");
+  };
+  auto parsed = std::from_chars(text.data(), end, options.alpha);
+  if (parsed.ec != std::errc{}) fail();
+  if (parsed.ptr == end) return;
+  if (*parsed.ptr != ':') fail();
+  parsed = std::from_chars(parsed.ptr + 1, end, options.alpha_max);
+  if (parsed.ec != std::errc{} || parsed.ptr != end || options.alpha_max == 0) fail();
+}
+
+}  // namespace
+
 BinMapCommand::BinMapCommand(Tool& tool) {
-  tool.option("--alpha", options_.alpha, "Beckmann roughness of a facet: sqrt(2) times the deviation of its lobe").required();
+  tool.option(
+          "--alpha", alpha_,
+          "Beckmann roughness of a facet: sqrt(2) times the deviation of its lobe; or a range A:B, for one asset that is asked "
+          "with any roughness between them")
+      .required();
+  tool.addCheck([this] { parseAlpha(alpha_, options_); });
   tool.option("--leaf-size", options_.leaf_size, "texels of a cell of a bin's grid, at least on average");
 }
 
@@ -22,6 +49,8 @@ BuiltBinMap BinMapCommand::build(const NormalMap& map, const bake::ProgressFn& p
 nlohmann::json binMapJson(const BuiltBinMap& built) {
   const BinMap map = built.data.view();
   return {{"alpha", map.alpha},
+          {"alpha_min", map.alpha_min},
+          {"alpha_max", map.alpha_max},
           {"bins_per_axis", map.bins_per_axis},
           {"occupied_bins", map.occupiedBins()},
           {"bins_with_grid", map.grid_cells.size() - 1},

@@ -23,6 +23,7 @@ class BinMapCommand {
   BuiltBinMap build(const NormalMap& map, const bake::ProgressFn& progress) const;
 
  private:
+  std::string alpha_;  // A, or A:B
   bake::BinMapOptions options_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "glint/formats/kinds/codec.h"
+#include "glint/formats/kinds/pyramid_shape.h"
 
 namespace glint::formats {
 namespace {
@@ -149,6 +150,9 @@ PackedAsset pack(const BinMap& map) {
   packed.integer("width", map.width);
   packed.integer("height", map.height);
   packed.real("alpha", map.alpha);
+  packed.real("alpha_min", map.alpha_min);
+  packed.real("alpha_max", map.alpha_max);
+  packSlopes(map.slopes, packed);
   packed.integer("bins_per_axis", map.bins_per_axis);
   packed.integer("leaf_size", map.leaf_size);
   packed.integer("bin_starts_shift", map.bin_starts.shift);
@@ -180,6 +184,9 @@ void unpack(const Content& content, BinMap& map) {
   map.width = content.integer("width");
   map.height = content.integer("height");
   map.alpha = content.real("alpha");
+  map.alpha_min = content.real("alpha_min");
+  map.alpha_max = content.real("alpha_max");
+  map.slopes = unpackSlopes(content);
   map.bins_per_axis = content.integer("bins_per_axis");
   map.leaf_size = content.integer("leaf_size");
   const auto counts = [&](const std::string& path, int shift) {
@@ -199,6 +206,9 @@ void unpack(const Content& content, BinMap& map) {
 }
 
 void checkIndex(const BinMap& map, Findings& findings) {
+  if (!(map.alpha_min <= map.alpha && map.alpha <= map.alpha_max))
+    findings.add("bin_map.alpha", "/@alpha", "is not between alpha_min and alpha_max");
+  checkSlopes(map.slopes, findings);
   if (texelCode(map.width, map.height).place_bits < 0) {
     findings.add("bin_map.size", "/", "has " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels");
     return;

@@ -36,6 +36,15 @@ NdfInfo infoOf(const HistogramSat& sat) {
   return {sat.width, sat.height, kReferenceResolution, 0, Surface::flat, Boundary::wrap, 0, 0};
 }
 
+float askedAlpha(const BinMap& map, float alpha, const std::filesystem::path& path) {
+  if (alpha == 0) return map.alpha_min;
+  if (alpha >= map.alpha_min && alpha <= map.alpha_max) return alpha;
+  throw Error(ErrorCode::usage, "query.alpha", path.string(), "",
+              "was made for roughnesses of " + std::to_string(map.alpha_min) + " to " + std::to_string(map.alpha_max) +
+                  ", not " + std::to_string(alpha),
+              "ask within the range, or make it with glint-binmap --alpha A:B");
+}
+
 }  // namespace
 
 template <class Model, class View>
@@ -60,7 +69,7 @@ OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& o
     opened.setPyramid<CpNdf>(asset.compressed());
   } else if (asset.kind() == "bin-map") {
     const BinMap& map = asset.binMap();
-    const BinMapNdf ndf(map);
+    const BinMapNdf ndf(map, askedAlpha(map, options.alpha, path));
     opened.model_ = ndf;
     opened.info_ = {map.width, map.height, kReferenceResolution, ndf.sigma(), Surface::flat, Boundary::wrap, 0, 0};
   } else if (asset.kind() == "histogram-sat") {

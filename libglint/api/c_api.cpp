@@ -93,6 +93,7 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   options.surface = static_cast<Surface>(o.surface);
   options.boundary = static_cast<Boundary>(o.boundary);
   options.verify_hashes = o.verify_hashes != 0;
+  options.alpha = o.alpha;
   return options;
 }
 

@@ -77,10 +77,11 @@ typedef struct glint_open_options {
   int32_t surface;          /* kind normals: GLINT_SURFACE_* */
   int32_t boundary;         /* kind normals: GLINT_BOUNDARY_* */
   int32_t verify_hashes;    /* not 0: compare every dataset with its hash; reads the whole file */
+  float alpha;              /* kind bin-map: Beckmann roughness, in the range that the asset was made for; 0: the smallest */
 } glint_open_options;
 
 /* clang-format off */
-#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0 }
+#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f }
 /* clang-format on */
 
 /* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat.

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "glint/bake/simd.h"
+#include "glint/bake/slopes.h"
 #include "glint/model/error.h"
 #include "glint/query/half.h"
 
@@ -30,6 +31,8 @@ void checkOptions(const NormalMap& map, const BinMapOptions& o) {
     throw Error(ErrorCode::usage, "option.range", {}, option, "out of range", "give " + range);
   };
   if (!(o.alpha >= kMinBinAlpha && o.alpha <= 1)) usage("--alpha", "a Beckmann roughness of 0.0005 to 1");
+  if (o.alpha_max != 0 && !(o.alpha_max >= o.alpha && o.alpha_max <= std::min(1.0f, kMaxAlphaRange * o.alpha)))
+    usage("--alpha", "a range that rises to at most 1 and 64 times its beginning");
   if (!(o.leaf_size >= 1 && o.leaf_size <= 1024)) usage("--leaf-size", "1 to 1024 texels");
   if (map.width < 1 || map.height < 1) throw Error(ErrorCode::invalid_input, "normals.size", {}, {}, "the map has no texels");
   if (texelCode(map.width, map.height).place_bits < 0) {
@@ -87,9 +90,11 @@ class Builder {
       : map_(map), progress_(progress), code_(texelCode(map.width, map.height)), count_(map.normals.size()) {
     out_.width = map.width;
     out_.height = map.height;
-    out_.alpha = options.alpha;
+    out_.alpha_min = options.alpha;
+    out_.alpha_max = options.alpha_max == 0 ? options.alpha : options.alpha_max;
+    out_.alpha = binAlpha(out_.alpha_min, out_.alpha_max, code_.place_bits);
     out_.leaf_size = options.leaf_size;
-    out_.bins_per_axis = binsPerAxis(options.alpha);
+    out_.bins_per_axis = binsPerAxis(out_.alpha);
     bin_count_ = static_cast<std::size_t>(out_.bins_per_axis) * out_.bins_per_axis;
     while (((bin_count_ - 1) >> range_shift_) >= kMaxRanges) ++range_shift_;
     range_count_ = ((bin_count_ - 1) >> range_shift_) + 1;
@@ -108,6 +113,7 @@ class Builder {
     step(3);
     listTexels();
     finishIndex();
+    out_.slopes = mapSlopes(map_);
     step(4);
     return std::move(out_);
   }
@@ -340,6 +346,12 @@ int binsPerAxis(float alpha) {
   return std::min(static_cast<int>(5 * std::sqrt(1 + reach * reach) / reach), kMaxBinsPerAxis);
 }
 
+float binAlpha(float alpha_min, float alpha_max, int place_bits) {
+  constexpr int kPlaceBits = 4;
+  const float finest = alpha_min * std::exp2(static_cast<float>(std::max(place_bits - kPlaceBits, 0)));
+  return alpha_min == alpha_max ? alpha_min : std::min(std::sqrt(alpha_min * alpha_max), finest);
+}
+
 CompactCountsData compactCounts(const std::vector<std::uint64_t>& values) {
   CompactCountsData data;
   const auto fits = [&](int shift) {
@@ -363,6 +375,9 @@ BinMap BinMapData::view() const {
   v.width = width;
   v.height = height;
   v.alpha = alpha;
+  v.alpha_min = alpha_min;
+  v.alpha_max = alpha_max;
+  v.slopes = slopes;
   v.bins_per_axis = bins_per_axis;
   v.leaf_size = leaf_size;
   v.masks = masks;

@@ -10,12 +10,15 @@
 namespace glint::bake {
 
 struct BinMapOptions {
-  float alpha = 0.01f;  ///< Beckmann roughness of the facets, kMinBinAlpha to 1
+  float alpha = 0.01f;  ///< Beckmann roughness of the facets, kMinBinAlpha to 1; the smallest, if there is a range
   int leaf_size = 8;    ///< texels of a cell of a bin's grid, at least on average, 1 to 1024
+  float alpha_max = 0;  ///< largest roughness that will be asked for, at most kMaxAlphaRange times alpha; 0: alpha
 };
 
 /// Smallest roughness: the number of bins grows with 1 / alpha^2.
 inline constexpr float kMinBinAlpha = 5e-4f;
+/// Largest quotient of the roughnesses of one bin map: a lobe of the largest reaches bins in proportion to its square.
+inline constexpr float kMaxAlphaRange = 64;
 /// Bins along each axis at most, reached near the smallest roughness.
 inline constexpr int kMaxBinsPerAxis = 4096;
 /// Bins with more texels than this many leaves get a grid.
@@ -24,6 +27,10 @@ inline constexpr int kGridLeaves = 8;
 /// Bins along each axis for a roughness: 5 / sin(arctan(3 sigma)), so that five bins span six deviations (Atanasov 2021, Eq. 16 and
 /// table 4, which rounds down).
 int binsPerAxis(float alpha);
+
+/// Roughness of the bins that serve a range of roughnesses: the geometric mean, but not so rough that a normal is known to less than
+/// a sixteenth of the bins of the smallest, or the smallest itself.
+float binAlpha(float alpha_min, float alpha_max, int place_bits);
 
 /// A CompactCounts that owns its arrays.
 struct CompactCountsData {
@@ -40,7 +47,8 @@ CompactCountsData compactCounts(const std::vector<std::uint64_t>& values);
 /// A BinMap that owns its arrays.
 struct BinMapData {
   int width = 0, height = 0;
-  float alpha = 0;
+  float alpha = 0, alpha_min = 0, alpha_max = 0;
+  MapSlopes slopes;
   int bins_per_axis = 0, leaf_size = 0;
   std::vector<std::uint64_t> masks, grid_masks;
   std::vector<std::uint32_t> mask_ranks, grid_ranks, grid_cells;

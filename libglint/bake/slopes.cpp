@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "glint/bake/simd.h"
+
 namespace glint::bake {
 namespace {
 
@@ -23,6 +25,36 @@ void visitSlopes(int width, int height, std::span<const float> heights, int j, c
     const float right = here[i == width - 1 ? 0 : i + 1];
     visit(i, Vec2{0.5f * (right - left), 0.5f * (above[i] - below[i])});
   }
+}
+
+/// Sums over slopes (p, q).
+struct Sums {
+  double p = 0, q = 0, pp = 0, pq = 0, qq = 0;
+};
+
+/// Sums over the slopes of some normals, in lanes that compilers vectorise.
+GLINT_MULTIVERSION Sums rowSums(const Vec2* normals, std::size_t count) {
+  constexpr std::size_t kLanes = 8;
+  double sums[5][kLanes] = {};
+  for (std::size_t first = 0; first < count; first += kLanes) {
+    float p[kLanes] = {}, q[kLanes] = {};
+    const std::size_t lanes = std::min(kLanes, count - first);
+    for (std::size_t k = 0; k < lanes; ++k) p[k] = normals[first + k].x, q[k] = normals[first + k].y;
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const float scale = -1 / std::sqrt(std::max(1e-12f, 1 - (p[k] * p[k] + q[k] * q[k])));
+      p[k] *= scale, q[k] *= scale;
+    }
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const double x = p[k], y = q[k];
+      sums[0][k] += x, sums[1][k] += y, sums[2][k] += x * x, sums[3][k] += x * y, sums[4][k] += y * y;
+    }
+  }
+  Sums total;
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    total.p += sums[0][k], total.q += sums[1][k];
+    total.pp += sums[2][k], total.pq += sums[3][k], total.qq += sums[4][k];
+  }
+  return total;
 }
 
 }  // namespace
@@ -63,18 +95,10 @@ SlopeMoments slopeMoments(int width, int height, std::span<const float> heights)
 }
 
 MapSlopes mapSlopes(const NormalMap& map) {
-  struct Sums {
-    double p = 0, q = 0, pp = 0, pq = 0, qq = 0;
-  };
   std::vector<Sums> rows(static_cast<std::size_t>(map.height));
-  tbb::parallel_for(0, map.height, [&](int j) {
-    Sums& sum = rows[static_cast<std::size_t>(j)];
-    for (int i = 0; i < map.width; ++i) {
-      const Vec2 n = map.at(i, j);
-      const double scale = -1 / std::sqrt(std::max(1e-12, 1.0 - dot(n, n))), p = scale * n.x, q = scale * n.y;
-      sum.p += p, sum.q += q, sum.pp += p * p, sum.pq += p * q, sum.qq += q * q;
-    }
-  });
+  const auto width = static_cast<std::size_t>(map.width);
+  tbb::parallel_for(std::size_t{0}, rows.size(),
+                    [&](std::size_t j) { rows[j] = rowSums(map.normals.data() + j * width, width); });
   Sums total;
   for (const Sums& row : rows) {  // in order of rows, so that the sum does not depend on threads
     total.p += row.p, total.q += row.q, total.pp += row.pp, total.pq += row.pq, total.qq += row.qq;

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "glint/model/device.h"
+#include "glint/model/map_slopes.h"
 
 namespace glint {
 
@@ -64,9 +65,12 @@ GLINT_HD constexpr TexelCode texelCode(int width, int height) {
 /// the map, a power of two of them, and its list is sorted by cell, row by row. Columns and rows of the map are cut at multiples of
 /// powers of two, see `cellGrid`.
 struct BinMap {
-  int width = 0;    ///< texels
-  int height = 0;   ///< texels
-  float alpha = 0;  ///< Beckmann roughness of a facet; its lobe has the deviation alpha / sqrt(2) in disk units
+  int width = 0;        ///< texels
+  int height = 0;       ///< texels
+  float alpha = 0;      ///< Beckmann roughness that the bins are made for; a facet's lobe has the deviation alpha / sqrt(2)
+  float alpha_min = 0;  ///< roughnesses that may be asked for: alpha is between them, and the same where there is only one
+  float alpha_max = 0;
+  MapSlopes slopes;  ///< of the map's texels, for masking
   int bins_per_axis = 0;
   int leaf_size = 0;  ///< texels of a cell, at least on average
 

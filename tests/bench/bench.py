@@ -277,6 +277,18 @@ class Bench:
                 self.table.add(f"bin map, median error, {name}, {alpha}, {entry['side']:.0f}^2", entry["median"], "", target=limit)
                 self.table.add(f"bin map, energy, {name}, {alpha}, {entry['side']:.0f}^2", abs(entry["energy"]), "", target=0.005)
 
+        text = call([self.tools.folder / "glint-binmap-bench", "--range"])
+        (self.folder / "binmap-range.json").write_text(text)
+        for run in json.loads(text):
+            name = run["map"]
+            self.table.add(f"bin map for a range, bytes over those of five, {name}", run["range_bytes"] / run["own_bytes"], "")
+            self.table.add(f"bin map for a range, building over that of five, {name}", run["range_build_ms"] / run["own_build_ms"], "")
+            for entry in run["densities"]:
+                figure = f"{name}, {entry['alpha']:.2f}, {entry['side']:.0f}^2"
+                self.table.add(f"bin map for a range, density, {figure}", entry["range_ns"], "ns", own_ns=entry["own_ns"])
+                if "range_error" in entry:
+                    self.table.add(f"bin map for a range, median error, {figure}", entry["range_error"]["median"], "", target=0.015)
+
     def write(self):
         """Figures of an earlier run at this size stay where this one has not measured them."""
         path = self.folder / "results.json"

@@ -1,14 +1,14 @@
 // Builds bin maps and asks them:
-//   glint-binmap-bench [--quick]
+//   glint-binmap-bench [--quick | --range] [MAP]...
 // Prints JSON: for each map and roughness the time of building, bytes, and the median time of the weights around a half vector for
-// footprints of several sizes; errors of the density against Reference. Times are of one thread; builds use all.
+// footprints of several sizes; errors of the density against Reference. Times are of one thread; builds use all. MAP: only maps of these
+// names. --range: instead, one bin map for roughnesses of 0.01 to 0.16 beside one for each.
 
 #include <tbb/global_control.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <ctime>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -166,21 +166,72 @@ ordered_json measure(const Map& m, float alpha, std::size_t queries) {
   return result;
 }
 
+/// One bin map for a range of roughnesses beside one for each: bytes, building, and time and error of densities.
+ordered_json measureRange(const Map& m, std::size_t queries) {
+  const std::vector<float> alphas = {0.01f, 0.02f, 0.04f, 0.08f, 0.16f};
+  const auto built = [&](const bake::BinMapOptions& options, double& seconds) {
+    const double start = now();
+    bake::BinMapData data = bake::buildBinMap(m.map, options);
+    seconds += now() - start;
+    return data;
+  };
+  double together_s = 0, apart_s = 0;
+  std::size_t apart_bytes = 0;
+  const bake::BinMapData together = built({alphas.front(), 8, alphas.back()}, together_s);
+  ordered_json answers = ordered_json::array();
+  for (const float alpha : alphas) {
+    const bake::BinMapData apart = built({alpha, 8}, apart_s);
+    apart_bytes += apart.sizeBytes();
+    const BinMapNdf one(together.view(), alpha), own(apart.view());
+    for (const float side : {4.0f, 16.0f, 64.0f, 256.0f, 1024.0f}) {
+      const auto asked = randomQueries(m, side, queries / (side < 200 ? 10 : 40), 0);
+      const auto time = [&](const BinMapNdf& ndf) {
+        return medianNanoseconds(asked, [&](const Query& q) { return ndf.density(q.footprint, q.half); });
+      };
+      ordered_json entry = {{"alpha", alpha}, {"side", side}, {"range_ns", time(one)}, {"own_ns", time(own)}};
+      if (side < 200) {
+        entry["range_error"] = errors(m, one, side, 200);
+        entry["own_error"] = errors(m, own, side, 200);
+      }
+      answers.push_back(entry);
+    }
+  }
+  return {{"map", m.name},
+          {"range", {alphas.front(), alphas.back()}},
+          {"bins_for", together.alpha},
+          {"range_bytes", together.sizeBytes()},
+          {"own_bytes", apart_bytes},
+          {"range_build_ms", 1e3 * together_s},
+          {"own_build_ms", 1e3 * apart_s},
+          {"densities", answers}};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool quick = argc > 1 && std::strcmp(argv[1], "--quick") == 0;
+  const std::vector<std::string> arguments(argv + 1, argv + argc);
+  const bool quick = !arguments.empty() && arguments[0] == "--quick", range = !arguments.empty() && arguments[0] == "--range";
+  const std::vector<std::string> names(arguments.begin() + (quick || range), arguments.end());
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 2);
   using enum bake::SynthKind;
   const std::vector<float> all(std::begin(kAlphas), std::end(kAlphas));
   ordered_json results = ordered_json::array();
-  const auto add = [&](const Map& m) {
-    for (const float alpha : m.alphas) results.push_back(measure(m, alpha, quick ? 2000 : 20000));
+  const auto add = [&](const std::string& name, int size, const auto& normals, const std::vector<float>& alphas) {
+    if (!names.empty() && std::find(names.begin(), names.end(), name) == names.end()) return;
+    const Map map = finish(name, size, normals(), alphas);
+    if (range) {
+      results.push_back(measureRange(map, 2000));
+      return;
+    }
+    for (const float alpha : map.alphas) results.push_back(measure(map, alpha, quick ? 2000 : 20000));
   };
-  add(finish("isotropic 1K", 1024, synthesised(isotropic, 1024, 0.2f), all));
-  add(finish("Gaussian 2K", 2048, beckmannNoise(2048, 0.6f), all));
-  add(finish("brushed 2K", 2048, synthesised(brushed, 2048, 0.2f), {0.01f}));
-  add(finish("8-bit isotropic 1K", 1024, eightBits(synthesised(isotropic, 1024, 0.2f)), all));
+  add(
+      "isotropic 1K", 1024, [] { return synthesised(isotropic, 1024, 0.2f); }, all);
+  add(
+      "Gaussian 2K", 2048, [] { return beckmannNoise(2048, 0.6f); }, all);
+  add("brushed 2K", 2048, [] { return synthesised(brushed, 2048, 0.2f); }, {0.01f});
+  add(
+      "8-bit isotropic 1K", 1024, [] { return eightBits(synthesised(isotropic, 1024, 0.2f)); }, all);
   std::cout << results.dump(1) << "\n";
   return 0;
 }

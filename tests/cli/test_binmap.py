@@ -62,6 +62,29 @@ def test_json_says_what_was_built(glint, assets):
     assert f'"occupied_bins": {result["occupied_bins"]}' in summary
 
 
+def test_a_range_of_roughnesses_is_one_asset(glint, assets):
+    assert glint("binmap", assets / "map.glint", "-o", "range.glint", "--alpha", "0.02:0.1").returncode == 0
+    assert glint("validate", "range.glint").returncode == 0
+    info = json.loads(glint("info", "range.glint", "--json").stdout)["result"]
+    assert [info["properties"][key] for key in ("alpha_min", "alpha_max")] == pytest.approx([0.02, 0.1])
+    question = ["--uv", "0.97", "0.3", "--box", "12", "3", "-4", "9", "--half", "0.05", "-0.1"]
+    for alpha in (0.02, 0.05, 0.1):
+        expected = number(glint("query", assets / "map.glint", *question, "--sigma-r", repr(alpha / math.sqrt(2))))
+        answer = number(glint("query", "range.glint", *question, "--alpha", alpha))
+        assert answer == pytest.approx(expected, rel=DENSITY_TOLERANCE, abs=1e-3), alpha
+    smallest = number(glint("query", "range.glint", *question))
+    assert smallest == number(glint("query", "range.glint", *question, "--alpha", "0.02"))
+    refused = glint("query", "range.glint", *question, "--alpha", "0.2")
+    assert refused.returncode == 1 and "0.02" in refused.stderr and "0.1" in refused.stderr
+    assert glint("query", assets / "bins.glint", *question, "--alpha", "0.1").returncode == 1
+
+
+@pytest.mark.parametrize("alpha", ["0.1:0.05", "0.1:", ":0.1", "0.1:2", "0.001:0.1", "0.1:x", "0.1-0.2", "0.1:0"])
+def test_bad_ranges_are_usage_errors(glint, assets, alpha):
+    process = glint("binmap", assets / "map.glint", "-o", "b.glint", "--alpha", alpha)
+    assert process.returncode == 1 and "--alpha" in process.stderr, process.stderr
+
+
 @pytest.mark.parametrize(
     "options",
     [[], ["--alpha", "0"], ["--alpha", "-0.1"], ["--alpha", "1e9"], ["--alpha", "nan"], ["--alpha", "0.1", "--leaf-size", "0"]],

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "glint/query/bin_map_brdf.h"
 #include "glint/query/packed_ndf_view.h"
 
 namespace glint::device {
@@ -21,6 +22,16 @@ __global__ void draw(const Model model, const Footprint* footprints, const Vec2*
   if (k < count) samples[k] = model.sample(footprints[k], points[k]);
 }
 
+/// Directions drawn from the micro-BRDF of a bin map, and its value there.
+__global__ void drawBrdf(const BinMapNdf ndf, const Footprint* footprints, const Vec3* views, const Vec2* points, int count,
+                         BrdfSample* samples, Rgb* values) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k >= count) return;
+  const BinMapBrdf brdf(ndf, footprints[k], Fresnel::mirror());
+  samples[k] = brdf.sample(views[k], points[k]);
+  values[k] = brdf.evaluate(samples[k].wi, views[k]);
+}
+
 /// Densities from a packed buffer, whose model every thread makes for itself.
 __global__ void answerPacked(const void* buffer, const Footprint* footprints, const Vec2* halves, int count, float* densities) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
@@ -36,11 +47,14 @@ template __global__ void answer<Reference>(Reference, const Footprint*, const Ve
 template __global__ void answer<PyramidNdf>(PyramidNdf, const Footprint*, const Vec2*, float, int, float*, float*);
 template __global__ void answer<CpNdf>(CpNdf, const Footprint*, const Vec2*, float, int, float*, float*);
 
+template __global__ void answer<BinMapNdf>(BinMapNdf, const Footprint*, const Vec2*, float, int, float*, float*);
+
+template __global__ void draw<BinMapNdf>(BinMapNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 template __global__ void draw<Reference>(Reference, const Footprint*, const Vec2*, int, HalfVectorSample*);
 template __global__ void draw<PyramidNdf>(PyramidNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 template __global__ void draw<CpNdf>(CpNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 
 // Models are passed by value, in the 4 KB that all GPUs have for a kernel's arguments.
-static_assert(sizeof(Reference) < 4000 && sizeof(PyramidNdf) < 4000 && sizeof(CpNdf) < 4000);
+static_assert(sizeof(Reference) < 4000 && sizeof(PyramidNdf) < 4000 && sizeof(CpNdf) < 4000 && sizeof(BinMapNdf) < 4000);
 
 }  // namespace glint::device

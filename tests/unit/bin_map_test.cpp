@@ -4,7 +4,6 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <map>
 #include <random>
 #include <tuple>
 #include <vector>
@@ -12,13 +11,15 @@
 #include "glint/model/error.h"
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/reference.h"
+#include "support/bin_weights.h"
 #include "support/test_maps.h"
 
 namespace glint {
 namespace {
 
-/// What issue and paper ask: shares of the footprint, from sums of areas that are exact to double or float rounding of each texel.
-constexpr double kWeightTolerance = 1e-6;
+using test::expectWeights;
+using test::kWeightTolerance;
+
 /// Normals are kept to 1/2^p of a bin, p at least 5 here: 1.2 deviations / 2^6 at most, at a slope of the lobe of 1.
 constexpr double kLobeTolerance = 0.02;
 /// Acceptance: median error of the density on noise, on a map of 8 bits, and of all densities together.
@@ -35,87 +36,6 @@ class OwnedBinMap {
   bake::BinMapData data_;
   BinMapNdf ndf_;
 };
-
-struct Point {
-  double x, y;
-};
-
-/// Part of a polygon with a x + b y <= c.
-std::vector<Point> clipped(const std::vector<Point>& polygon, double a, double b, double c) {
-  std::vector<Point> kept;
-  for (std::size_t k = 0; k < polygon.size(); ++k) {
-    const Point p = polygon[k], q = polygon[(k + 1) % polygon.size()];
-    const double dp = c - a * p.x - b * p.y, dq = c - a * q.x - b * q.y;
-    if (dp >= 0) kept.push_back(p);
-    if ((dp >= 0) != (dq >= 0)) kept.push_back({p.x + dp / (dp - dq) * (q.x - p.x), p.y + dp / (dp - dq) * (q.y - p.y)});
-  }
-  return kept;
-}
-
-double areaOf(const std::vector<Point>& polygon) {
-  double twice = 0;
-  for (std::size_t k = 0; k < polygon.size(); ++k) {
-    const Point p = polygon[k], q = polygon[(k + 1) % polygon.size()];
-    twice += (p.x - polygon[0].x) * (q.y - polygon[0].y) - (p.y - polygon[0].y) * (q.x - polygon[0].x);
-  }
-  return 0.5 * std::abs(twice);
-}
-
-/// Corners of a box footprint on the endless plane, texels.
-std::vector<Point> cornersOf(const Footprint& p, int width, int height) {
-  const Point c = {double{p.centre.x} * width, double{p.centre.y} * height};
-  std::vector<Point> corners;
-  for (const auto& [s, t] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}})
-    corners.push_back(
-        {c.x + s * double{p.axis_a.x} + t * double{p.axis_b.x}, c.y + s * double{p.axis_a.y} + t * double{p.axis_b.y}});
-  return corners;
-}
-
-/// Share of the footprint in every bin, by cutting the parallelogram at the sides of every texel.
-std::map<std::uint32_t, double> bruteWeights(const NormalMap& map, int bins, const Footprint& p) {
-  const std::vector<Point> polygon = cornersOf(p, map.width, map.height);
-  double low_x = 1e30, low_y = 1e30, high_x = -1e30, high_y = -1e30;
-  for (const Point q : polygon) {
-    low_x = std::min(low_x, q.x), high_x = std::max(high_x, q.x);
-    low_y = std::min(low_y, q.y), high_y = std::max(high_y, q.y);
-  }
-  const double total = areaOf(polygon);
-  std::map<std::uint32_t, double> weights;
-  for (int y = static_cast<int>(std::floor(low_y)); y < high_y; ++y) {
-    const std::vector<Point> row = clipped(clipped(polygon, 0, 1, y + 1), 0, -1, -y);
-    for (int x = static_cast<int>(std::floor(low_x)); x < high_x; ++x) {
-      const std::vector<Point> part = clipped(clipped(row, 1, 0, x + 1), -1, 0, -x);
-      if (part.size() < 3) continue;
-      const auto wrapped = [](int i, int n) { return ((i % n) + n) % n; };
-      const Vec2 n = map.at(wrapped(x, map.width), wrapped(y, map.height));
-      const auto bin = [&](float v) { return std::min(static_cast<int>((v + 1) * 0.5f * static_cast<float>(bins)), bins - 1); };
-      weights[static_cast<std::uint32_t>(bin(n.y) * bins + bin(n.x))] += areaOf(part) / total;
-    }
-  }
-  return weights;
-}
-
-/// Compares the weights around h with brute force: the right 21 bins, at the border of the square too.
-void expectWeights(const NormalMap& map, const BinMapNdf& ndf, const Footprint& p, Vec2 h) {
-  const int bins = ndf.map().bins_per_axis;
-  auto expected = bruteWeights(map, bins, p);
-  const BinWeights weights = ndf.weights(p, h);
-  ASSERT_LE(weights.count, BinWeights::kMost);
-  const int column = std::min(static_cast<int>((h.x + 1) * 0.5f * static_cast<float>(bins)), bins - 1);
-  const int row = std::min(static_cast<int>((h.y + 1) * 0.5f * static_cast<float>(bins)), bins - 1);
-  for (int k = 0; k < weights.count; ++k) {
-    const int dx = static_cast<int>(weights.bins[k]) % bins - column, dy = static_cast<int>(weights.bins[k]) / bins - row;
-    EXPECT_TRUE(std::abs(dx) <= 2 && std::abs(dy) <= 2 && std::abs(dx * dy) < 4) << dx << " " << dy;
-    EXPECT_NEAR(weights.weights[k], expected[weights.bins[k]], kWeightTolerance) << "bin " << weights.bins[k];
-    expected.erase(weights.bins[k]);
-  }
-  for (const auto& [bin, weight] : expected) {
-    const int dx = static_cast<int>(bin) % bins - column, dy = static_cast<int>(bin) / bins - row;
-    if (std::abs(dx) <= 2 && std::abs(dy) <= 2 && std::abs(dx * dy) < 4) {
-      EXPECT_NEAR(weight, 0, kWeightTolerance) << "bin " << bin << " was not found";
-    }
-  }
-}
 
 class Random {
  public:
@@ -252,6 +172,9 @@ TEST(BinMap, BadOptionsAreUsageErrors) {
     }
   }
   EXPECT_THROW(bake::buildBinMap(map.map(), {0.1f, 0}), Error);
+  for (const float alpha_max : {0.05f, 1.5f, -1.0f, std::nanf("")})
+    EXPECT_THROW(bake::buildBinMap(map.map(), {0.1f, 8, alpha_max}), Error) << alpha_max;
+  EXPECT_THROW(bake::buildBinMap(map.map(), {0.001f, 8, 0.1f}), Error);  // a hundredfold
 }
 
 TEST(BinMap, NormalsOutsideTheDiskAreNamed) {
@@ -398,14 +321,48 @@ TEST(BinMapNdf, ConvergesToReferenceAsBinsShrink) {
   constexpr double kRounding = 1e-4;  // single precision, and lobes that end at five deviations
   double last = 1;
   for (const float finer : {1.0f, 4.0f, 16.0f}) {
-    bake::BinMapData data = bake::buildBinMap(map.map(), {0.16f / finer, 8});
-    data.alpha = 0.16f;
-    const BinMapNdf ndf(data.view());
+    const bake::BinMapData data = bake::buildBinMap(map.map(), {0.16f / finer, 8});
+    const BinMapNdf ndf(data.view(), 0.16f);
     const double error = densityErrors(map, ndf, 6, true, 200).median;
     EXPECT_LT(error, std::max(0.5 * last, kRounding)) << finer;
     last = error;
   }
   EXPECT_LT(last, 1e-3);
+}
+
+TEST(BinMapNdf, OneMapAnswersARangeOfRoughnesses) {
+  const float low = 0.01f, high = 0.16f;
+  const test::OwnedMap map(512, 512, test::roughSurface(512, 512, 0.3f));
+  const bake::BinMapData data = bake::buildBinMap(map.map(), {low, 8, high});
+  EXPECT_EQ(std::tuple(data.alpha_min, data.alpha_max), std::tuple(low, high));
+  EXPECT_FLOAT_EQ(data.alpha, std::sqrt(low * high));
+  EXPECT_FLOAT_EQ(BinMapNdf(data.view()).sigma(), low * kInvSqrt2);
+  for (const float alpha : {low, 0.02f, 0.08f, high}) {
+    const BinMapNdf ndf(data.view(), alpha);
+    for (const float side : {4.0f, 16.0f, 24.0f, 64.0f, 300.0f}) {
+      const DensityErrors errors = densityErrors(map, ndf, side, side < 100, side < 50 ? 200 : side < 100 ? 60 : 10);
+      EXPECT_LT(errors.median, kNoiseTolerance) << alpha << " " << side;
+      EXPECT_LT(std::abs(errors.energy), kEnergyTolerance) << alpha << " " << side;
+    }
+    Random random(5);
+    double drawn = 0;
+    constexpr int kSamples = 4000;
+    const Footprint p = Footprint::box({0.3f, 0.2f}, {10, 3}, {-3, 10});
+    const Box2 range = {{-0.05f, -0.05f}, {0.1f, 0.1f}};
+    for (int k = 0; k < kSamples; ++k) {
+      const HalfVectorSample s = ndf.sample(p, {random.unit(), random.unit()});
+      drawn += s.h.x > range.low.x && s.h.x < range.high.x && s.h.y > range.low.y && s.h.y < range.high.y;
+    }
+    const double share = ndf.mean(p, range) * range.area();
+    EXPECT_NEAR(drawn / kSamples, share, 5 * std::sqrt(share * (1 - share) / kSamples)) << alpha;
+  }
+}
+
+TEST(BinMap, BinsOfARangeKeepNormalsFineEnough) {
+  EXPECT_FLOAT_EQ(bake::binAlpha(0.01f, 0.16f, 8), 0.04f);
+  EXPECT_FLOAT_EQ(bake::binAlpha(0.01f, 0.16f, 5), 0.02f);  // 2K^2
+  EXPECT_FLOAT_EQ(bake::binAlpha(0.01f, 0.16f, 2), 0.01f);  // 16K^2
+  EXPECT_EQ(bake::binAlpha(0.03f, 0.03f, 8), 0.03f);
 }
 
 TEST(BinMapNdf, DensityIsContinuous) {

@@ -238,6 +238,11 @@ TEST(AssetRoundTrip, BinMapsComeBackBitExact) {
     const BinMap& map = asset.binMap();
     EXPECT_EQ(std::tuple(map.width, map.height, map.alpha, map.bins_per_axis, map.leaf_size),
               std::tuple(width, height, sample.map.alpha, sample.map.bins_per_axis, sample.map.leaf_size));
+    EXPECT_EQ(std::tuple(map.alpha_min, map.alpha_max), std::tuple(sample.map.alpha_min, sample.map.alpha_max));
+    EXPECT_EQ(std::tuple(map.slopes.mean.x, map.slopes.mean.y, map.slopes.covariance.xx, map.slopes.covariance.xy,
+                         map.slopes.covariance.yy),
+              std::tuple(sample.map.slopes.mean.x, sample.map.slopes.mean.y, sample.map.slopes.covariance.xx,
+                         sample.map.slopes.covariance.xy, sample.map.slopes.covariance.yy));
     expectSame(map.masks, sample.map.masks);
     expectSame(map.mask_ranks, sample.map.mask_ranks);
     expectSame(map.bin_starts.bases, sample.map.bin_starts.bases);

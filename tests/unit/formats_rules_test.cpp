@@ -605,6 +605,8 @@ std::vector<Fixture> binMapFixtures() {
                 patch.replace("texels", H5T_STD_U32LE, {kWidth * kHeight}, false, reserve);
                 patch.replace("texel_classes", H5T_STD_U16LE, {(kWidth * kHeight * 12 + 15) / 16}, false, reserve);
               }),
+      patched("bin_map.alpha", Base::bin_map, [](const Patch& patch) { patch.setReal("alpha_min", 0.5f); }),
+      patched("bin_map.alpha", Base::bin_map, [](const Patch& patch) { patch.setReal("alpha_max", 0.25f); }),
       changed("bin_map.masks", "masks", 1, word([](auto v) { return v | 1ull << 40; })),
       changed("bin_map.masks", "masks", 0, word([](auto v) { return v & (v - 1); })),
       changed("bin_map.masks", "mask_ranks", 1, u32(raise)),
