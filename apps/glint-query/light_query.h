@@ -18,19 +18,19 @@ class LightQuery {
   bool asked() const { return !path_.empty(); }
 
   /// Integrates the light against the asset's normals and prints the result.
+  /// @param wo    outgoing direction, unit vector above the surface
   /// @param info  its roughness is that of the facets, unless --lobes says it
   /// @throws Error unsupported if the model cannot list the normals of a footprint, or they are not facets
-  void run(const AnyNdf& model, const api::NdfInfo& info, const Footprint& footprint);
+  void run(const AnyNdf& model, const api::NdfInfo& info, const Footprint& footprint, Vec3 wo);
 
  private:
   void check() const;
 
   Tool& tool_;
   std::string path_, lobes_path_;
-  std::vector<float> wo_, fresnel_ = {1, 1, 1};
+  std::vector<float> fresnel_ = {1, 1, 1};
   float shadowing_ = 1;
   ShLightOptions options_;
-  Option* wo_option_;
 };
 
 }  // namespace glint::apps
