@@ -411,13 +411,22 @@ void Estimator::completeGlossyPairs() {
   }
 }
 
+/// Facets of the quadrature, and walks of each view: narrow lobes need more for the same noise.
+struct GlossySamples {
+  std::size_t facets;
+  std::size_t walks;
+};
+
+GlossySamples samplesFor(float alpha) {
+  if (alpha >= 0.25f) return {1 << 18, 1 << 13};
+  if (alpha >= 0.15f) return {1 << 19, 1 << 15};
+  return {1 << 21, 5 << 15};
+}
+
 EffectiveBrdf Estimator::glossy() {
   const std::size_t n = directions_.count;
-  // Narrow lobes need more samples for the same noise.
-  const float alpha = base_.leastAlpha();
-  const std::size_t detail = alpha >= 0.25f ? 0 : alpha >= 0.15f ? 1 : 2;
-  const std::vector<PatchFacets> patches =
-      facets(options_.facet_samples > 0 ? options_.facet_samples : std::size_t{1} << (18 + detail));
+  const GlossySamples samples = samplesFor(base_.leastAlpha());
+  const std::vector<PatchFacets> patches = facets(options_.facet_samples > 0 ? options_.facet_samples : samples.facets);
   const std::vector<Chunk> chunks = makeChunks(patches);
   std::vector<Vec3> half(n * n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -441,7 +450,7 @@ EffectiveBrdf Estimator::glossy() {
   Shares total;
   if (follow) {
     for (const double value : sums_) total.all += value / static_cast<double>(result_.channels);
-    const std::vector<PatchFacets> starts = facets(options_.walks > 0 ? options_.walks : std::size_t{1} << (13 + 2 * detail));
+    const std::vector<PatchFacets> starts = facets(options_.walks > 0 ? options_.walks : samples.walks);
     std::vector<Shares> shares(n);
     tbb::parallel_for(std::size_t{0}, n, [&](std::size_t view) {
       shares[view] = glossyView(starts, view);
