@@ -98,6 +98,8 @@ constexpr std::array kRules = {
     Rule{"displacement.heights", error, invalid_input, "downsampled heights are finite", kMakeAgain},
     Rule{"displacement.lobes", error, invalid_input,
          "lobes have centres in the disk, bandwidths up to 1e6 and amplitudes of 0 or more", kMakeAgain},
+    Rule{"displacement.bases", error, invalid_input, "colours of lobes are 0 to 1, and their alphas above 0 and at most 1",
+         kMakeAgain},
     Rule{"displacement.scales", error, invalid_input, "scaling functions are finite and not negative", kMakeAgain},
     Rule{"displacement.moments", error, invalid_input, "slope moments and fit errors are finite", kMakeAgain},
     Rule{"compressed.image_scales", error, invalid_input, "image_scales are finite and positive", kMakeAgain},

@@ -8,7 +8,7 @@
 namespace glint::apps {
 
 NdfAsset::NdfAsset(Tool& tool) {
-  tool.option("ASSET", path_, "asset of kind normals, ndf-pyramid, ndf-cp, bin-map or histogram-sat").required();
+  tool.option("ASSET", path_, "asset of kind normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat or displacement").required();
   tool.option("--normals", normals_path_,
               "asset of kind normals that the pyramid was made from, for footprints below its finest level");
   tool.choice("--surface", options_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},

@@ -21,6 +21,7 @@ class NdfAsset {
   /// Opens the asset. Call once, in the work; the model lives as long as this object.
   /// @throws Error invalid_input if --normals is not the map that the asset was made from
   void open();
+  const std::string& path() const { return path_; }
   const AnyNdf& model() const { return opened_->model(); }
 
   /// Pixels along each axis of the asset's NDF images; 256 for normals.

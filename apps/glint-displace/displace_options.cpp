@@ -32,14 +32,15 @@ double meanFitError(const bake::DisplacementData::Level& level) {
 
 }  // namespace
 
-DisplaceCommand::DisplaceCommand(Tool& tool) {
+DisplaceCommand::DisplaceCommand(Tool& tool) : images_(tool) {
   const Option& factor =
       tool.option("--factor", factor_, "texels of the map along a side of a downsampled cell").range(2, 65536);
   factors_given_ =
       &tool.option("--factors", factors_, "several levels of detail, e.g. 4,16,64").range(2, 65536).excludes(factor);
-  tool.option("--base", base_,
-              "reflectance of the surface: diffuse:RHO (albedo above 0, at most 1), ggx:ALPHA (0.05 to 1; reflects "
-              "all light) or ggx:ALPHA:ETA,K (a conductor)");
+  base_given_ =
+      &tool.option("--base", base_,
+                   "reflectance of the surface: diffuse:RHO (albedo above 0, at most 1), ggx:ALPHA (0.05 to 1; reflects "
+                   "all light) or ggx:ALPHA:ETA,K (a conductor)");
   tool.option("--lobes", options_.lobes, "lobes of normals in each cell").range(1, kMaxLobes);
   tool.option("--angular", options_.angular, "directions of light and view: the square of this").range(3, 25);
   tool.option("--spatial", options_.spatial, "patches of the spatial factor along each axis").range(1, 16);
@@ -69,10 +70,11 @@ BaseBrdf parseBase(const std::string& text) {
   return base;
 }
 
-bake::DisplaceOptions DisplaceCommand::options() const {
+bake::DisplaceOptions DisplaceCommand::options(const HeightMap& map) const {
   bake::DisplaceOptions options = options_;
   options.factors = factors_given_->given() ? factors_ : std::vector<int>{factor_};
-  options.base = parseBase(base_);
+  options.base = parseBase(images_.colored() && !base_given_->given() ? "diffuse:1" : base_);
+  options.texture = images_.read(map.width, map.height);
   if (bounces_ == "auto") return options;
   const char* end = bounces_.data() + bounces_.size();
   const auto [stop, error] = std::from_chars(bounces_.data(), end, options.bounces);
@@ -117,7 +119,8 @@ nlohmann::json displacementJson(const bake::DisplacementData& data) {
                       {"interreflected_share", shape.interreflected_share},
                       {"distant_share", shape.distant_share},
                       {"height_bytes", level.heights.size() * sizeof(float)},
-                      {"lobe_bytes", level.lobes.size() * sizeof(VmfLobe)},
+                      {"lobe_bytes", level.lobes.size() * sizeof(VmfLobe) +
+                                         (level.lobe_colors.size() + level.lobe_alphas.size()) * sizeof(float)},
                       {"scale_bytes", level.spatial_scale.size() * sizeof(float) + level.angular_scale.size() * 2}});
   }
   return {{"levels", levels}};

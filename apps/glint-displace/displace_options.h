@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/tool.h"
+#include "glint-displace/base_images.h"
 #include "glint/bake/displace.h"
 
 namespace glint::apps {
@@ -14,16 +15,19 @@ class DisplaceCommand {
  public:
   explicit DisplaceCommand(Tool& tool);
 
-  /// Valid after parsing. @throws Error usage if --base or --bounces cannot be read
-  bake::DisplaceOptions options() const;
+  /// Valid after parsing; reads the images of the base.
+  /// @throws Error usage if --base or --bounces cannot be read; invalid_input if an image does not fit the map
+  bake::DisplaceOptions options(const HeightMap& map) const;
 
  private:
   int factor_ = 16;
   std::vector<int> factors_;
   std::string base_ = "diffuse:0.8";
+  BaseImages images_;
   std::string bounces_ = "auto";
   bake::DisplaceOptions options_;
   const Option* factors_given_ = nullptr;
+  const Option* base_given_ = nullptr;
 };
 
 /// Reads `diffuse:RHO`, `ggx:ALPHA` or `ggx:ALPHA:ETA,K`.

@@ -20,7 +20,7 @@ int main(int argc, char** argv) {
 
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = formats::Asset::open(input.path());
-    bake::DisplaceOptions options = command.options();
+    bake::DisplaceOptions options = command.options(asset.heights());
     options.seed = tool.seed();
     const formats::Provenance provenance = tool.provenance();
     const bake::DisplacementData data = bake::displace(asset.heights(), options, tool.progress("levels"));

@@ -179,7 +179,13 @@ ordered_json displacementProperties(const Displacement& d) {
     properties["eta"] = d.base.eta;
     properties["k"] = d.base.k;
   }
+  properties["channels"] = d.channels;
   properties["lobes"] = d.lobe_count;
+  properties["base_color"] = d.levels[0].lobe_colors.empty() ? "one"
+                             : d.channels == 3               ? "rgb of each lobe"
+                                                             : "grey of each lobe";
+  if (d.base.kind == BaseBrdf::Kind::ggx)
+    properties["base_roughness"] = d.levels[0].lobe_alphas.empty() ? "one" : "of each lobe";
   properties["angular"] = d.angular;
   properties["levels"] = d.level_count;
   return properties;

@@ -50,7 +50,6 @@ ShLightIntegral integrate(const ShLight& light, std::span<const float> zonal, fl
 LightQuery::LightQuery(Tool& tool) : tool_(tool) {
   const Option& light = tool.option(
       "--light", path_, "ask for the light that the footprint reflects: table of kind sh-light, in the frame of the surface");
-  wo_option_ = &tool.option("--wo", wo_, "--light: outgoing direction X Y Z, z out of the surface").count(3).needs(light);
   tool.option("--lobes", lobes_path_, "--light: asset of kind sh-lobes whose roughness is taken instead of --sigma-r")
       .needs(light);
   tool.option("--order", options_.order, "--light: highest band that is summed")
@@ -89,9 +88,6 @@ void LightQuery::check() const {
   if (!asked()) return;
   checkReadable(path_);
   if (!lobes_path_.empty()) checkReadable(lobes_path_);
-  if (!wo_option_->given() || !(wo_[2] > 0))
-    throw Error(ErrorCode::usage, "query.arguments", "", "--wo", "no outgoing direction above the surface was given",
-                "add --wo X Y Z with Z > 0");
 }
 
 LightQuery::Lobe LightQuery::lobe(const NdfAsset& asset, int order) const {
@@ -127,14 +123,13 @@ void LightQuery::report(const ShLightIntegral& integral, Rgb transfer) {
                    {"order", integral.order}});
 }
 
-void LightQuery::run(const NdfAsset& asset, const Footprint& footprint) {
+void LightQuery::run(const NdfAsset& asset, const Footprint& footprint, Vec3 wo) {
   if (asset.info().surface != Surface::flat)
     throw Error(ErrorCode::unsupported, "query.light", "", "--surface", "light is summed over facets, not over smooth surfaces",
                 "leave out --surface smooth");
   const formats::Asset light_asset = formats::Asset::open(path_);
   const ShLight& light = light_asset.shLight();
   const Lobe lobe = this->lobe(asset, light.order);
-  const Vec3 given = {wo_[0], wo_[1], wo_[2]}, wo = 1 / std::sqrt(dot(given, given)) * given;
   const auto ask = [&](const auto& histogram) {
     return light.order <= kShFloatOrder
                ? integrate<float>(light, lobe.zonal, lobe.sigma_r, histogram, footprint, wo, options_)

@@ -19,8 +19,9 @@ class LightQuery {
   bool asked() const { return !path_.empty(); }
 
   /// Integrates the light against the asset's normals and prints the result. Facets are as rough as the asset says, or --lobes.
+  /// @param wo  outgoing direction, unit vector above the surface
   /// @throws Error unsupported if the model cannot list the normals of a footprint, or they are not facets
-  void run(const NdfAsset& asset, const Footprint& footprint);
+  void run(const NdfAsset& asset, const Footprint& footprint, Vec3 wo);
 
  private:
   /// The roughness lobe of the facets.
@@ -37,11 +38,10 @@ class LightQuery {
 
   Tool& tool_;
   std::string path_, lobes_path_;
-  std::vector<float> wo_, fresnel_ = {1, 1, 1}, eta_, k_;
+  std::vector<float> fresnel_ = {1, 1, 1}, eta_, k_;
   float shadowing_ = 1, ior_ = 0;
   bool smith_ = false;
   ShLightOptions options_;
-  Option* wo_option_;
 };
 
 }  // namespace glint::apps

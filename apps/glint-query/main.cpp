@@ -1,6 +1,7 @@
 #include "common/ndf_models.h"
 #include "common/tool.h"
 #include "glint-query/query_command.h"
+#include "glint/formats/asset_reader.h"
 
 using namespace glint;
 
@@ -8,12 +9,14 @@ int main(int argc, char** argv) {
   apps::Tool tool(
       {"glint-query",
        "Asks an asset how the normals inside a footprint are distributed: the density towards a half vector, its mean over "
-       "a range of them, or a picture of the whole distribution.",
+       "a range of them, or a picture of the whole distribution; or how much light a displacement reflects.",
        "glint-query flakes.pyramid.glint --uv 0.3 0.7 --sigma 20 --half 0.1 -0.05"});
   apps::NdfAsset asset(tool);
   apps::QueryCommand command(tool);
 
   return tool.run(argc, argv, [&] {
+    const formats::Asset file = formats::Asset::open(asset.path());
+    if (file.kind() == "displacement") return command.run(file.displacement());
     asset.open();
     command.run(asset);
   });

@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <mutex>
 
@@ -26,22 +25,6 @@ std::vector<float> answerAll(const AnyNdf& model, std::span<const Query> queries
   return answers;
 }
 
-double nanosecondsPerQuery(const AnyNdf& model, const Query& query, int repeats) {
-  // Runs of several queries, so that reading the clock does not count.
-  constexpr int kRuns = 15;
-  const int per_run = std::max(1, repeats / kRuns);
-  std::vector<double> times;
-  volatile float sink = 0;
-  for (int run = 0; run < kRuns; ++run) {
-    const auto start = std::chrono::steady_clock::now();
-    for (int k = 0; k < per_run; ++k) sink = answer(model, query);
-    times.push_back(std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count() / per_run);
-  }
-  static_cast<void>(sink);
-  std::nth_element(times.begin(), times.begin() + kRuns / 2, times.end());
-  return times[kRuns / 2];
-}
-
 std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int resolution, const bake::ProgressFn& progress) {
   std::vector<float> image(static_cast<std::size_t>(resolution) * resolution);
   const float pixel = 2.0f / static_cast<float>(resolution);
@@ -50,8 +33,11 @@ std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int
   tbb::parallel_for(0, resolution, [&](int y) {
     for (int x = 0; x < resolution; ++x) {
       const Vec2 low = {-1 + static_cast<float>(x) * pixel, -1 + static_cast<float>(y) * pixel};
-      image[static_cast<std::size_t>(y) * resolution + x] =
-          std::visit([&](const auto& m) { return m.mean(footprint, {low, low + Vec2{pixel, pixel}}); }, model);
+      image[static_cast<std::size_t>(y) * resolution + x] = std::visit(
+          [&](const auto& m) {
+            return m.mean(footprint, {low, low + Vec2{pixel, pixel}});
+          },
+          model);
     }
     const std::scoped_lock lock(mutex);
     if (progress) progress(++done, resolution);
@@ -80,29 +66,6 @@ std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& 
 std::string sampleTable(std::span<const HalfVectorSample> samples) {
   std::string text = "hx,hy,pdf\n";
   for (const HalfVectorSample& s : samples) text += fmt::format("{:.9g},{:.9g},{:.9g}\n", s.h.x, s.h.y, s.pdf);
-  return text;
-}
-
-namespace {
-
-/// A field of a CSV table, quoted where RFC 4180 asks for it.
-std::string csvField(const std::string& text) {
-  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
-}
-
-}  // namespace
-
-std::string QueryTable::withAnswers(std::span<const float> answers) const {
-  std::string text;
-  const bool ranges = !queries_.empty() && queries_.front().range;
-  for (std::size_t r = 0; r < rows_.size(); ++r) {
-    for (const std::string& field : rows_[r]) text += csvField(field) + ",";
-    text += r == 0 ? (ranges ? "mean" : "density") : fmt::format("{:.9g}", answers[r - 1]);
-    text += "\n";
-  }
   return text;
 }
 

@@ -1,11 +1,15 @@
 #pragma once
 
+#include <algorithm>
+#include <chrono>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/ndf_models.h"
+#include "glint-query/csv_table.h"
 #include "glint/model/footprint.h"
 
 namespace glint::apps {
@@ -24,7 +28,23 @@ float answer(const AnyNdf& model, const Query& query);
 std::vector<float> answerAll(const AnyNdf& model, std::span<const Query> queries);
 
 /// Median nanoseconds of a query over `repeats` runs of one thread.
-double nanosecondsPerQuery(const AnyNdf& model, const Query& query, int repeats);
+/// @param ask  asks once
+template <class Ask>
+double medianNanoseconds(int repeats, const Ask& ask) {
+  // Runs of several queries, so that reading the clock does not count.
+  constexpr int kRuns = 15;
+  const int per_run = std::max(1, repeats / kRuns);
+  std::vector<double> times;
+  volatile float sink = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    const auto start = std::chrono::steady_clock::now();
+    for (int k = 0; k < per_run; ++k) sink = ask();
+    times.push_back(std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count() / per_run);
+  }
+  static_cast<void>(sink);
+  std::nth_element(times.begin(), times.begin() + kRuns / 2, times.end());
+  return times[kRuns / 2];
+}
 
 /// Pixel means of the density over [-1, 1]^2, [resolution][resolution], bottom row first.
 std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int resolution, const bake::ProgressFn& progress);
@@ -42,7 +62,9 @@ class QueryTable {
   std::string withAnswers(std::span<const float> answers) const;
 
  private:
-  std::vector<std::vector<std::string>> rows_;  // the header first
+  explicit QueryTable(CsvTable table) : table_(std::move(table)) {}
+
+  CsvTable table_;
   std::vector<Query> queries_;
 };
 

@@ -9,8 +9,16 @@
 #include "common/ndf_picture.h"
 
 namespace glint::apps {
+namespace {
 
-QueryCommand::QueryCommand(Tool& tool) : tool_(tool), light_(tool) {
+[[noreturn]] void usage(const std::string& what, const std::string& remedy) {
+  throw Error(ErrorCode::usage, "query.arguments", "", "", what, remedy);
+}
+
+}  // namespace
+
+QueryCommand::QueryCommand(Tool& tool) : tool_(tool), light_(tool), displacement_(tool) {
+  wo_option_ = &tool.option("--wo", wo_, "--light and --wi: outgoing direction X Y Z, z out of the surface").count(3);
   uv_option_ = &tool.option("--uv", uv_, "centre of the footprint, texture space").count(2);
   sigma_option_ = &tool.option("--sigma", sigma_, "footprint: deviation of an isotropic Gaussian, texels").range(1e-6, 1e9);
   covariance_option_ = &tool.option("--cov", covariance_, "footprint: covariance SXX SXY SYY of a Gaussian, texels^2").count(3);
@@ -34,28 +42,31 @@ QueryCommand::QueryCommand(Tool& tool) : tool_(tool), light_(tool) {
   tool.addCheck([this] { check(); });
 }
 
+void QueryCommand::checkTable() const {
+  if (uv_option_->given() || samples_ > 0 || !image_.empty() || half_option_->given() || range_option_->given() ||
+      light_.asked() || displacement_.lightGiven() || displacement_.levelGiven())
+    usage("--csv asks its own queries", "leave out the others");
+  checkReadable(csv_);
+}
+
 void QueryCommand::check() const {
-  const auto usage = [](const std::string& what, const std::string& remedy) {
-    throw Error(ErrorCode::usage, "query.arguments", "", "", what, remedy);
-  };
   const bool makes_table = csv_option_->given() || samples_ > 0;
   if (makes_table && !output_option_->given())
     usage(csv_option_->given() ? "--csv needs a place for the answers" : "--samples needs a place for them",
           "add -o OUT.csv, or -o - for stdout");
   if (!makes_table && output_option_->given()) usage("-o is for tables", "add --csv or --samples, or leave it out");
   if (makes_table && output_ != "-") checkWritable(output_);
-  if (csv_option_->given()) {
-    if (uv_option_->given() || samples_ > 0 || !image_.empty() || half_option_->given() || range_option_->given() ||
-        light_.asked())
-      usage("--csv asks its own queries", "leave out the others");
-    checkReadable(csv_);
-    return;
-  }
+  if (csv_option_->given()) return checkTable();
   if (!uv_option_->given()) usage("no footprint was given", "add --uv U V, or --csv TABLE");
-  if (!sigma_option_->given() && !covariance_option_->given() && !box_option_->given())
-    usage("the footprint has no size", "add --sigma S, --cov SXX SXY SYY or --box AX AY BX BY");
-  if (image_.empty() && !half_option_->given() && !range_option_->given() && samples_ == 0 && !light_.asked())
-    usage("nothing was asked", "add --half, --range, --samples, --image or --light");
+  if (!sigma_option_->given() && !covariance_option_->given() && !box_option_->given() && !displacement_.levelGiven())
+    usage("the footprint has no size",
+          "add --sigma S, --cov SXX SXY SYY or --box AX AY BX BY; of a displacement --sigma or --level");
+  if (image_.empty() && !half_option_->given() && !range_option_->given() && samples_ == 0 && !light_.asked() &&
+      !displacement_.lightGiven())
+    usage("nothing was asked", "add --half, --range, --samples, --image or --light; of a displacement --wi and --wo");
+  if (light_.asked() && (!wo_option_->given() || !(wo_[2] > 0)))
+    throw Error(ErrorCode::usage, "query.arguments", "", "--wo", "no outgoing direction above the surface was given",
+                "add --wo X Y Z with Z > 0");
   if (!image_.empty()) {
     checkWritable(image_);
     checkPictureName(image_);
@@ -77,12 +88,43 @@ Query QueryCommand::query() const {
   return query;
 }
 
+void QueryCommand::checkDisplacement() const {
+  if (covariance_option_->given() || box_option_->given())
+    usage("a displacement has levels, not footprints of any shape", "give --sigma S or --level L");
+  if (sigma_option_->given() && displacement_.levelGiven()) usage("the level was given twice", "give --sigma S or --level L");
+  if (range_option_->given()) usage("lobes have no means over ranges", "ask for --half, --image, or --wi and --wo");
+  if (light_.asked())
+    usage("--light is for distributions of normals", "ask for the light from one direction: --wi X Y Z --wo X Y Z");
+  if ((displacement_.lightGiven() || samples_ > 0) && !wo_option_->given())
+    usage("no outgoing direction was given", "add --wo X Y Z");
+  if (displacement_.lightGiven() + half_option_->given() > 1)
+    usage("light and normals were both asked for", "give --wi and --wo, or --half");
+}
+
+void QueryCommand::run(const Displacement& asset) {
+  checkDisplacement();
+  const DisplacedBrdf brdf(asset);
+  if (csv_option_->given()) return writeTable(displacement_.table(brdf, csv_));
+  const DisplacedPoint at = displacement_.point(asset, {uv_[0], uv_[1]}, sigma_);
+  if (!image_.empty()) {
+    const int size = image_size_ > 0 ? image_size_ : 256;
+    writeNdfPicture(image_, size, lobeImage(brdf, at, size));
+    tool_.setResult({{"image", image_}, {"image_size", size}});
+  }
+  if (samples_ > 0) writeTable(displacement_.samples(brdf, at, directionOf(wo_, "--wo"), samples_));
+  if (displacement_.lightGiven()) displacement_.reflect(brdf, at, directionOf(wo_, "--wo"), repeat_);
+  if (half_option_->given()) displacement_.density(brdf, at, {half_[0], half_[1]}, repeat_);
+}
+
 void QueryCommand::run(NdfAsset& asset) {
+  if (displacement_.asked())
+    usage("--wi, --level and --variant ask how a surface reflects; this asset holds how its normals are distributed",
+          "ask an asset of kind displacement, from glint-displace; or --half, --range, --samples, --image or --light");
   if (csv_option_->given()) return answerTable(asset);
   asset.requireAnswerable(footprint());
   if (!image_.empty()) writePicture(asset);
   if (samples_ > 0) writeSamples(asset);
-  if (light_.asked()) return light_.run(asset, footprint());
+  if (light_.asked()) return light_.run(asset, footprint(), directionOf(wo_, "--wo"));
   if (half_option_->given() || range_option_->given()) answerOne(asset);
 }
 
@@ -113,7 +155,7 @@ void QueryCommand::answerOne(NdfAsset& asset) {
   nlohmann::json result = {{q.range ? "mean" : "density", value}};
   tool_.print(fmt::format("{:.9g}\n", value));
   if (repeat_ > 0) {
-    const double ns = nanosecondsPerQuery(asset.model(), q, repeat_);
+    const double ns = medianNanoseconds(repeat_, [&] { return answer(asset.model(), q); });
     result["nanoseconds"] = ns;
     tool_.print(fmt::format("{:.1f} ns per query\n", ns));
   }

@@ -5,6 +5,7 @@
 
 #include "common/ndf_models.h"
 #include "common/tool.h"
+#include "glint-query/displacement_query.h"
 #include "glint-query/light_query.h"
 #include "glint-query/queries.h"
 
@@ -15,11 +16,16 @@ class QueryCommand {
  public:
   explicit QueryCommand(Tool& tool);
 
-  /// Answers what was asked: one query, a table of them, an image, or the time of a query.
+  /// Answers what was asked of a distribution: one query, a table of them, an image, or the time of a query.
   void run(NdfAsset& asset);
+
+  /// Answers what was asked of a displacement.
+  void run(const Displacement& asset);
 
  private:
   void check() const;
+  void checkTable() const;
+  void checkDisplacement() const;
   Footprint footprint() const;
   Query query() const;
   void answerTable(NdfAsset& asset);
@@ -30,14 +36,15 @@ class QueryCommand {
 
   Tool& tool_;
   LightQuery light_;
-  std::vector<float> uv_, covariance_, box_, half_, range_;
+  DisplacementQuery displacement_;
+  std::vector<float> uv_, covariance_, box_, half_, range_, wo_;
   float sigma_ = 0;
   std::string image_, csv_, output_;
   int image_size_ = 0;
   int repeat_ = 0;
   int samples_ = 0;
-  Option *uv_option_, *sigma_option_, *covariance_option_, *box_option_, *half_option_, *range_option_, *csv_option_,
-      *output_option_;
+  Option *wo_option_, *uv_option_, *sigma_option_, *covariance_option_, *box_option_, *half_option_, *range_option_,
+      *csv_option_, *output_option_;
 };
 
 }  // namespace glint::apps

@@ -27,6 +27,9 @@ void report(Findings& findings, const char* rule, int level, const char* dataset
                std::to_string(number) + " " + what + " (first is element " + std::to_string(first) + ")");
 }
 
+bool hasColors(const Displacement& d) { return d.level_count > 0 && !d.levels[0].lobe_colors.empty(); }
+bool hasAlphas(const Displacement& d) { return d.level_count > 0 && !d.levels[0].lobe_alphas.empty(); }
+
 }  // namespace
 
 PackedAsset pack(const Displacement& displacement) {
@@ -40,7 +43,10 @@ PackedAsset pack(const Displacement& displacement) {
   packed.real("alpha", d.base.alpha);
   packed.real("eta", d.base.eta);
   packed.real("k", d.base.k);
+  packed.integer("rgb", d.channels == 3);
   packed.integer("lobe_count", d.lobe_count);
+  packed.integer("has_lobe_colors", hasColors(d));
+  packed.integer("has_lobe_alphas", hasAlphas(d));
   packed.integer("angular", d.angular);
   packed.integer("level_count", d.level_count);
   packed.integers("level_factors", listed(d, [](const DisplacementLevel& l) { return l.factor; }));
@@ -53,19 +59,25 @@ PackedAsset pack(const Displacement& displacement) {
   packed.reals("level_interreflected", listed(d, [](const DisplacementLevel& l) { return l.interreflected_share; }));
   packed.reals("level_distant", listed(d, [](const DisplacementLevel& l) { return l.distant_share; }));
   const auto directions = static_cast<std::uint64_t>(d.angular) * static_cast<std::uint64_t>(d.angular);
+  const auto channels = static_cast<std::uint64_t>(d.channels), lobes = static_cast<std::uint64_t>(d.lobe_count);
   for (int l = 0; l < d.level_count; ++l) {
     const DisplacementLevel& level = d.levels[l];
     const auto rows = static_cast<std::uint64_t>(level.rows), columns = static_cast<std::uint64_t>(level.columns);
-    const auto lobes = static_cast<std::uint64_t>(d.lobe_count);
     packed.array(pathOf(l, "heights"), ElementType::f32, {rows, columns}, level.heights.data(), level.heights.size());
     packed.array(pathOf(l, "lobes"), ElementType::f32, {rows, columns, lobes, 4}, level.lobes.data(), 4 * level.lobes.size());
     packed.array(pathOf(l, "slopes"), ElementType::f32, {rows, columns, 5}, level.slopes.data(), 5 * level.slopes.size());
     packed.array(pathOf(l, "fit_errors"), ElementType::f32, {rows, columns}, level.fit_errors.data(), level.fit_errors.size());
     packed.array(pathOf(l, "spatial_scale"), ElementType::f32,
-                 {static_cast<std::uint64_t>(level.spatial_rows), static_cast<std::uint64_t>(level.spatial_columns)},
+                 {static_cast<std::uint64_t>(level.spatial_rows), static_cast<std::uint64_t>(level.spatial_columns), channels},
                  level.spatial_scale.data(), level.spatial_scale.size());
-    packed.array(pathOf(l, "angular_scale"), ElementType::f16, {directions * (directions + 1) / 2}, level.angular_scale.data(),
-                 level.angular_scale.size());
+    packed.array(pathOf(l, "angular_scale"), ElementType::f16, {directions * (directions + 1) / 2, channels},
+                 level.angular_scale.data(), level.angular_scale.size());
+    if (hasColors(d))
+      packed.array(pathOf(l, "lobe_colors"), ElementType::f32, {rows, columns, lobes, channels}, level.lobe_colors.data(),
+                   level.lobe_colors.size());
+    if (hasAlphas(d))
+      packed.array(pathOf(l, "lobe_alphas"), ElementType::f32, {rows, columns, lobes}, level.lobe_alphas.data(),
+                   level.lobe_alphas.size());
   }
   return packed;
 }
@@ -79,6 +91,7 @@ void unpack(const Content& content, Displacement& displacement) {
   displacement.base.alpha = content.real("alpha");
   displacement.base.eta = content.real("eta");
   displacement.base.k = content.real("k");
+  displacement.channels = content.integer("rgb") == 1 ? 3 : 1;
   displacement.lobe_count = content.integer("lobe_count");
   displacement.angular = content.integer("angular");
   displacement.level_count = content.integer("level_count");
@@ -99,6 +112,8 @@ void unpack(const Content& content, Displacement& displacement) {
     level.fit_errors = content.array<float>(pathOf(l, "fit_errors"));
     level.spatial_scale = content.array<float>(pathOf(l, "spatial_scale"));
     level.angular_scale = content.array<std::uint16_t>(pathOf(l, "angular_scale"));
+    if (content.integer("has_lobe_colors") == 1) level.lobe_colors = content.array<float>(pathOf(l, "lobe_colors"));
+    if (content.integer("has_lobe_alphas") == 1) level.lobe_alphas = content.array<float>(pathOf(l, "lobe_alphas"));
   }
 }
 
@@ -126,6 +141,10 @@ void checkData(const Displacement& displacement, Findings& findings) {
       return !(dot(lobe.mu, lobe.mu) <= 1 && lobe.kappa >= 0 && lobe.kappa <= kMaxKappa && lobe.amplitude >= 0 &&
                std::isfinite(lobe.amplitude));
     });
+    report(findings, "displacement.bases", l, "lobe_colors", level.lobe_colors.size(), "colours are out of range",
+           [&](std::size_t k) { return !(level.lobe_colors[k] >= 0 && level.lobe_colors[k] <= 1); });
+    report(findings, "displacement.bases", l, "lobe_alphas", level.lobe_alphas.size(), "alphas are out of range",
+           [&](std::size_t k) { return !(level.lobe_alphas[k] > 0 && level.lobe_alphas[k] <= 1); });
     report(findings, "displacement.moments", l, "slopes", level.slopes.size(), "cells have moments that are not finite",
            [&](std::size_t k) {
              const MapSlopes& m = level.slopes[k];

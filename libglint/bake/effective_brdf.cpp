@@ -82,7 +82,7 @@ std::vector<Chunk> makeChunks(const std::vector<PatchFacets>& patches) {
 
 /// What a chunk adds up.
 struct ChunkSums {
-  std::vector<float> pairs;  ///< [padded directions][padded directions]
+  std::vector<float> pairs;  ///< [channels][padded directions][padded directions]
   std::vector<float> areas;  ///< [padded directions]: visible projected area
 };
 
@@ -103,8 +103,22 @@ struct Shares {
 
 /// Rows over all directions that a walk needs.
 struct Scratch {
-  std::vector<float> visible, light, sum;
+  std::vector<float> visible, light;
+  std::vector<float> sum;  ///< [channels][padded directions]
 };
+
+/// a *= scale * b in the first `channels`; returns the largest of them.
+float multiply(Color& a, const Color& b, float scale, std::size_t channels) {
+  float largest = 0;
+  for (std::size_t c = 0; c < channels; ++c) largest = std::max(largest, a[c] *= scale * b[c]);
+  return largest;
+}
+
+double meanOf(const Color& color, std::size_t channels) {
+  double sum = 0;
+  for (std::size_t c = 0; c < channels; ++c) sum += color[c];
+  return sum / static_cast<double>(channels);
+}
 
 /// What all estimators share.
 class Estimator {
@@ -117,9 +131,12 @@ class Estimator {
         grid_(grid),
         options_(options),
         progress_(progress),
-        tracer_(surface) {
+        tracer_(surface),
+        base_(surface_, options_.base, options_.texture) {
     result_.directions = directions_.count;
-    sums_.resize(static_cast<std::size_t>(grid.count()) * directions_.count * directions_.count);
+    result_.patches = static_cast<std::size_t>(grid.count());
+    result_.channels = static_cast<std::size_t>(base_.channels());
+    sums_.resize(result_.channels * result_.patches * directions_.count * directions_.count);
     areas_.resize(directions_.count);
   }
 
@@ -130,9 +147,11 @@ class Estimator {
   std::vector<PatchFacets> facets(std::size_t samples) const;
   void facingRow(std::size_t facet, float* row) const;
   Vec3 pointOf(std::size_t facet, std::uint64_t index) const;
-  void diffuseWalk(std::size_t facet, std::uint64_t index, float* row, float* scratch, Shares& shares) const;
+  void diffuseWalk(std::size_t facet, std::uint64_t index, std::size_t stride, float* rows, float* scratch,
+                   Shares& shares) const;
   void diffuseChunk(const PatchFacets& facets, const Chunk& chunk, ChunkSums& sums, Shares& shares) const;
   void glossyChunk(const PatchFacets& facets, const Chunk& chunk, std::span<const Vec3> half, ChunkSums& sums) const;
+  void completeGlossyPairs();
   Shares glossyView(const std::vector<PatchFacets>& facets, std::size_t view);
   void glossyWalk(std::size_t facet, std::size_t view, std::uint64_t index, float scale, Scratch& scratch,
                   Shares& shares) const;
@@ -141,8 +160,8 @@ class Estimator {
   EffectiveBrdf finish(const Shares& shares);
   void report(std::size_t total);
 
-  double& sum(std::size_t patch, std::size_t i, std::size_t o) {
-    return sums_[(patch * directions_.count + i) * directions_.count + o];
+  double& sum(std::size_t channel, std::size_t patch, std::size_t i, std::size_t o) {
+    return sums_[((channel * result_.patches + patch) * directions_.count + i) * directions_.count + o];
   }
 
   const HeightSurface& surface_;
@@ -152,7 +171,8 @@ class Estimator {
   EffectiveOptions options_;
   const ProgressFn& progress_;
   HeightTracer tracer_;
-  std::vector<double> sums_;   ///< [patches][directions][directions]
+  FacetBase base_;
+  std::vector<double> sums_;   ///< [channels][patches][directions][directions]
   std::vector<double> areas_;  ///< [directions]: visible projected area of the whole map
   EffectiveBrdf result_;
   std::mutex mutex_;
@@ -185,34 +205,43 @@ Vec3 Estimator::pointOf(std::size_t facet, std::uint64_t index) const {
   return surface_.point(facet, xi.x, xi.y);
 }
 
-/// Follows light from a facet through diffuse reflections; adds the masked cosines of every facet on the way to `row`.
-void Estimator::diffuseWalk(std::size_t facet, std::uint64_t index, float* row, float* scratch, Shares& shares) const {
-  float throughput = 1;
-  float longest = 0;
+/// Follows light from a facet through diffuse reflections: rows[channel * stride + d], which hold the facet's masked cosines, become
+/// the light that it reflects, in units of the base, from directions d.
+void Estimator::diffuseWalk(std::size_t facet, std::uint64_t index, std::size_t stride, float* rows, float* scratch,
+                            Shares& shares) const {
+  const std::size_t channels = result_.channels, n = directions_.count;
+  Color throughput = base_.color(facet);
+  float largest = 1, longest = 0;
+  double light = 0;
+  for (std::size_t d = 0; d < n; ++d) light += rows[d];
+  shares.all += meanOf(throughput, channels) * light;
+  if (base_.colored())
+    for (std::size_t c = channels; c-- > 0;)
+      for (std::size_t d = 0; d < n; ++d) rows[c * stride + d] = throughput[c] * rows[d];
   Vec3 point = pointOf(facet, index);
-  double first = 0;
-  for (std::size_t d = 0; d < directions_.count; ++d) first += row[d];
-  shares.all += first;
-  for (int bounce = 1; bounce < options_.bounces && throughput > kLeastThroughput; ++bounce) {
+  for (int bounce = 1; bounce < options_.bounces && largest > kLeastThroughput; ++bounce) {
     const Vec2 xi = randomPair(options_.seed, kTurnStream + static_cast<std::uint64_t>(bounce), index);
     const float radius = std::sqrt(xi.x), angle = 2 * kPi * xi.y;
     const Vec3 local = {radius * std::cos(angle), radius * std::sin(angle), std::sqrt(1 - xi.x)};
     const auto hit = tracer_.trace(facet, point, Frame(surface_.normal(facet)).toWorld(local));
     if (!hit) return;
     facet = hit->facet, point = hit->point;
-    throughput *= options_.base.albedo;
+    largest = multiply(throughput, base_.color(facet), options_.base.albedo, channels);
     longest = std::max(longest, hit->distance);
     facingRow(facet, scratch);
-    double light = 0;
-    for (std::size_t d = 0; d < directions_.count; ++d) row[d] += throughput * scratch[d], light += throughput * scratch[d];
+    light = 0;
+    for (std::size_t d = 0; d < n; ++d) light += scratch[d];
+    for (std::size_t c = 0; c < channels; ++c)
+      for (std::size_t d = 0; d < n; ++d) rows[c * stride + d] += throughput[c] * scratch[d];
+    light *= meanOf(throughput, channels);
     shares.all += light;
     shares.addHop(light, longest, options_.distant_cells);
   }
 }
 
 void Estimator::diffuseChunk(const PatchFacets& facets, const Chunk& chunk, ChunkSums& sums, Shares& shares) const {
-  const std::size_t size = directions_.padded;
-  std::vector<float> views(kBlock * size), lights(kBlock * size), scratch(size);
+  const std::size_t size = directions_.padded, stride = kBlock * size;
+  std::vector<float> views(stride), lights(result_.channels * stride), scratch(size);
   for (std::size_t start = chunk.first; start < chunk.last; start += kBlock) {
     const std::size_t count = std::min(kBlock, chunk.last - start);
     for (std::size_t k = 0; k < count; ++k) {
@@ -223,21 +252,25 @@ void Estimator::diffuseChunk(const PatchFacets& facets, const Chunk& chunk, Chun
       facingRow(facet, light);
       const float area = 1 / surface_.normal(facet).z;
       for (std::size_t d = 0; d < size; ++d) sums.areas[d] += view[d] = area * light[d];
-      if (options_.bounces > 1) diffuseWalk(facet, index, light, scratch.data(), shares);
+      diffuseWalk(facet, index, stride, light, scratch.data(), shares);
     }
-    addProducts(lights.data(), views.data(), count, size, sums.pairs.data());
+    for (std::size_t c = 0; c < result_.channels; ++c)
+      addProducts(&lights[c * stride], views.data(), count, size, &sums.pairs[c * size * size]);
   }
 }
 
 ChunkSums Estimator::emptySums() const {
-  return {std::vector<float>(directions_.padded * directions_.padded), std::vector<float>(directions_.padded)};
+  return {std::vector<float>(result_.channels * directions_.padded * directions_.padded),
+          std::vector<float>(directions_.padded)};
 }
 
 void Estimator::addChunk(const Chunk& chunk, const ChunkSums& sums, double samples, double scale) {
   for (std::size_t i = 0; i < directions_.count; ++i) {
     areas_[i] += grid_.share(chunk.patch) * sums.areas[i] / samples;
-    for (std::size_t o = 0; o < directions_.count; ++o)
-      sum(static_cast<std::size_t>(chunk.patch), i, o) += scale / samples * sums.pairs[i * directions_.padded + o];
+    for (std::size_t c = 0; c < result_.channels; ++c)
+      for (std::size_t o = 0; o < directions_.count; ++o)
+        sum(c, static_cast<std::size_t>(chunk.patch), i, o) +=
+            scale / samples * sums.pairs[(c * directions_.padded + i) * directions_.padded + o];
   }
 }
 
@@ -260,10 +293,11 @@ EffectiveBrdf Estimator::diffuse() {
   return finish(total);
 }
 
-/// Quadrature of single reflections from GGX facets.
+/// Quadrature of single reflections from GGX facets, without Fresnel's factor and 1 / (4 pi).
 void Estimator::glossyChunk(const PatchFacets& facets, const Chunk& chunk, std::span<const Vec3> half, ChunkSums& sums) const {
-  const std::size_t n = directions_.count;
-  std::vector<float> x(kBlock), y(kBlock), z(kBlock), masked(n * kBlock), row(directions_.padded);
+  const std::size_t n = directions_.count, channels = result_.channels;
+  std::vector<float> x(kBlock), y(kBlock), z(kBlock), bend(kBlock), colors(3 * kBlock), masked(n * kBlock),
+      row(directions_.padded);
   for (std::size_t start = chunk.first; start < chunk.last; start += kBlock) {
     const std::size_t count = std::min(kBlock, chunk.last - start), used = (count + 7) / 8 * 8;
     for (std::size_t k = 0; k < used; ++k) {
@@ -273,15 +307,22 @@ void Estimator::glossyChunk(const PatchFacets& facets, const Chunk& chunk, std::
       const std::size_t facet =
           facets.facet(std::min(start + k, chunk.last - 1), randomPair(options_.seed, kFacetStream, index).x);
       const Vec3 normal = surface_.normal(facet);
-      x[k] = normal.x, y[k] = normal.y, z[k] = normal.z;
+      const Color color = base_.color(facet);
+      const float alpha = base_.of(facet).alpha;
+      x[k] = normal.x, y[k] = normal.y, z[k] = normal.z, bend[k] = alpha * alpha - 1;
+      for (std::size_t c = 0; c < channels; ++c) colors[c * kBlock + k] = color[c];
       facingRow(facet, row.data());
-      const float root_area = padding ? 0 : std::sqrt(1 / normal.z);
-      for (std::size_t d = 0; d < n; ++d)
-        masked[d * used + k] = row[d] > 0 ? root_area * ggxMasking(row[d], options_.base.alpha) : 0.0f;
-      for (std::size_t d = 0; d < n; ++d) sums.areas[d] += root_area * root_area * row[d];
+      const float area = padding ? 0 : 1 / normal.z;
+      // Rows are multiplied by each other, so half of a facet's weight is in each. That of a grey facet includes its colour.
+      const float weight = alpha * std::sqrt(channels == 1 ? area * color[0] : area);
+      for (std::size_t d = 0; d < n; ++d) masked[d * used + k] = row[d] > 0 ? weight * ggxMasking(row[d], alpha) : 0.0f;
+      for (std::size_t d = 0; d < n; ++d) sums.areas[d] += area * row[d];
     }
-    addGgxPairs({x.data(), y.data(), z.data(), masked.data(), used}, half, n, options_.base.alpha, directions_.padded,
-                sums.pairs.data());
+    const FacetArrays arrays{x.data(), y.data(), z.data(), bend.data(), masked.data(), used};
+    if (channels == 1)
+      addGgxPairs(arrays, half, n, directions_.padded, sums.pairs.data());
+    else
+      addColoredGgxPairs(arrays, colors.data(), kBlock, half, n, directions_.padded, sums.pairs.data());
   }
 }
 
@@ -303,11 +344,12 @@ Vec3 visibleGgxNormal(Vec3 view, float alpha, Vec2 xi) {
 /// Follows a view through glossy reflections and adds the light that every facet after the first one reflects into it.
 void Estimator::glossyWalk(std::size_t facet, std::size_t view, std::uint64_t index, float scale, Scratch& scratch,
                            Shares& shares) const {
-  const BaseBrdf& base = options_.base;
+  const std::size_t channels = result_.channels, n = directions_.count;
   Vec3 point = pointOf(facet, index), back = directions_.at(view);
-  float longest = 0;
-  float throughput = 1;
-  for (int bounce = 1; bounce < options_.bounces && throughput > kLeastThroughput; ++bounce) {
+  BaseBrdf base = base_.of(facet);
+  Color throughput = base_.color(facet);
+  float largest = 1, longest = 0;
+  for (int bounce = 1; bounce < options_.bounces && largest > kLeastThroughput; ++bounce) {
     const Frame frame(surface_.normal(facet));
     const Vec3 local = frame.toLocal(back);
     const Vec2 xi = randomPair(options_.seed, kTurnStream + static_cast<std::uint64_t>(bounce), index);
@@ -315,19 +357,22 @@ void Estimator::glossyWalk(std::size_t facet, std::size_t view, std::uint64_t in
     const float cosine = dot(m, local);
     const Vec3 turned = 2 * cosine * m - local;
     if (turned.z <= 0) return;
-    throughput *= conductorFresnel(cosine, base.eta, base.k) * ggxMasking(turned.z, base.alpha);
+    const float reflected = conductorFresnel(cosine, base.eta, base.k) * ggxMasking(turned.z, base.alpha);
     const Vec3 direction = frame.toWorld(turned);
     const auto hit = tracer_.trace(facet, point, direction);
     if (!hit) return;
     facet = hit->facet, point = hit->point, back = -1.0f * direction;
+    base = base_.of(facet);
+    largest = multiply(throughput, base_.color(facet), reflected, channels);
     longest = std::max(longest, hit->distance);
     masks_.expand(facet, scratch.visible.data());
     std::fill(scratch.light.begin(), scratch.light.end(), 0.0f);
-    addGgxLights(directions_, scratch.visible.data(), surface_.normal(facet), back, base, scale * throughput,
-                 scratch.light.data());
+    addGgxLights(directions_, scratch.visible.data(), surface_.normal(facet), back, base, scale, scratch.light.data());
     double light = 0;
-    for (std::size_t d = 0; d < directions_.count; ++d) scratch.sum[d] += scratch.light[d], light += scratch.light[d];
-    shares.addHop(light, longest, options_.distant_cells);
+    for (std::size_t d = 0; d < n; ++d) light += scratch.light[d];
+    for (std::size_t c = 0; c < channels; ++c)
+      for (std::size_t d = 0; d < n; ++d) scratch.sum[c * directions_.padded + d] += throughput[c] * scratch.light[d];
+    shares.addHop(meanOf(throughput, channels) * light, longest, options_.distant_cells);
   }
 }
 
@@ -335,7 +380,7 @@ void Estimator::glossyWalk(std::size_t facet, std::size_t view, std::uint64_t in
 Shares Estimator::glossyView(const std::vector<PatchFacets>& patches, std::size_t view) {
   Shares shares;
   Scratch scratch{std::vector<float>(directions_.padded), std::vector<float>(directions_.padded),
-                  std::vector<float>(directions_.padded)};
+                  std::vector<float>(result_.channels * directions_.padded)};
   const Vec3 direction = directions_.at(view);
   for (std::size_t p = 0; p < patches.size(); ++p) {
     std::fill(scratch.sum.begin(), scratch.sum.end(), 0.0f);
@@ -347,27 +392,47 @@ Shares Estimator::glossyView(const std::vector<PatchFacets>& patches, std::size_
       if (cosine <= 0 || !masks_.visible(facet, view)) continue;
       glossyWalk(facet, view, index, cosine / (normal.z * static_cast<float>(patches[p].samples())), scratch, shares);
     }
-    for (std::size_t i = 0; i < directions_.count; ++i) sum(p, i, view) += scratch.sum[i];
+    for (std::size_t c = 0; c < result_.channels; ++c)
+      for (std::size_t i = 0; i < directions_.count; ++i) sum(c, p, i, view) += scratch.sum[c * directions_.padded + i];
   }
   return shares;
 }
 
-EffectiveBrdf Estimator::glossy() {
-  const BaseBrdf& base = options_.base;
+/// Completes sums of single reflections of pairs i <= o: Fresnel's factor, and the pairs the other way round.
+void Estimator::completeGlossyPairs() {
   const std::size_t n = directions_.count;
-  // Narrow lobes need more samples for the same noise.
-  const std::size_t detail = base.alpha >= 0.25f ? 0 : base.alpha >= 0.15f ? 1 : 2;
-  const std::vector<PatchFacets> patches =
-      facets(options_.facet_samples > 0 ? options_.facet_samples : std::size_t{1} << (18 + detail));
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t o = i; o < n; ++o) {
+      const Vec3 sum = directions_.at(i) + directions_.at(o);
+      const float fresnel = conductorFresnel(0.5f * std::sqrt(dot(sum, sum)), options_.base.eta, options_.base.k);
+      for (std::size_t plane = 0; plane < sums_.size(); plane += n * n)  // channels and patches
+        sums_[plane + o * n + i] = sums_[plane + i * n + o] *= fresnel;
+    }
+  }
+}
+
+/// Facets of the quadrature, and walks of each view: narrow lobes need more for the same noise.
+struct GlossySamples {
+  std::size_t facets;
+  std::size_t walks;
+};
+
+GlossySamples samplesFor(float alpha) {
+  if (alpha >= 0.25f) return {1 << 18, 1 << 13};
+  if (alpha >= 0.15f) return {1 << 19, 1 << 15};
+  return {1 << 21, 5 << 15};
+}
+
+EffectiveBrdf Estimator::glossy() {
+  const std::size_t n = directions_.count;
+  const GlossySamples samples = samplesFor(base_.leastAlpha());
+  const std::vector<PatchFacets> patches = facets(options_.facet_samples > 0 ? options_.facet_samples : samples.facets);
   const std::vector<Chunk> chunks = makeChunks(patches);
   std::vector<Vec3> half(n * n);
-  std::vector<float> fresnel(n * n);
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t o = 0; o < n; ++o) {
       const Vec3 sum = directions_.at(i) + directions_.at(o);
-      const float length = std::sqrt(dot(sum, sum));
-      half[i * n + o] = (1 / length) * sum;
-      fresnel[i * n + o] = conductorFresnel(0.5f * length, base.eta, base.k);
+      half[i * n + o] = (1 / std::sqrt(dot(sum, sum))) * sum;
     }
   }
   const bool follow = options_.bounces > 1;
@@ -378,20 +443,14 @@ EffectiveBrdf Estimator::glossy() {
     glossyChunk(patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], half, sums[c]);
     report(work);
   });
+  for (std::size_t c = 0; c < chunks.size(); ++c)
+    addChunk(chunks[c], sums[c], static_cast<double>(patches[static_cast<std::size_t>(chunks[c].patch)].samples()),
+             1 / (4 * kPi));
+  completeGlossyPairs();
   Shares total;
-  for (std::size_t c = 0; c < chunks.size(); ++c) {
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t o = i; o < n; ++o) {
-        const float value = fresnel[i * n + o] * sums[c].pairs[i * directions_.padded + o];
-        sums[c].pairs[i * directions_.padded + o] = sums[c].pairs[o * directions_.padded + i] = value;
-      }
-    }
-    const auto samples = static_cast<double>(patches[static_cast<std::size_t>(chunks[c].patch)].samples());
-    addChunk(chunks[c], sums[c], samples, base.alpha * base.alpha / (4 * kPi));
-  }
   if (follow) {
-    for (const double value : sums_) total.all += value;
-    const std::vector<PatchFacets> starts = facets(options_.walks > 0 ? options_.walks : std::size_t{1} << (13 + 2 * detail));
+    for (const double value : sums_) total.all += value / static_cast<double>(result_.channels);
+    const std::vector<PatchFacets> starts = facets(options_.walks > 0 ? options_.walks : samples.walks);
     std::vector<Shares> shares(n);
     tbb::parallel_for(std::size_t{0}, n, [&](std::size_t view) {
       shares[view] = glossyView(starts, view);
@@ -416,12 +475,13 @@ EffectiveBrdf Estimator::finish(const Shares& shares) {
     if (areas_[d] > 0) correction[d] = std::clamp(directions_.z[d] / areas_[d], 1 / kMostCorrection, kMostCorrection);
   result_.values.resize(sums_.size());
   double difference = 0, norm = 0;
-  for (std::size_t p = 0; p < static_cast<std::size_t>(grid_.count()); ++p) {
+  for (std::size_t plane = 0; plane < sums_.size(); plane += n * n) {  // channels and patches
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t o = 0; o < n; ++o) {
-        const double a = sum(p, i, o), b = sum(p, o, i);
+        const double a = sums_[plane + i * n + o], b = sums_[plane + o * n + i];
+        result_.values[plane + i * n + o] = static_cast<float>(0.5 * correction[i] * correction[o] * (a + b));
+        if (directions_.z[i] < kGrazingCosine || directions_.z[o] < kGrazingCosine) continue;
         difference += (a - b) * (a - b), norm += (a + b) * (a + b);
-        result_.values[(p * n + i) * n + o] = static_cast<float>(0.5 * correction[i] * correction[o] * (a + b));
       }
     }
   }
@@ -443,10 +503,10 @@ double PatchGrid::share(int patch) const {
          (static_cast<double>(coarse_x) * coarse_y * factor * factor);
 }
 
-std::vector<double> EffectiveBrdf::mean(const PatchGrid& grid) const {
+std::vector<double> EffectiveBrdf::mean(const PatchGrid& grid, std::size_t channel) const {
   std::vector<double> mean(directions * directions);
   for (int p = 0; p < grid.count(); ++p)
-    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += grid.share(p) * patch(static_cast<std::size_t>(p))[k];
+    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += grid.share(p) * patch(static_cast<std::size_t>(p), channel)[k];
   return mean;
 }
 

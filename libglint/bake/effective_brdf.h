@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "glint/bake/base_texture.h"
 #include "glint/bake/height_surface.h"
 #include "glint/bake/progress.h"
 #include "glint/bake/visibility_masks.h"
@@ -45,28 +46,39 @@ struct EffectiveOptions {
   /// Samples in all: facets whose light is summed exactly, and walks (ggx: walks of each view). 0: as many as the base needs.
   std::size_t facet_samples = 0;
   std::size_t walks = 0;
+  BaseTexture texture = {};  ///< how the base varies
 };
 
 /// Effective BRDFs times the visible projected area of the view, for each patch: f_eff(wi, wo) A(wo) of Wu 2019 (Eq. 6, 17, 25),
 /// which is symmetric. On a flat surface it is f(wi, wo) cos(wi) cos(wo).
 struct EffectiveBrdf {
   std::size_t directions = 0;
-  std::vector<float> values;  ///< [patches][directions][directions]
-  double asymmetry = 0;  ///< norm of the estimates' antisymmetric part over that of the rest, before it was removed; all noise
+  std::size_t patches = 0;
+  std::size_t channels = 1;
+  std::vector<float> values;  ///< [channels][patches][directions][directions]
+  /// Norm of the estimates' antisymmetric part over that of the rest, before it was removed, within 75 degrees: all noise.
+  double asymmetry = 0;
   double interreflected = 0;    ///< share of the reflected light under an even sky that was scattered more than once
   std::vector<double> distant;  ///< for each of distant_cells: share of the reflected light that made a longer hop
 
-  std::span<const float> patch(std::size_t p) const { return {&values[p * directions * directions], directions * directions}; }
+  std::span<const float> patch(std::size_t p, std::size_t channel = 0) const {
+    const std::size_t pairs = directions * directions;
+    return {&values[(channel * patches + p) * pairs], pairs};
+  }
   /// Mean over the patches, weighted by their cells.
-  std::vector<double> mean(const PatchGrid& grid) const;
+  std::vector<double> mean(const PatchGrid& grid, std::size_t channel = 0) const;
 };
 
-/// Estimates the effective BRDFs of a surface whose facets all have the base's reflectance.
+/// Directions farther from the normal than this are grazing: what is known of them is finite but not reliable, and left out of measures.
+inline constexpr float kGrazingCosine = 0.25881904510252076f;  // 75 degrees
+
+/// Estimates the effective BRDFs of a surface whose facets have the base's reflectance, varied by the texture.
 ///
 /// Single scattering is a sum over facets, each seen through its visibility mask: no noise but that of leaving facets out.
 /// Interreflections come from random walks: a diffuse walk p, q1, q2 ... serves all pairs of directions at once,
-/// F += (G_p / n_z)^T (G_p + rho G_q1 + rho^2 G_q2 ...), G being a facet's masked cosines; glossy walks start from each view and
-/// collect light from all directions at every facet that they visit. Results do not depend on the number of threads.
+/// F += (G_p / n_z)^T rho_p (G_p + rho_q1 (G_q1 + rho_q2 (G_q2 ...))), G being a facet's masked cosines; glossy walks start from each
+/// view and collect light from all directions at every facet that they visit. Channels share the walks. Results do not depend on the
+/// number of threads.
 EffectiveBrdf effectiveBrdf(const HeightSurface& surface, const VisibilityMasks& masks, std::span<const Vec3> directions,
                             const PatchGrid& grid, const EffectiveOptions& options, const ProgressFn& progress = {});
 

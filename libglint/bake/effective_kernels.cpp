@@ -49,25 +49,58 @@ GLINT_MULTIVERSION void addProducts(const float* a, const float* b, std::size_t 
   }
 }
 
-GLINT_MULTIVERSION void addGgxPairs(const FacetArrays& facets, std::span<const Vec3> half, std::size_t directions, float alpha,
+namespace {
+
+/// Sums of one pair of directions. Inlined into each version of its callers.
+template <std::size_t Channels>
+[[gnu::always_inline]] inline void sumGgxPair(const FacetArrays& facets, const float* colors, std::size_t color_stride, Vec3 h,
+                                              const float* row_i, const float* row_o, float* totals) {
+  Lanes sums[Channels] = {};
+  for (std::size_t k = 0; k < facets.count; k += 8) {
+    Lanes x, y, z, bend, gi, go;
+    load(facets.x + k, x), load(facets.y + k, y), load(facets.z + k, z), load(facets.bend + k, bend);
+    load(row_i + k, gi), load(row_o + k, go);
+    const Lanes cosine = x * h.x + y * h.y + z * h.z;
+    const Lanes t = 1 + bend * cosine * cosine;
+    const Lanes value = gi * go / (t * t);
+    if constexpr (Channels == 1) {
+      sums[0] += value;
+    } else {
+      for (std::size_t c = 0; c < Channels; ++c) {
+        Lanes color;
+        load(colors + c * color_stride + k, color);
+        sums[c] += color * value;
+      }
+    }
+  }
+  for (std::size_t c = 0; c < Channels; ++c) {
+    totals[c] = 0;
+    for (int l = 0; l < 8; ++l) totals[c] += sums[c][l];
+  }
+}
+
+}  // namespace
+
+GLINT_MULTIVERSION void addGgxPairs(const FacetArrays& facets, std::span<const Vec3> half, std::size_t directions,
                                     std::size_t stride, float* c) {
-  const float bend = alpha * alpha - 1;
   for (std::size_t i = 0; i < directions; ++i) {
     for (std::size_t o = i; o < directions; ++o) {
-      const Vec3 h = half[i * directions + o];
-      const float* row_i = facets.masked + i * facets.count;
-      const float* row_o = facets.masked + o * facets.count;
-      Lanes sum = {};
-      for (std::size_t k = 0; k < facets.count; k += 8) {
-        Lanes x, y, z, gi, go;
-        load(facets.x + k, x), load(facets.y + k, y), load(facets.z + k, z), load(row_i + k, gi), load(row_o + k, go);
-        const Lanes cosine = x * h.x + y * h.y + z * h.z;
-        const Lanes t = 1 + bend * cosine * cosine;
-        sum += gi * go / (t * t);
-      }
-      float total = 0;
-      for (int l = 0; l < 8; ++l) total += sum[l];
+      float total;
+      sumGgxPair<1>(facets, nullptr, 0, half[i * directions + o], facets.masked + i * facets.count,
+                    facets.masked + o * facets.count, &total);
       c[i * stride + o] += total;
+    }
+  }
+}
+
+GLINT_MULTIVERSION void addColoredGgxPairs(const FacetArrays& facets, const float* colors, std::size_t color_stride,
+                                           std::span<const Vec3> half, std::size_t directions, std::size_t stride, float* c) {
+  for (std::size_t i = 0; i < directions; ++i) {
+    for (std::size_t o = i; o < directions; ++o) {
+      float totals[3];
+      sumGgxPair<3>(facets, colors, color_stride, half[i * directions + o], facets.masked + i * facets.count,
+                    facets.masked + o * facets.count, totals);
+      for (std::size_t channel = 0; channel < 3; ++channel) c[(channel * stride + i) * stride + o] += totals[channel];
     }
   }
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -50,6 +51,14 @@ class HeightSurface {
     const auto j = static_cast<float>(cell / static_cast<std::size_t>(width_));
     if (facet % 2 == 0) return {i + u, j + v, c.h00 + u * (c.h10 - c.h00) + v * (c.h01 - c.h00)};
     return {i + 1 - u, j + 1 - v, c.h11 + u * (c.h01 - c.h11) + v * (c.h10 - c.h11)};
+  }
+
+  /// Vertices of a facet as numbers j * width + i.
+  std::array<std::size_t, 3> cornerTexels(std::size_t facet) const {
+    const std::size_t cell = facet / 2, width = static_cast<std::size_t>(width_);
+    const std::size_t i = cell % width, row = cell - i;
+    const std::size_t right = i + 1 == width ? 0 : i + 1, up = row + width == cellCount() ? 0 : row + width;
+    return {facet % 2 == 0 ? cell : up + right, row + right, up + i};
   }
 
   struct Corners {

@@ -51,56 +51,63 @@ struct PairTable {
   }
 };
 
-/// out[i][o] += amplitude * ggxLobe for i <= o.
-GLINT_MULTIVERSION void addGgxLobe(const DirectionTable& directions, const PairTable& pairs, const BaseBrdf& base,
-                                   const VmfLobe& lobe, float* out) {
-  const Vec3 centre = lobeCentre(lobe);
-  const std::size_t padded = directions.padded;
+/// row[o] = ggxLobe with Fresnel's factor of one light and every view from `first` on.
+GLINT_MULTIVERSION void ggxLobeRow(const DirectionTable& directions, const PairTable& pairs, float alpha, const VmfLobe& lobe,
+                                   std::size_t light, std::size_t first, float* row) {
+  const Vec3 centre = lobeCentre(lobe), wi = directions.at(light);
+  const std::size_t padded = directions.padded, begin = light * padded;
   const float *ox = directions.x.data(), *oy = directions.y.data(), *oz = directions.z.data();
+  const float *hx = &pairs.x[begin], *hy = &pairs.y[begin], *hz = &pairs.z[begin], *fresnel = &pairs.fresnel[begin];
+  for (std::size_t o = first; o < padded; ++o)
+    row[o] = fresnel[o] * ggxLobe(alpha, centre, lobe.kappa, wi, {ox[o], oy[o], oz[o]}, {hx[o], hy[o], hz[o]});
+}
+
+/// out[channel][i][o] += weight of the channel * ggxLobe for i <= o.
+void addGgxLobe(const DirectionTable& directions, const PairTable& pairs, float alpha, const VmfLobe& lobe,
+                std::span<const float> weights, float* row, float* out) {
+  const std::size_t padded = directions.padded;
   for (std::size_t i = 0; i < directions.count; ++i) {
-    const Vec3 wi = directions.at(i);
-    const std::size_t row = i * padded;
-    const float *hx = &pairs.x[row], *hy = &pairs.y[row], *hz = &pairs.z[row], *fresnel = &pairs.fresnel[row];
-    for (std::size_t o = i / 8 * 8; o < padded; ++o)
-      out[row + o] +=
-          lobe.amplitude * ggxLobe(base, centre, lobe.kappa, wi, {ox[o], oy[o], oz[o]}, {hx[o], hy[o], hz[o]}, fresnel[o]);
+    const std::size_t first = i / 8 * 8;
+    ggxLobeRow(directions, pairs, alpha, lobe, i, first, row);
+    for (std::size_t c = 0; c < weights.size(); ++c)
+      for (std::size_t o = first; o < padded; ++o) out[(c * padded + i) * padded + o] += weights[c] * row[o];
   }
 }
 
-/// The sum of lobeCosines over the lobes of a cell, for all pairs, as a product of few rows: it is one for every term of a moment.
-void addDiffuseLobes(const DirectionTable& directions, std::span<const VmfLobe> lobes, float factor, std::vector<float>& left,
-                     std::vector<float>& right, float* out) {
+/// The rows whose products are lobeCosines: five for every lobe, one for each term of a moment. Scales hold the moments.
+struct DiffuseRows {
+  std::vector<float> values;  ///< [rows][padded directions]
+  std::vector<float> scales;  ///< [rows]
+};
+
+void fillDiffuseRows(const DirectionTable& directions, std::span<const VmfLobe> lobes, DiffuseRows& rows) {
   const std::size_t padded = directions.padded;
-  std::size_t rows = 0;
+  rows.scales.clear();
   for (const VmfLobe& lobe : lobes) {
     if (lobe.amplitude <= 0) break;
     const LobeMoments moments = lobeMoments(lobe.kappa);
     const Vec3 centre = lobeCentre(lobe);
-    const float scale[5] = {1, moments.spread, moments.spread, moments.spread, moments.bias};
+    float* row = &rows.values[rows.scales.size() * padded];
     for (std::size_t d = 0; d < padded; ++d) {
       const LobeFacing facing = lobeFacing(moments, centre, directions.at(d));
-      const float values[5] = {facing.lit, facing.visible * directions.x[d], facing.visible * directions.y[d],
-                               facing.visible * directions.z[d], facing.visible * facing.cosine};
-      for (std::size_t r = 0; r < 5; ++r) {
-        left[(rows + r) * padded + d] = factor * lobe.amplitude * scale[r] * values[r];
-        right[(rows + r) * padded + d] = values[r];
-      }
+      row[d] = facing.lit;
+      row[padded + d] = facing.visible * directions.x[d];
+      row[2 * padded + d] = facing.visible * directions.y[d];
+      row[3 * padded + d] = facing.visible * directions.z[d];
+      row[4 * padded + d] = facing.visible * facing.cosine;
     }
-    rows += 5;
+    for (const float scale : {1.0f, moments.spread, moments.spread, moments.spread, moments.bias})
+      rows.scales.push_back(lobe.amplitude * scale);
   }
-  addProducts(left.data(), right.data(), rows, padded, out);
 }
 
 /// Sums the cells of a downsampled surface.
 class LowEstimator {
  public:
-  LowEstimator(std::span<const float> heights, std::span<const VmfLobe> lobes, int lobe_count, const BaseBrdf& base,
-               std::span<const Vec3> directions, const PatchGrid& grid)
-      : lobes_(lobes),
-        lobe_count_(static_cast<std::size_t>(lobe_count)),
-        base_(base),
+  LowEstimator(std::span<const float> heights, const LobeField& field, std::span<const Vec3> directions, const PatchGrid& grid)
+      : field_(field),
         directions_(directions),
-        pairs_(directions_, base),
+        pairs_(directions_, field.base),
         grid_(grid),
         parts_(heights.size() <= 4 * kMostCells    ? 4
                : heights.size() <= 16 * kMostCells ? 2
@@ -113,7 +120,9 @@ class LowEstimator {
     EffectiveBrdf result;
     const std::size_t n = directions_.count;
     result.directions = n;
-    result.values.resize(static_cast<std::size_t>(grid_.count()) * n * n);
+    result.patches = static_cast<std::size_t>(grid_.count());
+    result.channels = field_.channels;
+    result.values.resize(result.channels * result.patches * n * n);
     struct Chunk {
       int patch;
       std::size_t first, last;
@@ -128,16 +137,18 @@ class LowEstimator {
     std::vector<std::vector<float>> sums(chunks.size());
     tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
       const Chunk& chunk = chunks[c];
-      sums[c].resize(n * n);
+      sums[c].resize(field_.channels * n * n);
       addCells(std::span(cells[static_cast<std::size_t>(chunk.patch)]).subspan(chunk.first, chunk.last - chunk.first),
                sums[c].data());
     });
     for (std::size_t c = 0; c < chunks.size(); ++c) {
       const auto patch = static_cast<std::size_t>(chunks[c].patch);
       const float scale = 1 / static_cast<float>(cells[patch].size());
-      for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t o = 0; o < n; ++o)
-          result.values[(patch * n + i) * n + o] += scale * sums[c][std::min(i, o) * n + std::max(i, o)];
+      for (std::size_t channel = 0; channel < field_.channels; ++channel)
+        for (std::size_t i = 0; i < n; ++i)
+          for (std::size_t o = 0; o < n; ++o)
+            result.values[((channel * result.patches + patch) * n + i) * n + o] +=
+                scale * sums[c][(channel * n + std::min(i, o)) * n + std::max(i, o)];
     }
     return result;
   }
@@ -174,31 +185,69 @@ class LowEstimator {
     }
   }
 
-  void addCells(std::span<const std::size_t> cells, float* sums) const {
-    const std::size_t n = directions_.count, padded = directions_.padded;
-    std::vector<float> pairs(padded * padded), left(5 * kMaxLobes * padded), right(5 * kMaxLobes * padded);
-    std::vector<std::uint64_t> bits(n);
-    const float share = 1 / static_cast<float>(2 * parts_ * parts_);
-    for (const std::size_t cell : cells) {
-      std::fill(pairs.begin(), pairs.end(), 0.0f);
-      const auto lobes = lobes_.subspan(cell * lobe_count_, lobe_count_);
-      if (base_.kind == BaseBrdf::Kind::diffuse) {
-        addDiffuseLobes(directions_, lobes, base_.albedo / std::numbers::pi_v<float>, left, right, pairs.data());
-      } else {
-        for (const VmfLobe& lobe : lobes)
-          if (lobe.amplitude > 0) addGgxLobe(directions_, pairs_, base_, lobe, pairs.data());
+  /// Scratch of one task.
+  struct Scratch {
+    Scratch(const DirectionTable& directions, std::size_t channels)
+        : pairs(channels * directions.padded * directions.padded),
+          left(5 * kMaxLobes * directions.padded),
+          row(directions.padded),
+          bits(directions.count) {
+      rows.values.resize(left.size());
+    }
+    std::vector<float> pairs;  ///< [channels][padded directions][padded directions]
+    std::vector<float> left;   ///< as DiffuseRows, weighted
+    std::vector<float> row;
+    DiffuseRows rows;
+    std::vector<std::uint64_t> bits;
+  };
+
+  /// Factor of the base for a lobe.
+  float color(std::size_t lobe, std::size_t channel) const {
+    return field_.colors.empty() ? 1.0f : field_.colors[lobe * field_.channels + channel];
+  }
+
+  /// The integral of f cos(wi) cos(wo) D of a cell for all pairs i <= o.
+  void fillPairs(std::size_t cell, Scratch& s) const {
+    std::fill(s.pairs.begin(), s.pairs.end(), 0.0f);
+    const std::size_t first = cell * field_.lobe_count, padded = directions_.padded;
+    const auto lobes = field_.lobes.subspan(first, field_.lobe_count);
+    if (field_.base.kind == BaseBrdf::Kind::diffuse) {
+      fillDiffuseRows(directions_, lobes, s.rows);
+      for (std::size_t c = 0; c < field_.channels; ++c) {
+        for (std::size_t r = 0; r < s.rows.scales.size(); ++r) {
+          const float scale = field_.base.albedo / std::numbers::pi_v<float> * color(first + r / 5, c) * s.rows.scales[r];
+          for (std::size_t d = 0; d < padded; ++d) s.left[r * padded + d] = scale * s.rows.values[r * padded + d];
+        }
+        addProducts(s.left.data(), s.rows.values.data(), s.rows.scales.size(), padded, &s.pairs[c * padded * padded]);
       }
-      facetBits(cell, bits);
-      for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t o = i; o < n; ++o)
-          sums[i * n + o] +=
-              share * static_cast<float>(std::popcount(bits[i] & bits[o])) * std::max(0.0f, pairs[i * padded + o]);
+      return;
+    }
+    for (std::size_t l = 0; l < lobes.size() && lobes[l].amplitude > 0; ++l) {
+      const float alpha = field_.alphas.empty() ? field_.base.alpha : field_.alphas[first + l];
+      float weights[3];
+      for (std::size_t c = 0; c < field_.channels; ++c) weights[c] = lobes[l].amplitude * color(first + l, c);
+      addGgxLobe(directions_, pairs_, alpha, lobes[l], {weights, field_.channels}, s.row.data(), s.pairs.data());
     }
   }
 
-  std::span<const VmfLobe> lobes_;
-  std::size_t lobe_count_;
-  BaseBrdf base_;
+  void addCells(std::span<const std::size_t> cells, float* sums) const {
+    const std::size_t n = directions_.count, padded = directions_.padded;
+    Scratch s(directions_, field_.channels);
+    const float share = 1 / static_cast<float>(2 * parts_ * parts_);
+    for (const std::size_t cell : cells) {
+      fillPairs(cell, s);
+      facetBits(cell, s.bits);
+      for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t o = i; o < n; ++o) {
+          const float shown = share * static_cast<float>(std::popcount(s.bits[i] & s.bits[o]));
+          for (std::size_t c = 0; c < field_.channels; ++c)
+            sums[(c * n + i) * n + o] += shown * std::max(0.0f, s.pairs[(c * padded + i) * padded + o]);
+        }
+      }
+    }
+  }
+
+  LobeField field_;
   DirectionTable directions_;
   PairTable pairs_;
   PatchGrid grid_;
@@ -210,9 +259,9 @@ class LowEstimator {
 
 }  // namespace
 
-EffectiveBrdf lowBrdf(std::span<const float> heights, std::span<const VmfLobe> lobes, int lobe_count, const BaseBrdf& base,
-                      std::span<const Vec3> directions, const PatchGrid& grid) {
-  return LowEstimator(heights, lobes, lobe_count, base, directions, grid).sum();
+EffectiveBrdf lowBrdf(std::span<const float> heights, const LobeField& field, std::span<const Vec3> directions,
+                      const PatchGrid& grid) {
+  return LowEstimator(heights, field, directions, grid).sum();
 }
 
 }  // namespace glint::bake

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 
 #include "glint/bake/counter_random.h"
 #include "glint/bake/simd.h"
@@ -113,6 +114,18 @@ GLINT_MULTIVERSION void normalise(const float* weight, std::size_t count, std::s
     for (std::size_t k = 0; k < count; ++k) shares.values[l][k] *= inverse[k];
 }
 
+/// The whole expectation step.
+void shareOut(const Normals& normals, std::span<const Lobe> lobes, Shares& shares) {
+  const std::size_t count = normals.size();
+  for (std::size_t l = 0; l < lobes.size(); ++l) {
+    shares.values[l].resize(count);
+    lobeValues(normals.x.data(), normals.y.data(), normals.z.data(), count, lobes[l].centre, lobes[l].kappa,
+               static_cast<float>(lobes[l].weight) * lobeScale(lobes[l].kappa), shares.values[l].data());
+  }
+  shares.inverse.resize(count);
+  normalise(normals.weight.data(), count, lobes.size(), shares);
+}
+
 /// Maximisation of one lobe.
 void updateLobe(const Normals& normals, const std::vector<float>& share, double total, Lobe& lobe) {
   double w = 0, x = 0, y = 0, z = 0;
@@ -131,20 +144,12 @@ void updateLobe(const Normals& normals, const std::vector<float>& share, double 
 
 void fitLobes(std::span<const WeightedNormal> input, std::span<VmfLobe> out) {
   const Normals normals = split(input);
-  const std::size_t count = normals.size();
   double total = 0;
   for (const float w : normals.weight) total += w;
   std::vector<Lobe> lobes = firstLobes(normals, out.size());
   Shares shares;
-  for (auto& values : shares.values) values.resize(count);
-  shares.inverse.resize(count);
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    for (std::size_t l = 0; l < lobes.size(); ++l) {
-      const float scale = static_cast<float>(lobes[l].weight) * lobeScale(lobes[l].kappa);
-      lobeValues(normals.x.data(), normals.y.data(), normals.z.data(), count, lobes[l].centre, lobes[l].kappa, scale,
-                 shares.values[l].data());
-    }
-    normalise(normals.weight.data(), count, lobes.size(), shares);
+    shareOut(normals, lobes, shares);
     for (std::size_t l = 0; l < lobes.size(); ++l) updateLobe(normals, shares.values[l], total, lobes[l]);
     std::erase_if(lobes, [](const Lobe& lobe) { return lobe.weight < kEmptyShare; });
   }
@@ -154,6 +159,27 @@ void fitLobes(std::span<const WeightedNormal> input, std::span<VmfLobe> out) {
   std::fill(out.begin(), out.end(), VmfLobe{});
   for (std::size_t l = 0; l < lobes.size(); ++l)
     out[l] = {{lobes[l].centre.x, lobes[l].centre.y}, lobes[l].kappa, static_cast<float>(total * lobes[l].weight / kept)};
+}
+
+void averageOverLobes(std::span<const WeightedNormal> input, std::span<const VmfLobe> fitted, std::span<const float> values,
+                      std::span<float> means) {
+  std::fill(means.begin(), means.end(), 0.0f);
+  const Normals normals = split(input);
+  const std::size_t each = values.size() / input.size();
+  std::vector<Lobe> lobes;
+  for (const VmfLobe& lobe : fitted)
+    if (lobe.amplitude > 0) lobes.push_back({lobeCentre(lobe), lobe.kappa, lobe.amplitude});
+  Shares shares;
+  shareOut(normals, lobes, shares);
+  for (std::size_t l = 0; l < lobes.size(); ++l) {
+    const std::vector<float>& share = shares.values[l];
+    const double total = std::accumulate(share.begin(), share.end(), 0.0);
+    for (std::size_t c = 0; c < each; ++c) {
+      double sum = 0;
+      for (std::size_t k = 0; k < share.size(); ++k) sum += static_cast<double>(share[k]) * values[k * each + c];
+      means[l * each + c] = static_cast<float>(total > 0 ? sum / total : 0);
+    }
+  }
 }
 
 float lobeError(std::span<const WeightedNormal> input, std::span<const VmfLobe> lobes) {

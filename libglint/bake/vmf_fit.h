@@ -21,6 +21,12 @@ struct WeightedNormal {
 /// @param lobes    at most kMaxLobes; largest amplitude first, empty lobes last with amplitude 0. Amplitudes add up to the weights
 void fitLobes(std::span<const WeightedNormal> normals, std::span<VmfLobe> lobes);
 
+/// Means over each lobe of numbers that normals carry, weighted by the normals' shares in it: the lobe's colour, say.
+/// @param values  [normals][count]
+/// @param means   [lobes][count]; 0 for empty lobes
+void averageOverLobes(std::span<const WeightedNormal> normals, std::span<const VmfLobe> lobes, std::span<const float> values,
+                      std::span<float> means);
+
 /// How well lobes represent normals: both distributions blurred by a lobe of 8 degrees, compared at up to 32 of the normals;
 /// norm of the difference over the norm.
 float lobeError(std::span<const WeightedNormal> normals, std::span<const VmfLobe> lobes);

@@ -52,12 +52,14 @@ struct DisplacementLevel {
 
   std::span<const float> heights;        ///< [rows][columns] of the vertices, texels of the original
   std::span<const VmfLobe> lobes;        ///< [rows][columns][lobe_count], largest amplitude first
+  std::span<const float> lobe_colors;    ///< [rows][columns][lobe_count][channels], factors of the base; empty: all 1
+  std::span<const float> lobe_alphas;    ///< [rows][columns][lobe_count], ggx roughness; empty: that of the base
   std::span<const MapSlopes> slopes;     ///< [rows][columns], for the single-lobe variant
   std::span<const float> fit_errors;     ///< [rows][columns]: relative error of the lobes, both sides blurred by 8 degrees
-  std::span<const float> spatial_scale;  ///< T [spatial_rows][spatial_columns], mean 1 over the cells
-  std::span<const std::uint16_t> angular_scale;  ///< S, half precision: element (i, o) with i <= o is at o (o + 1) / 2 + i
+  std::span<const float> spatial_scale;  ///< T [spatial_rows][spatial_columns][channels], mean 1 over the cells
+  std::span<const std::uint16_t> angular_scale;  ///< S [][channels], half precision: pair i <= o is at o (o + 1) / 2 + i
 
-  // How far the factorisation and its assumptions hold (below 75 degrees).
+  // How far the factorisation and its assumptions hold (below 75 degrees; of colours the worst channel or the mean of them).
   float rank1_residual = 0;        ///< |R - T S| / |R| of the scaling function R before it was factorised
   float rank1_energy = 1;          ///< share of the largest singular value's square: what the best factorisation keeps
   float interreflected_share = 0;  ///< of the reflected light
@@ -71,6 +73,7 @@ struct Displacement {
   int height = 0;  ///< of the original, texels
   float texel_size_um = 0;
   BaseBrdf base;
+  int channels = 1;    ///< of colours, T and S: 1, or 3 for linear red, green and blue
   int lobe_count = 0;  ///< lobes of each cell, 1 to kMaxLobes
   int angular = 0;     ///< N: S has N^2 directions of either kind, the cells of concentric_map.h
   int level_count = 0;

@@ -7,6 +7,7 @@
 #include "glint/query/base_brdf.h"
 #include "glint/query/concentric_map.h"
 #include "glint/query/half.h"
+#include "glint/query/rgb.h"
 #include "glint/query/smith.h"
 #include "glint/query/vmf_lobe.h"
 
@@ -37,7 +38,7 @@ struct DirectionSample {
 /// f'_low(wi, wo) = n_z / (cos(wi) cos(wo)) * integral of f cos(n', wi) cos(n', wo) D(n') over the normals n' of the cell, with
 /// the cosines in front those of the facet n of the downsampled surface. Unlike Eq. 5 it counts the area that normals show to
 /// wo: so it is reciprocal, and with one normal it is the base itself. Renderers use it on the downsampled surface, with their
-/// own visibility; that of smaller scale is in S.
+/// own visibility; that of smaller scale is in S. Where the asset has no colours, all channels are the same.
 ///
 /// Thread-safe, allocates nothing.
 class DisplacedBrdf {
@@ -72,45 +73,48 @@ class DisplacedBrdf {
   }
 
   /// BRDF at a point of the downsampled surface, per steradian; 0 if a direction is behind its facet.
-  GLINT_HD float evaluate(int level, Vec2 uv, Vec3 wi, Vec3 wo, DisplacedVariant variant = DisplacedVariant::full) const {
+  GLINT_HD Rgb evaluate(int level, Vec2 uv, Vec3 wi, Vec3 wo, DisplacedVariant variant = DisplacedVariant::full) const {
     const Vec3 n = normal(level, uv);
     const float ci = dot(n, wi), co = dot(n, wo);
-    if (ci <= 0 || co <= 0) return 0;
+    if (ci <= 0 || co <= 0) return {};
     const DisplacementLevel& l = asset_.levels[level];
-    const Place p = place(l, uv);
-    if (variant == DisplacedVariant::single) return n.z / (ci * co) * singleLobe(l.slopes[p.cell], wi, wo);
-    const float scale = variant == DisplacedVariant::full ? spatialScale(level, uv) * angularScale(level, wi, wo) : 1;
-    return scale * n.z / (ci * co) * timesCosines(l, p.cell, wi, wo);
+    const std::size_t cell = place(l, uv).cell;
+    const float facet = n.z / (ci * co);
+    if (variant == DisplacedVariant::single) return facet * singleLobe(l, cell, wi, wo);
+    const Rgb reflected = facet * timesCosines(l, cell, wi, wo);
+    return variant == DisplacedVariant::full ? spatialScale(level, uv) * angularScale(level, wi, wo) * reflected : reflected;
   }
 
   /// Light reflected from wi to wo, BRDF times cosine, blended between levels. Each level has its own facet.
-  GLINT_HD float reflected(const LevelBlend& blend, Vec2 uv, Vec3 wi, Vec3 wo,
-                           DisplacedVariant variant = DisplacedVariant::full) const {
+  GLINT_HD Rgb reflected(const LevelBlend& blend, Vec2 uv, Vec3 wi, Vec3 wo,
+                         DisplacedVariant variant = DisplacedVariant::full) const {
     const auto at = [&](int level) {
-      return evaluate(level, uv, wi, wo, variant) * std::max(0.0f, dot(normal(level, uv), wi));
+      return std::max(0.0f, dot(normal(level, uv), wi)) * evaluate(level, uv, wi, wo, variant);
     };
-    const float first = at(blend.first);
-    return blend.weight > 0 ? first + blend.weight * (at(blend.second) - first) : first;
+    const Rgb first = at(blend.first);
+    return blend.weight > 0 ? (1 - blend.weight) * first + blend.weight * at(blend.second) : first;
   }
 
-  /// Draws wi for a view wo: a lobe by its amplitude, then a cosine around its centre (diffuse), or a normal of the widened lobe
-  /// to reflect at (ggx).
+  /// Draws wi for a view wo: a lobe by its amplitude times the mean of its colour, then a cosine around its centre (diffuse), or
+  /// a normal of the widened lobe to reflect at (ggx).
   /// @param xi  uniform in [0, 1)^2
   GLINT_HD DirectionSample sample(int level, Vec2 uv, Vec3 wo, Vec2 xi) const {
     const DisplacementLevel& l = asset_.levels[level];
-    const VmfLobe* lobes = &l.lobes[place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count)];
-    float left = xi.x * totalAmplitude(lobes);
-    int chosen = 0;
-    while (chosen + 1 < asset_.lobe_count && lobes[chosen + 1].amplitude > 0 && left >= lobes[chosen].amplitude)
-      left -= lobes[chosen++].amplitude;
-    const float unit = std::clamp(left / std::max(lobes[chosen].amplitude, 1e-20f), 0.0f, 0.99999994f);
-    const Vec3 axis = lobeCentre(lobes[chosen]);
+    const std::size_t first = place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count);
+    float left = xi.x * totalShare(l, first);
+    std::size_t lobe = first;
+    float share = lobeShare(l, lobe);
+    for (const std::size_t last = first + static_cast<std::size_t>(asset_.lobe_count) - 1;
+         lobe < last && l.lobes[lobe + 1].amplitude > 0 && left >= share; share = lobeShare(l, ++lobe))
+      left -= share;
+    const float unit = std::clamp(left / std::max(share, 1e-20f), 0.0f, 0.99999994f);
+    const Vec3 axis = lobeCentre(l.lobes[lobe]);
     const float angle = 6.28318530717958648f * xi.y;
     Vec3 wi;
     if (asset_.base.kind == BaseBrdf::Kind::diffuse) {
       wi = around(axis, std::sqrt(1 - unit), angle);
     } else {
-      const float a = spreadRoughness(asset_.base.alpha, lobes[chosen].kappa);
+      const float a = spreadRoughness(lobeAlpha(l, lobe), l.lobes[lobe].kappa);
       const Vec3 h = around(axis, std::sqrt((1 - unit) / (1 + (a * a - 1) * unit)), angle);
       const float c = dot(h, wo);
       if (c <= 0) return {};
@@ -122,25 +126,42 @@ class DisplacedBrdf {
   /// Density of `sample` per solid angle. Directions below the horizon can be drawn; `evaluate` is 0 there.
   GLINT_HD float pdf(int level, Vec2 uv, Vec3 wi, Vec3 wo) const {
     const DisplacementLevel& l = asset_.levels[level];
-    const VmfLobe* lobes = &l.lobes[place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count)];
+    const std::size_t first = place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count);
     const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
     const Vec3 sum = wi + wo;
     const float length = std::sqrt(std::max(1e-20f, dot(sum, sum)));
     const Vec3 h = (1 / length) * sum;
     float density = 0;
-    for (int k = 0; k < asset_.lobe_count; ++k) {
-      const Vec3 axis = lobeCentre(lobes[k]);
-      const float c = dot(axis, diffuse ? wi : h);
+    for (std::size_t k = first; k < first + static_cast<std::size_t>(asset_.lobe_count); ++k) {
+      const float c = dot(lobeCentre(l.lobes[k]), diffuse ? wi : h);
       if (c <= 0) continue;
-      density +=
-          lobes[k].amplitude *
-          (diffuse ? c * kInversePi : ggxDensity(c, spreadRoughness(asset_.base.alpha, lobes[k].kappa)) * c / (2 * length));
+      const float of_lobe =
+          diffuse ? c * kInversePi : ggxDensity(c, spreadRoughness(lobeAlpha(l, k), l.lobes[k].kappa)) * c / (2 * length);
+      density += lobeShare(l, k) * of_lobe;
     }
-    return density / totalAmplitude(lobes);
+    return density / totalShare(l, first);
+  }
+
+  /// Density of the original's normals towards a half vector, by the lobes of a cell: per unit projected area. Its integral over
+  /// the disk is 1 but for what lobes have below the horizon; 0 outside the disk.
+  /// @param least_variance  lobes are widened to at least this variance, radians^2: for pixels that are wider than they
+  GLINT_HD float normalDensity(int level, Vec2 uv, Vec2 h, float least_variance = 0) const {
+    const float z2 = 1 - dot(h, h);
+    if (z2 <= 0) return 0;
+    const Vec3 n = {h.x, h.y, std::sqrt(z2)};
+    const DisplacementLevel& l = asset_.levels[level];
+    const std::size_t first = place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count);
+    float density = 0;
+    for (std::size_t k = first; k < first + static_cast<std::size_t>(asset_.lobe_count); ++k) {
+      const VmfLobe& lobe = l.lobes[k];
+      const float kappa = least_variance * lobe.kappa > 1 ? 1 / least_variance : lobe.kappa;
+      density += lobe.amplitude * vmfDensity(dot(lobeCentre(lobe), n), kappa);
+    }
+    return density;
   }
 
   /// T, linear between the centres of its patches; periodic.
-  GLINT_HD float spatialScale(int level, Vec2 uv) const {
+  GLINT_HD Rgb spatialScale(int level, Vec2 uv) const {
     const DisplacementLevel& l = asset_.levels[level];
     const auto axis = [](float coordinate, int n, int& low, int& high) {
       const float x = (coordinate - std::floor(coordinate)) * static_cast<float>(n) - 0.5f;
@@ -152,47 +173,53 @@ class DisplacedBrdf {
     int i0, i1, j0, j1;
     const float fx = axis(uv.x - 0.5f / static_cast<float>(asset_.width), l.spatial_columns, i0, i1);
     const float fy = axis(uv.y - 0.5f / static_cast<float>(asset_.height), l.spatial_rows, j0, j1);
-    const auto at = [&](int i, int j) { return l.spatial_scale[static_cast<std::size_t>(j) * l.spatial_columns + i]; };
-    const float low = at(i0, j0) + fx * (at(i1, j0) - at(i0, j0)), high = at(i0, j1) + fx * (at(i1, j1) - at(i0, j1));
-    return low + fy * (high - low);
+    const auto at = [&](int i, int j) {
+      return color(l.spatial_scale.data(), static_cast<std::size_t>(j) * l.spatial_columns + static_cast<std::size_t>(i));
+    };
+    return (1 - fy) * ((1 - fx) * at(i0, j0) + fx * at(i1, j0)) + fy * ((1 - fx) * at(i0, j1) + fx * at(i1, j1));
   }
 
   /// S, linear in both directions on the concentric map.
-  GLINT_HD float angularScale(int level, Vec3 wi, Vec3 wo) const {
+  GLINT_HD Rgb angularScale(int level, Vec3 wi, Vec3 wo) const {
     const DisplacementLevel& l = asset_.levels[level];
     const GridPlace a = gridPlace(wi, asset_.angular), b = gridPlace(wo, asset_.angular);
-    float sum = 0;
+    const auto channels = static_cast<std::size_t>(asset_.channels);
+    float sum[3] = {};
     for (int i = 0; i < 4; ++i) {
       for (int o = 0; o < 4; ++o) {
         const auto low = static_cast<std::size_t>(std::min(a.cell[i], b.cell[o]));
         const auto high = static_cast<std::size_t>(std::max(a.cell[i], b.cell[o]));
-        sum += a.weight[i] * b.weight[o] * halfToFloat(l.angular_scale[high * (high + 1) / 2 + low]);
+        const std::uint16_t* values = &l.angular_scale[(high * (high + 1) / 2 + low) * channels];
+        for (std::size_t c = 0; c < channels; ++c) sum[c] += a.weight[i] * b.weight[o] * halfToFloat(values[c]);
       }
     }
-    return sum;
+    return color(sum, 0);
   }
 
   /// Integral of f cos(wi) cos(wo) D over the normals of a cell: f'_low without the facet's terms.
-  GLINT_HD float timesCosines(const DisplacementLevel& l, std::size_t cell, Vec3 wi, Vec3 wo) const {
-    const VmfLobe* lobes = &l.lobes[cell * static_cast<std::size_t>(asset_.lobe_count)];
+  GLINT_HD Rgb timesCosines(const DisplacementLevel& l, std::size_t cell, Vec3 wi, Vec3 wo) const {
+    const std::size_t first = cell * static_cast<std::size_t>(asset_.lobe_count);
     const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
     const float cosine = dot(wi, wo);
     const Vec3 sum = wi + wo;
     const float length = std::sqrt(std::max(1e-20f, dot(sum, sum)));
     const Vec3 h = (1 / length) * sum;
-    const float fresnel = diffuse ? 1 : conductorFresnel(0.5f * length, asset_.base.eta, asset_.base.k);
-    float total = 0;
-    for (int k = 0; k < asset_.lobe_count && lobes[k].amplitude > 0; ++k) {
-      const Vec3 axis = lobeCentre(lobes[k]);
+    const float factor =
+        diffuse ? asset_.base.albedo * kInversePi : conductorFresnel(0.5f * length, asset_.base.eta, asset_.base.k);
+    Rgb total;
+    for (std::size_t k = first; k < first + static_cast<std::size_t>(asset_.lobe_count) && l.lobes[k].amplitude > 0; ++k) {
+      const VmfLobe& lobe = l.lobes[k];
+      const Vec3 axis = lobeCentre(lobe);
+      float value = 0;
       if (diffuse) {
-        const LobeMoments moments = lobeMoments(lobes[k].kappa);
-        total +=
-            lobes[k].amplitude * lobeCosines(moments, lobeFacing(moments, axis, wi), lobeFacing(moments, axis, wo), cosine);
+        const LobeMoments moments = lobeMoments(lobe.kappa);
+        value = lobeCosines(moments, lobeFacing(moments, axis, wi), lobeFacing(moments, axis, wo), cosine);
       } else {
-        total += lobes[k].amplitude * ggxLobe(asset_.base, axis, lobes[k].kappa, wi, wo, h, fresnel);
+        value = ggxLobe(lobeAlpha(l, k), axis, lobe.kappa, wi, wo, h);
       }
+      total = total + lobe.amplitude * value * lobeColor(l, k);
     }
-    return std::max(0.0f, diffuse ? asset_.base.albedo * kInversePi * total : total);
+    return {factor * std::max(0.0f, total.r), factor * std::max(0.0f, total.g), factor * std::max(0.0f, total.b)};
   }
 
  private:
@@ -219,9 +246,28 @@ class DisplacedBrdf {
     return p;
   }
 
-  GLINT_HD float totalAmplitude(const VmfLobe* lobes) const {
+  /// Element k of an array of colours.
+  GLINT_HD Rgb color(const float* values, std::size_t k) const {
+    return asset_.channels == 1 ? Rgb::grey(values[k]) : Rgb{values[3 * k], values[3 * k + 1], values[3 * k + 2]};
+  }
+
+  GLINT_HD Rgb lobeColor(const DisplacementLevel& l, std::size_t lobe) const {
+    return l.lobe_colors.empty() ? Rgb::grey(1) : color(l.lobe_colors.data(), lobe);
+  }
+
+  GLINT_HD float lobeAlpha(const DisplacementLevel& l, std::size_t lobe) const {
+    return l.lobe_alphas.empty() ? asset_.base.alpha : l.lobe_alphas[lobe];
+  }
+
+  /// How often `sample` takes a lobe, relative to the others of its cell.
+  GLINT_HD float lobeShare(const DisplacementLevel& l, std::size_t lobe) const {
+    const Rgb c = lobeColor(l, lobe);
+    return l.lobes[lobe].amplitude * (c.r + c.g + c.b);
+  }
+
+  GLINT_HD float totalShare(const DisplacementLevel& l, std::size_t first) const {
     float total = 1e-20f;
-    for (int k = 0; k < asset_.lobe_count; ++k) total += lobes[k].amplitude;
+    for (std::size_t k = first; k < first + static_cast<std::size_t>(asset_.lobe_count); ++k) total += lobeShare(l, k);
     return total;
   }
 
@@ -233,11 +279,26 @@ class DisplacedBrdf {
     return sine * std::cos(angle) * s + sine * std::sin(angle) * t + cosine * axis;
   }
 
-  /// The same integral for one Beckmann lobe with the cell's slope moments, shadowed by its own Smith term (Dupuy et al. 2013).
-  GLINT_HD float singleLobe(const MapSlopes& m, Vec3 wi, Vec3 wo) const {
-    if (wi.z <= 0 || wo.z <= 0) return 0;
+  /// The same integral for one Beckmann lobe with the cell's slope moments and mean base, shadowed by its own Smith term (Dupuy et
+  /// al. 2013).
+  GLINT_HD Rgb singleLobe(const DisplacementLevel& l, std::size_t cell, Vec3 wi, Vec3 wo) const {
+    if (wi.z <= 0 || wo.z <= 0) return {};
+    const std::size_t first = cell * static_cast<std::size_t>(asset_.lobe_count);
+    Rgb color;
+    float width = 0, area = 1e-20f;
+    for (std::size_t k = first; k < first + static_cast<std::size_t>(asset_.lobe_count); ++k) {
+      const float amplitude = l.lobes[k].amplitude, alpha = lobeAlpha(l, k);
+      color = color + amplitude * lobeColor(l, k);
+      width += amplitude * alpha * alpha;
+      area += amplitude;
+    }
+    return singleLobe(l.slopes[cell], width / area, wi, wo) / area * color;
+  }
+
+  /// @param width  square of the base's alpha
+  GLINT_HD float singleLobe(const MapSlopes& m, float width, Vec3 wi, Vec3 wo) const {
     const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
-    const float widening = diffuse ? 1e-8f : 0.5f * asset_.base.alpha * asset_.base.alpha;
+    const float widening = diffuse ? 1e-8f : 0.5f * width;
     const float xx = m.covariance.xx + widening, yy = m.covariance.yy + widening, xy = m.covariance.xy;
     const float shadowing = SmithMasking(m, std::sqrt(widening)).g2(wi, wo);
     if (!diffuse) {

@@ -71,10 +71,10 @@ inline GLINT_HD float lobeCosines(const LobeMoments& moments, const LobeFacing& 
 /// lobe and alpha^2 / 2 for the facet.
 inline GLINT_HD float spreadRoughness(float alpha, float kappa) { return std::sqrt(alpha * alpha + 2 / std::max(kappa, 1.0f)); }
 
-/// Mean over the normals of a lobe of f cos(wi) cos(wo) of a GGX facet: the facet's distribution widened by the lobe's, seen
-/// towards the half vector, masked at the normal that is likeliest to reflect.
-inline GLINT_HD float ggxLobe(const BaseBrdf& base, Vec3 centre, float kappa, Vec3 wi, Vec3 wo, Vec3 half, float fresnel) {
-  const float a2 = base.alpha * base.alpha;
+/// Mean over the normals of a lobe of f cos(wi) cos(wo) of a GGX facet, without Fresnel's factor: the facet's distribution widened by
+/// the lobe's, seen towards the half vector, masked at the normal that is likeliest to reflect.
+inline GLINT_HD float ggxLobe(float alpha, Vec3 centre, float kappa, Vec3 wi, Vec3 wo, Vec3 half) {
+  const float a2 = alpha * alpha;
   const float width = a2 + 2 / std::max(kappa, 1.0f);
   const float share = a2 / width;  // of the facet's own roughness in the width
   const Vec3 sum = share * centre + (1 - share) * half;
@@ -85,7 +85,7 @@ inline GLINT_HD float ggxLobe(const BaseBrdf& base, Vec3 centre, float kappa, Ve
   const float density = width * kInversePi / (t * t);
   const float mi = 2 * ci / (ci + std::sqrt(a2 + (1 - a2) * ci * ci));
   const float mo = 2 * co / (co + std::sqrt(a2 + (1 - a2) * co * co));
-  return 0.25f * fresnel * density * mi * mo;
+  return 0.25f * density * mi * mo;
 }
 
 }  // namespace glint

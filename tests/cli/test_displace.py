@@ -48,7 +48,7 @@ def test_specification_is_enough_to_read_the_model(glint, heights):
         both = numpy.roll(right, -1, 0)
         area = numpy.mean(0.5 * (numpy.hypot(1, numpy.hypot(right - h, up - h)) + numpy.hypot(1, numpy.hypot(both - up, both - right))))
         assert lobes[..., 3].sum(axis=-1).mean() == pytest.approx(area, rel=1e-4)
-        assert level["angular_scale"].shape == (25 * 26 // 2,)
+        assert level["angular_scale"].shape == (25 * 26 // 2, 1)
         assert level["heights"][...].mean() == pytest.approx(h.mean(), abs=1e-3)
 
 
@@ -96,6 +96,218 @@ def test_wrong_use_is_refused_and_leaves_nothing(glint, heights, options, code, 
     assert process.returncode == code, process.stderr
     assert message in process.stderr
     assert not (glint.folder / "d.glint").exists()
+
+
+def write_image(path, pixels, kind="uint8"):
+    """pixels: [height][width][channels], top row first."""
+    oiio = pytest.importorskip("OpenImageIO")
+    pixels = numpy.ascontiguousarray(pixels)
+    height, width, channels = pixels.shape
+    output = oiio.ImageOutput.create(str(path))
+    assert output.open(str(path), oiio.ImageSpec(width, height, channels, kind))
+    assert output.write_image(pixels)
+    output.close()
+
+
+@pytest.fixture
+def two_colours(glint):
+    """A sawtooth, red (sRGB) where it falls towards +u, blue where it rises."""
+    assert glint("synth", "sawtooth", "--size", "64x32", "--feature-size", "16", "--slope", "1", "-o", "s.exr", "--height").returncode == 0
+    assert glint("ingest", "s.exr", "--kind", "height", "--to", "heights", "-o", "s.glint").returncode == 0
+    with h5py.File(glint.folder / "s.glint") as file:
+        h = file["heights"][...]
+    falls = (numpy.roll(h, -1, 1) < h)[::-1]
+    rgb = numpy.where(falls[..., None], (230, 30, 30), (30, 30, 230)).astype(numpy.uint8)
+    write_image(glint.folder / "colour.png", rgb)
+    return "s.glint"
+
+
+def test_colours_of_the_base_follow_the_normals(glint, two_colours):
+    process = glint("displace", two_colours, "-o", "d.glint", "--base-color", "colour.png", "--depfile", "d.d", *QUICK)
+    assert process.returncode == 0, process.stderr
+    assert "colour.png" in (glint.folder / "d.d").read_text()
+    assert glint("validate", "d.glint").returncode == 0
+    with h5py.File(glint.folder / "d.glint") as file:
+        assert (file.attrs["rgb"], file.attrs["has_lobe_colors"], file.attrs["has_lobe_alphas"]) == (1, 1, 0)
+        assert file.attrs["albedo"] == 1  # the image is the albedo unless --base says more
+        assert b"colour.png" in b"".join(file.attrs["inputs"])
+        level = file["level_00"]
+        assert level["angular_scale"].shape == (25 * 26 // 2, 3)
+        lobes, colours = level["lobes"][...], level["lobe_colors"][...]
+        right = (lobes[..., 3] > 0) & (lobes[..., 0] > 0.1)
+        left = (lobes[..., 3] > 0) & (lobes[..., 0] < -0.1)
+        linear = ((230 / 255 + 0.055) / 1.055) ** 2.4
+        # A facet at the edge of a wall has some of the other colour.
+        assert colours[right][:, 0] == pytest.approx(linear, abs=0.25)
+        assert colours[left][:, 2] == pytest.approx(linear, abs=0.25)
+        assert (colours[right][:, 0] > 2 * colours[right][:, 2]).all() and (colours[left][:, 2] > 2 * colours[left][:, 0]).all()
+    info = json.loads(glint("info", "d.glint", "--json").stdout)
+    assert info["result"]["properties"]["channels"] == 3 if "properties" in info["result"] else "rgb of each lobe" in json.dumps(info)
+
+    def reflected(x):
+        run = glint("query", "d.glint", "--uv", 0.3, 0.6, "--level", 0, "--wi", x, 0, 1, "--wo", x, 0, 1, "--json")
+        assert run.returncode == 0, run.stderr
+        return json.loads(run.stdout)["result"]["reflected"]
+
+    right, left = reflected(1), reflected(-1)
+    assert right[0] > 2 * right[2] and left[2] > 2 * left[0]
+
+
+def test_grey_images_keep_one_channel_and_linear_ones_their_values(glint, heights):
+    for value, space, wanted in ((128, "auto", 0.2158605), (128, "linear", 128 / 255)):
+        write_image(glint.folder / "grey.png", numpy.full((96, 64, 3), value, numpy.uint8))
+        process = glint("displace", heights, "-o", "d.glint", "--base-color", "grey.png", "--color-space", space, "--base", "diffuse:0.5", *QUICK)
+        assert process.returncode == 0, process.stderr
+        with h5py.File(glint.folder / "d.glint") as file:
+            assert file.attrs["rgb"] == 0 and file.attrs["albedo"] == 0.5
+            assert file["level_00/lobe_colors"][...].max() == pytest.approx(wanted, rel=1e-4)
+    write_image(glint.folder / "grey.exr", numpy.full((96, 64, 1), 0.25, numpy.float32), "float")
+    assert glint("displace", heights, "-o", "d.glint", "--base-color", "grey.exr", *QUICK).returncode == 0
+    with h5py.File(glint.folder / "d.glint") as file:
+        assert file["level_00/lobe_colors"][...].max() == pytest.approx(0.25, rel=1e-4)
+
+
+def test_roughness_of_the_base_is_that_of_the_image(glint, heights):
+    roughness = numpy.full((96, 64, 1), 0.25, numpy.float32)
+    roughness[:48] = 0.75
+    write_image(glint.folder / "r.exr", roughness, "float")
+    process = glint("displace", heights, "-o", "d.glint", "--factor", "8", "--base", "ggx:0.8", "--base-roughness", "r.exr", *QUICK)
+    assert process.returncode == 0, process.stderr
+    assert glint("validate", "d.glint").returncode == 0
+    with h5py.File(glint.folder / "d.glint") as file:
+        alphas, lobes = file["level_00/lobe_alphas"][...], file["level_00/lobes"][...]
+        used = lobes[..., 3] > 0
+        assert alphas[1][used[1]] == pytest.approx(0.2, rel=1e-3)  # bottom row first
+        assert alphas[-2][used[-2]] == pytest.approx(0.6, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "shape, value, options, message",
+    [
+        ((64, 64, 3), 0.5, [], "64 x 64 pixels, the heights 64 x 96"),
+        ((96, 64, 3), 1.5, [], "not in 0..1"),
+        ((96, 64, 3), -0.1, [], "not in 0..1"),
+        ((96, 64, 3), float("nan"), [], "not in 0..1"),
+        ((96, 64, 3), 0.0, [], "all black"),
+    ],
+)
+def test_colours_that_no_surface_has_are_refused(glint, heights, shape, value, options, message):
+    pixels = numpy.full(shape, 0.0 if value == 0 else 0.5, numpy.float32)
+    pixels[2, 7, 1] = value
+    write_image(glint.folder / "c.exr", pixels, "float")
+    process = glint("displace", heights, "-o", "d.glint", "--base-color", "c.exr", *options)
+    assert process.returncode == 3, process.stderr
+    assert message in process.stderr
+    if "0..1" in message:
+        assert "column 7" in process.stderr and "c.exr" in process.stderr
+    assert not (glint.folder / "d.glint").exists()
+
+
+def test_roughness_needs_a_glossy_base_and_enough_of_it(glint, heights):
+    write_image(glint.folder / "r.exr", numpy.full((96, 64, 1), 0.1, numpy.float32), "float")
+    process = glint("displace", heights, "-o", "d.glint", "--base-roughness", "r.exr")
+    assert process.returncode == 1 and "ggx" in process.stderr
+    process = glint("displace", heights, "-o", "d.glint", "--base-roughness", "r.exr", "--base", "ggx:0.3")
+    assert process.returncode == 3 and "0.05 to 1" in process.stderr
+    assert glint("displace", heights, "-o", "d.glint", "--base-color", "missing.exr").returncode == 2
+
+
+@pytest.fixture
+def displaced(glint, heights):
+    assert glint("displace", heights, "-o", "d.glint", "--factors", "4,16", "--base", "ggx:0.4", "--quiet", *QUICK).returncode == 0
+    return "d.glint"
+
+
+def reflected(glint, *arguments):
+    process = glint("query", "d.glint", *arguments, "--json")
+    assert process.returncode == 0, process.stderr
+    return json.loads(process.stdout)["result"]
+
+
+POINT = ["--uv", 0.3, 0.7]
+LIGHT = ["--wi", 0.3, 0.1, 1, "--wo", -0.4, 0, 1]
+
+
+def test_query_reflects_light(glint, displaced):
+    process = glint("query", displaced, *POINT, "--level", 0, *LIGHT)
+    assert process.returncode == 0, process.stderr
+    values = {variant: reflected(glint, *POINT, "--level", 0, *LIGHT, "--variant", variant)["reflected"][0] for variant in ("full", "lobes", "single")}
+    assert float(process.stdout) == pytest.approx(values["full"], rel=1e-6)
+    assert len(set(values.values())) == 3 and min(values.values()) > 0
+    # Directions of any length are the same.
+    assert reflected(glint, *POINT, "--level", 0, "--wi", 0.6, 0.2, 2, "--wo", -4, 0, 10)["reflected"][0] == pytest.approx(values["full"], rel=1e-5)
+    assert "ns per query" in glint("query", displaced, *POINT, "--level", 0, *LIGHT, "--repeat", 300).stdout
+
+
+def test_query_blends_levels_by_the_footprint(glint, displaced):
+    fine, coarse = (reflected(glint, *POINT, "--level", level, *LIGHT)["reflected"][0] for level in (0, 1))
+    middle = reflected(glint, *POINT, "--sigma", 8 / 12**0.5, *LIGHT)  # as wide as a cell of 8 texels, between 4 and 16
+    assert middle["levels"] == [0, 1] and middle["level_weight"] == pytest.approx(0.5, abs=1e-5)
+    assert middle["reflected"][0] == pytest.approx((fine + coarse) / 2, rel=1e-5)
+
+
+def test_query_tables_and_samples_of_a_displacement(glint, displaced):
+    (glint.folder / "q.csv").write_text("u,v,level,wix,wiy,wiz,wox,woy,woz,name\n0.3,0.7,0,0.3,0.1,1,-0.4,0,1,a\n0.3,0.7,1,0.3,0.1,1,-0.4,0,1,b\n")
+    process = glint("query", displaced, "--csv", "q.csv", "-o", "-")
+    assert process.returncode == 0, process.stderr
+    rows = process.stdout.splitlines()
+    assert rows[0].endswith("name,reflected")
+    for level in (0, 1):
+        assert float(rows[1 + level].split(",")[-1]) == pytest.approx(reflected(glint, *POINT, "--level", level, *LIGHT)["reflected"][0], rel=1e-6)
+    process = glint("query", displaced, *POINT, "--level", 0, "--wo", -0.4, 0, 1, "--samples", 50, "-o", "-")
+    table = numpy.array([[float(field) for field in row.split(",")] for row in process.stdout.splitlines()[1:]])
+    drawn = table[table[:, 3] > 0]
+    assert len(drawn) > 30
+    assert numpy.linalg.norm(drawn[:, :3], axis=1) == pytest.approx(1, abs=1e-4)
+    first = reflected(glint, *POINT, "--level", 0, "--wi", *drawn[0, :3], "--wo", -0.4, 0, 1)
+    assert first["pdf"] == pytest.approx(drawn[0, 3], rel=1e-3)
+
+
+def test_query_normals_of_a_displacement_integrate_to_one(glint, displaced):
+    n = 24
+    centres = (numpy.arange(n) + 0.5) * 2 / n - 1
+    grid = [(x, y) for x in centres for y in centres]
+    (glint.folder / "h.csv").write_text("u,v,level,hx,hy\n" + "".join(f"0.3,0.7,1,{x},{y}\n" for x, y in grid))
+    process = glint("query", displaced, "--csv", "h.csv", "-o", "-")
+    assert process.returncode == 0, process.stderr
+    densities = [float(row.split(",")[-1]) for row in process.stdout.splitlines()[1:]]
+    assert sum(densities) * (2 / n) ** 2 == pytest.approx(1, abs=0.05)  # 24 x 24 points of broad lobes
+    assert glint("query", displaced, *POINT, "--level", 1, "--half", *grid[40]).stdout.strip() == f"{densities[40]:.9g}"
+    assert glint("query", displaced, *POINT, "--level", 1, "--image", "lobes.png", "--image-size", 64).returncode == 0
+    assert (glint.folder / "lobes.png").stat().st_size > 500
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        ([*POINT, "--box", 1, 0, 0, 1, *LIGHT], "--sigma S or --level L"),
+        ([*POINT, "--level", 0, "--sigma", 3, *LIGHT], "twice"),
+        ([*POINT, "--level", 2, *LIGHT], "no level 2"),
+        ([*POINT, "--level", 0, "--wi", 0, 0, 1], "--wo X Y Z"),
+        ([*POINT, "--level", 0, "--wi", 0, 0, 0, "--wo", 0, 0, 1], "no direction"),
+        ([*POINT, "--level", 0, "--range", 0, 0, 0.1, 0.1], "--half"),
+        ([*POINT, "--level", 0, "--half", 0, 0, *LIGHT], "both"),
+        ([*POINT, "--sigma", 2, "--wo", 0, 0, 1, "--samples", 3, "-o", "-"], "--level 0 or --level 1"),
+        (["--level", 0, *LIGHT], "--uv"),
+    ],
+)
+def test_questions_that_a_displacement_cannot_answer(glint, displaced, arguments, message):
+    process = glint("query", displaced, *arguments)
+    assert process.returncode == 1, process.stderr
+    assert message in process.stderr
+
+
+def test_light_is_not_asked_of_distributions(glint):
+    glint("synth", "flakes", "--size", "32", "-o", "n.png")
+    glint("ingest", "n.png", "-o", "n.glint")
+    process = glint("query", "n.glint", *POINT, "--sigma", 3, *LIGHT)
+    assert process.returncode == 1 and "glint-displace" in process.stderr
+
+
+def test_factors_that_do_not_divide_the_map_name_the_nearest_that_do(glint, heights):
+    process = glint("displace", heights, "-o", "d.glint", "--factor", "10")
+    assert process.returncode == 3
+    assert "8 or 16" in process.stderr
 
 
 def test_slopes_beyond_80_degrees_are_refused(glint):

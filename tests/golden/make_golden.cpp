@@ -18,6 +18,7 @@ int main(int argc, char** argv) {
     writeAsset(folder / "normals.glint", test::sampleNormals(64, 48).map, provenance);
     writeAsset(folder / "heights.glint", test::sampleHeights(64, 48).map, provenance);
     writeAsset(folder / "displacement.glint", test::sampleDisplacement(64).displacement, provenance);
+    writeAsset(folder / "displacement-rgb.glint", test::sampleDisplacement(64, true).displacement, provenance);
     writeAsset(folder / "ndf-pyramid.glint", test::samplePyramid(64, BlockPrecision::f16).pyramid, provenance);
     writeAsset(folder / "histogram-sat.glint", test::sampleHistograms(22, 19).sat, provenance);
     using enum CompressionMethod;

@@ -389,12 +389,12 @@ SampleHeights sampleHeights(int width, int height) {
   return sample;
 }
 
-SampleDisplacement sampleDisplacement(int size) {
+SampleDisplacement sampleDisplacement(int size, bool colored) {
   SampleDisplacement sample;
   Displacement& d = sample.displacement;
   d.width = size, d.height = size / 2, d.texel_size_um = 2.5f;
   d.base = {BaseBrdf::Kind::ggx, 1, 0.25f, 1.5f, 3};
-  d.lobe_count = 2, d.angular = 3, d.level_count = 2;
+  d.channels = colored ? 3 : 1, d.lobe_count = 2, d.angular = 3, d.level_count = 2;
   sample.levels.resize(2);
   for (int l = 0; l < 2; ++l) {
     SampleDisplacement::Level& from = sample.levels[static_cast<std::size_t>(l)];
@@ -408,14 +408,19 @@ SampleDisplacement sampleDisplacement(int size) {
         from.heights.push_back(4 * bump);
         from.lobes.push_back({{0.5f * bump, 0.25f}, 20 + 10 * bump, 0.75f});
         from.lobes.push_back({{-0.25f, bump}, kMaxKappa, 0.375f});
+        for (int k = 0; colored && k < 6; ++k) from.lobe_colors.push_back(0.125f * static_cast<float>(k + 1));
+        for (int k = 0; colored && k < 2; ++k) from.lobe_alphas.push_back(0.5f + 0.25f * bump);
         from.slopes.push_back({{bump, -0.125f}, {0.25f, 0.0625f * bump, 0.5f}});
         from.fit_errors.push_back(0.125f + 0.125f * bump);
       }
     }
-    from.spatial_scale = {0.75f, 1.25f};
-    for (int k = 0; k < 45; ++k) from.angular_scale.push_back(floatToHalf(0.5f + 0.03125f * static_cast<float>(k)));
+    for (const float t : {0.75f, 1.25f})
+      from.spatial_scale.insert(from.spatial_scale.end(), static_cast<std::size_t>(d.channels), t);
+    for (int k = 0; k < 45 * d.channels; ++k)
+      from.angular_scale.push_back(floatToHalf(0.5f + 0.03125f * static_cast<float>(k / d.channels)));
     to.heights = from.heights, to.lobes = from.lobes, to.slopes = from.slopes, to.fit_errors = from.fit_errors;
     to.spatial_scale = from.spatial_scale, to.angular_scale = from.angular_scale;
+    to.lobe_colors = from.lobe_colors, to.lobe_alphas = from.lobe_alphas;
   }
   return sample;
 }

@@ -26,6 +26,8 @@ struct SampleDisplacement {
   struct Level {
     std::vector<float> heights;
     std::vector<VmfLobe> lobes;
+    std::vector<float> lobe_colors;
+    std::vector<float> lobe_alphas;
     std::vector<MapSlopes> slopes;
     std::vector<float> fit_errors;
     std::vector<float> spatial_scale;
@@ -102,7 +104,8 @@ SampleNormals sampleNormals(int width, int height, bool with_bounds = true);
 SampleHeights sampleHeights(int width, int height);
 /// NDF images of sampleNormals(size, size) at strides size/4, size/2 and size, 64^2 pixels, sigma_r 0.05.
 /// Two levels (factors 4 and 8) over bumps, with lobes and scales from formulas; angular 3, two lobes.
-SampleDisplacement sampleDisplacement(int size);
+/// @param colored  with three channels, colours and roughness of lobes
+SampleDisplacement sampleDisplacement(int size, bool colored = false);
 SamplePyramid samplePyramid(int size, BlockPrecision precision);
 /// The same images, each block approximated by a constant and slopes; two regions.
 SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "glint/bake/base_texture.h"
 #include "glint/bake/height_surface.h"
 #include "glint/bake/synth.h"
 
@@ -36,6 +37,19 @@ inline OwnedSurface grooves(int width, int height, int half_width, float slope) 
     out.heights[k] = slope * static_cast<float>(std::min(phase, 2 * half_width - phase));
   }
   return out;
+}
+
+/// Red where the surface faces +x, blue where it faces -x, with a little of the other colours: Wu 2019, Fig. 14.
+inline bake::BaseTexture twoColors(const OwnedSurface& map) {
+  bake::BaseTexture texture{3, {}, {}};
+  const auto surface = map.surface();
+  for (int j = 0; j < map.height; ++j) {
+    for (int i = 0; i < map.width; ++i) {
+      const bool right = surface.at(surface.nextColumn(i), j) < surface.at(i, j);
+      for (const float c : {right ? 0.9f : 0.1f, 0.3f, right ? 0.2f : 0.8f}) texture.colors.push_back(c);
+    }
+  }
+  return texture;
 }
 
 }  // namespace glint::test

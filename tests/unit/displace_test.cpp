@@ -58,14 +58,14 @@ TEST(Displace, FlatMapsNeedNoScaling) {
     }
     const DisplacedBrdf brdf(built.asset);
     const Vec3 wi = towards(40, 1), wo = towards(20, 3);
-    EXPECT_NEAR(brdf.evaluate(0, {0.3f, 0.6f}, wi, wo), baseTimesCosines(base, {0, 0, 1}, wi, wo) / (wi.z * wo.z), 1e-3f);
+    EXPECT_NEAR(brdf.evaluate(0, {0.3f, 0.6f}, wi, wo).r, baseTimesCosines(base, {0, 0, 1}, wi, wo) / (wi.z * wo.z), 1e-3f);
   }
 }
 
 /// What the asset reflects as a whole where its smooth surface hides nothing: the mean over its cells of the answers of the query.
-double meanOfQueries(const DisplacedBrdf& brdf, int level, Vec3 wi, Vec3 wo) {
+Rgb meanOfQueries(const DisplacedBrdf& brdf, int level, Vec3 wi, Vec3 wo) {
   const DisplacementLevel& l = brdf.asset().levels[level];
-  double sum = 0;
+  Rgb sum;
   for (int j = 0; j < l.rows; ++j) {
     for (int i = 0; i < l.columns; ++i) {
       for (const float inside : {0.25f, 0.75f}) {  // one point of each triangle
@@ -73,11 +73,11 @@ double meanOfQueries(const DisplacedBrdf& brdf, int level, Vec3 wi, Vec3 wo) {
         const Vec2 uv = {((static_cast<float>(i) + inside) * f + 0.5f) / static_cast<float>(brdf.asset().width),
                          ((static_cast<float>(j) + inside) * f + 0.5f) / static_cast<float>(brdf.asset().height)};
         const Vec3 n = brdf.normal(level, uv);
-        sum += brdf.evaluate(level, uv, wi, wo) * dot(n, wi) * dot(n, wo) / n.z;
+        sum = sum + dot(n, wi) * dot(n, wo) / n.z * brdf.evaluate(level, uv, wi, wo);
       }
     }
   }
-  return sum / (2.0 * l.columns * l.rows);
+  return 0.5f / static_cast<float>(l.columns * l.rows) * sum;
 }
 
 TEST(Displace, QueriesAddUpToTheEffectiveBrdfOfTheOriginal) {
@@ -97,7 +97,7 @@ TEST(Displace, QueriesAddUpToTheEffectiveBrdfOfTheOriginal) {
         for (std::size_t o = 0; o < directions.size(); ++o) {
           if (directions[i].z < 0.6f || directions[o].z < 0.6f) continue;  // where cells of the weave begin to hide each other
           const double wanted = original.values[i * directions.size() + o];
-          EXPECT_NEAR(meanOfQueries(brdf, 0, directions[i], directions[o]), wanted, 0.01 * wanted) << i << " " << o;
+          EXPECT_NEAR(meanOfQueries(brdf, 0, directions[i], directions[o]).r, wanted, 0.01 * wanted) << i << " " << o;
         }
       }
     }
@@ -160,7 +160,7 @@ TEST(Displace, GrazingAnglesStayFinite) {
   for (const float degrees : {80.0f, 88.0f, 89.99f, 90.0f}) {
     for (float azimuth = 0; azimuth < 6; azimuth += 0.5f) {
       for (const DisplacedVariant variant : {DisplacedVariant::full, DisplacedVariant::lobes, DisplacedVariant::single}) {
-        const float value = brdf.evaluate(0, {0.1f * azimuth, 0.3f}, towards(degrees, azimuth), towards(89, 1), variant);
+        const float value = brdf.evaluate(0, {0.1f * azimuth, 0.3f}, towards(degrees, azimuth), towards(89, 1), variant).r;
         EXPECT_TRUE(std::isfinite(value) && value >= 0) << degrees;
       }
     }
@@ -192,9 +192,66 @@ TEST(Displace, RefusesWhatItCannotUse) {
   EXPECT_EQ(refused(bad, quick({8})), "displace.steep");
 }
 
-class DisplacedBrdfQuery : public testing::TestWithParam<BaseBrdf> {
+TEST(Displace, RefusesTexturesThatItCannotUse) {
+  const OwnedSurface map = test::synthSurface(SynthKind::isotropic, 48, 32);
+  const std::size_t texels = map.heights.size();
+  const auto refused = [&](const BaseBrdf& base, BaseTexture texture) {
+    DisplaceOptions options = quick({8}, base);
+    options.texture = std::move(texture);
+    try {
+      displace({map.width, map.height, 0, map.heights}, options);
+    } catch (const Error& error) {
+      return error.rule();
+    }
+    return std::string("accepted");
+  };
+  const auto colors = [&](std::size_t count, float last) {
+    std::vector<float> values(count, 0.5f);
+    values.back() = last;
+    return values;
+  };
+  EXPECT_EQ(refused({}, {3, colors(3 * texels, 0), {}}), "accepted");
+  EXPECT_EQ(refused({}, {3, colors(texels, 1), {}}), "displace.texture");
+  EXPECT_EQ(refused({}, {3, colors(3 * texels, 1.01f), {}}), "displace.texture");
+  EXPECT_EQ(refused({}, {1, colors(texels, -0.01f), {}}), "displace.texture");
+  EXPECT_EQ(refused({}, {1, colors(texels, std::numeric_limits<float>::quiet_NaN()), {}}), "displace.texture");
+  EXPECT_EQ(refused({}, {1, std::vector<float>(texels), {}}), "displace.texture");  // black
+  EXPECT_EQ(refused({}, {1, {}, colors(texels, 1)}), "displace.texture");           // no roughness to vary
+  EXPECT_EQ(refused(ggx(0.4f), {1, {}, colors(texels, 1)}), "accepted");
+  EXPECT_EQ(refused(ggx(0.4f), {1, {}, colors(texels, 0.1f)}), "displace.texture");
+  EXPECT_EQ(refused(ggx(0.4f), {1, {}, colors(texels, 2.6f)}), "displace.texture");
+  EXPECT_EQ(refused(ggx(0.4f), {1, {}, colors(texels - 1, 1)}), "displace.texture");
+}
+
+struct QueryCase {
+  const char* name;
+  BaseBrdf base;
+  bool textured;
+};
+
+/// Colours that follow the slope along u, and roughness.
+BaseTexture someTexture(const OwnedSurface& map, bool rough) {
+  BaseTexture texture{3, {}, {}};
+  const auto surface = map.surface();
+  for (std::size_t k = 0; k < surface.cellCount(); ++k) {
+    const float slope = std::clamp(surface.slope(2 * k).x, -1.0f, 1.0f);
+    for (const float c : {0.5f + 0.5f * slope, 0.25f, 0.5f - 0.5f * slope}) texture.colors.push_back(c);
+    if (rough) texture.roughness.push_back(0.75f + 0.25f * slope);
+  }
+  return texture;
+}
+
+class DisplacedBrdfQuery : public testing::TestWithParam<QueryCase> {
  protected:
-  DisplacedBrdfQuery() : built_(test::synthSurface(SynthKind::isotropic, 64, 64), quick({8, 16}, GetParam())) {}
+  DisplacedBrdfQuery() : map_(test::synthSurface(SynthKind::isotropic, 64, 64)), built_(map_, options()) {}
+
+  DisplaceOptions options() const {
+    DisplaceOptions o = quick({8, 16}, GetParam().base);
+    if (GetParam().textured) o.texture = someTexture(map_, o.base.kind == BaseBrdf::Kind::ggx);
+    return o;
+  }
+
+  OwnedSurface map_;
   Built built_;
 };
 
@@ -204,8 +261,9 @@ TEST_P(DisplacedBrdfQuery, IsReciprocal) {
     for (int k = 0; k < 50; ++k) {
       const Vec3 wi = gridDirection(k * 31 % 225, 15), wo = gridDirection(k * 53 % 225, 15);
       const Vec2 uv = {0.37f * static_cast<float>(k), 0.11f * static_cast<float>(k)};
-      const float there = brdf.evaluate(0, uv, wi, wo, variant), back = brdf.evaluate(0, uv, wo, wi, variant);
-      EXPECT_NEAR(there, back, 1e-4f * (there + 1e-3f));
+      const Rgb there = brdf.evaluate(0, uv, wi, wo, variant), back = brdf.evaluate(0, uv, wo, wi, variant);
+      EXPECT_NEAR(there.r, back.r, 1e-4f * (there.r + 1e-3f));
+      EXPECT_NEAR(there.b, back.b, 1e-4f * (there.b + 1e-3f));
     }
   }
 }
@@ -213,6 +271,7 @@ TEST_P(DisplacedBrdfQuery, IsReciprocal) {
 TEST_P(DisplacedBrdfQuery, SamplesFollowTheirDensity) {
   // The mean of f cos / pdf over samples is the integral of f cos, which the same integrand over even directions also gives.
   const DisplacedBrdf brdf(built_.asset);
+  const auto sum = [](Rgb c) { return static_cast<double>(c.r + c.g + c.b); };
   const Vec2 uv = {0.4f, 0.7f};
   std::mt19937 random(9);
   std::uniform_real_distribution<float> uniform(0, 1);
@@ -224,7 +283,7 @@ TEST_P(DisplacedBrdfQuery, SamplesFollowTheirDensity) {
       if (s.pdf > 0) {
         EXPECT_NEAR(s.pdf, brdf.pdf(1, uv, s.direction, wo), 1e-6f * s.pdf);
         EXPECT_NEAR(dot(s.direction, s.direction), 1, 1e-4f);
-        sampled += brdf.evaluate(1, uv, s.direction, wo) * std::max(0.0f, dot(s.direction, brdf.normal(1, uv))) / s.pdf;
+        sampled += sum(brdf.evaluate(1, uv, s.direction, wo)) * std::max(0.0f, dot(s.direction, brdf.normal(1, uv))) / s.pdf;
       }
     }
     const int n = 400;
@@ -232,7 +291,7 @@ TEST_P(DisplacedBrdfQuery, SamplesFollowTheirDensity) {
       const Vec3 above = gridDirection(d, n);
       const double part = 2 * std::numbers::pi / (n * n);
       for (const Vec3 wi : {above, Vec3{above.x, above.y, -above.z}}) {  // a tilted facet is lit from below the horizon, too
-        even += part * brdf.evaluate(1, uv, wi, wo) * std::max(0.0f, dot(wi, brdf.normal(1, uv)));
+        even += part * sum(brdf.evaluate(1, uv, wi, wo)) * std::max(0.0f, dot(wi, brdf.normal(1, uv)));
         mass += part * brdf.pdf(1, uv, wi, wo);
       }
     }
@@ -250,8 +309,8 @@ TEST_P(DisplacedBrdfQuery, BlendsBetweenLevels) {
   EXPECT_EQ(brdf.levelsFor(1e6f).first, 1);
   const Vec3 wi = towards(30, 1), wo = towards(40, 2);
   const Vec2 uv = {0.2f, 0.9f};
-  const float a = brdf.reflected({0, 0, 0}, uv, wi, wo), b = brdf.reflected({1, 1, 0}, uv, wi, wo);
-  EXPECT_NEAR(brdf.reflected({0, 1, 0.25f}, uv, wi, wo), 0.75f * a + 0.25f * b, 1e-5f * (a + b));
+  const float a = brdf.reflected({0, 0, 0}, uv, wi, wo).b, b = brdf.reflected({1, 1, 0}, uv, wi, wo).b;
+  EXPECT_NEAR(brdf.reflected({0, 1, 0.25f}, uv, wi, wo).b, 0.75f * a + 0.25f * b, 1e-5f * (a + b));
   EXPECT_NE(a, b);
 }
 
@@ -259,15 +318,17 @@ TEST_P(DisplacedBrdfQuery, RepeatsBeyondTheMap) {
   const DisplacedBrdf brdf(built_.asset);
   const Vec3 wi = towards(30, 1), wo = towards(40, 2);
   for (const Vec2 uv : {Vec2{0.001f, 0.002f}, Vec2{0.5f, 0.9999f}, Vec2{0.3f, 0.3f}}) {
-    const float here = brdf.evaluate(0, uv, wi, wo);
-    EXPECT_NEAR(brdf.evaluate(0, {uv.x + 2, uv.y - 1}, wi, wo), here, 1e-3f * here);
+    const float here = brdf.evaluate(0, uv, wi, wo).g;
+    EXPECT_NEAR(brdf.evaluate(0, {uv.x + 2, uv.y - 1}, wi, wo).g, here, 1e-3f * here);
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Bases, DisplacedBrdfQuery,
-                         testing::Values(BaseBrdf{BaseBrdf::Kind::diffuse, 0.8f, 0, 1, 0},
-                                         BaseBrdf{BaseBrdf::Kind::ggx, 1, 0.3f, 0.2f, 3.9f}),
-                         [](const auto& test) { return test.param.kind == BaseBrdf::Kind::diffuse ? "Diffuse" : "Ggx"; });
+                         testing::Values(QueryCase{"Diffuse", {BaseBrdf::Kind::diffuse, 0.8f, 0, 1, 0}, false},
+                                         QueryCase{"Ggx", {BaseBrdf::Kind::ggx, 1, 0.3f, 0.2f, 3.9f}, false},
+                                         QueryCase{"ColoredDiffuse", {BaseBrdf::Kind::diffuse, 0.8f, 0, 1, 0}, true},
+                                         QueryCase{"ColoredGgx", {BaseBrdf::Kind::ggx, 1, 0.4f, 0.2f, 3.9f}, true}),
+                         [](const auto& test) { return test.param.name; });
 
 TEST(DisplacedBrdf, OneBeckmannLobeIsRightForAGaussianSurface) {
   // A Gaussian field's slopes are what LEADR assumes; its single lobe and the six lobes must then nearly agree before scaling.
@@ -277,9 +338,9 @@ TEST(DisplacedBrdf, OneBeckmannLobeIsRightForAGaussianSurface) {
   const DisplacedBrdf brdf(built.asset);
   for (const float degrees : {0.0f, 15.0f, 30.0f}) {
     const float single =
-        brdf.evaluate(0, {0.4f, 0.4f}, towards(degrees, 0), towards(degrees, 3.1415927f), DisplacedVariant::single);
+        brdf.evaluate(0, {0.4f, 0.4f}, towards(degrees, 0), towards(degrees, 3.1415927f), DisplacedVariant::single).r;
     const float lobes =
-        brdf.evaluate(0, {0.4f, 0.4f}, towards(degrees, 0), towards(degrees, 3.1415927f), DisplacedVariant::lobes);
+        brdf.evaluate(0, {0.4f, 0.4f}, towards(degrees, 0), towards(degrees, 3.1415927f), DisplacedVariant::lobes).r;
     EXPECT_NEAR(single, lobes, 0.2f * lobes) << degrees;  // Beckmann against GGX tails
   }
 }

@@ -114,29 +114,35 @@ TEST(AssetRoundTrip, HeightsComeBackBitExact) {
 
 TEST(AssetRoundTrip, DisplacementsComeBackBitExact) {
   const TempFolder folder;
-  const auto sample = test::sampleDisplacement(32);
-  writeAsset(folder / "a.glint", sample.displacement, test::sampleProvenance());
-  const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
-  const Displacement& d = asset.displacement();
-  EXPECT_EQ(std::tuple(d.width, d.height, d.texel_size_um, d.lobe_count, d.angular, d.level_count),
-            std::tuple(32, 16, 2.5f, 2, 3, 2));
-  EXPECT_EQ(d.base.kind, BaseBrdf::Kind::ggx);
-  EXPECT_EQ(std::tuple(d.base.albedo, d.base.alpha, d.base.eta, d.base.k), std::tuple(1.0f, 0.25f, 1.5f, 3.0f));
-  for (int l = 0; l < 2; ++l) {
-    const DisplacementLevel& level = d.levels[l];
-    const DisplacementLevel& wanted = sample.displacement.levels[l];
-    EXPECT_EQ(std::tuple(level.factor, level.columns, level.rows, level.spatial_columns, level.spatial_rows),
-              std::tuple(4 << l, 8 >> l, 4 >> l, 2, 1));
-    EXPECT_EQ(std::tuple(level.rank1_residual, level.rank1_energy, level.interreflected_share, level.distant_share),
-              std::tuple(0.125f, 0.75f, 0.25f, 0.0625f));
-    expectSame(level.heights, wanted.heights);
-    expectSame(level.lobes, wanted.lobes);
-    expectSame(level.slopes, wanted.slopes);
-    expectSame(level.fit_errors, wanted.fit_errors);
-    expectSame(level.spatial_scale, wanted.spatial_scale);
-    expectSame(level.angular_scale, wanted.angular_scale);
+  for (const bool colored : {false, true}) {
+    const auto sample = test::sampleDisplacement(32, colored);
+    writeAsset(folder / "a.glint", sample.displacement, test::sampleProvenance(), {.overwrite = true});
+    const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
+    const Displacement& d = asset.displacement();
+    EXPECT_EQ(std::tuple(d.width, d.height, d.texel_size_um, d.lobe_count, d.angular, d.level_count),
+              std::tuple(32, 16, 2.5f, 2, 3, 2));
+    EXPECT_EQ(d.base.kind, BaseBrdf::Kind::ggx);
+    EXPECT_EQ(std::tuple(d.base.albedo, d.base.alpha, d.base.eta, d.base.k), std::tuple(1.0f, 0.25f, 1.5f, 3.0f));
+    for (int l = 0; l < 2; ++l) {
+      const DisplacementLevel& level = d.levels[l];
+      const DisplacementLevel& wanted = sample.displacement.levels[l];
+      EXPECT_EQ(std::tuple(level.factor, level.columns, level.rows, level.spatial_columns, level.spatial_rows),
+                std::tuple(4 << l, 8 >> l, 4 >> l, 2, 1));
+      EXPECT_EQ(std::tuple(level.rank1_residual, level.rank1_energy, level.interreflected_share, level.distant_share),
+                std::tuple(0.125f, 0.75f, 0.25f, 0.0625f));
+      expectSame(level.heights, wanted.heights);
+      expectSame(level.lobes, wanted.lobes);
+      expectSame(level.slopes, wanted.slopes);
+      expectSame(level.fit_errors, wanted.fit_errors);
+      expectSame(level.spatial_scale, wanted.spatial_scale);
+      expectSame(level.angular_scale, wanted.angular_scale);
+      expectSame(level.lobe_colors, wanted.lobe_colors);
+      expectSame(level.lobe_alphas, wanted.lobe_alphas);
+      EXPECT_EQ(level.lobe_alphas.empty(), !colored);
+    }
+    EXPECT_EQ(d.channels, colored ? 3 : 1);
+    EXPECT_TRUE(validateAsset(folder / "a.glint").findings.empty());
   }
-  EXPECT_TRUE(validateAsset(folder / "a.glint").findings.empty());
 }
 
 TEST(AssetRoundTrip, PyramidsComeBackBitExact) {

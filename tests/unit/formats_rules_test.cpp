@@ -35,10 +35,12 @@ enum class Base {
   histograms,
   sh_lobes,
   sh_light,
-  displacement
+  displacement,
+  displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals, Base::heights,    Base::pyramid,  Base::compressed, Base::compressed_f32,
-                           Base::bin_map, Base::histograms, Base::sh_lobes, Base::sh_light,   Base::displacement};
+constexpr Base kBases[] = {Base::normals,        Base::heights,      Base::pyramid,         Base::compressed,
+                           Base::compressed_f32, Base::bin_map,      Base::histograms,      Base::sh_lobes,
+                           Base::sh_light,       Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -53,6 +55,8 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
     case Base::displacement:
       return writeAsset(path, test::sampleDisplacement(32).displacement, provenance);
+    case Base::displacement_rgb:
+      return writeAsset(path, test::sampleDisplacement(32, true).displacement, provenance);
     case Base::compressed_f32:
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
     case Base::bin_map:
@@ -299,33 +303,56 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.virtual", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually);
+              }),
       patched("dataset.external", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external);
+              }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked);
+              }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact);
+              }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false);
+              }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false);
+              }),
       {"dataset.alignment", Base::heights,
-       [](const fs::path& path) { Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }},
+       [](const fs::path& path) {
+         Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
+       }},
       {"dataset.alignment_64", Base::heights,
-       [](const fs::path& path) { Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }, true},
+       [](const fs::path& path) {
+         Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
+       },
+       true},
       patched(
           "dataset.unknown", Base::heights, [](const Patch& patch) { patch.replace("extra", H5T_IEEE_F32LE, {kSize}, true); },
           true),
       patched("dataset.missing", Base::heights, [](const Patch& patch) { H5Ldelete(patch.file(), "heights", 0); }),
       patched("dataset.missing", Base::pyramid, [](const Patch& patch) { H5Ldelete(patch.file(), "level_01/masks", 0); }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true);
+              }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true);
+              }),
       patched("dataset.type", Base::pyramid, [](const Patch& patch) { patch.setText("precision", "f16"); }),
       patched("dataset.type", Base::compressed,
-              [](const Patch& patch) { patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true); }),
+              [](const Patch& patch) {
+                patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true);
+              }),
       patched("dataset.type", Base::heights,
               [](const Patch& patch) {
                 const hid_t type = H5Tcopy(H5T_IEEE_F32LE);
@@ -335,7 +362,9 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.dims", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true);
+              }),
       patched("dataset.dims", Base::heights,
               [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize * kSize}, true); }),
       patched("dataset.dims", Base::heights, [](const Patch& patch) { patch.setInteger("width", kSize + 1); }),
@@ -442,6 +471,13 @@ std::vector<Fixture> displacementFixtures() {
                 patch.set("/", "level_factors", H5T_STD_I32LE, H5T_NATIVE_INT, factors, 2);
               }),
       patched(
+          "displacement.bases", Base::displacement_rgb,
+          [](const Patch& patch) { patch.change<float>("level_00/lobe_colors", 4, [](float& c) { c = 1.25f; }); }, true),
+      patched(
+          "displacement.bases", Base::displacement_rgb,
+          [](const Patch& patch) { patch.change<float>("level_01/lobe_alphas", 1, [](float& a) { a = 0; }); }, true),
+      patched("dataset.missing", Base::displacement, [](const Patch& patch) { patch.setInteger("has_lobe_colors", 1); }),
+      patched(
           "displacement.heights", Base::displacement,
           [nan](const Patch& patch) { patch.change<float>("level_01/heights", 3, nan); }, true),
       patched(
@@ -475,10 +511,14 @@ std::vector<Fixture> dataFixtures() {
           [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n.y = kNan; }); }, true),
       patched(
           "normals.disk", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.8f, -0.7f}; }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
+                                     n = {0.8f, -0.7f};
+                                   }); }, true),
       patched(
           "normals.bounds", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.7f, -0.7f}; }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
+                                     n = {0.7f, -0.7f};
+                                   }); }, true),
       patched(
           "normals.bounds", Base::normals,
           [](const Patch& patch) { patch.change<NormalBounds>("bounds/level_02", 3, [](auto& node) { node.high_x = -1; }); },
@@ -774,7 +814,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 12u);
+  EXPECT_EQ(count, 13u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -788,6 +828,9 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_EQ(displacement.displacement().base.eta, 1.5f);
   EXPECT_EQ(displacement.displacement().levels[1].lobes[1].amplitude, 0.375f);
   EXPECT_EQ(displacement.displacement().levels[1].angular_scale[44], 0x3f80);  // 1.875
+  const Asset colored = Asset::open(folder / "displacement-rgb.glint");
+  EXPECT_EQ(colored.displacement().levels[1].lobe_colors[4], 0.625f);
+  EXPECT_EQ(colored.displacement().levels[1].angular_scale[3 * 44 + 2], 0x3f80);
   const Asset pyramid = Asset::open(folder / "ndf-pyramid.glint");
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 0, 5, 30, 33), 4.3046875f);
   EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 1, 2, 35, 29), 4.7890625f);

@@ -1,0 +1,102 @@
+#include "glint-displace/base_images.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "common/files.h"
+#include "common/image_io.h"
+
+namespace glint::apps {
+namespace {
+
+/// The first `channels` channels of an image; codes of integers become 0..1.
+std::vector<float> channelsOf(const Image& image, int channels) {
+  const auto texels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  std::vector<float> values;
+  values.reserve(texels * static_cast<std::size_t>(channels));
+  std::visit(
+      [&](const auto& pixels) {
+        using Code = typename std::decay_t<decltype(pixels)>::value_type;
+        const float scale = std::is_same_v<Code, std::uint8_t>    ? 1 / 255.0f
+                            : std::is_same_v<Code, std::uint16_t> ? 1 / 65535.0f
+                                                                  : 1.0f;
+        for (std::size_t k = 0; k < texels; ++k)
+          for (int c = 0; c < channels; ++c)
+            values.push_back(
+                scale * static_cast<float>(pixels[k * static_cast<std::size_t>(image.channels) + static_cast<std::size_t>(c)]));
+      },
+      image.pixels);
+  return values;
+}
+
+void requireUnitRange(const std::string& path, const std::vector<float>& values, int channels, int width) {
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (values[k] >= 0 && values[k] <= 1) continue;
+    const std::size_t texel = k / static_cast<std::size_t>(channels);
+    throw Error(ErrorCode::invalid_input, "displace.texture", path,
+                fmt::format("column {}, row {} from below", texel % static_cast<std::size_t>(width),
+                            texel / static_cast<std::size_t>(width)),
+                fmt::format("the value {} is not in 0..1", values[k]), "scale the image to 0..1: a surface cannot gain light");
+  }
+}
+
+/// Reads an image of the size of the heights.
+Image readOfSize(const std::string& path, int width, int height) {
+  Image image = readImage(path);
+  if (image.width == width && image.height == height) return image;
+  throw Error(ErrorCode::invalid_input, "displace.texture", path, "",
+              fmt::format("the image has {} x {} pixels, the heights {} x {} texels", image.width, image.height, width, height),
+              "resample it to the size of the heights");
+}
+
+/// IEC 61966-2-1.
+float linearOfSrgb(float code) { return code <= 0.04045f ? code / 12.92f : std::pow((code + 0.055f) / 1.055f, 2.4f); }
+
+}  // namespace
+
+BaseImages::BaseImages(Tool& tool) {
+  const Option& color =
+      tool.option("--base-color", color_path_,
+                  "image of the map's size whose colours multiply the base's reflectance; grey or RGB, alpha is "
+                  "ignored. The albedo of a diffuse base is then 1 unless --base says it");
+  tool.option(
+      "--base-roughness", roughness_path_,
+      "image of the map's size whose first channel, linear, multiplies the base's ALPHA: with ggx:1 it is the roughness");
+  tool.choice("--color-space", color_space_,
+              {{"auto", ColorSpace::automatic}, {"srgb", ColorSpace::srgb}, {"linear", ColorSpace::linear}},
+              "how --base-color is coded; auto: linear in floating-point files, else sRGB")
+      .needs(color);
+  tool.addCheck([this, &tool] {
+    for (const std::string& path : {color_path_, roughness_path_}) {
+      if (path.empty()) continue;
+      checkReadable(path);
+      tool.addInput(path);
+    }
+  });
+}
+
+bake::BaseTexture BaseImages::read(int width, int height) const {
+  bake::BaseTexture texture;
+  if (!roughness_path_.empty()) {
+    texture.roughness = channelsOf(readOfSize(roughness_path_, width, height), 1);
+    requireUnitRange(roughness_path_, texture.roughness, 1, width);
+  }
+  if (color_path_.empty()) return texture;
+  const Image image = readOfSize(color_path_, width, height);
+  texture.channels = image.channels >= 3 ? 3 : 1;
+  texture.colors = channelsOf(image, texture.channels);
+  requireUnitRange(color_path_, texture.colors, texture.channels, width);
+  if (color_space_ == ColorSpace::srgb || (color_space_ == ColorSpace::automatic && !image.floating))
+    for (float& value : texture.colors) value = linearOfSrgb(value);
+  bool grey = true;
+  for (std::size_t k = 0; grey && texture.channels == 3 && k < texture.colors.size(); k += 3)
+    grey = texture.colors[k] == texture.colors[k + 1] && texture.colors[k] == texture.colors[k + 2];
+  if (!grey || texture.channels == 1) return texture;
+  for (std::size_t k = 0; 3 * k < texture.colors.size(); ++k) texture.colors[k] = texture.colors[3 * k];
+  texture.colors.resize(texture.colors.size() / 3);
+  texture.channels = 1;
+  return texture;
+}
+
+}  // namespace glint::apps

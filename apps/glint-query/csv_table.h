@@ -1,0 +1,48 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace glint::apps {
+
+/// A CSV table (RFC 4180) whose header names columns of numbers; further columns are kept as they are.
+class CsvTable {
+ public:
+  /// @throws Error io; invalid_input that names the row
+  static CsvTable read(const std::string& path);
+
+  const std::string& path() const { return path_; }
+  /// Rows below the header.
+  std::size_t count() const { return rows_.size() - 1; }
+
+  template <std::size_t N>
+  bool has(const std::array<const char*, N>& names) const {
+    return std::all_of(names.begin(), names.end(), [&](const char* name) { return find(name) < rows_.front().size(); });
+  }
+
+  /// Numbers of one row, 0 being the first below the header.
+  /// @throws Error invalid_input that names the row and the column
+  template <std::size_t N>
+  std::array<float, N> numbers(const std::array<const char*, N>& names, std::size_t row) const {
+    std::array<float, N> values;
+    for (std::size_t k = 0; k < N; ++k) values[k] = number(names[k], row);
+    return values;
+  }
+
+  /// The table with more columns.
+  /// @param values  [rows][names]
+  std::string withColumns(std::span<const std::string> names, std::span<const float> values) const;
+
+ private:
+  std::size_t find(const std::string& name) const;
+  float number(const char* column, std::size_t row) const;
+
+  std::string path_;
+  std::vector<std::vector<std::string>> rows_;  // the header first
+};
+
+}  // namespace glint::apps
