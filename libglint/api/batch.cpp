@@ -14,8 +14,7 @@ namespace {
 
 constexpr int kSlices = PyramidSlices::kMost;
 
-/// Where the slices of a chunk are stored. Every step reads what the step before has asked the memory for, so that the misses of a
-/// whole chunk are under way together. Nothing branches on what is stored: that cannot be predicted.
+/// Where the slices of a chunk are stored. Nothing branches on what is stored: that cannot be predicted.
 class PyramidChunk {
  public:
   explicit PyramidChunk(const NdfPyramid& pyramid)
@@ -42,13 +41,13 @@ class PyramidChunk {
     if (words_ == 4)  // images of 256^2, as most are
       findPixels<4>(chunk, 4);
     else
-      findPixels<kMostWords>(chunk, words_);
+      findPixels<kMostMaskWords>(chunk, words_);
   }
 
   /// Finds every pixel, and gives slices that have none weight 0.
   template <int kWords>
   void findPixels(SliceChunk& chunk, int given_words) {
-    const int words = kWords < kMostWords ? kWords : given_words;
+    const int words = kWords < kMostMaskWords ? kWords : given_words;
     for (int k = 0; k < kChunk; ++k) {
       const int block = chunk.blocks[k];
       std::uint64_t before[kWords];  // bits of the blocks before this one
@@ -73,16 +72,21 @@ class PyramidChunk {
     }
   }
 
+  /// As PyramidNdf adds up: the corners of a level first.
   void addUp(const SliceChunk& chunk, float* sums) const {
-    if (pyramid_.precision == BlockPrecision::f16)
-      addUpHalves(chunk, sums);
-    else
-      addUpFloats(chunk, sums);
+    for (int step = 0; step < 2; ++step) {
+      alignas(64) float products[4][kChunk];
+      for (int corner = 0; corner < 4; ++corner) {
+        const int j = 4 * step + corner;
+        pyramid_.precision == BlockPrecision::f16 ? weighHalves(chunk.weights[j], places_[j], products[corner])
+                                                  : weighFloats(chunk.weights[j], places_[j], products[corner]);
+      }
+      for (int k = 0; k < kChunk; ++k) sums[k] += (products[0][k] + products[2][k]) + (products[1][k] + products[3][k]);
+    }
   }
 
  private:
   static constexpr float kZero = 0;
-  static constexpr int kMostWords = 64;
 
   struct Level {
     const std::uint64_t* masks;
@@ -90,21 +94,18 @@ class PyramidChunk {
     const char* pixels;
   };
 
-  void addUpHalves(const SliceChunk& chunk, float* sums) const {
-    for (int j = 0; j < kSlices; ++j) {
-      alignas(64) std::uint16_t halves[kChunk];
-      for (int k = 0; k < kChunk; ++k) halves[k] = *reinterpret_cast<const std::uint16_t*>(places_[j][k]);
-      for (int k = 0; k < kChunk; ++k) sums[k] += chunk.weights[j][k] * halfToFloat(halves[k]);
-    }
+  static void weighHalves(const float* weights, const char* const* places, float* products) {
+    alignas(64) std::uint16_t halves[kChunk];
+    for (int k = 0; k < kChunk; ++k) halves[k] = *reinterpret_cast<const std::uint16_t*>(places[k]);
+    for (int k = 0; k < kChunk; ++k) products[k] = weights[k] * halfToFloat(halves[k]);
   }
 
-  void addUpFloats(const SliceChunk& chunk, float* sums) const {
-    for (int j = 0; j < kSlices; ++j)
-      for (int k = 0; k < kChunk; ++k) {
-        // Values of a file are not checked: a slice that does not count must not bring an infinity.
-        const float value = chunk.weights[j][k] * *reinterpret_cast<const float*>(places_[j][k]);
-        sums[k] += chunk.weights[j][k] > 0 ? value : 0.0f;
-      }
+  static void weighFloats(const float* weights, const char* const* places, float* products) {
+    for (int k = 0; k < kChunk; ++k) {
+      // Values of a file are not checked: a slice that does not count must not bring an infinity.
+      const float value = weights[k] * *reinterpret_cast<const float*>(places[k]);
+      products[k] = weights[k] > 0 ? value : 0.0f;
+    }
   }
 
   const NdfPyramid& pyramid_;
@@ -114,12 +115,10 @@ class PyramidChunk {
   const char* places_[kSlices][kChunk];
 };
 
-GLINT_API_MULTIVERSION void answerChunk(const PyramidNdf& model, SliceChunk& chunk, float* sums) {
-  PyramidChunk places(model.pyramid());
-  places.prefetchMasks(chunk);
-  places.findPixels(chunk);
+GLINT_API_MULTIVERSION void findPixels(PyramidChunk& places, SliceChunk& chunk) { places.findPixels(chunk); }
+
+GLINT_API_MULTIVERSION void addUpPixels(const PyramidChunk& places, const SliceChunk& chunk, float* sums) {
   places.addUp(chunk, sums);
-  for (int k = 0; k < kChunk; ++k) sums[k] *= model.pyramid().value_scale;
 }
 
 bool hasWideKernels() {
@@ -247,11 +246,7 @@ class CompressedChunk {
   std::uint16_t slots_[kSlices][kChunk];
 };
 
-void answerChunk(const CpNdf& model, SliceChunk& chunk, int count, float* sums) {
-  const CompressedNdf& ndf = model.compressed();
-  CompressedChunk places(ndf);
-  places.findClusters(chunk);
-  places.findRows(chunk);
+void addUpRows(const CompressedNdf& ndf, const CompressedChunk& places, const SliceChunk& chunk, int count, float* sums) {
   const bool pca = ndf.method == CompressionMethod::pca;
   switch (ndf.coefficient_type) {
     case CoefficientType::i8:
@@ -268,34 +263,71 @@ void answerChunk(const CpNdf& model, SliceChunk& chunk, int count, float* sums) 
   }
 }
 
-void answer(const PyramidNdf& model, SliceChunk& chunk, int, float* sums) { answerChunk(model, chunk, sums); }
-void answer(const CpNdf& model, SliceChunk& chunk, int count, float* sums) { answerChunk(model, chunk, count, sums); }
+/// The steps of a chunk of densities: `begin` asks the memory for the index, `find` reads it and asks for the values, `finish` adds these
+/// up.
+struct PyramidSteps {
+  explicit PyramidSteps(const PyramidNdf& model) : places(model.pyramid()), scale(model.pyramid().value_scale) {}
+  void begin(SliceChunk& chunk) { places.prefetchMasks(chunk); }
+  void find(SliceChunk& chunk) { findPixels(places, chunk); }
+  void finish(const SliceChunk& chunk, int, float* sums) const {
+    addUpPixels(places, chunk, sums);
+    for (int k = 0; k < kChunk; ++k) sums[k] *= scale;
+  }
+  PyramidChunk places;
+  float scale;
+};
 
-template <class Model>
+struct CompressedSteps {
+  explicit CompressedSteps(const CpNdf& model) : ndf(model.compressed()), places(ndf) {}
+  void begin(SliceChunk& chunk) { places.findClusters(chunk); }
+  void find(SliceChunk& chunk) { places.findRows(chunk); }
+  void finish(const SliceChunk& chunk, int count, float* sums) const { addUpRows(ndf, places, chunk, count, sums); }
+  const CompressedNdf& ndf;
+  CompressedChunk places;
+};
+
+/// Chunks go through their steps one behind the other, so that what a step asks the memory for has the time of another chunk's to come.
+template <class Steps, class Model>
 void pyramidDensities(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                       float* out) {
-  for (std::size_t first = 0; first < count; first += kChunk) {
-    const int lanes = static_cast<int>(std::min(count - first, static_cast<std::size_t>(kChunk)));
+  struct Stage {
     SliceChunk chunk;
+    Steps steps;
+  };
+  Stage stages[3] = {{{}, Steps(model)}, {{}, Steps(model)}, {{}, Steps(model)}};
+  const std::size_t chunks = (count + kChunk - 1) / kChunk;
+  const auto lanesOf = [&](std::size_t k) { return static_cast<int>(std::min(count - k * kChunk, std::size_t{kChunk})); };
+  for (std::size_t step = 0; step < chunks + 2; ++step) {
+    if (step < chunks) {
+      Stage& stage = stages[step % 3];
+      selectChunk(model.shape(), footprints, halves, step * kChunk, lanesOf(step), stage.chunk);
+      stage.steps.begin(stage.chunk);
+    }
+    if (step >= 1 && step - 1 < chunks) {
+      Stage& stage = stages[(step - 1) % 3];
+      stage.steps.find(stage.chunk);
+    }
+    if (step < 2) continue;
+    const Stage& stage = stages[(step - 2) % 3];
+    const int lanes = lanesOf(step - 2);
     alignas(64) float sums[kChunk] = {};
-    selectChunk(model.shape(), footprints, halves, first, lanes, chunk);
-    answer(model, chunk, lanes, sums);
+    stage.steps.finish(stage.chunk, lanes, sums);
     for (int k = 0; k < lanes; ++k) {
-      const std::size_t at = first + static_cast<std::size_t>(k);
-      const bool from_texels = model.hasNormals() && chunk.below[k] != 0;
-      out[at] = from_texels ? model.density(footprints[at], halves[at]) : chunk.inside[k] != 0 ? sums[k] : 0.0f;
+      const std::size_t at = (step - 2) * kChunk + static_cast<std::size_t>(k);
+      const bool from_texels = model.hasNormals() && stage.chunk.below[k] != 0;
+      out[at] = from_texels ? model.density(footprints[at], halves[at]) : stage.chunk.inside[k] != 0 ? sums[k] : 0.0f;
     }
   }
 }
 
 void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints,
                     const HalfVectorArrays& halves, float* out) {
-  pyramidDensities(model, count, footprints, halves, out);
+  pyramidDensities<PyramidSteps>(model, count, footprints, halves, out);
 }
 
 void modelDensities(const CpNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                     float* out) {
-  pyramidDensities(model, count, footprints, halves, out);
+  pyramidDensities<CompressedSteps>(model, count, footprints, halves, out);
 }
 
 /// Models that have no way of their own are asked one by one.
@@ -303,6 +335,57 @@ template <class Model>
 void modelDensities(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                     float* out) {
   for (std::size_t k = 0; k < count; ++k) out[k] = model.density(footprints[k], halves[k]);
+}
+
+/// A mean is long work next to its cache misses, and reads many lines: few are asked ahead.
+constexpr int kMeansAhead = 4;
+constexpr int kSamplesAhead = 16;
+
+void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
+                float* out) {
+  for (std::size_t first = 0; first < count; first += kMeansAhead) {
+    const int lanes = static_cast<int>(std::min(count - first, static_cast<std::size_t>(kMeansAhead)));
+    PyramidSlices chosen[kMeansAhead];
+    for (int k = 0; k < lanes; ++k) {
+      chosen[k] = selectSlices(model.shape(), footprints[first + static_cast<std::size_t>(k)]);
+      model.prefetchIndex(chosen[k]);
+    }
+    for (int k = 0; k < lanes; ++k) model.prefetchMean(chosen[k], ranges[first + static_cast<std::size_t>(k)]);
+    for (int k = 0; k < lanes; ++k) {
+      const std::size_t at = first + static_cast<std::size_t>(k);
+      out[at] = model.fromTexels(footprints[at]) ? model.mean(footprints[at], ranges[at]) : model.mean(chosen[k], ranges[at]);
+    }
+  }
+}
+
+void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
+                  const SampleArrays& out) {
+  for (std::size_t first = 0; first < count; first += kSamplesAhead) {
+    const int lanes = static_cast<int>(std::min(count - first, static_cast<std::size_t>(kSamplesAhead)));
+    PyramidNdf::Draw draws[kSamplesAhead];
+    for (int k = 0; k < lanes; ++k) {
+      const std::size_t at = first + static_cast<std::size_t>(k);
+      draws[k] = model.chooseImage(footprints[at], xi[at]);
+    }
+    for (int k = 0; k < lanes; ++k) model.findBlocks(draws[k]);
+    for (int k = 0; k < lanes; ++k) model.chooseBlock(draws[k]);
+    for (int k = 0; k < lanes; ++k) model.choosePixel(draws[k]);
+    for (int k = 0; k < lanes; ++k) {
+      const std::size_t at = first + static_cast<std::size_t>(k);
+      out.set(at, model.fromTexels(footprints[at]) ? model.sample(footprints[at], xi[at]) : model.finish(draws[k]));
+    }
+  }
+}
+
+template <class Model>
+void modelMeans(const Model& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges, float* out) {
+  for (std::size_t k = 0; k < count; ++k) out[k] = model.mean(footprints[k], ranges[k]);
+}
+
+template <class Model>
+void modelSamples(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
+                  const SampleArrays& out) {
+  for (std::size_t k = 0; k < count; ++k) out.set(k, model.sample(footprints[k], xi[k]));
 }
 
 }  // namespace
@@ -313,25 +396,12 @@ void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& fo
 }
 
 void means(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges, float* out) {
-  std::visit(
-      [&](const auto& m) {
-        for (std::size_t k = 0; k < count; ++k) out[k] = m.mean(footprints[k], ranges[k]);
-      },
-      model);
+  std::visit([&](const auto& m) { modelMeans(m, count, footprints, ranges, out); }, model);
 }
 
 void samples(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
              const SampleArrays& out) {
-  std::visit(
-      [&](const auto& m) {
-        for (std::size_t k = 0; k < count; ++k) {
-          const HalfVectorSample drawn = m.sample(footprints[k], xi[k]);
-          out.x[k] = drawn.h.x;
-          out.y[k] = drawn.h.y;
-          out.pdf[k] = drawn.pdf;
-        }
-      },
-      model);
+  std::visit([&](const auto& m) { modelSamples(m, count, footprints, xi, out); }, model);
 }
 
 }  // namespace glint::api

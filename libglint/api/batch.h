@@ -51,6 +51,12 @@ struct RangeArrays {
 /// Half vectors that are drawn, and their pdfs; all contiguous.
 struct SampleArrays {
   float *x, *y, *pdf;
+
+  void set(std::size_t k, const HalfVectorSample& drawn) const {
+    x[k] = drawn.h.x;
+    y[k] = drawn.h.y;
+    pdf[k] = drawn.pdf;
+  }
 };
 
 /// out[k] = density of query k, for k < count. The same values as asking one by one, and the same rules for what is degenerate.

@@ -15,6 +15,9 @@ inline constexpr int kBlockPixels = kBlockSize * kBlockSize;
 /// Most levels that a pyramid can have.
 inline constexpr int kMaxPyramidLevels = 16;
 
+/// Most 64-bit words that an image's mask of blocks can have: images of 1024^2.
+inline constexpr int kMostMaskWords = 64;
+
 /// Where the footprints of one level lie: centres ((i + 0.5) stride, (j + 0.5) stride) in texels.
 struct PyramidGrid {
   float stride = 0;  ///< texels

@@ -10,11 +10,21 @@ namespace glint {
 
 /// A Gaussian footprint as a sum of isotropic ones of equal size along its long axis. Weights are > 0 and sum to 1.
 struct IsotropicParts {
-  static constexpr int kMost = 16;
+  static constexpr int kMost = 32;
   Footprint footprints[kMost];
   float weights[kMost];
   int count = 0;
 };
+
+/// Most that neighbouring parts are apart, in deviations of a part: their sum ripples by 1 %. More only where kMost is too few.
+inline constexpr float kPartGap = 2;
+/// Parts lie out to this many deviations of the footprint.
+inline constexpr float kPartReach = 2.2f;
+/// Aspect up to which IsotropicParts::kMost parts are enough: sqrt(1 + (kMost kPartGap / (2 kPartReach))^2).
+inline constexpr float kMostAspect = 14.58f;
+/// How much wider parts become where they are too few: a share of the square of the gap beyond kPartGap. Gaps miss texels, width adds
+/// others; this leaves the least squared error on a map of unrelated texels, to a tenth (tests/unit/anisotropic_test.cpp).
+inline constexpr float kPartWidening = 0.055f;
 
 /// Deviations along the axes of a covariance, and the direction of the longer one.
 struct PrincipalAxes {
@@ -32,16 +42,18 @@ inline GLINT_HD PrincipalAxes principalAxes(const Covariance& c) {
 /// Splits a footprint along its long axis so that the first and second moments of the parts together are its own.
 ///
 /// The size is made usable first (usableCovariance). The parts have the short deviation, or `narrowest_sigma` where that is larger,
-/// and neighbours are at most kPartGap deviations apart, until IsotropicParts::kMost are not enough: above an
-/// aspect of 7 there are gaps between them, 4.4 deviations at an aspect of 16. Boxes are split as the Gaussian of the same moments.
+/// and neighbours are at most kPartGap deviations apart. Above an aspect of kMostAspect the parts are too few: they are wider and further
+/// apart, so that the footprint keeps its length, exactly in its second moment, and grows in width (kPartWidening).
+/// Boxes are split as the Gaussian of the same moments.
 /// @param narrowest_sigma  texels; what the model that is asked cannot tell apart, e.g. finestSigma(shape) of a pyramid without normals
-/// @return 1 part for round footprints, else 2 to 16
+/// @return 1 part for round footprints, else 2 to 32
 inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int height, float narrowest_sigma = 0) {
-  constexpr float kPartGap = 2;    // in deviations of a part: the sum of neighbours ripples by 1 %
-  constexpr float kReach = 2.2f;   // parts out to this many deviations
   constexpr float kRound = 0.05f;  // a variance larger by less is no length
   const PrincipalAxes axes = principalAxes(usableCovariance(p.covariance, width, height));
-  const float sigma = std::max(axes.shortest, narrowest_sigma);
+  const float narrow = std::max(axes.shortest, narrowest_sigma), narrow2 = narrow * narrow;
+  constexpr float kGapPerLength = 2 * kPartReach / IsotropicParts::kMost;
+  const float gap2 = kGapPerLength * kGapPerLength * (axes.longest * axes.longest - narrow2);
+  const float sigma = std::sqrt(narrow2 + kPartWidening * std::max(0.0f, gap2 - kPartGap * kPartGap * narrow2));
   const float along2 = axes.longest * axes.longest - sigma * sigma;
   IsotropicParts parts;
   if (!(along2 > kRound * sigma * sigma)) {
@@ -51,8 +63,8 @@ inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int
     return parts;
   }
   const float along = std::sqrt(along2);
-  parts.count = std::clamp(static_cast<int>(std::ceil(2 * kReach * along / (kPartGap * sigma))), 2, IsotropicParts::kMost);
-  const float step = 2 * kReach / static_cast<float>(parts.count), middle = 0.5f * static_cast<float>(parts.count - 1);
+  parts.count = std::clamp(static_cast<int>(std::ceil(2 * kPartReach * along / (kPartGap * sigma))), 2, IsotropicParts::kMost);
+  const float step = 2 * kPartReach / static_cast<float>(parts.count), middle = 0.5f * static_cast<float>(parts.count - 1);
   float total = 0, moment = 0;
   for (int k = 0; k < parts.count; ++k) {
     const float x = step * (static_cast<float>(k) - middle);
@@ -71,7 +83,7 @@ inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int
   return parts;
 }
 
-/// Answers stretched footprints from a model that knows only round ones (PyramidNdf, CpNdf): each as the sum of up to 16 round ones
+/// Answers stretched footprints from a model that knows only round ones (PyramidNdf, CpNdf): each as the sum of up to 32 round ones
 /// along its long axis, at that many times the cost. Round footprints cost what they did.
 ///
 /// Holds a pointer to the model, which must outlive it. Thread-safe, allocates nothing.

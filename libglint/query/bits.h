@@ -25,4 +25,16 @@ inline GLINT_HD int lowestBit(std::uint64_t bits) {
 #endif
 }
 
+/// Index of set bit number k, counted from the lowest; at least k + 1 are set.
+inline GLINT_HD int selectBit(std::uint64_t bits, int k) {
+  int at = 0;
+  for (int width = 32; width > 0; width /= 2) {
+    const int below = setBits(bits & ((std::uint64_t{1} << width) - 1)), skip = k >= below ? width : 0;
+    k -= skip > 0 ? below : 0;
+    bits >>= skip;
+    at += skip;
+  }
+  return at;
+}
+
 }  // namespace glint

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 
@@ -20,6 +21,7 @@ struct Float4 {
 
   static Float4 zero() { return {_mm_setzero_ps()}; }
   static Float4 all(float x) { return {_mm_set1_ps(x)}; }
+  static Float4 of(float a, float b, float c, float d) { return {_mm_setr_ps(a, b, c, d)}; }
   static Float4 load(const float* p) { return {_mm_loadu_ps(p)}; }
   static Float4 load(const std::int8_t* p) {
     std::int32_t four;
@@ -41,13 +43,42 @@ struct Float4 {
     const __m128 is_subnormal = _mm_castsi128_ps(_mm_cmplt_epi32(magnitude, _mm_set1_epi32(0x400)));
     return {_mm_or_ps(_mm_blendv_ps(_mm_castsi128_ps(normal), subnormal, is_subnormal), _mm_castsi128_ps(sign))};
   }
+  /// Half-precision numbers >= 0, in half the time.
+  static Float4 loadPositive(const std::uint16_t* p) {
+    return positiveHalves(_mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))));
+  }
+  static Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
+    return positiveHalves(_mm_setr_epi32(a, b, c, d));
+  }
+  static Float4 positiveHalves(__m128i bits) {
+    // Right for normal numbers. A subnormal f 2^-14 comes out as 2^-15 (1 + f): less than twice that minus 2^-14 only if it is normal.
+    const __m128 normal = _mm_castsi128_ps(_mm_add_epi32(_mm_slli_epi32(bits, 13), _mm_set1_epi32(112 << 23)));
+    return {_mm_min_ps(normal, _mm_sub_ps(_mm_add_ps(normal, normal), _mm_set1_ps(0x1p-14f)))};
+  }
   void store(float* p) const { _mm_storeu_ps(p, v); }
 
   friend Float4 operator+(Float4 a, Float4 b) { return {_mm_add_ps(a.v, b.v)}; }
   friend Float4 operator-(Float4 a, Float4 b) { return {_mm_sub_ps(a.v, b.v)}; }
   friend Float4 operator*(Float4 a, Float4 b) { return {_mm_mul_ps(a.v, b.v)}; }
+  friend Float4 operator/(Float4 a, Float4 b) { return {_mm_div_ps(a.v, b.v)}; }
+  friend Float4 floorOf(Float4 a) { return {_mm_floor_ps(a.v)}; }
+  /// In lanes: a < b ? yes : no.
+  friend Float4 whereLess(Float4 a, Float4 b, Float4 yes, Float4 no) {
+    return {_mm_blendv_ps(no.v, yes.v, _mm_cmplt_ps(a.v, b.v))};
+  }
   /// Negative numbers and NaN become 0.
   Float4 positive() const { return {_mm_max_ps(v, _mm_setzero_ps())}; }
+  /// Bit k: lane k is at most `bound`.
+  unsigned notAbove(float bound) const {
+    return static_cast<unsigned>(_mm_movemask_ps(_mm_cmple_ps(v, _mm_set1_ps(bound))));
+  }
+  /// 0, 1 + 0, (2 + 1) + 0, (3 + 2) + (1 + 0).
+  Float4 runningSums() const {
+    const __m128 pairs = _mm_add_ps(v, _mm_castsi128_ps(_mm_slli_si128(_mm_castps_si128(v), 4)));
+    return {_mm_add_ps(pairs, _mm_castsi128_ps(_mm_slli_si128(_mm_castps_si128(pairs), 8)))};
+  }
+  /// The last lane in all.
+  Float4 last() const { return {_mm_shuffle_ps(v, v, 0xff)}; }
   /// (0 + 2) + (1 + 3).
   float sum() const {
     const __m128 pairs = _mm_add_ps(v, _mm_movehl_ps(v, v));
@@ -58,6 +89,7 @@ struct Float4 {
 
   static GLINT_HD Float4 zero() { return {{0, 0, 0, 0}}; }
   static GLINT_HD Float4 all(float x) { return {{x, x, x, x}}; }
+  static GLINT_HD Float4 of(float a, float b, float c, float d) { return {{a, b, c, d}}; }
   template <class T>
   static GLINT_HD Float4 load(const T* p) {
     return {{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]), static_cast<float>(p[3])}};
@@ -65,6 +97,10 @@ struct Float4 {
   /// Half-precision numbers.
   static GLINT_HD Float4 load(const std::uint16_t* p) {
     return {{halfToFloat(p[0]), halfToFloat(p[1]), halfToFloat(p[2]), halfToFloat(p[3])}};
+  }
+  static GLINT_HD Float4 loadPositive(const std::uint16_t* p) { return load(p); }
+  static GLINT_HD Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
+    return {{halfToFloat(a), halfToFloat(b), halfToFloat(c), halfToFloat(d)}};
   }
   GLINT_HD void store(float* p) const {
     for (int k = 0; k < 4; ++k) p[k] = v[k];
@@ -79,10 +115,34 @@ struct Float4 {
   friend GLINT_HD Float4 operator*(Float4 a, Float4 b) {
     return {{a.v[0] * b.v[0], a.v[1] * b.v[1], a.v[2] * b.v[2], a.v[3] * b.v[3]}};
   }
+  friend GLINT_HD Float4 operator/(Float4 a, Float4 b) {
+    return {{a.v[0] / b.v[0], a.v[1] / b.v[1], a.v[2] / b.v[2], a.v[3] / b.v[3]}};
+  }
+  friend GLINT_HD Float4 floorOf(Float4 a) {
+    return {{std::floor(a.v[0]), std::floor(a.v[1]), std::floor(a.v[2]), std::floor(a.v[3])}};
+  }
+  /// In lanes: a < b ? yes : no.
+  friend GLINT_HD Float4 whereLess(Float4 a, Float4 b, Float4 yes, Float4 no) {
+    for (int k = 0; k < 4; ++k) no.v[k] = a.v[k] < b.v[k] ? yes.v[k] : no.v[k];
+    return no;
+  }
   /// Negative numbers and NaN become 0.
   GLINT_HD Float4 positive() const {
     return {{v[0] > 0 ? v[0] : 0, v[1] > 0 ? v[1] : 0, v[2] > 0 ? v[2] : 0, v[3] > 0 ? v[3] : 0}};
   }
+  /// Bit k: lane k is at most `bound`.
+  GLINT_HD unsigned notAbove(float bound) const {
+    unsigned bits = 0;
+    for (int k = 0; k < 4; ++k) bits |= (v[k] <= bound ? 1u : 0u) << k;
+    return bits;
+  }
+  /// 0, 1 + 0, (2 + 1) + 0, (3 + 2) + (1 + 0).
+  GLINT_HD Float4 runningSums() const {
+    const float pair = v[1] + v[0];
+    return {{v[0], pair, (v[2] + v[1]) + v[0], (v[3] + v[2]) + pair}};
+  }
+  /// The last lane in all.
+  GLINT_HD Float4 last() const { return {{v[3], v[3], v[3], v[3]}}; }
   /// (0 + 2) + (1 + 3).
   GLINT_HD float sum() const { return (v[0] + v[2]) + (v[1] + v[3]); }
 #endif

@@ -27,11 +27,13 @@ class PyramidNdf {
   /// Whether footprints below level 0 are answered from the texels.
   GLINT_HD bool hasNormals() const { return below_.hasMap(); }
   GLINT_HD const PyramidShape& shape() const { return pyramid_.shape; }
+  /// Whether this footprint is answered from the texels.
+  GLINT_HD bool fromTexels(const Footprint& p) const { return hasNormals() && belowFinest(shape(), p); }
 
   /// Density towards h, >= 0; O(1): one pixel in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
+    if (fromTexels(p)) return below_.density(p, h);
     return pixelDensity(selectSlices(shape(), p), pixelPlace(shape(), h));
   }
 
@@ -39,76 +41,207 @@ class PyramidNdf {
   /// the density is constant there. The pdf is the density, which integrates to what the images do: 1 within 1e-3 by the format,
   /// 1e-5 as they are built. O(stored blocks of one image + 256).
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
-    xi = clampUnit(xi);
-    if (below_.hasMap() && belowFinest(shape(), p)) return below_.sample(p, xi);
-    const PyramidSlices chosen = selectSlices(shape(), p);
-    const int k = chooseIndex(chosen.count, 1, [&](int i) { return chosen.slices[i].weight; }, xi.x);
-    if (k < 0) return {};
-    const BlockChoice block = chooseStoredBlock(chosen.slices[k], xi);
-    if (block.block < 0) return {};
-    const PyramidLevel& level = pyramid_.levels[chosen.slices[k].level];
-    float pixels[kBlockPixels];
-    loadBlock(level, level.first_block.data()[chosen.slices[k].image] + static_cast<std::uint64_t>(block.rank), pixels);
-    const PixelPlace place = choosePixel(pixels, sumRows(pixels), block.block, xi);
-    if (place.x < 0) return {};
-    return {pointInPixel(shape(), place, xi), pixelDensity(chosen, place)};
+    if (fromTexels(p)) return below_.sample(p, clampUnit(xi));
+    Draw draw = chooseImage(p, xi);
+    findBlocks(draw);
+    chooseBlock(draw);
+    choosePixel(draw);
+    return finish(draw);
+  }
+
+  /// Where a place is in the level of every slice.
+  struct Places {
+    const void* pixels[PyramidSlices::kMost];
+    float weights[PyramidSlices::kMost];  ///< 0 where nothing is stored: then the pixel is something else, which can be read
+    int count = 0;
+  };
+
+  /// A sample from the images on its way: chooseImage, findBlocks, chooseBlock, choosePixel and finish make it, in this order. Each
+  /// reads what the one before has asked the memory for, so the cache misses of many samples can be under way together.
+  struct Draw {
+    PyramidSlices slices;
+    Vec2 xi;
+    PyramidSlice chosen = {0, 0, 0};  ///< weight 0: nothing can be drawn
+    std::uint64_t first_block = 0;    ///< of the chosen image
+    int block_count = 0;
+    std::uint64_t stored = 0;  ///< the chosen block
+    PixelPlace place = {0, -1, -1};
+    Places pixels;
+  };
+
+  GLINT_HD Draw chooseImage(const Footprint& p, Vec2 xi) const {
+    Draw draw;
+    draw.slices = selectSlices(shape(), p);
+    draw.xi = clampUnit(xi);
+    const int k = chooseIndex(draw.slices.count, 1, [&](int i) { return draw.slices.slices[i].weight; }, draw.xi.x);
+    if (k < 0) return draw;
+    draw.chosen = draw.slices.slices[k];
+    prefetch(maskOf(draw.chosen));
+    prefetch(levelOf(draw.chosen).first_block.data() + draw.chosen.image);
+    return draw;
+  }
+
+  GLINT_HD void findBlocks(Draw& draw) const {
+    constexpr int kLine = 16;
+    const PyramidLevel& level = levelOf(draw.chosen);
+    const std::uint64_t* first = level.first_block.data() + draw.chosen.image;
+    draw.first_block = first[0];
+    draw.block_count = static_cast<int>(first[1] - first[0]);
+    for (int k = 0; k < draw.block_count; k += kLine) prefetch(level.block_means.data() + first[0] + k);
+    prefetchIndex(draw.slices);
+  }
+
+  GLINT_HD void chooseBlock(Draw& draw) const {
+    if (!(draw.chosen.weight > 0)) return;
+    const PyramidLevel& level = levelOf(draw.chosen);
+    const float* means = level.block_means.data() + draw.first_block;
+    const int blocks = shape().blocksPerAxis();
+    const auto mass = [&](int begin, int end) {
+      float sum = 0;
+      for (int k = begin; k < end; ++k) sum += means[k];
+      return sum;
+    };
+    const BlockChoice choice =
+        blocks <= 16 ? chooseBlockOf16(maskOf(draw.chosen), blocks, means, draw.block_count, draw.xi)
+                     : glint::chooseBlock(maskOf(draw.chosen), blocks, mass(0, draw.block_count), mass, draw.xi);
+    draw.place.block = choice.block;
+    if (choice.block < 0) return;
+    draw.stored = draw.first_block + static_cast<std::uint64_t>(choice.rank);
+    prefetchPixels(level, draw.stored, 0, kBlockSize);
+  }
+
+  GLINT_HD void choosePixel(Draw& draw) const {
+    if (!(draw.chosen.weight > 0 && draw.place.block >= 0)) return;
+    const PyramidLevel& level = levelOf(draw.chosen);
+    draw.place = pyramid_.precision == BlockPrecision::f16
+                     ? choosePixelOf(static_cast<const std::uint16_t*>(level.pixels), draw)
+                     : choosePixelOf(static_cast<const float*>(level.pixels), draw);
+    if (draw.place.x >= 0) draw.pixels = findPixels(draw.slices, draw.place);
+  }
+
+  GLINT_HD HalfVectorSample finish(const Draw& draw) const {
+    if (draw.place.x < 0) return {};
+    return {pointInPixel(shape(), draw.place, draw.xi), addPixels(draw.pixels)};
   }
 
   /// Average density over a box of half vectors, 0 if it is empty. O(1) for each block that the box covers: whole blocks have
   /// their mean stored, others sum at most 256 pixels.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
+    if (fromTexels(p)) return below_.mean(p, range);
+    return mean(selectSlices(shape(), p), range);
+  }
+
+  /// The same from chosen images.
+  GLINT_HD float mean(const PyramidSlices& chosen, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
-    if (below_.hasMap() && belowFinest(shape(), p)) return below_.mean(p, range);
-    const PyramidSlices chosen = selectSlices(shape(), p);
     double sum = 0;
     forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
+      const BlockCover cover(box);
       for (int k = 0; k < chosen.count; ++k) {
         const std::int64_t stored = storedBlock(chosen.slices[k], block);
-        if (stored >= 0) sum += double{chosen.slices[k].weight} * blockSum(chosen.slices[k].level, stored, box);
+        if (stored >= 0) sum += double{chosen.slices[k].weight} * blockSum(levelOf(chosen.slices[k]), stored, cover);
       }
     });
     return static_cast<float>(sum / areaInPixels(shape(), range));
   }
 
- private:
-  GLINT_HD float pixelDensity(const PyramidSlices& chosen, const PixelPlace& place) const {
-    float sum = 0;
+  /// Asks the memory for where chosen images say which blocks they store.
+  GLINT_HD void prefetchIndex(const PyramidSlices& chosen) const {
     for (int k = 0; k < chosen.count; ++k) {
-      const PyramidSlice& slice = chosen.slices[k];
-      const std::int64_t block = storedBlock(slice, place.block);
-      if (block >= 0) sum += slice.weight * pixel(slice.level, block, place.y * kBlockSize + place.x);
+      prefetch(maskOf(chosen.slices[k]));
+      prefetch(levelOf(chosen.slices[k]).first_block.data() + chosen.slices[k].image);
+    }
+  }
+
+  /// Asks the memory for what a mean from chosen images reads. Reads their index.
+  GLINT_HD void prefetchMean(const PyramidSlices& chosen, const Box2& range) const {
+    forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
+      const BlockCover cover(box);
+      for (int k = 0; k < chosen.count; ++k) {
+        const std::int64_t stored = storedBlock(chosen.slices[k], block);
+        if (stored < 0) continue;
+        const PyramidLevel& level = levelOf(chosen.slices[k]);
+        if (cover.isWhole())
+          prefetch(level.block_means.data() + stored);
+        else
+          prefetchPixels(level, static_cast<std::uint64_t>(stored), cover.first_row, cover.end_row);
+      }
+    });
+  }
+
+ private:
+  GLINT_HD const PyramidLevel& levelOf(const PyramidSlice& slice) const { return pyramid_.levels[slice.level]; }
+  GLINT_HD const std::uint64_t* maskOf(const PyramidSlice& slice) const {
+    return levelOf(slice).masks.data() + static_cast<std::size_t>(slice.image) * shape().maskWords();
+  }
+  GLINT_HD float pixelDensity(const PyramidSlices& chosen, const PixelPlace& place) const {
+    return addPixels(findPixels(chosen, place));
+  }
+
+  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be predicted, so
+  /// the cache misses of all slices are under way together.
+  GLINT_HD Places findPixels(const PyramidSlices& chosen, const PixelPlace& place) const {
+    Places places;
+    if (shape().maskWords() == 4)  // images of 256^2, as most are
+      findPixels<4>(chosen, place, 4, places);
+    else
+      findPixels<kMostMaskWords>(chosen, place, shape().maskWords(), places);
+    return places;
+  }
+
+  template <int kWords>
+  GLINT_HD void findPixels(const PyramidSlices& chosen, const PixelPlace& place, int given_words, Places& places) const {
+    const int words = kWords < kMostMaskWords ? kWords : given_words, word = place.block / 64, bit = place.block % 64;
+    std::uint64_t before[kWords];  // the blocks before this one
+    for (int w = 0; w < words; ++w)
+      before[w] = w < word ? ~std::uint64_t{0} : w == word ? (std::uint64_t{1} << bit) - 1 : 0;
+    const int shift = pyramid_.precision == BlockPrecision::f16 ? 1 : 2;
+    const auto pixel = static_cast<std::uint64_t>(place.y * kBlockSize + place.x);
+    places.count = chosen.count;
+    for (int k = 0; k < chosen.count; ++k) {
+      const PyramidLevel& level = levelOf(chosen.slices[k]);
+      const std::uint64_t* mask = level.masks.data() + static_cast<std::size_t>(chosen.slices[k].image) * words;
+      std::uint64_t rank = level.first_block.data()[chosen.slices[k].image];
+      for (int w = 0; w < words; ++w) rank += static_cast<std::uint64_t>(setBits(mask[w] & before[w]));
+      const std::uint64_t stored = mask[word] >> bit & 1, offset = (rank * kBlockPixels + pixel) << shift & (0 - stored);
+      // Where nothing is stored the first pixel of the level is read; a level may have none.
+      const void* pixels = level.block_means.empty() ? level.masks.data() : level.pixels;
+      places.pixels[k] = static_cast<const char*>(pixels) + offset;
+      places.weights[k] = static_cast<float>(static_cast<int>(stored)) * chosen.slices[k].weight;
+      prefetch(places.pixels[k]);
+    }
+  }
+
+  GLINT_HD float addPixels(const Places& places) const {
+    float sum = 0;
+    for (int k = 0; k < places.count; k += 4) {
+      const float* w = places.weights + k;
+      sum += (fourPixels(places.pixels + k, w) * Float4::of(w[0], w[1], w[2], w[3])).sum();
     }
     return pyramid_.value_scale * sum;
   }
 
-  GLINT_HD BlockChoice chooseStoredBlock(const PyramidSlice& slice, Vec2& xi) const {
-    const PyramidLevel& level = pyramid_.levels[slice.level];
-    const std::uint64_t* first = level.first_block.data() + slice.image;
-    const float* means = level.block_means.data() + first[0];
-    const auto mass = [&](int begin, int end) {
-      float sums[4] = {};
-      int k = begin;
-      for (; k + 4 <= end; k += 4)
-        for (int lane = 0; lane < 4; ++lane) sums[lane] += means[k + lane];
-      float sum = (sums[0] + sums[2]) + (sums[1] + sums[3]);
-      for (; k < end; ++k) sum += means[k];
-      return sum;
-    };
-    const std::uint64_t* mask = level.masks.data() + static_cast<std::size_t>(slice.image) * shape().maskWords();
-    return chooseBlock(mask, shape().blocksPerAxis(), mass(0, static_cast<int>(first[1] - first[0])), mass, xi);
+  GLINT_HD Float4 fourPixels(const void* const* at, const float* weights) const {
+    if (pyramid_.precision == BlockPrecision::f16) {
+      const auto half = [&](int k) { return *static_cast<const std::uint16_t*>(at[k]); };
+      return Float4::ofPositive(half(0), half(1), half(2), half(3));
+    }
+    // Values of a file are not checked: a slice that does not count must not bring an infinity.
+    const auto value = [&](int k) { return weights[k] > 0 ? *static_cast<const float*>(at[k]) : 0.0f; };
+    return Float4::of(value(0), value(1), value(2), value(3));
   }
 
-  /// The pixels of a stored block, in any unit.
-  GLINT_HD void loadBlock(const PyramidLevel& level, std::uint64_t block, float* pixels) const {
-    const std::size_t first = static_cast<std::size_t>(block) * kBlockPixels;
-    if (pyramid_.precision == BlockPrecision::f16) {
-      const auto* stored = static_cast<const std::uint16_t*>(level.pixels) + first;
-      for (int k = 0; k < kBlockPixels; k += 4) Float4::load(stored + k).store(pixels + k);
-    } else {
-      const auto* stored = static_cast<const float*>(level.pixels) + first;
-      for (int k = 0; k < kBlockPixels; ++k) pixels[k] = stored[k];
-    }
+  template <class Pixel>
+  GLINT_HD static PixelPlace choosePixelOf(const Pixel* pixels, Draw& draw) {
+    const Pixel* block = pixels + draw.stored * kBlockPixels;
+    const int y = chooseOf16(sumRows(block).rows, draw.xi.y);
+    if (y < 0) return {draw.place.block, -1, -1};
+    float row[kBlockSize];
+    for (int x = 0; x < kBlockSize; x += 4) loadPixels(block + y * kBlockSize + x).store(row + x);
+    return {draw.place.block, chooseOf16(row, draw.xi.x), y};
   }
+  GLINT_HD static Float4 loadPixels(const std::uint16_t* pixels) { return Float4::loadPositive(pixels); }
+  GLINT_HD static Float4 loadPixels(const float* pixels) { return Float4::load(pixels); }
 
   /// Index of a block of an image among the stored blocks of its level, or -1.
   GLINT_HD std::int64_t storedBlock(const PyramidSlice& slice, int block) const {
@@ -123,29 +256,61 @@ class PyramidNdf {
     return static_cast<std::int64_t>(level.first_block.data()[slice.image]) + rank;
   }
 
-  GLINT_HD float pixel(int level, std::int64_t block, int k) const {
-    const std::size_t at = static_cast<std::size_t>(block) * kBlockPixels + k;
-    return pyramid_.precision == BlockPrecision::f16
-               ? halfToFloat(static_cast<const std::uint16_t*>(pyramid_.levels[level].pixels)[at])
-               : static_cast<const float*>(pyramid_.levels[level].pixels)[at];
+  /// How much of each row and column of a block a box covers.
+  class BlockCover {
+   public:
+    GLINT_HD explicit BlockCover(const BlockBox& box) {
+      constexpr float kFull = kBlockSize;
+      whole_ = box.x0 <= 0 && box.y0 <= 0 && box.x1 >= kFull && box.y1 >= kFull;
+      for (int k = 0; k < kBlockSize; ++k) {
+        columns_[k] = covered(box.x0, box.x1, k);
+        rows_[k] = covered(box.y0, box.y1, k);
+      }
+      first_row = static_cast<int>(box.y0);
+      end_row = std::min(static_cast<int>(std::ceil(box.y1)), kBlockSize);
+      first_column = static_cast<int>(box.x0) / 4 * 4;
+      end_column = std::min(static_cast<int>(std::ceil(box.x1)), kBlockSize);
+    }
+    int first_row, end_row, first_column, end_column;  ///< the first column is a multiple of 4
+    GLINT_HD bool isWhole() const { return whole_; }
+    GLINT_HD Float4 row(int k) const { return Float4::all(rows_[k]); }
+    GLINT_HD Float4 columns(int k) const { return Float4::load(columns_ + k); }
+
+   private:
+    static GLINT_HD float covered(float low, float high, int k) {
+      return std::max(0.0f, std::min(high, static_cast<float>(k + 1)) - std::max(low, static_cast<float>(k)));
+    }
+    float columns_[kBlockSize], rows_[kBlockSize];
+    bool whole_;
+  };
+
+  /// Sum of the densities of the covered pixels of a block, in pixels.
+  GLINT_HD float blockSum(const PyramidLevel& level, std::int64_t block, const BlockCover& cover) const {
+    if (cover.isWhole()) return kBlockPixels * level.block_means.data()[block];
+    const std::size_t first = static_cast<std::size_t>(block) * kBlockPixels;
+    return pyramid_.value_scale * (pyramid_.precision == BlockPrecision::f16
+                                       ? coveredSum(static_cast<const std::uint16_t*>(level.pixels) + first, cover)
+                                       : coveredSum(static_cast<const float*>(level.pixels) + first, cover));
   }
 
-  /// Sum of the densities of the pixels in a box, in pixels.
-  GLINT_HD double blockSum(int level, std::int64_t block, const BlockBox& box) const {
-    const float full = kBlockSize;
-    if (box.x0 <= 0 && box.y0 <= 0 && box.x1 >= full && box.y1 >= full)
-      return double{kBlockPixels} * pyramid_.levels[level].block_means.data()[block];
-    const auto covered = [](float low, float high, int k) {
-      return std::max(0.0f, std::min(high, static_cast<float>(k + 1)) - std::max(low, static_cast<float>(k)));
-    };
-    double sum = 0;
-    for (int y = static_cast<int>(box.y0); y < kBlockSize && static_cast<float>(y) < box.y1; ++y) {
-      float row = 0;
-      for (int x = static_cast<int>(box.x0); x < kBlockSize && static_cast<float>(x) < box.x1; ++x)
-        row += covered(box.x0, box.x1, x) * pixel(level, block, y * kBlockSize + x);
-      sum += double{row} * covered(box.y0, box.y1, y);
+  template <class Pixel>
+  static GLINT_HD float coveredSum(const Pixel* pixels, const BlockCover& cover) {
+    Float4 sum = Float4::zero();
+    for (int y = cover.first_row; y < cover.end_row; ++y) {
+      Float4 row = Float4::zero();
+      for (int x = cover.first_column; x < cover.end_column; x += 4)
+        row = row + cover.columns(x) * loadPixels(pixels + y * kBlockSize + x);
+      sum = sum + cover.row(y) * row;
     }
-    return pyramid_.value_scale * sum;
+    return sum.sum();
+  }
+
+  /// Asks the memory for rows of a block's pixels.
+  GLINT_HD void prefetchPixels(const PyramidLevel& level, std::uint64_t block, int first_row, int end_row) const {
+    constexpr int kCacheLine = 64;
+    const int row_bytes = kBlockSize * (pyramid_.precision == BlockPrecision::f16 ? 2 : 4);
+    const char* pixels = static_cast<const char*>(level.pixels) + block * static_cast<std::uint64_t>(kBlockSize * row_bytes);
+    for (int k = first_row * row_bytes / kCacheLine * kCacheLine; k < end_row * row_bytes; k += kCacheLine) prefetch(pixels + k);
   }
 
   NdfPyramid pyramid_;

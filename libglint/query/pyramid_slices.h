@@ -7,6 +7,7 @@
 
 #include "glint/model/footprint.h"
 #include "glint/model/ndf_pyramid.h"
+#include "glint/query/float4.h"
 #include "glint/query/footprint_weights.h"
 
 namespace glint {
@@ -18,7 +19,8 @@ struct PyramidSlice {
   float weight;
 };
 
-/// The images that answer a footprint: four neighbours in each of two levels. Weights are >= 0 and sum to 1.
+/// The images that answer a footprint: four neighbours in one level or in each of two: corner k % 4 (x in bit 0, y in bit 1) of step
+/// k / 4. Weights are >= 0 and sum to 1.
 struct PyramidSlices {
   static constexpr int kMost = 8;
   PyramidSlice slices[kMost];
@@ -48,31 +50,40 @@ inline GLINT_HD bool belowFinest(const PyramidShape& shape, const Footprint& p) 
   return isotropicVariance(shape, p) < finestSigma(shape) * finestSigma(shape);
 }
 
-/// Two neighbouring centres of a level along one axis, and the position between them.
+/// Neighbouring centres, and the position between them. Lanes: along x and y of one level, along x and y of another.
 struct CentreNeighbours {
-  int low, high;
-  float t;
+  float low[4], high[4], t[4];
 };
 
-/// @param u       coordinate of texture space, in [0, 1)
-/// @param size    of the map along this axis, texels
-/// @param stride  texels
-/// @param count   centres along this axis
-inline GLINT_HD CentreNeighbours centreNeighbours(float u, int size, float stride, int count, Boundary boundary) {
-  const auto extent = static_cast<float>(size);
-  float x = u * extent;
-  if (boundary == Boundary::clamp) {
-    const float t = std::clamp(x / stride - 0.5f, 0.0f, static_cast<float>(count - 1));
-    const int low = static_cast<int>(t);
-    return {low, std::min(low + 1, count - 1), t - static_cast<float>(low)};
+/// @param u, v  in [0, 1)
+inline GLINT_HD CentreNeighbours centreNeighbours(const PyramidShape& shape, const PyramidGrid& a, const PyramidGrid& b, float u,
+                                                  float v) {
+  const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
+  const Float4 extent = Float4::of(width, height, width, height), x = Float4::of(u, v, u, v) * extent;
+  const Float4 stride = Float4::of(a.stride, a.stride, b.stride, b.stride);
+  const Float4 count = Float4::of(static_cast<float>(a.columns), static_cast<float>(a.rows), static_cast<float>(b.columns),
+                                  static_cast<float>(b.rows));
+  const Float4 zero = Float4::zero(), half = Float4::all(0.5f), one = Float4::all(1), last = count - one;
+  Float4 low, high, t;
+  if (shape.boundary == Boundary::clamp) {
+    const Float4 at = (x / stride - half).positive(), clamped = whereLess(last, at, last, at);
+    low = floorOf(clamped);
+    high = whereLess(low, last, low + one, last);
+    t = clamped - low;
+  } else {
+    const Float4 unrolled = x + whereLess(x, half * stride, extent, zero);
+    const Float4 at = unrolled / stride - half, below = floorOf(at);
+    // From the last centre round to the first; this gap is shorter when the stride does not divide the map.
+    const Float4 gap = extent - last * stride, round = ((unrolled - (count - half) * stride) / gap).positive();
+    low = whereLess(below, last, below, last);
+    high = whereLess(below, last, below + one, zero);
+    t = whereLess(below, last, at - below, whereLess(one, round, one, round));
   }
-  if (x < 0.5f * stride) x += extent;
-  const float t = x / stride - 0.5f;
-  const int low = static_cast<int>(t);
-  if (low < count - 1) return {low, low + 1, t - static_cast<float>(low)};
-  // From the last centre round to the first; this gap is shorter when the stride does not divide the map.
-  const float gap = extent - static_cast<float>(count - 1) * stride;
-  return {count - 1, 0, std::clamp((x - (static_cast<float>(count) - 0.5f) * stride) / gap, 0.0f, 1.0f)};
+  CentreNeighbours out;
+  low.store(out.low);
+  high.store(out.high);
+  t.store(out.t);
+  return out;
 }
 
 /// log2 of a positive, finite number, to 2e-7. Plain arithmetic, so that batches and device code choose the same levels to the bit.
@@ -99,20 +110,22 @@ inline GLINT_HD PyramidSlices selectSlices(const PyramidShape& shape, const Foot
   const int first = std::min(static_cast<int>(level), shape.level_count - 1);
   const float t = level - static_cast<float>(first);
   const float u = wrapUnit(p.centre.x), v = wrapUnit(p.centre.y);
+  const PyramidGrid& finer = shape.levels[first];
+  const PyramidGrid& coarser = shape.levels[std::min(first + 1, shape.level_count - 1)];
+  const CentreNeighbours at = centreNeighbours(shape, finer, coarser, u, v);
   PyramidSlices out;
-  for (int l = first; l < std::min(first + 2, shape.level_count); ++l) {
-    const float level_weight = l == first ? 1 - t : t;
-    if (level_weight <= 0) continue;
-    const PyramidGrid& grid = shape.levels[l];
-    const CentreNeighbours x = centreNeighbours(u, shape.width, grid.stride, grid.columns, shape.boundary);
-    const CentreNeighbours y = centreNeighbours(v, shape.height, grid.stride, grid.rows, shape.boundary);
+  const int steps = t > 0 ? 2 : 1;
+  for (int step = 0; step < steps; ++step) {
+    const float level_weight = step == 0 ? 1 - t : t, tx = at.t[2 * step], ty = at.t[2 * step + 1];
+    const std::int32_t columns = step == 0 ? finer.columns : coarser.columns;
     for (int k = 0; k < 4; ++k) {
-      const float w = level_weight * (k & 1 ? x.t : 1 - x.t) * (k & 2 ? y.t : 1 - y.t);
-      if (w <= 0) continue;
-      const int column = k & 1 ? x.high : x.low, row = k & 2 ? y.high : y.low;
-      out.slices[out.count++] = {l, static_cast<std::uint32_t>(row * grid.columns + column), w};
+      const auto column = static_cast<std::int32_t>(k & 1 ? at.high[2 * step] : at.low[2 * step]);
+      const auto row = static_cast<std::int32_t>(k & 2 ? at.high[2 * step + 1] : at.low[2 * step + 1]);
+      out.slices[4 * step + k] = {first + step, static_cast<std::uint32_t>(row * columns + column),
+                                  level_weight * (k & 1 ? tx : 1 - tx) * (k & 2 ? ty : 1 - ty)};
     }
   }
+  out.count = 4 * steps;
   return out;
 }
 

@@ -194,6 +194,11 @@ class Bench:
                 if entry.get("aggregate_name", "median") != "median":
                     continue
                 what, file = entry["run_name"].split("/")[:2]  # then its settings
+                if what.startswith("ratio_batch_"):
+                    asked = what.removeprefix("ratio_batch_").replace("_", ", ")
+                    self.table.add(f"{asked}, in a batch over alone, {name} {file.removeprefix(name + '.').removesuffix('.glint')}", 1 / entry["ratio"],
+                                   "x", target=0.333)
+                    continue
                 if what.startswith("ratio_"):
                     # To a plain microfacet model in the same run.
                     asked = what.removeprefix("ratio_").replace("_", ", ")

@@ -3,7 +3,8 @@
 // Names are WHAT/FILE. `random`: footprints of every size anywhere, towards normals of the map, so that most queries miss the
 // caches on big assets. `warm`: one such query again and again. A plain microfacet model (GGX) is timed in the same run, as a function
 // and as a sampler of half vectors, and ratio_* give the ratios of densities and samples to it: median of alternating runs.
-// `few`: the same 64 queries again and again, which stay in the caches. `batch`: those of `random` and `few` in batches, for each query.
+// `few`: the same 64 queries again and again, which stay in the caches. `batch`: those of `random` and `few` in batches of 1024 and 64,
+// for each query. ratio_batch_*: how many times as many queries a second a batch answers, medians of alternating runs.
 
 #include <benchmark/benchmark.h>
 #include <time.h>
@@ -28,8 +29,10 @@ using namespace glint;
 
 /// Enough that their blocks do not fit a cache of a few megabytes.
 constexpr std::size_t kQueries = 1 << 15;
-/// Few enough that all they read stays in the nearest caches; and as many queries as a batch has.
+/// Few enough that all they read stays in the nearest caches.
 constexpr std::size_t kFew = 64;
+/// Queries of a wavefront that are answered at once.
+constexpr std::size_t kBatch = 1024;
 /// Half width of the range that `mean` is asked for: a light of about 6 degrees.
 constexpr float kRangeReach = 0.05f;
 
@@ -111,9 +114,12 @@ std::vector<Query> randomQueries(const NormalMap& map, float finest, float coars
   return queries;
 }
 
-float density(const auto& model, const Query& query) { return model.density(query.footprint, query.half); }
-float mean(const auto& model, const Query& query) { return model.mean(query.footprint, query.range); }
-float sample(const auto& model, const Query& query) {
+template <class Model>
+float density(const Model& model, const Query& query) { return model.density(query.footprint, query.half); }
+template <class Model>
+float mean(const Model& model, const Query& query) { return model.mean(query.footprint, query.range); }
+template <class Model>
+float sample(const Model& model, const Query& query) {
   const HalfVectorSample s = model.sample(query.footprint, query.xi);
   return s.pdf + s.h.x + s.h.y;
 }
@@ -174,30 +180,78 @@ struct QueryArrays {
       sigma.push_back(std::sqrt(query.footprint.covariance.xx));
       hx.push_back(query.half.x);
       hy.push_back(query.half.y);
+      x0.push_back(query.range.low.x);
+      y0.push_back(query.range.low.y);
+      x1.push_back(query.range.high.x);
+      y1.push_back(query.range.high.y);
+      xi_x.push_back(query.xi.x);
+      xi_y.push_back(query.xi.y);
     }
   }
-  std::vector<float> u, v, sigma, hx, hy;
+  api::FootprintArrays footprints(std::size_t first) const {
+    api::FootprintArrays p;
+    p.u = {&u[first]};
+    p.v = {&v[first]};
+    p.sigma = {&sigma[first]};
+    return p;
+  }
+  std::vector<float> u, v, sigma, hx, hy, x0, y0, x1, y1, xi_x, xi_y;
+};
+
+/// A batch of queries [first, first + count), and where its answers go.
+struct Batch {
+  std::vector<float> answers = std::vector<float>(3 * kBatch);
+  void densities(const api::AnyNdf& model, const QueryArrays& q, std::size_t first, std::size_t count) {
+    api::densities(model, count, q.footprints(first), {{&q.hx[first]}, {&q.hy[first]}}, answers.data());
+  }
+  void means(const api::AnyNdf& model, const QueryArrays& q, std::size_t first, std::size_t count) {
+    api::means(model, count, q.footprints(first), {{&q.x0[first]}, {&q.y0[first]}, {&q.x1[first]}, {&q.y1[first]}}, answers.data());
+  }
+  void samples(const api::AnyNdf& model, const QueryArrays& q, std::size_t first, std::size_t count) {
+    float* out = answers.data();
+    api::samples(model, count, q.footprints(first), {{&q.xi_x[first]}, {&q.xi_y[first]}}, {out, out + kBatch, out + 2 * kBatch});
+  }
 };
 
 template <class Model>
-void addBatchBenchmarks(const std::string& name, const Model& model, const std::vector<Query>& queries) {
+void addBatchBenchmarks(const std::string& what, const std::string& name, const Model& model, const std::vector<Query>& queries,
+                        float (*one)(const Model&, const Query&),
+                        void (Batch::*many)(const api::AnyNdf&, const QueryArrays&, std::size_t, std::size_t)) {
   for (const bool few : {false, true}) {
-    const std::string what = few ? "density_batch_few/" : "density_batch_random/";
+    const std::string which = few ? "_few/" : "_random/";
+    const std::size_t size = few ? kFew : kBatch;
+    benchmark::RegisterBenchmark((what + "_batch" + which + name).c_str(), [any = api::AnyNdf(model), arrays = QueryArrays(queries),
+                                                                           few, size, many](benchmark::State& state) {
+      Batch batch;
+      std::size_t first = 0;
+      while (state.KeepRunningBatch(static_cast<benchmark::IterationCount>(size))) {
+        (batch.*many)(any, arrays, first, size);
+        benchmark::DoNotOptimize(batch.answers.data());
+        benchmark::ClobberMemory();
+        if (!few) first = (first + size) % kQueries;
+      }
+    });
     benchmark::RegisterBenchmark(
-        (what + name).c_str(), [any = api::AnyNdf(model), arrays = QueryArrays(queries), few](benchmark::State& state) {
-          std::vector<float> answers(kFew);
-          std::size_t first = 0;
-          while (state.KeepRunningBatch(kFew)) {
-            api::FootprintArrays footprints;
-            footprints.u = {&arrays.u[first]};
-            footprints.v = {&arrays.v[first]};
-            footprints.sigma = {&arrays.sigma[first]};
-            api::densities(any, kFew, footprints, {{&arrays.hx[first]}, {&arrays.hy[first]}}, answers.data());
-            benchmark::DoNotOptimize(answers.data());
-            benchmark::ClobberMemory();
-            if (!few) first = (first + kFew) % kQueries;
+        ("ratio_batch_" + what + which + name).c_str(),
+        [any = api::AnyNdf(model), arrays = QueryArrays(queries), &model, &queries, few, size, one, many](benchmark::State& state) {
+          constexpr int kRuns = 30;  // as many as there are different batches
+          Batch batch;
+          std::vector<double> ratios;
+          for (auto _ : state) {
+            for (int run = 0; run < kRuns; ++run) {
+              // Half the queries away: what one way has read does not help the other.
+              const std::size_t first = few ? 0 : run * kBatch % kQueries, other = few ? 0 : (first + kQueries / 2) % kQueries;
+              const double start = threadSeconds();
+              for (std::size_t done = 0; done < kBatch; done += size) (batch.*many)(any, arrays, first + (few ? 0 : done), size);
+              const double middle = threadSeconds();
+              for (std::size_t k = 0; k < kBatch; ++k) benchmark::DoNotOptimize(one(model, queries[other + k % size]));
+              ratios.push_back((threadSeconds() - middle) / (middle - start));
+            }
           }
-        });
+          std::nth_element(ratios.begin(), ratios.begin() + kRuns / 2, ratios.end());
+          state.counters["ratio"] = ratios[kRuns / 2];
+        })
+        ->Iterations(1);
   }
 }
 
@@ -208,7 +262,9 @@ void addModelBenchmarks(const std::string& name, const Model& model, const std::
     std::size_t k = 0;
     for (auto _ : state) benchmark::DoNotOptimize(density(model, queries[k++ % kFew]));
   });
-  addBatchBenchmarks(name, model, queries);
+  addBatchBenchmarks<Model>("density", name, model, queries, &density<Model>, &Batch::densities);
+  addBatchBenchmarks<Model>("mean", name, model, queries, &mean<Model>, &Batch::means);
+  addBatchBenchmarks<Model>("sample", name, model, queries, &sample<Model>, &Batch::samples);
   addQueryBenchmarks("mean", name, queries, [&model](const Query& query) { return mean(model, query); });
   addQueryBenchmarks("sample", name, queries, [&model](const Query& query) { return sample(model, query); });
   addRatio("density", name, queries, [&model](const Query& query) { return density(model, query); }, plainDensity);

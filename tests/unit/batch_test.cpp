@@ -50,6 +50,30 @@ struct Queries {
   }
 };
 
+/// To the bit: batches only ask the memory ahead.
+template <class Model>
+void expectMeansAndSamplesEqualSingleQueries(const Model& model, const Queries& q) {
+  const api::AnyNdf any(model);
+  const std::size_t count = q.u.size();
+  std::vector<float> x1, y1, means(count + 1, -7), x(count + 1, -7), y(count + 1, -7), pdf(count + 1, -7);
+  for (std::size_t k = 0; k < count; ++k) {
+    x1.push_back(q.hx[k] + (k % 11 == 0 ? -0.1f : k % 5 == 0 ? 1.0f : 0.03f));  // empty, many blocks, few pixels
+    y1.push_back(q.hy[k] + 0.05f);
+  }
+  api::means(any, count, q.footprints(), {{q.hx.data()}, {q.hy.data()}, {x1.data()}, {y1.data()}}, means.data());
+  api::samples(any, count, q.footprints(), {{q.hx.data()}, {q.v.data()}}, {x.data(), y.data(), pdf.data()});
+  EXPECT_EQ(means[count], -7);
+  EXPECT_EQ(pdf[count], -7);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Footprint p = Footprint::isotropic({q.u[k], q.v[k]}, q.sigma[k]);
+    ASSERT_EQ(means[k], model.mean(p, {{q.hx[k], q.hy[k]}, {x1[k], y1[k]}})) << "query " << k << " of " << count;
+    const HalfVectorSample one = model.sample(p, {q.hx[k], q.v[k]});
+    ASSERT_EQ(x[k], one.h.x) << "query " << k << " of " << count;
+    ASSERT_EQ(y[k], one.h.y) << "query " << k << " of " << count;
+    ASSERT_EQ(pdf[k], one.pdf) << "query " << k << " of " << count;
+  }
+}
+
 template <class Model>
 void expectBatchesEqualSingleQueries(const Model& model, std::size_t most = 1000) {
   const api::AnyNdf any(model);
@@ -64,6 +88,7 @@ void expectBatchesEqualSingleQueries(const Model& model, std::size_t most = 1000
       ASSERT_NEAR(answers[k], one, kBatchError * one) << "query " << k << " of " << count;
       positive += one > 0;
     }
+    expectMeansAndSamplesEqualSingleQueries(model, q);
   }
   EXPECT_GT(positive, most / 10);
 }

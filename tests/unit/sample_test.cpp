@@ -7,10 +7,14 @@
 #include <memory>
 #include <string>
 
+#include "glint/bake/bin_map.h"
 #include "glint/bake/compress.h"
 #include "glint/bake/counter_random.h"
+#include "glint/bake/histogram_sat.h"
 #include "glint/bake/pyramid.h"
+#include "glint/query/bin_map_ndf.h"
 #include "glint/query/cp_ndf.h"
+#include "glint/query/histogram_ndf.h"
 #include "glint/query/pyramid_ndf.h"
 #include "support/test_maps.h"
 
@@ -222,8 +226,10 @@ TEST(Sample, OfCompressedPyramidsFollowsTheDensity) {
   }
 }
 
-void expectSamplesFollowReference(const Reference& model, const std::string& name, const std::vector<Footprint>& footprints,
-                                  int samples) {
+/// For models that know the mean over any box of half vectors, and answer any footprint.
+template <class Model>
+void expectSamplesFollowTheMean(const Model& model, const std::string& name, const std::vector<Footprint>& footprints,
+                                int samples, float pdf_error = 0) {
   double least = 1;
   for (std::size_t k = 0; k < footprints.size(); ++k) {
     const Footprint& p = footprints[k];
@@ -232,8 +238,9 @@ void expectSamplesFollowReference(const Reference& model, const std::string& nam
     const ChiSquared test = chiSquared(expected, histogramOf(model, p, samples, 200 + k), samples);
     EXPECT_GT(test.p(), kFalseAlarm / static_cast<double>(footprints.size())) << name << " footprint " << k;
     least = std::min(least, test.p());
-    expectPdfIsDensity(model, p, 20, 0);
+    expectPdfIsDensity(model, p, 20, pdf_error);
   }
+  testing::Test::RecordProperty(name + "_least_p", std::to_string(least));
   std::printf("%s: least p of %zu footprints %.3g\n", name.c_str(), footprints.size(), least);
 }
 
@@ -260,16 +267,32 @@ std::vector<Footprint> mixedFootprints(float scale) {
 TEST(Sample, OfReferenceFollowsTheMean) {
   for (const auto& c : cases()) {
     const Reference model(c->map.map(), kSigmaR, Surface::flat, Boundary::wrap, Reference::Search::pruned);
-    expectSamplesFollowReference(model, "flat " + c->name, mixedFootprints(1.5f), 4000);
+    expectSamplesFollowTheMean(model, "flat " + c->name, mixedFootprints(1.5f), 4000);
   }
   const Reference clamped(cases()[0]->map.map(), kSigmaR, Surface::flat, Boundary::clamp, Reference::Search::pruned);
-  expectSamplesFollowReference(clamped, "flat, clamped", mixedFootprints(1.5f), 4000);
+  expectSamplesFollowTheMean(clamped, "flat, clamped", mixedFootprints(1.5f), 4000);
 }
 
 TEST(Sample, OfReferenceOnSmoothSurfacesFollowsTheMean) {
   for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
     const Reference model(cases()[0]->map.map(), 0.05f, Surface::smooth, boundary, Reference::Search::pruned);
-    expectSamplesFollowReference(model, "smooth", mixedFootprints(0.25f), 2000);
+    expectSamplesFollowTheMean(model, "smooth", mixedFootprints(0.25f), 2000);
+  }
+}
+
+TEST(Sample, OfBinMapsFollowsTheMean) {
+  constexpr float kRounding = 1e-5f;
+  for (const auto& c : cases()) {
+    const bake::BinMapData data = bake::buildBinMap(c->map.map(), {.alpha = 0.05f});
+    expectSamplesFollowTheMean(BinMapNdf(data.view()), "bin map " + c->name, mixedFootprints(4), 10000, kRounding);
+  }
+}
+
+TEST(Sample, OfHistogramsFollowsTheMean) {
+  constexpr float kRounding = 1e-4f;
+  for (const auto& c : cases()) {
+    const bake::HistogramSatData data = bake::buildHistogramSat(c->map.map(), {.theta_bins = 9, .phi_bins = 32, .stride = 4});
+    expectSamplesFollowTheMean(HistogramNdf(data.view()), "histogram " + c->name, mixedFootprints(4), 10000, kRounding);
   }
 }
 
