@@ -31,13 +31,14 @@ enum class Base {
   pyramid,
   compressed,
   compressed_f32,
+  spots,
   bin_map,
   histograms,
   sh_lobes,
   sh_light,
   displacement
 };
-constexpr Base kBases[] = {Base::normals, Base::heights,    Base::pyramid,  Base::compressed, Base::compressed_f32,
+constexpr Base kBases[] = {Base::normals, Base::heights,    Base::pyramid,  Base::compressed, Base::compressed_f32, Base::spots,
                            Base::bin_map, Base::histograms, Base::sh_lobes, Base::sh_light,   Base::displacement};
 
 void writeBase(const fs::path& path, Base base) {
@@ -53,6 +54,10 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
     case Base::displacement:
       return writeAsset(path, test::sampleDisplacement(32).displacement, provenance);
+    case Base::spots:
+      return writeAsset(path,
+                        test::sampleCompressed(32, CompressionMethod::tucker, CoefficientType::i8, test::SampleForm::spots).ndf,
+                        provenance);
     case Base::compressed_f32:
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
     case Base::bin_map:
@@ -299,33 +304,56 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.virtual", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, virtually);
+              }),
       patched("dataset.external", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false, external);
+              }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, chunked);
+              }),
       patched("dataset.layout", Base::heights,
-              [=](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact); }),
+              [=](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true, compact);
+              }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, false);
+              }),
       patched("dataset.storage", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {1u << 30, 1u << 30}, false);
+              }),
       {"dataset.alignment", Base::heights,
-       [](const fs::path& path) { Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }},
+       [](const fs::path& path) {
+         Patch(path, 4099).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
+       }},
       {"dataset.alignment_64", Base::heights,
-       [](const fs::path& path) { Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true); }, true},
+       [](const fs::path& path) {
+         Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
+       },
+       true},
       patched(
           "dataset.unknown", Base::heights, [](const Patch& patch) { patch.replace("extra", H5T_IEEE_F32LE, {kSize}, true); },
           true),
       patched("dataset.missing", Base::heights, [](const Patch& patch) { H5Ldelete(patch.file(), "heights", 0); }),
       patched("dataset.missing", Base::pyramid, [](const Patch& patch) { H5Ldelete(patch.file(), "level_01/masks", 0); }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_STD_I32LE, {kSize, kSize}, true);
+              }),
       patched("dataset.type", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32BE, {kSize, kSize}, true);
+              }),
       patched("dataset.type", Base::pyramid, [](const Patch& patch) { patch.setText("precision", "f16"); }),
       patched("dataset.type", Base::compressed,
-              [](const Patch& patch) { patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true); }),
+              [](const Patch& patch) {
+                patch.replace("clusters", H5T_STD_U64LE, {2, 16}, true);
+              }),
       patched("dataset.type", Base::heights,
               [](const Patch& patch) {
                 const hid_t type = H5Tcopy(H5T_IEEE_F32LE);
@@ -335,7 +363,9 @@ std::vector<Fixture> datasetFixtures() {
                 H5Tclose(type);
               }),
       patched("dataset.dims", Base::heights,
-              [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true); }),
+              [](const Patch& patch) {
+                patch.replace("heights", H5T_IEEE_F32LE, {kSize, kSize - 1}, true);
+              }),
       patched("dataset.dims", Base::heights,
               [](const Patch& patch) { patch.replace("heights", H5T_IEEE_F32LE, {kSize * kSize}, true); }),
       patched("dataset.dims", Base::heights, [](const Patch& patch) { patch.setInteger("width", kSize + 1); }),
@@ -414,12 +444,12 @@ std::vector<Fixture> indexFixtures() {
               [](const Patch& patch) { patch.replace("block_masses", H5T_STD_U8LE, {20}, true); }),
       patched(
           "compressed.ranks", Base::compressed,
-          [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.rank_x = 60000; }); }),
+          [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.columns = 60000; }); }),
       patched("compressed.ranks", Base::compressed,
               [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.rank_y = 1; }); }),
       patched("compressed.ranges", Base::compressed,
               [](const Patch& patch) {
-                patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_basis = ~0ull; });
+                patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_basis = ~0u; });
               }),
       patched("compressed.ranges", Base::compressed,
               [](const Patch& patch) {
@@ -429,6 +459,27 @@ std::vector<Fixture> indexFixtures() {
               [](const Patch& patch) {
                 patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_scale = 1000; });
               }),
+      patched(
+          "compressed.ranges", Base::compressed,
+          [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_word = ~0u; }); }),
+      patched("compressed.ranks", Base::compressed,
+              [](const Patch& patch) {
+                patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.narrow_columns = 4; });
+              }),
+      patched("compressed.places", Base::compressed,
+              [](const Patch& patch) { patch.change<std::uint16_t>("block_places", 5, [](auto& place) { place = 4; }); }),
+      patched("compressed.places", Base::compressed,
+              [](const Patch& patch) { patch.change<std::uint16_t>("place_blocks", 5, [](auto& block) { block = 60000; }); }),
+      patched("compressed.spots", Base::spots,
+              [](const Patch& patch) { patch.change<std::uint8_t>("coefficients", 0, [](auto& before) { before = 1; }); }),
+      patched("compressed.spots", Base::spots,
+              [](const Patch& patch) {
+                std::uint32_t slices = 0;
+                patch.change<NdfCluster>("clusters", 0, [&](auto& cluster) { slices = cluster.slice_count; });
+                patch.change<std::uint8_t>("coefficients", firstSpotOffset(slices), [](auto& x) { x = kLastSpotPlace + 1; });
+              }),
+      patched("compressed.spots", Base::spots,
+              [](const Patch& patch) { patch.replace("spot_sums", H5T_IEEE_F32LE, {304}, true); }),
   };
 }
 
@@ -475,10 +526,14 @@ std::vector<Fixture> dataFixtures() {
           [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n.y = kNan; }); }, true),
       patched(
           "normals.disk", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.8f, -0.7f}; }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
+                                     n = {0.8f, -0.7f};
+                                   }); }, true),
       patched(
           "normals.bounds", Base::normals,
-          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) { n = {0.7f, -0.7f}; }); }, true),
+          [](const Patch& patch) { patch.change<Vec2>("normals", 7, [](Vec2& n) {
+                                     n = {0.7f, -0.7f};
+                                   }); }, true),
       patched(
           "normals.bounds", Base::normals,
           [](const Patch& patch) { patch.change<NormalBounds>("bounds/level_02", 3, [](auto& node) { node.high_x = -1; }); },
@@ -767,7 +822,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 12u);
+  EXPECT_EQ(count, 14u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -801,6 +856,8 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   for (const Recorded& recorded : {Recorded{"cp-i8", {3.49882889f, 3.00286174f, 2.97668457f}},
                                    Recorded{"tucker-f16", {4.83468008f, 3.82640028f, 3.10592413f}},
                                    Recorded{"pca-i8", {3.49882889f, 3.0028615f, 2.97668457f}},
+                                   Recorded{"narrow-i8", {4.72693872f, 3.72354555f, 3.08629251f}},
+                                   Recorded{"spots-i8", {0.513697445f, 0.513941109f, 0.515995741f}},
                                    Recorded{"cp-f32", {3.49453115f, 3.00421071f, 2.98451018f}}}) {
     const Asset asset = Asset::open(folder / ("ndf-cp-" + std::string(recorded.file) + ".glint"));
     EXPECT_FLOAT_EQ(test::compressedPixel(asset.compressed(), 5, 30, 33), recorded.values[0]);
