@@ -27,12 +27,16 @@ Handle clusterType() {
   const auto insert = [&](const char* field, std::size_t offset, hid_t member) {
     check(H5Tinsert(type, field, offset, member), "cannot create a type", {});
   };
-  insert("first_basis", offsetof(NdfCluster, first_basis), H5T_STD_U64LE);
   insert("first_coefficient", offsetof(NdfCluster, first_coefficient), H5T_STD_U64LE);
-  insert("first_scale", offsetof(NdfCluster, first_scale), H5T_STD_U64LE);
-  insert("rank_x", offsetof(NdfCluster, rank_x), H5T_STD_U16LE);
-  insert("rank_y", offsetof(NdfCluster, rank_y), H5T_STD_U16LE);
+  insert("first_basis", offsetof(NdfCluster, first_basis), H5T_STD_U32LE);
+  insert("first_scale", offsetof(NdfCluster, first_scale), H5T_STD_U32LE);
+  insert("first_word", offsetof(NdfCluster, first_word), H5T_STD_U32LE);
   insert("slice_count", offsetof(NdfCluster, slice_count), H5T_STD_U32LE);
+  insert("columns", offsetof(NdfCluster, columns), H5T_STD_U16LE);
+  insert("narrow_columns", offsetof(NdfCluster, narrow_columns), H5T_STD_U16LE);
+  insert("rank_x", offsetof(NdfCluster, rank_x), H5T_STD_U8LE);
+  insert("rank_y", offsetof(NdfCluster, rank_y), H5T_STD_U8LE);
+  insert("reserved", offsetof(NdfCluster, reserved), H5T_STD_U16LE);
   return type;
 }
 

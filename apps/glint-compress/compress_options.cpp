@@ -19,17 +19,19 @@ CompressOptions::CompressOptions(Tool& tool) {
   tool.choice("--method", options_.method,
               {{"cp", CompressionMethod::cp}, {"tucker", CompressionMethod::tucker}, {"pca", CompressionMethod::pca}},
               "decomposition of the blocks: canonical polyadic, Tucker-2 or principal components");
-  const Option& rank =
-      tool.option("--rank", options_.rank, "columns of every cluster (tucker: rank_x * rank_y at most)").range(1, 256);
-  tool.option("--tolerance", options_.tolerance,
-              "instead of --rank: relative error of all images together; the rank of every cluster is chosen to meet it in the "
-              "fewest bytes")
+  const Option& rank = tool.option("--rank", options_.rank, "columns of every cluster").range(1, 256);
+  tool.option(
+          "--tolerance", options_.tolerance,
+          "instead of --rank: relative error of all images together; columns and bits of every cluster are chosen to meet it "
+          "in the fewest bytes")
       .range(1e-6, 0.99)
       .excludes(rank)
       .defaultText("none");
   tool.choice("--quantize", options_.coefficient_type,
               {{"f32", CoefficientType::f32}, {"f16", CoefficientType::f16}, {"i8", CoefficientType::i8}},
               "type of the coefficients");
+  tool.choice("--spots", options_.spots, {{"auto", true}, {"off", false}},
+              "with --tolerance, tucker or pca, and i8: store slices of few facets as spots where that costs less");
   tool.option("--regions", options_.regions, "regions of the map along each axis")
       .range(1, 255)
       .defaultText("8 for cp, otherwise 1");
@@ -53,6 +55,8 @@ nlohmann::json compressionJson(const bake::CompressionReport& report) {
           {"ratio_to_dense", report.ratio_to_dense},
           {"ratio_to_stored", report.ratio_to_stored},
           {"rank_histogram", report.rank_histogram},
+          {"spot_slices", report.spot_slices},
+          {"spots", report.spots},
           {"unscaled_images", report.unscaled_images}};
 }
 

@@ -97,22 +97,21 @@ ordered_json summarizePyramid(const NdfPyramid& pyramid) {
 }
 
 ordered_json summarizeCompressed(const CompressedNdf& ndf, const formats::AssetInfo& info) {
-  std::map<std::pair<int, int>, std::uint64_t> ranks;
-  std::uint64_t slices = 0;
+  std::map<int, std::uint64_t> ranks;
+  std::uint64_t slices = 0, spot_slices = 0;
   std::uint64_t empty = 0;
   for (const NdfCluster& cluster : ndf.clusters) {
     slices += cluster.slice_count;
     if (cluster.slice_count == 0) {
       ++empty;
+    } else if (cluster.columns == 0) {
+      spot_slices += cluster.slice_count;
     } else {
-      ++ranks[{cluster.rank_x, cluster.rank_y}];
+      ++ranks[cluster.columns];
     }
   }
   ordered_json histogram = ordered_json::array();
-  for (const auto& [rank, clusters] : ranks) {
-    histogram.push_back({{"rank", std::to_string(rank.first) + (rank.second > 0 ? "x" + std::to_string(rank.second) : "")},
-                         {"clusters", clusters}});
-  }
+  for (const auto& [columns, clusters] : ranks) histogram.push_back({{"columns", columns}, {"clusters", clusters}});
   std::uint64_t bytes = 0;
   for (const formats::DatasetInfo& dataset : info.datasets) bytes += dataset.size_bytes;
   ordered_json levels = ordered_json::array();
@@ -120,6 +119,7 @@ ordered_json summarizeCompressed(const CompressedNdf& ndf, const formats::AssetI
   return {{"clusters", ndf.clusters.size()},
           {"empty_clusters", empty},
           {"slices", slices},
+          {"spot_slices", spot_slices},
           {"bytes_per_slice", slices == 0 ? 0.0 : static_cast<double>(bytes) / static_cast<double>(slices)},
           {"ranks", std::move(histogram)},
           {"levels", std::move(levels)}};
@@ -238,7 +238,7 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
     constexpr const char* kTypes[] = {"i8", "f16", "f32"};
     properties["method"] = kMethods[static_cast<int>(ndf.method)];
     properties["coefficient_type"] = kTypes[static_cast<int>(ndf.coefficient_type)];
-    properties["regions"] = std::to_string(ndf.region_columns) + "x" + std::to_string(ndf.region_rows);
+    properties["regions"] = ndf.regions;
     statistics = summarizeCompressed(ndf, asset.info());
   } else if (asset.kind() == "bin-map") {
     const BinMap& map = asset.binMap();

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 #include "glint/formats/kinds/pyramid_shape.h"
 
@@ -8,7 +9,6 @@ namespace glint::formats {
 namespace {
 
 constexpr double kIntegralTolerance = 1e-3;
-constexpr int kMaxCpRank = 256;
 constexpr std::string_view kMethods[] = {"cp", "tucker", "pca"};
 constexpr std::string_view kCoefficientTypes[] = {"i8", "f16", "f32"};
 
@@ -48,34 +48,20 @@ double element(ElementType type, const void* data, std::uint64_t index) {
   }
 }
 
-std::uint64_t columnCount(const CompressedNdf& ndf, const NdfCluster& cluster) {
-  return ndf.method == CompressionMethod::tucker ? std::uint64_t{cluster.rank_x} * cluster.rank_y : cluster.rank_x;
-}
-
-std::uint64_t basisSize(const CompressedNdf& ndf, const NdfCluster& cluster) {
-  switch (ndf.method) {
-    case CompressionMethod::cp:
-      return std::uint64_t{2} * kBlockSize * cluster.rank_x;
-    case CompressionMethod::tucker:
-      return std::uint64_t{kBlockSize} * (cluster.rank_x + cluster.rank_y);
-    default:
-      return std::uint64_t{kBlockPixels} * cluster.rank_x;
-  }
-}
-
+/// Whether the sizes of a cluster with slices fit its method and type.
 bool ranksHold(const CompressedNdf& ndf, const NdfCluster& cluster) {
-  if (ndf.method == CompressionMethod::tucker) {
-    return cluster.rank_x >= 1 && cluster.rank_x <= kBlockSize && cluster.rank_y >= 1 && cluster.rank_y <= kBlockSize;
-  }
-  const int most = ndf.method == CompressionMethod::pca ? kBlockPixels : kMaxCpRank;
-  return cluster.rank_x >= 1 && cluster.rank_x <= most && cluster.rank_y == 0;
+  const bool i8 = ndf.coefficient_type == CoefficientType::i8;
+  if (cluster.columns == 0) return i8 && cluster.narrow_columns == 0 && !ndf.spot_sums.empty();
+  if (cluster.columns > kBlockPixels || cluster.narrow_columns > (i8 ? cluster.columns : 0)) return false;
+  if (ndf.method != CompressionMethod::tucker) return cluster.rank_x == 0 && cluster.rank_y == 0;
+  return cluster.rank_x >= 1 && cluster.rank_x <= kBlockSize && cluster.rank_y >= 1 && cluster.rank_y <= kBlockSize;
 }
 
 bool inside(std::uint64_t first, std::uint64_t count, std::uint64_t size) { return first <= size && count <= size - first; }
 
 std::string clusterName(const CompressedNdf& ndf, std::size_t cluster) {
-  const auto blocks = static_cast<std::size_t>(ndf.shape.blocksPerImage());
-  return "cluster [" + std::to_string(cluster / blocks) + "][" + std::to_string(cluster % blocks) + "]";
+  const auto places = static_cast<std::size_t>(ndf.places);
+  return "cluster [" + std::to_string(cluster / places) + "][" + std::to_string(cluster % places) + "]";
 }
 
 /// Checks regions and slots of images. Returns the number of slots of each region; empty if they are wrong.
@@ -86,7 +72,7 @@ std::vector<std::uint32_t> checkImages(const CompressedNdf& ndf, Findings& findi
                  "holds " + std::to_string(ndf.image_slots.size()) + " images, the levels " + std::to_string(images));
     return {};
   }
-  const auto regions = static_cast<std::size_t>(ndf.region_columns) * static_cast<std::size_t>(ndf.region_rows);
+  const auto regions = static_cast<std::size_t>(ndf.regions);
   std::vector<std::uint32_t> slots(regions);
   for (const std::uint16_t region : ndf.image_regions) {
     if (region >= regions) {
@@ -103,8 +89,7 @@ std::vector<std::uint32_t> checkImages(const CompressedNdf& ndf, Findings& findi
   for (std::size_t k = 0; k < images; ++k) {
     const std::uint16_t region = ndf.image_regions[k];
     const std::uint16_t slot = ndf.image_slots[k];
-    if (slot >= slots[region] || slot >= std::uint64_t{64} * static_cast<std::uint64_t>(ndf.words_per_cluster) ||
-        used[first[region] + slot]) {
+    if (slot >= slots[region] || used[first[region] + slot]) {
       findings.add("compressed.slots", "/image_slots",
                    "image " + std::to_string(k) + " has an invalid or used slot " + std::to_string(slot));
       return {};
@@ -114,202 +99,263 @@ std::vector<std::uint32_t> checkImages(const CompressedNdf& ndf, Findings& findi
   return slots;
 }
 
+/// Checks that places and blocks name each other.
+bool checkPlaces(const CompressedNdf& ndf, Findings& findings) {
+  const auto blocks = static_cast<std::size_t>(ndf.shape.blocksPerImage());
+  bool holds = true;
+  std::size_t next = 0;
+  for (std::size_t block = 0; block < blocks; ++block) {
+    const std::uint16_t place = ndf.block_places[block];
+    if (place == kNoBlockPlace) continue;
+    holds = holds && place == next && next < ndf.place_blocks.size() && ndf.place_blocks[next] == block;
+    ++next;
+  }
+  holds = holds && next == ndf.place_blocks.size();
+  if (!holds) findings.add("compressed.places", "/block_places", "does not number the blocks of place_blocks");
+  return holds;
+}
+
 void checkFirstBlock(const CompressedNdf& ndf, Findings& findings) {
-  const auto words = static_cast<std::size_t>(ndf.shape.maskWords());
-  const int tail_bits = ndf.shape.blocksPerImage() % 64;
+  const auto words = static_cast<std::size_t>(ndf.placeWords());
+  const int tail_bits = ndf.places % 64;
   const std::uint64_t beyond = tail_bits == 0 ? 0 : ~std::uint64_t{0} << tail_bits;
   std::uint64_t count = 0;
   bool holds = true;
   for (std::size_t image = 0; image < ndf.image_slots.size(); ++image) {
     holds &= ndf.first_block[image] == count;
-    const std::uint64_t* mask = &ndf.block_masks[image * words];
+    const std::uint64_t* mask = ndf.block_masks.data() + image * words;
     for (std::size_t w = 0; w < words; ++w) count += static_cast<std::uint64_t>(std::popcount(mask[w]));
-    holds &= (mask[words - 1] & beyond) == 0;
+    holds = holds && (words == 0 || (mask[words - 1] & beyond) == 0);
   }
   holds &= ndf.first_block[ndf.image_slots.size()] == count && count == ndf.block_masses.size();
   if (!holds) findings.add("compressed.first_block", "/first_block", "is not the running count of the bits in block_masks");
 }
 
-/// Checks the mask of one cluster. Returns the broken rule, or nothing.
-std::string_view checkMask(const CompressedNdf& ndf, std::size_t cluster, std::uint32_t slots) {
-  const auto words = static_cast<std::size_t>(ndf.words_per_cluster);
+/// Checks the mask of one cluster, whose words are inside the array. Returns the broken rule, or nothing.
+std::string_view checkMask(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint32_t slots) {
+  const std::size_t words = (slots + 63) / 64;
   std::uint32_t count = 0;
   for (std::size_t w = 0; w < words; ++w) {
-    const std::uint64_t mask = ndf.masks[cluster * words + w];
-    if (ndf.mask_ranks[cluster * words + w] != count) return "compressed.mask_ranks";
-    const std::uint64_t valid = slots <= 64 * w        ? 0
-                                : slots - 64 * w >= 64 ? ~std::uint64_t{0}
-                                                       : (std::uint64_t{1} << (slots - 64 * w)) - 1;
+    const std::uint64_t mask = ndf.masks[cluster.first_word + w];
+    if (ndf.mask_ranks[cluster.first_word + w] != count) return "compressed.mask_ranks";
+    const std::uint64_t valid = slots - 64 * w >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << (slots - 64 * w)) - 1;
     if ((mask & ~valid) != 0) return "compressed.masks";
     count += static_cast<std::uint32_t>(std::popcount(mask));
   }
-  return count == ndf.clusters[cluster].slice_count ? std::string_view() : "compressed.masks";
+  return count == cluster.slice_count ? std::string_view() : "compressed.masks";
 }
 
-/// Integral over its block of each column's basis image, in pixels: the last prefix sums.
-double blockSum(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t column) {
-  const auto at = [&](std::uint64_t index) { return element(basisType(ndf), ndf.basis, cluster.first_basis + index); };
-  const std::uint64_t rank_x = cluster.rank_x;
-  const std::uint64_t rank_y = cluster.rank_y;
-  switch (ndf.method) {
-    case CompressionMethod::cp:
-      return at((kBlockSize - 1) * rank_x + column) * at((2 * kBlockSize - 1) * rank_x + column);
-    case CompressionMethod::tucker:
-      return at((kBlockSize - 1) * rank_x + column / rank_y) *
-             at(kBlockSize * rank_x + (kBlockSize - 1) * rank_y + column % rank_y);
-    default:
-      return at((kBlockPixels - 1) * rank_x + column);
+/// Whether the counts of a cluster of spots agree and its spots are inside the array and near the block.
+bool spotsHold(const CompressedNdf& ndf, const NdfCluster& cluster) {
+  const std::uint64_t head = firstSpotOffset(cluster.slice_count);
+  if (cluster.first_coefficient % sizeof(NdfSpot) != 0 || !inside(cluster.first_coefficient, head, ndf.coefficient_count))
+    return false;
+  const auto* first = static_cast<const std::uint8_t*>(ndf.coefficients) + cluster.first_coefficient;
+  std::uint64_t total = 0;
+  for (std::uint32_t s = 0; s < cluster.slice_count; ++s) {
+    std::uint32_t before;
+    std::memcpy(&before, first + 4 * (s / kSpotGroup), sizeof before);
+    if (s % kSpotGroup == 0 && before != total) return false;
+    total += first[spotCountsOffset(cluster.slice_count) + s];
   }
+  if (!inside(cluster.first_coefficient, head + total * sizeof(NdfSpot) + kRowPadding, ndf.coefficient_count)) return false;
+  const auto* spots = reinterpret_cast<const NdfSpot*>(first + head);
+  return std::all_of(spots, spots + total, [](const NdfSpot& s) { return s.x <= kLastSpotPlace && s.y <= kLastSpotPlace; });
 }
 
-/// Integral of every [region][slot] image before its image_scale, in the order of `first`.
-std::vector<double> slotIntegrals(const CompressedNdf& ndf, const std::vector<std::size_t>& first) {
-  std::vector<double> integrals(imageCount(ndf.shape));
-  const auto blocks = static_cast<std::size_t>(ndf.shape.blocksPerImage());
-  const auto words = static_cast<std::size_t>(ndf.words_per_cluster);
-  const ElementType type = coefficientElement(ndf.coefficient_type);
-  std::vector<double> weights;
-  for (std::size_t c = 0; c < ndf.clusters.size(); ++c) {
-    const NdfCluster& cluster = ndf.clusters[c];
-    if (cluster.slice_count == 0) continue;
-    const std::uint64_t columns = columnCount(ndf, cluster);
-    weights.resize(columns);
-    for (std::uint64_t k = 0; k < columns; ++k) weights[k] = ndf.scales[cluster.first_scale + k] * blockSum(ndf, cluster, k);
-    std::uint64_t coefficient = cluster.first_coefficient;
-    for (std::size_t w = 0; w < words; ++w) {
-      for (std::uint64_t mask = ndf.masks[c * words + w]; mask != 0; mask &= mask - 1) {
-        const std::size_t slot = 64 * w + static_cast<std::size_t>(std::countr_zero(mask));
-        for (std::uint64_t k = 0; k < columns; ++k)
-          integrals[first[c / blocks] + slot] += weights[k] * element(type, ndf.coefficients, coefficient++);
-      }
-    }
-  }
-  return integrals;
+/// Whether the pairs of functions of a cluster's columns are below its ranks.
+bool coreHolds(const CompressedNdf& ndf, const NdfCluster& cluster) {
+  const auto* core = ndf.core.data() + cluster.first_scale;
+  return std::all_of(core, core + cluster.columns, [&](std::uint8_t pair) {
+    return pair % kBlockSize < cluster.rank_x && pair / kBlockSize < cluster.rank_y;
+  });
+}
+
+/// Checks where the factors of a cluster with slices are. Returns the broken rule, or nothing.
+std::string_view checkFactors(const CompressedNdf& ndf, const NdfCluster& cluster) {
+  if (!ranksHold(ndf, cluster)) return "compressed.ranks";
+  const std::uint64_t columns = cluster.columns == 0 ? 2 : cluster.columns;
+  if (!inside(cluster.first_scale, columns, ndf.scales.size())) return "compressed.ranges";
+  if (cluster.columns == 0) return spotsHold(ndf, cluster) ? std::string_view() : "compressed.spots";
+  const bool tucker = ndf.method == CompressionMethod::tucker;
+  if (!inside(cluster.first_basis, static_cast<std::uint64_t>(basisElements(ndf.method, cluster)), ndf.basis_count) ||
+      !inside(cluster.first_coefficient,
+              static_cast<std::uint64_t>(cluster.slice_count) * static_cast<std::uint64_t>(rowElements(cluster)) + kRowPadding,
+              ndf.coefficient_count) ||
+      (tucker && !inside(cluster.first_scale, columns, ndf.core.size())))
+    return "compressed.ranges";
+  return !tucker || coreHolds(ndf, cluster) ? std::string_view() : "compressed.ranks";
 }
 
 /// Number of the first slot of each region, in one list of the slots of all regions.
 std::vector<std::size_t> firstSlots(const CompressedNdf& ndf) {
-  const auto regions = static_cast<std::size_t>(ndf.region_columns) * static_cast<std::size_t>(ndf.region_rows);
-  std::vector<std::size_t> first(regions + 1);
+  std::vector<std::size_t> first(static_cast<std::size_t>(ndf.regions) + 1);
   for (const std::uint16_t region : ndf.image_regions) ++first[region + 1u];
-  for (std::size_t r = 0; r < regions; ++r) first[r + 1] += first[r];
+  for (std::size_t r = 0; r < static_cast<std::size_t>(ndf.regions); ++r) first[r + 1] += first[r];
   return first;
 }
 
 /// Basis images of a cluster with their scales, [columns][256].
 std::vector<float> basisImages(const CompressedNdf& ndf, const NdfCluster& cluster) {
   const auto at = [&](std::uint64_t index) { return element(basisType(ndf), ndf.basis, cluster.first_basis + index); };
-  const std::uint64_t rx = cluster.rank_x, ry = ndf.method == CompressionMethod::tucker ? cluster.rank_y : rx;
+  const bool tucker = ndf.method == CompressionMethod::tucker;
+  const std::uint64_t columns = cluster.columns, rx = tucker ? cluster.rank_x : columns, ry = tucker ? cluster.rank_y : columns;
   const auto along = [&](std::uint64_t first, std::uint64_t rank, std::uint64_t k, int t) {
     const auto row = [&](int r) { return at(first + static_cast<std::uint64_t>(r) * rank + k); };
     return t > 0 ? row(t) - row(t - 1) : row(0);
   };
-  const std::uint64_t columns = columnCount(ndf, cluster);
   std::vector<float> images(columns * kBlockPixels);
   for (std::uint64_t k = 0; k < columns; ++k) {
-    const bool tucker = ndf.method == CompressionMethod::tucker;
+    const std::uint64_t a = tucker ? ndf.core[cluster.first_scale + k] % kBlockSize : k;
+    const std::uint64_t b = tucker ? ndf.core[cluster.first_scale + k] / kBlockSize : k;
     const auto table = [&](int x, int y) {
-      return x < 0 || y < 0 ? 0.0 : at(static_cast<std::uint64_t>(y * kBlockSize + x) * rx + k);
+      return x < 0 || y < 0 ? 0.0 : at(static_cast<std::uint64_t>(y * kBlockSize + x) * columns + k);
     };
     for (int p = 0; p < kBlockPixels; ++p) {
       const int x = p % kBlockSize, y = p / kBlockSize;
       const double value = ndf.method == CompressionMethod::pca
                                ? table(x, y) - table(x - 1, y) - table(x, y - 1) + table(x - 1, y - 1)
-                               : along(0, rx, tucker ? k / ry : k, x) * along(kBlockSize * rx, ry, tucker ? k % ry : k, y);
+                               : along(0, rx, a, x) * along(kBlockSize * rx, ry, b, y);
       images[k * kBlockPixels + static_cast<std::size_t>(p)] = static_cast<float>(ndf.scales[cluster.first_scale + k] * value);
     }
   }
   return images;
 }
 
-/// The positive part of a slice: the sum of its pixels, negative ones taken as 0.
-double positivePart(const CompressedNdf& ndf, const std::vector<float>& images, std::uint64_t first_coefficient) {
-  float pixels[kBlockPixels] = {};
-  for (std::size_t k = 0; k * kBlockPixels < images.size(); ++k) {
-    const auto c =
-        static_cast<float>(element(coefficientElement(ndf.coefficient_type), ndf.coefficients, first_coefficient + k));
-    for (int p = 0; p < kBlockPixels; ++p) pixels[p] += c * images[k * kBlockPixels + static_cast<std::size_t>(p)];
-  }
-  double sum = 0;
-  for (const float pixel : pixels) sum += std::max(0.0f, pixel);
-  return sum;
+/// Coefficient k of a slice.
+float coefficient(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t slice, int k) {
+  const std::uint64_t row = cluster.first_coefficient + slice * static_cast<std::uint64_t>(rowElements(cluster));
+  const int wide = cluster.columns - cluster.narrow_columns, half = (cluster.narrow_columns + 1) / 2, j = k - wide;
+  if (j < 0)
+    return static_cast<float>(
+        element(coefficientElement(ndf.coefficient_type), ndf.coefficients, row + static_cast<std::uint64_t>(k)));
+  const auto byte = static_cast<const std::uint8_t*>(ndf.coefficients)[row + static_cast<std::uint64_t>(wide + j % half)];
+  const int bits = j < half ? byte & 15 : byte >> 4;
+  return static_cast<float>(bits < 8 ? bits : bits - 16);
 }
 
-/// Positive parts of all slices in the order of block_masses. Empty, with a finding, if block_masks contradict the clusters.
-std::vector<double> positiveParts(const CompressedNdf& ndf, Findings& findings) {
+/// Sums over the pixels of a slice.
+struct SliceSums {
+  double sum = 0;
+  double positive = 0;  ///< negative pixels taken as 0
+};
+
+SliceSums sumsOf(const float* pixels) {
+  SliceSums sums;
+  for (int p = 0; p < kBlockPixels; ++p) {
+    sums.sum += pixels[p];
+    sums.positive += std::max(0.0f, pixels[p]);
+  }
+  return sums;
+}
+
+/// Adds the spots of a slice to its pixels.
+/// @param first  number of the slice's first spot in the cluster
+void addSpots(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t first, int count, float* pixels) {
+  const auto* bytes = static_cast<const std::uint8_t*>(ndf.coefficients) + cluster.first_coefficient;
+  const auto* spots = reinterpret_cast<const NdfSpot*>(bytes + firstSpotOffset(cluster.slice_count)) + first;
+  const auto share = [&](int pixel, int place) {
+    const float* edge = &ndf.spot_sums[static_cast<std::size_t>(kSpotSteps * pixel + kLastSpotPlace - place)];
+    return edge[kSpotSteps] - edge[0];
+  };
+  for (int k = 0; k < count; ++k)
+    for (int p = 0; p < kBlockPixels; ++p)
+      pixels[p] += ndf.scales[cluster.first_scale] * static_cast<float>(spots[k].weight) * share(p % kBlockSize, spots[k].x) *
+                   share(p / kBlockSize, spots[k].y);
+}
+
+/// Sums of all slices of a cluster.
+std::vector<SliceSums> clusterSums(const CompressedNdf& ndf, const NdfCluster& cluster) {
+  std::vector<SliceSums> sums;
+  const std::vector<float> images = basisImages(ndf, cluster);
+  const std::uint8_t* counts =
+      static_cast<const std::uint8_t*>(ndf.coefficients) + cluster.first_coefficient + spotCountsOffset(cluster.slice_count);
+  std::uint64_t spots = 0;
+  for (std::uint32_t s = 0; s < cluster.slice_count; ++s) {
+    float pixels[kBlockPixels] = {};
+    if (cluster.columns == 0) {
+      const int count = counts[s];
+      const float rest = halfToFloat(static_cast<std::uint16_t>(counts[cluster.slice_count + s] << 6));
+      std::fill_n(pixels, kBlockPixels, ndf.scales[cluster.first_scale + 1] * rest);
+      addSpots(ndf, cluster, spots, count, pixels);
+      spots += static_cast<std::uint64_t>(count);
+    }
+    for (int k = 0; k < cluster.columns; ++k) {
+      const float c = coefficient(ndf, cluster, s, k);
+      const float* image = images.data() + k * kBlockPixels;
+      for (int p = 0; p < kBlockPixels; ++p) pixels[p] += c * image[p];
+    }
+    sums.push_back(sumsOf(pixels));
+  }
+  return sums;
+}
+
+/// Sums of all slices in the order of block_masses. Empty, with a finding, if block_masks contradict the clusters.
+std::vector<SliceSums> sliceSums(const CompressedNdf& ndf, Findings& findings) {
   const std::vector<std::size_t> first = firstSlots(ndf);
   std::vector<std::size_t> image_of(ndf.image_slots.size());
   for (std::size_t i = 0; i < image_of.size(); ++i) image_of[first[ndf.image_regions[i]] + ndf.image_slots[i]] = i;
-  const auto blocks = static_cast<std::size_t>(ndf.shape.blocksPerImage());
-  const auto words = static_cast<std::size_t>(ndf.words_per_cluster),
-             image_words = static_cast<std::size_t>(ndf.shape.maskWords());
-  std::vector<double> parts(ndf.block_masses.size(), -1);
+  const auto places = static_cast<std::size_t>(ndf.places), image_words = static_cast<std::size_t>(ndf.placeWords());
+  std::vector<SliceSums> all(ndf.block_masses.size());
+  std::uint64_t slices = 0, named = 0;
   for (std::size_t c = 0; c < ndf.clusters.size(); ++c) {
     const NdfCluster& cluster = ndf.clusters[c];
     if (cluster.slice_count == 0) continue;
-    const std::vector<float> images = basisImages(ndf, cluster);
-    const std::size_t block = c % blocks;
-    std::uint64_t coefficient = cluster.first_coefficient;
-    for (std::size_t slot = 0; slot < 64 * words; ++slot) {
-      if ((ndf.masks[c * words + slot / 64] >> (slot % 64) & 1u) == 0) continue;
-      const std::size_t image = image_of[first[c / blocks] + slot];
+    const std::vector<SliceSums> sums = clusterSums(ndf, cluster);
+    const std::size_t place = c % places, region = c / places;
+    const std::uint64_t bit = std::uint64_t{1} << (place % 64);
+    std::size_t slice = 0;
+    for (std::size_t slot = 0; slot < first[region + 1] - first[region]; ++slot) {
+      if ((ndf.masks[cluster.first_word + slot / 64] >> (slot % 64) & 1u) == 0) continue;
+      const std::size_t image = image_of[first[region] + slot];
       const std::uint64_t* mask = &ndf.block_masks[image * image_words];
       std::size_t rank = ndf.first_block[image];
-      for (std::size_t w = 0; w < block / 64; ++w) rank += static_cast<std::size_t>(std::popcount(mask[w]));
-      const std::uint64_t bit = std::uint64_t{1} << (block % 64);
-      rank += static_cast<std::size_t>(std::popcount(mask[block / 64] & (bit - 1)));
-      if ((mask[block / 64] & bit) != 0) parts[rank] = positivePart(ndf, images, coefficient);
-      coefficient += columnCount(ndf, cluster);
+      for (std::size_t w = 0; w < place / 64; ++w) rank += static_cast<std::size_t>(std::popcount(mask[w]));
+      rank += static_cast<std::size_t>(std::popcount(mask[place / 64] & (bit - 1)));
+      if ((mask[place / 64] & bit) != 0) {
+        all[rank] = sums[slice];
+        ++named;
+      }
+      ++slice;
     }
+    slices += cluster.slice_count;
   }
-  std::uint64_t slices = 0;
-  for (const NdfCluster& cluster : ndf.clusters) slices += cluster.slice_count;
-  if (slices == parts.size() && std::find(parts.begin(), parts.end(), -1.0) == parts.end()) return parts;
+  if (slices == all.size() && named == slices) return all;
   findings.add("compressed.block_masks", "/block_masks", "does not name the slices of the clusters");
   return {};
 }
 
-/// Checks what sampling and densities rest on: the scale of each image's positive part and the shares of its blocks.
+/// Checks what means, densities and sampling rest on: the scales of each image and the shares of its blocks.
 void checkDensities(const CompressedNdf& ndf, Findings& findings) {
   constexpr double kRounding = 1e-3;  // of sums of float products
-  const std::vector<double> parts = positiveParts(ndf, findings);
-  if (parts.empty()) return;
+  const std::vector<SliceSums> sums = sliceSums(ndf, findings);
+  if (sums.size() != ndf.block_masses.size()) return;
   const double pixel_area = 4.0 / (static_cast<double>(ndf.shape.resolution) * ndf.shape.resolution);
-  std::size_t bad_images = 0, bad_masses = 0;
+  std::size_t bad_integrals = 0, bad_images = 0, bad_masses = 0;
+  double worst = 1;
   for (std::size_t i = 0; i < ndf.density_scales.size(); ++i) {
     const double scale = ndf.density_scales[i] * pixel_area;
-    double integral = 0;
+    double integral = 0, signed_integral = 0;
     for (std::uint32_t b = ndf.first_block[i]; b < ndf.first_block[i + 1]; ++b) {
-      const double mass = parts[b] * scale, most = halfToFloat(static_cast<std::uint16_t>(ndf.block_masses[b] << 6));
+      const double mass = sums[b].positive * scale, most = halfToFloat(static_cast<std::uint16_t>(ndf.block_masses[b] << 6));
       integral += mass;
+      signed_integral += sums[b].sum * ndf.image_scales[i] * pixel_area;
       bad_masses += !(mass <= most * (1 + kRounding) && most <= mass * (1.0625 + kRounding) + 0x1p-17);
     }
     bad_images += !(std::abs(integral - 1) <= kIntegralTolerance) && !(scale == 0 && integral == 0);
+    if (std::abs(signed_integral - 1) <= kIntegralTolerance) continue;
+    ++bad_integrals;
+    if (!(std::abs(signed_integral - 1) <= std::abs(worst - 1))) worst = signed_integral;
   }
+  if (bad_integrals > 0)
+    findings.add("compressed.integral", "/image_scales",
+                 std::to_string(bad_integrals) + " images do not integrate to 1 (worst " + std::to_string(worst) + ")");
   if (bad_images > 0)
     findings.add("compressed.density_scales", "/density_scales",
                  std::to_string(bad_images) + " images do not integrate to 1 without their negative parts");
   if (bad_masses > 0)
     findings.add("compressed.block_masses", "/block_masses",
                  std::to_string(bad_masses) + " masses are not the slices' shares of their images, rounded up");
-}
-
-void checkIntegrals(const CompressedNdf& ndf, Findings& findings) {
-  const std::vector<std::size_t> first = firstSlots(ndf);
-  const std::vector<double> integrals = slotIntegrals(ndf, first);
-  const double pixel_area = 4.0 / (static_cast<double>(ndf.shape.resolution) * ndf.shape.resolution);
-  std::size_t bad = 0;
-  double worst = 1;
-  for (std::size_t k = 0; k < ndf.image_slots.size(); ++k) {
-    const double integral = integrals[first[ndf.image_regions[k]] + ndf.image_slots[k]] * ndf.image_scales[k] * pixel_area;
-    if (std::abs(integral - 1) <= kIntegralTolerance) continue;
-    ++bad;
-    if (!(std::abs(integral - 1) <= std::abs(worst - 1))) worst = integral;
-  }
-  if (bad > 0) {
-    findings.add("compressed.integral", "/image_scales",
-                 std::to_string(bad) + " images do not integrate to 1 (worst " + std::to_string(worst) + ")");
-  }
 }
 
 template <class Condition>
@@ -338,28 +384,30 @@ PackedAsset pack(const CompressedNdf& ndf) {
   }
   packed.text("method", kMethods[static_cast<int>(ndf.method)]);
   packed.text("coefficient_type", kCoefficientTypes[static_cast<int>(ndf.coefficient_type)]);
-  packed.integer("region_columns", ndf.region_columns);
-  packed.integer("region_rows", ndf.region_rows);
-  packed.integer("words_per_cluster", ndf.words_per_cluster);
+  packed.integer("regions", ndf.regions);
+  packed.integer("places", ndf.places);
   const std::uint64_t images = ndf.image_regions.size();
-  const std::uint64_t regions = static_cast<std::uint64_t>(ndf.region_columns) * static_cast<std::uint64_t>(ndf.region_rows);
+  const auto regions = static_cast<std::uint64_t>(ndf.regions), places = static_cast<std::uint64_t>(ndf.places);
   const auto blocks = static_cast<std::uint64_t>(ndf.shape.blocksPerImage());
-  const auto words = static_cast<std::uint64_t>(ndf.words_per_cluster);
   packed.array("image_regions", ElementType::u16, {images}, ndf.image_regions.data(), images);
   packed.array("image_slots", ElementType::u16, {images}, ndf.image_slots.data(), ndf.image_slots.size());
   packed.array("image_scales", ElementType::f32, {images}, ndf.image_scales.data(), ndf.image_scales.size());
   packed.array("density_scales", ElementType::f32, {images}, ndf.density_scales.data(), ndf.density_scales.size());
-  packed.array("block_masks", ElementType::u64, {images, static_cast<std::uint64_t>(ndf.shape.maskWords())},
-               ndf.block_masks.data(), ndf.block_masks.size());
+  packed.array("block_places", ElementType::u16, {blocks}, ndf.block_places.data(), ndf.block_places.size());
+  packed.array("place_blocks", ElementType::u16, {places}, ndf.place_blocks.data(), ndf.place_blocks.size());
+  packed.array("block_masks", ElementType::u64, {images, static_cast<std::uint64_t>(ndf.placeWords())}, ndf.block_masks.data(),
+               ndf.block_masks.size());
   packed.array("first_block", ElementType::u32, {images + 1}, ndf.first_block.data(), ndf.first_block.size());
   packed.array("block_masses", ElementType::u8, {ndf.block_masses.size()}, ndf.block_masses.data(), ndf.block_masses.size());
-  packed.array("clusters", ElementType::ndf_cluster, {regions, blocks}, ndf.clusters.data(), ndf.clusters.size());
-  packed.array("masks", ElementType::u64, {regions, blocks, words}, ndf.masks.data(), ndf.masks.size());
-  packed.array("mask_ranks", ElementType::u32, {regions, blocks, words}, ndf.mask_ranks.data(), ndf.mask_ranks.size());
+  packed.array("clusters", ElementType::ndf_cluster, {regions, places}, ndf.clusters.data(), ndf.clusters.size());
+  packed.array("masks", ElementType::u64, {ndf.masks.size()}, ndf.masks.data(), ndf.masks.size());
+  packed.array("mask_ranks", ElementType::u32, {ndf.masks.size()}, ndf.mask_ranks.data(), ndf.mask_ranks.size());
   packed.array("basis", basisType(ndf), {ndf.basis_count}, ndf.basis, ndf.basis_count);
   packed.array("coefficients", coefficientElement(ndf.coefficient_type), {ndf.coefficient_count}, ndf.coefficients,
                ndf.coefficient_count);
   packed.array("scales", ElementType::f32, {ndf.scales.size()}, ndf.scales.data(), ndf.scales.size());
+  packed.array("core", ElementType::u8, {ndf.core.size()}, ndf.core.data(), ndf.core.size());
+  packed.array("spot_sums", ElementType::f32, {ndf.spot_sums.size()}, ndf.spot_sums.data(), ndf.spot_sums.size());
   return packed;
 }
 
@@ -367,9 +415,8 @@ void unpack(const Content& content, CompressedNdf& ndf) {
   unpackShape(content, ndf.shape);
   ndf.method = fromText<CompressionMethod>(kMethods, content.text("method"));
   ndf.coefficient_type = fromText<CoefficientType>(kCoefficientTypes, content.text("coefficient_type"));
-  ndf.region_columns = content.integer("region_columns");
-  ndf.region_rows = content.integer("region_rows");
-  ndf.words_per_cluster = content.integer("words_per_cluster");
+  ndf.regions = content.integer("regions");
+  ndf.places = content.integer("places");
   std::uint32_t first_image = 0;
   for (int l = 0; l < ndf.shape.level_count; ++l) {
     ndf.first_image[l] = first_image;
@@ -379,6 +426,8 @@ void unpack(const Content& content, CompressedNdf& ndf) {
   ndf.image_slots = content.array<std::uint16_t>("image_slots");
   ndf.image_scales = content.array<float>("image_scales");
   ndf.density_scales = content.array<float>("density_scales");
+  ndf.block_places = content.array<std::uint16_t>("block_places");
+  ndf.place_blocks = content.array<std::uint16_t>("place_blocks");
   ndf.block_masks = content.array<std::uint64_t>("block_masks");
   ndf.first_block = content.array<std::uint32_t>("first_block");
   ndf.block_masses = content.array<std::uint8_t>("block_masses");
@@ -390,32 +439,34 @@ void unpack(const Content& content, CompressedNdf& ndf) {
   ndf.coefficients = content.dataset("coefficients").data;
   ndf.coefficient_count = content.dataset("coefficients").dims[0];
   ndf.scales = content.array<float>("scales");
+  ndf.core = content.array<std::uint8_t>("core");
+  ndf.spot_sums = content.array<float>("spot_sums");
 }
 
 void checkIndex(const CompressedNdf& ndf, Findings& findings) {
   checkShape(ndf.shape, findings);
   const std::vector<std::uint32_t> slots = checkImages(ndf, findings);
   if (slots.empty()) return;
+  if (!checkPlaces(ndf, findings)) return;
   checkFirstBlock(ndf, findings);
-  const auto blocks = static_cast<std::size_t>(ndf.shape.blocksPerImage());
+  if (!ndf.spot_sums.empty() && ndf.spot_sums.size() != static_cast<std::size_t>(kSpotSums)) {
+    findings.add("compressed.spots", "/spot_sums", "does not have " + std::to_string(kSpotSums) + " values");
+    return;
+  }
+  const auto places = static_cast<std::size_t>(ndf.places);
   for (std::size_t c = 0; c < ndf.clusters.size(); ++c) {
     const NdfCluster& cluster = ndf.clusters[c];
-    if (const std::string_view rule = checkMask(ndf, c, slots[c / blocks]); !rule.empty()) {
-      findings.add(rule, "/masks", clusterName(ndf, c) + " has a mask that does not agree with its counts");
-    }
-    if (cluster.slice_count == 0) continue;
-    if (!ranksHold(ndf, cluster)) {
-      findings.add(
-          "compressed.ranks", "/clusters",
-          clusterName(ndf, c) + " has ranks " + std::to_string(cluster.rank_x) + ", " + std::to_string(cluster.rank_y));
+    const std::uint32_t region_slots = slots[c / places];
+    if (!inside(cluster.first_word, (region_slots + 63) / 64, ndf.masks.size())) {
+      findings.add("compressed.ranges", "/clusters", clusterName(ndf, c) + " reaches beyond the masks");
       continue;
     }
-    const std::uint64_t columns = columnCount(ndf, cluster);
-    if (!inside(cluster.first_basis, basisSize(ndf, cluster), ndf.basis_count) ||
-        !inside(cluster.first_coefficient, cluster.slice_count * columns, ndf.coefficient_count) ||
-        !inside(cluster.first_scale, columns, ndf.scales.size())) {
-      findings.add("compressed.ranges", "/clusters", clusterName(ndf, c) + " reaches beyond basis, coefficients or scales");
-    }
+    if (const std::string_view rule = checkMask(ndf, cluster, region_slots); !rule.empty())
+      findings.add(rule, "/masks", clusterName(ndf, c) + " has a mask that does not agree with its counts");
+    if (cluster.slice_count == 0) continue;
+    if (const std::string_view rule = checkFactors(ndf, cluster); !rule.empty())
+      findings.add(rule, "/clusters",
+                   clusterName(ndf, c) + ", " + std::to_string(cluster.columns) + " columns, has factors that do not fit");
   }
 }
 
@@ -437,7 +488,9 @@ void checkData(const CompressedNdf& ndf, Findings& findings) {
         ndf.basis_count, [&](std::uint64_t k) { return std::isfinite(element(ElementType::f32, ndf.basis, k)); },
         "compressed.factors", "/basis", "not finite", findings);
   }
-  checkIntegrals(ndf, findings);
+  checkAll(
+      ndf.spot_sums.size(), [&](std::uint64_t k) { return ndf.spot_sums[k] >= 0 && ndf.spot_sums[k] <= 1; },
+      "compressed.factors", "/spot_sums", "not between 0 and 1", findings);
   checkDensities(ndf, findings);
 }
 

@@ -133,20 +133,24 @@ bool hasWideKernels() {
 /// The same for compressed images: clusters and rows of coefficients.
 class CompressedChunk {
  public:
-  explicit CompressedChunk(const CompressedNdf& ndf)
-      : ndf_(ndf), blocks_(static_cast<std::size_t>(ndf.shape.blocksPerImage())) {}
+  explicit CompressedChunk(const CompressedNdf& ndf) : ndf_(ndf) {}
 
   void findClusters(SliceChunk& chunk) {
     for (int k = 0; k < kChunk; ++k) {
       for (int j = 0; j < kSlices; ++j) {
         const std::uint32_t image = ndf_.first_image[chunk.levels[j / 4][k]] + chunk.images[j][k];
-        const std::size_t cluster = ndf_.image_regions.data()[image] * blocks_ + static_cast<std::size_t>(chunk.blocks[k]);
+        const std::uint16_t place = ndf_.block_places.data()[chunk.blocks[k]];
+        if (place == kNoBlockPlace) {
+          chunk.weights[j][k] = 0;
+          continue;
+        }
+        const std::size_t cluster =
+            std::size_t{ndf_.image_regions.data()[image]} * static_cast<std::size_t>(ndf_.places) + place;
         slots_[j][k] = ndf_.image_slots.data()[image];
         clusters_[j][k] = static_cast<std::uint32_t>(cluster);
-        const std::size_t word = cluster * static_cast<std::size_t>(ndf_.words_per_cluster) + slots_[j][k] / 64u;
+        const std::size_t word = ndf_.clusters.data()[cluster].first_word + slots_[j][k] / 64u;
         prefetch(ndf_.masks.data() + word);
         prefetch(ndf_.mask_ranks.data() + word);
-        prefetch(ndf_.clusters.data() + cluster);
         chunk.weights[j][k] *= ndf_.density_scales.data()[image];
       }
     }
@@ -157,21 +161,24 @@ class CompressedChunk {
     for (int k = 0; k < kChunk; ++k) {
       std::uint32_t previous = ~std::uint32_t{0};
       for (int j = 0; j < kSlices; ++j) {
+        if (!(chunk.weights[j][k] > 0)) continue;
         const std::uint32_t at = clusters_[j][k];
-        const std::size_t word =
-            static_cast<std::size_t>(at) * static_cast<std::size_t>(ndf_.words_per_cluster) + slots_[j][k] / 64u;
-        const std::uint64_t mask = ndf_.masks.data()[word], bit = std::uint64_t{1} << (slots_[j][k] % 64u);
-        const bool stored = (mask & bit) != 0;
         const NdfCluster& cluster = ndf_.clusters.data()[at];
-        const std::uint64_t row = ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(setBits(mask & (bit - 1)));
-        chunk.weights[j][k] = stored ? chunk.weights[j][k] : 0.0f;
-        rows_[j][k] = cluster.first_coefficient + row * static_cast<std::uint64_t>(columnCount(ndf_, cluster));
-        if (!stored) continue;
-        prefetch(static_cast<const char*>(ndf_.coefficients) + rows_[j][k] * bytes);
+        const std::size_t word = cluster.first_word + slots_[j][k] / 64u;
+        const std::uint64_t mask = ndf_.masks.data()[word], bit = std::uint64_t{1} << (slots_[j][k] % 64u);
+        if ((mask & bit) == 0) {
+          chunk.weights[j][k] = 0;
+          continue;
+        }
+        slices_[j][k] = ndf_.mask_ranks.data()[word] + static_cast<std::uint32_t>(setBits(mask & (bit - 1)));
+        const std::uint64_t row = cluster.columns > 0 ? slices_[j][k] * static_cast<std::uint64_t>(rowElements(cluster))
+                                                      : spotCountsOffset(cluster.slice_count) + slices_[j][k];
+        prefetch(static_cast<const char*>(ndf_.coefficients) + (cluster.first_coefficient + row) * bytes);
         if (at == previous) continue;
         previous = at;
+        if (cluster.columns == 0) continue;
         prefetch(ndf_.scales.data() + cluster.first_scale);
-        prefetch(ndf_.scales.data() + cluster.first_scale + columnCount(ndf_, cluster) - 1);
+        prefetch(ndf_.scales.data() + cluster.first_scale + cluster.columns - 1);
         prefetchBasis(cluster, chunk.pixels[k]);
       }
     }
@@ -181,7 +188,7 @@ class CompressedChunk {
   template <class Basis, class Coefficient>
   void addUp(const SliceChunk& chunk, int count, float* sums) const {
     const ClusterReader<Basis, Coefficient> reader(ndf_);
-    alignas(64) float projection[kMaxColumns];
+    alignas(64) float projection[ColumnLayout::kMost];
     for (int k = 0; k < count; ++k) {
       float sum = 0;
       unsigned left = 0;  // slices that are still to be added
@@ -189,17 +196,15 @@ class CompressedChunk {
       while (left != 0) {
         const std::uint32_t at = clusters_[lowestBit(left)][k];
         const NdfCluster& cluster = ndf_.clusters.data()[at];
-        const int columns = columnCount(ndf_, cluster);
-        project<Basis>(reader, cluster, chunk.pixels[k], projection);
-        const Float4 last = reader.lastColumns(projection, columns);
-        float tail[4];
-        last.store(tail);
+        const ColumnLayout layout(cluster);
+        const int x = chunk.pixels[k] % kBlockSize, y = chunk.pixels[k] / kBlockSize;
+        if (cluster.columns > 0) project<Basis>(reader, cluster, x, y, projection);
         for (int j = lowestBit(left); j < kSlices; ++j) {
           if (!(left >> j & 1) || clusters_[j][k] != at) continue;
           left &= ~(1u << j);
-          const Coefficient* row = static_cast<const Coefficient*>(ndf_.coefficients) + rows_[j][k];
-          const float value =
-              wide_ && columns >= 4 ? dotColumns(projection, tail, row, columns) : reader.dot(projection, last, row, columns);
+          const float value = cluster.columns > 0
+                                  ? dot<Coefficient>(reader, projection, layout, reader.row(cluster, slices_[j][k]))
+                                  : spotsAt(SpotProfile(ndf_), spotsOf(ndf_, cluster, slices_[j][k]), x, y);
           sum += chunk.weights[j][k] * std::max(0.0f, value);
         }
       }
@@ -209,15 +214,19 @@ class CompressedChunk {
 
  private:
   template <class Basis, class Reader>
-  void project(const Reader& reader, const NdfCluster& cluster, int pixel, float* projection) const {
-    const int x = pixel % kBlockSize, y = pixel / kBlockSize;
+  void project(const Reader& reader, const NdfCluster& cluster, int x, int y, float* projection) const {
     if constexpr (!std::is_same_v<Basis, std::int32_t>) {
-      if (wide_ && ndf_.method == CompressionMethod::cp) {
+      if (wide_ && ndf_.method == CompressionMethod::cp && cluster.narrow_columns == 0) {
         const Basis* basis = static_cast<const Basis*>(ndf_.basis) + cluster.first_basis;
-        return projectColumns(basis, cluster.rank_x, x, y, ndf_.scales.data() + cluster.first_scale, projection);
+        return projectColumns(basis, cluster.columns, x, y, ndf_.scales.data() + cluster.first_scale, projection);
       }
     }
     reader.pixel(cluster, x, y, projection);
+  }
+
+  template <class Coefficient, class Reader>
+  float dot(const Reader& reader, const float* projection, const ColumnLayout& layout, const Coefficient* row) const {
+    return wide_ && layout.half == 0 ? dotColumns(projection, row, layout.low) : reader.dot(projection, layout, row);
   }
 
   void prefetchBasis(const NdfCluster& cluster, int pixel) const {
@@ -225,23 +234,23 @@ class CompressedChunk {
     const char* basis = static_cast<const char*>(ndf_.basis) + cluster.first_basis * bytes;
     const std::size_t x = static_cast<std::size_t>(pixel % kBlockSize), y = static_cast<std::size_t>(pixel / kBlockSize);
     if (ndf_.method == CompressionMethod::pca) {
-      prefetch(basis + static_cast<std::size_t>(pixel) * cluster.rank_x * bytes);
+      prefetch(basis + static_cast<std::size_t>(pixel) * cluster.columns * bytes);
       return;
     }
-    const std::size_t rank_y = ndf_.method == CompressionMethod::cp ? cluster.rank_x : cluster.rank_y;
+    const bool cp = ndf_.method == CompressionMethod::cp;
+    const std::size_t rank_x = cp ? cluster.columns : cluster.rank_x, rank_y = cp ? cluster.columns : cluster.rank_y;
     // A value is the difference of two rows of prefix sums.
-    const char* along_x = basis + x * cluster.rank_x * bytes;
-    const char* along_y = basis + (kBlockSize * cluster.rank_x + y * rank_y) * bytes;
-    prefetch(along_x - (x > 0 ? cluster.rank_x * bytes : 0));
-    prefetch(along_x + cluster.rank_x * bytes - 1);
+    const char* along_x = basis + x * rank_x * bytes;
+    const char* along_y = basis + (kBlockSize * rank_x + y * rank_y) * bytes;
+    prefetch(along_x - (x > 0 ? rank_x * bytes : 0));
+    prefetch(along_x + rank_x * bytes - 1);
     prefetch(along_y - (y > 0 ? rank_y * bytes : 0));
     prefetch(along_y + rank_y * bytes - 1);
   }
 
   const CompressedNdf& ndf_;
-  const std::size_t blocks_;
   const bool wide_ = hasWideKernels();
-  std::uint64_t rows_[kSlices][kChunk];
+  std::uint32_t slices_[kSlices][kChunk];  ///< in their clusters
   std::uint32_t clusters_[kSlices][kChunk];
   std::uint16_t slots_[kSlices][kChunk];
 };

@@ -41,13 +41,14 @@ inline void project(const T* basis, int columns, int x, int y, const float* scal
   for (; k + kWidth <= columns; k += kWidth) {
     const __m256 along_x = difference(x1 + k, x0 != nullptr ? x0 + k : nullptr);
     const __m256 along_y = difference(y1 + k, y0 != nullptr ? y0 + k : nullptr);
-    _mm256_storeu_ps(projection + k, _mm256_mul_ps(_mm256_mul_ps(load(scales + k), along_x), along_y));
+    _mm256_storeu_ps(projection + k, _mm256_mul_ps(_mm256_mul_ps(along_x, along_y), load(scales + k)));
   }
   for (; k < columns; ++k) {
     const auto along_x = static_cast<float>(x0 != nullptr ? x1[k] - x0[k] : x1[k]);
     const auto along_y = static_cast<float>(y0 != nullptr ? y1[k] - y0[k] : y1[k]);
-    projection[k] = scales[k] * along_x * along_y;
+    projection[k] = along_x * along_y * scales[k];
   }
+  for (; k % 4 != 0; ++k) projection[k] = 0;
 }
 
 inline __m128 loadFour(const float* at) { return _mm_loadu_ps(at); }
@@ -57,14 +58,14 @@ inline __m128 loadFour(const std::uint16_t* halves) {
 }
 
 template <class T>
-inline float dot(const float* projection, const float* last, const T* row, int columns) {
-  __m128 sum = _mm_mul_ps(_mm_loadu_ps(last), loadFour(row + (columns - 4)));
+inline float dot(const float* projection, const T* row, int columns) {
+  __m128 sum = _mm_setzero_ps();
   int k = 0;
   for (; k + kWidth <= columns; k += kWidth) {
     const __m256 products = _mm256_mul_ps(load(projection + k), load(row + k));
     sum = _mm_add_ps(_mm_add_ps(sum, _mm256_castps256_ps128(products)), _mm256_extractf128_ps(products, 1));
   }
-  if (k + 4 <= columns) sum = _mm_add_ps(sum, _mm_mul_ps(_mm_loadu_ps(projection + k), loadFour(row + k)));
+  if (k < columns) sum = _mm_add_ps(sum, _mm_mul_ps(_mm_loadu_ps(projection + k), loadFour(row + k)));
   const __m128 pairs = _mm_add_ps(sum, _mm_movehl_ps(sum, sum));  // (0 + 2), (1 + 3)
   return _mm_cvtss_f32(_mm_add_ss(pairs, _mm_shuffle_ps(pairs, pairs, 1)));
 }
@@ -78,15 +79,9 @@ void projectColumns(const float* basis, int columns, int x, int y, const float* 
   project(basis, columns, x, y, scales, projection);
 }
 
-float dotColumns(const float* projection, const float* last, const std::int8_t* row, int columns) {
-  return dot(projection, last, row, columns);
-}
-float dotColumns(const float* projection, const float* last, const std::uint16_t* row, int columns) {
-  return dot(projection, last, row, columns);
-}
-float dotColumns(const float* projection, const float* last, const float* row, int columns) {
-  return dot(projection, last, row, columns);
-}
+float dotColumns(const float* projection, const std::int8_t* row, int columns) { return dot(projection, row, columns); }
+float dotColumns(const float* projection, const std::uint16_t* row, int columns) { return dot(projection, row, columns); }
+float dotColumns(const float* projection, const float* row, int columns) { return dot(projection, row, columns); }
 
 }  // namespace glint::api
 

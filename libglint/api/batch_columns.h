@@ -13,16 +13,16 @@ namespace glint::api {
 
 #if defined(GLINT_WIDE_KERNELS)
 
-/// Projection of a CP cluster on pixel (x, y) of its block, to the bit that of ClusterReader::pixel.
+/// Projection of a CP cluster without narrow columns on pixel (x, y) of its block, to the bit that of ClusterReader::pixel.
 /// @param basis  X[16][columns] then Y[16][columns], prefix sums
 void projectColumns(const std::int16_t* basis, int columns, int x, int y, const float* scales, float* projection);
 void projectColumns(const float* basis, int columns, int x, int y, const float* scales, float* projection);
 
-/// Dot product of a projection with a row of coefficients (i8, f16, f32), columns >= 4, to the bit that of ClusterReader::dot.
-/// @param last  four floats: lastColumns of the projection
-float dotColumns(const float* projection, const float* last, const std::int8_t* row, int columns);
-float dotColumns(const float* projection, const float* last, const std::uint16_t* row, int columns);
-float dotColumns(const float* projection, const float* last, const float* row, int columns);
+/// Dot product of a projection with a row of wide coefficients (i8, f16, f32), to the bit that of ClusterReader::dot.
+/// @param columns  rounded up to a multiple of 4; what is read beyond the row meets zeros
+float dotColumns(const float* projection, const std::int8_t* row, int columns);
+float dotColumns(const float* projection, const std::uint16_t* row, int columns);
+float dotColumns(const float* projection, const float* row, int columns);
 
 #else
 
@@ -30,7 +30,7 @@ float dotColumns(const float* projection, const float* last, const float* row, i
 template <class Basis>
 void projectColumns(const Basis*, int, int, int, const float*, float*) {}
 template <class Coefficient>
-float dotColumns(const float*, const float*, const Coefficient*, int) {
+float dotColumns(const float*, const Coefficient*, int) {
   return 0;
 }
 

@@ -97,9 +97,8 @@ std::vector<std::byte> pack(const CompressedNdf& ndf, const NormalMap* normals) 
   header.kind = PackedKind::compressed;
   header.element_type = static_cast<std::uint32_t>(ndf.coefficient_type);
   header.method = static_cast<std::uint32_t>(ndf.method);
-  header.region_columns = ndf.region_columns;
-  header.region_rows = ndf.region_rows;
-  header.words_per_cluster = ndf.words_per_cluster;
+  header.regions = ndf.regions;
+  header.places = ndf.places;
   packer.addShape(ndf.shape);
   for (int l = 0; l < ndf.shape.level_count; ++l) header.levels[l].first_image = ndf.first_image[l];
   header.arrays[0] = packer.add(ndf.image_regions);
@@ -115,6 +114,10 @@ std::vector<std::byte> pack(const CompressedNdf& ndf, const NormalMap* normals) 
   header.arrays[10] = packer.add(ndf.block_masks);
   header.arrays[11] = packer.add(ndf.first_block);
   header.arrays[12] = packer.add(ndf.block_masses);
+  header.arrays[13] = packer.add(ndf.block_places);
+  header.arrays[14] = packer.add(ndf.place_blocks);
+  header.arrays[15] = packer.add(ndf.core);
+  header.arrays[16] = packer.add(ndf.spot_sums);
   if (normals != nullptr) packer.addNormals(*normals);
   return packer.finish();
 }

@@ -3,7 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
+#include <bit>
 #include <cmath>
 #include <mutex>
 #include <optional>
@@ -25,7 +25,7 @@ constexpr double kLeastEnergy = 0.5;
 
 // The measured error of a tolerance lies between this part of it and all of it, unless single steps are larger.
 constexpr double kTightness = 0.985;
-constexpr int kMostCorrections = 12;
+constexpr int kMostCorrections = 16;
 
 void checkOptions(const CompressionOptions& options) {
   const auto require = [](bool valid, const char* rule, const std::string& what) {
@@ -69,7 +69,7 @@ class Compressor {
   Compressor(const NdfPyramid& pyramid, const CompressionOptions& options, const ProgressFn& progress)
       : pyramid_(pyramid),
         options_(options),
-        index_(pyramid, regions(options)),
+        index_(pyramid, regions(options), levelGroups(options)),
         progress_(progress, 3 * index_.clusterCount()),
         statistics_(index_.clusterCount()),
         encoded_(index_.clusterCount()),
@@ -96,6 +96,10 @@ class Compressor {
     if (options.regions > 0) return options.regions;
     return options.method == CompressionMethod::cp ? 8 : 1;
   }
+
+  // The finest levels differ most from the others and hold most of the slices. Axes of tucker cost little: it can have more of
+  // them.
+  static int levelGroups(const CompressionOptions& options) { return options.method == CompressionMethod::tucker ? 3 : 1; }
 
   template <class Work>
   void forEachCluster(Work work) {
@@ -126,7 +130,7 @@ class Compressor {
     forEachCluster([&](std::size_t c) {
       if (selection[c] == selection_[c]) return;
       encoded_[c] = encodeCluster(index_, c, statistics_[c], models_[c].basis(selection[c]), options_.method,
-                                  options_.coefficient_type, pyramid_.value_scale);
+                                  options_.coefficient_type, pyramid_.value_scale, gain_per_byte_);
     });
     selection_ = selection;
     scaleImages();
@@ -170,38 +174,40 @@ class Compressor {
     return sum;
   }
 
-  /// Searches the error before quantisation that gives the tolerance after it. The difference of the two changes slowly, so a
-  /// few corrections by it suffice.
+  /// Searches the error that the allocator has to aim at so that the measured one, after quantisation, meets the tolerance.
+  /// The two are nearly proportional, so a few corrections suffice; where they are not, the search halves the interval.
   void meetTolerance() {
     const RankAllocator allocator(models_);
     const double budget = options_.tolerance * options_.tolerance * energy_;
+    const double aim = budget * (1 + kTightness * kTightness) / 2;
+    if (options_.method != CompressionMethod::cp) gain_per_byte_ = allocator.gainPerByte(budget);
+    double met = 0, failed = 0;  // targets; 0: none yet
     double target = budget;
-    double least = 0;
-    std::optional<double> met;  // the largest target known to meet the budget
     for (int i = 0; i < kMostCorrections; ++i) {
-      std::vector<int> selection = allocator.allocate(target);
-      const bool everything = target <= allocator.smallestError();
-      if (i > 0 && selection == selection_) break;
-      progress_.grow(index_.clusterCount());
-      encode(selection);
-      const double measured = totalError();
-      least = measured;
-      if (measured <= budget) {
-        met = target;
-        if (measured >= kTightness * kTightness * budget) return;
-      } else if (everything) {
-        break;
+      const std::vector<int> selection = allocator.allocate(target);
+      if (selection != selection_) {
+        progress_.grow(index_.clusterCount());
+        encode(selection);
       }
-      const double aim = budget * (1 + kTightness * kTightness) / 2;
-      target = std::max(0.0, allocator.error(selection) + aim - measured);
+      const double measured = totalError();
+      if (measured <= budget) {
+        if (measured >= kTightness * kTightness * budget) return;
+        met = std::max(met, target);
+      } else {
+        if (target <= allocator.smallestError()) break;
+        failed = failed > 0 ? std::min(failed, target) : target;
+      }
+      if (met > 0 && met >= allocator.largestError()) break;
+      target = allocator.error(selection) * aim / measured;
+      const bool outside = (met > 0 && target <= met) || (failed > 0 && target >= failed);
+      if (outside && met > 0 && failed > 0)
+        target = std::sqrt(met * failed);
+      else if (outside)
+        target = met > 0 ? 2 * met : failed / 2;
     }
     if (totalError() <= budget) return;
-    if (met) {
-      encode(allocator.allocate(*met));
-      return;
-    }
-    encode(allocator.allocate(0));
-    least = totalError();
+    encode(allocator.allocate(met));
+    const double least = totalError();
     if (least > budget)
       throw Error(ErrorCode::failed, "compress.tolerance", "", "",
                   "the tolerance " + std::to_string(options_.tolerance) +
@@ -217,63 +223,94 @@ class Compressor {
     data.header.coefficient_type = options_.coefficient_type;
     data.image_scales = image_scales_;
     data.density_scales = density_scales_;
-    const int basis_bytes = basisElementBytes(options_.method, options_.coefficient_type);
-    const int coefficient_bytes = coefficientElementBytes(options_.coefficient_type);
-    for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
-      EncodedCluster& e = encoded_[c];
-      NdfCluster cluster;
-      cluster.first_basis = data.basis.size() / basis_bytes;
-      cluster.first_coefficient = data.coefficients.size() / coefficient_bytes;
-      cluster.first_scale = data.scales.size();
-      cluster.rank_x = static_cast<std::uint16_t>(e.rank_x);
-      cluster.rank_y = static_cast<std::uint16_t>(e.rank_y);
-      cluster.slice_count = static_cast<std::uint32_t>(index_.sliceCount(c));
-      data.clusters.push_back(cluster);
-      data.basis.insert(data.basis.end(), e.basis.begin(), e.basis.end());
-      data.coefficients.insert(data.coefficients.end(), e.coefficients.begin(), e.coefficients.end());
-      data.scales.insert(data.scales.end(), e.scales.begin(), e.scales.end());
-      if (e.rank_x == 0) makeEmpty(data, c);
-    }
+    numberBlocks(data);
+    const std::size_t blocks = pyramid_.shape.blocksPerImage();
+    for (int region = 0; region < index_.regionCount(); ++region)
+      for (const std::uint16_t block : data.place_blocks) packCluster(region, region * blocks + block, data);
+    data.coefficients.resize(data.coefficients.size() +
+                             static_cast<std::size_t>(kRowPadding) * coefficientElementBytes(options_.coefficient_type));
     packBlockMasses(data);
+    if (std::any_of(encoded_.begin(), encoded_.end(), [](const EncodedCluster& e) { return e.spots > 0; }))
+      data.spot_sums = SpotFinder(index_.sigmaPixels()).sums();
     return data;
+  }
+
+  /// Places for the blocks that any image still has.
+  void numberBlocks(CompressedNdfData& data) const {
+    const std::size_t blocks = pyramid_.shape.blocksPerImage();
+    data.block_places.assign(blocks, kNoBlockPlace);
+    for (std::size_t block = 0; block < blocks; ++block) {
+      bool occurs = false;
+      for (int region = 0; region < index_.regionCount(); ++region) occurs |= !encoded_[region * blocks + block].kept.empty();
+      if (!occurs) continue;
+      data.block_places[block] = static_cast<std::uint16_t>(data.place_blocks.size());
+      data.place_blocks.push_back(static_cast<std::uint16_t>(block));
+    }
+    data.header.places = static_cast<int>(data.place_blocks.size());
+  }
+
+  /// Appends one cluster: its record, mask and factors.
+  void packCluster(int region, std::size_t c, CompressedNdfData& data) {
+    const EncodedCluster& e = encoded_[c];
+    const int coefficient_bytes = coefficientElementBytes(options_.coefficient_type);
+    // Spots begin where their numbers are aligned.
+    if (e.spots > 0) data.coefficients.resize((data.coefficients.size() + 3) / 4 * 4);
+    NdfCluster cluster;
+    cluster.first_basis =
+        static_cast<std::uint32_t>(data.basis.size() / basisElementBytes(options_.method, options_.coefficient_type));
+    cluster.first_coefficient = data.coefficients.size() / coefficient_bytes;
+    cluster.first_scale = static_cast<std::uint32_t>(data.scales.size());
+    cluster.first_word = static_cast<std::uint32_t>(data.masks.size());
+    cluster.slice_count = static_cast<std::uint32_t>(e.kept.size());
+    cluster.columns = static_cast<std::uint16_t>(e.columns);
+    cluster.narrow_columns = static_cast<std::uint16_t>(e.narrow_columns);
+    cluster.rank_x = static_cast<std::uint8_t>(e.rank_x);
+    cluster.rank_y = static_cast<std::uint8_t>(e.rank_y);
+    data.clusters.push_back(cluster);
+    const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+    append(data.basis, e.basis);
+    append(data.coefficients, e.coefficients);
+    append(data.scales, e.scales);
+    append(data.core, e.core);
+    data.masks.resize(data.masks.size() + (index_.slotCount(region) + 63) / 64, 0);
+    for (const std::uint32_t s : e.kept) {
+      const std::uint16_t slot = index_.slot(index_.image(index_.firstSlice(c) + s));
+      data.masks[cluster.first_word + slot / 64] |= std::uint64_t{1} << (slot % 64);
+    }
+    std::uint32_t count = 0;
+    for (std::size_t w = cluster.first_word; w < data.masks.size(); ++w) {
+      data.mask_ranks.push_back(count);
+      count += static_cast<std::uint32_t>(std::popcount(data.masks[w]));
+    }
   }
 
   /// The blocks of every image and their shares of it, from the slices of all clusters.
   void packBlockMasses(CompressedNdfData& data) const {
     // A reader adds up the pixels in another order: its share must not exceed the stored one.
     constexpr float kRounding = 1 + 1e-5f;
-    const std::size_t images = index_.imageCount(), words = pyramid_.shape.maskWords(),
-                      blocks = pyramid_.shape.blocksPerImage();
+    const std::size_t images = index_.imageCount(), blocks = pyramid_.shape.blocksPerImage();
+    const auto places = static_cast<std::size_t>(data.header.places),
+               words = static_cast<std::size_t>(data.header.placeWords());
     const double pixel = 2.0 / pyramid_.shape.resolution;
-    std::vector<float> masses(images * blocks, -1);
+    std::vector<float> masses(images * places, -1);
     for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
-      if (data.clusters[c].slice_count == 0) continue;
       const double unit = pixel * pixel * pyramid_.value_scale * statistics_[c].peak;
-      for (int s = 0; s < index_.sliceCount(c); ++s) {
+      for (const std::uint32_t s : encoded_[c].kept) {
         const std::size_t image = index_.image(index_.firstSlice(c) + s);
-        masses[image * blocks + c % blocks] =
+        masses[image * places + data.block_places[c % blocks]] =
             static_cast<float>(unit * encoded_[c].slices[s].positive * density_scales_[image]) * kRounding;
       }
     }
     data.block_masks.assign(images * words, 0);
     data.first_block.assign(1, 0);
     for (std::size_t image = 0; image < images; ++image) {
-      for (std::size_t b = 0; b < blocks; ++b) {
-        if (masses[image * blocks + b] < 0) continue;
-        data.block_masks[image * words + b / 64] |= std::uint64_t{1} << (b % 64);
-        data.block_masses.push_back(blockMassCode(masses[image * blocks + b]));
+      for (std::size_t k = 0; k < places; ++k) {
+        if (masses[image * places + k] < 0) continue;
+        data.block_masks[image * words + k / 64] |= std::uint64_t{1} << (k % 64);
+        data.block_masses.push_back(blockMassCode(masses[image * places + k]));
       }
       data.first_block.push_back(static_cast<std::uint32_t>(data.block_masses.size()));
     }
-  }
-
-  /// A cluster that a tolerance leaves without columns decodes to 0: for readers, it is empty.
-  static void makeEmpty(CompressedNdfData& data, std::size_t cluster) {
-    const auto words = static_cast<std::ptrdiff_t>(data.header.words_per_cluster);
-    const std::ptrdiff_t first = static_cast<std::ptrdiff_t>(cluster) * words;
-    std::fill_n(data.masks.begin() + first, words, 0);
-    std::fill_n(data.mask_ranks.begin() + first, words, 0);
-    data.clusters[cluster].slice_count = 0;
   }
 
   CompressionReport makeReport(const CompressedNdfData& data) const {
@@ -281,9 +318,13 @@ class Compressor {
     measureLevels(data, report);
     measureBytes(data, report);
     report.unscaled_images = unscaled_images_;
+    for (const EncodedCluster& e : encoded_) {
+      report.spots += e.spots;
+      if (e.spots > 0) report.spot_slices += e.kept.size();
+    }
     for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
       if (index_.sliceCount(c) == 0) continue;
-      const std::size_t columns = encoded_[c].scales.size();
+      const auto columns = static_cast<std::size_t>(encoded_[c].columns);
       if (report.rank_histogram.size() <= columns) report.rank_histogram.resize(columns + 1, 0);
       ++report.rank_histogram[columns];
     }
@@ -320,10 +361,11 @@ class Compressor {
       return array.size() * sizeof(typename std::remove_cvref_t<decltype(array)>::value_type);
     };
     report.basis_bytes = bytes(data.basis);
-    report.coefficient_bytes = bytes(data.coefficients) + bytes(data.scales);
+    report.coefficient_bytes = bytes(data.coefficients) + bytes(data.scales) + bytes(data.spot_sums);
     report.index_bytes = bytes(data.image_regions) + bytes(data.image_slots) + bytes(data.image_scales) + bytes(data.clusters) +
                          bytes(data.masks) + bytes(data.mask_ranks) + bytes(data.density_scales) + bytes(data.block_masks) +
-                         bytes(data.first_block) + bytes(data.block_masses);
+                         bytes(data.first_block) + bytes(data.block_masses) + bytes(data.block_places) +
+                         bytes(data.place_blocks) + bytes(data.core);
     report.total_bytes = report.basis_bytes + report.coefficient_bytes + report.index_bytes;
     const double pixels = static_cast<double>(pyramid_.shape.resolution) * pyramid_.shape.resolution;
     const double dense = static_cast<double>(index_.imageCount()) * pixels * sizeof(float);
@@ -343,6 +385,7 @@ class Compressor {
   Progress progress_;
   std::vector<ClusterStatistics> statistics_;
   double energy_ = 0;
+  double gain_per_byte_ = 0;  ///< error that a byte has to take off
   std::vector<ClusterModel> models_;
   std::vector<EncodedCluster> encoded_;
   std::vector<int> selection_;
@@ -362,6 +405,8 @@ CompressedNdf CompressedNdfData::view() const {
   v.block_masks = block_masks;
   v.first_block = first_block;
   v.block_masses = block_masses;
+  v.block_places = block_places;
+  v.place_blocks = place_blocks;
   v.clusters = clusters;
   v.masks = masks;
   v.mask_ranks = mask_ranks;
@@ -370,6 +415,8 @@ CompressedNdf CompressedNdfData::view() const {
   v.coefficients = coefficients.data();
   v.coefficient_count = coefficients.size() / coefficientElementBytes(header.coefficient_type);
   v.scales = scales;
+  v.core = core;
+  v.spot_sums = spot_sums;
   return v;
 }
 

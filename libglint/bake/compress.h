@@ -14,18 +14,21 @@ namespace glint::bake {
 struct CompressionOptions {
   CompressionMethod method = CompressionMethod::tucker;
 
-  /// Columns of every cluster, 1..256 (fewer where a cluster has no more to give). tucker: the best rank_x * rank_y <= rank.
-  /// Not used when a tolerance is given.
+  /// Columns of every cluster, 1..256 (fewer where a cluster has no more to give). Not used when a tolerance is given.
   int rank = 16;
 
-  /// If > 0: choose the rank of every cluster so that the relative error of all images together, ||D' - D|| / ||D||, is at most
-  /// this and the bytes are as few as possible. Below 1.
+  /// If > 0: choose the columns of every cluster, and with i8 the bits of their coefficients (8 or 4; cp: 8), so that the
+  /// relative
+  /// error of all images together, ||D' - D|| / ||D||, is at most this and the bytes are as few as possible. Below 1.
   double tolerance = 0;
+
+  /// With a tolerance, tucker and pca, i8: store slices as spots where they cost less.
+  bool spots = true;
 
   CoefficientType coefficient_type = CoefficientType::i8;
 
   /// Regions along each axis of the map, 1..255. 0: the default of the method, 8 for cp (Deng 2022, section 4.2) and 1
-  /// otherwise.
+  /// otherwise. With tucker, the first two levels have regions of their own, as the others have together.
   int regions = 0;
 
   double min_improvement = 1e-4;  ///< cp: stop when a sweep improves the relative error of a cluster by less, >= 0
@@ -43,12 +46,14 @@ struct CompressionReport {
   std::vector<CompressionLevelReport> levels;
   CompressionLevelReport total;
   std::uint64_t basis_bytes = 0;
-  std::uint64_t coefficient_bytes = 0;  ///< with the scale of every column
-  std::uint64_t index_bytes = 0;        ///< clusters, masks; regions, slots, scales and block masses of images
+  std::uint64_t coefficient_bytes = 0;  ///< with the scale of every column, and spots
+  std::uint64_t index_bytes = 0;        ///< clusters, masks, core; regions, slots, scales and block masses of images
   std::uint64_t total_bytes = 0;
   double ratio_to_dense = 0;                  ///< bytes of the uncompressed f32 images, empty blocks included, over total_bytes
   double ratio_to_stored = 0;                 ///< bytes of the pyramid as it is stored, over total_bytes
-  std::vector<std::uint64_t> rank_histogram;  ///< [columns]: occupied clusters that have so many columns
+  std::vector<std::uint64_t> rank_histogram;  ///< [columns]: occupied clusters that have so many columns (spots: 0)
+  std::uint64_t spot_slices = 0;              ///< slices that are stored as spots
+  std::uint64_t spots = 0;
   std::uint64_t unscaled_images = 0;  ///< images that decode to half their energy or less, so that they cannot be normalised
 };
 
@@ -60,6 +65,8 @@ class CompressedNdfData {
   std::vector<std::uint16_t> image_slots;
   std::vector<float> image_scales;
   std::vector<float> density_scales;
+  std::vector<std::uint16_t> block_places;
+  std::vector<std::uint16_t> place_blocks;
   std::vector<std::uint64_t> block_masks;
   std::vector<std::uint32_t> first_block;
   std::vector<std::uint8_t> block_masses;
@@ -69,6 +76,8 @@ class CompressedNdfData {
   std::vector<std::byte> basis;         ///< of the element type of CompressedNdf::basis
   std::vector<std::byte> coefficients;  ///< of the element type of CompressedNdf::coefficients
   std::vector<float> scales;
+  std::vector<std::uint8_t> core;
+  std::vector<float> spot_sums;
 
   /// @return what a model queries; valid while this object lives and is not changed
   CompressedNdf view() const;

@@ -5,23 +5,32 @@
 
 #include "glint/bake/compress_cp.h"
 #include "glint/bake/compress_slices.h"
+#include "glint/bake/compress_spots.h"
 
 namespace glint::bake {
 
-/// One rank that a cluster can have, and what it costs.
-struct RankChoice {
-  int rank_x = 0;  ///< as in NdfCluster
-  int rank_y = 0;
-  double error = 0;         ///< squared, before quantisation, stored units
-  std::uint64_t bytes = 0;  ///< bases, coefficients and scales
+/// One size that a cluster can have, and what it costs.
+struct SizeChoice {
+  bool spots = false;       ///< of spots, not of columns
+  int count = 0;            ///< steps of columns (cp: rank), or spots
+  double error = 0;         ///< squared, stored units (cp: a bound of it)
+  std::uint64_t bytes = 0;  ///< bases, coefficients, scales and block masses
 };
 
-/// Real-valued basis of a cluster.
+/// A column of a cluster and the bits of its coefficients.
+struct ClusterColumn {
+  int index = 0;  ///< cp: of the factors; tucker: a + 16 b; pca: of the components
+  int bits = 8;   ///< 4 or 8; the other coefficient types do not look at it
+};
+
+/// What a choice stands for: real-valued basis images, or spots.
 struct ClusterBasis {
-  int rank_x = 0;
+  std::vector<ClusterColumn> columns;  ///< wide ones first
+  int rank_x = 0;                      ///< functions in x and y; pca: images in x
   int rank_y = 0;
-  std::vector<float> x;  ///< cp: X[16][R]; tucker: U[16][rx]; pca: images [256][K]
-  std::vector<float> y;  ///< cp: Y[16][R]; tucker: V[16][ry]; pca: empty
+  std::vector<float> x;           ///< cp: X[16][R]; tucker: U[16][rank_x]; pca: images [256][K]
+  std::vector<float> y;           ///< cp: Y[16][R]; tucker: V[16][rank_y]; pca: empty
+  std::vector<SliceSpots> spots;  ///< of each slice; empty for columns
 };
 
 /// Size and scale of a cluster.
@@ -33,29 +42,44 @@ struct ClusterStatistics {
 /// @throw Error invalid_input if a value is not finite
 ClusterStatistics measureCluster(const SliceIndex& index, std::size_t cluster);
 
-/// A decomposed cluster: the ranks worth choosing, and the basis of each.
+/// A decomposed cluster: the sizes worth choosing, and what each stands for.
 class ClusterModel {
  public:
+  /// @param index       must outlive the model
   /// @param options     a tolerance of 0 gives one choice, `options.rank`; else the choices on the lower convex hull of (bytes,
-  /// error),
-  ///                    starting with no column at all
+  ///                    error), starting with nothing at all
   /// @param negligible  squared error in stored units below which more columns are of no interest (for a tolerance)
   ClusterModel(const SliceIndex& index, std::size_t cluster, const ClusterStatistics& statistics,
                const CompressionOptions& options, double negligible);
 
   /// From few bytes to many; never empty.
-  const std::vector<RankChoice>& choices() const { return choices_; }
+  const std::vector<SizeChoice>& choices() const { return choices_; }
 
+  /// cp: decomposes the cluster.
   /// @param choice  0..choices().size()-1
   ClusterBasis basis(int choice) const;
 
  private:
-  void addChoice(int rank_x, int rank_y, double error);
+  /// A column, or more bits for its coefficients, in the order of gain per byte.
+  struct Step {
+    int column;
+    int bits;
+    double gain;
+    double bytes;
+  };
+
+  void addColumnSteps(int column, const float* coefficients, double basis_bytes);
+  void addStepChoices(double error);
+  void addSpots(const SliceIndex& index, double negligible);
+  void addSpotChoices(const SpotFinder& finder, std::vector<float> rests);
+  std::vector<float> project(const SliceIndex& index, const std::vector<float>& images, int count) const;
   void keepHull();
-  void decomposeTucker(const SliceIndex& index, const CompressionOptions& options);
+  void decomposeTucker(const SliceIndex& index, const CompressionOptions& options, double negligible);
   void decomposePca(const SliceIndex& index, const CompressionOptions& options, double negligible);
-  void decomposeCpRanks(const SliceIndex& index, const CompressionOptions& options, double negligible);
+  void boundCpRanks(const SliceIndex& index, const CompressionOptions& options, double negligible);
+  CpFactors decompose(int rank) const;
   TuckerAxes analyseAxes(const SliceIndex& index) const;
+  std::vector<ClusterColumn> columnsAfter(int steps) const;
 
   CompressionMethod method_;
   CoefficientType type_;
@@ -63,10 +87,15 @@ class ClusterModel {
   int slice_count_;
   float peak_;
   double energy_;  // of the slices divided by peak_
-  std::vector<RankChoice> choices_;
-  TuckerAxes axes_;                 // tucker
-  std::vector<float> components_;   // pca: [K][256], orthonormal
-  std::vector<CpFactors> factors_;  // cp: one for each rank tried
+  const SliceIndex* index_;
+  double min_improvement_;
+  int max_iterations_;
+  std::vector<SizeChoice> choices_;
+  std::vector<Step> steps_;        // tucker, pca
+  std::vector<SliceSpots> spots_;  // of each slice, falling gains
+  std::vector<float> spot_gains_;  // of all spots, falling
+  TuckerAxes axes_;                // tucker, cp
+  std::vector<float> components_;  // pca: [K][256], orthonormal
 };
 
 }  // namespace glint::bake

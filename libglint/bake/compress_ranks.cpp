@@ -33,6 +33,12 @@ std::vector<int> RankAllocator::allocate(double squared_error) const {
   return selection;
 }
 
+double RankAllocator::gainPerByte(double squared_error) const {
+  double gain = 0;
+  for (std::size_t i = 0; i < steps_.size() && errors_[i] > squared_error; ++i) gain = steps_[i].gain_per_byte;
+  return gain;
+}
+
 double RankAllocator::error(const std::vector<int>& selection) const {
   double sum = 0;
   for (std::size_t c = 0; c < models_.size(); ++c) sum += models_[c].choices()[selection[c]].error;

@@ -19,8 +19,14 @@ class RankAllocator {
   /// @return choice of each cluster; the last of each if even that has a larger error
   std::vector<int> allocate(double squared_error) const;
 
+  /// Squared error that the last byte of allocate(squared_error) takes off.
+  double gainPerByte(double squared_error) const;
+
   /// Sum of the errors of a selection, before quantisation.
   double error(const std::vector<int>& selection) const;
+
+  /// Error without any step.
+  double largestError() const { return errors_.front(); }
 
   /// Error with all steps taken.
   double smallestError() const { return errors_.back(); }

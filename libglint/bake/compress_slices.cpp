@@ -55,7 +55,8 @@ void checkShape(const PyramidShape& shape) {
 
 }  // namespace
 
-SliceIndex::SliceIndex(const NdfPyramid& pyramid, int regions) : pyramid_(pyramid), regions_(regions) {
+SliceIndex::SliceIndex(const NdfPyramid& pyramid, int regions, int level_groups)
+    : pyramid_(pyramid), regions_(regions), level_groups_(std::min(level_groups, pyramid.shape.level_count)) {
   checkShape(pyramid.shape);
   for (int l = 0; l < pyramid.shape.level_count; ++l) checkLevel(pyramid, l);
   assignImages();
@@ -65,24 +66,24 @@ SliceIndex::SliceIndex(const NdfPyramid& pyramid, int regions) : pyramid_(pyrami
 void SliceIndex::assignImages() {
   const PyramidShape& shape = pyramid_.shape;
   first_image_.push_back(0);
-  std::vector<std::uint32_t> next_slot(static_cast<std::size_t>(regions_) * regions_, 0);
+  region_slots_.assign(static_cast<std::size_t>(regions_) * regions_ * level_groups_, 0);
   for (int l = 0; l < shape.level_count; ++l) {
     const PyramidGrid& grid = shape.levels[l];
     for (int j = 0; j < grid.rows; ++j) {
       for (int i = 0; i < grid.columns; ++i) {
-        const int region =
-            regionOf(j, grid.stride, shape.height, regions_) * regions_ + regionOf(i, grid.stride, shape.width, regions_);
+        const int row = regionOf(j, grid.stride, shape.height, regions_),
+                  column = regionOf(i, grid.stride, shape.width, regions_);
+        const int region = (std::min(l, level_groups_ - 1) * regions_ + row) * regions_ + column;
         image_regions_.push_back(static_cast<std::uint16_t>(region));
-        slots_.push_back(static_cast<std::uint16_t>(next_slot[region]++));
+        slots_.push_back(static_cast<std::uint16_t>(region_slots_[region]++));
       }
     }
     first_image_.push_back(static_cast<std::uint32_t>(slots_.size()));
   }
-  const std::uint32_t most = *std::max_element(next_slot.begin(), next_slot.end());
+  const std::uint32_t most = *std::max_element(region_slots_.begin(), region_slots_.end());
   if (most > std::numeric_limits<std::uint16_t>::max() + 1u)
     throw Error(ErrorCode::usage, "compress.regions", "", "",
                 "a region holds " + std::to_string(most) + " images, and 65536 is the limit", "ask for more regions");
-  words_per_cluster_ = static_cast<int>((most + 63) / 64);
 }
 
 void SliceIndex::assignSlices() {
@@ -102,7 +103,7 @@ void SliceIndex::assignSlices() {
       }
     }
   };
-  first_slices_.assign(static_cast<std::size_t>(regions_) * regions_ * blocks + 1, 0);
+  first_slices_.assign(region_slots_.size() * blocks + 1, 0);
   forEachBlock([&](std::size_t cluster, std::uint32_t, std::uint64_t) { ++first_slices_[cluster + 1]; });
   for (std::size_t c = 1; c < first_slices_.size(); ++c) first_slices_[c] += first_slices_[c - 1];
   images_.resize(first_slices_.back());
@@ -135,25 +136,10 @@ void SliceIndex::load(std::size_t cluster, int first, int count, float factor, f
 void SliceIndex::describe(CompressedNdfData& data) const {
   CompressedNdf& header = data.header;
   header.shape = pyramid_.shape;
-  header.region_columns = header.region_rows = regions_;
-  header.words_per_cluster = words_per_cluster_;
+  header.regions = regionCount();
   std::copy(first_image_.begin(), first_image_.end() - 1, header.first_image);
   data.image_regions = image_regions_;
   data.image_slots = slots_;
-  data.masks.assign(clusterCount() * words_per_cluster_, 0);
-  data.mask_ranks.assign(data.masks.size(), 0);
-  for (std::size_t c = 0; c < clusterCount(); ++c) {
-    std::uint64_t* mask = data.masks.data() + c * words_per_cluster_;
-    for (std::uint64_t s = first_slices_[c]; s < first_slices_[c + 1]; ++s) {
-      const std::uint16_t slot = slots_[images_[s]];
-      mask[slot / 64] |= std::uint64_t{1} << (slot % 64);
-    }
-    std::uint32_t count = 0;
-    for (int w = 0; w < words_per_cluster_; ++w) {
-      data.mask_ranks[c * words_per_cluster_ + w] = count;
-      count += static_cast<std::uint32_t>(std::popcount(mask[w]));
-    }
-  }
 }
 
 }  // namespace glint::bake

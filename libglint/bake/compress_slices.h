@@ -18,9 +18,20 @@ inline constexpr int kPanelSlices = 256;
 /// Densities are divided by the largest magnitude of the cluster, so that kernels in float neither overflow nor underflow.
 class SliceIndex {
  public:
-  /// @param regions  per axis, 1..255
+  /// @param regions       per axis, 1..255
+  /// @param level_groups  levels in regions of their own, the last with all coarser ones; >= 1
   /// @throw Error usage if a region has more than 65536 images, invalid_input if the arrays of the pyramid do not fit its shape
-  SliceIndex(const NdfPyramid& pyramid, int regions);
+  SliceIndex(const NdfPyramid& pyramid, int regions, int level_groups);
+
+  int regionCount() const { return static_cast<int>(region_slots_.size()); }
+  /// @return images of a region
+  std::uint32_t slotCount(int region) const { return region_slots_[region]; }
+  /// @return slot of an image in its region
+  std::uint16_t slot(std::uint32_t image) const { return slots_[image]; }
+  /// @return pixels of an image in a unit of area of the disk's square
+  double pixelsPerArea() const { return 0.25 * pyramid_.shape.resolution * pyramid_.shape.resolution; }
+  /// @return deviation of a facet's image, pixels
+  float sigmaPixels() const { return pyramid_.shape.sigma_r * 0.5f * static_cast<float>(pyramid_.shape.resolution); }
 
   std::size_t clusterCount() const { return first_slices_.size() - 1; }
   std::size_t imageCount() const { return slots_.size(); }
@@ -35,7 +46,7 @@ class SliceIndex {
   /// @param out  [count][kSliceStride]; the padding is not written
   void load(std::size_t cluster, int first, int count, float factor, float* out) const;
 
-  /// Fills the shape, regions, slots, masks and mask ranks of `data`.
+  /// Fills the shape, regions and slots of `data`.
   void describe(CompressedNdfData& data) const;
 
  private:
@@ -45,7 +56,8 @@ class SliceIndex {
 
   const NdfPyramid& pyramid_;
   int regions_;
-  int words_per_cluster_ = 0;
+  int level_groups_;
+  std::vector<std::uint32_t> region_slots_;   // [regions]: images
   std::vector<std::uint32_t> first_image_;    // [levels + 1]
   std::vector<std::uint16_t> image_regions_;  // [images]
   std::vector<std::uint16_t> slots_;          // [images]

@@ -38,7 +38,7 @@ static_assert(sizeof(PackedGrid) == 16);
 enum class PackedKind : std::uint32_t { normals = 0, pyramid = 1, compressed = 2 };
 
 inline constexpr std::uint32_t kPackedMagic = 0x6e6c6721;  // "!gln"
-inline constexpr std::uint32_t kPackedVersion = 1;
+inline constexpr std::uint32_t kPackedVersion = 2;
 inline constexpr std::size_t kPackedAlignment = 64;
 /// Arrays of a level of a pyramid, and of a compressed one: as many as PackedHeader::arrays has places for.
 inline constexpr int kPackedArrays = 4 * kMaxPyramidLevels;
@@ -59,9 +59,9 @@ struct PackedHeader {
   std::uint32_t element_type;                                //  48  pyramid: BlockPrecision; compressed: CoefficientType
   std::uint32_t method;                                      //  52  compressed: CompressionMethod
   float value_scale;                                         //  56  pyramid
-  std::int32_t region_columns;                               //  60  compressed
-  std::int32_t region_rows;                                  //  64
-  std::int32_t words_per_cluster;                            //  68
+  std::int32_t regions;                                      //  60  compressed
+  std::int32_t places;                                       //  64
+  std::uint32_t unused;                                      //  68  0
   std::int32_t bounds_level_count;                           //  72  of the normals
   float texel_size_um;                                       //  76
   PackedGrid levels[kMaxPyramidLevels];                      //   80
@@ -74,12 +74,12 @@ struct PackedHeader {
   std::uint32_t reserved[11];                                //  852  0
   /// 896. Pyramid: masks, first_block, block_means and pixels of level l at 4 l. Compressed: image_regions, image_slots,
   /// image_scales, clusters, masks, mask_ranks, basis, coefficients, scales, density_scales,
-  /// block_masks, first_block, block_masses.
+  /// block_masks, first_block, block_masses, block_places, place_blocks, core, spot_sums.
   PackedArray arrays[kPackedArrays];
 };
 static_assert(offsetof(PackedHeader, size_bytes) == 8 && offsetof(PackedHeader, kind) == 16);
 static_assert(offsetof(PackedHeader, sigma_r) == 32 && offsetof(PackedHeader, element_type) == 48);
-static_assert(offsetof(PackedHeader, region_rows) == 64 && offsetof(PackedHeader, levels) == 80);
+static_assert(offsetof(PackedHeader, places) == 64 && offsetof(PackedHeader, levels) == 80);
 static_assert(offsetof(PackedHeader, bounds_columns) == 336 && offsetof(PackedHeader, bounds_rows) == 416);
 static_assert(offsetof(PackedHeader, normals) == 496 && offsetof(PackedHeader, bounds) == 512);
 static_assert(offsetof(PackedHeader, slope_mean) == 832 && offsetof(PackedHeader, arrays) == 896);

@@ -5,10 +5,35 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "glint/query/cluster_basis.h"
+#include "glint/model/compressed_ndf.h"
 #include "glint/query/float4.h"
+#include "glint/query/half.h"
+#include "glint/query/pyramid_slices.h"
 
 namespace glint {
+
+/// Columns of the largest cluster: a block has no more pixels.
+inline constexpr int kMaxColumns = kBlockPixels;
+
+/// Where a projection holds the columns of a cluster, so that groups of four of them meet groups of four of a row: wide
+/// columns, then the narrow ones of low and of high halves, each padded by zeros.
+struct ColumnLayout {
+  GLINT_HD explicit ColumnLayout(const NdfCluster& cluster)
+      : columns(cluster.columns),
+        wide(cluster.columns - cluster.narrow_columns),
+        half((cluster.narrow_columns + 1) / 2),
+        low((wide + 3) & ~3),
+        high(low + ((half + 3) & ~3)) {}
+
+  /// Floats of the largest projection.
+  static constexpr int kMost = kMaxColumns + 16;
+
+  /// Where column k is.
+  GLINT_HD int at(int k) const { return k < wide ? k : k - wide < half ? low + (k - wide) : high + (k - wide - half); }
+
+  int columns, wide, half;
+  int low, high;  ///< first narrow column of each half
+};
 
 /// Calls four(k) for whole groups of four columns, so that every column below `columns` is in one; the last group may overlap the
 /// one before. Fewer than four columns are visited by one(k).
@@ -23,8 +48,7 @@ GLINT_HD void forEachColumn(int columns, Four&& four, One&& one) {
   if (k < columns) four(columns - 4);
 }
 
-/// What reads the factors of clusters: Basis is the stored type of prefix sums, Coefficient that of coefficients. Every function
-/// reads only elements of its cluster.
+/// What reads the factors of clusters of columns: Basis is the stored type of prefix sums, Coefficient that of coefficients.
 template <class Basis, class Coefficient>
 class ClusterReader {
  public:
@@ -33,83 +57,93 @@ class ClusterReader {
   using Row = const Coefficient*;
 
   /// Coefficients of a slice.
-  GLINT_HD Row row(const NdfCluster& cluster, std::uint64_t slice, int columns) const {
-    return static_cast<Row>(ndf_.coefficients) + cluster.first_coefficient + slice * static_cast<std::uint64_t>(columns);
+  GLINT_HD Row row(const NdfCluster& cluster, std::uint64_t slice) const {
+    return static_cast<Row>(ndf_.coefficients) + cluster.first_coefficient +
+           slice * static_cast<std::uint64_t>(rowElements(cluster));
   }
 
-  /// projection[k] = scaled column k at one pixel.
+  /// projection = scaled columns at one pixel, as ColumnLayout says.
   GLINT_HD void pixel(const NdfCluster& cluster, int x, int y, float* projection) const {
     const Basis* basis = first(cluster);
-    const float* scales = ndf_.scales.data() + cluster.first_scale;
-    const int rx = cluster.rank_x, ry = cluster.rank_y;
+    const int columns = cluster.columns;
     if (ndf_.method == CompressionMethod::cp) {
-      const Basis *at_x = basis + x * rx, *at_y = basis + (kBlockSize + y) * rx;
+      const Basis *at_x = basis + x * columns, *at_y = basis + (kBlockSize + y) * columns;
       forEachColumn(
-          rx,
-          [&](int k) {
-            (Float4::load(scales + k) * axis4(at_x + k, rx, x > 0) * axis4(at_y + k, rx, y > 0)).store(projection + k);
-          },
-          [&](int k) { projection[k] = scales[k] * axis(at_x + k, rx, x > 0) * axis(at_y + k, rx, y > 0); });
+          columns, [&](int k) { (axis4(at_x + k, columns, x > 0) * axis4(at_y + k, columns, y > 0)).store(projection + k); },
+          [&](int k) { projection[k] = axis(at_x + k, columns, x > 0) * axis(at_y + k, columns, y > 0); });
     } else if (ndf_.method == CompressionMethod::tucker) {
-      const Basis *at_x = basis + x * rx, *at_y = basis + kBlockSize * rx + y * ry;
-      for (int a = 0; a < rx; ++a) {
-        const float value = axis(at_x + a, rx, x > 0);
-        float* row = projection + a * ry;
-        const float* row_scales = scales + a * ry;
-        forEachColumn(
-            ry, [&](int b) { (Float4::load(row_scales + b) * Float4::all(value) * axis4(at_y + b, ry, y > 0)).store(row + b); },
-            [&](int b) { row[b] = row_scales[b] * value * axis(at_y + b, ry, y > 0); });
-      }
+      const int rx = cluster.rank_x, ry = cluster.rank_y;
+      float along_x[kBlockSize], along_y[kBlockSize];
+      axisColumns(basis + x * rx, rx, x > 0, along_x);
+      axisColumns(basis + kBlockSize * rx + y * ry, ry, y > 0, along_y);
+      combineCore(cluster, along_x, along_y, projection);
     } else {
-      const Basis* at = basis + (y * kBlockSize + x) * rx;
+      const Basis* at = basis + (y * kBlockSize + x) * columns;
       forEachColumn(
-          rx, [&](int k) { (Float4::load(scales + k) * image4(at + k, rx, x > 0, y > 0)).store(projection + k); },
-          [&](int k) { projection[k] = scales[k] * image(at + k, rx, x > 0, y > 0); });
+          columns, [&](int k) { image4(at + k, columns, x > 0, y > 0).store(projection + k); },
+          [&](int k) { projection[k] = image(at + k, columns, x > 0, y > 0); });
     }
+    scaleAndArrange(cluster, projection);
   }
 
-  /// The last group of four of a projection, without what whole groups before it hold.
-  GLINT_HD Float4 lastColumns(const float* projection, int columns) const {
-    if (columns < 4 || columns % 4 == 0) return Float4::zero();
-    float last[4];
-    for (int k = 0; k < 4; ++k) last[k] = k < 4 - columns % 4 ? 0.0f : projection[columns - 4 + k];
-    return Float4::load(last);
+  /// projection = sums of scaled columns over a part of the block, as ColumnLayout says.
+  GLINT_HD void box(const NdfCluster& cluster, const BlockBox& b, float* projection) const {
+    const Basis* basis = first(cluster);
+    const int columns = cluster.columns;
+    if (ndf_.method == CompressionMethod::pca) {
+      std::fill(projection, projection + columns, 0.0f);
+      addCorner(basis, columns, b.x1, b.y1, 1, projection);
+      addCorner(basis, columns, b.x0, b.y1, -1, projection);
+      addCorner(basis, columns, b.x1, b.y0, -1, projection);
+      addCorner(basis, columns, b.x0, b.y0, 1, projection);
+    } else if (ndf_.method == CompressionMethod::cp) {
+      float along_y[kMaxColumns];
+      sumAlongAxis(basis, columns, b.x0, b.x1, projection);
+      sumAlongAxis(basis + kBlockSize * columns, columns, b.y0, b.y1, along_y);
+      for (int k = 0; k < columns; ++k) projection[k] *= along_y[k];
+    } else {
+      float along_x[kBlockSize], along_y[kBlockSize];
+      sumAlongAxis(basis, cluster.rank_x, b.x0, b.x1, along_x);
+      sumAlongAxis(basis + kBlockSize * cluster.rank_x, cluster.rank_y, b.y0, b.y1, along_y);
+      combineCore(cluster, along_x, along_y, projection);
+    }
+    scaleAndArrange(cluster, projection);
   }
 
   /// Dot product of a projection with the coefficients of a slice.
-  /// @param last  lastColumns(projection, columns)
-  GLINT_HD float dot(const float* projection, Float4 last, Row c, int columns) const {
-    if (columns < 4) {
-      float sum = 0;
-      for (int k = 0; k < columns; ++k) sum += projection[k] * value(c[k]);
-      return sum;
+  /// @note reads up to three elements after the row, which meet zeros
+  GLINT_HD float dot(const float* projection, const ColumnLayout& layout, Row c) const {
+    Float4 sum = Float4::zero();
+    for (int k = 0; k < layout.wide; k += 4) sum = sum + Float4::load(projection + k) * Float4::load(c + k);
+    if constexpr (std::is_same_v<Coefficient, std::int8_t>) {
+      const std::int8_t* narrow = c + layout.wide;
+      for (int j = 0; j < layout.half; j += 4) {
+        sum = sum + Float4::load(projection + layout.low + j) * Float4::loadLow(narrow + j);
+        sum = sum + Float4::load(projection + layout.high + j) * Float4::loadHigh(narrow + j);
+      }
     }
-    Float4 sum = last * Float4::load(c + (columns - 4));
-    for (int k = 0; k + 4 <= columns; k += 4) sum = sum + Float4::load(projection + k) * Float4::load(c + k);
     return sum.sum();
   }
 
   /// All pixels of a slice, [16][16], negative ones taken as 0.
-  GLINT_HD void block(const NdfCluster& cluster, Row c, int columns, float* pixels) const {
-    const float* scales = ndf_.scales.data() + cluster.first_scale;
+  GLINT_HD void block(const NdfCluster& cluster, Row c, float* pixels) const {
     float scaled[kMaxColumns];
-    for (int k = 0; k < columns; ++k) scaled[k] = scales[k] * value(c[k]);
+    scaledCoefficients(cluster, c, scaled);
     if (ndf_.method == CompressionMethod::pca) return sumImages(cluster, scaled, pixels);
     const bool cp = ndf_.method == CompressionMethod::cp;
-    const int rx = cluster.rank_x, ry = cp ? rx : cluster.rank_y;
+    const int rx = cp ? cluster.columns : cluster.rank_x, ry = cp ? rx : cluster.rank_y;
     float along_x[kMaxColumns * kBlockSize], along_y[kMaxColumns * kBlockSize];  // [rank][16]
     valuesOfAxis(first(cluster), rx, along_x);
     valuesOfAxis(first(cluster) + kBlockSize * rx, ry, along_y);
     float weights[kMaxColumns * kBlockSize];  // [rank_x][16]: of the functions of x in each row
-    for (int a = 0; a < rx; ++a) {
+    if (!cp) std::fill(weights, weights + rx * kBlockSize, 0.0f);
+    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
+    for (int k = 0; k < cluster.columns; ++k) {
+      const int a = cp ? k : core[k] % kBlockSize, b = cp ? k : core[k] / kBlockSize;
       for (int y = 0; y < kBlockSize; y += 4) {
-        Float4 sum = Float4::zero();
-        if (cp) {
-          sum = Float4::all(scaled[a]) * Float4::load(along_y + a * kBlockSize + y);
-        } else {
-          for (int b = 0; b < ry; ++b) sum = sum + Float4::all(scaled[a * ry + b]) * Float4::load(along_y + b * kBlockSize + y);
-        }
-        sum.store(weights + a * kBlockSize + y);
+        const Float4 product = Float4::all(scaled[k]) * Float4::load(along_y + b * kBlockSize + y);
+        float* weight = weights + a * kBlockSize + y;
+        (cp ? product : Float4::load(weight) + product).store(weight);
       }
     }
     for (int y = 0; y < kBlockSize; ++y) {
@@ -126,6 +160,41 @@ class ClusterReader {
   GLINT_HD const Basis* first(const NdfCluster& cluster) const {
     return static_cast<const Basis*>(ndf_.basis) + cluster.first_basis;
   }
+
+  /// tucker: the column of each pair of functions.
+  GLINT_HD void combineCore(const NdfCluster& cluster, const float* along_x, const float* along_y, float* projection) const {
+    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
+    for (int k = 0; k < cluster.columns; ++k) projection[k] = along_x[core[k] % kBlockSize] * along_y[core[k] / kBlockSize];
+  }
+
+  /// Multiplies columns by their scales, and moves them to where ColumnLayout wants them.
+  GLINT_HD void scaleAndArrange(const NdfCluster& cluster, float* projection) const {
+    const float* scales = ndf_.scales.data() + cluster.first_scale;
+    const ColumnLayout layout(cluster);
+    int k4 = 0;
+    for (; k4 + 4 <= layout.columns; k4 += 4)
+      (Float4::load(scales + k4) * Float4::load(projection + k4)).store(projection + k4);
+    for (; k4 < layout.columns; ++k4) projection[k4] *= scales[k4];
+    // From the end: no column is moved down.
+    for (int k = layout.columns - 1; k >= layout.wide; --k) projection[layout.at(k)] = projection[k];
+    const int low_end = layout.low + layout.half, high_end = layout.high + layout.columns - layout.wide - layout.half;
+    for (int k = layout.wide; k < layout.low; ++k) projection[k] = 0;
+    for (int k = low_end; k < layout.high; ++k) projection[k] = 0;
+    for (int k = high_end; k < layout.high + ((layout.half + 3) & ~3); ++k) projection[k] = 0;
+  }
+
+  GLINT_HD void scaledCoefficients(const NdfCluster& cluster, Row c, float* scaled) const {
+    const float* scales = ndf_.scales.data() + cluster.first_scale;
+    const ColumnLayout layout(cluster);
+    for (int k = 0; k < layout.wide; ++k) scaled[k] = scales[k] * value(c[k]);
+    if constexpr (std::is_same_v<Coefficient, std::int8_t>) {
+      for (int k = layout.wide; k < layout.columns; ++k) {
+        const int j = k - layout.wide;
+        scaled[k] = scales[k] * static_cast<float>(j < layout.half ? lowHalf(c[k]) : highHalf(c[k - layout.half]));
+      }
+    }
+  }
+
   static GLINT_HD float value(Coefficient c) {
     if constexpr (std::is_same_v<Coefficient, std::uint16_t>)
       return halfToFloat(c);
@@ -140,6 +209,11 @@ class ClusterReader {
   static GLINT_HD Float4 axis4(const Basis* at, int rank, bool inner) {
     return inner ? Float4::load(at) - Float4::load(at - rank) : Float4::load(at);
   }
+  static GLINT_HD void axisColumns(const Basis* at, int rank, bool inner, float* values) {
+    forEachColumn(
+        rank, [&](int k) { axis4(at + k, rank, inner).store(values + k); },
+        [&](int k) { values[k] = axis(at + k, rank, inner); });
+  }
 
   /// The same for prefix sums over both axes of a block.
   static GLINT_HD float image(const Basis* at, int rank, bool inner_x, bool inner_y) {
@@ -149,6 +223,37 @@ class ClusterReader {
   static GLINT_HD Float4 image4(const Basis* at, int rank, bool inner_x, bool inner_y) {
     const Float4 here = axis4(at, rank, inner_x);
     return inner_y ? here - axis4(at - kBlockSize * rank, rank, inner_x) : here;
+  }
+
+  /// sums[k] = sum of column k over [low, high] of one block axis, from its inclusive prefix sums [16][columns]. Pixels at the
+  /// ends count by their covered part.
+  static GLINT_HD void sumAlongAxis(const Basis* prefix, int columns, float low, float high, float* sums) {
+    const int l = std::min(static_cast<int>(low), kBlockSize - 1), h = std::min(static_cast<int>(high), kBlockSize - 1);
+    const float fl = low - static_cast<float>(l), fh = high - static_cast<float>(h);
+    // Sum up to x = (1 - f) * prefix before its pixel + f * prefix after it.
+    const Basis* l0 = l > 0 ? prefix + (l - 1) * columns : nullptr;
+    const Basis* h0 = h > 0 ? prefix + (h - 1) * columns : nullptr;
+    const Basis* l1 = prefix + l * columns;
+    const Basis* h1 = prefix + h * columns;
+    for (int k = 0; k < columns; ++k) {
+      const float before =
+          (l0 ? (1 - fl) * static_cast<float>(l0[k]) : 0.0f) + (fl > 0 ? fl * static_cast<float>(l1[k]) : 0.0f);
+      const float after = (h0 ? (1 - fh) * static_cast<float>(h0[k]) : 0.0f) + fh * static_cast<float>(h1[k]);
+      sums[k] = after - before;
+    }
+  }
+
+  /// sums[k] += weight * sum of image k over [0, x] x [0, y], from its 2D prefix sums [16][16][columns]: bilinear between them.
+  static GLINT_HD void addCorner(const Basis* prefix, int columns, float x, float y, float weight, float* sums) {
+    const int px = std::min(static_cast<int>(x), kBlockSize - 1), py = std::min(static_cast<int>(y), kBlockSize - 1);
+    const float fx = x - static_cast<float>(px), fy = y - static_cast<float>(py);
+    for (int corner = 0; corner < 4; ++corner) {
+      const int cx = px - 1 + (corner & 1), cy = py - 1 + (corner >> 1);
+      const float w = weight * (corner & 1 ? fx : 1 - fx) * (corner & 2 ? fy : 1 - fy);
+      if (w == 0 || cx < 0 || cy < 0) continue;
+      const Basis* row = prefix + (cy * kBlockSize + cx) * columns;
+      for (int k = 0; k < columns; ++k) sums[k] += w * static_cast<float>(row[k]);
+    }
   }
 
   /// values[k][t] = column k at pixel t of an axis.
@@ -163,9 +268,17 @@ class ClusterReader {
     }
   }
 
+  /// The last group of four, without what whole groups before it hold.
+  static GLINT_HD Float4 lastColumns(const float* values, int columns) {
+    if (columns < 4 || columns % 4 == 0) return Float4::zero();
+    float last[4];
+    for (int k = 0; k < 4; ++k) last[k] = k < 4 - columns % 4 ? 0.0f : values[columns - 4 + k];
+    return Float4::load(last);
+  }
+
   /// pca: sums the prefix sums of all columns first, and takes differences once.
   GLINT_HD void sumImages(const NdfCluster& cluster, const float* scaled, float* pixels) const {
-    const int columns = cluster.rank_x;
+    const int columns = cluster.columns;
     const Basis* at = first(cluster);
     const Float4 last = lastColumns(scaled, columns);
     float above[kBlockSize + 1] = {}, here[kBlockSize + 1] = {};

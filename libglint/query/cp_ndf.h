@@ -3,24 +3,26 @@
 #include "glint/model/compressed_ndf.h"
 #include "glint/query/bits.h"
 #include "glint/query/block_mass.h"
-#include "glint/query/cluster_basis.h"
 #include "glint/query/cluster_slices.h"
 #include "glint/query/pyramid_slices.h"
 #include "glint/query/reference.h"
 #include "glint/query/sampling.h"
+#include "glint/query/spots.h"
 
 namespace glint {
 
 /// The NDF from a compressed pyramid: tensor rank (CP), Tucker-2 or PCA (Deng 2022, sections 4.2 to 4.4).
 ///
 /// Chooses images as PyramidNdf does. Pixels are sums of products of few factors, and so are sums over boxes of pixels, from
-/// prefix sums (Eq. 6 and 7).
+/// prefix sums (Eq. 6 and 7). Where few facets make up the slices, they are sums of few spots and an even rest instead.
 ///
 /// The density of an image is what the approximation leaves above zero, scaled to integrate to 1, and constant over a pixel. The
 /// mean is a difference of prefix sums, so it counts what lies below zero, is scaled to integrate to 1 with that, and only the
 /// result is clamped: it is the exact average of `signedDensity`, and of `density` where nothing is negative.
 /// Thread-safe, allocates nothing; the arrays must outlive it.
 class CpNdf {
+  static constexpr int kMaxBlocksPerAxis = 64;  // of 1024 pixels, the largest image
+
  public:
   GLINT_HD explicit CpNdf(const CompressedNdf& ndf) : ndf_(ndf) {}
   GLINT_HD CpNdf(const CompressedNdf& ndf, const NormalMap& normals)
@@ -56,8 +58,8 @@ class CpNdf {
     if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
     const PyramidSlices chosen = selectSlices(shape(), p);
     const PixelPlace place = pixelPlace(shape(), h);
-    return blockValue(chosen, place.block, [&](const auto& projector, const NdfCluster& cluster, float* projection) {
-      return projector.pixel(cluster, place.x, place.y, projection);
+    return withReader(ndf_, [&](const auto& reader) {
+      return sumSlices(chosen, place.block, ndf_.image_scales.data(), PixelOf<decltype(reader)>{reader, place}, Signed{});
     });
   }
 
@@ -65,19 +67,21 @@ class CpNdf {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
     if (below_.hasMap() && belowFinest(shape(), p)) return below_.mean(p, range);
     const PyramidSlices chosen = selectSlices(shape(), p);
-    double sum = 0;
-    forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
-      sum += blockValue(chosen, block, [&](const auto& projector, const NdfCluster& cluster, float* projection) {
-        return projector.box(cluster, box, projection);
+    return withReader(ndf_, [&](const auto& reader) {
+      double sum = 0;
+      forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
+        sum += sumSlices(chosen, block, ndf_.image_scales.data(), BoxOf<decltype(reader)>{reader, box}, Signed{});
       });
+      return static_cast<float>(sum / areaInPixels(shape(), range));
     });
-    return static_cast<float>(sum / areaInPixels(shape(), range));
   }
 
  private:
-  /// A slice of a cluster. cluster: ~0 when the image has nothing in the block.
+  static constexpr std::size_t kNone = ~std::size_t{0};
+
+  /// A slice of a cluster. cluster: kNone when the image has nothing in the block.
   struct SlicePlace {
-    std::size_t cluster = ~std::size_t{0};
+    std::size_t cluster = kNone;
     std::uint64_t slice = 0;
   };
 
@@ -85,43 +89,137 @@ class CpNdf {
     return std::size_t{ndf_.first_image[slice.level]} + slice.image;
   }
 
-  GLINT_HD SlicePlace findSlice(std::size_t image, int block) const {
-    const std::size_t at = static_cast<std::size_t>(ndf_.image_regions.data()[image]) * shape().blocksPerImage() + block;
+  /// @param block_place  as in CompressedNdf
+  GLINT_HD SlicePlace findSlice(std::size_t image, int block_place) const {
+    const std::size_t at =
+        static_cast<std::size_t>(ndf_.image_regions.data()[image]) * static_cast<std::size_t>(ndf_.places) + block_place;
     const int slot = ndf_.image_slots.data()[image];
-    const std::size_t word = at * ndf_.words_per_cluster + slot / 64;
+    const std::size_t word = ndf_.clusters.data()[at].first_word + static_cast<std::size_t>(slot / 64);
     const std::uint64_t mask = ndf_.masks.data()[word], bit = std::uint64_t{1} << (slot % 64);
     if (!(mask & bit)) return {};
     return {at, ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(setBits(mask & (bit - 1)))};
   }
 
-  /// Weighted sum over the chosen images. Slices of the same cluster, as those of neighbours mostly are, share its projection.
+  /// Negative values of a slice: kept, or taken as 0.
+  struct Signed {
+    GLINT_HD float operator()(float value) const { return value; }
+  };
+  struct Positive {
+    GLINT_HD float operator()(float value) const { return std::max(0.0f, value); }
+  };
+
+  /// What is asked of a block: one pixel, or the sum over a box of pixels.
   template <class Reader>
-  GLINT_HD float pixelDensity(const Reader& reader, const PyramidSlices& chosen, const PixelPlace& place) const {
+  struct PixelOf {
+    Reader reader;
+    PixelPlace place;
+    GLINT_HD void project(const NdfCluster& cluster, float* projection) const {
+      reader.pixel(cluster, place.x, place.y, projection);
+    }
+    GLINT_HD float spots(const SpotProfile& profile, const SpotList& list) const {
+      return spotsAt(profile, list, place.x, place.y);
+    }
+  };
+  template <class Reader>
+  struct BoxOf {
+    Reader reader;
+    BlockBox box;
+    GLINT_HD void project(const NdfCluster& cluster, float* projection) const { reader.box(cluster, box, projection); }
+    GLINT_HD float spots(const SpotProfile& profile, const SpotList& list) const { return spotsIn(profile, list, box); }
+  };
+
+  /// Weighted sum over the chosen images. Slices of the same cluster, as those of neighbours mostly are, share its projection.
+  /// @param scales  of images
+  /// @param ask     PixelOf or BoxOf
+  /// @param part    Signed or Positive
+  template <class Ask, class Part>
+  GLINT_HD float sumSlices(const PyramidSlices& chosen, int block, const float* scales, const Ask& ask, Part part) const {
+    const int block_place = ndf_.block_places.data()[block];
+    if (block_place == kNoBlockPlace) return 0;
     SlicePlace places[PyramidSlices::kMost];
     float weights[PyramidSlices::kMost];
     for (int k = 0; k < chosen.count; ++k) {
       const std::size_t image = imageOf(chosen.slices[k]);
-      places[k] = findSlice(image, place.block);
-      weights[k] = chosen.slices[k].weight * ndf_.density_scales.data()[image];
+      places[k] = findSlice(image, block_place);
+      weights[k] = chosen.slices[k].weight * scales[image];
     }
-    constexpr std::size_t kNone = ~std::size_t{0};
-    float projection[kMaxColumns];
     float sum = 0;
     for (int first = 0; first < chosen.count; ++first) {
       const std::size_t at = places[first].cluster;
       if (at == kNone) continue;
       const NdfCluster& cluster = ndf_.clusters.data()[at];
-      const int columns = columnCount(ndf_, cluster);
-      reader.pixel(cluster, place.x, place.y, projection);
-      const Float4 last = reader.lastColumns(projection, columns);
-      for (int k = first; k < chosen.count; ++k) {
-        if (places[k].cluster != at) continue;
-        sum +=
-            weights[k] * std::max(0.0f, reader.dot(projection, last, reader.row(cluster, places[k].slice, columns), columns));
-        places[k].cluster = kNone;
+      const auto addUp = [&](auto&& value) {
+        for (int k = first; k < chosen.count; ++k) {
+          if (places[k].cluster != at) continue;
+          sum += weights[k] * part(value(places[k].slice));
+          places[k].cluster = kNone;
+        }
+      };
+      if (cluster.columns == 0) {
+        const SpotProfile profile(ndf_);
+        addUp([&](std::uint64_t slice) { return ask.spots(profile, spotsOf(ndf_, cluster, slice)); });
+      } else {
+        float projection[ColumnLayout::kMost];
+        ask.project(cluster, projection);
+        const ColumnLayout layout(cluster);
+        addUp([&](std::uint64_t slice) { return ask.reader.dot(projection, layout, ask.reader.row(cluster, slice)); });
       }
     }
     return sum;
+  }
+
+  template <class Reader>
+  GLINT_HD float pixelDensity(const Reader& reader, const PyramidSlices& chosen, const PixelPlace& place) const {
+    return sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<const Reader&>{reader, place}, Positive{});
+  }
+
+  /// All pixels of a slice, [16][16], >= 0.
+  template <class Reader>
+  GLINT_HD void decodeBlock(const Reader& reader, const SlicePlace& at, float* pixels) const {
+    const NdfCluster& cluster = ndf_.clusters.data()[at.cluster];
+    if (cluster.columns == 0)
+      spotsOfBlock(SpotProfile(ndf_), spotsOf(ndf_, cluster, at.slice), pixels);
+    else
+      reader.block(cluster, reader.row(cluster, at.slice), pixels);
+  }
+
+  /// Chooses a block with a slice in proportion to its stored mass: its row with xi.y, its column with xi.x.
+  /// @param codes  masses of the blocks of the image
+  /// @return block -1 if the image has none
+  GLINT_HD BlockChoice chooseStored(std::size_t image, const std::uint8_t* codes, int count, Vec2& xi) const {
+    const int blocks = shape().blocksPerAxis();
+    const std::uint64_t* mask = ndf_.block_masks.data() + image * static_cast<std::size_t>(ndf_.placeWords());
+    const auto mass = [&](int begin, int end) {
+      std::uint32_t units = 0;
+      for (int k = begin; k < end; ++k) units += blockMassUnits(codes[k]);
+      return static_cast<float>(units);
+    };
+    int begins[kMaxBlocksPerAxis + 1], rows = 0, n = 0, row = -1;
+    for (int w = 0; w < ndf_.placeWords(); ++w) {
+      for (std::uint64_t bits = mask[w]; bits != 0; bits &= bits - 1, ++n) {
+        const int block_row = ndf_.place_blocks.data()[64 * w + lowestBit(bits)] / blocks;
+        if (block_row != row) begins[rows++] = n;
+        row = block_row;
+      }
+    }
+    begins[rows] = count;
+    const int r = chooseIndex(
+        rows, mass(0, count), [&](int k) { return mass(begins[k], begins[k + 1]); }, xi.y);
+    if (r < 0) return {};
+    const int begin = begins[r], end = begins[r + 1];
+    const int k = chooseIndex(
+        end - begin, mass(begin, end), [&](int j) { return mass(begin + j, begin + j + 1); }, xi.x);
+    const int rank = begin + std::max(k, 0);
+    return {ndf_.place_blocks.data()[placeOfRank(mask, rank)], rank};
+  }
+
+  /// Number of the set bit that has `rank` set bits below it.
+  static GLINT_HD int placeOfRank(const std::uint64_t* mask, int rank) {
+    int w = 0;
+    for (int bits = setBits(mask[0]); bits <= rank; bits = setBits(mask[++w])) rank -= bits;
+    std::uint64_t word = mask[w];
+    for (; rank > 0; --rank) word &= word - 1;
+    return 64 * w + lowestBit(word);
   }
 
   /// A pixel of an image, in proportion to the image's density. x = -1 if there is none.
@@ -130,23 +228,14 @@ class CpNdf {
     constexpr int kTries = 4;  // the last is kept: one in a million
     const std::uint32_t* first = ndf_.first_block.data() + image;
     const std::uint8_t* codes = ndf_.block_masses.data() + first[0];
-    const auto mass = [&](int begin, int end) {
-      std::uint32_t units = 0;
-      for (int k = begin; k < end; ++k) units += blockMassUnits(codes[k]);
-      return static_cast<float>(units);
-    };
-    const float total = mass(0, static_cast<int>(first[1] - first[0]));
-    const std::uint64_t* mask = ndf_.block_masks.data() + image * shape().maskWords();
     const float to_units = 0x1p18f * 4 * ndf_.density_scales.data()[image] /
                            (static_cast<float>(shape().resolution) * static_cast<float>(shape().resolution));
     for (int tries = 1;; ++tries) {
-      const BlockChoice choice = chooseBlock(mask, shape().blocksPerAxis(), total, mass, xi);
-      const SlicePlace at = choice.block < 0 ? SlicePlace{} : findSlice(image, choice.block);
-      if (at.cluster == ~std::size_t{0}) return {0, -1, -1};
-      const NdfCluster& cluster = ndf_.clusters.data()[at.cluster];
-      const int columns = columnCount(ndf_, cluster);
+      const BlockChoice choice = chooseStored(image, codes, static_cast<int>(first[1] - first[0]), xi);
+      const SlicePlace at = choice.block < 0 ? SlicePlace{} : findSlice(image, ndf_.block_places.data()[choice.block]);
+      if (at.cluster == kNone) return {0, -1, -1};
       float pixels[kBlockPixels];
-      reader.block(cluster, reader.row(cluster, at.slice, columns), columns, pixels);
+      decodeBlock(reader, at, pixels);
       const BlockSums sums = sumRows(pixels);
       const float kept = std::min(1.0f, sums.total * to_units / static_cast<float>(blockMassUnits(codes[choice.rank])));
       if (xi.y < kept || tries == kTries) {
@@ -155,40 +244,6 @@ class CpNdf {
       }
       xi.y = clampUnit((xi.y - kept) / (1 - kept));
     }
-  }
-
-  /// Signed: weighted sum over slices of one block. The coefficients of slices of the same cluster, as neighbours mostly are, are blended
-  /// first and meet the cluster's projection once.
-  template <class Project>
-  GLINT_HD float blockValue(const PyramidSlices& chosen, int block, Project&& project) const {
-    constexpr std::size_t kNone = ~std::size_t{0};
-    float blend[kMaxColumns];
-    std::size_t current = kNone;
-    float sum = 0;
-    const auto finishCluster = [&] {
-      if (current == kNone) return;
-      const NdfCluster& cluster = ndf_.clusters.data()[current];
-      float projection[kMaxColumns];
-      const int columns = withProjector(ndf_, [&](const auto& projector) { return project(projector, cluster, projection); });
-      sum += dotProduct(projection, blend, columns);
-    };
-    for (int k = 0; k < chosen.count; ++k) {
-      const PyramidSlice& slice = chosen.slices[k];
-      const std::size_t image = imageOf(slice);
-      const auto [at, row] = findSlice(image, block);
-      if (at == kNone) continue;
-      const NdfCluster& cluster = ndf_.clusters.data()[at];
-      const int columns = columnCount(ndf_, cluster);
-      if (at != current) {
-        finishCluster();
-        current = at;
-        std::fill(blend, blend + columns, 0.0f);
-      }
-      addCoefficients(ndf_, cluster.first_coefficient + row * columns, slice.weight * ndf_.image_scales.data()[image], columns,
-                      blend);
-    }
-    finishCluster();
-    return sum;
   }
 
   CompressedNdf ndf_;
@@ -206,7 +261,8 @@ inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) cons
     weights[k] = ndf_.density_scales.data()[imageOf(chosen.slices[k])] > 0 ? chosen.slices[k].weight : 0.0f;
     total += weights[k];
   }
-  const int k = chooseIndex(chosen.count, total, [&](int i) { return weights[i]; }, xi.x);
+  const int k = chooseIndex(
+      chosen.count, total, [&](int i) { return weights[i]; }, xi.x);
   if (k < 0) return {};
   return withReader(ndf_, [&](const auto& reader) -> HalfVectorSample {
     const PixelPlace place = choosePlace(reader, imageOf(chosen.slices[k]), xi);

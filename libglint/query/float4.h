@@ -14,6 +14,10 @@
 
 namespace glint {
 
+/// Signed numbers of four bits in the halves of a byte.
+inline GLINT_HD std::int8_t lowHalf(std::int8_t byte) { return static_cast<std::int8_t>(((byte & 15) ^ 8) - 8); }
+inline GLINT_HD std::int8_t highHalf(std::int8_t byte) { return static_cast<std::int8_t>(byte >> 4); }
+
 /// Four floats side by side, from SSE4.1 where the program is compiled for it. Results are the same bits without it.
 struct Float4 {
 #if defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(__CUDA__)
@@ -23,11 +27,12 @@ struct Float4 {
   static Float4 all(float x) { return {_mm_set1_ps(x)}; }
   static Float4 of(float a, float b, float c, float d) { return {_mm_setr_ps(a, b, c, d)}; }
   static Float4 load(const float* p) { return {_mm_loadu_ps(p)}; }
-  static Float4 load(const std::int8_t* p) {
+  static __m128i bytes(const std::int8_t* p) {
     std::int32_t four;
     std::memcpy(&four, p, sizeof four);
-    return {_mm_cvtepi32_ps(_mm_cvtepi8_epi32(_mm_cvtsi32_si128(four)))};
+    return _mm_cvtepi8_epi32(_mm_cvtsi32_si128(four));
   }
+  static Float4 load(const std::int8_t* p) { return {_mm_cvtepi32_ps(bytes(p))}; }
   static Float4 load(const std::int16_t* p) {
     return {_mm_cvtepi32_ps(_mm_cvtepi16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))))};
   }
@@ -55,6 +60,9 @@ struct Float4 {
     const __m128 normal = _mm_castsi128_ps(_mm_add_epi32(_mm_slli_epi32(bits, 13), _mm_set1_epi32(112 << 23)));
     return {_mm_min_ps(normal, _mm_sub_ps(_mm_add_ps(normal, normal), _mm_set1_ps(0x1p-14f)))};
   }
+  /// Signed numbers of four bits, from the low and the high halves of four bytes.
+  static Float4 loadLow(const std::int8_t* p) { return {_mm_cvtepi32_ps(_mm_srai_epi32(_mm_slli_epi32(bytes(p), 28), 28))}; }
+  static Float4 loadHigh(const std::int8_t* p) { return {_mm_cvtepi32_ps(_mm_srai_epi32(bytes(p), 4))}; }
   void store(float* p) const { _mm_storeu_ps(p, v); }
 
   friend Float4 operator+(Float4 a, Float4 b) { return {_mm_add_ps(a.v, b.v)}; }
@@ -101,6 +109,15 @@ struct Float4 {
   static GLINT_HD Float4 loadPositive(const std::uint16_t* p) { return load(p); }
   static GLINT_HD Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
     return {{halfToFloat(a), halfToFloat(b), halfToFloat(c), halfToFloat(d)}};
+  }
+  /// Signed numbers of four bits, from the low and the high halves of four bytes.
+  static GLINT_HD Float4 loadLow(const std::int8_t* p) {
+    const std::int8_t low[4] = {lowHalf(p[0]), lowHalf(p[1]), lowHalf(p[2]), lowHalf(p[3])};
+    return load(low);
+  }
+  static GLINT_HD Float4 loadHigh(const std::int8_t* p) {
+    const std::int8_t high[4] = {highHalf(p[0]), highHalf(p[1]), highHalf(p[2]), highHalf(p[3])};
+    return load(high);
   }
   GLINT_HD void store(float* p) const {
     for (int k = 0; k < 4; ++k) p[k] = v[k];

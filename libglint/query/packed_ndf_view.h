@@ -64,9 +64,8 @@ class PackedNdfView {
     out.shape = shape();
     out.method = static_cast<CompressionMethod>(header_.method);
     out.coefficient_type = static_cast<CoefficientType>(header_.element_type);
-    out.region_columns = header_.region_columns;
-    out.region_rows = header_.region_rows;
-    out.words_per_cluster = header_.words_per_cluster;
+    out.regions = header_.regions;
+    out.places = header_.places;
     for (int l = 0; l < header_.level_count; ++l) out.first_image[l] = header_.levels[l].first_image;
     out.image_regions = array<std::uint16_t>(arrays[0]);
     out.image_slots = array<std::uint16_t>(arrays[1]);
@@ -83,6 +82,10 @@ class PackedNdfView {
     out.block_masks = array<std::uint64_t>(arrays[10]);
     out.first_block = array<std::uint32_t>(arrays[11]);
     out.block_masses = array<std::uint8_t>(arrays[12]);
+    out.block_places = array<std::uint16_t>(arrays[13]);
+    out.place_blocks = array<std::uint16_t>(arrays[14]);
+    out.core = array<std::uint8_t>(arrays[15]);
+    out.spot_sums = array<float>(arrays[16]);
     return out;
   }
 

@@ -43,22 +43,57 @@ def pyramid_image(file, level, i, j):
     return image
 
 
-def basis_images(method, basis, cluster):
+def basis_images(method, file, cluster):
     """[K][16][16], rows y."""
-    p, rx, ry = int(cluster["first_basis"]), int(cluster["rank_x"]), int(cluster["rank_y"])
+    basis = file["basis"]
+    p, k, rx, ry = (int(cluster[name]) for name in ("first_basis", "columns", "rank_x", "rank_y"))
 
     def functions(at, rank):
         sums = basis[at : at + 16 * rank].astype(np.float64).reshape(16, rank)
         return np.diff(sums, axis=0, prepend=0)
 
     if method == "cp":
-        x, y = functions(p, rx), functions(p + 16 * rx, rx)
-        return np.einsum("xk,yk->kyx", x, y)
+        return np.einsum("xk,yk->kyx", functions(p, k), functions(p + 16 * k, k))
     if method == "tucker":
-        u, v = functions(p, rx), functions(p + 16 * rx, ry)
-        return np.einsum("xa,yb->abyx", u, v).reshape(rx * ry, 16, 16)
-    sums = basis[p : p + 256 * rx].astype(np.float64).reshape(16, 16, rx)
+        core = file["core"][int(cluster["first_scale"]) :][:k]
+        u, v = functions(p, rx)[:, core % 16], functions(p + 16 * rx, ry)[:, core // 16]
+        return np.einsum("xk,yk->kyx", u, v)
+    sums = basis[p : p + 256 * k].astype(np.float64).reshape(16, 16, k)
     return np.diff(np.diff(sums, axis=0, prepend=0), axis=1, prepend=0).transpose(2, 0, 1)
+
+
+def coefficients_of(file, cluster, slice_index):
+    """[K]: wide ones, then those of 4 bits."""
+    k, narrow = int(cluster["columns"]), int(cluster["narrow_columns"])
+    wide, half = k - narrow, (narrow + 1) // 2
+    first = int(cluster["first_coefficient"]) + slice_index * (wide + half)
+    row = file["coefficients"][first : first + wide + half]
+    if narrow == 0:
+        return row.astype(np.float64)
+    packed = row[wide:].view(np.uint8).astype(int)
+    halves = np.concatenate([packed & 15, packed >> 4])[:narrow]
+    return np.concatenate([row[:wide].astype(np.float64), np.where(halves < 8, halves, halves - 16)])
+
+
+def spots_block(file, cluster, slice_index):
+    """[16][16] of a slice of spots."""
+    n = int(cluster["slice_count"])
+    data = file["coefficients"][int(cluster["first_coefficient"]) :].view(np.uint8)
+    groups = -(-n // 16)
+    before = data[: 4 * groups].view("<u4")
+    counts, rests = data[4 * groups :][:n].astype(int), data[4 * groups + n :][:n]
+    first = counts[: slice_index // 16 * 16].sum()
+    assert first == before[slice_index // 16]
+    first += counts[slice_index // 16 * 16 : slice_index].sum()
+    spots = data[4 * groups + -(-2 * n // 4) * 4 + 4 * first :][: 4 * counts[slice_index]].reshape(-1, 4)
+    weight_scale, rest_scale = file["scales"][int(cluster["first_scale"]) :][:2].astype(np.float64)
+    rest = (rests[slice_index : slice_index + 1].astype(np.uint16) * 64).view(np.float16)[0]
+    block = np.full((16, 16), rest_scale * float(rest))
+    edges = 8 * np.arange(17) + 176
+    for x, y, low, high in spots.astype(int):
+        along = [np.diff(file["spot_sums"][...].astype(np.float64)[edges - place]) for place in (x, y)]
+        block += weight_scale * (low + 256 * high) * np.outer(along[1], along[0])
+    return block
 
 
 def compressed_image(file, m):
@@ -67,27 +102,32 @@ def compressed_image(file, m):
     method = text(file.attrs["method"])
     region, slot = int(file["image_regions"][m]), int(file["image_slots"][m])
     image = np.zeros((resolution, resolution))
-    for b in range(per_axis**2):
-        word = int(file["masks"][region, b, slot // 64])
+    for place, b in enumerate(file["place_blocks"][...].astype(int)):
+        assert file["block_places"][b] == place
+        cluster = file["clusters"][region, place]
+        at = int(cluster["first_word"]) + slot // 64
+        word = int(file["masks"][at])
         if not (word >> (slot % 64)) & 1:
             continue
         below = bin(word & ((1 << (slot % 64)) - 1)).count("1")
-        slice_index = int(file["mask_ranks"][region, b, slot // 64]) + below
-        cluster = file["clusters"][region, b]
-        images = basis_images(method, file["basis"], cluster)
-        count = len(images)
-        first = int(cluster["first_coefficient"]) + slice_index * count
-        coefficients = file["coefficients"][first : first + count].astype(np.float64)
-        scales = file["scales"][int(cluster["first_scale"]) : int(cluster["first_scale"]) + count].astype(np.float64)
+        slice_index = int(file["mask_ranks"][at]) + below
+        count = int(cluster["columns"])
+        if count == 0:
+            block = spots_block(file, cluster, slice_index)
+        else:
+            scales = file["scales"][int(cluster["first_scale"]) : int(cluster["first_scale"]) + count].astype(np.float64)
+            images = basis_images(method, file, cluster)
+            block = np.tensordot(scales * coefficients_of(file, cluster, slice_index), images, axes=1)
         y, x = 16 * (b // per_axis), 16 * (b % per_axis)
-        image[y : y + 16, x : x + 16] = np.tensordot(scales * coefficients, images, axes=1)
+        image[y : y + 16, x : x + 16] = block
     return image * file["image_scales"][m]
 
 
 def block_shares(file, m):
     """Stored shares of the blocks of an image, by block."""
     blocks = (file.attrs["resolution"] // 16) ** 2
-    bits = [b for b in range(blocks) if int(file["block_masks"][m, b // 64]) >> (b % 64) & 1]
+    stored = enumerate(file["place_blocks"][...].astype(int))
+    bits = [b for place, b in stored if int(file["block_masks"][m, place // 64]) >> (place % 64) & 1]
     first, last = (int(file["first_block"][k]) for k in (m, m + 1))
     codes = file["block_masses"][first:last].astype(np.uint16) * 64
     assert len(bits) == len(codes)
@@ -142,6 +182,8 @@ def test_pyramid():
         ("cp-i8", (3.49882889, 3.00286174, 2.97668457)),
         ("tucker-f16", (4.83468008, 3.82640028, 3.10592413)),
         ("pca-i8", (3.49882889, 3.0028615, 2.97668457)),
+        ("narrow-i8", (4.72693872, 3.72354555, 3.08629251)),
+        ("spots-i8", (0.513697445, 0.513941109, 0.515995741)),
         ("cp-f32", (3.49453115, 3.00421071, 2.98451018)),
     ],
 )

@@ -105,6 +105,8 @@ double blockMean(const Image& image, int block) {
   return sum / kBlockPixels;
 }
 
+constexpr double kSampleSpot = 0.64;  // pixels
+
 /// Two functions along an axis of a block, orthogonal: a constant and a slope.
 double axisFunction(int k, int x) { return k == 0 ? 1 : (x - 7.5) / 7.5; }
 
@@ -169,7 +171,7 @@ std::vector<double> basisSums(CompressionMethod method) {
 int columnsOf(CompressionMethod method) { return method == CompressionMethod::tucker ? 4 : 3; }
 
 /// Adds the coefficients of one cluster, [slices][columns], and its scales.
-void addCoefficients(SampleCompressed& sample, const std::vector<std::vector<double>>& slices) {
+void addCoefficients(SampleCompressed& sample, const std::vector<std::vector<double>>& slices, std::size_t narrow) {
   const CompressionMethod method = sample.ndf.method;
   const double unit = method == CompressionMethod::pca ? kBasisUnit : kBasisUnit * kBasisUnit;
   const auto columns = static_cast<std::size_t>(columnsOf(method));
@@ -177,12 +179,15 @@ void addCoefficients(SampleCompressed& sample, const std::vector<std::vector<dou
   for (std::size_t c = 0; c < columns; ++c) {
     double most = 0;
     for (const auto& slice : slices) most = std::max(most, std::abs(slice[c]));
-    if (sample.ndf.coefficient_type == CoefficientType::i8) steps[c] = most > 0 ? most / 127 : 1;
+    const double peak = c < columns - narrow ? 127 : 7;
+    if (sample.ndf.coefficient_type == CoefficientType::i8) steps[c] = most > 0 ? most / peak : 1;
     sample.scales.push_back(static_cast<float>(steps[c] / unit));
+    if (method == CompressionMethod::tucker) sample.core.push_back(static_cast<std::uint8_t>(c / 2 + 16 * (c % 2)));
   }
   for (const auto& slice : slices) {
     for (std::size_t c = 0; c < columns; ++c) {
       const double value = slice[c] / steps[c];
+      if (c >= columns - narrow) continue;
       switch (sample.ndf.coefficient_type) {
         case CoefficientType::i8:
           sample.coefficients_i8.push_back(static_cast<std::int8_t>(std::lround(value)));
@@ -195,7 +200,34 @@ void addCoefficients(SampleCompressed& sample, const std::vector<std::vector<dou
           break;
       }
     }
+    if (narrow == 0) continue;
+    const auto bits = [&](std::size_t c) { return static_cast<unsigned>(std::lround(slice[c] / steps[c])) & 15u; };
+    sample.coefficients_i8.push_back(static_cast<std::int8_t>(bits(columns - 2) | bits(columns - 1) << 4));
   }
+}
+
+/// Every slice as a spot that holds half of it, at a place of its own, and an even rest.
+void addSpotSlices(SampleCompressed& sample, const std::vector<double>& means) {
+  auto& bytes = sample.coefficients_i8;
+  const auto append = [&](const auto& value) {
+    const auto* first = reinterpret_cast<const std::int8_t*>(&value);
+    bytes.insert(bytes.end(), first, first + sizeof value);
+  };
+  const double most = *std::max_element(means.begin(), means.end());
+  sample.scales.push_back(static_cast<float>(most * kBlockPixels / 2 / 65535));
+  sample.scales.push_back(static_cast<float>(most / 2));
+  sample.core.insert(sample.core.end(), 2, 0);
+  for (std::size_t first = 0; first < means.size(); first += kSpotGroup) append(static_cast<std::uint32_t>(first));
+  for (std::size_t s = 0; s < means.size(); ++s) append(std::uint8_t{1});
+  for (const double mean : means) {
+    int code = 0;
+    while (halfToFloat(static_cast<std::uint16_t>(code << 6)) < mean / most) ++code;
+    append(static_cast<std::uint8_t>(code));
+  }
+  while (bytes.size() % sizeof(NdfSpot) != 0) append(std::uint8_t{0});
+  for (std::size_t s = 0; s < means.size(); ++s)
+    append(NdfSpot{static_cast<std::uint8_t>(20 + 7 * (s % 20)), static_cast<std::uint8_t>(60 + 5 * (s % 20)),
+                   static_cast<std::uint16_t>(std::lround(65535 * means[s] / most))});
 }
 
 std::uint64_t coefficientCount(const SampleCompressed& sample) {
@@ -214,11 +246,14 @@ void addBasis(SampleCompressed& sample) {
   }
 }
 
-void addCluster(SampleCompressed& sample, const std::vector<const Image*>& slots, int block) {
+void addCluster(SampleCompressed& sample, const std::vector<const Image*>& slots, int block, SampleForm form) {
   NdfCluster cluster;
-  cluster.first_basis = sample.basis_i16.size() + sample.basis_i32.size() + sample.basis_f32.size();
+  if (form == SampleForm::spots) sample.coefficients_i8.resize((sample.coefficients_i8.size() + 3) / 4 * 4);
+  cluster.first_basis = static_cast<std::uint32_t>(sample.basis_i16.size() + sample.basis_i32.size() + sample.basis_f32.size());
   cluster.first_coefficient = coefficientCount(sample);
-  cluster.first_scale = sample.scales.size();
+  cluster.first_scale = static_cast<std::uint32_t>(sample.scales.size());
+  cluster.first_word = static_cast<std::uint32_t>(sample.masks.size());
+  std::vector<double> means;
   std::vector<std::vector<double>> slices;
   std::uint64_t mask = 0;
   for (std::size_t slot = 0; slot < slots.size(); ++slot) {
@@ -232,13 +267,17 @@ void addCluster(SampleCompressed& sample, const std::vector<const Image*>& slots
       slice.push_back(projection(*slots[slot], block, k, l));
     }
     slices.push_back(slice);
+    means.push_back(blockMean(*slots[slot], block));
   }
   cluster.slice_count = static_cast<std::uint32_t>(slices.size());
-  if (!slices.empty()) {
-    cluster.rank_x = sample.ndf.method == CompressionMethod::tucker ? 2 : 3;
-    cluster.rank_y = sample.ndf.method == CompressionMethod::tucker ? 2 : 0;
+  if (!slices.empty() && form == SampleForm::spots) {
+    addSpotSlices(sample, means);
+  } else if (!slices.empty()) {
+    cluster.columns = static_cast<std::uint16_t>(columnsOf(sample.ndf.method));
+    cluster.narrow_columns = form == SampleForm::narrow ? 2 : 0;
+    cluster.rank_x = cluster.rank_y = sample.ndf.method == CompressionMethod::tucker ? 2 : 0;
     addBasis(sample);
-    addCoefficients(sample, slices);
+    addCoefficients(sample, slices, cluster.narrow_columns);
   }
   sample.clusters.push_back(cluster);
   sample.masks.push_back(mask);
@@ -258,6 +297,10 @@ void linkSpans(SampleCompressed& sample) {
   ndf.masks = sample.masks;
   ndf.mask_ranks = sample.mask_ranks;
   ndf.scales = sample.scales;
+  ndf.core = sample.core;
+  ndf.block_places = sample.block_places;
+  ndf.place_blocks = sample.place_blocks;
+  ndf.spot_sums = sample.spot_sums;
   ndf.basis = !sample.basis_i16.empty()   ? static_cast<const void*>(sample.basis_i16.data())
               : !sample.basis_i32.empty() ? static_cast<const void*>(sample.basis_i32.data())
                                           : sample.basis_f32.data();
@@ -292,13 +335,15 @@ double basisValue(const CompressedNdf& ndf, const NdfCluster& cluster, int colum
     const auto here = sum(first + static_cast<std::uint64_t>(t * rank + c));
     return t == 0 ? here : here - sum(first + static_cast<std::uint64_t>((t - 1) * rank + c));
   };
-  const int rx = cluster.rank_x;
-  const int ry = cluster.rank_y;
+  const bool tucker = ndf.method == CompressionMethod::tucker;
+  const int rx = tucker ? cluster.rank_x : cluster.columns, ry = tucker ? cluster.rank_y : cluster.columns;
   switch (ndf.method) {
     case CompressionMethod::cp:
       return at(0, rx, x, column) * at(static_cast<std::uint64_t>(kBlockSize * rx), rx, y, column);
-    case CompressionMethod::tucker:
-      return at(0, rx, x, column / ry) * at(static_cast<std::uint64_t>(kBlockSize * rx), ry, y, column % ry);
+    case CompressionMethod::tucker: {
+      const int pair = ndf.core[cluster.first_scale + static_cast<std::uint64_t>(column)];
+      return at(0, rx, x, pair % kBlockSize) * at(static_cast<std::uint64_t>(kBlockSize * rx), ry, y, pair / kBlockSize);
+    }
     default: {
       const auto table = [&](int tx, int ty) {
         return tx < 0 || ty < 0 ? 0.0 : sum(static_cast<std::uint64_t>((ty * kBlockSize + tx) * rx + column));
@@ -306,6 +351,30 @@ double basisValue(const CompressedNdf& ndf, const NdfCluster& cluster, int colum
       return table(x, y) - table(x - 1, y) - table(x, y - 1) + table(x - 1, y - 1);
     }
   }
+}
+
+double coefficientValue(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t slice, int column) {
+  const std::uint64_t row = cluster.first_coefficient + slice * static_cast<std::uint64_t>(rowElements(cluster));
+  const int narrow = column - (cluster.columns - cluster.narrow_columns);
+  if (narrow < 0) return coefficientElement(ndf, row + static_cast<std::uint64_t>(column));
+  // The samples have two narrow columns, in one byte.
+  const auto byte = static_cast<std::uint8_t>(
+      coefficientElement(ndf, row + static_cast<std::uint64_t>(cluster.columns - cluster.narrow_columns)) + 256);
+  const int bits = narrow == 0 ? byte & 15 : byte >> 4;
+  return bits < 8 ? bits : bits - 16;
+}
+
+/// Density of a slice of spots at a pixel of its block. The samples have one spot in each.
+double spotValue(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t slice, int x, int y) {
+  const auto* bytes = static_cast<const std::uint8_t*>(ndf.coefficients) + cluster.first_coefficient;
+  const NdfSpot spot = reinterpret_cast<const NdfSpot*>(bytes + firstSpotOffset(cluster.slice_count))[slice];
+  const auto share = [&](int pixel, int place) {
+    const float* edge = &ndf.spot_sums[static_cast<std::size_t>(kSpotSteps * pixel + kLastSpotPlace - place)];
+    return static_cast<double>(edge[kSpotSteps] - edge[0]);
+  };
+  const std::uint8_t code = bytes[spotCountsOffset(cluster.slice_count) + cluster.slice_count + slice];
+  return ndf.scales[cluster.first_scale] * spot.weight * share(x, spot.x) * share(y, spot.y) +
+         ndf.scales[cluster.first_scale + 1] * static_cast<double>(halfToFloat(static_cast<std::uint16_t>(code << 6)));
 }
 
 /// The share of each block in the positive part of its image, rounded up to a code: the first that is not below.
@@ -457,15 +526,25 @@ SamplePyramid samplePyramid(int size, BlockPrecision precision) {
   return sample;
 }
 
-SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type) {
+SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type, SampleForm form) {
   SampleCompressed sample;
   const SampleNormals normals = sampleNormals(size, size, false);
   CompressedNdf& ndf = sample.ndf;
   ndf.shape = sampleShape(size);
   ndf.method = method;
   ndf.coefficient_type = type;
-  ndf.region_columns = 2;
-  ndf.words_per_cluster = 1;
+  ndf.regions = 2;
+  ndf.places = ndf.shape.blocksPerImage();
+  for (std::uint16_t block = 0; block < ndf.places; ++block) {
+    sample.block_places.push_back(block);
+    sample.place_blocks.push_back(block);
+  }
+  if (form == SampleForm::spots) {
+    for (int k = 0; k < kSpotSums; ++k) {
+      const double pixels = static_cast<double>(k - kSpotSums / 2) / kSpotSteps;
+      sample.spot_sums.push_back(static_cast<float>(0.5 * std::erfc(-pixels / (kSampleSpot * std::sqrt(2.0)))));
+    }
+  }
   std::vector<Image> images;
   std::vector<std::vector<std::size_t>> region_images(2);
   for (int l = 0; l < ndf.shape.level_count; ++l) {
@@ -483,8 +562,11 @@ SampleCompressed sampleCompressed(int size, CompressionMethod method, Coefficien
   for (const auto& members : region_images) {
     std::vector<const Image*> slots;
     for (const std::size_t image : members) slots.push_back(&images[image]);
-    for (int block = 0; block < ndf.shape.blocksPerImage(); ++block) addCluster(sample, slots, block);
+    for (int block = 0; block < ndf.shape.blocksPerImage(); ++block) addCluster(sample, slots, block, form);
   }
+  sample.coefficients_i8.resize(type == CoefficientType::i8 ? sample.coefficients_i8.size() + kRowPadding : 0);
+  sample.coefficients_f16.resize(type == CoefficientType::f16 ? sample.coefficients_f16.size() + kRowPadding : 0);
+  sample.coefficients_f32.resize(type == CoefficientType::f32 ? sample.coefficients_f32.size() + kRowPadding : 0);
   sample.image_scales.assign(images.size(), 1);
   linkSpans(sample);
   for (std::size_t k = 0; k < images.size(); ++k) {
@@ -726,21 +808,18 @@ float pyramidPixel(const NdfPyramid& pyramid, int level, int image, int x, int y
 float compressedPixel(const CompressedNdf& ndf, int image, int x, int y) {
   const auto k = static_cast<std::size_t>(image);
   const int block = y / kBlockSize * ndf.shape.blocksPerAxis() + x / kBlockSize;
-  const auto c = static_cast<std::size_t>(ndf.image_regions[k] * ndf.shape.blocksPerImage() + block);
+  const auto c =
+      static_cast<std::size_t>(ndf.image_regions[k] * ndf.places + ndf.block_places[static_cast<std::size_t>(block)]);
+  const NdfCluster& cluster = ndf.clusters[c];
   const int slot = ndf.image_slots[k];
-  const std::size_t word = c * static_cast<std::size_t>(ndf.words_per_cluster) + static_cast<std::size_t>(slot / 64);
+  const std::size_t word = cluster.first_word + static_cast<std::size_t>(slot / 64);
   if ((ndf.masks[word] >> (slot % 64) & 1u) == 0) return 0;
   const std::uint64_t below = ndf.masks[word] & ((std::uint64_t{1} << (slot % 64)) - 1);
   const auto slice = ndf.mask_ranks[word] + static_cast<std::uint64_t>(std::popcount(below));
-  const NdfCluster& cluster = ndf.clusters[c];
-  const int columns = ndf.method == CompressionMethod::tucker ? cluster.rank_x * cluster.rank_y : cluster.rank_x;
-  double density = 0;
-  for (int column = 0; column < columns; ++column) {
-    const auto at = static_cast<std::uint64_t>(column);
-    density += ndf.scales[cluster.first_scale + at] *
-               coefficientElement(ndf, cluster.first_coefficient + slice * static_cast<std::uint64_t>(columns) + at) *
-               basisValue(ndf, cluster, column, x % kBlockSize, y % kBlockSize);
-  }
+  double density = cluster.columns == 0 ? spotValue(ndf, cluster, slice, x % kBlockSize, y % kBlockSize) : 0;
+  for (int column = 0; column < cluster.columns; ++column)
+    density += ndf.scales[cluster.first_scale + static_cast<std::uint64_t>(column)] *
+               coefficientValue(ndf, cluster, slice, column) * basisValue(ndf, cluster, column, x % kBlockSize, y % kBlockSize);
   return static_cast<float>(density * ndf.image_scales[k]);
 }
 

@@ -67,7 +67,18 @@ struct SampleCompressed {
   std::vector<std::uint16_t> coefficients_f16;
   std::vector<float> coefficients_f32;
   std::vector<float> scales;
+  std::vector<std::uint8_t> core;
+  std::vector<std::uint16_t> block_places;
+  std::vector<std::uint16_t> place_blocks;
+  std::vector<float> spot_sums;
   CompressedNdf ndf;
+};
+
+/// How the slices of a sample with coefficients of i8 are stored.
+enum class SampleForm : std::uint8_t {
+  wide,    ///< 8 bits
+  narrow,  ///< the last two columns with 4 bits
+  spots,   ///< a spot and a rest
 };
 
 struct SampleBinMap {
@@ -108,7 +119,7 @@ SampleHeights sampleHeights(int width, int height);
 SampleDisplacement sampleDisplacement(int size, bool colored = false);
 SamplePyramid samplePyramid(int size, BlockPrecision precision);
 /// The same images, each block approximated by a constant and slopes; two regions.
-SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type);
+SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type, SampleForm form = SampleForm::wide);
 
 /// sampleNormals(width, height) in 9 x 9 bins; lists of more than 64 texels have grids of 4 cells. Every second bin starts a class.
 SampleBinMap sampleBinMap(int width, int height);

@@ -111,6 +111,11 @@ TEST(Batch, DensitiesOfCompressedPyramidsAreThoseOfSingleQueries) {
       expectBatchesEqualSingleQueries(CpNdf(sample.ndf));
     }
   }
+  for (const auto form : {test::SampleForm::narrow, test::SampleForm::spots}) {
+    SCOPED_TRACE("form " + std::to_string(int(form)));
+    const auto sample = test::sampleCompressed(kSize, CompressionMethod::tucker, CoefficientType::i8, form);
+    expectBatchesEqualSingleQueries(CpNdf(sample.ndf));
+  }
 }
 
 TEST(Batch, DensitiesOfAnyRankAreThoseOfSingleQueries) {

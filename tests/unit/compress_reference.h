@@ -37,16 +37,47 @@ inline double basisValue(const CompressedNdf& c, const NdfCluster& cluster, int 
     const double before = i > 0 ? basisElement(c, first + static_cast<std::uint64_t>(i - 1) * columns + column) : 0;
     return basisElement(c, first + static_cast<std::uint64_t>(i) * columns + column) - before;
   };
-  const int rx = cluster.rank_x;
+  const bool tucker = c.method == CompressionMethod::tucker;
+  const int rx = tucker ? cluster.rank_x : cluster.columns, ry = tucker ? cluster.rank_y : cluster.columns;
   const std::uint64_t y_first = cluster.first_basis + static_cast<std::uint64_t>(kBlockSize) * rx;
-  if (c.method == CompressionMethod::cp) return along(cluster.first_basis, rx, k, x) * along(y_first, rx, k, y);
-  if (c.method == CompressionMethod::tucker)
-    return along(cluster.first_basis, rx, k / cluster.rank_y, x) * along(y_first, cluster.rank_y, k % cluster.rank_y, y);
+  if (c.method != CompressionMethod::pca) {
+    const int pair = tucker ? c.core[cluster.first_scale + k] : 0;
+    return along(cluster.first_basis, rx, tucker ? pair % 16 : k, x) * along(y_first, ry, tucker ? pair / 16 : k, y);
+  }
   const auto sum = [&](int i, int j) {
     return i < 0 || j < 0 ? 0.0
                           : basisElement(c, cluster.first_basis + static_cast<std::uint64_t>(j * kBlockSize + i) * rx + k);
   };
   return sum(x, y) - sum(x - 1, y) - sum(x, y - 1) + sum(x - 1, y - 1);
+}
+
+/// Coefficient k of a slice.
+inline double coefficientValue(const CompressedNdf& c, const NdfCluster& cluster, int slice, int k) {
+  const int wide = cluster.columns - cluster.narrow_columns, half = (cluster.narrow_columns + 1) / 2;
+  const std::uint64_t row = cluster.first_coefficient + static_cast<std::uint64_t>(slice) * (wide + half);
+  if (k < wide) return coefficientElement(c, row + k);
+  const int j = k - wide;
+  const int byte = static_cast<const std::uint8_t*>(c.coefficients)[row + wide + (j < half ? j : j - half)];
+  const int bits = j < half ? byte & 15 : byte >> 4;
+  return bits < 8 ? bits : bits - 16;
+}
+
+/// Pixel of a slice of spots, before its image's scale.
+inline double spotValue(const CompressedNdf& c, const NdfCluster& cluster, int slice, int x, int y) {
+  const auto* bytes = static_cast<const std::uint8_t*>(c.coefficients) + cluster.first_coefficient;
+  const std::uint8_t* counts = bytes + spotCountsOffset(cluster.slice_count);
+  const auto* spots = reinterpret_cast<const NdfSpot*>(bytes + firstSpotOffset(cluster.slice_count));
+  for (int s = 0; s < slice; ++s) spots += counts[s];
+  const double sigma = c.shape.sigma_r * 0.5 * c.shape.resolution;
+  const auto share = [&](int pixel, int place) {
+    const double centre = static_cast<double>(place) / kSpotSteps - kSpotReach;
+    return 0.5 *
+           (std::erf((pixel + 1 - centre) / (sigma * std::sqrt(2.0))) - std::erf((pixel - centre) / (sigma * std::sqrt(2.0))));
+  };
+  double sum = 0;
+  for (int k = 0; k < counts[slice]; ++k) sum += spots[k].weight * share(x, spots[k].x) * share(y, spots[k].y);
+  const double rest = decodeHalf(static_cast<std::uint16_t>(counts[cluster.slice_count + slice] << 6));
+  return sum * c.scales[cluster.first_scale] + rest * c.scales[cluster.first_scale + 1];
 }
 
 /// All pixels of an image, [resolution][resolution], densities. Plain loops after the comments of compressed_ndf.h.
@@ -55,20 +86,20 @@ inline std::vector<double> decodeImage(const CompressedNdf& c, std::uint32_t ima
   const int blocks = c.shape.blocksPerAxis();
   std::vector<double> pixels(static_cast<std::size_t>(n) * n, 0.0);
   const int slot = c.image_slots[image];
-  for (int b = 0; b < blocks * blocks; ++b) {
-    const std::size_t index = static_cast<std::size_t>(c.image_regions[image]) * blocks * blocks + b;
-    const std::uint64_t* mask = c.masks.data() + index * c.words_per_cluster;
+  for (int place = 0; place < c.places; ++place) {
+    const int b = c.place_blocks[place];
+    const NdfCluster& cluster = c.clusters[static_cast<std::size_t>(c.image_regions[image]) * c.places + place];
+    const std::uint64_t* mask = c.masks.data() + cluster.first_word;
     if (!(mask[slot / 64] >> (slot % 64) & 1)) continue;
     int slice = 0;
     for (int s = 0; s < slot; ++s) slice += mask[s / 64] >> (s % 64) & 1;
-    const NdfCluster& cluster = c.clusters[index];
-    const int columns = c.method == CompressionMethod::tucker ? cluster.rank_x * cluster.rank_y : cluster.rank_x;
-    for (int k = 0; k < columns; ++k) {
-      const double weight = c.image_scales[image] * c.scales[cluster.first_scale + k] *
-                            coefficientElement(c, cluster.first_coefficient + static_cast<std::uint64_t>(slice) * columns + k);
-      for (int y = 0; y < kBlockSize; ++y)
-        for (int x = 0; x < kBlockSize; ++x)
-          pixels[(b / blocks * kBlockSize + y) * n + b % blocks * kBlockSize + x] += weight * basisValue(c, cluster, k, x, y);
+    for (int y = 0; y < kBlockSize; ++y) {
+      for (int x = 0; x < kBlockSize; ++x) {
+        double value = cluster.columns == 0 ? spotValue(c, cluster, slice, x, y) : 0;
+        for (int k = 0; k < cluster.columns; ++k)
+          value += c.scales[cluster.first_scale + k] * coefficientValue(c, cluster, slice, k) * basisValue(c, cluster, k, x, y);
+        pixels[(b / blocks * kBlockSize + y) * n + b % blocks * kBlockSize + x] = c.image_scales[image] * value;
+      }
     }
   }
   return pixels;

@@ -201,22 +201,29 @@ TEST(AssetRoundTrip, HistogramsComeBackBitExact) {
 TEST(AssetRoundTrip, CompressedPyramidsOfEveryMethodAndTypeComeBackBitExact) {
   const TempFolder folder;
   for (const CompressionMethod method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
-    for (const CoefficientType type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
-      const auto sample = test::sampleCompressed(32, method, type);
+    for (const auto& [type, form] : {std::pair{CoefficientType::i8, test::SampleForm::wide},
+                                     {CoefficientType::i8, test::SampleForm::narrow},
+                                     {CoefficientType::i8, test::SampleForm::spots},
+                                     {CoefficientType::f16, test::SampleForm::wide},
+                                     {CoefficientType::f32, test::SampleForm::wide}}) {
+      const auto sample = test::sampleCompressed(32, method, type, form);
       writeAsset(folder / "a.glint", sample.ndf, test::sampleProvenance(), {.overwrite = true});
       const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
       const CompressedNdf& ndf = asset.compressed();
       expectSame(ndf.shape, sample.ndf.shape);
       EXPECT_EQ(ndf.method, method);
       EXPECT_EQ(ndf.coefficient_type, type);
-      EXPECT_EQ(ndf.region_columns, 2);
-      EXPECT_EQ(ndf.region_rows, 1);
-      EXPECT_EQ(ndf.words_per_cluster, 1);
+      EXPECT_EQ(ndf.regions, 2);
+      EXPECT_EQ(ndf.places, 16);
       for (int l = 0; l < ndf.shape.level_count; ++l) EXPECT_EQ(ndf.first_image[l], sample.ndf.first_image[l]);
       expectSame(ndf.image_regions, sample.ndf.image_regions);
       expectSame(ndf.image_slots, sample.ndf.image_slots);
       expectSame(ndf.image_scales, sample.ndf.image_scales);
       expectSame(ndf.density_scales, sample.ndf.density_scales);
+      expectSame(ndf.block_places, sample.ndf.block_places);
+      expectSame(ndf.place_blocks, sample.ndf.place_blocks);
+      expectSame(ndf.core, sample.ndf.core);
+      expectSame(ndf.spot_sums, sample.ndf.spot_sums);
       expectSame(ndf.block_masks, sample.ndf.block_masks);
       expectSame(ndf.first_block, sample.ndf.first_block);
       expectSame(ndf.block_masses, sample.ndf.block_masses);

@@ -31,6 +31,7 @@ enum class Base {
   pyramid,
   compressed,
   compressed_f32,
+  spots,
   bin_map,
   histograms,
   sh_lobes,
@@ -38,9 +39,9 @@ enum class Base {
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,        Base::heights,      Base::pyramid,         Base::compressed,
-                           Base::compressed_f32, Base::bin_map,      Base::histograms,      Base::sh_lobes,
-                           Base::sh_light,       Base::displacement, Base::displacement_rgb};
+constexpr Base kBases[] = {Base::normals,    Base::heights,        Base::pyramid,         Base::compressed, Base::compressed_f32,
+                           Base::spots,      Base::bin_map,        Base::histograms,      Base::sh_lobes,   Base::sh_light,
+                           Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -55,6 +56,10 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
     case Base::displacement:
       return writeAsset(path, test::sampleDisplacement(32).displacement, provenance);
+    case Base::spots:
+      return writeAsset(path,
+                        test::sampleCompressed(32, CompressionMethod::tucker, CoefficientType::i8, test::SampleForm::spots).ndf,
+                        provenance);
     case Base::displacement_rgb:
       return writeAsset(path, test::sampleDisplacement(32, true).displacement, provenance);
     case Base::compressed_f32:
@@ -443,12 +448,12 @@ std::vector<Fixture> indexFixtures() {
               [](const Patch& patch) { patch.replace("block_masses", H5T_STD_U8LE, {20}, true); }),
       patched(
           "compressed.ranks", Base::compressed,
-          [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.rank_x = 60000; }); }),
+          [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.columns = 60000; }); }),
       patched("compressed.ranks", Base::compressed,
               [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.rank_y = 1; }); }),
       patched("compressed.ranges", Base::compressed,
               [](const Patch& patch) {
-                patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_basis = ~0ull; });
+                patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_basis = ~0u; });
               }),
       patched("compressed.ranges", Base::compressed,
               [](const Patch& patch) {
@@ -458,6 +463,27 @@ std::vector<Fixture> indexFixtures() {
               [](const Patch& patch) {
                 patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_scale = 1000; });
               }),
+      patched(
+          "compressed.ranges", Base::compressed,
+          [](const Patch& patch) { patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.first_word = ~0u; }); }),
+      patched("compressed.ranks", Base::compressed,
+              [](const Patch& patch) {
+                patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.narrow_columns = 4; });
+              }),
+      patched("compressed.places", Base::compressed,
+              [](const Patch& patch) { patch.change<std::uint16_t>("block_places", 5, [](auto& place) { place = 4; }); }),
+      patched("compressed.places", Base::compressed,
+              [](const Patch& patch) { patch.change<std::uint16_t>("place_blocks", 5, [](auto& block) { block = 60000; }); }),
+      patched("compressed.spots", Base::spots,
+              [](const Patch& patch) { patch.change<std::uint8_t>("coefficients", 0, [](auto& before) { before = 1; }); }),
+      patched("compressed.spots", Base::spots,
+              [](const Patch& patch) {
+                std::uint32_t slices = 0;
+                patch.change<NdfCluster>("clusters", 0, [&](auto& cluster) { slices = cluster.slice_count; });
+                patch.change<std::uint8_t>("coefficients", firstSpotOffset(slices), [](auto& x) { x = kLastSpotPlace + 1; });
+              }),
+      patched("compressed.spots", Base::spots,
+              [](const Patch& patch) { patch.replace("spot_sums", H5T_IEEE_F32LE, {304}, true); }),
   };
 }
 
@@ -814,7 +840,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 13u);
+  EXPECT_EQ(count, 15u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -852,6 +878,8 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   for (const Recorded& recorded : {Recorded{"cp-i8", {3.49882889f, 3.00286174f, 2.97668457f}},
                                    Recorded{"tucker-f16", {4.83468008f, 3.82640028f, 3.10592413f}},
                                    Recorded{"pca-i8", {3.49882889f, 3.0028615f, 2.97668457f}},
+                                   Recorded{"narrow-i8", {4.72693872f, 3.72354555f, 3.08629251f}},
+                                   Recorded{"spots-i8", {0.513697445f, 0.513941109f, 0.515995741f}},
                                    Recorded{"cp-f32", {3.49453115f, 3.00421071f, 2.98451018f}}}) {
     const Asset asset = Asset::open(folder / ("ndf-cp-" + std::string(recorded.file) + ".glint"));
     EXPECT_FLOAT_EQ(test::compressedPixel(asset.compressed(), 5, 30, 33), recorded.values[0]);

@@ -63,7 +63,41 @@ const CompressedNdfData& compressed(CompressionMethod method, CoefficientType ty
   return built[key];
 }
 
-/// Calls visitor(CpNdf, data) for every method and coefficient type.
+/// With a tolerance: columns of 4 bits.
+const CompressedNdfData& compressedToTolerance(CompressionMethod method) {
+  static std::map<CompressionMethod, CompressedNdfData> built;
+  if (!built.contains(method)) {
+    bake::CompressionOptions o;
+    o.method = method;
+    o.tolerance = 0.2;
+    built[method] = bake::compressPyramid(pyramid().view(), o);
+    int narrow = 0;
+    for (const NdfCluster& cluster : built[method].clusters) narrow += cluster.narrow_columns;
+    EXPECT_GT(narrow, 0);
+  }
+  return built[method];
+}
+
+/// A pyramid of few facets, stored as spots.
+const CompressedNdfData& compressedSpots() {
+  static const CompressedNdfData data = [] {
+    const OwnedMap flakes(100, 72, test::synthesised(bake::SynthKind::flakes, 100, 72, 0.3f));
+    bake::PyramidOptions p;
+    p.stride = 16;
+    p.resolution = kResolution;
+    p.sigma_r = 0.02f;
+    p.levels = 3;
+    bake::CompressionOptions o;
+    o.tolerance = 0.3;
+    bake::CompressionReport report;
+    auto made = bake::compressPyramid(bake::buildPyramid(flakes.map(), p).view(), o, &report);
+    EXPECT_GT(report.spot_slices, 0u);
+    return made;
+  }();
+  return data;
+}
+
+/// Calls visitor(CpNdf, data) for every method, coefficient type, and form of slices.
 template <class Visitor>
 void forEachCompression(Visitor&& visitor) {
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
@@ -72,6 +106,12 @@ void forEachCompression(Visitor&& visitor) {
       visitor(CpNdf(compressed(method, type).view()), compressed(method, type));
     }
   }
+  for (const auto method : {CompressionMethod::tucker, CompressionMethod::pca}) {
+    SCOPED_TRACE("tolerance, method " + std::to_string(int(method)));
+    visitor(CpNdf(compressedToTolerance(method).view()), compressedToTolerance(method));
+  }
+  SCOPED_TRACE("spots");
+  visitor(CpNdf(compressedSpots().view()), compressedSpots());
 }
 
 class RandomQueries {

@@ -226,6 +226,19 @@ TEST(Sample, OfCompressedPyramidsFollowsTheDensity) {
   }
 }
 
+TEST(Sample, OfSpotsAndNarrowColumnsFollowsTheDensity) {
+  for (const auto& c : cases()) {
+    bake::CompressionOptions o;
+    o.tolerance = 0.3;
+    bake::CompressionReport report;
+    const CompressedNdfData data = bake::compressPyramid(c->pyramid.view(), o, &report);
+    if (c->name == "flakes") {
+      EXPECT_GT(report.spot_slices, 0u);
+    }
+    expectSamplesFollowThePixels(CpNdf(data.view()), "tolerance " + c->name, 20000);
+  }
+}
+
 /// For models that know the mean over any box of half vectors, and answer any footprint.
 template <class Model>
 void expectSamplesFollowTheMean(const Model& model, const std::string& name, const std::vector<Footprint>& footprints,
