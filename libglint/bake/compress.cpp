@@ -7,6 +7,7 @@
 #include <cmath>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 
@@ -22,10 +23,6 @@ namespace {
 
 // An image that decodes to this much of its energy or less is not scaled up: what is left of it is mostly error.
 constexpr double kLeastEnergy = 0.5;
-
-// The measured error of a tolerance lies between this part of it and all of it, unless single steps are larger.
-constexpr double kTightness = 0.985;
-constexpr int kMostCorrections = 16;
 
 void checkOptions(const CompressionOptions& options) {
   const auto require = [](bool valid, const char* rule, const std::string& what) {
@@ -70,6 +67,7 @@ class Compressor {
       : pyramid_(pyramid),
         options_(options),
         index_(pyramid, regions(options), levelGroups(options)),
+        groups_(index_.levelGroupCount()),
         progress_(progress, 3 * index_.clusterCount()),
         statistics_(index_.clusterCount()),
         encoded_(index_.clusterCount()),
@@ -79,7 +77,11 @@ class Compressor {
 
   CompressedNdfData run(CompressionReport* report) {
     forEachCluster([&](std::size_t c) { statistics_[c] = measureCluster(index_, c); });
-    for (const ClusterStatistics& s : statistics_) energy_ += s.energy;
+    for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
+      groupOf(c).energy += statistics_[c].energy;
+      groupOf(c).slices += static_cast<std::uint64_t>(index_.sliceCount(c));
+      energy_ += statistics_[c].energy;
+    }
     decompose();
     if (options_.tolerance > 0) {
       meetTolerance();
@@ -92,6 +94,17 @@ class Compressor {
   }
 
  private:
+  /// Levels whose clusters hold no slices of other levels: each group meets a tolerance by itself.
+  struct LevelGroup {
+    double energy = 0;
+    std::uint64_t slices = 0;
+    double gain_per_byte = 0;  ///< error that a byte has to take off
+  };
+
+  std::size_t clustersPerGroup() const { return index_.clusterCount() / groups_.size(); }
+  LevelGroup& groupOf(std::size_t cluster) { return groups_[cluster / clustersPerGroup()]; }
+  double budget(const LevelGroup& group) const { return options_.tolerance * options_.tolerance * group.energy; }
+
   static int regions(const CompressionOptions& options) {
     if (options.regions > 0) return options.regions;
     return options.method == CompressionMethod::cp ? 8 : 1;
@@ -114,12 +127,11 @@ class Compressor {
 
   void decompose() {
     std::vector<std::optional<ClusterModel>> models(index_.clusterCount());
-    const double budget = options_.tolerance * options_.tolerance * energy_;
     forEachCluster([&](std::size_t c) {
       // Finishing all clusters to this error leaves 1 part in 400 of the budget: further columns are not worth their memory.
-      const double share =
-          static_cast<double>(index_.sliceCount(c)) / static_cast<double>(std::max<std::uint64_t>(1, index_.totalSlices()));
-      models[c].emplace(index_, c, statistics_[c], options_, 0.0025 * budget * share);
+      const LevelGroup& group = groupOf(c);
+      const double share = static_cast<double>(index_.sliceCount(c)) / static_cast<double>(std::max<std::uint64_t>(1, group.slices));
+      models[c].emplace(index_, c, statistics_[c], options_, 0.0025 * budget(group) * share);
     });
     models_.reserve(models.size());
     for (auto& model : models) models_.push_back(std::move(*model));
@@ -130,7 +142,7 @@ class Compressor {
     forEachCluster([&](std::size_t c) {
       if (selection[c] == selection_[c]) return;
       encoded_[c] = encodeCluster(index_, c, statistics_[c], models_[c].basis(selection[c]), options_.method,
-                                  options_.coefficient_type, pyramid_.value_scale, gain_per_byte_);
+                                  options_.coefficient_type, pyramid_.value_scale, groupOf(c).gain_per_byte);
     });
     selection_ = selection;
     scaleImages();
@@ -167,53 +179,47 @@ class Compressor {
     return std::max(0.0, e.error + 2 * rest * e.cross + rest * rest * e.power) * peak * peak;
   }
 
-  double totalError() const {
+  /// Squared error of the clusters of a group.
+  double groupError(std::size_t group) const {
     double sum = 0;
-    for (std::size_t c = 0; c < index_.clusterCount(); ++c)
+    for (std::size_t c = group * clustersPerGroup(); c < (group + 1) * clustersPerGroup(); ++c)
       for (int s = 0; s < index_.sliceCount(c); ++s) sum += sliceError(c, s);
     return sum;
   }
 
-  /// Searches the error that the allocator has to aim at so that the measured one, after quantisation, meets the tolerance.
-  /// The two are nearly proportional, so a few corrections suffice; where they are not, the search halves the interval.
   void meetTolerance() {
-    const RankAllocator allocator(models_);
-    const double budget = options_.tolerance * options_.tolerance * energy_;
-    const double aim = budget * (1 + kTightness * kTightness) / 2;
-    if (options_.method != CompressionMethod::cp) gain_per_byte_ = allocator.gainPerByte(budget);
-    double met = 0, failed = 0;  // targets; 0: none yet
-    double target = budget;
-    for (int i = 0; i < kMostCorrections; ++i) {
-      const std::vector<int> selection = allocator.allocate(target);
-      if (selection != selection_) {
-        progress_.grow(index_.clusterCount());
-        encode(selection);
-      }
-      const double measured = totalError();
-      if (measured <= budget) {
-        if (measured >= kTightness * kTightness * budget) return;
-        met = std::max(met, target);
-      } else {
-        if (target <= allocator.smallestError()) break;
-        failed = failed > 0 ? std::min(failed, target) : target;
-      }
-      if (met > 0 && met >= allocator.largestError()) break;
-      target = allocator.error(selection) * aim / measured;
-      const bool outside = (met > 0 && target <= met) || (failed > 0 && target >= failed);
-      if (outside && met > 0 && failed > 0)
-        target = std::sqrt(met * failed);
-      else if (outside)
-        target = met > 0 ? 2 * met : failed / 2;
+    std::vector<ToleranceSearch> searches;
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const std::span models = std::span(models_).subspan(g * clustersPerGroup(), clustersPerGroup());
+      searches.emplace_back(models, budget(groups_[g]));
+      if (options_.method != CompressionMethod::cp)
+        groups_[g].gain_per_byte = searches[g].allocator().gainPerByte(budget(groups_[g]));
     }
-    if (totalError() <= budget) return;
-    encode(allocator.allocate(met));
-    const double least = totalError();
-    if (least > budget)
-      throw Error(ErrorCode::failed, "compress.tolerance", "", "",
-                  "the tolerance " + std::to_string(options_.tolerance) +
-                      " cannot be reached with this method and type of coefficient; the least error is " +
-                      std::to_string(std::sqrt(least / energy_)),
-                  "ask for a larger tolerance, or for coefficients of more bits");
+    const auto encodeChosen = [&] {
+      std::vector<int> selection;
+      for (const ToleranceSearch& search : searches)
+        selection.insert(selection.end(), search.selection().begin(), search.selection().end());
+      if (selection == selection_) return;
+      progress_.grow(index_.clusterCount());
+      encode(selection);
+    };
+    for (bool searching = true; searching;) {
+      encodeChosen();
+      searching = false;
+      for (std::size_t g = 0; g < groups_.size(); ++g) searching |= searches[g].next(groupError(g));
+    }
+    encodeChosen();
+    for (std::size_t g = 0; g < groups_.size(); ++g) requireMet(g);
+  }
+
+  void requireMet(std::size_t group) const {
+    const double error = groupError(group);
+    if (error <= budget(groups_[group])) return;
+    throw Error(ErrorCode::failed, "compress.tolerance", "", "",
+                "the tolerance " + std::to_string(options_.tolerance) +
+                    " cannot be reached with this method and type of coefficient; the least error is " +
+                    std::to_string(std::sqrt(error / groups_[group].energy)),
+                "ask for a larger tolerance, or for coefficients of more bits");
   }
 
   CompressedNdfData pack() {
@@ -382,10 +388,10 @@ class Compressor {
   const NdfPyramid& pyramid_;
   const CompressionOptions& options_;
   SliceIndex index_;
+  std::vector<LevelGroup> groups_;
   Progress progress_;
   std::vector<ClusterStatistics> statistics_;
   double energy_ = 0;
-  double gain_per_byte_ = 0;  ///< error that a byte has to take off
   std::vector<ClusterModel> models_;
   std::vector<EncodedCluster> encoded_;
   std::vector<int> selection_;

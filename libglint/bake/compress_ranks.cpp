@@ -1,10 +1,18 @@
 #include "glint/bake/compress_ranks.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace glint::bake {
+namespace {
 
-RankAllocator::RankAllocator(const std::vector<ClusterModel>& models) : models_(models) {
+// The measured error lies between this part of the tolerance and all of it, unless single steps are larger.
+constexpr double kTightness = 0.985;
+constexpr int kMostCorrections = 16;
+
+}  // namespace
+
+RankAllocator::RankAllocator(std::span<const ClusterModel> models) : models_(models) {
   double error = 0;
   for (std::size_t c = 0; c < models.size(); ++c) {
     const auto& choices = models[c].choices();
@@ -39,10 +47,39 @@ double RankAllocator::gainPerByte(double squared_error) const {
   return gain;
 }
 
-double RankAllocator::error(const std::vector<int>& selection) const {
+double RankAllocator::error(std::span<const int> selection) const {
   double sum = 0;
   for (std::size_t c = 0; c < models_.size(); ++c) sum += models_[c].choices()[selection[c]].error;
   return sum;
+}
+
+ToleranceSearch::ToleranceSearch(std::span<const ClusterModel> models, double budget)
+    : allocator_(models), budget_(budget), target_(budget), selection_(allocator_.allocate(budget)) {}
+
+bool ToleranceSearch::next(double measured) {
+  if (done_) return false;
+  const bool met = measured <= budget_;
+  if (met) {
+    met_ = std::max(met_, target_);
+    if (measured >= kTightness * kTightness * budget_ || met_ >= allocator_.largestError()) return finish(target_);
+  } else {
+    failed_ = failed_ > 0 ? std::min(failed_, target_) : target_;
+  }
+  if (++corrections_ == kMostCorrections || (!met && target_ <= allocator_.smallestError())) return finish(met_);
+  target_ = allocator_.error(selection_) * budget_ * (1 + kTightness * kTightness) / (2 * measured);
+  const bool outside = (met_ > 0 && target_ <= met_) || (failed_ > 0 && target_ >= failed_);
+  if (outside && met_ > 0 && failed_ > 0)
+    target_ = std::sqrt(met_ * failed_);
+  else if (outside)
+    target_ = met_ > 0 ? 2 * met_ : failed_ / 2;
+  selection_ = allocator_.allocate(target_);
+  return true;
+}
+
+bool ToleranceSearch::finish(double target) {
+  done_ = true;
+  selection_ = allocator_.allocate(target);
+  return false;
 }
 
 }  // namespace glint::bake

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "glint/bake/compress_model.h"
@@ -13,7 +14,7 @@ namespace glint::bake {
 class RankAllocator {
  public:
   /// @param models  must outlive the allocator
-  explicit RankAllocator(const std::vector<ClusterModel>& models);
+  explicit RankAllocator(std::span<const ClusterModel> models);
 
   /// Fewest bytes for at most this error.
   /// @return choice of each cluster; the last of each if even that has a larger error
@@ -23,7 +24,7 @@ class RankAllocator {
   double gainPerByte(double squared_error) const;
 
   /// Sum of the errors of a selection, before quantisation.
-  double error(const std::vector<int>& selection) const;
+  double error(std::span<const int> selection) const;
 
   /// Error without any step.
   double largestError() const { return errors_.front(); }
@@ -38,9 +39,37 @@ class RankAllocator {
     std::uint32_t choice;
   };
 
-  const std::vector<ClusterModel>& models_;
+  std::span<const ClusterModel> models_;
   std::vector<Step> steps_;
   std::vector<double> errors_;  // [steps + 1]: after so many steps
+};
+
+/// Searches the error that an allocator has to aim at so that the measured one, after quantisation, meets a budget.
+///
+/// The two are nearly proportional, so a few corrections suffice; where they are not, the search halves the interval.
+class ToleranceSearch {
+ public:
+  /// @param budget  squared error that must not be exceeded, and is used up as far as single steps allow
+  ToleranceSearch(std::span<const ClusterModel> models, double budget);
+
+  const RankAllocator& allocator() const { return allocator_; }
+
+  /// Choices to encode and measure next; those to keep once the search is done.
+  const std::vector<int>& selection() const { return selection_; }
+
+  /// @param measured  squared error of selection()
+  /// @return false when the search is done
+  bool next(double measured);
+
+ private:
+  bool finish(double target);
+
+  RankAllocator allocator_;
+  double budget_, target_;
+  double met_ = 0, failed_ = 0;  // targets; 0: none yet
+  int corrections_ = 0;
+  bool done_ = false;
+  std::vector<int> selection_;
 };
 
 }  // namespace glint::bake

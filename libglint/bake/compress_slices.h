@@ -23,6 +23,8 @@ class SliceIndex {
   /// @throw Error usage if a region has more than 65536 images, invalid_input if the arrays of the pyramid do not fit its shape
   SliceIndex(const NdfPyramid& pyramid, int regions, int level_groups);
 
+  /// @return groups of levels; the clusters of each follow those of the one before, and are as many
+  int levelGroupCount() const { return level_groups_; }
   int regionCount() const { return static_cast<int>(region_slots_.size()); }
   /// @return images of a region
   std::uint32_t slotCount(int region) const { return region_slots_[region]; }

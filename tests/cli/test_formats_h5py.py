@@ -208,7 +208,7 @@ def test_every_dataset_says_what_it_is(path):
         if isinstance(item, h5py.Dataset):
             assert text(item.attrs["long_name"]) and text(item.attrs["units"]), name
             assert len(item.attrs["xxh3_128"]) == 32, name
-            assert item.chunks is None and item.id.get_offset() % 64 == 0, name
+            assert item.chunks is None and (item.size == 0 or item.id.get_offset() % 64 == 0), name
 
     with h5py.File(path, "r") as file:
         file.visititems(check)
