@@ -242,12 +242,8 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
     statistics = summarizeCompressed(ndf, asset.info());
   } else if (asset.kind() == "bin-map") {
     const BinMap& map = asset.binMap();
-    properties = {{"width", map.width},
-                  {"height", map.height},
-                  {"alpha", map.alpha},
-                  {"alpha_min", map.alpha_min},
-                  {"alpha_max", map.alpha_max},
-                  {"bins_per_axis", map.bins_per_axis},
+    properties = {{"width", map.width},         {"height", map.height},       {"alpha", map.alpha},
+                  {"alpha_min", map.alpha_min}, {"alpha_max", map.alpha_max}, {"bins_per_axis", map.bins_per_axis},
                   {"leaf_size", map.leaf_size}};
     statistics = summarizeBinMap(map);
   } else if (asset.kind() == "histogram-sat") {

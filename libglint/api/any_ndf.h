@@ -24,8 +24,8 @@ struct NdfOptions {
   float sigma_r = 0.005f;              ///< kind normals: intrinsic roughness, disk units
   float alpha = 0;                     ///< kind bin-map: Beckmann roughness, in the range of the asset; 0: the smallest
   GaussianBoxes gaussian_boxes = GaussianBoxes::one;  ///< kind histogram-sat: boxes that stand for a Gaussian footprint
-  float slant_tolerance = kSlantTolerance;            ///< kind histogram-sat: share of a slanted footprint that may be misplaced
-  bool verify_hashes = false;                         ///< also compare every dataset with its hash; reads the whole file
+  float slant_tolerance = kSlantTolerance;  ///< kind histogram-sat: share of a slanted footprint that may be misplaced
+  bool verify_hashes = false;               ///< also compare every dataset with its hash; reads the whole file
 };
 
 /// What models of every kind have in common.

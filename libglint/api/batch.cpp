@@ -387,7 +387,8 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
 }
 
 template <class Model>
-void modelMeans(const Model& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges, float* out) {
+void modelMeans(const Model& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
+                float* out) {
   for (std::size_t k = 0; k < count; ++k) out[k] = model.mean(footprints[k], ranges[k]);
 }
 

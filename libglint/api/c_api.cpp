@@ -188,16 +188,22 @@ glint_footprint glint_footprint_isotropic(float u, float v, float sigma_texels) 
 
 glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy, float* density) {
   if (ndf == nullptr || footprint == nullptr || density == nullptr) return usage("glint_density: an argument is null");
-  *density =
-      std::visit([&](const auto& model) { return model.density(footprintOf(*footprint), {hx, hy}); }, ndf->opened.model());
+  *density = std::visit(
+      [&](const auto& model) {
+        return model.density(footprintOf(*footprint), {hx, hy});
+      },
+      ndf->opened.model());
   return GLINT_OK;
 }
 
 glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, float x0, float y0, float x1, float y1,
                         float* mean) {
   if (ndf == nullptr || footprint == nullptr || mean == nullptr) return usage("glint_mean: an argument is null");
-  *mean = std::visit([&](const auto& model) { return model.mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}}); },
-                     ndf->opened.model());
+  *mean = std::visit(
+      [&](const auto& model) {
+        return model.mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}});
+      },
+      ndf->opened.model());
   return GLINT_OK;
 }
 
@@ -205,8 +211,11 @@ glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint
                           float* pdf) {
   if (ndf == nullptr || footprint == nullptr || hx == nullptr || hy == nullptr || pdf == nullptr)
     return usage("glint_sample: an argument is null");
-  const HalfVectorSample drawn =
-      std::visit([&](const auto& model) { return model.sample(footprintOf(*footprint), {xi1, xi2}); }, ndf->opened.model());
+  const HalfVectorSample drawn = std::visit(
+      [&](const auto& model) {
+        return model.sample(footprintOf(*footprint), {xi1, xi2});
+      },
+      ndf->opened.model());
   *hx = drawn.h.x;
   *hy = drawn.h.y;
   *pdf = drawn.pdf;

@@ -130,7 +130,8 @@ class Compressor {
     forEachCluster([&](std::size_t c) {
       // Finishing all clusters to this error leaves 1 part in 400 of the budget: further columns are not worth their memory.
       const LevelGroup& group = groupOf(c);
-      const double share = static_cast<double>(index_.sliceCount(c)) / static_cast<double>(std::max<std::uint64_t>(1, group.slices));
+      const double share =
+          static_cast<double>(index_.sliceCount(c)) / static_cast<double>(std::max<std::uint64_t>(1, group.slices));
       models[c].emplace(index_, c, statistics_[c], options_, 0.0025 * budget(group) * share);
     });
     models_.reserve(models.size());

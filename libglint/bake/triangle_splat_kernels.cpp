@@ -20,7 +20,8 @@ static_assert(kLanes % kMoments == 0);
 
 // Cubic B-spline weights of the bins around a point as polynomials of its place between the middle two: by power, of each bin;
 // and with each bin once for every moment.
-#define GLINT_REPEATED(a, b, c, d) {a, a, a, a, b, b, b, b, c, c, c, c, d, d, d, d}
+#define GLINT_REPEATED(a, b, c, d) \
+  { a, a, a, a, b, b, b, b, c, c, c, c, d, d, d, d }
 HWY_ALIGN constexpr float kSpline[4][kTaps] = {
     {1.0f / 6, 4.0f / 6, 1.0f / 6, 0}, {-0.5f, 0, 0.5f, 0}, {0.5f, -1, 0.5f, 0}, {-1.0f / 6, 0.5f, -0.5f, 1.0f / 6}};
 HWY_ALIGN constexpr float kSplineOfMoments[4][kTaps * kMoments] = {
@@ -48,8 +49,7 @@ HWY_INLINE void addPoint(Vec2 point, float share, const float* weights, const Sp
   const float fx = x - static_cast<float>(ix);
   float* corner = raster.bins + (static_cast<std::size_t>(iy - 1) * raster.pitch + ix - 1) * kMoments;
   for (int k = 0; k < kTaps * kMoments; k += kLanes) {
-    const auto across =
-        hn::Mul(splineWeights(d, kSplineOfMoments[0] + k, kTaps * kMoments, fx), hn::LoadDup128(d, weights));
+    const auto across = hn::Mul(splineWeights(d, kSplineOfMoments[0] + k, kTaps * kMoments, fx), hn::LoadDup128(d, weights));
     float* row = corner + k;
     for (int dy = 0; dy < kTaps; ++dy, row += static_cast<std::size_t>(raster.pitch) * kMoments)
       hn::StoreU(hn::MulAdd(across, hn::Set(d, down[dy]), hn::LoadU(d, row)), d, row);
@@ -93,9 +93,7 @@ class Slabs {
       mass_before = mass_after;
     }
   }
-  float massBelow(float t) const {
-    return t < apex_ ? t * t / apex_ : apex_ < 1 ? 1 - (1 - t) * (1 - t) / (1 - apex_) : 1;
-  }
+  float massBelow(float t) const { return t < apex_ ? t * t / apex_ : apex_ < 1 ? 1 - (1 - t) * (1 - t) / (1 - apex_) : 1; }
 
   float apex_;
   int count_;
@@ -127,8 +125,7 @@ HWY_INLINE hn::Vec<Wide> splineIntegral(hn::Vec<Wide> t) {
   const Wide d;
   const auto a = hn::Min(hn::Abs(t), hn::Set(d, 2.0f)), b = hn::Sub(hn::Set(d, 2.0f), a), a2 = hn::Mul(a, a),
              b2 = hn::Mul(b, b);
-  const auto inner = hn::Mul(
-      a, hn::MulAdd(a2, hn::MulAdd(a, hn::Set(d, 0.125f), hn::Set(d, -1.0f / 3)), hn::Set(d, 2.0f / 3)));
+  const auto inner = hn::Mul(a, hn::MulAdd(a2, hn::MulAdd(a, hn::Set(d, 0.125f), hn::Set(d, -1.0f / 3)), hn::Set(d, 2.0f / 3)));
   const auto outer = hn::NegMulAdd(hn::Mul(b2, b2), hn::Set(d, 1.0f / 24), hn::Set(d, 0.5f));
   return hn::CopySign(hn::IfThenElse(hn::Lt(a, hn::Set(d, 1.0f)), inner, outer), t);
 }

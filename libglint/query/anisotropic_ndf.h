@@ -95,9 +95,10 @@ class AnisotropicNdf {
   GLINT_HD AnisotropicNdf(const M& model, int width, int height, float narrowest_sigma = 0)
       : model_(&model), width_(width), height_(height), narrowest_sigma_(narrowest_sigma) {}
   /// For a model of a pyramid.
-  GLINT_HD explicit AnisotropicNdf(const M& model, float narrowest_sigma = 0)
-    requires requires { model.shape(); }
-      : AnisotropicNdf(model, model.shape().width, model.shape().height, narrowest_sigma) {}
+  GLINT_HD explicit AnisotropicNdf(const M& model, float narrowest_sigma = 0) requires requires {
+    model.shape();
+  } : AnisotropicNdf(model, model.shape().width, model.shape().height, narrowest_sigma) {
+  }
 
   GLINT_HD IsotropicParts parts(const Footprint& p) const { return isotropicParts(p, width_, height_, narrowest_sigma_); }
 

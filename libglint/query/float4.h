@@ -77,9 +77,7 @@ struct Float4 {
   /// Negative numbers and NaN become 0.
   Float4 positive() const { return {_mm_max_ps(v, _mm_setzero_ps())}; }
   /// Bit k: lane k is at most `bound`.
-  unsigned notAbove(float bound) const {
-    return static_cast<unsigned>(_mm_movemask_ps(_mm_cmple_ps(v, _mm_set1_ps(bound))));
-  }
+  unsigned notAbove(float bound) const { return static_cast<unsigned>(_mm_movemask_ps(_mm_cmple_ps(v, _mm_set1_ps(bound)))); }
   /// 0, 1 + 0, (2 + 1) + 0, (3 + 2) + (1 + 0).
   Float4 runningSums() const {
     const __m128 pairs = _mm_add_ps(v, _mm_castsi128_ps(_mm_slli_si128(_mm_castps_si128(v), 4)));

@@ -17,8 +17,8 @@ struct BinCounts {
   /// Sums of texels are kept in four rows side by side, so that runs of texels of one bin need not wait for each addition.
   static constexpr int kLanes = 4;
   static constexpr int kLaneStride =
-      HistogramSat::kMaxBins + 24;           ///< not a multiple of 4 KiB, which processors take for a clash
-  double totals[HistogramSat::kMaxBins];     ///< texels of each bin, once finished; >= 0
+      HistogramSat::kMaxBins + 24;        ///< not a multiple of 4 KiB, which processors take for a clash
+  double totals[HistogramSat::kMaxBins];  ///< texels of each bin, once finished; >= 0
   std::uint32_t whole[HistogramSat::kMaxBins];
   std::int64_t areas[kLanes * kLaneStride];  ///< kAreaUnits
 };

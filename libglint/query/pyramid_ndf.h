@@ -73,7 +73,8 @@ class PyramidNdf {
     Draw draw;
     draw.slices = selectSlices(shape(), p);
     draw.xi = clampUnit(xi);
-    const int k = chooseIndex(draw.slices.count, 1, [&](int i) { return draw.slices.slices[i].weight; }, draw.xi.x);
+    const int k = chooseIndex(
+        draw.slices.count, 1, [&](int i) { return draw.slices.slices[i].weight; }, draw.xi.x);
     if (k < 0) return draw;
     draw.chosen = draw.slices.slices[k];
     prefetch(maskOf(draw.chosen));
@@ -101,9 +102,9 @@ class PyramidNdf {
       for (int k = begin; k < end; ++k) sum += means[k];
       return sum;
     };
-    const BlockChoice choice =
-        blocks <= 16 ? chooseBlockOf16(maskOf(draw.chosen), blocks, means, draw.block_count, draw.xi)
-                     : glint::chooseBlock(maskOf(draw.chosen), blocks, mass(0, draw.block_count), mass, draw.xi);
+    const BlockChoice choice = blocks <= 16
+                                   ? chooseBlockOf16(maskOf(draw.chosen), blocks, means, draw.block_count, draw.xi)
+                                   : glint::chooseBlock(maskOf(draw.chosen), blocks, mass(0, draw.block_count), mass, draw.xi);
     draw.place.block = choice.block;
     if (choice.block < 0) return;
     draw.stored = draw.first_block + static_cast<std::uint64_t>(choice.rank);
@@ -193,8 +194,7 @@ class PyramidNdf {
   GLINT_HD void findPixels(const PyramidSlices& chosen, const PixelPlace& place, int given_words, Places& places) const {
     const int words = kWords < kMostMaskWords ? kWords : given_words, word = place.block / 64, bit = place.block % 64;
     std::uint64_t before[kWords];  // the blocks before this one
-    for (int w = 0; w < words; ++w)
-      before[w] = w < word ? ~std::uint64_t{0} : w == word ? (std::uint64_t{1} << bit) - 1 : 0;
+    for (int w = 0; w < words; ++w) before[w] = w < word ? ~std::uint64_t{0} : w == word ? (std::uint64_t{1} << bit) - 1 : 0;
     const int shift = pyramid_.precision == BlockPrecision::f16 ? 1 : 2;
     const auto pixel = static_cast<std::uint64_t>(place.y * kBlockSize + place.x);
     places.count = chosen.count;
@@ -310,7 +310,8 @@ class PyramidNdf {
     constexpr int kCacheLine = 64;
     const int row_bytes = kBlockSize * (pyramid_.precision == BlockPrecision::f16 ? 2 : 4);
     const char* pixels = static_cast<const char*>(level.pixels) + block * static_cast<std::uint64_t>(kBlockSize * row_bytes);
-    for (int k = first_row * row_bytes / kCacheLine * kCacheLine; k < end_row * row_bytes; k += kCacheLine) prefetch(pixels + k);
+    for (int k = first_row * row_bytes / kCacheLine * kCacheLine; k < end_row * row_bytes; k += kCacheLine)
+      prefetch(pixels + k);
   }
 
   NdfPyramid pyramid_;

@@ -56,8 +56,8 @@ struct CentreNeighbours {
 };
 
 /// @param u, v  in [0, 1)
-inline GLINT_HD CentreNeighbours centreNeighbours(const PyramidShape& shape, const PyramidGrid& a, const PyramidGrid& b, float u,
-                                                  float v) {
+inline GLINT_HD CentreNeighbours centreNeighbours(const PyramidShape& shape, const PyramidGrid& a, const PyramidGrid& b,
+                                                  float u, float v) {
   const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
   const Float4 extent = Float4::of(width, height, width, height), x = Float4::of(u, v, u, v) * extent;
   const Float4 stride = Float4::of(a.stride, a.stride, b.stride, b.stride);

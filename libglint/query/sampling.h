@@ -50,7 +50,9 @@ inline GLINT_HD int chooseOf16(const float* weights, float& xi) {
   for (int k = 0; k < 16; k += 4) passed |= Float4::load(before + k + 1).notAbove(rest) << k;
   const int k = lowestBit(~std::uint64_t{passed});
   // The sums are rounded, so that the last one may be passed, or something without weight be met.
-  if (k == 16 || !(weights[k] > 0)) return chooseIndex(16, before[16], [&](int i) { return weights[i]; }, xi);
+  if (k == 16 || !(weights[k] > 0))
+    return chooseIndex(
+        16, before[16], [&](int i) { return weights[i]; }, xi);
   xi = clampUnit((rest - before[k]) / weights[k]);
   return k;
 }
@@ -95,8 +97,10 @@ GLINT_HD BlockChoice chooseBlock(const std::uint64_t* mask, int blocks_per_axis,
   }
   if (chosen_row < 0) return {};
   xi.y = clampUnit(rest / share);
-  const int k = std::max(
-      chooseIndex(setBits(chosen_bits), share, [&](int j) { return mass(chosen_begin + j, chosen_begin + j + 1); }, xi.x), 0);
+  const int k =
+      std::max(chooseIndex(
+                   setBits(chosen_bits), share, [&](int j) { return mass(chosen_begin + j, chosen_begin + j + 1); }, xi.x),
+               0);
   return {chosen_row * blocks_per_axis + selectBit(chosen_bits, k), chosen_begin + k};
 }
 

@@ -115,9 +115,13 @@ std::vector<Query> randomQueries(const NormalMap& map, float finest, float coars
 }
 
 template <class Model>
-float density(const Model& model, const Query& query) { return model.density(query.footprint, query.half); }
+float density(const Model& model, const Query& query) {
+  return model.density(query.footprint, query.half);
+}
 template <class Model>
-float mean(const Model& model, const Query& query) { return model.mean(query.footprint, query.range); }
+float mean(const Model& model, const Query& query) {
+  return model.mean(query.footprint, query.range);
+}
 template <class Model>
 float sample(const Model& model, const Query& query) {
   const HalfVectorSample s = model.sample(query.footprint, query.xi);
@@ -205,11 +209,13 @@ struct Batch {
     api::densities(model, count, q.footprints(first), {{&q.hx[first]}, {&q.hy[first]}}, answers.data());
   }
   void means(const api::AnyNdf& model, const QueryArrays& q, std::size_t first, std::size_t count) {
-    api::means(model, count, q.footprints(first), {{&q.x0[first]}, {&q.y0[first]}, {&q.x1[first]}, {&q.y1[first]}}, answers.data());
+    api::means(model, count, q.footprints(first), {{&q.x0[first]}, {&q.y0[first]}, {&q.x1[first]}, {&q.y1[first]}},
+               answers.data());
   }
   void samples(const api::AnyNdf& model, const QueryArrays& q, std::size_t first, std::size_t count) {
     float* out = answers.data();
-    api::samples(model, count, q.footprints(first), {{&q.xi_x[first]}, {&q.xi_y[first]}}, {out, out + kBatch, out + 2 * kBatch});
+    api::samples(model, count, q.footprints(first), {{&q.xi_x[first]}, {&q.xi_y[first]}},
+                 {out, out + kBatch, out + 2 * kBatch});
   }
 };
 
@@ -220,38 +226,39 @@ void addBatchBenchmarks(const std::string& what, const std::string& name, const 
   for (const bool few : {false, true}) {
     const std::string which = few ? "_few/" : "_random/";
     const std::size_t size = few ? kFew : kBatch;
-    benchmark::RegisterBenchmark((what + "_batch" + which + name).c_str(), [any = api::AnyNdf(model), arrays = QueryArrays(queries),
-                                                                           few, size, many](benchmark::State& state) {
-      Batch batch;
-      std::size_t first = 0;
-      while (state.KeepRunningBatch(static_cast<benchmark::IterationCount>(size))) {
-        (batch.*many)(any, arrays, first, size);
-        benchmark::DoNotOptimize(batch.answers.data());
-        benchmark::ClobberMemory();
-        if (!few) first = (first + size) % kQueries;
-      }
-    });
     benchmark::RegisterBenchmark(
-        ("ratio_batch_" + what + which + name).c_str(),
-        [any = api::AnyNdf(model), arrays = QueryArrays(queries), &model, &queries, few, size, one, many](benchmark::State& state) {
-          constexpr int kRuns = 30;  // as many as there are different batches
+        (what + "_batch" + which + name).c_str(),
+        [any = api::AnyNdf(model), arrays = QueryArrays(queries), few, size, many](benchmark::State& state) {
           Batch batch;
-          std::vector<double> ratios;
-          for (auto _ : state) {
-            for (int run = 0; run < kRuns; ++run) {
-              // Half the queries away: what one way has read does not help the other.
-              const std::size_t first = few ? 0 : run * kBatch % kQueries, other = few ? 0 : (first + kQueries / 2) % kQueries;
-              const double start = threadSeconds();
-              for (std::size_t done = 0; done < kBatch; done += size) (batch.*many)(any, arrays, first + (few ? 0 : done), size);
-              const double middle = threadSeconds();
-              for (std::size_t k = 0; k < kBatch; ++k) benchmark::DoNotOptimize(one(model, queries[other + k % size]));
-              ratios.push_back((threadSeconds() - middle) / (middle - start));
-            }
+          std::size_t first = 0;
+          while (state.KeepRunningBatch(static_cast<benchmark::IterationCount>(size))) {
+            (batch.*many)(any, arrays, first, size);
+            benchmark::DoNotOptimize(batch.answers.data());
+            benchmark::ClobberMemory();
+            if (!few) first = (first + size) % kQueries;
           }
-          std::nth_element(ratios.begin(), ratios.begin() + kRuns / 2, ratios.end());
-          state.counters["ratio"] = ratios[kRuns / 2];
-        })
-        ->Iterations(1);
+        });
+    benchmark::RegisterBenchmark(("ratio_batch_" + what + which + name).c_str(), [any = api::AnyNdf(model),
+                                                                                  arrays = QueryArrays(queries), &model,
+                                                                                  &queries, few, size, one,
+                                                                                  many](benchmark::State& state) {
+      constexpr int kRuns = 30;  // as many as there are different batches
+      Batch batch;
+      std::vector<double> ratios;
+      for (auto _ : state) {
+        for (int run = 0; run < kRuns; ++run) {
+          // Half the queries away: what one way has read does not help the other.
+          const std::size_t first = few ? 0 : run * kBatch % kQueries, other = few ? 0 : (first + kQueries / 2) % kQueries;
+          const double start = threadSeconds();
+          for (std::size_t done = 0; done < kBatch; done += size) (batch.*many)(any, arrays, first + (few ? 0 : done), size);
+          const double middle = threadSeconds();
+          for (std::size_t k = 0; k < kBatch; ++k) benchmark::DoNotOptimize(one(model, queries[other + k % size]));
+          ratios.push_back((threadSeconds() - middle) / (middle - start));
+        }
+      }
+      std::nth_element(ratios.begin(), ratios.begin() + kRuns / 2, ratios.end());
+      state.counters["ratio"] = ratios[kRuns / 2];
+    })->Iterations(1);
   }
 }
 
@@ -267,8 +274,10 @@ void addModelBenchmarks(const std::string& name, const Model& model, const std::
   addBatchBenchmarks<Model>("sample", name, model, queries, &sample<Model>, &Batch::samples);
   addQueryBenchmarks("mean", name, queries, [&model](const Query& query) { return mean(model, query); });
   addQueryBenchmarks("sample", name, queries, [&model](const Query& query) { return sample(model, query); });
-  addRatio("density", name, queries, [&model](const Query& query) { return density(model, query); }, plainDensity);
-  addRatio("sample", name, queries, [&model](const Query& query) { return sample(model, query); }, plainSample);
+  addRatio(
+      "density", name, queries, [&model](const Query& query) { return density(model, query); }, plainDensity);
+  addRatio(
+      "sample", name, queries, [&model](const Query& query) { return sample(model, query); }, plainSample);
 }
 
 void addOpenBenchmark(const std::string& path, const std::string& name) {

@@ -20,7 +20,7 @@ using namespace glint;
 
 constexpr int kFootprints = 500;
 constexpr int kRounds = 15;
-constexpr int kExactRounds = 3;  // they take up to half a millisecond each
+constexpr int kExactRounds = 3;                               // they take up to half a millisecond each
 constexpr int kSizes[] = {4, 16, 64, 256, 1024, 1900, 3000};  // texels along each side
 
 double threadNanoseconds() {

@@ -75,7 +75,8 @@ Footprint alongX(float longest, float aspect) {
 
 /// Offsets along x and the deviation of parts, in texels.
 struct Parts {
-  explicit Parts(const Footprint& p) : parts(isotropicParts(p, kSize, kSize)), sigma(std::sqrt(parts.footprints[0].covariance.xx)) {
+  explicit Parts(const Footprint& p)
+      : parts(isotropicParts(p, kSize, kSize)), sigma(std::sqrt(parts.footprints[0].covariance.xx)) {
     for (int k = 0; k < parts.count; ++k) x.push_back((double{parts.footprints[k].centre.x} - 0.5) * kSize);
   }
   IsotropicParts parts;
@@ -124,8 +125,8 @@ TEST(IsotropicParts, AreAsWideAsSuitsUnrelatedTexels) {
     double best = 1e9;
     for (double wider = 0.6; wider < 2; wider += 0.02) {
       std::vector<double> x;  // parts of another width, moved so that the length stays
-      const double length2 = 60.0 * 60, scale = (length2 - chosen.sigma * chosen.sigma * wider * wider) /
-                                                (length2 - chosen.sigma * chosen.sigma);
+      const double length2 = 60.0 * 60,
+                   scale = (length2 - chosen.sigma * chosen.sigma * wider * wider) / (length2 - chosen.sigma * chosen.sigma);
       for (const double old : chosen.x) x.push_back(old * std::sqrt(scale));
       best = std::min(best, noiseError(p, x, chosen.parts.weights, wider * chosen.sigma));
     }

@@ -39,9 +39,9 @@ enum class Base {
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,    Base::heights,        Base::pyramid,         Base::compressed, Base::compressed_f32,
-                           Base::spots,      Base::bin_map,        Base::histograms,      Base::sh_lobes,   Base::sh_light,
-                           Base::displacement, Base::displacement_rgb};
+constexpr Base kBases[] = {Base::normals,        Base::heights,  Base::pyramid,      Base::compressed,
+                           Base::compressed_f32, Base::spots,    Base::bin_map,      Base::histograms,
+                           Base::sh_lobes,       Base::sh_light, Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();

@@ -57,7 +57,7 @@ struct BuiltMap {
   }
   test::OwnedMap map;
   bake::HistogramSatData data;
-  HistogramNdf ndf;       ///< exact at any angle
+  HistogramNdf ndf;      ///< exact at any angle
   std::vector<int> ids;  ///< direction of every texel, from the map itself
 };
 
@@ -224,8 +224,8 @@ void expectStripsWithinBound(const BuiltMap& built, float largest, int boxes, un
     const Footprint p = Footprint::box({unit(random), unit(random)}, {a * std::cos(angle), a * std::sin(angle)},
                                        {-b * std::sin(angle + skew), b * std::cos(angle + skew)});
     const double bound = stripPlanBound(sat, p, tolerance);
-    const double off = 0.5 * sumOfDifferences(sharesByTable(HistogramNdf(sat, GaussianBoxes::one, tolerance), p),
-                                              sharesByTable(built.ndf, p));
+    const double off =
+        0.5 * sumOfDifferences(sharesByTable(HistogramNdf(sat, GaussianBoxes::one, tolerance), p), sharesByTable(built.ndf, p));
     EXPECT_LE(bound, tolerance);
     EXPECT_LE(off, bound + kFloatAreas) << "tolerance " << tolerance << " angle " << angle << " axes " << a << " " << b;
     with_strips += bound > 0, moved += off > kFloatAreas;

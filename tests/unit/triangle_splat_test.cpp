@@ -52,7 +52,7 @@ void expectMoments(Vec2 a, Vec2 b, Vec2 c) {
     const Moments m = momentsOf(bins, tiles, channel);
     EXPECT_NEAR(m.mass, weights[channel], kMass * std::fabs(weights[channel]));
     // Corners about the centroid: their mean square over 12 is the triangle's own spread.
-    const auto spread = [&](float Vec2::* s, float Vec2::* t) {
+    const auto spread = [&](float Vec2::*s, float Vec2::*t) {
       const double ms = (a.*s + b.*s + c.*s) / 3, mt = (a.*t + b.*t + c.*t) / 3;
       const double sum = (a.*s - ms) * (a.*t - mt) + (b.*s - ms) * (b.*t - mt) + (c.*s - ms) * (c.*t - mt);
       return 0.25 * kBins * kBins * sum / 12;

@@ -1,0 +1,127 @@
+// Queries that no renderer means to ask, put to every model alike: answers are finite, and 0 where nothing can be said.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "glint/query/anisotropic_ndf.h"
+#include "glint/query/bin_map_ndf.h"
+#include "glint/query/cp_ndf.h"
+#include "glint/query/environment.h"
+#include "glint/query/histogram_ndf.h"
+#include "glint/query/microfacet_brdf.h"
+#include "glint/query/pyramid_ndf.h"
+#include "glint/query/reference.h"
+#include "support/sample_assets.h"
+
+namespace glint {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kLargest = std::numeric_limits<float>::max();
+constexpr int kSize = 32;
+
+/// Calls visitor(model, name) for every model of the NDF, with and without the texels.
+template <class Visitor>
+void forEachModel(Visitor&& visitor) {
+  const auto map = test::sampleNormals(kSize, kSize);
+  // A mean over a smooth surface of random normals costs a piece for every deviation of every triangle: few, and wide ones.
+  const auto small = test::sampleNormals(8, 8);
+  for (const Surface surface : {Surface::flat, Surface::smooth})
+    for (const Boundary boundary : {Boundary::wrap, Boundary::clamp})
+      visitor(Reference(small.map, 0.25f, surface, boundary, Reference::Search::pruned), "Reference");
+  for (const auto precision : {BlockPrecision::f16, BlockPrecision::f32}) {
+    const auto pyramid = test::samplePyramid(kSize, precision);
+    const PyramidNdf round(pyramid.pyramid);
+    visitor(round, "PyramidNdf");
+    visitor(PyramidNdf(pyramid.pyramid, map.map), "PyramidNdf with texels");
+    visitor(AnisotropicNdf<PyramidNdf>(round), "AnisotropicNdf");
+  }
+  for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
+    const auto compressed = test::sampleCompressed(kSize, method, CoefficientType::i8);
+    visitor(CpNdf(compressed.ndf), "CpNdf");
+    visitor(CpNdf(compressed.ndf, map.map), "CpNdf with texels");
+  }
+  const auto bins = test::sampleBinMap(kSize, kSize);
+  visitor(BinMapNdf(bins.map), "BinMapNdf");
+  const auto histograms = test::sampleHistograms(kSize, kSize);
+  visitor(HistogramNdf(histograms.sat), "HistogramNdf");
+}
+
+/// Calls visitor(footprint, what).
+template <class Visitor>
+void forEachBadFootprint(Visitor&& visitor) {
+  const auto visit = [&](const Footprint& p, const char* what, float a, float b) {
+    visitor(p, std::string(what) + ' ' + std::to_string(a) + ' ' + std::to_string(b));
+  };
+  for (const float u : {0.3f, -7.25f, -1e9f, kNan})
+    for (const float size : {0.0f, 5.0f, 1e18f, kInfinity, kNan}) {
+      visit(Footprint::isotropic({u, 0.7f}, size), "isotropic", u, size);
+      visit(Footprint::gaussian({0.2f, u}, {size, size, 9}), "gaussian", u, size);
+      visit(Footprint::box({u, u}, {size, 1}, {-1, size}), "box", u, size);
+      visit(Footprint::box({0.5f, u}, {size, size}, {size, size}), "line", u, size);
+    }
+}
+
+template <class Model>
+void expectDefinedAnswers(const Model& model, const Footprint& p) {
+  const auto defined = [](float value) { return std::isfinite(value) && value >= 0; };
+  for (const Vec2 h : {Vec2{0.02f, -0.03f}, {0.8f, 0.8f}, {1, -1}}) EXPECT_TRUE(defined(model.density(p, h))) << h.x;
+  for (const Vec2 h : {Vec2{1.001f, 0}, {0, -1.5f}, {kNan, 0}, {0, kNan}, {kInfinity, -kInfinity}, {kLargest, 0}})
+    EXPECT_EQ(model.density(p, h), 0) << h.x;
+  for (const Box2& range :
+       {Box2{{-0.1f, -0.1f}, {0.2f, 0.1f}}, {{-1, -1}, {1, 1}}, {{-50, 0.1f}, {50, 0.2f}}, {{0.9f, 0.9f}, {1e9f, 1e9f}}})
+    EXPECT_TRUE(defined(model.mean(p, range))) << range.low.x;
+  for (const Box2& range : {Box2{{0.1f, 0.1f}, {0.1f, 0.2f}}, {{0.2f, 0}, {-0.2f, 1}}, {{kNan, 0}, {1, 1}}, {{2, 2}, {3, 3}}})
+    EXPECT_EQ(model.mean(p, range), 0) << range.low.x;
+  for (const Vec2 xi : {Vec2{0.4f, 0.6f}, {0, 0}, {1, 1}, {-2, 7}, {kNan, kNan}, {kInfinity, -kInfinity}}) {
+    const HalfVectorSample s = model.sample(p, xi);
+    EXPECT_TRUE(defined(s.pdf) && std::isfinite(s.h.x) && std::isfinite(s.h.y)) << xi.x;
+  }
+}
+
+TEST(BadInput, EveryModelAnswersEveryFootprint) {
+  forEachModel([](const auto& model, const char* name) {
+    SCOPED_TRACE(name);
+    forEachBadFootprint([&](const Footprint& p, const std::string& what) {
+      SCOPED_TRACE(what);
+      expectDefinedAnswers(model, p);
+    });
+  });
+}
+
+TEST(BadInput, EveryModelLightsASurfaceFromAnyDirection) {
+  const SmithMasking masking({{0, 0}, {0.02f, 0, 0.02f}}, 0.05f);
+  const SphericalGaussian lights[] = {
+      {{0.6f, 0, 0.8f}, 40, {1, 1, 1}}, {{0, 0, -1}, 1e9f, {1, 1, 1}}, {{kNan, 0, 1}, 1, {1, 1, 1}}};
+  forEachModel([&](const auto& model, const char* name) {
+    SCOPED_TRACE(name);
+    for (const Footprint& p : {Footprint::isotropic({0.3f, 0.7f}, 9), Footprint::isotropic({-1e9f, kNan}, kInfinity),
+                               Footprint::gaussian({0, 0}, {0, kNan, 1}), Footprint::box({kInfinity, 0}, {0, 0}, {kNan, 1})}) {
+      const MicrofacetBrdf brdf(model, p, masking, Fresnel::mirror());
+      const Vec3 good = {0.6f, 0, 0.8f};
+      for (const Vec3 bad :
+           {Vec3{0, 0, -1}, {1, 0, 0}, {0.6f, 0, -0.8f}, {0, 0, 0}, {kNan, 0, 1}, {0, kInfinity, 1}, {3, 4, 5}}) {
+        EXPECT_EQ(brdf.evaluate(bad, good), Rgb{});
+        EXPECT_EQ(brdf.evaluate(good, bad), Rgb{});
+        EXPECT_EQ(brdf.pdf(bad, good), 0);
+        EXPECT_EQ(brdf.pdf(good, bad), 0);
+        EXPECT_EQ(brdf.sample(bad, {0.5f, 0.5f}).pdf, 0);
+        EXPECT_EQ(prefilteredRadiance(brdf, bad, lights[0]), Rgb{});
+      }
+      for (const Vec3 wo : {Vec3{0, 0, 1}, good, {1, 0, 1e-4f}}) {
+        const BrdfSample s = brdf.sample(wo, {kNan, 0.5f});
+        EXPECT_TRUE(std::isfinite(s.pdf) && s.pdf >= 0 && std::isfinite(s.weight.r) && s.weight.r >= 0);
+        EXPECT_TRUE(std::isfinite(brdf.evaluate(good, wo).r) && brdf.evaluate(good, wo).r >= 0);
+        const float radiance = prefilteredRadiance(brdf, wo, SphericalGaussians{lights, 3}).r;
+        EXPECT_TRUE(std::isfinite(radiance) && radiance >= 0);
+      }
+    }
+  });
+}
+
+}  // namespace
+}  // namespace glint
