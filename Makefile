@@ -14,7 +14,7 @@ help:  ## list the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
 
 .PHONY: demo
-demo: build  ## run every tool on the sample maps and draw demo/ndf-before-after.png (DEMO_MAP=image.png adds yours)
+demo: build  ## run every tool on the sample maps, draw demo/*.png (DEMO_MAP=image.png adds yours)
 	@$(PYTHON) pipelines/demo/demo.py --bin build/bin --out demo $(if $(DEMO_MAP),--map '$(DEMO_MAP)')
 
 .PHONY: test

@@ -159,7 +159,7 @@ bool Option::given() const { return option_->count() > 0; }
 struct Tool::State {
   ToolInfo info;
   CLI::App app;
-  std::string section = "Options";
+  std::string section = kOptions;
   std::deque<Option> options;                                            // deque: references handed out stay valid
   std::vector<std::pair<std::string, std::function<json()>>> recorders;  // one for each option, same order
   std::vector<std::function<void()>> checks;

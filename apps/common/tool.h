@@ -68,8 +68,9 @@ class Tool {
   Tool(const Tool&) = delete;
   Tool& operator=(const Tool&) = delete;
 
-  /// Heads the options declared next, in the help text.
+  /// Heads the options declared next, in the help text; kOptions at first.
   void section(const std::string& title);
+  static constexpr const char* kOptions = "Options";
 
   /// Declares an option or, when `name` has no dash, a positional argument. `value` holds the default, which the help shows unless it
   /// is empty or out of range, as that of an option is which does nothing until it is given.

@@ -13,11 +13,8 @@
 namespace glint::apps {
 namespace {
 
-constexpr std::array kCentre = {"u", "v"};
-constexpr std::array kSigma = {"sigma"};
 constexpr std::array kLevel = {"level"};
 constexpr std::array kDirections = {"wix", "wiy", "wiz", "wox", "woy", "woz"};
-constexpr std::array kHalf = {"hx", "hy"};
 
 /// Side of the box with the second moments of a Gaussian.
 float diameterOf(float sigma) { return std::sqrt(12.0f) * sigma; }
@@ -49,6 +46,7 @@ Vec3 directionOf(const std::vector<float>& xyz, const char* option) {
 }
 
 DisplacementQuery::DisplacementQuery(Tool& tool) : tool_(tool) {
+  tool.section("Reflectance (kind displacement)");
   wi_option_ =
       &tool.option(
                "--wi", wi_,

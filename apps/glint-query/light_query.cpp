@@ -48,6 +48,7 @@ ShLightIntegral integrate(const ShLight& light, std::span<const float> zonal, fl
 }  // namespace
 
 LightQuery::LightQuery(Tool& tool) : tool_(tool) {
+  tool.section("Light (kinds normals and histogram-sat)");
   const Option& light = tool.option(
       "--light", path_, "ask for the light that the footprint reflects: table of kind sh-light, in the frame of the surface");
   tool.option("--lobes", lobes_path_, "--light: asset of kind sh-lobes whose roughness is taken instead of --sigma-r")

@@ -18,6 +18,7 @@ namespace {
 }  // namespace
 
 QueryCommand::QueryCommand(Tool& tool) : tool_(tool), light_(tool), displacement_(tool) {
+  tool.section(Tool::kOptions);
   wo_option_ = &tool.option("--wo", wo_, "--light and --wi: outgoing direction X Y Z, z out of the surface").count(3);
   uv_option_ = &tool.option("--uv", uv_, "centre of the footprint, texture space").count(2);
   sigma_option_ = &tool.option("--sigma", sigma_, "footprint: deviation of an isotropic Gaussian, texels").range(1e-6, 1e9);

@@ -5,11 +5,8 @@
 namespace glint::apps {
 namespace {
 
-constexpr std::array kCentre = {"u", "v"};
-constexpr std::array kSigma = {"sigma"};
 constexpr std::array kCovariance = {"sxx", "sxy", "syy"};
 constexpr std::array kBox = {"ax", "ay", "bx", "by"};
-constexpr std::array kHalf = {"hx", "hy"};
 constexpr std::array kRange = {"x0", "y0", "x1", "y1"};
 
 void requireColumns(const CsvTable& columns) {

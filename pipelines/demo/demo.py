@@ -1,4 +1,4 @@
-"""The chain of tools on the sample maps: assets, a table of time, bytes and error, and a picture before and after compression.
+"""The chain of tools on the sample maps: assets, a table of time, bytes and error, a picture before and after compression, and one of all models.
 
 Normally run by `make demo`.
 """
@@ -21,7 +21,7 @@ STRIDE = 32
 IMAGES_PER_REGION = 8
 PICTURE_LEVELS = (0, 1, 3)
 # Columns of the picture of all models -> kind in the file's name.
-MODELS = {"Reference": "", "pyramid": "pyramid", "cp, rank 16": "cp", "tucker, 5 x 5": "tucker", "pca, rank 16": "pca", "bin map": "binmap",
+MODELS = {"Reference": "", "pyramid": "pyramid", "cp, rank 16": "cp", "tucker, error of cp": "tolerance", "pca, rank 16": "pca", "bin map": "binmap",
           "histograms": "sat"}
 NOT_DRAWN = {"flakes_256"}  # flakes_1k is
 
@@ -69,9 +69,9 @@ class Chain:
         self.add("pyramid", pyramid, self.path("pyramid"), self.error("pyramid"))
         regions = max(1, round(max(self.size) / STRIDE / IMAGES_PER_REGION))
         cp = self.compress("cp", "cp, rank 16", "--method", "cp", "--rank", 16, "--regions", regions)
-        self.compress("tucker", "tucker, 5 x 5", "--method", "tucker", "--rank", 25)
+        self.compress("tucker", "tucker, rank 25", "--method", "tucker", "--rank", 25)
         self.compress("pca", "pca, rank 16", "--method", "pca", "--rank", 16)
-        self.compress("tolerance", "pca, error of cp", "--method", "pca", "--tolerance", cp.result["total"]["rel_l2"])
+        self.compress("tolerance", "tucker, error of cp", "--method", "tucker", "--tolerance", cp.result["total"]["rel_l2"])
         self.make("bin map", "binmap", "--alpha", self.sigma_r * 2**0.5)
         self.make("histograms", "sat")
         if kind:
@@ -168,13 +168,13 @@ def table_text(rows):
 
 def draw_footprints(chain, path):
     """The chain's images at three footprint sizes, before and after compression."""
-    chain.compress_to_bytes_of("pca-same", "cp", "pca")
+    chain.compress_to_bytes_of("tucker-same", "cp", "tucker")
     levels = sorted({min(level, len(chain.levels) - 1) for level in PICTURE_LEVELS})
     footprints = [chain.footprint(level) for level in levels]
-    sizes = {kind: readable_bytes(chain.path(kind).stat().st_size) for kind in ("pyramid", "cp", "pca-same") if chain.path(kind).exists()}
+    sizes = {kind: readable_bytes(chain.path(kind).stat().st_size) for kind in ("pyramid", "cp", "tucker-same") if chain.path(kind).exists()}
     titles = {"": "Reference", "pyramid": f"Pyramid\n{sizes['pyramid']}", "cp": f"CP, rank 16\n{sizes['cp']}"}
-    if "pca-same" in sizes:
-        titles["pca-same"] = f"PCA, same bytes\n{sizes['pca-same']}"
+    if "tucker-same" in sizes:
+        titles["tucker-same"] = f"Tucker, same bytes\n{sizes['tucker-same']}"
     images = {title: [chain.ndf(kind, p) for p in footprints] for kind, title in titles.items()}
     picture.draw_footprints(images, [f"footprint {p.sigma:.0f} texels" for p in footprints], path)
 
