@@ -72,6 +72,7 @@ class Compressor {
         statistics_(index_.clusterCount()),
         encoded_(index_.clusterCount()),
         selection_(index_.clusterCount(), -1),
+        encoded_gains_(index_.clusterCount(), 0.0),
         image_scales_(index_.imageCount(), 1.0f),
         density_scales_(index_.imageCount(), 0.0f) {}
 
@@ -138,12 +139,14 @@ class Compressor {
     for (auto& model : models) models_.push_back(std::move(*model));
   }
 
-  /// Encodes the clusters whose choice changed, and scales the images.
+  /// Encodes the clusters whose choice, or price of a byte, changed, and scales the images.
   void encode(const std::vector<int>& selection) {
     forEachCluster([&](std::size_t c) {
-      if (selection[c] == selection_[c]) return;
+      const double gain_per_byte = groupOf(c).gain_per_byte;
+      if (selection[c] == selection_[c] && gain_per_byte == encoded_gains_[c]) return;
+      encoded_gains_[c] = gain_per_byte;
       encoded_[c] = encodeCluster(index_, c, statistics_[c], models_[c].basis(selection[c]), options_.method,
-                                  options_.coefficient_type, pyramid_.value_scale, groupOf(c).gain_per_byte);
+                                  options_.coefficient_type, pyramid_.value_scale, gain_per_byte);
     });
     selection_ = selection;
     scaleImages();
@@ -193,14 +196,13 @@ class Compressor {
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       const std::span models = std::span(models_).subspan(g * clustersPerGroup(), clustersPerGroup());
       searches.emplace_back(models, budget(groups_[g]));
-      if (options_.method != CompressionMethod::cp)
-        groups_[g].gain_per_byte = searches[g].allocator().gainPerByte(budget(groups_[g]));
     }
     const auto encodeChosen = [&] {
       std::vector<int> selection;
-      for (const ToleranceSearch& search : searches)
-        selection.insert(selection.end(), search.selection().begin(), search.selection().end());
-      if (selection == selection_) return;
+      for (std::size_t g = 0; g < groups_.size(); ++g) {
+        selection.insert(selection.end(), searches[g].selection().begin(), searches[g].selection().end());
+        if (options_.method != CompressionMethod::cp) groups_[g].gain_per_byte = searches[g].gainPerByte();
+      }
       progress_.grow(index_.clusterCount());
       encode(selection);
     };
@@ -396,6 +398,7 @@ class Compressor {
   std::vector<ClusterModel> models_;
   std::vector<EncodedCluster> encoded_;
   std::vector<int> selection_;
+  std::vector<double> encoded_gains_;  // [clusters]: gain_per_byte that they were encoded for
   std::vector<float> image_scales_;
   std::vector<float> density_scales_;
   std::uint64_t unscaled_images_ = 0;

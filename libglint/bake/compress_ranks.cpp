@@ -78,6 +78,7 @@ bool ToleranceSearch::next(double measured) {
 
 bool ToleranceSearch::finish(double target) {
   done_ = true;
+  target_ = target;
   selection_ = allocator_.allocate(target);
   return false;
 }

@@ -52,10 +52,11 @@ class ToleranceSearch {
   /// @param budget  squared error that must not be exceeded, and is used up as far as single steps allow
   ToleranceSearch(std::span<const ClusterModel> models, double budget);
 
-  const RankAllocator& allocator() const { return allocator_; }
-
   /// Choices to encode and measure next; those to keep once the search is done.
   const std::vector<int>& selection() const { return selection_; }
+
+  /// Squared error that a byte has to take off to be worth it beside those of selection(); 0 when every byte is.
+  double gainPerByte() const { return target_ > 0 ? allocator_.gainPerByte(target_) : 0; }
 
   /// @param measured  squared error of selection()
   /// @return false when the search is done

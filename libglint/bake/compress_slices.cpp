@@ -7,6 +7,7 @@
 #include <string>
 
 #include "glint/bake/compress_kernels.h"
+#include "glint/bake/stored_block.h"
 #include "glint/model/error.h"
 
 namespace glint::bake {
@@ -115,19 +116,11 @@ void SliceIndex::assignSlices() {
   });
 }
 
-const std::byte* SliceIndex::block(std::uint64_t slice) const {
-  const auto level = std::upper_bound(first_image_.begin(), first_image_.end(), images_[slice]) - first_image_.begin() - 1;
-  const std::size_t pixel_bytes = pyramid_.precision == BlockPrecision::f16 ? 2 : 4;
-  return static_cast<const std::byte*>(pyramid_.levels[level].pixels) + blocks_[slice] * kBlockPixels * pixel_bytes;
-}
-
 void SliceIndex::load(std::size_t cluster, int first, int count, float factor, float* out) const {
   for (int s = 0; s < count; ++s, out += kSliceStride) {
-    const std::byte* source = block(first_slices_[cluster] + first + s);
-    if (pyramid_.precision == BlockPrecision::f16)
-      halfToFloat(reinterpret_cast<const std::uint16_t*>(source), kBlockPixels, out);
-    else
-      std::copy_n(reinterpret_cast<const float*>(source), kBlockPixels, out);
+    const std::uint64_t slice = first_slices_[cluster] + first + s;
+    const auto level = std::upper_bound(first_image_.begin(), first_image_.end(), images_[slice]) - first_image_.begin() - 1;
+    loadStoredBlock(pyramid_, pyramid_.levels[level], blocks_[slice], out);
     if (factor != 1)
       for (int p = 0; p < kBlockPixels; ++p) out[p] *= factor;
   }

@@ -54,7 +54,6 @@ class SliceIndex {
  private:
   void assignImages();
   void assignSlices();
-  const std::byte* block(std::uint64_t slice) const;
 
   const NdfPyramid& pyramid_;
   int regions_;

@@ -7,6 +7,7 @@
 
 #include "glint/bake/simd.h"
 #include "glint/model/ndf_pyramid.h"
+#include "glint/query/footprint_weights.h"
 
 namespace glint::bake {
 namespace {
@@ -62,11 +63,6 @@ Range texelsWithin(float centre, float reach, int size, Boundary boundary) {
   int begin = static_cast<int>(std::ceil(centre - reach - 0.5f)), end = static_cast<int>(std::floor(centre + reach - 0.5f)) + 1;
   if (boundary == Boundary::clamp) begin = std::max(begin, 0), end = std::min(end, size);
   return {begin, end};
-}
-
-int wrapIndex(int i, int n) {
-  const int r = i % n;
-  return r < 0 ? r + n : r;
 }
 
 std::vector<float> gaussianWeights(Range range, float centre, float sigma) {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <vector>
 
-#include "glint/query/half.h"
+#include "glint/bake/stored_block.h"
 
 namespace glint::bake {
 namespace {
@@ -21,12 +21,7 @@ void decodeImage(const NdfPyramid& pyramid, int l, std::size_t image, std::vecto
   for (int w = 0; w < words; ++w) {
     for (std::uint64_t mask = level.masks[image * words + w]; mask; mask &= mask - 1) {
       float* block = pixels.data() + static_cast<std::size_t>(64 * w + std::countr_zero(mask)) * kBlockPixels;
-      for (int k = 0; k < kBlockPixels; ++k) {
-        const std::size_t at = stored * kBlockPixels + k;
-        block[k] = pyramid.precision == BlockPrecision::f16 ? halfToFloat(static_cast<const std::uint16_t*>(level.pixels)[at])
-                                                            : static_cast<const float*>(level.pixels)[at];
-      }
-      ++stored;
+      loadStoredBlock(pyramid, level, stored++, block);
     }
   }
 }

@@ -15,6 +15,12 @@ inline constexpr float kMinBoxThickness = 1e-3f;
 /// Gaussian footprints are summed out to this many standard deviations: exp(-6^2 / 2) = 1.5e-8.
 inline constexpr float kFootprintReach = 6.0f;
 
+/// Index of texel i of an endless row of maps of n texels.
+inline GLINT_HD int wrapIndex(int i, int n) {
+  const int r = i % n;
+  return r < 0 ? r + n : r;
+}
+
 /// Brings a coordinate of a footprint's centre into [0, 1); what is not finite becomes 0.
 inline GLINT_HD float wrapUnit(float u) {
   const float wrapped = u - std::floor(u);

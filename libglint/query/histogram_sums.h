@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "glint/model/histogram_sat.h"
+#include "glint/query/footprint_weights.h"
 
 namespace glint {
 
@@ -217,11 +218,6 @@ class RectangleSums {
   static constexpr int kCacheLine = 32;  // counters
 
   static GLINT_HD std::int64_t areaUnits(double area) { return static_cast<std::int64_t>(area * kAreaUnits); }
-
-  static GLINT_HD int wrapIndex(int i, int n) {
-    const int r = i % n;
-    return r < 0 ? r + n : r;
-  }
 
   /// Splits [low, high] into whole periods and at most two parts of one: visitor(begin, end, times), 0 <= begin < end <= size.
   template <class Visitor>

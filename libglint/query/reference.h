@@ -224,10 +224,6 @@ class Reference {
     const int remainder = value % step;
     return value - (remainder < 0 ? remainder + step : remainder);
   }
-  static GLINT_HD int wrapIndex(int i, int n) {
-    const int r = i % n;
-    return r < 0 ? r + n : r;
-  }
   GLINT_HD Vec2 normal(int i, int j) const { return map_.at(wrapIndex(i, map_.width), wrapIndex(j, map_.height)); }
   /// Cells of the last row and column reach over the border, so they exist only on the endless plane.
   GLINT_HD bool hasCell(int i, int j) const {

@@ -41,7 +41,7 @@ def show(axis, image, truth, margin, note=""):
               path_effects=[patheffects.withStroke(linewidth=2, foreground="black")])
 
 
-def grid(rows, columns, left=0.19):
+def grid(rows, columns, left=0.2):
     """Axes of a grid of images, titles of rows at the left and of columns above."""
     figure, axes = plt.subplots(len(rows), len(columns), squeeze=False, figsize=(CELL_INCHES * len(columns) + 1.35, CELL_INCHES * len(rows) + 0.5))
     for c, title in enumerate(columns):

@@ -52,10 +52,11 @@ class Table:
 
     def __init__(self):
         self.rows = []
+        self.section = ""
 
     def add(self, figure, value, unit, target=None, paper="", design="", **details):
         """@param target  the value must not be more"""
-        self.rows.append({"figure": figure, "value": value, "unit": unit, "target": target, "paper": paper, "design": design, "details": details})
+        self.rows.append({"section": self.section, "figure": figure, "value": value, "unit": unit, "target": target, "paper": paper, "design": design, "details": details})
         print_row(self.rows[-1])
 
 
@@ -364,6 +365,7 @@ def main():
     bench.make_maps()
     print_header()
     for section in arguments.only:
+        bench.table.section = section
         getattr(bench, section)()
         bench.write()  # what was measured stays when a later section is stopped
     bench.summarize()

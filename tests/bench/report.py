@@ -11,6 +11,10 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 LABELS = {"pyramid": "pyramid", "cp16": "cp", "cp32": "cp", "tucker-tolerance": "tucker", "pca-tolerance": "pca"}
+# Sections of bench.py -> headings.
+SECTIONS = {"synth_and_ingest": "Synthesis and ingest", "pyramids": "Pyramids", "compressions": "Compression", "queries": "Queries",
+            "query_command": "glint-query", "displacements": "Displacements", "histograms": "Histograms", "light": "Light", "bin_maps": "Bin maps",
+            "accuracy": "Accuracy"}
 HEADER = """# Measurements
 
 Written by `make bench-report`; do not edit. Repeat with `make bench`, which prints the same figures and writes
@@ -18,7 +22,7 @@ Written by `make bench-report`; do not edit. Repeat with `make bench`, which pri
 
 {machine}
 Maps are {size}^2 texels, made by glint-synth and stored as 8-bit PNG (arguments: `tests/bench/bench.py`). Times are of whole
-processes, reading and writing files included: the median of {repeats} runs. Papers' figures are their own, on their machines (Deng
+processes, reading and writing files included, the median of {repeats}. Papers' figures are their own, on their machines (Deng
 2022: 40 cores at 2.39 GHz, other maps of the same kinds); the last column is what a throw-away version of the same idea reached on a
 machine like this.
 """
@@ -36,6 +40,19 @@ def table(rows):
             target = f"<= {number(row['target'], row['unit'])}" + ("" if row["value"] <= row["target"] else " **over**")
         lines.append(f"| {row['figure']} | {number(row['value'], row['unit'])} | {target} | {row['paper']} | {row['design']} |")
     return "\n".join(lines)
+
+
+def section_tables(rows):
+    """A table for each section of bench.py, and before them one of how many targets each meets."""
+    sections = {title: [row for row in rows if row["section"] == name] for name, title in SECTIONS.items()}
+    sections = {title: found for title, found in sections.items() if found}
+    lines = ["| section | figures | with a target | over it |", "|---|---|---|---|"]
+    for title, found in sections.items():
+        targets = [row for row in found if row["target"] is not None]
+        over = sum(row["value"] > row["target"] for row in targets)
+        anchor = "".join(c for c in title.lower() if c.isalnum() or c in " -").replace(" ", "-")
+        lines.append(f"| [{title}](#{anchor}) | {len(found)} | {len(targets)} | {over} |")
+    return "\n".join(lines) + "\n" + "".join(f"\n## {title}\n\n{table(found)}\n" for title, found in sections.items())
 
 
 def level_tables(accuracy):
@@ -175,12 +192,13 @@ def main():
     machine = "{processor}, {cores} cores; load {load:.1f} before the run; revision {revision}.".format(**results["machine"])
     data = points(accuracy, results["rows"])
     arguments.docs.mkdir(exist_ok=True)
-    text = HEADER.format(machine=machine, size=results["size_texels"], repeats=results["repeats"]) + f"\n{table(results['rows'])}\n"
+    text = HEADER.format(machine=machine, size=results["size_texels"], repeats=f"{results['repeats']} runs" if results["repeats"] > 1 else "one run") + "\n"
     if data:
         chart(data, 0, "MB", arguments.docs / "error-bytes.png")
         chart(data, 2, "nanoseconds of a density query, random", arguments.docs / "error-time.png")
         text += "\n## Error against bytes and time\n\n![Error against bytes](error-bytes.png)\n![Error against time](error-time.png)\n"
     text += light_section(results, arguments.results.parent, arguments.docs)
+    text += f"\n## Targets\n\n{section_tables(results['rows'])}"
     if data:
         text += f"\n## Errors of every octave\n\nAgainst brute force over the texels, at footprints on the centres of a level and at random ones of its octave.\n\n{level_tables(accuracy)}"
     (arguments.docs / "BENCHMARKS.md").write_text(text.rstrip() + "\n")

@@ -286,7 +286,7 @@ std::vector<Fixture> attributeFixtures() {
   };
 }
 
-std::vector<Fixture> datasetFixtures() {
+std::vector<Fixture> storageFixtures() {
   const auto external = [](hid_t properties) { H5Pset_external(properties, "/etc/passwd", 0, kSize * kSize * 4); };
   const auto chunked = [](hid_t properties) {
     const hsize_t chunk[2] = {4, 4};
@@ -340,6 +340,11 @@ std::vector<Fixture> datasetFixtures() {
          Patch(path, 4104).replace("heights", H5T_IEEE_F32LE, {kSize, kSize}, true);
        },
        true},
+  };
+}
+
+std::vector<Fixture> datasetFixtures() {
+  return {
       patched(
           "dataset.unknown", Base::heights, [](const Patch& patch) { patch.replace("extra", H5T_IEEE_F32LE, {kSize}, true); },
           true),
@@ -383,7 +388,7 @@ std::vector<Fixture> datasetFixtures() {
   };
 }
 
-std::vector<Fixture> indexFixtures() {
+std::vector<Fixture> pyramidFixtures() {
   return {
       patched("shape.resolution", Base::pyramid, [](const Patch& patch) { patch.setInteger("resolution", 65); }),
       patched("shape.strides", Base::pyramid,
@@ -420,6 +425,11 @@ std::vector<Fixture> indexFixtures() {
               }),
       patched("pyramid.first_block", Base::pyramid,
               [](const Patch& patch) { patch.change<std::uint64_t>("level_01/masks", 1, [](auto& mask) { mask ^= 1; }); }),
+  };
+}
+
+std::vector<Fixture> compressedFixtures() {
+  return {
       patched("compressed.images", Base::compressed,
               [](const Patch& patch) {
                 for (const char* path : {"image_regions", "image_slots"}) patch.replace(path, H5T_STD_U16LE, {20}, true);
@@ -730,8 +740,9 @@ std::vector<Fixture> shFixtures() {
 
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
-  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), datasetFixtures(), indexFixtures(), dataFixtures(),
-                    histogramFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
+  for (auto list :
+       {fileFixtures(), linkFixtures(), attributeFixtures(), storageFixtures(), datasetFixtures(), pyramidFixtures(),
+        compressedFixtures(), dataFixtures(), histogramFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
