@@ -69,7 +69,8 @@ class PixelFilter {
   /// Bins around the square that filters may read.
   int margin() const;
 
-  /// Adds one 16x16 block of pixels: mass per pixel (beside narrow lobes a little may be negative), from the bins whose pixel (0, 0) of the block starts at `bins`.
+  /// Adds one 16x16 block of pixels: mass per pixel (beside narrow lobes a little may be negative), from the bins whose pixel
+  /// (0, 0) of the block starts at `bins`.
   void addBlock(const float* bins, int pitch, float* pixels) const;
 
  private:

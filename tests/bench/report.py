@@ -22,7 +22,7 @@ Written by `make bench-report`; do not edit. Repeat with `make bench`, which pri
 
 {machine}
 Maps are {size}^2 texels, made by glint-synth and stored as 8-bit PNG (arguments: `tests/bench/bench.py`). Times are of whole
-processes, reading and writing files included, the median of {repeats}. Papers' figures are their own, on their machines (Deng
+processes, reading and writing files included, {repeats}. Papers' figures are their own, on their machines (Deng
 2022: 40 cores at 2.39 GHz, other maps of the same kinds); the last column is what a throw-away version of the same idea reached on a
 machine like this.
 """
@@ -192,7 +192,7 @@ def main():
     machine = "{processor}, {cores} cores; load {load:.1f} before the run; revision {revision}.".format(**results["machine"])
     data = points(accuracy, results["rows"])
     arguments.docs.mkdir(exist_ok=True)
-    text = HEADER.format(machine=machine, size=results["size_texels"], repeats=f"{results['repeats']} runs" if results["repeats"] > 1 else "one run") + "\n"
+    text = HEADER.format(machine=machine, size=results["size_texels"], repeats=f"the median of {results['repeats']} runs" if results["repeats"] > 1 else "of one run each") + "\n"
     if data:
         chart(data, 0, "MB", arguments.docs / "error-bytes.png")
         chart(data, 2, "nanoseconds of a density query, random", arguments.docs / "error-time.png")
