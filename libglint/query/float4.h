@@ -48,7 +48,7 @@ struct Float4 {
     const __m128 is_subnormal = _mm_castsi128_ps(_mm_cmplt_epi32(magnitude, _mm_set1_epi32(0x400)));
     return {_mm_or_ps(_mm_blendv_ps(_mm_castsi128_ps(normal), subnormal, is_subnormal), _mm_castsi128_ps(sign))};
   }
-  /// Half-precision numbers >= 0, in half the time.
+  /// Half-precision numbers >= 0: fewer steps, as there is no sign.
   static Float4 loadPositive(const std::uint16_t* p) {
     return positiveHalves(_mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))));
   }
