@@ -36,7 +36,7 @@ BinMapCommand::BinMapCommand(Tool& tool) {
           "with any roughness between them")
       .required();
   tool.addCheck([this] { parseAlpha(alpha_, options_); });
-  tool.option("--leaf-size", options_.leaf_size, "texels of a cell of a bin's grid, at least on average");
+  tool.option("--leaf-size", options_.leaf_size, "texels of a cell of the map within a list, on average at least");
 }
 
 BuiltBinMap BinMapCommand::build(const NormalMap& map, const bake::ProgressFn& progress) const {
@@ -52,17 +52,16 @@ nlohmann::json binMapJson(const BuiltBinMap& built) {
           {"alpha_min", map.alpha_min},
           {"alpha_max", map.alpha_max},
           {"bins_per_axis", map.bins_per_axis},
-          {"occupied_bins", map.occupiedBins()},
-          {"bins_with_grid", map.grid_cells.size() - 1},
-          {"cells", map.cell_starts.size()},
+          {"blocks", map.blockCount()},
+          {"cells", map.cell_starts.size() - 1},
           {"size_bytes", built.data.sizeBytes()},
           {"build_s", built.seconds}};
 }
 
 std::string binMapText(const BuiltBinMap& built) {
   const BinMap map = built.data.view();
-  return fmt::format("{} x {} bins, {} occupied, {} with a grid; {:.2f} MB, {:.2f} bytes a texel\n", map.bins_per_axis,
-                     map.bins_per_axis, map.occupiedBins(), map.grid_cells.size() - 1,
+  return fmt::format("{} x {} bins in {} blocks, {} cells; {:.2f} MB, {:.2f} bytes a texel\n", map.bins_per_axis,
+                     map.bins_per_axis, map.blockCount(), map.cell_starts.size() - 1,
                      1e-6 * static_cast<double>(built.data.sizeBytes()),
                      static_cast<double>(built.data.sizeBytes()) / static_cast<double>(map.texels.size()));
 }

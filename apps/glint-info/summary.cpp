@@ -126,14 +126,11 @@ ordered_json summarizeCompressed(const CompressedNdf& ndf, const formats::AssetI
 }
 
 ordered_json summarizeBinMap(const BinMap& map) {
-  std::uint64_t longest = 0;
-  for (std::size_t k = 0; k + 1 < map.bin_starts.size(); ++k)
-    longest = std::max(longest, map.bin_starts[k + 1] - map.bin_starts[k]);
-  return {{"occupied_bins", map.occupiedBins()},
-          {"occupied_share", static_cast<double>(map.occupiedBins()) / static_cast<double>(map.binCount())},
-          {"longest_list", longest},
-          {"bins_with_grid", map.grid_cells.size() - 1},
-          {"cells", map.cell_starts.size()},
+  return {{"bins", static_cast<std::uint64_t>(map.bins_per_axis) * static_cast<std::uint64_t>(map.bins_per_axis)},
+          {"bins_of_a_tile", std::uint64_t{1} << 2 * map.tile_bits},
+          {"blocks", map.blockCount()},
+          {"texels_of_a_block", static_cast<double>(map.texels.size()) / static_cast<double>(map.blockCount())},
+          {"cells", map.cell_starts.size() - 1},
           {"classes", map.classCount()}};
 }
 

@@ -1,6 +1,5 @@
 #include "glint/model/bin_map.h"
 
-#include <bit>
 #include <cmath>
 
 #include "glint/formats/kinds/codec.h"
@@ -11,51 +10,68 @@ namespace {
 
 std::size_t texelCount(const BinMap& map) { return static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height); }
 
-/// Whether ranks are the running count of mask bits, the bits are of `bits` places, and `count` of them are set.
-bool masksHold(std::span<const std::uint64_t> masks, std::span<const std::uint32_t> ranks, std::uint64_t bits,
-               std::uint64_t count) {
-  if (masks.size() != (bits + 63) / 64) return false;
-  std::uint64_t running = 0;
-  for (std::size_t w = 0; w < masks.size(); ++w) {
-    if (ranks[w] != running) return false;
-    running += static_cast<std::uint64_t>(std::popcount(masks[w]));
-  }
-  const bool tail = bits % 64 != 0 && (masks.back() >> (bits % 64)) != 0;
-  return !tail && running == count;
-}
-
 bool startsHold(const BinMap& map) {
-  if (map.bin_starts.size() < 2 || map.bin_starts[0] != 0) return false;
-  for (std::size_t k = 1; k < map.bin_starts.size(); ++k)
-    if (map.bin_starts[k] <= map.bin_starts[k - 1]) return false;
-  return map.bin_starts[map.bin_starts.size() - 1] == texelCount(map);
+  if (map.cell_starts.size() < 2 || map.cell_starts[0] != 0) return false;
+  for (std::size_t k = 1; k < map.cell_starts.size(); ++k)
+    if (map.cell_starts[k] < map.cell_starts[k - 1]) return false;
+  return map.cell_starts[map.cell_starts.size() - 1] == texelCount(map);
 }
 
-/// Calls visitor(ordinal, grid) for every occupied bin with a grid.
-template <class Visitor>
-void forEachGrid(const BinMap& map, Visitor&& visitor) {
-  std::size_t grid = 0;
-  for (std::size_t w = 0; w < map.grid_masks.size(); ++w)
-    for (std::uint64_t bits = map.grid_masks[w]; bits != 0; bits &= bits - 1)
-      visitor(64 * w + static_cast<std::size_t>(std::countr_zero(bits)), grid++);
-}
+/// A node that is a block.
+struct BlockOfNode {
+  std::uint64_t first_key;
+  int side_bits, cell_bits;
+  std::uint64_t first_cell;
+};
 
-/// Checks the grids of bins. Masks and bin starts must hold.
-void checkGrids(const BinMap& map, Findings& findings) {
-  const TexelCode code = texelCode(map.width, map.height);
-  const std::uint64_t most = std::uint64_t{1} << (code.column_bits + code.row_bits);
-  const auto holds = [&](std::size_t ordinal, std::size_t grid) {
-    const std::uint64_t first = map.grid_cells[grid], end = map.grid_cells[grid + 1];
-    if (end <= first + 1 || end > map.cell_starts.size()) return false;
-    if (const std::uint64_t cells = end - first - 1; cells > most || !std::has_single_bit(cells)) return false;
-    for (std::uint64_t c = first + 1; c < end; ++c)
-      if (map.cell_starts[c] < map.cell_starts[c - 1]) return false;
-    return map.cell_starts[first] == map.bin_starts[ordinal] && map.cell_starts[end - 1] == map.bin_starts[ordinal + 1];
-  };
-  bool whole = map.grid_cells[0] == 0 && map.grid_cells.back() == map.cell_starts.size();
-  forEachGrid(map, [&](std::size_t ordinal, std::size_t grid) { whole = whole && holds(ordinal, grid); });
-  if (!whole) findings.add("bin_map.grids", "/grid_cells", "does not divide the lists into powers of two of cells");
-}
+/// Walks the quadtrees of a bin map in order and checks that nodes, blocks and cells are numbered as they are met.
+class TreeWalk {
+ public:
+  explicit TreeWalk(const BinMap& map) : map_(map), code_(texelCode(map.width, map.height)) {
+    tiles_ = static_cast<std::uint64_t>(map.tilesPerAxis()) * static_cast<std::uint64_t>(map.tilesPerAxis());
+    next_node_ = tiles_;
+  }
+
+  /// Calls visitor(BlockOfNode) for each block. Returns false at what is out of order.
+  template <class Visitor>
+  bool walk(Visitor&& visitor) {
+    if (tiles_ > nodeCount()) return false;
+    for (std::uint64_t tile = 0; tile < tiles_; ++tile)
+      if (!visit(tile, map_.tile_bits, tile << 2 * map_.tile_bits, visitor)) return false;
+    return next_node_ == nodeCount() && next_block_ == map_.blockCount() && next_cell_ + 1 == map_.cell_starts.size();
+  }
+
+ private:
+  std::uint64_t nodeCount() const { return map_.nodes.size() / 2; }
+
+  template <class Visitor>
+  bool visit(std::uint64_t node, int side_bits, std::uint64_t key, Visitor& visitor) {
+    const std::uint32_t kind = map_.nodes[2 * node] & ((1u << BinMap::kKindBits) - 1);
+    const std::uint32_t number = map_.nodes[2 * node] >> BinMap::kKindBits, first = map_.nodes[2 * node + 1];
+    if (kind == BinMap::kEmpty) return number == 0 && first == 0;
+    if (kind != BinMap::kSplit) return visitBlock({key, side_bits, static_cast<int>(kind) - 1, first}, number, visitor);
+    if (side_bits == 0 || number != 0 || first != next_node_ || first + 4ull > nodeCount()) return false;
+    next_node_ += 4;
+    for (std::uint64_t quadrant = 0; quadrant < 4; ++quadrant)
+      if (!visit(first + quadrant, side_bits - 1, key + (quadrant << 2 * (side_bits - 1)), visitor)) return false;
+    return true;
+  }
+
+  template <class Visitor>
+  bool visitBlock(const BlockOfNode& block, std::uint32_t number, Visitor& visitor) {
+    if (block.cell_bits > code_.column_bits + code_.row_bits) return false;
+    if (number != next_block_++ || block.first_cell != next_cell_) return false;
+    next_cell_ += std::uint64_t{1} << block.cell_bits;
+    if (next_cell_ >= map_.cell_starts.size()) return false;
+    if (map_.cell_starts[block.first_cell] == map_.cell_starts[next_cell_]) return false;
+    if (blockCode(code_, block.side_bits, block.cell_bits).place_bits < block.side_bits) return false;
+    return visitor(block);
+  }
+
+  const BinMap& map_;
+  TexelCode code_;
+  std::uint64_t tiles_, next_node_, next_block_ = 0, next_cell_ = 0;
+};
 
 std::uint32_t classOf(const BinMap& map, std::size_t texel) {
   const std::size_t bit = texel * BinMap::kClassBits;
@@ -67,10 +83,10 @@ std::uint32_t classOf(const BinMap& map, std::size_t texel) {
 
 void checkClasses(const BinMap& map, Findings& findings) {
   const auto& bins = map.class_bins;
-  bool divide = bins.size() >= 2 && bins.size() <= BinMap::kMaxClasses + 1 && bins[0] == 0 && bins.back() == map.binCount();
+  bool divide = bins.size() >= 2 && bins.size() <= BinMap::kMaxClasses + 1 && bins[0] == 0 && bins.back() == map.keyCount();
   for (std::size_t c = 1; divide && c < bins.size(); ++c) divide = bins[c] > bins[c - 1];
   if (!divide) {
-    findings.add("bin_map.classes", "/class_bins", "does not rise from 0 to the number of bins");
+    findings.add("bin_map.classes", "/class_bins", "does not rise from 0 to the number of keys");
     return;
   }
   for (std::size_t k = 0; k < texelCount(map); ++k) {
@@ -80,48 +96,28 @@ void checkClasses(const BinMap& map, Findings& findings) {
   }
 }
 
-/// Whether every texel of a list is of the map, new, in its class, and in its cell.
-class ListCheck {
- public:
-  explicit ListCheck(const BinMap& map) : map_(map), code_(texelCode(map.width, map.height)), seen_(texelCount(map)) {}
-
-  bool holds(std::uint32_t bin, std::uint64_t begin, std::uint64_t end, const CellGrid* grid, std::uint32_t cell) {
-    for (std::uint64_t k = begin; k < end; ++k) {
-      const std::uint32_t column = code_.column(map_.texels[k]), row = code_.row(map_.texels[k]);
-      if (column >= static_cast<std::uint32_t>(map_.width) || row >= static_cast<std::uint32_t>(map_.height)) return false;
-      const std::size_t texel = std::size_t{row} * static_cast<std::size_t>(map_.width) + column;
-      const std::uint32_t c = classOf(map_, texel);
-      if (seen_[texel] || bin < map_.class_bins[c] || bin >= map_.class_bins[c + 1]) return false;
-      seen_[texel] = true;
-      if (grid != nullptr &&
-          cell != (row >> grid->row_shift) * static_cast<std::uint32_t>(grid->columns) + (column >> grid->column_shift)) {
-        return false;
+/// Whether the texels of a block are of the map, in their bins' class, and not yet in `seen`.
+bool listHolds(const BinMap& map, const BlockOfNode& block, std::vector<bool>& seen) {
+  const TexelCode code_of_map = texelCode(map.width, map.height);
+  const TexelCode code = blockCode(code_of_map, block.side_bits, block.cell_bits);
+  const CellGrid grid = cellGrid(code_of_map, block.cell_bits);
+  const std::uint32_t bin_shift = static_cast<std::uint32_t>(code.place_bits - block.side_bits);
+  for (std::uint32_t cell = 0; cell < 1u << block.cell_bits; ++cell) {
+    const std::uint32_t across = static_cast<std::uint32_t>(grid.columns);
+    const std::uint32_t first_column = cell % across << grid.column_shift, first_row = cell / across << grid.row_shift;
+    for (std::uint64_t k = map.cell_starts[block.first_cell + cell]; k < map.cell_starts[block.first_cell + cell + 1]; ++k) {
+      const std::uint32_t code_of_texel = map.texels[k];
+      const std::uint32_t column = first_column + code.column(code_of_texel), row = first_row + code.row(code_of_texel);
+      if (column >= static_cast<std::uint32_t>(map.width) || row >= static_cast<std::uint32_t>(map.height)) return false;
+      const std::size_t texel = std::size_t{row} * static_cast<std::size_t>(map.width) + column;
+      std::uint64_t key = block.first_key;
+      for (int bit = 0; bit < block.side_bits; ++bit) {
+        key += std::uint64_t{code.placeX(code_of_texel) >> (bin_shift + static_cast<std::uint32_t>(bit)) & 1} << 2 * bit;
+        key += std::uint64_t{code.placeY(code_of_texel) >> (bin_shift + static_cast<std::uint32_t>(bit)) & 1} << (2 * bit + 1);
       }
-    }
-    return true;
-  }
-
- private:
-  const BinMap& map_;
-  TexelCode code_;
-  std::vector<bool> seen_;
-};
-
-bool listsHold(const BinMap& map) {
-  ListCheck check(map);
-  std::size_t ordinal = 0, grid = 0;
-  for (std::size_t w = 0; w < map.masks.size(); ++w) {
-    for (std::uint64_t bits = map.masks[w]; bits != 0; bits &= bits - 1, ++ordinal) {
-      const auto bin = static_cast<std::uint32_t>(64 * w + static_cast<std::size_t>(std::countr_zero(bits)));
-      if ((map.grid_masks[ordinal / 64] >> (ordinal % 64) & 1) == 0) {
-        if (!check.holds(bin, map.bin_starts[ordinal], map.bin_starts[ordinal + 1], nullptr, 0)) return false;
-        continue;
-      }
-      const std::uint32_t first = map.grid_cells[grid], cells = map.grid_cells[grid + 1] - first - 1;
-      const CellGrid shape = cellGrid(texelCode(map.width, map.height), static_cast<int>(std::bit_width(cells)) - 1);
-      for (std::uint32_t c = 0; c < cells; ++c)
-        if (!check.holds(bin, map.cell_starts[first + c], map.cell_starts[first + c + 1], &shape, c)) return false;
-      ++grid;
+      const std::uint32_t c = classOf(map, texel);
+      if (seen[texel] || key < map.class_bins[c] || key >= map.class_bins[c + 1]) return false;
+      seen[texel] = true;
     }
   }
   return true;
@@ -134,7 +130,7 @@ double halfValue(std::uint16_t half) {
   return half & 0x8000 ? -size : size;
 }
 
-/// Normals in a bin have means in [0, 1] and variances of at most 1/4. Rounding to half precision moves each by 2^-11.
+/// Normals in a block have means in [0, 1] and variances of at most 1/4. Rounding to half precision moves each by 2^-11.
 bool momentsHold(std::span<const std::uint16_t> moments) {
   double v[5];
   for (int k = 0; k < 5; ++k) v[k] = halfValue(moments[static_cast<std::size_t>(k)]);
@@ -155,25 +151,16 @@ PackedAsset pack(const BinMap& map) {
   packSlopes(map.slopes, packed);
   packed.integer("bins_per_axis", map.bins_per_axis);
   packed.integer("leaf_size", map.leaf_size);
-  packed.integer("bin_starts_shift", map.bin_starts.shift);
+  packed.integer("tile_bits", map.tile_bits);
   packed.integer("cell_starts_shift", map.cell_starts.shift);
   const auto list = [&](const char* path, ElementType type, const auto& values, std::uint64_t count) {
     packed.array(path, type, {count}, values.data(), values.size());
   };
-  const auto counts = [&](const std::string& path, const CompactCounts& values) {
-    const std::uint64_t step = std::uint64_t{1} << values.shift;
-    list((path + "/offsets").c_str(), ElementType::u16, values.offsets, values.size());
-    list((path + "/bases").c_str(), ElementType::u64, values.bases, (values.size() + step - 1) / step);
-  };
-  const std::uint64_t words = (map.binCount() + 63) / 64, grids = map.grid_cells.empty() ? 0 : map.grid_cells.size() - 1;
-  list("masks", ElementType::u64, map.masks, words);
-  list("mask_ranks", ElementType::u32, map.mask_ranks, words);
-  counts("bin_starts", map.bin_starts);
-  list("grid_masks", ElementType::u64, map.grid_masks, map.grid_masks.size());
-  list("grid_ranks", ElementType::u32, map.grid_ranks, map.grid_masks.size());
-  packed.array("grid_moments", ElementType::f16, {grids, 5}, map.grid_moments.data(), map.grid_moments.size());
-  list("grid_cells", ElementType::u32, map.grid_cells, grids + 1);
-  counts("cell_starts", map.cell_starts);
+  const std::uint64_t step = std::uint64_t{1} << map.cell_starts.shift;
+  packed.array("nodes", ElementType::u32, {map.nodes.size() / 2, 2}, map.nodes.data(), map.nodes.size());
+  packed.array("block_moments", ElementType::f16, {map.blockCount(), 5}, map.block_moments.data(), map.block_moments.size());
+  list("cell_starts/offsets", ElementType::u16, map.cell_starts.offsets, map.cell_starts.size());
+  list("cell_starts/bases", ElementType::u64, map.cell_starts.bases, (map.cell_starts.size() + step - 1) / step);
   list("texels", ElementType::u32, map.texels, texelCount(map));
   list("class_bins", ElementType::u32, map.class_bins, map.class_bins.size());
   list("texel_classes", ElementType::u16, map.texel_classes, (texelCount(map) * BinMap::kClassBits + 15) / 16);
@@ -189,17 +176,11 @@ void unpack(const Content& content, BinMap& map) {
   map.slopes = unpackSlopes(content);
   map.bins_per_axis = content.integer("bins_per_axis");
   map.leaf_size = content.integer("leaf_size");
-  const auto counts = [&](const std::string& path, int shift) {
-    return CompactCounts{content.array<std::uint64_t>(path + "/bases"), content.array<std::uint16_t>(path + "/offsets"), shift};
-  };
-  map.masks = content.array<std::uint64_t>("masks");
-  map.mask_ranks = content.array<std::uint32_t>("mask_ranks");
-  map.bin_starts = counts("bin_starts", content.integer("bin_starts_shift"));
-  map.grid_masks = content.array<std::uint64_t>("grid_masks");
-  map.grid_ranks = content.array<std::uint32_t>("grid_ranks");
-  map.grid_moments = content.array<std::uint16_t>("grid_moments");
-  map.grid_cells = content.array<std::uint32_t>("grid_cells");
-  map.cell_starts = counts("cell_starts", content.integer("cell_starts_shift"));
+  map.tile_bits = content.integer("tile_bits");
+  map.nodes = content.array<std::uint32_t>("nodes");
+  map.block_moments = content.array<std::uint16_t>("block_moments");
+  map.cell_starts = {content.array<std::uint64_t>("cell_starts/bases"), content.array<std::uint16_t>("cell_starts/offsets"),
+                     content.integer("cell_starts_shift")};
   map.texels = content.array<std::uint32_t>("texels");
   map.class_bins = content.array<std::uint32_t>("class_bins");
   map.texel_classes = content.array<std::uint16_t>("texel_classes");
@@ -214,24 +195,30 @@ void checkIndex(const BinMap& map, Findings& findings) {
     return;
   }
   if (!startsHold(map)) {
-    findings.add("bin_map.bin_starts", "/bin_starts/offsets", "does not rise from 0 to the number of texels");
+    findings.add("bin_map.cells", "/cell_starts/offsets", "does not rise from 0 to the number of texels");
     return;
   }
-  const bool occupied = masksHold(map.masks, map.mask_ranks, map.binCount(), map.occupiedBins());
-  if (!occupied) findings.add("bin_map.masks", "/masks", "does not agree with mask_ranks and bin_starts");
-  if (!masksHold(map.grid_masks, map.grid_ranks, map.occupiedBins(), map.grid_cells.size() - 1)) {
-    findings.add("bin_map.masks", "/grid_masks", "does not agree with grid_ranks and grid_cells");
-    return;
-  }
-  checkGrids(map, findings);
+  if (!TreeWalk(map).walk([](const BlockOfNode&) { return true; }))
+    findings.add("bin_map.nodes", "/nodes", "does not divide the bins in blocks of texels, numbered in order");
   checkClasses(map, findings);
 }
 
 void checkData(const BinMap& map, Findings& findings) {
-  if (!listsHold(map)) findings.add("bin_map.texels", "/texels", "does not list every texel once, in its class and its cell");
-  for (std::size_t g = 0; g + 1 < map.grid_cells.size(); ++g) {
-    if (momentsHold(map.grid_moments.subspan(5 * g, 5))) continue;
-    findings.add("bin_map.moments", "/grid_moments", "grid " + std::to_string(g) + " has moments of no distribution in a bin");
+  std::vector<bool> seen(texelCount(map));
+  std::size_t number = 0;
+  const auto inOwnClass = [&](const BlockOfNode& block) {
+    const std::size_t c = number++;
+    const std::uint64_t end_key = block.first_key + (std::uint64_t{1} << 2 * block.side_bits);
+    return block.first_key >= map.class_bins[c] && end_key <= map.class_bins[c + 1];
+  };
+  if (map.classCount() == map.blockCount() && !TreeWalk(map).walk(inOwnClass))
+    findings.add("bin_map.classes", "/class_bins", "has as many classes as blocks, but not one for each");
+  if (!TreeWalk(map).walk([&](const BlockOfNode& block) { return listHolds(map, block, seen); }))
+    findings.add("bin_map.texels", "/texels", "does not list every texel once, in its class");
+  for (std::size_t b = 0; b < map.blockCount(); ++b) {
+    if (momentsHold(map.block_moments.subspan(5 * b, 5))) continue;
+    findings.add("bin_map.moments", "/block_moments",
+                 "block " + std::to_string(b) + " has moments of no distribution in a block");
     return;
   }
 }

@@ -17,12 +17,21 @@
 namespace glint::bake {
 namespace {
 
-/// Bins are counted in at most this many ranges of neighbours, from which classes are made.
+/// Bins are counted in at most this many ranges of neighbouring keys, to divide the work.
 constexpr std::size_t kMaxRanges = 1 << 16;
-/// Blocks of texels that are counted on their own. Their number must not depend on threads.
-constexpr std::size_t kBlocks = 16;
-/// Classes are joined to at most this many buckets for the first pass: as many streams as a processor writes at once.
-constexpr std::size_t kMaxBuckets = 512;
+/// Parts of the map that are counted on their own. Their number must not depend on threads.
+constexpr std::size_t kParts = 16;
+/// Tiles are joined to about this many buckets for the first pass: as many streams as a processor writes at once.
+constexpr std::size_t kBuckets = 512;
+/// Tiles have about this many texels, or are the bins themselves; but tiles of more bins than 8 x 8, which large footprints would have to
+/// search, only where they have few texels.
+constexpr std::size_t kTexelsOfTile = 1024, kFewTexelsOfTile = 64;
+constexpr int kWideTileBits = 3;
+/// Blocks of several bins have at most this many texels, and none of their bins more than kMostOfSharedBin: merging texels (see
+/// BinMapNdf) is for blocks.
+constexpr std::uint64_t kMostOfBlock = 4096, kMostOfSharedBin = 512;
+/// Places in bins are kept to at least this many bits along each axis, where the map is not too large for it.
+constexpr int kSurePlaceBits = 5;
 /// Texels binned at once.
 constexpr std::size_t kChunk = 512;
 
@@ -44,13 +53,20 @@ void checkOptions(const NormalMap& map, const BinMapOptions& o) {
 
 /// A texel on its way to its list.
 struct Entry {
-  std::uint32_t code;
-  std::uint32_t bin;
+  std::uint32_t code;  // texelCode
+  std::uint32_t key;   // of its bin
 };
 
-/// Bin number and place in the bin of each of some normals. Returns false if one is outside the disk.
-GLINT_MULTIVERSION bool binNormals(const Vec2* normals, std::size_t count, int bins, int place_bits, std::uint32_t* bin,
-                                   std::uint32_t* place) {
+/// A block that is being filled.
+struct Block {
+  std::uint32_t first_key, first_cell, texels;
+  std::uint16_t column, row;  // of its first bin
+  std::uint8_t side_bits, cell_bits;
+};
+
+/// Column and row of the bin, and place in it, of each of some normals. Returns false if one is outside the disk.
+GLINT_MULTIVERSION bool binNormals(const Vec2* normals, std::size_t count, int bins, int place_bits, std::uint16_t* columns,
+                                   std::uint16_t* rows, std::uint16_t* places) {
   const float half = 0.5f * static_cast<float>(bins);
   const auto steps = static_cast<float>(1 << place_bits);
   const int last = bins - 1, last_step = (1 << place_bits) - 1;
@@ -62,10 +78,18 @@ GLINT_MULTIVERSION bool binNormals(const Vec2* normals, std::size_t count, int b
     const int column = std::min(static_cast<int>(x), last), row = std::min(static_cast<int>(y), last);
     const int px = std::min(static_cast<int>((x - static_cast<float>(column)) * steps), last_step);
     const int py = std::min(static_cast<int>((y - static_cast<float>(row)) * steps), last_step);
-    bin[k] = static_cast<std::uint32_t>(row * bins + column);
-    place[k] = static_cast<std::uint32_t>(px | py << place_bits);
+    columns[k] = static_cast<std::uint16_t>(column);
+    rows[k] = static_cast<std::uint16_t>(row);
+    places[k] = static_cast<std::uint16_t>(px | py << place_bits);
   }
   return bad == 0;
+}
+
+/// Bit k of x becomes bit 2 k.
+std::uint32_t spreadBits(std::uint32_t x) {
+  std::uint32_t spread = 0;
+  for (int k = 0; k < 16; ++k) spread |= (x >> k & 1) << 2 * k;
+  return spread;
 }
 
 [[noreturn]] void throwOutside(const NormalMap& map) {
@@ -78,9 +102,56 @@ GLINT_MULTIVERSION bool binNormals(const Vec2* normals, std::size_t count, int b
               "repair them with glint-ingest --fix-invalid");
 }
 
-std::uint32_t cellOf(const TexelCode& code, const CellGrid& grid, std::uint32_t texel) {
-  return (code.row(texel) >> grid.row_shift) * static_cast<std::uint32_t>(grid.columns) +
-         (code.column(texel) >> grid.column_shift);
+/// Every second bit of x, from bit 0 on.
+std::uint32_t gatherBits(std::uint32_t x) {
+  x &= 0x55555555;
+  x = (x | x >> 1) & 0x33333333;
+  x = (x | x >> 2) & 0x0f0f0f0f;
+  x = (x | x >> 4) & 0x00ff00ff;
+  return (x | x >> 8) & 0x0000ffff;
+}
+
+/// Sorts and packs the texels of a block.
+class BlockPacker {
+ public:
+  /// @param map  code of entries
+  /// @param first_cell  of the cells that are counted from 0
+  BlockPacker(const TexelCode& map, const Block& block, std::uint32_t first_cell)
+      : map_(map),
+        code_(blockCode(map, block.side_bits, block.cell_bits)),
+        grid_(cellGrid(map, block.cell_bits)),
+        first_cell_(block.first_cell - first_cell),
+        key_mask_((1u << 2 * block.side_bits) - 1),
+        kept_bits_(code_.place_bits - block.side_bits) {}
+
+  std::uint32_t cell(const Entry& entry) const {
+    return first_cell_ + (map_.row(entry.code) >> grid_.row_shift) * static_cast<std::uint32_t>(grid_.columns) +
+           (map_.column(entry.code) >> grid_.column_shift);
+  }
+
+  std::uint32_t pack(const Entry& entry) const {
+    const std::uint32_t bin = entry.key & key_mask_;
+    const int dropped = map_.place_bits - kept_bits_;
+    return code_.pack(map_.column(entry.code) & ((1u << grid_.column_shift) - 1),
+                      map_.row(entry.code) & ((1u << grid_.row_shift) - 1),
+                      gatherBits(bin) << kept_bits_ | map_.placeX(entry.code) >> dropped,
+                      gatherBits(bin >> 1) << kept_bits_ | map_.placeY(entry.code) >> dropped);
+  }
+
+ private:
+  TexelCode map_, code_;
+  CellGrid grid_;
+  std::uint32_t first_cell_, key_mask_;
+  int kept_bits_;
+};
+
+/// Logarithm of the number of cells of a block: about `wanted`, but enough that codes keep places to kSurePlaceBits.
+int cellBits(const TexelCode& map, int side_bits, std::uint64_t wanted) {
+  const int most = map.column_bits + map.row_bits;
+  int bits = std::min(wanted == 0 ? 0 : static_cast<int>(std::bit_width(wanted)) - 1, most);
+  const int sure = side_bits + std::min(kSurePlaceBits, map.place_bits);
+  while (bits < most && blockCode(map, side_bits, bits).place_bits < sure) ++bits;
+  return bits;
 }
 
 /// Builds one bin map; each function is a step.
@@ -95,24 +166,29 @@ class Builder {
     out_.alpha = binAlpha(out_.alpha_min, out_.alpha_max, code_.place_bits);
     out_.leaf_size = options.leaf_size;
     out_.bins_per_axis = binsPerAxis(out_.alpha);
-    bin_count_ = static_cast<std::size_t>(out_.bins_per_axis) * out_.bins_per_axis;
-    while (((bin_count_ - 1) >> range_shift_) >= kMaxRanges) ++range_shift_;
-    range_count_ = ((bin_count_ - 1) >> range_shift_) + 1;
+    out_.tile_bits = tileBits(out_.bins_per_axis, count_);
+    tiles_ = (out_.bins_per_axis - 1) / (1 << out_.tile_bits) + 1;
+    key_count_ = (static_cast<std::size_t>(tiles_) * tiles_) << 2 * out_.tile_bits;
+    makeKeys();
+    while (((key_count_ - 1) >> range_shift_) >= kMaxRanges) ++range_shift_;
+    range_count_ = ((key_count_ - 1) >> range_shift_) + 1;
     // Four texels' classes fill three words, so blocks of a multiple of four never share one.
-    block_ = (count_ / kBlocks / kChunk + 1) * kChunk;
+    chunk_ = (count_ / kParts / kChunk + 1) * kChunk;
   }
 
   BinMapData build() {
     countRanges();
     step(1);
-    makeClasses();
+    makeBuckets();
     scatter();
     step(2);
     countBins();
-    indexBins();
+    plantTrees();
+    makeClasses();
     step(3);
     listTexels();
-    finishIndex();
+    classifyTexels();
+    out_.cell_starts = compactCounts(cells_);
     out_.slopes = mapSlopes(map_);
     step(4);
     return std::move(out_);
@@ -123,91 +199,192 @@ class Builder {
     if (progress_) progress_(done, 4);
   }
 
-  /// Calls visitor(first texel, count, bins, places) for chunks of one block.
+  /// A bin's key is the sum of those of its column and its row.
+  void makeKeys() {
+    const int bits = out_.tile_bits;
+    for (int k = 0; k < out_.bins_per_axis; ++k) {
+      const auto tile = static_cast<std::uint32_t>(k >> bits);
+      const std::uint32_t within = spreadBits(static_cast<std::uint32_t>(k) & ((1u << bits) - 1));
+      column_keys_.push_back((tile << 2 * bits) + within);
+      row_keys_.push_back((tile * static_cast<std::uint32_t>(tiles_) << 2 * bits) + 2 * within);
+    }
+  }
+
+  /// Calls visitor(first texel, count, keys of their bins, places) for chunks of one of kParts parts of the map.
   template <class Visitor>
-  bool forEachChunk(std::size_t block, Visitor&& visitor) const {
-    std::uint32_t bins[kChunk], places[kChunk];
-    const std::size_t end = std::min(count_, (block + 1) * block_);
-    for (std::size_t first = block * block_; first < end; first += kChunk) {
+  bool forEachChunk(std::size_t part, Visitor&& visitor) const {
+    std::uint16_t columns[kChunk], rows[kChunk], places[kChunk];
+    std::uint32_t keys[kChunk];
+    const std::size_t end = std::min(count_, (part + 1) * chunk_);
+    for (std::size_t first = part * chunk_; first < end; first += kChunk) {
       const std::size_t count = std::min(kChunk, end - first);
-      if (!binNormals(map_.normals.data() + first, count, out_.bins_per_axis, code_.place_bits, bins, places)) return false;
-      visitor(first, count, bins, places);
+      const Vec2* normals = map_.normals.data() + first;
+      if (!binNormals(normals, count, out_.bins_per_axis, code_.place_bits, columns, rows, places)) return false;
+      for (std::size_t k = 0; k < count; ++k) keys[k] = column_keys_[columns[k]] + row_keys_[rows[k]];
+      visitor(first, count, keys, places);
     }
     return true;
   }
 
   void countRanges() {
-    range_counts_.resize(kBlocks);
-    bool inside[kBlocks];
-    tbb::parallel_for(std::size_t{0}, kBlocks, [&](std::size_t block) {
-      std::vector<std::uint32_t>& counts = range_counts_[block];
+    range_counts_.resize(kParts);
+    bool inside[kParts];
+    tbb::parallel_for(std::size_t{0}, kParts, [&](std::size_t part) {
+      std::vector<std::uint32_t>& counts = range_counts_[part];
       counts.assign(range_count_, 0);
-      inside[block] = forEachChunk(block, [&](std::size_t, std::size_t count, const std::uint32_t* bins, const std::uint32_t*) {
-        for (std::size_t k = 0; k < count; ++k) ++counts[bins[k] >> range_shift_];
+      inside[part] = forEachChunk(part, [&](std::size_t, std::size_t count, const std::uint32_t* keys, const std::uint16_t*) {
+        for (std::size_t k = 0; k < count; ++k) ++counts[keys[k] >> range_shift_];
       });
     });
-    if (!std::all_of(inside, inside + kBlocks, [](bool b) { return b; })) throwOutside(map_);
+    if (!std::all_of(inside, inside + kParts, [](bool b) { return b; })) throwOutside(map_);
+    range_totals_.resize(range_count_);
+    for (const auto& counts : range_counts_)
+      for (std::size_t r = 0; r < range_count_; ++r) range_totals_[r] += counts[r];
   }
 
-  /// Joins ranges to classes of about equal numbers of texels; where there are few ranges in use, each is a class.
-  void makeClasses() {
-    std::vector<std::uint64_t> totals(range_count_);
-    for (const auto& counts : range_counts_)
-      for (std::size_t r = 0; r < range_count_; ++r) totals[r] += counts[r];
-    const auto used = static_cast<std::size_t>(std::count_if(totals.begin(), totals.end(), [](auto n) { return n > 0; }));
-    const std::uint64_t wanted = used <= BinMap::kMaxClasses ? 1 : count_ / (BinMap::kMaxClasses - 1) + 1;
-    range_classes_.resize(range_count_);
-    out_.class_bins.push_back(0);
-    std::uint64_t texels = 0;
+  /// Joins tiles to buckets of about equal numbers of texels.
+  void makeBuckets() {
+    const int key_bits = 2 * out_.tile_bits;
+    const std::uint64_t wanted = count_ / kBuckets + 1;
+    range_buckets_.resize(range_count_);
+    bucket_tiles_.push_back(0);
+    bucket_starts_.push_back(0);
+    std::uint64_t texels = 0, all = 0;
     for (std::size_t r = 0; r < range_count_; ++r) {
-      if (texels >= wanted && totals[r] > 0) {
-        out_.class_bins.push_back(static_cast<std::uint32_t>(r << range_shift_));
+      const std::size_t key = r << range_shift_, tile = key >> key_bits;
+      if (texels >= wanted && key == tile << key_bits) {
+        bucket_tiles_.push_back(tile);
+        bucket_starts_.push_back(all);
         texels = 0;
       }
-      range_classes_[r] = static_cast<std::uint16_t>(out_.class_bins.size() - 1);
-      texels += totals[r];
+      range_buckets_[r] = static_cast<std::uint16_t>(bucket_tiles_.size() - 1);
+      texels += range_totals_[r], all += range_totals_[r];
     }
-    class_count_ = out_.class_bins.size();
-    out_.class_bins.push_back(static_cast<std::uint32_t>(bin_count_));
-    while (((class_count_ - 1) >> bucket_shift_) >= kMaxBuckets) ++bucket_shift_;
-    bucket_count_ = ((class_count_ - 1) >> bucket_shift_) + 1;
+    bucket_count_ = bucket_tiles_.size();
+    bucket_tiles_.push_back(static_cast<std::size_t>(tiles_) * tiles_);
+    bucket_starts_.push_back(all);
   }
 
-  std::uint32_t firstBinOf(std::size_t bucket) const {
-    return out_.class_bins[std::min(bucket << bucket_shift_, class_count_)];
-  }
-
-  /// Moves every texel to its bucket, in the order of the map, and notes the class.
+  /// Moves every texel to its bucket, in the order of the map.
   void scatter() {
-    std::vector<std::vector<std::uint64_t>> cursors(kBlocks, std::vector<std::uint64_t>(bucket_count_));
-    for (std::size_t block = 0; block < kBlocks; ++block)
-      for (std::size_t r = 0; r < range_count_; ++r)
-        cursors[block][range_classes_[r] >> bucket_shift_] += range_counts_[block][r];
-    bucket_starts_.resize(bucket_count_ + 1);
-    std::uint64_t next = 0;
+    std::vector<std::vector<std::uint64_t>> cursors(kParts, std::vector<std::uint64_t>(bucket_count_));
+    for (std::size_t part = 0; part < kParts; ++part)
+      for (std::size_t r = 0; r < range_count_; ++r) cursors[part][range_buckets_[r]] += range_counts_[part][r];
     for (std::size_t bucket = 0; bucket < bucket_count_; ++bucket) {
-      bucket_starts_[bucket] = next;
+      std::uint64_t next = bucket_starts_[bucket];
       for (auto& cursor : cursors) next += std::exchange(cursor[bucket], next);
     }
-    bucket_starts_[bucket_count_] = next;
+    range_counts_.clear();
     entries_ = std::make_unique_for_overwrite<Entry[]>(count_);
-    out_.texel_classes.assign((count_ * BinMap::kClassBits + 15) / 16, 0);
-    tbb::parallel_for(std::size_t{0}, kBlocks, [&](std::size_t block) {
-      std::uint64_t* cursor = cursors[block].data();
-      forEachChunk(block, [&](std::size_t first, std::size_t count, const std::uint32_t* bins, const std::uint32_t* places) {
-        std::uint16_t classes[kChunk];
+    tbb::parallel_for(std::size_t{0}, kParts, [&](std::size_t part) {
+      std::uint64_t* cursor = cursors[part].data();
+      forEachChunk(part, [&](std::size_t first, std::size_t count, const std::uint32_t* keys, const std::uint16_t* places) {
         auto row = static_cast<std::uint32_t>(first / static_cast<std::size_t>(map_.width));
         auto column = static_cast<std::uint32_t>(first % static_cast<std::size_t>(map_.width));
-        const int place_shift = code_.column_bits + code_.row_bits;
         for (std::size_t k = 0; k < count; ++k) {
-          classes[k] = range_classes_[bins[k] >> range_shift_];
-          entries_[cursor[classes[k] >> bucket_shift_]++] = {code_.pack(column, row, 0, 0) | places[k] << place_shift, bins[k]};
+          entries_[cursor[range_buckets_[keys[k] >> range_shift_]]++] = {code_.pack(column, row, places[k], 0), keys[k]};
           if (++column == static_cast<std::uint32_t>(map_.width)) column = 0, ++row;
         }
+      });
+    });
+  }
+
+  void countBins() {
+    bin_counts_.assign(key_count_, 0);
+    tbb::parallel_for(std::size_t{0}, bucket_count_, [&](std::size_t bucket) {
+      for (std::uint64_t k = bucket_starts_[bucket]; k < bucket_starts_[bucket + 1]; ++k) ++bin_counts_[entries_[k].key];
+    });
+  }
+
+  /// Texels of some bins, and of the fullest of them.
+  struct Filling {
+    std::uint64_t all = 0, fullest = 0;
+  };
+  Filling filling(std::size_t first_key, int side_bits) const {
+    Filling result;
+    for (std::size_t key = first_key; key < first_key + (std::size_t{1} << 2 * side_bits); ++key) {
+      result.all += bin_counts_[key];
+      result.fullest = std::max<std::uint64_t>(result.fullest, bin_counts_[key]);
+    }
+    return result;
+  }
+
+  /// Divides tiles in blocks.
+  void plantTrees() {
+    const auto tiles = static_cast<std::uint32_t>(tiles_);
+    out_.nodes.assign(2 * std::size_t{tiles} * tiles, 0);
+    std::size_t bucket = 0;
+    for (std::uint32_t tile = 0; tile < tiles * tiles; ++tile) {
+      for (; bucket < bucket_count_ && bucket_tiles_[bucket] == tile; ++bucket)
+        bucket_blocks_.push_back(static_cast<std::uint32_t>(blocks_.size()));
+      const int bits = out_.tile_bits;
+      grow(tile, std::size_t{tile} << 2 * bits,
+           {0, 0, 0, static_cast<std::uint16_t>((tile % tiles) << bits), static_cast<std::uint16_t>((tile / tiles) << bits),
+            static_cast<std::uint8_t>(bits), 0});
+    }
+    bucket_blocks_.push_back(static_cast<std::uint32_t>(blocks_.size()));
+    out_.block_moments.resize(5 * blocks_.size());
+    cells_.resize(cell_count_ + 1);
+    cells_[cell_count_] = count_;
+  }
+
+  void grow(std::size_t node, std::size_t first_key, Block block) {
+    const Filling texels = filling(first_key, block.side_bits);
+    if (texels.all == 0) return;
+    if (block.side_bits > 0 && (texels.all > kMostOfBlock || texels.fullest > kMostOfSharedBin)) {
+      const auto first_child = static_cast<std::uint32_t>(out_.nodes.size() / 2);
+      out_.nodes[2 * node] = BinMap::kSplit;
+      out_.nodes[2 * node + 1] = first_child;
+      out_.nodes.resize(out_.nodes.size() + 8);
+      --block.side_bits;
+      for (std::uint32_t quadrant = 0; quadrant < 4; ++quadrant) {
+        Block child = block;
+        child.column = static_cast<std::uint16_t>(child.column + ((quadrant & 1) << block.side_bits));
+        child.row = static_cast<std::uint16_t>(child.row + ((quadrant >> 1) << block.side_bits));
+        grow(first_child + quadrant, first_key + (std::size_t{quadrant} << 2 * block.side_bits), child);
+      }
+      return;
+    }
+    block.first_key = static_cast<std::uint32_t>(first_key);
+    block.first_cell = static_cast<std::uint32_t>(cell_count_);
+    block.texels = static_cast<std::uint32_t>(texels.all);
+    block.cell_bits = static_cast<std::uint8_t>(cellBits(code_, block.side_bits, texels.all / out_.leaf_size));
+    const auto number = static_cast<std::uint32_t>(blocks_.size());
+    out_.nodes[2 * node] = (block.cell_bits + 1u) | number << BinMap::kKindBits;
+    out_.nodes[2 * node + 1] = block.first_cell;
+    cell_count_ += std::size_t{1} << block.cell_bits;
+    // Counts have been used: from now on a bin knows its block.
+    std::fill_n(bin_counts_.begin() + static_cast<std::ptrdiff_t>(first_key), std::size_t{1} << 2 * block.side_bits, number);
+    blocks_.push_back(block);
+  }
+
+  /// Makes a class of every block, or of several with about equal numbers of texels.
+  void makeClasses() {
+    const std::uint64_t wanted = blocks_.size() <= BinMap::kMaxClasses ? 1 : count_ / (BinMap::kMaxClasses - 1) + 1;
+    block_classes_.reserve(blocks_.size());
+    out_.class_bins.push_back(0);
+    std::uint64_t texels = 0;
+    for (const Block& block : blocks_) {
+      if (texels >= wanted) {
+        out_.class_bins.push_back(block.first_key);
+        texels = 0;
+      }
+      block_classes_.push_back(static_cast<std::uint16_t>(out_.class_bins.size() - 1));
+      texels += block.texels;
+    }
+    out_.class_bins.push_back(static_cast<std::uint32_t>(key_count_));
+  }
+
+  /// Notes the class of every texel.
+  void classifyTexels() {
+    out_.texel_classes.resize((count_ * BinMap::kClassBits + 15) / 16);
+    tbb::parallel_for(std::size_t{0}, kParts, [&](std::size_t part) {
+      forEachChunk(part, [&](std::size_t first, std::size_t count, const std::uint32_t* keys, const std::uint16_t*) {
+        std::uint16_t classes[kChunk];
+        for (std::size_t k = 0; k < count; ++k) classes[k] = block_classes_[bin_counts_[keys[k]]];
         packClasses(first, count, classes);
       });
     });
-    range_counts_.clear();
   }
 
   void packClasses(std::size_t first, std::size_t count, const std::uint16_t* classes) {
@@ -221,121 +398,69 @@ class Builder {
     }
   }
 
-  void countBins() {
-    bin_counts_.assign(bin_count_, 0);
-    tbb::parallel_for(std::size_t{0}, bucket_count_, [&](std::size_t bucket) {
-      for (std::uint64_t k = bucket_starts_[bucket]; k < bucket_starts_[bucket + 1]; ++k) ++bin_counts_[entries_[k].bin];
-    });
-  }
-
-  int cellBits(std::uint64_t texels) const {
-    if (texels <= static_cast<std::uint64_t>(kGridLeaves) * out_.leaf_size) return 0;
-    return std::min(static_cast<int>(std::bit_width(texels / out_.leaf_size)) - 1, code_.column_bits + code_.row_bits);
-  }
-
-  /// Numbers occupied bins and grids, and gives each its place.
-  void indexBins() {
-    out_.masks.assign((bin_count_ + 63) / 64, 0);
-    out_.mask_ranks.resize(out_.masks.size());
-    starts_.clear();
-    bucket_ordinals_.assign(bucket_count_ + 1, 0);
-    std::uint64_t start = 0, cells = 0;
-    std::size_t next_bucket = 0;
-    for (std::size_t bin = 0; bin < bin_count_; ++bin) {
-      if (next_bucket < bucket_count_ && firstBinOf(next_bucket) == bin)
-        bucket_ordinals_[next_bucket++] = static_cast<std::uint32_t>(starts_.size());
-      if (bin % 64 == 0) out_.mask_ranks[bin / 64] = static_cast<std::uint32_t>(starts_.size());
-      const std::uint32_t n = bin_counts_[bin];
-      if (n == 0) continue;
-      const std::size_t ordinal = starts_.size();
-      if (ordinal % 64 == 0) {
-        out_.grid_masks.push_back(0);
-        out_.grid_ranks.push_back(static_cast<std::uint32_t>(out_.grid_cells.size()));
-      }
-      out_.masks[bin / 64] |= std::uint64_t{1} << (bin % 64);
-      starts_.push_back(start);
-      start += n;
-      const int bits = cellBits(n);
-      if (bits == 0) continue;
-      out_.grid_masks.back() |= std::uint64_t{1} << (ordinal % 64);
-      out_.grid_cells.push_back(static_cast<std::uint32_t>(cells));
-      cells += (std::uint64_t{1} << bits) + 1;
-    }
-    starts_.push_back(start);
-    bucket_ordinals_[bucket_count_] = static_cast<std::uint32_t>(starts_.size() - 1);
-    out_.grid_moments.resize(5 * out_.grid_cells.size());
-    out_.grid_cells.push_back(static_cast<std::uint32_t>(cells));
-    cells_.resize(cells);
-  }
-
-  /// Sorts every bucket by bin, and large bins by cell.
+  /// Sorts every bucket by cell.
   void listTexels() {
     out_.texels.resize(count_);
     tbb::parallel_for(std::size_t{0}, bucket_count_, [&](std::size_t bucket) {
-      const std::uint32_t first_bin = firstBinOf(bucket), last_bin = firstBinOf(bucket + 1);
-      std::vector<std::uint64_t> cursors(last_bin - first_bin);
-      std::size_t ordinal = bucket_ordinals_[bucket];
-      for (std::uint32_t bin = first_bin; bin < last_bin; ++bin)
-        if (bin_counts_[bin] > 0) cursors[bin - first_bin] = starts_[ordinal++];
-      for (std::uint64_t k = bucket_starts_[bucket]; k < bucket_starts_[bucket + 1]; ++k)
-        out_.texels[cursors[entries_[k].bin - first_bin]++] = entries_[k].code;
-      std::vector<std::uint32_t> scratch;
-      for (ordinal = bucket_ordinals_[bucket]; ordinal < bucket_ordinals_[bucket + 1]; ++ordinal) {
-        const std::uint64_t mask = out_.grid_masks[ordinal / 64], bit = std::uint64_t{1} << (ordinal % 64);
-        if (mask & bit) sortByCell(ordinal, out_.grid_ranks[ordinal / 64] + std::popcount(mask & (bit - 1)), scratch);
+      const std::uint32_t first = bucket_blocks_[bucket], end = bucket_blocks_[bucket + 1];
+      if (first == end) return;
+      const std::uint32_t first_cell = blocks_[first].first_cell;
+      std::vector<BlockPacker> packers;
+      for (std::uint32_t b = first; b < end; ++b) packers.emplace_back(code_, blocks_[b], first_cell);
+      const auto packerOf = [&](const Entry& entry) -> const BlockPacker& { return packers[bin_counts_[entry.key] - first]; };
+
+      const Entry* entries = entries_.get() + bucket_starts_[bucket];
+      const std::size_t count = bucket_starts_[bucket + 1] - bucket_starts_[bucket];
+      std::vector<std::uint32_t> entry_cells(count);
+      std::uint64_t* cells = cells_.data() + first_cell;
+      const std::size_t cell_count = (end < blocks_.size() ? blocks_[end].first_cell : cell_count_) - first_cell;
+      for (std::size_t k = 0; k < count; ++k) ++cells[entry_cells[k] = packerOf(entries[k]).cell(entries[k])];
+      std::uint64_t next = bucket_starts_[bucket];
+      for (std::size_t c = 0; c < cell_count; ++c) next += std::exchange(cells[c], next);
+      for (std::size_t k = 0; k < count; ++k) out_.texels[cells[entry_cells[k]]++] = packerOf(entries[k]).pack(entries[k]);
+      // Each cursor ended where the next cell begins.
+      for (std::size_t c = cell_count; c-- > 1;) cells[c] = cells[c - 1];
+      cells[0] = bucket_starts_[bucket];
+      for (std::uint32_t b = first; b < end; ++b) {
+        const std::uint64_t last = b + 1 < end ? cells_[blocks_[b + 1].first_cell] : bucket_starts_[bucket + 1];
+        storeMoments(blocks_[b], cells_[blocks_[b].first_cell], last, out_.block_moments.data() + 5 * std::size_t{b});
       }
     });
   }
 
-  void sortByCell(std::size_t ordinal, std::size_t grid_number, std::vector<std::uint32_t>& scratch) {
-    std::uint32_t* texels = out_.texels.data() + starts_[ordinal];
-    const std::size_t n = starts_[ordinal + 1] - starts_[ordinal];
-    std::uint64_t* cells = cells_.data() + out_.grid_cells[grid_number];
-    const std::size_t cell_count = out_.grid_cells[grid_number + 1] - out_.grid_cells[grid_number] - 1;
-    const CellGrid grid = cellGrid(code_, static_cast<int>(std::bit_width(cell_count)) - 1);
-    std::fill_n(cells, cell_count + 1, 0);
-    for (std::size_t k = 0; k < n; ++k) ++cells[cellOf(code_, grid, texels[k])];
-    std::uint64_t next = 0;
-    for (std::size_t c = 0; c <= cell_count; ++c) next += std::exchange(cells[c], next);
-    scratch.assign(texels, texels + n);
-    for (const std::uint32_t texel : scratch) texels[cells[cellOf(code_, grid, texel)]++] = texel;
-    // Each cursor ended where the next cell begins.
-    for (std::size_t c = cell_count; c > 0; --c) cells[c] = starts_[ordinal] + cells[c - 1];
-    cells[0] = starts_[ordinal];
-    storeMoments(texels, n, out_.grid_moments.data() + 5 * grid_number);
-  }
-
-  void storeMoments(const std::uint32_t* texels, std::size_t n, std::uint16_t* moments) const {
-    std::uint64_t x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-    for (std::size_t k = 0; k < n; ++k) {
-      const std::uint64_t px = code_.placeX(texels[k]), py = code_.placeY(texels[k]);
-      x += px, y += py, xx += px * px, xy += px * py, yy += py * py;
+  /// Of the texels [begin, end) of a block.
+  void storeMoments(const Block& block, std::uint64_t begin, std::uint64_t end, std::uint16_t* moments) const {
+    const TexelCode code = blockCode(code_, block.side_bits, block.cell_bits);
+    std::uint64_t x = 0, y = 0;
+    double xx = 0, xy = 0, yy = 0;
+    for (std::uint64_t k = begin; k < end; ++k) {
+      const std::uint64_t px = code.placeX(out_.texels[k]), py = code.placeY(out_.texels[k]);
+      x += px, y += py;
+      xx += static_cast<double>(px * px), xy += static_cast<double>(px * py), yy += static_cast<double>(py * py);
     }
-    const double count = static_cast<double>(n), step = 1.0 / (1 << code_.place_bits);
+    const double count = static_cast<double>(end - begin), step = 1.0 / (1 << code.place_bits);
     const double mx = static_cast<double>(x) / count, my = static_cast<double>(y) / count;
-    const double values[5] = {(mx + 0.5) * step, (my + 0.5) * step, (static_cast<double>(xx) / count - mx * mx) * step * step,
-                              (static_cast<double>(xy) / count - mx * my) * step * step,
-                              (static_cast<double>(yy) / count - my * my) * step * step};
+    const double values[5] = {(mx + 0.5) * step, (my + 0.5) * step, (xx / count - mx * mx) * step * step,
+                              (xy / count - mx * my) * step * step, (yy / count - my * my) * step * step};
     for (int k = 0; k < 5; ++k) moments[k] = floatToHalf(static_cast<float>(values[k]));
-  }
-
-  void finishIndex() {
-    out_.bin_starts = compactCounts(starts_);
-    out_.cell_starts = compactCounts(cells_);
   }
 
   const NormalMap& map_;
   const ProgressFn& progress_;
   TexelCode code_;
-  std::size_t count_, bin_count_ = 0, range_count_ = 0, class_count_ = 0, bucket_count_ = 0, block_ = 0;
-  int range_shift_ = 0, bucket_shift_ = 0;
-  std::vector<std::vector<std::uint32_t>> range_counts_;  // [block][range]
-  std::vector<std::uint16_t> range_classes_;
+  std::size_t count_, key_count_ = 0, range_count_ = 0, bucket_count_ = 0, chunk_ = 0, cell_count_ = 0;
+  int tiles_ = 0, range_shift_ = 0;
+  std::vector<std::uint32_t> column_keys_, row_keys_;
+  std::vector<std::vector<std::uint32_t>> range_counts_;  // [part][range]
+  std::vector<std::uint64_t> range_totals_;
+  std::vector<std::uint16_t> range_buckets_, block_classes_;
+  std::vector<std::size_t> bucket_tiles_;  // first of each bucket
   std::vector<std::uint64_t> bucket_starts_;
-  std::vector<std::uint32_t> bucket_ordinals_;  // occupied bins before each bucket
+  std::vector<std::uint32_t> bucket_blocks_;  // first of each bucket
   std::unique_ptr<Entry[]> entries_;
-  std::vector<std::uint32_t> bin_counts_;
-  std::vector<std::uint64_t> starts_, cells_;
+  std::vector<std::uint32_t> bin_counts_;  // texels of each bin, by key; later the number of its block
+  std::vector<Block> blocks_;
+  std::vector<std::uint64_t> cells_;
   BinMapData out_;
 };
 
@@ -346,9 +471,21 @@ int binsPerAxis(float alpha) {
   return std::min(static_cast<int>(5 * std::sqrt(1 + reach * reach) / reach), kMaxBinsPerAxis);
 }
 
+int tileBits(int bins_per_axis, std::size_t texels) {
+  // The fewest bits with at most `most` tiles.
+  const auto bitsFor = [&](std::size_t most) {
+    int bits = 0;
+    for (; bits < BinMap::kMaxTileBits; ++bits)
+      if (const auto across = static_cast<std::size_t>((bins_per_axis - 1) >> bits) + 1; across * across <= most) break;
+    return bits;
+  };
+  return std::min(bitsFor(texels / kTexelsOfTile), std::max(kWideTileBits, bitsFor(texels / kFewTexelsOfTile)));
+}
+
 float binAlpha(float alpha_min, float alpha_max, int place_bits) {
   constexpr int kPlaceBits = 4;
-  const float finest = alpha_min * std::exp2(static_cast<float>(std::max(place_bits - kPlaceBits, 0)));
+  const int spare = std::max(std::min(place_bits, kSurePlaceBits) - kPlaceBits, 0);
+  const float finest = alpha_min * std::exp2(static_cast<float>(spare));
   return alpha_min == alpha_max ? alpha_min : std::min(std::sqrt(alpha_min * alpha_max), finest);
 }
 
@@ -380,13 +517,9 @@ BinMap BinMapData::view() const {
   v.slopes = slopes;
   v.bins_per_axis = bins_per_axis;
   v.leaf_size = leaf_size;
-  v.masks = masks;
-  v.mask_ranks = mask_ranks;
-  v.bin_starts = bin_starts.view();
-  v.grid_masks = grid_masks;
-  v.grid_ranks = grid_ranks;
-  v.grid_cells = grid_cells;
-  v.grid_moments = grid_moments;
+  v.tile_bits = tile_bits;
+  v.nodes = nodes;
+  v.block_moments = block_moments;
   v.cell_starts = cell_starts.view();
   v.texels = texels;
   v.class_bins = class_bins;
@@ -396,8 +529,7 @@ BinMap BinMapData::view() const {
 
 std::size_t BinMapData::sizeBytes() const {
   const auto bytes = [](const auto&... arrays) { return (... + (arrays.size() * sizeof(arrays[0]))); };
-  return bytes(masks, grid_masks, mask_ranks, grid_ranks, grid_cells, grid_moments, bin_starts.bases, bin_starts.offsets,
-               cell_starts.bases, cell_starts.offsets, texels, class_bins, texel_classes);
+  return bytes(nodes, block_moments, cell_starts.bases, cell_starts.offsets, texels, class_bins, texel_classes);
 }
 
 BinMapData buildBinMap(const NormalMap& map, const BinMapOptions& options, const ProgressFn& progress) {

@@ -11,7 +11,7 @@ namespace glint::bake {
 
 struct BinMapOptions {
   float alpha = 0.01f;  ///< Beckmann roughness of the facets, kMinBinAlpha to 1; the smallest, if there is a range
-  int leaf_size = 8;    ///< texels of a cell of a bin's grid, at least on average, 1 to 1024
+  int leaf_size = 8;    ///< texels of a cell, on average at least, 1 to 1024; sparse blocks have fewer
   float alpha_max = 0;  ///< largest roughness that will be asked for, at most kMaxAlphaRange times alpha; 0: alpha
 };
 
@@ -21,12 +21,13 @@ inline constexpr float kMinBinAlpha = 5e-4f;
 inline constexpr float kMaxAlphaRange = 64;
 /// Bins along each axis at most, reached near the smallest roughness.
 inline constexpr int kMaxBinsPerAxis = 4096;
-/// Bins with more texels than this many leaves get a grid.
-inline constexpr int kGridLeaves = 8;
 
 /// Bins along each axis for a roughness: 5 / sin(arctan(3 sigma)), so that five bins span six deviations (Atanasov 2021, Eq. 16 and
 /// table 4, which rounds down).
 int binsPerAxis(float alpha);
+
+/// Logarithm of the bins along each axis of a tile: 0 where texels are many.
+int tileBits(int bins_per_axis, std::size_t texels);
 
 /// Roughness of the bins that serve a range of roughnesses: the geometric mean, but not so rough that a normal is known to less than
 /// a sixteenth of the bins of the smallest, or the smallest itself.
@@ -49,11 +50,10 @@ struct BinMapData {
   int width = 0, height = 0;
   float alpha = 0, alpha_min = 0, alpha_max = 0;
   MapSlopes slopes;
-  int bins_per_axis = 0, leaf_size = 0;
-  std::vector<std::uint64_t> masks, grid_masks;
-  std::vector<std::uint32_t> mask_ranks, grid_ranks, grid_cells;
-  std::vector<std::uint16_t> grid_moments;
-  CompactCountsData bin_starts, cell_starts;
+  int bins_per_axis = 0, leaf_size = 0, tile_bits = 0;
+  std::vector<std::uint32_t> nodes;
+  std::vector<std::uint16_t> block_moments;
+  CompactCountsData cell_starts;
   std::vector<std::uint32_t> texels, class_bins;
   std::vector<std::uint16_t> texel_classes;
 
@@ -63,9 +63,10 @@ struct BinMapData {
   std::size_t sizeBytes() const;
 };
 
-/// Sorts the texels of a normal map by the bins of their normals (Atanasov 2021, section 5.4), each list by cells.
+/// Sorts the texels of a normal map by the blocks of their normals (Atanasov 2021, section 5.4, with blocks of bins for its bins), each list
+/// by cells.
 ///
-/// Two passes: into at most 512 buckets of neighbouring bins, then each bucket by bin and cell in the cache. O(texels + bins).
+/// Two passes: into about 512 buckets of neighbouring tiles, then each bucket by cell in the cache. O(texels + bins).
 /// @throws Error usage for options out of range; invalid_input for normals outside the disk; unsupported for maps whose columns and
 ///         rows need more than 28 bits together (16384 x 16384)
 BinMapData buildBinMap(const NormalMap& map, const BinMapOptions& options, const ProgressFn& progress = {});

@@ -21,11 +21,11 @@ struct CompactCounts {
   GLINT_HD std::uint64_t operator[](std::size_t k) const { return bases.data()[k >> shift] + offsets.data()[k]; }
 };
 
-/// How a texel of a bin map is packed in 32 bits, from the lowest: column, row, and place in its bin along x and y.
+/// How a texel is packed in 32 bits, from the lowest: column, row, and place along x and y.
 struct TexelCode {
-  int column_bits = 0;  ///< of width - 1
-  int row_bits = 0;     ///< of height - 1
-  int place_bits = 0;   ///< along each axis of a bin
+  int column_bits = 0;
+  int row_bits = 0;
+  int place_bits = 0;  ///< along each axis
 
   static constexpr int kMaxPositionBits = 28;
   static constexpr int kMaxPlaceBits = 8;
@@ -43,7 +43,8 @@ struct TexelCode {
   }
 };
 
-/// The code of a map's texels. Maps whose columns and rows need more than kMaxPositionBits together have none: place_bits is -1.
+/// Column and row in the map and place in the bin, as precise as a texel's bin keeps it at best. Maps whose columns and rows need more
+/// than kMaxPositionBits together have no code: place_bits is -1.
 GLINT_HD constexpr TexelCode texelCode(int width, int height) {
   const auto bits = [](int size) {
     int count = 0;
@@ -58,45 +59,7 @@ GLINT_HD constexpr TexelCode texelCode(int width, int height) {
   return code;
 }
 
-/// The texels of a normal map, listed by the bin of directions that their normals fall into (Atanasov 2021, section 5.4).
-///
-/// The square [-1, 1]^2 has bins_per_axis^2 bins; bin number = row * bins_per_axis + column. Only occupied bins have lists, in
-/// the order of their numbers; the k-th of them is found from `masks` and `mask_ranks`. A bin of many texels has a grid of cells over
-/// the map, a power of two of them, and its list is sorted by cell, row by row. Columns and rows of the map are cut at multiples of
-/// powers of two, see `cellGrid`.
-struct BinMap {
-  int width = 0;        ///< texels
-  int height = 0;       ///< texels
-  float alpha = 0;      ///< Beckmann roughness that the bins are made for; a facet's lobe has the deviation alpha / sqrt(2)
-  float alpha_min = 0;  ///< roughnesses that may be asked for: alpha is between them, and the same where there is only one
-  float alpha_max = 0;
-  MapSlopes slopes;  ///< of the map's texels, for masking
-  int bins_per_axis = 0;
-  int leaf_size = 0;  ///< texels of a cell, at least on average
-
-  std::span<const std::uint64_t> masks;       ///< [ceil(bins_per_axis^2 / 64)]; bit b of word w: bin 64 w + b is occupied
-  std::span<const std::uint32_t> mask_ranks;  ///< same shape: occupied bins before this word
-  CompactCounts bin_starts;                   ///< [occupied bins + 1]: place in `texels` of each occupied bin
-  std::span<const std::uint64_t> grid_masks;  ///< [ceil(occupied bins / 64)]; bit: the occupied bin has a grid
-  std::span<const std::uint32_t> grid_ranks;  ///< same shape: grids before this word
-  std::span<const std::uint32_t> grid_cells;  ///< [grids + 1]: place in `cell_starts`; a grid of n cells takes n + 1
-  /// [grids][5] of f16: mean (x, y) and covariance (xx, xy, yy) of the bin's normals, from its lower left corner, in bin sides
-  std::span<const std::uint16_t> grid_moments;
-  CompactCounts cell_starts;              ///< places in `texels` of each cell and of the end of each grid's last
-  std::span<const std::uint32_t> texels;  ///< [height * width]: TexelCode
-
-  /// Bins are also grouped in at most kMaxClasses classes of consecutive numbers, for the way from a texel to its bin.
-  static constexpr int kClassBits = 12;
-  static constexpr int kMaxClasses = 1 << kClassBits;
-  std::span<const std::uint32_t> class_bins;     ///< [classes + 1]: first bin number of each class; then the number of bins
-  std::span<const std::uint16_t> texel_classes;  ///< [ceil(height * width * 12 / 16)]: 12 bits a texel, rows of the map
-
-  GLINT_HD std::size_t binCount() const { return static_cast<std::size_t>(bins_per_axis) * bins_per_axis; }
-  GLINT_HD std::size_t occupiedBins() const { return bin_starts.size() - 1; }
-  GLINT_HD std::size_t classCount() const { return class_bins.size() - 1; }
-};
-
-/// Sizes of the cells of a bin's grid: 2^column_shift x 2^row_shift texels.
+/// Sizes of the cells of a block: 2^column_shift x 2^row_shift texels.
 struct CellGrid {
   int column_shift = 0;
   int row_shift = 0;
@@ -113,5 +76,59 @@ GLINT_HD constexpr CellGrid cellGrid(const TexelCode& code, int cell_bits) {
   across = cell_bits - across > code.row_bits ? cell_bits - code.row_bits : across;
   return {code.column_bits - across, code.row_bits - (cell_bits - across), 1 << across};
 }
+
+/// Code of the texels of a block of 2^side_bits x 2^side_bits bins with 2^cell_bits cells: column and row in the cell, place in the block. A
+/// place in a bin takes place_bits - side_bits bits along each axis, as many as `map`, the map's texelCode, has if there is room for
+/// them; fewer than 0 if there is none for the bin.
+GLINT_HD constexpr TexelCode blockCode(const TexelCode& map, int side_bits, int cell_bits) {
+  const CellGrid grid = cellGrid(map, cell_bits);
+  const int left = (32 - grid.column_shift - grid.row_shift) / 2 - side_bits;
+  return {grid.column_shift, grid.row_shift, side_bits + (left < map.place_bits ? left : map.place_bits)};
+}
+
+/// The texels of a normal map, listed by the directions of their normals (Atanasov 2021, section 5.4).
+///
+/// The square [-1, 1]^2 has bins_per_axis^2 bins. They are listed by block: squares of 2^s x 2^s neighbouring bins, larger where few
+/// normals are. A block's texels lie in a grid of cells over the map, a power of two of them (see `cellGrid`), and its list is sorted
+/// by cell, row by row. Small footprints meet one or two cells of each block, and few blocks have bins near a half vector.
+///
+/// Blocks are the leaves of quadtrees: tiles of 2^tile_bits x 2^tile_bits bins, row by row, each with the node of its number as root. The four
+/// children of a node are those with lower and higher columns and lower and higher rows, in the order (low, low), (high, low), (low,
+/// high), (high, high). The *key* of a bin counts bins in the order of the quadtrees: 4^tile_bits of each tile.
+struct BinMap {
+  int width = 0;        ///< texels
+  int height = 0;       ///< texels
+  float alpha = 0;      ///< Beckmann roughness that the bins are made for; a facet's lobe has the deviation alpha / sqrt(2)
+  float alpha_min = 0;  ///< roughnesses that may be asked for: alpha is between them, and the same where there is only one
+  float alpha_max = 0;
+  MapSlopes slopes;  ///< of the map's texels, for masking
+  int bins_per_axis = 0;
+  int leaf_size = 0;  ///< texels of a cell, on average at least, where a block is not sparse
+  int tile_bits = 0;  ///< 0 to kMaxTileBits
+
+  static constexpr int kMaxTileBits = 11;
+  static constexpr std::uint32_t kEmpty = 0, kSplit = 63;  ///< kinds of nodes; others are blocks of 2^(kind - 1) cells
+  static constexpr int kKindBits = 6;
+
+  /// [nodes][2]: kind | number of the block << kKindBits, and the first of four children or of the block's cells. Tiles first
+  std::span<const std::uint32_t> nodes;
+  /// [blocks][5] of f16: mean (x, y) and covariance (xx, xy, yy) of the block's normals, from its lower left corner, in its sides
+  std::span<const std::uint16_t> block_moments;
+  CompactCounts cell_starts;              ///< [cells + 1]: place in `texels` of each cell, of all blocks in order
+  std::span<const std::uint32_t> texels;  ///< [height * width]: blockCode
+
+  /// Bins are also grouped in at most kMaxClasses classes of consecutive keys, for the way from a texel to its block.
+  static constexpr int kClassBits = 12;
+  static constexpr int kMaxClasses = 1 << kClassBits;
+  std::span<const std::uint32_t> class_bins;     ///< [classes + 1]: first key of each class; then keyCount()
+  std::span<const std::uint16_t> texel_classes;  ///< [ceil(height * width * 12 / 16)]: 12 bits a texel, rows of the map
+
+  GLINT_HD int tilesPerAxis() const { return ((bins_per_axis - 1) >> tile_bits) + 1; }
+  GLINT_HD std::uint64_t keyCount() const {
+    return static_cast<std::uint64_t>(tilesPerAxis()) * static_cast<std::uint64_t>(tilesPerAxis()) << 2 * tile_bits;
+  }
+  GLINT_HD std::size_t blockCount() const { return block_moments.size() / 5; }
+  GLINT_HD std::size_t classCount() const { return class_bins.size() - 1; }
+};
 
 }  // namespace glint

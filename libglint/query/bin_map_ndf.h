@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "glint/query/bin_lists.h"
+#include "glint/query/bin_window.h"
 #include "glint/query/facet_lobe.h"
 #include "glint/query/gaussian.h"
 #include "glint/query/half.h"
@@ -12,15 +12,6 @@
 #include "glint/query/sampling.h"
 
 namespace glint {
-
-/// Weights of the bins around a half vector: the share of a footprint whose normals are in each (Atanasov 2021, section 5.2).
-struct BinWeights {
-  static constexpr int kMost = 21;  ///< 5 x 5 without the corners
-
-  int count = 0;
-  std::uint32_t bins[kMost];  ///< numbers; only occupied bins, and only those of the square [-1, 1]^2
-  double weights[kMost];      ///< 0 to 1
-};
 
 /// A facet, or several that are answered as one.
 struct BinFacet {
@@ -31,31 +22,30 @@ struct BinFacet {
 
 /// The NDF from an inverse bin map (Atanasov 2021): exact shares of the footprint for every texel near the half vector.
 ///
-/// Each texel in reach counts with its own normal, kept to 2^-place_bits of a bin. A bin that holds more than a few hundred texels of the
-/// footprint counts as one Gaussian with the mean and covariance of its normals; between kFewTexels and kManyTexels the two are
-/// blended, so that the density is continuous in footprint and half vector. Lobes are those of FacetLobe.
+/// Each texel in reach counts with its own normal, kept to a fraction of a bin (see blockCode). A block that holds more than a few hundred
+/// texels of the footprint, and is no wider than the lobe allows, counts as one Gaussian with the mean and covariance of its
+/// normals; between kFewTexels and kManyTexels the two are blended, so that the density is continuous in footprint and half vector.
+/// Lobes are those of FacetLobe.
 ///
 /// Boxes are answered exactly, Gaussians by the box of the same second moments: see TexelCover, also for boxes without area and
 /// boxes larger than the map. Thread-safe, allocates nothing; the arrays must outlive it.
 class BinMapNdf {
  public:
-  /// Bins with fewer texels than this in the footprint are summed texel by texel, those with more than kManyTexels at once.
+  /// Blocks with fewer texels than this in the footprint are summed texel by texel, those with more than kManyTexels at once.
   static constexpr double kFewTexels = 256;
   static constexpr double kManyTexels = 512;
-  /// A bin's Gaussian is wider than a facet's lobe: bins this far from the half vector are asked, in deviations.
+  /// A block's Gaussian is wider than a facet's lobe: bins this far from the half vector are asked, in deviations.
   static constexpr float kBinReach = 5.5f;
 
   /// Of the smallest roughness that the map is made for.
   GLINT_HD explicit BinMapNdf(const BinMap& map) : BinMapNdf(map, map.alpha_min) {}
   /// @param alpha  Beckmann roughness of the facets, alpha_min to alpha_max of the map
-  GLINT_HD BinMapNdf(const BinMap& map, float alpha) : lists_(map), sigma_(alpha * kInvSqrt2) {
+  GLINT_HD BinMapNdf(const BinMap& map, float alpha) : blocks_(map), sigma_(alpha * kInvSqrt2), wider_(alpha / map.alpha) {
     bin_size_ = 2.0f / static_cast<float>(map.bins_per_axis);
-    one_bin_classes_ = map.classCount() == map.occupiedBins();
-    const double wider = double{alpha} / map.alpha;
-    merging_ = wider >= kNarrowestMerged ? std::max(1.0, wider * wider) : 0;
+    block_classes_ = map.classCount() == map.blockCount();
   }
 
-  GLINT_HD const BinMap& map() const { return lists_.map(); }
+  GLINT_HD const BinMap& map() const { return blocks_.map(); }
   /// Deviation of a facet's lobe, disk units.
   GLINT_HD float sigma() const { return sigma_; }
 
@@ -98,21 +88,23 @@ class BinMapNdf {
     return normalAt(cover, x, y, normal);
   }
 
-  /// Weights of the bins around h, exact to rounding. O(texels of the footprint) or less, whichever way is shorter.
+  /// Weights of the bins around h, exact to rounding; none for h outside the square [-1, 1]^2. O(texels of the footprint) or less,
+  /// whichever way is shorter.
   GLINT_HD BinWeights weights(const Footprint& p, Vec2 h) const {
-    BinWeights result;
-    RowWindow rows[5];
+    if (!(std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1)) return {};
+    const BinWindow window(binAt(h.x), binAt(h.y), map().bins_per_axis);
+    blocks_.prefetchTiles(window.bins);
     const TexelCover cover(p, map().width, map().height);
-    prefetchClasses(cover);
-    const int row_count = windowAround(h, rows);
-    const double scale = 1 / cover.area();
-    if (shorterByTexel(cover, rows, row_count)) {
-      weighByTexel(cover, rows, row_count, result);
-    } else {
-      weighByList(cover, rows, row_count, result);
-    }
-    for (int k = 0; k < result.count; ++k) result.weights[k] *= scale;
-    return result;
+    WindowBlocks near;
+    blocks_.forEachBlock(window.bins, [&](const BinBlock& block) {
+      if (!window.isCorner(block)) near.blocks[near.count++] = block;
+    });
+    double areas[BinWindow::kSlots] = {};
+    if (block_classes_ && shorterByTexel(cover, near))
+      addByTexel(cover, window, near, areas);
+    else
+      addByBlock(cover, window, near, areas);
+    return window.weights(areas, 1 / cover.area());
   }
 
   /// Visits what of a footprint has normals in reach of a box of half vectors: visitor(BinFacet). Weights are shares of the
@@ -120,52 +112,48 @@ class BinMapNdf {
   template <class Visitor>
   GLINT_HD void forEachFacet(const Footprint& p, const Box2& support, Visitor&& visitor) const {
     const TexelCover cover(p, map().width, map().height);
-    const BinReach reach = reachOf(support);
+    const BinReach reach(support, kBinReach * sigma_);
     if (cover.area() <= kFewTexels && boxTexels(cover) <= 2 * kFewTexels) {
       forEachFacetByTexel(cover, reach, visitor);
       return;
     }
-    for (int row = reach.row_begin; row < reach.row_end; ++row) {
-      std::uint32_t first, end;
-      binsInReach(reach, row, first, end);
-      lists_.forEachOccupied(
-          first, end, [&](std::uint32_t bin, std::uint32_t ordinal) { visitBin(cover, lists_.list(bin, ordinal), visitor); });
-    }
+    CellRows rows;
+    blocks_.forEachBlock(binsIn(reach), [&](const BinBlock& block) {
+      const float side = bin_size_ * static_cast<float>(block.side());
+      if (reach.meets(corner(block), side)) visitBlock(cover, block, reach, rows, visitor);
+    });
   }
 
  private:
-  /// Occupied bins of one row of the window around a half vector.
-  struct RowWindow {
-    std::uint32_t bins[5];
-    std::uint32_t ordinal = 0;  // of the first
-    int count = 0;
-    int slot = 0;  // of the first among those of all rows
-  };
-
   static constexpr float kStrata = 4096;
-  /// Bins count as one facet for lobes that are not much narrower than those that they were made for.
+  /// Blocks count as one facet for lobes that are not much narrower than those that bins as wide as the block are made for.
   static constexpr double kNarrowestMerged = 0.9;
 
-  /// The bins that a box of half vectors reaches.
+  /// A box of half vectors, and how far from it a normal counts.
   struct BinReach {
+    GLINT_HD BinReach(const Box2& box, float distance) : support(box), radius(distance) {}
+    /// Whether some of a square is in reach.
+    GLINT_HD bool meets(Vec2 low, float side) const {
+      const float dx = std::max({low.x - support.high.x, support.low.x - low.x - side, 0.0f});
+      const float dy = std::max({low.y - support.high.y, support.low.y - low.y - side, 0.0f});
+      return dx * dx + dy * dy <= radius * radius;
+    }
     Box2 support;
     float radius;
-    int row_begin, row_end;
   };
 
-  GLINT_HD BinReach reachOf(const Box2& support) const {
-    const float radius = kBinReach * sigma_;
-    return {support, radius, binAt(support.low.y - radius), binAt(support.high.y + radius) + 1};
+  static GLINT_HD float fraction(float x) { return x - std::floor(x); }
+
+  /// Row or column of bins at a coordinate, those outside the square moved to its border.
+  GLINT_HD int binAt(float x) const {
+    const auto last = static_cast<float>(map().bins_per_axis - 1);
+    return static_cast<int>(std::clamp((x + 1) * 0.5f * static_cast<float>(map().bins_per_axis), 0.0f, last));
   }
 
-  /// Bins [first, end) of a row: above and below the box its part in reach is shorter.
-  GLINT_HD void binsInReach(const BinReach& reach, int row, std::uint32_t& first, std::uint32_t& end) const {
-    const float low = -1 + static_cast<float>(row) * bin_size_;
-    const float gap = std::max({low - reach.support.high.y, reach.support.low.y - low - bin_size_, 0.0f});
-    const float half = std::sqrt(std::max(0.0f, reach.radius * reach.radius - gap * gap));
-    const std::uint32_t row_start = static_cast<std::uint32_t>(row) * static_cast<std::uint32_t>(map().bins_per_axis);
-    first = row_start + static_cast<std::uint32_t>(binAt(reach.support.low.x - half));
-    end = row_start + static_cast<std::uint32_t>(binAt(reach.support.high.x + half)) + 1;
+  GLINT_HD BinRect binsIn(const BinReach& reach) const {
+    const Box2& box = reach.support;
+    return {binAt(box.low.x - reach.radius), binAt(box.high.x + reach.radius) + 1, binAt(box.low.y - reach.radius),
+            binAt(box.high.y + reach.radius) + 1};
   }
 
   /// Texels of a footprint's bounding box: more than an int may hold.
@@ -181,7 +169,7 @@ class BinMapNdf {
   GLINT_HD void forEachTexelRow(const TexelCover& cover, Visitor&& visitor) const {
     for (int y = 0, j = cover.originY(); y < cover.rows(); ++y, j = j + 1 < map().height ? j + 1 : 0) {
       for (int x = 0, i = cover.originX(); x < cover.columns();) {
-        const int count = std::min({cover.columns() - x, map().width - i, BinLists::kMostAtOnce});
+        const int count = std::min({cover.columns() - x, map().width - i, BinBlocks::kMostAtOnce});
         visitor(TexelRow{x, y, i, j, count});
         x += count;
         i = i + count < map().width ? i + count : 0;
@@ -196,8 +184,8 @@ class BinMapNdf {
     const int last = std::min(cover.originX() + cover.columns(), map().width) - 1;
     for (int y = 0, j = cover.originY(); y < cover.rows(); ++y, j = j + 1 < map().height ? j + 1 : 0) {
       const std::uint64_t row = static_cast<std::uint64_t>(j) * static_cast<std::uint64_t>(map().width);
-      lists_.prefetchClass(row + static_cast<std::uint64_t>(cover.originX()));
-      lists_.prefetchClass(row + static_cast<std::uint64_t>(last));
+      blocks_.prefetchClass(row + static_cast<std::uint64_t>(cover.originX()));
+      blocks_.prefetchClass(row + static_cast<std::uint64_t>(last));
     }
   }
 
@@ -211,153 +199,114 @@ class BinMapNdf {
   GLINT_HD void forEachTexelOfClasses(const TexelCover& cover, std::uint32_t first, std::uint32_t last,
                                       Visitor&& visitor) const {
     forEachTexelRow(cover, [&](const TexelRow& row) {
-      for (std::uint64_t bits = lists_.texelsOfClasses(indexOf(row), row.count, first, last); bits != 0; bits &= bits - 1) {
+      for (std::uint64_t bits = blocks_.texelsOfClasses(indexOf(row), row.count, first, last); bits != 0; bits &= bits - 1) {
         const int k = lowestBit(bits);
         visitor(row.x + k, row.y, static_cast<std::uint32_t>(row.column + k), static_cast<std::uint32_t>(row.row),
-                lists_.texelClass(indexOf(row) + static_cast<std::uint64_t>(k)));
+                blocks_.texelClass(indexOf(row) + static_cast<std::uint64_t>(k)));
       }
     });
   }
 
-  /// For footprints of few texels, which none of the bins would be merged for: looks up every texel.
+  /// For footprints of few texels, which none of the blocks would be merged for: looks up every texel.
   template <class Visitor>
   GLINT_HD void forEachFacetByTexel(const TexelCover& cover, const BinReach& reach, Visitor& visitor) const {
     prefetchClasses(cover);
     const double scale = 1 / cover.area();
-    const auto bins = static_cast<std::uint32_t>(map().bins_per_axis);
-    const std::uint32_t first_class = lists_.classOf(static_cast<std::uint32_t>(reach.row_begin) * bins);
-    const std::uint32_t last_class = lists_.classOf(static_cast<std::uint32_t>(reach.row_end) * bins - 1);
-    forEachTexelOfClasses(cover, first_class, last_class, [&](int x, int y, std::uint32_t i, std::uint32_t j, std::uint32_t c) {
-      const std::uint32_t class_begin = map().class_bins.data()[c], class_end = map().class_bins.data()[c + 1];
-      BinTexel found;
-      std::uint32_t first, end;
-      const int row_begin = std::max(static_cast<int>(class_begin / bins), reach.row_begin);
-      const int row_end = std::min(static_cast<int>((class_end - 1) / bins) + 1, reach.row_end);
-      for (int row = row_begin; row < row_end; ++row) {
-        binsInReach(reach, row, first, end);
-        first = std::max(first, class_begin), end = std::min(end, class_end);
-        if (first >= end || !lists_.find(first, end, i, j, found)) continue;
-        const double weight = cover.texel(x, y);
-        if (weight > 0) visitor(BinFacet{scale * weight, normal(corner(found.bin), found.code), {}});
-        return;
-      }
-    });
-  }
-
-  static GLINT_HD float fraction(float x) { return x - std::floor(x); }
-
-  /// Row or column of bins at a coordinate, those outside the square moved to its border.
-  GLINT_HD int binAt(float x) const {
-    const auto last = static_cast<float>(map().bins_per_axis - 1);
-    return static_cast<int>(std::clamp((x + 1) * 0.5f * static_cast<float>(map().bins_per_axis), 0.0f, last));
-  }
-
-  /// The rows of the window; false bins, beyond the square, are left out.
-  GLINT_HD int windowAround(Vec2 h, RowWindow* rows) const {
-    if (!(std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1)) return 0;
-    const int bins = map().bins_per_axis, column = binAt(h.x), row = binAt(h.y);
-    int count = 0, slot = 0;
-    for (int dy = -2; dy <= 2; ++dy) {
-      const int reach = dy == -2 || dy == 2 ? 1 : 2;
-      if (row + dy < 0 || row + dy >= bins) continue;
-      const auto first = static_cast<std::uint32_t>(row + dy) * static_cast<std::uint32_t>(bins);
-      RowWindow& out = rows[count++];
-      out.slot = slot;
-      out.count = 0;
-      lists_.forEachOccupied(first + static_cast<std::uint32_t>(std::max(column - reach, 0)),
-                             first + static_cast<std::uint32_t>(std::min(column + reach, bins - 1)) + 1,
-                             [&](std::uint32_t bin, std::uint32_t ordinal) {
-                               if (out.count == 0) out.ordinal = ordinal;
-                               out.bins[out.count++] = bin;
-                             });
-      slot += out.count;
-    }
-    return count;
-  }
-
-  /// Whether looking up every texel of the footprint is cheaper than reading lists.
-  GLINT_HD bool shorterByTexel(const TexelCover& cover, const RowWindow* rows, int row_count) const {
-    // Nanoseconds, about. Texels of the window cost more where each is a branch: few of them are where classes have many bins.
-    constexpr double kTexelCost = 1, kBranchCost = 6, kListCost = 0.6, kBinCost = 60, kCellRowCost = 60;
-    const double branch_cost = one_bin_classes_ && !cover.aligned() ? kBranchCost : 0;
-    double texels = 0;
-    int bins = 0;
-    for (int r = 0; r < row_count; ++r) bins += rows[r].count;
-    if ((kTexelCost + branch_cost) * boxTexels(cover) < kBinCost * bins) return true;
-    for (int r = 0; r < row_count; ++r) {
-      if (rows[r].count == 0) continue;
-      texels += static_cast<double>(map().bin_starts[rows[r].ordinal + static_cast<std::uint32_t>(rows[r].count)] -
-                                    map().bin_starts[rows[r].ordinal]);
-    }
-    // Lists are read up to a cell around the border; a cell of a bin holds 1 to 2 leaves.
-    const double all = static_cast<double>(map().texels.size());
-    const double cell = std::sqrt(all * 1.5 * map().leaf_size * bins / std::max(texels, 1.0));
-    const double border = 2 * (cover.columns() + cover.rows()) * cell + 2 * cell * cell;
-    const double by_list =
-        kListCost * texels / all * std::min(all, border) + (kBinCost + kCellRowCost * cover.rows() / cell) * bins;
-    return (kTexelCost + branch_cost * texels / all) * boxTexels(cover) < by_list;
-  }
-
-  GLINT_HD void weighByTexel(const TexelCover& cover, const RowWindow* rows, int row_count, BinWeights& result) const {
-    for (int r = 0; r < row_count; ++r) {
-      for (int k = 0; k < rows[r].count; ++k) {
-        result.bins[rows[r].slot + k] = rows[r].bins[k];
-        result.weights[rows[r].slot + k] = 0;
-      }
-      result.count += rows[r].count;
-    }
-    constexpr int kWorthATable = 64;  // texels
-    if (one_bin_classes_ && cover.aligned() && boxTexels(cover) > kWorthATable)
-      weighByBinClass(cover, rows, row_count, result);
-    else
-      weighByClass(cover, rows, row_count, result);
-  }
-
-  /// Looks at the class of every texel and, for the few of classes around the window, where they are in it.
-  GLINT_HD void weighByClass(const TexelCover& cover, const RowWindow* rows, int row_count, BinWeights& result) const {
-    if (result.count == 0) return;
-    const std::uint32_t first = lists_.classOf(result.bins[0]), last = lists_.classOf(result.bins[result.count - 1]);
+    const BinRect bins = binsIn(reach);
+    const std::uint32_t first = blocks_.classOf(blocks_.tileKey(bins.column_begin, bins.row_begin, false));
+    const std::uint32_t last = blocks_.classOf(blocks_.tileKey(bins.column_end - 1, bins.row_end - 1, true) - 1);
     forEachTexelOfClasses(cover, first, last, [&](int x, int y, std::uint32_t i, std::uint32_t j, std::uint32_t c) {
-      const std::uint32_t class_begin = map().class_bins.data()[c], class_end = map().class_bins.data()[c + 1];
-      for (int r = 0; r < row_count; ++r) {
-        const RowWindow& row = rows[r];
-        if (row.count == 0) continue;
-        const std::uint32_t begin = std::max(row.bins[0], class_begin), end = std::min(row.bins[row.count - 1] + 1, class_end);
-        BinTexel found;
-        if (begin >= end || !(one_bin_classes_ || lists_.find(begin, end, i, j, found))) continue;
-        const std::uint32_t ordinal = one_bin_classes_ ? c : found.ordinal;
-        result.weights[static_cast<std::uint32_t>(row.slot) + ordinal - row.ordinal] += cover.texel(x, y);
-        return;
-      }
+      BinTexel found;
+      if (!blocks_.find(c, i, j, bins, found)) return;
+      const double weight = cover.texel(x, y);
+      if (weight > 0) visitor(BinFacet{scale * weight, normal(found.block, blocks_.code(found.block), found.code), {}});
     });
   }
 
-  /// The same where every class is a bin, for boxes along the axes: each texel is counted, without branches, in the slot of its bin;
-  /// one more slot takes those that are not in the window.
-  GLINT_HD void weighByBinClass(const TexelCover& cover, const RowWindow* rows, int row_count, BinWeights& result) const {
+  /// Whether looking up every texel of the footprint is cheaper than reading lists. Nanoseconds, about.
+  GLINT_HD bool shorterByTexel(const TexelCover& cover, const WindowBlocks& near) const {
+    constexpr double kTexelCost = 1, kRowCost = 20, kTurnedCost = 6, kFindCost = 60;
+    constexpr double kFirstCost = 200, kBlockCost = 40, kListCost = 0.6, kCellRowCost = 60;
+    double by_texel = kTexelCost * boxTexels(cover) + kRowCost * cover.rows(), by_list = kFirstCost + kBlockCost * near.count;
+    if (by_texel < 0.5 * by_list) return true;
+    if (by_texel > kMostByTexel) return false;
+    double texels = 0, found = 0;
+    for (int k = 0; k < near.count; ++k) {
+      const auto size = static_cast<double>(blocks_.end(near.blocks[k]) - blocks_.begin(near.blocks[k]));
+      texels += size;
+      found += size * (near.blocks[k].side_bits > 0 ? kFindCost : cover.aligned() ? 0 : kTurnedCost);
+    }
+    // Lists are read up to a cell around the border; a cell holds 1 to 2 leaves.
+    const double all = static_cast<double>(map().texels.size());
+    const double cell = std::sqrt(all * 1.5 * map().leaf_size * near.count / std::max(texels, 1.0));
+    const double border = 2 * (cover.columns() + cover.rows()) * cell + 2 * cell * cell;
+    by_texel += found / all * boxTexels(cover);
+    by_list += kListCost * texels / all * std::min(all, border) + kCellRowCost * cover.rows() / cell * near.count;
+    return by_texel < by_list;
+  }
+  static constexpr double kMostByTexel = 1e5;
+
+  /// Slots for texels in no bin of the window, and from kShared on for texels of a block of several bins.
+  static constexpr std::uint8_t kNoSlot = BinWindow::kSlots, kShared = kNoSlot + 1;
+
+  /// Looks at the class of every texel, which is the number of its block.
+  GLINT_HD void addByTexel(const TexelCover& cover, const BinWindow& window, const WindowBlocks& near, double* areas) const {
+    prefetchClasses(cover);
     std::uint8_t slots[BinMap::kMaxClasses];
-    std::fill(slots, slots + map().classCount(), static_cast<std::uint8_t>(BinWeights::kMost));
-    for (int r = 0; r < row_count; ++r)
-      for (int k = 0; k < rows[r].count; ++k)
-        slots[rows[r].ordinal + static_cast<std::uint32_t>(k)] = static_cast<std::uint8_t>(rows[r].slot + k);
+    std::fill(slots, slots + map().classCount(), kNoSlot);
+    bool shared = false;
+    for (int k = 0; k < near.count; ++k) {
+      const BinBlock& block = near.blocks[k];
+      slots[block.number] = static_cast<std::uint8_t>(block.side_bits == 0 ? window.slotOf(block) : kShared + k);
+      shared = shared || block.side_bits > 0;
+    }
+    if (cover.aligned() && !shared) {
+      addAlignedTexels(cover, slots, areas);
+      return;
+    }
+    forEachTexelRow(cover, [&](const TexelRow& row) {
+      const auto one = [&](int k, std::uint32_t c) {
+        int slot = slots[c];
+        if (slot == kNoSlot) return;
+        if (slot >= kShared) slot = slotIn(near.blocks[slot - kShared], window, row.column + k, row.row);
+        if (slot < kNoSlot) areas[slot] += cover.texel(row.x + k, row.y);
+      };
+      blocks_.forEachClass(indexOf(row), row.count, one,
+                           [&](int k, std::uint32_t c0, std::uint32_t c1, std::uint32_t c2, std::uint32_t c3) {
+                             one(k, c0), one(k + 1, c1), one(k + 2, c2), one(k + 3, c3);
+                           });
+    });
+  }
+
+  /// The slot of a texel that is in a block, kNoSlot if it is not in the window.
+  GLINT_HD int slotIn(const BinBlock& block, const BinWindow& window, int column, int row) const {
+    std::uint32_t texel = 0;
+    if (!blocks_.findIn(block, static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row), texel)) return kNoSlot;
+    const TexelCode code = blocks_.code(block);
+    const int shift = code.place_bits - block.side_bits;
+    const int dx = block.column + static_cast<int>(code.placeX(texel) >> shift) - window.column;
+    const int dy = block.row + static_cast<int>(code.placeY(texel) >> shift) - window.row;
+    const bool inside = dx >= 0 && dx < BinWindow::kSide && dy >= 0 && dy < BinWindow::kSide;
+    return inside ? dy * BinWindow::kSide + dx : int{kNoSlot};
+  }
+
+  /// For boxes along the axes each texel is counted, without branches, in the slot of its class.
+  GLINT_HD void addAlignedTexels(const TexelCover& cover, const std::uint8_t* slots, double* areas) const {
     // Counts of four texels in turn, since an increment waits for the last one of the same slot; flushed where a row's height changes.
-    constexpr int kSlots = BinWeights::kMost + 1;
-    std::uint32_t counts[4][kSlots] = {};
+    std::uint32_t counts[4][kNoSlot + 1] = {};
     const BoxSides sides(cover);
     int last_y = 0;
     const auto flush = [&](double height) {
-      for (int slot = 0; slot < result.count; ++slot) {
-        result.weights[slot] += height * (1.0 * counts[0][slot] + counts[1][slot] + counts[2][slot] + counts[3][slot]);
+      for (int slot = 0; slot < kNoSlot; ++slot) {
+        areas[slot] += height * (1.0 * counts[0][slot] + counts[1][slot] + counts[2][slot] + counts[3][slot]);
         counts[0][slot] = counts[1][slot] = counts[2][slot] = counts[3][slot] = 0;
       }
     };
-    const auto height = [&](int y) { return y == 0 ? sides.lower : y == sides.last_y ? sides.upper : 1.0f; };
     forEachTexelRow(cover, [&](TexelRow row) {
-      if (height(row.y) != height(last_y)) flush(height(last_y));
+      if (sides.row(row.y) != sides.row(last_y)) flush(sides.row(last_y));
       last_y = row.y;
-      const auto edge = [&](std::uint64_t index, float width) {
-        if (const int slot = slots[lists_.texelClass(index)]; slot < BinWeights::kMost)
-          result.weights[slot] += double{width} * height(row.y);
+      const auto edge = [&](std::uint64_t index, double width) {
+        if (const int slot = slots[blocks_.texelClass(index)]; slot < kNoSlot) areas[slot] += width * sides.row(row.y);
       };
       if (row.x == 0) {
         edge(indexOf(row), sides.left);
@@ -367,279 +316,147 @@ class BinMapNdf {
         edge(indexOf(row) + static_cast<std::uint64_t>(row.count) - 1, sides.right);
         --row.count;
       }
-      lists_.forEachClass(
+      blocks_.forEachClass(
           indexOf(row), row.count, [&](int, std::uint32_t c) { ++counts[0][slots[c]]; },
           [&](int, std::uint32_t c0, std::uint32_t c1, std::uint32_t c2, std::uint32_t c3) {
             ++counts[0][slots[c0]], ++counts[1][slots[c1]], ++counts[2][slots[c2]], ++counts[3][slots[c3]];
           });
     });
-    flush(height(last_y));
+    flush(sides.row(last_y));
   }
 
-  /// Everything is asked for before it is read: the processor then waits for all bins together, not for one after the other.
-  GLINT_HD void weighByList(const TexelCover& cover, const RowWindow* rows, int row_count, BinWeights& result) const {
-    BinList lists[BinWeights::kMost];
-    CellRows cell_rows;
-    AreaSum sum(*this, cover);
-    const bool rare = cover.fits() && kBlock * cover.area() < 0.5 * static_cast<double>(map().texels.size());
-    int grids[BinWeights::kMost], grid_count = 0;
-    for (int r = 0; r < row_count; ++r) {
-      const RowWindow& row = rows[r];
-      for (int k = 0; k < row.count; ++k) {
-        result.bins[row.slot + k] = row.bins[k];
-        result.weights[row.slot + k] = 0;
-      }
-      result.count += row.count;
-      if (row.count == 0) continue;
-      const bool joined = rare && lists_.gridless(row.ordinal, row.count);
-      for (int k = 0; k < row.count; ++k) {
-        const int slot = row.slot + k;
-        lists[slot] = lists_.list(row.bins[k], row.ordinal + static_cast<std::uint32_t>(k));
-        if (lists[slot].grid >= 0) {
-          prefetch(map().grid_cells.data() + lists[slot].grid);
-          grids[grid_count++] = slot;
-        } else if (!joined) {
-          sum.select(result.weights + slot);
-          lists_.forEachWholeListRun(cover, lists[slot].begin, lists[slot].end, sum);
-        }
-      }
-      if (joined) sum.addRow(lists + row.slot, row.count, result.weights + row.slot);
+  /// Everything is asked for before it is read: the processor then waits for all blocks together, not for one after the other.
+  GLINT_HD void addByBlock(const TexelCover& cover, const BinWindow& window, const WindowBlocks& near, double* areas) const {
+    CellRows rows;
+    for (int k = 0; k < near.count; ++k) blocks_.prefetchCells(cover, near.blocks[k], rows);
+    WindowBlock blocks[BinWindow::kSlots];
+    WindowSum sum(map().texels.data(), cover, areas);
+    for (int k = 0; k < near.count; ++k) {
+      blocks[k] = WindowBlock(near.blocks[k], blocks_.code(near.blocks[k]), window);
+      sum.select(blocks[k]);
+      blocks_.forEachRun(cover, near.blocks[k], rows, sum);
     }
-    for (int k = 0; k < grid_count; ++k) lists_.prefetchCells(cover, lists[grids[k]], cell_rows);
-    for (int k = 0; k < grid_count; ++k) {
-      sum.select(result.weights + grids[k]);
-      lists_.forEachRun(cover, lists[grids[k]], cell_rows, sum);
-    }
-    sum.flush();
+    sum.finish();
   }
 
-  /// What of its border texels a box along the axes covers.
-  struct BoxSides {
-    GLINT_HD explicit BoxSides(const TexelCover& cover)
-        : last_x(cover.columns() - 1),
-          last_y(cover.rows() - 1),
-          left(static_cast<float>(cover.firstColumn())),
-          right(static_cast<float>(cover.lastColumn())),
-          lower(static_cast<float>(cover.firstRow())),
-          upper(static_cast<float>(cover.lastRow())) {}
-    int last_x, last_y;
-    float left, right, lower, upper;
-  };
+  /// Lower left corner of a block.
+  GLINT_HD Vec2 corner(const BinBlock& block) const {
+    return {-1 + static_cast<float>(block.column) * bin_size_, -1 + static_cast<float>(block.row) * bin_size_};
+  }
 
-  /// Adds up areas of runs, several at a time.
-  class AreaSum {
+  /// Side of the square of normals that a place stands for.
+  GLINT_HD float placeSize(const BinBlock& block, const TexelCode& code) const {
+    return bin_size_ / static_cast<float>(1 << (code.place_bits - block.side_bits));
+  }
+
+  GLINT_HD Vec2 normal(const BinBlock& block, const TexelCode& code, std::uint32_t texel) const {
+    return corner(block) + placeSize(block, code) * Vec2{static_cast<float>(code.placeX(texel)) + 0.5f,
+                                                         static_cast<float>(code.placeY(texel)) + 0.5f};
+  }
+
+  /// How far a block counts as one facet. Lobes that are wider than the block needs want fewer texels in it for the same error;
+  /// footprints of few texels merge nothing, as when they are looked up texel by texel.
+  GLINT_HD double mergedShare(const TexelCover& cover, const BinBlock& block) const {
+    const double wider = double{wider_} / block.side();
+    if (wider < kNarrowestMerged) return 0;
+    const auto texels = static_cast<double>(blocks_.end(block) - blocks_.begin(block));
+    const double expected = texels * cover.area() / static_cast<double>(map().texels.size());
+    return std::clamp(
+        (std::min(std::max(1.0, wider * wider) * expected, cover.area()) - kFewTexels) / (kManyTexels - kFewTexels), 0.0, 1.0);
+  }
+
+  /// Area of a block's texels in a footprint, texels.
+  GLINT_HD double coveredArea(const TexelCover& cover, const BinBlock& block, CellRows& rows) const {
+    double areas[BinWindow::kSlots] = {};
+    // All of the block in one slot.
+    BinBlock as_bin = block;
+    as_bin.column = as_bin.row = as_bin.side_bits = 0;
+    const WindowBlock all(as_bin, blocks_.code(block), BinWindow(BinWindow::kReach, BinWindow::kReach, map().bins_per_axis));
+    WindowSum sum(map().texels.data(), cover, areas);
+    sum.select(all);
+    blocks_.forEachRun(cover, block, rows, sum);
+    sum.finish();
+    return areas[0];
+  }
+
+  /// Passes on the texels of a block, in reach and in the footprint, as facets.
+  template <class Visitor>
+  class EachTexel {
    public:
-    GLINT_HD AreaSum(const BinMapNdf& ndf, const TexelCover& cover) : ndf_(ndf), cover_(cover), sides_(cover) {}
-    GLINT_HD void select(double* area) { area_ = area; }
-    GLINT_HD void whole(std::uint64_t begin, std::uint64_t end) { *area_ += static_cast<double>(end - begin); }
-    GLINT_HD void partial(const TexelRun& run) { push(run, area_, nullptr, run.rare ? 1 : 0); }
-    /// Lists of neighbouring bins without grids, for footprints that few of their texels are in.
-    GLINT_HD void addRow(const BinList* lists, int count, double* areas) {
-      push({lists[0].begin, lists[count - 1].end, cover_.originX(), cover_.originY(), cover_.width(), cover_.height()}, areas,
-           lists, count);
+    GLINT_HD EachTexel(const BinMapNdf& ndf, const TexelCover& cover, const BinBlock& block, const BinReach& reach,
+                       double scale, Visitor& visitor)
+        : ndf_(ndf),
+          cover_(cover),
+          sides_(cover),
+          block_(block),
+          code_(ndf.blocks_.code(block)),
+          scale_(scale),
+          visitor_(visitor) {
+      const Vec2 low = reach.support.low - Vec2{reach.radius, reach.radius},
+                 high = reach.support.high + Vec2{reach.radius, reach.radius};
+      const Vec2 corner = ndf.corner(block);
+      columns_ = placesBetween(low.x - corner.x, high.x - corner.x);
+      rows_ = placesBetween(low.y - corner.y, high.y - corner.y);
     }
-    GLINT_HD void flush() {
-      for (int k = 0; k < count_; ++k) {
-        const Item& item = items_[k];
-        if (item.count > 0)
-          ndf_.addRareTexels(cover_, item.run, item.lists, item.count, item.areas);
-        else
-          *item.areas += cover_.aligned() ? ndf_.alignedArea(sides_, item.run) : ndf_.turnedArea(cover_, item.run);
-      }
-      count_ = 0;
+    GLINT_HD void whole(std::uint64_t begin, std::uint64_t end) { partial({begin, end, 0, 0, false, false}); }
+    GLINT_HD void partial(const TexelRun& run) {
+      withCut(run, [&](auto cut) { add<cut()>(run); });
     }
 
    private:
-    struct Item {
-      TexelRun run;
-      double* areas;
-      const BinList* lists;
-      int count;
-    };
-    static constexpr int kMost = 32;
+    GLINT_HD IndexRange placesBetween(float begin, float end) const {
+      const float size = ndf_.placeSize(block_, code_), last = static_cast<float>((1 << code_.place_bits) - 1);
+      return {static_cast<int>(std::clamp(std::floor(begin / size), 0.0f, last)),
+              static_cast<int>(std::clamp(std::floor(end / size), 0.0f, last))};
+    }
 
-    GLINT_HD void push(const TexelRun& run, double* areas, const BinList* lists, int count) {
-      constexpr std::uint64_t kLine = 16, kAhead = 16 * kLine;  // texels
-      const std::uint32_t* texels = ndf_.map().texels.data();
-      for (std::uint64_t k = run.begin; k < std::min(run.end, run.begin + kAhead); k += kLine) prefetch(texels + k);
-      prefetch(texels + run.end - 1);
-      items_[count_++] = {run, areas, lists, count};
-      if (count_ == kMost) flush();
+    template <unsigned kCut>
+    GLINT_HD void add(const TexelRun& run) {
+      const TexelFilter near(code_, {-run.x, cover_.columns() - 1 - run.x}, {-run.y, cover_.rows() - 1 - run.y}, columns_,
+                             rows_);
+      for (std::uint64_t k = run.begin; k < run.end; k += TexelFilter::kMostAtOnce) {
+        const std::uint32_t* texels = ndf_.map().texels.data() + k;
+        const int count = static_cast<int>(std::min<std::uint64_t>(run.end - k, TexelFilter::kMostAtOnce));
+        for (std::uint64_t bits = near.matches<kCut | TexelFilter::kPlace>(texels, count); bits != 0; bits &= bits - 1) {
+          const std::uint32_t texel = texels[lowestBit(bits)];
+          const double weight = sides_.texelArea<kCut>(cover_, run, code_, texel);
+          if (weight > 0) visitor_(BinFacet{scale_ * weight, ndf_.normal(block_, code_, texel), {}});
+        }
+      }
     }
 
     const BinMapNdf& ndf_;
     const TexelCover& cover_;
     BoxSides sides_;
-    double* area_ = nullptr;
-    int count_ = 0;
-    Item items_[kMost];
+    const BinBlock& block_;
+    TexelCode code_;
+    double scale_;
+    Visitor& visitor_;
+    IndexRange columns_, rows_;  ///< places in reach
   };
 
-  static constexpr int kBlock = 16;
-
-  /// Looks for the few texels of a row of lists (or of one, which needs no `lists`) that are in a footprint: blocks in which none is
-  /// are left without branches.
-  GLINT_HD void addRareTexels(const TexelCover& cover, const TexelRun& run, const BinList* lists, int count,
-                              double* areas) const {
-    const TexelCode code = lists_.code();
-    const auto columns = static_cast<std::uint32_t>(cover.columns()), rows = static_cast<std::uint32_t>(cover.rows());
-    const std::uint32_t* texels = map().texels.data();
-    int slot = 0;
-    for (std::uint64_t begin = run.begin; begin < run.end; begin += kBlock) {
-      const TexelRun block = {begin, std::min(begin + kBlock, run.end), run.offset_x, run.offset_y, run.wrap_x, run.wrap_y};
-      const int size = static_cast<int>(block.end - begin);
-      std::uint32_t hits = 0;
-      for (int k = 0; k < size; ++k) {
-        int x = static_cast<int>(code.column(texels[begin + k])) - run.offset_x;
-        int y = static_cast<int>(code.row(texels[begin + k])) - run.offset_y;
-        x += (x >> 31) & run.wrap_x;
-        y += (y >> 31) & run.wrap_y;
-        hits |= static_cast<std::uint32_t>(static_cast<std::uint32_t>(x) < columns) &
-                static_cast<std::uint32_t>(static_cast<std::uint32_t>(y) < rows);
-      }
-      if (hits == 0) continue;
-      forEachTexel(cover, block, [&](double weight, std::uint32_t, std::uint64_t k) {
-        while (slot + 1 < count && k >= lists[slot].end) ++slot;
-        areas[slot] += weight;
-      });
-    }
-  }
-
-  /// Area of a list's texels in a footprint, texels.
-  GLINT_HD double coveredArea(const TexelCover& cover, const BinList& list) const {
-    double area = 0;
-    AreaSum sum(*this, cover);
-    CellRows rows;
-    sum.select(&area);
-    lists_.forEachRun(cover, list, rows, sum);
-    sum.flush();
-    return area;
-  }
-
-  /// Area of a run's texels in a box along the axes: loops without branches, which compilers vectorise.
-  GLINT_HD double alignedArea(const BoxSides& sides, const TexelRun& run) const {
-    const TexelCode code = lists_.code();
-    if (run.inside_x)
-      return stripArea(run, code.column_bits, code.row_bits, run.offset_y, sides.last_y, sides.lower, sides.upper);
-    if (run.inside_y) return stripArea(run, 0, code.column_bits, run.offset_x, sides.last_x, sides.left, sides.right);
-    const auto side = [](int x, int last, float first_part, float last_part) {
-      const float inner = static_cast<unsigned>(x) <= static_cast<unsigned>(last) ? 1.0f : 0.0f;
-      const float end = x == last ? last_part : inner;
-      return x == 0 ? first_part : end;
-    };
-    float areas[kBlock];
-    double total = 0;
-    for (std::uint64_t begin = run.begin; begin < run.end; begin += kBlock) {
-      const std::uint32_t* texels = map().texels.data() + begin;
-      const int count = static_cast<int>(std::min<std::uint64_t>(kBlock, run.end - begin));
-      for (int k = 0; k < count; ++k) {
-        int x = static_cast<int>(code.column(texels[k])) - run.offset_x,
-            y = static_cast<int>(code.row(texels[k])) - run.offset_y;
-        x += (x >> 31) & run.wrap_x;
-        y += (y >> 31) & run.wrap_y;
-        areas[k] = side(x, sides.last_x, sides.left, sides.right) * side(y, sides.last_y, sides.lower, sides.upper);
-      }
-      float sums[4] = {};
-      int k = 0;
-      for (; k + 4 <= count; k += 4)
-        for (int lane = 0; lane < 4; ++lane) sums[lane] += areas[k + lane];
-      for (; k < count; ++k) sums[0] += areas[k];
-      total += (double{sums[0]} + sums[1]) + (double{sums[2]} + sums[3]);
-    }
-    return total;
-  }
-
-  /// Area of a run's texels that are cut along one axis only, by a footprint that covers `first_part` of the texels at 0 and
-  /// `last_part` of those at `last`.
-  GLINT_HD double stripArea(const TexelRun& run, int shift, int bits, int offset, int last, float first_part,
-                            float last_part) const {
-    const std::uint32_t* texels = map().texels.data();
-    const auto mask = static_cast<int>((1u << bits) - 1);
-    int inner = 0, at_first = 0, at_last = 0;
-    for (std::uint64_t k = run.begin; k < run.end; ++k) {
-      const int at = static_cast<int>(texels[k] >> shift) & mask;
-      const int x = at - offset;
-      inner += (x > 0) & (x < last);
-      at_first += x == 0;
-      at_last += x == last;
-    }
-    return inner + double{first_part} * at_first + (last > 0 ? double{last_part} * at_last : 0);
-  }
-
-  GLINT_HD double turnedArea(const TexelCover& cover, const TexelRun& run) const {
-    double area = 0;
-    forEachTexel(cover, run, [&](double weight, std::uint32_t, std::uint64_t) { area += weight; });
-    return area;
-  }
-
-  /// Calls visitor(covered area, code, place in the list) for the texels of a run that are in a footprint.
+  /// Passes on the facets of one block.
   template <class Visitor>
-  GLINT_HD void forEachTexel(const TexelCover& cover, const TexelRun& run, Visitor&& visitor) const {
-    const TexelCode code = lists_.code();
-    for (std::uint64_t k = run.begin; k < run.end; ++k) {
-      const std::uint32_t texel = lists_.texel(k);
-      int x = static_cast<int>(code.column(texel)) - run.offset_x, y = static_cast<int>(code.row(texel)) - run.offset_y;
-      if (x < 0) x += run.wrap_x;
-      if (y < 0) y += run.wrap_y;
-      if (x < 0 || y < 0 || x >= cover.columns() || y >= cover.rows()) continue;
-      const double weight = cover.texel(x, y);
-      if (weight > 0) visitor(weight, texel, k);
-    }
-  }
-
-  GLINT_HD Vec2 corner(std::uint32_t bin) const {
-    const auto bins = static_cast<std::uint32_t>(map().bins_per_axis);
-    return {-1 + static_cast<float>(bin % bins) * bin_size_, -1 + static_cast<float>(bin / bins) * bin_size_};
-  }
-
-  GLINT_HD Vec2 normal(Vec2 low, std::uint32_t texel) const {
-    const TexelCode& code = lists_.code();
-    const float step = bin_size_ / static_cast<float>(1 << code.place_bits);
-    return low + step * Vec2{static_cast<float>(code.placeX(texel)) + 0.5f, static_cast<float>(code.placeY(texel)) + 0.5f};
-  }
-
-  /// How far a bin counts as one facet. Lobes that are wider than the bins were made for need fewer texels in them for the same error;
-  /// footprints of few texels merge nothing, as when they are looked up texel by texel.
-  GLINT_HD double mergedShare(const TexelCover& cover, const BinList& list) const {
-    const double expected = static_cast<double>(list.size()) * cover.area() / static_cast<double>(map().texels.size());
-    return std::clamp((std::min(merging_ * expected, cover.area()) - kFewTexels) / (kManyTexels - kFewTexels), 0.0, 1.0);
-  }
-
-  /// Passes on the facets of one bin.
-  template <class Visitor>
-  GLINT_HD void visitBin(const TexelCover& cover, const BinList& list, Visitor& visitor) const {
-    const double merged = list.grid < 0 ? 0 : mergedShare(cover, list);
+  GLINT_HD void visitBlock(const TexelCover& cover, const BinBlock& block, const BinReach& reach, CellRows& rows,
+                           Visitor& visitor) const {
+    const double merged = mergedShare(cover, block);
     if (merged < 1) {
-      struct Each {
-        const BinMapNdf& ndf;
-        const TexelCover& cover;
-        Vec2 low;
-        double scale;
-        Visitor& visitor;
-        GLINT_HD void add(double weight, std::uint32_t texel) { visitor(BinFacet{scale * weight, ndf.normal(low, texel), {}}); }
-        GLINT_HD void whole(std::uint64_t begin, std::uint64_t end) {
-          for (std::uint64_t k = begin; k < end; ++k) add(1, ndf.lists_.texel(k));
-        }
-        GLINT_HD void partial(const TexelRun& run) {
-          ndf.forEachTexel(cover, run, [&](double weight, std::uint32_t texel, std::uint64_t) { add(weight, texel); });
-        }
-      } each{*this, cover, corner(list.bin), (1 - merged) / cover.area(), visitor};
-      CellRows rows;
-      lists_.forEachRun(cover, list, rows, each);
+      EachTexel<Visitor> each(*this, cover, block, reach, (1 - merged) / cover.area(), visitor);
+      blocks_.forEachRun(cover, block, rows, each);
     }
     if (merged > 0) {
-      BinFacet facet = binFacet(list);
-      facet.weight = merged * coveredArea(cover, list) / cover.area();
+      BinFacet facet = blockFacet(block);
+      facet.weight = merged * coveredArea(cover, block, rows) / cover.area();
       visitor(facet);
     }
   }
 
-  /// All texels of a bin with a grid as one facet.
-  GLINT_HD BinFacet binFacet(const BinList& list) const {
-    const std::uint16_t* moments = map().grid_moments.data() + 5 * list.grid;
-    const float squared = bin_size_ * bin_size_;
+  /// All texels of a block as one facet.
+  GLINT_HD BinFacet blockFacet(const BinBlock& block) const {
+    const std::uint16_t* moments = map().block_moments.data() + 5 * std::size_t{block.number};
+    const float side = bin_size_ * static_cast<float>(block.side()), squared = side * side;
     return {0,
-            corner(list.bin) + bin_size_ * Vec2{halfToFloat(moments[0]), halfToFloat(moments[1])},
+            corner(block) + side * Vec2{halfToFloat(moments[0]), halfToFloat(moments[1])},
             {squared * halfToFloat(moments[2]), squared * halfToFloat(moments[3]), squared * halfToFloat(moments[4])}};
   }
 
@@ -659,18 +476,19 @@ class BinMapNdf {
     const auto wrapped = [](int i, int n) { return (i % n + n) % n; };
     const auto i = static_cast<std::uint32_t>(wrapped(cover.originX() + static_cast<int>(std::floor(x)), map().width));
     const auto j = static_cast<std::uint32_t>(wrapped(cover.originY() + static_cast<int>(std::floor(y)), map().height));
-    const std::uint32_t c = lists_.texelClass(static_cast<std::uint64_t>(j) * static_cast<std::uint64_t>(map().width) + i);
+    const std::uint32_t c = blocks_.texelClass(static_cast<std::uint64_t>(j) * static_cast<std::uint64_t>(map().width) + i);
     BinTexel texel;
-    if (!lists_.find(map().class_bins.data()[c], map().class_bins.data()[c + 1], i, j, texel)) return false;
-    found = normal(corner(texel.bin), texel.code);
+    const int bins = map().bins_per_axis;
+    if (!blocks_.find(c, i, j, {0, bins, 0, bins}, texel)) return false;
+    found = normal(texel.block, blocks_.code(texel.block), texel.code);
     return true;
   }
 
-  BinLists lists_;
+  BinBlocks blocks_;
   float sigma_ = 0;
+  float wider_ = 1;  ///< than the lobe that the bins are made for
   float bin_size_ = 0;
-  double merging_ = 1;  ///< texels that one in a bin counts as when deciding to merge; 0: never merged
-  bool one_bin_classes_ = false;
+  bool block_classes_ = false;  ///< whether the class of a texel is the number of its block
 };
 
 static_assert(NdfModel<BinMapNdf>);

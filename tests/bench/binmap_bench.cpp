@@ -150,7 +150,7 @@ ordered_json measure(const Map& m, float alpha, std::size_t queries) {
                          {"build_ms", 1e3 * median(wall)},
                          {"build_cpu_ms", 1e3 * median(cpu)},
                          {"bytes", data.sizeBytes()},
-                         {"bins", ndf.map().occupiedBins()}};
+                         {"blocks", ndf.map().blockCount()}};
   for (const float side : kSides) {
     const auto aligned = randomQueries(m, side, queries, 0), turned = randomQueries(m, side, queries / 10, kPi);
     const auto weights = [&](const Query& q) { return ndf.weights(q.footprint, q.half).weights[0]; };

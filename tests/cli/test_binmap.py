@@ -56,10 +56,10 @@ def test_json_says_what_was_built(glint, assets):
     process = glint("binmap", assets / "map.glint", "-o", "b.glint", "--alpha", ALPHA, "--leaf-size", "2", "--json")
     result = json.loads(process.stdout)["result"]
     assert result["bins_per_axis"] == int(5 / math.sin(math.atan(3 * ALPHA / math.sqrt(2))))
-    assert 0 < result["bins_with_grid"] <= result["occupied_bins"]
+    assert 0 < result["blocks"] <= result["cells"]
     info = json.loads(glint("info", "b.glint", "--json").stdout)["result"]
     summary = json.dumps(info)
-    assert f'"occupied_bins": {result["occupied_bins"]}' in summary
+    assert f'"blocks": {result["blocks"]}' in summary
 
 
 def test_a_range_of_roughnesses_is_one_asset(glint, assets):

@@ -587,7 +587,7 @@ void addCompact(std::uint64_t value, int shift, std::vector<std::uint64_t>& base
   offsets.push_back(static_cast<std::uint16_t>(value - bases.back()));
 }
 
-/// Mean and covariance of places in a bin, in bin sides.
+/// Mean and covariance of places in a block, in its sides.
 void addMoments(const TexelCode& code, const std::vector<std::uint32_t>& texels, std::vector<std::uint16_t>& moments) {
   const double step = 1.0 / (1 << code.place_bits), n = static_cast<double>(texels.size());
   double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
@@ -598,59 +598,77 @@ void addMoments(const TexelCode& code, const std::vector<std::uint32_t>& texels,
   for (const double v : {x, y, xx - x * x, xy - x * y, yy - y * y}) moments.push_back(floatToHalf(static_cast<float>(v)));
 }
 
+/// Lists the texels whose normals are in a square of bins as a block of the sample.
+void addBlock(const SampleNormals& normals, int width, int bins, int column, int row, int side_bits, int cell_bits,
+              std::size_t node, SampleBinMap& sample) {
+  constexpr int kShift = 2;
+  const TexelCode map_code = texelCode(width, static_cast<int>(normals.normals.size()) / width);
+  cell_bits = std::min(cell_bits, map_code.column_bits + map_code.row_bits);
+  const TexelCode code = blockCode(map_code, side_bits, cell_bits);
+  const CellGrid grid = cellGrid(map_code, cell_bits);
+  std::vector<std::uint32_t> list;
+  const std::size_t first_cell = sample.cell_offsets.size();
+  for (int cell = 0; cell < 1 << cell_bits; ++cell) {
+    addCompact(sample.texels.size() + list.size(), kShift, sample.cell_bases, sample.cell_offsets);
+    for (std::size_t t = 0; t < normals.normals.size(); ++t) {
+      const int i = static_cast<int>(t) % width, j = static_cast<int>(t) / width;
+      if ((j >> grid.row_shift) * grid.columns + (i >> grid.column_shift) != cell) continue;
+      const double scale = std::exp2(-side_bits);
+      const double x = ((normals.normals[t].x + 1.0) * bins / 2 - column) * scale;
+      const double y = ((normals.normals[t].y + 1.0) * bins / 2 - row) * scale;
+      if (x < 0 || x >= 1 || y < 0 || y >= 1) continue;
+      const auto place = [&](double v) { return static_cast<std::uint32_t>(v * (1 << code.place_bits)); };
+      list.push_back(code.pack(static_cast<std::uint32_t>(i & ((1 << grid.column_shift) - 1)),
+                               static_cast<std::uint32_t>(j & ((1 << grid.row_shift) - 1)), place(x), place(y)));
+    }
+  }
+  if (list.empty()) {
+    sample.cell_offsets.resize(first_cell);
+    sample.cell_bases.resize((first_cell + (1 << kShift) - 1) >> kShift);
+    return;
+  }
+  sample.nodes[2 * node] = static_cast<std::uint32_t>(cell_bits + 1) |
+                           static_cast<std::uint32_t>(sample.block_moments.size() / 5) << BinMap::kKindBits;
+  sample.nodes[2 * node + 1] = static_cast<std::uint32_t>(first_cell);
+  addMoments(code, list, sample.block_moments);
+  sample.texels.insert(sample.texels.end(), list.begin(), list.end());
+}
+
 }  // namespace
 
 SampleBinMap sampleBinMap(int width, int height) {
-  constexpr int kBins = 9, kShift = 2, kCellBits = 2;
+  constexpr int kBins = 9, kTileBits = 2, kTiles = 3, kShift = 2;
   const SampleNormals normals = sampleNormals(width, height, false);
-  const TexelCode code = texelCode(width, height);
   SampleBinMap sample;
-  std::vector<std::vector<std::uint32_t>> lists(kBins * kBins);
   sample.texel_classes.assign((normals.normals.size() * BinMap::kClassBits + 15) / 16, 0);
   for (std::size_t t = 0; t < normals.normals.size(); ++t) {
-    const double x = (normals.normals[t].x + 1.0) * kBins / 2, y = (normals.normals[t].y + 1.0) * kBins / 2;
-    const auto place = [&](double v) { return static_cast<std::uint32_t>((v - std::floor(v)) * (1 << code.place_bits)); };
-    const auto bin = static_cast<std::size_t>(y) * kBins + static_cast<std::size_t>(x);
-    lists[bin].push_back(code.pack(static_cast<std::uint32_t>(t) % static_cast<std::uint32_t>(width),
-                                   static_cast<std::uint32_t>(t) / static_cast<std::uint32_t>(width), place(x), place(y)));
+    const auto column = static_cast<std::size_t>((normals.normals[t].x + 1.0) * kBins / 2);
+    const auto row = static_cast<std::size_t>((normals.normals[t].y + 1.0) * kBins / 2);
+    // Classes are quarters of tiles.
+    const std::size_t quarter =
+        4 * ((row >> kTileBits) * kTiles + (column >> kTileBits)) + (row >> 1 & 1) * 2 + (column >> 1 & 1);
     for (std::size_t k = 0; k < BinMap::kClassBits; ++k) {
       const std::size_t bit = t * BinMap::kClassBits + k;
-      sample.texel_classes[bit / 16] |= static_cast<std::uint16_t>((bin / 2 >> k & 1) << (bit % 16));
+      sample.texel_classes[bit / 16] |= static_cast<std::uint16_t>((quarter >> k & 1) << (bit % 16));
     }
   }
-  sample.masks.assign(2, 0);
-  for (std::size_t bin = 0; bin < lists.size(); ++bin) {
-    if (bin % 2 == 0) sample.class_bins.push_back(static_cast<std::uint32_t>(bin));
-    if (bin % 64 == 0) sample.mask_ranks.push_back(static_cast<std::uint32_t>(sample.bin_offsets.size()));
-    if (lists[bin].empty()) continue;
-    const std::size_t ordinal = sample.bin_offsets.size();
-    sample.masks[bin / 64] |= std::uint64_t{1} << (bin % 64);
-    if (ordinal % 64 == 0) {
-      sample.grid_masks.push_back(0);
-      sample.grid_ranks.push_back(static_cast<std::uint32_t>(sample.grid_cells.size()));
-    }
-    addCompact(sample.texels.size(), kShift, sample.bin_bases, sample.bin_offsets);
-    if (lists[bin].size() <= 64) {
-      sample.texels.insert(sample.texels.end(), lists[bin].begin(), lists[bin].end());
+  for (std::uint32_t quarter = 0; quarter <= 4 * kTiles * kTiles; ++quarter) sample.class_bins.push_back(4 * quarter);
+  sample.nodes.assign(2 * kTiles * kTiles, 0);
+  for (int tile = 0; tile < kTiles * kTiles; ++tile) {
+    const int column = tile % kTiles << kTileBits, row = tile / kTiles << kTileBits;
+    if (tile != 4) {
+      addBlock(normals, width, kBins, column, row, kTileBits, 3, static_cast<std::size_t>(tile), sample);
       continue;
     }
-    sample.grid_masks.back() |= std::uint64_t{1} << (ordinal % 64);
-    sample.grid_cells.push_back(static_cast<std::uint32_t>(sample.cell_offsets.size()));
-    addMoments(code, lists[bin], sample.grid_moments);
-    const CellGrid grid = cellGrid(code, kCellBits);
-    for (std::uint32_t cell = 0; cell < 1u << kCellBits; ++cell) {
-      addCompact(sample.texels.size(), kShift, sample.cell_bases, sample.cell_offsets);
-      for (const std::uint32_t t : lists[bin])
-        if ((code.row(t) >> grid.row_shift) * static_cast<std::uint32_t>(grid.columns) +
-                (code.column(t) >> grid.column_shift) ==
-            cell)
-          sample.texels.push_back(t);
-    }
-    addCompact(sample.texels.size(), kShift, sample.cell_bases, sample.cell_offsets);
+    const std::size_t first_child = sample.nodes.size() / 2;
+    sample.nodes[2 * static_cast<std::size_t>(tile)] = BinMap::kSplit;
+    sample.nodes[2 * static_cast<std::size_t>(tile) + 1] = static_cast<std::uint32_t>(first_child);
+    sample.nodes.resize(sample.nodes.size() + 8);
+    for (int quadrant = 0; quadrant < 4; ++quadrant)
+      addBlock(normals, width, kBins, column + 2 * (quadrant & 1), row + 2 * (quadrant >> 1), kTileBits - 1, 2,
+               first_child + static_cast<std::size_t>(quadrant), sample);
   }
-  addCompact(sample.texels.size(), kShift, sample.bin_bases, sample.bin_offsets);
-  sample.grid_cells.push_back(static_cast<std::uint32_t>(sample.cell_offsets.size()));
-  sample.class_bins.push_back(kBins * kBins);
+  addCompact(sample.texels.size(), kShift, sample.cell_bases, sample.cell_offsets);
   sample.map = {width,
                 height,
                 0.4f,
@@ -659,13 +677,9 @@ SampleBinMap sampleBinMap(int width, int height) {
                 {{0.25f, -0.125f}, {0.5f, 0.125f, 0.25f}},
                 kBins,
                 8,
-                sample.masks,
-                sample.mask_ranks,
-                {sample.bin_bases, sample.bin_offsets, kShift},
-                sample.grid_masks,
-                sample.grid_ranks,
-                sample.grid_cells,
-                sample.grid_moments,
+                kTileBits,
+                sample.nodes,
+                sample.block_moments,
                 {sample.cell_bases, sample.cell_offsets, kShift},
                 sample.texels,
                 sample.class_bins,

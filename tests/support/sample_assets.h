@@ -82,9 +82,9 @@ enum class SampleForm : std::uint8_t {
 };
 
 struct SampleBinMap {
-  std::vector<std::uint64_t> masks, bin_bases, grid_masks, cell_bases;
-  std::vector<std::uint32_t> mask_ranks, grid_ranks, grid_cells, texels, class_bins;
-  std::vector<std::uint16_t> bin_offsets, grid_moments, cell_offsets, texel_classes;
+  std::vector<std::uint32_t> nodes, texels, class_bins;
+  std::vector<std::uint64_t> cell_bases;
+  std::vector<std::uint16_t> block_moments, cell_offsets, texel_classes;
   BinMap map;
 };
 

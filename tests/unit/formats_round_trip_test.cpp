@@ -256,15 +256,9 @@ TEST(AssetRoundTrip, BinMapsComeBackBitExact) {
                          map.slopes.covariance.yy),
               std::tuple(sample.map.slopes.mean.x, sample.map.slopes.mean.y, sample.map.slopes.covariance.xx,
                          sample.map.slopes.covariance.xy, sample.map.slopes.covariance.yy));
-    expectSame(map.masks, sample.map.masks);
-    expectSame(map.mask_ranks, sample.map.mask_ranks);
-    expectSame(map.bin_starts.bases, sample.map.bin_starts.bases);
-    expectSame(map.bin_starts.offsets, sample.map.bin_starts.offsets);
-    EXPECT_EQ(map.bin_starts.shift, sample.map.bin_starts.shift);
-    expectSame(map.grid_masks, sample.map.grid_masks);
-    expectSame(map.grid_ranks, sample.map.grid_ranks);
-    expectSame(map.grid_cells, sample.map.grid_cells);
-    expectSame(map.grid_moments, sample.map.grid_moments);
+    EXPECT_EQ(map.tile_bits, sample.map.tile_bits);
+    expectSame(map.nodes, sample.map.nodes);
+    expectSame(map.block_moments, sample.map.block_moments);
     expectSame(map.cell_starts.bases, sample.map.cell_starts.bases);
     expectSame(map.cell_starts.offsets, sample.map.cell_starts.offsets);
     EXPECT_EQ(map.cell_starts.shift, sample.map.cell_starts.shift);

@@ -13,11 +13,13 @@
 #include <limits>
 #include <set>
 
+#include "glint/bake/bin_map.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 #include "glint/formats/validate.h"
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
+#include "support/test_maps.h"
 
 namespace glint::formats {
 namespace {
@@ -683,25 +685,25 @@ std::vector<Fixture> binMapFixtures() {
               }),
       patched("bin_map.alpha", Base::bin_map, [](const Patch& patch) { patch.setReal("alpha_min", 0.5f); }),
       patched("bin_map.alpha", Base::bin_map, [](const Patch& patch) { patch.setReal("alpha_max", 0.25f); }),
-      changed("bin_map.masks", "masks", 1, word([](auto v) { return v | 1ull << 40; })),
-      changed("bin_map.masks", "masks", 0, word([](auto v) { return v & (v - 1); })),
-      changed("bin_map.masks", "mask_ranks", 1, u32(raise)),
-      changed("bin_map.masks", "grid_masks", 0, word([](auto v) { return v | 1ull << 63; })),
-      changed("bin_map.masks", "grid_ranks", 0, u32(raise)),
-      changed("bin_map.bin_starts", "bin_starts/offsets", 0, u16(raise)),
-      changed("bin_map.bin_starts", "bin_starts/offsets", 2, u16([](auto) { return 0xffff; })),
-      changed("bin_map.bin_starts", "bin_starts/bases", 1, word([](auto) { return ~0ull; })),
-      changed("bin_map.grids", "grid_cells", 1, u32(raise)),
-      changed("bin_map.grids", "grid_cells", 1, u32([](auto) { return 0xffffffffu; })),
-      changed("bin_map.grids", "cell_starts/offsets", 1, u16([](auto) { return 0xffff; })),
-      changed("bin_map.grids", "cell_starts/offsets", 0, u16(raise)),
+      changed("bin_map.cells", "cell_starts/offsets", 0, u16(raise)),
+      changed("bin_map.cells", "cell_starts/offsets", 2, u16([](auto) { return 0xffff; })),
+      changed("bin_map.cells", "cell_starts/bases", 1, word([](auto) { return ~0ull; })),
+      // Of each tile the kind and number, then the first cell. Tile 4 is split, and its children come after the last tile.
+      changed("bin_map.nodes", "nodes", 0, u32([](auto v) { return v + 1; })),
+      changed("bin_map.nodes", "nodes", 0, u32([](auto v) { return v + 64; })),
+      changed("bin_map.nodes", "nodes", 0, u32([](auto) { return 0u; })),
+      changed("bin_map.nodes", "nodes", 0, u32([](auto) { return 40u; })),
+      changed("bin_map.nodes", "nodes", 1, u32(raise)),
+      changed("bin_map.nodes", "nodes", 2 * 4 + 1, u32([](auto) { return 4u; })),
+      changed("bin_map.nodes", "nodes", 2 * 4 + 1, u32([](auto) { return 0xfffffffeu; })),
+      changed("bin_map.nodes", "nodes", 2 * 9, u32([](auto) { return BinMap::kSplit; })),
       changed("bin_map.classes", "class_bins", 3, u32([](auto) { return 0u; })),
-      changed("bin_map.classes", "class_bins", 41, u32([](auto v) { return v + 1000; })),
+      changed("bin_map.classes", "class_bins", 36, u32([](auto v) { return v + 1000; })),
       changed("bin_map.classes", "texel_classes", 100, u16([](auto) { return 0xffff; })),
       changed("bin_map.texels", "texels", 100, u32(flip), true),
       changed("bin_map.texels", "texels", 100, u32([](auto) { return 0xffffffffu; }), true),
-      changed("bin_map.moments", "grid_moments", 2, u16([](auto) { return 0x7c00; }), true),
-      changed("bin_map.moments", "grid_moments", 0, u16([](auto) { return 0x8400; }), true),
+      changed("bin_map.moments", "block_moments", 2, u16([](auto) { return 0x7c00; }), true),
+      changed("bin_map.moments", "block_moments", 0, u16([](auto) { return 0x8400; }), true),
   };
 }
 
@@ -800,6 +802,22 @@ TEST(FormatRules, EveryFailingFileIsNamedByItsRule) {
       EXPECT_EQ(error.path(), path.string());
     }
   }
+}
+
+TEST(FormatRules, AsManyClassesAsBlocksMustBeTheBlocks) {
+  const test::TempFolder folder;
+  const test::OwnedMap map(64, 64, test::randomNormals(64, 64, 0.9f, 3));
+  bake::BinMapData data = bake::buildBinMap(map.map(), {0.02f, 8});
+  ASSERT_EQ(data.view().classCount(), data.view().blockCount());
+  ASSERT_GT(data.tile_bits, 0);
+  writeAsset(folder / "good.glint", data.view(), {});
+  EXPECT_TRUE(validateAsset(folder / "good.glint").findings.empty());
+  ++data.class_bins[1];  // the second class begins within the second block
+  writeAsset(folder / "bad.glint", data.view(), {});
+  const ValidationReport report = validateAsset(folder / "bad.glint");
+  EXPECT_TRUE(std::any_of(report.findings.begin(), report.findings.end(), [](const Finding& f) {
+    return f.rule == "bin_map.classes" && f.message.find("as many classes") != std::string::npos;
+  }));
 }
 
 TEST(FormatRules, NothingOfHdf5StaysOpen) {
