@@ -66,6 +66,8 @@ glint_status guarded(Work&& work) noexcept {
 constexpr float kLeastSigmaR = 1e-4f, kMostSigmaR = 0.25f;
 /// Size of the options in the first version of the struct; no caller's is smaller.
 constexpr std::size_t kFirstOptionsSize = offsetof(glint_open_options, verify_hashes) + sizeof(int32_t);
+static_assert(offsetof(glint_open_options, reserved) + sizeof(int32_t) == sizeof(glint_open_options),
+              "padding at the end would be read as a member by a later library");
 
 /// Takes options of an older or newer header: members that the caller does not have are 0, those that this library does not have
 /// must be.
@@ -83,6 +85,11 @@ const char* takeOptions(const glint_open_options* from, glint_open_options& to) 
     return "glint_open_options: sigma_r is not in 1e-4 to 0.25; give 0 for 0.005";
   if (to.surface != GLINT_SURFACE_FLAT && to.surface != GLINT_SURFACE_SMOOTH) return "glint_open_options: unknown surface";
   if (to.boundary != GLINT_BOUNDARY_WRAP && to.boundary != GLINT_BOUNDARY_CLAMP) return "glint_open_options: unknown boundary";
+  if (to.slant_tolerance != GLINT_SLANT_EXACT && !(to.slant_tolerance >= 0 && to.slant_tolerance <= 1))
+    return "glint_open_options: slant_tolerance is not in 0 to 1; give 0 for 0.06, or GLINT_SLANT_EXACT";
+  if (to.gaussian_boxes != 0 && to.gaussian_boxes != 1 && to.gaussian_boxes != 3)
+    return "glint_open_options: gaussian_boxes is not 1 or 3; give 0 for 1";
+  if (to.reserved != 0) return "glint_open_options: reserved is not 0";
   return nullptr;
 }
 
@@ -94,6 +101,8 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   options.boundary = static_cast<Boundary>(o.boundary);
   options.verify_hashes = o.verify_hashes != 0;
   options.alpha = o.alpha;
+  if (o.slant_tolerance != 0) options.slant_tolerance = std::max(0.0f, o.slant_tolerance);
+  if (o.gaussian_boxes == 3) options.gaussian_boxes = GaussianBoxes::three;
   return options;
 }
 

@@ -67,8 +67,8 @@ typedef struct glint_ndf glint_ndf;
 enum { GLINT_SURFACE_FLAT = 0, GLINT_SURFACE_SMOOTH = 1 };
 enum { GLINT_BOUNDARY_WRAP = 0, GLINT_BOUNDARY_CLAMP = 1 };
 
-/* What an asset does not say itself. Zero is the default of every member but the first. Members are added at the end; a library
- * that does not know one accepts 0 there. */
+/* What an asset does not say itself. Zero is the default of every member but the first; options of other kinds are ignored, but
+ * have to be in range. Members are added at the end; a library that does not know one accepts 0 there. */
 typedef struct glint_open_options {
   size_t struct_size;       /* sizeof(glint_open_options) */
   const char* normals_path; /* asset of kind normals that the pyramid was made from: it answers footprints below level 0,
@@ -78,10 +78,16 @@ typedef struct glint_open_options {
   int32_t boundary;         /* kind normals: GLINT_BOUNDARY_* */
   int32_t verify_hashes;    /* not 0: compare every dataset with its hash; reads the whole file */
   float alpha;              /* kind bin-map: Beckmann roughness, in the range that the asset was made for; 0: the smallest */
+  float slant_tolerance;    /* kind histogram-sat: share of a footprint with slanted sides that may be counted in a wrong
+                               place, up to 1; 0: 0.06; GLINT_SLANT_EXACT: none, and slower */
+  int32_t gaussian_boxes;   /* kind histogram-sat: boxes that stand for a Gaussian footprint, 1 or 3; 0: 1 */
+  int32_t reserved;         /* 0 */
 } glint_open_options;
 
+#define GLINT_SLANT_EXACT (-1.0f)
+
 /* clang-format off */
-#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f }
+#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f, 0.0f, 0, 0 }
 /* clang-format on */
 
 /* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat.

@@ -86,6 +86,15 @@ static void check_opening(const char* path) {
   options.sigma_r = -1;
   check(glint_ndf_open(path, &options, &ndf) == GLINT_ERROR_USAGE, "a negative roughness is an error");
   options.sigma_r = 0;
+  options.slant_tolerance = -0.5f;
+  check(glint_ndf_open(path, &options, &ndf) == GLINT_ERROR_USAGE, "a negative tolerance is an error");
+  options.slant_tolerance = GLINT_SLANT_EXACT;
+  options.gaussian_boxes = 2;
+  check(glint_ndf_open(path, &options, &ndf) == GLINT_ERROR_USAGE, "Gaussians are 1 or 3 boxes");
+  options.gaussian_boxes = 3;
+  check(glint_ndf_open(path, &options, &ndf) == GLINT_OK, "options of other kinds are ignored");
+  glint_ndf_close(ndf);
+  ndf = NULL;
   options.struct_size = 1;
   check(glint_ndf_open(path, &options, &ndf) == GLINT_ERROR_USAGE, "options need their size");
   check(ndf == NULL, "a failed call leaves its outputs untouched");

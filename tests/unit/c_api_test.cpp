@@ -339,6 +339,56 @@ TEST(CApi, OptionsReachTheModel) {
   EXPECT_EQ(info.has_normals, 1);
 }
 
+TEST(CApi, OptionsOfHistogramsReachTheModel) {
+  const Footprint slanted = Footprint::box({0.4f, 0.6f}, {14, 5}, {-5, 14}), round = Footprint::isotropic({0.4f, 0.6f}, 9);
+  const glint_footprint c_slanted = {GLINT_FOOTPRINT_BOX, 0.4f, 0.6f, {14, 5, -5, 14}};
+  const glint_footprint c_round = glint_footprint_isotropic(0.4f, 0.6f, 9);
+  const auto histograms = test::sampleHistograms(kSize, kSize);
+  std::vector<float> slanted_answers, round_answers;
+  for (const auto& [tolerance, boxes] : {std::pair{0.0f, 0}, {0.5f, 1}, {GLINT_SLANT_EXACT, 1}, {0.06f, 3}}) {
+    glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+    options.slant_tolerance = tolerance;
+    options.gaussian_boxes = boxes;
+    const Handle ndf = openHandle("histogram-sat", &options);
+    const HistogramNdf same(histograms.sat, boxes == 3 ? GaussianBoxes::three : GaussianBoxes::one,
+                            tolerance == 0 ? kSlantTolerance : std::max(0.0f, tolerance));
+    float density = -1;
+    glint_mean(ndf.get(), &c_slanted, -0.3f, -0.2f, 0.1f, 0.2f, &density);
+    EXPECT_EQ(density, same.mean(slanted, {{-0.3f, -0.2f}, {0.1f, 0.2f}}));
+    slanted_answers.push_back(density);
+    glint_mean(ndf.get(), &c_round, -0.3f, -0.2f, 0.1f, 0.2f, &density);
+    EXPECT_EQ(density, same.mean(round, {{-0.3f, -0.2f}, {0.1f, 0.2f}}));
+    round_answers.push_back(density);
+  }
+  EXPECT_NE(slanted_answers[1], slanted_answers[2]);  // or the options would not be seen
+  EXPECT_NE(round_answers[0], round_answers[3]);
+}
+
+TEST(CApi, OptionsOutOfRangeAreRefusedByName) {
+  const auto refused = [](auto glint_open_options::*member, auto value, const char* name) {
+    glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+    options.*member = value;
+    glint_ndf* ndf = nullptr;
+    EXPECT_EQ(glint_ndf_open(assets().path("histogram-sat").c_str(), &options, &ndf), GLINT_ERROR_USAGE) << value;
+    EXPECT_NE(std::string(glint_error_message()).find(name), std::string::npos) << glint_error_message();
+    EXPECT_EQ(ndf, nullptr);
+  };
+  for (const float value : {-0.5f, 1.01f, kNan}) refused(&glint_open_options::slant_tolerance, value, "slant_tolerance");
+  for (const int32_t value : {-1, 2, 4}) refused(&glint_open_options::gaussian_boxes, value, "gaussian_boxes");
+  for (const float value : {-0.1f, 0.3f, kNan}) refused(&glint_open_options::sigma_r, value, "sigma_r");
+  refused(&glint_open_options::surface, 2, "surface");
+  refused(&glint_open_options::boundary, -1, "boundary");
+  refused(&glint_open_options::reserved, 1, "reserved");
+}
+
+TEST(CApi, OptionsOfAnOlderHeaderHaveTheDefaultsOfLaterOnes) {
+  glint_open_options older = GLINT_OPEN_OPTIONS_INIT;
+  older.struct_size = offsetof(glint_open_options, slant_tolerance);
+  older.slant_tolerance = -7;  // not the caller's memory: would be refused
+  older.gaussian_boxes = -7;
+  EXPECT_TRUE(openHandle("histogram-sat", &older));
+}
+
 TEST(CApi, FailedOpeningSaysWhy) {
   glint_ndf* ndf = nullptr;
   EXPECT_EQ(glint_ndf_open("/no/such.glint", nullptr, &ndf), GLINT_ERROR_IO);
