@@ -36,7 +36,6 @@ class DisplacementQuery {
   void density(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec2 half, int repeats) const;
 
   /// Light directions drawn for a view, as a table with the columns wix, wiy, wiz and pdf.
-  /// @throws Error usage if the footprint lies between two levels
   std::string samples(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int count) const;
 
   /// A table with the columns u, v; sigma or level; wix, wiy, wiz, wox, woy, woz (answered by reflected, or reflected_r, _g, _b) or

@@ -6,8 +6,11 @@
 #include "glint/model/displacement.h"
 #include "glint/query/base_brdf.h"
 #include "glint/query/concentric_map.h"
+#include "glint/query/footprint_weights.h"
 #include "glint/query/half.h"
+#include "glint/query/half_vector.h"
 #include "glint/query/rgb.h"
+#include "glint/query/sampling.h"
 #include "glint/query/smith.h"
 #include "glint/query/vmf_lobe.h"
 
@@ -40,6 +43,9 @@ struct DirectionSample {
 /// wo: so it is reciprocal, and with one normal it is the base itself. Renderers use it on the downsampled surface, with their
 /// own visibility; that of smaller scale is in S. Where the asset has no colours, all channels are the same.
 ///
+/// Directions are unit vectors away from the surface. Those that are longer or not finite, behind the facet or within kHorizon of
+/// its plane get 0. Coordinates are periodic; those that are not finite count as 0.
+///
 /// Thread-safe, allocates nothing.
 class DisplacedBrdf {
  public:
@@ -47,15 +53,23 @@ class DisplacedBrdf {
 
   GLINT_HD const Displacement& asset() const { return asset_; }
 
-  /// Levels for a footprint of this diameter: linear in its logarithm between the factors of the levels, clamped.
+  /// Levels for a footprint of this diameter: linear in its logarithm between the factors of the levels, clamped; NaN counts as 0.
   GLINT_HD LevelBlend levelsFor(float diameter_texels) const {
     int first = 0;
     while (first + 1 < asset_.level_count && static_cast<float>(asset_.levels[first + 1].factor) <= diameter_texels) ++first;
     const int second = std::min(first + 1, asset_.level_count - 1);
     if (first == second) return {first, second, 0};
     const float low = static_cast<float>(asset_.levels[first].factor), high = static_cast<float>(asset_.levels[second].factor);
-    const float place = std::log(std::max(diameter_texels, low) / low) / std::log(high / low);
+    const float place = std::log(std::max(low, diameter_texels) / low) / std::log(high / low);
     return {first, second, std::clamp(place, 0.0f, 1.0f)};
+  }
+
+  /// The levels around a place between them: 1.25 is three parts of level 1 and one of level 2. Clamped; NaN counts as 0.
+  GLINT_HD LevelBlend levelsAt(float level) const {
+    const float place = level > 0 ? std::min(level, static_cast<float>(asset_.level_count - 1)) : 0.0f;
+    const int first = static_cast<int>(place);
+    const float weight = place - static_cast<float>(first);
+    return {first, weight > 0 ? first + 1 : first, weight};
   }
 
   /// Normal of the downsampled surface: of one of the two triangles of the cell.
@@ -76,7 +90,7 @@ class DisplacedBrdf {
   GLINT_HD Rgb evaluate(int level, Vec2 uv, Vec3 wi, Vec3 wo, DisplacedVariant variant = DisplacedVariant::full) const {
     const Vec3 n = normal(level, uv);
     const float ci = dot(n, wi), co = dot(n, wo);
-    if (ci <= 0 || co <= 0) return {};
+    if (!(isDirection(wi) && isDirection(wo) && ci > kHorizon && co > kHorizon)) return {};
     const DisplacementLevel& l = asset_.levels[level];
     const std::size_t cell = place(l, uv).cell;
     const float facet = n.z / (ci * co);
@@ -89,16 +103,34 @@ class DisplacedBrdf {
   GLINT_HD Rgb reflected(const LevelBlend& blend, Vec2 uv, Vec3 wi, Vec3 wo,
                          DisplacedVariant variant = DisplacedVariant::full) const {
     const auto at = [&](int level) {
-      return std::max(0.0f, dot(normal(level, uv), wi)) * evaluate(level, uv, wi, wo, variant);
+      const float cosine = dot(normal(level, uv), wi);
+      return isDirection(wi) && cosine > 0 ? cosine * evaluate(level, uv, wi, wo, variant) : Rgb{};
     };
     const Rgb first = at(blend.first);
     return blend.weight > 0 ? (1 - blend.weight) * first + blend.weight * at(blend.second) : first;
   }
 
+  /// Draws wi at a blend of levels: at one of them, taken by its weight. The pdf is that of the blend.
+  GLINT_HD DirectionSample sample(const LevelBlend& blend, Vec2 uv, Vec3 wo, Vec2 xi) const {
+    if (!(blend.weight > 0)) return sample(blend.first, uv, wo, xi);
+    const bool second = xi.x < blend.weight;
+    xi.x = second ? xi.x / blend.weight : (xi.x - blend.weight) / (1 - blend.weight);
+    const DirectionSample drawn = sample(second ? blend.second : blend.first, uv, wo, xi);
+    return drawn.pdf > 0 ? DirectionSample{drawn.direction, pdf(blend, uv, drawn.direction, wo)} : DirectionSample{};
+  }
+
+  /// Density of `sample` at a blend of levels, per solid angle.
+  GLINT_HD float pdf(const LevelBlend& blend, Vec2 uv, Vec3 wi, Vec3 wo) const {
+    const float first = pdf(blend.first, uv, wi, wo);
+    return blend.weight > 0 ? (1 - blend.weight) * first + blend.weight * pdf(blend.second, uv, wi, wo) : first;
+  }
+
   /// Draws wi for a view wo: a lobe by its amplitude times the mean of its colour, then a cosine around its centre (diffuse), or
   /// a normal of the widened lobe to reflect at (ggx).
-  /// @param xi  uniform in [0, 1)^2
+  /// @param xi  uniform in [0, 1)^2; others are clamped, NaN counts as 0
   GLINT_HD DirectionSample sample(int level, Vec2 uv, Vec3 wo, Vec2 xi) const {
+    if (!isDirection(wo)) return {};
+    xi = clampUnit(xi);
     const DisplacementLevel& l = asset_.levels[level];
     const std::size_t first = place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count);
     float left = xi.x * totalShare(l, first);
@@ -125,6 +157,7 @@ class DisplacedBrdf {
 
   /// Density of `sample` per solid angle. Directions below the horizon can be drawn; `evaluate` is 0 there.
   GLINT_HD float pdf(int level, Vec2 uv, Vec3 wi, Vec3 wo) const {
+    if (!(isDirection(wi) && isDirection(wo))) return 0;
     const DisplacementLevel& l = asset_.levels[level];
     const std::size_t first = place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count);
     const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
@@ -164,7 +197,7 @@ class DisplacedBrdf {
   GLINT_HD Rgb spatialScale(int level, Vec2 uv) const {
     const DisplacementLevel& l = asset_.levels[level];
     const auto axis = [](float coordinate, int n, int& low, int& high) {
-      const float x = (coordinate - std::floor(coordinate)) * static_cast<float>(n) - 0.5f;
+      const float x = wrapUnit(coordinate) * static_cast<float>(n) - 0.5f;
       const float whole = std::floor(x);
       low = (static_cast<int>(whole) + n) % n, high = (low + 1) % n;
       return x - whole;
@@ -223,6 +256,9 @@ class DisplacedBrdf {
   }
 
  private:
+  /// False for what is longer than a unit vector is after rounding, and for NaN.
+  static GLINT_HD bool isDirection(Vec3 w) { return dot(w, w) < 1.001f; }
+
   /// A cell and the place in it.
   struct Place {
     int i, j;
@@ -232,7 +268,7 @@ class DisplacedBrdf {
 
   GLINT_HD Place place(const DisplacementLevel& l, Vec2 uv) const {
     const auto axis = [](float coordinate, int texels, int cells, float& part) {
-      const float x = (coordinate - std::floor(coordinate)) * static_cast<float>(texels) - 0.5f;
+      const float x = wrapUnit(coordinate) * static_cast<float>(texels) - 0.5f;
       float in_cells = x * static_cast<float>(cells) / static_cast<float>(texels);
       if (in_cells < 0) in_cells += static_cast<float>(cells);
       const int cell = std::clamp(static_cast<int>(in_cells), 0, cells - 1);
