@@ -28,7 +28,7 @@ class NdfAsset {
   int resolution() const { return opened_->info().resolution; }
 
   const api::NdfInfo& info() const { return opened_->info(); }
-  const formats::Asset& asset() const { return opened_->asset(); }
+  MapSlopes slopes() const { return opened_->slopes(); }
   /// Intrinsic roughness of the facets: the asset's own, or --sigma-r where it has none.
   float facetRoughness() const { return info().sigma_r > 0 ? info().sigma_r : options_.sigma_r; }
 

@@ -56,6 +56,8 @@ class OpenedNdf {
   bool hasNormals() const { return normals_.has_value(); }
   /// The map that answers them; nullptr if there is none.
   const NormalMap* normals() const { return normals_ ? &normals_->normals() : nullptr; }
+  /// Moments of the map's slopes, for SmithMasking. Kind normals: sums over all texels; other kinds hold them.
+  MapSlopes slopes() const;
 
  private:
   explicit OpenedNdf(formats::Asset asset) : asset_(std::move(asset)) {}

@@ -54,6 +54,14 @@ class BinMapBrdf {
     return static_cast<float>(sums(wi, wo, h).drawn / (4 * double{h.towards}));
   }
 
+  /// `evaluate` and `pdf` together, at the cost of one.
+  GLINT_HD BrdfValue evaluateWithPdf(Vec3 wi, Vec3 wo) const {
+    if (!(aboveHorizon(wi) && aboveHorizon(wo))) return {};
+    const HalfVector h = halfVectorOf(wi, wo);
+    const Sums s = sums(wi, wo, h);
+    return {response(wi, wo, h, s), static_cast<float>(s.drawn / (4 * double{h.towards}))};
+  }
+
   /// Draws wi (Atanasov 2021, section 5.3): a point of the footprint, a Beckmann microfacet of its texel, wo mirrored at that. The
   /// leading digits of xi choose the point, the others the microfacet.
   ///

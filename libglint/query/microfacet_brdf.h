@@ -14,6 +14,12 @@ struct BrdfSample {
   float pdf = 0;  ///< per unit solid angle; 0 if the sample is not a direction above the horizon
 };
 
+/// A BRDF towards one direction, and the density with which it is sampled.
+struct BrdfValue {
+  Rgb f;          ///< 1/sr, without the cosine wi.z
+  float pdf = 0;  ///< of wi for the given wo, per unit solid angle
+};
+
 /// The microfacet BRDF of one shading point: f = D F G2 / (4 wi.z wo.z), with D from any model of the NDF.
 ///
 /// Directions are unit vectors of the tangent frame, +z up, both away from the surface; radiance comes along wi and leaves along wo.
@@ -62,6 +68,19 @@ class MicrofacetBrdf {
     if (!(aboveHorizon(wi) && aboveHorizon(wo))) return 0;
     const HalfVector h = halfVectorOf(wi, wo);
     return mixed(model_->density(footprint_, h.disk), h, wo);
+  }
+
+  /// `evaluate` and `pdf` together. One density.
+  GLINT_HD BrdfValue evaluateWithPdf(Vec3 wi, Vec3 wo) const {
+    if (!(aboveHorizon(wi) && aboveHorizon(wo))) return {};
+    const HalfVector h = halfVectorOf(wi, wo);
+    return valueOf(wi, wo, h, model_->density(footprint_, h.disk));
+  }
+
+  /// The same where the density towards h is known.
+  /// @param wi, wo  above the horizon
+  GLINT_HD BrdfValue valueOf(Vec3 wi, Vec3 wo, const HalfVector& h, float density) const {
+    return {density * response(wi, wo, h), mixed(density, h, wo)};
   }
 
   /// Draws wi: a half vector from D, mirrored; or, with probability uniformShare(wo), evenly from the hemisphere.

@@ -1,96 +1,31 @@
+#include "support/c_api.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>
-#include <limits>
-#include <memory>
-#include <random>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "glint.h"
 #include "glint/api/any_ndf.h"
-#include "glint/formats/asset_writer.h"
-#include "support/sample_assets.h"
-#include "support/temp_folder.h"
 
 namespace glint {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr int kSize = 64;
+using test::assets;
+using test::contiguous;
+using test::Handle;
+using test::isotropic;
+using test::kKinds;
+using test::kNan;
+using test::kSize;
+using test::openHandle;
+using test::Queries;
+
 /// Batches may sum in another order.
 constexpr float kBatchError = 1e-6f;
-
-/// Files of every kind, with their maps.
-class Assets {
- public:
-  Assets() {
-    const auto normals = test::sampleNormals(kSize, kSize);
-    formats::writeAsset(path("normals"), normals.map, test::sampleProvenance());
-    const auto pyramid = test::samplePyramid(kSize, BlockPrecision::f16);
-    formats::writeAsset(path("ndf-pyramid"), pyramid.pyramid, test::sampleProvenance());
-    const auto compressed = test::sampleCompressed(kSize, CompressionMethod::cp, CoefficientType::i8);
-    formats::writeAsset(path("ndf-cp"), compressed.ndf, test::sampleProvenance());
-    formats::writeAsset(path("bin-map"), test::sampleBinMap(kSize, kSize).map, test::sampleProvenance());
-    formats::writeAsset(path("histogram-sat"), test::sampleHistograms(kSize, kSize).sat, test::sampleProvenance());
-    formats::writeAsset(path("heights"), test::sampleHeights(kSize, kSize).map, test::sampleProvenance());
-  }
-  std::string path(const std::string& kind) const { return (folder_.path() / (kind + ".glint")).string(); }
-
- private:
-  test::TempFolder folder_;
-};
-
-const Assets& assets() {
-  static const Assets files;
-  return files;
-}
-
-struct Closer {
-  void operator()(glint_ndf* ndf) const { glint_ndf_close(ndf); }
-};
-using Handle = std::unique_ptr<glint_ndf, Closer>;
-
-Handle openHandle(const std::string& kind, const glint_open_options* options = nullptr) {
-  glint_ndf* ndf = nullptr;
-  EXPECT_EQ(glint_ndf_open(assets().path(kind).c_str(), options, &ndf), GLINT_OK) << glint_error_message();
-  return Handle(ndf);
-}
-
-constexpr const char* kKinds[] = {"normals", "ndf-pyramid", "ndf-cp", "bin-map", "histogram-sat"};
-
-/// Random queries of every size, with a few that are degenerate.
-struct Queries {
-  explicit Queries(std::size_t count, unsigned seed = 1) {
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<float> unit(0, 1);
-    for (std::size_t k = 0; k < count; ++k) {
-      u.push_back(unit(random) * 3 - 1);
-      v.push_back(unit(random));
-      sigma.push_back(std::exp2(unit(random) * 7 - 2));
-      hx.push_back(unit(random) - 0.5f);
-      hy.push_back(unit(random) - 0.5f);
-      if (k % 23 == 5) u.back() = kNan;
-      if (k % 29 == 7) sigma.back() = k % 2 ? kNan : 0;
-      if (k % 31 == 3) hx.back() = k % 2 ? kNan : 1.5f;
-      if (k % 37 == 11) sigma.back() = k % 2 ? 1e18f : std::numeric_limits<float>::infinity();
-      if (k % 41 == 13) u.back() = k % 2 ? -1e9f : 1e30f;
-    }
-  }
-  std::vector<float> u, v, sigma, hx, hy;
-};
-
-glint_floats contiguous(const std::vector<float>& values) { return {values.data(), sizeof(float)}; }
-
-glint_footprints isotropic(const Queries& q) {
-  glint_footprints p = {};
-  p.u = contiguous(q.u);
-  p.v = contiguous(q.v);
-  p.sigma = contiguous(q.sigma);
-  return p;
-}
 
 void expectSame(float actual, float expected, std::size_t k) {
   EXPECT_NEAR(actual, expected, kBatchError * expected) << "query " << k;
