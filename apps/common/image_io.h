@@ -23,7 +23,8 @@ struct Image {
   std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>> pixels;
 };
 
-/// Reads the first image of a file: PNG by libpng, every other format by OpenImageIO. Alpha is not multiplied into the other channels.
+/// Reads the first image of a file: PNG by libpng, every other format by OpenImageIO. Alpha is not multiplied into the other
+/// channels.
 /// @throws Error io if the file cannot be opened; invalid_input if it is no image, damaged or truncated
 Image readImage(const std::string& path);
 

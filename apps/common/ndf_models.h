@@ -11,9 +11,9 @@ namespace glint::apps {
 
 using api::AnyNdf;
 
-/// Mix-in: the asset that a tool asks, and the options that say how. Normals are answered by Reference with --surface, --sigma-r and
-/// --boundary; pyramids and compressed ones by their own parameters, and by Reference below level 0 where --normals is given; bin
-/// maps by their own, at any size.
+/// Mix-in: the asset that a tool asks, and the options that say how. Normals are answered by Reference with --surface,
+/// --sigma-r and --boundary; pyramids and compressed ones by their own parameters, and by Reference below level 0 where
+/// --normals is given; bin maps by their own, at any size.
 class NdfAsset {
  public:
   explicit NdfAsset(Tool& tool);

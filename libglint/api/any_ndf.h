@@ -44,8 +44,8 @@ struct NdfInfo {
 class OpenedNdf {
  public:
   /// Opens an asset of a kind that answers an NDF.
-  /// @throws Error  as formats::Asset::open; unsupported for other kinds; invalid_input if `options.normals` is not the map that
-  ///                the asset was made from
+  /// @throws Error  as formats::Asset::open; unsupported for other kinds; invalid_input if `options.normals` is not the map
+  ///                that the asset was made from
   static OpenedNdf open(const std::filesystem::path& path, const NdfOptions& options = {});
 
   /// Points into the mapped asset: lives as long as this object, also when that is moved.

@@ -205,8 +205,8 @@ Vec3 Estimator::pointOf(std::size_t facet, std::uint64_t index) const {
   return surface_.point(facet, xi.x, xi.y);
 }
 
-/// Follows light from a facet through diffuse reflections: rows[channel * stride + d], which hold the facet's masked cosines, become
-/// the light that it reflects, in units of the base, from directions d.
+/// Follows light from a facet through diffuse reflections: rows[channel * stride + d], which hold the facet's masked cosines,
+/// become the light that it reflects, in units of the base, from directions d.
 void Estimator::diffuseWalk(std::size_t facet, std::uint64_t index, std::size_t stride, float* rows, float* scratch,
                             Shares& shares) const {
   const std::size_t channels = result_.channels, n = directions_.count;
@@ -462,9 +462,9 @@ EffectiveBrdf Estimator::glossy() {
   return finish(total);
 }
 
-/// Makes the estimates symmetric, since both halves estimate the same function, and their visible areas exact: the projected area
-/// that a periodic surface shows to a direction is its cosine (Wu 2019, Eq. 8), so what the masks show too much or too little of
-/// is known.
+/// Makes the estimates symmetric, since both halves estimate the same function, and their visible areas exact: the projected
+/// area that a periodic surface shows to a direction is its cosine (Wu 2019, Eq. 8), so what the masks show too much or too
+/// little of is known.
 EffectiveBrdf Estimator::finish(const Shares& shares) {
   result_.interreflected = shares.all > 0 ? shares.interreflected / shares.all : 0;
   for (std::size_t k = 0; k < options_.distant_cells.size(); ++k)

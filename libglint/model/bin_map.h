@@ -43,7 +43,8 @@ struct TexelCode {
   }
 };
 
-/// The code of a map's texels. Maps whose columns and rows need more than kMaxPositionBits together have none: place_bits is -1.
+/// The code of a map's texels. Maps whose columns and rows need more than kMaxPositionBits together have none: place_bits is
+/// -1.
 GLINT_HD constexpr TexelCode texelCode(int width, int height) {
   const auto bits = [](int size) {
     int count = 0;
@@ -61,9 +62,9 @@ GLINT_HD constexpr TexelCode texelCode(int width, int height) {
 /// The texels of a normal map, listed by the bin of directions that their normals fall into (Atanasov 2021, section 5.4).
 ///
 /// The square [-1, 1]^2 has bins_per_axis^2 bins; bin number = row * bins_per_axis + column. Only occupied bins have lists, in
-/// the order of their numbers; the k-th of them is found from `masks` and `mask_ranks`. A bin of many texels has a grid of cells over
-/// the map, a power of two of them, and its list is sorted by cell, row by row. Columns and rows of the map are cut at multiples of
-/// powers of two, see `cellGrid`.
+/// the order of their numbers; the k-th of them is found from `masks` and `mask_ranks`. A bin of many texels has a grid of
+/// cells over the map, a power of two of them, and its list is sorted by cell, row by row. Columns and rows of the map are cut
+/// at multiples of powers of two, see `cellGrid`.
 struct BinMap {
   int width = 0;        ///< texels
   int height = 0;       ///< texels

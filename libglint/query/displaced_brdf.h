@@ -43,8 +43,8 @@ struct DirectionSample {
 /// wo: so it is reciprocal, and with one normal it is the base itself. Renderers use it on the downsampled surface, with their
 /// own visibility; that of smaller scale is in S. Where the asset has no colours, all channels are the same.
 ///
-/// Directions are unit vectors away from the surface. Those that are longer or not finite, behind the facet or within kHorizon of
-/// its plane get 0. Coordinates are periodic; those that are not finite count as 0.
+/// Directions are unit vectors away from the surface. Those that are longer or not finite, behind the facet or within kHorizon
+/// of its plane get 0. Coordinates are periodic; those that are not finite count as 0.
 ///
 /// Thread-safe, allocates nothing.
 class DisplacedBrdf {
@@ -53,7 +53,8 @@ class DisplacedBrdf {
 
   GLINT_HD const Displacement& asset() const { return asset_; }
 
-  /// Levels for a footprint of this diameter: linear in its logarithm between the factors of the levels, clamped; NaN counts as 0.
+  /// Levels for a footprint of this diameter: linear in its logarithm between the factors of the levels, clamped; NaN counts as
+  /// 0.
   GLINT_HD LevelBlend levelsFor(float diameter_texels) const {
     int first = 0;
     while (first + 1 < asset_.level_count && static_cast<float>(asset_.levels[first + 1].factor) <= diameter_texels) ++first;
@@ -125,8 +126,8 @@ class DisplacedBrdf {
     return blend.weight > 0 ? (1 - blend.weight) * first + blend.weight * pdf(blend.second, uv, wi, wo) : first;
   }
 
-  /// Draws wi for a view wo: a lobe by its amplitude times the mean of its colour, then a cosine around its centre (diffuse), or
-  /// a normal of the widened lobe to reflect at (ggx).
+  /// Draws wi for a view wo: a lobe by its amplitude times the mean of its colour, then a cosine around its centre (diffuse),
+  /// or a normal of the widened lobe to reflect at (ggx).
   /// @param xi  uniform in [0, 1)^2; others are clamped, NaN counts as 0
   GLINT_HD DirectionSample sample(int level, Vec2 uv, Vec3 wo, Vec2 xi) const {
     if (!isDirection(wo)) return {};
@@ -175,8 +176,8 @@ class DisplacedBrdf {
     return density / totalShare(l, first);
   }
 
-  /// Density of the original's normals towards a half vector, by the lobes of a cell: per unit projected area. Its integral over
-  /// the disk is 1 but for what lobes have below the horizon; 0 outside the disk.
+  /// Density of the original's normals towards a half vector, by the lobes of a cell: per unit projected area. Its integral
+  /// over the disk is 1 but for what lobes have below the horizon; 0 outside the disk.
   /// @param least_variance  lobes are widened to at least this variance, radians^2: for pixels that are wider than they
   GLINT_HD float normalDensity(int level, Vec2 uv, Vec2 h, float least_variance = 0) const {
     const float z2 = 1 - dot(h, h);
@@ -315,8 +316,8 @@ class DisplacedBrdf {
     return sine * std::cos(angle) * s + sine * std::sin(angle) * t + cosine * axis;
   }
 
-  /// The same integral for one Beckmann lobe with the cell's slope moments and mean base, shadowed by its own Smith term (Dupuy et
-  /// al. 2013).
+  /// The same integral for one Beckmann lobe with the cell's slope moments and mean base, shadowed by its own Smith term (Dupuy
+  /// et al. 2013).
   GLINT_HD Rgb singleLobe(const DisplacementLevel& l, std::size_t cell, Vec3 wi, Vec3 wo) const {
     if (wi.z <= 0 || wo.z <= 0) return {};
     const std::size_t first = cell * static_cast<std::size_t>(asset_.lobe_count);

@@ -53,8 +53,9 @@ class Reference {
   /// Draws a texel (or triangle) by its weight in the footprint, a normal of it and the lobe's blur around that. The pdf is the
   /// density; half vectors that the blur takes out of [-1, 1]^2 have pdf 0.
   ///
-  /// O(rows + columns) of the footprint for Gaussians (O(area) if they are rotated and the boundary is clamped), O(1) for boxes, and
-  /// the density. A choice uses up leading digits of `xi` and the next one those below, so 24 bits are enough for one sample.
+  /// O(rows + columns) of the footprint for Gaussians (O(area) if they are rotated and the boundary is clamped), O(1) for
+  /// boxes, and the density. A choice uses up leading digits of `xi` and the next one those below, so 24 bits are enough for
+  /// one sample.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     xi = clampUnit(xi);
     const FootprintWeights weights(p, map_.width, map_.height);

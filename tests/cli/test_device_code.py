@@ -1,6 +1,6 @@
-"""The query headers are device code. Clang compiles tests/device for NVIDIA GPUs, without a CUDA toolkit: every model is made and asked in
-a kernel, so that a call of a host function is an error. What this cannot show is nvcc's own opinion and the numbers; glint-device-check
-shows those where there are a compiler and a GPU."""
+"""The query headers are device code. Clang compiles tests/device for NVIDIA GPUs, without a CUDA toolkit: every model is made
+and asked in a kernel, so that a call of a host function is an error. What this cannot show is nvcc's own opinion and the
+numbers; glint-device-check shows those where there are a compiler and a GPU."""
 
 import os
 import pathlib

@@ -1,5 +1,6 @@
-"""The installed package: installed into a folder of its own, then used from C and C++ through CMake and pkg-config, by projects that see
-nothing else of the repository. Programs in C run under AddressSanitizer; in the asan preset the library is instrumented as well."""
+"""The installed package: installed into a folder of its own, then used from C and C++ through CMake and pkg-config, by
+projects that see nothing else of the repository. Programs in C run under AddressSanitizer; in the asan preset the library is
+instrumented as well."""
 
 import os
 import pathlib

@@ -62,7 +62,8 @@ TEST(Displace, FlatMapsNeedNoScaling) {
   }
 }
 
-/// What the asset reflects as a whole where its smooth surface hides nothing: the mean over its cells of the answers of the query.
+/// What the asset reflects as a whole where its smooth surface hides nothing: the mean over its cells of the answers of the
+/// query.
 Rgb meanOfQueries(const DisplacedBrdf& brdf, int level, Vec3 wi, Vec3 wo) {
   const DisplacementLevel& l = brdf.asset().levels[level];
   Rgb sum;

@@ -307,8 +307,8 @@ TEST(PyramidSlices, WeightsAreNotNegativeAndSumToOne) {
 }
 
 TEST(PyramidSlices, WeightsAreContinuousInPositionAndSize) {
-  // Bilinear weights change by 2 a gap and axis. The shortest gap between centres of a wrapping level is what is left over when the
-  // stride does not divide the map: at stride 16 it is 4 of 100 texels, at 64 36.
+  // Bilinear weights change by 2 a gap and axis. The shortest gap between centres of a wrapping level is what is left over when
+  // the stride does not divide the map: at stride 16 it is 4 of 100 texels, at 64 36.
   constexpr double kShortestGap = 4, kStep = 0.02;  // texels
   constexpr double kMostPerStep = 2 * kStep / kShortestGap + 1e-4;
   for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {

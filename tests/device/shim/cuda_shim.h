@@ -1,7 +1,7 @@
 #pragma once
 
-// What CUDA's own headers give device code, as far as the query headers use it: enough for clang to compile device code where no
-// CUDA toolkit is. Whatever is not here, and not constexpr, is a host function, and calling it is an error.
+// What CUDA's own headers give device code, as far as the query headers use it: enough for clang to compile device code where
+// no CUDA toolkit is. Whatever is not here, and not constexpr, is a host function, and calling it is an error.
 
 #define __host__ __attribute__((host))
 #define __device__ __attribute__((device))
