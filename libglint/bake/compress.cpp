@@ -194,8 +194,10 @@ class Compressor {
   void meetTolerance() {
     std::vector<ToleranceSearch> searches;
     for (std::size_t g = 0; g < groups_.size(); ++g) {
-      const std::span models = std::span(models_).subspan(g * clustersPerGroup(), clustersPerGroup());
-      searches.emplace_back(models, budget(groups_[g]));
+      std::vector<std::span<const SizeChoice>> clusters;
+      for (const ClusterModel& model : std::span(models_).subspan(g * clustersPerGroup(), clustersPerGroup()))
+        clusters.emplace_back(model.choices());
+      searches.emplace_back(std::move(clusters), budget(groups_[g]));
     }
     const auto encodeChosen = [&] {
       std::vector<int> selection;
