@@ -67,7 +67,7 @@ void toHalfPortably(const float* from, float scale, std::uint16_t* to, float* ro
 }
 
 #ifdef __x86_64__
-/// The same bits by the processor's own conversion, ten times faster.
+/// The same bits by the processor's own conversion.
 __attribute__((target("avx,f16c"))) void toHalfByInstruction(const float* from, float scale, std::uint16_t* to,
                                                              float* rounded) {
   const __m256 scales = _mm256_set1_ps(scale), largest = _mm256_set1_ps(65504);
