@@ -13,6 +13,7 @@
 #include "glint/bake/height_tracer.h"
 #include "glint/query/base_brdf.h"
 #include "glint/query/concentric_map.h"
+#include "glint/query/tangents.h"
 
 namespace glint::bake {
 namespace {
@@ -25,16 +26,13 @@ constexpr double kMostCorrection = 1.25;  // of visible areas
 
 constexpr std::uint64_t kFacetStream = 101, kPointStream = 102, kTurnStream = 103;
 
-/// Two unit vectors that make a frame with n (Duff et al. 2017).
+/// The frame of a facet.
 struct Frame {
-  Vec3 s, t, n;
-  explicit Frame(Vec3 normal) : n(normal) {
-    const float a = -1 / (1 + n.z), b = n.x * n.y * a;  // n.z > 0
-    s = {1 + n.x * n.x * a, b, -n.x};
-    t = {b, 1 + n.y * n.y * a, -n.y};
-  }
-  Vec3 toWorld(Vec3 v) const { return v.x * s + v.y * t + v.z * n; }
-  Vec3 toLocal(Vec3 v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
+  Vec3 n;
+  Tangents tangents;
+  explicit Frame(Vec3 normal) : n(normal), tangents(tangentsOf(normal)) {}
+  Vec3 toWorld(Vec3 v) const { return v.x * tangents.s + v.y * tangents.t + v.z * n; }
+  Vec3 toLocal(Vec3 v) const { return {dot(v, tangents.s), dot(v, tangents.t), dot(v, n)}; }
 };
 
 /// The facets of one patch as a list, of which `samples` are drawn evenly.

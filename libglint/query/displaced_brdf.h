@@ -12,6 +12,7 @@
 #include "glint/query/rgb.h"
 #include "glint/query/sampling.h"
 #include "glint/query/smith.h"
+#include "glint/query/tangents.h"
 #include "glint/query/vmf_lobe.h"
 
 namespace glint {
@@ -308,12 +309,11 @@ class DisplacedBrdf {
     return total;
   }
 
-  /// The direction at this cosine and azimuth around an axis with z > 0.
+  /// The direction at this cosine and azimuth around an axis.
   static GLINT_HD Vec3 around(Vec3 axis, float cosine, float angle) {
-    const float a = -1 / (1 + axis.z), b = axis.x * axis.y * a;
-    const Vec3 s = {1 + axis.x * axis.x * a, b, -axis.x}, t = {b, 1 + axis.y * axis.y * a, -axis.y};
+    const Tangents frame = tangentsOf(axis);
     const float sine = std::sqrt(std::max(0.0f, 1 - cosine * cosine));
-    return sine * std::cos(angle) * s + sine * std::sin(angle) * t + cosine * axis;
+    return sine * std::cos(angle) * frame.s + sine * std::sin(angle) * frame.t + cosine * axis;
   }
 
   /// The same integral for one Beckmann lobe with the cell's slope moments and mean base, shadowed by its own Smith term (Dupuy

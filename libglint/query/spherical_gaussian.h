@@ -7,6 +7,7 @@
 #include "glint/model/vec.h"
 #include "glint/query/gaussian.h"
 #include "glint/query/rgb.h"
+#include "glint/query/tangents.h"
 
 namespace glint {
 
@@ -58,15 +59,6 @@ inline GLINT_HD float compactSupport(float amplitude, float sharpness, float eps
 /// Side of the square of the disk that Deng 2022 average over for a lobe, disk units: Eq. 9, halved as they do. Q / 2 of 256
 /// pixels that span 2 disk units, so 2 theta / pi.
 inline GLINT_HD float supportSide(float support_angle) { return 2 * support_angle / kPi; }
-
-/// Two unit vectors that make a right-handed frame with a third (Duff 2017).
-struct Tangents {
-  Vec3 s, t;
-};
-inline GLINT_HD Tangents tangentsOf(Vec3 n) {
-  const float sign = std::copysign(1.0f, n.z), a = -1 / (sign + n.z), b = n.x * n.y * a;
-  return {{1 + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}};
-}
 
 /// The direction at a point of the plane that the sphere is unrolled to around the axis, keeping areas (Lambert):
 /// |p| = 2 sin(angle / 2). On it a spherical Gaussian is a normal distribution of deviation 1 / sqrt(lambda), exactly, cut off
