@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <mutex>
 #include <numbers>
 
 #include "glint/bake/counter_random.h"
@@ -156,7 +155,6 @@ class Estimator {
   void addChunk(const Chunk& chunk, const ChunkSums& sums, double samples, double scale);
   ChunkSums emptySums() const;
   EffectiveBrdf finish(const Shares& shares);
-  void report(std::size_t total);
 
   double& sum(std::size_t channel, std::size_t patch, std::size_t i, std::size_t o) {
     return sums_[((channel * result_.patches + patch) * directions_.count + i) * directions_.count + o];
@@ -173,20 +171,12 @@ class Estimator {
   std::vector<double> sums_;   ///< [channels][patches][directions][directions]
   std::vector<double> areas_;  ///< [directions]: visible projected area of the whole map
   EffectiveBrdf result_;
-  std::mutex mutex_;
-  std::size_t done_ = 0;
 };
 
 std::vector<PatchFacets> Estimator::facets(std::size_t samples) const {
   std::vector<PatchFacets> list;
   for (int p = 0; p < grid_.count(); ++p) list.emplace_back(grid_, p, samples / static_cast<std::size_t>(grid_.count()));
   return list;
-}
-
-void Estimator::report(std::size_t total) {
-  const std::lock_guard lock(mutex_);
-  ++done_;
-  if (progress_) progress_(std::min(done_, total), total);
 }
 
 /// Masked cosines of a facet towards all directions.
@@ -277,10 +267,11 @@ EffectiveBrdf Estimator::diffuse() {
   const std::vector<Chunk> chunks = makeChunks(patches);
   std::vector<ChunkSums> sums(chunks.size());
   std::vector<Shares> shares(chunks.size());
+  ProgressCounter counter(progress_, chunks.size());
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
     sums[c] = emptySums();
     diffuseChunk(patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], sums[c], shares[c]);
-    report(chunks.size());
+    counter.advance();
   });
   Shares total;
   for (std::size_t c = 0; c < chunks.size(); ++c) {
@@ -434,12 +425,12 @@ EffectiveBrdf Estimator::glossy() {
     }
   }
   const bool follow = options_.bounces > 1;
-  const std::size_t work = chunks.size() + (follow ? n : 0);
+  ProgressCounter counter(progress_, chunks.size() + (follow ? n : 0));
   std::vector<ChunkSums> sums(chunks.size());
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
     sums[c] = emptySums();
     glossyChunk(patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], half, sums[c]);
-    report(work);
+    counter.advance();
   });
   for (std::size_t c = 0; c < chunks.size(); ++c)
     addChunk(chunks[c], sums[c], static_cast<double>(patches[static_cast<std::size_t>(chunks[c].patch)].samples()),
@@ -452,7 +443,7 @@ EffectiveBrdf Estimator::glossy() {
     std::vector<Shares> shares(n);
     tbb::parallel_for(std::size_t{0}, n, [&](std::size_t view) {
       shares[view] = glossyView(starts, view);
-      report(work);
+      counter.advance();
     });
     for (const Shares& share : shares) total.add(share);
     total.all += total.interreflected;
