@@ -234,6 +234,7 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
     properties = {{"width", map.width},         {"height", map.height},       {"alpha", map.alpha},
                   {"alpha_min", map.alpha_min}, {"alpha_max", map.alpha_max}, {"bins_per_axis", map.bins_per_axis},
                   {"leaf_size", map.leaf_size}};
+    addSlopes(map.slopes, properties);
     statistics = summarizeBinMap(map);
   } else if (asset.kind() == "histogram-sat") {
     const HistogramSat& sat = asset.histograms();
