@@ -143,7 +143,7 @@ class DisplacedBrdf {
       left -= share;
     const float unit = std::clamp(left / std::max(share, 1e-20f), 0.0f, 0.99999994f);
     const Vec3 axis = lobeCentre(l.lobes[lobe]);
-    const float angle = 6.28318530717958648f * xi.y;
+    const float angle = 2 * kPi * xi.y;
     Vec3 wi;
     if (asset_.base.kind == BaseBrdf::Kind::diffuse) {
       wi = around(axis, std::sqrt(1 - unit), angle);

@@ -14,15 +14,7 @@
 namespace glint {
 namespace {
 
-using test::assets;
-using test::contiguous;
-using test::Handle;
-using test::isotropic;
-using test::kKinds;
-using test::kNan;
-using test::kSize;
-using test::openHandle;
-using test::Queries;
+using namespace test;
 
 /// Batches may sum in another order.
 constexpr float kBatchError = 1e-6f;

@@ -20,15 +20,7 @@
 namespace glint {
 namespace {
 
-using test::assets;
-using test::contiguous;
-using test::Handle;
-using test::isotropic;
-using test::kKinds;
-using test::kNan;
-using test::kSize;
-using test::openHandle;
-using test::Queries;
+using namespace test;
 
 /// Batches may sum in another order; f and the pdf are products of the density with some ten factors.
 constexpr float kBatchError = 1e-6f;
