@@ -15,6 +15,8 @@ __device__ double fabs(double);
 __device__ double sin(double);
 __device__ double cos(double);
 __device__ double atan2(double, double);
+__device__ double hypot(double, double);
+__device__ int abs(int);
 __device__ void* memcpy(void*, const void*, __SIZE_TYPE__);
 __device__ int __popcll(unsigned long long);
 __device__ int __ffsll(long long);
