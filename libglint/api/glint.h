@@ -193,10 +193,8 @@ GLINT_API glint_status glint_mean_batch(const glint_ndf* ndf, size_t count, cons
 GLINT_API glint_status glint_sample_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints,
                                           glint_floats xi1, glint_floats xi2, float* hx, float* hy, float* pdfs);
 
-/* ------------------------------------------- Reflectance of a distribution ------------------------------------------- */
-
 /* A microfacet BRDF over a texture: a distribution of normals, what its facets are made of, and how its slopes mask each
- * other. */
+ * other (Deng 2022, sections 5.1 and 5.2; masking: Heitz 2014, Eq. 99; Beckmann facets: Atanasov 2021, Eq. 5, 11 and 15). */
 typedef struct glint_brdf glint_brdf;
 
 enum {
@@ -271,10 +269,8 @@ GLINT_API glint_status glint_brdf_sample_batch(const glint_brdf* brdf, size_t co
                                                const glint_directions* wo, glint_floats xi1, glint_floats xi2, float* wi,
                                                float* weights, float* pdfs);
 
-/* ------------------------------------------ Reflectance of a displacement map ------------------------------------------ */
-
 /* A displacement map at several levels of detail, each a coarse surface and the light that it reflects, shadowing and
- * interreflections of all that is finer included. */
+ * interreflections of all that is finer included (Wu 2019, Eq. 11 and 18). */
 typedef struct glint_displaced glint_displaced;
 
 enum { GLINT_DISPLACED_MAX_LEVELS = 8 };
