@@ -9,8 +9,8 @@
 
 namespace glint::apps {
 
-/// The formats of OpenImageIO, in a shared object of their own: programs and inputs that do not need that library must not wait until
-/// it and the hundreds that it links to are loaded.
+/// The formats of OpenImageIO, in a shared object of their own: programs and inputs that do not need that library must not wait
+/// until it and the hundreds that it links to are loaded.
 struct ImageFormats {
   /// @throws Error invalid_input, unsupported
   Image (*read)(const std::string& path);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 
 #include "common/files.h"
@@ -46,6 +47,27 @@ Image readImage(const std::string& path) {
   if (image.format == "jpeg") checkJpegComplete(path);
   return image;
 }
+
+std::vector<float> channelsOf(const Image& image, int channels) {
+  const auto texels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  std::vector<float> values;
+  values.reserve(texels * static_cast<std::size_t>(channels));
+  std::visit(
+      [&](const auto& pixels) {
+        using Code = typename std::decay_t<decltype(pixels)>::value_type;
+        const float scale = std::is_same_v<Code, std::uint8_t>    ? 1 / 255.0f
+                            : std::is_same_v<Code, std::uint16_t> ? 1 / 65535.0f
+                                                                  : 1.0f;
+        for (std::size_t k = 0; k < texels; ++k)
+          for (int c = 0; c < channels; ++c)
+            values.push_back(
+                scale * static_cast<float>(pixels[k * static_cast<std::size_t>(image.channels) + static_cast<std::size_t>(c)]));
+      },
+      image.pixels);
+  return values;
+}
+
+float linearFromSrgb(float code) { return code <= 0.04045f ? code / 12.92f : std::pow((code + 0.055f) / 1.055f, 2.4f); }
 
 void writeImage(const std::string& path, int width, int height, int channels, std::span<const float> pixels,
                 PixelFormat format) {

@@ -23,9 +23,17 @@ struct Image {
   std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>> pixels;
 };
 
-/// Reads the first image of a file: PNG by libpng, every other format by OpenImageIO. Alpha is not multiplied into the other channels.
+/// Reads the first image of a file: PNG by libpng, every other format by OpenImageIO. Alpha is not multiplied into the other
+/// channels.
 /// @throws Error io if the file cannot be opened; invalid_input if it is no image, damaged or truncated
 Image readImage(const std::string& path);
+
+/// The first `channels` channels of every pixel; codes of integers become 0..1.
+/// @param channels  at most those of the image
+std::vector<float> channelsOf(const Image& image, int channels);
+
+/// Linear value of an sRGB code in 0..1 (IEC 61966-2-1).
+float linearFromSrgb(float code);
 
 /// How pixels are stored. Formats that cannot hold the type are an error, not a conversion.
 enum class PixelFormat : std::uint8_t { u8, u16, f16, f32 };

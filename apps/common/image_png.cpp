@@ -10,8 +10,8 @@
 namespace glint::apps {
 namespace {
 
-/// A PNG while it is read. libpng reports errors by a long jump to the `setjmp` of the step that is running, so each step is a function
-/// without objects that need destruction.
+/// A PNG while it is read. libpng reports errors by a long jump to the `setjmp` of the step that is running, so each step is a
+/// function without objects that need destruction.
 struct PngReader {
   std::FILE* file = nullptr;
   png_structp png = nullptr;

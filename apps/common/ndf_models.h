@@ -11,9 +11,9 @@ namespace glint::apps {
 
 using api::AnyNdf;
 
-/// Mix-in: the asset that a tool asks, and the options that say how. Normals are answered by Reference with --surface, --sigma-r and
-/// --boundary; pyramids and compressed ones by their own parameters, and by Reference below level 0 where --normals is given; bin
-/// maps by their own, at any size.
+/// Mix-in: the asset that a tool asks, and the options that say how. Normals are answered by Reference with --surface,
+/// --sigma-r and --boundary; pyramids and compressed ones by their own parameters, and by Reference below level 0 where
+/// --normals is given; bin maps by their own, at any size.
 class NdfAsset {
  public:
   explicit NdfAsset(Tool& tool);
@@ -28,7 +28,7 @@ class NdfAsset {
   int resolution() const { return opened_->info().resolution; }
 
   const api::NdfInfo& info() const { return opened_->info(); }
-  const formats::Asset& asset() const { return opened_->asset(); }
+  MapSlopes slopes() const { return opened_->slopes(); }
   /// Intrinsic roughness of the facets: the asset's own, or --sigma-r where it has none.
   float facetRoughness() const { return info().sigma_r > 0 ? info().sigma_r : options_.sigma_r; }
 

@@ -125,7 +125,8 @@ Option& Option::range(double low, double high) {
       },
       text, "range"));
   double number = 0;
-  if (CLI::detail::lexical_cast(option_->get_default_str(), number) && !(number >= low && number <= high)) option_->default_str("");
+  if (CLI::detail::lexical_cast(option_->get_default_str(), number) && !(number >= low && number <= high))
+    option_->default_str("");
   return *this;
 }
 

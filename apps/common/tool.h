@@ -72,8 +72,8 @@ class Tool {
   void section(const std::string& title);
   static constexpr const char* kOptions = "Options";
 
-  /// Declares an option or, when `name` has no dash, a positional argument. `value` holds the default, which the help shows unless it
-  /// is empty or out of range, as that of an option is which does nothing until it is given.
+  /// Declares an option or, when `name` has no dash, a positional argument. `value` holds the default, which the help shows
+  /// unless it is empty or out of range, as that of an option is which does nothing until it is given.
   /// T: int, std::uint64_t, float, double, std::string, or std::vector of int, float or std::string (given as a,b,c).
   /// Numbers that are not finite are a usage error.
   template <class T>

@@ -22,8 +22,7 @@ CompressOptions::CompressOptions(Tool& tool) {
   const Option& rank = tool.option("--rank", options_.rank, "columns of every cluster").range(1, 256);
   tool.option("--tolerance", options_.tolerance,
               "instead of --rank: relative error of all images together (tucker: also of level 0, of level 1 and of the "
-              "coarser ones); "
-              "columns and bits of every cluster are chosen to meet it in the fewest bytes")
+              "coarser ones); columns and bits of every cluster are chosen to meet it in the fewest bytes")
       .range(1e-6, 0.99)
       .excludes(rank)
       .defaultText("none");

@@ -2,33 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "common/files.h"
 #include "common/image_io.h"
 
 namespace glint::apps {
 namespace {
-
-/// The first `channels` channels of an image; codes of integers become 0..1.
-std::vector<float> channelsOf(const Image& image, int channels) {
-  const auto texels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
-  std::vector<float> values;
-  values.reserve(texels * static_cast<std::size_t>(channels));
-  std::visit(
-      [&](const auto& pixels) {
-        using Code = typename std::decay_t<decltype(pixels)>::value_type;
-        const float scale = std::is_same_v<Code, std::uint8_t>    ? 1 / 255.0f
-                            : std::is_same_v<Code, std::uint16_t> ? 1 / 65535.0f
-                                                                  : 1.0f;
-        for (std::size_t k = 0; k < texels; ++k)
-          for (int c = 0; c < channels; ++c)
-            values.push_back(
-                scale * static_cast<float>(pixels[k * static_cast<std::size_t>(image.channels) + static_cast<std::size_t>(c)]));
-      },
-      image.pixels);
-  return values;
-}
 
 void requireUnitRange(const std::string& path, const std::vector<float>& values, int channels, int width) {
   for (std::size_t k = 0; k < values.size(); ++k) {
@@ -49,9 +27,6 @@ Image readOfSize(const std::string& path, int width, int height) {
               fmt::format("the image has {} x {} pixels, the heights {} x {} texels", image.width, image.height, width, height),
               "resample it to the size of the heights");
 }
-
-/// IEC 61966-2-1.
-float linearOfSrgb(float code) { return code <= 0.04045f ? code / 12.92f : std::pow((code + 0.055f) / 1.055f, 2.4f); }
 
 }  // namespace
 
@@ -88,7 +63,7 @@ bake::BaseTexture BaseImages::read(int width, int height) const {
   texture.colors = channelsOf(image, texture.channels);
   requireUnitRange(color_path_, texture.colors, texture.channels, width);
   if (color_space_ == ColorSpace::srgb || (color_space_ == ColorSpace::automatic && !image.floating))
-    for (float& value : texture.colors) value = linearOfSrgb(value);
+    for (float& value : texture.colors) value = linearFromSrgb(value);
   bool grey = true;
   for (std::size_t k = 0; grey && texture.channels == 3 && k < texture.colors.size(); k += 3)
     grey = texture.colors[k] == texture.colors[k + 1] && texture.colors[k] == texture.colors[k + 2];

@@ -95,8 +95,7 @@ void warnAbout(Tool& tool, const bake::DisplacementData& data) {
     if (level.distant_share > kDistant)
       warn(
           fmt::format("{:.1f} % of the reflected light hops farther than a cell; it is kept in the mean but not in its place. "
-                      "Take a larger "
-                      "factor, or let the renderer trace it on a finer level",
+                      "Take a larger factor, or let the renderer trace it on a finer level",
                       100 * level.distant_share));
     if (const double error = meanFitError(data.levels[l]); error > kFitError)
       warn(fmt::format("lobes miss the distributions of normals by {:.0f} % on average; take more lobes or a smaller factor",

@@ -5,40 +5,36 @@
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <numbers>
+
+#include "glint/bake/ingest.h"
 
 namespace glint::apps {
 namespace {
 
 using nlohmann::ordered_json;
 
+void addSlopes(const MapSlopes& slopes, ordered_json& properties) {
+  properties["mean_slope"] = {slopes.mean.x, slopes.mean.y};
+  properties["slope_covariance_xx"] = slopes.covariance.xx;
+  properties["slope_covariance_xy"] = slopes.covariance.xy;
+  properties["slope_covariance_yy"] = slopes.covariance.yy;
+}
+
 ordered_json summarizeNormals(const NormalMap& map) {
-  double tilt = 0;
-  double steepest = 0;
   Vec2 low{1, 1};
   Vec2 high{-1, -1};
-  double sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
   for (const Vec2 n : map.normals) {
-    const double nz = std::sqrt(std::max(1e-12, 1.0 - dot(n, n)));
-    const double theta = std::acos(nz) * 180 / std::numbers::pi;
-    tilt += theta;
-    steepest = std::max(steepest, theta);
     low = {std::min(low.x, n.x), std::min(low.y, n.y)};
     high = {std::max(high.x, n.x), std::max(high.y, n.y)};
-    const double x = -n.x / nz;
-    const double y = -n.y / nz;
-    sx += x, sy += y, sxx += x * x, sxy += x * y, syy += y * y;
   }
-  const auto count = static_cast<double>(map.normals.size());
-  return {{"mean_tilt_deg", tilt / count},
-          {"max_tilt_deg", steepest},
-          {"normal_range_x", {low.x, high.x}},
-          {"normal_range_y", {low.y, high.y}},
-          {"mean_slope", {sx / count, sy / count}},
-          {"slope_covariance_xx", sxx / count - sx / count * sx / count},
-          {"slope_covariance_xy", sxy / count - sx / count * sy / count},
-          {"slope_covariance_yy", syy / count - sy / count * sy / count},
-          {"bounds_levels", map.bounds_level_count}};
+  const bake::IngestReport report = bake::describeNormals(map.width, map.height, map.normals);
+  ordered_json properties = {{"mean_tilt_deg", report.mean_tilt_deg},
+                             {"max_tilt_deg", report.steepest_tilt_deg},
+                             {"normal_range_x", {low.x, high.x}},
+                             {"normal_range_y", {low.y, high.y}}};
+  addSlopes(report.slopes, properties);
+  properties["bounds_levels"] = map.bounds_level_count;
+  return properties;
 }
 
 ordered_json summarizeHeights(const HeightMap& map) {
@@ -52,13 +48,6 @@ ordered_json summarizeHeights(const HeightMap& map) {
           {"max_texels", *high},
           {"mean_texels", mean},
           {"deviation_texels", std::sqrt(std::max(0.0, squares / count - mean * mean))}};
-}
-
-void addSlopes(const MapSlopes& slopes, ordered_json& properties) {
-  properties["mean_slope"] = {slopes.mean.x, slopes.mean.y};
-  properties["slope_covariance_xx"] = slopes.covariance.xx;
-  properties["slope_covariance_xy"] = slopes.covariance.xy;
-  properties["slope_covariance_yy"] = slopes.covariance.yy;
 }
 
 ordered_json shapeProperties(const PyramidShape& shape) {
@@ -242,6 +231,7 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
     properties = {{"width", map.width},         {"height", map.height},       {"alpha", map.alpha},
                   {"alpha_min", map.alpha_min}, {"alpha_max", map.alpha_max}, {"bins_per_axis", map.bins_per_axis},
                   {"leaf_size", map.leaf_size}};
+    addSlopes(map.slopes, properties);
     statistics = summarizeBinMap(map);
   } else if (asset.kind() == "histogram-sat") {
     const HistogramSat& sat = asset.histograms();

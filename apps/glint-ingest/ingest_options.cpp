@@ -68,6 +68,7 @@ bake::PixelArray pixelArray(const Image& image) {
 }
 
 nlohmann::json reportJson(const bake::IngestReport& r) {
+  const Covariance& slopes = r.slopes.covariance;
   return {{"encoding", encodingName(r.encoding)},
           {"dequantized", r.dequantized},
           {"texels", r.texels},
@@ -79,19 +80,19 @@ nlohmann::json reportJson(const bake::IngestReport& r) {
           {"mean_normal", {r.mean_normal.x, r.mean_normal.y}},
           {"mean_tilt_deg", r.mean_tilt_deg},
           {"steepest_tilt_deg", r.steepest_tilt_deg},
-          {"slope_covariance", {{"xx", r.slope_covariance[0]}, {"xy", r.slope_covariance[1]}, {"yy", r.slope_covariance[2]}}}};
+          {"slope_covariance", {{"xx", slopes.xx}, {"xy", slopes.xy}, {"yy", slopes.yy}}}};
 }
 
 std::string reportText(const std::string& name, const Image& image, const bake::IngestReport& r) {
+  const Covariance& slopes = r.slopes.covariance;
   return fmt::format(
       "{}: {} x {}, {} channels of {} bits ({}), {}{}\n"
       "  mean normal ({:.5f}, {:.5f}), mean tilt {:.3f} degrees, steepest {:.3f}\n"
       "  slope covariance xx {:.6g} xy {:.6g} yy {:.6g}\n"
       "  {} not finite, {} downward, {} clipped, {} not of unit length, {} repaired\n",
       name, image.width, image.height, image.channels, image.bits, image.format, encodingName(r.encoding),
-      r.dequantized ? ", dequantized" : "", r.mean_normal.x, r.mean_normal.y, r.mean_tilt_deg, r.steepest_tilt_deg,
-      r.slope_covariance[0], r.slope_covariance[1], r.slope_covariance[2], r.non_finite, r.downward, r.clipped, r.non_unit,
-      r.repaired);
+      r.dequantized ? ", dequantized" : "", r.mean_normal.x, r.mean_normal.y, r.mean_tilt_deg, r.steepest_tilt_deg, slopes.xx,
+      slopes.xy, slopes.yy, r.non_finite, r.downward, r.clipped, r.non_unit, r.repaired);
 }
 
 void warnAbout(Tool& tool, const std::string& name, const bake::IngestReport& r) {

@@ -71,7 +71,7 @@ void DisplacementQuery::reflect(const DisplacedBrdf& brdf, const DisplacedPoint&
   const Vec3 wi = directionOf(wi_, "--wi");
   const std::vector<float> value = channelsOf(brdf, brdf.reflected(at.levels, at.uv, wi, wo, variant_));
   nlohmann::json result = {{"reflected", value},
-                           {"pdf", brdf.pdf(at.levels.first, at.uv, wi, wo)},
+                           {"pdf", brdf.pdf(at.levels, at.uv, wi, wo)},
                            {"levels", {at.levels.first, at.levels.second}},
                            {"level_weight", at.levels.weight}};
   std::string text;
@@ -98,14 +98,10 @@ void DisplacementQuery::density(const DisplacedBrdf& brdf, const DisplacedPoint&
 }
 
 std::string DisplacementQuery::samples(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int count) const {
-  if (at.levels.weight > 0)
-    throw Error(ErrorCode::usage, "query.level", "", "--sigma",
-                "the footprint lies between two levels, which are sampled one at a time",
-                fmt::format("add --level {} or --level {} instead", at.levels.first, at.levels.second));
   std::string text = "wix,wiy,wiz,pdf\n";
   for (int k = 0; k < count; ++k) {
     const DirectionSample s =
-        brdf.sample(at.levels.first, at.uv, wo, bake::randomPair(tool_.seed(), 0, static_cast<std::uint64_t>(k)));
+        brdf.sample(at.levels, at.uv, wo, bake::randomPair(tool_.seed(), 0, static_cast<std::uint64_t>(k)));
     text += fmt::format("{:.9g},{:.9g},{:.9g},{:.9g}\n", s.direction.x, s.direction.y, s.direction.z, s.pdf);
   }
   return text;

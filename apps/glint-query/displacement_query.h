@@ -36,11 +36,10 @@ class DisplacementQuery {
   void density(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec2 half, int repeats) const;
 
   /// Light directions drawn for a view, as a table with the columns wix, wiy, wiz and pdf.
-  /// @throws Error usage if the footprint lies between two levels
   std::string samples(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int count) const;
 
-  /// A table with the columns u, v; sigma or level; wix, wiy, wiz, wox, woy, woz (answered by reflected, or reflected_r, _g, _b) or
-  /// hx, hy (answered by density). @throws Error invalid_input that names the row and the column
+  /// A table with the columns u, v; sigma or level; wix, wiy, wiz, wox, woy, woz (answered by reflected, or reflected_r, _g,
+  /// _b) or hx, hy (answered by density). @throws Error invalid_input that names the row and the column
   std::string table(const DisplacedBrdf& brdf, const std::string& path) const;
 
  private:
@@ -51,8 +50,8 @@ class DisplacementQuery {
   Option *wi_option_, *level_option_, *variant_option_;
 };
 
-/// Densities of the lobes' normals at the pixels of [-1, 1]^2, [size][size], bottom row first. Lobes narrower than a pixel are widened
-/// to it.
+/// Densities of the lobes' normals at the pixels of [-1, 1]^2, [size][size], bottom row first. Lobes narrower than a pixel are
+/// widened to it.
 std::vector<float> lobeImage(const DisplacedBrdf& brdf, const DisplacedPoint& at, int size);
 
 /// A direction of any length above 0 as a unit vector.

@@ -9,7 +9,6 @@
 
 #include "common/files.h"
 #include "glint/bake/sh_lobes.h"
-#include "glint/bake/slopes.h"
 #include "glint/formats/asset_reader.h"
 
 namespace glint::apps {
@@ -106,9 +105,7 @@ Rgb LightQuery::transfer(const NdfAsset& asset, float sigma_r, Vec3 wo) const {
   if (ior_ > 0) fresnel = Fresnel::dielectric(ior_);
   if (!eta_.empty()) fresnel = Fresnel::conductor({eta_[0], eta_[1], eta_[2]}, {k_[0], k_[1], k_[2]});
   if (!smith_) return transferFactor(1, shadowing_, wo.z) * (given * fresnel.reflectance(wo.z));
-  const formats::Asset& map = asset.asset();
-  const MapSlopes slopes = map.kind() == "histogram-sat" ? map.histograms().slopes : bake::mapSlopes(map.normals());
-  return given * transferFactor(fresnel, SmithMasking(slopes, sigma_r), wo);
+  return given * transferFactor(fresnel, SmithMasking(asset.slopes(), sigma_r), wo);
 }
 
 void LightQuery::report(const ShLightIntegral& integral, Rgb transfer) {

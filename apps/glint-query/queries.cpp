@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 
 #include "glint/bake/counter_random.h"
 
@@ -28,8 +27,7 @@ std::vector<float> answerAll(const AnyNdf& model, std::span<const Query> queries
 std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int resolution, const bake::ProgressFn& progress) {
   std::vector<float> image(static_cast<std::size_t>(resolution) * resolution);
   const float pixel = 2.0f / static_cast<float>(resolution);
-  std::mutex mutex;
-  std::size_t done = 0;
+  bake::ProgressCounter counter(progress, static_cast<std::size_t>(resolution));
   tbb::parallel_for(0, resolution, [&](int y) {
     for (int x = 0; x < resolution; ++x) {
       const Vec2 low = {-1 + static_cast<float>(x) * pixel, -1 + static_cast<float>(y) * pixel};
@@ -39,8 +37,7 @@ std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int
           },
           model);
     }
-    const std::scoped_lock lock(mutex);
-    if (progress) progress(++done, resolution);
+    counter.advance();
   });
   return image;
 }

@@ -49,8 +49,8 @@ double medianNanoseconds(int repeats, const Ask& ask) {
 /// Pixel means of the density over [-1, 1]^2, [resolution][resolution], bottom row first.
 std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int resolution, const bake::ProgressFn& progress);
 
-/// A table of queries: the header names columns u, v; sigma or sxx, sxy, syy or ax, ay, bx, by; hx, hy or x0, y0, x1, y1. Further
-/// columns are kept.
+/// A table of queries: the header names columns u, v; sigma or sxx, sxy, syy or ax, ay, bx, by; hx, hy or x0, y0, x1, y1.
+/// Further columns are kept.
 class QueryTable {
  public:
   /// @throws Error io; invalid_input that names the line and the column
@@ -68,8 +68,8 @@ class QueryTable {
   std::vector<Query> queries_;
 };
 
-/// Half vectors drawn from the distribution inside a footprint, from stratified random numbers: the unit square is split in `count`
-/// cells of equal area, each with one number that depends only on the seed and the cell.
+/// Half vectors drawn from the distribution inside a footprint, from stratified random numbers: the unit square is split in
+/// `count` cells of equal area, each with one number that depends only on the seed and the cell.
 std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& footprint, int count, std::uint64_t seed);
 
 /// Samples as a CSV table with the columns hx, hy and pdf.

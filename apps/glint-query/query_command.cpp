@@ -33,7 +33,9 @@ QueryCommand::QueryCommand(Tool& tool) : tool_(tool), light_(tool), displacement
   csv_option_ = &tool.option("--csv", csv_,
                              "answer a table of queries; its header names u,v; sigma or sxx,sxy,syy or ax,ay,bx,by; "
                              "hx,hy or x0,y0,x1,y1");
-  tool.option("--samples", samples_, "draw half vectors in proportion to the density: a table of hx,hy,pdf")
+  tool.option("--samples", samples_,
+              "draw half vectors in proportion to the density: a table of hx,hy,pdf; of a displacement directions of light: "
+              "wix,wiy,wiz,pdf")
       .range(1, 100000000);
   output_option_ = &tool.option("-o,--output", output_, "where the table of --csv or --samples goes; - for stdout");
   tool.option("--repeat", repeat_, "time the query: nanoseconds, median of 15 runs of N / 15").range(1, 1000000000);

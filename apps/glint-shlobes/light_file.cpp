@@ -1,6 +1,6 @@
 #include "glint-shlobes/light_file.h"
 
-#include <cmath>
+#include <algorithm>
 #include <filesystem>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
@@ -13,30 +13,18 @@ namespace {
 
 using nlohmann::json;
 
-float linearFromSrgb(float code) { return code <= 0.04045f ? code / 12.92f : std::pow((code + 0.055f) / 1.055f, 2.4f); }
-
-/// RGB of an image; grey images have the same in all three.
+/// Linear RGB of an image, of which integers are sRGB; grey images have the same in all three.
 std::vector<float> linearRgb(const Image& image, const std::string& path) {
   if (image.channels == 2)
     throw Error(ErrorCode::invalid_input, "light.channels", path, "", "has 2 channels",
                 "give an image of 1, 3 or more channels");
-  const std::size_t pixels = static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
-  std::vector<float> rgb(3 * pixels);
-  const auto channels = static_cast<std::size_t>(image.channels);
-  std::visit(
-      [&](const auto& codes) {
-        using Code = typename std::decay_t<decltype(codes)>::value_type;
-        for (std::size_t p = 0; p < pixels; ++p) {
-          for (std::size_t c = 0; c < 3; ++c) {
-            const Code code = codes[p * channels + (channels == 1 ? 0 : c)];
-            if constexpr (std::is_floating_point_v<Code>)
-              rgb[3 * p + c] = code;
-            else
-              rgb[3 * p + c] = linearFromSrgb(static_cast<float>(code) / static_cast<float>(std::numeric_limits<Code>::max()));
-          }
-        }
-      },
-      image.pixels);
+  const bool grey = image.channels == 1;
+  std::vector<float> values = channelsOf(image, grey ? 1 : 3);
+  if (!image.floating)
+    for (float& value : values) value = linearFromSrgb(value);
+  if (!grey) return values;
+  std::vector<float> rgb;
+  for (const float value : values) rgb.insert(rgb.end(), 3, value);
   return rgb;
 }
 

@@ -29,8 +29,7 @@ ShLobesCommand::ShLobesCommand(Tool& tool) {
   sigma_option_ = &tool.option("--sigma-r", sigma_r_, "lobes: intrinsic roughness, disk units").range(1e-6, 1);
   tool.option("--light", light_,
               "instead of lobes: light, as a 2:1 latitude-longitude image (.exr, .hdr; z up, first column at +x towards +y), "
-              "or area "
-              "lights (.json)")
+              "or area lights (.json)")
       .excludes(*sigma_option_)
       .defaultText("none");
   tool.option("--order", order_, "highest band of the spherical harmonics").range(0, kMaxShOrder);

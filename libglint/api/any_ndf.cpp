@@ -4,6 +4,7 @@
 #include <string>
 
 #include "glint/formats/hash.h"
+#include "glint/query/slope_sums.h"
 
 namespace glint::api {
 namespace {
@@ -78,10 +79,25 @@ OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& o
   } else {
     throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",
                 "is of kind " + std::string(asset.kind()) + ", which holds no distribution of normals",
-                "pass an asset of kind normals, ndf-pyramid, ndf-cp, bin-map or histogram-sat");
+                asset.kind() == "displacement"
+                    ? "ask for the light that it reflects, with DisplacedBrdf or glint_displaced_open"
+                    : "pass an asset of kind normals, ndf-pyramid, ndf-cp, bin-map or histogram-sat");
   }
   if (opened.normals_) requireSameMap(asset, path, opened.info_, opened.normals_->normals(), options.normals);
   return opened;
+}
+
+MapSlopes OpenedNdf::slopes() const {
+  if (const auto* pyramid = std::get_if<PyramidNdf>(&model_)) return pyramid->shape().slopes;
+  if (const auto* compressed = std::get_if<CpNdf>(&model_)) return compressed->shape().slopes;
+  if (const auto* bins = std::get_if<BinMapNdf>(&model_)) return bins->map().slopes;
+  if (const auto* histograms = std::get_if<HistogramNdf>(&model_)) return histograms->sat().slopes;
+  const NormalMap& map = asset_.normals();
+  const auto width = static_cast<std::size_t>(map.width);
+  SlopeSums sums;
+  for (std::size_t j = 0; j < static_cast<std::size_t>(map.height); ++j)
+    sums.add(slopeSums(map.normals.data() + j * width, width));
+  return sums.moments(static_cast<double>(map.width) * map.height);
 }
 
 }  // namespace glint::api

@@ -44,8 +44,8 @@ struct NdfInfo {
 class OpenedNdf {
  public:
   /// Opens an asset of a kind that answers an NDF.
-  /// @throws Error  as formats::Asset::open; unsupported for other kinds; invalid_input if `options.normals` is not the map that
-  ///                the asset was made from
+  /// @throws Error  as formats::Asset::open; unsupported for other kinds; invalid_input if `options.normals` is not the map
+  ///                that the asset was made from
   static OpenedNdf open(const std::filesystem::path& path, const NdfOptions& options = {});
 
   /// Points into the mapped asset: lives as long as this object, also when that is moved.
@@ -56,6 +56,8 @@ class OpenedNdf {
   bool hasNormals() const { return normals_.has_value(); }
   /// The map that answers them; nullptr if there is none.
   const NormalMap* normals() const { return normals_ ? &normals_->normals() : nullptr; }
+  /// Moments of the map's slopes, for SmithMasking. Kind normals: sums over all texels; other kinds hold them.
+  MapSlopes slopes() const;
 
  private:
   explicit OpenedNdf(formats::Asset asset) : asset_(std::move(asset)) {}

@@ -1,17 +1,20 @@
 /*
- * glint, the C interface: ask a precomputed asset how the normals inside a footprint are distributed.
+ * glint, the C interface: ask a precomputed asset how the normals inside a footprint are distributed, and how they reflect
+ * light.
  *
  * Conventions
  *  - uv: texture space, periodic; any finite uv is valid. v points up.
  *  - Half vectors are points (x, y) of the unit disk in the tangent frame, z = sqrt(1 - x^2 - y^2).
  *  - Densities are per unit projected area, >= 0: the microfacet D whose integral against the cosine is 1.
  *  - Sizes are in texels of the normal map.
+ *  - Directions are unit vectors (x, y, z) of the tangent frame (dp/du, dp/dv, n), z out of the surface, both away from it:
+ *    radiance comes along wi and leaves along wo. Colours are linear red, green and blue.
  *
  * Errors: every function that can fail returns a glint_status and leaves its outputs untouched unless it is GLINT_OK.
  * glint_error_message() then says what, where, and what to do. Queries fail for null arguments only: numbers that are not
  * finite or out of range have defined answers, given with each function. No C++ exception leaves the library.
  *
- * Threads: a glint_ndf is immutable; any number of threads may ask it at once. Opening is thread-safe (one file at a time) and
+ * Threads: handles are immutable; any number of threads may ask one at once. Opening is thread-safe (one file at a time) and
  * uses HDF5 while it lasts: a program with HDF5 code of its own on other threads must keep it apart from that. Queries do not
  * use HDF5, and allocate nothing.
  *
@@ -45,7 +48,7 @@ enum {
   GLINT_ERROR_IO = 2,            /* a file cannot be opened or read */
   GLINT_ERROR_INVALID_INPUT = 3, /* a file was read, but what it holds breaks a rule of the format */
   GLINT_ERROR_FAILED = 4,        /* out of memory, or another failure of the work itself */
-  GLINT_ERROR_UNSUPPORTED = 5    /* a newer version of the format, or a kind that holds no distribution */
+  GLINT_ERROR_UNSUPPORTED = 5    /* a newer version of the format, or a kind that does not hold what is asked for */
 };
 
 /* GLINT_ABI_VERSION of the library that is loaded. Compare with the macro where the library is loaded by hand. */
@@ -67,8 +70,8 @@ typedef struct glint_ndf glint_ndf;
 enum { GLINT_SURFACE_FLAT = 0, GLINT_SURFACE_SMOOTH = 1 };
 enum { GLINT_BOUNDARY_WRAP = 0, GLINT_BOUNDARY_CLAMP = 1 };
 
-/* What an asset does not say itself. Zero is the default of every member but the first. Members are added at the end; a library
- * that does not know one accepts 0 there. */
+/* What an asset does not say itself. Zero is the default of every member but the first; options of other kinds are ignored, but
+ * have to be in range. Members are added at the end; a library that does not know one accepts 0 there. */
 typedef struct glint_open_options {
   size_t struct_size;       /* sizeof(glint_open_options) */
   const char* normals_path; /* asset of kind normals that the pyramid was made from: it answers footprints below level 0,
@@ -78,10 +81,16 @@ typedef struct glint_open_options {
   int32_t boundary;         /* kind normals: GLINT_BOUNDARY_* */
   int32_t verify_hashes;    /* not 0: compare every dataset with its hash; reads the whole file */
   float alpha;              /* kind bin-map: Beckmann roughness, in the range that the asset was made for; 0: the smallest */
+  float slant_tolerance;    /* kind histogram-sat: share of a footprint with slanted sides that may be counted in a wrong
+                               place, up to 1; 0: 0.06; GLINT_SLANT_EXACT: none, and slower */
+  int32_t gaussian_boxes;   /* kind histogram-sat: boxes that stand for a Gaussian footprint, 1 or 3; 0: 1 */
+  int32_t reserved;         /* 0 */
 } glint_open_options;
 
+#define GLINT_SLANT_EXACT (-1.0f)
+
 /* clang-format off */
-#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f }
+#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f, 0.0f, 0, 0 }
 /* clang-format on */
 
 /* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat.
@@ -89,7 +98,8 @@ typedef struct glint_open_options {
  * The file is checked, then mapped; what queries read is not copied. Safe on untrusted files. A file must not be changed in
  * place while it is open (the tools never do: they replace files).
  * path: UTF-8, not null. options: null for the defaults. ndf: receives the handle, not null.
- * Returns GLINT_ERROR_USAGE for null path or ndf, or options out of range; IO, INVALID_INPUT and UNSUPPORTED as listed above. */
+ * Returns GLINT_ERROR_USAGE for null path or ndf, or options out of range; IO, INVALID_INPUT and UNSUPPORTED as listed
+ * above. */
 GLINT_API glint_status glint_ndf_open(const char* path, const glint_open_options* options, glint_ndf** ndf);
 
 /* Closes a handle; null is ignored. No thread may be asking it. */
@@ -137,7 +147,8 @@ GLINT_API glint_status glint_density(const glint_ndf* ndf, const glint_footprint
 
 /* Mean density over the box [x0, x1] x [y0, y1] of half vectors, as a light or a pixel of an NDF image asks for it.
  *
- * Counts 0 outside the square [-1, 1]^2; 0 for a box that is empty or not finite. Footprints and status as for glint_density. */
+ * Counts 0 outside the square [-1, 1]^2; 0 for a box that is empty or not finite. Footprints and status as for
+ * glint_density. */
 GLINT_API glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, float x0, float y0, float x1,
                                   float y1, float* mean);
 
@@ -145,8 +156,9 @@ GLINT_API glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* f
  *
  * (xi1, xi2): random numbers in [0, 1), stratified ones stay stratified; others are clamped, NaN counts as 0.
  * (hx, hy): the half vector. It may lie outside the unit disk, where facets near the horizon blur to: no direction.
- * pdf: its density per unit projected area, the density over its integral; 0 if nothing can be drawn, and hx = hy = 0 then. Multiply by the
- * half vector's z for a density per unit solid angle of half vectors. Footprints and status as for glint_density. */
+ * pdf: its density per unit projected area, the density over its integral; 0 if nothing can be drawn, and hx = hy = 0 then.
+ * Multiply by the half vector's z for a density per unit solid angle of half vectors. Footprints and status as for
+ * glint_density. */
 GLINT_API glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint, float xi1, float xi2, float* hx,
                                     float* hy, float* pdf);
 
@@ -180,6 +192,168 @@ GLINT_API glint_status glint_mean_batch(const glint_ndf* ndf, size_t count, cons
 /* (hx[k], hy[k]) and pdfs[k] = glint_sample of query k; the three arrays are contiguous. Else as glint_density_batch. */
 GLINT_API glint_status glint_sample_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints,
                                           glint_floats xi1, glint_floats xi2, float* hx, float* hy, float* pdfs);
+
+/* A microfacet BRDF over a texture: a distribution of normals, what its facets are made of, and how its slopes mask each
+ * other (Deng 2022, sections 5.1 and 5.2; masking: Heitz 2014, Eq. 99; Beckmann facets: Atanasov 2021, Eq. 5, 11 and 15). */
+typedef struct glint_brdf glint_brdf;
+
+enum {
+  GLINT_FRESNEL_MIRROR = 0,     /* everything is reflected: for furnace tests, or where reflectance is applied elsewhere */
+  GLINT_FRESNEL_DIELECTRIC = 1, /* reflection only; what is refracted is lost */
+  GLINT_FRESNEL_CONDUCTOR = 2
+};
+enum {
+  GLINT_FACETS_OF_DISTRIBUTION = 0, /* f = D F G2 / (4 wi.z wo.z), D the density of the distribution */
+  GLINT_FACETS_BECKMANN = 1         /* kind bin-map: texels are facets of Beckmann microfacets, with masking of their own: for
+                                       rough or steep maps */
+};
+
+/* What facets are made of. Zero is the default of every member but the first. Members are added at the end, as to
+ * glint_open_options. */
+typedef struct glint_brdf_options {
+  size_t struct_size; /* sizeof(glint_brdf_options) */
+  int32_t fresnel;    /* GLINT_FRESNEL_* */
+  int32_t facets;     /* GLINT_FACETS_* */
+  float eta[3];       /* refractive index of each channel over that of the outside. Conductor: 0 to 1e3. Dielectric: the first
+                         counts, 1e-3 to 1e3 */
+  float k[3];         /* conductor: extinction of each channel, 0 to 1e3 */
+} glint_brdf_options;
+
+/* clang-format off */
+#define GLINT_BRDF_OPTIONS_INIT { sizeof(glint_brdf_options), 0, 0, { 0.0f, 0.0f, 0.0f }, { 0.0f, 0.0f, 0.0f } }
+/* clang-format on */
+
+/* Makes a BRDF of a distribution, which must stay open for as long as the BRDF is used. It is masked by the slopes of the whole
+ * map (Smith, heights correlated), which every kind holds but normals: for those this reads all texels once.
+ *
+ * options: null for the defaults. brdf: receives the handle, not null.
+ * Returns GLINT_ERROR_USAGE for null ndf or brdf, or options out of range; UNSUPPORTED for GLINT_FACETS_BECKMANN of another
+ * kind than bin-map. */
+GLINT_API glint_status glint_brdf_create(const glint_ndf* ndf, const glint_brdf_options* options, glint_brdf** brdf);
+
+/* Destroys a handle, not the distribution; null is ignored. No thread may be asking it. */
+GLINT_API void glint_brdf_destroy(glint_brdf* brdf);
+
+/* The BRDF inside a footprint and the density of its samples.
+ *
+ * f: red, green and blue, 1/sr, each >= 0, without the cosine wi.z. pdf: density with which glint_brdf_sample draws wi for this
+ * wo, per unit solid angle. Either may be null; together they cost one density.
+ * 0 for directions below the horizon or within 1e-6 of it, longer than a unit vector, or not finite. Reciprocal but for
+ * rounding. With all facets white, f wi.z integrates to at most 1 so far as the slopes of the map are normally distributed;
+ * single footprints that lean towards wo may exceed that. Footprints: as for glint_density.
+ * Returns GLINT_ERROR_USAGE for null arguments (f and pdf: both), else GLINT_OK. */
+GLINT_API glint_status glint_brdf_evaluate(const glint_brdf* brdf, const glint_footprint* footprint, const float wi[3],
+                                           const float wo[3], float f[3], float* pdf);
+
+/* Draws wi for a view wo.
+ *
+ * (xi1, xi2): as for glint_sample. weight: f wi.z / pdf of each channel, bounded. pdf: per unit solid angle; where it is 0
+ * nothing was drawn, and wi and weight are 0: half vectors outside the disk, and facets that reflect below the horizon. No
+ * argument may be null. Else as for glint_brdf_evaluate. */
+GLINT_API glint_status glint_brdf_sample(const glint_brdf* brdf, const glint_footprint* footprint, const float wo[3], float xi1,
+                                         float xi2, float wi[3], float weight[3], float* pdf);
+
+/* Directions of a batch; all three must be given. An array of structs of three floats has them at strides of that struct. */
+typedef struct glint_directions {
+  glint_floats x, y, z;
+} glint_directions;
+
+/* f[3 k] to f[3 k + 2] and pdfs[k] = glint_brdf_evaluate of query k, k < count, to 1e-6 of their size; f or pdfs may be null.
+ * Else as for glint_density_batch. */
+GLINT_API glint_status glint_brdf_evaluate_batch(const glint_brdf* brdf, size_t count, const glint_footprints* footprints,
+                                                 const glint_directions* wi, const glint_directions* wo, float* f, float* pdfs);
+
+/* wi[3 k] to wi[3 k + 2], weights[3 k] to weights[3 k + 2] and pdfs[k] = glint_brdf_sample of query k. Else as for
+ * glint_density_batch. */
+GLINT_API glint_status glint_brdf_sample_batch(const glint_brdf* brdf, size_t count, const glint_footprints* footprints,
+                                               const glint_directions* wo, glint_floats xi1, glint_floats xi2, float* wi,
+                                               float* weights, float* pdfs);
+
+/* A displacement map at several levels of detail, each a coarse surface and the light that it reflects, shadowing and
+ * interreflections of all that is finer included (Wu 2019, Eq. 11 and 18). */
+typedef struct glint_displaced glint_displaced;
+
+enum { GLINT_DISPLACED_MAX_LEVELS = 8 };
+enum { GLINT_BASE_DIFFUSE = 0, GLINT_BASE_GGX = 1 };
+enum {
+  GLINT_DISPLACED_FULL = 0,
+  GLINT_DISPLACED_LOBES = 1, /* the lobes of normals alone: no shadowing, no interreflections */
+  GLINT_DISPLACED_SINGLE = 2 /* one Beckmann lobe with Smith's shadowing */
+};
+
+/* Opens an asset of kind displacement; as glint_ndf_open. verify_hashes: not 0: compare every dataset with its hash. */
+GLINT_API glint_status glint_displaced_open(const char* path, int32_t verify_hashes, glint_displaced** displaced);
+
+/* Closes a handle; null is ignored. No thread may be asking it. */
+GLINT_API void glint_displaced_close(glint_displaced* displaced);
+
+/* What a handle is. Members are added at the end; the library fills those that fit into struct_size. */
+typedef struct glint_displaced_info {
+  size_t struct_size;  /* set by the caller: sizeof(glint_displaced_info) */
+  int32_t width;       /* of the original map, texels */
+  int32_t height;      /* of the original map, texels */
+  int32_t level_count; /* 1 to GLINT_DISPLACED_MAX_LEVELS */
+  int32_t channels;    /* 3, or 1: red, green and blue are the same */
+  int32_t base;        /* GLINT_BASE_*: what the original surface is made of */
+  float texel_size_um; /* of the original; 0: unknown */
+  uint64_t file_bytes; /* size of the asset */
+  /* Texels of the original along a side of a cell of each level, increasing; 0 beyond level_count. */
+  int32_t factors[GLINT_DISPLACED_MAX_LEVELS];
+} glint_displaced_info;
+
+/* Fills info. Returns GLINT_ERROR_USAGE for null arguments or a struct_size that does not reach beyond itself. */
+GLINT_API glint_status glint_displaced_get_info(const glint_displaced* displaced, glint_displaced_info* info);
+
+/* The coarse surface of one level, on which its reflectance is asked: heights in texels of the original, [rows][columns],
+ * bottom row first, periodic. Vertex (i, j) lies over the centre of texel (i factor, j factor); the cell above and to the right
+ * of it is two triangles that meet along the diagonal from vertex (i + 1, j) to (i, j + 1).
+ *
+ * heights: receives a pointer into the file, which lives as long as the handle. Returns GLINT_ERROR_USAGE for null arguments or
+ * a level that is not there. */
+GLINT_API glint_status glint_displaced_heights(const glint_displaced* displaced, int32_t level, const float** heights,
+                                               int32_t* columns, int32_t* rows);
+
+/* Level of detail for an isotropic Gaussian footprint of deviation sigma, texels of the original: 1.25 is three parts of level
+ * 1 and one of level 2. In [0, level_count - 1]; 0 for NaN. Returns GLINT_ERROR_USAGE for null arguments, else GLINT_OK. */
+GLINT_API glint_status glint_displaced_level(const glint_displaced* displaced, float sigma_texels, float* level);
+
+/* Light reflected from wi to wo at a point of the coarse surface, and the density of its samples.
+ *
+ * variant: GLINT_DISPLACED_*; other values count as FULL. level: clamped, NaN counts as 0; between two levels both are asked,
+ * each with the facet of its own. (u, v): any; what is not finite counts as 0.
+ * reflected: red, green and blue, BRDF times the cosine between wi and the facet, 1/sr, each >= 0: multiply by radiance and
+ * solid angle. It is that of all the relief below the level; whether the coarse surface hides wi or wo is the caller's to say.
+ * pdf: density with which glint_displaced_sample draws wi for this wo, per unit solid angle. Either may be null.
+ * 0 for directions behind the facet or within 1e-6 of its plane, longer than a unit vector, or not finite. BRDFs are reciprocal
+ * but for rounding. Returns GLINT_ERROR_USAGE for null arguments (reflected and pdf: both), else GLINT_OK. */
+GLINT_API glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t variant, float level, float u,
+                                                float v, const float wi[3], const float wo[3], float reflected[3], float* pdf);
+
+/* Draws wi for a view wo, by the lobes of whichever variant.
+ *
+ * (xi1, xi2): as for glint_sample. weight: reflected / pdf of each channel. pdf: per unit solid angle; where it is 0 nothing
+ * was drawn, and wi and weight are 0. Directions behind the facet are drawn, with weight 0. No argument may be null. Else as
+ * for glint_displaced_evaluate. */
+GLINT_API glint_status glint_displaced_sample(const glint_displaced* displaced, int32_t variant, float level, float u, float v,
+                                              const float wo[3], float xi1, float xi2, float wi[3], float weight[3],
+                                              float* pdf);
+
+/* Points of a batch; all three must be given. */
+typedef struct glint_displaced_points {
+  glint_floats level, u, v;
+} glint_displaced_points;
+
+/* reflected[3 k] to reflected[3 k + 2] and pdfs[k] = glint_displaced_evaluate of query k; reflected or pdfs may be null. Else
+ * as for glint_density_batch. */
+GLINT_API glint_status glint_displaced_evaluate_batch(const glint_displaced* displaced, int32_t variant, size_t count,
+                                                      const glint_displaced_points* points, const glint_directions* wi,
+                                                      const glint_directions* wo, float* reflected, float* pdfs);
+
+/* wi[3 k] to wi[3 k + 2], weights[3 k] to weights[3 k + 2] and pdfs[k] = glint_displaced_sample of query k. Else as for
+ * glint_density_batch. */
+GLINT_API glint_status glint_displaced_sample_batch(const glint_displaced* displaced, int32_t variant, size_t count,
+                                                    const glint_displaced_points* points, const glint_directions* wo,
+                                                    glint_floats xi1, glint_floats xi2, float* wi, float* weights, float* pdfs);
 
 #ifdef __cplusplus
 }

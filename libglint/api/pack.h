@@ -8,8 +8,8 @@
 
 namespace glint::api {
 
-/// A model and all that its queries read as one linear buffer, ready to be uploaded: see glint/model/packed_ndf.h for the layout,
-/// and PackedNdfView for asking it. Same bytes for the same model.
+/// A model and all that its queries read as one linear buffer, ready to be uploaded: see glint/model/packed_ndf.h for the
+/// layout, and PackedNdfView for asking it. Same bytes for the same model.
 /// @param normals  map for footprints below level 0; nullptr: left out
 std::vector<std::byte> pack(const NdfPyramid& pyramid, const NormalMap* normals = nullptr);
 std::vector<std::byte> pack(const CompressedNdf& compressed, const NormalMap* normals = nullptr);

@@ -20,7 +20,8 @@ struct BaseTexture {
 /// One number for each channel.
 using Color = std::array<float, 3>;
 
-/// The base of every facet. Colours and roughness are linear between texels as heights are, so a facet has the mean of its corners.
+/// The base of every facet. Colours and roughness are linear between texels as heights are, so a facet has the mean of its
+/// corners.
 class FacetBase {
  public:
   FacetBase(const HeightSurface& surface, const BaseBrdf& base, const BaseTexture& texture)

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -38,27 +37,6 @@ void checkOptions(const CompressionOptions& options) {
           "the least improvement is " + std::to_string(options.min_improvement) + "; it must be at least 0 and below 1");
   require(options.max_iterations >= 1, "compress.max_iterations", "the iterations must be at least 1");
 }
-
-/// Counts units of work of all threads.
-class Progress {
- public:
-  Progress(const ProgressFn& report, std::size_t total) : report_(report), total_(total) {}
-
-  /// More work than was known at first.
-  void grow(std::size_t units) { total_ += units; }
-
-  void advance() {
-    if (!report_) return;
-    const std::lock_guard lock(mutex_);
-    report_(++done_, total_);
-  }
-
- private:
-  const ProgressFn& report_;
-  std::mutex mutex_;
-  std::size_t done_ = 0;
-  std::size_t total_;
-};
 
 /// One run: the steps of compressPyramid() and what they pass on.
 class Compressor {
@@ -194,8 +172,10 @@ class Compressor {
   void meetTolerance() {
     std::vector<ToleranceSearch> searches;
     for (std::size_t g = 0; g < groups_.size(); ++g) {
-      const std::span models = std::span(models_).subspan(g * clustersPerGroup(), clustersPerGroup());
-      searches.emplace_back(models, budget(groups_[g]));
+      std::vector<std::span<const SizeChoice>> clusters;
+      for (const ClusterModel& model : std::span(models_).subspan(g * clustersPerGroup(), clustersPerGroup()))
+        clusters.emplace_back(model.choices());
+      searches.emplace_back(std::move(clusters), budget(groups_[g]));
     }
     const auto encodeChosen = [&] {
       std::vector<int> selection;
@@ -392,7 +372,7 @@ class Compressor {
   const CompressionOptions& options_;
   SliceIndex index_;
   std::vector<LevelGroup> groups_;
-  Progress progress_;
+  ProgressCounter progress_;
   std::vector<ClusterStatistics> statistics_;
   double energy_ = 0;
   std::vector<ClusterModel> models_;

@@ -18,9 +18,9 @@ struct CompressionOptions {
   int rank = 16;
 
   /// If > 0: choose the columns of every cluster, and with i8 the bits of their coefficients (8 or 4; cp: 8), so that the
-  /// relative error of all images together, ||D' - D|| / ||D||, is at most this and the bytes are as few as possible. With tucker
-  /// also that of level 0, of level 1, and of the coarser ones together: else all of it would be left to where a byte takes off
-  /// least, the coarser levels of flakes. Below 1.
+  /// relative error of all images together, ||D' - D|| / ||D||, is at most this and the bytes are as few as possible. With
+  /// tucker also that of level 0, of level 1, and of the coarser ones together: else all of it would be left to where a byte
+  /// takes off least, the coarser levels of flakes. Below 1.
   double tolerance = 0;
 
   /// With a tolerance, tucker and pca, i8: store slices as spots where they cost less.

@@ -14,7 +14,7 @@ namespace {
 constexpr int kSize = kBlockSize;
 
 // Weight of the ridge (third factor) and of the proximal term (first two), relative to the mean diagonal of the normal
-// equations. It bounds nearly parallel columns. Ten times less moves the error on noise by under 0.5 % at ranks 16 to 48.
+// equations. It bounds nearly parallel columns.
 constexpr float kRegularisation = 1e-3f;
 
 // Extrapolation: start, growth after a good sweep, limit, and shrinkage after a sweep that was taken back.

@@ -12,10 +12,10 @@ constexpr int kMostCorrections = 16;
 
 }  // namespace
 
-RankAllocator::RankAllocator(std::span<const ClusterModel> models) : models_(models) {
+RankAllocator::RankAllocator(std::vector<std::span<const SizeChoice>> clusters) : clusters_(std::move(clusters)) {
   double error = 0;
-  for (std::size_t c = 0; c < models.size(); ++c) {
-    const auto& choices = models[c].choices();
+  for (std::size_t c = 0; c < clusters_.size(); ++c) {
+    const auto& choices = clusters_[c];
     error += choices[0].error;
     for (std::size_t i = 1; i < choices.size(); ++i) {
       const double gain = choices[i - 1].error - choices[i].error;
@@ -28,14 +28,14 @@ RankAllocator::RankAllocator(std::span<const ClusterModel> models) : models_(mod
                    [](const Step& a, const Step& b) { return a.gain_per_byte > b.gain_per_byte; });
   errors_.push_back(error);
   for (const Step& step : steps_) {
-    const auto& choices = models[step.cluster].choices();
+    const auto& choices = clusters_[step.cluster];
     error -= choices[step.choice - 1].error - choices[step.choice].error;
     errors_.push_back(error);
   }
 }
 
 std::vector<int> RankAllocator::allocate(double squared_error) const {
-  std::vector<int> selection(models_.size(), 0);
+  std::vector<int> selection(clusters_.size(), 0);
   for (std::size_t i = 0; i < steps_.size() && errors_[i] > squared_error; ++i)
     selection[steps_[i].cluster] = static_cast<int>(steps_[i].choice);
   return selection;
@@ -49,12 +49,12 @@ double RankAllocator::gainPerByte(double squared_error) const {
 
 double RankAllocator::error(std::span<const int> selection) const {
   double sum = 0;
-  for (std::size_t c = 0; c < models_.size(); ++c) sum += models_[c].choices()[selection[c]].error;
+  for (std::size_t c = 0; c < clusters_.size(); ++c) sum += clusters_[c][static_cast<std::size_t>(selection[c])].error;
   return sum;
 }
 
-ToleranceSearch::ToleranceSearch(std::span<const ClusterModel> models, double budget)
-    : allocator_(models), budget_(budget), target_(budget), selection_(allocator_.allocate(budget)) {}
+ToleranceSearch::ToleranceSearch(std::vector<std::span<const SizeChoice>> clusters, double budget)
+    : allocator_(std::move(clusters)), budget_(budget), target_(budget), selection_(allocator_.allocate(budget)) {}
 
 bool ToleranceSearch::next(double measured) {
   if (done_) return false;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -13,8 +14,8 @@ namespace glint::bake {
 /// clusters in the order of their gain per byte is the minimum of bytes + lambda error for every lambda.
 class RankAllocator {
  public:
-  /// @param models  must outlive the allocator
-  explicit RankAllocator(std::span<const ClusterModel> models);
+  /// @param clusters  choices of each, on a convex hull from few bytes to many; must outlive the allocator
+  explicit RankAllocator(std::vector<std::span<const SizeChoice>> clusters);
 
   /// Fewest bytes for at most this error.
   /// @return choice of each cluster; the last of each if even that has a larger error
@@ -39,7 +40,7 @@ class RankAllocator {
     std::uint32_t choice;
   };
 
-  std::span<const ClusterModel> models_;
+  std::vector<std::span<const SizeChoice>> clusters_;
   std::vector<Step> steps_;
   std::vector<double> errors_;  // [steps + 1]: after so many steps
 };
@@ -50,7 +51,7 @@ class RankAllocator {
 class ToleranceSearch {
  public:
   /// @param budget  squared error that must not be exceeded, and is used up as far as single steps allow
-  ToleranceSearch(std::span<const ClusterModel> models, double budget);
+  ToleranceSearch(std::vector<std::span<const SizeChoice>> clusters, double budget);
 
   /// Choices to encode and measure next; those to keep once the search is done.
   const std::vector<int>& selection() const { return selection_; }

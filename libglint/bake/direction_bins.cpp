@@ -141,8 +141,8 @@ GLINT_MULTIVERSION void filterRows(const float* bins, int pitch, int step, const
   }
 }
 
-/// pixels[p][x] += sum over t of taps[t] * rows[p][x * step + t]. Every step-th value of a row is gathered first, so that the sums
-/// run over neighbours.
+/// pixels[p][x] += sum over t of taps[t] * rows[p][x * step + t]. Every step-th value of a row is gathered first, so that the
+/// sums run over neighbours.
 GLINT_MULTIVERSION void filterColumns(const float* rows, int columns, int step, const float* taps, int tap_count,
                                       float* pixels) {
   float phases[kMaxColumns + kBlockSize];

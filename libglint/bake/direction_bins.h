@@ -10,9 +10,9 @@ namespace glint::bake {
 
 /// A grid of bins over the square [-1, 1]^2 of directions, finer than the pixels of an NDF image by an integer factor.
 ///
-/// A facet is added with quadratic B-spline weights, 3x3 bins: these keep its mass and mean, and spread it alike wherever it lies,
-/// which the filter that makes pixels allows for (`PixelFilter`). Bins are kept all zero
-/// between images; only those of touched tiles are ever cleared.
+/// A facet is added with quadratic B-spline weights, 3x3 bins: these keep its mass and mean, and spread it alike wherever it
+/// lies, which the filter that makes pixels allows for (`PixelFilter`). Bins are kept all zero between images; only
+/// those of touched tiles are ever cleared.
 class DirectionBins {
  public:
   /// @param resolution  pixels along each axis of the image
@@ -56,8 +56,8 @@ inline constexpr double kFilterReach = 4;
 /// How facets are added to bins: with the weights of 3 or 4 bins along either axis.
 enum class Spline : std::uint8_t { quadratic, cubic };
 
-/// Blurs bins by the intrinsic roughness and averages over pixels, a separable filter: the one that comes closest to the blur of
-/// the facets themselves, given that they were added with the weights of a B-spline.
+/// Blurs bins by the intrinsic roughness and averages over pixels, a separable filter: the one that comes closest to the blur
+/// of the facets themselves, given that they were added with the weights of a B-spline.
 class PixelFilter {
  public:
   /// @param sigma_pixels  deviation of a facet's lobe, pixels

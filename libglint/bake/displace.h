@@ -45,15 +45,15 @@ class DisplacementData {
   Displacement view() const;
 };
 
-/// Downsamples a displacement map and computes what keeps its appearance (Wu 2019): lobes for each cell, and the scaling functions
-/// T and S that add shadowing, masking and interreflections.
+/// Downsamples a displacement map and computes what keeps its appearance (Wu 2019): lobes for each cell, and the scaling
+/// functions T and S that add shadowing, masking and interreflections.
 ///
-/// Where the base varies, every lobe has the mean colour and roughness of its normals, and each channel its own T and S, so that what
-/// colours and normals have to do with each other is kept (Fig. 14).
+/// Where the base varies, every lobe has the mean colour and roughness of its normals, and each channel its own T and S, so
+/// that what colours and normals have to do with each other is kept (Fig. 14).
 ///
 /// The original surface is the periodic triangulation of the heights (HeightSurface); the map may be flat, then T = S = 1.
-/// @throws Error usage if an option is out of range; invalid_input if heights are not finite, a facet is steeper than 80 degrees, a
-///         factor does not divide the map, or the texture is not of the map's size or out of range
+/// @throws Error usage if an option is out of range; invalid_input if heights are not finite, a facet is steeper than 80
+///         degrees, a factor does not divide the map, or the texture is not of the map's size or out of range
 /// @note memory: about 85 bytes for each texel of the map. The same result for any number of threads
 DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, const ProgressFn& progress = {});
 

@@ -19,10 +19,11 @@ class Spectrum {
  public:
   Spectrum(int columns, int rows) : values_(allocate(static_cast<std::size_t>(columns) * rows)) {
     auto* data = reinterpret_cast<fftw_complex*>(values_.get());
-    // FFTW_ESTIMATE: measuring would choose algorithms, and so roundings, by the clock.
-    const std::lock_guard lock(fftwPlannerMutex());
-    forward_.reset(fftw_plan_dft_2d(rows, columns, data, data, FFTW_FORWARD, FFTW_ESTIMATE));
-    backward_.reset(fftw_plan_dft_2d(rows, columns, data, data, FFTW_BACKWARD, FFTW_ESTIMATE));
+    const auto plan = [&](int sign) {
+      return makeFftwPlan([&](unsigned flags) { return fftw_plan_dft_2d(rows, columns, data, data, sign, flags); });
+    };
+    forward_ = plan(FFTW_FORWARD);
+    backward_ = plan(FFTW_BACKWARD);
   }
   Complex& operator[](std::size_t k) { return values_.get()[k]; }
   void forward() { fftw_execute(forward_.get()); }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <mutex>
 #include <numbers>
 
 #include "glint/bake/counter_random.h"
@@ -13,6 +12,7 @@
 #include "glint/bake/height_tracer.h"
 #include "glint/query/base_brdf.h"
 #include "glint/query/concentric_map.h"
+#include "glint/query/tangents.h"
 
 namespace glint::bake {
 namespace {
@@ -25,16 +25,13 @@ constexpr double kMostCorrection = 1.25;  // of visible areas
 
 constexpr std::uint64_t kFacetStream = 101, kPointStream = 102, kTurnStream = 103;
 
-/// Two unit vectors that make a frame with n (Duff et al. 2017).
+/// The frame of a facet.
 struct Frame {
-  Vec3 s, t, n;
-  explicit Frame(Vec3 normal) : n(normal) {
-    const float a = -1 / (1 + n.z), b = n.x * n.y * a;  // n.z > 0
-    s = {1 + n.x * n.x * a, b, -n.x};
-    t = {b, 1 + n.y * n.y * a, -n.y};
-  }
-  Vec3 toWorld(Vec3 v) const { return v.x * s + v.y * t + v.z * n; }
-  Vec3 toLocal(Vec3 v) const { return {dot(v, s), dot(v, t), dot(v, n)}; }
+  Vec3 n;
+  Tangents tangents;
+  explicit Frame(Vec3 normal) : n(normal), tangents(tangentsOf(normal)) {}
+  Vec3 toWorld(Vec3 v) const { return v.x * tangents.s + v.y * tangents.t + v.z * n; }
+  Vec3 toLocal(Vec3 v) const { return {dot(v, tangents.s), dot(v, tangents.t), dot(v, n)}; }
 };
 
 /// The facets of one patch as a list, of which `samples` are drawn evenly.
@@ -158,7 +155,6 @@ class Estimator {
   void addChunk(const Chunk& chunk, const ChunkSums& sums, double samples, double scale);
   ChunkSums emptySums() const;
   EffectiveBrdf finish(const Shares& shares);
-  void report(std::size_t total);
 
   double& sum(std::size_t channel, std::size_t patch, std::size_t i, std::size_t o) {
     return sums_[((channel * result_.patches + patch) * directions_.count + i) * directions_.count + o];
@@ -175,20 +171,12 @@ class Estimator {
   std::vector<double> sums_;   ///< [channels][patches][directions][directions]
   std::vector<double> areas_;  ///< [directions]: visible projected area of the whole map
   EffectiveBrdf result_;
-  std::mutex mutex_;
-  std::size_t done_ = 0;
 };
 
 std::vector<PatchFacets> Estimator::facets(std::size_t samples) const {
   std::vector<PatchFacets> list;
   for (int p = 0; p < grid_.count(); ++p) list.emplace_back(grid_, p, samples / static_cast<std::size_t>(grid_.count()));
   return list;
-}
-
-void Estimator::report(std::size_t total) {
-  const std::lock_guard lock(mutex_);
-  ++done_;
-  if (progress_) progress_(std::min(done_, total), total);
 }
 
 /// Masked cosines of a facet towards all directions.
@@ -205,8 +193,8 @@ Vec3 Estimator::pointOf(std::size_t facet, std::uint64_t index) const {
   return surface_.point(facet, xi.x, xi.y);
 }
 
-/// Follows light from a facet through diffuse reflections: rows[channel * stride + d], which hold the facet's masked cosines, become
-/// the light that it reflects, in units of the base, from directions d.
+/// Follows light from a facet through diffuse reflections: rows[channel * stride + d], which hold the facet's masked cosines,
+/// become the light that it reflects, in units of the base, from directions d.
 void Estimator::diffuseWalk(std::size_t facet, std::uint64_t index, std::size_t stride, float* rows, float* scratch,
                             Shares& shares) const {
   const std::size_t channels = result_.channels, n = directions_.count;
@@ -279,10 +267,11 @@ EffectiveBrdf Estimator::diffuse() {
   const std::vector<Chunk> chunks = makeChunks(patches);
   std::vector<ChunkSums> sums(chunks.size());
   std::vector<Shares> shares(chunks.size());
+  ProgressCounter counter(progress_, chunks.size());
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
     sums[c] = emptySums();
     diffuseChunk(patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], sums[c], shares[c]);
-    report(chunks.size());
+    counter.advance();
   });
   Shares total;
   for (std::size_t c = 0; c < chunks.size(); ++c) {
@@ -436,12 +425,12 @@ EffectiveBrdf Estimator::glossy() {
     }
   }
   const bool follow = options_.bounces > 1;
-  const std::size_t work = chunks.size() + (follow ? n : 0);
+  ProgressCounter counter(progress_, chunks.size() + (follow ? n : 0));
   std::vector<ChunkSums> sums(chunks.size());
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
     sums[c] = emptySums();
     glossyChunk(patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], half, sums[c]);
-    report(work);
+    counter.advance();
   });
   for (std::size_t c = 0; c < chunks.size(); ++c)
     addChunk(chunks[c], sums[c], static_cast<double>(patches[static_cast<std::size_t>(chunks[c].patch)].samples()),
@@ -454,7 +443,7 @@ EffectiveBrdf Estimator::glossy() {
     std::vector<Shares> shares(n);
     tbb::parallel_for(std::size_t{0}, n, [&](std::size_t view) {
       shares[view] = glossyView(starts, view);
-      report(work);
+      counter.advance();
     });
     for (const Shares& share : shares) total.add(share);
     total.all += total.interreflected;
@@ -462,9 +451,9 @@ EffectiveBrdf Estimator::glossy() {
   return finish(total);
 }
 
-/// Makes the estimates symmetric, since both halves estimate the same function, and their visible areas exact: the projected area
-/// that a periodic surface shows to a direction is its cosine (Wu 2019, Eq. 8), so what the masks show too much or too little of
-/// is known.
+/// Makes the estimates symmetric, since both halves estimate the same function, and their visible areas exact: the projected
+/// area that a periodic surface shows to a direction is its cosine (Wu 2019, Eq. 8), so what the masks show too much or too
+/// little of is known.
 EffectiveBrdf Estimator::finish(const Shares& shares) {
   result_.interreflected = shares.all > 0 ? shares.interreflected / shares.all : 0;
   for (std::size_t k = 0; k < options_.distant_cells.size(); ++k)

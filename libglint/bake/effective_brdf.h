@@ -49,8 +49,8 @@ struct EffectiveOptions {
   BaseTexture texture = {};  ///< how the base varies
 };
 
-/// Effective BRDFs times the visible projected area of the view, for each patch: f_eff(wi, wo) A(wo) of Wu 2019 (Eq. 6, 17, 25),
-/// which is symmetric. On a flat surface it is f(wi, wo) cos(wi) cos(wo).
+/// Effective BRDFs times the visible projected area of the view, for each patch: f_eff(wi, wo) A(wo) of Wu 2019 (Eq. 6, 17,
+/// 25), which is symmetric. On a flat surface it is f(wi, wo) cos(wi) cos(wo).
 struct EffectiveBrdf {
   std::size_t directions = 0;
   std::size_t patches = 0;
@@ -69,16 +69,17 @@ struct EffectiveBrdf {
   std::vector<double> mean(const PatchGrid& grid, std::size_t channel = 0) const;
 };
 
-/// Directions farther from the normal than this are grazing: what is known of them is finite but not reliable, and left out of measures.
+/// Directions farther from the normal than this are grazing: what is known of them is finite but not reliable, and left out of
+/// measures.
 inline constexpr float kGrazingCosine = 0.25881904510252076f;  // 75 degrees
 
 /// Estimates the effective BRDFs of a surface whose facets have the base's reflectance, varied by the texture.
 ///
 /// Single scattering is a sum over facets, each seen through its visibility mask: no noise but that of leaving facets out.
 /// Interreflections come from random walks: a diffuse walk p, q1, q2 ... serves all pairs of directions at once,
-/// F += (G_p / n_z)^T rho_p (G_p + rho_q1 (G_q1 + rho_q2 (G_q2 ...))), G being a facet's masked cosines; glossy walks start from each
-/// view and collect light from all directions at every facet that they visit. Channels share the walks. Results do not depend on the
-/// number of threads.
+/// F += (G_p / n_z)^T rho_p (G_p + rho_q1 (G_q1 + rho_q2 (G_q2 ...))), G being a facet's masked cosines; glossy walks start
+/// from each view and collect light from all directions at every facet that they visit. Channels share the walks. Results do
+/// not depend on the number of threads.
 EffectiveBrdf effectiveBrdf(const HeightSurface& surface, const VisibilityMasks& masks, std::span<const Vec3> directions,
                             const PatchGrid& grid, const EffectiveOptions& options, const ProgressFn& progress = {});
 

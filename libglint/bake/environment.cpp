@@ -1,14 +1,15 @@
 #include "glint/bake/environment.h"
 
-#include <fftw3.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <memory>
+#include <new>
 #include <numbers>
 
+#include "glint/bake/fftw_plan.h"
 #include "glint/bake/gauss_legendre.h"
 #include "glint/model/error.h"
 #include "glint/model/sh.h"
@@ -18,23 +19,16 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-struct FreeFft {
-  void operator()(void* memory) const { fftw_free(memory); }
-};
-struct DestroyPlan {
-  void operator()(fftw_plan plan) const { fftw_destroy_plan(plan); }
-};
-using Plan = std::unique_ptr<std::remove_pointer_t<fftw_plan>, DestroyPlan>;
-
 /// Fourier sums of every row and channel: [3][height][width / 2 + 1], sum over x of radiance exp(-2 pi i k x / width).
 std::vector<std::complex<double>> rowSpectra(const Environment& environment) {
   const auto width = static_cast<std::size_t>(environment.width), bins = width / 2 + 1;
   const auto rows = static_cast<std::size_t>(environment.height);
   std::vector<std::complex<double>> spectra(3 * rows * bins);
-  const std::unique_ptr<double, FreeFft> line(static_cast<double*>(fftw_malloc(sizeof(double) * width)));
-  const std::unique_ptr<fftw_complex, FreeFft> sums(static_cast<fftw_complex*>(fftw_malloc(sizeof(fftw_complex) * bins)));
-  if (!line || !sums) throw Error(ErrorCode::failed, "memory", {}, {}, "there is not enough memory for a transform");
-  const Plan plan(fftw_plan_dft_r2c_1d(environment.width, line.get(), sums.get(), FFTW_ESTIMATE));
+  const std::unique_ptr<double, FftwFree> line(static_cast<double*>(fftw_malloc(sizeof(double) * width)));
+  const std::unique_ptr<fftw_complex, FftwFree> sums(static_cast<fftw_complex*>(fftw_malloc(sizeof(fftw_complex) * bins)));
+  if (!line || !sums) throw std::bad_alloc();
+  const FftwPlan plan =
+      makeFftwPlan([&](unsigned flags) { return fftw_plan_dft_r2c_1d(environment.width, line.get(), sums.get(), flags); });
   for (std::size_t c = 0; c < 3; ++c) {
     for (std::size_t j = 0; j < rows; ++j) {
       for (std::size_t x = 0; x < width; ++x) line.get()[x] = environment.rgb[(j * width + x) * 3 + c];

@@ -22,8 +22,8 @@ struct Environment {
   const float* at(Vec3 direction) const;
 };
 
-/// Throws Error invalid_input, naming the path and the first bad pixel, unless the environment can be used: not empty, 2:1, and every
-/// pixel finite and not negative.
+/// Throws Error invalid_input, naming the path and the first bad pixel, unless the environment can be used: not empty, 2:1, and
+/// every pixel finite and not negative.
 void requireUsable(const Environment& environment, const std::string& path = {});
 
 /// Spherical harmonics of an environment up to a band: exact integrals over the pixels, in double.
@@ -52,8 +52,8 @@ struct SphereLight {
   std::vector<float> texture;
 };
 
-/// What a shading point at the origin sees of area lights: the nearest one in each direction, averaged over samples x samples rays in
-/// each pixel. Nothing of a sphere is seen from inside.
+/// What a shading point at the origin sees of area lights: the nearest one in each direction, averaged over samples x samples
+/// rays in each pixel. Nothing of a sphere is seen from inside.
 /// @throws Error usage if a size is out of range; invalid_input if a light is degenerate
 Environment renderAreaLights(std::span<const RectangleLight> rectangles, std::span<const SphereLight> spheres, int height,
                              int samples);

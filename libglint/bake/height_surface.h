@@ -13,7 +13,8 @@ namespace glint::bake {
 /// A periodic height field as a triangulated surface. Lengths are in cells.
 ///
 /// Vertex (i, j) has height heights[j][i]. Cell (i, j) lies between vertices (i, j) and (i + 1, j + 1) and is cut along the
-/// diagonal from (i + 1, j) to (i, j + 1): facet 2 (j width + i) is the half at vertex (i, j), facet 2 (j width + i) + 1 the other.
+/// diagonal from (i + 1, j) to (i, j + 1): facet 2 (j width + i) is the half at vertex (i, j), facet 2 (j width + i) + 1 the
+/// other.
 class HeightSurface {
  public:
   HeightSurface(int width, int height, std::span<const float> heights)

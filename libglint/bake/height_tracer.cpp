@@ -55,8 +55,8 @@ HeightTracer::HeightTracer(const HeightSurface& surface) : surface_(surface) {
   }
 }
 
-/// Where the ray falls below one of the two facets of a cell between t_in and t_out. A facet is hit where the ray ends up below it,
-/// so that rounding at edges lets nothing through.
+/// Where the ray falls below one of the two facets of a cell between t_in and t_out. A facet is hit where the ray ends up below
+/// it, so that rounding at edges lets nothing through.
 float HeightTracer::hitCell(const Ray& ray, int i, int j, float t_in, float t_out, std::size_t& facet) const {
   const std::size_t cell = static_cast<std::size_t>(j) * surface_.width() + i;
   const auto c = surface_.corners(cell);

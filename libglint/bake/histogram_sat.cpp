@@ -5,8 +5,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <functional>
-#include <mutex>
 #include <string>
 
 #include "glint/bake/slopes.h"
@@ -144,7 +142,7 @@ void sumDown(Counter* table, std::size_t rows, std::size_t row_counters) {
 
 /// The table of sums at every `stride` texels.
 template <class Counter>
-void buildTable(const HistogramSatData& sat, int stride, CounterArray<Counter>& table, const std::function<void()>& step) {
+void buildTable(const HistogramSatData& sat, int stride, CounterArray<Counter>& table, ProgressCounter& progress) {
   const HistogramSat& shape = sat.shape;
   const std::size_t length = shape.rowLength();
   const std::size_t points_x = shape.pointsX(stride), points_y = shape.pointsY(stride);
@@ -161,14 +159,14 @@ void buildTable(const HistogramSatData& sat, int stride, CounterArray<Counter>& 
       for (int j = (static_cast<int>(b) - 1) * stride; j < top; ++j)
         for (int i = (static_cast<int>(a) - 1) * stride; i < right; ++i) ++here[sat.texels.values[shape.texelIndex(i, j)]];
     }
-    step();
+    progress.advance();
   });
   sumDown(table.values.get(), points_y, points_x * length);
 }
 
 /// Sums along every row (or column) of texels.
 template <bool kColumns>
-void buildLines(const HistogramSatData& sat, CounterArray<std::uint16_t>& table, const std::function<void()>& step) {
+void buildLines(const HistogramSatData& sat, CounterArray<std::uint16_t>& table, ProgressCounter& progress) {
   const HistogramSat& shape = sat.shape;
   const int stride = shape.line_stride, lines = kColumns ? shape.width : shape.height;
   const int texels = kColumns ? shape.height : shape.width;
@@ -187,25 +185,9 @@ void buildLines(const HistogramSatData& sat, CounterArray<std::uint16_t>& table,
           ++here[length + sat.texels.values[kColumns ? shape.texelIndex(line, k) : shape.texelIndex(k, line)]];
       }
     }
-    step();
+    progress.advance();
   });
 }
-
-/// Reports steps from any thread, one at a time.
-class StepCounter {
- public:
-  StepCounter(const ProgressFn& progress, std::size_t total) : progress_(progress), total_(total) {}
-  void operator()() {
-    if (!progress_) return;
-    const std::scoped_lock lock(mutex_);
-    progress_(++done_, total_);
-  }
-
- private:
-  const ProgressFn& progress_;
-  std::size_t total_, done_ = 0;
-  std::mutex mutex_;
-};
 
 }  // namespace
 
@@ -237,13 +219,12 @@ HistogramSatData buildHistogramSat(const NormalMap& map, const HistogramSatOptio
   sat.texels.allocate(static_cast<std::size_t>(shape.tileColumns()) * shape.tileRows() * kTile * kTile);
   const SphericalBins bins(options.theta_bins, options.phi_bins);
   keepOccurring(binTexels(map, bins, sat), sat);
-  StepCounter counter(progress, static_cast<std::size_t>(shape.pointsY(shape.stride)) + shape.pointsY(shape.coarse_stride) - 2 +
-                                    shape.tileRows() + shape.tileColumns());
-  const std::function<void()> step = [&] { counter(); };
-  buildTable(sat, shape.stride, sat.sums, step);
-  buildTable(sat, shape.coarse_stride, sat.coarse_sums, step);
-  buildLines<false>(sat, sat.row_sums, step);
-  buildLines<true>(sat, sat.column_sums, step);
+  ProgressCounter counter(progress, static_cast<std::size_t>(shape.pointsY(shape.stride)) + shape.pointsY(shape.coarse_stride) -
+                                        2 + shape.tileRows() + shape.tileColumns());
+  buildTable(sat, shape.stride, sat.sums, counter);
+  buildTable(sat, shape.coarse_stride, sat.coarse_sums, counter);
+  buildLines<false>(sat, sat.row_sums, counter);
+  buildLines<true>(sat, sat.column_sums, counter);
   return sat;
 }
 

@@ -49,8 +49,8 @@ class HistogramSatData {
 
 /// Accumulates the histograms of a map (Gamboa 2018, section 4.1).
 ///
-/// Texels are binned, then counted in the cells of each table, summed along rows and down columns: every counter is written once
-/// and added to once. Integers, so the result does not depend on threads.
+/// Texels are binned, then counted in the cells of each table, summed along rows and down columns: every counter is written
+/// once and added to once. Integers, so the result does not depend on threads.
 /// @throws Error (usage) for options out of range; (unsupported) for maps of more than 2^32 texels
 HistogramSatData buildHistogramSat(const NormalMap& map, const HistogramSatOptions& options, const ProgressFn& progress = {});
 

@@ -12,6 +12,7 @@
 #include "glint/bake/ingest_checks.h"
 #include "glint/bake/slopes.h"
 #include "glint/model/error.h"
+#include "glint/query/slope_sums.h"
 
 namespace glint::bake {
 namespace {
@@ -225,25 +226,18 @@ void checkGrey(const PixelArray& image, const IngestParameters& p) {
 struct Moments {
   double n[2] = {};
   double tilt = 0;
-  double slope[2] = {};
-  double slope2[3] = {};
+  SlopeSums slopes;
   float lowest_z = 1;
 };
 
 Moments rowMoments(std::span<const Vec2> normals) {
   Moments m;
+  m.slopes = slopeSums(normals.data(), normals.size());
   for (const Vec2 n : normals) {
     const float z = std::sqrt(std::max(1e-12f, 1 - dot(n, n)));
-    const float p = -n.x / z;
-    const float q = -n.y / z;
     m.n[0] += n.x;
     m.n[1] += n.y;
     m.tilt += std::acos(z);
-    m.slope[0] += p;
-    m.slope[1] += q;
-    m.slope2[0] += p * p;
-    m.slope2[1] += p * q;
-    m.slope2[2] += q * q;
     m.lowest_z = std::min(m.lowest_z, z);
   }
   return m;
@@ -259,21 +253,18 @@ IngestReport describeNormals(int width, int height, std::span<const Vec2> normal
   });
   Moments sum;
   for (const Moments& row : rows) {
-    for (int k = 0; k < 2; ++k) sum.n[k] += row.n[k], sum.slope[k] += row.slope[k];
-    for (int k = 0; k < 3; ++k) sum.slope2[k] += row.slope2[k];
+    for (int k = 0; k < 2; ++k) sum.n[k] += row.n[k];
+    sum.slopes.add(row.slopes);
     sum.tilt += row.tilt;
     sum.lowest_z = std::min(sum.lowest_z, row.lowest_z);
   }
   const auto count = static_cast<double>(normals.size());
-  const double mean[2] = {sum.slope[0] / count, sum.slope[1] / count};
   IngestReport report;
   report.texels = normals.size();
   report.mean_normal = {static_cast<float>(sum.n[0] / count), static_cast<float>(sum.n[1] / count)};
   report.mean_tilt_deg = kDegreesPerRadian * sum.tilt / count;
   report.steepest_tilt_deg = kDegreesPerRadian * std::acos(sum.lowest_z);
-  report.slope_covariance[0] = sum.slope2[0] / count - mean[0] * mean[0];
-  report.slope_covariance[1] = sum.slope2[1] / count - mean[0] * mean[1];
-  report.slope_covariance[2] = sum.slope2[2] / count - mean[1] * mean[1];
+  report.slopes = sum.slopes.moments(count);
   return report;
 }
 

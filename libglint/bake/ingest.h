@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "glint/model/map_slopes.h"
 #include "glint/model/normal_map.h"
 
 namespace glint::bake {
@@ -52,14 +53,14 @@ struct IngestReport {
   Encoding encoding = Encoding::unorm;
   bool dequantized = false;
   std::size_t texels = 0;
-  std::size_t non_finite = 0;       ///< NaN or infinite pixels
-  std::size_t downward = 0;         ///< z <= 0 by more than rounding, or x^2 + y^2 > 1 without z
-  std::size_t clipped = 0;          ///< z <= 0 or x^2 + y^2 > 1 by rounding only: moved to just inside the disk
-  std::size_t non_unit = 0;         ///< length differs from 1 by more than rounding explains; normalised
-  std::size_t repaired = 0;         ///< texels that fix_invalid replaced
-  Vec2 mean_normal;                 ///< mean of (nx, ny)
-  double mean_tilt_deg = 0;         ///< mean angle between normal and z
-  double slope_covariance[3] = {};  ///< xx, xy, yy of the slopes (-nx/nz, -ny/nz) about their mean
+  std::size_t non_finite = 0;  ///< NaN or infinite pixels
+  std::size_t downward = 0;    ///< z <= 0 by more than rounding, or x^2 + y^2 > 1 without z
+  std::size_t clipped = 0;     ///< z <= 0 or x^2 + y^2 > 1 by rounding only: moved to just inside the disk
+  std::size_t non_unit = 0;    ///< length differs from 1 by more than rounding explains; normalised
+  std::size_t repaired = 0;    ///< texels that fix_invalid replaced
+  Vec2 mean_normal;            ///< mean of (nx, ny)
+  double mean_tilt_deg = 0;    ///< mean angle between normal and z
+  MapSlopes slopes;
   float steepest_tilt_deg = 0;
 };
 

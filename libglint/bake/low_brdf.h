@@ -18,8 +18,8 @@ struct LobeField {
   std::span<const float> alphas;   ///< [coarse_y][coarse_x][lobe_count]; empty: that of the base
 };
 
-/// Effective BRDFs of a downsampled surface whose cells have the multi-lobe BRDF f'_low, single scattering only: the denominators
-/// of the scaling function (Wu 2019, Eq. 12 and 20), times the visible projected area of the view.
+/// Effective BRDFs of a downsampled surface whose cells have the multi-lobe BRDF f'_low, single scattering only: the
+/// denominators of the scaling function (Wu 2019, Eq. 12 and 20), times the visible projected area of the view.
 /// @param heights  [coarse_y][coarse_x] of the vertices, cells
 /// @note of more than 4096 cells, an even choice of as many is summed
 EffectiveBrdf lowBrdf(std::span<const float> heights, const LobeField& field, std::span<const Vec3> directions,

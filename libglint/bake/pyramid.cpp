@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <mutex>
 #include <span>
 #include <string>
 
@@ -67,7 +66,7 @@ void toHalfPortably(const float* from, float scale, std::uint16_t* to, float* ro
 }
 
 #ifdef __x86_64__
-/// The same bits by the processor's own conversion, ten times faster.
+/// The same bits by the processor's own conversion.
 __attribute__((target("avx,f16c"))) void toHalfByInstruction(const float* from, float scale, std::uint16_t* to,
                                                              float* rounded) {
   const __m256 scales = _mm256_set1_ps(scale), largest = _mm256_set1_ps(65504);
@@ -175,24 +174,6 @@ NdfPyramidData::Level packLevel(std::vector<PackedImage>& images, BlockPrecision
   return level;
 }
 
-/// Counts images over all levels, from any thread.
-class ImageCounter {
- public:
-  ImageCounter(const PyramidShape& shape, const ProgressFn& progress) : progress_(progress) {
-    for (int l = 0; l < shape.level_count; ++l) total_ += shape.levels[l].imageCount();
-  }
-  void count() {
-    if (!progress_) return;
-    const std::scoped_lock lock(mutex_);
-    progress_(++done_, total_);
-  }
-
- private:
-  const ProgressFn& progress_;
-  std::mutex mutex_;
-  std::size_t done_ = 0, total_ = 0;
-};
-
 struct Scratch {
   Scratch(int resolution, const PixelFilter& filter)
       : bins(resolution, filter.subdivision(), filter.margin()), band(resolution, filter.subdivision(), filter.margin()) {}
@@ -201,7 +182,9 @@ struct Scratch {
 
 std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const PyramidShape& shape, const ImagePacker& packer,
                                                 const PixelFilter& filter, const ProgressFn& progress) {
-  ImageCounter counter(shape, progress);
+  std::size_t total = 0;
+  for (int l = 0; l < shape.level_count; ++l) total += shape.levels[l].imageCount();
+  ProgressCounter counter(progress, total);
   tbb::enumerable_thread_specific<Scratch> scratch([&] { return Scratch(shape.resolution, filter); });
   std::vector<std::vector<PackedImage>> images(shape.level_count);
   for (int l = 0; l < shape.level_count; ++l) {
@@ -215,7 +198,7 @@ std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const Pyra
       const Layer layer = {&s.bins, &filter};
       images[l][k] = packer.pack({&layer, 1}, 1);
       s.bins.clear();
-      counter.count();
+      counter.advance();
     });
   }
   return images;

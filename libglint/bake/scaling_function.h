@@ -17,9 +17,9 @@ struct ScalingFactors {
 
 /// Reduces R [patches][directions][directions] of one channel to T and S.
 ///
-/// T is the mean over directions of R relative to that of the whole map (Eq. 22), weighted by reflected light instead of evenly,
-/// so that pairs which reflect next to nothing do not add their noise; then S is the ratio of the sums over the map (Eq. 24,
-/// weighted by T and the denominators): the effective BRDF of the whole map is exactly the original's.
+/// T is the mean over directions of R relative to that of the whole map (Eq. 22), weighted by reflected light instead of
+/// evenly, so that pairs which reflect next to nothing do not add their noise; then S is the ratio of the sums over the map
+/// (Eq. 24, weighted by T and the denominators): the effective BRDF of the whole map is exactly the original's.
 ScalingFactors factorScaling(const EffectiveBrdf& original, const EffectiveBrdf& low, std::span<const Vec3> directions,
                              const PatchGrid& grid, std::size_t channel = 0);
 

@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 #include <numbers>
 
 #include "glint/bake/gauss_legendre.h"
@@ -229,13 +228,11 @@ ShLightData buildShLight(const Environment& environment, const ShLightOptions& o
   const std::size_t column_bytes = 2 * 3 * sizeof(double) * (static_cast<std::size_t>(options.order) + 1) * setup.band_limit;
   const int columns = std::clamp(static_cast<int>(kTaskBytes / column_bytes), 1, options.grid.columns);
   const int chunks = (options.grid.columns + columns - 1) / columns, tasks = chunks * options.grid.rows;
-  std::mutex mutex;
-  std::size_t done = 0;
+  ProgressCounter counter(progress, static_cast<std::size_t>(tasks));
   tbb::parallel_for(0, tasks, [&](int task) {
     const int first = task % chunks * columns;
     LightTask(setup, task / chunks, first, std::min(columns, options.grid.columns - first)).run(data);
-    const std::scoped_lock lock(mutex);
-    if (progress) progress(++done, static_cast<std::size_t>(tasks));
+    counter.advance();
   });
   return data;
 }

@@ -36,12 +36,12 @@ struct ShLightData {
   ShLight view() const;
 };
 
-/// Band of the environment up to which a table of an order can tell it apart. A half vector turns half as fast as the direction that it
-/// mirrors to, so `order` bands would do at normal incidence; around the direction opposite to the outgoing one, where whole rings of
-/// half vectors see one spot, no limit is enough: there the light of a direction turns as fast as half vectors turn about the rim. With
-/// this limit the light of a single direction is right to 1e-6 of its norm up to 120 degrees from the outgoing direction, and to
-/// 1e-3 up to 150 degrees (orders 20 to 60); with twice the limit to 1e-6 up to 140 (order 30). Facets that reflect by more have
-/// wo . h below 0.35.
+/// Band of the environment up to which a table of an order can tell it apart. A half vector turns half as fast as the direction
+/// that it mirrors to, so `order` bands would do at normal incidence; around the direction opposite to the outgoing one, where
+/// whole rings of half vectors see one spot, no limit is enough: there the light of a direction turns as fast as half vectors
+/// turn about the rim. With this limit the light of a single direction is right to 1e-6 of its norm up to 120 degrees from the
+/// outgoing direction, and to 1e-3 up to 150 degrees (orders 20 to 60); with twice the limit to 1e-6 up to 140 (order 30).
+/// Facets that reflect by more have wo . h below 0.35.
 constexpr int lightBandLimit(int order) { return std::max(3 * order + 24, std::min(6 * order + 24, 204)); }
 
 /// Weight of band l of an environment: 1 up to half of the band limit, then smoothly to 0.
@@ -53,8 +53,8 @@ double lightTaper(int l, int band_limit);
 /// @return [order - m + 1][band_limit - m + 1], row by row
 std::vector<double> halfVectorTransfer(int m, int order, int band_limit);
 
-/// Light coefficients of every outgoing direction of a grid (Gamboa 2018, section 6.4): the environment's harmonics are turned to the
-/// outgoing direction and mapped to half vectors, both by exact matrices.
+/// Light coefficients of every outgoing direction of a grid (Gamboa 2018, section 6.4): the environment's harmonics are turned
+/// to the outgoing direction and mapped to half vectors, both by exact matrices.
 /// Cost about directions * order * band_limit^2; the same for any number of threads.
 /// @throws Error usage if an option is out of range or the table is larger than max_bytes; invalid_input as requireUsable
 ShLightData buildShLight(const Environment& environment, const ShLightOptions& options, const ProgressFn& progress = {});

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <mutex>
 #include <numbers>
 #include <string>
 
@@ -137,12 +136,10 @@ ShLobesData buildShLobes(const ShLobesOptions& options, const ProgressFn& progre
   (half ? data.halves.resize(coefficients) : data.floats.resize(coefficients));
   std::vector<double> memory(ShRecurrence<double>::size(options.order));
   const ShRecurrence<double> recurrence(options.order, memory);
-  std::mutex mutex;
-  std::size_t done = 0;
+  ProgressCounter counter(progress, static_cast<std::size_t>(options.grid.rows));
   tbb::parallel_for(0, options.grid.rows, [&](int row) {
     fillRow(row, f, recurrence, data);
-    const std::scoped_lock lock(mutex);
-    if (progress) progress(++done, static_cast<std::size_t>(options.grid.rows));
+    counter.advance();
   });
   return data;
 }

@@ -28,8 +28,8 @@ struct ShLobesData {
   ShLobes view() const;
 };
 
-/// f_l, l = 0 .. order, of the roughness lobe along +z: 2 pi sqrt((2l + 1) / (4 pi)) integral of g(a) P_l(cos a) sin a da, by Gauss-Legendre
-/// quadrature to about 1e-13 of f_0. `ShLobes` says what g is.
+/// f_l, l = 0 .. order, of the roughness lobe along +z: 2 pi sqrt((2l + 1) / (4 pi)) integral of g(a) P_l(cos a) sin a da, by
+/// Gauss-Legendre quadrature to about 1e-13 of f_0. `ShLobes` says what g is.
 /// @throws Error usage if sigma_r or the order is out of range
 std::vector<double> zonalLobe(double sigma_r, int order);
 

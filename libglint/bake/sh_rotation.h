@@ -9,8 +9,8 @@ namespace glint::bake {
 ///
 /// In the real basis the cosines m >= 0 and the sines m > 0 of a band mix among themselves only:
 ///   c'_m = sum over m' of cosines(m, m') c_m',  s'_m = sum of sines(m, m') s_m'.
-/// Entries are sums of Wigner's d_mm'^l, from the recurrence over l, which is stable for every angle; d underflows only where it is
-/// negligible (see ShRecurrence).
+/// Entries are sums of Wigner's d_mm'^l, from the recurrence over l, which is stable for every angle; d underflows only where
+/// it is negligible (see ShRecurrence).
 class ShRotationY {
  public:
   /// @param angle   radians, in [0, pi]

@@ -6,12 +6,10 @@
 #include <cmath>
 
 #include "glint/bake/simd.h"
+#include "glint/query/slope_sums.h"
 
 namespace glint::bake {
 namespace {
-
-/// Variance of slopes that rounded normals alone can have: a map that is flat to float precision counts as flat.
-constexpr double kRoundingVariance = 1e-13;
 
 /// Calls visit(i, slopes) for each texel of row j.
 template <class Visit>
@@ -27,34 +25,8 @@ void visitSlopes(int width, int height, std::span<const float> heights, int j, c
   }
 }
 
-/// Sums over slopes (p, q).
-struct Sums {
-  double p = 0, q = 0, pp = 0, pq = 0, qq = 0;
-};
-
-/// Sums over the slopes of some normals, in lanes that compilers vectorise.
-GLINT_MULTIVERSION Sums rowSums(const Vec2* normals, std::size_t count) {
-  constexpr std::size_t kLanes = 8;
-  double sums[5][kLanes] = {};
-  for (std::size_t first = 0; first < count; first += kLanes) {
-    float p[kLanes] = {}, q[kLanes] = {};
-    const std::size_t lanes = std::min(kLanes, count - first);
-    for (std::size_t k = 0; k < lanes; ++k) p[k] = normals[first + k].x, q[k] = normals[first + k].y;
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      const float scale = -1 / std::sqrt(std::max(1e-12f, 1 - (p[k] * p[k] + q[k] * q[k])));
-      p[k] *= scale, q[k] *= scale;
-    }
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      const double x = p[k], y = q[k];
-      sums[0][k] += x, sums[1][k] += y, sums[2][k] += x * x, sums[3][k] += x * y, sums[4][k] += y * y;
-    }
-  }
-  Sums total;
-  for (std::size_t k = 0; k < kLanes; ++k) {
-    total.p += sums[0][k], total.q += sums[1][k];
-    total.pp += sums[2][k], total.pq += sums[3][k], total.qq += sums[4][k];
-  }
-  return total;
+[[gnu::flatten]] GLINT_MULTIVERSION SlopeSums rowSums(const Vec2* normals, std::size_t count) {
+  return slopeSums(normals, count);
 }
 
 }  // namespace
@@ -95,20 +67,13 @@ SlopeMoments slopeMoments(int width, int height, std::span<const float> heights)
 }
 
 MapSlopes mapSlopes(const NormalMap& map) {
-  std::vector<Sums> rows(static_cast<std::size_t>(map.height));
+  std::vector<SlopeSums> rows(static_cast<std::size_t>(map.height));
   const auto width = static_cast<std::size_t>(map.width);
   tbb::parallel_for(std::size_t{0}, rows.size(),
                     [&](std::size_t j) { rows[j] = rowSums(map.normals.data() + j * width, width); });
-  Sums total;
-  for (const Sums& row : rows) {  // in order of rows, so that the sum does not depend on threads
-    total.p += row.p, total.q += row.q, total.pp += row.pp, total.pq += row.pq, total.qq += row.qq;
-  }
-  const double count = static_cast<double>(map.width) * map.height, p = total.p / count, q = total.q / count;
-  const auto variance = [](double v) { return v > kRoundingVariance ? v : 0; };
-  const double pp = variance(total.pp / count - p * p), qq = variance(total.qq / count - q * q);
-  const double most = std::sqrt(pp * qq), pq = std::clamp(total.pq / count - p * q, -most, most);
-  return {{static_cast<float>(p), static_cast<float>(q)},
-          {static_cast<float>(pp), static_cast<float>(pq), static_cast<float>(qq)}};
+  SlopeSums total;
+  for (const SlopeSums& row : rows) total.add(row);  // in order of rows, so that the sum does not depend on threads
+  return total.moments(static_cast<double>(map.width) * map.height);
 }
 
 }  // namespace glint::bake

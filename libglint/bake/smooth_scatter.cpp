@@ -184,7 +184,8 @@ class Rasteriser {
   }
 
  private:
-  /// Cells of four texel centres whose middle (i + 1) lies in lattice cell `a`; the last cell of a map that does not wrap is none.
+  /// Cells of four texel centres whose middle (i + 1) lies in lattice cell `a`; the last cell of a map that does not wrap is
+  /// none.
   static std::pair<int, int> texelsIn(const Axis& axis, int a, int size) {
     const auto first = [&](int cell) {
       return cell >= axis.cells ? size : static_cast<int>(std::ceil(static_cast<float>(cell) * axis.spacing)) - 1;

@@ -17,9 +17,8 @@ using ImageSink = std::function<void(int level, int i, int j, const BlockBins& b
 ///
 /// Every triangle is rasterised once, into the histograms of its cell of a lattice of an eighth of a stride. The weight of a
 /// Gaussian footprint is approximated over each cell by its best linear function along either axis, so that an image is a sum
-/// over the moments of ~580 cells, along rows of cells first; moments of the lattice of the next level follow from those of this
-/// one exactly. Rows of cells stream through; only images whose footprint is open
-/// are held.
+/// over the moments of ~580 cells, along rows of cells first; moments of the lattice of the next level follow from those of
+/// this one exactly. Rows of cells stream through; only images whose footprint is open are held.
 /// Cost: O(area of the triangles' images) + O(tiles in use) for each cell.
 void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const DirectionTiles& direction_tiles,
                    const ImageSink& sink, const ProgressFn& progress);

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <memory>
-#include <mutex>
 #include <new>
 #include <numbers>
 
@@ -25,13 +24,10 @@ std::vector<float> noiseHeights(const SynthParameters& p, float correlation_x, f
   if (!memory) throw std::bad_alloc();
   auto* field = memory.get();
   auto* spectrum = reinterpret_cast<fftw_complex*>(field);
-  FftwPlan forward, backward;
-  {
-    // FFTW_ESTIMATE: measuring would choose algorithms, and so roundings, by the clock.
-    const std::lock_guard lock(fftwPlannerMutex());
-    forward.reset(fftw_plan_dft_r2c_2d(p.height, p.width, field, spectrum, FFTW_ESTIMATE));
-    backward.reset(fftw_plan_dft_c2r_2d(p.height, p.width, spectrum, field, FFTW_ESTIMATE));
-  }
+  const FftwPlan forward =
+      makeFftwPlan([&](unsigned flags) { return fftw_plan_dft_r2c_2d(p.height, p.width, field, spectrum, flags); });
+  const FftwPlan backward =
+      makeFftwPlan([&](unsigned flags) { return fftw_plan_dft_c2r_2d(p.height, p.width, spectrum, field, flags); });
 
   // White noise is drawn in space rather than in frequency: the transform then has the symmetry of a real field for any size.
   tbb::parallel_for(0, p.height, [&](int j) {

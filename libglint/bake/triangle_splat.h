@@ -9,8 +9,8 @@
 
 namespace glint::bake {
 
-/// Numbers of the tiles of two grids over the square [-1, 1]^2 of directions, the coarse one of bins of twice the size. Each has
-/// one tile of margin.
+/// Numbers of the tiles of two grids over the square [-1, 1]^2 of directions, the coarse one of bins of twice the size. Each
+/// has one tile of margin.
 struct DirectionTiles {
   struct Grid {
     int bins_per_axis;  // of the square; a multiple of BlockBins::kTile

@@ -71,7 +71,8 @@ GLINT_MULTIVERSION void advance(const float* row, int size, Shift shift, float d
   horizon[size] = horizon[0];
 }
 
-/// What lies ahead of a row of points: the row of heights that they look over, and the horizon that lines brought from beyond it.
+/// What lies ahead of a row of points: the row of heights that they look over, and the horizon that lines brought from beyond
+/// it.
 struct Ahead {
   const float* row;
   Shift on_row;
@@ -80,8 +81,8 @@ struct Ahead {
   float drop;  ///< of the horizon to the row
 };
 
-/// Sets `bit` of words[k] where height[k] + rise is below neither. The row is taken where the point looks over it, so only what is
-/// farther away is interpolated between lines.
+/// Sets `bit` of words[k] where height[k] + rise is below neither. The row is taken where the point looks over it, so only what
+/// is farther away is interpolated between lines.
 GLINT_MULTIVERSION void compare(const float* height, const Ahead& ahead, int size, float rise, std::uint32_t bit,
                                 std::uint32_t* words) {
   const float row_part = ahead.on_row.part, horizon_part = ahead.on_horizon.part, drop = ahead.drop;

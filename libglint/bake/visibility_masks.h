@@ -11,8 +11,8 @@ namespace glint::bake {
 /// Which facets of a periodic surface see which directions: one bit for each, taken at the facet's centroid.
 ///
 /// One running maximum is swept over the whole map for each direction: towards the horizon and back along lines that advance by
-/// one cell of the direction's longer axis at a time; heights between the cells of the shorter axis are interpolated. So the cost
-/// does not depend on how far shadows reach, O(facets x directions).
+/// one cell of the direction's longer axis at a time; heights between the cells of the shorter axis are interpolated. So the
+/// cost does not depend on how far shadows reach, O(facets x directions).
 ///
 /// Bits say nothing about whether a facet faces the direction: multiply by its cosine.
 class VisibilityMasks {

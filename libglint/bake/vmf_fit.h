@@ -15,10 +15,11 @@ struct WeightedNormal {
 
 /// Fits von Mises-Fisher lobes to weighted unit normals by expectation maximisation (Wu 2019, Eq. 4; Han et al. 2007).
 ///
-/// Starts from a weighted k-means++ choice with fixed random numbers, so the same normals give the same lobes. Bandwidths are at
-/// most kMaxKappa: normals that are all the same give one lobe of that bandwidth and empty lobes.
+/// Starts from a weighted k-means++ choice with fixed random numbers, so the same normals give the same lobes. Bandwidths are
+/// at most kMaxKappa: normals that are all the same give one lobe of that bandwidth and empty lobes.
 /// @param normals  z > 0; at least one, weights > 0
-/// @param lobes    at most kMaxLobes; largest amplitude first, empty lobes last with amplitude 0. Amplitudes add up to the weights
+/// @param lobes    at most kMaxLobes; largest amplitude first, empty lobes last with amplitude 0. Amplitudes add up to the
+///                 weights
 void fitLobes(std::span<const WeightedNormal> normals, std::span<VmfLobe> lobes);
 
 /// Means over each lobe of numbers that normals carry, weighted by the normals' shares in it: the lobe's colour, say.

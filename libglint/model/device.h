@@ -1,7 +1,8 @@
 #pragma once
 
 /// Marks a function that also compiles as CUDA device code. The only macro of the public headers.
-/// Device code calls constexpr functions of the standard library: nvcc needs --expt-relaxed-constexpr; clang allows it by itself.
+/// Device code calls constexpr functions of the standard library: nvcc needs --expt-relaxed-constexpr; clang allows it by
+/// itself.
 #if defined(__CUDACC__) || defined(__CUDA__)
 #define GLINT_HD __host__ __device__
 #else

@@ -11,13 +11,13 @@ namespace glint {
 
 /// Accumulated histograms of the normals of a map over (theta, phi) bins (asset kind `histogram-sat`).
 ///
-/// Normals are binned by elevation and azimuth in equal angles (Gamboa 2018, section 4.1): ring floor(theta / (pi/2) * theta_bins),
-/// sector floor(phi / (2 pi) * phi_bins), phi = atan2(ny, nx) in [0, 2 pi). Only the bins that occur are kept: bin k below is the
-/// k-th of them, in the order ring * phi_bins + sector.
+/// Normals are binned by elevation and azimuth in equal angles (Gamboa 2018, section 4.1): ring floor(theta / (pi/2) *
+/// theta_bins), sector floor(phi / (2 pi) * phi_bins), phi = atan2(ny, nx) in [0, 2 pi). Only the bins that occur are kept: bin
+/// k below is the k-th of them, in the order ring * phi_bins + sector.
 ///
 /// Four tables count texels of each bin, one row of `rowLength()` counters after the other:
-///  - `sums`: texels of [0, x) x [0, y) at every `stride` texels, modulo 2^16: exact differences for rectangles of less than 2^16
-///    texels;
+///  - `sums`: texels of [0, x) x [0, y) at every `stride` texels, modulo 2^16: exact differences for rectangles of less than
+///    2^16 texels;
 ///  - `coarse_sums`: the same at every `coarse_stride` texels, modulo 2^32;
 ///  - `row_sums`, `column_sums`: texels of one row (column) before every `line_stride`-th texel, modulo 2^16.
 /// Point a of a table lies at texel min(a * stride, size); the last one is the border. Counters beyond `bin_count` are 0.

@@ -9,15 +9,16 @@
 
 namespace glint {
 
-// One linear buffer that holds all that the queries of one model read, so that a GPU (or another process) has it after one copy.
-// Nothing in it is an address: places are offsets from its first byte, so it may be copied anywhere that is aligned to 16 bytes.
+// One linear buffer that holds all that the queries of one model read, so that a GPU (or another process) has it after one
+// copy. Nothing in it is an address: places are offsets from its first byte, so it may be copied anywhere that is aligned to 16
+// bytes.
 //
 //   0                      PackedHeader, 1920 bytes
 //   1920                   the arrays of the model, each at a multiple of 64 bytes, in the order of the header
 //   header.size_bytes      end
 //
-// glint::api::pack makes it, glint/query/packed_ndf_view.h makes models of it. All is little-endian. It is made from an asset in
-// memory and lives no longer than the program: it is no file format, and its version changes with the layout.
+// glint::api::pack makes it, glint/query/packed_ndf_view.h makes models of it. All is little-endian. It is made from an asset
+// in memory and lives no longer than the program: it is no file format, and its version changes with the layout.
 
 /// An array of a packed buffer. An array that the model does not have has count 0.
 struct PackedArray {

@@ -36,8 +36,8 @@ enum class ShPrecision : std::uint8_t { f16, f32 };
 /// The roughness lobe of a facet as spherical harmonics, along +z and turned towards the directions of a grid (asset kind
 /// `sh-lobes`; Gamboa 2018, Eq. 10 and 12).
 ///
-/// At the angle a from the facet's normal the lobe is exp(-sin^2(a) / (2 sigma_r^2)) / (2 pi sigma_r^2), and 0 from 90 degrees on:
-/// for a facet of an untilted normal, the Gaussian of deviation sigma_r on the unit disk.
+/// At the angle a from the facet's normal the lobe is exp(-sin^2(a) / (2 sigma_r^2)) / (2 pi sigma_r^2), and 0 from 90 degrees
+/// on: for a facet of an untilted normal, the Gaussian of deviation sigma_r on the unit disk.
 struct ShLobes {
   int order = 0;      ///< highest band
   float sigma_r = 0;  ///< intrinsic roughness, disk units
@@ -50,7 +50,8 @@ struct ShLobes {
 /// Distant light for half vectors: for every outgoing direction of a grid, the spherical harmonics of
 /// L(r(wo, h)) 4 (wo . h), with r the mirror direction of wo at h (asset kind `sh-light`; Gamboa 2018, section 6.4).
 ///
-/// Coefficients of an outgoing direction are in its own frame: z along wo, x towards growing polar angle, y towards growing azimuth.
+/// Coefficients of an outgoing direction are in its own frame: z along wo, x towards growing polar angle, y towards growing
+/// azimuth.
 struct ShLight {
   int order = 0;  ///< highest band
   ShGrid grid;    ///< outgoing directions

@@ -22,8 +22,9 @@ inline constexpr float kPartGap = 2;
 inline constexpr float kPartReach = 2.2f;
 /// Aspect up to which IsotropicParts::kMost parts are enough: sqrt(1 + (kMost kPartGap / (2 kPartReach))^2).
 inline constexpr float kMostAspect = 14.58f;
-/// How much wider parts become where they are too few: a share of the square of the gap beyond kPartGap. Gaps miss texels, width adds
-/// others; this leaves the least squared error on a map of unrelated texels, to a tenth (tests/unit/anisotropic_test.cpp).
+/// How much wider parts become where they are too few: a share of the square of the gap beyond kPartGap. Gaps miss texels,
+/// width adds others; this leaves the least squared error on a map of unrelated texels, to a tenth
+/// (tests/unit/anisotropic_test.cpp).
 inline constexpr float kPartWidening = 0.055f;
 
 /// Deviations along the axes of a covariance, and the direction of the longer one.
@@ -41,11 +42,12 @@ inline GLINT_HD PrincipalAxes principalAxes(const Covariance& c) {
 
 /// Splits a footprint along its long axis so that the first and second moments of the parts together are its own.
 ///
-/// The size is made usable first (usableCovariance). The parts have the short deviation, or `narrowest_sigma` where that is larger,
-/// and neighbours are at most kPartGap deviations apart. Above an aspect of kMostAspect the parts are too few: they are wider and further
-/// apart, so that the footprint keeps its length, exactly in its second moment, and grows in width (kPartWidening).
-/// Boxes are split as the Gaussian of the same moments.
-/// @param narrowest_sigma  texels; what the model that is asked cannot tell apart, e.g. finestSigma(shape) of a pyramid without normals
+/// The size is made usable first (usableCovariance). The parts have the short deviation, or `narrowest_sigma` where that is
+/// larger, and neighbours are at most kPartGap deviations apart. Above an aspect of kMostAspect the parts are too few: they are
+/// wider and further apart, so that the footprint keeps its length, exactly in its second moment, and grows in width
+/// (kPartWidening). Boxes are split as the Gaussian of the same moments.
+/// @param narrowest_sigma  texels; what the model that is asked cannot tell apart, e.g. finestSigma(shape) of a pyramid without
+///                         normals
 /// @return 1 part for round footprints, else 2 to 32
 inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int height, float narrowest_sigma = 0) {
   constexpr float kRound = 0.05f;  // a variance larger by less is no length
@@ -83,8 +85,8 @@ inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int
   return parts;
 }
 
-/// Answers stretched footprints from a model that knows only round ones (PyramidNdf, CpNdf): each as the sum of up to 32 round ones
-/// along its long axis, at that many times the cost. Round footprints cost what they did.
+/// Answers stretched footprints from a model that knows only round ones (PyramidNdf, CpNdf): each as the sum of up to 32 round
+/// ones along its long axis, at that many times the cost. Round footprints cost what they did.
 ///
 /// Holds a pointer to the model, which must outlive it. Thread-safe, allocates nothing.
 template <NdfModel M>

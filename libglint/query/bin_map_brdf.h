@@ -8,25 +8,26 @@
 
 namespace glint {
 
-/// The micro-BRDF form of a bin map (Atanasov 2021, Eq. 5, 11 and 15): every texel is a facet of Beckmann microfacets around its own
-/// normal t, which shadow and mask each other, and the map shadows and masks the facets:
+/// The micro-BRDF form of a bin map (Atanasov 2021, Eq. 5, 11 and 15): every texel is a facet of Beckmann microfacets around
+/// its own normal t, which shadow and mask each other, and the map shadows and masks the facets:
 ///
 ///   f = F(wo . h) Gx(wi, wo) / (4 wi.z wo.z) * sum over texels of share * D(h, t) G(wi, wo, t) / t.z
 ///
-/// with D the Beckmann distribution of the NDF's roughness in the frame of t, G its Smith term in that frame, Gx that of the map's
-/// slopes. As the roughness falls this becomes MicrofacetBrdf of the same BinMapNdf; where facets are rough or steep it keeps what that
-/// loses: lobes are round about each facet's normal instead of round in the disk, and no facet shines through its own back.
+/// with D the Beckmann distribution of the NDF's roughness in the frame of t, G its Smith term in that frame, Gx that of the
+/// map's slopes. As the roughness falls this becomes MicrofacetBrdf of the same BinMapNdf; where facets are rough or steep it
+/// keeps what that loses: lobes are round about each facet's normal instead of round in the disk, and no facet shines through
+/// its own back.
 ///
 /// Other than the paper:
-///  - its Eq. 3 weighs texels by their share of the surface, and leaves out 1 / t.z. A share is of area seen from above, and a facet is
-///    1 / t.z times larger. Without the factor steep maps lose energy (a map tilted by 60 degrees half of it).
+///  - its Eq. 3 weighs texels by their share of the surface, and leaves out 1 / t.z. A share is of area seen from above, and a
+///    facet is 1 / t.z times larger. Without the factor steep maps lose energy (a map tilted by 60 degrees half of it).
 ///  - its Eq. 18 leaves out h . t, which makes the pdf integrate to less than 1; here the pdf is that of `sample`.
 ///  - G and Gx see both directions with heights correlated, 1 / (1 + Lambda(i) + Lambda(o)), as everywhere in this library.
 ///  - bins count texel by texel with their own normals, and only many at once as one lobe: see BinMapNdf.
 ///
-/// Reciprocal, but for rounding. Energy: with F = 1 the integral of f wi.z over wi is at most the facet area that the footprint turns
-/// towards wo over that which masks it, as in MicrofacetBrdf: at most 1 on average over a map so far as its slopes are normal.
-/// Directions below the horizon (or within kHorizon of it), longer than 1, or not finite get 0 from everything here.
+/// Reciprocal, but for rounding. Energy: with F = 1 the integral of f wi.z over wi is at most the facet area that the footprint
+/// turns towards wo over that which masks it, as in MicrofacetBrdf: at most 1 on average over a map so far as its slopes are
+/// normal. Directions below the horizon (or within kHorizon of it), longer than 1, or not finite get 0 from everything here.
 /// Thread-safe, allocates nothing.
 class BinMapBrdf {
  public:
@@ -40,7 +41,8 @@ class BinMapBrdf {
   GLINT_HD const BinMapNdf& ndf() const { return ndf_; }
   GLINT_HD const SmithMasking& masking() const { return masking_; }
 
-  /// The BRDF f, 1/sr, each channel >= 0; without the cosine wi.z. Costs a density, and two error functions for each facet in reach.
+  /// The BRDF f, 1/sr, each channel >= 0; without the cosine wi.z. Costs a density, and two error functions for each facet in
+  /// reach.
   GLINT_HD Rgb evaluate(Vec3 wi, Vec3 wo) const {
     if (!(aboveHorizon(wi) && aboveHorizon(wo))) return {};
     const HalfVector h = halfVectorOf(wi, wo);
@@ -54,11 +56,19 @@ class BinMapBrdf {
     return static_cast<float>(sums(wi, wo, h).drawn / (4 * double{h.towards}));
   }
 
-  /// Draws wi (Atanasov 2021, section 5.3): a point of the footprint, a Beckmann microfacet of its texel, wo mirrored at that. The
-  /// leading digits of xi choose the point, the others the microfacet.
+  /// `evaluate` and `pdf` together, at the cost of one.
+  GLINT_HD BrdfValue evaluateWithPdf(Vec3 wi, Vec3 wo) const {
+    if (!(aboveHorizon(wi) && aboveHorizon(wo))) return {};
+    const HalfVector h = halfVectorOf(wi, wo);
+    const Sums s = sums(wi, wo, h);
+    return {response(wi, wo, h, s), static_cast<float>(s.drawn / (4 * double{h.towards}))};
+  }
+
+  /// Draws wi (Atanasov 2021, section 5.3): a point of the footprint, a Beckmann microfacet of its texel, wo mirrored at that.
+  /// The leading digits of xi choose the point, the others the microfacet.
   ///
-  /// pdf and weight are 0 for microfacets that are turned away from wo and for reflections below the horizon. Weights are at most
-  /// 1 / (A(wo) t.z (h . t)) for the steepest facet t near h, A the projected area of SmithMasking.
+  /// pdf and weight are 0 for microfacets that are turned away from wo and for reflections below the horizon. Weights are at
+  /// most 1 / (A(wo) t.z (h . t)) for the steepest facet t near h, A the projected area of SmithMasking.
   GLINT_HD BrdfSample sample(Vec3 wo, Vec2 xi) const {
     if (!aboveHorizon(wo)) return {};
     Vec2 normal;
@@ -79,6 +89,10 @@ class BinMapBrdf {
  private:
   /// t.z of facets is at least this: codes of normals next to the rim of the disk may lie beyond it.
   static constexpr float kSteepest = 1e-3f;
+  /// Deviation of the normals of a bin over the cosine to a direction, from where on kGrazingPoints along each axis stand for
+  /// it.
+  static constexpr float kGrazingSpread = 0.2f;
+  static constexpr int kGrazingPoints = 6;
 
   /// Axes of a facet: up its slope's azimuth, across it, and its normal.
   struct Frame {
@@ -114,7 +128,9 @@ class BinMapBrdf {
     return sums;
   }
 
-  /// A facet that stands for many becomes four of the same mean and covariance: masking and the frame are not linear in a bin.
+  /// A facet that stands for many becomes a grid of facets, evenly weighted, of the same mean and covariance: masking and the
+  /// frame are not linear in a bin. Where directions graze it some of its normals are turned away from them, which takes more
+  /// points.
   GLINT_HD void add(const BinFacet& f, Vec3 wi, Vec3 wo, Vec3 h, Sums& sums) const {
     if (f.spread.xx == 0 && f.spread.yy == 0) {
       addFacet(f.weight, f.normal, wi, wo, h, sums);
@@ -122,9 +138,15 @@ class BinMapBrdf {
     }
     const float x = std::sqrt(f.spread.xx), along = x > 0 ? f.spread.xy / x : 0;
     const float across = std::sqrt(std::max(0.0f, f.spread.yy - along * along));
-    for (int k = 0; k < 4; ++k) {
-      const float s = k & 1 ? 1.0f : -1.0f, t = k & 2 ? 1.0f : -1.0f;
-      addFacet(0.25 * f.weight, f.normal + Vec2{s * x, s * along + t * across}, wi, wo, h, sums);
+    const Vec3 mean = Frame(f.normal).normal;
+    const float grazing = std::min(std::fabs(dot(wi, mean)), std::fabs(dot(wo, mean)));
+    const bool turned = std::max(f.spread.xx, f.spread.yy) > kGrazingSpread * kGrazingSpread * grazing * grazing;
+    const int points = turned ? kGrazingPoints : 2;
+    const auto part = static_cast<float>(points), step = std::sqrt(12 / (part * part - 1));
+    for (int k = 0; k < points * points; ++k) {
+      const float s = step * (static_cast<float>(k % points) - 0.5f * (part - 1));
+      const float t = step * (static_cast<float>(k / points) - 0.5f * (part - 1));
+      addFacet(f.weight / (part * part), f.normal + Vec2{s * x, s * along + t * across}, wi, wo, h, sums);
     }
   }
 

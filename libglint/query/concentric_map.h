@@ -7,8 +7,8 @@
 
 namespace glint {
 
-/// Direction of the upper hemisphere at a point of [-1, 1]^2: the square is mapped to the disk by concentric squares (Shirley and
-/// Chiu 1997) and the disk to the hemisphere, both preserving relative areas. So a regular grid on the square divides the
+/// Direction of the upper hemisphere at a point of [-1, 1]^2: the square is mapped to the disk by concentric squares (Shirley
+/// and Chiu 1997) and the disk to the hemisphere, both preserving relative areas. So a regular grid on the square divides the
 /// hemisphere into parts of equal solid angle.
 inline GLINT_HD Vec3 concentricDirection(Vec2 square) {
   constexpr float kQuarterPi = 0.785398163397448310f;

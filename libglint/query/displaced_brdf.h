@@ -6,9 +6,13 @@
 #include "glint/model/displacement.h"
 #include "glint/query/base_brdf.h"
 #include "glint/query/concentric_map.h"
+#include "glint/query/footprint_weights.h"
 #include "glint/query/half.h"
+#include "glint/query/half_vector.h"
 #include "glint/query/rgb.h"
+#include "glint/query/sampling.h"
 #include "glint/query/smith.h"
+#include "glint/query/tangents.h"
 #include "glint/query/vmf_lobe.h"
 
 namespace glint {
@@ -40,6 +44,9 @@ struct DirectionSample {
 /// wo: so it is reciprocal, and with one normal it is the base itself. Renderers use it on the downsampled surface, with their
 /// own visibility; that of smaller scale is in S. Where the asset has no colours, all channels are the same.
 ///
+/// Directions are unit vectors away from the surface. Those that are longer or not finite, behind the facet or within kHorizon
+/// of its plane get 0. Coordinates are periodic; those that are not finite count as 0.
+///
 /// Thread-safe, allocates nothing.
 class DisplacedBrdf {
  public:
@@ -47,15 +54,24 @@ class DisplacedBrdf {
 
   GLINT_HD const Displacement& asset() const { return asset_; }
 
-  /// Levels for a footprint of this diameter: linear in its logarithm between the factors of the levels, clamped.
+  /// Levels for a footprint of this diameter: linear in its logarithm between the factors of the levels, clamped; NaN counts as
+  /// 0.
   GLINT_HD LevelBlend levelsFor(float diameter_texels) const {
     int first = 0;
     while (first + 1 < asset_.level_count && static_cast<float>(asset_.levels[first + 1].factor) <= diameter_texels) ++first;
     const int second = std::min(first + 1, asset_.level_count - 1);
     if (first == second) return {first, second, 0};
     const float low = static_cast<float>(asset_.levels[first].factor), high = static_cast<float>(asset_.levels[second].factor);
-    const float place = std::log(std::max(diameter_texels, low) / low) / std::log(high / low);
+    const float place = std::log(std::max(low, diameter_texels) / low) / std::log(high / low);
     return {first, second, std::clamp(place, 0.0f, 1.0f)};
+  }
+
+  /// The levels around a place between them: 1.25 is three parts of level 1 and one of level 2. Clamped; NaN counts as 0.
+  GLINT_HD LevelBlend levelsAt(float level) const {
+    const float place = level > 0 ? std::min(level, static_cast<float>(asset_.level_count - 1)) : 0.0f;
+    const int first = static_cast<int>(place);
+    const float weight = place - static_cast<float>(first);
+    return {first, weight > 0 ? first + 1 : first, weight};
   }
 
   /// Normal of the downsampled surface: of one of the two triangles of the cell.
@@ -76,7 +92,7 @@ class DisplacedBrdf {
   GLINT_HD Rgb evaluate(int level, Vec2 uv, Vec3 wi, Vec3 wo, DisplacedVariant variant = DisplacedVariant::full) const {
     const Vec3 n = normal(level, uv);
     const float ci = dot(n, wi), co = dot(n, wo);
-    if (ci <= 0 || co <= 0) return {};
+    if (!(isDirection(wi) && isDirection(wo) && ci > kHorizon && co > kHorizon)) return {};
     const DisplacementLevel& l = asset_.levels[level];
     const std::size_t cell = place(l, uv).cell;
     const float facet = n.z / (ci * co);
@@ -89,16 +105,34 @@ class DisplacedBrdf {
   GLINT_HD Rgb reflected(const LevelBlend& blend, Vec2 uv, Vec3 wi, Vec3 wo,
                          DisplacedVariant variant = DisplacedVariant::full) const {
     const auto at = [&](int level) {
-      return std::max(0.0f, dot(normal(level, uv), wi)) * evaluate(level, uv, wi, wo, variant);
+      const float cosine = dot(normal(level, uv), wi);
+      return isDirection(wi) && cosine > 0 ? cosine * evaluate(level, uv, wi, wo, variant) : Rgb{};
     };
     const Rgb first = at(blend.first);
     return blend.weight > 0 ? (1 - blend.weight) * first + blend.weight * at(blend.second) : first;
   }
 
-  /// Draws wi for a view wo: a lobe by its amplitude times the mean of its colour, then a cosine around its centre (diffuse), or
-  /// a normal of the widened lobe to reflect at (ggx).
-  /// @param xi  uniform in [0, 1)^2
+  /// Draws wi at a blend of levels: at one of them, taken by its weight. The pdf is that of the blend.
+  GLINT_HD DirectionSample sample(const LevelBlend& blend, Vec2 uv, Vec3 wo, Vec2 xi) const {
+    if (!(blend.weight > 0)) return sample(blend.first, uv, wo, xi);
+    const bool second = xi.x < blend.weight;
+    xi.x = second ? xi.x / blend.weight : (xi.x - blend.weight) / (1 - blend.weight);
+    const DirectionSample drawn = sample(second ? blend.second : blend.first, uv, wo, xi);
+    return drawn.pdf > 0 ? DirectionSample{drawn.direction, pdf(blend, uv, drawn.direction, wo)} : DirectionSample{};
+  }
+
+  /// Density of `sample` at a blend of levels, per solid angle.
+  GLINT_HD float pdf(const LevelBlend& blend, Vec2 uv, Vec3 wi, Vec3 wo) const {
+    const float first = pdf(blend.first, uv, wi, wo);
+    return blend.weight > 0 ? (1 - blend.weight) * first + blend.weight * pdf(blend.second, uv, wi, wo) : first;
+  }
+
+  /// Draws wi for a view wo: a lobe by its amplitude times the mean of its colour, then a cosine around its centre (diffuse),
+  /// or a normal of the widened lobe to reflect at (ggx).
+  /// @param xi  uniform in [0, 1)^2; others are clamped, NaN counts as 0
   GLINT_HD DirectionSample sample(int level, Vec2 uv, Vec3 wo, Vec2 xi) const {
+    if (!isDirection(wo)) return {};
+    xi = clampUnit(xi);
     const DisplacementLevel& l = asset_.levels[level];
     const std::size_t first = place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count);
     float left = xi.x * totalShare(l, first);
@@ -109,7 +143,7 @@ class DisplacedBrdf {
       left -= share;
     const float unit = std::clamp(left / std::max(share, 1e-20f), 0.0f, 0.99999994f);
     const Vec3 axis = lobeCentre(l.lobes[lobe]);
-    const float angle = 6.28318530717958648f * xi.y;
+    const float angle = 2 * kPi * xi.y;
     Vec3 wi;
     if (asset_.base.kind == BaseBrdf::Kind::diffuse) {
       wi = around(axis, std::sqrt(1 - unit), angle);
@@ -125,6 +159,7 @@ class DisplacedBrdf {
 
   /// Density of `sample` per solid angle. Directions below the horizon can be drawn; `evaluate` is 0 there.
   GLINT_HD float pdf(int level, Vec2 uv, Vec3 wi, Vec3 wo) const {
+    if (!(isDirection(wi) && isDirection(wo))) return 0;
     const DisplacementLevel& l = asset_.levels[level];
     const std::size_t first = place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count);
     const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
@@ -142,8 +177,8 @@ class DisplacedBrdf {
     return density / totalShare(l, first);
   }
 
-  /// Density of the original's normals towards a half vector, by the lobes of a cell: per unit projected area. Its integral over
-  /// the disk is 1 but for what lobes have below the horizon; 0 outside the disk.
+  /// Density of the original's normals towards a half vector, by the lobes of a cell: per unit projected area. Its integral
+  /// over the disk is 1 but for what lobes have below the horizon; 0 outside the disk.
   /// @param least_variance  lobes are widened to at least this variance, radians^2: for pixels that are wider than they
   GLINT_HD float normalDensity(int level, Vec2 uv, Vec2 h, float least_variance = 0) const {
     const float z2 = 1 - dot(h, h);
@@ -164,7 +199,7 @@ class DisplacedBrdf {
   GLINT_HD Rgb spatialScale(int level, Vec2 uv) const {
     const DisplacementLevel& l = asset_.levels[level];
     const auto axis = [](float coordinate, int n, int& low, int& high) {
-      const float x = (coordinate - std::floor(coordinate)) * static_cast<float>(n) - 0.5f;
+      const float x = wrapUnit(coordinate) * static_cast<float>(n) - 0.5f;
       const float whole = std::floor(x);
       low = (static_cast<int>(whole) + n) % n, high = (low + 1) % n;
       return x - whole;
@@ -223,6 +258,9 @@ class DisplacedBrdf {
   }
 
  private:
+  /// False for what is longer than a unit vector is after rounding, and for NaN.
+  static GLINT_HD bool isDirection(Vec3 w) { return dot(w, w) < 1.001f; }
+
   /// A cell and the place in it.
   struct Place {
     int i, j;
@@ -232,7 +270,7 @@ class DisplacedBrdf {
 
   GLINT_HD Place place(const DisplacementLevel& l, Vec2 uv) const {
     const auto axis = [](float coordinate, int texels, int cells, float& part) {
-      const float x = (coordinate - std::floor(coordinate)) * static_cast<float>(texels) - 0.5f;
+      const float x = wrapUnit(coordinate) * static_cast<float>(texels) - 0.5f;
       float in_cells = x * static_cast<float>(cells) / static_cast<float>(texels);
       if (in_cells < 0) in_cells += static_cast<float>(cells);
       const int cell = std::clamp(static_cast<int>(in_cells), 0, cells - 1);
@@ -271,16 +309,15 @@ class DisplacedBrdf {
     return total;
   }
 
-  /// The direction at this cosine and azimuth around an axis with z > 0.
+  /// The direction at this cosine and azimuth around an axis.
   static GLINT_HD Vec3 around(Vec3 axis, float cosine, float angle) {
-    const float a = -1 / (1 + axis.z), b = axis.x * axis.y * a;
-    const Vec3 s = {1 + axis.x * axis.x * a, b, -axis.x}, t = {b, 1 + axis.y * axis.y * a, -axis.y};
+    const Tangents frame = tangentsOf(axis);
     const float sine = std::sqrt(std::max(0.0f, 1 - cosine * cosine));
-    return sine * std::cos(angle) * s + sine * std::sin(angle) * t + cosine * axis;
+    return sine * std::cos(angle) * frame.s + sine * std::sin(angle) * frame.t + cosine * axis;
   }
 
-  /// The same integral for one Beckmann lobe with the cell's slope moments and mean base, shadowed by its own Smith term (Dupuy et
-  /// al. 2013).
+  /// The same integral for one Beckmann lobe with the cell's slope moments and mean base, shadowed by its own Smith term (Dupuy
+  /// et al. 2013).
   GLINT_HD Rgb singleLobe(const DisplacementLevel& l, std::size_t cell, Vec3 wi, Vec3 wo) const {
     if (wi.z <= 0 || wo.z <= 0) return {};
     const std::size_t first = cell * static_cast<std::size_t>(asset_.lobe_count);

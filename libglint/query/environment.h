@@ -18,8 +18,8 @@ inline constexpr int kMostLobeCells = 8;
 /// Cells of a lobe that answer best for their cost: 9 means.
 inline constexpr int kLobeCells = 3;
 
-/// Half the extent of a lobe that is cut into n cells, in deviations: with it the cells, each evenly filled with its share of the
-/// lobe, have the variance of the lobe.
+/// Half the extent of a lobe that is cut into n cells, in deviations: with it the cells, each evenly filled with its share of
+/// the lobe, have the variance of the lobe.
 inline GLINT_HD float lobeExtent(int cells) {
   constexpr float kExtents[kMostLobeCells] = {1.732f, 1.732f, 1.994f, 2.181f, 2.326f, 2.444f, 2.542f, 2.626f};
   return kExtents[std::clamp(cells, 1, kMostLobeCells) - 1];
@@ -110,11 +110,11 @@ struct LightSample {
   float pdf = 0;  ///< per unit solid angle; 0 if there is no light
 };
 
-/// Importance sampling of a list of lobes for one BRDF and wo: first a lobe by what it contributes to the radiance towards wo, then a
-/// direction in it.
+/// Importance sampling of a list of lobes for one BRDF and wo: first a lobe by what it contributes to the radiance towards wo,
+/// then a direction in it.
 ///
-/// A lobe's contribution is its prefiltered radiance with one cell; kFluxShare of the samples choose by flux alone, so that every
-/// lobe that gives light can be chosen. Directions may lie below the horizon: there the BRDF is 0. Colours count by their
+/// A lobe's contribution is its prefiltered radiance with one cell; kFluxShare of the samples choose by flux alone, so that
+/// every lobe that gives light can be chosen. Directions may lie below the horizon: there the BRDF is 0. Colours count by their
 /// luminance; lobes of luminance 0 or less are never chosen.
 class LightSampler {
  public:

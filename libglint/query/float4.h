@@ -56,7 +56,8 @@ struct Float4 {
     return positiveHalves(_mm_setr_epi32(a, b, c, d));
   }
   static Float4 positiveHalves(__m128i bits) {
-    // Right for normal numbers. A subnormal f 2^-14 comes out as 2^-15 (1 + f): less than twice that minus 2^-14 only if it is normal.
+    // Right for normal numbers. A subnormal f 2^-14 comes out as 2^-15 (1 + f): less than twice that minus 2^-14 only if it is
+    // normal.
     const __m128 normal = _mm_castsi128_ps(_mm_add_epi32(_mm_slli_epi32(bits, 13), _mm_set1_epi32(112 << 23)));
     return {_mm_min_ps(normal, _mm_sub_ps(_mm_add_ps(normal, normal), _mm_set1_ps(0x1p-14f)))};
   }

@@ -27,8 +27,8 @@ inline GLINT_HD float wrapUnit(float u) {
   return wrapped >= 0 && wrapped < 1 ? wrapped : 0.0f;
 }
 
-/// Covariance of a footprint, made usable: shortened to the sides of the map along u and v (a longer one sees the map evenly, to
-/// 5e-9), widened to kMinSigmaTexels; what is not finite becomes the narrowest one.
+/// Covariance of a footprint, made usable: shortened to the sides of the map along u and v (a longer one sees the map evenly,
+/// to 5e-9), widened to kMinSigmaTexels; what is not finite becomes the narrowest one.
 inline GLINT_HD Covariance usableCovariance(Covariance c, int width, int height) {
   constexpr float kLowest = kMinSigmaTexels * kMinSigmaTexels;
   if (!(std::isfinite(c.xx) && std::isfinite(c.xy) && std::isfinite(c.yy))) return {kLowest, 0, kLowest};
@@ -90,12 +90,13 @@ inline GLINT_HD float areaInsideUnitBox(const Vec2* points, int count) {
 
 /// A footprint made ready for sums over texels.
 ///
-/// Texel (i, j) of the endless plane is the square [i, i+1] x [j, j+1]; the cell (i, j) of a smooth surface is the square between
-/// the centres of texels (i, j) and (i+1, j+1), halved along its diagonal. A Gaussian weighs texels at their centres and triangles
-/// at their centroids; a box weighs both by the covered area. Weights are relative: divide by their sum.
+/// Texel (i, j) of the endless plane is the square [i, i+1] x [j, j+1]; the cell (i, j) of a smooth surface is the square
+/// between the centres of texels (i, j) and (i+1, j+1), halved along its diagonal. A Gaussian weighs texels at their centres
+/// and triangles at their centroids; a box weighs both by the covered area. Weights are relative: divide by their sum.
 ///
-/// Sizes are made usable first, so that every footprint has an answer: see `usableCovariance` for Gaussians; boxes are shortened
-/// to four times the map along u and v, and boxes without area or finite size are answered as the Gaussian of the same moments.
+/// Sizes are made usable first, so that every footprint has an answer: see `usableCovariance` for Gaussians; boxes are
+/// shortened to four times the map along u and v, and boxes without area or finite size are answered as the Gaussian of the
+/// same moments.
 class FootprintWeights {
  public:
   GLINT_HD FootprintWeights(const Footprint& p, int width, int height) {
@@ -129,8 +130,8 @@ class FootprintWeights {
   GLINT_HD bool isBox() const { return is_box_; }
   GLINT_HD Vec2 centre() const { return centre_; }
 
-  /// A Gaussian along one line of texel space, y = const: where it peaks, its deviation, and the integral over the line relative
-  /// to that over the line through the centre.
+  /// A Gaussian along one line of texel space, y = const: where it peaks, its deviation, and the integral over the line
+  /// relative to that over the line through the centre.
   struct Line {
     float mean, sigma, share;
   };

@@ -20,8 +20,8 @@ inline GLINT_HD float gaussianMass(float low, float high, float mean, float sigm
   return 0.5f * (std::erf((high - mean) * scale) - std::erf((low - mean) * scale));
 }
 
-/// Quantile of the standard normal distribution, for u in (0, 1); numbers closer to 0 than 2^-25 count as 2^-25. Monotone; relative
-/// error below 1e-6 (M. Giles 2012, "Approximating the erfinv function", single precision).
+/// Quantile of the standard normal distribution, for u in (0, 1); numbers closer to 0 than 2^-25 count as 2^-25. Monotone;
+/// relative error below 1e-6 (M. Giles 2012, "Approximating the erfinv function", single precision).
 inline GLINT_HD float normalQuantile(float u) {
   const float low = std::max(u, 0x1p-25f);
   const float x = 2 * low - 1;

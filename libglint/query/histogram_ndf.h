@@ -26,12 +26,12 @@ inline constexpr float kSlantTolerance = 0.06f;
 
 /// The NDF from accumulated histograms of normals (Gamboa 2018, section 4.1).
 ///
-/// Texels count by their covered area, the plane is periodic. Boxes along the axes are exact, whatever their size. Boxes at an angle are
-/// made of strips where these misplace no more than a given share of the footprint, which bounds the total variation from the exact
-/// histogram; small or thin ones, and all with a tolerance of 0, are exact. Gaussian footprints are answered as the
-/// parallelogram of the same covariance, or three of them. Inside a bin of directions the density is
-/// even over the bin's area of the disk: the histogram knows no more. Bins are some ten degrees wide, far wider than the intrinsic
-/// roughness, so there is no further blur, and the density integrates to 1 over the disk.
+/// Texels count by their covered area, the plane is periodic. Boxes along the axes are exact, whatever their size. Boxes at an
+/// angle are made of strips where these misplace no more than a given share of the footprint, which bounds the total variation
+/// from the exact histogram; small or thin ones, and all with a tolerance of 0, are exact. Gaussian footprints are answered as
+/// the parallelogram of the same covariance, or three of them. Inside a bin of directions the density is even over the bin's
+/// area of the disk: the histogram knows no more. Bins are some ten degrees wide, far wider than the intrinsic roughness, so
+/// there is no further blur, and the density integrates to 1 over the disk.
 /// Cost: a few texels for each texel along the border of an axis-aligned box (and none beyond some hundreds), four rows of
 /// counters; at an angle that for some 1 / tolerance strips, and exactly O(stride * border).
 /// Thread-safe, allocates nothing; the arrays must outlive it.
@@ -51,8 +51,8 @@ class HistogramNdf {
   /// Middle of a bin in elevation and azimuth: the direction that stands for it in the paper.
   GLINT_HD Vec2 binCentre(int bin) const { return bins_.centre(sat_.bin_ids.data()[bin]); }
 
-  /// Whole histogram of a footprint: visitor(int bin, float weight) for every bin with weight > 0, in increasing order, 0 <= bin <
-  /// binCount(). Weights are shares of the footprint and sum to 1.
+  /// Whole histogram of a footprint: visitor(int bin, float weight) for every bin with weight > 0, in increasing order,
+  /// 0 <= bin < binCount(). Weights are shares of the footprint and sum to 1.
   template <class Visitor>
   GLINT_HD void forEachBin(const Footprint& p, Visitor&& visitor) const {
     BinCounts counts;
@@ -100,8 +100,8 @@ class HistogramNdf {
     return static_cast<float>(mass / (total * range.area()));
   }
 
-  /// Half vector with probability density `density`, which is its pdf: xi.x chooses the bin and what is left of it the azimuth in
-  /// the bin, xi.y the radius, so that even xi stay even within bins.
+  /// Half vector with probability density `density`, which is its pdf: xi.x chooses the bin and what is left of it the azimuth
+  /// in the bin, xi.y the radius, so that even xi stay even within bins.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     xi = clampUnit(xi);
     BinCounts counts;
@@ -194,8 +194,8 @@ class HistogramNdf {
 
   /// Longest half axis in periods of the map: sums of areas stay below 2^63.
   static constexpr double kMostPeriods = 64;
-  /// Nested boxes for a Gaussian: sizes relative to the box of its covariance, and shares. Fitted: least squared difference under
-  /// sum of shares 1, sum of shares * scales^2 1.
+  /// Nested boxes for a Gaussian: sizes relative to the box of its covariance, and shares. Fitted: least squared difference
+  /// under sum of shares 1, sum of shares * scales^2 1.
   static constexpr double kBoxScales[3] = {0.508447702070, 0.812387977981, 1.239504002977};
   static constexpr double kBoxShares[3] = {0.179460940730, 0.350350560935, 0.470188498334};
 

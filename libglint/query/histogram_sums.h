@@ -139,16 +139,17 @@ class OneBin {
 
 /// Adds rectangles of texels to a sum over bins. Each texel counts by its covered area.
 ///
-/// A rectangle is moved to the nearest points of the fine table on all sides, and the strips between are added or taken off texel by
-/// texel, long ones from the sums along their rows and columns. Rectangles of several times 2^16 texels take their middle from the
-/// coarse table, whose counters are modulo 2^32, and the frame around it from the fine one: at once, or in pieces, below 2^16 texels.
+/// A rectangle is moved to the nearest points of the fine table on all sides, and the strips between are added or taken off
+/// texel by texel, long ones from the sums along their rows and columns. Rectangles of several times 2^16 texels take their
+/// middle from the coarse table, whose counters are modulo 2^32, and the frame around it from the fine one: at once, or in
+/// pieces, below 2^16 texels.
 template <class Sum>
 class RectangleSums {
  public:
   GLINT_HD RectangleSums(const HistogramSat& sat, Sum& sum) : sat_(sat), sum_(sum) {}
 
-  /// Rectangle [x0, x1] x [y0, y1] of the endless plane, texels; any finite size, counted in whole periods where it is larger than
-  /// the map.
+  /// Rectangle [x0, x1] x [y0, y1] of the endless plane, texels; any finite size, counted in whole periods where it is larger
+  /// than the map.
   GLINT_HD void add(double x0, double x1, double y0, double y1, double weight) {
     forEachPiece(y0, y1, sat_.height, [&](double b0, double b1, double times_y) {
       forEachPiece(x0, x1, sat_.width,
@@ -212,8 +213,8 @@ class RectangleSums {
   /// What a difference of two points of row_sums costs, in texels.
   static constexpr int kDifferenceCost = 96;
   static constexpr std::int64_t kFineLimit = 65536;
-  /// Rectangles of less than so many times kFineLimit are added in pieces. With more, their shorter side times the largest stride
-  /// could exceed kFineLimit.
+  /// Rectangles of less than so many times kFineLimit are added in pieces. With more, their shorter side times the largest
+  /// stride could exceed kFineLimit.
   static constexpr int kMostPieces = 3;
   static constexpr int kCacheLine = 32;  // counters
 

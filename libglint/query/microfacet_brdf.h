@@ -14,20 +14,26 @@ struct BrdfSample {
   float pdf = 0;  ///< per unit solid angle; 0 if the sample is not a direction above the horizon
 };
 
+/// A BRDF towards one direction, and the density with which it is sampled.
+struct BrdfValue {
+  Rgb f;          ///< 1/sr, without the cosine wi.z
+  float pdf = 0;  ///< of wi for the given wo, per unit solid angle
+};
+
 /// The microfacet BRDF of one shading point: f = D F G2 / (4 wi.z wo.z), with D from any model of the NDF.
 ///
-/// Directions are unit vectors of the tangent frame, +z up, both away from the surface; radiance comes along wi and leaves along wo.
-/// Directions below the horizon (or within kHorizon of it), longer than 1, or not finite get 0 from everything here.
+/// Directions are unit vectors of the tangent frame, +z up, both away from the surface; radiance comes along wi and leaves
+/// along wo. Directions below the horizon (or within kHorizon of it), longer than 1, or not finite get 0 from everything here.
 ///
 /// Reciprocal: f(wi, wo) = f(wo, wi), but for rounding. `sample` is not: its pdf depends on which direction is given.
 ///
-/// Energy: with F = 1, the integral of f wi.z over wi is at most A_D(wo) / A(wo), the facet area that the footprint's D turns towards
-/// wo over that of the normal distribution of slopes which masks it (SmithMasking). It is at most 1 where D is that distribution, and
-/// on average over the map so far as its slopes are normal; a single footprint that leans towards wo can exceed 1, as a tilted
-/// facet does. What bounces between facets is lost, so white facets give less than 1.
+/// Energy: with F = 1, the integral of f wi.z over wi is at most A_D(wo) / A(wo), the facet area that the footprint's D turns
+/// towards wo over that of the normal distribution of slopes which masks it (SmithMasking). It is at most 1 where D is that
+/// distribution, and on average over the map so far as its slopes are normal; a single footprint that leans towards wo can
+/// exceed 1, as a tilted facet does. What bounces between facets is lost, so white facets give less than 1.
 ///
-/// Half vectors that D spills outside the unit disk are no directions: they are never evaluated, and a sample of them has pdf and
-/// weight 0. So the pdf integrates to less than 1: by those, and by facets that reflect below the horizon.
+/// Half vectors that D spills outside the unit disk are no directions: they are never evaluated, and a sample of them has pdf
+/// and weight 0. So the pdf integrates to less than 1: by those, and by facets that reflect below the horizon.
 ///
 /// Holds a pointer to the model, which must outlive it. Thread-safe, allocates nothing.
 template <NdfModel M>
@@ -64,10 +70,23 @@ class MicrofacetBrdf {
     return mixed(model_->density(footprint_, h.disk), h, wo);
   }
 
+  /// `evaluate` and `pdf` together. One density.
+  GLINT_HD BrdfValue evaluateWithPdf(Vec3 wi, Vec3 wo) const {
+    if (!(aboveHorizon(wi) && aboveHorizon(wo))) return {};
+    const HalfVector h = halfVectorOf(wi, wo);
+    return valueOf(wi, wo, h, model_->density(footprint_, h.disk));
+  }
+
+  /// The same where the density towards h is known.
+  /// @param wi, wo  above the horizon
+  GLINT_HD BrdfValue valueOf(Vec3 wi, Vec3 wo, const HalfVector& h, float density) const {
+    return {density * response(wi, wo, h), mixed(density, h, wo)};
+  }
+
   /// Draws wi: a half vector from D, mirrored; or, with probability uniformShare(wo), evenly from the hemisphere.
   ///
-  /// From D alone the weight F G2 (wo . h) / (wo.z h.z) grows without bound towards the horizon. With the share s and the projected
-  /// area A of SmithMasking, each channel of the weight is at most 2 / ((1 - s) A(wo) wo.z), and at most
+  /// From D alone the weight F G2 (wo . h) / (wo.z h.z) grows without bound towards the horizon. With the share s and the
+  /// projected area A of SmithMasking, each channel of the weight is at most 2 / ((1 - s) A(wo) wo.z), and at most
   /// pi D(h) / (2 s A(wo)): the first is 2 at normal incidence, where nothing is drawn evenly, and
   /// the second holds down to the horizon. D is at most 1 / (2 pi sigma_r^2).
   /// @param xi  in [0, 1)^2

@@ -16,11 +16,12 @@ struct HalfVectorSample {
 /// A distribution of microscopic normals, filtered over a footprint. Density is per unit projected area: its integral over the
 /// disk is 1, and its value is the usual microfacet D(omega).
 ///
-/// Half vectors are points of [-1, 1]^2, the square that NDF images cover; only those with |h| < 1 are directions. A facet's blur
-/// may spill a little past the unit circle; it is kept there, so that sums stay exact. Outside the square the density is 0.
-/// `mean` is the average of the density over a box, counting 0 outside the square.
-/// `sample` draws half vectors in proportion to the density from two numbers in [0, 1). Its warp keeps stratification: equal areas
-/// of [0, 1)^2 go to equal masses, neighbours mostly to neighbours. Numbers outside [0, 1) are clamped to it, NaN counts as 0.
+/// Half vectors are points of [-1, 1]^2, the square that NDF images cover; only those with |h| < 1 are directions. A facet's
+/// blur may spill a little past the unit circle; it is kept there, so that sums stay exact. Outside the square the density is
+/// 0. `mean` is the average of the density over a box, counting 0 outside the square.
+/// `sample` draws half vectors in proportion to the density from two numbers in [0, 1). Its warp keeps stratification: equal
+/// areas of [0, 1)^2 go to equal masses, neighbours mostly to neighbours. Numbers outside [0, 1) are clamped to it, NaN counts
+/// as 0.
 template <class M>
 concept NdfModel = requires(const M& m, const Footprint& p, Vec2 h, Box2 range, Vec2 xi) {
   { m.density(p, h) } -> std::same_as<float>;

@@ -9,8 +9,8 @@ namespace glint {
 
 /// Makes the models of a packed buffer. Trusts the header, which must come from glint::api::pack.
 ///
-/// Header and arrays are given apart, because the processor that makes the model need not be the one that asks it: a host reads its
-/// own copy of the header, and gives the address of the buffer on the device. On the device both are the buffer.
+/// Header and arrays are given apart, because the processor that makes the model need not be the one that asks it: a host reads
+/// its own copy of the header, and gives the address of the buffer on the device. On the device both are the buffer.
 /// @see glint/model/packed_ndf.h for the layout
 class PackedNdfView {
  public:

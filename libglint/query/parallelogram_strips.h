@@ -17,10 +17,10 @@ struct StripPlan {
 
 /// Strips of one height, the highest that misplace no more than a share of a parallelogram.
 ///
-/// In a strip of height h, a side that runs over r texels along u and its mean enclose an area of 8/27 r h at most (r h / 4 where it
-/// has no corner): over all strips, 32/27 h (|ax| + |bx|). Half of that is misplaced, since what is too much here lacks there.
-/// Moving the ends to points `snap` apart moves an area of 1/2 snap * height on each side, which counts twice since shares are taken of
-/// an area that has changed.
+/// In a strip of height h, a side that runs over r texels along u and its mean enclose an area of 8/27 r h at most (r h / 4
+/// where it has no corner): over all strips, 32/27 h (|ax| + |bx|). Half of that is misplaced, since what is too much here
+/// lacks there. Moving the ends to points `snap` apart moves an area of 1/2 snap * height on each side, which counts twice
+/// since shares are taken of an area that has changed.
 /// @param ax, ay, bx, by  half axes, texels
 GLINT_HD inline StripPlan planStrips(const HistogramSat& sat, double ax, double ay, double bx, double by, double tolerance) {
   const double area = 4 * std::fabs(ax * by - ay * bx), height = 2 * (std::fabs(ay) + std::fabs(by));
@@ -35,8 +35,9 @@ GLINT_HD inline StripPlan planStrips(const HistogramSat& sat, double ax, double 
   return {};
 }
 
-/// Adds a parallelogram of texels to a sum over bins as strips, rectangles between rows of the fine table: each begins and ends where
-/// the parallelogram does on average over the strip. So a strip has the right area, and steps take the place of slanted sides.
+/// Adds a parallelogram of texels to a sum over bins as strips, rectangles between rows of the fine table: each begins and ends
+/// where the parallelogram does on average over the strip. So a strip has the right area, and steps take the place of slanted
+/// sides.
 ///
 /// Strips end at the same rows of the map wherever the parallelogram lies, so that results change smoothly as it moves.
 /// O(height / plan.rows) rectangles; without plan.snap, O(height * stride) texels as well.

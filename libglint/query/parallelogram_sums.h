@@ -50,10 +50,10 @@ class ParallelogramEdges {
 
 /// Adds a parallelogram of texels to a sum over bins, each texel by its covered area: exact, whatever the angle.
 ///
-/// A row of texels sees the area on the right of the edges that go down less that on the right of those that go up. The texels that
-/// an edge crosses get their part of that area in closed form; the rest of a row is a run of whole texels. Runs of the rows between
-/// two points of the fine table are cut to points as well, so that they make a rectangle, and the texels left over at their ends
-/// are added or taken off. O(length of the edges * stride) texels and O(height / stride) rectangles.
+/// A row of texels sees the area on the right of the edges that go down less that on the right of those that go up. The texels
+/// that an edge crosses get their part of that area in closed form; the rest of a row is a run of whole texels. Runs of the
+/// rows between two points of the fine table are cut to points as well, so that they make a rectangle, and the texels left over
+/// at their ends are added or taken off. O(length of the edges * stride) texels and O(height / stride) rectangles.
 template <class Sum>
 class ParallelogramSums {
  public:
@@ -102,7 +102,8 @@ class ParallelogramSums {
     addShares(row, ends, shares, count);
   }
 
-  /// Texels of a row that an edge crosses between columns left and right. Returns the first texel that lies wholly on its right.
+  /// Texels of a row that an edge crosses between columns left and right. Returns the first texel that lies wholly on its
+  /// right.
   GLINT_HD int addEdge(int row, double left, double right, double share) {
     const int first = static_cast<int>(std::floor(left)), last = std::max(static_cast<int>(std::ceil(right)), first);
     if (last - first == 1) {

@@ -7,7 +7,8 @@
 
 namespace glint {
 
-/// Deviation of the pixel filter that `footprintFromDifferentials` assumes, in pixels: that of renderers' usual Gaussian filter.
+/// Deviation of the pixel filter that `footprintFromDifferentials` assumes, in pixels: that of renderers' usual Gaussian
+/// filter.
 inline constexpr float kPixelFilterSigma = 0.5f;
 /// Half axes are cut to this length (texels), so that their squares are finite.
 inline constexpr float kLongestAxis = 1e15f;
@@ -20,9 +21,10 @@ inline GLINT_HD Vec2 finiteAxis(Vec2 a) {
 
 /// The Gaussian footprint of a pixel from a renderer's ray differentials.
 ///
-/// Its covariance is filter_sigma^2 (a a^T + b b^T), where a and b are the texels that neighbouring pixels along x and y are apart:
-/// the image of a round pixel filter in texture space. What is not a number counts as 0, infinite lengths as kLongestAxis, and a
-/// footprint without extent is answered as the narrowest: every input gives a footprint that every model answers.
+/// Its covariance is filter_sigma^2 (a a^T + b b^T), where a and b are the texels that neighbouring pixels along x and y are
+/// apart: the image of a round pixel filter in texture space. What is not a number counts as 0, infinite lengths as
+/// kLongestAxis, and a footprint without extent is answered as the narrowest: every input gives a footprint that every model
+/// answers.
 /// @param uv             centre; the texture is periodic
 /// @param duvdx, duvdy   change of uv from one pixel to the next
 /// @param width, height  of the map, texels
@@ -61,9 +63,9 @@ inline GLINT_HD RayCone propagated(RayCone cone, float distance) {
   return {std::sqrt(cone.width * cone.width + widening * widening), cone.spread};
 }
 
-/// The beam after it was reflected by facets whose slopes deviate by `slope_sigma` per axis: directions deviate by twice the angle.
-/// With alpha of a GGX or Beckmann lobe slope_sigma is alpha / sqrt(2); with a map's slopes and sigma_r, sqrt(mean variance + sigma_r^2).
-/// The spread is at most that of the whole hemisphere.
+/// The beam after it was reflected by facets whose slopes deviate by `slope_sigma` per axis: directions deviate by twice the
+/// angle. With alpha of a GGX or Beckmann lobe slope_sigma is alpha / sqrt(2); with a map's slopes and sigma_r, sqrt(mean
+/// variance + sigma_r^2). The spread is at most that of the whole hemisphere.
 inline GLINT_HD RayCone bounced(RayCone cone, float slope_sigma) {
   constexpr float kHemisphere = 0.75f;  // radians: RMS angle per axis of a hemisphere seen evenly by projected area
   const float turned = 2 * std::atan(slope_sigma);
@@ -72,7 +74,8 @@ inline GLINT_HD RayCone bounced(RayCone cone, float slope_sigma) {
 
 /// The footprint of a beam on a surface.
 /// @param uv              centre
-/// @param direction       unit vector of the tangent frame towards the ray's origin: the footprint is stretched along it by 1 / z
+/// @param direction       unit vector of the tangent frame towards the ray's origin: the footprint is stretched along it by
+///                        1 / z
 /// @param texels_per_unit texels in one scene unit, > 0
 /// @note sizes that are NaN count as 0, infinite ones as kLongestAxis; grazing rays stretch at most kMostStretch times
 inline GLINT_HD Footprint footprintOfCone(RayCone cone, Vec2 uv, Vec3 direction, float texels_per_unit) {

@@ -18,7 +18,8 @@ namespace glint {
 /// Exact for Gaussian and box footprints, flat and smooth surfaces. `Search::exhaustive` visits every texel of the footprint:
 /// O(footprint area). `Search::pruned` descends the map's min-max pyramid of normals and skips blocks whose normals are out of
 /// the lobe's reach (kLobeReach): the same to 3e-7 of a lobe's peak, and sublinear; it needs `map.bounds`.
-/// With Boundary::clamp a footprint sees only texels of the map.
+/// With Boundary::clamp a footprint sees only texels of the map. A smooth surface then ends at the outermost texel centres:
+/// footprints whose centre lies beyond them, in the outer half texel, are moved there, so that none misses it.
 /// Thread-safe, allocates nothing; the map must outlive it.
 class Reference {
  public:
@@ -53,11 +54,12 @@ class Reference {
   /// Draws a texel (or triangle) by its weight in the footprint, a normal of it and the lobe's blur around that. The pdf is the
   /// density; half vectors that the blur takes out of [-1, 1]^2 have pdf 0.
   ///
-  /// O(rows + columns) of the footprint for Gaussians (O(area) if they are rotated and the boundary is clamped), O(1) for boxes, and
-  /// the density. A choice uses up leading digits of `xi` and the next one those below, so 24 bits are enough for one sample.
+  /// O(rows + columns) of the footprint for Gaussians (O(area) if they are rotated and the boundary is clamped), O(1) for
+  /// boxes, and the density. A choice uses up leading digits of `xi` and the next one those below, so 24 bits are enough for
+  /// one sample.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     xi = clampUnit(xi);
-    const FootprintWeights weights(p, map_.width, map_.height);
+    const FootprintWeights weights = weightsOf(p);
     const TexelChoice texel = chooseTexel(weights, {map_.width, map_.height, surface_, boundary_}, xi);
     if (!texel.found) return {};
     Vec2 n = normal(texel.i, texel.j);
@@ -75,7 +77,7 @@ class Reference {
   /// Visits every facet in a footprint: visitor(weight, normal) on a flat surface. Weights sum to the returned total.
   template <class Visitor>
   GLINT_HD double forEachTexel(const Footprint& p, Visitor&& visitor) const {
-    const FootprintWeights weights(p, map_.width, map_.height);
+    const FootprintWeights weights = weightsOf(p);
     double total = 0;
     forEachCell(weights, [&](int i, int j) {
       const float w = weights.texel(i, j);
@@ -89,7 +91,7 @@ class Reference {
   /// Visits every triangle in a footprint: visitor(weight, n0, n1, n2) on a smooth surface. Weights sum to the returned total.
   template <class Visitor>
   GLINT_HD double forEachTriangle(const Footprint& p, Visitor&& visitor) const {
-    const FootprintWeights weights(p, map_.width, map_.height);
+    const FootprintWeights weights = weightsOf(p);
     double total = 0;
     forEachCell(weights, [&](int i, int j) {
       if (!hasCell(i, j)) return;
@@ -119,6 +121,16 @@ class Reference {
     GLINT_HD float triangle(Vec2 a, Vec2 b, Vec2 c) const { return triangleMass(a, b, c, box, sigma); }
   };
 
+  GLINT_HD FootprintWeights weightsOf(Footprint p) const {
+    const auto onSurface = [](float u, int texels) {
+      const float border = 0.5f / static_cast<float>(texels);
+      return std::clamp(wrapUnit(u), border, 1 - border);
+    };
+    if (surface_ == Surface::smooth && boundary_ == Boundary::clamp)
+      p.centre = {onSurface(p.centre.x, map_.width), onSurface(p.centre.y, map_.height)};
+    return {p, map_.width, map_.height};
+  }
+
   template <class Lobe>
   GLINT_HD double average(const Footprint& p, const Lobe& lobe) const {
     if (search_ == Search::pruned) return averagePruned(p, lobe);
@@ -132,7 +144,7 @@ class Reference {
 
   template <class Lobe>
   GLINT_HD double averagePruned(const Footprint& p, const Lobe& lobe) const {
-    const FootprintWeights weights(p, map_.width, map_.height);
+    const FootprintWeights weights = weightsOf(p);
     const Box2 support = lobe.support();
     const float reach = kLobeReach * sigma_r_;
     double sum = 0;

@@ -14,10 +14,11 @@ namespace glint {
 ///   P_l^m = a_l^m (z P_(l-1)^m - b_l^m P_(l-2)^m),
 /// which depend on l and m only. Row l holds m = 0 .. l, rows follow one another.
 ///
-/// Made once in the caller's memory, used for any direction. The normalisation makes sum over m of (y_l^m)^2 = (2l + 1) / (4 pi).
-/// @note In double, sin^m underflows only where every band up to order 1900 is negligible: m > l sin(theta) makes P_l^m fall like
-///       (e l sin(theta) / (2 m))^m, and the worst seed that still matters is about exp(-order / e). In float the same holds up
-///       to order 200.
+/// Made once in the caller's memory, used for any direction. The normalisation makes sum over m of (y_l^m)^2 =
+/// (2l + 1) / (4 pi).
+/// @note In double, sin^m underflows only where every band up to order 1900 is negligible: m > l sin(theta) makes P_l^m fall
+///       like (e l sin(theta) / (2 m))^m, and the worst seed that still matters is about exp(-order / e). In float the same
+///       holds up to order 200.
 template <class T>
 class ShRecurrence {
  public:
@@ -163,8 +164,8 @@ class ShAccumulator {
   double weight_[kShBatch] = {};
 };
 
-/// Turns a circularly symmetric function from +z to a direction, band by band: g_l^m = sqrt(4 pi / (2l + 1)) f_l y_l^m(direction)
-/// (Gamboa 2018, Eq. 10). This is the factor of y_l^m.
+/// Turns a circularly symmetric function from +z to a direction, band by band: g_l^m = sqrt(4 pi / (2l + 1)) f_l
+/// y_l^m(direction) (Gamboa 2018, Eq. 10). This is the factor of y_l^m.
 GLINT_HD inline double zonalFactor(int l, double f_l) { return std::sqrt(4 * std::numbers::pi / (2 * l + 1)) * f_l; }
 
 }  // namespace glint

@@ -28,8 +28,8 @@ struct ShadingFrame {
 struct ShLightOptions {
   int order = kMaxShOrder;           ///< highest band; no more than light and lobes have
   ShWindow window = ShWindow::none;  ///< weight of the bands up to `order`
-  /// Bands are left out from the lowest on whose rest cannot change the result by more than this times the mean of the light over
-  /// all half vectors: the effective band limit of light and NDF together (Gamboa 2018, section 4.2).
+  /// Bands are left out from the lowest on whose rest cannot change the result by more than this times the mean of the light
+  /// over all half vectors: the effective band limit of light and NDF together (Gamboa 2018, section 4.2).
   float tolerance = 0;
   bool nearest =
       false;  ///< take the nearest outgoing direction of the table; else blend the four around it, at four times the cost
@@ -43,19 +43,19 @@ struct ShLightIntegral {
   int order = 0;                      ///< band that the sum ended with
 };
 
-/// The integral over all light of L(wi) D(h) dwi for a histogram of normals, in one evaluation without noise (Gamboa 2018, Eq. 6, 7, 11
-/// and 12): times F G / (4 cos(wo)), see transferFactor, it is the reflected radiance.
+/// The integral over all light of L(wi) D(h) dwi for a histogram of normals, in one evaluation without noise (Gamboa 2018, Eq.
+/// 6, 7, 11 and 12): times F G / (4 cos(wo)), see transferFactor, it is the reflected radiance.
 ///
-/// Every bin stands for a facet whose roughness lobe (ShLobes) is turned towards the light's half vectors by evaluating spherical
-/// harmonics, exactly, rather than by a table of turned lobes. The light is tabulated for outgoing directions; a bin is asked at the
-/// half vector of the *same light direction* under the tabulated outgoing direction, so that bright spots stay in place between
-/// grid points and only the shape of the lobe's image is interpolated. Facets whose light comes from below the surface are left out, in
-/// part where the lobe straddles the horizon.
+/// Every bin stands for a facet whose roughness lobe (ShLobes) is turned towards the light's half vectors by evaluating
+/// spherical harmonics, exactly, rather than by a table of turned lobes. The light is tabulated for outgoing directions; a bin
+/// is asked at the half vector of the *same light direction* under the tabulated outgoing direction, so that bright spots stay
+/// in place between grid points and only the shape of the lobe's image is interpolated. Facets whose light comes from below the
+/// surface are left out, in part where the lobe straddles the horizon.
 ///
-/// Measured by glint-sh-bench against quadrature (sigma_r 0.05, 24 bins, a studio with a sun of 1.5 degrees): relative error 6 % at order
-/// 30, 0.9 % at 60; with 9 x 16, 17 x 32 and 33 x 64 outgoing directions 0.88, 0.86 and 0.85 % (nearest: 2.0, 1.7 and 1.0 %), with half
-/// precision the same to three digits. What stays at high orders is the first-order share at the horizon: 0.2 % under constant light,
-/// 0.5 % at sigma_r 0.1.
+/// Measured by glint-sh-bench against quadrature (sigma_r 0.05, 24 bins, a studio with a sun of 1.5 degrees): relative error
+/// 6 % at order 30, 0.9 % at 60; with 9 x 16, 17 x 32 and 33 x 64 outgoing directions 0.88, 0.86 and 0.85 % (nearest: 2.0, 1.7
+/// and 1.0 %), with half precision the same to three digits. What stays at high orders is the first-order share at the horizon:
+/// 0.2 % under constant light, 0.5 % at sigma_r 0.1.
 ///
 /// Thread-safe, allocates nothing; tables and recurrence must outlive it. T: float up to order kShFloatOrder, double beyond.
 template <class T>
@@ -101,8 +101,8 @@ class ShLightQuery {
     return result;
   }
 
-  /// Smallest band after which the rest of the product with any NDF is below tolerance * |band 0|: the norms of the light's bands times
-  /// those of the lobe, which no sum of turned lobes of total weight 1 exceeds.
+  /// Smallest band after which the rest of the product with any NDF is below tolerance * |band 0|: the norms of the light's
+  /// bands times those of the lobe, which no sum of turned lobes of total weight 1 exceeds.
   GLINT_HD int effectiveOrder(std::size_t direction, int highest, float tolerance) const {
     const float* norms = light_.band_norms.data() + direction * (static_cast<std::size_t>(light_.order) + 1);
     const float bound = tolerance * norms[0] * std::fabs(zonal_.data()[0]);
@@ -161,8 +161,8 @@ class ShLightQuery {
     return count;
   }
 
-  /// Share of a facet's lobe whose light comes from above the surface, to first order: the light's height changes along the half
-  /// vector h by the gradient of n . (2 (h . wo) h - wo).
+  /// Share of a facet's lobe whose light comes from above the surface, to first order: the light's height changes along the
+  /// half vector h by the gradient of n . (2 (h . wo) h - wo).
   GLINT_HD float shareAbove(Vec3 normal, Vec3 wo, Vec3 h, float height) const {
     const float ho = dot(h, wo), hn = dot(h, normal);
     const Vec3 gradient = 2 * hn * (wo - ho * h) + 2 * ho * (normal - hn * h);

@@ -8,8 +8,8 @@
 
 namespace glint {
 
-/// How bands are weighted before a series of spherical harmonics is cut off. Cutting alone makes bright spots ring: dark and even
-/// negative rings around them.
+/// How bands are weighted before a series of spherical harmonics is cut off. Cutting alone makes bright spots ring: dark and
+/// even negative rings around them.
 enum class ShWindow : std::uint8_t {
   none,     ///< all bands alike: sharpest, rings most
   lanczos,  ///< sinc(l / (order + 1)): blurs a spot by about a quarter, rings a tenth of `none`

@@ -13,12 +13,13 @@ namespace glint {
 ///
 /// Everything follows from the area that facets turn towards a direction w, projected along it, for each unit of the surface:
 /// A(w) = E[max(0, w . (-p, -q, 1))] over slopes (p, q). It is that of a normal variable and finite down to the horizon:
-/// G1 = w.z / A, Lambda = A / w.z - 1. Where facets lean away so far that A < w.z (only with a mean slope that is not 0) A counts as
-/// w.z, so that nothing is made brighter than unshadowed. Directions are unit vectors with w.z > 0.
+/// G1 = w.z / A, Lambda = A / w.z - 1. Where facets lean away so far that A < w.z (only with a mean slope that is not 0) A
+/// counts as w.z, so that nothing is made brighter than unshadowed. Directions are unit vectors with w.z > 0.
 class SmithMasking {
  public:
   /// @param slopes   of the map: PyramidShape::slopes, or bake::mapSlopes
-  /// @param sigma_r  intrinsic roughness of its facets; their blur adds sigma_r^2 to both variances, exact for facets that are level
+  /// @param sigma_r  intrinsic roughness of its facets; their blur adds sigma_r^2 to both variances, exact for facets that are
+  ///                 level
   GLINT_HD SmithMasking(const MapSlopes& slopes, float sigma_r) : mean_(slopes.mean), covariance_(slopes.covariance) {
     covariance_.xx += sigma_r * sigma_r;
     covariance_.yy += sigma_r * sigma_r;

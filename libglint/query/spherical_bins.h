@@ -70,8 +70,9 @@ struct DiskPolygon {
   }
 };
 
-/// Bins of the upper hemisphere with equal extents of elevation and azimuth (Gamboa 2018, section 4.1), seen as areas of the disk:
-/// ring k lies between radii sin(k pi / (2 rings)), sector s between azimuths 2 pi s / sectors. Bin = ring * sectors + sector.
+/// Bins of the upper hemisphere with equal extents of elevation and azimuth (Gamboa 2018, section 4.1), seen as areas of the
+/// disk: ring k lies between radii sin(k pi / (2 rings)), sector s between azimuths 2 pi s / sectors. Bin = ring * sectors +
+/// sector.
 class SphericalBins {
  public:
   /// @param theta_bins, phi_bins  within the limits of HistogramSat

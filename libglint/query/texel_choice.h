@@ -22,8 +22,8 @@ struct TexelChoice {
   int i = 0, j = 0, half = 0;
 };
 
-/// The digits of u below about 2^-bits as a number in [0, 1): uniform, and nearly independent of the leading ones. The factor is no
-/// power of two, so that regular grids of u spread too.
+/// The digits of u below about 2^-bits as a number in [0, 1): uniform, and nearly independent of the leading ones. The factor
+/// is no power of two, so that regular grids of u spread too.
 inline GLINT_HD float lowerDigits(float u, int bits) {
   const double scaled = static_cast<double>(u) * 1.2360679774997896 * static_cast<double>(1 << bits);
   return clampUnit(static_cast<float>(scaled - std::floor(scaled)));
@@ -31,8 +31,8 @@ inline GLINT_HD float lowerDigits(float u, int bits) {
 
 /// Chooses among the weights of a footprint, texel by texel or triangle by triangle, exactly in proportion.
 ///
-/// Gaussians: a row by its sum, then a column in it. On a plane that goes on for ever, sums of rows at least a texel wide have a
-/// closed form (to 5e-9: Poisson's formula); others are added up. Boxes: the texel under an even point of the parallelogram.
+/// Gaussians: a row by its sum, then a column in it. On a plane that goes on for ever, sums of rows at least a texel wide have
+/// a closed form (to 5e-9: Poisson's formula); others are added up. Boxes: the texel under an even point of the parallelogram.
 class TexelChooser {
  public:
   GLINT_HD TexelChooser(const FootprintWeights& weights, const TexelGrid& grid) : weights_(weights), grid_(grid) {

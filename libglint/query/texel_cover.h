@@ -47,12 +47,12 @@ struct CoverSpan {
 
 /// A parallelogram on the periodic plane of a map, made ready for exact overlaps with texels.
 ///
-/// Its coordinates count texels from the corner (originX, originY) of the map, the texel where its bounding box begins. Texel (i, j)
-/// of the map lies at (i - originX + m width, j - originY + n height) for all integers m, n.
+/// Its coordinates count texels from the corner (originX, originY) of the map, the texel where its bounding box begins. Texel
+/// (i, j) of the map lies at (i - originX + m width, j - originY + n height) for all integers m, n.
 ///
-/// Boxes are what they say, shortened to four times the map along u and v. Gaussians become the parallelogram with the same second
-/// moments along their principal axes, with the covariance of `usableCovariance`; boxes without area or finite size become the
-/// Gaussian of their moments first (as in FootprintWeights).
+/// Boxes are what they say, shortened to four times the map along u and v. Gaussians become the parallelogram with the same
+/// second moments along their principal axes, with the covariance of `usableCovariance`; boxes without area or finite size
+/// become the Gaussian of their moments first (as in FootprintWeights).
 class TexelCover {
  public:
   GLINT_HD TexelCover(const Footprint& p, int width, int height) : width_(width), height_(height) {

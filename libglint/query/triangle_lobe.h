@@ -61,8 +61,8 @@ inline GLINT_HD float triangleDensity(Vec2 n0, Vec2 n1, Vec2 n2, Vec2 h, float s
 
 /// Average over a triangle of the disk of the mass that the lobe around each of its points puts into a box.
 ///
-/// Halves the longest edge until pieces are about a deviation long, then applies a rule of degree 5; pieces that lie deep inside
-/// or far outside the box need no halving.
+/// Halves the longest edge until pieces are about a deviation long, then applies a rule of degree 5; pieces that lie deep
+/// inside or far outside the box need no halving.
 inline GLINT_HD float triangleMass(Vec2 n0, Vec2 n1, Vec2 n2, const Box2& box, float sigma) {
   struct Piece {
     Vec2 a, b, c;

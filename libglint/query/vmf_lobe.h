@@ -60,19 +60,19 @@ inline GLINT_HD LobeFacing lobeFacing(const LobeMoments& moments, Vec3 centre, V
   return facing;
 }
 
-/// Mean over the normals of a lobe of max(0, dot(n, wi)) max(0, dot(n, wo)), to first order in the correlation of the two cosines:
-/// exact when all normals face both directions. May fall slightly below 0 where hardly any do.
+/// Mean over the normals of a lobe of max(0, dot(n, wi)) max(0, dot(n, wo)), to first order in the correlation of the two
+/// cosines: exact when all normals face both directions. May fall slightly below 0 where hardly any do.
 inline GLINT_HD float lobeCosines(const LobeMoments& moments, const LobeFacing& i, const LobeFacing& o, float cosine_io) {
   const float covariance = moments.spread * cosine_io + moments.bias * i.cosine * o.cosine;
   return i.lit * o.lit + covariance * i.visible * o.visible;
 }
 
-/// Roughness of a GGX lobe that is spread over the normals of a von Mises-Fisher lobe: variances of slopes add, 1 / kappa for the
-/// lobe and alpha^2 / 2 for the facet.
+/// Roughness of a GGX lobe that is spread over the normals of a von Mises-Fisher lobe: variances of slopes add, 1 / kappa for
+/// the lobe and alpha^2 / 2 for the facet.
 inline GLINT_HD float spreadRoughness(float alpha, float kappa) { return std::sqrt(alpha * alpha + 2 / std::max(kappa, 1.0f)); }
 
-/// Mean over the normals of a lobe of f cos(wi) cos(wo) of a GGX facet, without Fresnel's factor: the facet's distribution widened by
-/// the lobe's, seen towards the half vector, masked at the normal that is likeliest to reflect.
+/// Mean over the normals of a lobe of f cos(wi) cos(wo) of a GGX facet, without Fresnel's factor: the facet's distribution
+/// widened by the lobe's, seen towards the half vector, masked at the normal that is likeliest to reflect.
 inline GLINT_HD float ggxLobe(float alpha, Vec3 centre, float kappa, Vec3 wi, Vec3 wo, Vec3 half) {
   const float a2 = alpha * alpha;
   const float width = a2 + 2 / std::max(kappa, 1.0f);

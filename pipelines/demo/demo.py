@@ -1,4 +1,5 @@
-"""The chain of tools on the sample maps: assets, a table of time, bytes and error, a picture before and after compression, and one of all models.
+"""The chain of tools on the sample maps: assets, a table of time, bytes and error, a picture before and after compression,
+and one of all models.
 
 Normally run by `make demo`.
 """

@@ -21,7 +21,8 @@ MAPS = {
     "flakes": ["flakes", "--flake-size", 6, "--alpha", 0.2, "--seed", 3],
 }
 MB = 1e6
-# Nanoseconds of the authors' inverse bin map for the 21 weights of a query: (map, alpha) -> footprints of 4^2, 16^2, 64^2, 256^2, 1024^2.
+# Nanoseconds of the authors' inverse bin map for the 21 weights of a query: (map, alpha) -> footprints of 4^2, 16^2, 64^2,
+# 256^2, 1024^2.
 BIN_MAP_AUTHORS = {
     ("isotropic 1K", 0.0025): (2448, 2668, 3197, 7113),
     ("isotropic 1K", 0.01): (3099, 3782, 8178, 27034),

@@ -1,10 +1,11 @@
 // Opening assets and asking them:
 //   glint-query-bench NORMALS.glint ASSET.glint... [--benchmark_format=json ...]
 // Names are WHAT/FILE. `random`: footprints of every size anywhere, towards normals of the map, so that most queries miss the
-// caches on big assets. `warm`: one such query again and again. A plain microfacet model (GGX) is timed in the same run, as a function
-// and as a sampler of half vectors, and ratio_* give the ratios of densities and samples to it: median of alternating runs.
-// `few`: the same 64 queries again and again, which stay in the caches. `batch`: those of `random` and `few` in batches of 1024 and 64,
-// for each query. ratio_batch_*: how many times as many queries a second a batch answers, medians of alternating runs.
+// caches on big assets. `warm`: one such query again and again. A plain microfacet model (GGX) is timed in the same run, as a
+// function and as a sampler of half vectors, and ratio_* give the ratios of densities and samples to it: median of alternating
+// runs. `few`: the same 64 queries again and again, which stay in the caches. `batch`: those of `random` and `few` in batches
+// of 1024 and 64, for each query. ratio_batch_*: how many times as many queries a second a batch answers, medians of
+// alternating runs.
 
 #include <benchmark/benchmark.h>
 #include <time.h>
@@ -46,8 +47,8 @@ Vector normalized(Vector v) {
   return {s * v.x, s * v.y, s * v.z};
 }
 
-/// What a renderer without glints does: anisotropic GGX, height-correlated Smith masking, and a conductor's Fresnel term at three
-/// wavelengths.
+/// What a renderer without glints does: anisotropic GGX, height-correlated Smith masking, and a conductor's Fresnel term at
+/// three wavelengths.
 struct PlainGgx {
   float alpha_x = 0.2f, alpha_y = 0.3f;
 

@@ -1,6 +1,6 @@
-// What a histogram costs: glint-sat-bench ASSET.glint... prints JSON. Footprints lie anywhere on the map, so that tables of many
-// megabytes miss the caches as they do in a renderer. CPU time of the thread; median of rounds. At an angle also exactly, and how far
-// the strips of the default tolerance are from that: total variation.
+// What a histogram costs: glint-sat-bench ASSET.glint... prints JSON. Footprints lie anywhere on the map, so that tables of
+// many megabytes miss the caches as they do in a renderer. CPU time of the thread; median of rounds. At an angle also exactly,
+// and how far the strips of the default tolerance are from that: total variation.
 
 #include <algorithm>
 #include <cmath>

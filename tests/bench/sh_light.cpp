@@ -1,7 +1,7 @@
 // Light integrals by spherical harmonics against quadrature, and against Monte Carlo at equal error:
 //   glint-sh-bench [--quick]
-// Prints one JSON object. Errors are RMS over outgoing directions and colours, relative to the RMS of the truth. Times are thread CPU
-// time, medians.
+// Prints one JSON object. Errors are RMS over outgoing directions and colours, relative to the RMS of the truth. Times are
+// thread CPU time, medians.
 
 #include "glint/bake/sh_light.h"
 

@@ -58,6 +58,8 @@ def test_json_says_what_was_built(glint, assets):
     assert result["bins_per_axis"] == int(5 / math.sin(math.atan(3 * ALPHA / math.sqrt(2))))
     assert 0 < result["blocks"] <= result["cells"]
     info = json.loads(glint("info", "b.glint", "--json").stdout)["result"]
+    # The map's noise has slopes of alpha / sqrt(2) along each axis.
+    assert info["properties"]["slope_covariance_xx"] == pytest.approx(0.3**2 / 2, rel=0.2)
     summary = json.dumps(info)
     assert f'"blocks": {result["blocks"]}' in summary
 

@@ -1,5 +1,6 @@
-"""The installed package: installed into a folder of its own, then used from C and C++ through CMake and pkg-config, by projects that see
-nothing else of the repository. Programs in C run under AddressSanitizer; in the asan preset the library is instrumented as well."""
+"""The installed package: installed into a folder of its own, then used from C and C++ through CMake and pkg-config, by
+projects that see nothing else of the repository. Programs in C run under AddressSanitizer; in the asan preset the library is
+instrumented as well."""
 
 import os
 import pathlib
@@ -13,7 +14,8 @@ ROOT = pathlib.Path(__file__).parents[2]
 BUILD = pathlib.Path(os.environ.get("GLINT_BUILD_DIR", ROOT / "build"))
 CONSUMER = ROOT / "tests/consumer_installed"
 GOLDEN = ROOT / "tests/golden/v1.0"
-KINDS = ["normals.glint", "ndf-pyramid.glint", "ndf-cp-cp-i8.glint", "ndf-cp-tucker-f16.glint"]
+KINDS = ["normals.glint", "ndf-pyramid.glint", "ndf-cp-cp-i8.glint", "ndf-cp-tucker-f16.glint", "bin-map.glint"]
+DISPLACEMENT = GOLDEN / "displacement-rgb.glint"
 SANITIZE = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g"]
 
 
@@ -67,11 +69,12 @@ def programs(prefix, tmp_path_factory):
 @pytest.mark.parametrize("program", ["check_c", "check_c_static", "check_cxx"])
 @pytest.mark.parametrize("asset", KINDS)
 def test_programs_of_an_installed_package_get_what_the_header_promises(programs, program, asset):
-    run(programs / program, GOLDEN / asset)
+    displacement = [] if program == "check_cxx" else [DISPLACEMENT]
+    run(programs / program, GOLDEN / asset, *displacement)
 
 
 def test_example_of_the_readme_answers(programs):
-    assert re.fullmatch(r"density \S+\nmean over a light \S+\n", run(programs / "app", GOLDEN / "ndf-cp-cp-i8.glint"))
+    assert re.fullmatch(r"density \S+\nmean over a light \S+\nreflected \S+ \S+ \S+\n", run(programs / "app", GOLDEN / "ndf-cp-cp-i8.glint"))
 
 
 def test_kinds_without_a_distribution_are_refused_by_name(programs):
@@ -89,7 +92,7 @@ def test_a_plain_compiler_and_pkg_config_are_enough(prefix, library_dir, tmp_pat
     run("cc", "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *SANITIZE, CONSUMER / "check.c", "-o", program, *flags, "-lm")
     loaded = {**os.environ, "LD_LIBRARY_PATH": str(library_dir)} if package == "glint" else None
     for asset in KINDS:
-        run(program, GOLDEN / asset, env=loaded)
+        run(program, GOLDEN / asset, DISPLACEMENT, env=loaded)
 
 
 def test_shared_library_shows_the_c_interface_and_nothing_else(prefix, library_dir):

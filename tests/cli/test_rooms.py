@@ -84,7 +84,8 @@ def test_room_includes_only_the_rooms_below_it(room):
 
 @pytest.mark.parametrize("room", ["model", "query"])
 def test_room_needs_only_the_standard_library(room):
-    """These compile into renderers and device code: nothing but our headers and those of the standard library (no dot, no slash).
+    """These compile into renderers and device code: nothing but our headers and those of the standard library (no dot, no
+    slash).
 
     One header may also include the compiler's own intrinsics, which it does where the program is compiled for them.
     """

@@ -82,7 +82,10 @@ def bins_of(normals, rings=9, sectors=32):
 
 
 def light_by_quadrature(facets, weights, sigma, wo, light, steps=64):
-    """Integral of L(wi) D(h) dwi: directions around every facet, weighted by its lobe. light: [height][width][3], image rows from the top."""
+    """Integral of L(wi) D(h) dwi: directions around every facet, weighted by its lobe.
+
+    light: [height][width][3], image rows from the top.
+    """
     theta = (np.arange(steps) + 0.5) / steps * 6 * sigma
     phi = (np.arange(2 * steps) + 0.5) / steps * np.pi
     sine, lobe = np.sin(theta), np.exp(-0.5 * (np.sin(theta) / sigma) ** 2) / (2 * np.pi * sigma**2)
@@ -103,7 +106,8 @@ def light_by_quadrature(facets, weights, sigma, wo, light, steps=64):
 
 
 def test_histograms_reflect_what_a_quadrature_over_their_normals_does(glint, folder):
-    """The whole chain on an asset of kind histogram-sat, against numpy: counts of the texels' bins, mean normals, and the lobes around them."""
+    """The whole chain on an asset of kind histogram-sat, against numpy: counts of the texels' bins, mean normals, and the lobes
+    around them."""
     sigma, wo = 0.08, np.array([0.3, -0.2, 0.9])
     wo /= np.linalg.norm(wo)
     random = np.random.default_rng(5)

@@ -1,4 +1,4 @@
-/* Asks the library everything that its header promises: check ASSET. Exits with the number of broken promises. */
+/* Asks the library everything that its header promises: check ASSET DISPLACEMENT. Exits with the number of broken promises. */
 #include <glint.h>
 #include <math.h>
 #include <stdio.h>
@@ -86,15 +86,125 @@ static void check_opening(const char* path) {
   options.sigma_r = -1;
   check(glint_ndf_open(path, &options, &ndf) == GLINT_ERROR_USAGE, "a negative roughness is an error");
   options.sigma_r = 0;
+  options.slant_tolerance = -0.5f;
+  check(glint_ndf_open(path, &options, &ndf) == GLINT_ERROR_USAGE, "a negative tolerance is an error");
+  options.slant_tolerance = GLINT_SLANT_EXACT;
+  options.gaussian_boxes = 2;
+  check(glint_ndf_open(path, &options, &ndf) == GLINT_ERROR_USAGE, "Gaussians are 1 or 3 boxes");
+  options.gaussian_boxes = 3;
+  check(glint_ndf_open(path, &options, &ndf) == GLINT_OK, "options of other kinds are ignored");
+  glint_ndf_close(ndf);
+  ndf = NULL;
   options.struct_size = 1;
   check(glint_ndf_open(path, &options, &ndf) == GLINT_ERROR_USAGE, "options need their size");
   check(ndf == NULL, "a failed call leaves its outputs untouched");
   glint_ndf_close(NULL);
 }
 
+static int is_light(const float color[3]) {
+  int c, light = 1;
+  for (c = 0; c < 3; ++c) light = light && isfinite(color[c]) && color[c] >= 0;
+  return light;
+}
+
+/* Directions of a batch as structs, around a view. */
+static void make_directions(float (*wi)[3], float (*wo)[3]) {
+  for (int k = 0; k < COUNT; ++k) {
+    const float t = (float)k / COUNT;
+    wi[k][0] = 0.2f - 0.3f * t, wi[k][1] = 0.2f * t, wo[k][0] = 0.5f * t - 0.3f, wo[k][1] = -0.1f;
+    wi[k][2] = sqrtf(1 - wi[k][0] * wi[k][0] - wi[k][1] * wi[k][1]);
+    wo[k][2] = sqrtf(1 - wo[k][0] * wo[k][0] - wo[k][1] * wo[k][1]);
+  }
+}
+
+static glint_directions columns(float (*w)[3]) {
+  const glint_directions d = {{&w[0][0], sizeof *w}, {&w[0][1], sizeof *w}, {&w[0][2], sizeof *w}};
+  return d;
+}
+
+static void check_brdf(const glint_ndf* ndf) {
+  const glint_footprint p = glint_footprint_isotropic(0.3f, 0.7f, 40);
+  const float sigma = 40, u = 0.3f, v = 0.7f, xi = 0.4f, below[3] = {0, 0.6f, -0.8f};
+  float(*wi)[3] = malloc(COUNT * sizeof *wi), (*wo)[3] = malloc(COUNT * sizeof *wo);
+  float *f = malloc(3 * COUNT * sizeof *f), *weights = malloc(3 * COUNT * sizeof *weights);
+  float *drawn = malloc(3 * COUNT * sizeof *drawn), *pdfs = malloc(COUNT * sizeof *pdfs),
+        *drawn_pdfs = malloc(COUNT * sizeof *pdfs);
+  glint_brdf* brdf = NULL;
+  glint_brdf_options gold = GLINT_BRDF_OPTIONS_INIT;
+  gold.fresnel = GLINT_FRESNEL_CONDUCTOR;
+  gold.eta[0] = 0.18f, gold.eta[1] = 0.42f, gold.eta[2] = 1.37f;
+  gold.k[0] = -1;
+  check(glint_brdf_create(ndf, &gold, &brdf) == GLINT_ERROR_USAGE && brdf == NULL, "a negative extinction is an error");
+  gold.k[0] = 3.42f, gold.k[1] = 2.35f, gold.k[2] = 1.77f;
+  check(glint_brdf_create(ndf, &gold, &brdf) == GLINT_OK, "a distribution reflects");
+  make_directions(wi, wo);
+  glint_footprints footprints;
+  memset(&footprints, 0, sizeof footprints);
+  footprints.u.data = &u, footprints.v.data = &v, footprints.sigma.data = &sigma;
+  const glint_directions wis = columns(wi), wos = columns(wo);
+  const glint_floats random = {&xi, 0};
+  check(glint_brdf_evaluate_batch(brdf, COUNT, &footprints, &wis, &wos, f, pdfs) == GLINT_OK, "a batch of values");
+  check(glint_brdf_sample_batch(brdf, COUNT, &footprints, &wos, random, random, drawn, weights, drawn_pdfs) == GLINT_OK,
+        "a batch of drawn directions");
+  for (int k = 0; k < COUNT; ++k) {
+    float one[3], weight[3], direction[3], pdf = -1;
+    glint_brdf_evaluate(brdf, &p, wi[k], wo[k], one, &pdf);
+    check(is_light(one) && pdf >= 0 && fabsf(one[2] - f[3 * k + 2]) <= 1e-6f * one[2] && fabsf(pdf - pdfs[k]) <= 1e-6f * pdf,
+          "values of a batch are those of single queries");
+    glint_brdf_sample(brdf, &p, wo[k], xi, xi, direction, weight, &pdf);
+    check(is_light(weight) && direction[0] == drawn[3 * k] && weight[1] == weights[3 * k + 1] && pdf == drawn_pdfs[k],
+          "directions of a batch are those of single queries");
+  }
+  float one[3] = {-1, -1, -1}, pdf = -1;
+  check(glint_brdf_evaluate(brdf, &p, below, wo[0], one, &pdf) == GLINT_OK && one[0] == 0 && pdf == 0,
+        "nothing is reflected from below the horizon");
+  check(glint_brdf_evaluate(brdf, NULL, wi[0], wo[0], one, &pdf) == GLINT_ERROR_USAGE && one[0] == 0,
+        "a BRDF needs a footprint");
+  glint_brdf_destroy(brdf);
+  glint_brdf_destroy(NULL);
+  free(wi), free(wo), free(f), free(weights), free(drawn), free(pdfs), free(drawn_pdfs);
+}
+
+static void check_displaced(const char* path) {
+  glint_displaced* displaced = NULL;
+  glint_displaced_info info;
+  const float *heights = NULL, u = 0.3f, v = 0.7f, xi = 0.4f;
+  int32_t width = 0, height = 0;
+  float level = -1, drawn[3], weight[3], pdf = -1;
+  float(*wi)[3] = malloc(COUNT * sizeof *wi), (*wo)[3] = malloc(COUNT * sizeof *wo);
+  float *light = malloc(3 * COUNT * sizeof *light), *pdfs = malloc(COUNT * sizeof *pdfs);
+  check(glint_displaced_open("no-such-file.glint", 0, &displaced) == GLINT_ERROR_IO, "a missing displacement is an error");
+  check(glint_displaced_open(path, 1, &displaced) == GLINT_OK, "a displacement opens");
+  info.struct_size = sizeof info;
+  check(glint_displaced_get_info(displaced, &info) == GLINT_OK && info.level_count > 0, "a displacement has levels");
+  check(glint_displaced_heights(displaced, 0, &heights, &width, &height) == GLINT_OK && width * info.factors[0] == info.width &&
+            isfinite(heights[width * height - 1]),
+        "a level has a surface");
+  check(glint_displaced_level(displaced, 1e9f, &level) == GLINT_OK && level == (float)(info.level_count - 1),
+        "the largest footprint has the coarsest level");
+  make_directions(wi, wo);
+  const glint_directions wis = columns(wi), wos = columns(wo);
+  glint_displaced_points points;
+  memset(&points, 0, sizeof points);
+  points.level.data = &level, points.u.data = &u, points.v.data = &v;
+  level = 0.25f;
+  check(glint_displaced_evaluate_batch(displaced, GLINT_DISPLACED_FULL, COUNT, &points, &wis, &wos, light, pdfs) == GLINT_OK,
+        "a batch of reflected light");
+  for (int k = 0; k < COUNT; ++k) {
+    float one[3];
+    glint_displaced_evaluate(displaced, GLINT_DISPLACED_FULL, level, u, v, wi[k], wo[k], one, &pdf);
+    check(is_light(one) && one[0] == light[3 * k] && pdf == pdfs[k], "light of a batch is that of single queries");
+    glint_displaced_sample(displaced, GLINT_DISPLACED_FULL, level, u, v, wo[k], xi, xi, drawn, weight, &pdf);
+    check(is_light(weight) && isfinite(pdf) && pdf >= 0, "a displacement draws directions");
+  }
+  glint_displaced_close(displaced);
+  glint_displaced_close(NULL);
+  free(wi), free(wo), free(light), free(pdfs);
+}
+
 int main(int argc, char** argv) {
   glint_ndf* ndf = NULL;
-  if (argc != 2) return 99;
+  if (argc != 3) return 99;
   check(glint_abi_version() == GLINT_ABI_VERSION, "header and library are of one ABI");
   check(strchr(glint_version(), '.') != NULL, "the library knows its version");
   check(strcmp(glint_error_message(), "") == 0, "before the first error there is no message");
@@ -109,6 +219,8 @@ int main(int argc, char** argv) {
   check(info.struct_size == sizeof info, "the size of the struct is kept");
   check_bad_arguments(ndf);
   check_batches(ndf);
+  check_brdf(ndf);
+  check_displaced(argv[2]);
   printf("%s, %d x %d texels, %d levels: %d broken promises\n", info.kind, (int)info.width, (int)info.height,
          (int)info.level_count, broken);
   glint_ndf_close(ndf);

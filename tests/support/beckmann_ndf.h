@@ -9,8 +9,8 @@
 
 namespace glint::test {
 
-/// The NDF of a surface with normally distributed slopes: the known answer for masking, furnaces and sampling. The same for every
-/// footprint. All of it lies inside the disk.
+/// The NDF of a surface with normally distributed slopes: the known answer for masking, furnaces and sampling. The same for
+/// every footprint. All of it lies inside the disk.
 class BeckmannNdf {
  public:
   explicit BeckmannNdf(const MapSlopes& slopes) : slopes_(slopes) {

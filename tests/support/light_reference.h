@@ -49,8 +49,8 @@ inline float spot(Vec3 d, Vec3 towards, float degrees) {
 /// The light that errors are measured under.
 enum class TestLight { constant, bright_spot, studio };
 
-/// constant: 1 everywhere. bright_spot: 5 degrees of 1000 in darkness. studio: a sky, a sun of 1.5 degrees and 1500, a window of 12
-/// degrees, stripes, and dark ground.
+/// constant: 1 everywhere. bright_spot: 5 degrees of 1000 in darkness. studio: a sky, a sun of 1.5 degrees and 1500, a window
+/// of 12 degrees, stripes, and dark ground.
 inline bake::Environment testEnvironment(TestLight light, int height) {
   return makeEnvironment(height, [light](Vec3 d, int c) {
     if (light == TestLight::constant) return 1.0f;
@@ -62,8 +62,8 @@ inline bake::Environment testEnvironment(TestLight light, int height) {
   });
 }
 
-/// Integral of L(wi) D(h) dwi over the directions above the surface (normal +z), for lobes of sigma_r around the bins' normals: many
-/// directions of every lobe, one after the other.
+/// Integral of L(wi) D(h) dwi over the directions above the surface (normal +z), for lobes of sigma_r around the bins' normals:
+/// many directions of every lobe, one after the other.
 /// @param steps  polar nodes of a lobe; twice as many around it
 inline std::vector<double> lightIntegralByQuadrature(const bake::Environment& e, const FixedHistogram& histogram,
                                                      double sigma_r, Vec3 wo, int steps) {

@@ -17,8 +17,8 @@
 
 namespace glint::test {
 
-/// A path tracer that shares nothing with the estimators: Embree's triangles, rays to every direction from random points instead
-/// of masks, colours and roughness interpolated at every point, turns drawn by the cosine, and no correction.
+/// A path tracer that shares nothing with the estimators: Embree's triangles, rays to every direction from random points
+/// instead of masks, colours and roughness interpolated at every point, turns drawn by the cosine, and no correction.
 class PathTracer {
  public:
   /// @param texture  lives as long as this
@@ -162,8 +162,8 @@ class PathTracer {
   std::size_t walks_;
 };
 
-/// Relative difference of two lists, root mean square over pairs of directions within 70 degrees; the truth may be noisy, so both
-/// ways of a pair are averaged.
+/// Relative difference of two lists, root mean square over pairs of directions within 70 degrees; the truth may be noisy, so
+/// both ways of a pair are averaged.
 /// @param truth  [directions][directions]
 inline double rmsWithin70Degrees(std::span<const float> values, std::span<const double> truth,
                                  std::span<const Vec3> directions) {

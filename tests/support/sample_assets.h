@@ -113,15 +113,16 @@ struct SampleShLight {
 /// Bumps in the disk; sizes need not be powers of two.
 SampleNormals sampleNormals(int width, int height, bool with_bounds = true);
 SampleHeights sampleHeights(int width, int height);
-/// NDF images of sampleNormals(size, size) at strides size/4, size/2 and size, 64^2 pixels, sigma_r 0.05.
 /// Two levels (factors 4 and 8) over bumps, with lobes and scales from formulas; angular 3, two lobes.
 /// @param colored  with three channels, colours and roughness of lobes
 SampleDisplacement sampleDisplacement(int size, bool colored = false);
+/// NDF images of sampleNormals(size, size) at strides size/4, size/2 and size, 64^2 pixels, sigma_r 0.05.
 SamplePyramid samplePyramid(int size, BlockPrecision precision);
 /// The same images, each block approximated by a constant and slopes; two regions.
 SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type, SampleForm form = SampleForm::wide);
 
-/// sampleNormals(width, height) in 9 x 9 bins; lists of more than 64 texels have grids of 4 cells. Every second bin starts a class.
+/// sampleNormals(width, height) in 9 x 9 bins; lists of more than 64 texels have grids of 4 cells. Every second bin starts a
+/// class.
 SampleBinMap sampleBinMap(int width, int height);
 /// Histograms of sampleNormals(width, height) over 12 x 8 bins; strides 4, 8 and 16 texels.
 SampleHistograms sampleHistograms(int width, int height);

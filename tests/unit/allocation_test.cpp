@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstdlib>
 #include <new>
 
@@ -11,6 +12,7 @@
 #include "glint/bake/pyramid.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"
+#include "support/c_api.h"
 #include "support/test_maps.h"
 
 namespace {
@@ -62,6 +64,35 @@ TEST(Queries, AllocateNothing) {
     const bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), o);
     expectNoAllocation(CpNdf(data.view()));
   }
+}
+
+TEST(CApi, QueriesAllocateNothing) {
+  constexpr std::size_t kCount = 300;
+  const test::Queries q(kCount);
+  const glint_footprints p = test::isotropic(q);
+  const float zero = 0, one = 1;
+  const glint_directions up = {{&zero, 0}, {&zero, 0}, {&one, 0}};
+  const glint_floats xi = test::contiguous(q.v);
+  const glint_displaced_points points = {xi, xi, xi};
+  std::array<float, 3 * kCount> colors, directions, pdfs;
+  glint_displaced* displaced = nullptr;
+  ASSERT_EQ(glint_displaced_open(test::assets().path("displacement").c_str(), 0, &displaced), GLINT_OK);
+  for (const char* kind : test::kKinds) {
+    const test::Handle ndf = test::openHandle(kind);
+    glint_brdf* brdf = nullptr;
+    ASSERT_EQ(glint_brdf_create(ndf.get(), nullptr, &brdf), GLINT_OK);
+    const long before = allocations;
+    glint_density_batch(ndf.get(), kCount, &p, xi, xi, pdfs.data());
+    glint_sample_batch(ndf.get(), kCount, &p, xi, xi, colors.data(), directions.data(), pdfs.data());
+    glint_brdf_evaluate_batch(brdf, kCount, &p, &up, &up, colors.data(), pdfs.data());
+    glint_brdf_sample_batch(brdf, kCount, &p, &up, xi, xi, directions.data(), colors.data(), pdfs.data());
+    glint_displaced_evaluate_batch(displaced, 0, kCount, &points, &up, &up, colors.data(), pdfs.data());
+    glint_displaced_sample_batch(displaced, 0, kCount, &points, &up, xi, xi, directions.data(), colors.data(), pdfs.data());
+    EXPECT_EQ(glint_density(nullptr, nullptr, 0, 0, nullptr), GLINT_ERROR_USAGE);
+    EXPECT_EQ(allocations, before) << kind;
+    glint_brdf_destroy(brdf);
+  }
+  glint_displaced_close(displaced);
 }
 
 }  // namespace

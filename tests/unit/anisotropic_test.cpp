@@ -101,8 +101,8 @@ TEST(IsotropicParts, KeepTheLengthAtAnyAspectAndTheWidthWhileTheyAreEnough) {
   }
 }
 
-/// Squared error of a sum over parts on a map of unrelated texels, relative to that of no answer: all from integrals of products of
-/// normal densities.
+/// Squared error of a sum over parts on a map of unrelated texels, relative to that of no answer: all from integrals of
+/// products of normal densities.
 double noiseError(const Footprint& p, const std::vector<double>& x, const float* weights, double sigma) {
   const auto product = [](double dx, double var_x, double var_y) {
     return std::exp(-0.5 * dx * dx / var_x) / std::sqrt(var_x * var_y);
@@ -237,8 +237,9 @@ TEST(AnisotropicNdf, MeanOverPixelsIsTheMeanOfPointQueries) {
 }
 
 TEST(AnisotropicNdf, IsClearlyCloserToTheTexelsThanARoundFootprint) {
-  // Mean relative errors over three footprints of short deviation 4 to 8 texels at each aspect, beside those of the round footprint of
-  // the same mean square size. Recorded as properties: the chart of issue 3. What is left is the pyramid's own error.
+  // Mean relative errors over three footprints of short deviation 4 to 8 texels at each aspect, beside those of the round
+  // footprint of the same mean square size. Recorded as properties: the chart of issue 3. What is left is the pyramid's own
+  // error.
   for (const auto& [kind, name] : {std::pair{bake::SynthKind::isotropic, "isotropic"},
                                    {bake::SynthKind::flakes, "flakes"},
                                    {bake::SynthKind::brushed, "brushed"}}) {

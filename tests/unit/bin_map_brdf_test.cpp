@@ -119,6 +119,30 @@ TEST(BinMapBrdf, IsTheSumOverTexels) {
   }
 }
 
+TEST(BinMapBrdf, MergedBinsOfWideLobesHaveFacetsThatGrazingDirectionsAreTurnedAwayFrom) {
+  // Bins are up to .4 of the disk wide. What is left is that their moments are those of the whole map, and nothing of higher
+  // order.
+  constexpr double kMerged = 0.07, kFewer = 0.015;
+  for (const float alpha : {0.4f, 0.8f}) {
+    const RoughMap surface = roughMap(0.3f, alpha);
+    Random random(5);
+    int grazing = 0, fewer = 0;
+    for (int k = 0; k < 300; ++k) {
+      const Footprint p = randomBox(random, 100);
+      const Vec3 wo = random.above(0.05);
+      const BrdfSample drawn = surface.brdf(p).sample(wo, random.pair());
+      if (drawn.pdf == 0) continue;
+      const Brute expected = bruteForce(surface, p, alpha, drawn.wi, wo);
+      const double peak = 1e-4 / (alpha * alpha * drawn.wi.z * wo.z), value = surface.brdf(p).evaluate(drawn.wi, wo).r;
+      EXPECT_NEAR(value, expected.value, kMerged * expected.value + peak) << alpha << " " << k;
+      fewer += std::fabs(value - expected.value) > kFewer * expected.value + peak;
+      grazing += std::min(drawn.wi.z, wo.z) < 0.15f;
+    }
+    EXPECT_LT(fewer, 10);
+    EXPECT_GT(grazing, 20);
+  }
+}
+
 TEST(BinMapBrdf, WhiteFacetsReflectAtMostWhatTheyTurnToTheView) {
   for (const float steepness : {0.3f, 0.6f}) {
     constexpr float alpha = 0.3f;

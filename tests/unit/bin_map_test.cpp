@@ -366,7 +366,8 @@ TEST(BinMap, BinsOfARangeKeepNormalsFineEnough) {
 }
 
 TEST(BinMapNdf, DensityIsContinuous) {
-  // Lobes are smooth over a deviation; a step of 1/200 of it, or of a texel, must not show. Three sizes: texel by texel, blended, merged.
+  // Lobes are smooth over a deviation; a step of 1/200 of it, or of a texel, must not show. Three sizes: texel by texel,
+  // blended, merged.
   const test::OwnedMap map(512, 512, test::roughSurface(512, 512, 0.2f));
   const OwnedBinMap bins(map, 0.1f);
   const float step = bins.ndf().sigma() / 200;

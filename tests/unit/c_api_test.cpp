@@ -1,96 +1,23 @@
+#include "support/c_api.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>
-#include <limits>
-#include <memory>
-#include <random>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "glint.h"
 #include "glint/api/any_ndf.h"
-#include "glint/formats/asset_writer.h"
-#include "support/sample_assets.h"
-#include "support/temp_folder.h"
 
 namespace glint {
 namespace {
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr int kSize = 64;
+using namespace test;
+
 /// Batches may sum in another order.
 constexpr float kBatchError = 1e-6f;
-
-/// Files of every kind, with their maps.
-class Assets {
- public:
-  Assets() {
-    const auto normals = test::sampleNormals(kSize, kSize);
-    formats::writeAsset(path("normals"), normals.map, test::sampleProvenance());
-    const auto pyramid = test::samplePyramid(kSize, BlockPrecision::f16);
-    formats::writeAsset(path("ndf-pyramid"), pyramid.pyramid, test::sampleProvenance());
-    const auto compressed = test::sampleCompressed(kSize, CompressionMethod::cp, CoefficientType::i8);
-    formats::writeAsset(path("ndf-cp"), compressed.ndf, test::sampleProvenance());
-    formats::writeAsset(path("bin-map"), test::sampleBinMap(kSize, kSize).map, test::sampleProvenance());
-    formats::writeAsset(path("histogram-sat"), test::sampleHistograms(kSize, kSize).sat, test::sampleProvenance());
-    formats::writeAsset(path("heights"), test::sampleHeights(kSize, kSize).map, test::sampleProvenance());
-  }
-  std::string path(const std::string& kind) const { return (folder_.path() / (kind + ".glint")).string(); }
-
- private:
-  test::TempFolder folder_;
-};
-
-const Assets& assets() {
-  static const Assets files;
-  return files;
-}
-
-struct Closer {
-  void operator()(glint_ndf* ndf) const { glint_ndf_close(ndf); }
-};
-using Handle = std::unique_ptr<glint_ndf, Closer>;
-
-Handle openHandle(const std::string& kind, const glint_open_options* options = nullptr) {
-  glint_ndf* ndf = nullptr;
-  EXPECT_EQ(glint_ndf_open(assets().path(kind).c_str(), options, &ndf), GLINT_OK) << glint_error_message();
-  return Handle(ndf);
-}
-
-constexpr const char* kKinds[] = {"normals", "ndf-pyramid", "ndf-cp", "bin-map", "histogram-sat"};
-
-/// Random queries of every size, with a few that are degenerate.
-struct Queries {
-  explicit Queries(std::size_t count, unsigned seed = 1) {
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<float> unit(0, 1);
-    for (std::size_t k = 0; k < count; ++k) {
-      u.push_back(unit(random) * 3 - 1);
-      v.push_back(unit(random));
-      sigma.push_back(std::exp2(unit(random) * 7 - 2));
-      hx.push_back(unit(random) - 0.5f);
-      hy.push_back(unit(random) - 0.5f);
-      if (k % 23 == 5) u.back() = kNan;
-      if (k % 29 == 7) sigma.back() = k % 2 ? kNan : 0;
-      if (k % 31 == 3) hx.back() = k % 2 ? kNan : 1.5f;
-      if (k % 37 == 11) sigma.back() = k % 2 ? 1e18f : std::numeric_limits<float>::infinity();
-      if (k % 41 == 13) u.back() = k % 2 ? -1e9f : 1e30f;
-    }
-  }
-  std::vector<float> u, v, sigma, hx, hy;
-};
-
-glint_floats contiguous(const std::vector<float>& values) { return {values.data(), sizeof(float)}; }
-
-glint_footprints isotropic(const Queries& q) {
-  glint_footprints p = {};
-  p.u = contiguous(q.u);
-  p.v = contiguous(q.v);
-  p.sigma = contiguous(q.sigma);
-  return p;
-}
 
 void expectSame(float actual, float expected, std::size_t k) {
   EXPECT_NEAR(actual, expected, kBatchError * expected) << "query " << k;
@@ -337,6 +264,56 @@ TEST(CApi, OptionsReachTheModel) {
   info.struct_size = sizeof info;
   glint_ndf_get_info(with_normals.get(), &info);
   EXPECT_EQ(info.has_normals, 1);
+}
+
+TEST(CApi, OptionsOfHistogramsReachTheModel) {
+  const Footprint slanted = Footprint::box({0.4f, 0.6f}, {14, 5}, {-5, 14}), round = Footprint::isotropic({0.4f, 0.6f}, 9);
+  const glint_footprint c_slanted = {GLINT_FOOTPRINT_BOX, 0.4f, 0.6f, {14, 5, -5, 14}};
+  const glint_footprint c_round = glint_footprint_isotropic(0.4f, 0.6f, 9);
+  const auto histograms = test::sampleHistograms(kSize, kSize);
+  std::vector<float> slanted_answers, round_answers;
+  for (const auto& [tolerance, boxes] : {std::pair{0.0f, 0}, {0.5f, 1}, {GLINT_SLANT_EXACT, 1}, {0.06f, 3}}) {
+    glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+    options.slant_tolerance = tolerance;
+    options.gaussian_boxes = boxes;
+    const Handle ndf = openHandle("histogram-sat", &options);
+    const HistogramNdf same(histograms.sat, boxes == 3 ? GaussianBoxes::three : GaussianBoxes::one,
+                            tolerance == 0 ? kSlantTolerance : std::max(0.0f, tolerance));
+    float density = -1;
+    glint_mean(ndf.get(), &c_slanted, -0.3f, -0.2f, 0.1f, 0.2f, &density);
+    EXPECT_EQ(density, same.mean(slanted, {{-0.3f, -0.2f}, {0.1f, 0.2f}}));
+    slanted_answers.push_back(density);
+    glint_mean(ndf.get(), &c_round, -0.3f, -0.2f, 0.1f, 0.2f, &density);
+    EXPECT_EQ(density, same.mean(round, {{-0.3f, -0.2f}, {0.1f, 0.2f}}));
+    round_answers.push_back(density);
+  }
+  EXPECT_NE(slanted_answers[1], slanted_answers[2]);  // or the options would not be seen
+  EXPECT_NE(round_answers[0], round_answers[3]);
+}
+
+TEST(CApi, OptionsOutOfRangeAreRefusedByName) {
+  const auto refused = [](auto glint_open_options::*member, auto value, const char* name) {
+    glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+    options.*member = value;
+    glint_ndf* ndf = nullptr;
+    EXPECT_EQ(glint_ndf_open(assets().path("histogram-sat").c_str(), &options, &ndf), GLINT_ERROR_USAGE) << value;
+    EXPECT_NE(std::string(glint_error_message()).find(name), std::string::npos) << glint_error_message();
+    EXPECT_EQ(ndf, nullptr);
+  };
+  for (const float value : {-0.5f, 1.01f, kNan}) refused(&glint_open_options::slant_tolerance, value, "slant_tolerance");
+  for (const int32_t value : {-1, 2, 4}) refused(&glint_open_options::gaussian_boxes, value, "gaussian_boxes");
+  for (const float value : {-0.1f, 0.3f, kNan}) refused(&glint_open_options::sigma_r, value, "sigma_r");
+  refused(&glint_open_options::surface, 2, "surface");
+  refused(&glint_open_options::boundary, -1, "boundary");
+  refused(&glint_open_options::reserved, 1, "reserved");
+}
+
+TEST(CApi, OptionsOfAnOlderHeaderHaveTheDefaultsOfLaterOnes) {
+  glint_open_options older = GLINT_OPEN_OPTIONS_INIT;
+  older.struct_size = offsetof(glint_open_options, slant_tolerance);
+  older.slant_tolerance = -7;  // not the caller's memory: would be refused
+  older.gaussian_boxes = -7;
+  EXPECT_TRUE(openHandle("histogram-sat", &older));
 }
 
 TEST(CApi, FailedOpeningSaysWhy) {

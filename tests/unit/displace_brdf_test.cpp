@@ -43,8 +43,8 @@ TEST(EffectiveBrdf, OfAFlatSurfaceIsTheBase) {
 }
 
 TEST(EffectiveBrdf, OfAGrooveIsMaskedAsGeometrySays) {
-  // Walls of slope s and horizontal half width d; the view comes from +x with a rise of c for each unit, the light from above. The
-  // wall that faces +x is seen down to x = min(d, 2 d c / (s + c)) from its ridge, the other wall if c > s.
+  // Walls of slope s and horizontal half width d; the view comes from +x with a rise of c for each unit, the light from above.
+  // The wall that faces +x is seen down to x = min(d, 2 d c / (s + c)) from its ridge, the other wall if c > s.
   const double s = 1, albedo = 0.8;
   const int d = 32;
   std::vector<Vec3> directions = {{0, 0, 1}};
@@ -106,8 +106,8 @@ TEST(EffectiveBrdf, KeepsTheLightOfAWhiteFurnaceWithInterreflectionsOnly) {
 }
 
 TEST(EffectiveBrdf, GlossyPathsLoseNoMoreThanTheirFacetsDo) {
-  // A GGX facet alone loses light to its own masking. Grooves of 45 degrees send most light on to the other wall: with interreflections
-  // the surface must reflect clearly more than without, and less than all.
+  // A GGX facet alone loses light to its own masking. Grooves of 45 degrees send most light on to the other wall: with
+  // interreflections the surface must reflect clearly more than without, and less than all.
   const auto directions = angularDirections(9);
   EffectiveOptions options{{BaseBrdf::Kind::ggx, 1, 0.3f, 1, 0}, 1, 1, {}, 0, 0};
   const OwnedSurface map = test::grooves(64, 16, 8, 1);

@@ -62,7 +62,8 @@ TEST(Displace, FlatMapsNeedNoScaling) {
   }
 }
 
-/// What the asset reflects as a whole where its smooth surface hides nothing: the mean over its cells of the answers of the query.
+/// What the asset reflects as a whole where its smooth surface hides nothing: the mean over its cells of the answers of the
+/// query.
 Rgb meanOfQueries(const DisplacedBrdf& brdf, int level, Vec3 wi, Vec3 wo) {
   const DisplacementLevel& l = brdf.asset().levels[level];
   Rgb sum;
@@ -275,30 +276,73 @@ TEST_P(DisplacedBrdfQuery, SamplesFollowTheirDensity) {
   const Vec2 uv = {0.4f, 0.7f};
   std::mt19937 random(9);
   std::uniform_real_distribution<float> uniform(0, 1);
-  for (const Vec3 wo : {towards(10, 2), towards(55, 0.3f)}) {
-    double sampled = 0, even = 0, mass = 0;
-    const int count = 200000;
-    for (int k = 0; k < count; ++k) {
-      const DirectionSample s = brdf.sample(1, uv, wo, {uniform(random), uniform(random)});
-      if (s.pdf > 0) {
-        EXPECT_NEAR(s.pdf, brdf.pdf(1, uv, s.direction, wo), 1e-6f * s.pdf);
-        EXPECT_NEAR(dot(s.direction, s.direction), 1, 1e-4f);
-        sampled += sum(brdf.evaluate(1, uv, s.direction, wo)) * std::max(0.0f, dot(s.direction, brdf.normal(1, uv))) / s.pdf;
+  for (const LevelBlend levels : {LevelBlend{1, 1, 0}, LevelBlend{0, 1, 0.3f}}) {
+    for (const Vec3 wo : {towards(10, 2), towards(55, 0.3f)}) {
+      double sampled = 0, even = 0, mass = 0;
+      const int count = 200000;
+      for (int k = 0; k < count; ++k) {
+        const DirectionSample s = brdf.sample(levels, uv, wo, {uniform(random), uniform(random)});
+        if (s.pdf > 0) {
+          EXPECT_NEAR(s.pdf, brdf.pdf(levels, uv, s.direction, wo), 1e-6f * s.pdf);
+          EXPECT_NEAR(dot(s.direction, s.direction), 1, 1e-4f);
+          sampled += sum(brdf.reflected(levels, uv, s.direction, wo)) / s.pdf;
+        }
       }
-    }
-    const int n = 400;
-    for (int d = 0; d < n * n; ++d) {
-      const Vec3 above = gridDirection(d, n);
-      const double part = 2 * std::numbers::pi / (n * n);
-      for (const Vec3 wi : {above, Vec3{above.x, above.y, -above.z}}) {  // a tilted facet is lit from below the horizon, too
-        even += part * sum(brdf.evaluate(1, uv, wi, wo)) * std::max(0.0f, dot(wi, brdf.normal(1, uv)));
-        mass += part * brdf.pdf(1, uv, wi, wo);
+      const int n = 400;
+      for (int d = 0; d < n * n; ++d) {
+        const Vec3 above = gridDirection(d, n);
+        const double part = 2 * std::numbers::pi / (n * n);
+        for (const Vec3 wi : {above, Vec3{above.x, above.y, -above.z}}) {  // a tilted facet is lit from below the horizon, too
+          even += part * sum(brdf.reflected(levels, uv, wi, wo));
+          mass += part * brdf.pdf(levels, uv, wi, wo);
+        }
       }
+      EXPECT_NEAR(sampled / count, even, 0.01 * even);  // noise of the samples
+      EXPECT_LT(mass, 1.01);
+      EXPECT_GT(mass, 0.8);  // normals that face away from the view reflect nothing
     }
-    EXPECT_NEAR(sampled / count, even, 0.01 * even);  // noise of the samples
-    EXPECT_LT(mass, 1.01);
-    EXPECT_GT(mass, 0.8);  // normals that face away from the view reflect nothing
   }
+}
+
+TEST_P(DisplacedBrdfQuery, AnswersWhatNoRendererMeansToAsk) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInfinity = std::numeric_limits<float>::infinity();
+  const DisplacedBrdf brdf(built_.asset);
+  const Vec3 good = towards(30, 1);
+  const Vec2 at = {0.2f, 0.9f};
+  for (const DisplacedVariant variant : {DisplacedVariant::full, DisplacedVariant::lobes, DisplacedVariant::single}) {
+    for (const Vec3 bad : {Vec3{0, 0, -1}, {0, 0, 0}, {kNan, 0, 1}, {0, kInfinity, 1}, {3, 4, 5}, {-1e-9f, 0, -1e-9f}}) {
+      EXPECT_EQ(brdf.reflected({0, 1, 0.5f}, at, bad, good, variant), Rgb{}) << bad.x << bad.z;
+      EXPECT_EQ(brdf.reflected({0, 1, 0.5f}, at, good, bad, variant), Rgb{}) << bad.x << bad.z;
+    }
+    for (const float u : {kNan, kInfinity, -1e30f, -1e-12f, 1e9f})
+      for (const Vec2 uv : {Vec2{u, 0.4f}, {0.4f, u}}) {
+        const Rgb value = brdf.reflected({0, 1, 0.5f}, uv, good, towards(20, 3), variant);
+        EXPECT_TRUE(std::isfinite(value.r) && value.r >= 0) << u;
+      }
+    // Both in the plane of the facet: no division by a cosine of 0.
+    const Vec3 n = brdf.normal(0, at), along = {n.z, 0, -n.x};
+    const float length = 1 / std::sqrt(dot(along, along));
+    for (const float sign : {-1.0f, 1.0f}) {
+      const Rgb value = brdf.reflected({0, 0, 0}, at, length * along, sign * length * along, variant);
+      EXPECT_TRUE(std::isfinite(value.r) && value.r >= 0);
+    }
+  }
+  for (const Vec3 bad : {Vec3{kNan, 0, 1}, {0, kInfinity, 1}, {3, 4, 5}}) {
+    EXPECT_EQ(brdf.pdf({0, 1, 0.5f}, at, bad, good), 0);
+    EXPECT_EQ(brdf.pdf({0, 1, 0.5f}, at, good, bad), 0);
+    EXPECT_EQ(brdf.sample({0, 1, 0.5f}, at, bad, {0.5f, 0.5f}).pdf, 0);
+  }
+  EXPECT_TRUE(std::isfinite(brdf.pdf(0, at, -1.0f * good, good)));  // no half vector
+  for (const Vec2 xi : {Vec2{-1, 2}, {kNan, kNan}, {1, 1}, {kInfinity, -kInfinity}}) {
+    const DirectionSample s = brdf.sample({0, 1, 0.5f}, at, good, xi);
+    EXPECT_TRUE(std::isfinite(s.pdf) && s.pdf >= 0 && std::isfinite(dot(s.direction, s.direction))) << xi.x;
+  }
+  EXPECT_EQ(brdf.levelsFor(kNan).weight, 0);
+  EXPECT_EQ(brdf.levelsFor(kInfinity).first, 1);
+  EXPECT_EQ(brdf.levelsAt(kNan).second, 0);
+  EXPECT_EQ(brdf.levelsAt(-3).second, 0);
+  EXPECT_EQ(brdf.levelsAt(kInfinity).first, 1);
+  EXPECT_FLOAT_EQ(brdf.levelsAt(0.25f).weight, 0.25f);
 }
 
 TEST_P(DisplacedBrdfQuery, BlendsBetweenLevels) {

@@ -1,5 +1,5 @@
-// The product integral from accumulated histograms, from a normal map to light: against the NDF of Reference, integrated over all half
-// vectors.
+// The product integral from accumulated histograms, from a normal map to light: against the NDF of Reference, integrated over
+// all half vectors.
 
 #include <gtest/gtest.h>
 
@@ -118,8 +118,8 @@ class Chain {
   ShRecurrence<float> recurrence_;
 };
 
-/// @param exact  what is left where the histogram is exact: the cut of the series at order 40, the share of lobes at the horizon, and
-///               that Reference blurs facets on the disk, which stretches the lobes of tilted ones
+/// @param exact  what is left where the histogram is exact: the cut of the series at order 40, the share of lobes at the
+///               horizon, and that Reference blurs facets on the disk, which stretches the lobes of tilted ones
 void expectReference(TestLight light, double exact) {
   Chain chain(light);
   const HistogramNdf ndf(chain.sat(), GaussianBoxes::one, 0), strips(chain.sat());

@@ -209,8 +209,8 @@ double stripPlanBound(const HistogramSat& sat, const Footprint& p, double tolera
   return planStrips(sat, p.axis_a.x, p.axis_a.y, p.axis_b.x, p.axis_b.y, tolerance).misplaced;
 }
 
-/// Total variation from the exact histogram against the bound of the plan, for boxes of all sizes and angles. Where every texel has a bin
-/// of its own, it is the share that is misplaced.
+/// Total variation from the exact histogram against the bound of the plan, for boxes of all sizes and angles. Where every texel
+/// has a bin of its own, it is the share that is misplaced.
 void expectStripsWithinBound(const BuiltMap& built, float largest, int boxes, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> unit(0, 1);

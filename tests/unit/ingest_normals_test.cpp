@@ -314,8 +314,8 @@ TEST(IngestHeights, RefusesColoursAndHoles) {
 TEST(IngestReport, GivesTheMomentsOfTheSlopes) {
   const TestMap map(256, 256, 0.2f);
   const IngestReport report = describeNormals(256, 256, map.normals);
-  EXPECT_NEAR(0.5 * (report.slope_covariance[0] + report.slope_covariance[2]), 0.02, 2e-5);
-  EXPECT_NEAR(report.slope_covariance[1], 0, 2e-3);
+  EXPECT_NEAR(0.5 * (report.slopes.covariance.xx + report.slopes.covariance.yy), 0.02, 2e-5);
+  EXPECT_NEAR(report.slopes.covariance.xy, 0, 2e-3);
 }
 
 TEST(NormalBounds, HoldTheirBlockAndOneMoreRowAndColumn) {

@@ -156,7 +156,8 @@ TEST(MicrofacetBrdf, SamplesGiveTheirOwnPdfAndWeight) {
   }
 }
 
-/// Draws directions and compares their counts in 12 x 24 cells of the hemisphere, and those that are no directions, with the pdf.
+/// Draws directions and compares their counts in 12 x 24 cells of the hemisphere, and those that are no directions, with the
+/// pdf.
 template <class Brdf>
 double directionFit(const Brdf& brdf, Vec3 wo, int samples, int subdivision, unsigned seed) {
   constexpr int kRows = 12, kColumns = 24;

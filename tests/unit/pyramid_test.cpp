@@ -302,8 +302,8 @@ double parentToChildren(const NdfPyramidData& data, int level, int i, int j) {
 }
 
 TEST(Pyramid, ALevelAgreesWithTheMeanOfItsChildren) {
-  // Four footprints around a centre weigh texels much as the larger one does, but not as widely: their variance is 0.44 strides^2
-  // against 0.75. Measured on these maps: a total variation of 0.058.
+  // Four footprints around a centre weigh texels much as the larger one does, but not as widely: their variance is 0.44
+  // strides^2 against 0.75. Measured on these maps: a total variation of 0.058.
   constexpr double kWeightsDiffer = 0.08;
   for (const Surface surface : {Surface::flat, Surface::smooth}) {
     const OwnedMap noise(128, 128, test::randomNormals(128, 128, 0.5f, 5)), rough(128, 128, test::roughSurface(128, 128, 0.2f));

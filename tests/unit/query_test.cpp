@@ -307,8 +307,8 @@ TEST(PyramidSlices, WeightsAreNotNegativeAndSumToOne) {
 }
 
 TEST(PyramidSlices, WeightsAreContinuousInPositionAndSize) {
-  // Bilinear weights change by 2 a gap and axis. The shortest gap between centres of a wrapping level is what is left over when the
-  // stride does not divide the map: at stride 16 it is 4 of 100 texels, at 64 36.
+  // Bilinear weights change by 2 a gap and axis. The shortest gap between centres of a wrapping level is what is left over when
+  // the stride does not divide the map: at stride 16 it is 4 of 100 texels, at 64 36.
   constexpr double kShortestGap = 4, kStep = 0.02;  // texels
   constexpr double kMostPerStep = 2 * kStep / kShortestGap + 1e-4;
   for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
@@ -462,6 +462,25 @@ TEST(PyramidNdf, BoxesAndAnisotropicFootprintsAreAnsweredByTheirMeanSquareSize) 
   EXPECT_NEAR(model.density(Footprint::gaussian(uv, {100, 50, 400}), h), expected, 1e-5 * expected);
   const float a = std::sqrt(300.0f), b = std::sqrt(1200.0f);  // half axes: three times the variance
   EXPECT_NEAR(model.density(Footprint::box(uv, {a, 0}, {0, b}), h), expected, 1e-4 * expected);
+}
+
+TEST(PyramidNdf, BoxesInTheOuterHalfTexelOfAClampedSmoothSurfaceAreAnsweredFromItsBorder) {
+  bake::PyramidOptions o;
+  o.stride = 16;
+  o.resolution = kResolution;
+  o.sigma_r = 0.05f;
+  o.surface = Surface::smooth;
+  o.boundary = Boundary::clamp;
+  const NdfPyramidData data = bake::buildPyramid(map().map(), o);
+  const PyramidNdf pyramid(data.view(), map().map());
+  const Reference reference(map().map(), o.sigma_r, Surface::smooth, Boundary::clamp);
+  const Vec2 h = map().map().at(0, 40) + Vec2{0.01f, 0.02f};
+  const Footprint outside = Footprint::box({0.2f / 100, 40.5f / 72}, {0.1f, 0}, {0, 0.1f});
+  const Footprint border = Footprint::box({0.5f / 100, 40.5f / 72}, {0.1f, 0}, {0, 0.1f});
+  EXPECT_GT(pyramid.density(outside, h), 1);
+  EXPECT_NEAR(pyramid.density(outside, h), reference.density(border, h), 1e-4 * reference.density(border, h));
+  EXPECT_NEAR(pyramid.mean(outside, {{-1, -1}, {1, 1}}), 0.25, 1e-4);
+  EXPECT_GT(pyramid.sample(outside, {0.2f, 0.6f}).pdf, 0);
 }
 
 }  // namespace

@@ -300,6 +300,54 @@ TEST(Reference, ImagesHoldTheMeanOverEveryPixel) {
   }
 }
 
+/// Density of a box on a clamped smooth surface from a grid of points inside it; those off the surface do not count.
+double boxByPoints(const NormalMap& map, const Footprint& box, Vec2 centre_texels, Vec2 h, float sigma_r) {
+  constexpr int kPoints = 300;
+  double sum = 0, count = 0;
+  for (int k = 0; k < kPoints * kPoints; ++k) {
+    const float s = 2 * (static_cast<float>(k % kPoints) + 0.5f) / kPoints - 1;
+    const float t = 2 * (static_cast<float>(k / kPoints) + 0.5f) / kPoints - 1;
+    const Vec2 at = centre_texels + s * box.axis_a + t * box.axis_b - Vec2{0.5f, 0.5f};
+    const int i = static_cast<int>(std::floor(at.x)), j = static_cast<int>(std::floor(at.y));
+    if (i < 0 || j < 0 || i + 1 >= map.width || j + 1 >= map.height) continue;
+    const float x = at.x - static_cast<float>(i), y = at.y - static_cast<float>(j);
+    const Vec2 side = x > y ? map.at(i + 1, j) : map.at(i, j + 1);
+    const Vec2 n = (1 - std::max(x, y)) * map.at(i, j) + std::fabs(x - y) * side + std::min(x, y) * map.at(i + 1, j + 1);
+    sum += gaussianDensity(n - h, sigma_r);
+    ++count;
+  }
+  return sum / count;
+}
+
+TEST(Reference, BoxesInTheOuterHalfTexelSeeTheBorderOfAClampedSmoothSurface) {
+  // Triangles count by the covered area, with all of their normals: boxes as wide as a texel and wider have most of them.
+  constexpr float kSigmaR = 0.1f;
+  constexpr double kTrianglesError = 0.05;
+  const NormalMap& map = rough().map();
+  const Vec2 size = {static_cast<float>(map.width), static_cast<float>(map.height)};
+  for (const auto search : {Reference::Search::exhaustive, Reference::Search::pruned}) {
+    const Reference reference(map, kSigmaR, Surface::smooth, Boundary::clamp, search);
+    for (const Vec2 texels :
+         {Vec2{0.2f, 20.3f}, {size.x - 0.1f, 7.8f}, {30.4f, 0.01f}, {12.7f, size.y - 0.4f}, {0.3f, size.y - 0.2f}}) {
+      const Vec2 nearest = {std::clamp(texels.x, 0.5f, size.x - 0.5f), std::clamp(texels.y, 0.5f, size.y - 0.5f)};
+      const Vec2 uv = {texels.x / size.x, texels.y / size.y};
+      const Vec2 h = map.at(static_cast<int>(nearest.x), static_cast<int>(nearest.y)) + Vec2{0.03f, -0.02f};
+      for (const Footprint& p : {Footprint::box(uv, {0.1f, 0}, {0, 0.1f}), Footprint::box(uv, {0.05f, 0.1f}, {-0.1f, 0.04f})}) {
+        EXPECT_NEAR(reference.mean(p, {{-1, -1}, {1, 1}}), 0.25, 1e-3)
+            << texels.x << ' ' << texels.y;  // lobes leave the square
+        EXPECT_GT(reference.density(p, h), 0);
+        EXPECT_GT(reference.sample(p, {0.4f, 0.7f}).pdf, 0);
+        Footprint moved = p;  // to the nearest point, from where nothing is moved
+        moved.centre = {nearest.x / size.x, nearest.y / size.y};
+        EXPECT_NEAR(reference.density(p, h), reference.density(moved, h), 1e-4 * peakOf(kSigmaR));
+      }
+      const Footprint wide = Footprint::box(uv, {3, 0}, {0, 2});
+      const double expected = boxByPoints(map, wide, nearest, h, kSigmaR);
+      EXPECT_NEAR(reference.density(wide, h), expected, kTrianglesError * peakOf(kSigmaR)) << texels.x << ' ' << texels.y;
+    }
+  }
+}
+
 TEST(Reference, MeanOverTheWholeSquareIsAQuarter) {
   RandomQueries random(6);
   for (const Surface surface : {Surface::flat, Surface::smooth}) {

@@ -61,7 +61,8 @@ struct ChiSquared {
   double p() const { return degrees > 0 ? gammaQ(0.5 * degrees, 0.5 * statistic) : 1; }
 };
 
-/// Pearson's statistic, bins merged in order until each expects `least` samples. What is expected in no bin at all forms the last one.
+/// Pearson's statistic, bins merged in order until each expects `least` samples. What is expected in no bin at all forms the
+/// last one.
 ChiSquared chiSquared(const std::vector<double>& expected, const std::vector<double>& observed, double total,
                       double least = 8) {
   ChiSquared result;

@@ -55,8 +55,8 @@ double worstAdditionError(int order, double theta, double phi) {
 }
 
 TEST(ShBasis, SquaresOfABandSumToItsSizeAtOrder300InEveryDirection) {
-  // Rounding of 300 steps of a recurrence, 1.2e-12 at 0.001 of a radian from a pole and below 1e-12 elsewhere; functions that were
-  // lost to under- or overflow would be wrong by far more.
+  // Rounding of 300 steps of a recurrence, 1.2e-12 at 0.001 of a radian from a pole and below 1e-12 elsewhere; functions that
+  // were lost to under- or overflow would be wrong by far more.
   constexpr double kTolerance = 2e-12;
   for (const double theta : hardAngles()) EXPECT_LT(worstAdditionError<double>(300, theta, 0.7), kTolerance) << theta;
 }

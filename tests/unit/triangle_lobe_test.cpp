@@ -53,7 +53,8 @@ double denseMean(const Triangle& t, double sigma, const F& f) {
   return sum / (double(n) * n);
 }
 
-/// Mean of the lobe over a triangle much larger than it: rows of constant y within nine deviations of h, each by the normal CDF.
+/// Mean of the lobe over a triangle much larger than it: rows of constant y within nine deviations of h, each by the normal
+/// CDF.
 double densityByRows(const Triangle& t, Vec2 h, double sigma) {
   const double low = std::max<double>(std::min({t.a.y, t.b.y, t.c.y}), h.y - 9 * sigma);
   const double high = std::min<double>(std::max({t.a.y, t.b.y, t.c.y}), h.y + 9 * sigma);

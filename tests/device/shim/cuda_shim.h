@@ -1,7 +1,7 @@
 #pragma once
 
-// What CUDA's own headers give device code, as far as the query headers use it: enough for clang to compile device code where no
-// CUDA toolkit is. Whatever is not here, and not constexpr, is a host function, and calling it is an error.
+// What CUDA's own headers give device code, as far as the query headers use it: enough for clang to compile device code where
+// no CUDA toolkit is. Whatever is not here, and not constexpr, is a host function, and calling it is an error.
 
 #define __host__ __attribute__((host))
 #define __device__ __attribute__((device))
@@ -15,6 +15,8 @@ __device__ double fabs(double);
 __device__ double sin(double);
 __device__ double cos(double);
 __device__ double atan2(double, double);
+__device__ double hypot(double, double);
+__device__ int abs(int);
 __device__ void* memcpy(void*, const void*, __SIZE_TYPE__);
 __device__ int __popcll(unsigned long long);
 __device__ int __ffsll(long long);

@@ -1,0 +1,155 @@
+#include <cmath>
+
+#include "glint/api/c_support.h"
+#include "glint/query/displaced_brdf.h"
+
+struct glint_displaced {
+  explicit glint_displaced(glint::formats::Asset opened) : asset(std::move(opened)), brdf(asset.displacement()) {}
+
+  glint::formats::Asset asset;
+  glint::DisplacedBrdf brdf;
+};
+
+namespace {
+
+using namespace glint;
+using namespace glint::api::c;
+
+static_assert(GLINT_DISPLACED_MAX_LEVELS == kMaxDisplacementLevels);
+static_assert(static_cast<int>(BaseBrdf::Kind::diffuse) == GLINT_BASE_DIFFUSE &&
+              static_cast<int>(BaseBrdf::Kind::ggx) == GLINT_BASE_GGX);
+
+DisplacedVariant variantOf(int32_t variant) {
+  if (variant == GLINT_DISPLACED_LOBES) return DisplacedVariant::lobes;
+  if (variant == GLINT_DISPLACED_SINGLE) return DisplacedVariant::single;
+  return DisplacedVariant::full;
+}
+
+/// One point of the coarse surface.
+struct Point {
+  Point(const glint_displaced& displaced, int32_t variant_id, float level, Vec2 at)
+      : brdf(displaced.brdf), variant(variantOf(variant_id)), levels(brdf.levelsAt(level)), uv(at) {}
+
+  void evaluate(Vec3 wi, Vec3 wo, float* reflected, float* pdf) const {
+    if (reflected != nullptr) set(reflected, brdf.reflected(levels, uv, wi, wo, variant));
+    if (pdf != nullptr) *pdf = brdf.pdf(levels, uv, wi, wo);
+  }
+
+  void sample(Vec3 wo, Vec2 xi, float* wi, float* weight, float* pdf) const {
+    const DirectionSample drawn = brdf.sample(levels, uv, wo, xi);
+    *pdf = drawn.pdf > 0 ? drawn.pdf : 0;
+    set(wi, *pdf > 0 ? drawn.direction : Vec3{});
+    set(weight, *pdf > 0 ? 1 / drawn.pdf * brdf.reflected(levels, uv, drawn.direction, wo, variant) : Rgb{});
+  }
+
+  const DisplacedBrdf& brdf;
+  DisplacedVariant variant;
+  LevelBlend levels;
+  Vec2 uv;
+};
+
+/// Points as a structure of arrays.
+struct PointArrays {
+  explicit PointArrays(const glint_displaced_points& p) : level(arrayOf(p.level)), u(arrayOf(p.u)), v(arrayOf(p.v)) {}
+  api::StridedFloats level, u, v;
+};
+
+/// What is wrong with the arguments that both batches have; null if nothing.
+const char* faultOf(const glint_displaced* displaced, const glint_displaced_points* points, const glint_directions* wo) {
+  if (displaced == nullptr) return "displaced is null";
+  if (points == nullptr || points->level.data == nullptr || points->u.data == nullptr || points->v.data == nullptr)
+    return "level, u and v of the points must be given";
+  return complete(wo) ? nullptr : "x, y and z of wo must be given";
+}
+
+}  // namespace
+
+glint_status glint_displaced_open(const char* path, int32_t verify_hashes, glint_displaced** displaced) {
+  if (path == nullptr) return usage("glint_displaced_open", "path is null");
+  if (displaced == nullptr) return usage("glint_displaced_open", "displaced is null");
+  return guarded([&] { *displaced = new glint_displaced(formats::Asset::open(path, {verify_hashes != 0})); });
+}
+
+void glint_displaced_close(glint_displaced* displaced) { delete displaced; }
+
+glint_status glint_displaced_get_info(const glint_displaced* displaced, glint_displaced_info* info) {
+  if (displaced == nullptr) return usage("glint_displaced_get_info", "displaced is null");
+  if (info == nullptr) return usage("glint_displaced_get_info", "info is null");
+  const Displacement& from = displaced->brdf.asset();
+  glint_displaced_info all = {};
+  all.width = from.width;
+  all.height = from.height;
+  all.level_count = from.level_count;
+  all.channels = from.channels;
+  all.base = static_cast<int32_t>(from.base.kind);
+  all.texel_size_um = from.texel_size_um;
+  all.file_bytes = displaced->asset.info().file_bytes;
+  for (int l = 0; l < from.level_count; ++l) all.factors[l] = from.levels[l].factor;
+  return giveSized(all, info) ? GLINT_OK : usage("glint_displaced_info", "struct_size is not the size of the struct");
+}
+
+glint_status glint_displaced_heights(const glint_displaced* displaced, int32_t level, const float** heights, int32_t* columns,
+                                     int32_t* rows) {
+  if (displaced == nullptr || heights == nullptr || columns == nullptr || rows == nullptr)
+    return usage("glint_displaced_heights", "an argument is null");
+  const Displacement& asset = displaced->brdf.asset();
+  if (level < 0 || level >= asset.level_count) return usage("glint_displaced_heights", "the asset has no such level");
+  *heights = asset.levels[level].heights.data();
+  *columns = asset.levels[level].columns;
+  *rows = asset.levels[level].rows;
+  return GLINT_OK;
+}
+
+glint_status glint_displaced_level(const glint_displaced* displaced, float sigma_texels, float* level) {
+  if (displaced == nullptr || level == nullptr) return usage("glint_displaced_level", "an argument is null");
+  const LevelBlend levels = displaced->brdf.levelsFor(std::sqrt(12.0f) * sigma_texels);
+  *level = static_cast<float>(levels.first) + levels.weight;
+  return GLINT_OK;
+}
+
+glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t variant, float level, float u, float v,
+                                      const float wi[3], const float wo[3], float reflected[3], float* pdf) {
+  if (displaced == nullptr || wi == nullptr || wo == nullptr) return usage("glint_displaced_evaluate", "an argument is null");
+  if (reflected == nullptr && pdf == nullptr) return usage("glint_displaced_evaluate", "reflected and pdf are null");
+  Point(*displaced, variant, level, {u, v}).evaluate(vectorOf(wi), vectorOf(wo), reflected, pdf);
+  return GLINT_OK;
+}
+
+glint_status glint_displaced_sample(const glint_displaced* displaced, int32_t variant, float level, float u, float v,
+                                    const float wo[3], float xi1, float xi2, float wi[3], float weight[3], float* pdf) {
+  if (displaced == nullptr || wo == nullptr || wi == nullptr || weight == nullptr || pdf == nullptr)
+    return usage("glint_displaced_sample", "an argument is null");
+  Point(*displaced, variant, level, {u, v}).sample(vectorOf(wo), {xi1, xi2}, wi, weight, pdf);
+  return GLINT_OK;
+}
+
+glint_status glint_displaced_evaluate_batch(const glint_displaced* displaced, int32_t variant, size_t count,
+                                            const glint_displaced_points* points, const glint_directions* wi,
+                                            const glint_directions* wo, float* reflected, float* pdfs) {
+  if (count == 0) return GLINT_OK;
+  if (const char* fault = faultOf(displaced, points, wo)) return usage("glint_displaced_evaluate_batch", fault);
+  if (!complete(wi)) return usage("glint_displaced_evaluate_batch", "x, y and z of wi must be given");
+  if (reflected == nullptr && pdfs == nullptr) return usage("glint_displaced_evaluate_batch", "reflected and pdfs are null");
+  const PointArrays at(*points);
+  const DirectionArrays i(*wi), o(*wo);
+  for (std::size_t k = 0; k < count; ++k)
+    Point(*displaced, variant, at.level[k], {at.u[k], at.v[k]})
+        .evaluate(i[k], o[k], reflected == nullptr ? nullptr : reflected + 3 * k, pdfs == nullptr ? nullptr : pdfs + k);
+  return GLINT_OK;
+}
+
+glint_status glint_displaced_sample_batch(const glint_displaced* displaced, int32_t variant, size_t count,
+                                          const glint_displaced_points* points, const glint_directions* wo, glint_floats xi1,
+                                          glint_floats xi2, float* wi, float* weights, float* pdfs) {
+  if (count == 0) return GLINT_OK;
+  if (const char* fault = faultOf(displaced, points, wo)) return usage("glint_displaced_sample_batch", fault);
+  if (xi1.data == nullptr || xi2.data == nullptr) return usage("glint_displaced_sample_batch", "xi1 and xi2 must be given");
+  if (wi == nullptr || weights == nullptr || pdfs == nullptr)
+    return usage("glint_displaced_sample_batch", "wi, weights and pdfs must be given");
+  const PointArrays at(*points);
+  const DirectionArrays o(*wo);
+  const api::HalfVectorArrays xi = {arrayOf(xi1), arrayOf(xi2)};
+  for (std::size_t k = 0; k < count; ++k)
+    Point(*displaced, variant, at.level[k], {at.u[k], at.v[k]}).sample(o[k], xi[k], wi + 3 * k, weights + 3 * k, pdfs + k);
+  return GLINT_OK;
+}

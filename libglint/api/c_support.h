@@ -1,0 +1,98 @@
+#pragma once
+
+// Private to libglint/api. What the sources of the C interface share.
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <new>
+#include <string>
+
+#include "glint/api/any_ndf.h"
+#include "glint/api/batch.h"
+#include "glint/api/glint.h"
+#include "glint/model/vec.h"
+#include "glint/query/rgb.h"
+
+struct glint_ndf {
+  glint::api::OpenedNdf opened;
+  std::string kind;
+};
+
+namespace glint::api::c {
+
+/// Sets the thread's last error. Returns the status.
+glint_status fail(glint_status status, const char* message, const char* rule = "");
+
+/// Fails for an argument.
+/// @param where  function or struct
+/// @param what   is wrong with it
+glint_status usage(const char* where, const char* what);
+
+/// Runs work that may throw.
+template <class Work>
+glint_status guarded(Work&& work) noexcept {
+  try {
+    work();
+    return GLINT_OK;
+  } catch (const Error& error) {
+    return fail(static_cast<glint_status>(error.code()), error.what(), error.rule().c_str());
+  } catch (const std::bad_alloc&) {
+    return fail(GLINT_ERROR_FAILED, "out of memory");
+  } catch (const std::exception& error) {
+    return fail(GLINT_ERROR_FAILED, error.what());
+  } catch (...) {
+    return fail(GLINT_ERROR_FAILED, "failed for a reason that it does not name");
+  }
+}
+
+/// Takes a struct of options of an older or newer header: members that the caller does not have stay as they are, those that
+/// this library does not have must be 0.
+/// @param first_size  of the struct in its first version; no caller's is smaller
+/// @return null if the options can be used, else what is wrong
+template <class Options>
+const char* takeSized(const Options& from, std::size_t first_size, Options& to) {
+  if (from.struct_size < first_size) return "struct_size is not the size of the struct";
+  std::memcpy(&to, &from, std::min(from.struct_size, sizeof to));
+  const char* bytes = reinterpret_cast<const char*>(&from);
+  const bool unknown = from.struct_size > sizeof to &&
+                       std::any_of(bytes + sizeof to, bytes + from.struct_size, [](char byte) { return byte != 0; });
+  return unknown ? "has members that this version of the library does not know" : nullptr;
+}
+
+/// Fills as much of a struct of answers as its caller has.
+/// @return whether that is anything
+template <class Info>
+bool giveSized(Info all, Info* info) {
+  if (info->struct_size <= sizeof info->struct_size) return false;
+  all.struct_size = info->struct_size;
+  std::memcpy(info, &all, std::min(info->struct_size, sizeof all));
+  return true;
+}
+
+inline Footprint footprintOf(const glint_footprint& p) {
+  if (p.kind == GLINT_FOOTPRINT_BOX) return Footprint::box({p.u, p.v}, {p.m[0], p.m[1]}, {p.m[2], p.m[3]});
+  return Footprint::gaussian({p.u, p.v}, {p.m[0], p.m[1], p.m[2]});
+}
+
+inline StridedFloats arrayOf(const glint_floats& a) { return {a.data, a.stride}; }
+
+/// @return null if the footprints are complete, else what is missing
+const char* missingIn(const glint_footprints& p);
+FootprintArrays arraysOf(const glint_footprints& p);
+
+inline Vec3 vectorOf(const float w[3]) { return {w[0], w[1], w[2]}; }
+inline void set(float out[3], Vec3 w) { out[0] = w.x, out[1] = w.y, out[2] = w.z; }
+inline void set(float out[3], Rgb c) { out[0] = c.r, out[1] = c.g, out[2] = c.b; }
+
+/// Directions as a structure of arrays.
+struct DirectionArrays {
+  explicit DirectionArrays(const glint_directions& d) : x(arrayOf(d.x)), y(arrayOf(d.y)), z(arrayOf(d.z)) {}
+  Vec3 operator[](std::size_t k) const { return {x[k], y[k], z[k]}; }
+
+  StridedFloats x, y, z;
+};
+
+inline bool complete(const glint_directions* d) { return d && d->x.data && d->y.data && d->z.data; }
+
+}  // namespace glint::api::c

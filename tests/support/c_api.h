@@ -1,0 +1,95 @@
+#pragma once
+
+// What tests of the C interface share: files of every kind, handles that close themselves, and random queries.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "glint.h"
+#include "glint/formats/asset_writer.h"
+#include "support/sample_assets.h"
+#include "support/temp_folder.h"
+
+namespace glint::test {
+
+inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+inline constexpr int kSize = 64;
+
+/// Files of every kind, with their maps.
+class Assets {
+ public:
+  Assets() {
+    const auto normals = sampleNormals(kSize, kSize);
+    formats::writeAsset(path("normals"), normals.map, sampleProvenance());
+    const auto pyramid = samplePyramid(kSize, BlockPrecision::f16);
+    formats::writeAsset(path("ndf-pyramid"), pyramid.pyramid, sampleProvenance());
+    const auto compressed = sampleCompressed(kSize, CompressionMethod::cp, CoefficientType::i8);
+    formats::writeAsset(path("ndf-cp"), compressed.ndf, sampleProvenance());
+    formats::writeAsset(path("bin-map"), sampleBinMap(kSize, kSize).map, sampleProvenance());
+    formats::writeAsset(path("histogram-sat"), sampleHistograms(kSize, kSize).sat, sampleProvenance());
+    formats::writeAsset(path("heights"), sampleHeights(kSize, kSize).map, sampleProvenance());
+    formats::writeAsset(path("displacement"), sampleDisplacement(kSize, true).displacement, sampleProvenance());
+  }
+  std::string path(const std::string& kind) const { return (folder_.path() / (kind + ".glint")).string(); }
+
+ private:
+  TempFolder folder_;
+};
+
+inline const Assets& assets() {
+  static const Assets files;
+  return files;
+}
+
+struct Closer {
+  void operator()(glint_ndf* ndf) const { glint_ndf_close(ndf); }
+};
+using Handle = std::unique_ptr<glint_ndf, Closer>;
+
+inline Handle openHandle(const std::string& kind, const glint_open_options* options = nullptr) {
+  glint_ndf* ndf = nullptr;
+  EXPECT_EQ(glint_ndf_open(assets().path(kind).c_str(), options, &ndf), GLINT_OK) << glint_error_message();
+  return Handle(ndf);
+}
+
+inline constexpr const char* kKinds[] = {"normals", "ndf-pyramid", "ndf-cp", "bin-map", "histogram-sat"};
+
+/// Random queries of every size, with a few that are degenerate.
+struct Queries {
+  explicit Queries(std::size_t count, unsigned seed = 1) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> unit(0, 1);
+    for (std::size_t k = 0; k < count; ++k) {
+      u.push_back(unit(random) * 3 - 1);
+      v.push_back(unit(random));
+      sigma.push_back(std::exp2(unit(random) * 7 - 2));
+      hx.push_back(unit(random) - 0.5f);
+      hy.push_back(unit(random) - 0.5f);
+      if (k % 23 == 5) u.back() = kNan;
+      if (k % 29 == 7) sigma.back() = k % 2 ? kNan : 0;
+      if (k % 31 == 3) hx.back() = k % 2 ? kNan : 1.5f;
+      if (k % 37 == 11) sigma.back() = k % 2 ? 1e18f : std::numeric_limits<float>::infinity();
+      if (k % 41 == 13) u.back() = k % 2 ? -1e9f : 1e30f;
+    }
+  }
+  std::vector<float> u, v, sigma, hx, hy;
+};
+
+inline glint_floats contiguous(const std::vector<float>& values) { return {values.data(), sizeof(float)}; }
+
+inline glint_footprints isotropic(const Queries& q) {
+  glint_footprints p = {};
+  p.u = contiguous(q.u);
+  p.v = contiguous(q.v);
+  p.sigma = contiguous(q.sigma);
+  return p;
+}
+
+}  // namespace glint::test
