@@ -172,7 +172,7 @@ class Builder {
     makeKeys();
     while (((key_count_ - 1) >> range_shift_) >= kMaxRanges) ++range_shift_;
     range_count_ = ((key_count_ - 1) >> range_shift_) + 1;
-    // Four texels' classes fill three words, so blocks of a multiple of four never share one.
+    // Four texels' classes fill three words, so parts of a multiple of four never share one.
     chunk_ = (count_ / kParts / kChunk + 1) * kChunk;
   }
 
@@ -183,7 +183,7 @@ class Builder {
     scatter();
     step(2);
     countBins();
-    plantTrees();
+    divideTiles();
     makeClasses();
     step(3);
     listTexels();
@@ -309,8 +309,8 @@ class Builder {
     return result;
   }
 
-  /// Divides tiles in blocks.
-  void plantTrees() {
+  /// Divides every tile in blocks.
+  void divideTiles() {
     const auto tiles = static_cast<std::uint32_t>(tiles_);
     out_.nodes.assign(2 * std::size_t{tiles} * tiles, 0);
     std::size_t bucket = 0;
@@ -318,7 +318,7 @@ class Builder {
       for (; bucket < bucket_count_ && bucket_tiles_[bucket] == tile; ++bucket)
         bucket_blocks_.push_back(static_cast<std::uint32_t>(blocks_.size()));
       const int bits = out_.tile_bits;
-      grow(tile, std::size_t{tile} << 2 * bits,
+      divide(tile, std::size_t{tile} << 2 * bits,
            {0, 0, 0, static_cast<std::uint16_t>((tile % tiles) << bits), static_cast<std::uint16_t>((tile / tiles) << bits),
             static_cast<std::uint8_t>(bits), 0});
     }
@@ -328,7 +328,8 @@ class Builder {
     cells_[cell_count_] = count_;
   }
 
-  void grow(std::size_t node, std::size_t first_key, Block block) {
+  /// Makes a node a block, or the parent of four nodes, if it has texels.
+  void divide(std::size_t node, std::size_t first_key, Block block) {
     const Filling texels = filling(first_key, block.side_bits);
     if (texels.all == 0) return;
     if (block.side_bits > 0 && (texels.all > kMostOfBlock || texels.fullest > kMostOfSharedBin)) {
@@ -341,7 +342,7 @@ class Builder {
         Block child = block;
         child.column = static_cast<std::uint16_t>(child.column + ((quadrant & 1) << block.side_bits));
         child.row = static_cast<std::uint16_t>(child.row + ((quadrant >> 1) << block.side_bits));
-        grow(first_child + quadrant, first_key + (std::size_t{quadrant} << 2 * block.side_bits), child);
+        divide(first_child + quadrant, first_key + (std::size_t{quadrant} << 2 * block.side_bits), child);
       }
       return;
     }
