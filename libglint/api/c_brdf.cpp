@@ -82,10 +82,12 @@ api::FootprintArrays from(const api::FootprintArrays& p, std::size_t first) {
           from(p.yy, first), from(p.ax, first), from(p.ay, first),    from(p.bx, first), from(p.by, first)};
 }
 
+/// Queries that are answered at once, from arrays on the stack.
+constexpr std::size_t kPart = 256;
+
 /// Values with D from the batch of densities, whose cache misses overlap; part by part, so that nothing is allocated.
 void evaluateByDensities(const glint_brdf& b, std::size_t count, const api::FootprintArrays& footprints,
                          const DirectionArrays& wi, const DirectionArrays& wo, const Values& out) {
-  constexpr std::size_t kPart = 256;
   std::array<HalfVector, kPart> halves;
   std::array<float, kPart> densities;
   const api::AnyNdf& model = b.ndf->opened.model();
@@ -104,6 +106,47 @@ void evaluateByDensities(const glint_brdf& b, std::size_t count, const api::Foot
           out.set(first + k,
                   halves[k].cosine > 0 ? brdf.valueOf(wi[first + k], wo[first + k], halves[k], densities[k]) : BrdfValue{});
     });
+  }
+}
+
+/// Where a batch of samples goes.
+struct Samples {
+  float* wi;
+  float* weights;
+  float* pdfs;
+
+  void set(std::size_t k, const BrdfSample& drawn) const {
+    glint::api::c::set(wi + 3 * k, drawn.wi);
+    glint::api::c::set(weights + 3 * k, drawn.weight);
+    pdfs[k] = drawn.pdf;
+  }
+};
+
+/// Samples whose half vectors come from the batch of samples; those that are drawn evenly, and none, ask it in vain.
+void sampleByHalfVectors(const glint_brdf& b, std::size_t count, const api::FootprintArrays& footprints,
+                         const DirectionArrays& wo, const api::HalfVectorArrays& xi, const Samples& out) {
+  using Brdf = MicrofacetBrdf<Reference>;  // any model has the same share
+  std::array<Vec2, kPart> points;
+  std::array<float, kPart> x, y, pdfs;
+  constexpr std::ptrdiff_t kStride = sizeof(Vec2);
+  for (std::size_t first = 0; first < count; first += kPart) {
+    const std::size_t size = std::min(kPart, count - first);
+    for (std::size_t k = 0; k < size; ++k) {
+      const Vec3 o = wo[first + k];
+      points[k] = aboveHorizon(o) ? Brdf::modelPoint(o, clampUnit(xi[first + k])) : Vec2{};
+    }
+    api::samples(b.ndf->opened.model(), size, from(footprints, first), {{&points[0].x, kStride}, {&points[0].y, kStride}},
+                 {x.data(), y.data(), pdfs.data()});
+    for (std::size_t k = 0; k < size; ++k) {
+      const Vec3 o = wo[first + k];
+      const Vec2 at = clampUnit(xi[first + k]);
+      const bool drawn = aboveHorizon(o) && !(at.x < Brdf::uniformShare(o));
+      out.set(first + k, atFootprint(b, drawn ? Footprint{} : footprints[first + k], [&](const auto& brdf) {
+                if constexpr (requires { brdf.sampleOf(o, HalfVectorSample{}); })
+                  if (drawn) return brdf.sampleOf(o, {{x[k], y[k]}, pdfs[k]});
+                return brdf.sample(o, at);
+              }));
+    }
   }
 }
 
@@ -189,11 +232,12 @@ glint_status glint_brdf_sample_batch(const glint_brdf* brdf, size_t count, const
   const api::FootprintArrays p = arraysOf(*footprints);
   const DirectionArrays o(*wo);
   const api::HalfVectorArrays xi = {arrayOf(xi1), arrayOf(xi2)};
-  for (std::size_t k = 0; k < count; ++k) {
-    const BrdfSample drawn = atFootprint(*brdf, p[k], [&](const auto& b) { return b.sample(o[k], clampUnit(xi[k])); });
-    set(wi + 3 * k, drawn.wi);
-    set(weights + 3 * k, drawn.weight);
-    pdfs[k] = drawn.pdf;
+  const Samples out = {wi, weights, pdfs};
+  if (!brdf->beckmann) {
+    sampleByHalfVectors(*brdf, count, p, o, xi, out);
+    return GLINT_OK;
   }
+  for (std::size_t k = 0; k < count; ++k)
+    out.set(k, atFootprint(*brdf, p[k], [&](const auto& b) { return b.sample(o[k], clampUnit(xi[k])); }));
   return GLINT_OK;
 }

@@ -94,7 +94,18 @@ class MicrofacetBrdf {
     if (!aboveHorizon(wo)) return {};
     const float share = uniformShare(wo);
     if (xi.x < share) return sampleUniform(wo, {xi.x / share, xi.y});
-    const HalfVectorSample drawn = model_->sample(footprint_, {std::min((xi.x - share) / (1 - share), kBelowOne), xi.y});
+    return sampleOf(wo, model_->sample(footprint_, modelPoint(wo, xi)));
+  }
+
+  /// What `sample` asks the model for where xi.x >= uniformShare(wo).
+  static GLINT_HD Vec2 modelPoint(Vec3 wo, Vec2 xi) {
+    const float share = uniformShare(wo);
+    return {std::min((xi.x - share) / (1 - share), kBelowOne), xi.y};
+  }
+
+  /// What `sample` makes of the half vector that the model has drawn at modelPoint.
+  /// @param wo  above the horizon
+  GLINT_HD BrdfSample sampleOf(Vec3 wo, const HalfVectorSample& drawn) const {
     const HalfVector h = halfVectorAt(drawn.h, wo);
     if (!(drawn.pdf > 0 && h.cosine > 0)) return {};
     const Vec3 wi = reflected(wo, h);
