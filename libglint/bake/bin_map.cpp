@@ -23,8 +23,8 @@ constexpr std::size_t kMaxRanges = 1 << 16;
 constexpr std::size_t kParts = 16;
 /// Tiles are joined to about this many buckets for the first pass: as many streams as a processor writes at once.
 constexpr std::size_t kBuckets = 512;
-/// Tiles have about this many texels, or are the bins themselves; but tiles of more bins than 8 x 8, which large footprints would have to
-/// search, only where they have few texels.
+/// Tiles have about this many texels, or are the bins themselves; but tiles of more bins than 8 x 8, which large footprints
+/// would have to search, only where they have few texels.
 constexpr std::size_t kTexelsOfTile = 1024, kFewTexelsOfTile = 64;
 constexpr int kWideTileBits = 3;
 /// Blocks of several bins have at most this many texels, and none of their bins more than kMostOfSharedBin: merging texels (see
@@ -319,8 +319,8 @@ class Builder {
         bucket_blocks_.push_back(static_cast<std::uint32_t>(blocks_.size()));
       const int bits = out_.tile_bits;
       divide(tile, std::size_t{tile} << 2 * bits,
-           {0, 0, 0, static_cast<std::uint16_t>((tile % tiles) << bits), static_cast<std::uint16_t>((tile / tiles) << bits),
-            static_cast<std::uint8_t>(bits), 0});
+             {0, 0, 0, static_cast<std::uint16_t>((tile % tiles) << bits), static_cast<std::uint16_t>((tile / tiles) << bits),
+              static_cast<std::uint8_t>(bits), 0});
     }
     bucket_blocks_.push_back(static_cast<std::uint32_t>(blocks_.size()));
     out_.block_moments.resize(5 * blocks_.size());

@@ -22,15 +22,15 @@ inline constexpr float kMaxAlphaRange = 64;
 /// Bins along each axis at most, reached near the smallest roughness.
 inline constexpr int kMaxBinsPerAxis = 4096;
 
-/// Bins along each axis for a roughness: 5 / sin(arctan(3 sigma)), so that five bins span six deviations (Atanasov 2021, Eq. 16 and
-/// table 4, which rounds down).
+/// Bins along each axis for a roughness: 5 / sin(arctan(3 sigma)), so that five bins span six deviations (Atanasov 2021, Eq. 16
+/// and table 4, which rounds down).
 int binsPerAxis(float alpha);
 
 /// Logarithm of the bins along each axis of a tile: 0 where texels are many.
 int tileBits(int bins_per_axis, std::size_t texels);
 
-/// Roughness of the bins that serve a range of roughnesses: the geometric mean, but not so rough that a normal is known to less than
-/// a sixteenth of the bins of the smallest, or the smallest itself.
+/// Roughness of the bins that serve a range of roughnesses: the geometric mean, but not so rough that a normal is known to less
+/// than a sixteenth of the bins of the smallest, or the smallest itself.
 float binAlpha(float alpha_min, float alpha_max, int place_bits);
 
 /// A CompactCounts that owns its arrays.
@@ -63,12 +63,12 @@ struct BinMapData {
   std::size_t sizeBytes() const;
 };
 
-/// Sorts the texels of a normal map by the blocks of their normals (Atanasov 2021, section 5.4, with blocks of bins for its bins), each list
-/// by cells.
+/// Sorts the texels of a normal map by the blocks of their normals (Atanasov 2021, section 5.4, with blocks of bins for its
+/// bins), each list by cells.
 ///
 /// Two passes: into about 512 buckets of neighbouring tiles, then each bucket by cell in the cache. O(texels + bins).
-/// @throws Error usage for options out of range; invalid_input for normals outside the disk; unsupported for maps whose columns and
-///         rows need more than 28 bits together (16384 x 16384)
+/// @throws Error usage for options out of range; invalid_input for normals outside the disk; unsupported for maps whose columns
+///         and rows need more than 28 bits together (16384 x 16384)
 BinMapData buildBinMap(const NormalMap& map, const BinMapOptions& options, const ProgressFn& progress = {});
 
 }  // namespace glint::bake

@@ -43,8 +43,8 @@ struct TexelCode {
   }
 };
 
-/// Column and row in the map and place in the bin, as precise as a texel's bin keeps it at best. Maps whose columns and rows need more
-/// than kMaxPositionBits together have no code: place_bits is -1.
+/// Column and row in the map and place in the bin, as precise as a texel's bin keeps it at best. Maps whose columns and rows
+/// need more than kMaxPositionBits together have no code: place_bits is -1.
 GLINT_HD constexpr TexelCode texelCode(int width, int height) {
   const auto bits = [](int size) {
     int count = 0;
@@ -77,9 +77,9 @@ GLINT_HD constexpr CellGrid cellGrid(const TexelCode& code, int cell_bits) {
   return {code.column_bits - across, code.row_bits - (cell_bits - across), 1 << across};
 }
 
-/// Code of the texels of a block of 2^side_bits x 2^side_bits bins with 2^cell_bits cells: column and row in the cell, place in the block. A
-/// place in a bin takes place_bits - side_bits bits along each axis, as many as `map`, the map's texelCode, has if there is room for
-/// them; fewer than 0 if there is none for the bin.
+/// Code of the texels of a block of 2^side_bits x 2^side_bits bins with 2^cell_bits cells: column and row in the cell, place in
+/// the block. A place in a bin takes place_bits - side_bits bits along each axis, as many as `map`, the map's texelCode, has if
+/// there is room for them; fewer than 0 if there is none for the bin.
 GLINT_HD constexpr TexelCode blockCode(const TexelCode& map, int side_bits, int cell_bits) {
   const CellGrid grid = cellGrid(map, cell_bits);
   const int left = (32 - grid.column_shift - grid.row_shift) / 2 - side_bits;
@@ -88,13 +88,15 @@ GLINT_HD constexpr TexelCode blockCode(const TexelCode& map, int side_bits, int 
 
 /// The texels of a normal map, listed by the directions of their normals (Atanasov 2021, section 5.4).
 ///
-/// The square [-1, 1]^2 has bins_per_axis^2 bins. They are listed by block: squares of 2^s x 2^s neighbouring bins, larger where few
-/// normals are. A block's texels lie in a grid of cells over the map, a power of two of them (see `cellGrid`), and its list is sorted
-/// by cell, row by row. Small footprints meet one or two cells of each block, and few blocks have bins near a half vector.
+/// The square [-1, 1]^2 has bins_per_axis^2 bins. They are listed by block: squares of 2^s x 2^s neighbouring bins, larger
+/// where few normals are. A block's texels lie in a grid of cells over the map, a power of two of them (see `cellGrid`), and
+/// its list is sorted by cell, row by row. Small footprints meet one or two cells of each block, and few blocks have bins near
+/// a half vector.
 ///
-/// Blocks are the leaves of quadtrees: tiles of 2^tile_bits x 2^tile_bits bins, row by row, each with the node of its number as root. The four
-/// children of a node are those with lower and higher columns and lower and higher rows, in the order (low, low), (high, low), (low,
-/// high), (high, high). The *key* of a bin counts bins in the order of the quadtrees: 4^tile_bits of each tile.
+/// Blocks are the leaves of quadtrees: tiles of 2^tile_bits x 2^tile_bits bins, row by row, each with the node of its number as
+/// root. The four children of a node are those with lower and higher columns and lower and higher rows, in the order (low,
+/// low), (high, low), (low, high), (high, high). The *key* of a bin counts bins in the order of the quadtrees: 4^tile_bits of
+/// each tile.
 struct BinMap {
   int width = 0;        ///< texels
   int height = 0;       ///< texels
@@ -112,7 +114,8 @@ struct BinMap {
 
   /// [nodes][2]: kind | number of the block << kKindBits, and the first of four children or of the block's cells. Tiles first
   std::span<const std::uint32_t> nodes;
-  /// [blocks][5] of f16: mean (x, y) and covariance (xx, xy, yy) of the block's normals, from its lower left corner, in its sides
+  /// [blocks][5] of f16: mean (x, y) and covariance (xx, xy, yy) of the block's normals, from its lower left corner, in its
+  /// sides
   std::span<const std::uint16_t> block_moments;
   CompactCounts cell_starts;              ///< [cells + 1]: place in `texels` of each cell, of all blocks in order
   std::span<const std::uint32_t> texels;  ///< [height * width]: blockCode

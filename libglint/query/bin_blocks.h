@@ -37,8 +37,8 @@ struct BinTexel {
   std::uint32_t code = 0;  ///< blockCode
 };
 
-/// Texels [begin, end) of a block's list that a footprint may meet in part. Column and row of their codes count from (x, y) in coordinates of
-/// the footprint (TexelCover).
+/// Texels [begin, end) of a block's list that a footprint may meet in part. Column and row of their codes count from (x, y) in
+/// coordinates of the footprint (TexelCover).
 struct TexelRun {
   std::uint64_t begin = 0, end = 0;
   int x = 0, y = 0;
@@ -46,8 +46,8 @@ struct TexelRun {
        cut_y = true;  ///< whether sides may cut it along u, and along v; where not, the coordinate does not matter
 };
 
-/// Cells [first, end) of one row of a block that a footprint meets. Those of [whole, whole_end) are covered completely, or along u only if
-/// `cut_y`.
+/// Cells [first, end) of one row of a block that a footprint meets. Those of [whole, whole_end) are covered completely, or
+/// along u only if `cut_y`.
 struct CellRow {
   std::uint32_t first, whole, whole_end, end;
   int x, y;  ///< of cell `first`
@@ -96,8 +96,9 @@ class BinBlocks {
     });
   }
 
-  /// Splits the part of a block's list that may be in a footprint into runs: visitor.partial(TexelRun) where texels have to be looked at, and
-  /// visitor.whole(begin, end) where all are covered completely. A texel of a footprint larger than the map is met once for every period. O(cells along the border).
+  /// Splits the part of a block's list that may be in a footprint into runs: visitor.partial(TexelRun) where texels have to be
+  /// looked at, and visitor.whole(begin, end) where all are covered completely. A texel of a footprint larger than the map is
+  /// met once for every period. O(cells along the border).
   /// @param kept  what was found for other blocks and the same footprint
   template <class Visitor>
   GLINT_HD void forEachRun(const TexelCover& cover, const BinBlock& block, CellRows& kept, Visitor&& visitor) const {
@@ -168,7 +169,8 @@ class BinBlocks {
 
   /// Bit k: the class of texel index + k is in [first, last], for 0 <= k < count <= kMostAtOnce, all of one row of the map.
   GLINT_HD std::uint64_t texelsOfClasses(std::uint64_t index, int count, std::uint32_t first, std::uint32_t last) const {
-    // Four texels at a time, each in 16 bits of a word: additions carry into the highest of these for c >= first, and for c > last.
+    // Four texels at a time, each in 16 bits of a word: additions carry into the highest of these for c >= first, and for c >
+    // last.
     constexpr std::uint64_t kOnes = 0x0001000100010001, kHighest = kOnes << 15;
     const std::uint64_t below = (0x8000 - first) * kOnes, above = (0x7fff - last) * kOnes;
     const int head = static_cast<int>(index % 4), end = head + count;

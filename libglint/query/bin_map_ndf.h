@@ -22,10 +22,10 @@ struct BinFacet {
 
 /// The NDF from an inverse bin map (Atanasov 2021): exact shares of the footprint for every texel near the half vector.
 ///
-/// Each texel in reach counts with its own normal, kept to a fraction of a bin (see blockCode). A block that holds more than a few hundred
-/// texels of the footprint, and is no wider than the lobe allows, counts as one Gaussian with the mean and covariance of its
-/// normals; between kFewTexels and kManyTexels the two are blended, so that the density is continuous in footprint and half vector.
-/// Lobes are those of FacetLobe.
+/// Each texel in reach counts with its own normal, kept to a fraction of a bin (see blockCode). A block that holds more than a
+/// few hundred texels of the footprint, and is no wider than the lobe allows, counts as one Gaussian with the mean and
+/// covariance of its normals; between kFewTexels and kManyTexels the two are blended, so that the density is continuous in
+/// footprint and half vector. Lobes are those of FacetLobe.
 ///
 /// Boxes are answered exactly, Gaussians by the box of the same second moments: see TexelCover, also for boxes without area and
 /// boxes larger than the map. Thread-safe, allocates nothing; the arrays must outlive it.
@@ -67,8 +67,8 @@ class BinMapNdf {
     return static_cast<float>(sum / range.area());
   }
 
-  /// A half vector with the density of the footprint (Atanasov 2021, section 5.3 and Eq. 18): a point of the footprint, the normal
-  /// of its texel, and a point of its lobe. The leading digits of xi choose the point, the others the lobe.
+  /// A half vector with the density of the footprint (Atanasov 2021, section 5.3 and Eq. 18): a point of the footprint, the
+  /// normal of its texel, and a point of its lobe. The leading digits of xi choose the point, the others the lobe.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     Vec2 normal;
     if (!sampleNormal(p, xi, normal)) return {};
@@ -77,8 +77,8 @@ class BinMapNdf {
     return {h, density(p, h)};
   }
 
-  /// The normal of the texel at a point of the footprint, even over it. Uses up the leading digits of xi and leaves the others, even
-  /// in [0, 1)^2.
+  /// The normal of the texel at a point of the footprint, even over it. Uses up the leading digits of xi and leaves the others,
+  /// even in [0, 1)^2.
   GLINT_HD bool sampleNormal(const Footprint& p, Vec2& xi, Vec2& normal) const {
     xi = clampUnit(xi);
     const TexelCover cover(p, map().width, map().height);
@@ -88,8 +88,8 @@ class BinMapNdf {
     return normalAt(cover, x, y, normal);
   }
 
-  /// Weights of the bins around h, exact to rounding; none for h outside the square [-1, 1]^2. O(texels of the footprint) or less,
-  /// whichever way is shorter.
+  /// Weights of the bins around h, exact to rounding; none for h outside the square [-1, 1]^2. O(texels of the footprint) or
+  /// less, whichever way is shorter.
   GLINT_HD BinWeights weights(const Footprint& p, Vec2 h) const {
     if (!(std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1)) return {};
     const BinWindow window(binAt(h.x), binAt(h.y), map().bins_per_axis);
@@ -292,7 +292,8 @@ class BinMapNdf {
 
   /// For boxes along the axes each texel is counted, without branches, in the slot of its class.
   GLINT_HD void addAlignedTexels(const TexelCover& cover, const std::uint8_t* slots, double* areas) const {
-    // Counts of four texels in turn, since an increment waits for the last one of the same slot; flushed where a row's height changes.
+    // Counts of four texels in turn, since an increment waits for the last one of the same slot; flushed where a row's height
+    // changes.
     std::uint32_t counts[4][kNoSlot + 1] = {};
     const BoxSides sides(cover);
     int last_y = 0;

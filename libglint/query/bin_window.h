@@ -122,8 +122,8 @@ GLINT_HD void withCut(const TexelRun& run, Visitor&& visitor) {
     visitor(std::integral_constant<unsigned, 0>());
 }
 
-/// Adds up the areas of runs (BinBlocks::forEachRun) by bin. Several are asked for before they are read: the processor then waits for
-/// all of them together.
+/// Adds up the areas of runs (BinBlocks::forEachRun) by bin. Several are asked for before they are read: the processor then
+/// waits for all of them together.
 class WindowSum {
  public:
   /// @param texels  of all lists

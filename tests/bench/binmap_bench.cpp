@@ -1,8 +1,8 @@
 // Builds bin maps and asks them:
 //   glint-binmap-bench [--quick | --range] [MAP]...
-// Prints JSON: for each map and roughness the time of building, bytes, and the median time of the weights around a half vector for
-// footprints of several sizes; errors of the density against Reference. Times are of one thread; builds use all. MAP: only maps of these
-// names. --range: instead, one bin map for roughnesses of 0.01 to 0.16 beside one for each.
+// Prints JSON: for each map and roughness the time of building, bytes, and the median time of the weights around a half vector
+// for footprints of several sizes; errors of the density against Reference. Times are of one thread; builds use all. MAP: only
+// maps of these names. --range: instead, one bin map for roughnesses of 0.01 to 0.16 beside one for each.
 
 #include <tbb/global_control.h>
 
@@ -112,8 +112,8 @@ double medianNanoseconds(const std::vector<Query>& queries, Ask ask) {
   return median(times);
 }
 
-/// Median relative error of the density against Reference within two deviations of a normal of the footprint, where a renderer finds a
-/// glint, and the error of all densities together.
+/// Median relative error of the density against Reference within two deviations of a normal of the footprint, where a renderer
+/// finds a glint, and the error of all densities together.
 ordered_json errors(const Map& m, const BinMapNdf& ndf, float side, std::size_t count) {
   const Reference reference(m.map, ndf.sigma());
   std::vector<double> relative;
