@@ -24,21 +24,23 @@ class CpNdf {
   static constexpr int kMaxBlocksPerAxis = 64;  // of 1024 pixels, the largest image
 
  public:
-  GLINT_HD explicit CpNdf(const CompressedNdf& ndf) : ndf_(ndf) {}
+  GLINT_HD explicit CpNdf(const CompressedNdf& ndf) : ndf_(ndf), chooser_(ndf.shape) {}
   GLINT_HD CpNdf(const CompressedNdf& ndf, const NormalMap& normals)
       : ndf_(ndf),
+        chooser_(ndf.shape),
         below_(Reference(normals, ndf.shape.sigma_r, ndf.shape.surface, ndf.shape.boundary, Reference::Search::pruned)) {}
 
   GLINT_HD const CompressedNdf& compressed() const { return ndf_; }
   /// Whether footprints below level 0 are answered from the texels.
   GLINT_HD bool hasNormals() const { return below_.hasMap(); }
   GLINT_HD const PyramidShape& shape() const { return ndf_.shape; }
+  GLINT_HD const SliceChooser& chooser() const { return chooser_; }
 
   /// Density towards h, >= 0; O(columns) in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
-    const PyramidSlices chosen = selectSlices(shape(), p);
+    const PyramidSlices chosen = chooser_.choose(p);
     const PixelPlace place = pixelPlace(shape(), h);
     return withReader(ndf_, [&](const auto& reader) { return pixelDensity(reader, chosen, place); });
   }
@@ -56,7 +58,7 @@ class CpNdf {
   GLINT_HD float signedDensity(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
-    const PyramidSlices chosen = selectSlices(shape(), p);
+    const PyramidSlices chosen = chooser_.choose(p);
     const PixelPlace place = pixelPlace(shape(), h);
     return withReader(ndf_, [&](const auto& reader) {
       return sumSlices(chosen, place.block, ndf_.image_scales.data(), PixelOf<decltype(reader)>{reader, place}, Signed{});
@@ -66,7 +68,7 @@ class CpNdf {
   GLINT_HD float signedMean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
     if (below_.hasMap() && belowFinest(shape(), p)) return below_.mean(p, range);
-    const PyramidSlices chosen = selectSlices(shape(), p);
+    const PyramidSlices chosen = chooser_.choose(p);
     return withReader(ndf_, [&](const auto& reader) {
       double sum = 0;
       forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
@@ -139,9 +141,9 @@ class CpNdf {
     SlicePlace places[PyramidSlices::kMost];
     float weights[PyramidSlices::kMost];
     for (int k = 0; k < chosen.count; ++k) {
-      const std::size_t image = imageOf(chosen.slices[k]);
+      const std::size_t image = imageOf(chosen[k]);
       places[k] = findSlice(image, block_place);
-      weights[k] = chosen.slices[k].weight * scales[image];
+      weights[k] = chosen.weights[k] * scales[image];
     }
     float sum = 0;
     for (int first = 0; first < chosen.count; ++first) {
@@ -247,6 +249,7 @@ class CpNdf {
   }
 
   CompressedNdf ndf_;
+  SliceChooser chooser_;
   Reference below_;
 };
 
@@ -254,18 +257,18 @@ class CpNdf {
 inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) const {
   xi = clampUnit(xi);
   if (below_.hasMap() && belowFinest(shape(), p)) return below_.sample(p, xi);
-  const PyramidSlices chosen = selectSlices(shape(), p);
+  const PyramidSlices chosen = chooser_.choose(p);
   float weights[PyramidSlices::kMost];
   float total = 0;  // images of which nothing was kept have no density
   for (int k = 0; k < chosen.count; ++k) {
-    weights[k] = ndf_.density_scales.data()[imageOf(chosen.slices[k])] > 0 ? chosen.slices[k].weight : 0.0f;
+    weights[k] = ndf_.density_scales.data()[imageOf(chosen[k])] > 0 ? chosen.weights[k] : 0.0f;
     total += weights[k];
   }
   const int k = chooseIndex(
       chosen.count, total, [&](int i) { return weights[i]; }, xi.x);
   if (k < 0) return {};
   return withReader(ndf_, [&](const auto& reader) -> HalfVectorSample {
-    const PixelPlace place = choosePlace(reader, imageOf(chosen.slices[k]), xi);
+    const PixelPlace place = choosePlace(reader, imageOf(chosen[k]), xi);
     if (place.x < 0) return {};
     return {pointInPixel(shape(), place, xi), pixelDensity(reader, chosen, place) / total};
   });
