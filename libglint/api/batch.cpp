@@ -18,7 +18,9 @@ constexpr int kSlices = PyramidSlices::kMost;
 class PyramidChunk {
  public:
   explicit PyramidChunk(const NdfPyramid& pyramid)
-      : pyramid_(pyramid), words_(static_cast<unsigned>(pyramid.shape.maskWords())), pixel_shift_(pyramid.precision == BlockPrecision::f16 ? 1 : 2) {
+      : pyramid_(pyramid),
+        words_(static_cast<unsigned>(pyramid.shape.maskWords())),
+        pixel_shift_(pyramid.precision == BlockPrecision::f16 ? 1 : 2) {
     for (int l = 0; l < pyramid.shape.level_count; ++l) {
       const PyramidLevel& level = pyramid.levels[l];
       levels_[l] = {level.masks.data(), level.mask_ranks.data(), static_cast<const char*>(level.pixels)};
@@ -183,7 +185,7 @@ class CompressedChunk {
         const NdfCluster& cluster = ndf_.clusters.data()[at];
         const ColumnLayout layout(cluster);
         const int x = chunk.pixels[k] % kBlockSize, y = chunk.pixels[k] / kBlockSize;
-        if (cluster.columns > 0) project<Basis>(reader, cluster, x, y, projection);
+        if (cluster.columns > 0) project<Basis>(reader, cluster, layout, x, y, projection);
         for (int j = lowestBit(left); j < kSlices; ++j) {
           if (!(left >> j & 1) || clusters_[j][k] != at) continue;
           left &= ~(1u << j);
@@ -199,19 +201,20 @@ class CompressedChunk {
 
  private:
   template <class Basis, class Reader>
-  void project(const Reader& reader, const NdfCluster& cluster, int x, int y, float* projection) const {
+  void project(const Reader& reader, const NdfCluster& cluster, const ColumnLayout& layout, int x, int y,
+               float* projection) const {
     if constexpr (!std::is_same_v<Basis, std::int32_t>) {
       if (wide_ && ndf_.method == CompressionMethod::cp && cluster.narrow_columns == 0) {
         const Basis* basis = static_cast<const Basis*>(ndf_.basis) + cluster.first_basis;
         return projectColumns(basis, cluster.columns, x, y, ndf_.scales.data() + cluster.first_scale, projection);
       }
     }
-    reader.pixel(cluster, x, y, projection);
+    reader.pixel(cluster, layout, x, y, projection);
   }
 
   template <class Coefficient, class Reader>
   float dot(const Reader& reader, const float* projection, const ColumnLayout& layout, const Coefficient* row) const {
-    return wide_ && layout.half == 0 ? dotColumns(projection, row, layout.low) : reader.dot(projection, layout, row);
+    return wide_ && layout.half == 0 ? dotColumns(projection, row, layout.low()) : reader.dot(projection, layout, row);
   }
 
   void prefetchBasis(const NdfCluster& cluster, int pixel) const {

@@ -37,20 +37,16 @@ GLINT_API_MULTIVERSION void chooseLevels(const PyramidShape& shape, const SliceC
   constexpr float kLowest = kMinSigmaTexels * kMinSigmaTexels;
   const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
   const float finest = finestSigma(shape), finest_variance = finest * finest;
-  const float per_finest_variance = chooser.perFinestVariance();
-  const int last = chooser.lastLevel();
   for (int k = 0; k < kChunk; ++k) {
     const float sum = lanes.xx[k] + lanes.xy[k] + lanes.yy[k];
     const float mean = 0.5f * (std::min(lanes.xx[k], width * width) + std::min(lanes.yy[k], height * height));
     const float widened = std::max(mean, kLowest);
     const float variance = std::fabs(sum) <= std::numeric_limits<float>::max() ? widened : kLowest;
-    const float ratio = variance * per_finest_variance;
-    const int lower = std::min(std::max(floorLog2(ratio) >> 1, 0), last);
-    const float level = std::min(0.5f * log2Of(ratio), static_cast<float>(last));
+    const LevelPlace level = levelPlace(chooser.sizeRatio(variance));
     chunk.below[k] = variance < finest_variance ? 1 : 0;
-    chunk.levels[0][k] = lower;
-    chunk.levels[1][k] = std::min(lower + 1, last);  // with weight 0 at the last
-    lanes.t[k] = std::min(std::max(level - static_cast<float>(lower), 0.0f), 1.0f);
+    chunk.levels[0][k] = level.first;
+    chunk.levels[1][k] = std::min(level.first + 1, shape.level_count - 1);  // with weight 0 at the last
+    lanes.t[k] = level.t;
   }
 }
 

@@ -105,9 +105,11 @@ class CpNdf {
   /// Negative values of a slice: kept, or taken as 0.
   struct Signed {
     GLINT_HD float operator()(float value) const { return value; }
+    GLINT_HD Float4 operator()(Float4 values) const { return values; }
   };
   struct Positive {
     GLINT_HD float operator()(float value) const { return std::max(0.0f, value); }
+    GLINT_HD Float4 operator()(Float4 values) const { return values.positive(); }
   };
 
   /// What is asked of a block: one pixel, or the sum over a box of pixels.
@@ -115,8 +117,15 @@ class CpNdf {
   struct PixelOf {
     Reader reader;
     PixelPlace place;
-    GLINT_HD void project(const NdfCluster& cluster, float* projection) const {
-      reader.pixel(cluster, place.x, place.y, projection);
+    GLINT_HD void project(const NdfCluster& cluster, const ColumnLayout& layout, float* projection) const {
+      reader.pixel(cluster, layout, place.x, place.y, projection);
+    }
+    GLINT_HD void prefetch(const NdfCluster& cluster, std::uint64_t slice) const {
+      reader.prefetchAlone(cluster, slice, place.x, place.y);
+    }
+    GLINT_HD bool alone(const NdfCluster& cluster) const { return reader.asksAlone(cluster); }
+    GLINT_HD float valueAlone(const NdfCluster& cluster, std::uint64_t slice) const {
+      return reader.valueAlone(cluster, reader.row(cluster, slice), place.x, place.y);
     }
     GLINT_HD float spots(const SpotProfile& profile, const SpotList& list) const {
       return spotsAt(profile, list, place.x, place.y);
@@ -126,9 +135,41 @@ class CpNdf {
   struct BoxOf {
     Reader reader;
     BlockBox box;
-    GLINT_HD void project(const NdfCluster& cluster, float* projection) const { reader.box(cluster, box, projection); }
+    GLINT_HD void project(const NdfCluster& cluster, const ColumnLayout& layout, float* projection) const {
+      reader.box(cluster, layout, box, projection);
+    }
+    GLINT_HD void prefetch(const NdfCluster&, std::uint64_t) const {}
+    GLINT_HD bool alone(const NdfCluster&) const { return false; }
+    GLINT_HD float valueAlone(const NdfCluster&, std::uint64_t) const { return 0; }
     GLINT_HD float spots(const SpotProfile& profile, const SpotList& list) const { return spotsIn(profile, list, box); }
   };
+
+  /// Where the slices of the chosen images are. Weights include the scales of images, and are 0 where an image has no slice, or
+  /// where no more images are chosen.
+  struct SlicePlaces {
+    std::uint32_t clusters[PyramidSlices::kMost];
+    std::uint32_t slices[PyramidSlices::kMost];
+    float weights[PyramidSlices::kMost] = {};
+  };
+
+  /// Nothing branches on what is stored: that cannot be predicted.
+  GLINT_HD SlicePlaces findSlices(const PyramidSlices& chosen, unsigned block_place, const float* scales) const {
+    SlicePlaces out;
+    const auto block_places = static_cast<unsigned>(ndf_.places);
+    for (int step = 0; 4 * step < chosen.count; ++step) {
+      const std::uint32_t first = ndf_.first_image[chosen.levels[step]];
+      for (int k = 4 * step; k < 4 * step + 4; ++k) {
+        const std::size_t image = first + chosen.images[k];
+        const unsigned slot = ndf_.image_slots.data()[image];
+        out.clusters[k] = ndf_.image_regions.data()[image] * block_places + block_place;
+        const std::size_t word = ndf_.clusters.data()[out.clusters[k]].first_word + slot / 64;
+        const BitRank rank(ndf_.masks.data()[word], slot % 64);
+        out.slices[k] = static_cast<std::uint32_t>(ndf_.mask_ranks.data()[word] + rank.below);
+        out.weights[k] = keepIf(rank.kept, chosen.weights[k] * scales[image]);
+      }
+    }
+    return out;
+  }
 
   /// Weighted sum over the chosen images. Slices of the same cluster, as those of neighbours mostly are, share its projection.
   /// @param scales  of images
@@ -136,36 +177,62 @@ class CpNdf {
   /// @param part    Signed or Positive
   template <class Ask, class Part>
   GLINT_HD float sumSlices(const PyramidSlices& chosen, int block, const float* scales, const Ask& ask, Part part) const {
-    const int block_place = ndf_.block_places.data()[block];
+    const unsigned block_place = ndf_.block_places.data()[block];
     if (block_place == kNoBlockPlace) return 0;
-    SlicePlace places[PyramidSlices::kMost];
-    float weights[PyramidSlices::kMost];
-    for (int k = 0; k < chosen.count; ++k) {
-      const std::size_t image = imageOf(chosen[k]);
-      places[k] = findSlice(image, block_place);
-      weights[k] = chosen.weights[k] * scales[image];
+    const SlicePlaces places = findSlices(chosen, block_place, scales);
+    if (ndf_.method == CompressionMethod::cp) {
+      for (int k = 0; k < chosen.count; ++k)
+        if (places.weights[k] > 0) ask.prefetch(ndf_.clusters.data()[places.clusters[k]], places.slices[k]);
     }
+    unsigned left = lanesAbove0(Float4::load(places.weights)) | lanesAbove0(Float4::load(places.weights + 4)) << 4;
     float sum = 0;
-    for (int first = 0; first < chosen.count; ++first) {
-      const std::size_t at = places[first].cluster;
-      if (at == kNone) continue;
+    while (left != 0) {
+      const int lowest = lowestBit(left);
+      const std::uint32_t at = places.clusters[lowest];
       const NdfCluster& cluster = ndf_.clusters.data()[at];
-      const auto addUp = [&](auto&& value) {
-        for (int k = first; k < chosen.count; ++k) {
-          if (places[k].cluster != at) continue;
-          sum += weights[k] * part(value(places[k].slice));
-          places[k].cluster = kNone;
-        }
-      };
-      if (cluster.columns == 0) {
-        const SpotProfile profile(ndf_);
-        addUp([&](std::uint64_t slice) { return ask.spots(profile, spotsOf(ndf_, cluster, slice)); });
-      } else {
-        float projection[ColumnLayout::kMost];
-        ask.project(cluster, projection);
-        const ColumnLayout layout(cluster);
-        addUp([&](std::uint64_t slice) { return ask.reader.dot(projection, layout, ask.reader.row(cluster, slice)); });
+      if (ask.alone(cluster)) {
+        left &= left - 1;
+        sum += places.weights[lowest] * part(ask.valueAlone(cluster, places.slices[lowest]));
+        continue;
       }
+      const auto shares = [&](int step) { return whereEqual(places.clusters + step, at, Float4::load(places.weights + step)); };
+      const unsigned here = lanesAbove0(shares(0)) | lanesAbove0(shares(4)) << 4;
+      left &= ~here;
+      if (cluster.columns == 0) {
+        sum += addSpots(cluster, places, here, ask, part);
+        continue;
+      }
+      const ColumnLayout layout(cluster);
+      float projection[ColumnLayout::kMost];
+      ask.project(cluster, layout, projection);
+      const auto rows = ask.reader.rows(cluster, layout);
+      for (int step = 0; step < PyramidSlices::kMost; step += 4) {
+        const unsigned lanes = here >> step & 15;
+        if (lanes == 0) continue;
+        const int first = step + lowestBit(lanes);
+        if ((lanes & (lanes - 1)) == 0) {
+          sum += places.weights[first] * part(ask.reader.dot(projection, layout, rows(places.slices[first])));
+          continue;
+        }
+        // Lanes of other clusters repeat one of this, and weigh nothing.
+        const auto lane = [&](int k) { return rows(places.slices[lanes >> k & 1 ? step + k : first]); };
+        sum += (shares(step) * part(ask.reader.dots(projection, layout, {lane(0), lane(1), lane(2), lane(3)}))).sum();
+      }
+    }
+    return sum;
+  }
+
+  static GLINT_HD unsigned lanesAbove0(Float4 weights) { return ~weights.notAbove(0) & 15u; }
+
+  /// Weighted sum over the slices `here` of a cluster of spots.
+  template <class Ask, class Part>
+  GLINT_HD float addSpots(const NdfCluster& cluster, const SlicePlaces& places, unsigned here, const Ask& ask,
+                          Part part) const {
+    const SpotProfile profile(ndf_);
+    float sum = 0;
+    for (; here != 0; here &= here - 1) {
+      const int k = lowestBit(here);
+      sum += places.weights[k] * part(ask.spots(profile, spotsOf(ndf_, cluster, places.slices[k])));
     }
     return sum;
   }

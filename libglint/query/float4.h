@@ -64,12 +64,14 @@ struct Float4 {
   }
   /// differenceOf(a[k], b[k]), or a[k] where `mask` is 0 rather than -1.
   static Float4 difference(const std::int16_t* a, const std::int16_t* b, int mask) {
-    const auto load = [](const std::int16_t* p) { return _mm_cvtepi16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))); };
-    return {_mm_cvtepi32_ps(_mm_sub_epi32(load(a), _mm_and_si128(load(b), _mm_set1_epi32(mask))))};
+    const auto wide = [](const std::int16_t* p) {
+      return _mm_cvtepi16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
+    };
+    return {_mm_cvtepi32_ps(_mm_sub_epi32(wide(a), _mm_and_si128(wide(b), _mm_set1_epi32(mask))))};
   }
   static Float4 difference(const std::int32_t* a, const std::int32_t* b, int mask) {
-    const auto load = [](const std::int32_t* p) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(p)); };
-    return {_mm_cvtepi32_ps(_mm_sub_epi32(load(a), _mm_and_si128(load(b), _mm_set1_epi32(mask))))};
+    const auto four = [](const std::int32_t* p) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(p)); };
+    return {_mm_cvtepi32_ps(_mm_sub_epi32(four(a), _mm_and_si128(four(b), _mm_set1_epi32(mask))))};
   }
   static Float4 difference(const float* a, const float* b, int mask) {
     return {_mm_sub_ps(_mm_loadu_ps(a), _mm_and_ps(_mm_loadu_ps(b), _mm_castsi128_ps(_mm_set1_epi32(mask))))};
@@ -79,7 +81,9 @@ struct Float4 {
     return positiveHalves(_mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))));
   }
   static Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
-    return positiveHalves(_mm_setr_epi32(a, b, c, d));
+    __m128i bits = _mm_insert_epi16(_mm_setzero_si128(), a, 0);
+    bits = _mm_insert_epi16(_mm_insert_epi16(bits, b, 2), c, 4);
+    return positiveHalves(_mm_insert_epi16(bits, d, 6));
   }
   static Float4 positiveHalves(__m128i bits) {
     // Right for normal numbers. A subnormal f 2^-14 comes out as 2^-15 (1 + f): less than twice that minus 2^-14 only if it is
@@ -118,6 +122,8 @@ struct Float4 {
   friend Float4 whereLess(Float4 a, Float4 b, Float4 yes, Float4 no) {
     return {_mm_blendv_ps(no.v, yes.v, _mm_cmplt_ps(a.v, b.v))};
   }
+  /// In lanes: a < b ? yes : 0.
+  friend Float4 whereLess(Float4 a, Float4 b, Float4 yes) { return {_mm_and_ps(yes.v, _mm_cmplt_ps(a.v, b.v))}; }
   /// Negative numbers and NaN become 0.
   Float4 positive() const { return {_mm_max_ps(v, _mm_setzero_ps())}; }
   /// Bit k: lane k is at most `bound`.
@@ -213,6 +219,8 @@ struct Float4 {
     for (int k = 0; k < 4; ++k) no.v[k] = a.v[k] < b.v[k] ? yes.v[k] : no.v[k];
     return no;
   }
+  /// In lanes: a < b ? yes : 0.
+  friend GLINT_HD Float4 whereLess(Float4 a, Float4 b, Float4 yes) { return whereLess(a, b, yes, zero()); }
   /// Negative numbers and NaN become 0.
   GLINT_HD Float4 positive() const {
     return {{v[0] > 0 ? v[0] : 0, v[1] > 0 ? v[1] : 0, v[2] > 0 ? v[2] : 0, v[3] > 0 ? v[3] : 0}};

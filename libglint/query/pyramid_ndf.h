@@ -1,5 +1,7 @@
 #pragma once
 
+#include <type_traits>
+
 #include "glint/model/ndf_pyramid.h"
 #include "glint/query/bits.h"
 #include "glint/query/float4.h"
@@ -188,8 +190,8 @@ class PyramidNdf {
     return levelOf(slice).mask_ranks.data() + std::size_t{slice.image} * mask_words_;
   }
 
-  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be predicted, so
-  /// the cache misses of all slices are under way together.
+  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be
+  /// predicted, so the cache misses of all slices are under way together.
   GLINT_HD Places findPixels(const PyramidSlices& chosen, const PixelPlace& place) const {
     return pyramid_.precision == BlockPrecision::f16 ? findPixelsOf<std::uint16_t>(chosen, place)
                                                      : findPixelsOf<float>(chosen, place);
@@ -225,22 +227,22 @@ class PyramidNdf {
 
   template <class Pixel>
   GLINT_HD float addPixelsOf(const Places& places) const {
-    float sum = 0;
-    for (int k = 0; k < places.count; k += 4) {
-      const Float4 weights = Float4::load(places.weights + k);
-      sum += (fourPixels(static_cast<const Pixel*>(nullptr), places.pixels + k, places.weights + k) * weights).sum();
-    }
-    return pyramid_.value_scale * sum;
+    Float4 sum = fourPixels<Pixel>(places, 0);
+    if (places.count > 4) sum = sum + fourPixels<Pixel>(places, 4);
+    return pyramid_.value_scale * sum.sum();
   }
 
-  static GLINT_HD Float4 fourPixels(const std::uint16_t*, const void* const* at, const float*) {
-    const auto half = [&](int k) { return *static_cast<const std::uint16_t*>(at[k]); };
-    return Float4::ofPositive(half(0), half(1), half(2), half(3));
-  }
-  static GLINT_HD Float4 fourPixels(const float*, const void* const* at, const float* weights) {
-    // Values of a file are not checked: a slice that does not count must not bring an infinity.
-    const auto value = [&](int k) { return weights[k] > 0 ? *static_cast<const float*>(at[k]) : 0.0f; };
-    return Float4::of(value(0), value(1), value(2), value(3));
+  /// Weighted pixels of the four slices from k on.
+  template <class Pixel>
+  static GLINT_HD Float4 fourPixels(const Places& places, int k) {
+    const auto pixel = [&](int j) { return *static_cast<const Pixel*>(places.pixels[k + j]); };
+    const Float4 weights = Float4::load(places.weights + k);
+    if constexpr (std::is_same_v<Pixel, float>) {
+      // Values of a file are not checked: a slice that does not count must not bring an infinity.
+      return whereLess(Float4::zero(), weights, weights * Float4::of(pixel(0), pixel(1), pixel(2), pixel(3)));
+    } else {
+      return weights * Float4::ofPositive(pixel(0), pixel(1), pixel(2), pixel(3));
+    }
   }
 
   template <class Pixel>

@@ -23,7 +23,7 @@ struct PyramidSlice {
 /// k / 4. Weights are >= 0 and sum to 1.
 struct PyramidSlices {
   static constexpr int kMost = 8;
-  int levels[2];  ///< of the first four slices and of the others
+  int levels[2];  ///< of the first four slices and, if there are more, of the others
   std::uint32_t images[kMost];
   float weights[kMost];
   int count = 0;  ///< 4 or 8
@@ -73,11 +73,25 @@ inline GLINT_HD float log2Of(float x) {
   return static_cast<float>(exponent) + kTwoOverLn2 * s * series;
 }
 
-/// Largest k with 2^k <= x, of a positive, normal, finite number.
-inline GLINT_HD int floorLog2(float x) {
+/// A level between those of a pyramid.
+struct LevelPlace {
+  int first;  ///< the finer of its neighbours
+  float t;    ///< 0 to 1: how far it is to the next; 0 at the last
+};
+
+/// @param ratio  variance over that of level 0, from 1 to 4^15: a level is where it is 4^level
+inline GLINT_HD LevelPlace levelPlace(float ratio) {
+  constexpr std::uint32_t kOne = 0x3f800000u;
+  constexpr int kPowerOf4 = 24;  // the exponent less its lowest bit
   std::uint32_t bits;
-  std::memcpy(&bits, &x, sizeof bits);
-  return static_cast<int>(bits >> 23) - 127;
+  std::memcpy(&bits, &ratio, sizeof bits);
+  // The level is known without waiting for the logarithm.
+  const std::uint32_t first = (bits - kOne) >> kPowerOf4;
+  bits -= first << kPowerOf4;
+  float rest;  // [1, 4)
+  std::memcpy(&rest, &bits, sizeof rest);
+  const float t = 0.5f * log2Of(rest);
+  return {static_cast<int>(first), t < 1 ? t : 1.0f};
 }
 
 /// Chooses the images of footprints. Holds what follows from the shape, so that a query divides by nothing.
@@ -96,7 +110,8 @@ class SliceChooser {
     largest_u_ = width * width;
     largest_v_ = height * height;
     per_finest_variance_ = 1 / (finestSigma(shape) * finestSigma(shape));
-    last_level_ = shape.level_count - 1;
+    largest_ratio_ = 1;
+    for (int l = 1; l < shape.level_count; ++l) largest_ratio_ *= 4;
     wraps_ = shape.boundary == Boundary::wrap;
     for (int l = 0; l < shape.level_count; ++l) {
       const PyramidGrid& grid = shape.levels[l];
@@ -104,31 +119,33 @@ class SliceChooser {
       const float across = width / grid.stride, up = height / grid.stride;
       levels_[l] = {{across, up}, {last_column, last_row}, {1 / (across - last_column), 1 / (up - last_row)}, grid.columns, 0};
     }
+    levels_[shape.level_count] = levels_[shape.level_count - 1];  // with weight 0
   }
 
   /// Trilinear choice of images: bilinear between centres, linear in log2 of the footprint's size between levels. Footprints
   /// below the finest or above the coarsest level get that level.
   GLINT_HD PyramidSlices choose(const Footprint& p) const {
-    const float ratio = isotropicVariance(largest_u_, largest_v_, p.covariance) * per_finest_variance_;
-    // The level is where the ratio is in [4^level, 4^(level + 1)): known without waiting for the logarithm.
-    const int first = std::clamp(floorLog2(ratio) >> 1, 0, last_level_), second = std::min(first + 1, last_level_);
-    const float level = std::min(0.5f * log2Of(ratio), static_cast<float>(last_level_));
-    const float t = std::clamp(level - static_cast<float>(first), 0.0f, 1.0f);
-    const LevelCentres &finer = levels_[first], &coarser = levels_[second];
+    const LevelPlace level = levelPlace(sizeRatio(isotropicVariance(largest_u_, largest_v_, p.covariance)));
+    const LevelCentres &finer = levels_[level.first], &coarser = levels_[level.first + 1];
     const Neighbours at = neighbours(finer, coarser, p.centre);
     PyramidSlices out;
-    out.levels[0] = first;
-    out.levels[1] = second;
-    setCorners(interleaveLow(at.low, at.high), interleaveLow(at.rest, at.t), finer.columns, 1 - t, out.images, out.weights);
-    setCorners(interleaveHigh(at.low, at.high), interleaveHigh(at.rest, at.t), coarser.columns, t, out.images + 4,
+    out.levels[0] = level.first;
+    out.levels[1] = level.first + 1;
+    setCorners(interleaveLow(at.low, at.high), interleaveLow(at.rest, at.t), finer.columns, 1 - level.t, out.images,
+               out.weights);
+    setCorners(interleaveHigh(at.low, at.high), interleaveHigh(at.rest, at.t), coarser.columns, level.t, out.images + 4,
                out.weights + 4);
-    out.count = t > 0 ? 8 : 4;
+    out.count = level.t > 0 ? 8 : 4;
     return out;
   }
 
   // What batches choose by, in vectors.
-  GLINT_HD float perFinestVariance() const { return per_finest_variance_; }
-  GLINT_HD int lastLevel() const { return last_level_; }
+  /// For levelPlace.
+  GLINT_HD float sizeRatio(float variance) const {
+    const float ratio = variance * per_finest_variance_, coarse = ratio > 1 ? ratio : 1;
+    return coarse < largest_ratio_ ? coarse : largest_ratio_;
+  }
+  /// @param level  up to the one behind the last
   GLINT_HD const LevelCentres& centres(int level) const { return levels_[level]; }
 
  private:
@@ -138,16 +155,17 @@ class SliceChooser {
   };
 
   GLINT_HD Neighbours neighbours(const LevelCentres& a, const LevelCentres& b, Vec2 centre) const {
-    const Float4 zero = Float4::zero(), one = Float4::all(1);
-    const Float4 uv = Float4::of(centre.x, centre.y, centre.x, centre.y), turned = (uv - floorOf(uv)).positive();
-    const Float4 wrapped = whereLess(turned, one, turned, zero);  // as wrapUnit: 0 if it is not finite
+    const Float4 zero = Float4::zero(), one = Float4::all(1), below_one = Float4::all(0x1.fffffep-1f);
+    // In [0, 1), and 0 if it is not finite.
+    const Float4 uv = Float4::of(centre.x, centre.y, centre.x, centre.y);
+    const Float4 wrapped = minOf((uv - floorOf(uv)).positive(), below_one);
     const Float4 extent = Float4::ofPairs(a.extent, b.extent), last = Float4::ofPairs(a.last, b.last);
     const Float4 at = wrapped * extent - Float4::all(0.5f);
     Float4 low, high, t;
     if (wraps_) {
-      const Float4 unrolled = at + whereLess(at, zero, extent, zero);
+      const Float4 unrolled = at + whereLess(at, zero, extent);
       low = minOf(floorOf(unrolled), last);
-      high = whereLess(low, last, low + one, zero);
+      high = whereLess(low, last, low + one);
       t = minOf((unrolled - low) * whereLess(low, last, one, Float4::ofPairs(a.per_gap, b.per_gap)), one);
     } else {
       const Float4 clamped = minOf(at.positive(), last);
@@ -167,9 +185,9 @@ class SliceChooser {
 
   float largest_u_, largest_v_;  // texels^2
   float per_finest_variance_;
-  int last_level_;
+  float largest_ratio_;  // of variances, that of the last level
   bool wraps_;
-  LevelCentres levels_[kMaxPyramidLevels];
+  LevelCentres levels_[kMaxPyramidLevels + 1];
 };
 
 /// A box of pixels within one angular block: [x0, x1] x [y0, y1] in [0, 16]^2.
