@@ -61,7 +61,7 @@ constexpr std::array kRules = {
     Rule{"shape.grid", error, invalid_input, "a level's grid is ceil(size / stride)", kMakeAgain},
     Rule{"normals.bounds_levels", error, invalid_input, "the coarsest level of bounds is one node", kMakeAgain},
     Rule{"pyramid.masks", error, invalid_input, "no occupancy bit lies beyond the image's blocks", kMakeAgain},
-    Rule{"pyramid.first_block", error, invalid_input, "first_block is the running count of occupancy bits", kMakeAgain},
+    Rule{"pyramid.mask_ranks", error, invalid_input, "mask_ranks is the running count of occupancy bits", kMakeAgain},
     Rule{"compressed.images", error, invalid_input, "there is one record for each image of each level", kMakeAgain},
     Rule{"compressed.slots", error, invalid_input, "images have valid regions, and slots 0..n-1 in each region", kMakeAgain},
     Rule{"compressed.places", error, invalid_input, "block_places number the blocks of place_blocks in turn", kMakeAgain},

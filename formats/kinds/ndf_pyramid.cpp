@@ -62,16 +62,15 @@ PackedAsset pack(const NdfPyramid& pyramid) {
     const auto path = [&](const char* dataset) { return levelPath("level_{l}/", l) + dataset; };
     const auto rows = static_cast<std::uint64_t>(shape.levels[l].rows);
     const auto columns = static_cast<std::uint64_t>(shape.levels[l].columns);
+    const auto words = static_cast<std::uint64_t>(shape.maskWords());
     const std::uint64_t blocks = level.block_means.size();
-    packed.array(path("masks"), ElementType::u64, {rows, columns, static_cast<std::uint64_t>(shape.maskWords())},
-                 level.masks.data(), level.masks.size());
-    packed.array(path("first_block"), ElementType::u64, {rows * columns + 1}, level.first_block.data(),
-                 level.first_block.size());
+    packed.array(path("masks"), ElementType::u64, {rows, columns, words}, level.masks.data(), level.masks.size());
+    packed.array(path("mask_ranks"), ElementType::u32, {rows * columns * words + 1}, level.mask_ranks.data(), level.mask_ranks.size());
     packed.array(path("block_means"), ElementType::f32, {blocks}, level.block_means.data(), blocks);
     // The pixels are a bare pointer: the running count is the only witness of how many there are.
     packed.array(path("pixels"), pyramid.precision == BlockPrecision::f16 ? ElementType::f16 : ElementType::f32,
                  {blocks, kBlockSize, kBlockSize}, level.pixels,
-                 (level.first_block.empty() ? 0 : level.first_block.back()) * kBlockPixels);
+                 std::uint64_t{level.mask_ranks.empty() ? 0 : level.mask_ranks.back()} * kBlockPixels);
   }
   return packed;
 }
@@ -84,7 +83,7 @@ void unpack(const Content& content, NdfPyramid& pyramid) {
     const auto path = [&](const char* dataset) { return levelPath("level_{l}/", l) + dataset; };
     PyramidLevel& level = pyramid.levels[l];
     level.masks = content.array<std::uint64_t>(path("masks"));
-    level.first_block = content.array<std::uint64_t>(path("first_block"));
+    level.mask_ranks = content.array<std::uint32_t>(path("mask_ranks"));
     level.block_means = content.array<float>(path("block_means"));
     level.pixels = content.dataset(path("pixels")).data;
   }
@@ -92,7 +91,7 @@ void unpack(const Content& content, NdfPyramid& pyramid) {
 
 void checkIndex(const NdfPyramid& pyramid, Findings& findings) {
   checkShape(pyramid.shape, findings);
-  const int words = pyramid.shape.maskWords();
+  const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
   const int tail_bits = pyramid.shape.blocksPerImage() % 64;
   const std::uint64_t beyond = tail_bits == 0 ? 0 : ~std::uint64_t{0} << tail_bits;
   for (int l = 0; l < pyramid.shape.level_count; ++l) {
@@ -100,31 +99,30 @@ void checkIndex(const NdfPyramid& pyramid, Findings& findings) {
     std::uint64_t count = 0;
     std::uint64_t stray = 0;
     bool counts_hold = true;
-    const std::size_t images = level.first_block.size() - 1;
-    for (std::size_t image = 0; image < images; ++image) {
-      counts_hold &= level.first_block[image] == count;
-      const std::uint64_t* mask = &level.masks[image * static_cast<std::size_t>(words)];
-      for (int w = 0; w < words; ++w) count += static_cast<std::uint64_t>(std::popcount(mask[w]));
-      stray |= mask[words - 1] & beyond;
+    for (std::size_t word = 0; word < level.masks.size(); ++word) {
+      counts_hold &= level.mask_ranks[word] == count;
+      count += static_cast<std::uint64_t>(std::popcount(level.masks[word]));
+      if ((word + 1) % words == 0) stray |= level.masks[word] & beyond;
     }
-    counts_hold &= level.first_block[images] == count && count == level.block_means.size();
+    counts_hold &= level.mask_ranks.back() == count && count == level.block_means.size();
     if (stray != 0) findings.add("pyramid.masks", levelObject(l, "masks"), "has bits beyond the blocks of an image");
     if (!counts_hold) {
-      findings.add("pyramid.first_block", levelObject(l, "first_block"), "is not the running count of the bits in masks");
+      findings.add("pyramid.mask_ranks", levelObject(l, "mask_ranks"), "is not the running count of the bits in masks");
     }
   }
 }
 
 void checkData(const NdfPyramid& pyramid, Findings& findings) {
+  const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
   const double pixel_area = 4.0 / (static_cast<double>(pyramid.shape.resolution) * pyramid.shape.resolution);
   for (int l = 0; l < pyramid.shape.level_count; ++l) {
     const PyramidLevel& level = pyramid.levels[l];
     const std::vector<double> sums = checkBlocks(pyramid, l, findings);
     std::size_t bad = 0;
     double worst = 1;
-    for (std::size_t image = 0; image + 1 < level.first_block.size(); ++image) {
+    for (std::size_t first = 0; first + words < level.mask_ranks.size(); first += words) {
       double integral = 0;
-      for (std::uint64_t b = level.first_block[image]; b < level.first_block[image + 1]; ++b) integral += sums[b];
+      for (std::uint32_t b = level.mask_ranks[first]; b < level.mask_ranks[first + words]; ++b) integral += sums[b];
       integral *= pyramid.value_scale * pixel_area;
       if (std::abs(integral - 1) <= kIntegralTolerance) continue;
       ++bad;

@@ -18,10 +18,12 @@ constexpr int kSlices = PyramidSlices::kMost;
 class PyramidChunk {
  public:
   explicit PyramidChunk(const NdfPyramid& pyramid)
-      : pyramid_(pyramid), words_(pyramid.shape.maskWords()), pixel_shift_(pyramid.precision == BlockPrecision::f16 ? 1 : 2) {
+      : pyramid_(pyramid),
+        words_(static_cast<unsigned>(pyramid.shape.maskWords())),
+        pixel_shift_(pyramid.precision == BlockPrecision::f16 ? 1 : 2) {
     for (int l = 0; l < pyramid.shape.level_count; ++l) {
       const PyramidLevel& level = pyramid.levels[l];
-      levels_[l] = {level.masks.data(), level.first_block.data(), static_cast<const char*>(level.pixels)};
+      levels_[l] = {level.masks.data(), level.mask_ranks.data(), static_cast<const char*>(level.pixels)};
       // Slices without a pixel read the first one of their level; a level may have none.
       if (level.block_means.empty()) levels_[l].pixels = reinterpret_cast<const char*>(&kZero);
     }
@@ -31,40 +33,25 @@ class PyramidChunk {
     for (int k = 0; k < kChunk; ++k) {
       for (int j = 0; j < kSlices; ++j) {
         const Level& level = levels_[chunk.levels[j / 4][k]];
-        prefetch(level.masks + static_cast<std::size_t>(chunk.images[j][k]) * words_);
-        if (j % 2 == 0) prefetch(level.first_block + chunk.images[j][k]);
+        const std::size_t word = static_cast<std::size_t>(chunk.images[j][k]) * words_ + chunk.blocks[k] / 64;
+        prefetch(level.masks + word);
+        if (j % 2 == 0) prefetch(level.mask_ranks + word);
       }
     }
   }
 
-  void findPixels(SliceChunk& chunk) {
-    if (words_ == 4)  // images of 256^2, as most are
-      findPixels<4>(chunk, 4);
-    else
-      findPixels<kMostMaskWords>(chunk, words_);
-  }
-
   /// Finds every pixel, and gives slices that have none weight 0.
-  template <int kWords>
-  void findPixels(SliceChunk& chunk, int given_words) {
-    const int words = kWords < kMostMaskWords ? kWords : given_words;
+  void findPixels(SliceChunk& chunk) {
     for (int k = 0; k < kChunk; ++k) {
-      const int block = chunk.blocks[k];
-      std::uint64_t before[kWords];  // bits of the blocks before this one
-      for (int w = 0; w < words; ++w) {
-        const int bits = std::clamp(block - 64 * w, 0, 64);
-        before[w] = bits == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1;
-      }
+      const unsigned word = static_cast<unsigned>(chunk.blocks[k]) / 64, bit = static_cast<unsigned>(chunk.blocks[k]) % 64;
       for (int step = 0; step < 2; ++step) {
         const Level level = levels_[chunk.levels[step][k]];
         for (int j = 4 * step; j < 4 * step + 4; ++j) {
-          const std::uint32_t image = chunk.images[j][k];
-          const std::uint64_t* mask = level.masks + static_cast<std::size_t>(image) * words;
-          std::uint64_t rank = level.first_block[image];
-          for (int w = 0; w < words; ++w) rank += setBits(mask[w] & before[w]);
-          const std::uint64_t stored = mask[block / 64] >> (block % 64) & 1;
-          chunk.weights[j][k] *= static_cast<float>(static_cast<int>(stored));
-          const std::uint64_t pixel = (rank * kBlockPixels + static_cast<std::uint64_t>(chunk.pixels[k])) & (0 - stored);
+          const std::size_t at = static_cast<std::size_t>(chunk.images[j][k]) * words_ + word;
+          const BitRank rank(level.masks[at], bit);
+          const std::uint64_t stored = level.mask_ranks[at] + rank.below;
+          const std::uint64_t pixel = (stored * kBlockPixels + static_cast<std::uint64_t>(chunk.pixels[k])) & rank.kept;
+          chunk.weights[j][k] = keepIf(rank.kept, chunk.weights[j][k]);
           places_[j][k] = level.pixels + (pixel << pixel_shift_);
           prefetch(places_[j][k]);
         }
@@ -90,7 +77,7 @@ class PyramidChunk {
 
   struct Level {
     const std::uint64_t* masks;
-    const std::uint64_t* first_block;
+    const std::uint32_t* mask_ranks;
     const char* pixels;
   };
 
@@ -109,7 +96,7 @@ class PyramidChunk {
   }
 
   const NdfPyramid& pyramid_;
-  const int words_;
+  const unsigned words_;
   const int pixel_shift_;
   Level levels_[kMaxPyramidLevels];
   const char* places_[kSlices][kChunk];
@@ -198,7 +185,7 @@ class CompressedChunk {
         const NdfCluster& cluster = ndf_.clusters.data()[at];
         const ColumnLayout layout(cluster);
         const int x = chunk.pixels[k] % kBlockSize, y = chunk.pixels[k] / kBlockSize;
-        if (cluster.columns > 0) project<Basis>(reader, cluster, x, y, projection);
+        if (cluster.columns > 0) project<Basis>(reader, cluster, layout, x, y, projection);
         for (int j = lowestBit(left); j < kSlices; ++j) {
           if (!(left >> j & 1) || clusters_[j][k] != at) continue;
           left &= ~(1u << j);
@@ -214,19 +201,20 @@ class CompressedChunk {
 
  private:
   template <class Basis, class Reader>
-  void project(const Reader& reader, const NdfCluster& cluster, int x, int y, float* projection) const {
+  void project(const Reader& reader, const NdfCluster& cluster, const ColumnLayout& layout, int x, int y,
+               float* projection) const {
     if constexpr (!std::is_same_v<Basis, std::int32_t>) {
       if (wide_ && ndf_.method == CompressionMethod::cp && cluster.narrow_columns == 0) {
         const Basis* basis = static_cast<const Basis*>(ndf_.basis) + cluster.first_basis;
         return projectColumns(basis, cluster.columns, x, y, ndf_.scales.data() + cluster.first_scale, projection);
       }
     }
-    reader.pixel(cluster, x, y, projection);
+    reader.pixel(cluster, layout, x, y, projection);
   }
 
   template <class Coefficient, class Reader>
   float dot(const Reader& reader, const float* projection, const ColumnLayout& layout, const Coefficient* row) const {
-    return wide_ && layout.half == 0 ? dotColumns(projection, row, layout.low) : reader.dot(projection, layout, row);
+    return wide_ && layout.half == 0 ? dotColumns(projection, row, layout.low()) : reader.dot(projection, layout, row);
   }
 
   void prefetchBasis(const NdfCluster& cluster, int pixel) const {
@@ -309,7 +297,7 @@ void pyramidDensities(const Model& model, std::size_t count, const FootprintArra
   for (std::size_t step = 0; step < chunks + 2; ++step) {
     if (step < chunks) {
       Stage& stage = stages[step % 3];
-      selectChunk(model.shape(), footprints, halves, step * kChunk, lanesOf(step), stage.chunk);
+      selectChunk(model.shape(), model.chooser(), footprints, halves, step * kChunk, lanesOf(step), stage.chunk);
       stage.steps.begin(stage.chunk);
     }
     if (step >= 1 && step - 1 < chunks) {
@@ -356,7 +344,7 @@ void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArray
     const int lanes = static_cast<int>(std::min(count - first, static_cast<std::size_t>(kMeansAhead)));
     PyramidSlices chosen[kMeansAhead];
     for (int k = 0; k < lanes; ++k) {
-      chosen[k] = selectSlices(model.shape(), footprints[first + static_cast<std::size_t>(k)]);
+      chosen[k] = model.chooseSlices(footprints[first + static_cast<std::size_t>(k)]);
       model.prefetchIndex(chosen[k]);
     }
     for (int k = 0; k < lanes; ++k) model.prefetchMean(chosen[k], ranges[first + static_cast<std::size_t>(k)]);

@@ -31,30 +31,28 @@ void load(const FootprintArrays& footprints, const HalfVectorArrays& halves, std
   }
 }
 
-/// As isotropicVariance, belowFinest, and the choice of levels in selectSlices.
-GLINT_API_MULTIVERSION void chooseLevels(const PyramidShape& shape, Lanes& lanes, SliceChunk& chunk) {
+/// As isotropicVariance, belowFinest, and the choice of levels in SliceChooser.
+GLINT_API_MULTIVERSION void chooseLevels(const PyramidShape& shape, const SliceChooser& chooser, Lanes& lanes,
+                                         SliceChunk& chunk) {
   constexpr float kLowest = kMinSigmaTexels * kMinSigmaTexels;
   const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
   const float finest = finestSigma(shape), finest_variance = finest * finest;
-  const int last = shape.level_count - 1;
   for (int k = 0; k < kChunk; ++k) {
     const float sum = lanes.xx[k] + lanes.xy[k] + lanes.yy[k];
     const float mean = 0.5f * (std::min(lanes.xx[k], width * width) + std::min(lanes.yy[k], height * height));
     const float widened = std::max(mean, kLowest);
     const float variance = std::fabs(sum) <= std::numeric_limits<float>::max() ? widened : kLowest;
-    const float octave = 0.5f * log2Of(variance / finest_variance);
-    const float level = std::min(std::max(octave, 0.0f), static_cast<float>(last));
-    const int lower = std::min(static_cast<int>(level), last);
+    const LevelPlace level = levelPlace(chooser.sizeRatio(variance));
     chunk.below[k] = variance < finest_variance ? 1 : 0;
-    chunk.levels[0][k] = lower;
-    chunk.levels[1][k] = std::min(lower + 1, last);  // with weight 0 at the last
-    lanes.t[k] = level - static_cast<float>(lower);
+    chunk.levels[0][k] = level.first;
+    chunk.levels[1][k] = std::min(level.first + 1, shape.level_count - 1);  // with weight 0 at the last
+    lanes.t[k] = level.t;
   }
 }
 
 /// One level of every lane along one axis, looked up first: loads by index and arithmetic in one loop do not become vectors.
 struct AxisLevels {
-  alignas(64) float stride[kChunk], count[kChunk];
+  alignas(64) float extent[kChunk], last[kChunk], per_gap[kChunk];
 };
 
 /// Neighbouring centres along one axis, in floats: counts and indices are far below 2^24.
@@ -62,28 +60,23 @@ struct Neighbours {
   alignas(64) float low[kChunk], high[kChunk], t[kChunk];
 };
 
-/// centreNeighbours without branches.
+/// As SliceChooser, along one axis.
 template <bool kWrap>
-inline void findNeighbours(const float* __restrict coordinates, float extent, const AxisLevels& axis,
-                           Neighbours& __restrict out) {
+inline void findNeighbours(const float* __restrict coordinates, const AxisLevels& axis, Neighbours& __restrict out) {
   for (int k = 0; k < kChunk; ++k) {
     const float wrapped = coordinates[k] - std::floor(coordinates[k]);
     const float u = wrapped >= 0 && wrapped < 1 ? wrapped : 0.0f;
-    const float stride = axis.stride[k], count = axis.count[k], last = count - 1;
-    const float x = u * extent;
+    const float last = axis.last[k], at = u * axis.extent[k] - 0.5f;
     if constexpr (kWrap) {
-      const float unrolled = x + (x < 0.5f * stride ? extent : 0.0f);
-      const float t = unrolled / stride - 0.5f;
-      const float low = std::floor(t);
-      const float gap = extent - last * stride;
-      const float round = (unrolled - (count - 0.5f) * stride) / gap;
-      const float between = t - low, across = std::min(std::max(round, 0.0f), 1.0f);
+      const float unrolled = at + (at < 0 ? axis.extent[k] : 0.0f);
+      const float below = std::floor(unrolled), low = below < last ? below : last;
       const bool inner = low < last;
-      out.low[k] = inner ? low : last;
+      const float t = (unrolled - low) * (inner ? 1.0f : axis.per_gap[k]);
+      out.low[k] = low;
       out.high[k] = inner ? low + 1 : 0.0f;
-      out.t[k] = inner ? between : across;
+      out.t[k] = t < 1 ? t : 1.0f;
     } else {
-      const float t = std::min(std::max(x / stride - 0.5f, 0.0f), last);
+      const float t = std::min(std::max(at, 0.0f), last);
       const float low = std::floor(t);
       out.low[k] = low;
       out.high[k] = std::min(low + 1, last);
@@ -94,42 +87,47 @@ inline void findNeighbours(const float* __restrict coordinates, float extent, co
 
 /// Slices of one corner of one level.
 inline void setCorner(int corner, const float* __restrict level_weights, const Neighbours& x, const Neighbours& y,
-                      const AxisLevels& columns, float* __restrict weights, std::uint32_t* __restrict images) {
+                      const std::int32_t* columns, float* __restrict weights, std::uint32_t* __restrict images) {
   const float* xs = corner & 1 ? x.high : x.low;
   const float* ys = corner & 2 ? y.high : y.low;
   for (int k = 0; k < kChunk; ++k) {
     const float wx = corner & 1 ? x.t[k] : 1 - x.t[k], wy = corner & 2 ? y.t[k] : 1 - y.t[k];
     weights[k] = level_weights[k] * wx * wy;
-    images[k] = static_cast<std::uint32_t>(static_cast<std::int32_t>(ys[k]) * static_cast<std::int32_t>(columns.count[k]) +
-                                           static_cast<std::int32_t>(xs[k]));
+    images[k] =
+        static_cast<std::uint32_t>(static_cast<std::int32_t>(ys[k]) * columns[k] + static_cast<std::int32_t>(xs[k]));
   }
 }
 
 template <bool kWrap>
-inline void chooseImages(const PyramidShape& shape, const Lanes& lanes, SliceChunk& chunk) {
+inline void chooseImages(const SliceChooser& chooser, const Lanes& lanes, SliceChunk& chunk) {
   for (int step = 0; step < 2; ++step) {
-    AxisLevels columns, rows;
+    AxisLevels along_x, along_y;
+    alignas(64) std::int32_t columns[kChunk];
     alignas(64) float level_weights[kChunk];
     for (int k = 0; k < kChunk; ++k) {
-      const PyramidGrid& grid = shape.levels[chunk.levels[step][k]];
-      columns.stride[k] = rows.stride[k] = grid.stride;
-      columns.count[k] = static_cast<float>(grid.columns);
-      rows.count[k] = static_cast<float>(grid.rows);
+      const SliceChooser::LevelCentres& centres = chooser.centres(chunk.levels[step][k]);
+      along_x.extent[k] = centres.extent[0];
+      along_y.extent[k] = centres.extent[1];
+      along_x.last[k] = centres.last[0];
+      along_y.last[k] = centres.last[1];
+      along_x.per_gap[k] = centres.per_gap[0];
+      along_y.per_gap[k] = centres.per_gap[1];
+      columns[k] = centres.columns;
     }
     for (int k = 0; k < kChunk; ++k) level_weights[k] = step == 0 ? 1 - lanes.t[k] : lanes.t[k];
     Neighbours x, y;
-    findNeighbours<kWrap>(lanes.u, static_cast<float>(shape.width), columns, x);
-    findNeighbours<kWrap>(lanes.v, static_cast<float>(shape.height), rows, y);
+    findNeighbours<kWrap>(lanes.u, along_x, x);
+    findNeighbours<kWrap>(lanes.v, along_y, y);
     for (int corner = 0; corner < 4; ++corner)
       setCorner(corner, level_weights, x, y, columns, chunk.weights[4 * step + corner], chunk.images[4 * step + corner]);
   }
 }
 
-GLINT_API_MULTIVERSION void chooseWrapping(const PyramidShape& shape, const Lanes& lanes, SliceChunk& chunk) {
-  chooseImages<true>(shape, lanes, chunk);
+GLINT_API_MULTIVERSION void chooseWrapping(const SliceChooser& chooser, const Lanes& lanes, SliceChunk& chunk) {
+  chooseImages<true>(chooser, lanes, chunk);
 }
-GLINT_API_MULTIVERSION void chooseClamped(const PyramidShape& shape, const Lanes& lanes, SliceChunk& chunk) {
-  chooseImages<false>(shape, lanes, chunk);
+GLINT_API_MULTIVERSION void chooseClamped(const SliceChooser& chooser, const Lanes& lanes, SliceChunk& chunk) {
+  chooseImages<false>(chooser, lanes, chunk);
 }
 
 /// As insideSquare and pixelPlace; lanes outside get a pixel that can be read.
@@ -149,15 +147,15 @@ GLINT_API_MULTIVERSION void choosePixels(const PyramidShape& shape, const Lanes&
 
 }  // namespace
 
-void selectChunk(const PyramidShape& shape, const FootprintArrays& footprints, const HalfVectorArrays& halves,
-                 std::size_t first, int count, SliceChunk& chunk) {
+void selectChunk(const PyramidShape& shape, const SliceChooser& chooser, const FootprintArrays& footprints,
+                 const HalfVectorArrays& halves, std::size_t first, int count, SliceChunk& chunk) {
   Lanes lanes;
   load(footprints, halves, first, count, lanes);
-  chooseLevels(shape, lanes, chunk);
+  chooseLevels(shape, chooser, lanes, chunk);
   if (shape.boundary == Boundary::wrap)
-    chooseWrapping(shape, lanes, chunk);
+    chooseWrapping(chooser, lanes, chunk);
   else
-    chooseClamped(shape, lanes, chunk);
+    chooseClamped(chooser, lanes, chunk);
   choosePixels(shape, lanes, chunk);
 }
 

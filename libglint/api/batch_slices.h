@@ -5,13 +5,14 @@
 #include <cstdint>
 
 #include "glint/api/batch.h"
+#include "glint/query/pyramid_slices.h"
 
 namespace glint::api {
 
 /// Queries that a batch works on at once: enough to keep many cache misses in flight, few enough to stay in the nearest cache.
 inline constexpr int kChunk = 32;
 
-/// The images that answer a chunk of queries, as selectSlices chooses them, and the pixels that are asked. Lane k is a query;
+/// The images that answer a chunk of queries, as SliceChooser chooses them, and the pixels that are asked. Lane k is a query;
 /// lanes beyond the last query repeat harmless ones.
 struct SliceChunk {
   /// Slice j of a query: corner j % 4 (x in bit 0, y in bit 1) of level first + j / 4.
@@ -25,7 +26,8 @@ struct SliceChunk {
 };
 
 /// Fills a chunk with queries [first, first + count), count <= kChunk.
-void selectChunk(const PyramidShape& shape, const FootprintArrays& footprints, const HalfVectorArrays& halves,
-                 std::size_t first, int count, SliceChunk& chunk);
+/// @param chooser  of this shape
+void selectChunk(const PyramidShape& shape, const SliceChooser& chooser, const FootprintArrays& footprints,
+                 const HalfVectorArrays& halves, std::size_t first, int count, SliceChunk& chunk);
 
 }  // namespace glint::api

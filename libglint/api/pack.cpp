@@ -83,7 +83,7 @@ std::vector<std::byte> pack(const NdfPyramid& pyramid, const NormalMap* normals)
     const PyramidLevel& level = pyramid.levels[l];
     PackedArray* arrays = header.arrays + 4 * l;
     arrays[0] = packer.add(level.masks);
-    arrays[1] = packer.add(level.first_block);
+    arrays[1] = packer.add(level.mask_ranks);
     arrays[2] = packer.add(level.block_means);
     arrays[3] = packer.addBytes(level.pixels, level.block_means.size() * kBlockPixels, pixelBytes(pyramid.precision));
   }

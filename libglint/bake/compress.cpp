@@ -362,7 +362,7 @@ class Compressor {
         static_cast<double>(index_.totalSlices()) * kBlockPixels * (pyramid_.precision == BlockPrecision::f16 ? 2 : 4);
     for (int l = 0; l < pyramid_.shape.level_count; ++l) {
       const PyramidLevel& level = pyramid_.levels[l];
-      stored += static_cast<double>(level.masks.size_bytes() + level.first_block.size_bytes() + level.block_means.size_bytes());
+      stored += static_cast<double>(level.masks.size_bytes() + level.mask_ranks.size_bytes() + level.block_means.size_bytes());
     }
     report.ratio_to_dense = dense / static_cast<double>(report.total_bytes);
     report.ratio_to_stored = stored / static_cast<double>(report.total_bytes);

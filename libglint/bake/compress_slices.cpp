@@ -31,19 +31,19 @@ void checkLevel(const NdfPyramid& pyramid, int level) {
   const std::size_t words = shape.maskWords();
   if (!(shape.levels[level].stride > 0)) rejectLevel(level, "the stride is not positive");
   if (data.masks.size() != images * words) rejectLevel(level, "the masks do not fit the number of images");
-  if (data.first_block.size() != images + 1)
+  if (data.mask_ranks.size() != images * words + 1)
     rejectLevel(level, "the running count of blocks does not fit the number of images");
   const int spare_bits = static_cast<int>(words) * 64 - shape.blocksPerImage();
   for (std::size_t i = 0; i < images; ++i) {
-    std::uint64_t count = 0;
-    for (std::size_t w = 0; w < words; ++w) count += std::popcount(data.masks[i * words + w]);
-    if (data.first_block[i + 1] - data.first_block[i] != count)
-      rejectLevel(level, "the running count of blocks contradicts the masks (first at image " + std::to_string(i) + ")");
+    for (std::size_t w = i * words; w < (i + 1) * words; ++w) {
+      if (data.mask_ranks[w + 1] - data.mask_ranks[w] != static_cast<std::uint32_t>(std::popcount(data.masks[w])))
+        rejectLevel(level, "the running count of blocks contradicts the masks (first at image " + std::to_string(i) + ")");
+    }
     if (spare_bits > 0 && data.masks[i * words + words - 1] >> (64 - spare_bits))
       rejectLevel(level, "a mask has bits beyond the last block (first at image " + std::to_string(i) + ")");
   }
-  if (data.first_block[0] != 0) rejectLevel(level, "the running count of blocks does not start at 0");
-  if (data.first_block[images] > 0 && data.pixels == nullptr) rejectLevel(level, "the pixels are missing");
+  if (data.mask_ranks[0] != 0) rejectLevel(level, "the running count of blocks does not start at 0");
+  if (data.mask_ranks.back() > 0 && data.pixels == nullptr) rejectLevel(level, "the pixels are missing");
 }
 
 void checkShape(const PyramidShape& shape) {

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <span>
 #include <string>
@@ -158,8 +159,13 @@ class ImagePacker {
 NdfPyramidData::Level packLevel(std::vector<PackedImage>& images, BlockPrecision precision) {
   NdfPyramidData::Level level;
   std::size_t blocks = 0;
-  level.first_block.push_back(0);
-  for (const PackedImage& image : images) level.first_block.push_back(blocks += image.means.size());
+  for (const PackedImage& image : images) {
+    for (const std::uint64_t word : image.mask) {
+      level.mask_ranks.push_back(static_cast<std::uint32_t>(blocks));
+      blocks += static_cast<std::size_t>(std::popcount(word));
+    }
+  }
+  level.mask_ranks.push_back(static_cast<std::uint32_t>(blocks));
   level.block_means.reserve(blocks);
   (precision == BlockPrecision::f16 ? level.half_pixels.reserve(blocks * kBlockPixels)
                                     : level.float_pixels.reserve(blocks * kBlockPixels));
@@ -270,7 +276,7 @@ NdfPyramid NdfPyramidData::view() const {
     const Level& level = levels[l];
     const void* pixels =
         precision == BlockPrecision::f16 ? static_cast<const void*>(level.half_pixels.data()) : level.float_pixels.data();
-    v.levels[l] = {level.masks, level.first_block, level.block_means, pixels};
+    v.levels[l] = {level.masks, level.mask_ranks, level.block_means, pixels};
   }
   return v;
 }

@@ -29,7 +29,7 @@ class NdfPyramidData {
  public:
   struct Level {
     std::vector<std::uint64_t> masks;
-    std::vector<std::uint64_t> first_block;
+    std::vector<std::uint32_t> mask_ranks;
     std::vector<float> block_means;
     std::vector<std::uint16_t> half_pixels;  ///< used with BlockPrecision::f16
     std::vector<float> float_pixels;         ///< used with BlockPrecision::f32

@@ -17,7 +17,7 @@ void decodeImage(const NdfPyramid& pyramid, int l, std::size_t image, std::vecto
   const PyramidLevel& level = pyramid.levels[l];
   const int words = pyramid.shape.maskWords();
   pixels.assign(static_cast<std::size_t>(pyramid.shape.blocksPerImage()) * kBlockPixels, 0.0f);
-  std::size_t stored = level.first_block[image];
+  std::size_t stored = level.mask_ranks[image * words];
   for (int w = 0; w < words; ++w) {
     for (std::uint64_t mask = level.masks[image * words + w]; mask; mask &= mask - 1) {
       float* block = pixels.data() + static_cast<std::size_t>(64 * w + std::countr_zero(mask)) * kBlockPixels;

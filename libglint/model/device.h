@@ -15,6 +15,8 @@ namespace glint {
 inline GLINT_HD void prefetch([[maybe_unused]] const void* address) {
 #if defined(__GNUC__) && !defined(__CUDA_ARCH__)
   __builtin_prefetch(address);
+  // GCC takes a function that does nothing but this for one without effects, and leaves out calls of it.
+  asm volatile("" : : "r"(address));
 #endif
 }
 

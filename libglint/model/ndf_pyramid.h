@@ -53,8 +53,8 @@ enum class BlockPrecision : std::uint8_t { f16, f32 };
 /// The NDF images of one level. Only blocks that hold something are stored.
 struct PyramidLevel {
   std::span<const std::uint64_t> masks;  ///< [rows][columns][maskWords]; bit b: block b = by * blocksPerAxis + bx is stored
-  std::span<const std::uint64_t>
-      first_block;  ///< [rows][columns + 1 in total]: running count of stored blocks, imageCount() + 1 values
+  /// [rows][columns][maskWords], and one more: stored blocks of the level before those of this word; the last is their number.
+  std::span<const std::uint32_t> mask_ranks;
   std::span<const float> block_means;  ///< [blocks]: mean density of each stored block
   const void* pixels = nullptr;        ///< [blocks][16][16] of f16 or f32: density (pixel means) / value_scale
 };

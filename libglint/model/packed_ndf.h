@@ -39,7 +39,7 @@ static_assert(sizeof(PackedGrid) == 16);
 enum class PackedKind : std::uint32_t { normals = 0, pyramid = 1, compressed = 2 };
 
 inline constexpr std::uint32_t kPackedMagic = 0x6e6c6721;  // "!gln"
-inline constexpr std::uint32_t kPackedVersion = 2;
+inline constexpr std::uint32_t kPackedVersion = 3;
 inline constexpr std::size_t kPackedAlignment = 64;
 /// Arrays of a level of a pyramid, and of a compressed one: as many as PackedHeader::arrays has places for.
 inline constexpr int kPackedArrays = 4 * kMaxPyramidLevels;
@@ -73,7 +73,7 @@ struct PackedHeader {
   float slope_mean[2];                                       //  832  of the map's texels, as MapSlopes
   float slope_covariance[3];                                 //  840  xx, xy, yy
   std::uint32_t reserved[11];                                //  852  0
-  /// 896. Pyramid: masks, first_block, block_means and pixels of level l at 4 l. Compressed: image_regions, image_slots,
+  /// 896. Pyramid: masks, mask_ranks, block_means and pixels of level l at 4 l. Compressed: image_regions, image_slots,
   /// image_scales, clusters, masks, mask_ranks, basis, coefficients, scales, density_scales,
   /// block_masks, first_block, block_masses, block_places, place_blocks, core, spot_sums.
   PackedArray arrays[kPackedArrays];

@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cstdint>
+#include <cstring>
 
 #include "glint/model/device.h"
 
@@ -15,6 +16,17 @@ inline GLINT_HD int setBits(std::uint64_t bits) {
   return std::popcount(bits);
 #endif
 }
+
+/// What a bit of a word of a mask stands for: whether it is set, and how many are set below it. Nothing branches on it.
+struct BitRank {
+  GLINT_HD BitRank(std::uint64_t word, unsigned bit) {
+    const std::uint64_t up_to = word << (~bit & 63u);
+    kept = static_cast<std::uint64_t>(static_cast<std::int64_t>(up_to) >> 63);
+    below = static_cast<std::uint64_t>(setBits(up_to)) + kept;
+  }
+  std::uint64_t kept;   ///< all bits if it is set, else 0
+  std::uint64_t below;  ///< the number of set bits below it
+};
 
 /// Index of the lowest set bit; `bits` is not 0.
 inline GLINT_HD int lowestBit(std::uint64_t bits) {
@@ -35,6 +47,15 @@ inline GLINT_HD int selectBit(std::uint64_t bits, int k) {
     at += skip;
   }
   return at;
+}
+
+/// x if all bits of `kept` are set, 0 if none is.
+inline GLINT_HD float keepIf(std::uint64_t kept, float x) {
+  std::uint32_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  bits &= static_cast<std::uint32_t>(kept);
+  std::memcpy(&x, &bits, sizeof bits);
+  return x;
 }
 
 }  // namespace glint

@@ -21,32 +21,50 @@ struct ColumnLayout {
   GLINT_HD explicit ColumnLayout(const NdfCluster& cluster)
       : columns(cluster.columns),
         wide(cluster.columns - cluster.narrow_columns),
-        half((cluster.narrow_columns + 1) / 2),
-        low((wide + 3) & ~3),
-        high(low + ((half + 3) & ~3)) {}
+        half((cluster.narrow_columns + 1) / 2) {}
 
   /// Floats of the largest projection.
   static constexpr int kMost = kMaxColumns + 16;
 
-  /// Where column k is.
-  GLINT_HD int at(int k) const { return k < wide ? k : k - wide < half ? low + (k - wide) : high + (k - wide - half); }
+  /// Writes a projection: scales[k] * values.one(k) of every column k, four(k) of four at once.
+  template <class Values>
+  GLINT_HD void arrange(const float* scales, const Values& values, float* projection) const {
+    arrangeRange(scales, values, 0, wide, projection);
+    if (half == 0) return;
+    arrangeRange(scales, values, wide, wide + half, projection + low());
+    arrangeRange(scales, values, wide + half, columns, projection + high());
+  }
+
+  // Where a projection has the first narrow column of each half.
+  GLINT_HD int low() const { return (wide + 3) & ~3; }
+  GLINT_HD int high() const { return low() + ((half + 3) & ~3); }
 
   int columns, wide, half;
-  int low, high;  ///< first narrow column of each half
+
+ private:
+  /// A range of columns, and zeros up to a whole group.
+  template <class Values>
+  static GLINT_HD void arrangeRange(const float* scales, const Values& values, int begin, int end, float* to) {
+    const int count = end - begin;
+    if (count < 4) {
+      Float4::zero().store(to);
+      for (int k = 0; k < count; ++k) to[k] = scales[begin + k] * values.one(begin + k);
+      return;
+    }
+    const auto group = [&](int k) { (Float4::load(scales + begin + k) * values.four(begin + k)).store(to + k); };
+    for (int k = 0; k + 4 <= count; k += 4) group(k);
+    if (count % 4 != 0) group(count - 4);
+    // Always: the high halves may be one less than the low ones, and a group of these more.
+    Float4::zero().store(to + count);
+  }
 };
 
-/// Calls four(k) for whole groups of four columns, so that every column below `columns` is in one; the last group may overlap the
-/// one before. Fewer than four columns are visited by one(k).
-template <class Four, class One>
-GLINT_HD void forEachColumn(int columns, Four&& four, One&& one) {
-  if (columns < 4) {
-    for (int k = 0; k < columns; ++k) one(k);
-    return;
-  }
-  int k = 0;
-  for (; k + 4 <= columns; k += 4) four(k);
-  if (k < columns) four(columns - 4);
-}
+/// Columns that are at hand, for ColumnLayout::arrange.
+struct ColumnValues {
+  const float* values;
+  GLINT_HD float one(int k) const { return values[k]; }
+  GLINT_HD Float4 four(int k) const { return Float4::load(values + k); }
+};
 
 /// What reads the factors of clusters of columns: Basis is the stored type of prefix sums, Coefficient that of coefficients.
 template <class Basis, class Coefficient>
@@ -62,67 +80,104 @@ class ClusterReader {
            slice * static_cast<std::uint64_t>(rowElements(cluster));
   }
 
+  /// The rows of a cluster, by slice.
+  struct Rows {
+    GLINT_HD Row operator()(std::uint64_t slice) const { return first + slice * elements; }
+    Row first;
+    std::uint64_t elements;
+  };
+  GLINT_HD Rows rows(const NdfCluster& cluster, const ColumnLayout& layout) const {
+    return {static_cast<Row>(ndf_.coefficients) + cluster.first_coefficient,
+            static_cast<std::uint64_t>(layout.wide + layout.half)};
+  }
+
   /// projection = scaled columns at one pixel, as ColumnLayout says.
-  GLINT_HD void pixel(const NdfCluster& cluster, int x, int y, float* projection) const {
+  /// @note inline: as a call it would have callers save all their vectors
+  [[gnu::always_inline]] GLINT_HD void pixel(const NdfCluster& cluster, const ColumnLayout& layout, int x, int y,
+                                             float* projection) const {
     const Basis* basis = first(cluster);
+    const float* scales = ndf_.scales.data() + cluster.first_scale;
     const int columns = cluster.columns;
     if (ndf_.method == CompressionMethod::cp) {
-      const Basis *at_x = basis + x * columns, *at_y = basis + (kBlockSize + y) * columns;
-      forEachColumn(
-          columns, [&](int k) { (axis4(at_x + k, columns, x > 0) * axis4(at_y + k, columns, y > 0)).store(projection + k); },
-          [&](int k) { projection[k] = axis(at_x + k, columns, x > 0) * axis(at_y + k, columns, y > 0); });
+      const Axis along_x(basis, columns, x), along_y(basis + kBlockSize * columns, columns, y);
+      layout.arrange(scales, Products{along_x, along_y}, projection);
     } else if (ndf_.method == CompressionMethod::tucker) {
       const int rx = cluster.rank_x, ry = cluster.rank_y;
-      float along_x[kBlockSize], along_y[kBlockSize];
-      axisColumns(basis + x * rx, rx, x > 0, along_x);
-      axisColumns(basis + kBlockSize * rx + y * ry, ry, y > 0, along_y);
-      combineCore(cluster, along_x, along_y, projection);
+      float along_x[kBlockSize] = {}, along_y[kBlockSize];
+      Axis(basis, rx, x).store(along_x);
+      Axis(basis + kBlockSize * rx, ry, y).store(along_y);
+      arrangeCore(cluster, layout, along_x, along_y, projection);
     } else {
-      const Basis* at = basis + (y * kBlockSize + x) * columns;
-      forEachColumn(
-          columns, [&](int k) { image4(at + k, columns, x > 0, y > 0).store(projection + k); },
-          [&](int k) { projection[k] = image(at + k, columns, x > 0, y > 0); });
+      layout.arrange(scales, Image(basis, columns, x, y), projection);
     }
-    scaleAndArrange(cluster, projection);
+  }
+
+  /// Whether a slice is as quickly asked by itself as with a projection that others share. Then nothing branches on whether
+  /// neighbours are of one cluster.
+  GLINT_HD bool asksAlone(const NdfCluster& cluster) const {
+    return ndf_.method == CompressionMethod::cp && cluster.narrow_columns == 0;
+  }
+
+  /// Asks the memory for what valueAlone reads.
+  GLINT_HD void prefetchAlone(const NdfCluster& cluster, std::uint64_t slice, int x, int y) const {
+    const auto columns = static_cast<std::uint64_t>(cluster.columns);
+    prefetch(first(cluster) + static_cast<unsigned>(x) * columns);
+    prefetch(first(cluster) + static_cast<unsigned>(kBlockSize + y) * columns);
+    prefetch(static_cast<Row>(ndf_.coefficients) + cluster.first_coefficient + slice * columns);
+  }
+
+  /// One pixel of a slice of such a cluster: `dot` with `pixel`, to the bit.
+  GLINT_HD float valueAlone(const NdfCluster& cluster, Row c, int x, int y) const {
+    const float* scales = ndf_.scales.data() + cluster.first_scale;
+    const int columns = cluster.columns;
+    const Axis along_x(first(cluster), columns, x), along_y(first(cluster) + kBlockSize * columns, columns, y);
+    Float4 sum = Float4::zero();
+    int k = 0;
+    for (; k + 4 <= columns; k += 4)
+      sum = sum + Float4::load(scales + k) * (along_x.four(k) * along_y.four(k)) * Float4::load(c + k);
+    float rest[4] = {};
+    for (int j = 0; k < columns; ++k, ++j) rest[j] = scales[k] * (along_x.one(k) * along_y.one(k)) * value(c[k]);
+    return (columns % 4 == 0 ? sum : sum + Float4::load(rest)).sum();
   }
 
   /// projection = sums of scaled columns over a part of the block, as ColumnLayout says.
-  GLINT_HD void box(const NdfCluster& cluster, const BlockBox& b, float* projection) const {
+  GLINT_HD void box(const NdfCluster& cluster, const ColumnLayout& layout, const BlockBox& b, float* projection) const {
     const Basis* basis = first(cluster);
     const int columns = cluster.columns;
-    if (ndf_.method == CompressionMethod::pca) {
-      std::fill(projection, projection + columns, 0.0f);
-      addCorner(basis, columns, b.x1, b.y1, 1, projection);
-      addCorner(basis, columns, b.x0, b.y1, -1, projection);
-      addCorner(basis, columns, b.x1, b.y0, -1, projection);
-      addCorner(basis, columns, b.x0, b.y0, 1, projection);
-    } else if (ndf_.method == CompressionMethod::cp) {
-      float along_y[kMaxColumns];
-      sumAlongAxis(basis, columns, b.x0, b.x1, projection);
-      sumAlongAxis(basis + kBlockSize * columns, columns, b.y0, b.y1, along_y);
-      for (int k = 0; k < columns; ++k) projection[k] *= along_y[k];
-    } else {
-      float along_x[kBlockSize], along_y[kBlockSize];
+    if (ndf_.method == CompressionMethod::tucker) {
+      float along_x[kBlockSize] = {}, along_y[kBlockSize];
       sumAlongAxis(basis, cluster.rank_x, b.x0, b.x1, along_x);
       sumAlongAxis(basis + kBlockSize * cluster.rank_x, cluster.rank_y, b.y0, b.y1, along_y);
-      combineCore(cluster, along_x, along_y, projection);
+      return arrangeCore(cluster, layout, along_x, along_y, projection);
     }
-    scaleAndArrange(cluster, projection);
+    float along_x[kMaxColumns], along_y[kMaxColumns];
+    if (ndf_.method == CompressionMethod::pca) {
+      std::fill(along_x, along_x + columns, 0.0f);
+      addCorner(basis, columns, b.x1, b.y1, 1, along_x);
+      addCorner(basis, columns, b.x0, b.y1, -1, along_x);
+      addCorner(basis, columns, b.x1, b.y0, -1, along_x);
+      addCorner(basis, columns, b.x0, b.y0, 1, along_x);
+    } else {
+      sumAlongAxis(basis, columns, b.x0, b.x1, along_x);
+      sumAlongAxis(basis + kBlockSize * columns, columns, b.y0, b.y1, along_y);
+      for (int k = 0; k < columns; ++k) along_x[k] *= along_y[k];
+    }
+    layout.arrange(ndf_.scales.data() + cluster.first_scale, ColumnValues{along_x}, projection);
   }
 
   /// Dot product of a projection with the coefficients of a slice.
   /// @note reads up to three elements after the row, which meet zeros
   GLINT_HD float dot(const float* projection, const ColumnLayout& layout, Row c) const {
-    Float4 sum = Float4::zero();
-    for (int k = 0; k < layout.wide; k += 4) sum = sum + Float4::load(projection + k) * Float4::load(c + k);
-    if constexpr (std::is_same_v<Coefficient, std::int8_t>) {
-      const std::int8_t* narrow = c + layout.wide;
-      for (int j = 0; j < layout.half; j += 4) {
-        sum = sum + Float4::load(projection + layout.low + j) * Float4::loadLow(narrow + j);
-        sum = sum + Float4::load(projection + layout.high + j) * Float4::loadHigh(narrow + j);
-      }
-    }
-    return sum.sum();
+    Float4 sum[1] = {Float4::zero()};
+    addProducts<1>(projection, layout, &c, sum);
+    return sum[0].sum();
+  }
+
+  /// The same for four slices, to the bit.
+  GLINT_HD Float4 dots(const float* projection, const ColumnLayout& layout, const Row (&rows)[4]) const {
+    Float4 sums[4] = {Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()};
+    addProducts<4>(projection, layout, rows, sums);
+    return sumsOf(sums[0], sums[1], sums[2], sums[3]);
   }
 
   /// All pixels of a slice, [16][16], negative ones taken as 0.
@@ -161,26 +216,81 @@ class ClusterReader {
     return static_cast<const Basis*>(ndf_.basis) + cluster.first_basis;
   }
 
-  /// tucker: the column of each pair of functions.
-  GLINT_HD void combineCore(const NdfCluster& cluster, const float* along_x, const float* along_y, float* projection) const {
-    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
-    for (int k = 0; k < cluster.columns; ++k) projection[k] = along_x[core[k] % kBlockSize] * along_y[core[k] / kBlockSize];
+  /// Adds the products of a projection and rows of coefficients: lane k has those of columns 4 n + k.
+  template <int kRows>
+  static GLINT_HD void addProducts(const float* projection, const ColumnLayout& layout, const Row* rows, Float4* sums) {
+    for (int k = 0; k < layout.wide; k += 4) {
+      const Float4 p = Float4::load(projection + k);
+      for (int r = 0; r < kRows; ++r) sums[r] = sums[r] + p * Float4::load(rows[r] + k);
+    }
+    if constexpr (std::is_same_v<Coefficient, std::int8_t>) {
+      for (int j = 0; j < layout.half; j += 4) {
+        const Float4 low = Float4::load(projection + layout.low() + j), high = Float4::load(projection + layout.high() + j);
+        for (int r = 0; r < kRows; ++r) {
+          const std::int8_t* narrow = rows[r] + layout.wide + j;
+          sums[r] = sums[r] + low * Float4::loadLow(narrow);
+          sums[r] = sums[r] + high * Float4::loadHigh(narrow);
+        }
+      }
+    }
   }
 
-  /// Multiplies columns by their scales, and moves them to where ColumnLayout wants them.
-  GLINT_HD void scaleAndArrange(const NdfCluster& cluster, float* projection) const {
-    const float* scales = ndf_.scales.data() + cluster.first_scale;
-    const ColumnLayout layout(cluster);
-    int k4 = 0;
-    for (; k4 + 4 <= layout.columns; k4 += 4)
-      (Float4::load(scales + k4) * Float4::load(projection + k4)).store(projection + k4);
-    for (; k4 < layout.columns; ++k4) projection[k4] *= scales[k4];
-    // From the end: no column is moved down.
-    for (int k = layout.columns - 1; k >= layout.wide; --k) projection[layout.at(k)] = projection[k];
-    const int low_end = layout.low + layout.half, high_end = layout.high + layout.columns - layout.wide - layout.half;
-    for (int k = layout.wide; k < layout.low; ++k) projection[k] = 0;
-    for (int k = low_end; k < layout.high; ++k) projection[k] = 0;
-    for (int k = high_end; k < layout.high + ((layout.half + 3) & ~3); ++k) projection[k] = 0;
+  /// Functions of one axis at a pixel: differences of rows of prefix sums.
+  struct Axis {
+    GLINT_HD Axis(const Basis* prefix, int columns, int pixel)
+        : inner(pixel > 0 ? -1 : 0), count(columns), at(prefix + pixel * columns), before(at - (columns & inner)) {}
+    GLINT_HD float one(int k) const { return differenceOf(at[k], inner != 0 ? before[k] : Basis{0}); }
+    GLINT_HD Float4 four(int k) const { return Float4::difference(at + k, before + k, inner); }
+    GLINT_HD void store(float* values) const {
+      if (count < 4) {
+        for (int k = 0; k < count; ++k) values[k] = one(k);
+        return;
+      }
+      int k = 0;
+      for (; k + 4 <= count; k += 4) four(k).store(values + k);
+      if (k < count) four(count - 4).store(values + count - 4);
+    }
+    int inner;  ///< all bits, or none where there is nothing before
+    int count;
+    const Basis *at, *before;
+  };
+
+  /// cp: products of functions of x and of y.
+  struct Products {
+    GLINT_HD float one(int k) const { return x.one(k) * y.one(k); }
+    GLINT_HD Float4 four(int k) const { return x.four(k) * y.four(k); }
+    const Axis &x, &y;
+  };
+
+  /// pca: a pixel of every basis image, from their prefix sums over both axes.
+  struct Image {
+    GLINT_HD Image(const Basis* prefix, int columns, int x, int y)
+        : here(prefix + y * kBlockSize * columns, columns, x),
+          below(prefix + (y > 0 ? y - 1 : 0) * kBlockSize * columns, columns, x),
+          inner(y > 0) {}
+    GLINT_HD float one(int k) const { return here.one(k) - (inner ? below.one(k) : 0.0f); }
+    GLINT_HD Float4 four(int k) const { return inner ? here.four(k) - below.four(k) : here.four(k); }
+    Axis here, below;
+    bool inner;
+  };
+
+  /// tucker: products of the pairs of functions that the core names.
+  struct CorePairs {
+    GLINT_HD float one(int k) const { return products[core[k]]; }
+    GLINT_HD Float4 four(int k) const { return Float4::of(one(k), one(k + 1), one(k + 2), one(k + 3)); }
+    const std::uint8_t* core;
+    const float* products;  ///< a + 16 b: of function a of x and function b of y
+  };
+
+  [[gnu::always_inline]] GLINT_HD void arrangeCore(const NdfCluster& cluster, const ColumnLayout& layout,
+                                                   const float* along_x, const float* along_y, float* projection) const {
+    float products[kBlockPixels];  // those beyond rank_x are of no meaning
+    for (int b = 0; b < cluster.rank_y; ++b) {
+      const Float4 y = Float4::all(along_y[b]);
+      for (int a = 0; a < cluster.rank_x; a += 4) (y * Float4::load(along_x + a)).store(products + b * kBlockSize + a);
+    }
+    layout.arrange(ndf_.scales.data() + cluster.first_scale, CorePairs{ndf_.core.data() + cluster.first_scale, products},
+                   projection);
   }
 
   GLINT_HD void scaledCoefficients(const NdfCluster& cluster, Row c, float* scaled) const {
@@ -200,29 +310,6 @@ class ClusterReader {
       return halfToFloat(c);
     else
       return static_cast<float>(c);
-  }
-
-  /// A prefix sum without the one before it along an axis.
-  static GLINT_HD float axis(const Basis* at, int rank, bool inner) {
-    return static_cast<float>(*at) - (inner ? static_cast<float>(at[-rank]) : 0.0f);
-  }
-  static GLINT_HD Float4 axis4(const Basis* at, int rank, bool inner) {
-    return inner ? Float4::load(at) - Float4::load(at - rank) : Float4::load(at);
-  }
-  static GLINT_HD void axisColumns(const Basis* at, int rank, bool inner, float* values) {
-    forEachColumn(
-        rank, [&](int k) { axis4(at + k, rank, inner).store(values + k); },
-        [&](int k) { values[k] = axis(at + k, rank, inner); });
-  }
-
-  /// The same for prefix sums over both axes of a block.
-  static GLINT_HD float image(const Basis* at, int rank, bool inner_x, bool inner_y) {
-    const float here = axis(at, rank, inner_x);
-    return inner_y ? here - axis(at - kBlockSize * rank, rank, inner_x) : here;
-  }
-  static GLINT_HD Float4 image4(const Basis* at, int rank, bool inner_x, bool inner_y) {
-    const Float4 here = axis4(at, rank, inner_x);
-    return inner_y ? here - axis4(at - kBlockSize * rank, rank, inner_x) : here;
   }
 
   /// sums[k] = sum of column k over [low, high] of one block axis, from its inclusive prefix sums [16][columns]. Pixels at the

@@ -24,21 +24,23 @@ class CpNdf {
   static constexpr int kMaxBlocksPerAxis = 64;  // of 1024 pixels, the largest image
 
  public:
-  GLINT_HD explicit CpNdf(const CompressedNdf& ndf) : ndf_(ndf) {}
+  GLINT_HD explicit CpNdf(const CompressedNdf& ndf) : ndf_(ndf), chooser_(ndf.shape) {}
   GLINT_HD CpNdf(const CompressedNdf& ndf, const NormalMap& normals)
       : ndf_(ndf),
+        chooser_(ndf.shape),
         below_(Reference(normals, ndf.shape.sigma_r, ndf.shape.surface, ndf.shape.boundary, Reference::Search::pruned)) {}
 
   GLINT_HD const CompressedNdf& compressed() const { return ndf_; }
   /// Whether footprints below level 0 are answered from the texels.
   GLINT_HD bool hasNormals() const { return below_.hasMap(); }
   GLINT_HD const PyramidShape& shape() const { return ndf_.shape; }
+  GLINT_HD const SliceChooser& chooser() const { return chooser_; }
 
   /// Density towards h, >= 0; O(columns) in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
-    const PyramidSlices chosen = selectSlices(shape(), p);
+    const PyramidSlices chosen = chooser_.choose(p);
     const PixelPlace place = pixelPlace(shape(), h);
     return withReader(ndf_, [&](const auto& reader) { return pixelDensity(reader, chosen, place); });
   }
@@ -56,7 +58,7 @@ class CpNdf {
   GLINT_HD float signedDensity(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
-    const PyramidSlices chosen = selectSlices(shape(), p);
+    const PyramidSlices chosen = chooser_.choose(p);
     const PixelPlace place = pixelPlace(shape(), h);
     return withReader(ndf_, [&](const auto& reader) {
       return sumSlices(chosen, place.block, ndf_.image_scales.data(), PixelOf<decltype(reader)>{reader, place}, Signed{});
@@ -66,7 +68,7 @@ class CpNdf {
   GLINT_HD float signedMean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
     if (below_.hasMap() && belowFinest(shape(), p)) return below_.mean(p, range);
-    const PyramidSlices chosen = selectSlices(shape(), p);
+    const PyramidSlices chosen = chooser_.choose(p);
     return withReader(ndf_, [&](const auto& reader) {
       double sum = 0;
       forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
@@ -103,9 +105,11 @@ class CpNdf {
   /// Negative values of a slice: kept, or taken as 0.
   struct Signed {
     GLINT_HD float operator()(float value) const { return value; }
+    GLINT_HD Float4 operator()(Float4 values) const { return values; }
   };
   struct Positive {
     GLINT_HD float operator()(float value) const { return std::max(0.0f, value); }
+    GLINT_HD Float4 operator()(Float4 values) const { return values.positive(); }
   };
 
   /// What is asked of a block: one pixel, or the sum over a box of pixels.
@@ -113,8 +117,15 @@ class CpNdf {
   struct PixelOf {
     Reader reader;
     PixelPlace place;
-    GLINT_HD void project(const NdfCluster& cluster, float* projection) const {
-      reader.pixel(cluster, place.x, place.y, projection);
+    GLINT_HD void project(const NdfCluster& cluster, const ColumnLayout& layout, float* projection) const {
+      reader.pixel(cluster, layout, place.x, place.y, projection);
+    }
+    GLINT_HD void prefetch(const NdfCluster& cluster, std::uint64_t slice) const {
+      reader.prefetchAlone(cluster, slice, place.x, place.y);
+    }
+    GLINT_HD bool alone(const NdfCluster& cluster) const { return reader.asksAlone(cluster); }
+    GLINT_HD float valueAlone(const NdfCluster& cluster, std::uint64_t slice) const {
+      return reader.valueAlone(cluster, reader.row(cluster, slice), place.x, place.y);
     }
     GLINT_HD float spots(const SpotProfile& profile, const SpotList& list) const {
       return spotsAt(profile, list, place.x, place.y);
@@ -124,9 +135,41 @@ class CpNdf {
   struct BoxOf {
     Reader reader;
     BlockBox box;
-    GLINT_HD void project(const NdfCluster& cluster, float* projection) const { reader.box(cluster, box, projection); }
+    GLINT_HD void project(const NdfCluster& cluster, const ColumnLayout& layout, float* projection) const {
+      reader.box(cluster, layout, box, projection);
+    }
+    GLINT_HD void prefetch(const NdfCluster&, std::uint64_t) const {}
+    GLINT_HD bool alone(const NdfCluster&) const { return false; }
+    GLINT_HD float valueAlone(const NdfCluster&, std::uint64_t) const { return 0; }
     GLINT_HD float spots(const SpotProfile& profile, const SpotList& list) const { return spotsIn(profile, list, box); }
   };
+
+  /// Where the slices of the chosen images are. Weights include the scales of images, and are 0 where an image has no slice, or
+  /// where no more images are chosen.
+  struct SlicePlaces {
+    std::uint32_t clusters[PyramidSlices::kMost];
+    std::uint32_t slices[PyramidSlices::kMost];
+    float weights[PyramidSlices::kMost] = {};
+  };
+
+  /// Nothing branches on what is stored: that cannot be predicted.
+  GLINT_HD SlicePlaces findSlices(const PyramidSlices& chosen, unsigned block_place, const float* scales) const {
+    SlicePlaces out;
+    const auto block_places = static_cast<unsigned>(ndf_.places);
+    for (int step = 0; 4 * step < chosen.count; ++step) {
+      const std::uint32_t first = ndf_.first_image[chosen.levels[step]];
+      for (int k = 4 * step; k < 4 * step + 4; ++k) {
+        const std::size_t image = first + chosen.images[k];
+        const unsigned slot = ndf_.image_slots.data()[image];
+        out.clusters[k] = ndf_.image_regions.data()[image] * block_places + block_place;
+        const std::size_t word = ndf_.clusters.data()[out.clusters[k]].first_word + slot / 64;
+        const BitRank rank(ndf_.masks.data()[word], slot % 64);
+        out.slices[k] = static_cast<std::uint32_t>(ndf_.mask_ranks.data()[word] + rank.below);
+        out.weights[k] = keepIf(rank.kept, chosen.weights[k] * scales[image]);
+      }
+    }
+    return out;
+  }
 
   /// Weighted sum over the chosen images. Slices of the same cluster, as those of neighbours mostly are, share its projection.
   /// @param scales  of images
@@ -134,36 +177,62 @@ class CpNdf {
   /// @param part    Signed or Positive
   template <class Ask, class Part>
   GLINT_HD float sumSlices(const PyramidSlices& chosen, int block, const float* scales, const Ask& ask, Part part) const {
-    const int block_place = ndf_.block_places.data()[block];
+    const unsigned block_place = ndf_.block_places.data()[block];
     if (block_place == kNoBlockPlace) return 0;
-    SlicePlace places[PyramidSlices::kMost];
-    float weights[PyramidSlices::kMost];
-    for (int k = 0; k < chosen.count; ++k) {
-      const std::size_t image = imageOf(chosen.slices[k]);
-      places[k] = findSlice(image, block_place);
-      weights[k] = chosen.slices[k].weight * scales[image];
+    const SlicePlaces places = findSlices(chosen, block_place, scales);
+    if (ndf_.method == CompressionMethod::cp) {
+      for (int k = 0; k < chosen.count; ++k)
+        if (places.weights[k] > 0) ask.prefetch(ndf_.clusters.data()[places.clusters[k]], places.slices[k]);
     }
+    unsigned left = lanesAbove0(Float4::load(places.weights)) | lanesAbove0(Float4::load(places.weights + 4)) << 4;
     float sum = 0;
-    for (int first = 0; first < chosen.count; ++first) {
-      const std::size_t at = places[first].cluster;
-      if (at == kNone) continue;
+    while (left != 0) {
+      const int lowest = lowestBit(left);
+      const std::uint32_t at = places.clusters[lowest];
       const NdfCluster& cluster = ndf_.clusters.data()[at];
-      const auto addUp = [&](auto&& value) {
-        for (int k = first; k < chosen.count; ++k) {
-          if (places[k].cluster != at) continue;
-          sum += weights[k] * part(value(places[k].slice));
-          places[k].cluster = kNone;
-        }
-      };
-      if (cluster.columns == 0) {
-        const SpotProfile profile(ndf_);
-        addUp([&](std::uint64_t slice) { return ask.spots(profile, spotsOf(ndf_, cluster, slice)); });
-      } else {
-        float projection[ColumnLayout::kMost];
-        ask.project(cluster, projection);
-        const ColumnLayout layout(cluster);
-        addUp([&](std::uint64_t slice) { return ask.reader.dot(projection, layout, ask.reader.row(cluster, slice)); });
+      if (ask.alone(cluster)) {
+        left &= left - 1;
+        sum += places.weights[lowest] * part(ask.valueAlone(cluster, places.slices[lowest]));
+        continue;
       }
+      const auto shares = [&](int step) { return whereEqual(places.clusters + step, at, Float4::load(places.weights + step)); };
+      const unsigned here = lanesAbove0(shares(0)) | lanesAbove0(shares(4)) << 4;
+      left &= ~here;
+      if (cluster.columns == 0) {
+        sum += addSpots(cluster, places, here, ask, part);
+        continue;
+      }
+      const ColumnLayout layout(cluster);
+      float projection[ColumnLayout::kMost];
+      ask.project(cluster, layout, projection);
+      const auto rows = ask.reader.rows(cluster, layout);
+      for (int step = 0; step < PyramidSlices::kMost; step += 4) {
+        const unsigned lanes = here >> step & 15;
+        if (lanes == 0) continue;
+        const int first = step + lowestBit(lanes);
+        if ((lanes & (lanes - 1)) == 0) {
+          sum += places.weights[first] * part(ask.reader.dot(projection, layout, rows(places.slices[first])));
+          continue;
+        }
+        // Lanes of other clusters repeat one of this, and weigh nothing.
+        const auto lane = [&](int k) { return rows(places.slices[lanes >> k & 1 ? step + k : first]); };
+        sum += (shares(step) * part(ask.reader.dots(projection, layout, {lane(0), lane(1), lane(2), lane(3)}))).sum();
+      }
+    }
+    return sum;
+  }
+
+  static GLINT_HD unsigned lanesAbove0(Float4 weights) { return ~weights.notAbove(0) & 15u; }
+
+  /// Weighted sum over the slices `here` of a cluster of spots.
+  template <class Ask, class Part>
+  GLINT_HD float addSpots(const NdfCluster& cluster, const SlicePlaces& places, unsigned here, const Ask& ask,
+                          Part part) const {
+    const SpotProfile profile(ndf_);
+    float sum = 0;
+    for (; here != 0; here &= here - 1) {
+      const int k = lowestBit(here);
+      sum += places.weights[k] * part(ask.spots(profile, spotsOf(ndf_, cluster, places.slices[k])));
     }
     return sum;
   }
@@ -247,6 +316,7 @@ class CpNdf {
   }
 
   CompressedNdf ndf_;
+  SliceChooser chooser_;
   Reference below_;
 };
 
@@ -254,18 +324,18 @@ class CpNdf {
 inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) const {
   xi = clampUnit(xi);
   if (below_.hasMap() && belowFinest(shape(), p)) return below_.sample(p, xi);
-  const PyramidSlices chosen = selectSlices(shape(), p);
+  const PyramidSlices chosen = chooser_.choose(p);
   float weights[PyramidSlices::kMost];
   float total = 0;  // images of which nothing was kept have no density
   for (int k = 0; k < chosen.count; ++k) {
-    weights[k] = ndf_.density_scales.data()[imageOf(chosen.slices[k])] > 0 ? chosen.slices[k].weight : 0.0f;
+    weights[k] = ndf_.density_scales.data()[imageOf(chosen[k])] > 0 ? chosen.weights[k] : 0.0f;
     total += weights[k];
   }
   const int k = chooseIndex(
       chosen.count, total, [&](int i) { return weights[i]; }, xi.x);
   if (k < 0) return {};
   return withReader(ndf_, [&](const auto& reader) -> HalfVectorSample {
-    const PixelPlace place = choosePlace(reader, imageOf(chosen.slices[k]), xi);
+    const PixelPlace place = choosePlace(reader, imageOf(chosen[k]), xi);
     if (place.x < 0) return {};
     return {pointInPixel(shape(), place, xi), pixelDensity(reader, chosen, place) / total};
   });

@@ -18,6 +18,15 @@ namespace glint {
 inline GLINT_HD std::int8_t lowHalf(std::int8_t byte) { return static_cast<std::int8_t>(((byte & 15) ^ 8) - 8); }
 inline GLINT_HD std::int8_t highHalf(std::int8_t byte) { return static_cast<std::int8_t>(byte >> 4); }
 
+/// a - b, rounded once. Integers that are too far apart, as only a broken file has them, wrap.
+inline GLINT_HD float differenceOf(float a, float b) { return a - b; }
+inline GLINT_HD float differenceOf(std::int32_t a, std::int32_t b) {
+  return static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b)));
+}
+inline GLINT_HD float differenceOf(std::int16_t a, std::int16_t b) {
+  return differenceOf(std::int32_t{a}, std::int32_t{b});
+}
+
 /// Four floats side by side, from SSE4.1 where the program is compiled for it. Results are the same bits without it.
 struct Float4 {
 #if defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(__CUDA__)
@@ -26,6 +35,11 @@ struct Float4 {
   static Float4 zero() { return {_mm_setzero_ps()}; }
   static Float4 all(float x) { return {_mm_set1_ps(x)}; }
   static Float4 of(float a, float b, float c, float d) { return {_mm_setr_ps(a, b, c, d)}; }
+  /// a[0], a[1], b[0], b[1].
+  static Float4 ofPairs(const float* a, const float* b) {
+    const __m128 low = _mm_castpd_ps(_mm_load_sd(reinterpret_cast<const double*>(a)));
+    return {_mm_loadh_pi(low, reinterpret_cast<const __m64*>(b))};
+  }
   static Float4 load(const float* p) { return {_mm_loadu_ps(p)}; }
   static __m128i bytes(const std::int8_t* p) {
     std::int32_t four;
@@ -48,12 +62,28 @@ struct Float4 {
     const __m128 is_subnormal = _mm_castsi128_ps(_mm_cmplt_epi32(magnitude, _mm_set1_epi32(0x400)));
     return {_mm_or_ps(_mm_blendv_ps(_mm_castsi128_ps(normal), subnormal, is_subnormal), _mm_castsi128_ps(sign))};
   }
+  /// differenceOf(a[k], b[k]), or a[k] where `mask` is 0 rather than -1.
+  static Float4 difference(const std::int16_t* a, const std::int16_t* b, int mask) {
+    const auto wide = [](const std::int16_t* p) {
+      return _mm_cvtepi16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
+    };
+    return {_mm_cvtepi32_ps(_mm_sub_epi32(wide(a), _mm_and_si128(wide(b), _mm_set1_epi32(mask))))};
+  }
+  static Float4 difference(const std::int32_t* a, const std::int32_t* b, int mask) {
+    const auto four = [](const std::int32_t* p) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(p)); };
+    return {_mm_cvtepi32_ps(_mm_sub_epi32(four(a), _mm_and_si128(four(b), _mm_set1_epi32(mask))))};
+  }
+  static Float4 difference(const float* a, const float* b, int mask) {
+    return {_mm_sub_ps(_mm_loadu_ps(a), _mm_and_ps(_mm_loadu_ps(b), _mm_castsi128_ps(_mm_set1_epi32(mask))))};
+  }
   /// Half-precision numbers >= 0: fewer steps, as there is no sign.
   static Float4 loadPositive(const std::uint16_t* p) {
     return positiveHalves(_mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))));
   }
   static Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
-    return positiveHalves(_mm_setr_epi32(a, b, c, d));
+    __m128i bits = _mm_insert_epi16(_mm_setzero_si128(), a, 0);
+    bits = _mm_insert_epi16(_mm_insert_epi16(bits, b, 2), c, 4);
+    return positiveHalves(_mm_insert_epi16(bits, d, 6));
   }
   static Float4 positiveHalves(__m128i bits) {
     // Right for normal numbers. A subnormal f 2^-14 comes out as 2^-15 (1 + f): less than twice that minus 2^-14 only if it is
@@ -71,10 +101,29 @@ struct Float4 {
   friend Float4 operator*(Float4 a, Float4 b) { return {_mm_mul_ps(a.v, b.v)}; }
   friend Float4 operator/(Float4 a, Float4 b) { return {_mm_div_ps(a.v, b.v)}; }
   friend Float4 floorOf(Float4 a) { return {_mm_floor_ps(a.v)}; }
+  friend Float4 minOf(Float4 a, Float4 b) { return {_mm_min_ps(a.v, b.v)}; }
+  /// In lanes: numbers[k] == number ? yes : 0.
+  friend Float4 whereEqual(const std::uint32_t* numbers, std::uint32_t number, Float4 yes) {
+    const __m128i equal = _mm_cmpeq_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(numbers)),
+                                          _mm_set1_epi32(static_cast<std::int32_t>(number)));
+    return {_mm_and_ps(_mm_castsi128_ps(equal), yes.v)};
+  }
+  /// Lanes 0 and 1, 2 and 3 of two, in turn.
+  friend Float4 interleaveLow(Float4 a, Float4 b) { return {_mm_unpacklo_ps(a.v, b.v)}; }
+  friend Float4 interleaveHigh(Float4 a, Float4 b) { return {_mm_unpackhi_ps(a.v, b.v)}; }
+  Float4 lanes0101() const { return {_mm_movelh_ps(v, v)}; }
+  Float4 lanes2233() const { return {_mm_unpackhi_ps(v, v)}; }
+  /// out[k] = row[k] * columns + column[k], of whole numbers >= 0.
+  friend void storeIndices(Float4 row, std::int32_t columns, Float4 column, std::uint32_t* out) {
+    const __m128i before = _mm_mullo_epi32(_mm_cvttps_epi32(row.v), _mm_set1_epi32(columns));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(out), _mm_add_epi32(before, _mm_cvttps_epi32(column.v)));
+  }
   /// In lanes: a < b ? yes : no.
   friend Float4 whereLess(Float4 a, Float4 b, Float4 yes, Float4 no) {
     return {_mm_blendv_ps(no.v, yes.v, _mm_cmplt_ps(a.v, b.v))};
   }
+  /// In lanes: a < b ? yes : 0.
+  friend Float4 whereLess(Float4 a, Float4 b, Float4 yes) { return {_mm_and_ps(yes.v, _mm_cmplt_ps(a.v, b.v))}; }
   /// Negative numbers and NaN become 0.
   Float4 positive() const { return {_mm_max_ps(v, _mm_setzero_ps())}; }
   /// Bit k: lane k is at most `bound`.
@@ -97,6 +146,8 @@ struct Float4 {
   static GLINT_HD Float4 zero() { return {{0, 0, 0, 0}}; }
   static GLINT_HD Float4 all(float x) { return {{x, x, x, x}}; }
   static GLINT_HD Float4 of(float a, float b, float c, float d) { return {{a, b, c, d}}; }
+  /// a[0], a[1], b[0], b[1].
+  static GLINT_HD Float4 ofPairs(const float* a, const float* b) { return {{a[0], a[1], b[0], b[1]}}; }
   template <class T>
   static GLINT_HD Float4 load(const T* p) {
     return {{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]), static_cast<float>(p[3])}};
@@ -104,6 +155,13 @@ struct Float4 {
   /// Half-precision numbers.
   static GLINT_HD Float4 load(const std::uint16_t* p) {
     return {{halfToFloat(p[0]), halfToFloat(p[1]), halfToFloat(p[2]), halfToFloat(p[3])}};
+  }
+  /// differenceOf(a[k], b[k]), or a[k] where `mask` is 0 rather than -1.
+  template <class T>
+  static GLINT_HD Float4 difference(const T* a, const T* b, int mask) {
+    Float4 out;
+    for (int k = 0; k < 4; ++k) out.v[k] = differenceOf(a[k], mask != 0 ? b[k] : T{0});
+    return out;
   }
   static GLINT_HD Float4 loadPositive(const std::uint16_t* p) { return load(p); }
   static GLINT_HD Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
@@ -137,11 +195,32 @@ struct Float4 {
   friend GLINT_HD Float4 floorOf(Float4 a) {
     return {{std::floor(a.v[0]), std::floor(a.v[1]), std::floor(a.v[2]), std::floor(a.v[3])}};
   }
+  /// In lanes: numbers[k] == number ? yes : 0.
+  friend GLINT_HD Float4 whereEqual(const std::uint32_t* numbers, std::uint32_t number, Float4 yes) {
+    for (int k = 0; k < 4; ++k) yes.v[k] = numbers[k] == number ? yes.v[k] : 0.0f;
+    return yes;
+  }
+  friend GLINT_HD Float4 minOf(Float4 a, Float4 b) {
+    for (int k = 0; k < 4; ++k) a.v[k] = a.v[k] < b.v[k] ? a.v[k] : b.v[k];
+    return a;
+  }
+  /// Lanes 0 and 1, 2 and 3 of two, in turn.
+  friend GLINT_HD Float4 interleaveLow(Float4 a, Float4 b) { return {{a.v[0], b.v[0], a.v[1], b.v[1]}}; }
+  friend GLINT_HD Float4 interleaveHigh(Float4 a, Float4 b) { return {{a.v[2], b.v[2], a.v[3], b.v[3]}}; }
+  GLINT_HD Float4 lanes0101() const { return {{v[0], v[1], v[0], v[1]}}; }
+  GLINT_HD Float4 lanes2233() const { return {{v[2], v[2], v[3], v[3]}}; }
+  /// out[k] = row[k] * columns + column[k], of whole numbers >= 0.
+  friend GLINT_HD void storeIndices(Float4 row, std::int32_t columns, Float4 column, std::uint32_t* out) {
+    for (int k = 0; k < 4; ++k)
+      out[k] = static_cast<std::uint32_t>(static_cast<std::int32_t>(row.v[k]) * columns + static_cast<std::int32_t>(column.v[k]));
+  }
   /// In lanes: a < b ? yes : no.
   friend GLINT_HD Float4 whereLess(Float4 a, Float4 b, Float4 yes, Float4 no) {
     for (int k = 0; k < 4; ++k) no.v[k] = a.v[k] < b.v[k] ? yes.v[k] : no.v[k];
     return no;
   }
+  /// In lanes: a < b ? yes : 0.
+  friend GLINT_HD Float4 whereLess(Float4 a, Float4 b, Float4 yes) { return whereLess(a, b, yes, zero()); }
   /// Negative numbers and NaN become 0.
   GLINT_HD Float4 positive() const {
     return {{v[0] > 0 ? v[0] : 0, v[1] > 0 ? v[1] : 0, v[2] > 0 ? v[2] : 0, v[3] > 0 ? v[3] : 0}};

@@ -52,7 +52,7 @@ class PackedNdfView {
     out.value_scale = header_.value_scale;
     for (int l = 0; l < header_.level_count; ++l) {
       const PackedArray* arrays = header_.arrays + 4 * l;
-      out.levels[l] = {array<std::uint64_t>(arrays[0]), array<std::uint64_t>(arrays[1]), array<float>(arrays[2]),
+      out.levels[l] = {array<std::uint64_t>(arrays[0]), array<std::uint32_t>(arrays[1]), array<float>(arrays[2]),
                        base_ + arrays[3].offset};
     }
     return out;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <type_traits>
+
 #include "glint/model/ndf_pyramid.h"
 #include "glint/query/bits.h"
 #include "glint/query/float4.h"
@@ -17,9 +19,11 @@ namespace glint {
 /// The density is constant over a pixel. Thread-safe, allocates nothing; the arrays must outlive it.
 class PyramidNdf {
  public:
-  GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid) : pyramid_(pyramid) {}
+  GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid) : pyramid_(pyramid), chooser_(pyramid.shape), mask_words_(pyramid.shape.maskWords()) {}
   GLINT_HD PyramidNdf(const NdfPyramid& pyramid, const NormalMap& normals)
       : pyramid_(pyramid),
+        chooser_(pyramid.shape),
+        mask_words_(pyramid.shape.maskWords()),
         below_(Reference(normals, pyramid.shape.sigma_r, pyramid.shape.surface, pyramid.shape.boundary,
                          Reference::Search::pruned)) {}
 
@@ -29,12 +33,19 @@ class PyramidNdf {
   GLINT_HD const PyramidShape& shape() const { return pyramid_.shape; }
   /// Whether this footprint is answered from the texels.
   GLINT_HD bool fromTexels(const Footprint& p) const { return hasNormals() && belowFinest(shape(), p); }
+  /// The images that answer a footprint that is not answered from the texels.
+  GLINT_HD PyramidSlices chooseSlices(const Footprint& p) const { return chooser_.choose(p); }
+  GLINT_HD const SliceChooser& chooser() const { return chooser_; }
 
   /// Density towards h, >= 0; O(1): one pixel in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     if (fromTexels(p)) return below_.density(p, h);
-    return pixelDensity(selectSlices(shape(), p), pixelPlace(shape(), h));
+    const PyramidSlices chosen = chooseSlices(p);
+    const PixelPlace place = pixelPlace(shape(), h);
+    return pyramid_.precision == BlockPrecision::f16
+               ? addPixelsOf<std::uint16_t>(findPixelsOf<std::uint16_t>(chosen, place))
+               : addPixelsOf<float>(findPixelsOf<float>(chosen, place));
   }
 
   /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly inside, as
@@ -71,24 +82,24 @@ class PyramidNdf {
 
   GLINT_HD Draw chooseImage(const Footprint& p, Vec2 xi) const {
     Draw draw;
-    draw.slices = selectSlices(shape(), p);
+    draw.slices = chooseSlices(p);
     draw.xi = clampUnit(xi);
     const int k = chooseIndex(
-        draw.slices.count, 1, [&](int i) { return draw.slices.slices[i].weight; }, draw.xi.x);
+        draw.slices.count, 1, [&](int i) { return draw.slices.weights[i]; }, draw.xi.x);
     if (k < 0) return draw;
-    draw.chosen = draw.slices.slices[k];
+    draw.chosen = draw.slices[k];
     prefetch(maskOf(draw.chosen));
-    prefetch(levelOf(draw.chosen).first_block.data() + draw.chosen.image);
+    prefetch(ranksOf(draw.chosen));
     return draw;
   }
 
   GLINT_HD void findBlocks(Draw& draw) const {
     constexpr int kLine = 16;
     const PyramidLevel& level = levelOf(draw.chosen);
-    const std::uint64_t* first = level.first_block.data() + draw.chosen.image;
-    draw.first_block = first[0];
-    draw.block_count = static_cast<int>(first[1] - first[0]);
-    for (int k = 0; k < draw.block_count; k += kLine) prefetch(level.block_means.data() + first[0] + k);
+    const std::uint32_t *ranks = ranksOf(draw.chosen), end = ranks[mask_words_];
+    draw.first_block = ranks[0];
+    draw.block_count = static_cast<int>(end - ranks[0]);
+    for (int k = 0; k < draw.block_count; k += kLine) prefetch(level.block_means.data() + draw.first_block + k);
     prefetchIndex(draw.slices);
   }
 
@@ -129,7 +140,7 @@ class PyramidNdf {
   /// their mean stored, others sum at most 256 pixels.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     if (fromTexels(p)) return below_.mean(p, range);
-    return mean(selectSlices(shape(), p), range);
+    return mean(chooseSlices(p), range);
   }
 
   /// The same from chosen images.
@@ -139,8 +150,8 @@ class PyramidNdf {
     forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
       const BlockCover cover(box);
       for (int k = 0; k < chosen.count; ++k) {
-        const std::int64_t stored = storedBlock(chosen.slices[k], block);
-        if (stored >= 0) sum += double{chosen.slices[k].weight} * blockSum(levelOf(chosen.slices[k]), stored, cover);
+        const std::int64_t stored = storedBlock(chosen[k], block);
+        if (stored >= 0) sum += double{chosen.weights[k]} * blockSum(pyramid_.levels[chosen.level(k)], stored, cover);
       }
     });
     return static_cast<float>(sum / areaInPixels(shape(), range));
@@ -149,8 +160,8 @@ class PyramidNdf {
   /// Asks the memory for where chosen images say which blocks they store.
   GLINT_HD void prefetchIndex(const PyramidSlices& chosen) const {
     for (int k = 0; k < chosen.count; ++k) {
-      prefetch(maskOf(chosen.slices[k]));
-      prefetch(levelOf(chosen.slices[k]).first_block.data() + chosen.slices[k].image);
+      prefetch(maskOf(chosen[k]));
+      prefetch(ranksOf(chosen[k]));
     }
   }
 
@@ -159,9 +170,9 @@ class PyramidNdf {
     forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
       const BlockCover cover(box);
       for (int k = 0; k < chosen.count; ++k) {
-        const std::int64_t stored = storedBlock(chosen.slices[k], block);
+        const std::int64_t stored = storedBlock(chosen[k], block);
         if (stored < 0) continue;
-        const PyramidLevel& level = levelOf(chosen.slices[k]);
+        const PyramidLevel& level = pyramid_.levels[chosen.level(k)];
         if (cover.isWhole())
           prefetch(level.block_means.data() + stored);
         else
@@ -173,62 +184,65 @@ class PyramidNdf {
  private:
   GLINT_HD const PyramidLevel& levelOf(const PyramidSlice& slice) const { return pyramid_.levels[slice.level]; }
   GLINT_HD const std::uint64_t* maskOf(const PyramidSlice& slice) const {
-    return levelOf(slice).masks.data() + static_cast<std::size_t>(slice.image) * shape().maskWords();
+    return levelOf(slice).masks.data() + std::size_t{slice.image} * mask_words_;
   }
-  GLINT_HD float pixelDensity(const PyramidSlices& chosen, const PixelPlace& place) const {
-    return addPixels(findPixels(chosen, place));
+  GLINT_HD const std::uint32_t* ranksOf(const PyramidSlice& slice) const {
+    return levelOf(slice).mask_ranks.data() + std::size_t{slice.image} * mask_words_;
   }
 
-  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be predicted, so
-  /// the cache misses of all slices are under way together.
+  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be
+  /// predicted, so the cache misses of all slices are under way together.
   GLINT_HD Places findPixels(const PyramidSlices& chosen, const PixelPlace& place) const {
+    return pyramid_.precision == BlockPrecision::f16 ? findPixelsOf<std::uint16_t>(chosen, place)
+                                                     : findPixelsOf<float>(chosen, place);
+  }
+
+  template <class Pixel>
+  GLINT_HD Places findPixelsOf(const PyramidSlices& chosen, const PixelPlace& place) const {
+    constexpr std::uint64_t kBlockBytes = kBlockPixels * sizeof(Pixel);
+    const unsigned word = static_cast<unsigned>(place.block) / 64, bit = static_cast<unsigned>(place.block) % 64;
     Places places;
-    if (shape().maskWords() == 4)  // images of 256^2, as most are
-      findPixels<4>(chosen, place, 4, places);
-    else
-      findPixels<kMostMaskWords>(chosen, place, shape().maskWords(), places);
+    places.count = chosen.count;
+    for (int step = 0; 4 * step < chosen.count; ++step) {
+      const PyramidLevel& level = pyramid_.levels[chosen.levels[step]];
+      // Where nothing is stored a pixel of the first block is read; a level may have none.
+      const void* pixels = level.masks.data();
+      if (!level.block_means.empty())
+        pixels = static_cast<const Pixel*>(level.pixels) + (place.y * kBlockSize + place.x);
+      for (int k = 4 * step; k < 4 * step + 4; ++k) {
+        const std::size_t at = std::size_t{chosen.images[k]} * mask_words_ + word;
+        const BitRank rank(level.masks.data()[at], bit);
+        const std::uint64_t stored = level.mask_ranks.data()[at] + rank.below;
+        places.pixels[k] = static_cast<const char*>(pixels) + (stored * kBlockBytes & rank.kept);
+        places.weights[k] = keepIf(rank.kept, chosen.weights[k]);
+        prefetch(places.pixels[k]);
+      }
+    }
     return places;
   }
 
-  template <int kWords>
-  GLINT_HD void findPixels(const PyramidSlices& chosen, const PixelPlace& place, int given_words, Places& places) const {
-    const int words = kWords < kMostMaskWords ? kWords : given_words, word = place.block / 64, bit = place.block % 64;
-    std::uint64_t before[kWords];  // the blocks before this one
-    for (int w = 0; w < words; ++w) before[w] = w < word ? ~std::uint64_t{0} : w == word ? (std::uint64_t{1} << bit) - 1 : 0;
-    const int shift = pyramid_.precision == BlockPrecision::f16 ? 1 : 2;
-    const auto pixel = static_cast<std::uint64_t>(place.y * kBlockSize + place.x);
-    places.count = chosen.count;
-    for (int k = 0; k < chosen.count; ++k) {
-      const PyramidLevel& level = levelOf(chosen.slices[k]);
-      const std::uint64_t* mask = level.masks.data() + static_cast<std::size_t>(chosen.slices[k].image) * words;
-      std::uint64_t rank = level.first_block.data()[chosen.slices[k].image];
-      for (int w = 0; w < words; ++w) rank += static_cast<std::uint64_t>(setBits(mask[w] & before[w]));
-      const std::uint64_t stored = mask[word] >> bit & 1, offset = (rank * kBlockPixels + pixel) << shift & (0 - stored);
-      // Where nothing is stored the first pixel of the level is read; a level may have none.
-      const void* pixels = level.block_means.empty() ? level.masks.data() : level.pixels;
-      places.pixels[k] = static_cast<const char*>(pixels) + offset;
-      places.weights[k] = static_cast<float>(static_cast<int>(stored)) * chosen.slices[k].weight;
-      prefetch(places.pixels[k]);
-    }
-  }
-
   GLINT_HD float addPixels(const Places& places) const {
-    float sum = 0;
-    for (int k = 0; k < places.count; k += 4) {
-      const float* w = places.weights + k;
-      sum += (fourPixels(places.pixels + k, w) * Float4::of(w[0], w[1], w[2], w[3])).sum();
-    }
-    return pyramid_.value_scale * sum;
+    return pyramid_.precision == BlockPrecision::f16 ? addPixelsOf<std::uint16_t>(places) : addPixelsOf<float>(places);
   }
 
-  GLINT_HD Float4 fourPixels(const void* const* at, const float* weights) const {
-    if (pyramid_.precision == BlockPrecision::f16) {
-      const auto half = [&](int k) { return *static_cast<const std::uint16_t*>(at[k]); };
-      return Float4::ofPositive(half(0), half(1), half(2), half(3));
+  template <class Pixel>
+  GLINT_HD float addPixelsOf(const Places& places) const {
+    Float4 sum = fourPixels<Pixel>(places, 0);
+    if (places.count > 4) sum = sum + fourPixels<Pixel>(places, 4);
+    return pyramid_.value_scale * sum.sum();
+  }
+
+  /// Weighted pixels of the four slices from k on.
+  template <class Pixel>
+  static GLINT_HD Float4 fourPixels(const Places& places, int k) {
+    const auto pixel = [&](int j) { return *static_cast<const Pixel*>(places.pixels[k + j]); };
+    const Float4 weights = Float4::load(places.weights + k);
+    if constexpr (std::is_same_v<Pixel, float>) {
+      // Values of a file are not checked: a slice that does not count must not bring an infinity.
+      return whereLess(Float4::zero(), weights, weights * Float4::of(pixel(0), pixel(1), pixel(2), pixel(3)));
+    } else {
+      return weights * Float4::ofPositive(pixel(0), pixel(1), pixel(2), pixel(3));
     }
-    // Values of a file are not checked: a slice that does not count must not bring an infinity.
-    const auto value = [&](int k) { return weights[k] > 0 ? *static_cast<const float*>(at[k]) : 0.0f; };
-    return Float4::of(value(0), value(1), value(2), value(3));
   }
 
   template <class Pixel>
@@ -245,15 +259,8 @@ class PyramidNdf {
 
   /// Index of a block of an image among the stored blocks of its level, or -1.
   GLINT_HD std::int64_t storedBlock(const PyramidSlice& slice, int block) const {
-    const PyramidLevel& level = pyramid_.levels[slice.level];
-    const int words = shape().maskWords();
-    const std::uint64_t* mask = level.masks.data() + static_cast<std::size_t>(slice.image) * words;
-    const int word = block / 64;
-    const std::uint64_t bit = std::uint64_t{1} << (block % 64);
-    if (!(mask[word] & bit)) return -1;
-    int rank = setBits(mask[word] & (bit - 1));
-    for (int w = 0; w < word; ++w) rank += setBits(mask[w]);
-    return static_cast<std::int64_t>(level.first_block.data()[slice.image]) + rank;
+    const BitRank rank(maskOf(slice)[block / 64], static_cast<unsigned>(block) % 64);
+    return rank.kept ? static_cast<std::int64_t>(ranksOf(slice)[block / 64] + rank.below) : -1;
   }
 
   /// How much of each row and column of a block a box covers.
@@ -315,6 +322,8 @@ class PyramidNdf {
   }
 
   NdfPyramid pyramid_;
+  SliceChooser chooser_;
+  std::size_t mask_words_;
   Reference below_;
 };
 

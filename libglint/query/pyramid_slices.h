@@ -23,18 +23,26 @@ struct PyramidSlice {
 /// k / 4. Weights are >= 0 and sum to 1.
 struct PyramidSlices {
   static constexpr int kMost = 8;
-  PyramidSlice slices[kMost];
-  int count = 0;
+  int levels[2];  ///< of the first four slices and, if there are more, of the others
+  std::uint32_t images[kMost];
+  float weights[kMost];
+  int count = 0;  ///< 4 or 8
+
+  GLINT_HD int level(int k) const { return levels[k / 4]; }
+  GLINT_HD PyramidSlice operator[](int k) const { return {level(k), images[k], weights[k]}; }
 };
 
 /// Variance (texels^2) of the isotropic Gaussian with the same mean square size as a footprint, which is first shortened to the
 /// map along u and v and widened to kMinSigmaTexels; a size that is not finite counts as the smallest.
-inline GLINT_HD float isotropicVariance(const PyramidShape& shape, const Footprint& p) {
+/// @param largest_u, largest_v  squares of the map's width and height
+inline GLINT_HD float isotropicVariance(float largest_u, float largest_v, const Covariance& c) {
   constexpr float kLowest = kMinSigmaTexels * kMinSigmaTexels;
+  if (!std::isfinite(c.xx + c.xy + c.yy)) return kLowest;
+  return std::max(0.5f * (std::min(c.xx, largest_u) + std::min(c.yy, largest_v)), kLowest);
+}
+inline GLINT_HD float isotropicVariance(const PyramidShape& shape, const Footprint& p) {
   const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
-  if (!std::isfinite(p.covariance.xx + p.covariance.xy + p.covariance.yy)) return kLowest;
-  const float variance = 0.5f * (std::min(p.covariance.xx, width * width) + std::min(p.covariance.yy, height * height));
-  return std::max(variance, kLowest);
+  return isotropicVariance(width * width, height * height, p.covariance);
 }
 
 /// Its deviation, texels.
@@ -48,42 +56,6 @@ inline GLINT_HD float finestSigma(const PyramidShape& shape) { return kFootprint
 /// Whether a footprint is narrower than those of level 0.
 inline GLINT_HD bool belowFinest(const PyramidShape& shape, const Footprint& p) {
   return isotropicVariance(shape, p) < finestSigma(shape) * finestSigma(shape);
-}
-
-/// Neighbouring centres, and the position between them. Lanes: along x and y of one level, along x and y of another.
-struct CentreNeighbours {
-  float low[4], high[4], t[4];
-};
-
-/// @param u, v  in [0, 1)
-inline GLINT_HD CentreNeighbours centreNeighbours(const PyramidShape& shape, const PyramidGrid& a, const PyramidGrid& b,
-                                                  float u, float v) {
-  const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
-  const Float4 extent = Float4::of(width, height, width, height), x = Float4::of(u, v, u, v) * extent;
-  const Float4 stride = Float4::of(a.stride, a.stride, b.stride, b.stride);
-  const Float4 count = Float4::of(static_cast<float>(a.columns), static_cast<float>(a.rows), static_cast<float>(b.columns),
-                                  static_cast<float>(b.rows));
-  const Float4 zero = Float4::zero(), half = Float4::all(0.5f), one = Float4::all(1), last = count - one;
-  Float4 low, high, t;
-  if (shape.boundary == Boundary::clamp) {
-    const Float4 at = (x / stride - half).positive(), clamped = whereLess(last, at, last, at);
-    low = floorOf(clamped);
-    high = whereLess(low, last, low + one, last);
-    t = clamped - low;
-  } else {
-    const Float4 unrolled = x + whereLess(x, half * stride, extent, zero);
-    const Float4 at = unrolled / stride - half, below = floorOf(at);
-    // From the last centre round to the first; this gap is shorter when the stride does not divide the map.
-    const Float4 gap = extent - last * stride, round = ((unrolled - (count - half) * stride) / gap).positive();
-    low = whereLess(below, last, below, last);
-    high = whereLess(below, last, below + one, zero);
-    t = whereLess(below, last, at - below, whereLess(one, round, one, round));
-  }
-  CentreNeighbours out;
-  low.store(out.low);
-  high.store(out.high);
-  t.store(out.t);
-  return out;
 }
 
 /// log2 of a positive, finite number, to 2e-7. Plain arithmetic, so that batches and device code choose the same levels to the bit.
@@ -101,33 +73,122 @@ inline GLINT_HD float log2Of(float x) {
   return static_cast<float>(exponent) + kTwoOverLn2 * s * series;
 }
 
-/// Trilinear choice of images: bilinear between centres, linear in log2 of the footprint's size between levels. Footprints
-/// below the finest or above the coarsest level get that level.
-inline GLINT_HD PyramidSlices selectSlices(const PyramidShape& shape, const Footprint& p) {
-  const float finest = finestSigma(shape);
-  const float octave = 0.5f * log2Of(isotropicVariance(shape, p) / (finest * finest));
-  const float level = std::clamp(octave, 0.0f, static_cast<float>(shape.level_count - 1));
-  const int first = std::min(static_cast<int>(level), shape.level_count - 1);
-  const float t = level - static_cast<float>(first);
-  const float u = wrapUnit(p.centre.x), v = wrapUnit(p.centre.y);
-  const PyramidGrid& finer = shape.levels[first];
-  const PyramidGrid& coarser = shape.levels[std::min(first + 1, shape.level_count - 1)];
-  const CentreNeighbours at = centreNeighbours(shape, finer, coarser, u, v);
-  PyramidSlices out;
-  const int steps = t > 0 ? 2 : 1;
-  for (int step = 0; step < steps; ++step) {
-    const float level_weight = step == 0 ? 1 - t : t, tx = at.t[2 * step], ty = at.t[2 * step + 1];
-    const std::int32_t columns = step == 0 ? finer.columns : coarser.columns;
-    for (int k = 0; k < 4; ++k) {
-      const auto column = static_cast<std::int32_t>(k & 1 ? at.high[2 * step] : at.low[2 * step]);
-      const auto row = static_cast<std::int32_t>(k & 2 ? at.high[2 * step + 1] : at.low[2 * step + 1]);
-      out.slices[4 * step + k] = {first + step, static_cast<std::uint32_t>(row * columns + column),
-                                  level_weight * (k & 1 ? tx : 1 - tx) * (k & 2 ? ty : 1 - ty)};
-    }
-  }
-  out.count = 4 * steps;
-  return out;
+/// A level between those of a pyramid.
+struct LevelPlace {
+  int first;  ///< the finer of its neighbours
+  float t;    ///< 0 to 1: how far it is to the next; 0 at the last
+};
+
+/// @param ratio  variance over that of level 0, from 1 to 4^15: a level is where it is 4^level
+inline GLINT_HD LevelPlace levelPlace(float ratio) {
+  constexpr std::uint32_t kOne = 0x3f800000u;
+  constexpr int kPowerOf4 = 24;  // the exponent less its lowest bit
+  std::uint32_t bits;
+  std::memcpy(&bits, &ratio, sizeof bits);
+  // The level is known without waiting for the logarithm.
+  const std::uint32_t first = (bits - kOne) >> kPowerOf4;
+  bits -= first << kPowerOf4;
+  float rest;  // [1, 4)
+  std::memcpy(&rest, &bits, sizeof rest);
+  const float t = 0.5f * log2Of(rest);
+  return {static_cast<int>(first), t < 1 ? t : 1.0f};
 }
+
+/// Chooses the images of footprints. Holds what follows from the shape, so that a query divides by nothing.
+class SliceChooser {
+ public:
+  /// The centres of one level along x and y, in strides.
+  struct LevelCentres {
+    float extent[2];   ///< of the map
+    float last[2];     ///< last column and row
+    float per_gap[2];  ///< 1 / (gap from the last centre round to the first): not 1 when the stride does not divide the map
+    std::int32_t columns, unused;
+  };
+
+  GLINT_HD explicit SliceChooser(const PyramidShape& shape) {
+    const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
+    largest_u_ = width * width;
+    largest_v_ = height * height;
+    per_finest_variance_ = 1 / (finestSigma(shape) * finestSigma(shape));
+    largest_ratio_ = 1;
+    for (int l = 1; l < shape.level_count; ++l) largest_ratio_ *= 4;
+    wraps_ = shape.boundary == Boundary::wrap;
+    for (int l = 0; l < shape.level_count; ++l) {
+      const PyramidGrid& grid = shape.levels[l];
+      const auto last_column = static_cast<float>(grid.columns - 1), last_row = static_cast<float>(grid.rows - 1);
+      const float across = width / grid.stride, up = height / grid.stride;
+      levels_[l] = {{across, up}, {last_column, last_row}, {1 / (across - last_column), 1 / (up - last_row)}, grid.columns, 0};
+    }
+    levels_[shape.level_count] = levels_[shape.level_count - 1];  // with weight 0
+  }
+
+  /// Trilinear choice of images: bilinear between centres, linear in log2 of the footprint's size between levels. Footprints
+  /// below the finest or above the coarsest level get that level.
+  GLINT_HD PyramidSlices choose(const Footprint& p) const {
+    const LevelPlace level = levelPlace(sizeRatio(isotropicVariance(largest_u_, largest_v_, p.covariance)));
+    const LevelCentres &finer = levels_[level.first], &coarser = levels_[level.first + 1];
+    const Neighbours at = neighbours(finer, coarser, p.centre);
+    PyramidSlices out;
+    out.levels[0] = level.first;
+    out.levels[1] = level.first + 1;
+    setCorners(interleaveLow(at.low, at.high), interleaveLow(at.rest, at.t), finer.columns, 1 - level.t, out.images,
+               out.weights);
+    setCorners(interleaveHigh(at.low, at.high), interleaveHigh(at.rest, at.t), coarser.columns, level.t, out.images + 4,
+               out.weights + 4);
+    out.count = level.t > 0 ? 8 : 4;
+    return out;
+  }
+
+  // What batches choose by, in vectors.
+  /// For levelPlace.
+  GLINT_HD float sizeRatio(float variance) const {
+    const float ratio = variance * per_finest_variance_, coarse = ratio > 1 ? ratio : 1;
+    return coarse < largest_ratio_ ? coarse : largest_ratio_;
+  }
+  /// @param level  up to the one behind the last
+  GLINT_HD const LevelCentres& centres(int level) const { return levels_[level]; }
+
+ private:
+  /// Neighbouring centres, and the position between them: 0 to 1, and what is left to 1. Lanes: x and y of a level, x and y of another.
+  struct Neighbours {
+    Float4 low, high, t, rest;
+  };
+
+  GLINT_HD Neighbours neighbours(const LevelCentres& a, const LevelCentres& b, Vec2 centre) const {
+    const Float4 zero = Float4::zero(), one = Float4::all(1), below_one = Float4::all(0x1.fffffep-1f);
+    // In [0, 1), and 0 if it is not finite.
+    const Float4 uv = Float4::of(centre.x, centre.y, centre.x, centre.y);
+    const Float4 wrapped = minOf((uv - floorOf(uv)).positive(), below_one);
+    const Float4 extent = Float4::ofPairs(a.extent, b.extent), last = Float4::ofPairs(a.last, b.last);
+    const Float4 at = wrapped * extent - Float4::all(0.5f);
+    Float4 low, high, t;
+    if (wraps_) {
+      const Float4 unrolled = at + whereLess(at, zero, extent);
+      low = minOf(floorOf(unrolled), last);
+      high = whereLess(low, last, low + one);
+      t = minOf((unrolled - low) * whereLess(low, last, one, Float4::ofPairs(a.per_gap, b.per_gap)), one);
+    } else {
+      const Float4 clamped = minOf(at.positive(), last);
+      low = floorOf(clamped);
+      high = minOf(low + one, last);
+      t = clamped - low;
+    }
+    return {low, high, t, one - t};
+  }
+
+  /// Images and weights of the corners of one level. Lanes of places and weights: low and high along x, low and high along y.
+  static GLINT_HD void setCorners(Float4 places, Float4 parts, std::int32_t columns, float level_weight, std::uint32_t* images,
+                                  float* weights) {
+    storeIndices(places.lanes2233(), columns, places.lanes0101(), images);
+    (Float4::all(level_weight) * parts.lanes0101() * parts.lanes2233()).store(weights);
+  }
+
+  float largest_u_, largest_v_;  // texels^2
+  float per_finest_variance_;
+  float largest_ratio_;  // of variances, that of the last level
+  bool wraps_;
+  LevelCentres levels_[kMaxPyramidLevels + 1];
+};
 
 /// A box of pixels within one angular block: [x0, x1] x [y0, y1] in [0, 16]^2.
 struct BlockBox {
@@ -142,7 +203,9 @@ inline GLINT_HD PixelPlace pixelPlace(const PyramidShape& shape, Vec2 h) {
   const float half = 0.5f * static_cast<float>(shape.resolution);
   const int x = std::min(static_cast<int>((h.x + 1) * half), shape.resolution - 1);
   const int y = std::min(static_cast<int>((h.y + 1) * half), shape.resolution - 1);
-  return {y / kBlockSize * shape.blocksPerAxis() + x / kBlockSize, x % kBlockSize, y % kBlockSize};
+  // Shifts, since neither is negative.
+  static_assert(kBlockSize == 16);
+  return {(y >> 4) * (shape.resolution >> 4) + (x >> 4), x & 15, y & 15};
 }
 
 inline GLINT_HD bool insideSquare(Vec2 h) { return std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1; }

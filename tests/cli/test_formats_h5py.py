@@ -33,7 +33,8 @@ def pyramid_image(file, level, i, j):
     per_axis = resolution // 16
     group = file[f"level_{level:02d}"]
     occupied = bits(group["masks"][j, i])
-    first = int(group["first_block"][j * file.attrs["level_columns"][level] + i])
+    words = group["masks"].shape[2]
+    first = int(group["mask_ranks"][(j * file.attrs["level_columns"][level] + i) * words])
     image = np.zeros((resolution, resolution))
     for b in range(per_axis**2):
         if occupied[b]:

@@ -505,7 +505,7 @@ SamplePyramid samplePyramid(int size, BlockPrecision precision) {
   for (int l = 0; l < pyramid.shape.level_count; ++l) {
     SamplePyramid::Level& level = sample.levels[static_cast<std::size_t>(l)];
     for (const Image& image : levelImages(normals.map, pyramid.shape.levels[l])) {
-      level.first_block.push_back(level.block_means.size());
+      level.mask_ranks.push_back(static_cast<std::uint32_t>(level.block_means.size()));  // one word: at most 64 blocks
       level.masks.push_back(0);
       for (int block = 0; block < pyramid.shape.blocksPerImage(); ++block) {
         const double mean = blockMean(image, block);
@@ -519,9 +519,9 @@ SamplePyramid samplePyramid(int size, BlockPrecision precision) {
         }
       }
     }
-    level.first_block.push_back(level.block_means.size());
+    level.mask_ranks.push_back(static_cast<std::uint32_t>(level.block_means.size()));
     const void* pixels = precision == BlockPrecision::f16 ? static_cast<const void*>(level.halves.data()) : level.floats.data();
-    pyramid.levels[l] = {level.masks, level.first_block, level.block_means, pixels};
+    pyramid.levels[l] = {level.masks, level.mask_ranks, level.block_means, pixels};
   }
   return sample;
 }
@@ -810,7 +810,8 @@ float pyramidPixel(const NdfPyramid& pyramid, int level, int image, int x, int y
   const std::uint64_t* mask =
       &data.masks[static_cast<std::size_t>(image) * static_cast<std::size_t>(pyramid.shape.maskWords())];
   if ((mask[block / 64] >> (block % 64) & 1u) == 0) return 0;
-  std::uint64_t index = data.first_block[static_cast<std::size_t>(image)];
+  std::uint64_t index =
+      data.mask_ranks[static_cast<std::size_t>(image) * static_cast<std::size_t>(pyramid.shape.maskWords())];
   for (int b = 0; b < block; ++b) index += mask[b / 64] >> (b % 64) & 1u;
   index = index * kBlockPixels + static_cast<std::uint64_t>(y % kBlockSize * kBlockSize + x % kBlockSize);
   const float stored = pyramid.precision == BlockPrecision::f16

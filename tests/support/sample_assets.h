@@ -40,7 +40,7 @@ struct SampleDisplacement {
 struct SamplePyramid {
   struct Level {
     std::vector<std::uint64_t> masks;
-    std::vector<std::uint64_t> first_block;
+    std::vector<std::uint32_t> mask_ranks;
     std::vector<float> block_means;
     std::vector<std::uint16_t> halves;
     std::vector<float> floats;

@@ -16,7 +16,7 @@ namespace glint::test {
 struct TestPyramid {
   PyramidShape shape;
   std::vector<std::uint64_t> masks[kMaxPyramidLevels];
-  std::vector<std::uint64_t> first_block[kMaxPyramidLevels];
+  std::vector<std::uint32_t> mask_ranks[kMaxPyramidLevels];
   std::vector<float> block_means[kMaxPyramidLevels];
   std::vector<float> pixels[kMaxPyramidLevels];
   float value_scale = 1;
@@ -26,14 +26,14 @@ struct TestPyramid {
     p.shape = shape;
     p.precision = BlockPrecision::f32;
     p.value_scale = value_scale;
-    for (int l = 0; l < shape.level_count; ++l) p.levels[l] = {masks[l], first_block[l], block_means[l], pixels[l].data()};
+    for (int l = 0; l < shape.level_count; ++l) p.levels[l] = {masks[l], mask_ranks[l], block_means[l], pixels[l].data()};
     return p;
   }
 
   /// Appends an image to a level: dense [resolution][resolution]; blocks of zeros are not stored.
   void addImage(int level, const std::vector<float>& image) {
     const int blocks = shape.blocksPerAxis();
-    if (first_block[level].empty()) first_block[level].push_back(0);
+    if (mask_ranks[level].empty()) mask_ranks[level].push_back(0);
     std::vector<std::uint64_t> mask(shape.maskWords(), 0);
     for (int b = 0; b < blocks * blocks; ++b) {
       float block[kBlockPixels];
@@ -50,7 +50,8 @@ struct TestPyramid {
       block_means[level].push_back(static_cast<float>(sum / kBlockPixels));
     }
     masks[level].insert(masks[level].end(), mask.begin(), mask.end());
-    first_block[level].push_back(block_means[level].size());
+    for (const std::uint64_t word : mask)
+      mask_ranks[level].push_back(mask_ranks[level].back() + static_cast<std::uint32_t>(std::popcount(word)));
   }
 };
 

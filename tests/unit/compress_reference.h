@@ -111,7 +111,7 @@ inline std::vector<double> storedImage(const NdfPyramid& p, int level, std::size
   const int blocks = p.shape.blocksPerAxis();
   const PyramidLevel& l = p.levels[level];
   std::vector<double> pixels(static_cast<std::size_t>(n) * n, 0.0);
-  std::uint64_t block = l.first_block[image];
+  std::uint64_t block = l.mask_ranks[image * p.shape.maskWords()];
   for (int b = 0; b < blocks * blocks; ++b) {
     if (!(l.masks[image * p.shape.maskWords() + b / 64] >> (b % 64) & 1)) continue;
     const float* source = static_cast<const float*>(l.pixels) + block++ * kBlockPixels;

@@ -411,7 +411,7 @@ TEST(Compress, RefusesPyramidsThatContradictThemselves) {
     return false;
   };
   EXPECT_TRUE(refuses([](auto& p) { p.masks[1].pop_back(); }));
-  EXPECT_TRUE(refuses([](auto& p) { p.first_block[0].pop_back(); }));
+  EXPECT_TRUE(refuses([](auto& p) { p.mask_ranks[0].pop_back(); }));
   EXPECT_TRUE(refuses([](auto& p) { p.masks[0][3] ^= 1; }));
   EXPECT_TRUE(refuses([](auto& p) { p.pixels[0][77] = std::nanf(""); }));
   EXPECT_TRUE(refuses([](auto& p) { p.pixels[0][77] = std::numeric_limits<float>::infinity(); }));

@@ -164,7 +164,7 @@ TEST(AssetRoundTrip, PyramidsComeBackBitExact) {
     for (int l = 0; l < pyramid.shape.level_count; ++l) {
       const PyramidLevel& wanted = sample.pyramid.levels[l];
       expectSame(pyramid.levels[l].masks, wanted.masks);
-      expectSame(pyramid.levels[l].first_block, wanted.first_block);
+      expectSame(pyramid.levels[l].mask_ranks, wanted.mask_ranks);
       expectSame(pyramid.levels[l].block_means, wanted.block_means);
       const std::size_t bytes = wanted.block_means.size() * kBlockPixels * (precision == BlockPrecision::f16 ? 2 : 4);
       expectSameBytes(pyramid.levels[l].pixels, wanted.pixels, bytes);
@@ -376,15 +376,15 @@ std::size_t fileCount(const fs::path& folder) {
 TEST(AssetWriter, InvalidStructsLeaveNoFile) {
   const TempFolder folder;
   auto sample = test::samplePyramid(32, BlockPrecision::f16);
-  sample.levels[0].first_block[3] += 1;
+  sample.levels[0].mask_ranks[3] += 1;
   try {
     writeAsset(folder / "a.glint", sample.pyramid, {});
     FAIL();
   } catch (const Error& error) {
-    EXPECT_EQ(error.rule(), "pyramid.first_block");
+    EXPECT_EQ(error.rule(), "pyramid.mask_ranks");
     EXPECT_EQ(error.path(), (folder / "a.glint").string());
   }
-  sample.levels[0].first_block[3] -= 1;
+  sample.levels[0].mask_ranks[3] -= 1;
   sample.pyramid.levels[1].block_means = sample.pyramid.levels[1].block_means.first(3);
   EXPECT_THROW(writeAsset(folder / "a.glint", sample.pyramid, {}), Error);
   auto map = test::sampleHeights(4, 4);

@@ -421,13 +421,13 @@ std::vector<Fixture> pyramidFixtures() {
           "pyramid.masks", Base::pyramid,
           [](const Patch& patch) { patch.change<std::uint64_t>("level_00/masks", 2, [](auto& mask) { mask |= 1ull << 16; }); }),
       patched(
-          "pyramid.first_block", Base::pyramid,
-          [](const Patch& patch) { patch.change<std::uint64_t>("level_00/first_block", 2, [](auto& first) { first += 1; }); }),
-      patched("pyramid.first_block", Base::pyramid,
+          "pyramid.mask_ranks", Base::pyramid,
+          [](const Patch& patch) { patch.change<std::uint32_t>("level_00/mask_ranks", 2, [](auto& first) { first += 1; }); }),
+      patched("pyramid.mask_ranks", Base::pyramid,
               [](const Patch& patch) {
-                patch.change<std::uint64_t>("level_02/first_block", 1, [](auto& first) { first = ~0ull; });
+                patch.change<std::uint32_t>("level_02/mask_ranks", 1, [](auto& first) { first = ~0u; });
               }),
-      patched("pyramid.first_block", Base::pyramid,
+      patched("pyramid.mask_ranks", Base::pyramid,
               [](const Patch& patch) { patch.change<std::uint64_t>("level_01/masks", 1, [](auto& mask) { mask ^= 1; }); }),
   };
 }

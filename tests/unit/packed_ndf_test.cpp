@@ -136,7 +136,7 @@ TEST(PackedNdf, LayoutIsAsDocumented) {
   };
   for (int l = 0; l < header.level_count; ++l) {
     follows(header.arrays[4 * l], 8);
-    follows(header.arrays[4 * l + 1], 8);
+    follows(header.arrays[4 * l + 1], 4);
     follows(header.arrays[4 * l + 2], 4);
     follows(header.arrays[4 * l + 3], 2);
   }

@@ -60,7 +60,7 @@ std::vector<float> storedImage(const NdfPyramid& pyramid, int level, int i, int 
   const PyramidLevel& data = pyramid.levels[level];
   const std::size_t image = static_cast<std::size_t>(j) * shape.levels[level].columns + i;
   std::vector<float> pixels(static_cast<std::size_t>(shape.resolution) * shape.resolution, 0.0f);
-  std::size_t stored = data.first_block[image];
+  std::size_t stored = data.mask_ranks[image * shape.maskWords()];
   for (int b = 0; b < shape.blocksPerImage(); ++b) {
     if (!(data.masks[image * shape.maskWords() + b / 64] >> (b % 64) & 1)) continue;
     for (int k = 0; k < kBlockPixels; ++k) {
@@ -74,7 +74,7 @@ std::vector<float> storedImage(const NdfPyramid& pyramid, int level, int i, int 
     }
     ++stored;
   }
-  EXPECT_EQ(stored, data.first_block[image + 1]);
+  EXPECT_EQ(stored, data.mask_ranks[(image + 1) * shape.maskWords()]);
   return pixels;
 }
 
@@ -145,8 +145,8 @@ TEST(Pyramid, BlockMeansAreTheMeansOfStoredPixelsAndEmptyBlocksAreLeftOut) {
     forEachImage(data.shape, [&](int l, int i, int j) {
       const auto image = storedImage(pyramid, l, i, j);
       const std::size_t index = static_cast<std::size_t>(j) * data.shape.levels[l].columns + i;
-      std::size_t stored = data.levels[l].first_block[index];
-      blocks += data.levels[l].first_block[index + 1] - stored;
+      std::size_t stored = data.levels[l].mask_ranks[index * data.shape.maskWords()];
+      blocks += data.levels[l].mask_ranks[(index + 1) * data.shape.maskWords()] - stored;
       ++images;
       for (int b = 0; b < data.shape.blocksPerImage(); ++b) {
         if (!(data.levels[l].masks[index * data.shape.maskWords() + b / 64] >> (b % 64) & 1)) continue;
@@ -378,7 +378,7 @@ TEST(Pyramid, DoesNotDependOnTheNumberOfThreads) {
         const NdfPyramidData two = build(2);
         for (int l = 0; l < one.shape.level_count; ++l) {
           EXPECT_EQ(one.levels[l].masks, two.levels[l].masks);
-          EXPECT_EQ(one.levels[l].first_block, two.levels[l].first_block);
+          EXPECT_EQ(one.levels[l].mask_ranks, two.levels[l].mask_ranks);
           EXPECT_EQ(one.levels[l].half_pixels, two.levels[l].half_pixels);
           const auto same = [](const std::vector<float>& a, const std::vector<float>& b) {
             return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;

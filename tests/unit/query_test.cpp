@@ -277,9 +277,9 @@ TEST(CpNdf, MeanOverTheWholeSquareIsAQuarter) {
 /// Weight of every image, as a sparse vector.
 std::map<std::pair<int, std::uint32_t>, double> weightsOf(const PyramidShape& shape, const Footprint& p) {
   std::map<std::pair<int, std::uint32_t>, double> weights;
-  const PyramidSlices chosen = selectSlices(shape, p);
+  const PyramidSlices chosen = SliceChooser(shape).choose(p);
   for (int k = 0; k < chosen.count; ++k) {
-    const PyramidSlice& s = chosen.slices[k];
+    const PyramidSlice s = chosen[k];
     EXPECT_GE(s.weight, 0);
     EXPECT_LT(s.level, shape.level_count);
     EXPECT_LT(s.image, shape.levels[s.level].imageCount());
