@@ -19,8 +19,8 @@ struct PyramidSlice {
   float weight;
 };
 
-/// The images that answer a footprint: four neighbours in one level or in each of two: corner k % 4 (x in bit 0, y in bit 1) of step
-/// k / 4. Weights are >= 0 and sum to 1.
+/// The images that answer a footprint: four neighbours in one level or in each of two: corner k % 4 (x in bit 0, y in bit 1) of
+/// step k / 4. Weights are >= 0 and sum to 1.
 struct PyramidSlices {
   static constexpr int kMost = 8;
   int levels[2];  ///< of the first four slices and, if there are more, of the others
@@ -58,7 +58,8 @@ inline GLINT_HD bool belowFinest(const PyramidShape& shape, const Footprint& p) 
   return isotropicVariance(shape, p) < finestSigma(shape) * finestSigma(shape);
 }
 
-/// log2 of a positive, finite number, to 2e-7. Plain arithmetic, so that batches and device code choose the same levels to the bit.
+/// log2 of a positive, finite number, to 2e-7. Plain arithmetic, so that batches and device code choose the same levels to the
+/// bit.
 inline GLINT_HD float log2Of(float x) {
   constexpr std::uint32_t kSqrtHalf = 0x3f3504f3u;
   std::uint32_t bits;
@@ -149,7 +150,8 @@ class SliceChooser {
   GLINT_HD const LevelCentres& centres(int level) const { return levels_[level]; }
 
  private:
-  /// Neighbouring centres, and the position between them: 0 to 1, and what is left to 1. Lanes: x and y of a level, x and y of another.
+  /// Neighbouring centres, and the position between them: 0 to 1, and what is left to 1. Lanes: x and y of a level, x and y of
+  /// another.
   struct Neighbours {
     Float4 low, high, t, rest;
   };
