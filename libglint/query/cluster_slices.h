@@ -125,10 +125,79 @@ class ClusterReader {
     return sum.sum();
   }
 
+  /// scaled = coefficients of a slice times the scales of their columns, in the order of columns.
+  GLINT_HD void scaledCoefficients(const NdfCluster& cluster, Row c, float* scaled) const {
+    const float* scales = ndf_.scales.data() + cluster.first_scale;
+    const ColumnLayout layout(cluster);
+    int k = 0;
+    for (; k + 4 <= layout.wide; k += 4) (Float4::load(scales + k) * Float4::load(c + k)).store(scaled + k);
+    for (; k < layout.wide; ++k) scaled[k] = scales[k] * value(c[k]);
+    if constexpr (std::is_same_v<Coefficient, std::int8_t>) {
+      const Row bytes = c + layout.wide;
+      const int high = layout.wide + layout.half, high_columns = layout.columns - high;
+      int j = 0;
+      for (; j + 4 <= high_columns; j += 4) {
+        (Float4::load(scales + layout.wide + j) * Float4::loadLow(bytes + j)).store(scaled + layout.wide + j);
+        (Float4::load(scales + high + j) * Float4::loadHigh(bytes + j)).store(scaled + high + j);
+      }
+      for (; j < layout.half; ++j) {
+        scaled[layout.wide + j] = scales[layout.wide + j] * static_cast<float>(lowHalf(bytes[j]));
+        if (j < high_columns) scaled[high + j] = scales[high + j] * static_cast<float>(highHalf(bytes[j]));
+      }
+    }
+  }
+
+  /// Sums of the rows of a slice, negative pixels included: O(16 rank) for cp and tucker, O(16 columns) for pca.
+  /// @param scaled  its scaledCoefficients
+  GLINT_HD Float16 rowSums(const NdfCluster& cluster, const float* scaled) const {
+    constexpr int kLast = kBlockSize - 1;
+    const Basis* basis = first(cluster);
+    const int columns = cluster.columns;
+    if (ndf_.method == CompressionMethod::pca)
+      return weighPrefixes(basis + kLast * columns, kBlockSize * columns, columns, scaled).differences();
+    float weights[kMaxColumns];
+    if (ndf_.method == CompressionMethod::cp) {
+      const Basis* along_x = basis + kLast * columns;
+      for (int k = 0; k < columns; ++k) weights[k] = scaled[k] * static_cast<float>(along_x[k]);
+      return weighPrefixes(basis + kBlockSize * columns, columns, columns, weights).differences();
+    }
+    const int rx = cluster.rank_x, ry = cluster.rank_y;
+    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
+    float along_x[kBlockSize];
+    axisColumns(basis + kLast * rx, rx, false, along_x);
+    std::fill(weights, weights + kBlockSize, 0.0f);
+    for (int k = 0; k < columns; ++k) weights[core[k] / kBlockSize] += scaled[k] * along_x[core[k] % kBlockSize];
+    return weighPrefixes(basis + kBlockSize * rx, ry, ry, weights).differences();
+  }
+
+  /// Row y of a slice, negative pixels taken as 0. The cost is that of rowSums.
+  /// @param scaled  its scaledCoefficients
+  GLINT_HD Float16 rowPixels(const NdfCluster& cluster, const float* scaled, int y) const {
+    const Basis* basis = first(cluster);
+    const int columns = cluster.columns;
+    if (ndf_.method == CompressionMethod::pca) {
+      const Basis* row = basis + y * kBlockSize * columns;
+      Float16 sums = weighPrefixes(row, columns, columns, scaled);
+      if (y > 0) sums = sums - weighPrefixes(row - kBlockSize * columns, columns, columns, scaled);
+      return sums.differences().positive();
+    }
+    float weights[kMaxColumns];
+    if (ndf_.method == CompressionMethod::cp) {
+      axisColumns(basis + (kBlockSize + y) * columns, columns, y > 0, weights);
+      for (int k = 0; k < columns; ++k) weights[k] *= scaled[k];
+      return weighPrefixes(basis, columns, columns, weights).differences().positive();
+    }
+    const int rx = cluster.rank_x, ry = cluster.rank_y;
+    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
+    float along_y[kBlockSize];
+    axisColumns(basis + kBlockSize * rx + y * ry, ry, y > 0, along_y);
+    std::fill(weights, weights + kBlockSize, 0.0f);
+    for (int k = 0; k < columns; ++k) weights[core[k] % kBlockSize] += scaled[k] * along_y[core[k] / kBlockSize];
+    return weighPrefixes(basis, rx, rx, weights).differences().positive();
+  }
+
   /// All pixels of a slice, [16][16], negative ones taken as 0.
-  GLINT_HD void block(const NdfCluster& cluster, Row c, float* pixels) const {
-    float scaled[kMaxColumns];
-    scaledCoefficients(cluster, c, scaled);
+  GLINT_HD void block(const NdfCluster& cluster, const float* scaled, float* pixels) const {
     if (ndf_.method == CompressionMethod::pca) return sumImages(cluster, scaled, pixels);
     const bool cp = ndf_.method == CompressionMethod::cp;
     const int rx = cp ? cluster.columns : cluster.rank_x, ry = cp ? rx : cluster.rank_y;
@@ -181,18 +250,6 @@ class ClusterReader {
     for (int k = layout.wide; k < layout.low; ++k) projection[k] = 0;
     for (int k = low_end; k < layout.high; ++k) projection[k] = 0;
     for (int k = high_end; k < layout.high + ((layout.half + 3) & ~3); ++k) projection[k] = 0;
-  }
-
-  GLINT_HD void scaledCoefficients(const NdfCluster& cluster, Row c, float* scaled) const {
-    const float* scales = ndf_.scales.data() + cluster.first_scale;
-    const ColumnLayout layout(cluster);
-    for (int k = 0; k < layout.wide; ++k) scaled[k] = scales[k] * value(c[k]);
-    if constexpr (std::is_same_v<Coefficient, std::int8_t>) {
-      for (int k = layout.wide; k < layout.columns; ++k) {
-        const int j = k - layout.wide;
-        scaled[k] = scales[k] * static_cast<float>(j < layout.half ? lowHalf(c[k]) : highHalf(c[k - layout.half]));
-      }
-    }
   }
 
   static GLINT_HD float value(Coefficient c) {
@@ -276,35 +333,47 @@ class ClusterReader {
     return Float4::load(last);
   }
 
+  /// Lane t: sum over k of weights[k] * prefix[t * stride + k].
+  static GLINT_HD Float16 weighPrefixes(const Basis* prefix, int stride, int columns, const float* weights) {
+    Float16 sums;
+    if (columns < 4) {  // reads what is around a row, but nothing around the block
+      float w[3] = {};
+      for (int k = 0; k < columns; ++k) w[k] = weights[k];
+      const Float4 head = Float4::of(w[0], w[1], w[2], 0);
+      const Float4 tail = columns == 1   ? Float4::of(0, 0, 0, w[0])
+                          : columns == 2 ? Float4::of(0, 0, w[0], w[1])
+                                         : Float4::of(0, w[0], w[1], w[2]);
+      for (int k = 0; k < 3; ++k) sums.v[k] = fourRows(prefix + 4 * k * stride, stride, head);
+      sums.v[3] = fourRows(prefix + 12 * stride + columns - 4, stride, tail);
+      return sums;
+    }
+    const Float4 last = lastColumns(weights, columns);
+    for (int k = 0; k < 4; ++k) sums.v[k] = fourRows(prefix + 4 * k * stride, stride, columns, weights, last);
+    return sums;
+  }
+  static GLINT_HD Float4 fourRows(const Basis* prefix, int stride, Float4 w) {
+    return sumsOf(w * Float4::load(prefix), w * Float4::load(prefix + stride), w * Float4::load(prefix + 2 * stride),
+                  w * Float4::load(prefix + 3 * stride));
+  }
+  static GLINT_HD Float4 fourRows(const Basis* prefix, int stride, int columns, const float* weights, Float4 last) {
+    Float4 sums[4];
+    for (int j = 0; j < 4; ++j) sums[j] = last * Float4::load(prefix + j * stride + columns - 4);
+    for (int k = 0; k + 4 <= columns; k += 4) {
+      const Float4 w = Float4::load(weights + k);
+      for (int j = 0; j < 4; ++j) sums[j] = sums[j] + w * Float4::load(prefix + j * stride + k);
+    }
+    return sumsOf(sums[0], sums[1], sums[2], sums[3]);
+  }
+
   /// pca: sums the prefix sums of all columns first, and takes differences once.
   GLINT_HD void sumImages(const NdfCluster& cluster, const float* scaled, float* pixels) const {
     const int columns = cluster.columns;
     const Basis* at = first(cluster);
-    const Float4 last = lastColumns(scaled, columns);
-    float above[kBlockSize + 1] = {}, here[kBlockSize + 1] = {};
-    for (int y = 0; y < kBlockSize; ++y) {
-      for (int x = 0; x < kBlockSize; x += 4, at += 4 * columns) {
-        if (columns < 4) {
-          for (int j = 0; j < 4; ++j) {
-            here[1 + x + j] = 0;
-            for (int k = 0; k < columns; ++k) here[1 + x + j] += scaled[k] * static_cast<float>(at[j * columns + k]);
-          }
-          continue;
-        }
-        Float4 sums[4];
-        for (int j = 0; j < 4; ++j) sums[j] = last * Float4::load(at + j * columns + columns - 4);
-        for (int k = 0; k + 4 <= columns; k += 4) {
-          const Float4 w = Float4::load(scaled + k);
-          for (int j = 0; j < 4; ++j) sums[j] = sums[j] + w * Float4::load(at + j * columns + k);
-        }
-        sumsOf(sums[0], sums[1], sums[2], sums[3]).store(here + 1 + x);
-      }
-      for (int x = 0; x < kBlockSize; x += 4) {
-        const Float4 outer = Float4::load(here + x + 1) - Float4::load(here + x);
-        const Float4 inner = Float4::load(above + x + 1) - Float4::load(above + x);
-        (outer - inner).positive().store(pixels + y * kBlockSize + x);
-      }
-      for (int x = 1; x <= kBlockSize; ++x) above[x] = here[x];
+    Float16 above = {{Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()}};
+    for (int y = 0; y < kBlockSize; ++y, at += kBlockSize * columns) {
+      const Float16 here = weighPrefixes(at, columns, columns, scaled).differences();
+      (here - above).positive().store(pixels + y * kBlockSize);
+      above = here;
     }
   }
 

@@ -21,7 +21,7 @@ namespace glint {
 /// result is clamped: it is the exact average of `signedDensity`, and of `density` where nothing is negative.
 /// Thread-safe, allocates nothing; the arrays must outlive it.
 class CpNdf {
-  static constexpr int kMaxBlocksPerAxis = 64;  // of 1024 pixels, the largest image
+  static constexpr int kMostBlocks = 64 * 64;  // of 1024^2 pixels, the largest image
 
  public:
   GLINT_HD explicit CpNdf(const CompressedNdf& ndf) : ndf_(ndf) {}
@@ -46,8 +46,8 @@ class CpNdf {
   /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly inside, as
   /// the density is constant there: exactly in proportion to the density, which is the pdf.
   ///
-  /// Stored masses are rounded up by at most a sixteenth; a block is kept with the ratio of the mass that its pixels have to the
-  /// stored one, else another is drawn from the digits of `xi` that are left (one in forty on average). O(columns * 256).
+  /// Stored masses are rounded up by at most a sixteenth: with the difference's share another block is drawn, from the digits of `xi`
+  /// that are left (one in forty on average). O(16 columns), and O(256 columns) with that share and the one of negative pixels.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const;
 
   /// Average over a box of half vectors, >= 0, 0 if the box is empty; O(columns) for each block that the box covers.
@@ -173,76 +173,104 @@ class CpNdf {
     return sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<const Reader&>{reader, place}, Positive{});
   }
 
-  /// All pixels of a slice, [16][16], >= 0.
-  template <class Reader>
-  GLINT_HD void decodeBlock(const Reader& reader, const SlicePlace& at, float* pixels) const {
-    const NdfCluster& cluster = ndf_.clusters.data()[at.cluster];
-    if (cluster.columns == 0)
-      spotsOfBlock(SpotProfile(ndf_), spotsOf(ndf_, cluster, at.slice), pixels);
-    else
-      reader.block(cluster, reader.row(cluster, at.slice), pixels);
+  /// A block of an image that has a slice.
+  struct StoredBlock {
+    int block = -1;  ///< -1: nothing to choose
+    int place = 0;
+    float mass = 0;  ///< at least its share of the image
+  };
+
+  /// Chooses a block with a slice in proportion to its stored mass, with xi.y.
+  GLINT_HD StoredBlock chooseStored(std::size_t image, Vec2& xi) const {
+    const std::uint32_t* first = ndf_.first_block.data() + image;
+    const std::uint8_t* codes = ndf_.block_masses.data() + first[0];
+    const int count = static_cast<int>(first[1] - first[0]);
+    const std::size_t readable = ndf_.block_masses.size() - first[0];
+    const int rank = chooseOfMany<kMostBlocks>(
+        count, [&](int k) { return loadMasses(codes + k, count - k, readable - static_cast<std::size_t>(k)); }, xi.y);
+    if (rank < 0) return {};
+    const int place = placeOfRank(ndf_.block_masks.data() + image * static_cast<std::size_t>(ndf_.placeWords()), rank);
+    return {ndf_.place_blocks.data()[place], place, blockMass(codes[rank])};
   }
 
-  /// Chooses a block with a slice in proportion to its stored mass: its row with xi.y, its column with xi.x.
-  /// @param codes  masses of the blocks of the image
-  /// @return block -1 if the image has none
-  GLINT_HD BlockChoice chooseStored(std::size_t image, const std::uint8_t* codes, int count, Vec2& xi) const {
-    const int blocks = shape().blocksPerAxis();
-    const std::uint64_t* mask = ndf_.block_masks.data() + image * static_cast<std::size_t>(ndf_.placeWords());
-    const auto mass = [&](int begin, int end) {
-      std::uint32_t units = 0;
-      for (int k = begin; k < end; ++k) units += blockMassUnits(codes[k]);
-      return static_cast<float>(units);
-    };
-    int begins[kMaxBlocksPerAxis + 1], rows = 0, n = 0, row = -1;
-    for (int w = 0; w < ndf_.placeWords(); ++w) {
-      for (std::uint64_t bits = mask[w]; bits != 0; bits &= bits - 1, ++n) {
-        const int block_row = ndf_.place_blocks.data()[64 * w + lowestBit(bits)] / blocks;
-        if (block_row != row) begins[rows++] = n;
-        row = block_row;
+  /// Sums of the rows of a slice and single rows of pixels: of columns, or of spots.
+  template <class Reader>
+  class SliceRows {
+   public:
+    GLINT_HD SliceRows(const CompressedNdf& ndf, const Reader& reader, const SlicePlace& at)
+        : reader_(reader), cluster_(ndf.clusters.data()[at.cluster]), profile_(ndf) {
+      if (cluster_.columns == 0)
+        spots_ = spotsOf(ndf, cluster_, at.slice);
+      else
+        reader.scaledCoefficients(cluster_, reader.row(cluster_, at.slice), scaled_);
+    }
+
+    /// What is surely in each row: less by what lies below zero there.
+    GLINT_HD Float16 leastSums() const {
+      return cluster_.columns == 0 ? spotRowSums(profile_, spots_) : reader_.rowSums(cluster_, scaled_).positive();
+    }
+    /// What is in each row besides. Decodes all pixels.
+    GLINT_HD Float16 addedSums(const Float16& least) const {
+      float pixels[kBlockPixels];
+      if (cluster_.columns == 0)  // nothing is below zero
+        std::fill(pixels, pixels + kBlockPixels, 0.0f);
+      else
+        reader_.block(cluster_, scaled_, pixels);
+      return (sumRows(pixels) - least).positive();
+    }
+    /// Pixels of a row, >= 0.
+    GLINT_HD Float16 row(int y) const {
+      return cluster_.columns == 0 ? spotRow(profile_, spots_, y) : reader_.rowPixels(cluster_, scaled_, y);
+    }
+
+   private:
+    const Reader& reader_;
+    const NdfCluster& cluster_;
+    SpotProfile profile_;
+    SpotList spots_ = {};
+    float scaled_[kMaxColumns];
+  };
+
+  /// Chooses a pixel of a block in proportion to its value: its row with xi.y, its column with xi.x.
+  ///
+  /// Sums of whole rows are cheap, but count what lies below zero: where they are positive, the row has at least that. So a number
+  /// below their total chooses a row by them. One above it chooses by what else the rows have, which takes all pixels, or falls into
+  /// what the stored mass is too large by.
+  /// @param mass       stored, in pixels
+  /// @param last_try   whether no other block can be drawn: one in a million; then rows are chosen by their sums alone
+  /// @return y = -1: another block is to be drawn with `xi`; x = -1: no pixel is positive
+  template <class Reader>
+  GLINT_HD PixelPlace choosePixel(const Reader& reader, const SlicePlace& at, int block, float mass, bool last_try,
+                                  Vec2& xi) const {
+    const SliceRows<Reader> rows(ndf_, reader, at);
+    Float16 sums = rows.leastSums();
+    float total = sums.sum(), reached = xi.y * (last_try ? total : mass);
+    if (!(reached < total) && !last_try) {
+      reached -= total;
+      mass -= total;
+      sums = rows.addedSums(sums);
+      total = sums.sum();
+      if (!(reached < total)) {
+        xi.y = clampUnit((reached - total) / (mass - total));
+        return {block, -1, -1};
       }
     }
-    begins[rows] = count;
-    const int r = chooseIndex(
-        rows, mass(0, count), [&](int k) { return mass(begins[k], begins[k + 1]); }, xi.y);
-    if (r < 0) return {};
-    const int begin = begins[r], end = begins[r + 1];
-    const int k = chooseIndex(
-        end - begin, mass(begin, end), [&](int j) { return mass(begin + j, begin + j + 1); }, xi.x);
-    const int rank = begin + std::max(k, 0);
-    return {ndf_.place_blocks.data()[placeOfRank(mask, rank)], rank};
-  }
-
-  /// Number of the set bit that has `rank` set bits below it.
-  static GLINT_HD int placeOfRank(const std::uint64_t* mask, int rank) {
-    int w = 0;
-    for (int bits = setBits(mask[0]); bits <= rank; bits = setBits(mask[++w])) rank -= bits;
-    std::uint64_t word = mask[w];
-    for (; rank > 0; --rank) word &= word - 1;
-    return 64 * w + lowestBit(word);
+    const int y = std::max(chooseAt(sums, reached, xi.y), 0);
+    return {block, chooseOf16(rows.row(y), xi.x), y};
   }
 
   /// A pixel of an image, in proportion to the image's density. x = -1 if there is none.
   template <class Reader>
   GLINT_HD PixelPlace choosePlace(const Reader& reader, std::size_t image, Vec2& xi) const {
-    constexpr int kTries = 4;  // the last is kept: one in a million
-    const std::uint32_t* first = ndf_.first_block.data() + image;
-    const std::uint8_t* codes = ndf_.block_masses.data() + first[0];
-    const float to_units = 0x1p18f * 4 * ndf_.density_scales.data()[image] /
-                           (static_cast<float>(shape().resolution) * static_cast<float>(shape().resolution));
+    constexpr int kTries = 4;
+    const auto resolution = static_cast<float>(shape().resolution);
+    const float to_pixels = 0.25f * resolution * resolution / ndf_.density_scales.data()[image];
     for (int tries = 1;; ++tries) {
-      const BlockChoice choice = chooseStored(image, codes, static_cast<int>(first[1] - first[0]), xi);
-      const SlicePlace at = choice.block < 0 ? SlicePlace{} : findSlice(image, ndf_.block_places.data()[choice.block]);
+      const StoredBlock chosen = chooseStored(image, xi);
+      const SlicePlace at = chosen.block < 0 ? SlicePlace{} : findSlice(image, chosen.place);
       if (at.cluster == kNone) return {0, -1, -1};
-      float pixels[kBlockPixels];
-      decodeBlock(reader, at, pixels);
-      const BlockSums sums = sumRows(pixels);
-      const float kept = std::min(1.0f, sums.total * to_units / static_cast<float>(blockMassUnits(codes[choice.rank])));
-      if (xi.y < kept || tries == kTries) {
-        xi.y = clampUnit(xi.y / kept);
-        return choosePixel(pixels, sums, choice.block, xi);
-      }
-      xi.y = clampUnit((xi.y - kept) / (1 - kept));
+      const PixelPlace place = choosePixel(reader, at, chosen.block, chosen.mass * to_pixels, tries == kTries, xi);
+      if (place.y >= 0 || tries == kTries) return place;
     }
   }
 

@@ -95,19 +95,21 @@ class PyramidNdf {
   GLINT_HD void chooseBlock(Draw& draw) const {
     if (!(draw.chosen.weight > 0)) return;
     const PyramidLevel& level = levelOf(draw.chosen);
+    constexpr int kMostBlocks = 64 * kMostMaskWords;
     const float* means = level.block_means.data() + draw.first_block;
-    const int blocks = shape().blocksPerAxis();
-    const auto mass = [&](int begin, int end) {
-      float sum = 0;
-      for (int k = begin; k < end; ++k) sum += means[k];
-      return sum;
-    };
-    const BlockChoice choice = blocks <= 16
-                                   ? chooseBlockOf16(maskOf(draw.chosen), blocks, means, draw.block_count, draw.xi)
-                                   : glint::chooseBlock(maskOf(draw.chosen), blocks, mass(0, draw.block_count), mass, draw.xi);
-    draw.place.block = choice.block;
-    if (choice.block < 0) return;
-    draw.stored = draw.first_block + static_cast<std::uint64_t>(choice.rank);
+    const int count = draw.block_count;
+    const int rank = chooseOfMany<kMostBlocks>(
+        count,
+        [&](int first) {
+          if (first + 16 <= count) return Float16::load(means + first);
+          float rest[16] = {};
+          for (int k = first; k < count; ++k) rest[k - first] = means[k];
+          return Float16::load(rest);
+        },
+        draw.xi.y);
+    if (rank < 0) return;
+    draw.place.block = placeOfRank(maskOf(draw.chosen), rank);
+    draw.stored = draw.first_block + static_cast<std::uint64_t>(rank);
     prefetchPixels(level, draw.stored, 0, kBlockSize);
   }
 
@@ -234,14 +236,10 @@ class PyramidNdf {
   template <class Pixel>
   GLINT_HD static PixelPlace choosePixelOf(const Pixel* pixels, Draw& draw) {
     const Pixel* block = pixels + draw.stored * kBlockPixels;
-    const int y = chooseOf16(sumRows(block).rows, draw.xi.y);
+    const int y = chooseOf16(sumRows(block), draw.xi.y);
     if (y < 0) return {draw.place.block, -1, -1};
-    float row[kBlockSize];
-    for (int x = 0; x < kBlockSize; x += 4) loadPixels(block + y * kBlockSize + x).store(row + x);
-    return {draw.place.block, chooseOf16(row, draw.xi.x), y};
+    return {draw.place.block, chooseOf16(rowOf(block, y), draw.xi.x), y};
   }
-  GLINT_HD static Float4 loadPixels(const std::uint16_t* pixels) { return Float4::loadPositive(pixels); }
-  GLINT_HD static Float4 loadPixels(const float* pixels) { return Float4::load(pixels); }
 
   /// Index of a block of an image among the stored blocks of its level, or -1.
   GLINT_HD std::int64_t storedBlock(const PyramidSlice& slice, int block) const {
