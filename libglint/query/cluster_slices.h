@@ -72,10 +72,8 @@ class ClusterReader {
           columns, [&](int k) { (axis4(at_x + k, columns, x > 0) * axis4(at_y + k, columns, y > 0)).store(projection + k); },
           [&](int k) { projection[k] = axis(at_x + k, columns, x > 0) * axis(at_y + k, columns, y > 0); });
     } else if (ndf_.method == CompressionMethod::tucker) {
-      const int rx = cluster.rank_x, ry = cluster.rank_y;
       float along_x[kBlockSize], along_y[kBlockSize];
-      axisColumns(basis + x * rx, rx, x > 0, along_x);
-      axisColumns(basis + kBlockSize * rx + y * ry, ry, y > 0, along_y);
+      alongAxes(cluster, x, y, along_x, along_y);
       combineCore(cluster, along_x, along_y, projection);
     } else {
       const Basis* at = basis + (y * kBlockSize + x) * columns;
@@ -86,16 +84,22 @@ class ClusterReader {
     scaleAndArrange(cluster, projection);
   }
 
+  /// tucker: values of the functions along each axis at one pixel.
+  GLINT_HD void alongAxes(const NdfCluster& cluster, int x, int y, float* along_x, float* along_y) const {
+    const int rx = cluster.rank_x, ry = cluster.rank_y;
+    axisColumns(first(cluster) + x * rx, rx, x > 0, along_x);
+    axisColumns(first(cluster) + kBlockSize * rx + y * ry, ry, y > 0, along_y);
+  }
+
   /// projection = sums of scaled columns over a part of the block, as ColumnLayout says.
   GLINT_HD void box(const NdfCluster& cluster, const BlockBox& b, float* projection) const {
     const Basis* basis = first(cluster);
     const int columns = cluster.columns;
     if (ndf_.method == CompressionMethod::pca) {
       std::fill(projection, projection + columns, 0.0f);
-      addCorner(basis, columns, b.x1, b.y1, 1, projection);
-      addCorner(basis, columns, b.x0, b.y1, -1, projection);
-      addCorner(basis, columns, b.x1, b.y0, -1, projection);
-      addCorner(basis, columns, b.x0, b.y0, 1, projection);
+      forEachPrefix(basis, columns, b, [&](const Basis* row, float weight) {
+        for (int k = 0; k < columns; ++k) projection[k] += weight * static_cast<float>(row[k]);
+      });
     } else if (ndf_.method == CompressionMethod::cp) {
       float along_y[kMaxColumns];
       sumAlongAxis(basis, columns, b.x0, b.x1, projection);
@@ -108,6 +112,22 @@ class ClusterReader {
       combineCore(cluster, along_x, along_y, projection);
     }
     scaleAndArrange(cluster, projection);
+  }
+
+  /// pca: calls visitor(row, weight) for the rows of 2D prefix sums [16][16][columns] that make up the sums over a box: bilinear
+  /// between the nearest at each corner.
+  template <class Visitor>
+  static GLINT_HD void forEachPrefix(const Basis* prefix, int columns, const BlockBox& box, Visitor&& visitor) {
+    for (int end = 0; end < 4; ++end) {
+      const float x = end & 1 ? box.x0 : box.x1, y = end & 2 ? box.y0 : box.y1, sign = end == 0 || end == 3 ? 1.0f : -1.0f;
+      const int px = std::min(static_cast<int>(x), kBlockSize - 1), py = std::min(static_cast<int>(y), kBlockSize - 1);
+      const float fx = x - static_cast<float>(px), fy = y - static_cast<float>(py);
+      for (int corner = 0; corner < 4; ++corner) {
+        const int cx = px - 1 + (corner & 1), cy = py - 1 + (corner >> 1);
+        const float weight = sign * (corner & 1 ? fx : 1 - fx) * (corner & 2 ? fy : 1 - fy);
+        if (weight != 0 && cx >= 0 && cy >= 0) visitor(prefix + (cy * kBlockSize + cx) * columns, weight);
+      }
+    }
   }
 
   /// Dot product of a projection with the coefficients of a slice.
@@ -297,19 +317,6 @@ class ClusterReader {
           (l0 ? (1 - fl) * static_cast<float>(l0[k]) : 0.0f) + (fl > 0 ? fl * static_cast<float>(l1[k]) : 0.0f);
       const float after = (h0 ? (1 - fh) * static_cast<float>(h0[k]) : 0.0f) + fh * static_cast<float>(h1[k]);
       sums[k] = after - before;
-    }
-  }
-
-  /// sums[k] += weight * sum of image k over [0, x] x [0, y], from its 2D prefix sums [16][16][columns]: bilinear between them.
-  static GLINT_HD void addCorner(const Basis* prefix, int columns, float x, float y, float weight, float* sums) {
-    const int px = std::min(static_cast<int>(x), kBlockSize - 1), py = std::min(static_cast<int>(y), kBlockSize - 1);
-    const float fx = x - static_cast<float>(px), fy = y - static_cast<float>(py);
-    for (int corner = 0; corner < 4; ++corner) {
-      const int cx = px - 1 + (corner & 1), cy = py - 1 + (corner >> 1);
-      const float w = weight * (corner & 1 ? fx : 1 - fx) * (corner & 2 ? fy : 1 - fy);
-      if (w == 0 || cx < 0 || cy < 0) continue;
-      const Basis* row = prefix + (cy * kBlockSize + cx) * columns;
-      for (int k = 0; k < columns; ++k) sums[k] += w * static_cast<float>(row[k]);
     }
   }
 

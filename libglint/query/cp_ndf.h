@@ -33,11 +33,13 @@ class CpNdf {
   /// Whether footprints below level 0 are answered from the texels.
   GLINT_HD bool hasNormals() const { return below_.hasMap(); }
   GLINT_HD const PyramidShape& shape() const { return ndf_.shape; }
+  /// Whether this footprint is answered from the texels.
+  GLINT_HD bool fromTexels(const Footprint& p) const { return hasNormals() && belowFinest(shape(), p); }
 
   /// Density towards h, >= 0; O(columns) in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
+    if (fromTexels(p)) return below_.density(p, h);
     const PyramidSlices chosen = selectSlices(shape(), p);
     const PixelPlace place = pixelPlace(shape(), h);
     return withReader(ndf_, [&](const auto& reader) { return pixelDensity(reader, chosen, place); });
@@ -55,7 +57,7 @@ class CpNdf {
 
   GLINT_HD float signedDensity(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
+    if (fromTexels(p)) return below_.density(p, h);
     const PyramidSlices chosen = selectSlices(shape(), p);
     const PixelPlace place = pixelPlace(shape(), h);
     return withReader(ndf_, [&](const auto& reader) {
@@ -65,7 +67,7 @@ class CpNdf {
 
   GLINT_HD float signedMean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
-    if (below_.hasMap() && belowFinest(shape(), p)) return below_.mean(p, range);
+    if (fromTexels(p)) return below_.mean(p, range);
     const PyramidSlices chosen = selectSlices(shape(), p);
     return withReader(ndf_, [&](const auto& reader) {
       double sum = 0;
@@ -281,7 +283,7 @@ class CpNdf {
 // Behind the class: clang instantiates the templates that it calls only once it has read them.
 inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) const {
   xi = clampUnit(xi);
-  if (below_.hasMap() && belowFinest(shape(), p)) return below_.sample(p, xi);
+  if (fromTexels(p)) return below_.sample(p, xi);
   const PyramidSlices chosen = selectSlices(shape(), p);
   float weights[PyramidSlices::kMost];
   float total = 0;  // images of which nothing was kept have no density

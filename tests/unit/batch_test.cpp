@@ -6,6 +6,7 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "glint/bake/compress.h"
@@ -50,7 +51,12 @@ struct Queries {
   }
 };
 
-/// To the bit: batches only ask the memory ahead.
+/// Means of compressed pyramids add up to eight images in another order, and their terms may cancel.
+template <class Model>
+float meanError(float mean) {
+  return std::is_same_v<Model, CpNdf> ? kBatchError * (1 + mean) : 0.0f;
+}
+
 template <class Model>
 void expectMeansAndSamplesEqualSingleQueries(const Model& model, const Queries& q) {
   const api::AnyNdf any(model);
@@ -66,7 +72,8 @@ void expectMeansAndSamplesEqualSingleQueries(const Model& model, const Queries& 
   EXPECT_EQ(pdf[count], -7);
   for (std::size_t k = 0; k < count; ++k) {
     const Footprint p = Footprint::isotropic({q.u[k], q.v[k]}, q.sigma[k]);
-    ASSERT_EQ(means[k], model.mean(p, {{q.hx[k], q.hy[k]}, {x1[k], y1[k]}})) << "query " << k << " of " << count;
+    const float mean = model.mean(p, {{q.hx[k], q.hy[k]}, {x1[k], y1[k]}});
+    ASSERT_NEAR(means[k], mean, meanError<Model>(mean)) << "query " << k << " of " << count;
     const HalfVectorSample one = model.sample(p, {q.hx[k], q.v[k]});
     ASSERT_EQ(x[k], one.h.x) << "query " << k << " of " << count;
     ASSERT_EQ(y[k], one.h.y) << "query " << k << " of " << count;
