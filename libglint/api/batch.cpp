@@ -230,6 +230,11 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
   }
 }
 
+void modelSamples(const CpNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
+                  const SampleArrays& out) {
+  compressedSamples(model, count, footprints, xi, out);
+}
+
 template <class Model>
 void modelMeans(const Model& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
                 float* out) {

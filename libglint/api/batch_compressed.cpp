@@ -155,6 +155,7 @@ class SliceValues {
         core_(ndf.core.data(), ndf.core.size()) {}
 
   using Reader = ClusterReader<Basis, Coefficient>;
+  const Reader& reader() const { return reader_; }
 
   struct Pixel {
     int x, y;
@@ -399,6 +400,48 @@ void compressedMeans(const CpNdf& model, std::size_t count, const FootprintArray
         const bool empty = !(range.width() > 0 && range.height() > 0);
         const auto mean = static_cast<float>(sums[k] / areaInPixels(model.shape(), range));
         out[at] = empty ? 0.0f : model.fromTexels(footprints[at]) ? model.mean(footprints[at], range) : std::max(0.0f, mean);
+      }
+    }
+  });
+}
+
+/// Samples follow their cache misses together; what their pixels hold is then asked as densities are.
+void compressedSamples(const CpNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
+                       const SampleArrays& out) {
+  const CompressedNdf& ndf = model.compressed();
+  withValues(ndf, [&](const auto& values) {
+    using Pixel = typename std::decay_t<decltype(values)>::Pixel;
+    SliceChunk chunk;
+    SliceRows places(ndf);
+    BlockItems items;
+    CpNdf::Draw draws[kChunk];
+    for (std::size_t first = 0; first < count; first += kChunk) {
+      items.count = static_cast<int>(lanesOf(first, count));
+      selectChunk(model.shape(), footprints, xi, first, items.count, chunk);
+      for (int k = 0; k < items.count; ++k)
+        draws[k] = model.chooseImage(chunk.slices(k), xi[first + static_cast<std::size_t>(k)]);
+      for (int k = 0; k < items.count; ++k) model.findBlocks(draws[k]);
+      for (int k = 0; k < items.count; ++k) model.chooseBlock(draws[k]);
+      for (int k = 0; k < items.count; ++k) model.findBlockSlice(draws[k]);
+      for (int k = 0; k < items.count; ++k) {
+        model.choosePixel(values.reader(), draws[k]);
+        items.lanes[k] = k;
+        items.blocks[k] = draws[k].place.block;
+      }
+      places.findImages(chunk, items.count, ndf.density_scales.data());
+      places.findRows(items);
+      for (int k = 0; k < items.count; ++k) {
+        const std::size_t at = first + static_cast<std::size_t>(k);
+        const CpNdf::Draw& draw = draws[k];
+        HalfVectorSample drawn;
+        if (model.fromTexels(footprints[at])) {
+          drawn = model.sample(footprints[at], xi[at]);
+        } else if (draw.place.x >= 0) {
+          float each[kSlices];
+          values.evaluate(places, k, Pixel{draw.place.x, draw.place.y}, each);
+          drawn = {pointInPixel(model.shape(), draw.place, draw.xi), weighedSum<true>(places.weights[k], each) / draw.total};
+        }
+        out.set(at, drawn);
       }
     }
   });

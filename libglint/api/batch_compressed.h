@@ -11,5 +11,7 @@ void compressedDensities(const CpNdf& model, std::size_t count, const FootprintA
                          const HalfVectorArrays& halves, float* out);
 void compressedMeans(const CpNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
                      float* out);
+void compressedSamples(const CpNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
+                       const SampleArrays& out);
 
 }  // namespace glint::api

@@ -52,6 +52,16 @@ class CpNdf {
   /// that are left (one in forty on average). O(16 columns), and O(256 columns) with that share and the one of negative pixels.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const;
 
+  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock, findBlockSlice and choosePixel make it, in this order.
+  /// Each reads what the one before has asked the memory for, so the cache misses of many samples can be under way together.
+  struct Draw;
+  GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const;
+  GLINT_HD void findBlocks(const Draw& draw) const;
+  GLINT_HD void chooseBlock(Draw& draw) const;
+  GLINT_HD void findBlockSlice(Draw& draw) const;
+  template <class Reader>
+  GLINT_HD void choosePixel(const Reader& reader, Draw& draw) const;
+
   /// Average over a box of half vectors, >= 0, 0 if the box is empty; O(columns) for each block that the box covers.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const { return std::max(0.0f, signedMean(p, range)); }
 
@@ -175,26 +185,6 @@ class CpNdf {
     return sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<const Reader&>{reader, place}, Positive{});
   }
 
-  /// A block of an image that has a slice.
-  struct StoredBlock {
-    int block = -1;  ///< -1: nothing to choose
-    int place = 0;
-    float mass = 0;  ///< at least its share of the image
-  };
-
-  /// Chooses a block with a slice in proportion to its stored mass, with xi.y.
-  GLINT_HD StoredBlock chooseStored(std::size_t image, Vec2& xi) const {
-    const std::uint32_t* first = ndf_.first_block.data() + image;
-    const std::uint8_t* codes = ndf_.block_masses.data() + first[0];
-    const int count = static_cast<int>(first[1] - first[0]);
-    const std::size_t readable = ndf_.block_masses.size() - first[0];
-    const int rank = chooseOfMany<kMostBlocks>(
-        count, [&](int k) { return loadMasses(codes + k, count - k, readable - static_cast<std::size_t>(k)); }, xi.y);
-    if (rank < 0) return {};
-    const int place = placeOfRank(ndf_.block_masks.data() + image * static_cast<std::size_t>(ndf_.placeWords()), rank);
-    return {ndf_.place_blocks.data()[place], place, blockMass(codes[rank])};
-  }
-
   /// Sums of the rows of a slice and single rows of pixels: of columns, or of spots.
   template <class Reader>
   class SliceRows {
@@ -233,71 +223,119 @@ class CpNdf {
     float scaled_[kMaxColumns];
   };
 
-  /// Chooses a pixel of a block in proportion to its value: its row with xi.y, its column with xi.x.
+  /// Chooses a pixel of the chosen block in proportion to its value: its row with xi.y, its column with xi.x.
   ///
   /// Sums of whole rows are cheap, but count what lies below zero: where they are positive, the row has at least that. So a number
   /// below their total chooses a row by them. One above it chooses by what else the rows have, which takes all pixels, or falls into
   /// what the stored mass is too large by.
-  /// @param mass       stored, in pixels
-  /// @param last_try   whether no other block can be drawn: one in a million; then rows are chosen by their sums alone
-  /// @return y = -1: another block is to be drawn with `xi`; x = -1: no pixel is positive
+  /// @param last_try  whether no other block can be drawn: one in a million; then rows are chosen by their sums alone
+  /// @return false: another block is to be drawn with what is left of xi
   template <class Reader>
-  GLINT_HD PixelPlace choosePixel(const Reader& reader, const SlicePlace& at, int block, float mass, bool last_try,
-                                  Vec2& xi) const {
-    const SliceRows<Reader> rows(ndf_, reader, at);
-    Float16 sums = rows.leastSums();
-    float total = sums.sum(), reached = xi.y * (last_try ? total : mass);
-    if (!(reached < total) && !last_try) {
-      reached -= total;
-      mass -= total;
-      sums = rows.addedSums(sums);
-      total = sums.sum();
-      if (!(reached < total)) {
-        xi.y = clampUnit((reached - total) / (mass - total));
-        return {block, -1, -1};
-      }
-    }
-    const int y = std::max(chooseAt(sums, reached, xi.y), 0);
-    return {block, chooseOf16(rows.row(y), xi.x), y};
-  }
-
-  /// A pixel of an image, in proportion to the image's density. x = -1 if there is none.
-  template <class Reader>
-  GLINT_HD PixelPlace choosePlace(const Reader& reader, std::size_t image, Vec2& xi) const {
-    constexpr int kTries = 4;
-    const auto resolution = static_cast<float>(shape().resolution);
-    const float to_pixels = 0.25f * resolution * resolution / ndf_.density_scales.data()[image];
-    for (int tries = 1;; ++tries) {
-      const StoredBlock chosen = chooseStored(image, xi);
-      const SlicePlace at = chosen.block < 0 ? SlicePlace{} : findSlice(image, chosen.place);
-      if (at.cluster == kNone) return {0, -1, -1};
-      const PixelPlace place = choosePixel(reader, at, chosen.block, chosen.mass * to_pixels, tries == kTries, xi);
-      if (place.y >= 0 || tries == kTries) return place;
-    }
-  }
+  GLINT_HD bool choosePixelOfBlock(const Reader& reader, bool last_try, Draw& draw) const;
 
   CompressedNdf ndf_;
   Reference below_;
 };
 
-// Behind the class: clang instantiates the templates that it calls only once it has read them.
-inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) const {
-  xi = clampUnit(xi);
-  if (fromTexels(p)) return below_.sample(p, xi);
-  const PyramidSlices chosen = selectSlices(shape(), p);
+struct CpNdf::Draw {
+  Vec2 xi;
+  float total = 0;  ///< weights of the images that have any density
+  bool possible = false;
+  std::size_t image = 0;
+  int block = 0, block_place = 0;
+  float mass = 0;  ///< of the block, as stored: at least its share of the image
+  SlicePlace slice;
+  PixelPlace place = {0, -1, -1};  ///< x = -1: nothing can be drawn
+};
+
+inline GLINT_HD CpNdf::Draw CpNdf::chooseImage(const PyramidSlices& chosen, Vec2 xi) const {
+  Draw draw;
+  draw.xi = clampUnit(xi);
   float weights[PyramidSlices::kMost];
-  float total = 0;  // images of which nothing was kept have no density
-  for (int k = 0; k < chosen.count; ++k) {
+  for (int k = 0; k < chosen.count; ++k) {  // images of which nothing was kept have no density
     weights[k] = ndf_.density_scales.data()[imageOf(chosen.slices[k])] > 0 ? chosen.slices[k].weight : 0.0f;
-    total += weights[k];
+    draw.total += weights[k];
   }
   const int k = chooseIndex(
-      chosen.count, total, [&](int i) { return weights[i]; }, xi.x);
-  if (k < 0) return {};
+      chosen.count, draw.total, [&](int i) { return weights[i]; }, draw.xi.x);
+  if (k < 0) return draw;
+  draw.possible = true;
+  draw.image = imageOf(chosen.slices[k]);
+  prefetch(ndf_.first_block.data() + draw.image);
+  prefetch(ndf_.block_masks.data() + draw.image * static_cast<std::size_t>(ndf_.placeWords()));
+  return draw;
+}
+
+inline GLINT_HD void CpNdf::findBlocks(const Draw& draw) const {
+  constexpr std::uint32_t kLine = 64;
+  const std::uint32_t* first = ndf_.first_block.data() + draw.image;
+  for (std::uint32_t k = first[0]; k < first[1]; k += kLine) prefetch(ndf_.block_masses.data() + k);
+}
+
+/// In proportion to its stored mass, with xi.y.
+inline GLINT_HD void CpNdf::chooseBlock(Draw& draw) const {
+  if (!draw.possible) return;
+  const std::uint32_t* first = ndf_.first_block.data() + draw.image;
+  const std::uint8_t* codes = ndf_.block_masses.data() + first[0];
+  const int count = static_cast<int>(first[1] - first[0]);
+  const std::size_t readable = ndf_.block_masses.size() - first[0];
+  const int rank = chooseOfMany<kMostBlocks>(
+      count, [&](int k) { return loadMasses(codes + k, count - k, readable - static_cast<std::size_t>(k)); }, draw.xi.y);
+  draw.possible = rank >= 0;
+  if (!draw.possible) return;
+  draw.block_place = placeOfRank(ndf_.block_masks.data() + draw.image * static_cast<std::size_t>(ndf_.placeWords()), rank);
+  draw.block = ndf_.place_blocks.data()[draw.block_place];
+  draw.mass = blockMass(codes[rank]);
+}
+
+inline GLINT_HD void CpNdf::findBlockSlice(Draw& draw) const {
+  if (!draw.possible) return;
+  draw.slice = findSlice(draw.image, draw.block_place);
+  draw.possible = draw.slice.cluster != kNone;
+}
+
+template <class Reader>
+GLINT_HD bool CpNdf::choosePixelOfBlock(const Reader& reader, bool last_try, Draw& draw) const {
+  const auto resolution = static_cast<float>(shape().resolution);
+  float mass = draw.mass * 0.25f * resolution * resolution / ndf_.density_scales.data()[draw.image];  // in pixels
+  const SliceRows<Reader> rows(ndf_, reader, draw.slice);
+  Float16 sums = rows.leastSums();
+  float total = sums.sum(), reached = draw.xi.y * (last_try ? total : mass);
+  if (!(reached < total) && !last_try) {
+    reached -= total;
+    mass -= total;
+    sums = rows.addedSums(sums);
+    total = sums.sum();
+    if (!(reached < total)) {
+      draw.xi.y = clampUnit((reached - total) / (mass - total));
+      return false;
+    }
+  }
+  const int y = std::max(chooseAt(sums, reached, draw.xi.y), 0);
+  draw.place = {draw.block, chooseOf16(rows.row(y), draw.xi.x), y};
+  return true;
+}
+
+template <class Reader>
+GLINT_HD void CpNdf::choosePixel(const Reader& reader, Draw& draw) const {
+  constexpr int kTries = 4;
+  for (int tries = 1; draw.possible && !choosePixelOfBlock(reader, tries == kTries, draw); ++tries) {
+    chooseBlock(draw);
+    findBlockSlice(draw);
+  }
+}
+
+// Behind the class: clang instantiates the templates that it calls only once it has read them.
+inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) const {
+  if (fromTexels(p)) return below_.sample(p, clampUnit(xi));
+  const PyramidSlices chosen = selectSlices(shape(), p);
+  Draw draw = chooseImage(chosen, xi);
+  chooseBlock(draw);
+  findBlockSlice(draw);
   return withReader(ndf_, [&](const auto& reader) -> HalfVectorSample {
-    const PixelPlace place = choosePlace(reader, imageOf(chosen.slices[k]), xi);
-    if (place.x < 0) return {};
-    return {pointInPixel(shape(), place, xi), pixelDensity(reader, chosen, place) / total};
+    choosePixel(reader, draw);
+    if (draw.place.x < 0) return {};
+    return {pointInPixel(shape(), draw.place, draw.xi), pixelDensity(reader, chosen, draw.place) / draw.total};
   });
 }
 
