@@ -4,11 +4,22 @@
 #include <type_traits>
 
 #include "glint/api/batch_compressed.h"
+#include "glint/api/batch_kernels.h"
 #include "glint/api/batch_slices.h"
 #include "glint/api/multiversion.h"
 #include "glint/query/bits.h"
 
 namespace glint::api {
+
+bool hasWideKernels() {
+#if defined(GLINT_WIDE_KERNELS)
+  static const bool supported = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("f16c");
+  return supported;
+#else
+  return false;
+#endif
+}
+
 namespace {
 
 constexpr int kSlices = PyramidSlices::kMost;
@@ -126,7 +137,7 @@ struct PyramidSteps {
   explicit PyramidSteps(const PyramidNdf& model) : places(model.pyramid()), scale(model.pyramid().value_scale) {}
   void begin(SliceChunk& chunk) { places.prefetchMasks(chunk); }
   void find(SliceChunk& chunk) { findPixels(places, chunk); }
-  void finish(const SliceChunk& chunk, int, float* sums) const {
+  void finish(const SliceChunk& chunk, float* sums) const {
     addUpPixels(places, chunk, sums);
     for (int k = 0; k < kChunk; ++k) sums[k] *= scale;
   }
@@ -135,14 +146,13 @@ struct PyramidSteps {
 };
 
 /// Chunks go through their steps one behind the other, so that what a step asks the memory for has the time of another chunk's to come.
-template <class Steps, class Model>
-void pyramidDensities(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
-                      float* out) {
+void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints,
+                    const HalfVectorArrays& halves, float* out) {
   struct Stage {
     SliceChunk chunk;
-    Steps steps;
+    PyramidSteps steps;
   };
-  Stage stages[3] = {{{}, Steps(model)}, {{}, Steps(model)}, {{}, Steps(model)}};
+  Stage stages[3] = {{{}, PyramidSteps(model)}, {{}, PyramidSteps(model)}, {{}, PyramidSteps(model)}};
   const std::size_t chunks = (count + kChunk - 1) / kChunk;
   const auto lanesOf = [&](std::size_t k) { return static_cast<int>(std::min(count - k * kChunk, std::size_t{kChunk})); };
   for (std::size_t step = 0; step < chunks + 2; ++step) {
@@ -159,18 +169,13 @@ void pyramidDensities(const Model& model, std::size_t count, const FootprintArra
     const Stage& stage = stages[(step - 2) % 3];
     const int lanes = lanesOf(step - 2);
     alignas(64) float sums[kChunk] = {};
-    stage.steps.finish(stage.chunk, lanes, sums);
+    stage.steps.finish(stage.chunk, sums);
     for (int k = 0; k < lanes; ++k) {
       const std::size_t at = (step - 2) * kChunk + static_cast<std::size_t>(k);
       const bool from_texels = model.hasNormals() && stage.chunk.below[k] != 0;
       out[at] = from_texels ? model.density(footprints[at], halves[at]) : stage.chunk.inside[k] != 0 ? sums[k] : 0.0f;
     }
   }
-}
-
-void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints,
-                    const HalfVectorArrays& halves, float* out) {
-  pyramidDensities<PyramidSteps>(model, count, footprints, halves, out);
 }
 
 void modelDensities(const CpNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
@@ -185,23 +190,25 @@ void modelDensities(const Model& model, std::size_t count, const FootprintArrays
   for (std::size_t k = 0; k < count; ++k) out[k] = model.density(footprints[k], halves[k]);
 }
 
-/// A mean is long work next to its cache misses, and reads many lines: few are asked ahead.
-constexpr int kMeansAhead = 4;
-constexpr int kSamplesAhead = 16;
-
 void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
                 float* out) {
-  for (std::size_t first = 0; first < count; first += kMeansAhead) {
-    const int lanes = static_cast<int>(std::min(count - first, static_cast<std::size_t>(kMeansAhead)));
-    PyramidSlices chosen[kMeansAhead];
-    for (int k = 0; k < lanes; ++k) {
-      chosen[k] = selectSlices(model.shape(), footprints[first + static_cast<std::size_t>(k)]);
-      model.prefetchIndex(chosen[k]);
-    }
-    for (int k = 0; k < lanes; ++k) model.prefetchMean(chosen[k], ranges[first + static_cast<std::size_t>(k)]);
+  const bool wide = hasWideKernels();
+  const auto sum = [wide]<class Pixel>(const Pixel* pixels, const PyramidNdf::BlockCover& cover) {
+    if constexpr (sizeof(Pixel) == 2)
+      if (wide) return sumCoveredPixels(pixels, cover.columns, cover.rows, cover.first_row, cover.end_row);
+    return cover.sum(pixels);
+  };
+  SliceChunk chunk;
+  for (std::size_t first = 0; first < count; first += kChunk) {
+    const int lanes = static_cast<int>(std::min(count - first, std::size_t{kChunk}));
+    selectChunk(model.shape(), footprints, {ranges.x0, ranges.y0}, first, lanes, chunk);
+    for (int k = 0; k < lanes; ++k) model.prefetchIndex(chunk.slices(k));
+    // A mean is long work next to its cache misses, and reads many lines: only the next one's are asked ahead.
     for (int k = 0; k < lanes; ++k) {
       const std::size_t at = first + static_cast<std::size_t>(k);
-      out[at] = model.fromTexels(footprints[at]) ? model.mean(footprints[at], ranges[at]) : model.mean(chosen[k], ranges[at]);
+      if (k + 1 < lanes) model.prefetchMean(chunk.slices(k + 1), ranges[at + 1]);
+      out[at] = model.fromTexels(footprints[at]) ? model.mean(footprints[at], ranges[at])
+                                                 : model.mean(chunk.slices(k), ranges[at], sum);
     }
   }
 }
@@ -213,19 +220,44 @@ void modelMeans(const CpNdf& model, std::size_t count, const FootprintArrays& fo
 
 void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
                   const SampleArrays& out) {
-  for (std::size_t first = 0; first < count; first += kSamplesAhead) {
-    const int lanes = static_cast<int>(std::min(count - first, static_cast<std::size_t>(kSamplesAhead)));
-    PyramidNdf::Draw draws[kSamplesAhead];
-    for (int k = 0; k < lanes; ++k) {
-      const std::size_t at = first + static_cast<std::size_t>(k);
-      draws[k] = model.chooseImage(footprints[at], xi[at]);
+  const bool wide = hasWideKernels();
+  const auto sum = [wide]<class Pixel>(const Pixel* pixels) {
+    if constexpr (sizeof(Pixel) == 2) {
+      if (wide) {
+        float sums[kBlockSize];
+        sumPixelRows(pixels, sums);
+        return Float16::load(sums);
+      }
     }
+    return sumRows(pixels);
+  };
+  SliceChunk chunk;
+  PyramidSteps steps(model);
+  PyramidNdf::Draw draws[kChunk];
+  for (std::size_t first = 0; first < count; first += kChunk) {
+    const int lanes = static_cast<int>(std::min(count - first, std::size_t{kChunk}));
+    selectChunk(model.shape(), footprints, xi, first, lanes, chunk);
+    steps.begin(chunk);
+    for (int k = 0; k < lanes; ++k) draws[k] = model.chooseImage(chunk.slices(k), xi[first + static_cast<std::size_t>(k)]);
     for (int k = 0; k < lanes; ++k) model.findBlocks(draws[k]);
     for (int k = 0; k < lanes; ++k) model.chooseBlock(draws[k]);
-    for (int k = 0; k < lanes; ++k) model.choosePixel(draws[k]);
+    for (int k = 0; k < lanes; ++k) {
+      model.choosePixel(draws[k], sum);
+      const PixelPlace place = draws[k].place;
+      chunk.blocks[k] = std::max(place.block, 0);
+      chunk.pixels[k] = std::max(place.y * kBlockSize + place.x, 0);
+    }
+    steps.find(chunk);
+    alignas(64) float pdfs[kChunk] = {};
+    steps.finish(chunk, pdfs);
     for (int k = 0; k < lanes; ++k) {
       const std::size_t at = first + static_cast<std::size_t>(k);
-      out.set(at, model.fromTexels(footprints[at]) ? model.sample(footprints[at], xi[at]) : model.finish(draws[k]));
+      if (model.fromTexels(footprints[at]))
+        out.set(at, model.sample(footprints[at], xi[at]));
+      else if (draws[k].place.x < 0)
+        out.set(at, {});
+      else
+        out.set(at, {pointInPixel(model.shape(), draws[k].place, draws[k].xi), pdfs[k]});
     }
   }
 }

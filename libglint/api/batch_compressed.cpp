@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <type_traits>
 
-#include "glint/api/batch_columns.h"
+#include "glint/api/batch_kernels.h"
 #include "glint/api/batch_slices.h"
 #include "glint/model/packed_ndf.h"
 #include "glint/query/bits.h"
@@ -12,15 +12,6 @@ namespace glint::api {
 namespace {
 
 constexpr int kSlices = PyramidSlices::kMost;
-
-bool hasWideKernels() {
-#if defined(GLINT_WIDE_KERNELS)
-  static const bool supported = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("f16c");
-  return supported;
-#else
-  return false;
-#endif
-}
 
 /// What is asked of blocks: each item is one block, and a pixel of it or a box, for one query of a chunk.
 struct BlockItems {
@@ -170,7 +161,7 @@ class SliceValues {
     for (int step = 0; step < kSlices; step += 4) {
       const std::uint32_t* at = places.clusters[i] + step;
       const NdfCluster& cluster = ndf_.clusters.data()[*at];
-      if (cluster.columns == 0 || !places.same_cluster[i][step / 4]) {
+      if (!hasColumns(cluster) || !places.same_cluster[i][step / 4]) {
         for (int j = step; j < step + 4; ++j) values[j] = one(places, i, j, ask);
         continue;
       }
@@ -181,7 +172,10 @@ class SliceValues {
   }
 
  private:
-  /// What a projection reads, as kernels may read it.
+  /// Nobody checks what else an empty cluster of a file says.
+  static bool hasColumns(const NdfCluster& cluster) { return cluster.columns > 0 && cluster.slice_count > 0; }
+
+  /// What a projection reads, as kernels may read it. The cluster has columns.
   struct Factors {
     const Basis* basis;
     const float* scales;
@@ -263,8 +257,9 @@ class SliceValues {
       bool possible = true;
       for (int j = 0; j < kSlices; ++j) {
         const NdfCluster& cluster = ndf_.clusters.data()[places.clusters[i][j]];
+        if (!hasColumns(cluster) || cluster.narrow_columns > 0) return false;
         const Factors factors = factorsOf(cluster);
-        possible = possible && factors.readable && cluster.columns > 0 && cluster.narrow_columns == 0;
+        possible = possible && factors.readable;
         slices[j] = {factors.basis, factors.scales, reinterpret_cast<const Coefficient*>(places.rows[i][j]), cluster.columns};
       }
       if (possible) dotEightSlices(slices, alongX(ask), alongY(ask), values);

@@ -42,11 +42,13 @@ class PyramidNdf {
   /// 1e-5 as they are built. O(stored blocks of one image + 256).
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     if (fromTexels(p)) return below_.sample(p, clampUnit(xi));
-    Draw draw = chooseImage(p, xi);
+    Draw draw = chooseImage(selectSlices(shape(), p), xi);
     findBlocks(draw);
+    prefetchIndex(draw.slices);
     chooseBlock(draw);
-    choosePixel(draw);
-    return finish(draw);
+    choosePixel(draw, [](const auto* pixels) { return sumRows(pixels); });
+    if (draw.place.x < 0) return {};
+    return {pointInPixel(shape(), draw.place, draw.xi), pixelDensity(draw.slices, draw.place)};
   }
 
   /// Where a place is in the level of every slice.
@@ -56,22 +58,21 @@ class PyramidNdf {
     int count = 0;
   };
 
-  /// A sample from the images on its way: chooseImage, findBlocks, chooseBlock, choosePixel and finish make it, in this order. Each
-  /// reads what the one before has asked the memory for, so the cache misses of many samples can be under way together.
+  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock and choosePixel make it, in this order. Each reads what
+  /// the one before has asked the memory for, so the cache misses of many samples can be under way together.
   struct Draw {
     PyramidSlices slices;
     Vec2 xi;
     PyramidSlice chosen = {0, 0, 0};  ///< weight 0: nothing can be drawn
     std::uint64_t first_block = 0;    ///< of the chosen image
     int block_count = 0;
-    std::uint64_t stored = 0;  ///< the chosen block
-    PixelPlace place = {0, -1, -1};
-    Places pixels;
+    std::uint64_t stored = 0;        ///< the chosen block
+    PixelPlace place = {0, -1, -1};  ///< x = -1: nothing can be drawn
   };
 
-  GLINT_HD Draw chooseImage(const Footprint& p, Vec2 xi) const {
+  GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const {
     Draw draw;
-    draw.slices = selectSlices(shape(), p);
+    draw.slices = chosen;
     draw.xi = clampUnit(xi);
     const int k = chooseIndex(
         draw.slices.count, 1, [&](int i) { return draw.slices.slices[i].weight; }, draw.xi.x);
@@ -89,7 +90,6 @@ class PyramidNdf {
     draw.first_block = first[0];
     draw.block_count = static_cast<int>(first[1] - first[0]);
     for (int k = 0; k < draw.block_count; k += kLine) prefetch(level.block_means.data() + first[0] + k);
-    prefetchIndex(draw.slices);
   }
 
   GLINT_HD void chooseBlock(Draw& draw) const {
@@ -113,36 +113,78 @@ class PyramidNdf {
     prefetchPixels(level, draw.stored, 0, kBlockSize);
   }
 
-  GLINT_HD void choosePixel(Draw& draw) const {
+  /// @param sum_rows  sum_rows(pixels): sums of the rows of a block of floats or half-precision numbers
+  template <class SumRows>
+  GLINT_HD void choosePixel(Draw& draw, SumRows&& sum_rows) const {
     if (!(draw.chosen.weight > 0 && draw.place.block >= 0)) return;
     const PyramidLevel& level = levelOf(draw.chosen);
-    draw.place = pyramid_.precision == BlockPrecision::f16
-                     ? choosePixelOf(static_cast<const std::uint16_t*>(level.pixels), draw)
-                     : choosePixelOf(static_cast<const float*>(level.pixels), draw);
-    if (draw.place.x >= 0) draw.pixels = findPixels(draw.slices, draw.place);
+    const auto choose = [&](const auto* pixels) {
+      const auto* block = pixels + draw.stored * kBlockPixels;
+      const int y = chooseOf16(sum_rows(block), draw.xi.y);
+      if (y >= 0) draw.place = {draw.place.block, chooseOf16(rowOf(block, y), draw.xi.x), y};
+    };
+    pyramid_.precision == BlockPrecision::f16 ? choose(static_cast<const std::uint16_t*>(level.pixels))
+                                              : choose(static_cast<const float*>(level.pixels));
   }
 
-  GLINT_HD HalfVectorSample finish(const Draw& draw) const {
-    if (draw.place.x < 0) return {};
-    return {pointInPixel(shape(), draw.place, draw.xi), addPixels(draw.pixels)};
-  }
+  /// How much of each row and column of a block a box covers.
+  class BlockCover {
+   public:
+    GLINT_HD explicit BlockCover(const BlockBox& box) {
+      constexpr float kFull = kBlockSize;
+      whole_ = box.x0 <= 0 && box.y0 <= 0 && box.x1 >= kFull && box.y1 >= kFull;
+      for (int k = 0; k < kBlockSize; ++k) {
+        columns[k] = covered(box.x0, box.x1, k);
+        rows[k] = covered(box.y0, box.y1, k);
+      }
+      first_row = static_cast<int>(box.y0);
+      end_row = std::min(static_cast<int>(std::ceil(box.y1)), kBlockSize);
+      first_column = static_cast<int>(box.x0) / 4 * 4;
+      end_column = std::min(static_cast<int>(std::ceil(box.x1)), kBlockSize);
+    }
+    int first_row, end_row, first_column, end_column;  ///< the first column is a multiple of 4
+    float columns[kBlockSize], rows[kBlockSize];       ///< covered parts, 0 to 1
+    GLINT_HD bool isWhole() const { return whole_; }
+
+    /// Sum of the covered pixels.
+    template <class Pixel>
+    GLINT_HD float sum(const Pixel* pixels) const {
+      Float4 sum = Float4::zero();
+      for (int y = first_row; y < end_row; ++y) {
+        Float4 row = Float4::zero();
+        for (int x = first_column; x < end_column; x += 4)
+          row = row + Float4::load(columns + x) * loadPixels(pixels + y * kBlockSize + x);
+        sum = sum + Float4::all(rows[y]) * row;
+      }
+      return sum.sum();
+    }
+
+   private:
+    static GLINT_HD float covered(float low, float high, int k) {
+      return std::max(0.0f, std::min(high, static_cast<float>(k + 1)) - std::max(low, static_cast<float>(k)));
+    }
+    bool whole_;
+  };
 
   /// Average density over a box of half vectors, 0 if it is empty. O(1) for each block that the box covers: whole blocks have
   /// their mean stored, others sum at most 256 pixels.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     if (fromTexels(p)) return below_.mean(p, range);
-    return mean(selectSlices(shape(), p), range);
+    return mean(selectSlices(shape(), p), range, [](const auto* pixels, const BlockCover& cover) { return cover.sum(pixels); });
   }
 
   /// The same from chosen images.
-  GLINT_HD float mean(const PyramidSlices& chosen, const Box2& range) const {
+  /// @param covered_sum  covered_sum(pixels, cover): BlockCover::sum of floats or half-precision numbers
+  template <class Sum>
+  GLINT_HD float mean(const PyramidSlices& chosen, const Box2& range, Sum&& covered_sum) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
     double sum = 0;
     forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
       const BlockCover cover(box);
       for (int k = 0; k < chosen.count; ++k) {
         const std::int64_t stored = storedBlock(chosen.slices[k], block);
-        if (stored >= 0) sum += double{chosen.slices[k].weight} * blockSum(levelOf(chosen.slices[k]), stored, cover);
+        if (stored >= 0)
+          sum += double{chosen.slices[k].weight} * blockSum(levelOf(chosen.slices[k]), stored, cover, covered_sum);
       }
     });
     return static_cast<float>(sum / areaInPixels(shape(), range));
@@ -233,14 +275,6 @@ class PyramidNdf {
     return Float4::of(value(0), value(1), value(2), value(3));
   }
 
-  template <class Pixel>
-  GLINT_HD static PixelPlace choosePixelOf(const Pixel* pixels, Draw& draw) {
-    const Pixel* block = pixels + draw.stored * kBlockPixels;
-    const int y = chooseOf16(sumRows(block), draw.xi.y);
-    if (y < 0) return {draw.place.block, -1, -1};
-    return {draw.place.block, chooseOf16(rowOf(block, y), draw.xi.x), y};
-  }
-
   /// Index of a block of an image among the stored blocks of its level, or -1.
   GLINT_HD std::int64_t storedBlock(const PyramidSlice& slice, int block) const {
     const PyramidLevel& level = pyramid_.levels[slice.level];
@@ -254,53 +288,14 @@ class PyramidNdf {
     return static_cast<std::int64_t>(level.first_block.data()[slice.image]) + rank;
   }
 
-  /// How much of each row and column of a block a box covers.
-  class BlockCover {
-   public:
-    GLINT_HD explicit BlockCover(const BlockBox& box) {
-      constexpr float kFull = kBlockSize;
-      whole_ = box.x0 <= 0 && box.y0 <= 0 && box.x1 >= kFull && box.y1 >= kFull;
-      for (int k = 0; k < kBlockSize; ++k) {
-        columns_[k] = covered(box.x0, box.x1, k);
-        rows_[k] = covered(box.y0, box.y1, k);
-      }
-      first_row = static_cast<int>(box.y0);
-      end_row = std::min(static_cast<int>(std::ceil(box.y1)), kBlockSize);
-      first_column = static_cast<int>(box.x0) / 4 * 4;
-      end_column = std::min(static_cast<int>(std::ceil(box.x1)), kBlockSize);
-    }
-    int first_row, end_row, first_column, end_column;  ///< the first column is a multiple of 4
-    GLINT_HD bool isWhole() const { return whole_; }
-    GLINT_HD Float4 row(int k) const { return Float4::all(rows_[k]); }
-    GLINT_HD Float4 columns(int k) const { return Float4::load(columns_ + k); }
-
-   private:
-    static GLINT_HD float covered(float low, float high, int k) {
-      return std::max(0.0f, std::min(high, static_cast<float>(k + 1)) - std::max(low, static_cast<float>(k)));
-    }
-    float columns_[kBlockSize], rows_[kBlockSize];
-    bool whole_;
-  };
-
   /// Sum of the densities of the covered pixels of a block, in pixels.
-  GLINT_HD float blockSum(const PyramidLevel& level, std::int64_t block, const BlockCover& cover) const {
+  template <class Sum>
+  GLINT_HD float blockSum(const PyramidLevel& level, std::int64_t block, const BlockCover& cover, Sum&& covered_sum) const {
     if (cover.isWhole()) return kBlockPixels * level.block_means.data()[block];
     const std::size_t first = static_cast<std::size_t>(block) * kBlockPixels;
     return pyramid_.value_scale * (pyramid_.precision == BlockPrecision::f16
-                                       ? coveredSum(static_cast<const std::uint16_t*>(level.pixels) + first, cover)
-                                       : coveredSum(static_cast<const float*>(level.pixels) + first, cover));
-  }
-
-  template <class Pixel>
-  static GLINT_HD float coveredSum(const Pixel* pixels, const BlockCover& cover) {
-    Float4 sum = Float4::zero();
-    for (int y = cover.first_row; y < cover.end_row; ++y) {
-      Float4 row = Float4::zero();
-      for (int x = cover.first_column; x < cover.end_column; x += 4)
-        row = row + cover.columns(x) * loadPixels(pixels + y * kBlockSize + x);
-      sum = sum + cover.row(y) * row;
-    }
-    return sum.sum();
+                                       ? covered_sum(static_cast<const std::uint16_t*>(level.pixels) + first, cover)
+                                       : covered_sum(static_cast<const float*>(level.pixels) + first, cover));
   }
 
   /// Asks the memory for rows of a block's pixels.

@@ -1,6 +1,6 @@
 // Compiled for AVX2 and F16C as a whole. Nothing but intrinsics may be included: an inline function of another header would be
 // compiled for AVX2 too, and the linker might give that copy to those who run on older processors.
-#include "glint/api/batch_columns.h"
+#include "glint/api/batch_kernels.h"
 
 #if defined(GLINT_WIDE_KERNELS)
 
@@ -204,7 +204,41 @@ inline void dotProducts(const ProductSlice<T, C>* slices, const Part& x, const P
   }
 }
 
+/// Pixels of half precision, which may be anything in a file: what is no number or infinite becomes 2^16, as in halfToFloat or near it.
+inline __m256 loadPixels(const std::uint16_t* pixels) { return _mm256_min_ps(load(pixels), _mm256_set1_ps(65536)); }
+
+inline __m128 lowOf(__m256 a) { return _mm256_castps256_ps128(a); }
+inline __m128 highOf(__m256 a) { return _mm256_extractf128_ps(a, 1); }
+
+inline __m128 rowSum(const std::uint16_t* row) {
+  const __m256 left = loadPixels(row), right = loadPixels(row + kWidth);
+  return _mm_add_ps(_mm_add_ps(lowOf(left), highOf(left)), _mm_add_ps(lowOf(right), highOf(right)));
+}
+
 }  // namespace
+
+float sumCoveredPixels(const std::uint16_t* pixels, const float* columns, const float* rows, int first_row, int end_row) {
+  const __m256 left = load(columns), right = load(columns + kWidth);
+  __m128 sum = _mm_setzero_ps();
+  for (int y = first_row; y < end_row; ++y) {
+    const __m256 a = _mm256_mul_ps(left, loadPixels(pixels + y * kBlockSide));
+    const __m256 b = _mm256_mul_ps(right, loadPixels(pixels + y * kBlockSide + kWidth));
+    const __m128 row = _mm_add_ps(_mm_add_ps(_mm_add_ps(lowOf(a), highOf(a)), lowOf(b)), highOf(b));
+    sum = _mm_add_ps(sum, _mm_mul_ps(_mm_set1_ps(rows[y]), row));
+  }
+  const __m128 pairs = _mm_add_ps(sum, _mm_movehl_ps(sum, sum));  // (0 + 2), (1 + 3)
+  return _mm_cvtss_f32(_mm_add_ss(pairs, _mm_shuffle_ps(pairs, pairs, 1)));
+}
+
+void sumPixelRows(const std::uint16_t* pixels, float* sums) {
+  for (int y = 0; y < kBlockSide; y += 4) {
+    const std::uint16_t* four = pixels + y * kBlockSide;
+    __m128 a = rowSum(four), b = rowSum(four + kBlockSide), c = rowSum(four + 2 * kBlockSide),
+           d = rowSum(four + 3 * kBlockSide);
+    _MM_TRANSPOSE4_PS(a, b, c, d);
+    _mm_storeu_ps(sums + y, _mm_add_ps(_mm_add_ps(a, c), _mm_add_ps(b, d)));
+  }
+}
 
 void projectColumns(const std::int16_t* basis, const KernelLayout& layout, int x, int y, const float* scales,
                     float* projection) {

@@ -11,6 +11,9 @@
 
 namespace glint::api {
 
+/// Whether this processor has what the kernels need.
+bool hasWideKernels();
+
 /// ColumnLayout of a cluster: where a projection holds its columns.
 struct KernelLayout {
   int columns, wide, half, low, high;
@@ -88,6 +91,14 @@ void dotEightSlices(const ProductSlice<std::int16_t, std::uint16_t>* slices, con
                     float* values);
 void dotEightSlices(const ProductSlice<float, float>* slices, const AxisPart& x, const AxisPart& y, float* values);
 
+/// Sum of the pixels of a block by how much of their columns and rows is covered, to the bit that of PyramidNdf::mean.
+/// @param pixels         [16][16], half-precision numbers >= 0
+/// @param columns, rows  [16]
+float sumCoveredPixels(const std::uint16_t* pixels, const float* columns, const float* rows, int first_row, int end_row);
+
+/// sums[y] = sum of row y of a block, to the bit that of sumRows.
+void sumPixelRows(const std::uint16_t* pixels, float* sums);
+
 #else
 
 // Never called: there is no processor that has what they need.
@@ -103,6 +114,8 @@ template <class Coefficient>
 void dotFourRows(const float*, const KernelLayout&, const Coefficient* const*, float*) {}
 template <class Basis, class Coefficient, class Part>
 void dotEightSlices(const ProductSlice<Basis, Coefficient>*, const Part&, const Part&, float*) {}
+inline float sumCoveredPixels(const std::uint16_t*, const float*, const float*, int, int) { return 0; }
+inline void sumPixelRows(const std::uint16_t*, float*) {}
 
 #endif
 
