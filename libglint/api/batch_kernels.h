@@ -96,7 +96,7 @@ void dotEightSlices(const ProductSlice<float, float>* slices, const AxisPart& x,
 /// @param columns, rows  [16]
 float sumCoveredPixels(const std::uint16_t* pixels, const float* columns, const float* rows, int first_row, int end_row);
 
-/// sums[y] = sum of row y of a block, to the bit that of sumRows.
+/// sums[y] = sum of row y of a block: 2^112 times that of sumRows.
 void sumPixelRows(const std::uint16_t* pixels, float* sums);
 
 #else
