@@ -54,6 +54,7 @@ TEST(CApi, AnswersAsTheModelsDo) {
 TEST(CApi, SamplesHaveThePdfOfTheDensityAlsoInBatches) {
   // Compressed images integrate to 1 in half precision; single bins of a histogram are asked at their borders.
   constexpr float kPdfError = 2e-3f;
+  constexpr float kBatchError = 1e-6f;  // as glint.h promises
   constexpr std::size_t kCount = 64;
   for (const char* kind : kKinds) {
     const Handle ndf = openHandle(kind);
@@ -69,7 +70,7 @@ TEST(CApi, SamplesHaveThePdfOfTheDensityAlsoInBatches) {
       ASSERT_EQ(glint_sample(ndf.get(), &one, q.v[k], q.u[k], &hx, &hy, &single), GLINT_OK);
       EXPECT_EQ(hx, x[k]) << kind << k;
       EXPECT_EQ(hy, y[k]) << kind << k;
-      EXPECT_EQ(single, pdf[k]) << kind << k;
+      EXPECT_NEAR(single, pdf[k], kBatchError * single) << kind << k;
       ASSERT_EQ(glint_density(ndf.get(), &one, hx, hy, &density), GLINT_OK);
       if (single > 0 && std::fabs(hx) < 1 && std::fabs(hy) < 1) {
         EXPECT_NEAR(density / single, 1, kPdfError) << kind << k;
