@@ -204,7 +204,8 @@ inline void dotProducts(const ProductSlice<T, C>* slices, const Part& x, const P
   }
 }
 
-/// Pixels of half precision, which may be anything in a file: what is no number or infinite becomes 2^16, as in halfToFloat or near it.
+/// Pixels of half precision, which may be anything in a file: what is infinite or no number becomes 2^16, as halfToFloat makes
+/// numbers of them, too.
 inline __m256 loadPixels(const std::uint16_t* pixels) { return _mm256_min_ps(load(pixels), _mm256_set1_ps(65536)); }
 
 inline __m128 lowOf(__m256 a) { return _mm256_castps256_ps128(a); }

@@ -34,7 +34,8 @@ struct ProductSlice {
   int columns;
 };
 
-/// A part of one block axis, as sums up to its ends are interpolated: pixels that hold the ends, and how much of each is before the end.
+/// A part of one block axis, as sums up to its ends are interpolated: pixels that hold the ends, and how much of each is before
+/// the end.
 struct AxisPart {
   int low, high;
   float low_share, high_share;

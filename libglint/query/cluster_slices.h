@@ -114,8 +114,8 @@ class ClusterReader {
     scaleAndArrange(cluster, projection);
   }
 
-  /// pca: calls visitor(row, weight) for the rows of 2D prefix sums [16][16][columns] that make up the sums over a box: bilinear
-  /// between the nearest at each corner.
+  /// pca: calls visitor(row, weight) for the rows of 2D prefix sums [16][16][columns] that make up the sums over a box:
+  /// bilinear between the nearest at each corner.
   template <class Visitor>
   static GLINT_HD void forEachPrefix(const Basis* prefix, int columns, const BlockBox& box, Visitor&& visitor) {
     for (int end = 0; end < 4; ++end) {

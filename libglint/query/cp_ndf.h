@@ -48,12 +48,14 @@ class CpNdf {
   /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly inside, as
   /// the density is constant there: exactly in proportion to the density, which is the pdf.
   ///
-  /// Stored masses are rounded up by at most a sixteenth: with the difference's share another block is drawn, from the digits of `xi`
-  /// that are left (one in forty on average). O(16 columns), and O(256 columns) with that share and the one of negative pixels.
+  /// Stored masses are rounded up by at most a sixteenth: with the difference's share another block is drawn, from the digits
+  /// of `xi` that are left (one in forty on average). O(16 columns), and O(256 columns) with that share and with the share of
+  /// pixels next to negative ones.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const;
 
-  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock, findBlockSlice and choosePixel make it, in this order.
-  /// Each reads what the one before has asked the memory for, so the cache misses of many samples can be under way together.
+  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock, findBlockSlice and choosePixel make it, in this
+  /// order. Each reads what the one before has asked the memory for, so the cache misses of many samples can be under way
+  /// together.
   struct Draw;
   GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const;
   GLINT_HD void findBlocks(const Draw& draw) const;
@@ -225,9 +227,9 @@ class CpNdf {
 
   /// Chooses a pixel of the chosen block in proportion to its value: its row with xi.y, its column with xi.x.
   ///
-  /// Sums of whole rows are cheap, but count what lies below zero: where they are positive, the row has at least that. So a number
-  /// below their total chooses a row by them. One above it chooses by what else the rows have, which takes all pixels, or falls into
-  /// what the stored mass is too large by.
+  /// Sums of whole rows are cheap, but count what lies below zero: where they are positive, the row has at least that. So a
+  /// number below their total chooses a row by them. One above it chooses by what else the rows have, which takes all pixels,
+  /// or falls into what the stored mass is too large by.
   /// @param last_try  whether no other block can be drawn: one in a million; then rows are chosen by their sums alone
   /// @return false: another block is to be drawn with what is left of xi
   template <class Reader>

@@ -55,7 +55,8 @@ struct Float4 {
   static Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
     return positiveHalves(_mm_setr_epi32(a, b, c, d));
   }
-  /// Half-precision numbers >= 0 times 2^-112, in the fewest steps. Subnormal ones stay subnormal: for sums and comparisons only.
+  /// Half-precision numbers >= 0 times 2^-112, in the fewest steps. Subnormal ones stay subnormal, so they are for sums and
+  /// comparisons only.
   static Float4 loadTiny(const std::uint16_t* p) {
     const __m128i bits = _mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
     return {_mm_castsi128_ps(_mm_slli_epi32(bits, 13))};
@@ -123,7 +124,8 @@ struct Float4 {
   static GLINT_HD Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
     return {{halfToFloat(a), halfToFloat(b), halfToFloat(c), halfToFloat(d)}};
   }
-  /// Half-precision numbers >= 0 times 2^-112, in the fewest steps. Subnormal ones stay subnormal: for sums and comparisons only.
+  /// Half-precision numbers >= 0 times 2^-112, in the fewest steps. Subnormal ones stay subnormal, so they are for sums and
+  /// comparisons only.
   static GLINT_HD Float4 loadTiny(const std::uint16_t* p) {
     Float4 out;
     for (int k = 0; k < 4; ++k) {

@@ -58,8 +58,8 @@ class PyramidNdf {
     int count = 0;
   };
 
-  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock and choosePixel make it, in this order. Each reads what
-  /// the one before has asked the memory for, so the cache misses of many samples can be under way together.
+  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock and choosePixel make it, in this order. Each
+  /// reads what the one before has asked the memory for, so the cache misses of many samples can be under way together.
   struct Draw {
     PyramidSlices slices;
     Vec2 xi;

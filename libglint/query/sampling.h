@@ -36,7 +36,8 @@ GLINT_HD int chooseIndex(int count, float total, Weight&& weight, float& xi) {
   return chosen;
 }
 
-/// The one of 16 things at which the sum of their weights passes `reached`. Nothing branches on the weights, which cannot be predicted.
+/// The one of 16 things at which the sum of their weights passes `reached`. Nothing branches on the weights, which cannot be
+/// predicted.
 /// @param sums  runningSums of the weights
 /// @param xi    set to how far into its share
 /// @return index, or -1 if no weight is positive

@@ -54,7 +54,6 @@ TEST(CApi, AnswersAsTheModelsDo) {
 TEST(CApi, SamplesHaveThePdfOfTheDensityAlsoInBatches) {
   // Compressed images integrate to 1 in half precision; single bins of a histogram are asked at their borders.
   constexpr float kPdfError = 2e-3f;
-  constexpr float kBatchError = 1e-6f;  // as glint.h promises
   constexpr std::size_t kCount = 64;
   for (const char* kind : kKinds) {
     const Handle ndf = openHandle(kind);

@@ -216,7 +216,7 @@ TEST(Sample, OfPyramidsFollowsTheDensity) {
   for (const auto& c : cases()) expectSamplesFollowThePixels(PyramidNdf(c->pyramid.view()), "pyramid " + c->name, 20000);
 }
 
-/// What the pixels of slices are like: a choice of rows by sums that include negative pixels is right only where there are none.
+/// What the pixels of slices are like: choosing rows by sums that include negative pixels is right only where there are none.
 struct SliceKinds {
   int without_negatives = 0, with_negatives = 0;
   double mass = 0;    ///< of all pixels, negative ones taken as 0
