@@ -65,7 +65,8 @@ PackedAsset pack(const NdfPyramid& pyramid) {
     const auto words = static_cast<std::uint64_t>(shape.maskWords());
     const std::uint64_t blocks = level.block_means.size();
     packed.array(path("masks"), ElementType::u64, {rows, columns, words}, level.masks.data(), level.masks.size());
-    packed.array(path("mask_ranks"), ElementType::u32, {rows * columns * words + 1}, level.mask_ranks.data(), level.mask_ranks.size());
+    packed.array(path("mask_ranks"), ElementType::u32, {rows * columns * words + 1}, level.mask_ranks.data(),
+                 level.mask_ranks.size());
     packed.array(path("block_means"), ElementType::f32, {blocks}, level.block_means.data(), blocks);
     // The pixels are a bare pointer: the running count is the only witness of how many there are.
     packed.array(path("pixels"), pyramid.precision == BlockPrecision::f16 ? ElementType::f16 : ElementType::f32,

@@ -59,12 +59,13 @@ struct SampleArrays {
   }
 };
 
-/// out[k] = density of query k, for k < count. The same values as asking one by one, and the same rules for what is degenerate.
+/// out[k] = density of query k, for k < count. The same values as asking one by one, but for 1e-6 of each where products and sums
+/// are fused or in another order, and the same rules for what is degenerate.
 /// @note thread-safe, allocates nothing; split a batch over threads as you like
 void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                float* out);
 
-/// out[k] = mean density over the box of query k.
+/// out[k] = mean density over the box of query k. Of compressed pyramids, whose terms may cancel, to 1e-6 of 1 + mean.
 void means(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges, float* out);
 
 /// Draws the half vector of query k from its footprint's density, with xi[k] in [0, 1)^2.

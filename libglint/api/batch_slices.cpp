@@ -93,8 +93,7 @@ inline void setCorner(int corner, const float* __restrict level_weights, const N
   for (int k = 0; k < kChunk; ++k) {
     const float wx = corner & 1 ? x.t[k] : 1 - x.t[k], wy = corner & 2 ? y.t[k] : 1 - y.t[k];
     weights[k] = level_weights[k] * wx * wy;
-    images[k] =
-        static_cast<std::uint32_t>(static_cast<std::int32_t>(ys[k]) * columns[k] + static_cast<std::int32_t>(xs[k]));
+    images[k] = static_cast<std::uint32_t>(static_cast<std::int32_t>(ys[k]) * columns[k] + static_cast<std::int32_t>(xs[k]));
   }
 }
 

@@ -23,6 +23,18 @@ struct SliceChunk {
   alignas(64) std::int32_t pixels[kChunk];  ///< y * kBlockSize + x in the block
   alignas(64) std::int32_t inside[kChunk];  ///< 1: the half vector is in the square, else the density is 0
   alignas(64) std::int32_t below[kChunk];   ///< 1: the footprint is below level 0
+
+  /// The images of one query.
+  PyramidSlices slices(int lane) const {
+    PyramidSlices out;
+    for (int step = 0; step < 2; ++step) out.levels[step] = levels[step][lane];
+    for (int j = 0; j < PyramidSlices::kMost; ++j) {
+      out.images[j] = images[j][lane];
+      out.weights[j] = weights[j][lane];
+    }
+    out.count = PyramidSlices::kMost;
+    return out;
+  }
 };
 
 /// Fills a chunk with queries [first, first + count), count <= kChunk.

@@ -19,9 +19,7 @@ inline constexpr int kMaxColumns = kBlockPixels;
 /// columns, then the narrow ones of low and of high halves, each padded by zeros.
 struct ColumnLayout {
   GLINT_HD explicit ColumnLayout(const NdfCluster& cluster)
-      : columns(cluster.columns),
-        wide(cluster.columns - cluster.narrow_columns),
-        half((cluster.narrow_columns + 1) / 2) {}
+      : columns(cluster.columns), wide(cluster.columns - cluster.narrow_columns), half((cluster.narrow_columns + 1) / 2) {}
 
   /// Floats of the largest projection.
   static constexpr int kMost = kMaxColumns + 16;
@@ -153,16 +151,31 @@ class ClusterReader {
     float along_x[kMaxColumns], along_y[kMaxColumns];
     if (ndf_.method == CompressionMethod::pca) {
       std::fill(along_x, along_x + columns, 0.0f);
-      addCorner(basis, columns, b.x1, b.y1, 1, along_x);
-      addCorner(basis, columns, b.x0, b.y1, -1, along_x);
-      addCorner(basis, columns, b.x1, b.y0, -1, along_x);
-      addCorner(basis, columns, b.x0, b.y0, 1, along_x);
+      forEachPrefix(basis, columns, b, [&](const Basis* row, float weight) {
+        for (int k = 0; k < columns; ++k) along_x[k] += weight * static_cast<float>(row[k]);
+      });
     } else {
       sumAlongAxis(basis, columns, b.x0, b.x1, along_x);
       sumAlongAxis(basis + kBlockSize * columns, columns, b.y0, b.y1, along_y);
       for (int k = 0; k < columns; ++k) along_x[k] *= along_y[k];
     }
     layout.arrange(ndf_.scales.data() + cluster.first_scale, ColumnValues{along_x}, projection);
+  }
+
+  /// pca: calls visitor(row, weight) for the rows of 2D prefix sums [16][16][columns] that make up the sums over a box:
+  /// bilinear between the nearest at each corner.
+  template <class Visitor>
+  static GLINT_HD void forEachPrefix(const Basis* prefix, int columns, const BlockBox& box, Visitor&& visitor) {
+    for (int end = 0; end < 4; ++end) {
+      const float x = end & 1 ? box.x0 : box.x1, y = end & 2 ? box.y0 : box.y1, sign = end == 0 || end == 3 ? 1.0f : -1.0f;
+      const int px = std::min(static_cast<int>(x), kBlockSize - 1), py = std::min(static_cast<int>(y), kBlockSize - 1);
+      const float fx = x - static_cast<float>(px), fy = y - static_cast<float>(py);
+      for (int corner = 0; corner < 4; ++corner) {
+        const int cx = px - 1 + (corner & 1), cy = py - 1 + (corner >> 1);
+        const float weight = sign * (corner & 1 ? fx : 1 - fx) * (corner & 2 ? fy : 1 - fy);
+        if (weight != 0 && cx >= 0 && cy >= 0) visitor(prefix + (cy * kBlockSize + cx) * columns, weight);
+      }
+    }
   }
 
   /// Dot product of a projection with the coefficients of a slice.
@@ -180,10 +193,79 @@ class ClusterReader {
     return sumsOf(sums[0], sums[1], sums[2], sums[3]);
   }
 
+  /// scaled = coefficients of a slice times the scales of their columns, in the order of columns.
+  GLINT_HD void scaledCoefficients(const NdfCluster& cluster, Row c, float* scaled) const {
+    const float* scales = ndf_.scales.data() + cluster.first_scale;
+    const ColumnLayout layout(cluster);
+    int k = 0;
+    for (; k + 4 <= layout.wide; k += 4) (Float4::load(scales + k) * Float4::load(c + k)).store(scaled + k);
+    for (; k < layout.wide; ++k) scaled[k] = scales[k] * value(c[k]);
+    if constexpr (std::is_same_v<Coefficient, std::int8_t>) {
+      const Row bytes = c + layout.wide;
+      const int high = layout.wide + layout.half, high_columns = layout.columns - high;
+      int j = 0;
+      for (; j + 4 <= high_columns; j += 4) {
+        (Float4::load(scales + layout.wide + j) * Float4::loadLow(bytes + j)).store(scaled + layout.wide + j);
+        (Float4::load(scales + high + j) * Float4::loadHigh(bytes + j)).store(scaled + high + j);
+      }
+      for (; j < layout.half; ++j) {
+        scaled[layout.wide + j] = scales[layout.wide + j] * static_cast<float>(lowHalf(bytes[j]));
+        if (j < high_columns) scaled[high + j] = scales[high + j] * static_cast<float>(highHalf(bytes[j]));
+      }
+    }
+  }
+
+  /// Sums of the rows of a slice, negative pixels included: O(16 rank) for cp and tucker, O(16 columns) for pca.
+  /// @param scaled  its scaledCoefficients
+  GLINT_HD Float16 rowSums(const NdfCluster& cluster, const float* scaled) const {
+    constexpr int kLast = kBlockSize - 1;
+    const Basis* basis = first(cluster);
+    const int columns = cluster.columns;
+    if (ndf_.method == CompressionMethod::pca)
+      return weighPrefixes(basis + kLast * columns, kBlockSize * columns, columns, scaled).differences();
+    float weights[kMaxColumns];
+    if (ndf_.method == CompressionMethod::cp) {
+      const Basis* along_x = basis + kLast * columns;
+      for (int k = 0; k < columns; ++k) weights[k] = scaled[k] * static_cast<float>(along_x[k]);
+      return weighPrefixes(basis + kBlockSize * columns, columns, columns, weights).differences();
+    }
+    const int rx = cluster.rank_x, ry = cluster.rank_y;
+    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
+    float along_x[kBlockSize];
+    for (int a = 0; a < rx; ++a) along_x[a] = static_cast<float>(basis[kLast * rx + a]);
+    std::fill(weights, weights + kBlockSize, 0.0f);
+    for (int k = 0; k < columns; ++k) weights[core[k] / kBlockSize] += scaled[k] * along_x[core[k] % kBlockSize];
+    return weighPrefixes(basis + kBlockSize * rx, ry, ry, weights).differences();
+  }
+
+  /// Row y of a slice, negative pixels taken as 0. The cost is that of rowSums.
+  /// @param scaled  its scaledCoefficients
+  GLINT_HD Float16 rowPixels(const NdfCluster& cluster, const float* scaled, int y) const {
+    const Basis* basis = first(cluster);
+    const int columns = cluster.columns;
+    if (ndf_.method == CompressionMethod::pca) {
+      const Basis* row = basis + y * kBlockSize * columns;
+      Float16 sums = weighPrefixes(row, columns, columns, scaled);
+      if (y > 0) sums = sums - weighPrefixes(row - kBlockSize * columns, columns, columns, scaled);
+      return sums.differences().positive();
+    }
+    float weights[kMaxColumns];
+    if (ndf_.method == CompressionMethod::cp) {
+      Axis(basis + kBlockSize * columns, columns, y).store(weights);
+      for (int k = 0; k < columns; ++k) weights[k] *= scaled[k];
+      return weighPrefixes(basis, columns, columns, weights).differences().positive();
+    }
+    const int rx = cluster.rank_x, ry = cluster.rank_y;
+    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
+    float along_y[kBlockSize];
+    Axis(basis + kBlockSize * rx, ry, y).store(along_y);
+    std::fill(weights, weights + kBlockSize, 0.0f);
+    for (int k = 0; k < columns; ++k) weights[core[k] % kBlockSize] += scaled[k] * along_y[core[k] / kBlockSize];
+    return weighPrefixes(basis, rx, rx, weights).differences().positive();
+  }
+
   /// All pixels of a slice, [16][16], negative ones taken as 0.
-  GLINT_HD void block(const NdfCluster& cluster, Row c, float* pixels) const {
-    float scaled[kMaxColumns];
-    scaledCoefficients(cluster, c, scaled);
+  GLINT_HD void block(const NdfCluster& cluster, const float* scaled, float* pixels) const {
     if (ndf_.method == CompressionMethod::pca) return sumImages(cluster, scaled, pixels);
     const bool cp = ndf_.method == CompressionMethod::cp;
     const int rx = cp ? cluster.columns : cluster.rank_x, ry = cp ? rx : cluster.rank_y;
@@ -282,8 +364,8 @@ class ClusterReader {
     const float* products;  ///< a + 16 b: of function a of x and function b of y
   };
 
-  [[gnu::always_inline]] GLINT_HD void arrangeCore(const NdfCluster& cluster, const ColumnLayout& layout,
-                                                   const float* along_x, const float* along_y, float* projection) const {
+  [[gnu::always_inline]] GLINT_HD void arrangeCore(const NdfCluster& cluster, const ColumnLayout& layout, const float* along_x,
+                                                   const float* along_y, float* projection) const {
     float products[kBlockPixels];  // those beyond rank_x are of no meaning
     for (int b = 0; b < cluster.rank_y; ++b) {
       const Float4 y = Float4::all(along_y[b]);
@@ -291,18 +373,6 @@ class ClusterReader {
     }
     layout.arrange(ndf_.scales.data() + cluster.first_scale, CorePairs{ndf_.core.data() + cluster.first_scale, products},
                    projection);
-  }
-
-  GLINT_HD void scaledCoefficients(const NdfCluster& cluster, Row c, float* scaled) const {
-    const float* scales = ndf_.scales.data() + cluster.first_scale;
-    const ColumnLayout layout(cluster);
-    for (int k = 0; k < layout.wide; ++k) scaled[k] = scales[k] * value(c[k]);
-    if constexpr (std::is_same_v<Coefficient, std::int8_t>) {
-      for (int k = layout.wide; k < layout.columns; ++k) {
-        const int j = k - layout.wide;
-        scaled[k] = scales[k] * static_cast<float>(j < layout.half ? lowHalf(c[k]) : highHalf(c[k - layout.half]));
-      }
-    }
   }
 
   static GLINT_HD float value(Coefficient c) {
@@ -330,19 +400,6 @@ class ClusterReader {
     }
   }
 
-  /// sums[k] += weight * sum of image k over [0, x] x [0, y], from its 2D prefix sums [16][16][columns]: bilinear between them.
-  static GLINT_HD void addCorner(const Basis* prefix, int columns, float x, float y, float weight, float* sums) {
-    const int px = std::min(static_cast<int>(x), kBlockSize - 1), py = std::min(static_cast<int>(y), kBlockSize - 1);
-    const float fx = x - static_cast<float>(px), fy = y - static_cast<float>(py);
-    for (int corner = 0; corner < 4; ++corner) {
-      const int cx = px - 1 + (corner & 1), cy = py - 1 + (corner >> 1);
-      const float w = weight * (corner & 1 ? fx : 1 - fx) * (corner & 2 ? fy : 1 - fy);
-      if (w == 0 || cx < 0 || cy < 0) continue;
-      const Basis* row = prefix + (cy * kBlockSize + cx) * columns;
-      for (int k = 0; k < columns; ++k) sums[k] += w * static_cast<float>(row[k]);
-    }
-  }
-
   /// values[k][t] = column k at pixel t of an axis.
   static GLINT_HD void valuesOfAxis(const Basis* prefix, int rank, float* values) {
     for (int k = 0; k < rank; ++k) {
@@ -363,35 +420,47 @@ class ClusterReader {
     return Float4::load(last);
   }
 
+  /// Lane t: sum over k of weights[k] * prefix[t * stride + k].
+  static GLINT_HD Float16 weighPrefixes(const Basis* prefix, int stride, int columns, const float* weights) {
+    Float16 sums;
+    if (columns < 4) {  // reads what is around a row, but nothing around the block
+      float w[3] = {};
+      for (int k = 0; k < columns; ++k) w[k] = weights[k];
+      const Float4 head = Float4::of(w[0], w[1], w[2], 0);
+      const Float4 tail = columns == 1   ? Float4::of(0, 0, 0, w[0])
+                          : columns == 2 ? Float4::of(0, 0, w[0], w[1])
+                                         : Float4::of(0, w[0], w[1], w[2]);
+      for (int k = 0; k < 3; ++k) sums.v[k] = fourRows(prefix + 4 * k * stride, stride, head);
+      sums.v[3] = fourRows(prefix + 12 * stride + columns - 4, stride, tail);
+      return sums;
+    }
+    const Float4 last = lastColumns(weights, columns);
+    for (int k = 0; k < 4; ++k) sums.v[k] = fourRows(prefix + 4 * k * stride, stride, columns, weights, last);
+    return sums;
+  }
+  static GLINT_HD Float4 fourRows(const Basis* prefix, int stride, Float4 w) {
+    return sumsOf(w * Float4::load(prefix), w * Float4::load(prefix + stride), w * Float4::load(prefix + 2 * stride),
+                  w * Float4::load(prefix + 3 * stride));
+  }
+  static GLINT_HD Float4 fourRows(const Basis* prefix, int stride, int columns, const float* weights, Float4 last) {
+    Float4 sums[4];
+    for (int j = 0; j < 4; ++j) sums[j] = last * Float4::load(prefix + j * stride + columns - 4);
+    for (int k = 0; k + 4 <= columns; k += 4) {
+      const Float4 w = Float4::load(weights + k);
+      for (int j = 0; j < 4; ++j) sums[j] = sums[j] + w * Float4::load(prefix + j * stride + k);
+    }
+    return sumsOf(sums[0], sums[1], sums[2], sums[3]);
+  }
+
   /// pca: sums the prefix sums of all columns first, and takes differences once.
   GLINT_HD void sumImages(const NdfCluster& cluster, const float* scaled, float* pixels) const {
     const int columns = cluster.columns;
     const Basis* at = first(cluster);
-    const Float4 last = lastColumns(scaled, columns);
-    float above[kBlockSize + 1] = {}, here[kBlockSize + 1] = {};
-    for (int y = 0; y < kBlockSize; ++y) {
-      for (int x = 0; x < kBlockSize; x += 4, at += 4 * columns) {
-        if (columns < 4) {
-          for (int j = 0; j < 4; ++j) {
-            here[1 + x + j] = 0;
-            for (int k = 0; k < columns; ++k) here[1 + x + j] += scaled[k] * static_cast<float>(at[j * columns + k]);
-          }
-          continue;
-        }
-        Float4 sums[4];
-        for (int j = 0; j < 4; ++j) sums[j] = last * Float4::load(at + j * columns + columns - 4);
-        for (int k = 0; k + 4 <= columns; k += 4) {
-          const Float4 w = Float4::load(scaled + k);
-          for (int j = 0; j < 4; ++j) sums[j] = sums[j] + w * Float4::load(at + j * columns + k);
-        }
-        sumsOf(sums[0], sums[1], sums[2], sums[3]).store(here + 1 + x);
-      }
-      for (int x = 0; x < kBlockSize; x += 4) {
-        const Float4 outer = Float4::load(here + x + 1) - Float4::load(here + x);
-        const Float4 inner = Float4::load(above + x + 1) - Float4::load(above + x);
-        (outer - inner).positive().store(pixels + y * kBlockSize + x);
-      }
-      for (int x = 1; x <= kBlockSize; ++x) above[x] = here[x];
+    Float16 above = {{Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()}};
+    for (int y = 0; y < kBlockSize; ++y, at += kBlockSize * columns) {
+      const Float16 here = weighPrefixes(at, columns, columns, scaled).differences();
+      (here - above).positive().store(pixels + y * kBlockSize);
+      above = here;
     }
   }
 

@@ -21,7 +21,7 @@ namespace glint {
 /// result is clamped: it is the exact average of `signedDensity`, and of `density` where nothing is negative.
 /// Thread-safe, allocates nothing; the arrays must outlive it.
 class CpNdf {
-  static constexpr int kMaxBlocksPerAxis = 64;  // of 1024 pixels, the largest image
+  static constexpr int kMostBlocks = 64 * 64;  // of 1024^2 pixels, the largest image
 
  public:
   GLINT_HD explicit CpNdf(const CompressedNdf& ndf) : ndf_(ndf), chooser_(ndf.shape) {}
@@ -34,12 +34,14 @@ class CpNdf {
   /// Whether footprints below level 0 are answered from the texels.
   GLINT_HD bool hasNormals() const { return below_.hasMap(); }
   GLINT_HD const PyramidShape& shape() const { return ndf_.shape; }
+  /// Whether this footprint is answered from the texels.
+  GLINT_HD bool fromTexels(const Footprint& p) const { return hasNormals() && belowFinest(shape(), p); }
   GLINT_HD const SliceChooser& chooser() const { return chooser_; }
 
   /// Density towards h, >= 0; O(columns) in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
+    if (fromTexels(p)) return below_.density(p, h);
     const PyramidSlices chosen = chooser_.choose(p);
     const PixelPlace place = pixelPlace(shape(), h);
     return withReader(ndf_, [&](const auto& reader) { return pixelDensity(reader, chosen, place); });
@@ -48,16 +50,28 @@ class CpNdf {
   /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly inside, as
   /// the density is constant there: exactly in proportion to the density, which is the pdf.
   ///
-  /// Stored masses are rounded up by at most a sixteenth; a block is kept with the ratio of the mass that its pixels have to the
-  /// stored one, else another is drawn from the digits of `xi` that are left (one in forty on average). O(columns * 256).
+  /// Stored masses are rounded up by at most a sixteenth: with the difference's share another block is drawn, from the digits
+  /// of `xi` that are left (one in forty on average). O(16 columns), and O(256 columns) with that share and with the share of
+  /// pixels next to negative ones.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const;
+
+  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock, findBlockSlice and choosePixel make it, in this
+  /// order. Each reads what the one before has asked the memory for, so the cache misses of many samples can be under way
+  /// together.
+  struct Draw;
+  GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const;
+  GLINT_HD void findBlocks(const Draw& draw) const;
+  GLINT_HD void chooseBlock(Draw& draw) const;
+  GLINT_HD void findBlockSlice(Draw& draw) const;
+  template <class Reader>
+  GLINT_HD void choosePixel(const Reader& reader, Draw& draw) const;
 
   /// Average over a box of half vectors, >= 0, 0 if the box is empty; O(columns) for each block that the box covers.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const { return std::max(0.0f, signedMean(p, range)); }
 
   GLINT_HD float signedDensity(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    if (below_.hasMap() && belowFinest(shape(), p)) return below_.density(p, h);
+    if (fromTexels(p)) return below_.density(p, h);
     const PyramidSlices chosen = chooser_.choose(p);
     const PixelPlace place = pixelPlace(shape(), h);
     return withReader(ndf_, [&](const auto& reader) {
@@ -67,7 +81,7 @@ class CpNdf {
 
   GLINT_HD float signedMean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
-    if (below_.hasMap() && belowFinest(shape(), p)) return below_.mean(p, range);
+    if (fromTexels(p)) return below_.mean(p, range);
     const PyramidSlices chosen = chooser_.choose(p);
     return withReader(ndf_, [&](const auto& reader) {
       double sum = 0;
@@ -242,102 +256,158 @@ class CpNdf {
     return sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<const Reader&>{reader, place}, Positive{});
   }
 
-  /// All pixels of a slice, [16][16], >= 0.
+  /// Sums of the rows of a slice and single rows of pixels: of columns, or of spots.
   template <class Reader>
-  GLINT_HD void decodeBlock(const Reader& reader, const SlicePlace& at, float* pixels) const {
-    const NdfCluster& cluster = ndf_.clusters.data()[at.cluster];
-    if (cluster.columns == 0)
-      spotsOfBlock(SpotProfile(ndf_), spotsOf(ndf_, cluster, at.slice), pixels);
-    else
-      reader.block(cluster, reader.row(cluster, at.slice), pixels);
-  }
-
-  /// Chooses a block with a slice in proportion to its stored mass: its row with xi.y, its column with xi.x.
-  /// @param codes  masses of the blocks of the image
-  /// @return block -1 if the image has none
-  GLINT_HD BlockChoice chooseStored(std::size_t image, const std::uint8_t* codes, int count, Vec2& xi) const {
-    const int blocks = shape().blocksPerAxis();
-    const std::uint64_t* mask = ndf_.block_masks.data() + image * static_cast<std::size_t>(ndf_.placeWords());
-    const auto mass = [&](int begin, int end) {
-      std::uint32_t units = 0;
-      for (int k = begin; k < end; ++k) units += blockMassUnits(codes[k]);
-      return static_cast<float>(units);
-    };
-    int begins[kMaxBlocksPerAxis + 1], rows = 0, n = 0, row = -1;
-    for (int w = 0; w < ndf_.placeWords(); ++w) {
-      for (std::uint64_t bits = mask[w]; bits != 0; bits &= bits - 1, ++n) {
-        const int block_row = ndf_.place_blocks.data()[64 * w + lowestBit(bits)] / blocks;
-        if (block_row != row) begins[rows++] = n;
-        row = block_row;
-      }
+  class SliceRows {
+   public:
+    GLINT_HD SliceRows(const CompressedNdf& ndf, const Reader& reader, const SlicePlace& at)
+        : reader_(reader), cluster_(ndf.clusters.data()[at.cluster]), profile_(ndf) {
+      if (cluster_.columns == 0)
+        spots_ = spotsOf(ndf, cluster_, at.slice);
+      else
+        reader.scaledCoefficients(cluster_, reader.row(cluster_, at.slice), scaled_);
     }
-    begins[rows] = count;
-    const int r = chooseIndex(
-        rows, mass(0, count), [&](int k) { return mass(begins[k], begins[k + 1]); }, xi.y);
-    if (r < 0) return {};
-    const int begin = begins[r], end = begins[r + 1];
-    const int k = chooseIndex(
-        end - begin, mass(begin, end), [&](int j) { return mass(begin + j, begin + j + 1); }, xi.x);
-    const int rank = begin + std::max(k, 0);
-    return {ndf_.place_blocks.data()[placeOfRank(mask, rank)], rank};
-  }
 
-  /// Number of the set bit that has `rank` set bits below it.
-  static GLINT_HD int placeOfRank(const std::uint64_t* mask, int rank) {
-    int w = 0;
-    for (int bits = setBits(mask[0]); bits <= rank; bits = setBits(mask[++w])) rank -= bits;
-    std::uint64_t word = mask[w];
-    for (; rank > 0; --rank) word &= word - 1;
-    return 64 * w + lowestBit(word);
-  }
-
-  /// A pixel of an image, in proportion to the image's density. x = -1 if there is none.
-  template <class Reader>
-  GLINT_HD PixelPlace choosePlace(const Reader& reader, std::size_t image, Vec2& xi) const {
-    constexpr int kTries = 4;  // the last is kept: one in a million
-    const std::uint32_t* first = ndf_.first_block.data() + image;
-    const std::uint8_t* codes = ndf_.block_masses.data() + first[0];
-    const float to_units = 0x1p18f * 4 * ndf_.density_scales.data()[image] /
-                           (static_cast<float>(shape().resolution) * static_cast<float>(shape().resolution));
-    for (int tries = 1;; ++tries) {
-      const BlockChoice choice = chooseStored(image, codes, static_cast<int>(first[1] - first[0]), xi);
-      const SlicePlace at = choice.block < 0 ? SlicePlace{} : findSlice(image, ndf_.block_places.data()[choice.block]);
-      if (at.cluster == kNone) return {0, -1, -1};
+    /// What is surely in each row: less by what lies below zero there.
+    GLINT_HD Float16 leastSums() const {
+      return cluster_.columns == 0 ? spotRowSums(profile_, spots_) : reader_.rowSums(cluster_, scaled_).positive();
+    }
+    /// What is in each row besides. Decodes all pixels.
+    GLINT_HD Float16 addedSums(const Float16& least) const {
       float pixels[kBlockPixels];
-      decodeBlock(reader, at, pixels);
-      const BlockSums sums = sumRows(pixels);
-      const float kept = std::min(1.0f, sums.total * to_units / static_cast<float>(blockMassUnits(codes[choice.rank])));
-      if (xi.y < kept || tries == kTries) {
-        xi.y = clampUnit(xi.y / kept);
-        return choosePixel(pixels, sums, choice.block, xi);
-      }
-      xi.y = clampUnit((xi.y - kept) / (1 - kept));
+      if (cluster_.columns == 0)  // nothing is below zero
+        std::fill(pixels, pixels + kBlockPixels, 0.0f);
+      else
+        reader_.block(cluster_, scaled_, pixels);
+      return (sumRows(pixels) - least).positive();
     }
-  }
+    /// Pixels of a row, >= 0.
+    GLINT_HD Float16 row(int y) const {
+      return cluster_.columns == 0 ? spotRow(profile_, spots_, y) : reader_.rowPixels(cluster_, scaled_, y);
+    }
+
+   private:
+    const Reader& reader_;
+    const NdfCluster& cluster_;
+    SpotProfile profile_;
+    SpotList spots_ = {};
+    float scaled_[kMaxColumns];
+  };
+
+  /// Chooses a pixel of the chosen block in proportion to its value: its row with xi.y, its column with xi.x.
+  ///
+  /// Sums of whole rows are cheap, but count what lies below zero: where they are positive, the row has at least that. So a
+  /// number below their total chooses a row by them. One above it chooses by what else the rows have, which takes all pixels,
+  /// or falls into what the stored mass is too large by.
+  /// @param last_try  whether no other block can be drawn: one in a million; then rows are chosen by their sums alone
+  /// @return false: another block is to be drawn with what is left of xi
+  template <class Reader>
+  GLINT_HD bool choosePixelOfBlock(const Reader& reader, bool last_try, Draw& draw) const;
 
   CompressedNdf ndf_;
   SliceChooser chooser_;
   Reference below_;
 };
 
-// Behind the class: clang instantiates the templates that it calls only once it has read them.
-inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) const {
-  xi = clampUnit(xi);
-  if (below_.hasMap() && belowFinest(shape(), p)) return below_.sample(p, xi);
-  const PyramidSlices chosen = chooser_.choose(p);
+struct CpNdf::Draw {
+  Vec2 xi;
+  float total = 0;  ///< weights of the images that have any density
+  bool possible = false;
+  std::size_t image = 0;
+  int block = 0, block_place = 0;
+  float mass = 0;  ///< of the block, as stored: at least its share of the image
+  SlicePlace slice;
+  PixelPlace place = {0, -1, -1};  ///< x = -1: nothing can be drawn
+};
+
+inline GLINT_HD CpNdf::Draw CpNdf::chooseImage(const PyramidSlices& chosen, Vec2 xi) const {
+  Draw draw;
+  draw.xi = clampUnit(xi);
   float weights[PyramidSlices::kMost];
-  float total = 0;  // images of which nothing was kept have no density
-  for (int k = 0; k < chosen.count; ++k) {
+  for (int k = 0; k < chosen.count; ++k) {  // images of which nothing was kept have no density
     weights[k] = ndf_.density_scales.data()[imageOf(chosen[k])] > 0 ? chosen.weights[k] : 0.0f;
-    total += weights[k];
+    draw.total += weights[k];
   }
   const int k = chooseIndex(
-      chosen.count, total, [&](int i) { return weights[i]; }, xi.x);
-  if (k < 0) return {};
+      chosen.count, draw.total, [&](int i) { return weights[i]; }, draw.xi.x);
+  if (k < 0) return draw;
+  draw.possible = true;
+  draw.image = imageOf(chosen[k]);
+  prefetch(ndf_.first_block.data() + draw.image);
+  prefetch(ndf_.block_masks.data() + draw.image * static_cast<std::size_t>(ndf_.placeWords()));
+  return draw;
+}
+
+inline GLINT_HD void CpNdf::findBlocks(const Draw& draw) const {
+  constexpr std::uint32_t kLine = 64;
+  const std::uint32_t* first = ndf_.first_block.data() + draw.image;
+  for (std::uint32_t k = first[0]; k < first[1]; k += kLine) prefetch(ndf_.block_masses.data() + k);
+}
+
+/// In proportion to its stored mass, with xi.y.
+inline GLINT_HD void CpNdf::chooseBlock(Draw& draw) const {
+  if (!draw.possible) return;
+  const std::uint32_t* first = ndf_.first_block.data() + draw.image;
+  const std::uint8_t* codes = ndf_.block_masses.data() + first[0];
+  const int count = static_cast<int>(first[1] - first[0]);
+  const std::size_t readable = ndf_.block_masses.size() - first[0];
+  const int rank = chooseOfMany<kMostBlocks>(
+      count, [&](int k) { return loadMasses(codes + k, count - k, readable - static_cast<std::size_t>(k)); }, draw.xi.y);
+  draw.possible = rank >= 0;
+  if (!draw.possible) return;
+  draw.block_place = placeOfRank(ndf_.block_masks.data() + draw.image * static_cast<std::size_t>(ndf_.placeWords()), rank);
+  draw.block = ndf_.place_blocks.data()[draw.block_place];
+  draw.mass = blockMass(codes[rank]);
+}
+
+inline GLINT_HD void CpNdf::findBlockSlice(Draw& draw) const {
+  if (!draw.possible) return;
+  draw.slice = findSlice(draw.image, draw.block_place);
+  draw.possible = draw.slice.cluster != kNone;
+}
+
+template <class Reader>
+GLINT_HD bool CpNdf::choosePixelOfBlock(const Reader& reader, bool last_try, Draw& draw) const {
+  const auto resolution = static_cast<float>(shape().resolution);
+  float mass = draw.mass * 0.25f * resolution * resolution / ndf_.density_scales.data()[draw.image];  // in pixels
+  const SliceRows<Reader> rows(ndf_, reader, draw.slice);
+  Float16 sums = rows.leastSums();
+  float total = sums.sum(), reached = draw.xi.y * (last_try ? total : mass);
+  if (!(reached < total) && !last_try) {
+    reached -= total;
+    mass -= total;
+    sums = rows.addedSums(sums);
+    total = sums.sum();
+    if (!(reached < total)) {
+      draw.xi.y = clampUnit((reached - total) / (mass - total));
+      return false;
+    }
+  }
+  const int y = std::max(chooseAt(sums, reached, draw.xi.y), 0);
+  draw.place = {draw.block, chooseOf16(rows.row(y), draw.xi.x), y};
+  return true;
+}
+
+template <class Reader>
+GLINT_HD void CpNdf::choosePixel(const Reader& reader, Draw& draw) const {
+  constexpr int kTries = 4;
+  for (int tries = 1; draw.possible && !choosePixelOfBlock(reader, tries == kTries, draw); ++tries) {
+    chooseBlock(draw);
+    findBlockSlice(draw);
+  }
+}
+
+// Behind the class: clang instantiates the templates that it calls only once it has read them.
+inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) const {
+  if (fromTexels(p)) return below_.sample(p, clampUnit(xi));
+  const PyramidSlices chosen = chooser_.choose(p);
+  Draw draw = chooseImage(chosen, xi);
+  chooseBlock(draw);
+  findBlockSlice(draw);
   return withReader(ndf_, [&](const auto& reader) -> HalfVectorSample {
-    const PixelPlace place = choosePlace(reader, imageOf(chosen[k]), xi);
-    if (place.x < 0) return {};
-    return {pointInPixel(shape(), place, xi), pixelDensity(reader, chosen, place) / total};
+    choosePixel(reader, draw);
+    if (draw.place.x < 0) return {};
+    return {pointInPixel(shape(), draw.place, draw.xi), pixelDensity(reader, chosen, draw.place) / draw.total};
   });
 }
 

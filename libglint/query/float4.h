@@ -23,9 +23,7 @@ inline GLINT_HD float differenceOf(float a, float b) { return a - b; }
 inline GLINT_HD float differenceOf(std::int32_t a, std::int32_t b) {
   return static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b)));
 }
-inline GLINT_HD float differenceOf(std::int16_t a, std::int16_t b) {
-  return differenceOf(std::int32_t{a}, std::int32_t{b});
-}
+inline GLINT_HD float differenceOf(std::int16_t a, std::int16_t b) { return differenceOf(std::int32_t{a}, std::int32_t{b}); }
 
 /// Four floats side by side, from SSE4.1 where the program is compiled for it. Results are the same bits without it.
 struct Float4 {
@@ -85,6 +83,16 @@ struct Float4 {
     bits = _mm_insert_epi16(_mm_insert_epi16(bits, b, 2), c, 4);
     return positiveHalves(_mm_insert_epi16(bits, d, 6));
   }
+  /// Half-precision numbers >= 0 times 2^-112, in the fewest steps. Subnormal ones stay subnormal, so they are for sums and
+  /// comparisons only.
+  static Float4 loadTiny(const std::uint16_t* p) {
+    const __m128i bits = _mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
+    return {_mm_castsi128_ps(_mm_slli_epi32(bits, 13))};
+  }
+  /// Masses of blocks whose codes (block_mass.h) are the bytes of `codes`, the first of them lowest.
+  static Float4 ofMassCodes(std::uint32_t codes) {
+    return positiveHalves(_mm_slli_epi32(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(static_cast<int>(codes))), 6));
+  }
   static Float4 positiveHalves(__m128i bits) {
     // Right for normal numbers. A subnormal f 2^-14 comes out as 2^-15 (1 + f): less than twice that minus 2^-14 only if it is
     // normal.
@@ -135,6 +143,11 @@ struct Float4 {
   }
   /// The last lane in all.
   Float4 last() const { return {_mm_shuffle_ps(v, v, 0xff)}; }
+  float lastLane() const { return _mm_cvtss_f32(last().v); }
+  /// Lanes one further, behind the last one of `before`.
+  Float4 shiftedBehind(Float4 before) const {
+    return {_mm_castsi128_ps(_mm_alignr_epi8(_mm_castps_si128(v), _mm_castps_si128(before.v), 12))};
+  }
   /// (0 + 2) + (1 + 3).
   float sum() const {
     const __m128 pairs = _mm_add_ps(v, _mm_movehl_ps(v, v));
@@ -166,6 +179,21 @@ struct Float4 {
   static GLINT_HD Float4 loadPositive(const std::uint16_t* p) { return load(p); }
   static GLINT_HD Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
     return {{halfToFloat(a), halfToFloat(b), halfToFloat(c), halfToFloat(d)}};
+  }
+  /// Half-precision numbers >= 0 times 2^-112, in the fewest steps. Subnormal ones stay subnormal, so they are for sums and
+  /// comparisons only.
+  static GLINT_HD Float4 loadTiny(const std::uint16_t* p) {
+    Float4 out;
+    for (int k = 0; k < 4; ++k) {
+      const std::uint32_t bits = static_cast<std::uint32_t>(p[k]) << 13;
+      std::memcpy(out.v + k, &bits, sizeof bits);
+    }
+    return out;
+  }
+  /// Masses of blocks whose codes (block_mass.h) are the bytes of `codes`, the first of them lowest.
+  static GLINT_HD Float4 ofMassCodes(std::uint32_t codes) {
+    const auto half = [&](int k) { return static_cast<std::uint16_t>((codes >> (8 * k) & 255u) << 6); };
+    return ofPositive(half(0), half(1), half(2), half(3));
   }
   /// Signed numbers of four bits, from the low and the high halves of four bytes.
   static GLINT_HD Float4 loadLow(const std::int8_t* p) {
@@ -212,7 +240,8 @@ struct Float4 {
   /// out[k] = row[k] * columns + column[k], of whole numbers >= 0.
   friend GLINT_HD void storeIndices(Float4 row, std::int32_t columns, Float4 column, std::uint32_t* out) {
     for (int k = 0; k < 4; ++k)
-      out[k] = static_cast<std::uint32_t>(static_cast<std::int32_t>(row.v[k]) * columns + static_cast<std::int32_t>(column.v[k]));
+      out[k] =
+          static_cast<std::uint32_t>(static_cast<std::int32_t>(row.v[k]) * columns + static_cast<std::int32_t>(column.v[k]));
   }
   /// In lanes: a < b ? yes : no.
   friend GLINT_HD Float4 whereLess(Float4 a, Float4 b, Float4 yes, Float4 no) {
@@ -238,6 +267,9 @@ struct Float4 {
   }
   /// The last lane in all.
   GLINT_HD Float4 last() const { return {{v[3], v[3], v[3], v[3]}}; }
+  GLINT_HD float lastLane() const { return v[3]; }
+  /// Lanes one further, behind the last one of `before`.
+  GLINT_HD Float4 shiftedBehind(Float4 before) const { return {{before.v[3], v[0], v[1], v[2]}}; }
   /// (0 + 2) + (1 + 3).
   GLINT_HD float sum() const { return (v[0] + v[2]) + (v[1] + v[3]); }
 #endif
@@ -252,5 +284,43 @@ inline GLINT_HD Float4 sumsOf(Float4 a, Float4 b, Float4 c, Float4 d) {
   return {{a.sum(), b.sum(), c.sum(), d.sum()}};
 #endif
 }
+
+/// Sixteen floats: a row or a column of a block, or sums of its rows.
+struct Float16 {
+  Float4 v[4];
+
+  static GLINT_HD Float16 load(const float* p) {
+    return {{Float4::load(p), Float4::load(p + 4), Float4::load(p + 8), Float4::load(p + 12)}};
+  }
+  GLINT_HD void store(float* p) const {
+    for (int k = 0; k < 4; ++k) v[k].store(p + 4 * k);
+  }
+  friend GLINT_HD Float16 operator-(const Float16& a, const Float16& b) {
+    return {{a.v[0] - b.v[0], a.v[1] - b.v[1], a.v[2] - b.v[2], a.v[3] - b.v[3]}};
+  }
+  GLINT_HD Float16 positive() const { return {{v[0].positive(), v[1].positive(), v[2].positive(), v[3].positive()}}; }
+  /// Lane k: sum of lanes 0 to k. In an order that does not depend on the processor.
+  GLINT_HD Float16 runningSums() const {
+    Float16 sums;
+    Float4 before = Float4::zero();
+    for (int k = 0; k < 4; ++k) before = (sums.v[k] = before + v[k].runningSums()).last();
+    return sums;
+  }
+  /// Lane k without lane k - 1.
+  GLINT_HD Float16 differences() const {
+    Float16 out;
+    Float4 before = Float4::zero();
+    for (int k = 0; k < 4; ++k) {
+      out.v[k] = v[k] - v[k].shiftedBehind(before);
+      before = v[k];
+    }
+    return out;
+  }
+  /// Bit k: lane k is at most `bound`.
+  GLINT_HD unsigned notAbove(float bound) const {
+    return v[0].notAbove(bound) | v[1].notAbove(bound) << 4 | v[2].notAbove(bound) << 8 | v[3].notAbove(bound) << 12;
+  }
+  GLINT_HD float sum() const { return ((v[0] + v[1]) + (v[2] + v[3])).sum(); }
+};
 
 }  // namespace glint

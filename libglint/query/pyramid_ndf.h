@@ -19,7 +19,8 @@ namespace glint {
 /// The density is constant over a pixel. Thread-safe, allocates nothing; the arrays must outlive it.
 class PyramidNdf {
  public:
-  GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid) : pyramid_(pyramid), chooser_(pyramid.shape), mask_words_(pyramid.shape.maskWords()) {}
+  GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid)
+      : pyramid_(pyramid), chooser_(pyramid.shape), mask_words_(pyramid.shape.maskWords()) {}
   GLINT_HD PyramidNdf(const NdfPyramid& pyramid, const NormalMap& normals)
       : pyramid_(pyramid),
         chooser_(pyramid.shape),
@@ -41,11 +42,7 @@ class PyramidNdf {
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     if (fromTexels(p)) return below_.density(p, h);
-    const PyramidSlices chosen = chooseSlices(p);
-    const PixelPlace place = pixelPlace(shape(), h);
-    return pyramid_.precision == BlockPrecision::f16
-               ? addPixelsOf<std::uint16_t>(findPixelsOf<std::uint16_t>(chosen, place))
-               : addPixelsOf<float>(findPixelsOf<float>(chosen, place));
+    return pixelDensity(chooseSlices(p), pixelPlace(shape(), h));
   }
 
   /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly inside, as
@@ -53,11 +50,13 @@ class PyramidNdf {
   /// 1e-5 as they are built. O(stored blocks of one image + 256).
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     if (fromTexels(p)) return below_.sample(p, clampUnit(xi));
-    Draw draw = chooseImage(p, xi);
+    Draw draw = chooseImage(chooseSlices(p), xi);
     findBlocks(draw);
+    prefetchIndex(draw.slices);
     chooseBlock(draw);
-    choosePixel(draw);
-    return finish(draw);
+    choosePixel(draw, [](const auto* pixels) { return sumRows(pixels); });
+    if (draw.place.x < 0) return {};
+    return {pointInPixel(shape(), draw.place, draw.xi), pixelDensity(draw.slices, draw.place)};
   }
 
   /// Where a place is in the level of every slice.
@@ -67,7 +66,7 @@ class PyramidNdf {
     int count = 0;
   };
 
-  /// A sample from the images on its way: chooseImage, findBlocks, chooseBlock, choosePixel and finish make it, in this order. Each
+  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock and choosePixel make it, in this order. Each
   /// reads what the one before has asked the memory for, so the cache misses of many samples can be under way together.
   struct Draw {
     PyramidSlices slices;
@@ -75,14 +74,13 @@ class PyramidNdf {
     PyramidSlice chosen = {0, 0, 0};  ///< weight 0: nothing can be drawn
     std::uint64_t first_block = 0;    ///< of the chosen image
     int block_count = 0;
-    std::uint64_t stored = 0;  ///< the chosen block
-    PixelPlace place = {0, -1, -1};
-    Places pixels;
+    std::uint64_t stored = 0;        ///< the chosen block
+    PixelPlace place = {0, -1, -1};  ///< x = -1: nothing can be drawn
   };
 
-  GLINT_HD Draw chooseImage(const Footprint& p, Vec2 xi) const {
+  GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const {
     Draw draw;
-    draw.slices = chooseSlices(p);
+    draw.slices = chosen;
     draw.xi = clampUnit(xi);
     const int k = chooseIndex(
         draw.slices.count, 1, [&](int i) { return draw.slices.weights[i]; }, draw.xi.x);
@@ -100,58 +98,101 @@ class PyramidNdf {
     draw.first_block = ranks[0];
     draw.block_count = static_cast<int>(end - ranks[0]);
     for (int k = 0; k < draw.block_count; k += kLine) prefetch(level.block_means.data() + draw.first_block + k);
-    prefetchIndex(draw.slices);
   }
 
   GLINT_HD void chooseBlock(Draw& draw) const {
     if (!(draw.chosen.weight > 0)) return;
     const PyramidLevel& level = levelOf(draw.chosen);
+    constexpr int kMostBlocks = 64 * kMostMaskWords;
     const float* means = level.block_means.data() + draw.first_block;
-    const int blocks = shape().blocksPerAxis();
-    const auto mass = [&](int begin, int end) {
-      float sum = 0;
-      for (int k = begin; k < end; ++k) sum += means[k];
-      return sum;
-    };
-    const BlockChoice choice = blocks <= 16
-                                   ? chooseBlockOf16(maskOf(draw.chosen), blocks, means, draw.block_count, draw.xi)
-                                   : glint::chooseBlock(maskOf(draw.chosen), blocks, mass(0, draw.block_count), mass, draw.xi);
-    draw.place.block = choice.block;
-    if (choice.block < 0) return;
-    draw.stored = draw.first_block + static_cast<std::uint64_t>(choice.rank);
+    const int count = draw.block_count;
+    const int rank = chooseOfMany<kMostBlocks>(
+        count,
+        [&](int first) {
+          if (first + 16 <= count) return Float16::load(means + first);
+          float rest[16] = {};
+          for (int k = first; k < count; ++k) rest[k - first] = means[k];
+          return Float16::load(rest);
+        },
+        draw.xi.y);
+    if (rank < 0) return;
+    draw.place.block = placeOfRank(maskOf(draw.chosen), rank);
+    draw.stored = draw.first_block + static_cast<std::uint64_t>(rank);
     prefetchPixels(level, draw.stored, 0, kBlockSize);
   }
 
-  GLINT_HD void choosePixel(Draw& draw) const {
+  /// @param sum_rows  sum_rows(pixels): sums of the rows of a block of floats or half-precision numbers
+  template <class SumRows>
+  GLINT_HD void choosePixel(Draw& draw, SumRows&& sum_rows) const {
     if (!(draw.chosen.weight > 0 && draw.place.block >= 0)) return;
     const PyramidLevel& level = levelOf(draw.chosen);
-    draw.place = pyramid_.precision == BlockPrecision::f16
-                     ? choosePixelOf(static_cast<const std::uint16_t*>(level.pixels), draw)
-                     : choosePixelOf(static_cast<const float*>(level.pixels), draw);
-    if (draw.place.x >= 0) draw.pixels = findPixels(draw.slices, draw.place);
+    const auto choose = [&](const auto* pixels) {
+      const auto* block = pixels + draw.stored * kBlockPixels;
+      const int y = chooseOf16(sum_rows(block), draw.xi.y);
+      if (y >= 0) draw.place = {draw.place.block, chooseOf16(rowOf(block, y), draw.xi.x), y};
+    };
+    pyramid_.precision == BlockPrecision::f16 ? choose(static_cast<const std::uint16_t*>(level.pixels))
+                                              : choose(static_cast<const float*>(level.pixels));
   }
 
-  GLINT_HD HalfVectorSample finish(const Draw& draw) const {
-    if (draw.place.x < 0) return {};
-    return {pointInPixel(shape(), draw.place, draw.xi), addPixels(draw.pixels)};
-  }
+  /// How much of each row and column of a block a box covers.
+  class BlockCover {
+   public:
+    GLINT_HD explicit BlockCover(const BlockBox& box) {
+      constexpr float kFull = kBlockSize;
+      whole_ = box.x0 <= 0 && box.y0 <= 0 && box.x1 >= kFull && box.y1 >= kFull;
+      for (int k = 0; k < kBlockSize; ++k) {
+        columns[k] = covered(box.x0, box.x1, k);
+        rows[k] = covered(box.y0, box.y1, k);
+      }
+      first_row = static_cast<int>(box.y0);
+      end_row = std::min(static_cast<int>(std::ceil(box.y1)), kBlockSize);
+      first_column = static_cast<int>(box.x0) / 4 * 4;
+      end_column = std::min(static_cast<int>(std::ceil(box.x1)), kBlockSize);
+    }
+    int first_row, end_row, first_column, end_column;  ///< the first column is a multiple of 4
+    float columns[kBlockSize], rows[kBlockSize];       ///< covered parts, 0 to 1
+    GLINT_HD bool isWhole() const { return whole_; }
+
+    /// Sum of the covered pixels.
+    template <class Pixel>
+    GLINT_HD float sum(const Pixel* pixels) const {
+      Float4 sum = Float4::zero();
+      for (int y = first_row; y < end_row; ++y) {
+        Float4 row = Float4::zero();
+        for (int x = first_column; x < end_column; x += 4)
+          row = row + Float4::load(columns + x) * loadPixels(pixels + y * kBlockSize + x);
+        sum = sum + Float4::all(rows[y]) * row;
+      }
+      return sum.sum();
+    }
+
+   private:
+    static GLINT_HD float covered(float low, float high, int k) {
+      return std::max(0.0f, std::min(high, static_cast<float>(k + 1)) - std::max(low, static_cast<float>(k)));
+    }
+    bool whole_;
+  };
 
   /// Average density over a box of half vectors, 0 if it is empty. O(1) for each block that the box covers: whole blocks have
   /// their mean stored, others sum at most 256 pixels.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     if (fromTexels(p)) return below_.mean(p, range);
-    return mean(chooseSlices(p), range);
+    return mean(chooseSlices(p), range, [](const auto* pixels, const BlockCover& cover) { return cover.sum(pixels); });
   }
 
   /// The same from chosen images.
-  GLINT_HD float mean(const PyramidSlices& chosen, const Box2& range) const {
+  /// @param covered_sum  covered_sum(pixels, cover): BlockCover::sum of floats or half-precision numbers
+  template <class Sum>
+  GLINT_HD float mean(const PyramidSlices& chosen, const Box2& range, Sum&& covered_sum) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
     double sum = 0;
     forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
       const BlockCover cover(box);
       for (int k = 0; k < chosen.count; ++k) {
         const std::int64_t stored = storedBlock(chosen[k], block);
-        if (stored >= 0) sum += double{chosen.weights[k]} * blockSum(pyramid_.levels[chosen.level(k)], stored, cover);
+        if (stored >= 0)
+          sum += double{chosen.weights[k]} * blockSum(pyramid_.levels[chosen.level(k)], stored, cover, covered_sum);
       }
     });
     return static_cast<float>(sum / areaInPixels(shape(), range));
@@ -190,13 +231,13 @@ class PyramidNdf {
     return levelOf(slice).mask_ranks.data() + std::size_t{slice.image} * mask_words_;
   }
 
-  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be
-  /// predicted, so the cache misses of all slices are under way together.
-  GLINT_HD Places findPixels(const PyramidSlices& chosen, const PixelPlace& place) const {
-    return pyramid_.precision == BlockPrecision::f16 ? findPixelsOf<std::uint16_t>(chosen, place)
-                                                     : findPixelsOf<float>(chosen, place);
+  GLINT_HD float pixelDensity(const PyramidSlices& chosen, const PixelPlace& place) const {
+    return pyramid_.precision == BlockPrecision::f16 ? addPixelsOf<std::uint16_t>(findPixelsOf<std::uint16_t>(chosen, place))
+                                                     : addPixelsOf<float>(findPixelsOf<float>(chosen, place));
   }
 
+  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be predicted, so
+  /// the cache misses of all slices are under way together.
   template <class Pixel>
   GLINT_HD Places findPixelsOf(const PyramidSlices& chosen, const PixelPlace& place) const {
     constexpr std::uint64_t kBlockBytes = kBlockPixels * sizeof(Pixel);
@@ -207,8 +248,7 @@ class PyramidNdf {
       const PyramidLevel& level = pyramid_.levels[chosen.levels[step]];
       // Where nothing is stored a pixel of the first block is read; a level may have none.
       const void* pixels = level.masks.data();
-      if (!level.block_means.empty())
-        pixels = static_cast<const Pixel*>(level.pixels) + (place.y * kBlockSize + place.x);
+      if (!level.block_means.empty()) pixels = static_cast<const Pixel*>(level.pixels) + (place.y * kBlockSize + place.x);
       for (int k = 4 * step; k < 4 * step + 4; ++k) {
         const std::size_t at = std::size_t{chosen.images[k]} * mask_words_ + word;
         const BitRank rank(level.masks.data()[at], bit);
@@ -219,10 +259,6 @@ class PyramidNdf {
       }
     }
     return places;
-  }
-
-  GLINT_HD float addPixels(const Places& places) const {
-    return pyramid_.precision == BlockPrecision::f16 ? addPixelsOf<std::uint16_t>(places) : addPixelsOf<float>(places);
   }
 
   template <class Pixel>
@@ -245,71 +281,20 @@ class PyramidNdf {
     }
   }
 
-  template <class Pixel>
-  GLINT_HD static PixelPlace choosePixelOf(const Pixel* pixels, Draw& draw) {
-    const Pixel* block = pixels + draw.stored * kBlockPixels;
-    const int y = chooseOf16(sumRows(block).rows, draw.xi.y);
-    if (y < 0) return {draw.place.block, -1, -1};
-    float row[kBlockSize];
-    for (int x = 0; x < kBlockSize; x += 4) loadPixels(block + y * kBlockSize + x).store(row + x);
-    return {draw.place.block, chooseOf16(row, draw.xi.x), y};
-  }
-  GLINT_HD static Float4 loadPixels(const std::uint16_t* pixels) { return Float4::loadPositive(pixels); }
-  GLINT_HD static Float4 loadPixels(const float* pixels) { return Float4::load(pixels); }
-
   /// Index of a block of an image among the stored blocks of its level, or -1.
   GLINT_HD std::int64_t storedBlock(const PyramidSlice& slice, int block) const {
     const BitRank rank(maskOf(slice)[block / 64], static_cast<unsigned>(block) % 64);
     return rank.kept ? static_cast<std::int64_t>(ranksOf(slice)[block / 64] + rank.below) : -1;
   }
 
-  /// How much of each row and column of a block a box covers.
-  class BlockCover {
-   public:
-    GLINT_HD explicit BlockCover(const BlockBox& box) {
-      constexpr float kFull = kBlockSize;
-      whole_ = box.x0 <= 0 && box.y0 <= 0 && box.x1 >= kFull && box.y1 >= kFull;
-      for (int k = 0; k < kBlockSize; ++k) {
-        columns_[k] = covered(box.x0, box.x1, k);
-        rows_[k] = covered(box.y0, box.y1, k);
-      }
-      first_row = static_cast<int>(box.y0);
-      end_row = std::min(static_cast<int>(std::ceil(box.y1)), kBlockSize);
-      first_column = static_cast<int>(box.x0) / 4 * 4;
-      end_column = std::min(static_cast<int>(std::ceil(box.x1)), kBlockSize);
-    }
-    int first_row, end_row, first_column, end_column;  ///< the first column is a multiple of 4
-    GLINT_HD bool isWhole() const { return whole_; }
-    GLINT_HD Float4 row(int k) const { return Float4::all(rows_[k]); }
-    GLINT_HD Float4 columns(int k) const { return Float4::load(columns_ + k); }
-
-   private:
-    static GLINT_HD float covered(float low, float high, int k) {
-      return std::max(0.0f, std::min(high, static_cast<float>(k + 1)) - std::max(low, static_cast<float>(k)));
-    }
-    float columns_[kBlockSize], rows_[kBlockSize];
-    bool whole_;
-  };
-
   /// Sum of the densities of the covered pixels of a block, in pixels.
-  GLINT_HD float blockSum(const PyramidLevel& level, std::int64_t block, const BlockCover& cover) const {
+  template <class Sum>
+  GLINT_HD float blockSum(const PyramidLevel& level, std::int64_t block, const BlockCover& cover, Sum&& covered_sum) const {
     if (cover.isWhole()) return kBlockPixels * level.block_means.data()[block];
     const std::size_t first = static_cast<std::size_t>(block) * kBlockPixels;
     return pyramid_.value_scale * (pyramid_.precision == BlockPrecision::f16
-                                       ? coveredSum(static_cast<const std::uint16_t*>(level.pixels) + first, cover)
-                                       : coveredSum(static_cast<const float*>(level.pixels) + first, cover));
-  }
-
-  template <class Pixel>
-  static GLINT_HD float coveredSum(const Pixel* pixels, const BlockCover& cover) {
-    Float4 sum = Float4::zero();
-    for (int y = cover.first_row; y < cover.end_row; ++y) {
-      Float4 row = Float4::zero();
-      for (int x = cover.first_column; x < cover.end_column; x += 4)
-        row = row + cover.columns(x) * loadPixels(pixels + y * kBlockSize + x);
-      sum = sum + cover.row(y) * row;
-    }
-    return sum.sum();
+                                       ? covered_sum(static_cast<const std::uint16_t*>(level.pixels) + first, cover)
+                                       : covered_sum(static_cast<const float*>(level.pixels) + first, cover));
   }
 
   /// Asks the memory for rows of a block's pixels.

@@ -52,6 +52,11 @@ class SpotProfile {
     const float* at = edge(p, place);
     return at[kSpotSteps] - at[0];
   }
+  /// Share that lies in the block.
+  GLINT_HD float whole(int place) const {
+    const float* at = edge(0, place);
+    return at[kSpotSteps * kBlockSize] - at[0];
+  }
   /// Share that lies before position `x` in [0, 16], which may cut a pixel.
   GLINT_HD float before(float x, int place) const {
     const int p = std::min(static_cast<int>(x), kBlockSize - 1);
@@ -86,19 +91,29 @@ inline GLINT_HD float spotsIn(const SpotProfile& profile, const SpotList& list, 
   return list.scale * sum + list.rest * (box.x1 - box.x0) * (box.y1 - box.y0);
 }
 
-/// All pixels of a slice, [16][16].
-inline GLINT_HD void spotsOfBlock(const SpotProfile& profile, const SpotList& list, float* pixels) {
-  for (int p = 0; p < kBlockPixels; ++p) pixels[p] = list.rest;
+/// Sum of each row of a slice.
+inline GLINT_HD Float16 spotRowSums(const SpotProfile& profile, const SpotList& list) {
+  float sums[kBlockSize];
+  for (int y = 0; y < kBlockSize; ++y) sums[y] = kBlockSize * list.rest;
   for (int k = 0; k < list.count; ++k) {
     const NdfSpot spot = list.spots[k];
-    float along_x[kBlockSize];
-    for (int x = 0; x < kBlockSize; ++x) along_x[x] = profile.pixel(x, spot.x);
-    for (int y = 0; y < kBlockSize; ++y) {
-      const float row = list.scale * static_cast<float>(spot.weight) * profile.pixel(y, spot.y);
-      if (row == 0) continue;
-      for (int x = 0; x < kBlockSize; ++x) pixels[y * kBlockSize + x] += row * along_x[x];
-    }
+    const float share = list.scale * static_cast<float>(spot.weight) * profile.whole(spot.x);
+    for (int y = 0; y < kBlockSize; ++y) sums[y] += share * profile.pixel(y, spot.y);
   }
+  return Float16::load(sums);
+}
+
+/// Row y of a slice.
+inline GLINT_HD Float16 spotRow(const SpotProfile& profile, const SpotList& list, int y) {
+  float pixels[kBlockSize];
+  for (int x = 0; x < kBlockSize; ++x) pixels[x] = list.rest;
+  for (int k = 0; k < list.count; ++k) {
+    const NdfSpot spot = list.spots[k];
+    const float row = list.scale * static_cast<float>(spot.weight) * profile.pixel(y, spot.y);
+    if (row == 0) continue;
+    for (int x = 0; x < kBlockSize; ++x) pixels[x] += row * profile.pixel(x, spot.x);
+  }
+  return Float16::load(pixels);
 }
 
 }  // namespace glint

@@ -106,11 +106,14 @@ class TexelChooser {
     TexelChoice texel;
     const int per_row = smooth() ? 2 : 1;
     int row = 0;
-    if (!choose({rows_.begin * per_row, rows_.end * per_row}, [&](int r) { return rowWeight(r); }, xi.y, row)) return texel;
+    if (!choose(
+            {rows_.begin * per_row, rows_.end * per_row}, [&](int r) { return rowWeight(r); }, xi.y, row))
+      return texel;
     texel.j = smooth() ? row >> 1 : row;
     texel.half = smooth() ? row & 1 : 0;
     const Range columns = columnsOf(weights_.gaussianLine(static_cast<float>(texel.j) + offset(texel.half).y), texel.half);
-    texel.found = choose(columns, [&](int i) { return double{weight(i, texel.j, texel.half)}; }, xi.x, texel.i);
+    texel.found = choose(
+        columns, [&](int i) { return double{weight(i, texel.j, texel.half)}; }, xi.x, texel.i);
     return texel;
   }
 

@@ -810,8 +810,7 @@ float pyramidPixel(const NdfPyramid& pyramid, int level, int image, int x, int y
   const std::uint64_t* mask =
       &data.masks[static_cast<std::size_t>(image) * static_cast<std::size_t>(pyramid.shape.maskWords())];
   if ((mask[block / 64] >> (block % 64) & 1u) == 0) return 0;
-  std::uint64_t index =
-      data.mask_ranks[static_cast<std::size_t>(image) * static_cast<std::size_t>(pyramid.shape.maskWords())];
+  std::uint64_t index = data.mask_ranks[static_cast<std::size_t>(image) * static_cast<std::size_t>(pyramid.shape.maskWords())];
   for (int b = 0; b < block; ++b) index += mask[b / 64] >> (b % 64) & 1u;
   index = index * kBlockPixels + static_cast<std::uint64_t>(y % kBlockSize * kBlockSize + x % kBlockSize);
   const float stored = pyramid.precision == BlockPrecision::f16

@@ -423,10 +423,9 @@ std::vector<Fixture> pyramidFixtures() {
       patched(
           "pyramid.mask_ranks", Base::pyramid,
           [](const Patch& patch) { patch.change<std::uint32_t>("level_00/mask_ranks", 2, [](auto& first) { first += 1; }); }),
-      patched("pyramid.mask_ranks", Base::pyramid,
-              [](const Patch& patch) {
-                patch.change<std::uint32_t>("level_02/mask_ranks", 1, [](auto& first) { first = ~0u; });
-              }),
+      patched(
+          "pyramid.mask_ranks", Base::pyramid,
+          [](const Patch& patch) { patch.change<std::uint32_t>("level_02/mask_ranks", 1, [](auto& first) { first = ~0u; }); }),
       patched("pyramid.mask_ranks", Base::pyramid,
               [](const Patch& patch) { patch.change<std::uint64_t>("level_01/masks", 1, [](auto& mask) { mask ^= 1; }); }),
   };

@@ -249,7 +249,8 @@ TEST(RatioEstimator, TendsToShadowedLight) {
   };
   const float unshadowed[3] = {static_cast<float>(2 * kPi / 3), 1, 10};
   float result[3];
-  shadowedIntegral(unshadowed, 200000, draw, [](Vec3 wi) { return wi.x > 0.3f ? 0.0f : 1.0f; }, result);
+  shadowedIntegral(
+      unshadowed, 200000, draw, [](Vec3 wi) { return wi.x > 0.3f ? 0.0f : 1.0f; }, result);
   double hidden = 0;  // by quadrature
   constexpr int kSteps = 400;
   for (int a = 0; a < kSteps; ++a) {
