@@ -118,8 +118,8 @@ GLINT_API_MULTIVERSION void addUpPixels(const PyramidChunk& places, const SliceC
   places.addUp(chunk, sums);
 }
 
-/// The steps of a chunk of densities: `begin` asks the memory for the index, `find` reads it and asks for the values, `finish` adds these
-/// up.
+/// The steps of a chunk of densities: `begin` asks the memory for the index, `find` reads it and asks for the values, `finish`
+/// adds these up.
 struct PyramidSteps {
   explicit PyramidSteps(const PyramidNdf& model) : places(model.pyramid()), scale(model.pyramid().value_scale) {}
   void begin(SliceChunk& chunk) { places.prefetchMasks(chunk); }
@@ -132,7 +132,8 @@ struct PyramidSteps {
   float scale;
 };
 
-/// Chunks go through their steps one behind the other, so that what a step asks the memory for has the time of another chunk's to come.
+/// Chunks go through their steps one behind the other, so that what a step asks the memory for has the time of another chunk's
+/// to come.
 void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints,
                     const HalfVectorArrays& halves, float* out) {
   struct Stage {

@@ -59,8 +59,8 @@ struct SampleArrays {
   }
 };
 
-/// out[k] = density of query k, for k < count. The same values as asking one by one, but for 1e-6 of each where products and sums
-/// are fused or in another order, and the same rules for what is degenerate.
+/// out[k] = density of query k, for k < count. The same values as asking one by one, but for 1e-6 of each where products and
+/// sums are fused or in another order, and the same rules for what is degenerate.
 /// @note thread-safe, allocates nothing; split a batch over threads as you like
 void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                float* out);

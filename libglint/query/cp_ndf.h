@@ -16,10 +16,10 @@ namespace glint {
 /// Chooses images as PyramidNdf does. Pixels are sums of products of few factors, and so are sums over boxes of pixels, from
 /// prefix sums (Eq. 6 and 7). Where few facets make up the slices, they are sums of few spots and an even rest instead.
 ///
-/// The density of an image is what the approximation leaves above zero, scaled to integrate to 1, and constant over a pixel. The
-/// mean is a difference of prefix sums, so it counts what lies below zero, is scaled to integrate to 1 with that, and only the
-/// result is clamped: it is the exact average of `signedDensity`, and of `density` where nothing is negative.
-/// Thread-safe, allocates nothing; the arrays must outlive it.
+/// The density of an image is what the approximation leaves above zero, scaled to integrate to 1, and constant over a pixel.
+/// The mean is a difference of prefix sums, so it counts what lies below zero, is scaled to integrate to 1 with that, and only
+/// the result is clamped: it is the exact average of `signedDensity`, and of `density` where nothing is negative. Thread-safe,
+/// allocates nothing; the arrays must outlive it.
 class CpNdf {
   static constexpr int kMostBlocks = 64 * 64;  // of 1024^2 pixels, the largest image
 
@@ -47,8 +47,8 @@ class CpNdf {
     return withReader(ndf_, [&](const auto& reader) { return pixelDensity(reader, chosen, place); });
   }
 
-  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly inside, as
-  /// the density is constant there: exactly in proportion to the density, which is the pdf.
+  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly
+  /// inside, as the density is constant there: exactly in proportion to the density, which is the pdf.
   ///
   /// Stored masses are rounded up by at most a sixteenth: with the difference's share another block is drawn, from the digits
   /// of `xi` that are left (one in forty on average). O(16 columns), and O(256 columns) with that share and with the share of

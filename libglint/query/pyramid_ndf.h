@@ -14,9 +14,9 @@ namespace glint {
 
 /// The NDF from a pyramid of images: exact (pixel means) at the centres of its levels, trilinear between them.
 ///
-/// Footprints are answered as isotropic Gaussians of the same mean square size. With the normals at hand, those below level 0 are
-/// answered by Reference; without, and above the last level, the nearest level answers.
-/// The density is constant over a pixel. Thread-safe, allocates nothing; the arrays must outlive it.
+/// Footprints are answered as isotropic Gaussians of the same mean square size. With the normals at hand, those below level 0
+/// are answered by Reference; without, and above the last level, the nearest level answers. The density is constant over a
+/// pixel. Thread-safe, allocates nothing; the arrays must outlive it.
 class PyramidNdf {
  public:
   GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid)
@@ -45,9 +45,9 @@ class PyramidNdf {
     return pixelDensity(chooseSlices(p), pixelPlace(shape(), h));
   }
 
-  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly inside, as
-  /// the density is constant there. The pdf is the density, which integrates to what the images do: 1 within 1e-3 by the format,
-  /// 1e-5 as they are built. O(stored blocks of one image + 256).
+  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly
+  /// inside, as the density is constant there. The pdf is the density, which integrates to what the images do: 1 within 1e-3 by
+  /// the format, 1e-5 as they are built. O(stored blocks of one image + 256).
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     if (fromTexels(p)) return below_.sample(p, clampUnit(xi));
     Draw draw = chooseImage(chooseSlices(p), xi);
@@ -236,8 +236,8 @@ class PyramidNdf {
                                                      : addPixelsOf<float>(findPixelsOf<float>(chosen, place));
   }
 
-  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be predicted, so
-  /// the cache misses of all slices are under way together.
+  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be
+  /// predicted, so the cache misses of all slices are under way together.
   template <class Pixel>
   GLINT_HD Places findPixelsOf(const PyramidSlices& chosen, const PixelPlace& place) const {
     constexpr std::uint64_t kBlockBytes = kBlockPixels * sizeof(Pixel);

@@ -16,8 +16,9 @@ namespace glint {
 inline GLINT_HD float clampUnit(float xi) { return xi > 0 ? std::min(xi, 0x1.fffffep-1f) : 0.0f; }
 inline GLINT_HD Vec2 clampUnit(Vec2 xi) { return {clampUnit(xi.x), clampUnit(xi.y)}; }
 
-/// Chooses one of `count` things in proportion to weight(k) >= 0, which sum to `total`, and leaves in `xi` how far into the share of
-/// the chosen one it fell: again uniform in [0, 1), so that one number serves a chain of choices and stratified numbers stay so.
+/// Chooses one of `count` things in proportion to weight(k) >= 0, which sum to `total`, and leaves in `xi` how far into the
+/// share of the chosen one it fell: again uniform in [0, 1), so that one number serves a chain of choices and stratified
+/// numbers stay so.
 /// @return index, or -1 if no weight is positive
 template <class Weight>
 GLINT_HD int chooseIndex(int count, float total, Weight&& weight, float& xi) {
@@ -117,8 +118,8 @@ GLINT_HD Float16 sumRows(const Pixel* pixels) {
 }
 static_assert(kBlockSize == 16);
 
-/// The half vector at position `xi` of a pixel. Kept 2^-23 resolution from the pixel's border, so that rounding does not take it
-/// into a neighbour.
+/// The half vector at position `xi` of a pixel. Kept 2^-23 resolution from the pixel's border, so that rounding does not take
+/// it into a neighbour.
 inline GLINT_HD Vec2 pointInPixel(const PyramidShape& shape, const PixelPlace& place, Vec2 xi) {
   const float margin = 0x1p-23f * static_cast<float>(shape.resolution);
   const int blocks = shape.blocksPerAxis();
