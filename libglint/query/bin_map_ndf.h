@@ -327,9 +327,8 @@ class BinMapNdf {
   }
 
   /// Everything is asked for before it is read: the processor then waits for all blocks together, not for one after the other.
-  /// @note flattened: left to itself, GCC inlines what it calls in one program and not in the next, and that one is slower
-  [[gnu::flatten]] GLINT_HD void addByBlock(const TexelCover& cover, const BinWindow& window, const WindowBlocks& near,
-                                            double* areas) const {
+  GLINT_FLATTEN GLINT_HD void addByBlock(const TexelCover& cover, const BinWindow& window, const WindowBlocks& near,
+                                         double* areas) const {
     CellRows rows;
     for (int k = 0; k < near.count; ++k) blocks_.prefetchCells(cover, near.blocks[k], rows);
     WindowBlock blocks[BinWindow::kSlots];
