@@ -125,14 +125,18 @@ TEST(Batch, DensitiesOfCompressedPyramidsAreThoseOfSingleQueries) {
   }
 }
 
-TEST(Batch, QueriesOfAnyRankAreThoseOfSingleQueries) {
-  const test::OwnedMap map(100, 72, test::roughSurface(100, 72, 0.3f));
+bake::NdfPyramidData smallPyramid(const NormalMap& map) {
   bake::PyramidOptions o;
   o.stride = 16;
   o.resolution = 64;
   o.sigma_r = 0.02f;
   o.levels = 3;
-  const bake::NdfPyramidData pyramid = bake::buildPyramid(map.map(), o);
+  return bake::buildPyramid(map, o);
+}
+
+TEST(Batch, QueriesOfAnyRankAreThoseOfSingleQueries) {
+  const test::OwnedMap map(100, 72, test::roughSurface(100, 72, 0.3f));
+  const bake::NdfPyramidData pyramid = smallPyramid(map.map());
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     for (const int rank : {1, 3, 4, 8, 13, 16}) {  // kernels take columns by eights and fours; a block of tucker has at most 16
       for (const auto type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
@@ -152,12 +156,7 @@ TEST(Batch, QueriesOfAnyRankAreThoseOfSingleQueries) {
 
 TEST(Batch, QueriesOfNarrowColumnsAndSpotsAreThoseOfSingleQueries) {
   const test::OwnedMap map(96, 64, test::synthesised(bake::SynthKind::flakes, 96, 64, 0.25f));
-  bake::PyramidOptions o;
-  o.stride = 16;
-  o.resolution = 64;
-  o.sigma_r = 0.02f;
-  o.levels = 3;
-  const bake::NdfPyramidData pyramid = bake::buildPyramid(map.map(), o);
+  const bake::NdfPyramidData pyramid = smallPyramid(map.map());
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     for (const double tolerance : {0.1, 0.4}) {
       bake::CompressionOptions c;
@@ -171,12 +170,7 @@ TEST(Batch, QueriesOfNarrowColumnsAndSpotsAreThoseOfSingleQueries) {
 
 TEST(Batch, WhatEmptyClustersSayIsNotFollowed) {
   const test::OwnedMap map(96, 64, test::synthesised(bake::SynthKind::flakes, 96, 64, 0.25f));
-  bake::PyramidOptions o;
-  o.stride = 16;
-  o.resolution = 64;
-  o.sigma_r = 0.02f;
-  o.levels = 3;
-  const bake::NdfPyramidData pyramid = bake::buildPyramid(map.map(), o);
+  const bake::NdfPyramidData pyramid = smallPyramid(map.map());
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     bake::CompressionOptions c;
     c.method = method;
