@@ -255,7 +255,7 @@ KindSchema binMapSchema() {
         {"height * width"},
         "1",
         "column and row in its cell and place in its block of each texel, listed by block and cell"},
-       {"class_bins", "", {{"", u32}}, {"class_bounds"}, "1", "first key of each class of bins, and the number of keys"},
+       {"class_keys", "", {{"", u32}}, {"class_bounds"}, "1", "first key of each class of bins, and the number of keys"},
        {"texel_classes",
         "",
         {{"", u16}},

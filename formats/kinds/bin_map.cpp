@@ -82,11 +82,11 @@ std::uint32_t classOf(const BinMap& map, std::size_t texel) {
 }
 
 void checkClasses(const BinMap& map, Findings& findings) {
-  const auto& bins = map.class_bins;
+  const auto& bins = map.class_keys;
   bool divide = bins.size() >= 2 && bins.size() <= BinMap::kMaxClasses + 1 && bins[0] == 0 && bins.back() == map.keyCount();
   for (std::size_t c = 1; divide && c < bins.size(); ++c) divide = bins[c] > bins[c - 1];
   if (!divide) {
-    findings.add("bin_map.classes", "/class_bins", "does not rise from 0 to the number of keys");
+    findings.add("bin_map.classes", "/class_keys", "does not rise from 0 to the number of keys");
     return;
   }
   for (std::size_t k = 0; k < texelCount(map); ++k) {
@@ -116,7 +116,7 @@ bool listHolds(const BinMap& map, const BlockOfNode& block, std::vector<bool>& s
         key += std::uint64_t{code.placeY(code_of_texel) >> (bin_shift + static_cast<std::uint32_t>(bit)) & 1} << (2 * bit + 1);
       }
       const std::uint32_t c = classOf(map, texel);
-      if (seen[texel] || key < map.class_bins[c] || key >= map.class_bins[c + 1]) return false;
+      if (seen[texel] || key < map.class_keys[c] || key >= map.class_keys[c + 1]) return false;
       seen[texel] = true;
     }
   }
@@ -162,7 +162,7 @@ PackedAsset pack(const BinMap& map) {
   list("cell_starts/offsets", ElementType::u16, map.cell_starts.offsets, map.cell_starts.size());
   list("cell_starts/bases", ElementType::u64, map.cell_starts.bases, (map.cell_starts.size() + step - 1) / step);
   list("texels", ElementType::u32, map.texels, texelCount(map));
-  list("class_bins", ElementType::u32, map.class_bins, map.class_bins.size());
+  list("class_keys", ElementType::u32, map.class_keys, map.class_keys.size());
   list("texel_classes", ElementType::u16, map.texel_classes, (texelCount(map) * BinMap::kClassBits + 15) / 16);
   return packed;
 }
@@ -182,7 +182,7 @@ void unpack(const Content& content, BinMap& map) {
   map.cell_starts = {content.array<std::uint64_t>("cell_starts/bases"), content.array<std::uint16_t>("cell_starts/offsets"),
                      content.integer("cell_starts_shift")};
   map.texels = content.array<std::uint32_t>("texels");
-  map.class_bins = content.array<std::uint32_t>("class_bins");
+  map.class_keys = content.array<std::uint32_t>("class_keys");
   map.texel_classes = content.array<std::uint16_t>("texel_classes");
 }
 
@@ -209,10 +209,10 @@ void checkData(const BinMap& map, Findings& findings) {
   const auto inOwnClass = [&](const BlockOfNode& block) {
     const std::size_t c = number++;
     const std::uint64_t end_key = block.first_key + (std::uint64_t{1} << 2 * block.side_bits);
-    return block.first_key >= map.class_bins[c] && end_key <= map.class_bins[c + 1];
+    return block.first_key >= map.class_keys[c] && end_key <= map.class_keys[c + 1];
   };
   if (map.classCount() == map.blockCount() && !TreeWalk(map).walk(inOwnClass))
-    findings.add("bin_map.classes", "/class_bins", "has as many classes as blocks, but not one for each");
+    findings.add("bin_map.classes", "/class_keys", "has as many classes as blocks, but not one for each");
   if (!TreeWalk(map).walk([&](const BlockOfNode& block) { return listHolds(map, block, seen); }))
     findings.add("bin_map.texels", "/texels", "does not list every texel once, in its class");
   for (std::size_t b = 0; b < map.blockCount(); ++b) {

@@ -363,17 +363,17 @@ class Builder {
   void makeClasses() {
     const std::uint64_t wanted = blocks_.size() <= BinMap::kMaxClasses ? 1 : count_ / (BinMap::kMaxClasses - 1) + 1;
     block_classes_.reserve(blocks_.size());
-    out_.class_bins.push_back(0);
+    out_.class_keys.push_back(0);
     std::uint64_t texels = 0;
     for (const Block& block : blocks_) {
       if (texels >= wanted) {
-        out_.class_bins.push_back(block.first_key);
+        out_.class_keys.push_back(block.first_key);
         texels = 0;
       }
-      block_classes_.push_back(static_cast<std::uint16_t>(out_.class_bins.size() - 1));
+      block_classes_.push_back(static_cast<std::uint16_t>(out_.class_keys.size() - 1));
       texels += block.texels;
     }
-    out_.class_bins.push_back(static_cast<std::uint32_t>(key_count_));
+    out_.class_keys.push_back(static_cast<std::uint32_t>(key_count_));
   }
 
   /// Notes the class of every texel.
@@ -523,14 +523,14 @@ BinMap BinMapData::view() const {
   v.block_moments = block_moments;
   v.cell_starts = cell_starts.view();
   v.texels = texels;
-  v.class_bins = class_bins;
+  v.class_keys = class_keys;
   v.texel_classes = texel_classes;
   return v;
 }
 
 std::size_t BinMapData::sizeBytes() const {
   const auto bytes = [](const auto&... arrays) { return (... + (arrays.size() * sizeof(arrays[0]))); };
-  return bytes(nodes, block_moments, cell_starts.bases, cell_starts.offsets, texels, class_bins, texel_classes);
+  return bytes(nodes, block_moments, cell_starts.bases, cell_starts.offsets, texels, class_keys, texel_classes);
 }
 
 BinMapData buildBinMap(const NormalMap& map, const BinMapOptions& options, const ProgressFn& progress) {

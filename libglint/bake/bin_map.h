@@ -54,7 +54,7 @@ struct BinMapData {
   std::vector<std::uint32_t> nodes;
   std::vector<std::uint16_t> block_moments;
   CompactCountsData cell_starts;
-  std::vector<std::uint32_t> texels, class_bins;
+  std::vector<std::uint32_t> texels, class_keys;
   std::vector<std::uint16_t> texel_classes;
 
   /// Spans over the arrays; valid while this object lives and is not changed.

@@ -123,7 +123,7 @@ struct BinMap {
   /// Bins are also grouped in at most kMaxClasses classes of consecutive keys, for the way from a texel to its block.
   static constexpr int kClassBits = 12;
   static constexpr int kMaxClasses = 1 << kClassBits;
-  std::span<const std::uint32_t> class_bins;     ///< [classes + 1]: first key of each class; then keyCount()
+  std::span<const std::uint32_t> class_keys;     ///< [classes + 1]: first key of each class; then keyCount()
   std::span<const std::uint16_t> texel_classes;  ///< [ceil(height * width * 12 / 16)]: 12 bits a texel, rows of the map
 
   GLINT_HD int tilesPerAxis() const { return ((bins_per_axis - 1) >> tile_bits) + 1; }
@@ -131,7 +131,7 @@ struct BinMap {
     return static_cast<std::uint64_t>(tilesPerAxis()) * static_cast<std::uint64_t>(tilesPerAxis()) << 2 * tile_bits;
   }
   GLINT_HD std::size_t blockCount() const { return block_moments.size() / 5; }
-  GLINT_HD std::size_t classCount() const { return class_bins.size() - 1; }
+  GLINT_HD std::size_t classCount() const { return class_keys.size() - 1; }
 };
 
 }  // namespace glint

@@ -124,8 +124,8 @@ class BinBlocks {
   /// Looks for the texel (column, row) of a class, among its bins in `bins`.
   GLINT_HD bool find(std::uint32_t texel_class, std::uint32_t column, std::uint32_t row, const BinRect& bins,
                      BinTexel& found) const {
-    const std::uint64_t end = map_.class_bins.data()[texel_class + 1];
-    for (std::uint64_t key = map_.class_bins.data()[texel_class]; key < end;) {
+    const std::uint64_t end = map_.class_keys.data()[texel_class + 1];
+    for (std::uint64_t key = map_.class_keys.data()[texel_class]; key < end;) {
       const bool occupied = blockAt(key, found.block);
       const int bits = 2 * found.block.side_bits;
       key = ((key >> bits) + 1) << bits;
@@ -158,7 +158,7 @@ class BinBlocks {
     std::uint32_t low = 0, count = static_cast<std::uint32_t>(map_.classCount());
     while (count > 1) {  // the class is in [low, low + count)
       const std::uint32_t half = count / 2;
-      low += map_.class_bins.data()[low + half] <= key ? half : 0;
+      low += map_.class_keys.data()[low + half] <= key ? half : 0;
       count -= half;
     }
     return low;

@@ -652,7 +652,7 @@ SampleBinMap sampleBinMap(int width, int height) {
       sample.texel_classes[bit / 16] |= static_cast<std::uint16_t>((quarter >> k & 1) << (bit % 16));
     }
   }
-  for (std::uint32_t quarter = 0; quarter <= 4 * kTiles * kTiles; ++quarter) sample.class_bins.push_back(4 * quarter);
+  for (std::uint32_t quarter = 0; quarter <= 4 * kTiles * kTiles; ++quarter) sample.class_keys.push_back(4 * quarter);
   sample.nodes.assign(2 * kTiles * kTiles, 0);
   for (int tile = 0; tile < kTiles * kTiles; ++tile) {
     const int column = tile % kTiles << kTileBits, row = tile / kTiles << kTileBits;
@@ -682,7 +682,7 @@ SampleBinMap sampleBinMap(int width, int height) {
                 sample.block_moments,
                 {sample.cell_bases, sample.cell_offsets, kShift},
                 sample.texels,
-                sample.class_bins,
+                sample.class_keys,
                 sample.texel_classes};
   return sample;
 }

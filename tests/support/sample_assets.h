@@ -82,7 +82,7 @@ enum class SampleForm : std::uint8_t {
 };
 
 struct SampleBinMap {
-  std::vector<std::uint32_t> nodes, texels, class_bins;
+  std::vector<std::uint32_t> nodes, texels, class_keys;
   std::vector<std::uint64_t> cell_bases;
   std::vector<std::uint16_t> block_moments, cell_offsets, texel_classes;
   BinMap map;

@@ -269,7 +269,7 @@ TEST(AssetRoundTrip, BinMapsComeBackBitExact) {
     expectSame(map.cell_starts.offsets, sample.map.cell_starts.offsets);
     EXPECT_EQ(map.cell_starts.shift, sample.map.cell_starts.shift);
     expectSame(map.texels, sample.map.texels);
-    expectSame(map.class_bins, sample.map.class_bins);
+    expectSame(map.class_keys, sample.map.class_keys);
     expectSame(map.texel_classes, sample.map.texel_classes);
     for (const Finding& finding : validateAsset(folder / "a.glint").findings) ADD_FAILURE() << finding.rule << finding.message;
   }

@@ -685,8 +685,8 @@ std::vector<Fixture> binMapFixtures() {
       changed("bin_map.nodes", "nodes", 2 * 4 + 1, u32([](auto) { return 4u; })),
       changed("bin_map.nodes", "nodes", 2 * 4 + 1, u32([](auto) { return 0xfffffffeu; })),
       changed("bin_map.nodes", "nodes", 2 * 9, u32([](auto) { return BinMap::kSplit; })),
-      changed("bin_map.classes", "class_bins", 3, u32([](auto) { return 0u; })),
-      changed("bin_map.classes", "class_bins", 36, u32([](auto v) { return v + 1000; })),
+      changed("bin_map.classes", "class_keys", 3, u32([](auto) { return 0u; })),
+      changed("bin_map.classes", "class_keys", 36, u32([](auto v) { return v + 1000; })),
       changed("bin_map.classes", "texel_classes", 100, u16([](auto) { return 0xffff; })),
       changed("bin_map.texels", "texels", 100, u32(flip), true),
       changed("bin_map.texels", "texels", 100, u32([](auto) { return 0xffffffffu; }), true),
@@ -803,7 +803,7 @@ TEST(FormatRules, AsManyClassesAsBlocksMustBeTheBlocks) {
   ASSERT_GT(data.tile_bits, 0);
   writeAsset(folder / "good.glint", data.view(), {});
   EXPECT_TRUE(validateAsset(folder / "good.glint").findings.empty());
-  ++data.class_bins[1];  // the second class begins within the second block
+  ++data.class_keys[1];  // the second class begins within the second block
   writeAsset(folder / "bad.glint", data.view(), {});
   const ValidationReport report = validateAsset(folder / "bad.glint");
   EXPECT_TRUE(std::any_of(report.findings.begin(), report.findings.end(), [](const Finding& f) {
