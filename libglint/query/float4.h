@@ -35,8 +35,8 @@ struct Float4 {
   static Float4 of(float a, float b, float c, float d) { return {_mm_setr_ps(a, b, c, d)}; }
   /// a[0], a[1], b[0], b[1].
   static Float4 ofPairs(const float* a, const float* b) {
-    const __m128 low = _mm_castpd_ps(_mm_load_sd(reinterpret_cast<const double*>(a)));
-    return {_mm_loadh_pi(low, reinterpret_cast<const __m64*>(b))};
+    const auto pair = [](const float* p) { return _mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)); };
+    return {_mm_castsi128_ps(_mm_unpacklo_epi64(pair(a), pair(b)))};
   }
   static Float4 load(const float* p) { return {_mm_loadu_ps(p)}; }
   static __m128i bytes(const std::int8_t* p) {
