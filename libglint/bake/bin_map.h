@@ -11,7 +11,7 @@ namespace glint::bake {
 
 struct BinMapOptions {
   float alpha = 0.01f;  ///< Beckmann roughness of the facets, kMinBinAlpha to 1; the smallest, if there is a range
-  int leaf_size = 8;    ///< texels of a cell, on average at least, 1 to 1024; sparse blocks have fewer
+  int leaf_size = 16;   ///< texels of a cell, on average at least, 1 to 1024; sparse blocks have fewer
   float alpha_max = 0;  ///< largest roughness that will be asked for, at most kMaxAlphaRange times alpha; 0: alpha
 };
 

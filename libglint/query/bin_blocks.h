@@ -22,11 +22,11 @@ struct BinRect {
 
 /// A square of 2^side_bits x 2^side_bits bins with a list of its own.
 struct BinBlock {
-  int column = 0, row = 0;  ///< of its first bin
-  int side_bits = 0;
-  int cell_bits = 0;             ///< 2^cell_bits cells
-  std::uint32_t first_cell = 0;  ///< of all cells
-  std::uint32_t number = 0;      ///< among blocks
+  int column, row;  ///< of its first bin
+  int side_bits;
+  int cell_bits;             ///< 2^cell_bits cells
+  std::uint32_t first_cell;  ///< of all cells
+  std::uint32_t number;      ///< among blocks
 
   GLINT_HD int side() const { return 1 << side_bits; }
 };
@@ -40,10 +40,10 @@ struct BinTexel {
 /// Texels [begin, end) of a block's list that a footprint may meet in part. Column and row of their codes count from (x, y) in
 /// coordinates of the footprint (TexelCover).
 struct TexelRun {
-  std::uint64_t begin = 0, end = 0;
-  int x = 0, y = 0;
-  bool cut_x = true,
-       cut_y = true;  ///< whether sides may cut it along u, and along v; where not, the coordinate does not matter
+  std::uint64_t begin, end;
+  int x, y;
+  bool cut_x,
+      cut_y;  ///< whether sides may cut it along u, and along v; where not, the coordinate does not matter
 };
 
 /// Cells [first, end) of one row of a block that a footprint meets. Those of [whole, whole_end) are covered completely, or
@@ -108,6 +108,38 @@ class BinBlocks {
       forEachCellRow(cover, shape, [&](const CellRow& row) { visitCellRow(block.first_cell, shape, row, visitor); });
     } else {
       for (int k = 0; k < grid.count; ++k) visitCellRow(block.first_cell, shape, grid.rows[k], visitor);
+    }
+  }
+
+  /// The same for several blocks, cell by cell: runs of the same cell follow one another. Calls visitor.select(index of the
+  /// block) before each run.
+  /// @param blocks  of any type that has a BinBlock `block`
+  template <class Block, class Visitor>
+  GLINT_HD void forEachRun(const TexelCover& cover, const Block* blocks, int count, CellRows& kept, Visitor&& visitor) const {
+    std::uint32_t left = (1u << count) - 1;
+    while (left != 0) {
+      const BinBlock& first = blocks[lowestBit(left)].block;
+      std::uint32_t alike = 0;
+      for (std::uint32_t rest = left; rest != 0; rest &= rest - 1) {
+        const int k = lowestBit(rest);
+        if (blocks[k].block.cell_bits == first.cell_bits) alike |= 1u << k;
+      }
+      left &= ~alike;
+      const CellGrid shape = cellGrid(code_, first.cell_bits);
+      const auto visit = [&](const CellRow& row) {
+        forEachPiece(row, shape, [&](const Piece& piece) {
+          for (std::uint32_t rest = alike; rest != 0; rest &= rest - 1) {
+            const int k = lowestBit(rest);
+            visitor.select(blocks[k]);
+            visitPiece(blocks[k].block.first_cell, piece, visitor);
+          }
+        });
+      };
+      const CellRows::Grid& grid = cellRows(cover, first, kept);
+      if (grid.count > CellRows::kMost)
+        forEachCellRow(cover, shape, visit);
+      else
+        for (int k = 0; k < grid.count; ++k) visit(grid.rows[k]);
     }
   }
 
@@ -365,25 +397,38 @@ class BinBlocks {
     });
   }
 
+  /// Cells [from, to) of a row that are read together.
+  struct Piece {
+    std::uint32_t from, to;
+    int x, y;
+    bool cut_x, cut_y;
+  };
+
+  template <class Visitor>
+  GLINT_HD void forEachPiece(const CellRow& row, const CellGrid& grid, Visitor&& visitor) const {
+    const auto each = [&](std::uint32_t from, std::uint32_t to) {
+      for (std::uint32_t c = from; c < to; ++c)
+        visitor(Piece{c, c + 1, row.x + (static_cast<int>(c - row.first) << grid.column_shift), row.y, true, row.cut_y});
+    };
+    each(row.first, row.whole);
+    if (row.whole < row.whole_end) visitor(Piece{row.whole, row.whole_end, 0, row.y, false, row.cut_y});
+    each(row.whole_end, row.end);
+  }
+
+  template <class Visitor>
+  GLINT_HD void visitPiece(std::uint32_t first_cell, const Piece& piece, Visitor& visitor) const {
+    const std::uint64_t begin = map_.cell_starts[std::uint64_t{first_cell} + piece.from];
+    const std::uint64_t end = map_.cell_starts[std::uint64_t{first_cell} + piece.to];
+    if (begin == end) return;
+    if (piece.cut_x || piece.cut_y)
+      visitor.partial(TexelRun{begin, end, piece.x, piece.y, piece.cut_x, piece.cut_y});
+    else
+      visitor.whole(begin, end);
+  }
+
   template <class Visitor>
   GLINT_HD void visitCellRow(std::uint32_t first_cell, const CellGrid& grid, const CellRow& row, Visitor& visitor) const {
-    const auto start = [&](std::uint32_t cell) { return map_.cell_starts[std::uint64_t{first_cell} + cell]; };
-    const auto each = [&](std::uint32_t from, std::uint32_t to) {
-      std::uint64_t begin = start(from);
-      for (std::uint32_t c = from; c < to; ++c) {
-        const std::uint64_t end = start(c + 1);
-        const int x = row.x + (static_cast<int>(c - row.first) << grid.column_shift);
-        if (begin < end) visitor.partial(TexelRun{begin, end, x, row.y, true, row.cut_y});
-        begin = end;
-      }
-    };
-    if (row.first < row.whole) each(row.first, row.whole);
-    if (row.whole < row.whole_end) {
-      const std::uint64_t begin = start(row.whole), end = start(row.whole_end);
-      if (begin < end && row.cut_y) visitor.partial(TexelRun{begin, end, 0, row.y, false, true});
-      if (begin < end && !row.cut_y) visitor.whole(begin, end);
-    }
-    if (row.whole_end < row.end) each(row.whole_end, row.end);
+    forEachPiece(row, grid, [&](const Piece& piece) { visitPiece(first_cell, piece, visitor); });
   }
 
   /// Rounds down what is known to be near [0, limit].

@@ -225,8 +225,8 @@ class BinMapNdf {
 
   /// Whether looking up every texel of the footprint is cheaper than reading lists. Nanoseconds, about.
   GLINT_HD bool shorterByTexel(const TexelCover& cover, const WindowBlocks& near) const {
-    constexpr double kTexelCost = 1, kRowCost = 20, kTurnedCost = 6, kFindCost = 60;
-    constexpr double kFirstCost = 200, kBlockCost = 40, kListCost = 0.6, kCellRowCost = 60;
+    constexpr double kTexelCost = 1, kRowCost = 20, kTurnedCost = 6, kFindCost = 180;
+    constexpr double kFirstCost = 250, kBlockCost = 50, kListCost = 0.3, kCellRowCost = 45;
     double by_texel = kTexelCost * boxTexels(cover) + kRowCost * cover.rows(), by_list = kFirstCost + kBlockCost * near.count;
     if (by_texel < 0.5 * by_list) return true;
     if (by_texel > kMostByTexel) return false;
@@ -333,11 +333,8 @@ class BinMapNdf {
     for (int k = 0; k < near.count; ++k) blocks_.prefetchCells(cover, near.blocks[k], rows);
     WindowBlock blocks[BinWindow::kSlots];
     WindowSum sum(map().texels.data(), cover, areas);
-    for (int k = 0; k < near.count; ++k) {
-      blocks[k] = WindowBlock(near.blocks[k], blocks_.code(near.blocks[k]), window);
-      sum.select(blocks[k]);
-      blocks_.forEachRun(cover, near.blocks[k], rows, sum);
-    }
+    for (int k = 0; k < near.count; ++k) blocks[k] = WindowBlock(near.blocks[k], blocks_.code(near.blocks[k]), window);
+    blocks_.forEachRun(cover, blocks, near.count, rows, sum);
     sum.finish();
   }
 
@@ -416,15 +413,11 @@ class BinMapNdf {
     GLINT_HD void add(const TexelRun& run) {
       const TexelFilter near(code_, {-run.x, cover_.columns() - 1 - run.x}, {-run.y, cover_.rows() - 1 - run.y}, columns_,
                              rows_);
-      for (std::uint64_t k = run.begin; k < run.end; k += TexelFilter::kMostAtOnce) {
-        const std::uint32_t* texels = ndf_.map().texels.data() + k;
-        const int count = static_cast<int>(std::min<std::uint64_t>(run.end - k, TexelFilter::kMostAtOnce));
-        for (std::uint64_t bits = near.matches<kCut | TexelFilter::kPlace>(texels, count); bits != 0; bits &= bits - 1) {
-          const std::uint32_t texel = texels[lowestBit(bits)];
-          const double weight = sides_.texelArea<kCut>(cover_, run, code_, texel);
-          if (weight > 0) visitor_(BinFacet{scale_ * weight, ndf_.normal(block_, code_, texel), {}});
-        }
-      }
+      const auto pass = [&](std::uint32_t texel) {
+        const double weight = sides_.texelArea<kCut>(cover_, run, code_, texel);
+        if (weight > 0) visitor_(BinFacet{scale_ * weight, ndf_.normal(block_, code_, texel), {}});
+      };
+      near.forEach<kCut | TexelFilter::kPlace>(ndf_.map().texels.data() + run.begin, run.end - run.begin, pass);
     }
 
     const BinMapNdf& ndf_;

@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "glint/query/bin_blocks.h"
+#include "glint/query/slot_sums.h"
 #include "glint/query/texel_filter.h"
 
 namespace glint {
@@ -60,24 +61,17 @@ struct WindowBlocks {
 struct WindowBlock {
   WindowBlock() = default;
   GLINT_HD WindowBlock(const BinBlock& b, const TexelCode& c, const BinWindow& window)
-      : block(b), code(c), slot(window.slotOf(b)), bin_shift(c.place_bits - b.side_bits) {
-    columns = placesOf(window.bins.column_begin - b.column, window.bins.column_end - b.column);
-    rows = placesOf(window.bins.row_begin - b.row, window.bins.row_end - b.row);
-  }
-  GLINT_HD IndexRange placesOf(int begin, int end) const {
-    return {std::max(begin, 0) << bin_shift, (std::min(end, block.side()) << bin_shift) - 1};
+      : block(b), code(c), slot(window.slotOf(b)) {
+    const int shift = code.column_bits + code.row_bits + code.place_bits - block.side_bits;
+    bins = {shift, std::min(shift + code.place_bits, 31), (1u << block.side_bits) - 1,
+            static_cast<std::uint32_t>(b.column - window.column), static_cast<std::uint32_t>(b.row - window.row)};
   }
   GLINT_HD bool isBin() const { return block.side_bits == 0; }
-  GLINT_HD int slotOf(std::uint32_t texel) const {
-    const int dx = static_cast<int>(code.placeX(texel) >> bin_shift), dy = static_cast<int>(code.placeY(texel) >> bin_shift);
-    return slot + dy * BinWindow::kSide + dx;
-  }
 
   BinBlock block;
   TexelCode code;
-  int slot = 0;  ///< of the first bin; may be outside
-  int bin_shift = 0;
-  IndexRange columns, rows;  ///< places in the window
+  int slot;  ///< of the first bin; may be outside
+  SlotFields bins;
 };
 
 /// What of its border texels a box along the axes covers.
@@ -92,8 +86,8 @@ struct BoxSides {
   GLINT_HD double column(int x) const { return x == 0 ? left : x == last_x ? right : 1; }
   GLINT_HD double row(int y) const { return y == 0 ? lower : y == last_y ? upper : 1; }
 
-  GLINT_HD TexelFilter::Ends columns() const { return {static_cast<float>(left), static_cast<float>(right)}; }
-  GLINT_HD TexelFilter::Ends rows() const { return {static_cast<float>(lower), static_cast<float>(upper)}; }
+  GLINT_HD RangeEnds columns() const { return {static_cast<float>(left), static_cast<float>(right)}; }
+  GLINT_HD RangeEnds rows() const { return {static_cast<float>(lower), static_cast<float>(upper)}; }
 
   /// Covered area of a texel in the bounding box, of a run that is cut along kCut.
   template <unsigned kCut>
@@ -130,11 +124,11 @@ class WindowSum {
   /// @param areas  of the window's slots
   GLINT_HD WindowSum(const std::uint32_t* texels, const TexelCover& cover, double* areas)
       : cover_(cover), sides_(cover), texels_(texels), areas_(areas) {}
-  /// The block that the next runs are of; kept until `finish`.
+  /// The block that the next run is of; kept until `finish`.
   GLINT_HD void select(const WindowBlock& block) { block_ = &block; }
   GLINT_HD void whole(std::uint64_t begin, std::uint64_t end) {
     if (block_->isBin())
-      areas_[block_->slot] += static_cast<double>(end - begin);
+      sums_.add(block_->slot, static_cast<double>(end - begin));
     else
       partial({begin, end, 0, 0, false, false});
   }
@@ -145,14 +139,10 @@ class WindowSum {
     items_[count_++] = {run, block_};
     if (count_ == kMost) flush();
   }
-  GLINT_HD void flush() {
-    for (int k = 0; k < count_; ++k) add(items_[k]);
-    count_ = 0;
-  }
   /// To be called when all runs are in.
   GLINT_HD void finish() {
     flush();
-    for (int k = 0; k < BinWindow::kSlots; ++k) areas_[k] += counts_[k];
+    sums_.addTo(areas_);
   }
 
  private:
@@ -162,78 +152,73 @@ class WindowSum {
     const WindowBlock* block;
   };
 
-  GLINT_HD void add(const Item& item) {
-    withCut(item.run, [&](auto cut) { addCut<cut()>(item); });
+  GLINT_HD void flush() {
+#ifdef GLINT_AVX2
+    WideTexels::supported() ? flushWide() : flushBy<SingleTexels>();
+#else
+    flushBy<SingleTexels>();
+#endif
+    count_ = 0;
+  }
+#ifdef GLINT_AVX2
+  GLINT_AVX2 GLINT_FLATTEN void flushWide() { flushBy<WideTexels>(); }
+#endif
+
+  template <class Texels>
+  GLINT_HD void flushBy() {
+    for (int k = 0; k < count_;) {
+      const Item& first = items_[k];
+      const typename Texels::Parts parts(partsOf(first));
+      withCut(first.run, [&](auto cut) {
+        do add<Texels, cut()>(items_[k], parts);
+        while (++k < count_ && countAlike(first, items_[k]));
+      });
+    }
   }
 
-  template <unsigned kCut>
-  GLINT_HD void addCut(const Item& item) {
-    if (!item.block->isBin())
-      addShared<kCut>(item);
-    else if (cover_.aligned())
-      areas_[item.block->slot] += alignedArea<kCut>(item);
+  template <class Texels, unsigned kCut>
+  GLINT_HD void add(const Item& item, const typename Texels::Parts& parts) {
+    const std::uint32_t* texels = texels_ + item.run.begin;
+    const std::uint64_t count = item.run.end - item.run.begin;
+    if (kCut != 0 && !cover_.aligned())
+      addTurned(item);
+    else if (item.block->isBin())
+      sums_.addBin<Texels, kCut>(texels, count, parts, item.block->slot);
     else
-      areas_[item.block->slot] += turnedArea(item);
+      sums_.addBins<Texels, kCut>(texels, count, parts, item.block->bins);
   }
 
-  /// Of texels in the footprint's bounding box and in the window.
-  GLINT_HD TexelFilter filter(const Item& item) const {
-    const TexelRun& run = item.run;
-    return {item.block->code,
-            {-run.x, cover_.columns() - 1 - run.x},
-            {-run.y, cover_.rows() - 1 - run.y},
-            item.block->columns,
-            item.block->rows};
+  /// Whether the texels of two runs count the same.
+  static GLINT_HD bool countAlike(const Item& a, const Item& b) {
+    return a.run.x == b.run.x && a.run.y == b.run.y && a.run.cut_x == b.run.cut_x && a.run.cut_y == b.run.cut_y &&
+           a.block->code.column_bits == b.block->code.column_bits && a.block->code.row_bits == b.block->code.row_bits;
   }
 
-  /// Calls visitor(first texel, count) for a run, at most TexelFilter::kMostAtOnce at a time.
-  template <class Visitor>
-  GLINT_HD void forEachPart(const Item& item, Visitor&& visitor) const {
-    for (std::uint64_t k = item.run.begin; k < item.run.end; k += TexelFilter::kMostAtOnce)
-      visitor(texels_ + k, static_cast<int>(std::min<std::uint64_t>(item.run.end - k, TexelFilter::kMostAtOnce)));
+  /// Columns and rows of a run that are in the footprint's bounding box.
+  GLINT_HD IndexRange columnsOf(const TexelRun& run) const { return {-run.x, cover_.columns() - 1 - run.x}; }
+  GLINT_HD IndexRange rowsOf(const TexelRun& run) const { return {-run.y, cover_.rows() - 1 - run.y}; }
+
+  GLINT_HD TexelParts partsOf(const Item& item) const {
+    const TexelCode& code = item.block->code;
+    return {{0, code.column_bits, columnsOf(item.run), sides_.columns()},
+            {code.column_bits, code.row_bits, rowsOf(item.run), sides_.rows()}};
   }
 
-  template <unsigned kCut>
-  GLINT_HD double texelArea(const Item& item, std::uint32_t texel) const {
-    return sides_.texelArea<kCut>(cover_, item.run, item.block->code, texel);
-  }
-
-  /// Texels of several bins.
-  template <unsigned kCut>
-  GLINT_HD void addShared(const Item& item) {
-    const TexelFilter near = filter(item);
-    forEachPart(item, [&](const std::uint32_t* texels, int count) {
-      for (std::uint64_t bits = near.matches<kCut | TexelFilter::kPlace>(texels, count); bits != 0; bits &= bits - 1) {
-        const std::uint32_t texel = texels[lowestBit(bits)];
-        if constexpr (kCut == 0)
-          ++counts_[item.block->slotOf(texel)];
-        else
-          areas_[item.block->slotOf(texel)] += texelArea<kCut>(item, texel);
-      }
+  /// A footprint with sides along no axis.
+  GLINT_HD void addTurned(const Item& item) {
+    constexpr unsigned kPosition = TexelFilter::kPosition;
+    const TexelFilter near(item.block->code, columnsOf(item.run), rowsOf(item.run), {}, {});
+    near.forEach<kPosition>(texels_ + item.run.begin, item.run.end - item.run.begin, [&](std::uint32_t texel) {
+      const std::uint32_t slot = item.block->bins.slotOf(texel);
+      if (slot < SlotSums::kSlots) areas_[slot] += sides_.texelArea<kPosition>(cover_, item.run, item.block->code, texel);
     });
-  }
-
-  /// Texels of one bin, for boxes along the axes.
-  template <unsigned kCut>
-  GLINT_HD double alignedArea(const Item& item) const {
-    return filter(item).sum<kCut>(texels_ + item.run.begin, item.run.end - item.run.begin, sides_.columns(), sides_.rows());
-  }
-
-  GLINT_HD double turnedArea(const Item& item) const {
-    const TexelFilter any = filter(item);
-    double area = 0;
-    forEachPart(item, [&](const std::uint32_t* texels, int count) {
-      for (std::uint64_t bits = any.matches<TexelFilter::kPosition>(texels, count); bits != 0; bits &= bits - 1)
-        area += texelArea<TexelFilter::kPosition>(item, texels[lowestBit(bits)]);
-    });
-    return area;
   }
 
   const TexelCover& cover_;
   BoxSides sides_;
   const std::uint32_t* texels_;
   double* areas_;
-  std::uint32_t counts_[BinWindow::kSlots] = {};  ///< of texels that are covered completely
+  SlotSums sums_;
   const WindowBlock* block_ = nullptr;
   int count_ = 0;
   Item items_[kMost];

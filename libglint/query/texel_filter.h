@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "glint/model/bin_map.h"
+#include "glint/query/bits.h"
 
 #if defined(__SSE2__) && !defined(__CUDACC__) && !defined(__CUDA__)
 #include <emmintrin.h>
@@ -48,20 +49,14 @@ class TexelFilter {
     return bits;
   }
 
-  /// What of the texels at the two ends of a range counts; those between count as 1.
-  struct Ends {
-    float low = 1, high = 1;  ///< the same where the range is one number
-  };
-
-  /// Sum over texels of what their column counts, their row, or the product of both: those of kFields.
-  template <unsigned kFields>
-  GLINT_HD double sum(const std::uint32_t* texels, std::uint64_t count, const Ends& columns, const Ends& rows) const {
-    double total = 0;
+  /// Calls visitor(texel) for the texels that have the fields kFields in range.
+  template <unsigned kFields, class Visitor>
+  GLINT_HD void forEach(const std::uint32_t* texels, std::uint64_t count, Visitor&& visitor) const {
     for (std::uint64_t k = 0; k < count; k += kMostAtOnce) {
       const int some = static_cast<int>(count - k < kMostAtOnce ? count - k : kMostAtOnce);
-      total += double{sumOfSome<kFields>(texels + k, some, columns, rows)};
+      for (std::uint64_t bits = matches<kFields>(texels + k, some); bits != 0; bits &= bits - 1)
+        visitor(texels[k + static_cast<std::uint64_t>(lowestBit(bits))]);
     }
-    return total;
   }
 
  private:
@@ -87,34 +82,6 @@ class TexelFilter {
     return outside < 0 ? 0 : 1;
   }
 
-  static GLINT_HD float part(const Field& f, const Ends& ends, std::uint32_t texel) {
-    const auto value = static_cast<int>(texel >> f.shift & f.mask);
-    if (value < f.low || value > f.high) return 0;
-    return value == f.low ? ends.low : value == f.high ? ends.high : 1;
-  }
-
-  /// In four sums, those of texels 4 k + i.
-  template <unsigned kFields>
-  GLINT_HD float sumOfSome(const std::uint32_t* texels, int count, const Ends& columns, const Ends& rows) const {
-    constexpr bool kColumns = (kFields & kColumn) != 0, kRows = (kFields & kRow) != 0;
-    float sums[4] = {};
-    int k = 0;
-#ifdef GLINT_TEXEL_FILTER_SSE2
-    __m128 four = _mm_setzero_ps();
-    for (; k + 4 <= count; k += 4) {
-      const __m128i loaded = _mm_loadu_si128(reinterpret_cast<const __m128i*>(texels + k));
-      __m128 product = _mm_set1_ps(1);
-      if constexpr (kColumns) product = _mm_mul_ps(product, parts(fields_[0], columns, loaded));
-      if constexpr (kRows) product = _mm_mul_ps(product, parts(fields_[1], rows, loaded));
-      four = _mm_add_ps(four, product);
-    }
-    _mm_storeu_ps(sums, four);
-#endif
-    for (; k < count; ++k)
-      sums[k % 4] += (kColumns ? part(fields_[0], columns, texels[k]) : 1) * (kRows ? part(fields_[1], rows, texels[k]) : 1);
-    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
-  }
-
 #ifdef GLINT_TEXEL_FILTER_SSE2
   template <unsigned kFields>
   std::uint64_t four(const std::uint32_t* texels) const {
@@ -129,17 +96,6 @@ class TexelFilter {
                                                    _mm_sub_epi32(_mm_set1_epi32(f.high), value)));
     }
     return static_cast<std::uint64_t>(~_mm_movemask_ps(_mm_castsi128_ps(outside)) & 15);
-  }
-
-  static __m128 parts(const Field& f, const Ends& ends, __m128i texels) {
-    const __m128i value =
-        _mm_and_si128(_mm_srl_epi32(texels, _mm_cvtsi32_si128(f.shift)), _mm_set1_epi32(static_cast<int>(f.mask)));
-    const __m128i low = _mm_set1_epi32(f.low), high = _mm_set1_epi32(f.high);
-    const __m128i between = _mm_and_si128(_mm_cmpgt_epi32(value, low), _mm_cmplt_epi32(value, high));
-    const __m128 at_low = _mm_and_ps(_mm_castsi128_ps(_mm_cmpeq_epi32(value, low)), _mm_set1_ps(ends.low));
-    const __m128i above = _mm_andnot_si128(_mm_cmpeq_epi32(low, high), _mm_cmpeq_epi32(value, high));
-    const __m128 at_high = _mm_and_ps(_mm_castsi128_ps(above), _mm_set1_ps(ends.high));
-    return _mm_or_ps(_mm_and_ps(_mm_castsi128_ps(between), _mm_set1_ps(1)), _mm_or_ps(at_low, at_high));
   }
 #endif
 

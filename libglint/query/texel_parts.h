@@ -1,0 +1,106 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "glint/model/bin_map.h"
+#include "glint/query/texel_filter.h"
+
+namespace glint {
+
+/// What texels count whose field is at the ends of a range; those between count as 1.
+struct RangeEnds {
+  float low = 1, high = 1;  ///< the same where the range is one number
+};
+
+/// What texels count by one field of their codes. Numbers stay in the place of the field.
+struct PartRange {
+  /// @param shift, bits  of the field
+  GLINT_HD PartRange(int shift, int bits, IndexRange range, RangeEnds ends) : at(ends) {
+    const int largest = static_cast<int>((1u << bits) - 1);
+    const int first = std::max(range.low, 0), last = std::min(range.high, largest);
+    if (bits == 0) shift = 0;  // it may be 32
+    mask = static_cast<std::uint32_t>(largest) << shift;
+    if (first <= last) {
+      begin = static_cast<std::uint32_t>(first) << shift;
+      span = static_cast<std::uint32_t>(last - first) << shift;
+    }
+    if (range.low == first) low = begin;
+    if (range.high == last) high = begin + span;
+  }
+  GLINT_HD float part(std::uint32_t texel) const {
+    const std::uint32_t value = texel & mask;
+    if (value - begin > span) return 0;
+    return value == low ? at.low : value == high ? at.high : 1;
+  }
+
+  static constexpr std::uint32_t kNever = ~std::uint32_t{0};  ///< no field fills a code
+  std::uint32_t mask;
+  std::uint32_t begin = kNever, span = 0;     ///< those that count
+  std::uint32_t low = kNever, high = kNever;  ///< the ends, if texels can have them
+  RangeEnds at;
+};
+
+/// What texels count by column and row.
+struct TexelParts {
+  /// @tparam kCut  the fields of TexelFilter that matter
+  template <unsigned kCut>
+  GLINT_HD float of(std::uint32_t texel) const {
+    float product = 1;
+    if constexpr ((kCut & TexelFilter::kColumn) != 0) product *= columns.part(texel);
+    if constexpr ((kCut & TexelFilter::kRow) != 0) product *= rows.part(texel);
+    return product;
+  }
+  PartRange columns, rows;
+};
+
+/// The slot that a texel of a block of several bins has in a window of kSide x kSide bins.
+struct SlotFields {
+  static constexpr std::uint32_t kSide = 5, kNone = kSide * kSide;
+
+  GLINT_HD std::uint32_t slotOf(std::uint32_t texel) const {
+    const std::uint32_t x = (texel >> shift_x & mask) + first_x, y = (texel >> shift_y & mask) + first_y;
+    return x < kSide && y < kSide ? y * kSide + x : kNone;
+  }
+
+  int shift_x, shift_y;            ///< of the bin in a code
+  std::uint32_t mask;              ///< bins of the block along each axis, less 1
+  std::uint32_t first_x, first_y;  ///< the window's column and row of the block's first bin; modulo 2^32
+};
+
+/// Texels that are in a window: their slots, and what they count.
+struct FoundTexels {
+  static constexpr int kMost = 256;
+  int count = 0;
+  std::uint32_t slots[kMost + 8];  // a group of texels is stored whole
+  float parts[kMost + 8];
+};
+
+/// Reads lists one texel after the other.
+struct SingleTexels {
+  using Parts = TexelParts;
+
+  /// Appends those of `count` texels that are in the window. There must be room for all.
+  template <unsigned kCut>
+  static GLINT_HD void find(const std::uint32_t* texels, int count, const Parts& parts, const SlotFields& fields,
+                            FoundTexels& found) {
+    for (int k = 0; k < count; ++k) {
+      const std::uint32_t slot = fields.slotOf(texels[k]);
+      found.slots[found.count] = slot;
+      found.parts[found.count] = parts.of<kCut>(texels[k]);
+      found.count += slot != SlotFields::kNone ? 1 : 0;
+    }
+  }
+
+  /// What all of them count, in eight sums: those of texels 8 k + i.
+  template <unsigned kCut>
+  static GLINT_HD float sum(const std::uint32_t* texels, int count, const Parts& parts) {
+    float sums[8] = {};
+    for (int k = 0; k < count; ++k) sums[k % 8] += parts.of<kCut>(texels[k]);
+    for (int half = 4; half > 0; half /= 2)
+      for (int k = 0; k < half; ++k) sums[k] += sums[k + half];
+    return sums[0];
+  }
+};
+
+}  // namespace glint

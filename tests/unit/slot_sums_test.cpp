@@ -1,0 +1,125 @@
+#include "glint/query/slot_sums.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <random>
+#include <vector>
+
+namespace glint {
+namespace {
+
+/// What of a list of texels counts: ranges of columns and rows may be empty, one number, reach beyond the cell, or hold all.
+struct Case {
+  TexelCode code;
+  IndexRange columns, rows;
+  RangeEnds column_ends, row_ends;
+  SlotFields bins;
+  std::vector<std::uint32_t> texels;
+
+  TexelParts parts() const {
+    return {{0, code.column_bits, columns, column_ends}, {code.column_bits, code.row_bits, rows, row_ends}};
+  }
+};
+
+Case randomCase(std::mt19937& random) {
+  const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
+  const auto range = [&](int bits) {
+    const int low = below((1 << bits) + 2) - 1;
+    return IndexRange{low, low + below(4) * (1 << bits) / 3};
+  };
+  Case c;
+  c.code = {below(12), below(12), 0};
+  const int side_bits = below(4), position_bits = c.code.column_bits + c.code.row_bits;
+  c.code.place_bits = std::min(side_bits + below(3), (32 - position_bits) / 2);
+  c.columns = range(c.code.column_bits);
+  c.rows = range(c.code.row_bits);
+  // Multiples of 2^-5: sums are exact.
+  c.column_ends = {0.03125f * static_cast<float>(below(33)), 0.25f};
+  c.row_ends = {0.5f, 0.03125f * static_cast<float>(below(33))};
+  const int shift = std::min(position_bits + c.code.place_bits - std::min(side_bits, c.code.place_bits), 31);
+  c.bins = {shift, std::min(shift + c.code.place_bits, 31), (1u << side_bits) - 1, static_cast<std::uint32_t>(below(10) - 5),
+            static_cast<std::uint32_t>(below(10) - 5)};
+  c.texels.resize(static_cast<std::size_t>(below(10) == 0 ? below(2000) : below(70)));
+  for (std::uint32_t& texel : c.texels) texel = static_cast<std::uint32_t>(random());
+  return c;
+}
+
+double partOf(int value, const IndexRange& range, const RangeEnds& ends) {
+  if (value < range.low || value > range.high) return 0;
+  return value == range.low ? ends.low : value == range.high ? ends.high : 1;
+}
+
+/// What a texel counts, field by field.
+template <unsigned kCut>
+double partOf(const Case& c, std::uint32_t texel) {
+  double part = 1;
+  if ((kCut & TexelFilter::kColumn) != 0) part *= partOf(static_cast<int>(c.code.column(texel)), c.columns, c.column_ends);
+  if ((kCut & TexelFilter::kRow) != 0) part *= partOf(static_cast<int>(c.code.row(texel)), c.rows, c.row_ends);
+  return part;
+}
+
+using Areas = std::array<double, SlotSums::kSlots>;
+
+/// All texels by bin, then all in slot 7.
+template <unsigned kCut>
+Areas expectedAreas(const Case& c) {
+  Areas areas = {};
+  for (const std::uint32_t texel : c.texels) {
+    const int x = static_cast<int>((texel >> c.bins.shift_x & c.bins.mask) + c.bins.first_x);
+    const int y = static_cast<int>((texel >> c.bins.shift_y & c.bins.mask) + c.bins.first_y);
+    if (x >= 0 && x < 5 && y >= 0 && y < 5) areas[static_cast<std::size_t>(5 * y + x)] += partOf<kCut>(c, texel);
+    areas[7] += partOf<kCut>(c, texel);
+  }
+  return areas;
+}
+
+template <class Texels, unsigned kCut>
+Areas areasBy(const Case& c) {
+  const typename Texels::Parts parts(c.parts());
+  SlotSums sums;
+  sums.addBins<Texels, kCut>(c.texels.data(), c.texels.size(), parts, c.bins);
+  sums.addBin<Texels, kCut>(c.texels.data(), c.texels.size(), parts, 7);
+  Areas areas = {};
+  sums.addTo(areas.data());
+  return areas;
+}
+
+template <class Texels>
+void expectAreas() {
+  std::mt19937 random(5);
+  for (int k = 0; k < 5000 && !testing::Test::HasFailure(); ++k) {
+    const Case c = randomCase(random);
+    SCOPED_TRACE(k);
+    EXPECT_EQ((areasBy<Texels, 0>(c)), expectedAreas<0>(c));
+    EXPECT_EQ((areasBy<Texels, 1>(c)), expectedAreas<1>(c));
+    EXPECT_EQ((areasBy<Texels, 2>(c)), expectedAreas<2>(c));
+    EXPECT_EQ((areasBy<Texels, 3>(c)), expectedAreas<3>(c));
+  }
+}
+
+TEST(SlotSums, AddUpTexelByTexel) { expectAreas<SingleTexels>(); }
+
+#ifdef GLINT_AVX2
+TEST(SlotSums, AddUpEightTexelsAtATime) {
+  if (!WideTexels::supported()) GTEST_SKIP() << "no AVX2";
+  expectAreas<WideTexels>();
+}
+
+/// Ends of any size, whose sums are rounded.
+TEST(SlotSums, AreTheSameToTheBitByEightAndByOne) {
+  if (!WideTexels::supported()) GTEST_SKIP() << "no AVX2";
+  std::mt19937 random(6);
+  std::uniform_real_distribution<float> end;
+  for (int k = 0; k < 2000; ++k) {
+    Case c = randomCase(random);
+    c.column_ends = {end(random), end(random)};
+    c.row_ends = {end(random), end(random)};
+    EXPECT_EQ((areasBy<WideTexels, 3>(c)), (areasBy<SingleTexels, 3>(c))) << k;
+  }
+}
+#endif
+
+}  // namespace
+}  // namespace glint
