@@ -139,7 +139,7 @@ ordered_json measure(const Map& m, float alpha, std::size_t queries) {
   for (int k = 0; k < kBuilds; ++k) {
     data = {};
     const double start = now(), cpu_start = cpuSeconds();
-    data = bake::buildBinMap(m.map, {alpha, 8});
+    data = bake::buildBinMap(m.map, {alpha});
     wall.push_back(now() - start);
     cpu.push_back(cpuSeconds() - cpu_start);
   }
