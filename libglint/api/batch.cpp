@@ -180,23 +180,30 @@ void modelDensities(const Model& model, std::size_t count, const FootprintArrays
 
 void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
                 float* out) {
+  using Cover = PyramidNdf::BlockCover;
   const bool wide = hasWideKernels();
-  const auto sum = [wide]<class Pixel>(const Pixel* pixels, const PyramidNdf::BlockCover& cover) {
+  const auto sum = [wide]<class Pixel>(const Cover& cover, const Pixel* const* blocks, const float* weights, int stored) {
     if constexpr (sizeof(Pixel) == 2)
-      if (wide) return sumCoveredPixels(pixels, cover.columns, cover.rows, cover.first_row, cover.end_row);
-    return cover.sum(pixels);
+      if (wide) return sumCoveredPixels(blocks, weights, stored, cover.columns, cover.rows, cover.first_row, cover.end_row);
+    return cover.sum(blocks, weights, stored);
   };
   SliceChunk chunk;
+  PyramidNdf::PendingMean pending[2];
   for (std::size_t first = 0; first < count; first += kChunk) {
     const int lanes = static_cast<int>(std::min(count - first, std::size_t{kChunk}));
     selectChunk(model.shape(), model.chooser(), footprints, {ranges.x0, ranges.y0}, first, lanes, chunk);
     for (int k = 0; k < lanes; ++k) model.prefetchIndex(chunk.slices(k));
     // A mean is long work next to its cache misses, and reads many lines: only the next one's are asked ahead.
+    const auto begin = [&](int k) {
+      pending[k % 2].sum = 0;
+      model.beginMean(chunk.slices(k), ranges[first + static_cast<std::size_t>(k)], sum, pending[k % 2]);
+    };
+    begin(0);
     for (int k = 0; k < lanes; ++k) {
       const std::size_t at = first + static_cast<std::size_t>(k);
-      if (k + 1 < lanes) model.prefetchMean(chunk.slices(k + 1), ranges[at + 1]);
-      out[at] = model.fromTexels(footprints[at]) ? model.mean(footprints[at], ranges[at])
-                                                 : model.mean(chunk.slices(k), ranges[at], sum);
+      if (k + 1 < lanes) begin(k + 1);
+      const float mean = model.finishMean(ranges[at], sum, pending[k % 2]);
+      out[at] = model.fromTexels(footprints[at]) ? model.mean(footprints[at], ranges[at]) : mean;
     }
   }
 }

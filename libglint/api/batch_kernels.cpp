@@ -230,15 +230,26 @@ inline __m128 rowSum(const std::uint16_t* row) {
 
 }  // namespace
 
-float sumCoveredPixels(const std::uint16_t* pixels, const float* columns, const float* rows, int first_row, int end_row) {
-  const __m256 left = load(columns), right = load(columns + kWidth);
-  __m128 sum = _mm_setzero_ps();
-  for (int y = first_row; y < end_row; ++y) {
-    const __m256 a = _mm256_mul_ps(left, loadPixels(pixels + y * kBlockSide));
-    const __m256 b = _mm256_mul_ps(right, loadPixels(pixels + y * kBlockSide + kWidth));
-    const __m128 row = _mm_add_ps(_mm_add_ps(_mm_add_ps(lowOf(a), highOf(a)), lowOf(b)), highOf(b));
-    sum = _mm_add_ps(sum, _mm_mul_ps(_mm_set1_ps(rows[y]), row));
+float sumCoveredPixels(const std::uint16_t* const* blocks, const float* weights, int count, const float* columns,
+                       const float* rows, int first_row, int end_row) {
+  __m256 left = _mm256_setzero_ps(), right = left;
+  for (int k = 0; k < count; ++k) {
+    __m256 even_left = _mm256_setzero_ps(), even_right = even_left, odd_left = even_left, odd_right = even_left;
+    const auto add = [&](int y, __m256& sum_left, __m256& sum_right) {
+      const __m256 row = _mm256_set1_ps(rows[y]);
+      sum_left = _mm256_add_ps(sum_left, _mm256_mul_ps(row, loadPixels(blocks[k] + y * kBlockSide)));
+      sum_right = _mm256_add_ps(sum_right, _mm256_mul_ps(row, loadPixels(blocks[k] + y * kBlockSide + kWidth)));
+    };
+    int y = first_row;
+    for (; y + 2 <= end_row; y += 2) add(y, even_left, even_right), add(y + 1, odd_left, odd_right);
+    if (y < end_row) add(y, even_left, even_right);
+    const __m256 weight = _mm256_set1_ps(weights[k]);
+    left = _mm256_add_ps(left, _mm256_mul_ps(weight, _mm256_add_ps(even_left, odd_left)));
+    right = _mm256_add_ps(right, _mm256_mul_ps(weight, _mm256_add_ps(even_right, odd_right)));
   }
+  left = _mm256_mul_ps(load(columns), left);
+  right = _mm256_mul_ps(load(columns + kWidth), right);
+  const __m128 sum = _mm_add_ps(_mm_add_ps(lowOf(left), highOf(left)), _mm_add_ps(lowOf(right), highOf(right)));
   const __m128 pairs = _mm_add_ps(sum, _mm_movehl_ps(sum, sum));  // (0 + 2), (1 + 3)
   return _mm_cvtss_f32(_mm_add_ss(pairs, _mm_shuffle_ps(pairs, pairs, 1)));
 }

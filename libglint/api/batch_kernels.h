@@ -95,7 +95,8 @@ void dotEightSlices(const ProductSlice<float, float>* slices, const AxisPart& x,
 /// Sum of the pixels of a block by how much of their columns and rows is covered, to the bit that of PyramidNdf::mean.
 /// @param pixels         [16][16], half-precision numbers >= 0
 /// @param columns, rows  [16]
-float sumCoveredPixels(const std::uint16_t* pixels, const float* columns, const float* rows, int first_row, int end_row);
+float sumCoveredPixels(const std::uint16_t* const* blocks, const float* weights, int count, const float* columns,
+                       const float* rows, int first_row, int end_row);
 
 /// sums[y] = sum of row y of a block: 2^112 times that of sumRows.
 void sumPixelRows(const std::uint16_t* pixels, float* sums);
@@ -115,7 +116,9 @@ template <class Coefficient>
 void dotFourRows(const float*, const KernelLayout&, const Coefficient* const*, float*) {}
 template <class Basis, class Coefficient, class Part>
 void dotEightSlices(const ProductSlice<Basis, Coefficient>*, const Part&, const Part&, float*) {}
-inline float sumCoveredPixels(const std::uint16_t*, const float*, const float*, int, int) { return 0; }
+inline float sumCoveredPixels(const std::uint16_t* const*, const float*, int, const float*, const float*, int, int) {
+  return 0;
+}
 inline void sumPixelRows(const std::uint16_t*, float*) {}
 
 #endif

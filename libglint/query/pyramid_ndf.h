@@ -118,7 +118,7 @@ class PyramidNdf {
     if (rank < 0) return;
     draw.place.block = placeOfRank(maskOf(draw.chosen), rank);
     draw.stored = draw.first_block + static_cast<std::uint64_t>(rank);
-    prefetchPixels(level, draw.stored, 0, kBlockSize);
+    prefetchRows(static_cast<const char*>(level.pixels) + draw.stored * blockBytes(), 0, kBlockSize);
   }
 
   /// @param sum_rows  sum_rows(pixels): sums of the rows of a block of floats or half-precision numbers
@@ -138,7 +138,7 @@ class PyramidNdf {
   /// How much of each row and column of a block a box covers.
   class BlockCover {
    public:
-    GLINT_HD explicit BlockCover(const BlockBox& box) {
+    GLINT_HD void set(const BlockBox& box) {
       constexpr float kFull = kBlockSize;
       whole_ = box.x0 <= 0 && box.y0 <= 0 && box.x1 >= kFull && box.y1 >= kFull;
       for (int k = 0; k < kBlockSize; ++k) {
@@ -154,17 +154,24 @@ class PyramidNdf {
     float columns[kBlockSize], rows[kBlockSize];       ///< covered parts, 0 to 1
     GLINT_HD bool isWhole() const { return whole_; }
 
-    /// Sum of the covered pixels.
+    /// Weighted sum of the covered pixels of some blocks.
     template <class Pixel>
-    GLINT_HD float sum(const Pixel* pixels) const {
-      Float4 sum = Float4::zero();
-      for (int y = first_row; y < end_row; ++y) {
-        Float4 row = Float4::zero();
-        for (int x = first_column; x < end_column; x += 4)
-          row = row + Float4::load(columns + x) * loadPixels(pixels + y * kBlockSize + x);
-        sum = sum + Float4::all(rows[y]) * row;
+    GLINT_HD float sum(const Pixel* const* blocks, const float* weights, int count) const {
+      Float4 sums[kBlockSize / 4] = {Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()};
+      for (int x = first_column; x < end_column; x += 4) {
+        Float4 sum = Float4::zero();
+        for (int k = 0; k < count; ++k) {
+          // Two sums, since an addition waits for the one before it.
+          Float4 even = Float4::zero(), odd = Float4::zero();
+          const auto row = [&](int y) { return Float4::all(rows[y]) * loadPixels(blocks[k] + y * kBlockSize + x); };
+          int y = first_row;
+          for (; y + 2 <= end_row; y += 2) even = even + row(y), odd = odd + row(y + 1);
+          if (y < end_row) even = even + row(y);
+          sum = sum + Float4::all(weights[k]) * (even + odd);
+        }
+        sums[x / 4] = Float4::load(columns + x) * sum;
       }
-      return sum.sum();
+      return ((sums[0] + sums[1]) + (sums[2] + sums[3])).sum();
     }
 
    private:
@@ -178,24 +185,51 @@ class PyramidNdf {
   /// their mean stored, others sum at most 256 pixels.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     if (fromTexels(p)) return below_.mean(p, range);
-    return mean(chooseSlices(p), range, [](const auto* pixels, const BlockCover& cover) { return cover.sum(pixels); });
+    const auto sum = [](const BlockCover& cover, const auto* const* blocks, const float* weights, int count) {
+      return cover.sum(blocks, weights, count);
+    };
+    PendingMean pending;
+    beginMean(chooseSlices(p), range, sum, pending);
+    return finishMean(range, sum, pending);
   }
 
-  /// The same from chosen images.
-  /// @param covered_sum  covered_sum(pixels, cover): BlockCover::sum of floats or half-precision numbers
+  /// Stored blocks in one place of the chosen images.
+  struct StoredBlocks {
+    int count;
+    float weights[PyramidSlices::kMost];
+    const void* pixels[PyramidSlices::kMost];
+    const float* means[PyramidSlices::kMost];
+  };
+
+  /// A mean on its way: what it reads is asked for, and not yet read.
+  struct PendingMean {
+    static constexpr int kMost = 4;
+    double sum = 0;  ///< of densities times pixels, so far
+    int count = 0;
+    BlockCover covers[kMost];
+    StoredBlocks blocks[kMost];
+  };
+
+  /// @param sum  sum(cover, blocks, weights, count): BlockCover::sum of blocks of floats or half-precision numbers
   template <class Sum>
-  GLINT_HD float mean(const PyramidSlices& chosen, const Box2& range, Sum&& covered_sum) const {
-    if (!(range.width() > 0 && range.height() > 0)) return 0;
-    double sum = 0;
+  GLINT_HD void beginMean(const PyramidSlices& chosen, const Box2& range, Sum&& sum, PendingMean& pending) const {
+    if (!(range.width() > 0 && range.height() > 0)) return;
     forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
-      const BlockCover cover(box);
-      for (int k = 0; k < chosen.count; ++k) {
-        const std::int64_t stored = storedBlock(chosen[k], block);
-        if (stored >= 0)
-          sum += double{chosen.weights[k]} * blockSum(pyramid_.levels[chosen.level(k)], stored, cover, covered_sum);
-      }
+      if (pending.count == PendingMean::kMost) addPending(sum, pending);
+      BlockCover& cover = pending.covers[pending.count];
+      StoredBlocks& stored = pending.blocks[pending.count++];
+      cover.set(box);
+      findStored(chosen, block, stored);
+      for (int k = 0; k < stored.count; ++k)
+        cover.isWhole() ? prefetch(stored.means[k]) : prefetchRows(stored.pixels[k], cover.first_row, cover.end_row);
     });
-    return static_cast<float>(sum / areaInPixels(shape(), range));
+  }
+
+  template <class Sum>
+  GLINT_HD float finishMean(const Box2& range, Sum&& sum, PendingMean& pending) const {
+    addPending(sum, pending);
+    const float area = areaInPixels(shape(), range);
+    return area > 0 ? static_cast<float>(pending.sum / area) : 0.0f;
   }
 
   /// Asks the memory for where chosen images say which blocks they store.
@@ -204,22 +238,6 @@ class PyramidNdf {
       prefetch(maskOf(chosen[k]));
       prefetch(ranksOf(chosen[k]));
     }
-  }
-
-  /// Asks the memory for what a mean from chosen images reads. Reads their index.
-  GLINT_HD void prefetchMean(const PyramidSlices& chosen, const Box2& range) const {
-    forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
-      const BlockCover cover(box);
-      for (int k = 0; k < chosen.count; ++k) {
-        const std::int64_t stored = storedBlock(chosen[k], block);
-        if (stored < 0) continue;
-        const PyramidLevel& level = pyramid_.levels[chosen.level(k)];
-        if (cover.isWhole())
-          prefetch(level.block_means.data() + stored);
-        else
-          prefetchPixels(level, static_cast<std::uint64_t>(stored), cover.first_row, cover.end_row);
-      }
-    });
   }
 
  private:
@@ -281,29 +299,57 @@ class PyramidNdf {
     }
   }
 
-  /// Index of a block of an image among the stored blocks of its level, or -1.
-  GLINT_HD std::int64_t storedBlock(const PyramidSlice& slice, int block) const {
-    const BitRank rank(maskOf(slice)[block / 64], static_cast<unsigned>(block) % 64);
-    return rank.kept ? static_cast<std::int64_t>(ranksOf(slice)[block / 64] + rank.below) : -1;
+  /// Nothing branches on what is stored, as in findPixelsOf.
+  GLINT_HD void findStored(const PyramidSlices& chosen, int block, StoredBlocks& out) const {
+    const unsigned word = static_cast<unsigned>(block) / 64, bit = static_cast<unsigned>(block) % 64;
+    int count = 0;
+    for (int k = 0; k < chosen.count; ++k) {
+      const PyramidLevel& level = pyramid_.levels[chosen.level(k)];
+      const std::size_t at = std::size_t{chosen.images[k]} * mask_words_ + word;
+      const BitRank rank(level.masks.data()[at], bit);
+      const std::uint64_t stored = level.mask_ranks.data()[at] + rank.below;
+      out.weights[count] = chosen.weights[k];
+      out.pixels[count] = static_cast<const char*>(level.pixels) + stored * blockBytes();
+      out.means[count] = level.block_means.data() + stored;
+      count += static_cast<int>(rank.kept & 1);
+    }
+    out.count = count;
   }
 
-  /// Sum of the densities of the covered pixels of a block, in pixels.
   template <class Sum>
-  GLINT_HD float blockSum(const PyramidLevel& level, std::int64_t block, const BlockCover& cover, Sum&& covered_sum) const {
-    if (cover.isWhole()) return kBlockPixels * level.block_means.data()[block];
-    const std::size_t first = static_cast<std::size_t>(block) * kBlockPixels;
+  GLINT_HD void addPending(Sum&& sum, PendingMean& pending) const {
+    for (int k = 0; k < pending.count; ++k) pending.sum += double{blockSum(pending.covers[k], pending.blocks[k], sum)};
+    pending.count = 0;
+  }
+
+  /// Weighted sum of the densities of the covered pixels, in pixels.
+  template <class Sum>
+  GLINT_HD float blockSum(const BlockCover& cover, const StoredBlocks& blocks, Sum&& sum) const {
+    if (cover.isWhole()) {
+      float means = 0;
+      for (int k = 0; k < blocks.count; ++k) means += blocks.weights[k] * *blocks.means[k];
+      return kBlockPixels * means;
+    }
+    const auto covered = [&]<class Pixel>(const Pixel*) {
+      const Pixel* pixels[PyramidSlices::kMost];
+      for (int k = 0; k < blocks.count; ++k) pixels[k] = static_cast<const Pixel*>(blocks.pixels[k]);
+      return sum(cover, pixels, blocks.weights, blocks.count);
+    };
     return pyramid_.value_scale * (pyramid_.precision == BlockPrecision::f16
-                                       ? covered_sum(static_cast<const std::uint16_t*>(level.pixels) + first, cover)
-                                       : covered_sum(static_cast<const float*>(level.pixels) + first, cover));
+                                       ? covered(static_cast<const std::uint16_t*>(nullptr))
+                                       : covered(static_cast<const float*>(nullptr)));
+  }
+
+  GLINT_HD std::size_t blockBytes() const {
+    return kBlockPixels * (pyramid_.precision == BlockPrecision::f16 ? sizeof(std::uint16_t) : sizeof(float));
   }
 
   /// Asks the memory for rows of a block's pixels.
-  GLINT_HD void prefetchPixels(const PyramidLevel& level, std::uint64_t block, int first_row, int end_row) const {
+  GLINT_HD void prefetchRows(const void* pixels, int first_row, int end_row) const {
     constexpr int kCacheLine = 64;
-    const int row_bytes = kBlockSize * (pyramid_.precision == BlockPrecision::f16 ? 2 : 4);
-    const char* pixels = static_cast<const char*>(level.pixels) + block * static_cast<std::uint64_t>(kBlockSize * row_bytes);
+    const int row_bytes = static_cast<int>(blockBytes()) / kBlockSize;
     for (int k = first_row * row_bytes / kCacheLine * kCacheLine; k < end_row * row_bytes; k += kCacheLine)
-      prefetch(pixels + k);
+      prefetch(static_cast<const char*>(pixels) + k);
   }
 
   NdfPyramid pyramid_;
