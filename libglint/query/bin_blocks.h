@@ -90,9 +90,8 @@ class BinBlocks {
   template <class Visitor>
   GLINT_HD void forEachBlock(const BinRect& bins, Visitor&& visitor) const {
     forEachTile(bins, [&](int column, int row) {
-      BinBlock block;
-      block.column = column << map_.tile_bits, block.row = row << map_.tile_bits, block.side_bits = map_.tile_bits;
-      visitNode(tileOf(column, row), block, bins, visitor);
+      const int bits = map_.tile_bits;
+      visitNode(tileOf(column, row), {column << bits, row << bits, bits, 0, 0, 0}, bins, visitor);
     });
   }
 
