@@ -39,13 +39,14 @@ class CpNdf {
   GLINT_HD const SliceChooser& chooser() const { return chooser_; }
 
   /// Density towards h, >= 0; O(columns) in each of 8 images.
-  GLINT_HD float density(const Footprint& p, Vec2 h) const {
-    if (!insideSquare(h)) return 0;
-    if (fromTexels(p)) return below_.density(p, h);
-    const PyramidSlices chosen = chooser_.choose(p);
-    const PixelPlace place = pixelPlace(shape(), h);
-    return withReader(ndf_, [&](const auto& reader) { return pixelDensity(reader, chosen, place); });
-  }
+  GLINT_HD float density(const Footprint& p, Vec2 h) const;
+
+  /// A density on its way: what it reads is asked for, so the cache misses of many densities can be under way together.
+  struct PendingDensity;
+  template <class Reader>
+  GLINT_HD PendingDensity beginDensity(const Reader& reader, const PyramidSlices& chosen, const PixelPlace& place) const;
+  template <class Reader>
+  GLINT_HD float finishDensity(const Reader& reader, const PendingDensity& pending) const;
 
   /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly
   /// inside, as the density is constant there: exactly in proportion to the density, which is the pdf.
@@ -167,8 +168,10 @@ class CpNdf {
   };
 
   /// Nothing branches on what is stored: that cannot be predicted.
-  GLINT_HD SlicePlaces findSlices(const PyramidSlices& chosen, unsigned block_place, const float* scales) const {
+  GLINT_HD SlicePlaces findSlices(const PyramidSlices& chosen, int block, const float* scales) const {
     SlicePlaces out;
+    const unsigned block_place = ndf_.block_places.data()[block];
+    if (block_place == kNoBlockPlace) return out;
     const auto block_places = static_cast<unsigned>(ndf_.places);
     for (int step = 0; 4 * step < chosen.count; ++step) {
       const std::uint32_t first = ndf_.first_image[chosen.levels[step]];
@@ -191,13 +194,21 @@ class CpNdf {
   /// @param part    Signed or Positive
   template <class Ask, class Part>
   GLINT_HD float sumSlices(const PyramidSlices& chosen, int block, const float* scales, const Ask& ask, Part part) const {
-    const unsigned block_place = ndf_.block_places.data()[block];
-    if (block_place == kNoBlockPlace) return 0;
-    const SlicePlaces places = findSlices(chosen, block_place, scales);
-    if (ndf_.method == CompressionMethod::cp) {
-      for (int k = 0; k < chosen.count; ++k)
-        if (places.weights[k] > 0) ask.prefetch(ndf_.clusters.data()[places.clusters[k]], places.slices[k]);
-    }
+    const SlicePlaces places = findSlices(chosen, block, scales);
+    prefetchSlices(places, ask);
+    return sumSlices(places, ask, part);
+  }
+
+  /// What cp reads of slices, which are of as many clusters; other methods read one or two of these.
+  template <class Ask>
+  GLINT_HD void prefetchSlices(const SlicePlaces& places, const Ask& ask) const {
+    if (ndf_.method != CompressionMethod::cp) return;
+    for (int k = 0; k < PyramidSlices::kMost; ++k)
+      if (places.weights[k] > 0) ask.prefetch(ndf_.clusters.data()[places.clusters[k]], places.slices[k]);
+  }
+
+  template <class Ask, class Part>
+  GLINT_HD float sumSlices(const SlicePlaces& places, const Ask& ask, Part part) const {
     unsigned left = lanesAbove0(Float4::load(places.weights)) | lanesAbove0(Float4::load(places.weights + 4)) << 4;
     float sum = 0;
     while (left != 0) {
@@ -249,11 +260,6 @@ class CpNdf {
       sum += places.weights[k] * part(ask.spots(profile, spotsOf(ndf_, cluster, places.slices[k])));
     }
     return sum;
-  }
-
-  template <class Reader>
-  GLINT_HD float pixelDensity(const Reader& reader, const PyramidSlices& chosen, const PixelPlace& place) const {
-    return sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<const Reader&>{reader, place}, Positive{});
   }
 
   /// Sums of the rows of a slice and single rows of pixels: of columns, or of spots.
@@ -308,6 +314,32 @@ class CpNdf {
   SliceChooser chooser_;
   Reference below_;
 };
+
+struct CpNdf::PendingDensity {
+  SlicePlaces slices;
+  PixelPlace place;
+};
+
+template <class Reader>
+GLINT_HD CpNdf::PendingDensity CpNdf::beginDensity(const Reader& reader, const PyramidSlices& chosen,
+                                                   const PixelPlace& place) const {
+  const PendingDensity pending = {findSlices(chosen, place.block, ndf_.density_scales.data()), place};
+  prefetchSlices(pending.slices, PixelOf<const Reader&>{reader, place});
+  return pending;
+}
+
+template <class Reader>
+GLINT_HD float CpNdf::finishDensity(const Reader& reader, const PendingDensity& pending) const {
+  return sumSlices(pending.slices, PixelOf<const Reader&>{reader, pending.place}, Positive{});
+}
+
+inline GLINT_HD float CpNdf::density(const Footprint& p, Vec2 h) const {
+  if (!insideSquare(h)) return 0;
+  if (fromTexels(p)) return below_.density(p, h);
+  const PyramidSlices chosen = chooser_.choose(p);
+  const PixelPlace place = pixelPlace(shape(), h);
+  return withReader(ndf_, [&](const auto& reader) { return finishDensity(reader, beginDensity(reader, chosen, place)); });
+}
 
 struct CpNdf::Draw {
   Vec2 xi;
@@ -404,10 +436,20 @@ inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) cons
   Draw draw = chooseImage(chosen, xi);
   chooseBlock(draw);
   findBlockSlice(draw);
-  return withReader(ndf_, [&](const auto& reader) -> HalfVectorSample {
+  if (!draw.possible) return {};
+  return withReader(ndf_, [&]<class Reader>(const Reader& reader) -> HalfVectorSample {
+    // What the pdf reads is on its way while the pixel is chosen.
+    const int block = draw.block;
+    PendingDensity pending;
+    pending.slices = findSlices(chosen, block, ndf_.density_scales.data());
+    for (int k = 0; k < PyramidSlices::kMost; ++k)
+      if (pending.slices.weights[k] > 0)
+        prefetch(reader.row(ndf_.clusters.data()[pending.slices.clusters[k]], pending.slices.slices[k]));
     choosePixel(reader, draw);
     if (draw.place.x < 0) return {};
-    return {pointInPixel(shape(), draw.place, draw.xi), pixelDensity(reader, chosen, draw.place) / draw.total};
+    if (draw.block != block) pending.slices = findSlices(chosen, draw.block, ndf_.density_scales.data());
+    pending.place = draw.place;
+    return {pointInPixel(shape(), draw.place, draw.xi), finishDensity(reader, pending) / draw.total};
   });
 }
 

@@ -3,9 +3,10 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numbers>
+#include <span>
 
 #include "glint/bake/pyramid_agreement.h"
 #include "glint/bake/reference_image.h"
@@ -381,7 +382,7 @@ TEST(Pyramid, DoesNotDependOnTheNumberOfThreads) {
           EXPECT_EQ(one.levels[l].mask_ranks, two.levels[l].mask_ranks);
           EXPECT_EQ(one.levels[l].half_pixels, two.levels[l].half_pixels);
           const auto same = [](const std::vector<float>& a, const std::vector<float>& b) {
-            return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+            return std::ranges::equal(std::as_bytes(std::span(a)), std::as_bytes(std::span(b)));
           };
           EXPECT_TRUE(same(one.levels[l].block_means, two.levels[l].block_means));
           EXPECT_TRUE(same(one.levels[l].float_pixels, two.levels[l].float_pixels));
