@@ -20,6 +20,7 @@ bool startsHold(const BinMap& map) {
 /// A node that is a block.
 struct BlockOfNode {
   std::uint64_t first_key;
+  int column, row;  ///< of its first bin
   int side_bits, cell_bits;
   std::uint64_t first_cell;
 };
@@ -28,16 +29,19 @@ struct BlockOfNode {
 class TreeWalk {
  public:
   explicit TreeWalk(const BinMap& map) : map_(map), code_(texelCode(map.width, map.height)) {
-    tiles_ = static_cast<std::uint64_t>(map.tilesPerAxis()) * static_cast<std::uint64_t>(map.tilesPerAxis());
-    next_node_ = tiles_;
+    across_ = static_cast<std::uint64_t>(map.tilesPerAxis());
+    next_node_ = across_ * across_;
   }
 
   /// Calls visitor(BlockOfNode) for each block. Returns false at what is out of order.
   template <class Visitor>
   bool walk(Visitor&& visitor) {
-    if (tiles_ > nodeCount()) return false;
-    for (std::uint64_t tile = 0; tile < tiles_; ++tile)
-      if (!visit(tile, map_.tile_bits, tile << 2 * map_.tile_bits, visitor)) return false;
+    if (next_node_ > nodeCount()) return false;
+    const int bits = map_.tile_bits;
+    for (std::uint64_t tile = 0; tile < across_ * across_; ++tile) {
+      const auto column = static_cast<int>(tile % across_), row = static_cast<int>(tile / across_);
+      if (!visit(tile, {tile << 2 * bits, column << bits, row << bits, bits, 0, 0}, visitor)) return false;
+    }
     return next_node_ == nodeCount() && next_block_ == map_.blockCount() && next_cell_ + 1 == map_.cell_starts.size();
   }
 
@@ -45,15 +49,24 @@ class TreeWalk {
   std::uint64_t nodeCount() const { return map_.nodes.size() / 2; }
 
   template <class Visitor>
-  bool visit(std::uint64_t node, int side_bits, std::uint64_t key, Visitor& visitor) {
+  bool visit(std::uint64_t node, BlockOfNode block, Visitor& visitor) {
     const std::uint32_t kind = map_.nodes[2 * node] & ((1u << BinMap::kKindBits) - 1);
     const std::uint32_t number = map_.nodes[2 * node] >> BinMap::kKindBits, first = map_.nodes[2 * node + 1];
     if (kind == BinMap::kEmpty) return number == 0 && first == 0;
-    if (kind != BinMap::kSplit) return visitBlock({key, side_bits, static_cast<int>(kind) - 1, first}, number, visitor);
-    if (side_bits == 0 || number != 0 || first != next_node_ || first + 4ull > nodeCount()) return false;
+    if (kind != BinMap::kSplit) {
+      block.cell_bits = static_cast<int>(kind) - 1, block.first_cell = first;
+      return visitBlock(block, number, visitor);
+    }
+    if (block.side_bits == 0 || number != 0 || first != next_node_ || first + 4ull > nodeCount()) return false;
     next_node_ += 4;
-    for (std::uint64_t quadrant = 0; quadrant < 4; ++quadrant)
-      if (!visit(first + quadrant, side_bits - 1, key + (quadrant << 2 * (side_bits - 1)), visitor)) return false;
+    --block.side_bits;
+    for (std::uint64_t quadrant = 0; quadrant < 4; ++quadrant) {
+      BlockOfNode child = block;
+      child.first_key += quadrant << 2 * block.side_bits;
+      child.column += static_cast<int>(quadrant & 1) << block.side_bits;
+      child.row += static_cast<int>(quadrant >> 1) << block.side_bits;
+      if (!visit(first + quadrant, child, visitor)) return false;
+    }
     return true;
   }
 
@@ -70,7 +83,7 @@ class TreeWalk {
 
   const BinMap& map_;
   TexelCode code_;
-  std::uint64_t tiles_, next_node_, next_block_ = 0, next_cell_ = 0;
+  std::uint64_t across_, next_node_, next_block_ = 0, next_cell_ = 0;
 };
 
 std::uint32_t classOf(const BinMap& map, std::size_t texel) {
@@ -109,6 +122,9 @@ bool listHolds(const BinMap& map, const BlockOfNode& block, std::vector<bool>& s
       const std::uint32_t code_of_texel = map.texels[k];
       const std::uint32_t column = first_column + code.column(code_of_texel), row = first_row + code.row(code_of_texel);
       if (column >= static_cast<std::uint32_t>(map.width) || row >= static_cast<std::uint32_t>(map.height)) return false;
+      const int bin_column = block.column + static_cast<int>(code.placeX(code_of_texel) >> bin_shift);
+      const int bin_row = block.row + static_cast<int>(code.placeY(code_of_texel) >> bin_shift);
+      if (bin_column >= map.bins_per_axis || bin_row >= map.bins_per_axis) return false;
       const std::size_t texel = std::size_t{row} * static_cast<std::size_t>(map.width) + column;
       std::uint64_t key = block.first_key;
       for (int bit = 0; bit < block.side_bits; ++bit) {

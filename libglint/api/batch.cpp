@@ -193,17 +193,17 @@ void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArray
     const int lanes = static_cast<int>(std::min(count - first, std::size_t{kChunk}));
     selectChunk(model.shape(), model.chooser(), footprints, {ranges.x0, ranges.y0}, first, lanes, chunk);
     for (int k = 0; k < lanes; ++k) model.prefetchIndex(chunk.slices(k));
+    const auto fromTexels = [&](int k) { return model.hasNormals() && chunk.below[k] != 0; };
     // A mean is long work next to its cache misses, and reads many lines: only the next one's are asked ahead.
     const auto begin = [&](int k) {
-      pending[k % 2].sum = 0;
+      if (fromTexels(k)) return;
       model.beginMean(chunk.slices(k), ranges[first + static_cast<std::size_t>(k)], sum, pending[k % 2]);
     };
     begin(0);
     for (int k = 0; k < lanes; ++k) {
       const std::size_t at = first + static_cast<std::size_t>(k);
       if (k + 1 < lanes) begin(k + 1);
-      const float mean = model.finishMean(ranges[at], sum, pending[k % 2]);
-      out[at] = model.fromTexels(footprints[at]) ? model.mean(footprints[at], ranges[at]) : mean;
+      out[at] = fromTexels(k) ? model.mean(footprints[at], ranges[at]) : model.finishMean(ranges[at], sum, pending[k % 2]);
     }
   }
 }

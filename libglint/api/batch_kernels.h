@@ -92,9 +92,11 @@ void dotEightSlices(const ProductSlice<std::int16_t, std::uint16_t>* slices, con
                     float* values);
 void dotEightSlices(const ProductSlice<float, float>* slices, const AxisPart& x, const AxisPart& y, float* values);
 
-/// Sum of the pixels of a block by how much of their columns and rows is covered, to the bit that of PyramidNdf::mean.
-/// @param pixels         [16][16], half-precision numbers >= 0
-/// @param columns, rows  [16]
+/// Weighted sum of the pixels of some blocks by how much of their columns and rows is covered, to the bit that of
+/// PyramidNdf::BlockCover::sum.
+/// @param blocks, weights     [count]; each block [16][16], half-precision numbers >= 0
+/// @param columns, rows       [16]; columns that are not covered are 0
+/// @param first_row, end_row  rows that are covered
 float sumCoveredPixels(const std::uint16_t* const* blocks, const float* weights, int count, const float* columns,
                        const float* rows, int first_row, int end_row);
 

@@ -10,8 +10,7 @@
 #endif
 
 /// Inlines all that a function calls: left to itself, GCC does so in one program and not in the next. Not under sanitizers,
-/// whose checks would make such a function take minutes to compile. This and GLINT_HD are the only macros of the public
-/// headers.
+/// whose checks would make such a function take minutes to compile.
 #if defined(__GNUC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define GLINT_FLATTEN [[gnu::flatten]]
 #else

@@ -101,18 +101,13 @@ class BinBlocks {
   /// @param kept  what was found for other blocks and the same footprint
   template <class Visitor>
   GLINT_HD void forEachRun(const TexelCover& cover, const BinBlock& block, CellRows& kept, Visitor&& visitor) const {
-    const CellGrid shape = cellGrid(code_, block.cell_bits);
-    const CellRows::Grid& grid = cellRows(cover, block, kept);
-    if (grid.count > CellRows::kMost) {
-      forEachCellRow(cover, shape, [&](const CellRow& row) { visitCellRow(block.first_cell, shape, row, visitor); });
-    } else {
-      for (int k = 0; k < grid.count; ++k) visitCellRow(block.first_cell, shape, grid.rows[k], visitor);
-    }
+    forEachPiece(cover, block, kept, [&](const Piece& piece) { visitPiece(block.first_cell, piece, visitor); });
   }
 
-  /// The same for several blocks, cell by cell: runs of the same cell follow one another. Calls visitor.select(index of the
-  /// block) before each run.
+  /// The same for several blocks, cell by cell: runs of the same cell follow one another. Calls visitor.select(block) before
+  /// what may be a run of it.
   /// @param blocks  of any type that has a BinBlock `block`
+  /// @param count   at most 31
   template <class Block, class Visitor>
   GLINT_HD void forEachRun(const TexelCover& cover, const Block* blocks, int count, CellRows& kept, Visitor&& visitor) const {
     std::uint32_t left = (1u << count) - 1;
@@ -124,21 +119,13 @@ class BinBlocks {
         if (blocks[k].block.cell_bits == first.cell_bits) alike |= 1u << k;
       }
       left &= ~alike;
-      const CellGrid shape = cellGrid(code_, first.cell_bits);
-      const auto visit = [&](const CellRow& row) {
-        forEachPiece(row, shape, [&](const Piece& piece) {
-          for (std::uint32_t rest = alike; rest != 0; rest &= rest - 1) {
-            const int k = lowestBit(rest);
-            visitor.select(blocks[k]);
-            visitPiece(blocks[k].block.first_cell, piece, visitor);
-          }
-        });
-      };
-      const CellRows::Grid& grid = cellRows(cover, first, kept);
-      if (grid.count > CellRows::kMost)
-        forEachCellRow(cover, shape, visit);
-      else
-        for (int k = 0; k < grid.count; ++k) visit(grid.rows[k]);
+      forEachPiece(cover, first, kept, [&](const Piece& piece) {
+        for (std::uint32_t rest = alike; rest != 0; rest &= rest - 1) {
+          const int k = lowestBit(rest);
+          visitor.select(blocks[k]);
+          visitPiece(blocks[k].block.first_cell, piece, visitor);
+        }
+      });
     }
   }
 
@@ -403,8 +390,20 @@ class BinBlocks {
     bool cut_x, cut_y;
   };
 
+  /// The pieces of a block's cells that a footprint meets.
   template <class Visitor>
-  GLINT_HD void forEachPiece(const CellRow& row, const CellGrid& grid, Visitor&& visitor) const {
+  GLINT_HD void forEachPiece(const TexelCover& cover, const BinBlock& block, CellRows& kept, Visitor&& visitor) const {
+    const CellGrid shape = cellGrid(code_, block.cell_bits);
+    const auto visit = [&](const CellRow& row) { splitRow(row, shape, visitor); };
+    const CellRows::Grid& grid = cellRows(cover, block, kept);
+    if (grid.count > CellRows::kMost)
+      forEachCellRow(cover, shape, visit);
+    else
+      for (int k = 0; k < grid.count; ++k) visit(grid.rows[k]);
+  }
+
+  template <class Visitor>
+  static GLINT_HD void splitRow(const CellRow& row, const CellGrid& grid, Visitor& visitor) {
     const auto each = [&](std::uint32_t from, std::uint32_t to) {
       for (std::uint32_t c = from; c < to; ++c)
         visitor(Piece{c, c + 1, row.x + (static_cast<int>(c - row.first) << grid.column_shift), row.y, true, row.cut_y});
@@ -423,11 +422,6 @@ class BinBlocks {
       visitor.partial(TexelRun{begin, end, piece.x, piece.y, piece.cut_x, piece.cut_y});
     else
       visitor.whole(begin, end);
-  }
-
-  template <class Visitor>
-  GLINT_HD void visitCellRow(std::uint32_t first_cell, const CellGrid& grid, const CellRow& row, Visitor& visitor) const {
-    forEachPiece(row, grid, [&](const Piece& piece) { visitPiece(first_cell, piece, visitor); });
   }
 
   /// Rounds down what is known to be near [0, limit].

@@ -88,7 +88,7 @@ class BinMapNdf {
     return normalAt(cover, x, y, normal);
   }
 
-  /// Weights of the bins around h, exact to rounding; none for h outside the square [-1, 1]^2. O(texels of the footprint) or
+  /// Weights of the bins around h, exact to rounding in single precision; none for h outside the square [-1, 1]^2. O(texels of the footprint) or
   /// less, whichever way is shorter.
   GLINT_HD BinWeights weights(const Footprint& p, Vec2 h) const {
     if (!(std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1)) return {};
@@ -411,8 +411,7 @@ class BinMapNdf {
 
     template <unsigned kCut>
     GLINT_HD void add(const TexelRun& run) {
-      const TexelFilter near(code_, {-run.x, cover_.columns() - 1 - run.x}, {-run.y, cover_.rows() - 1 - run.y}, columns_,
-                             rows_);
+      const TexelFilter near(code_, columnsIn(cover_, run), rowsIn(cover_, run), columns_, rows_);
       const auto pass = [&](std::uint32_t texel) {
         const double weight = sides_.texelArea<kCut>(cover_, run, code_, texel);
         if (weight > 0) visitor_(BinFacet{scale_ * weight, ndf_.normal(block_, code_, texel), {}});

@@ -16,12 +16,13 @@ struct BinWeights {
 
   int count = 0;
   std::uint32_t bins[kMost];  ///< row * bins_per_axis + column; only bins that some texel of the footprint is in
-  double weights[kMost];      ///< more than 0, at most 1
+  double weights[kMost];      ///< more than 0, at most 1 to rounding
 };
 
 /// The bins around a half vector: 5 x 5 slots, row by row.
 struct BinWindow {
   static constexpr int kReach = 2, kSide = 2 * kReach + 1, kSlots = kSide * kSide;
+  static_assert(kSide == SlotFields::kSide && kSlots == SlotSums::kSlots);
 
   GLINT_HD BinWindow(int centre_column, int centre_row, int bins_per_axis)
       : column(centre_column - kReach), row(centre_row - kReach), across(bins_per_axis) {
@@ -35,18 +36,20 @@ struct BinWindow {
   GLINT_HD BinWeights weights(const double* areas, double scale) const {
     BinWeights result;
     for (int dy = 0; dy < kSide; ++dy) {
+      if (row + dy < bins.row_begin || row + dy >= bins.row_end) continue;
       const int reach = dy == 0 || dy == kSide - 1 ? kReach - 1 : kReach;
       for (int dx = kReach - reach; dx <= kReach + reach; ++dx) {
         const double area = areas[dy * kSide + dx];
         result.bins[result.count] = static_cast<std::uint32_t>((row + dy) * across + column + dx);
         result.weights[result.count] = scale * area;
-        result.count += area > 0 ? 1 : 0;
+        const bool exists = column + dx >= bins.column_begin && column + dx < bins.column_end;
+        result.count += exists && area > 0 ? 1 : 0;
       }
     }
     return result;
   }
 
-  int column, row;  ///< of the first bin; bins beyond the square have no texels
+  int column, row;  ///< of the first bin; bins beyond the square are left out: only a broken file has texels there
   int across;
   BinRect bins;
 };
@@ -63,15 +66,15 @@ struct WindowBlock {
   GLINT_HD WindowBlock(const BinBlock& b, const TexelCode& c, const BinWindow& window)
       : block(b), code(c), slot(window.slotOf(b)) {
     const int shift = code.column_bits + code.row_bits + code.place_bits - block.side_bits;
-    bins = {shift, std::min(shift + code.place_bits, 31), (1u << block.side_bits) - 1,
-            static_cast<std::uint32_t>(b.column - window.column), static_cast<std::uint32_t>(b.row - window.row)};
+    fields = {shift, std::min(shift + code.place_bits, 31), (1u << block.side_bits) - 1,
+              static_cast<std::uint32_t>(b.column - window.column), static_cast<std::uint32_t>(b.row - window.row)};
   }
   GLINT_HD bool isBin() const { return block.side_bits == 0; }
 
   BinBlock block;
   TexelCode code;
   int slot;  ///< of the first bin; may be outside
-  SlotFields bins;
+  SlotFields fields;
 };
 
 /// What of its border texels a box along the axes covers.
@@ -101,6 +104,12 @@ struct BoxSides {
   int last_x, last_y;
   double left, right, lower, upper;
 };
+
+/// Columns and rows of a run that are in the footprint's bounding box.
+inline GLINT_HD IndexRange columnsIn(const TexelCover& cover, const TexelRun& run) {
+  return {-run.x, cover.columns() - 1 - run.x};
+}
+inline GLINT_HD IndexRange rowsIn(const TexelCover& cover, const TexelRun& run) { return {-run.y, cover.rows() - 1 - run.y}; }
 
 /// Calls visitor(c), where c() is the fields of TexelFilter along which a run is cut.
 template <class Visitor>
@@ -185,7 +194,7 @@ class WindowSum {
     else if (item.block->isBin())
       sums_.addBin<Texels, kCut>(texels, count, parts, item.block->slot);
     else
-      sums_.addBins<Texels, kCut>(texels, count, parts, item.block->bins);
+      sums_.addBins<Texels, kCut>(texels, count, parts, item.block->fields);
   }
 
   /// Whether the texels of two runs count the same.
@@ -194,22 +203,18 @@ class WindowSum {
            a.block->code.column_bits == b.block->code.column_bits && a.block->code.row_bits == b.block->code.row_bits;
   }
 
-  /// Columns and rows of a run that are in the footprint's bounding box.
-  GLINT_HD IndexRange columnsOf(const TexelRun& run) const { return {-run.x, cover_.columns() - 1 - run.x}; }
-  GLINT_HD IndexRange rowsOf(const TexelRun& run) const { return {-run.y, cover_.rows() - 1 - run.y}; }
-
   GLINT_HD TexelParts partsOf(const Item& item) const {
     const TexelCode& code = item.block->code;
-    return {{0, code.column_bits, columnsOf(item.run), sides_.columns()},
-            {code.column_bits, code.row_bits, rowsOf(item.run), sides_.rows()}};
+    return {{0, code.column_bits, columnsIn(cover_, item.run), sides_.columns()},
+            {code.column_bits, code.row_bits, rowsIn(cover_, item.run), sides_.rows()}};
   }
 
   /// A footprint with sides along no axis.
   GLINT_HD void addTurned(const Item& item) {
     constexpr unsigned kPosition = TexelFilter::kPosition;
-    const TexelFilter near(item.block->code, columnsOf(item.run), rowsOf(item.run), {}, {});
+    const TexelFilter near(item.block->code, columnsIn(cover_, item.run), rowsIn(cover_, item.run), {}, {});
     near.forEach<kPosition>(texels_ + item.run.begin, item.run.end - item.run.begin, [&](std::uint32_t texel) {
-      const std::uint32_t slot = item.block->bins.slotOf(texel);
+      const std::uint32_t slot = item.block->fields.slotOf(texel);
       if (slot < SlotSums::kSlots) areas_[slot] += sides_.texelArea<kPosition>(cover_, item.run, item.block->code, texel);
     });
   }

@@ -204,15 +204,19 @@ class PyramidNdf {
   /// A mean on its way: what it reads is asked for, and not yet read.
   struct PendingMean {
     static constexpr int kMost = 4;
-    double sum = 0;  ///< of densities times pixels, so far
-    int count = 0;
+    double sum;  ///< of densities times pixels, so far
+    int count;
     BlockCover covers[kMost];
     StoredBlocks blocks[kMost];
   };
 
+  /// Begins a mean from chosen images: finds what is stored and asks the memory for it. Ranges of more than
+  /// PendingMean::kMost blocks are summed on the way.
   /// @param sum  sum(cover, blocks, weights, count): BlockCover::sum of blocks of floats or half-precision numbers
   template <class Sum>
   GLINT_HD void beginMean(const PyramidSlices& chosen, const Box2& range, Sum&& sum, PendingMean& pending) const {
+    pending.sum = 0;
+    pending.count = 0;
     if (!(range.width() > 0 && range.height() > 0)) return;
     forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
       if (pending.count == PendingMean::kMost) addPending(sum, pending);
@@ -225,6 +229,7 @@ class PyramidNdf {
     });
   }
 
+  /// The mean that was begun with the same range and sum; 0 if the range is empty.
   template <class Sum>
   GLINT_HD float finishMean(const Box2& range, Sum&& sum, PendingMean& pending) const {
     addPending(sum, pending);
@@ -311,7 +316,8 @@ class PyramidNdf {
       out.weights[count] = chosen.weights[k];
       out.pixels[count] = static_cast<const char*>(level.pixels) + stored * blockBytes();
       out.means[count] = level.block_means.data() + stored;
-      count += static_cast<int>(rank.kept & 1);
+      // Those of weight 0 would cost as much; and values of a file are not checked, so that 0 times one may be no number.
+      count += rank.kept != 0 && chosen.weights[k] > 0 ? 1 : 0;
     }
     out.count = count;
   }

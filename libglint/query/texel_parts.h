@@ -15,11 +15,10 @@ struct RangeEnds {
 
 /// What texels count by one field of their codes. Numbers stay in the place of the field.
 struct PartRange {
-  /// @param shift, bits  of the field
+  /// @param shift, bits  of the field; shift below 32
   GLINT_HD PartRange(int shift, int bits, IndexRange range, RangeEnds ends) : at(ends) {
     const int largest = static_cast<int>((1u << bits) - 1);
     const int first = std::max(range.low, 0), last = std::min(range.high, largest);
-    if (bits == 0) shift = 0;  // it may be 32
     mask = static_cast<std::uint32_t>(largest) << shift;
     if (first <= last) {
       begin = static_cast<std::uint32_t>(first) << shift;

@@ -14,7 +14,7 @@
 
 namespace glint {
 
-/// Reads lists eight texels at a time, with the results of SingleTexels to the bit.
+/// Reads lists eight texels at a time, with the results of SingleTexels: to the bit where no product and sum are fused.
 struct WideTexels {
   static bool supported() {
 #ifdef __AVX2__

@@ -47,7 +47,7 @@ def test_query_headers_compile_as_device_code(clang, tmp_path):
     assert 'target triple = "nvptx64' in code
     kernels = " ".join(re.findall(r'!\{ptr @(\w+), !"kernel", i32 1\}', code))
     models = ("9ReferenceE", "10PyramidNdfE", "5CpNdfE", "9BinMapNdfE", "12HistogramNdfE")
-    for name in (*(f"answerINS_{model}" for model in models), "answerPacked", "drawBrdf", "shade", "reflect", "light"):
+    for name in (*(f"answerINS_{model}" for model in models), "answerPacked", "weigh", "drawBrdf", "shade", "reflect", "light"):
         assert name in kernels
     # All else is in the module: nothing waits for a function of the host.
     declared = set(re.findall(r"^declare [^@]*@([\w.]+)\(", code, re.MULTILINE))

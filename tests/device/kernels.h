@@ -22,6 +22,12 @@ __global__ void draw(const Model model, const Footprint* footprints, const Vec2*
   if (k < count) samples[k] = model.sample(footprints[k], points[k]);
 }
 
+/// Weights of bins around half vectors.
+__global__ void weigh(const BinMapNdf ndf, const Footprint* footprints, const Vec2* halves, int count, BinWeights* weights) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k < count) weights[k] = ndf.weights(footprints[k], halves[k]);
+}
+
 /// Directions drawn from the micro-BRDF of a bin map, and its value there.
 __global__ void drawBrdf(const BinMapNdf ndf, const Footprint* footprints, const Vec3* views, const Vec2* points, int count,
                          BrdfSample* samples, Rgb* values) {

@@ -110,6 +110,26 @@ TEST(Batch, DensitiesOfPyramidsAreThoseOfSingleQueries) {
   }
 }
 
+/// Values of a file are not checked: what does not count must not bring an infinity.
+TEST(Batch, MeansLeaveOutLevelsThatDoNotCount) {
+  auto sample = test::samplePyramid(kSize, BlockPrecision::f32);
+  for (float& pixel : sample.levels[1].floats) pixel = std::numeric_limits<float>::infinity();
+  for (float& mean : sample.levels[1].block_means) mean = std::numeric_limits<float>::infinity();
+  const PyramidNdf model(sample.pyramid);
+  const Queries q(100, 1);
+  const std::vector<float> finest(100, finestSigma(model.shape()));
+  api::FootprintArrays footprints = q.footprints();
+  footprints.sigma = {finest.data()};
+  std::vector<float> x1, y1, means(100);
+  for (std::size_t k = 0; k < 100; ++k) x1.push_back(q.hx[k] + 0.5f), y1.push_back(q.hy[k] + 0.5f);
+  api::means(api::AnyNdf(model), 100, footprints, {{q.hx.data()}, {q.hy.data()}, {x1.data()}, {y1.data()}}, means.data());
+  for (std::size_t k = 0; k < 100; ++k) {
+    ASSERT_TRUE(std::isfinite(means[k])) << k;
+    const Footprint p = Footprint::isotropic({q.u[k], q.v[k]}, finest[k]);
+    ASSERT_EQ(means[k], model.mean(p, {{q.hx[k], q.hy[k]}, {x1[k], y1[k]}})) << k;
+  }
+}
+
 TEST(Batch, DensitiesOfCompressedPyramidsAreThoseOfSingleQueries) {
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     for (const auto type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {

@@ -92,8 +92,8 @@ TEST_P(BinMapWeights, EqualBruteForceForFootprintsLargerThanTheMap) {
 INSTANTIATE_TEST_SUITE_P(Sizes, BinMapWeights,
                          testing::Values(std::tuple{64, 64, 0.16f, 8}, std::tuple{64, 64, 0.01f, 8},
                                          std::tuple{64, 64, 0.5f, 1}, std::tuple{50, 37, 0.3f, 2}, std::tuple{7, 300, 0.2f, 1},
-                                         std::tuple{300, 7, 0.2f, 4}, std::tuple{1, 1, 0.1f, 8}, std::tuple{256, 256, 0.16f, 8},
-                                         std::tuple{256, 200, 0.4f, 1}));
+                                         std::tuple{300, 7, 0.2f, 4}, std::tuple{1, 1, 0.1f, 8},
+                                         std::tuple{256, 256, 0.16f, 16}, std::tuple{256, 200, 0.4f, 1}));
 
 TEST(BinMapNdf, WeightsAreRightAtTheBorderOfTheSquare) {
   std::vector<Vec2> normals(64 * 64);
@@ -110,6 +110,32 @@ TEST(BinMapNdf, WeightsAreRightAtTheBorderOfTheSquare) {
     expectWeights(map.map(), bins.ndf(), Footprint::box({0.5f, 0.5f}, {20, 0}, {0, 20}), {-1, 1});
     EXPECT_EQ(bins.ndf().weights(Footprint::box({0, 0}, {2, 0}, {0, 2}), {1.5f, 0}).count, 0);
   }
+}
+
+TEST(BinMapNdf, WeightsOfBrokenFilesAreOfBinsAroundTheHalfVector) {
+  std::vector<Vec2> normals(64 * 64);
+  Random random(8);
+  for (Vec2& n : normals) n = random.direction(random.between(0.9f, 0.9999f));
+  const test::OwnedMap map(64, 64, normals);
+  bake::BinMapData data = bake::buildBinMap(map.map(), {0.02f});
+  for (std::uint32_t& texel : data.texels) texel |= static_cast<std::uint32_t>(random.below(2)) * 0xffff0000u;  // other bins
+  const BinMapNdf ndf(data.view());
+  const int across = data.view().bins_per_axis;
+  const auto binAt = [&](float x) {
+    return std::min(static_cast<int>((x + 1) * 0.5f * static_cast<float>(across)), across - 1);
+  };
+  int found = 0;
+  for (int k = 0; k < 400; ++k) {
+    const Vec2 h = random.direction(random.between(0.97f, 1.0f));
+    const float side = k % 2 == 0 ? 4.0f : 32.0f;
+    const BinWeights weights = ndf.weights(Footprint::box({random.unit(), random.unit()}, {side, 0}, {0, side}), h);
+    found += weights.count;
+    for (int b = 0; b < weights.count; ++b) {
+      ASSERT_LE(std::abs(static_cast<int>(weights.bins[b]) % across - binAt(h.x)), 2) << k;
+      ASSERT_LE(std::abs(static_cast<int>(weights.bins[b]) / across - binAt(h.y)), 2) << k;
+    }
+  }
+  EXPECT_GT(found, 100);
 }
 
 TEST(BinMapNdf, TinyBoxesSeeTheTexelsTheyTouch) {

@@ -27,10 +27,10 @@ Case randomCase(std::mt19937& random) {
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
   const auto range = [&](int bits) {
     const int low = below((1 << bits) + 2) - 1;
-    return IndexRange{low, low + below(4) * (1 << bits) / 3};
+    return IndexRange{low, low + below(4) * (1 << bits) / 3 - (below(20) == 0 ? 1 : 0)};
   };
   Case c;
-  c.code = {below(12), below(12), 0};
+  c.code = {below(15), below(15), 0};
   const int side_bits = below(4), position_bits = c.code.column_bits + c.code.row_bits;
   c.code.place_bits = std::min(side_bits + below(3), (32 - position_bits) / 2);
   c.columns = range(c.code.column_bits);
@@ -79,7 +79,9 @@ template <class Texels, unsigned kCut>
 Areas areasBy(const Case& c) {
   const typename Texels::Parts parts(c.parts());
   SlotSums sums;
-  sums.addBins<Texels, kCut>(c.texels.data(), c.texels.size(), parts, c.bins);
+  const std::size_t half = c.texels.size() / 2;  // two lists
+  sums.addBins<Texels, kCut>(c.texels.data(), half, parts, c.bins);
+  sums.addBins<Texels, kCut>(c.texels.data() + half, c.texels.size() - half, parts, c.bins);
   sums.addBin<Texels, kCut>(c.texels.data(), c.texels.size(), parts, 7);
   Areas areas = {};
   sums.addTo(areas.data());
