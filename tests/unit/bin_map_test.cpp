@@ -118,7 +118,7 @@ TEST(BinMapNdf, WeightsOfBrokenFilesAreOfBinsAroundTheHalfVector) {
   for (Vec2& n : normals) n = random.direction(random.between(0.9f, 0.9999f));
   const test::OwnedMap map(64, 64, normals);
   bake::BinMapData data = bake::buildBinMap(map.map(), {0.02f});
-  for (std::uint32_t& texel : data.texels) texel |= static_cast<std::uint32_t>(random.below(2)) * 0xffff0000u;  // other bins
+  for (std::uint32_t& texel : data.texels) texel = static_cast<std::uint32_t>(random.below(std::size_t{1} << 32));
   const BinMapNdf ndf(data.view());
   const int across = data.view().bins_per_axis;
   const auto binAt = [&](float x) {
