@@ -337,42 +337,14 @@ std::size_t lanesOf(std::size_t first, std::size_t count) { return std::min(coun
 
 }  // namespace
 
-namespace {
-
-/// cp, whose slices are of as many clusters, gains nothing from wide kernels: densities are answered one by one, each begun well
-/// before it is finished.
-void densitiesInTurn(const CpNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
-                     float* out) {
-  constexpr int kAhead = 4;
-  withReader(model.compressed(), [&](const auto& reader) {
-    SliceChunk chunk;
-    CpNdf::PendingDensity pending[kAhead];
-    const auto begin = [&](int i) {
-      const PixelPlace place = {chunk.blocks[i], chunk.pixels[i] % kBlockSize, chunk.pixels[i] / kBlockSize};
-      pending[i % kAhead] = model.beginDensity(reader, chunk.slices(i), place);
-    };
-    for (std::size_t first = 0; first < count; first += kChunk) {
-      const int lanes = static_cast<int>(lanesOf(first, count));
-      selectChunk(model.shape(), model.chooser(), footprints, halves, first, lanes, chunk);
-      for (int i = 0; i < std::min(lanes, kAhead - 1); ++i) begin(i);
-      for (int i = 0; i < lanes; ++i) {
-        if (i + kAhead - 1 < lanes) begin(i + kAhead - 1);
-        const std::size_t at = first + static_cast<std::size_t>(i);
-        const float density = model.finishDensity(reader, pending[i % kAhead]);
-        out[at] = model.fromTexels(footprints[at]) ? model.density(footprints[at], halves[at])
-                  : chunk.inside[i] != 0           ? density
-                                                   : 0.0f;
-      }
-    }
-  });
-}
-
-}  // namespace
-
 void compressedDensities(const CpNdf& model, std::size_t count, const FootprintArrays& footprints,
                          const HalfVectorArrays& halves, float* out) {
   const CompressedNdf& ndf = model.compressed();
-  if (ndf.method == CompressionMethod::cp) return densitiesInTurn(model, count, footprints, halves, out);
+  if (ndf.method == CompressionMethod::cp) {
+    // The slices of a density are of as many clusters: wide kernels gain less than it takes to hand these over.
+    for (std::size_t k = 0; k < count; ++k) out[k] = model.density(footprints[k], halves[k]);
+    return;
+  }
   withValues(ndf, [&](const auto& values) {
     using Pixel = typename std::decay_t<decltype(values)>::Pixel;
     SliceChunk chunk;

@@ -39,14 +39,15 @@ class CpNdf {
   GLINT_HD const SliceChooser& chooser() const { return chooser_; }
 
   /// Density towards h, >= 0; O(columns) in each of 8 images.
-  GLINT_HD float density(const Footprint& p, Vec2 h) const;
-
-  /// A density on its way: what it reads is asked for, so the cache misses of many densities can be under way together.
-  struct PendingDensity;
-  template <class Reader>
-  GLINT_HD PendingDensity beginDensity(const Reader& reader, const PyramidSlices& chosen, const PixelPlace& place) const;
-  template <class Reader>
-  GLINT_HD float finishDensity(const Reader& reader, const PendingDensity& pending) const;
+  GLINT_HD float density(const Footprint& p, Vec2 h) const {
+    if (!insideSquare(h)) return 0;
+    if (fromTexels(p)) return below_.density(p, h);
+    const PyramidSlices chosen = chooser_.choose(p);
+    const PixelPlace place = pixelPlace(shape(), h);
+    return withReader(ndf_, [&](const auto& reader) {
+      return sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<decltype(reader)>{reader, place}, Positive{});
+    });
+  }
 
   /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly
   /// inside, as the density is constant there: exactly in proportion to the density, which is the pdf.
@@ -315,32 +316,6 @@ class CpNdf {
   Reference below_;
 };
 
-struct CpNdf::PendingDensity {
-  SlicePlaces slices;
-  PixelPlace place;
-};
-
-template <class Reader>
-GLINT_HD CpNdf::PendingDensity CpNdf::beginDensity(const Reader& reader, const PyramidSlices& chosen,
-                                                   const PixelPlace& place) const {
-  const PendingDensity pending = {findSlices(chosen, place.block, ndf_.density_scales.data()), place};
-  prefetchSlices(pending.slices, PixelOf<const Reader&>{reader, place});
-  return pending;
-}
-
-template <class Reader>
-GLINT_HD float CpNdf::finishDensity(const Reader& reader, const PendingDensity& pending) const {
-  return sumSlices(pending.slices, PixelOf<const Reader&>{reader, pending.place}, Positive{});
-}
-
-inline GLINT_HD float CpNdf::density(const Footprint& p, Vec2 h) const {
-  if (!insideSquare(h)) return 0;
-  if (fromTexels(p)) return below_.density(p, h);
-  const PyramidSlices chosen = chooser_.choose(p);
-  const PixelPlace place = pixelPlace(shape(), h);
-  return withReader(ndf_, [&](const auto& reader) { return finishDensity(reader, beginDensity(reader, chosen, place)); });
-}
-
 struct CpNdf::Draw {
   Vec2 xi;
   float total = 0;  ///< weights of the images that have any density
@@ -440,16 +415,14 @@ inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) cons
   return withReader(ndf_, [&]<class Reader>(const Reader& reader) -> HalfVectorSample {
     // What the pdf reads is on its way while the pixel is chosen.
     const int block = draw.block;
-    PendingDensity pending;
-    pending.slices = findSlices(chosen, block, ndf_.density_scales.data());
+    SlicePlaces places = findSlices(chosen, block, ndf_.density_scales.data());
     for (int k = 0; k < PyramidSlices::kMost; ++k)
-      if (pending.slices.weights[k] > 0)
-        prefetch(reader.row(ndf_.clusters.data()[pending.slices.clusters[k]], pending.slices.slices[k]));
+      if (places.weights[k] > 0) prefetch(reader.row(ndf_.clusters.data()[places.clusters[k]], places.slices[k]));
     choosePixel(reader, draw);
     if (draw.place.x < 0) return {};
-    if (draw.block != block) pending.slices = findSlices(chosen, draw.block, ndf_.density_scales.data());
-    pending.place = draw.place;
-    return {pointInPixel(shape(), draw.place, draw.xi), finishDensity(reader, pending) / draw.total};
+    if (draw.block != block) places = findSlices(chosen, draw.block, ndf_.density_scales.data());
+    const float density = sumSlices(places, PixelOf<const Reader&>{reader, draw.place}, Positive{});
+    return {pointInPixel(shape(), draw.place, draw.xi), density / draw.total};
   });
 }
 
