@@ -109,7 +109,7 @@ constexpr std::array kRules = {
     Rule{"compressed.scales", error, invalid_input, "scales are finite", kMakeAgain},
     Rule{"compressed.factors", error, invalid_input, "bases and coefficients are finite", kMakeAgain},
     Rule{"compressed.integral", warning, invalid_input, "every image integrates to 1 within 1e-3", kMakeAgain},
-    Rule{"bin_map.texels", error, invalid_input, "every texel of the map is listed once, in its class", kMakeAgain},
+    Rule{"bin_map.texels", error, invalid_input, "every texel of the map is listed once, in its class and in a bin of the square", kMakeAgain},
     Rule{"bin_map.moments", error, invalid_input, "block_moments are those of a distribution inside the block", kMakeAgain},
     Rule{"histogram.bin_normals", error, invalid_input, "the mean normals of bins lie inside the unit disk", kMakeAgain},
     Rule{"histogram.totals", error, invalid_input, "bin_totals are the numbers of texels of each bin, above 0", kMakeAgain},

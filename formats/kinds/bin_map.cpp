@@ -95,9 +95,9 @@ std::uint32_t classOf(const BinMap& map, std::size_t texel) {
 }
 
 void checkClasses(const BinMap& map, Findings& findings) {
-  const auto& bins = map.class_keys;
-  bool divide = bins.size() >= 2 && bins.size() <= BinMap::kMaxClasses + 1 && bins[0] == 0 && bins.back() == map.keyCount();
-  for (std::size_t c = 1; divide && c < bins.size(); ++c) divide = bins[c] > bins[c - 1];
+  const auto& keys = map.class_keys;
+  bool divide = keys.size() >= 2 && keys.size() <= BinMap::kMaxClasses + 1 && keys[0] == 0 && keys.back() == map.keyCount();
+  for (std::size_t c = 1; divide && c < keys.size(); ++c) divide = keys[c] > keys[c - 1];
   if (!divide) {
     findings.add("bin_map.classes", "/class_keys", "does not rise from 0 to the number of keys");
     return;
@@ -230,7 +230,7 @@ void checkData(const BinMap& map, Findings& findings) {
   if (map.classCount() == map.blockCount() && !TreeWalk(map).walk(inOwnClass))
     findings.add("bin_map.classes", "/class_keys", "has as many classes as blocks, but not one for each");
   if (!TreeWalk(map).walk([&](const BlockOfNode& block) { return listHolds(map, block, seen); }))
-    findings.add("bin_map.texels", "/texels", "does not list every texel once, in its class");
+    findings.add("bin_map.texels", "/texels", "does not list every texel once, in its class and in a bin of the square");
   for (std::size_t b = 0; b < map.blockCount(); ++b) {
     if (momentsHold(map.block_moments.subspan(5 * b, 5))) continue;
     findings.add("bin_map.moments", "/block_moments",

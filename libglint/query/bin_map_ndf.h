@@ -88,8 +88,8 @@ class BinMapNdf {
     return normalAt(cover, x, y, normal);
   }
 
-  /// Weights of the bins around h, exact to rounding in single precision; none for h outside the square [-1, 1]^2. O(texels of the footprint) or
-  /// less, whichever way is shorter.
+  /// Weights of the bins around h, exact to rounding in single precision; none for h outside the square [-1, 1]^2. O(texels of
+  /// the footprint) or less, whichever way is shorter.
   GLINT_HD BinWeights weights(const Footprint& p, Vec2 h) const {
     if (!(std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1)) return {};
     const BinWindow window(binAt(h.x), binAt(h.y), map().bins_per_axis);

@@ -215,7 +215,8 @@ class WindowSum {
     const TexelFilter near(item.block->code, columnsIn(cover_, item.run), rowsIn(cover_, item.run), {}, {});
     near.forEach<kPosition>(texels_ + item.run.begin, item.run.end - item.run.begin, [&](std::uint32_t texel) {
       const std::uint32_t slot = item.block->fields.slotOf(texel);
-      if (slot < SlotSums::kSlots) areas_[slot] += sides_.texelArea<kPosition>(cover_, item.run, item.block->code, texel);
+      if (slot == SlotFields::kNone) return;
+      sums_.add(static_cast<int>(slot), sides_.texelArea<kPosition>(cover_, item.run, item.block->code, texel));
     });
   }
 

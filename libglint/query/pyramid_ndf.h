@@ -317,7 +317,7 @@ class PyramidNdf {
       out.pixels[count] = static_cast<const char*>(level.pixels) + stored * blockBytes();
       out.means[count] = level.block_means.data() + stored;
       // Those of weight 0 would cost as much; and values of a file are not checked, so that 0 times one may be no number.
-      count += rank.kept != 0 && chosen.weights[k] > 0 ? 1 : 0;
+      count += static_cast<int>(rank.kept & 1) & static_cast<int>(chosen.weights[k] > 0);
     }
     out.count = count;
   }

@@ -19,6 +19,7 @@
 #include "glint/formats/findings.h"
 #include "glint/formats/kinds/codec.h"
 #include "glint/formats/validate.h"
+#include "glint/query/bin_blocks.h"
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 #include "support/test_maps.h"
@@ -824,6 +825,38 @@ TEST(FormatRules, BinMapsOfTooManyTexelsAreRefused) {
   EXPECT_EQ(broken((1 << 28) + 1, 1), kRuleOfHugeFiles);
   EXPECT_EQ(broken(1 << 14, 1 << 14), "bin_map.cells");  // as many as there may be, but they are not listed
   EXPECT_EQ(findRule(kRuleOfHugeFiles).code, ErrorCode::unsupported);
+}
+
+TEST(FormatRules, TexelsInBinsBeyondTheSquareAreFound) {
+  std::vector<Vec2> normals(64 * 64);
+  for (std::size_t k = 0; k < normals.size(); ++k) normals[k] = {0.9f + 0.0999f * static_cast<float>(k % 64) / 63, 0};
+  NormalMap map;
+  map.width = map.height = 64;
+  map.normals = normals;
+  bake::BinMapData data = bake::buildBinMap(map, {0.01f});
+  const auto found = [&] {
+    Findings findings("a.glint");
+    checkData(data.view(), findings);
+    return findings.report().findings;
+  };
+  EXPECT_TRUE(found().empty());
+  // Moves a texel of the last column of bins to the next, which its block has, too.
+  const BinBlocks blocks(data.view());
+  const int last = data.bins_per_axis - 1;
+  bool moved = false;
+  blocks.forEachBlock({last, last + 1, 0, last + 1}, [&](const BinBlock& block) {
+    const TexelCode code = blocks.code(block);
+    const int shift = code.place_bits - block.side_bits;
+    for (std::uint64_t k = blocks.begin(block); k < blocks.end(block) && !moved && block.column + block.side() > last + 1;
+         ++k) {
+      if (block.column + static_cast<int>(code.placeX(blocks.texel(k)) >> shift) != last) continue;
+      data.texels[k] += 1u << (code.column_bits + code.row_bits + shift);
+      moved = true;
+    }
+  });
+  ASSERT_TRUE(moved);
+  ASSERT_EQ(found().size(), 1u);
+  EXPECT_EQ(found()[0].rule, "bin_map.texels");
 }
 
 TEST(FormatRules, NothingOfHdf5StaysOpen) {
