@@ -91,7 +91,7 @@ class BinBlocks {
   GLINT_HD void forEachBlock(const BinRect& bins, Visitor&& visitor) const {
     forEachTile(bins, [&](int column, int row) {
       const int bits = map_.tile_bits;
-      visitNode(tileOf(column, row), {column << bits, row << bits, bits, 0, 0, 0}, bins, visitor);
+      visitTile(tileOf(column, row), {column << bits, row << bits, bits, 0, 0, 0}, bins, visitor);
     });
   }
 
@@ -266,17 +266,28 @@ class BinBlocks {
     block.row += static_cast<int>(quadrant >> 1) << block.side_bits;
   }
 
+  /// Visits the blocks of a tile, not by recursion: GPUs cannot tell how deep a stack that takes.
   template <class Visitor>
-  GLINT_HD void visitNode(std::uint32_t k, BinBlock block, const BinRect& bins, Visitor& visitor) const {
-    const std::uint32_t* here = node(k);
-    if (!isSplit(here)) {
-      if (isBlock(here, block)) visitor(block);
-      return;
-    }
-    for (std::uint32_t quadrant = 0; quadrant < 4; ++quadrant) {
-      BinBlock child = block;
-      descend(child, quadrant);
-      if (bins.meets(child.column, child.row, child.side())) visitNode(here[1] + quadrant, child, bins, visitor);
+  GLINT_HD void visitTile(std::uint32_t tile, const BinBlock& place, const BinRect& bins, Visitor& visitor) const {
+    struct Pending {
+      std::uint32_t node;
+      BinBlock block;
+    };
+    // Each split leaves at most three siblings behind.
+    Pending pending[3 * BinMap::kMaxTileBits + 1];
+    pending[0] = {tile, place};
+    for (int count = 1; count > 0;) {
+      Pending next = pending[--count];
+      const std::uint32_t* here = node(next.node);
+      if (!isSplit(here)) {
+        if (isBlock(here, next.block)) visitor(next.block);
+        continue;
+      }
+      for (std::uint32_t quadrant = 4; quadrant-- > 0;) {  // the first one is the next
+        BinBlock child = next.block;
+        descend(child, quadrant);
+        if (bins.meets(child.column, child.row, child.side())) pending[count++] = {here[1] + quadrant, child};
+      }
     }
   }
 

@@ -97,7 +97,7 @@ class BinMapBrdf {
   /// Axes of a facet: up its slope's azimuth, across it, and its normal.
   struct Frame {
     GLINT_HD explicit Frame(Vec2 n) {
-      const float length = std::sqrt(dot(n, n)), r = std::min(length, kRim);
+      const float length = std::sqrt(dot(n, n)), r = std::min(length, float{kRim});
       const Vec2 azimuth = length > 0 ? (1 / length) * n : Vec2{1, 0};
       const float z = std::sqrt((1 - r) * (1 + r));
       along = {z * azimuth.x, z * azimuth.y, -r};

@@ -253,7 +253,7 @@ class BinMapNdf {
   GLINT_HD void addByTexel(const TexelCover& cover, const BinWindow& window, const WindowBlocks& near, double* areas) const {
     prefetchClasses(cover);
     std::uint8_t slots[BinMap::kMaxClasses];
-    std::fill(slots, slots + map().classCount(), kNoSlot);
+    std::fill(slots, slots + map().classCount(), std::uint8_t{kNoSlot});
     bool shared = false;
     for (int k = 0; k < near.count; ++k) {
       const BinBlock& block = near.blocks[k];
@@ -365,7 +365,7 @@ class BinMapNdf {
   }
 
   /// Area of a block's texels in a footprint, texels.
-  GLINT_HD double coveredArea(const TexelCover& cover, const BinBlock& block, CellRows& rows) const {
+  GLINT_DEVICE_CALL GLINT_HD double coveredArea(const TexelCover& cover, const BinBlock& block, CellRows& rows) const {
     double areas[BinWindow::kSlots] = {};
     // All of the block in one slot.
     BinBlock as_bin = block;
@@ -398,7 +398,7 @@ class BinMapNdf {
       rows_ = placesBetween(low.y - corner.y, high.y - corner.y);
     }
     GLINT_HD void whole(std::uint64_t begin, std::uint64_t end) { partial({begin, end, 0, 0, false, false}); }
-    GLINT_HD void partial(const TexelRun& run) {
+    GLINT_DEVICE_CALL GLINT_HD void partial(const TexelRun& run) {
       withCut(run, [&](auto cut) { add<cut()>(run); });
     }
 

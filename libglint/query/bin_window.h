@@ -161,7 +161,7 @@ class WindowSum {
     const WindowBlock* block;
   };
 
-  GLINT_HD void flush() {
+  GLINT_DEVICE_CALL GLINT_HD void flush() {
 #ifdef GLINT_AVX2
     WideTexels::supported() ? flushWide() : flushBy<SingleTexels>();
 #else
@@ -210,7 +210,7 @@ class WindowSum {
   }
 
   /// A footprint with sides along no axis.
-  GLINT_HD void addTurned(const Item& item) {
+  GLINT_DEVICE_CALL GLINT_HD void addTurned(const Item& item) {
     constexpr unsigned kPosition = TexelFilter::kPosition;
     const TexelFilter near(item.block->code, columnsIn(cover_, item.run), rowsIn(cover_, item.run), {}, {});
     near.forEach<kPosition>(texels_ + item.run.begin, item.run.end - item.run.begin, [&](std::uint32_t texel) {

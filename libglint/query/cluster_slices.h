@@ -42,7 +42,7 @@ struct ColumnLayout {
  private:
   /// A range of columns, and zeros up to a whole group.
   template <class Values>
-  static GLINT_HD void arrangeRange(const float* scales, const Values& values, int begin, int end, float* to) {
+  GLINT_DEVICE_CALL static GLINT_HD void arrangeRange(const float* scales, const Values& values, int begin, int end, float* to) {
     const int count = end - begin;
     if (count < 4) {
       Float4::zero().store(to);
@@ -91,15 +91,15 @@ class ClusterReader {
 
   /// projection = scaled columns at one pixel, as ColumnLayout says.
   /// @note inline: as a call it would have callers save all their vectors
-  [[gnu::always_inline]] GLINT_HD void pixel(const NdfCluster& cluster, const ColumnLayout& layout, int x, int y,
-                                             float* projection) const {
+  GLINT_HOST_INLINE GLINT_HD void pixel(const NdfCluster& cluster, const ColumnLayout& layout, int x, int y,
+                                        float* projection) const {
     const Basis* basis = first(cluster);
     const float* scales = ndf_.scales.data() + cluster.first_scale;
     const int columns = cluster.columns;
-    if (ndf_.method == CompressionMethod::cp) {
+    if (isOf(CompressionMethod::cp)) {
       const Axis along_x(basis, columns, x), along_y(basis + kBlockSize * columns, columns, y);
       layout.arrange(scales, Products{along_x, along_y}, projection);
-    } else if (ndf_.method == CompressionMethod::tucker) {
+    } else if (isOf(CompressionMethod::tucker)) {
       const int rx = cluster.rank_x, ry = cluster.rank_y;
       float along_x[kBlockSize] = {}, along_y[kBlockSize];
       Axis(basis, rx, x).store(along_x);
@@ -113,7 +113,7 @@ class ClusterReader {
   /// Whether a slice is as quickly asked by itself as with a projection that others share. Then nothing branches on whether
   /// neighbours are of one cluster.
   GLINT_HD bool asksAlone(const NdfCluster& cluster) const {
-    return ndf_.method == CompressionMethod::cp && cluster.narrow_columns == 0;
+    return isOf(CompressionMethod::cp) && cluster.narrow_columns == 0;
   }
 
   /// Asks the memory for what valueAlone reads.
@@ -125,7 +125,7 @@ class ClusterReader {
   }
 
   /// One pixel of a slice of such a cluster: `dot` with `pixel`, to the bit.
-  GLINT_HD float valueAlone(const NdfCluster& cluster, Row c, int x, int y) const {
+  GLINT_DEVICE_CALL GLINT_HD float valueAlone(const NdfCluster& cluster, Row c, int x, int y) const {
     const float* scales = ndf_.scales.data() + cluster.first_scale;
     const int columns = cluster.columns;
     const Axis along_x(first(cluster), columns, x), along_y(first(cluster) + kBlockSize * columns, columns, y);
@@ -139,17 +139,17 @@ class ClusterReader {
   }
 
   /// projection = sums of scaled columns over a part of the block, as ColumnLayout says.
-  GLINT_HD void box(const NdfCluster& cluster, const ColumnLayout& layout, const BlockBox& b, float* projection) const {
+  GLINT_DEVICE_CALL GLINT_HD void box(const NdfCluster& cluster, const ColumnLayout& layout, const BlockBox& b, float* projection) const {
     const Basis* basis = first(cluster);
     const int columns = cluster.columns;
-    if (ndf_.method == CompressionMethod::tucker) {
+    if (isOf(CompressionMethod::tucker)) {
       float along_x[kBlockSize] = {}, along_y[kBlockSize];
       sumAlongAxis(basis, cluster.rank_x, b.x0, b.x1, along_x);
       sumAlongAxis(basis + kBlockSize * cluster.rank_x, cluster.rank_y, b.y0, b.y1, along_y);
       return arrangeCore(cluster, layout, along_x, along_y, projection);
     }
     float along_x[kMaxColumns], along_y[kMaxColumns];
-    if (ndf_.method == CompressionMethod::pca) {
+    if (isOf(CompressionMethod::pca)) {
       std::fill(along_x, along_x + columns, 0.0f);
       forEachPrefix(basis, columns, b, [&](const Basis* row, float weight) {
         for (int k = 0; k < columns; ++k) along_x[k] += weight * static_cast<float>(row[k]);
@@ -180,21 +180,21 @@ class ClusterReader {
 
   /// Dot product of a projection with the coefficients of a slice.
   /// @note reads up to three elements after the row, which meet zeros
-  GLINT_HD float dot(const float* projection, const ColumnLayout& layout, Row c) const {
+  GLINT_DEVICE_CALL GLINT_HD float dot(const float* projection, const ColumnLayout& layout, Row c) const {
     Float4 sum[1] = {Float4::zero()};
     addProducts<1>(projection, layout, &c, sum);
     return sum[0].sum();
   }
 
   /// The same for four slices, to the bit.
-  GLINT_HD Float4 dots(const float* projection, const ColumnLayout& layout, const Row (&rows)[4]) const {
+  GLINT_DEVICE_CALL GLINT_HD Float4 dots(const float* projection, const ColumnLayout& layout, const Row (&rows)[4]) const {
     Float4 sums[4] = {Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()};
     addProducts<4>(projection, layout, rows, sums);
     return sumsOf(sums[0], sums[1], sums[2], sums[3]);
   }
 
   /// scaled = coefficients of a slice times the scales of their columns, in the order of columns.
-  GLINT_HD void scaledCoefficients(const NdfCluster& cluster, Row c, float* scaled) const {
+  GLINT_DEVICE_CALL GLINT_HD void scaledCoefficients(const NdfCluster& cluster, Row c, float* scaled) const {
     const float* scales = ndf_.scales.data() + cluster.first_scale;
     const ColumnLayout layout(cluster);
     int k = 0;
@@ -217,14 +217,14 @@ class ClusterReader {
 
   /// Sums of the rows of a slice, negative pixels included: O(16 rank) for cp and tucker, O(16 columns) for pca.
   /// @param scaled  its scaledCoefficients
-  GLINT_HD Float16 rowSums(const NdfCluster& cluster, const float* scaled) const {
+  GLINT_DEVICE_CALL GLINT_HD Float16 rowSums(const NdfCluster& cluster, const float* scaled) const {
     constexpr int kLast = kBlockSize - 1;
     const Basis* basis = first(cluster);
     const int columns = cluster.columns;
-    if (ndf_.method == CompressionMethod::pca)
+    if (isOf(CompressionMethod::pca))
       return weighPrefixes(basis + kLast * columns, kBlockSize * columns, columns, scaled).differences();
     float weights[kMaxColumns];
-    if (ndf_.method == CompressionMethod::cp) {
+    if (isOf(CompressionMethod::cp)) {
       const Basis* along_x = basis + kLast * columns;
       for (int k = 0; k < columns; ++k) weights[k] = scaled[k] * static_cast<float>(along_x[k]);
       return weighPrefixes(basis + kBlockSize * columns, columns, columns, weights).differences();
@@ -240,17 +240,17 @@ class ClusterReader {
 
   /// Row y of a slice, negative pixels taken as 0. The cost is that of rowSums.
   /// @param scaled  its scaledCoefficients
-  GLINT_HD Float16 rowPixels(const NdfCluster& cluster, const float* scaled, int y) const {
+  GLINT_DEVICE_CALL GLINT_HD Float16 rowPixels(const NdfCluster& cluster, const float* scaled, int y) const {
     const Basis* basis = first(cluster);
     const int columns = cluster.columns;
-    if (ndf_.method == CompressionMethod::pca) {
+    if (isOf(CompressionMethod::pca)) {
       const Basis* row = basis + y * kBlockSize * columns;
       Float16 sums = weighPrefixes(row, columns, columns, scaled);
       if (y > 0) sums = sums - weighPrefixes(row - kBlockSize * columns, columns, columns, scaled);
       return sums.differences().positive();
     }
     float weights[kMaxColumns];
-    if (ndf_.method == CompressionMethod::cp) {
+    if (isOf(CompressionMethod::cp)) {
       Axis(basis + kBlockSize * columns, columns, y).store(weights);
       for (int k = 0; k < columns; ++k) weights[k] *= scaled[k];
       return weighPrefixes(basis, columns, columns, weights).differences().positive();
@@ -265,9 +265,9 @@ class ClusterReader {
   }
 
   /// All pixels of a slice, [16][16], negative ones taken as 0.
-  GLINT_HD void block(const NdfCluster& cluster, const float* scaled, float* pixels) const {
-    if (ndf_.method == CompressionMethod::pca) return sumImages(cluster, scaled, pixels);
-    const bool cp = ndf_.method == CompressionMethod::cp;
+  GLINT_DEVICE_CALL GLINT_HD void block(const NdfCluster& cluster, const float* scaled, float* pixels) const {
+    if (isOf(CompressionMethod::pca)) return sumImages(cluster, scaled, pixels);
+    const bool cp = isOf(CompressionMethod::cp);
     const int rx = cp ? cluster.columns : cluster.rank_x, ry = cp ? rx : cluster.rank_y;
     float along_x[kMaxColumns * kBlockSize], along_y[kMaxColumns * kBlockSize];  // [rank][16]
     valuesOfAxis(first(cluster), rx, along_x);
@@ -294,6 +294,13 @@ class ClusterReader {
   }
 
  private:
+  /// Whether clusters are of this method: integers of a basis say whether it is pca.
+  GLINT_HD bool isOf(CompressionMethod method) const {
+    if constexpr (std::is_same_v<Basis, std::int32_t>) return method == CompressionMethod::pca;
+    if (std::is_same_v<Basis, std::int16_t> && method == CompressionMethod::pca) return false;
+    return ndf_.method == method;
+  }
+
   GLINT_HD const Basis* first(const NdfCluster& cluster) const {
     return static_cast<const Basis*>(ndf_.basis) + cluster.first_basis;
   }
@@ -364,8 +371,8 @@ class ClusterReader {
     const float* products;  ///< a + 16 b: of function a of x and function b of y
   };
 
-  [[gnu::always_inline]] GLINT_HD void arrangeCore(const NdfCluster& cluster, const ColumnLayout& layout, const float* along_x,
-                                                   const float* along_y, float* projection) const {
+  GLINT_HOST_INLINE GLINT_HD void arrangeCore(const NdfCluster& cluster, const ColumnLayout& layout, const float* along_x,
+                                              const float* along_y, float* projection) const {
     float products[kBlockPixels];  // those beyond rank_x are of no meaning
     for (int b = 0; b < cluster.rank_y; ++b) {
       const Float4 y = Float4::all(along_y[b]);
@@ -421,7 +428,7 @@ class ClusterReader {
   }
 
   /// Lane t: sum over k of weights[k] * prefix[t * stride + k].
-  static GLINT_HD Float16 weighPrefixes(const Basis* prefix, int stride, int columns, const float* weights) {
+  GLINT_DEVICE_CALL static GLINT_HD Float16 weighPrefixes(const Basis* prefix, int stride, int columns, const float* weights) {
     Float16 sums;
     if (columns < 4) {  // reads what is around a row, but nothing around the block
       float w[3] = {};

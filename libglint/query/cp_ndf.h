@@ -309,7 +309,7 @@ class CpNdf {
   /// @param last_try  whether no other block can be drawn: one in a million; then rows are chosen by their sums alone
   /// @return false: another block is to be drawn with what is left of xi
   template <class Reader>
-  GLINT_HD bool choosePixelOfBlock(const Reader& reader, bool last_try, Draw& draw) const;
+  GLINT_DEVICE_CALL GLINT_HD bool choosePixelOfBlock(const Reader& reader, bool last_try, Draw& draw) const;
 
   CompressedNdf ndf_;
   SliceChooser chooser_;

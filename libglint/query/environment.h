@@ -22,7 +22,7 @@ inline constexpr int kLobeCells = 3;
 /// the lobe, have the variance of the lobe.
 inline GLINT_HD float lobeExtent(int cells) {
   constexpr float kExtents[kMostLobeCells] = {1.732f, 1.732f, 1.994f, 2.181f, 2.326f, 2.444f, 2.542f, 2.626f};
-  return kExtents[std::clamp(cells, 1, kMostLobeCells) - 1];
+  return kExtents[std::clamp(cells, 1, int{kMostLobeCells}) - 1];
 }
 
 /// Mean density over a range of half vectors; ranges too small for that are points.
@@ -76,7 +76,7 @@ GLINT_HD Rgb prefilteredRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const S
   if (!aboveHorizon(wo) || !isUsable(light)) return {};
   const Rgb flux = integralOf(light) * light.amplitude;
   if (range == LobeRange::support) return flux * supportRadiance(brdf, wo, light);
-  const int n = std::clamp(cells, 1, kMostLobeCells);
+  const int n = std::clamp(cells, 1, int{kMostLobeCells});
   const float sigma = 1 / std::sqrt(light.sharpness), extent = std::min(lobeExtent(n), 1.41421356f / sigma);
   const float step = 2 * extent / static_cast<float>(n), side = sigma * step;
   const Tangents frame = tangentsOf(light.axis);

@@ -84,7 +84,7 @@ inline GLINT_HD SmallPolygon clipToUnitBox(const Vec2* points, int count) {
 }
 
 /// Area of the part of a convex polygon that lies in the square [-1, 1]^2. `points` holds `count` <= 4 corners.
-inline GLINT_HD float areaInsideUnitBox(const Vec2* points, int count) {
+GLINT_DEVICE_CALL inline GLINT_HD float areaInsideUnitBox(const Vec2* points, int count) {
   return 0.5f * std::fabs(clipToUnitBox(points, count).twiceSignedArea());
 }
 
@@ -109,7 +109,7 @@ class FootprintWeights {
   /// Half-open range of texels that can have weight.
   int column_begin = 0, column_end = 0, row_begin = 0, row_end = 0;
 
-  GLINT_HD float texel(int i, int j) const {
+  GLINT_DEVICE_CALL GLINT_HD float texel(int i, int j) const {
     const Vec2 d = Vec2{static_cast<float>(i) + 0.5f, static_cast<float>(j) + 0.5f} - centre_;
     if (!is_box_) return gaussian(d);
     const Vec2 corners[4] = {local({d.x - 0.5f, d.y - 0.5f}), local({d.x + 0.5f, d.y - 0.5f}), local({d.x + 0.5f, d.y + 0.5f}),
@@ -118,7 +118,7 @@ class FootprintWeights {
   }
 
   /// Weight of the lower right (half 0) or upper left (half 1) triangle of a cell.
-  GLINT_HD float triangle(int i, int j, int half) const {
+  GLINT_DEVICE_CALL GLINT_HD float triangle(int i, int j, int half) const {
     const Vec2 d = Vec2{static_cast<float>(i) + 0.5f, static_cast<float>(j) + 0.5f} - centre_;
     const float third = 1.0f / 3;
     if (!is_box_) return 0.5f * gaussian(d + (half == 0 ? Vec2{2 * third, third} : Vec2{third, 2 * third}));

@@ -150,10 +150,14 @@ class HistogramNdf {
     const double xx = c.xx, xy = c.xy, yy = c.yy;
     const double ax = std::sqrt(3 * xx), ay = xy * std::sqrt(3 / xx), by = std::sqrt(3 * std::max(yy - xy * xy / xx, 1e-6));
     if (gaussian_ == GaussianBoxes::one) return addParallelogram(p.centre, ax, ay, 0, by, 1, sum);
+    // Nested boxes for a Gaussian: sizes relative to the box of its covariance, and shares. Fitted: least squared difference
+    // under sum of shares 1, sum of shares * scales^2 1.
+    constexpr double scales[3] = {0.508447702070, 0.812387977981, 1.239504002977};
+    constexpr double shares[3] = {0.179460940730, 0.350350560935, 0.470188498334};
     double total = 0;
     for (int k = 0; k < 3; ++k) {
-      const double s = kBoxScales[k];
-      total += addParallelogram(p.centre, s * ax, s * ay, 0, s * by, kBoxShares[k] / (4 * s * s * ax * by), sum);
+      const double s = scales[k];
+      total += addParallelogram(p.centre, s * ax, s * ay, 0, s * by, shares[k] / (4 * s * s * ax * by), sum);
     }
     return total;
   }
@@ -178,7 +182,7 @@ class HistogramNdf {
 
   /// Returns the area that it adds, times the weight.
   template <class Sum>
-  GLINT_HD double addParallelogram(Vec2 centre_uv, double ax, double ay, double bx, double by, double weight, Sum& sum) const {
+  GLINT_DEVICE_CALL GLINT_HD double addParallelogram(Vec2 centre_uv, double ax, double ay, double bx, double by, double weight, Sum& sum) const {
     const double x = double{wrapUnit(centre_uv.x)} * sat_.width, y = double{wrapUnit(centre_uv.y)} * sat_.height;
     if ((ay == 0 && bx == 0) || (ax == 0 && by == 0)) {
       const double rx = std::fabs(ax) + std::fabs(bx), ry = std::fabs(ay) + std::fabs(by);
@@ -194,10 +198,6 @@ class HistogramNdf {
 
   /// Longest half axis in periods of the map: sums of areas stay below 2^63.
   static constexpr double kMostPeriods = 64;
-  /// Nested boxes for a Gaussian: sizes relative to the box of its covariance, and shares. Fitted: least squared difference
-  /// under sum of shares 1, sum of shares * scales^2 1.
-  static constexpr double kBoxScales[3] = {0.508447702070, 0.812387977981, 1.239504002977};
-  static constexpr double kBoxShares[3] = {0.179460940730, 0.350350560935, 0.470188498334};
 
   HistogramSat sat_;
   SphericalBins bins_;

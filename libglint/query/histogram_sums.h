@@ -167,7 +167,7 @@ class RectangleSums {
   GLINT_HD int rowOf(int j) const { return wrapIndex(j, sat_.height); }
 
   /// Texels [from, to) of a row of the map, along the endless plane.
-  GLINT_HD void addRow(int row, int from, int to, double weight) {
+  GLINT_DEVICE_CALL GLINT_HD void addRow(int row, int from, int to, double weight) {
     if (to - from > kDifferenceCost) {
       return forEachPiece(from, to, sat_.width, [&](double a, double b, double times) {
         addRun<false>(row, static_cast<int>(a), static_cast<int>(b), weight * times);
@@ -250,7 +250,7 @@ class RectangleSums {
   }
 
   /// A rectangle of the map itself.
-  GLINT_HD void addInside(double x0, double x1, double y0, double y1, double weight) {
+  GLINT_DEVICE_CALL GLINT_HD void addInside(double x0, double x1, double y0, double y1, double weight) {
     if ((std::ceil(x1) - std::floor(x0)) * (std::ceil(y1) - std::floor(y0)) <= kFewTexels) {
       return forEachCovered(y0, y1, [&](int j, double covered) { addLine<false>(j, x0, x1, weight * covered); });
     }
@@ -282,7 +282,7 @@ class RectangleSums {
 
   /// One column (or row) from low to high, the texels at the ends by their covered part.
   template <bool kColumn>
-  GLINT_HD void addLine(int line, double low, double high, double weight) {
+  GLINT_DEVICE_CALL GLINT_HD void addLine(int line, double low, double high, double weight) {
     const int first = static_cast<int>(std::ceil(low)), last = static_cast<int>(high);
     if (first > last) return addRunTexels<kColumn>(line, last, first, weight * (high - low));
     if (low < first) addRunTexels<kColumn>(line, first - 1, first, weight * (first - low));
@@ -292,7 +292,7 @@ class RectangleSums {
 
   /// Whole texels [from, to) of a column (or row).
   template <bool kColumn>
-  GLINT_HD void addRun(int line, int from, int to, double weight) {
+  GLINT_DEVICE_CALL GLINT_HD void addRun(int line, int from, int to, double weight) {
     const int stride = sat_.line_stride, size = kColumn ? sat_.height : sat_.width;
     const int first = nearest(from, stride, size), last = nearest(to, stride, size);
     const int begin = texelOf(first, stride, size), end = texelOf(last, stride, size);
@@ -346,7 +346,7 @@ class RectangleSums {
   }
 
   /// The rectangle between points (a0, b0) and (a1, b1) of the fine table.
-  GLINT_HD void addPoints(int a0, int a1, int b0, int b1, double weight) {
+  GLINT_DEVICE_CALL GLINT_HD void addPoints(int a0, int a1, int b0, int b1, double weight) {
     if (a0 >= a1 || b0 >= b1) return;
     const std::int64_t all = texels(a0, a1, b0, b1);
     if (all < kMostPieces * kFineLimit) return addPieces(a0, a1, b0, b1, weight);

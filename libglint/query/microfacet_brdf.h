@@ -100,7 +100,7 @@ class MicrofacetBrdf {
   /// What `sample` asks the model for where xi.x >= uniformShare(wo).
   static GLINT_HD Vec2 modelPoint(Vec3 wo, Vec2 xi) {
     const float share = uniformShare(wo);
-    return {std::min((xi.x - share) / (1 - share), kBelowOne), xi.y};
+    return {std::min((xi.x - share) / (1 - share), float{kBelowOne}), xi.y};
   }
 
   /// What `sample` makes of the half vector that the model has drawn at modelPoint.

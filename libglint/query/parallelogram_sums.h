@@ -80,7 +80,7 @@ class ParallelogramSums {
   };
 
   /// Adds the texels of row j that edges cross, and what lies between them: as a run for later where it is whole.
-  GLINT_HD void addEdges(const ParallelogramEdges& edges, int j) {
+  GLINT_DEVICE_CALL GLINT_HD void addEdges(const ParallelogramEdges& edges, int j) {
     const int row = sum_.rowOf(j);
     int ends[4], count = 0;
     double shares[4];  // right of ends[k], an edge adds shares[k] to every texel of the row

@@ -146,9 +146,9 @@ class PyramidNdf {
         rows[k] = covered(box.y0, box.y1, k);
       }
       first_row = static_cast<int>(box.y0);
-      end_row = std::min(static_cast<int>(std::ceil(box.y1)), kBlockSize);
+      end_row = std::min(static_cast<int>(std::ceil(box.y1)), int{kBlockSize});
       first_column = static_cast<int>(box.x0) / 4 * 4;
-      end_column = std::min(static_cast<int>(std::ceil(box.x1)), kBlockSize);
+      end_column = std::min(static_cast<int>(std::ceil(box.x1)), int{kBlockSize});
     }
     int first_row, end_row, first_column, end_column;  ///< the first column is a multiple of 4
     float columns[kBlockSize], rows[kBlockSize];       ///< covered parts, 0 to 1

@@ -15,7 +15,7 @@ inline constexpr float kLongestAxis = 1e15f;
 
 /// A vector of texels with finite components, at most kLongestAxis each; components that are NaN become 0.
 inline GLINT_HD Vec2 finiteAxis(Vec2 a) {
-  const auto finite = [](float x) { return x == x ? std::clamp(x, -kLongestAxis, kLongestAxis) : 0.0f; };
+  const auto finite = [](float x) { return x == x ? std::clamp(x, -kLongestAxis, float{kLongestAxis}) : 0.0f; };
   return {finite(a.x), finite(a.y)};
 }
 

@@ -38,13 +38,13 @@ class Reference {
   GLINT_HD bool hasMap() const { return map_.width > 0; }
 
   /// Density towards h, per unit projected area; >= 0, finite.
-  GLINT_HD float density(const Footprint& p, Vec2 h) const {
+  GLINT_DEVICE_CALL GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!(std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1)) return 0;
     return static_cast<float>(average(p, PointLobe{h, sigma_r_}));
   }
 
   /// Average density over a box of half vectors; 0 if the box is empty.
-  GLINT_HD float mean(const Footprint& p, const Box2& range) const {
+  GLINT_DEVICE_CALL GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     const Box2 box = {{std::max(range.low.x, -1.0f), std::max(range.low.y, -1.0f)},
                       {std::min(range.high.x, 1.0f), std::min(range.high.y, 1.0f)}};
     if (!(box.width() > 0 && box.height() > 0)) return 0;
@@ -57,7 +57,7 @@ class Reference {
   /// O(rows + columns) of the footprint for Gaussians (O(area) if they are rotated and the boundary is clamped), O(1) for
   /// boxes, and the density. A choice uses up leading digits of `xi` and the next one those below, so 24 bits are enough for
   /// one sample.
-  GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+  GLINT_DEVICE_CALL GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     xi = clampUnit(xi);
     const FootprintWeights weights = weightsOf(p);
     const TexelChoice texel = chooseTexel(weights, {map_.width, map_.height, surface_, boundary_}, xi);
@@ -164,7 +164,7 @@ class Reference {
     return total > 0 ? sum / total : 0;
   }
 
-  GLINT_HD double totalWeight(const Footprint& p) const {
+  GLINT_DEVICE_CALL GLINT_HD double totalWeight(const Footprint& p) const {
     return surface_ == Surface::flat ? forEachTexel(p, [](float, Vec2) {}) : forEachTriangle(p, [](float, Vec2, Vec2, Vec2) {});
   }
 

@@ -192,7 +192,7 @@ class ShLightQuery {
       const float share = shareAbove(frame.normal, wo, h, dot(wi, frame.normal));
       if (!(share > 0)) return;
       // D is per projected area: a facet covers 1 / nz of its share of the surface.
-      const float amount = weight * share / std::max(nz, kSteepest);
+      const float amount = weight * share / std::max(nz, float{kSteepest});
       for (std::size_t k = 0; k < corners.size(); ++k) {
         const Corner& c = corners[k];
         const Vec3 middle = wi + c.z;

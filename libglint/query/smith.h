@@ -29,7 +29,7 @@ class SmithMasking {
   GLINT_HD float projectedArea(Vec3 w) const {
     const float mean = w.z - w.x * mean_.x - w.y * mean_.y;
     const float variance = w.x * w.x * covariance_.xx + 2 * w.x * w.y * covariance_.xy + w.y * w.y * covariance_.yy;
-    const float sigma = std::sqrt(std::max(variance, kSmallestVariance));
+    const float sigma = std::sqrt(std::max(variance, float{kSmallestVariance}));
     const float a = mean / sigma;
     const float area = 0.5f * mean * (1 + std::erf(kInvSqrt2 * a)) + kInvSqrt2Pi * sigma * std::exp(-0.5f * a * a);
     return std::max(area, w.z);

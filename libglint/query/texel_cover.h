@@ -55,7 +55,7 @@ struct CoverSpan {
 /// become the Gaussian of their moments first (as in FootprintWeights).
 class TexelCover {
  public:
-  GLINT_HD TexelCover(const Footprint& p, int width, int height) : width_(width), height_(height) {
+  GLINT_DEVICE_CALL GLINT_HD TexelCover(const Footprint& p, int width, int height) : width_(width), height_(height) {
     double axes[2][2];
     if (!(p.kind == Footprint::Kind::box && boxAxes(p, axes)))
       gaussianAxes(usableCovariance(p.covariance, width, height), axes);
@@ -103,7 +103,7 @@ class TexelCover {
   }
 
   /// Covered area of the texel [x, x + 1] x [y, y + 1], 0 to 1.
-  GLINT_HD double texel(int x, int y) const {
+  GLINT_DEVICE_CALL GLINT_HD double texel(int x, int y) const {
     if (x < 0 || y < 0 || x >= columns_ || y >= rows_count_) return 0;
     if (aligned_) return overlap(x, low_[0], high_[0]) * overlap(y, low_[1], high_[1]);
     const double dx = x - centre_[0], dy = y - centre_[1];
@@ -120,7 +120,7 @@ class TexelCover {
 
   /// For the rows between y0 < y1: `outer` holds every point of the parallelogram there; every point between them and inside
   /// `inner` is of the parallelogram.
-  GLINT_HD void spans(double y0, double y1, CoverSpan& outer, CoverSpan& inner) const {
+  GLINT_DEVICE_CALL GLINT_HD void spans(double y0, double y1, CoverSpan& outer, CoverSpan& inner) const {
     outer = inner = {low_[0], high_[0]};
     for (int k = 0; k < 2; ++k) {
       if (reach_[k] == 0) {  // a condition on y alone
