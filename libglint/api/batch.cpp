@@ -3,22 +3,11 @@
 #include <algorithm>
 #include <type_traits>
 
-#include "glint/api/batch_compressed.h"
-#include "glint/api/batch_kernels.h"
 #include "glint/api/batch_slices.h"
 #include "glint/api/multiversion.h"
 #include "glint/query/bits.h"
 
 namespace glint::api {
-
-bool hasWideKernels() {
-#if defined(GLINT_WIDE_KERNELS)
-  static const bool supported = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("f16c");
-  return supported;
-#else
-  return false;
-#endif
-}
 
 namespace {
 
@@ -166,11 +155,6 @@ void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintA
   }
 }
 
-void modelDensities(const CpNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
-                    float* out) {
-  compressedDensities(model, count, footprints, halves, out);
-}
-
 /// Models that have no way of their own are asked one by one.
 template <class Model>
 void modelDensities(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
@@ -180,13 +164,6 @@ void modelDensities(const Model& model, std::size_t count, const FootprintArrays
 
 void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
                 float* out) {
-  using Cover = PyramidNdf::BlockCover;
-  const bool wide = hasWideKernels();
-  const auto sum = [wide]<class Pixel>(const Cover& cover, const Pixel* const* blocks, const float* weights, int stored) {
-    if constexpr (sizeof(Pixel) == 2)
-      if (wide) return sumCoveredPixels(blocks, weights, stored, cover.columns, cover.rows, cover.first_row, cover.end_row);
-    return cover.sum(blocks, weights, stored);
-  };
   SliceChunk chunk;
   PyramidNdf::PendingMean pending[2];
   for (std::size_t first = 0; first < count; first += kChunk) {
@@ -197,35 +174,19 @@ void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArray
     // A mean is long work next to its cache misses, and reads many lines: only the next one's are asked ahead.
     const auto begin = [&](int k) {
       if (fromTexels(k)) return;
-      model.beginMean(chunk.slices(k), ranges[first + static_cast<std::size_t>(k)], sum, pending[k % 2]);
+      model.beginMean(chunk.slices(k), ranges[first + static_cast<std::size_t>(k)], pending[k % 2]);
     };
     begin(0);
     for (int k = 0; k < lanes; ++k) {
       const std::size_t at = first + static_cast<std::size_t>(k);
       if (k + 1 < lanes) begin(k + 1);
-      out[at] = fromTexels(k) ? model.mean(footprints[at], ranges[at]) : model.finishMean(ranges[at], sum, pending[k % 2]);
+      out[at] = fromTexels(k) ? model.mean(footprints[at], ranges[at]) : model.finishMean(ranges[at], pending[k % 2]);
     }
   }
 }
 
-void modelMeans(const CpNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
-                float* out) {
-  compressedMeans(model, count, footprints, ranges, out);
-}
-
 void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
                   const SampleArrays& out) {
-  const bool wide = hasWideKernels();
-  const auto sum = [wide]<class Pixel>(const Pixel* pixels) {
-    if constexpr (sizeof(Pixel) == 2) {
-      if (wide) {
-        float sums[kBlockSize];
-        sumPixelRows(pixels, sums);
-        return Float16::load(sums);
-      }
-    }
-    return sumRows(pixels);
-  };
   SliceChunk chunk;
   PyramidSteps steps(model);
   PyramidNdf::Draw draws[kChunk];
@@ -237,7 +198,7 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
     for (int k = 0; k < lanes; ++k) model.findBlocks(draws[k]);
     for (int k = 0; k < lanes; ++k) model.chooseBlock(draws[k]);
     for (int k = 0; k < lanes; ++k) {
-      model.choosePixel(draws[k], sum);
+      model.choosePixel(draws[k]);
       const PixelPlace place = draws[k].place;
       chunk.blocks[k] = std::max(place.block, 0);
       chunk.pixels[k] = std::max(place.y * kBlockSize + place.x, 0);
@@ -255,11 +216,6 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
         out.set(at, {pointInPixel(model.shape(), draws[k].place, draws[k].xi), pdfs[k]});
     }
   }
-}
-
-void modelSamples(const CpNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
-                  const SampleArrays& out) {
-  compressedSamples(model, count, footprints, xi, out);
 }
 
 template <class Model>

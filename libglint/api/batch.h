@@ -61,11 +61,14 @@ struct SampleArrays {
 
 /// out[k] = density of query k, for k < count. The same values as asking one by one, but for 1e-6 of each where products and
 /// sums are fused or in another order, and the same rules for what is degenerate.
+///
+/// Pyramids have the cache misses of many queries in flight. A query of any other kind has enough work or misses of its own to
+/// overlap, and gains nothing but the call.
 /// @note thread-safe, allocates nothing; split a batch over threads as you like
 void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                float* out);
 
-/// out[k] = mean density over the box of query k. Of compressed pyramids, whose terms may cancel, to 1e-6 of 1 + mean.
+/// out[k] = mean density over the box of query k.
 void means(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges, float* out);
 
 /// Draws the half vector of query k from its footprint's density, with xi[k] in [0, 1)^2.

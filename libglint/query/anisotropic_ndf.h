@@ -65,7 +65,8 @@ inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int
     return parts;
   }
   const float along = std::sqrt(along2);
-  parts.count = std::clamp(static_cast<int>(std::ceil(2 * kPartReach * along / (kPartGap * sigma))), 2, int{IsotropicParts::kMost});
+  parts.count =
+      std::clamp(static_cast<int>(std::ceil(2 * kPartReach * along / (kPartGap * sigma))), 2, int{IsotropicParts::kMost});
   const float step = 2 * kPartReach / static_cast<float>(parts.count), middle = 0.5f * static_cast<float>(parts.count - 1);
   float total = 0, moment = 0;
   for (int k = 0; k < parts.count; ++k) {

@@ -24,13 +24,13 @@ struct ColumnLayout {
   /// Floats of the largest projection.
   static constexpr int kMost = kMaxColumns + 16;
 
-  /// Writes a projection: scales[k] * values.one(k) of every column k, four(k) of four at once.
+  /// Writes a projection: scales[k] * values.one(k) of every column k, four(k) of four at once; values.scaled(scales, k, to) of
+  /// eight, if there is such a function.
   template <class Values>
   GLINT_HD void arrange(const float* scales, const Values& values, float* projection) const {
-    arrangeRange(scales, values, 0, wide, projection);
-    if (half == 0) return;
-    arrangeRange(scales, values, wide, wide + half, projection + low());
-    arrangeRange(scales, values, wide + half, columns, projection + high());
+    const int ends[4] = {0, wide, wide + half, columns}, places[3] = {0, low(), high()};
+    for (int part = 0; part < (half > 0 ? 3 : 1); ++part)
+      arrangeRange(scales, values, ends[part], ends[part + 1], projection + places[part]);
   }
 
   // Where a projection has the first narrow column of each half.
@@ -42,8 +42,17 @@ struct ColumnLayout {
  private:
   /// A range of columns, and zeros up to a whole group.
   template <class Values>
-  GLINT_DEVICE_CALL static GLINT_HD void arrangeRange(const float* scales, const Values& values, int begin, int end, float* to) {
+  GLINT_DEVICE_CALL static GLINT_HD void arrangeRange(const float* scales, const Values& values, int begin, int end,
+                                                      float* to) {
     const int count = end - begin;
+    if constexpr (requires { values.scaled(scales, begin, to); }) {
+      if (count >= 8) {
+        for (int k = 0; k + 8 <= count; k += 8) values.scaled(scales, begin + k, to + k);
+        if (count % 8 != 0) values.scaled(scales, end - 8, to + count - 8);
+        Float4::zero().store(to + count);
+        return;
+      }
+    }
     if (count < 4) {
       Float4::zero().store(to);
       for (int k = 0; k < count; ++k) to[k] = scales[begin + k] * values.one(begin + k);
@@ -64,6 +73,9 @@ struct ColumnValues {
   GLINT_HD Float4 four(int k) const { return Float4::load(values + k); }
 };
 
+template <class Basis, class Coefficient>
+class WideReader;
+
 /// What reads the factors of clusters of columns: Basis is the stored type of prefix sums, Coefficient that of coefficients.
 template <class Basis, class Coefficient>
 class ClusterReader {
@@ -71,6 +83,7 @@ class ClusterReader {
   GLINT_HD explicit ClusterReader(const CompressedNdf& ndf) : ndf_(ndf) {}
 
   using Row = const Coefficient*;
+  using Wide = WideReader<Basis, Coefficient>;  ///< the same with vectors of eight, where the processor has them
 
   /// Coefficients of a slice.
   GLINT_HD Row row(const NdfCluster& cluster, std::uint64_t slice) const {
@@ -126,20 +139,14 @@ class ClusterReader {
 
   /// One pixel of a slice of such a cluster: `dot` with `pixel`, to the bit.
   GLINT_DEVICE_CALL GLINT_HD float valueAlone(const NdfCluster& cluster, Row c, int x, int y) const {
-    const float* scales = ndf_.scales.data() + cluster.first_scale;
     const int columns = cluster.columns;
     const Axis along_x(first(cluster), columns, x), along_y(first(cluster) + kBlockSize * columns, columns, y);
-    Float4 sum = Float4::zero();
-    int k = 0;
-    for (; k + 4 <= columns; k += 4)
-      sum = sum + Float4::load(scales + k) * (along_x.four(k) * along_y.four(k)) * Float4::load(c + k);
-    float rest[4] = {};
-    for (int j = 0; k < columns; ++k, ++j) rest[j] = scales[k] * (along_x.one(k) * along_y.one(k)) * value(c[k]);
-    return (columns % 4 == 0 ? sum : sum + Float4::load(rest)).sum();
+    return addRest(cluster, c, Products{along_x, along_y}, 0, Float4::zero());
   }
 
   /// projection = sums of scaled columns over a part of the block, as ColumnLayout says.
-  GLINT_DEVICE_CALL GLINT_HD void box(const NdfCluster& cluster, const ColumnLayout& layout, const BlockBox& b, float* projection) const {
+  GLINT_DEVICE_CALL GLINT_HD void box(const NdfCluster& cluster, const ColumnLayout& layout, const BlockBox& b,
+                                      float* projection) const {
     const Basis* basis = first(cluster);
     const int columns = cluster.columns;
     if (isOf(CompressionMethod::tucker)) {
@@ -200,68 +207,18 @@ class ClusterReader {
     int k = 0;
     for (; k + 4 <= layout.wide; k += 4) (Float4::load(scales + k) * Float4::load(c + k)).store(scaled + k);
     for (; k < layout.wide; ++k) scaled[k] = scales[k] * value(c[k]);
-    if constexpr (std::is_same_v<Coefficient, std::int8_t>) {
-      const Row bytes = c + layout.wide;
-      const int high = layout.wide + layout.half, high_columns = layout.columns - high;
-      int j = 0;
-      for (; j + 4 <= high_columns; j += 4) {
-        (Float4::load(scales + layout.wide + j) * Float4::loadLow(bytes + j)).store(scaled + layout.wide + j);
-        (Float4::load(scales + high + j) * Float4::loadHigh(bytes + j)).store(scaled + high + j);
-      }
-      for (; j < layout.half; ++j) {
-        scaled[layout.wide + j] = scales[layout.wide + j] * static_cast<float>(lowHalf(bytes[j]));
-        if (j < high_columns) scaled[high + j] = scales[high + j] * static_cast<float>(highHalf(bytes[j]));
-      }
-    }
+    if constexpr (std::is_same_v<Coefficient, std::int8_t>) scaleNarrow(scales, layout, c + layout.wide, 0, scaled);
   }
 
   /// Sums of the rows of a slice, negative pixels included: O(16 rank) for cp and tucker, O(16 columns) for pca.
   /// @param scaled  its scaledCoefficients
-  GLINT_DEVICE_CALL GLINT_HD Float16 rowSums(const NdfCluster& cluster, const float* scaled) const {
-    constexpr int kLast = kBlockSize - 1;
-    const Basis* basis = first(cluster);
-    const int columns = cluster.columns;
-    if (isOf(CompressionMethod::pca))
-      return weighPrefixes(basis + kLast * columns, kBlockSize * columns, columns, scaled).differences();
-    float weights[kMaxColumns];
-    if (isOf(CompressionMethod::cp)) {
-      const Basis* along_x = basis + kLast * columns;
-      for (int k = 0; k < columns; ++k) weights[k] = scaled[k] * static_cast<float>(along_x[k]);
-      return weighPrefixes(basis + kBlockSize * columns, columns, columns, weights).differences();
-    }
-    const int rx = cluster.rank_x, ry = cluster.rank_y;
-    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
-    float along_x[kBlockSize];
-    for (int a = 0; a < rx; ++a) along_x[a] = static_cast<float>(basis[kLast * rx + a]);
-    std::fill(weights, weights + kBlockSize, 0.0f);
-    for (int k = 0; k < columns; ++k) weights[core[k] / kBlockSize] += scaled[k] * along_x[core[k] % kBlockSize];
-    return weighPrefixes(basis + kBlockSize * rx, ry, ry, weights).differences();
+  GLINT_HD Float16 rowSums(const NdfCluster& cluster, const float* scaled) const {
+    return rowSumsBy(cluster, scaled, WeighPrefixes());
   }
-
   /// Row y of a slice, negative pixels taken as 0. The cost is that of rowSums.
   /// @param scaled  its scaledCoefficients
-  GLINT_DEVICE_CALL GLINT_HD Float16 rowPixels(const NdfCluster& cluster, const float* scaled, int y) const {
-    const Basis* basis = first(cluster);
-    const int columns = cluster.columns;
-    if (isOf(CompressionMethod::pca)) {
-      const Basis* row = basis + y * kBlockSize * columns;
-      Float16 sums = weighPrefixes(row, columns, columns, scaled);
-      if (y > 0) sums = sums - weighPrefixes(row - kBlockSize * columns, columns, columns, scaled);
-      return sums.differences().positive();
-    }
-    float weights[kMaxColumns];
-    if (isOf(CompressionMethod::cp)) {
-      Axis(basis + kBlockSize * columns, columns, y).store(weights);
-      for (int k = 0; k < columns; ++k) weights[k] *= scaled[k];
-      return weighPrefixes(basis, columns, columns, weights).differences().positive();
-    }
-    const int rx = cluster.rank_x, ry = cluster.rank_y;
-    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
-    float along_y[kBlockSize];
-    Axis(basis + kBlockSize * rx, ry, y).store(along_y);
-    std::fill(weights, weights + kBlockSize, 0.0f);
-    for (int k = 0; k < columns; ++k) weights[core[k] % kBlockSize] += scaled[k] * along_y[core[k] / kBlockSize];
-    return weighPrefixes(basis, rx, rx, weights).differences().positive();
+  GLINT_HD Float16 rowPixels(const NdfCluster& cluster, const float* scaled, int y) const {
+    return rowPixelsBy(cluster, scaled, y, WeighPrefixes());
   }
 
   /// All pixels of a slice, [16][16], negative ones taken as 0.
@@ -293,7 +250,7 @@ class ClusterReader {
     }
   }
 
- private:
+ protected:
   /// Whether clusters are of this method: integers of a basis say whether it is pca.
   GLINT_HD bool isOf(CompressionMethod method) const {
     if constexpr (std::is_same_v<Basis, std::int32_t>) return method == CompressionMethod::pca;
@@ -303,6 +260,34 @@ class ClusterReader {
 
   GLINT_HD const Basis* first(const NdfCluster& cluster) const {
     return static_cast<const Basis*>(ndf_.basis) + cluster.first_basis;
+  }
+
+  GLINT_HD const float* scalesOf(const NdfCluster& cluster) const { return ndf_.scales.data() + cluster.first_scale; }
+  GLINT_HD const std::uint8_t* coreOf(const NdfCluster& cluster) const { return ndf_.core.data() + cluster.first_scale; }
+
+  /// valueAlone from column k on. `sum` has the columns before.
+  template <class Values>
+  GLINT_HD float addRest(const NdfCluster& cluster, Row c, const Values& values, int k, Float4 sum) const {
+    const float* scales = scalesOf(cluster);
+    const int columns = cluster.columns;
+    for (; k + 4 <= columns; k += 4) sum = sum + Float4::load(scales + k) * values.four(k) * Float4::load(c + k);
+    float rest[4] = {};
+    for (int j = 0; k < columns; ++k, ++j) rest[j] = scales[k] * values.one(k) * value(c[k]);
+    return (columns % 4 == 0 ? sum : sum + Float4::load(rest)).sum();
+  }
+
+  /// scaledCoefficients of narrow columns from number j of each half on.
+  static GLINT_HD void scaleNarrow(const float* scales, const ColumnLayout& layout, const std::int8_t* bytes, int j,
+                                   float* scaled) {
+    const int low = layout.wide, high = layout.wide + layout.half, high_columns = layout.columns - high;
+    for (; j + 4 <= high_columns; j += 4) {
+      (Float4::load(scales + low + j) * Float4::loadLow(bytes + j)).store(scaled + low + j);
+      (Float4::load(scales + high + j) * Float4::loadHigh(bytes + j)).store(scaled + high + j);
+    }
+    for (; j < layout.half; ++j) {
+      scaled[low + j] = scales[low + j] * static_cast<float>(lowHalf(bytes[j]));
+      if (j < high_columns) scaled[high + j] = scales[high + j] * static_cast<float>(highHalf(bytes[j]));
+    }
   }
 
   /// Adds the products of a projection and rows of coefficients: lane k has those of columns 4 n + k.
@@ -419,44 +404,108 @@ class ClusterReader {
     }
   }
 
-  /// The last group of four, without what whole groups before it hold.
-  static GLINT_HD Float4 lastColumns(const float* values, int columns) {
-    if (columns < 4 || columns % 4 == 0) return Float4::zero();
-    float last[4];
-    for (int k = 0; k < 4; ++k) last[k] = k < 4 - columns % 4 ? 0.0f : values[columns - 4 + k];
-    return Float4::load(last);
-  }
+  /// Weights of columns in groups of eight.
+  struct ColumnWeights {
+    const float* weights;  ///< of `whole` columns
+    int whole;
+    // Of columns [last_at, last_at + 8), as far as `kept` is 1 and not 0; nullptr: nothing is left.
+    const float *last, *kept;
+    int last_at;
+  };
 
   /// Lane t: sum over k of weights[k] * prefix[t * stride + k].
-  GLINT_DEVICE_CALL static GLINT_HD Float16 weighPrefixes(const Basis* prefix, int stride, int columns, const float* weights) {
+  /// @param four_rows  FourRows, or what has the same results
+  template <class Rows>
+  static GLINT_HD Float16 weighPrefixes(const Basis* prefix, int stride, int columns, const float* weights, Rows four_rows) {
+    static constexpr float kept[16] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
     Float16 sums;
-    if (columns < 4) {  // reads what is around a row, but nothing around the block
-      float w[3] = {};
-      for (int k = 0; k < columns; ++k) w[k] = weights[k];
-      const Float4 head = Float4::of(w[0], w[1], w[2], 0);
-      const Float4 tail = columns == 1   ? Float4::of(0, 0, 0, w[0])
-                          : columns == 2 ? Float4::of(0, 0, w[0], w[1])
-                                         : Float4::of(0, w[0], w[1], w[2]);
-      for (int k = 0; k < 3; ++k) sums.v[k] = fourRows(prefix + 4 * k * stride, stride, head);
-      sums.v[3] = fourRows(prefix + 12 * stride + columns - 4, stride, tail);
+    if (columns < 8) {  // reads what is around a row, but nothing around the block
+      float first[8] = {}, last[8] = {};
+      for (int k = 0; k < columns; ++k) first[k] = last[8 - columns + k] = weights[k];
+      for (int k = 0; k < 4; ++k)
+        sums.v[k] = four_rows(prefix + 4 * k * stride, stride,
+                              ColumnWeights{weights, 0, k < 2 ? first : last, kept + 8, k < 2 ? 0 : columns - 8});
       return sums;
     }
-    const Float4 last = lastColumns(weights, columns);
-    for (int k = 0; k < 4; ++k) sums.v[k] = fourRows(prefix + 4 * k * stride, stride, columns, weights, last);
+    const int rest = columns % 8, last_at = columns - 8;
+    const ColumnWeights all = {weights, columns - rest, rest > 0 ? weights + last_at : nullptr, kept + rest, last_at};
+    for (int k = 0; k < 4; ++k) sums.v[k] = four_rows(prefix + 4 * k * stride, stride, all);
     return sums;
   }
-  static GLINT_HD Float4 fourRows(const Basis* prefix, int stride, Float4 w) {
-    return sumsOf(w * Float4::load(prefix), w * Float4::load(prefix + stride), w * Float4::load(prefix + 2 * stride),
-                  w * Float4::load(prefix + 3 * stride));
-  }
-  static GLINT_HD Float4 fourRows(const Basis* prefix, int stride, int columns, const float* weights, Float4 last) {
-    Float4 sums[4];
-    for (int j = 0; j < 4; ++j) sums[j] = last * Float4::load(prefix + j * stride + columns - 4);
-    for (int k = 0; k + 4 <= columns; k += 4) {
-      const Float4 w = Float4::load(weights + k);
-      for (int j = 0; j < 4; ++j) sums[j] = sums[j] + w * Float4::load(prefix + j * stride + k);
+
+  /// Weighted sums of the columns of four rows: each in eight lanes first, which two groups of four hold.
+  struct FourRows {
+    GLINT_HD Float4 operator()(const Basis* prefix, int stride, const ColumnWeights& columns) const {
+      Float4 low[4] = {Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()},
+             high[4] = {low[0], low[0], low[0], low[0]};
+      const auto add = [&](Float4 w0, Float4 w1, const Basis* at) {
+        for (int j = 0; j < 4; ++j) {
+          low[j] = low[j] + w0 * Float4::load(at + j * stride);
+          high[j] = high[j] + w1 * Float4::load(at + j * stride + 4);
+        }
+      };
+      if (columns.last != nullptr)
+        add(Float4::load(columns.last) * Float4::load(columns.kept),
+            Float4::load(columns.last + 4) * Float4::load(columns.kept + 4), prefix + columns.last_at);
+      for (int k = 0; k < columns.whole; k += 8)
+        add(Float4::load(columns.weights + k), Float4::load(columns.weights + k + 4), prefix + k);
+      return sumsOf(low[0] + high[0], low[1] + high[1], low[2] + high[2], low[3] + high[3]);
     }
-    return sumsOf(sums[0], sums[1], sums[2], sums[3]);
+  };
+
+  /// weighPrefixes by FourRows.
+  struct WeighPrefixes {
+    GLINT_DEVICE_CALL GLINT_HD Float16 operator()(const Basis* prefix, int stride, int columns, const float* weights) const {
+      return weighPrefixes(prefix, stride, columns, weights, FourRows());
+    }
+  };
+
+  // rowSums and rowPixels by WeighPrefixes, or by what has the same results.
+  template <class Weigh>
+  GLINT_DEVICE_CALL GLINT_HD Float16 rowSumsBy(const NdfCluster& cluster, const float* scaled, Weigh weigh) const {
+    constexpr int kLast = kBlockSize - 1;
+    const Basis* basis = first(cluster);
+    const int columns = cluster.columns;
+    if (isOf(CompressionMethod::pca))
+      return weigh(basis + kLast * columns, kBlockSize * columns, columns, scaled).differences();
+    float weights[kMaxColumns];
+    if (isOf(CompressionMethod::cp)) {
+      const Basis* along_x = basis + kLast * columns;
+      for (int k = 0; k < columns; ++k) weights[k] = scaled[k] * static_cast<float>(along_x[k]);
+      return weigh(basis + kBlockSize * columns, columns, columns, weights).differences();
+    }
+    const int rx = cluster.rank_x, ry = cluster.rank_y;
+    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
+    float along_x[kBlockSize];
+    for (int a = 0; a < rx; ++a) along_x[a] = static_cast<float>(basis[kLast * rx + a]);
+    std::fill(weights, weights + kBlockSize, 0.0f);
+    for (int k = 0; k < columns; ++k) weights[core[k] / kBlockSize] += scaled[k] * along_x[core[k] % kBlockSize];
+    return weigh(basis + kBlockSize * rx, ry, ry, weights).differences();
+  }
+
+  template <class Weigh>
+  GLINT_DEVICE_CALL GLINT_HD Float16 rowPixelsBy(const NdfCluster& cluster, const float* scaled, int y, Weigh weigh) const {
+    const Basis* basis = first(cluster);
+    const int columns = cluster.columns;
+    if (isOf(CompressionMethod::pca)) {
+      const Basis* row = basis + y * kBlockSize * columns;
+      Float16 sums = weigh(row, columns, columns, scaled);
+      if (y > 0) sums = sums - weigh(row - kBlockSize * columns, columns, columns, scaled);
+      return sums.differences().positive();
+    }
+    float weights[kMaxColumns];
+    if (isOf(CompressionMethod::cp)) {
+      Axis(basis + kBlockSize * columns, columns, y).store(weights);
+      for (int k = 0; k < columns; ++k) weights[k] *= scaled[k];
+      return weigh(basis, columns, columns, weights).differences().positive();
+    }
+    const int rx = cluster.rank_x, ry = cluster.rank_y;
+    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
+    float along_y[kBlockSize];
+    Axis(basis + kBlockSize * rx, ry, y).store(along_y);
+    std::fill(weights, weights + kBlockSize, 0.0f);
+    for (int k = 0; k < columns; ++k) weights[core[k] % kBlockSize] += scaled[k] * along_y[core[k] / kBlockSize];
+    return weigh(basis, rx, rx, weights).differences().positive();
   }
 
   /// pca: sums the prefix sums of all columns first, and takes differences once.
@@ -465,7 +514,7 @@ class ClusterReader {
     const Basis* at = first(cluster);
     Float16 above = {{Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()}};
     for (int y = 0; y < kBlockSize; ++y, at += kBlockSize * columns) {
-      const Float16 here = weighPrefixes(at, columns, columns, scaled).differences();
+      const Float16 here = WeighPrefixes()(at, columns, columns, scaled).differences();
       (here - above).positive().store(pixels + y * kBlockSize);
       above = here;
     }

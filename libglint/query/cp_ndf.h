@@ -8,6 +8,7 @@
 #include "glint/query/reference.h"
 #include "glint/query/sampling.h"
 #include "glint/query/spots.h"
+#include "glint/query/wide_reader.h"
 
 namespace glint {
 
@@ -44,8 +45,8 @@ class CpNdf {
     if (fromTexels(p)) return below_.density(p, h);
     const PyramidSlices chosen = chooser_.choose(p);
     const PixelPlace place = pixelPlace(shape(), h);
-    return withReader(ndf_, [&](const auto& reader) {
-      return sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<decltype(reader)>{reader, place}, Positive{});
+    return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
+      return sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<Reader>{reader, place}, Positive{});
     });
   }
 
@@ -57,17 +58,6 @@ class CpNdf {
   /// pixels next to negative ones.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const;
 
-  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock, findBlockSlice and choosePixel make it, in this
-  /// order. Each reads what the one before has asked the memory for, so the cache misses of many samples can be under way
-  /// together.
-  struct Draw;
-  GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const;
-  GLINT_HD void findBlocks(const Draw& draw) const;
-  GLINT_HD void chooseBlock(Draw& draw) const;
-  GLINT_HD void findBlockSlice(Draw& draw) const;
-  template <class Reader>
-  GLINT_HD void choosePixel(const Reader& reader, Draw& draw) const;
-
   /// Average over a box of half vectors, >= 0, 0 if the box is empty; O(columns) for each block that the box covers.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const { return std::max(0.0f, signedMean(p, range)); }
 
@@ -76,8 +66,8 @@ class CpNdf {
     if (fromTexels(p)) return below_.density(p, h);
     const PyramidSlices chosen = chooser_.choose(p);
     const PixelPlace place = pixelPlace(shape(), h);
-    return withReader(ndf_, [&](const auto& reader) {
-      return sumSlices(chosen, place.block, ndf_.image_scales.data(), PixelOf<decltype(reader)>{reader, place}, Signed{});
+    return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
+      return sumSlices(chosen, place.block, ndf_.image_scales.data(), PixelOf<Reader>{reader, place}, Signed{});
     });
   }
 
@@ -85,10 +75,10 @@ class CpNdf {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
     if (fromTexels(p)) return below_.mean(p, range);
     const PyramidSlices chosen = chooser_.choose(p);
-    return withReader(ndf_, [&](const auto& reader) {
+    return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
       double sum = 0;
       forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
-        sum += sumSlices(chosen, block, ndf_.image_scales.data(), BoxOf<decltype(reader)>{reader, box}, Signed{});
+        sum += double{sumSlices(chosen, block, ndf_.image_scales.data(), BoxOf<Reader>{reader, box}, Signed{})};
       });
       return static_cast<float>(sum / areaInPixels(shape(), range));
     });
@@ -133,11 +123,15 @@ class CpNdf {
   struct PixelOf {
     Reader reader;
     PixelPlace place;
+#ifdef GLINT_WIDE
+    PixelOf<typename Reader::Wide> wide() const { return {typename Reader::Wide(reader), place}; }
+#endif
     GLINT_HD void project(const NdfCluster& cluster, const ColumnLayout& layout, float* projection) const {
       reader.pixel(cluster, layout, place.x, place.y, projection);
     }
     GLINT_HD void prefetch(const NdfCluster& cluster, std::uint64_t slice) const {
-      reader.prefetchAlone(cluster, slice, place.x, place.y);
+      reader.asksAlone(cluster) ? reader.prefetchAlone(cluster, slice, place.x, place.y)
+                                : glint::prefetch(reader.row(cluster, slice));
     }
     GLINT_HD bool alone(const NdfCluster& cluster) const { return reader.asksAlone(cluster); }
     GLINT_HD float valueAlone(const NdfCluster& cluster, std::uint64_t slice) const {
@@ -151,10 +145,15 @@ class CpNdf {
   struct BoxOf {
     Reader reader;
     BlockBox box;
+#ifdef GLINT_WIDE
+    BoxOf<typename Reader::Wide> wide() const { return {typename Reader::Wide(reader), box}; }
+#endif
     GLINT_HD void project(const NdfCluster& cluster, const ColumnLayout& layout, float* projection) const {
       reader.box(cluster, layout, box, projection);
     }
-    GLINT_HD void prefetch(const NdfCluster&, std::uint64_t) const {}
+    GLINT_HD void prefetch(const NdfCluster& cluster, std::uint64_t slice) const {
+      glint::prefetch(reader.row(cluster, slice));
+    }
     GLINT_HD bool alone(const NdfCluster&) const { return false; }
     GLINT_HD float valueAlone(const NdfCluster&, std::uint64_t) const { return 0; }
     GLINT_HD float spots(const SpotProfile& profile, const SpotList& list) const { return spotsIn(profile, list, box); }
@@ -189,27 +188,35 @@ class CpNdf {
     return out;
   }
 
-  /// Weighted sum over the chosen images. Slices of the same cluster, as those of neighbours mostly are, share its projection.
+  /// Weighted sum over the chosen images. What it reads is asked for together before it is read.
   /// @param scales  of images
   /// @param ask     PixelOf or BoxOf
   /// @param part    Signed or Positive
   template <class Ask, class Part>
   GLINT_HD float sumSlices(const PyramidSlices& chosen, int block, const float* scales, const Ask& ask, Part part) const {
     const SlicePlaces places = findSlices(chosen, block, scales);
-    prefetchSlices(places, ask);
+    for (int k = 0; k < PyramidSlices::kMost; ++k)
+      if (places.weights[k] > 0) ask.prefetch(ndf_.clusters.data()[places.clusters[k]], places.slices[k]);
     return sumSlices(places, ask, part);
   }
 
-  /// What cp reads of slices, which are of as many clusters; other methods read one or two of these.
-  template <class Ask>
-  GLINT_HD void prefetchSlices(const SlicePlaces& places, const Ask& ask) const {
-    if (ndf_.method != CompressionMethod::cp) return;
-    for (int k = 0; k < PyramidSlices::kMost; ++k)
-      if (places.weights[k] > 0) ask.prefetch(ndf_.clusters.data()[places.clusters[k]], places.slices[k]);
-  }
-
+  /// Weighted sum over slices. Those of the same cluster, as those of neighbours mostly are, share its projection.
   template <class Ask, class Part>
   GLINT_HD float sumSlices(const SlicePlaces& places, const Ask& ask, Part part) const {
+#ifdef GLINT_WIDE
+    if (hasWideVectors()) return sumSlicesWide(places, ask, part);
+#endif
+    return sumSlicesBy(places, ask, part);
+  }
+#ifdef GLINT_WIDE
+  template <class Ask, class Part>
+  GLINT_WIDE GLINT_FLATTEN float sumSlicesWide(const SlicePlaces& places, const Ask& ask, Part part) const {
+    return sumSlicesBy(places, ask.wide(), part);
+  }
+#endif
+
+  template <class Ask, class Part>
+  GLINT_HD float sumSlicesBy(const SlicePlaces& places, const Ask& ask, Part part) const {
     unsigned left = lanesAbove0(Float4::load(places.weights)) | lanesAbove0(Float4::load(places.weights + 4)) << 4;
     float sum = 0;
     while (left != 0) {
@@ -263,6 +270,14 @@ class CpNdf {
     return sum;
   }
 
+  /// A sample on its way: chooseImage, chooseBlock, findBlockSlice and choosePixel make it, in this order.
+  struct Draw;
+  GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const;
+  GLINT_HD void chooseBlock(Draw& draw) const;
+  GLINT_HD void findBlockSlice(Draw& draw) const;
+  template <class Reader>
+  GLINT_HD void choosePixel(const Reader& reader, Draw& draw) const;
+
   /// Sums of the rows of a slice and single rows of pixels: of columns, or of spots.
   template <class Reader>
   class SliceRows {
@@ -310,6 +325,8 @@ class CpNdf {
   /// @return false: another block is to be drawn with what is left of xi
   template <class Reader>
   GLINT_DEVICE_CALL GLINT_HD bool choosePixelOfBlock(const Reader& reader, bool last_try, Draw& draw) const;
+  template <class Reader>
+  GLINT_HD void choosePixelBy(const Reader& reader, Draw& draw) const;
 
   CompressedNdf ndf_;
   SliceChooser chooser_;
@@ -340,15 +357,8 @@ inline GLINT_HD CpNdf::Draw CpNdf::chooseImage(const PyramidSlices& chosen, Vec2
   if (k < 0) return draw;
   draw.possible = true;
   draw.image = imageOf(chosen[k]);
-  prefetch(ndf_.first_block.data() + draw.image);
   prefetch(ndf_.block_masks.data() + draw.image * static_cast<std::size_t>(ndf_.placeWords()));
   return draw;
-}
-
-inline GLINT_HD void CpNdf::findBlocks(const Draw& draw) const {
-  constexpr std::uint32_t kLine = 64;
-  const std::uint32_t* first = ndf_.first_block.data() + draw.image;
-  for (std::uint32_t k = first[0]; k < first[1]; k += kLine) prefetch(ndf_.block_masses.data() + k);
 }
 
 /// In proportion to its stored mass, with xi.y.
@@ -397,6 +407,14 @@ GLINT_HD bool CpNdf::choosePixelOfBlock(const Reader& reader, bool last_try, Dra
 
 template <class Reader>
 GLINT_HD void CpNdf::choosePixel(const Reader& reader, Draw& draw) const {
+#ifdef GLINT_WIDE
+  if (hasWideVectors()) return choosePixelBy(typename Reader::Wide(reader), draw);
+#endif
+  choosePixelBy(reader, draw);
+}
+
+template <class Reader>
+GLINT_HD void CpNdf::choosePixelBy(const Reader& reader, Draw& draw) const {
   constexpr int kTries = 4;
   for (int tries = 1; draw.possible && !choosePixelOfBlock(reader, tries == kTries, draw); ++tries) {
     chooseBlock(draw);
@@ -421,7 +439,7 @@ inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) cons
     choosePixel(reader, draw);
     if (draw.place.x < 0) return {};
     if (draw.block != block) places = findSlices(chosen, draw.block, ndf_.density_scales.data());
-    const float density = sumSlices(places, PixelOf<const Reader&>{reader, draw.place}, Positive{});
+    const float density = sumSlices(places, PixelOf<Reader>{reader, draw.place}, Positive{});
     return {pointInPixel(shape(), draw.place, draw.xi), density / draw.total};
   });
 }

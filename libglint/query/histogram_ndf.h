@@ -182,7 +182,8 @@ class HistogramNdf {
 
   /// Returns the area that it adds, times the weight.
   template <class Sum>
-  GLINT_DEVICE_CALL GLINT_HD double addParallelogram(Vec2 centre_uv, double ax, double ay, double bx, double by, double weight, Sum& sum) const {
+  GLINT_DEVICE_CALL GLINT_HD double addParallelogram(Vec2 centre_uv, double ax, double ay, double bx, double by, double weight,
+                                                     Sum& sum) const {
     const double x = double{wrapUnit(centre_uv.x)} * sat_.width, y = double{wrapUnit(centre_uv.y)} * sat_.height;
     if ((ay == 0 && bx == 0) || (ax == 0 && by == 0)) {
       const double rx = std::fabs(ax) + std::fabs(bx), ry = std::fabs(ay) + std::fabs(by);

@@ -9,6 +9,7 @@
 #include "glint/query/pyramid_slices.h"
 #include "glint/query/reference.h"
 #include "glint/query/sampling.h"
+#include "glint/query/wide_blocks.h"
 
 namespace glint {
 
@@ -54,7 +55,7 @@ class PyramidNdf {
     findBlocks(draw);
     prefetchIndex(draw.slices);
     chooseBlock(draw);
-    choosePixel(draw, [](const auto* pixels) { return sumRows(pixels); });
+    choosePixel(draw);
     if (draw.place.x < 0) return {};
     return {pointInPixel(shape(), draw.place, draw.xi), pixelDensity(draw.slices, draw.place)};
   }
@@ -121,14 +122,12 @@ class PyramidNdf {
     prefetchRows(static_cast<const char*>(level.pixels) + draw.stored * blockBytes(), 0, kBlockSize);
   }
 
-  /// @param sum_rows  sum_rows(pixels): sums of the rows of a block of floats or half-precision numbers
-  template <class SumRows>
-  GLINT_HD void choosePixel(Draw& draw, SumRows&& sum_rows) const {
+  GLINT_HD void choosePixel(Draw& draw) const {
     if (!(draw.chosen.weight > 0 && draw.place.block >= 0)) return;
     const PyramidLevel& level = levelOf(draw.chosen);
     const auto choose = [&](const auto* pixels) {
       const auto* block = pixels + draw.stored * kBlockPixels;
-      const int y = chooseOf16(sum_rows(block), draw.xi.y);
+      const int y = chooseOf16(rowSums(block), draw.xi.y);
       if (y >= 0) draw.place = {draw.place.block, chooseOf16(rowOf(block, y), draw.xi.x), y};
     };
     pyramid_.precision == BlockPrecision::f16 ? choose(static_cast<const std::uint16_t*>(level.pixels))
@@ -157,6 +156,10 @@ class PyramidNdf {
     /// Weighted sum of the covered pixels of some blocks.
     template <class Pixel>
     GLINT_HD float sum(const Pixel* const* blocks, const float* weights, int count) const {
+#ifdef GLINT_WIDE
+      if constexpr (std::is_same_v<Pixel, std::uint16_t>)
+        if (hasWideVectors()) return sumCoveredPixels(blocks, weights, count, columns, rows, first_row, end_row);
+#endif
       Float4 sums[kBlockSize / 4] = {Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()};
       for (int x = first_column; x < end_column; x += 4) {
         Float4 sum = Float4::zero();
@@ -185,12 +188,9 @@ class PyramidNdf {
   /// their mean stored, others sum at most 256 pixels.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     if (fromTexels(p)) return below_.mean(p, range);
-    const auto sum = [](const BlockCover& cover, const auto* const* blocks, const float* weights, int count) {
-      return cover.sum(blocks, weights, count);
-    };
     PendingMean pending;
-    beginMean(chooseSlices(p), range, sum, pending);
-    return finishMean(range, sum, pending);
+    beginMean(chooseSlices(p), range, pending);
+    return finishMean(range, pending);
   }
 
   /// Stored blocks in one place of the chosen images.
@@ -212,14 +212,12 @@ class PyramidNdf {
 
   /// Begins a mean from chosen images: finds what is stored and asks the memory for it. Ranges of more than
   /// PendingMean::kMost blocks are summed on the way.
-  /// @param sum  sum(cover, blocks, weights, count): BlockCover::sum of blocks of floats or half-precision numbers
-  template <class Sum>
-  GLINT_HD void beginMean(const PyramidSlices& chosen, const Box2& range, Sum&& sum, PendingMean& pending) const {
+  GLINT_HD void beginMean(const PyramidSlices& chosen, const Box2& range, PendingMean& pending) const {
     pending.sum = 0;
     pending.count = 0;
     if (!(range.width() > 0 && range.height() > 0)) return;
     forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
-      if (pending.count == PendingMean::kMost) addPending(sum, pending);
+      if (pending.count == PendingMean::kMost) addPending(pending);
       BlockCover& cover = pending.covers[pending.count];
       StoredBlocks& stored = pending.blocks[pending.count++];
       cover.set(box);
@@ -229,10 +227,9 @@ class PyramidNdf {
     });
   }
 
-  /// The mean that was begun with the same range and sum; 0 if the range is empty.
-  template <class Sum>
-  GLINT_HD float finishMean(const Box2& range, Sum&& sum, PendingMean& pending) const {
-    addPending(sum, pending);
+  /// The mean that was begun with the same range; 0 if the range is empty.
+  GLINT_HD float finishMean(const Box2& range, PendingMean& pending) const {
+    addPending(pending);
     const float area = areaInPixels(shape(), range);
     return area > 0 ? static_cast<float>(pending.sum / area) : 0.0f;
   }
@@ -322,15 +319,13 @@ class PyramidNdf {
     out.count = count;
   }
 
-  template <class Sum>
-  GLINT_HD void addPending(Sum&& sum, PendingMean& pending) const {
-    for (int k = 0; k < pending.count; ++k) pending.sum += double{blockSum(pending.covers[k], pending.blocks[k], sum)};
+  GLINT_HD void addPending(PendingMean& pending) const {
+    for (int k = 0; k < pending.count; ++k) pending.sum += double{blockSum(pending.covers[k], pending.blocks[k])};
     pending.count = 0;
   }
 
   /// Weighted sum of the densities of the covered pixels, in pixels.
-  template <class Sum>
-  GLINT_HD float blockSum(const BlockCover& cover, const StoredBlocks& blocks, Sum&& sum) const {
+  GLINT_HD float blockSum(const BlockCover& cover, const StoredBlocks& blocks) const {
     if (cover.isWhole()) {
       float means = 0;
       for (int k = 0; k < blocks.count; ++k) means += blocks.weights[k] * *blocks.means[k];
@@ -339,11 +334,21 @@ class PyramidNdf {
     const auto covered = [&]<class Pixel>(const Pixel*) {
       const Pixel* pixels[PyramidSlices::kMost];
       for (int k = 0; k < blocks.count; ++k) pixels[k] = static_cast<const Pixel*>(blocks.pixels[k]);
-      return sum(cover, pixels, blocks.weights, blocks.count);
+      return cover.sum(pixels, blocks.weights, blocks.count);
     };
     return pyramid_.value_scale * (pyramid_.precision == BlockPrecision::f16
                                        ? covered(static_cast<const std::uint16_t*>(nullptr))
                                        : covered(static_cast<const float*>(nullptr)));
+  }
+
+  /// Sums of the rows of a block, or 2^-112 times these: what a choice among the rows needs.
+  template <class Pixel>
+  static GLINT_HD Float16 rowSums(const Pixel* block) {
+#ifdef GLINT_WIDE
+    if constexpr (std::is_same_v<Pixel, std::uint16_t>)
+      if (hasWideVectors()) return sumRowsWide(block);
+#endif
+    return sumRows(block);
   }
 
   GLINT_HD std::size_t blockBytes() const {

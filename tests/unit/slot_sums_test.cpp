@@ -103,15 +103,15 @@ void expectAreas() {
 
 TEST(SlotSums, AddUpTexelByTexel) { expectAreas<SingleTexels>(); }
 
-#ifdef GLINT_AVX2
+#ifdef GLINT_WIDE
 TEST(SlotSums, AddUpEightTexelsAtATime) {
-  if (!WideTexels::supported()) GTEST_SKIP() << "no AVX2";
+  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
   expectAreas<WideTexels>();
 }
 
 /// Ends of any size, whose sums are rounded.
 TEST(SlotSums, AreTheSameToTheBitByEightAndByOne) {
-  if (!WideTexels::supported()) GTEST_SKIP() << "no AVX2";
+  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
   std::mt19937 random(6);
   std::uniform_real_distribution<float> end;
   for (int k = 0; k < 2000; ++k) {

@@ -1,0 +1,193 @@
+// Vectors of eight against those of four, to the bit: factors of compressed pyramids and pixels of blocks.
+#include "glint/query/wide_reader.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "glint/bake/compress.h"
+#include "glint/bake/pyramid.h"
+#include "glint/query/half.h"
+#include "glint/query/pyramid_ndf.h"
+#include "glint/query/wide_blocks.h"
+#include "support/test_maps.h"
+
+#ifdef GLINT_WIDE
+
+namespace glint {
+namespace {
+
+bake::NdfPyramidData smallPyramid(const NormalMap& map) {
+  bake::PyramidOptions o;
+  o.stride = 16;
+  o.resolution = 64;
+  o.sigma_r = 0.02f;
+  o.levels = 3;
+  return bake::buildPyramid(map, o);
+}
+
+struct Compared {
+  int columns = 0, narrow = 0;  ///< most that a cluster has
+  int slices = 0;
+};
+
+void expectEqual(const float* wide, const float* narrow, int count, const char* what) {
+  for (int k = 0; k < count; ++k) ASSERT_EQ(wide[k], narrow[k]) << what << " " << k << " of " << count;
+}
+
+/// Columns of a projection, in groups of four with zeros up to their ends.
+template <class Reader>
+std::vector<float> projectionOf(const Reader& reader, const NdfCluster& cluster, int x, int y) {
+  const ColumnLayout layout(cluster);
+  std::vector<float> projection(ColumnLayout::kMost, 7);
+  reader.pixel(cluster, layout, x, y, projection.data());
+  projection.resize(static_cast<std::size_t>(layout.half > 0 ? layout.high() + (layout.half + 3) / 4 * 4 : layout.low()));
+  return projection;
+}
+
+template <class Reader>
+void expectReadersAgree(const CompressedNdf& ndf, const Reader& reader, Compared& compared) {
+  const typename Reader::Wide wide(reader);
+  std::mt19937 random(1);
+  for (const NdfCluster& cluster : ndf.clusters) {
+    if (cluster.columns == 0 || cluster.slice_count == 0) continue;
+    compared.columns = std::max(compared.columns, int{cluster.columns});
+    compared.narrow = std::max(compared.narrow, int{cluster.narrow_columns});
+    const ColumnLayout layout(cluster);
+    for (int round = 0; round < 6; ++round) {
+      const int x = round == 0 ? 0 : static_cast<int>(random() % 16), y = round == 1 ? 0 : static_cast<int>(random() % 16);
+      const auto projection = projectionOf(reader, cluster, x, y), by_eight = projectionOf(wide, cluster, x, y);
+      expectEqual(by_eight.data(), projection.data(), static_cast<int>(projection.size()), "projection");
+      typename Reader::Row rows[4];
+      for (auto& row : rows) row = reader.row(cluster, random() % cluster.slice_count);
+      float dots[4], wide_dots[4];
+      reader.dots(projection.data(), layout, rows).store(dots);
+      wide.dots(projection.data(), layout, rows).store(wide_dots);
+      expectEqual(wide_dots, dots, 4, "dot product");
+      if (reader.asksAlone(cluster)) {
+        ASSERT_EQ(wide.valueAlone(cluster, rows[0], x, y), reader.valueAlone(cluster, rows[0], x, y));
+      }
+      float scaled[kMaxColumns], wide_scaled[kMaxColumns], sums[kBlockSize], wide_sums[kBlockSize];
+      reader.scaledCoefficients(cluster, rows[1], scaled);
+      wide.scaledCoefficients(cluster, rows[1], wide_scaled);
+      expectEqual(wide_scaled, scaled, cluster.columns, "coefficient");
+      reader.rowSums(cluster, scaled).store(sums);
+      wide.rowSums(cluster, scaled).store(wide_sums);
+      expectEqual(wide_sums, sums, kBlockSize, "sum of row");
+      reader.rowPixels(cluster, scaled, y).store(sums);
+      wide.rowPixels(cluster, scaled, y).store(wide_sums);
+      expectEqual(wide_sums, sums, kBlockSize, "pixel");
+      ++compared.slices;
+    }
+  }
+}
+
+TEST(WideReader, ReadsClustersOfAnyRank) {
+  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+  const test::OwnedMap map(100, 72, test::roughSurface(100, 72, 0.3f));
+  const bake::NdfPyramidData pyramid = smallPyramid(map.map());
+  for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
+    // Columns are taken by eights and by fours, the last ones in a group that begins before them.
+    for (const int rank : {1, 3, 4, 7, 8, 9, 13, 16}) {
+      for (const auto type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
+        SCOPED_TRACE("method " + std::to_string(int(method)) + " rank " + std::to_string(rank) + " type " +
+                     std::to_string(int(type)));
+        bake::CompressionOptions c;
+        c.method = method;
+        c.coefficient_type = type;
+        c.rank = rank;
+        c.regions = 2;
+        const bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), c);
+        Compared compared;
+        withReader(data.view(), [&](const auto& reader) { expectReadersAgree(data.view(), reader, compared); });
+        EXPECT_GE(compared.columns, std::min(rank, 8));
+        EXPECT_GT(compared.slices, 20);
+      }
+    }
+  }
+}
+
+TEST(WideReader, ReadsNarrowColumns) {
+  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+  const test::OwnedMap map(200, 144, test::synthesised(bake::SynthKind::isotropic, 200, 144, 0.25f));
+  const bake::NdfPyramidData pyramid = smallPyramid(map.map());
+  for (const auto method : {CompressionMethod::tucker, CompressionMethod::pca}) {
+    for (const double tolerance : {0.05, 0.1, 0.2}) {
+      SCOPED_TRACE("method " + std::to_string(int(method)) + " tolerance " + std::to_string(tolerance));
+      bake::CompressionOptions c;
+      c.method = method;
+      c.tolerance = tolerance;
+      const bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), c);
+      Compared compared;
+      withReader(data.view(), [&](const auto& reader) { expectReadersAgree(data.view(), reader, compared); });
+      EXPECT_GE(compared.narrow, 8);
+    }
+  }
+}
+
+/// Blocks of random pixels, in half precision and as floats.
+struct Blocks {
+  std::vector<std::uint16_t> halves = std::vector<std::uint16_t>(8 * kBlockPixels);
+  std::vector<float> floats = std::vector<float>(8 * kBlockPixels);
+
+  explicit Blocks(std::mt19937& random) {
+    for (std::size_t k = 0; k < halves.size(); ++k) {
+      halves[k] = static_cast<std::uint16_t>(random() % (random() % 4 == 0 ? 0x400 : 0x7c00));  // subnormal ones, too
+      floats[k] = halfToFloat(halves[k]);
+    }
+  }
+};
+
+TEST(WideBlocks, SumCoveredPixels) {
+  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+  std::mt19937 random(2);
+  std::uniform_real_distribution<float> unit(0, 1);
+  for (int round = 0; round < 300; ++round) {
+    const Blocks blocks(random);
+    const float x = 16 * unit(random), y = 16 * unit(random);
+    PyramidNdf::BlockCover cover;
+    cover.set({x, y, x + (16 - x) * unit(random), y + (16 - y) * unit(random)});
+    const std::uint16_t* halves[8];
+    const float* floats[8];
+    float weights[8];
+    for (int k = 0; k < 8; ++k) {
+      halves[k] = blocks.halves.data() + k * kBlockPixels;
+      floats[k] = blocks.floats.data() + k * kBlockPixels;
+      weights[k] = unit(random);
+    }
+    const int count = static_cast<int>(random() % 9);
+    ASSERT_EQ(sumCoveredPixels(halves, weights, count, cover.columns, cover.rows, cover.first_row, cover.end_row),
+              cover.sum(floats, weights, count))
+        << round;
+  }
+}
+
+TEST(WideBlocks, SumRows) {
+  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+  std::mt19937 random(3);
+  for (int round = 0; round < 100; ++round) {
+    const Blocks blocks(random);
+    float sums[kBlockSize], wide_sums[kBlockSize];
+    sumRows(blocks.floats.data()).store(sums);
+    sumRowsWide(blocks.halves.data()).store(wide_sums);
+    expectEqual(wide_sums, sums, kBlockSize, "row");
+  }
+}
+
+/// Pixels of a file are not checked.
+TEST(WideBlocks, MakeNumbersOfWhatIsNone) {
+  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+  std::vector<std::uint16_t> pixels(kBlockPixels, 0x7c00);  // infinite
+  pixels[17] = 0x7e00;                                      // no number
+  float sums[kBlockSize];
+  sumRowsWide(pixels.data()).store(sums);
+  for (const float sum : sums) EXPECT_EQ(sum, 16 * 65536.0f);
+}
+
+}  // namespace
+}  // namespace glint
+
+#endif
