@@ -4,11 +4,7 @@
 
 #include "glint/model/bin_map.h"
 #include "glint/query/bits.h"
-
-#if defined(__SSE2__) && !defined(__CUDACC__) && !defined(__CUDA__)
-#include <emmintrin.h>
-#define GLINT_TEXEL_FILTER_SSE2
-#endif
+#include "glint/query/wide.h"
 
 namespace glint {
 
@@ -17,7 +13,7 @@ struct IndexRange {
   int low = 0, high = 0;
 };
 
-/// Finds the texels of a list whose columns, rows and places are in ranges. The same with SSE2 and without.
+/// Finds the texels of a list whose columns, rows and places are in ranges: eight at a time where the processor can.
 class TexelFilter {
  public:
   static constexpr int kMostAtOnce = 64;
@@ -38,14 +34,11 @@ class TexelFilter {
   /// Bit k: texel k of `count`, at most kMostAtOnce, has the fields kFields in range.
   template <unsigned kFields>
   GLINT_HD std::uint64_t matches(const std::uint32_t* texels, int count) const {
-    std::uint64_t bits = 0;
-    int k = 0;
-#ifdef GLINT_TEXEL_FILTER_SSE2
-    for (; k + 4 <= count; k += 4) bits |= four<kFields>(texels + k) << k;
-    // The last four again: bits that are already there do not change.
-    if (count >= 4) return k < count ? bits | four<kFields>(texels + count - 4) << (count - 4) : bits;
+#ifdef GLINT_WIDE
+    if (count >= 8 && hasWideVectors()) return matchesWide<kFields>(texels, count);
 #endif
-    for (; k < count; ++k) bits |= one<kFields>(texels[k]) << k;
+    std::uint64_t bits = 0;
+    for (int k = 0; k < count; ++k) bits |= one<kFields>(texels[k]) << k;
     return bits;
   }
 
@@ -82,20 +75,29 @@ class TexelFilter {
     return outside < 0 ? 0 : 1;
   }
 
-#ifdef GLINT_TEXEL_FILTER_SSE2
+#ifdef GLINT_WIDE
   template <unsigned kFields>
-  std::uint64_t four(const std::uint32_t* texels) const {
-    const __m128i loaded = _mm_loadu_si128(reinterpret_cast<const __m128i*>(texels));
-    __m128i outside = _mm_setzero_si128();
+  GLINT_WIDE std::uint64_t matchesWide(const std::uint32_t* texels, int count) const {
+    std::uint64_t bits = 0;
+    int k = 0;
+    for (; k + 8 <= count; k += 8) bits |= eight<kFields>(texels + k) << k;
+    // The last eight again: bits that are already there do not change.
+    return k < count ? bits | eight<kFields>(texels + count - 8) << (count - 8) : bits;
+  }
+
+  template <unsigned kFields>
+  GLINT_WIDE std::uint64_t eight(const std::uint32_t* texels) const {
+    const __m256i loaded = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(texels));
+    __m256i outside = _mm256_setzero_si256();
     for (int k = 0; k < 4; ++k) {
       if ((kFields >> k & 1) == 0) continue;
       const Field& f = fields_[k];
-      const __m128i value =
-          _mm_and_si128(_mm_srl_epi32(loaded, _mm_cvtsi32_si128(f.shift)), _mm_set1_epi32(static_cast<int>(f.mask)));
-      outside = _mm_or_si128(outside, _mm_or_si128(_mm_sub_epi32(value, _mm_set1_epi32(f.low)),  //
-                                                   _mm_sub_epi32(_mm_set1_epi32(f.high), value)));
+      const __m256i value =
+          _mm256_and_si256(_mm256_srl_epi32(loaded, _mm_cvtsi32_si128(f.shift)), _mm256_set1_epi32(static_cast<int>(f.mask)));
+      outside = _mm256_or_si256(outside, _mm256_or_si256(_mm256_sub_epi32(value, _mm256_set1_epi32(f.low)),
+                                                         _mm256_sub_epi32(_mm256_set1_epi32(f.high), value)));
     }
-    return static_cast<std::uint64_t>(~_mm_movemask_ps(_mm_castsi128_ps(outside)) & 15);
+    return static_cast<std::uint64_t>(~_mm256_movemask_ps(_mm256_castsi256_ps(outside)) & 255);
   }
 #endif
 
