@@ -24,8 +24,7 @@ if(CMAKE_BUILD_TYPE STREQUAL "Debug")
 endif()
 
 # Our own programs may use POPCNT and SSE4.2, which every x86 processor has had since 2009; kernels for newer ones are chosen at
-# run time. The query headers take whatever the including program is compiled for, but for lists of bin maps, which look for AVX2
-# at run time.
+# run time. The query headers take whatever the including program is compiled for, and look for AVX2 at run time.
 set(GLINT_ARCH "x86-64-v2" CACHE STRING "-march of the programs and libraries on x86-64")
 if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   add_compile_options($<$<COMPILE_LANGUAGE:C,CXX>:-march=${GLINT_ARCH}>)

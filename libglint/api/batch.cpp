@@ -1,7 +1,6 @@
 #include "glint/api/batch.h"
 
 #include <algorithm>
-#include <type_traits>
 
 #include "glint/api/batch_slices.h"
 #include "glint/api/multiversion.h"

@@ -185,8 +185,7 @@ typedef struct glint_footprints {
 GLINT_API glint_status glint_density_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints,
                                            glint_floats hx, glint_floats hy, float* densities);
 
-/* means[k] = glint_mean of query k, to 1e-6 of 1 + its size, since the terms of compressed pyramids may cancel. Else as
- * glint_density_batch. */
+/* means[k] = glint_mean of query k. Else as glint_density_batch. */
 GLINT_API glint_status glint_mean_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints, glint_floats x0,
                                         glint_floats y0, glint_floats x1, glint_floats y1, float* means);
 

@@ -126,7 +126,7 @@ class ClusterReader {
   /// Whether a slice is as quickly asked by itself as with a projection that others share. Then nothing branches on whether
   /// neighbours are of one cluster.
   GLINT_HD bool asksAlone(const NdfCluster& cluster) const {
-    return isOf(CompressionMethod::cp) && cluster.narrow_columns == 0;
+    return isOf(CompressionMethod::cp) && cluster.narrow_columns == 0 && cluster.columns > 0;
   }
 
   /// Asks the memory for what valueAlone reads.

@@ -14,20 +14,22 @@
 
 namespace glint {
 
-/// Whether this processor has what functions that are marked GLINT_WIDE need.
-inline bool hasWideVectors() {
-#if defined(__AVX2__) && defined(__F16C__)
-  return true;
-#else
-  return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("f16c") != 0;
-#endif
-}
+/// Whether this processor has what functions that are marked GLINT_WIDE need: all that have AVX2 have F16C, which clang cannot
+/// be asked for before version 18. Never decided by how a source is compiled: the linker keeps one copy for all of a program.
+inline bool hasWideVectors() { return __builtin_cpu_supports("avx2") != 0; }
 
-/// Eight numbers as floats.
+/// p[0] to p[7] as floats.
 GLINT_WIDE inline __m256 loadEight(const float* p) { return _mm256_loadu_ps(p); }
+/// Eight half-precision numbers, from the bits of a file, which may be anything: like halfToFloat, makes finite numbers of what
+/// is none.
+GLINT_WIDE inline __m256 floatsOf(__m128i halves) {
+  constexpr float kLimit = 65536;
+  const __m256 known = _mm256_max_ps(_mm256_cvtph_ps(halves), _mm256_set1_ps(-kLimit));  // no number: the second one
+  return _mm256_min_ps(known, _mm256_set1_ps(kLimit));
+}
 /// Half-precision numbers.
 GLINT_WIDE inline __m256 loadEight(const std::uint16_t* p) {
-  return _mm256_cvtph_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
+  return floatsOf(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
 }
 GLINT_WIDE inline __m256i integersOf(const std::int8_t* p) {
   return _mm256_cvtepi8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));

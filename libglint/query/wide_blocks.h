@@ -7,9 +7,9 @@
 
 namespace glint {
 
-// Blocks of pixels of half precision, [16][16], which may be anything in a file: what is infinite or no number becomes 2^16, as
-// halfToFloat makes numbers of them, too.
-GLINT_WIDE inline __m256 loadPixelsWide(const std::uint16_t* p) { return _mm256_min_ps(loadEight(p), _mm256_set1_ps(65536)); }
+// Blocks of pixels of half precision, [16][16], all >= 0. In a file they may be anything: what is not is taken as 0, or as a
+// large number.
+GLINT_WIDE inline __m256 loadPixelsWide(const std::uint16_t* p) { return _mm256_max_ps(loadEight(p), _mm256_setzero_ps()); }
 
 /// Weighted sum of the pixels of some blocks by how much of their columns and rows is covered, to the bit that of
 /// PyramidNdf::BlockCover::sum.

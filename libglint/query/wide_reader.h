@@ -192,8 +192,8 @@ class WideReader : public ClusterReader<Basis, Coefficient> {
   }
   GLINT_WIDE static __m256 loadTwo(const std::int8_t* a, const std::int8_t* b) { return _mm256_cvtepi32_ps(bytesOf(a, b)); }
   GLINT_WIDE static __m256 loadTwo(const std::uint16_t* a, const std::uint16_t* b) {
-    return _mm256_cvtph_ps(_mm_unpacklo_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(a)),
-                                              _mm_loadl_epi64(reinterpret_cast<const __m128i*>(b))));
+    return floatsOf(_mm_unpacklo_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(a)),
+                                       _mm_loadl_epi64(reinterpret_cast<const __m128i*>(b))));
   }
   GLINT_WIDE static __m256 loadTwo(const float* a, const float* b) {
     return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(a)), _mm_loadu_ps(b), 1);

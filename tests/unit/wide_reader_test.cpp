@@ -3,13 +3,14 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
+#include <cmath>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "glint/bake/compress.h"
 #include "glint/bake/pyramid.h"
+#include "glint/query/cp_ndf.h"
 #include "glint/query/half.h"
 #include "glint/query/pyramid_ndf.h"
 #include "glint/query/wide_blocks.h"
@@ -31,7 +32,7 @@ bake::NdfPyramidData smallPyramid(const NormalMap& map) {
 
 struct Compared {
   int columns = 0, narrow = 0;  ///< most that a cluster has
-  int slices = 0;
+  int slices = 0, alone = 0;
 };
 
 void expectEqual(const float* wide, const float* narrow, int count, const char* what) {
@@ -68,6 +69,7 @@ void expectReadersAgree(const CompressedNdf& ndf, const Reader& reader, Compared
       wide.dots(projection.data(), layout, rows).store(wide_dots);
       expectEqual(wide_dots, dots, 4, "dot product");
       if (reader.asksAlone(cluster)) {
+        ++compared.alone;
         ASSERT_EQ(wide.valueAlone(cluster, rows[0], x, y), reader.valueAlone(cluster, rows[0], x, y));
       }
       float scaled[kMaxColumns], wide_scaled[kMaxColumns], sums[kBlockSize], wide_sums[kBlockSize];
@@ -105,6 +107,7 @@ TEST(WideReader, ReadsClustersOfAnyRank) {
         withReader(data.view(), [&](const auto& reader) { expectReadersAgree(data.view(), reader, compared); });
         EXPECT_GE(compared.columns, std::min(rank, 8));
         EXPECT_GT(compared.slices, 20);
+        EXPECT_EQ(compared.alone > 0, method == CompressionMethod::cp);
       }
     }
   }
@@ -177,14 +180,49 @@ TEST(WideBlocks, SumRows) {
   }
 }
 
-/// Pixels of a file are not checked.
+/// Values of a file are not checked when it is opened.
+constexpr std::uint16_t kNoNumbers[] = {0x7c00, 0xfc00, 0x7e00, 0xfe00};
+
 TEST(WideBlocks, MakeNumbersOfWhatIsNone) {
   if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
-  std::vector<std::uint16_t> pixels(kBlockPixels, 0x7c00);  // infinite
-  pixels[17] = 0x7e00;                                      // no number
-  float sums[kBlockSize];
-  sumRowsWide(pixels.data()).store(sums);
-  for (const float sum : sums) EXPECT_EQ(sum, 16 * 65536.0f);
+  for (const std::uint16_t bits : kNoNumbers) {
+    const std::vector<std::uint16_t> pixels(kBlockPixels, bits);
+    float sums[kBlockSize];
+    sumRowsWide(pixels.data()).store(sums);
+    for (const float sum : sums) EXPECT_TRUE(sum >= 0 && sum <= 16 * 65536.0f) << bits;
+    PyramidNdf::BlockCover cover;
+    cover.set({3.5f, 2, 9, 7.25f});
+    const std::uint16_t* block = pixels.data();
+    const float weight = 1, sum = cover.sum(&block, &weight, 1);
+    EXPECT_TRUE(sum >= 0 && sum <= 256 * 65536.0f) << bits;
+  }
+}
+
+TEST(WideReader, MakesNumbersOfWhatIsNone) {
+  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+  const test::OwnedMap map(100, 72, test::roughSurface(100, 72, 0.3f));
+  const bake::NdfPyramidData pyramid = smallPyramid(map.map());
+  for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
+    bake::CompressionOptions c;
+    c.method = method;
+    c.coefficient_type = CoefficientType::f16;
+    c.rank = 9;
+    const bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), c);
+    CompressedNdf ndf = data.view();
+    for (const std::uint16_t bits : kNoNumbers) {
+      const std::vector<std::uint16_t> coefficients(1 << 20, bits);
+      ndf.coefficients = coefficients.data();
+      const CpNdf model(ndf);
+      for (int k = 0; k < 50; ++k) {
+        const float t = 0.02f * static_cast<float>(k);
+        const Footprint p = Footprint::isotropic({t, 0.5f}, 8);
+        const Vec2 h = {0.6f * t - 0.3f, 0.1f};
+        ASSERT_TRUE(std::isfinite(model.density(p, h))) << bits;
+        ASSERT_TRUE(std::isfinite(model.mean(p, {h, {h.x + 0.1f, h.y + 0.1f}}))) << bits;
+        ASSERT_TRUE(std::isfinite(model.sample(p, {t, 0.5f}).pdf)) << bits;
+      }
+    }
+  }
 }
 
 }  // namespace
