@@ -7,7 +7,6 @@
 #include "glint/query/bits.h"
 
 namespace glint::api {
-
 namespace {
 
 constexpr int kSlices = PyramidSlices::kMost;

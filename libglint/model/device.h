@@ -11,7 +11,7 @@
 
 /// Marks a function that device code calls, not inlines: copies of it wherever it is called would make kernels of a hundred
 /// thousand instructions, which nvcc takes minutes to compile.
-#if defined(__CUDACC__) || defined(__CUDA__)
+#if defined(__CUDA_ARCH__)
 #define GLINT_DEVICE_CALL [[gnu::noinline]]
 #define GLINT_HOST_INLINE GLINT_DEVICE_CALL
 #else

@@ -107,7 +107,7 @@ class ClusterReader {
   GLINT_HOST_INLINE GLINT_HD void pixel(const NdfCluster& cluster, const ColumnLayout& layout, int x, int y,
                                         float* projection) const {
     const Basis* basis = first(cluster);
-    const float* scales = ndf_.scales.data() + cluster.first_scale;
+    const float* scales = scalesOf(cluster);
     const int columns = cluster.columns;
     if (isOf(CompressionMethod::cp)) {
       const Axis along_x(basis, columns, x), along_y(basis + kBlockSize * columns, columns, y);
@@ -166,23 +166,7 @@ class ClusterReader {
       sumAlongAxis(basis + kBlockSize * columns, columns, b.y0, b.y1, along_y);
       for (int k = 0; k < columns; ++k) along_x[k] *= along_y[k];
     }
-    layout.arrange(ndf_.scales.data() + cluster.first_scale, ColumnValues{along_x}, projection);
-  }
-
-  /// pca: calls visitor(row, weight) for the rows of 2D prefix sums [16][16][columns] that make up the sums over a box:
-  /// bilinear between the nearest at each corner.
-  template <class Visitor>
-  static GLINT_HD void forEachPrefix(const Basis* prefix, int columns, const BlockBox& box, Visitor&& visitor) {
-    for (int end = 0; end < 4; ++end) {
-      const float x = end & 1 ? box.x0 : box.x1, y = end & 2 ? box.y0 : box.y1, sign = end == 0 || end == 3 ? 1.0f : -1.0f;
-      const int px = std::min(static_cast<int>(x), kBlockSize - 1), py = std::min(static_cast<int>(y), kBlockSize - 1);
-      const float fx = x - static_cast<float>(px), fy = y - static_cast<float>(py);
-      for (int corner = 0; corner < 4; ++corner) {
-        const int cx = px - 1 + (corner & 1), cy = py - 1 + (corner >> 1);
-        const float weight = sign * (corner & 1 ? fx : 1 - fx) * (corner & 2 ? fy : 1 - fy);
-        if (weight != 0 && cx >= 0 && cy >= 0) visitor(prefix + (cy * kBlockSize + cx) * columns, weight);
-      }
-    }
+    layout.arrange(scalesOf(cluster), ColumnValues{along_x}, projection);
   }
 
   /// Dot product of a projection with the coefficients of a slice.
@@ -202,7 +186,7 @@ class ClusterReader {
 
   /// scaled = coefficients of a slice times the scales of their columns, in the order of columns.
   GLINT_DEVICE_CALL GLINT_HD void scaledCoefficients(const NdfCluster& cluster, Row c, float* scaled) const {
-    const float* scales = ndf_.scales.data() + cluster.first_scale;
+    const float* scales = scalesOf(cluster);
     const ColumnLayout layout(cluster);
     int k = 0;
     for (; k + 4 <= layout.wide; k += 4) (Float4::load(scales + k) * Float4::load(c + k)).store(scaled + k);
@@ -231,7 +215,7 @@ class ClusterReader {
     valuesOfAxis(first(cluster) + kBlockSize * rx, ry, along_y);
     float weights[kMaxColumns * kBlockSize];  // [rank_x][16]: of the functions of x in each row
     if (!cp) std::fill(weights, weights + rx * kBlockSize, 0.0f);
-    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
+    const std::uint8_t* core = coreOf(cluster);
     for (int k = 0; k < cluster.columns; ++k) {
       const int a = cp ? k : core[k] % kBlockSize, b = cp ? k : core[k] / kBlockSize;
       for (int y = 0; y < kBlockSize; y += 4) {
@@ -264,6 +248,22 @@ class ClusterReader {
 
   GLINT_HD const float* scalesOf(const NdfCluster& cluster) const { return ndf_.scales.data() + cluster.first_scale; }
   GLINT_HD const std::uint8_t* coreOf(const NdfCluster& cluster) const { return ndf_.core.data() + cluster.first_scale; }
+
+  /// pca: calls visitor(row, weight) for the rows of 2D prefix sums [16][16][columns] that make up the sums over a box:
+  /// bilinear between the nearest at each corner.
+  template <class Visitor>
+  static GLINT_HD void forEachPrefix(const Basis* prefix, int columns, const BlockBox& box, Visitor&& visitor) {
+    for (int end = 0; end < 4; ++end) {
+      const float x = end & 1 ? box.x0 : box.x1, y = end & 2 ? box.y0 : box.y1, sign = end == 0 || end == 3 ? 1.0f : -1.0f;
+      const int px = std::min(static_cast<int>(x), kBlockSize - 1), py = std::min(static_cast<int>(y), kBlockSize - 1);
+      const float fx = x - static_cast<float>(px), fy = y - static_cast<float>(py);
+      for (int corner = 0; corner < 4; ++corner) {
+        const int cx = px - 1 + (corner & 1), cy = py - 1 + (corner >> 1);
+        const float weight = sign * (corner & 1 ? fx : 1 - fx) * (corner & 2 ? fy : 1 - fy);
+        if (weight != 0 && cx >= 0 && cy >= 0) visitor(prefix + (cy * kBlockSize + cx) * columns, weight);
+      }
+    }
+  }
 
   /// valueAlone from column k on. `sum` has the columns before.
   template <class Values>
@@ -363,8 +363,7 @@ class ClusterReader {
       const Float4 y = Float4::all(along_y[b]);
       for (int a = 0; a < cluster.rank_x; a += 4) (y * Float4::load(along_x + a)).store(products + b * kBlockSize + a);
     }
-    layout.arrange(ndf_.scales.data() + cluster.first_scale, CorePairs{ndf_.core.data() + cluster.first_scale, products},
-                   projection);
+    layout.arrange(scalesOf(cluster), CorePairs{coreOf(cluster), products}, projection);
   }
 
   static GLINT_HD float value(Coefficient c) {
@@ -408,29 +407,46 @@ class ClusterReader {
   struct ColumnWeights {
     const float* weights;  ///< of `whole` columns
     int whole;
-    // Of columns [last_at, last_at + 8), as far as `kept` is 1 and not 0; nullptr: nothing is left.
-    const float *last, *kept;
-    int last_at;
+    // Of columns [last_at, last_at + 8), but for the first `counted`; nullptr: no more.
+    const float* last;
+    int last_at, counted;
   };
 
   /// Lane t: sum over k of weights[k] * prefix[t * stride + k].
   /// @param four_rows  FourRows, or what has the same results
   template <class Rows>
   static GLINT_HD Float16 weighPrefixes(const Basis* prefix, int stride, int columns, const float* weights, Rows four_rows) {
-    static constexpr float kept[16] = {0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
+    if (columns < 4) return weighFew(prefix, stride, columns, weights);
     Float16 sums;
     if (columns < 8) {  // reads what is around a row, but nothing around the block
       float first[8] = {}, last[8] = {};
       for (int k = 0; k < columns; ++k) first[k] = last[8 - columns + k] = weights[k];
       for (int k = 0; k < 4; ++k)
         sums.v[k] = four_rows(prefix + 4 * k * stride, stride,
-                              ColumnWeights{weights, 0, k < 2 ? first : last, kept + 8, k < 2 ? 0 : columns - 8});
+                              ColumnWeights{weights, 0, k < 2 ? first : last, k < 2 ? 0 : columns - 8, 0});
       return sums;
     }
     const int rest = columns % 8, last_at = columns - 8;
-    const ColumnWeights all = {weights, columns - rest, rest > 0 ? weights + last_at : nullptr, kept + rest, last_at};
+    const ColumnWeights all = {weights, columns - rest, rest > 0 ? weights + last_at : nullptr, last_at, 8 - rest};
     for (int k = 0; k < 4; ++k) sums.v[k] = four_rows(prefix + 4 * k * stride, stride, all);
     return sums;
+  }
+
+  /// The same for less than four columns.
+  static GLINT_HD Float16 weighFew(const Basis* prefix, int stride, int columns, const float* weights) {
+    float w[3] = {};
+    for (int k = 0; k < columns; ++k) w[k] = weights[k];
+    const Float4 head = Float4::of(w[0], w[1], w[2], 0);
+    const Float4 tail = columns == 1   ? Float4::of(0, 0, 0, w[0])
+                        : columns == 2 ? Float4::of(0, 0, w[0], w[1])
+                                       : Float4::of(0, w[0], w[1], w[2]);
+    const auto four = [&](const Basis* at, Float4 each) {
+      return sumsOf(each * Float4::load(at), each * Float4::load(at + stride), each * Float4::load(at + 2 * stride),
+                    each * Float4::load(at + 3 * stride));
+    };
+    // Reads what is around a row, but nothing around the block.
+    return {{four(prefix, head), four(prefix + 4 * stride, head), four(prefix + 8 * stride, head),
+             four(prefix + 12 * stride + columns - 4, tail)}};
   }
 
   /// Weighted sums of the columns of four rows: each in eight lanes first, which two groups of four hold.
@@ -444,9 +460,11 @@ class ClusterReader {
           high[j] = high[j] + w1 * Float4::load(at + j * stride + 4);
         }
       };
-      if (columns.last != nullptr)
-        add(Float4::load(columns.last) * Float4::load(columns.kept),
-            Float4::load(columns.last + 4) * Float4::load(columns.kept + 4), prefix + columns.last_at);
+      if (columns.last != nullptr) {
+        const Float4 counted = Float4::all(static_cast<float>(columns.counted) - 0.5f);
+        add(whereLess(counted, Float4::of(0, 1, 2, 3), Float4::load(columns.last)),
+            whereLess(counted, Float4::of(4, 5, 6, 7), Float4::load(columns.last + 4)), prefix + columns.last_at);
+      }
       for (int k = 0; k < columns.whole; k += 8)
         add(Float4::load(columns.weights + k), Float4::load(columns.weights + k + 4), prefix + k);
       return sumsOf(low[0] + high[0], low[1] + high[1], low[2] + high[2], low[3] + high[3]);
@@ -475,7 +493,7 @@ class ClusterReader {
       return weigh(basis + kBlockSize * columns, columns, columns, weights).differences();
     }
     const int rx = cluster.rank_x, ry = cluster.rank_y;
-    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
+    const std::uint8_t* core = coreOf(cluster);
     float along_x[kBlockSize];
     for (int a = 0; a < rx; ++a) along_x[a] = static_cast<float>(basis[kLast * rx + a]);
     std::fill(weights, weights + kBlockSize, 0.0f);
@@ -500,7 +518,7 @@ class ClusterReader {
       return weigh(basis, columns, columns, weights).differences().positive();
     }
     const int rx = cluster.rank_x, ry = cluster.rank_y;
-    const std::uint8_t* core = ndf_.core.data() + cluster.first_scale;
+    const std::uint8_t* core = coreOf(cluster);
     float along_y[kBlockSize];
     Axis(basis + kBlockSize * rx, ry, y).store(along_y);
     std::fill(weights, weights + kBlockSize, 0.0f);

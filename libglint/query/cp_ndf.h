@@ -37,7 +37,6 @@ class CpNdf {
   GLINT_HD const PyramidShape& shape() const { return ndf_.shape; }
   /// Whether this footprint is answered from the texels.
   GLINT_HD bool fromTexels(const Footprint& p) const { return hasNormals() && belowFinest(shape(), p); }
-  GLINT_HD const SliceChooser& chooser() const { return chooser_; }
 
   /// Density towards h, >= 0; O(columns) in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {

@@ -160,6 +160,11 @@ class PyramidNdf {
       if constexpr (std::is_same_v<Pixel, std::uint16_t>)
         if (hasWideVectors()) return sumCoveredPixels(blocks, weights, count, columns, rows, first_row, end_row);
 #endif
+      return sumByFour(blocks, weights, count);
+    }
+    /// The same without vectors of eight.
+    template <class Pixel>
+    GLINT_HD float sumByFour(const Pixel* const* blocks, const float* weights, int count) const {
       Float4 sums[kBlockSize / 4] = {Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()};
       for (int x = first_column; x < end_column; x += 4) {
         Float4 sum = Float4::zero();

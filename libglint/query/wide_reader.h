@@ -7,7 +7,8 @@
 
 namespace glint {
 
-/// ClusterReader eight columns at a time, with the same results to the bit where no product and sum are fused.
+/// ClusterReader eight columns at a time, with the same results to the bit where no product and sum are fused. What it has of
+/// its own does what is named alike there, and reads no further.
 template <class Basis, class Coefficient>
 class WideReader : public ClusterReader<Basis, Coefficient> {
   using Base = ClusterReader<Basis, Coefficient>;
@@ -21,7 +22,8 @@ class WideReader : public ClusterReader<Basis, Coefficient> {
     const float* scales = this->scalesOf(cluster);
     const int columns = cluster.columns;
     if (this->isOf(CompressionMethod::cp)) {
-      layout.arrange(scales, Products{{basis, columns, x}, {basis + kBlockSize * columns, columns, y}}, projection);
+      const Axis along_x(basis, columns, x), along_y(basis + kBlockSize * columns, columns, y);
+      layout.arrange(scales, Products{{along_x, along_y}}, projection);
     } else if (this->isOf(CompressionMethod::tucker)) {
       const int rx = cluster.rank_x, ry = cluster.rank_y;
       float along_x[kBlockSize] = {}, along_y[kBlockSize] = {};
@@ -29,7 +31,7 @@ class WideReader : public ClusterReader<Basis, Coefficient> {
       Axis(basis + kBlockSize * rx, ry, y).store(along_y);
       layout.arrange(scales, CorePairs{this->coreOf(cluster), along_x, along_y}, projection);
     } else {
-      layout.arrange(scales, Image(basis, columns, x, y), projection);
+      layout.arrange(scales, Image{{basis, columns, x, y}}, projection);
     }
   }
 
@@ -37,7 +39,8 @@ class WideReader : public ClusterReader<Basis, Coefficient> {
     const Basis* basis = this->first(cluster);
     const float* scales = this->scalesOf(cluster);
     const int columns = cluster.columns;
-    const Products products{{basis, columns, x}, {basis + kBlockSize * columns, columns, y}};
+    const Axis along_x(basis, columns, x), along_y(basis + kBlockSize * columns, columns, y);
+    const Products products{{along_x, along_y}};
     Float4 sum = Float4::zero();
     int k = 0;
     for (; k + 8 <= columns; k += 8) {
@@ -96,8 +99,11 @@ class WideReader : public ClusterReader<Basis, Coefficient> {
   struct FourRows {
     GLINT_WIDE Float4 operator()(const Basis* prefix, int stride, const typename Base::ColumnWeights& columns) const {
       __m256 sums[4] = {_mm256_setzero_ps(), _mm256_setzero_ps(), _mm256_setzero_ps(), _mm256_setzero_ps()};
-      if (columns.last != nullptr)
-        add(_mm256_mul_ps(loadEight(columns.last), loadEight(columns.kept)), prefix + columns.last_at, stride, sums);
+      if (columns.last != nullptr) {
+        const __m256 counted = _mm256_set1_ps(static_cast<float>(columns.counted) - 0.5f);
+        const __m256 left = _mm256_cmp_ps(counted, _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _CMP_LT_OQ);
+        add(_mm256_and_ps(left, loadEight(columns.last)), prefix + columns.last_at, stride, sums);
+      }
       for (int k = 0; k < columns.whole; k += 8) add(loadEight(columns.weights + k), prefix + k, stride, sums);
       return sumsOf(halves(sums[0]), halves(sums[1]), halves(sums[2]), halves(sums[3]));
     }
@@ -107,7 +113,7 @@ class WideReader : public ClusterReader<Basis, Coefficient> {
     GLINT_WIDE static Float4 halves(__m256 a) { return lowFour(a) + highFour(a); }
   };
 
-  /// Base::WeighPrefixes. Once for all callers: the compiler would take minutes for copies in each of them.
+  /// Base::WeighPrefixes. Once for all callers: with copies in each of them a source takes twice as long to compile.
   struct WeighPrefixes {
     [[gnu::noinline]] GLINT_WIDE GLINT_FLATTEN Float16 operator()(const Basis* prefix, int stride, int columns,
                                                                   const float* weights) const {
@@ -115,35 +121,24 @@ class WideReader : public ClusterReader<Basis, Coefficient> {
     }
   };
 
-  struct Axis : Base::Axis {
-    GLINT_WIDE Axis(const Basis* prefix, int columns, int pixel) : Base::Axis(prefix, columns, pixel) {}
-    GLINT_WIDE __m256 eight(int k) const { return difference(this->at + k, this->before + k, this->inner); }
-  };
+  using Axis = typename Base::Axis;
+  /// Columns k to k + 7 at the pixel.
+  GLINT_WIDE static __m256 eight(const Axis& axis, int k) { return difference(axis.at + k, axis.before + k, axis.inner); }
 
-  /// Values of columns for ColumnLayout::arrange, `scaled` eight at once.
-  struct Products {
-    GLINT_WIDE float one(int k) const { return x.one(k) * y.one(k); }
-    GLINT_WIDE Float4 four(int k) const { return x.four(k) * y.four(k); }
-    GLINT_WIDE __m256 eight(int k) const { return _mm256_mul_ps(x.eight(k), y.eight(k)); }
+  // Values of columns for ColumnLayout::arrange, `scaled` eight at once.
+
+  struct Products : Base::Products {
+    GLINT_WIDE __m256 eight(int k) const { return _mm256_mul_ps(WideReader::eight(this->x, k), WideReader::eight(this->y, k)); }
     GLINT_WIDE void scaled(const float* scales, int k, float* to) const {
       store(to, _mm256_mul_ps(loadEight(scales + k), eight(k)));
     }
-    Axis x, y;
   };
 
-  struct Image {
-    GLINT_WIDE Image(const Basis* prefix, int columns, int x, int y)
-        : here(prefix + y * kBlockSize * columns, columns, x),
-          below(prefix + (y > 0 ? y - 1 : 0) * kBlockSize * columns, columns, x),
-          inner(y > 0) {}
-    GLINT_WIDE float one(int k) const { return here.one(k) - (inner ? below.one(k) : 0.0f); }
-    GLINT_WIDE Float4 four(int k) const { return inner ? here.four(k) - below.four(k) : here.four(k); }
+  struct Image : Base::Image {
     GLINT_WIDE void scaled(const float* scales, int k, float* to) const {
-      const __m256 value = inner ? _mm256_sub_ps(here.eight(k), below.eight(k)) : here.eight(k);
-      store(to, _mm256_mul_ps(loadEight(scales + k), value));
+      const __m256 at = eight(this->here, k);
+      store(to, _mm256_mul_ps(loadEight(scales + k), this->inner ? _mm256_sub_ps(at, eight(this->below, k)) : at));
     }
-    Axis here, below;
-    bool inner;
   };
 
   struct CorePairs {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "glint/bake/compress.h"
-#include "glint/bake/pyramid.h"
 #include "support/sample_assets.h"
+#include "support/small_pyramid.h"
 #include "support/test_maps.h"
 
 namespace glint {
@@ -138,18 +138,9 @@ TEST(Batch, DensitiesOfCompressedPyramidsAreThoseOfSingleQueries) {
   }
 }
 
-bake::NdfPyramidData smallPyramid(const NormalMap& map) {
-  bake::PyramidOptions o;
-  o.stride = 16;
-  o.resolution = 64;
-  o.sigma_r = 0.02f;
-  o.levels = 3;
-  return bake::buildPyramid(map, o);
-}
-
 TEST(Batch, WhatEmptyClustersSayIsNotFollowed) {
   const test::OwnedMap map(96, 64, test::synthesised(bake::SynthKind::flakes, 96, 64, 0.25f));
-  const bake::NdfPyramidData pyramid = smallPyramid(map.map());
+  const bake::NdfPyramidData pyramid = test::smallPyramid(map.map());
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     bake::CompressionOptions c;
     c.method = method;
