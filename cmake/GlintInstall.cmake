@@ -25,6 +25,7 @@ foreach(room libglint/model libglint/query libglint/api formats)
   endforeach()
 endforeach()
 install(FILES ${PROJECT_SOURCE_DIR}/libglint/api/glint.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/formats/SPEC.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 # pkg-config files name their folder relative to their own, so that the prefix may be moved.
 file(RELATIVE_PATH pc_to_prefix /prefix/${CMAKE_INSTALL_LIBDIR}/pkgconfig /prefix)

@@ -2,38 +2,66 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "common/files.h"
 #include "glint/bake/reference_image.h"
 
 namespace glint::apps {
 
-NdfAsset::NdfAsset(Tool& tool) {
+NdfAsset::NdfAsset(Tool& tool) : tool_(tool) {
   tool.option("ASSET", path_, "asset of kind normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat or displacement").required();
-  tool.option("--normals", normals_path_,
-              "asset of kind normals that the pyramid was made from, for footprints below its finest level");
-  tool.choice("--surface", options_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
-              "how normals behave between texels (kind normals)");
-  tool.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
-              "beyond the border of the map (kind normals)");
-  tool.option("--sigma-r", options_.sigma_r, "intrinsic roughness, disk units (kind normals; histogram-sat with --light)")
-      .range(1e-4, 0.25);
-  tool.option("--alpha", options_.alpha, "Beckmann roughness, in the range of the asset (kind bin-map)")
-      .range(1e-4, 1)
-      .defaultText("the smallest of the asset");
-  tool.choice("--gaussian-boxes", options_.gaussian_boxes, {{"1", GaussianBoxes::one}, {"3", GaussianBoxes::three}},
-              "boxes that stand for a Gaussian footprint (kind histogram-sat)");
-  tool.option("--slant-tolerance", options_.slant_tolerance,
-              "share of a footprint with slanted sides that may be misplaced; 0: exact, and slower (kind histogram-sat)")
-      .range(0, 1);
+  const std::vector<std::string> normals = {"normals"}, pyramids = {"ndf-pyramid", "ndf-cp"}, histograms = {"histogram-sat"};
+  useOnly(pyramids, "--normals",
+          tool.option("--normals", normals_path_,
+                      "asset of kind normals that the pyramid was made from, for footprints below its finest level"));
+  useOnly(pyramids, "--parts",
+          tool.option("--parts", options_.footprint_parts,
+                      "most round footprints that stand for a stretched one; 1: one of the same mean square size (kinds "
+                      "ndf-pyramid and ndf-cp)")
+              .range(1, IsotropicParts::kMost));
+  useOnly(normals, "--surface",
+          tool.choice("--surface", options_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
+                      "how normals behave between texels (kind normals)"));
+  useOnly(normals, "--boundary",
+          tool.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
+                      "beyond the border of the map (kind normals)"));
+  useOnly(
+      {"normals", "histogram-sat"}, "--sigma-r",
+      tool.option("--sigma-r", options_.sigma_r, "intrinsic roughness, disk units (kind normals; histogram-sat with --light)")
+          .range(1e-4, 0.25));
+  useOnly({"bin-map"}, "--alpha",
+          tool.option("--alpha", options_.alpha, "Beckmann roughness, in the range of the asset (kind bin-map)")
+              .range(1e-4, 1)
+              .defaultText("the smallest of the asset"));
+  useOnly(histograms, "--gaussian-boxes",
+          tool.choice("--gaussian-boxes", options_.gaussian_boxes, {{"1", GaussianBoxes::one}, {"3", GaussianBoxes::three}},
+                      "boxes that stand for a Gaussian footprint (kind histogram-sat)"));
+  useOnly(
+      histograms, "--slant-tolerance",
+      tool.option("--slant-tolerance", options_.slant_tolerance,
+                  "share of a footprint with slanted sides that may be misplaced; 0: exact, and slower (kind histogram-sat)")
+          .range(0, 1));
   tool.addCheck([this] {
     checkReadable(path_);
-    if (!normals_path_.empty()) checkReadable(normals_path_);
+    tool_.addInput(path_);
+    if (normals_path_.empty()) return;
+    checkReadable(normals_path_);
+    tool_.addInput(normals_path_);
   });
+}
+
+void NdfAsset::useOnly(std::vector<std::string> kinds, const std::string& name, const Option& option) {
+  kind_options_.push_back({std::move(kinds), name, &option});
 }
 
 void NdfAsset::open() {
   options_.normals = normals_path_;
   opened_ = api::OpenedNdf::open(path_, options_);
+  const auto kind = opened_->asset().kind();
+  for (const KindOption& o : kind_options_)
+    if (o.option->given() && std::find(o.kinds.begin(), o.kinds.end(), kind) == o.kinds.end())
+      tool_.warn(fmt::format("{} has no effect: {} is of kind {}", o.name, path_, kind));
 }
 
 std::optional<std::vector<float>> NdfAsset::scatteredImage(const Footprint& footprint, int size) const {
@@ -51,8 +79,8 @@ void NdfAsset::requireAnswerable(const Footprint& footprint) const {
                 fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
                 "add --normals with the asset that the pyramid was made from");
   };
-  if (const auto* pyramid = std::get_if<PyramidNdf>(&model())) check(pyramid->shape());
-  if (const auto* compressed = std::get_if<CpNdf>(&model())) check(compressed->shape());
+  if (const auto* pyramid = api::roundModel<PyramidNdf>(model())) check(pyramid->shape());
+  if (const auto* compressed = api::roundModel<CpNdf>(model())) check(compressed->shape());
 }
 
 }  // namespace glint::apps

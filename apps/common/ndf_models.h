@@ -18,7 +18,8 @@ class NdfAsset {
  public:
   explicit NdfAsset(Tool& tool);
 
-  /// Opens the asset. Call once, in the work; the model lives as long as this object.
+  /// Opens the asset, and warns of options that are for other kinds. Call once, in the work; the model lives as long as this
+  /// object.
   /// @throws Error invalid_input if --normals is not the map that the asset was made from
   void open();
   const std::string& path() const { return path_; }
@@ -40,6 +41,16 @@ class NdfAsset {
   void requireAnswerable(const Footprint& footprint) const;
 
  private:
+  /// An option that only some kinds of assets use.
+  struct KindOption {
+    std::vector<std::string> kinds;
+    std::string name;
+    const Option* option;
+  };
+  void useOnly(std::vector<std::string> kinds, const std::string& name, const Option& option);
+
+  Tool& tool_;
+  std::vector<KindOption> kind_options_;
   std::string path_;
   std::string normals_path_;
   api::NdfOptions options_;

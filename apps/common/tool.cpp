@@ -5,6 +5,8 @@
 #include <tbb/info.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <deque>
@@ -195,7 +197,7 @@ Tool::Tool(ToolInfo info) : state_(std::make_unique<State>()) {
   CLI::App& app = state_->app;
   app.description(state_->info.summary);
   app.name(state_->info.name);
-  app.footer("Example:\n  " + state_->info.example +
+  app.footer((state_->info.notes.empty() ? "" : state_->info.notes + "\n\n") + "Example:\n  " + state_->info.example +
              "\n\nExit codes: 0 ok, 1 usage, 2 input/output, 3 invalid input, 4 failed, 5 unsupported, 7 differs");
   app.formatter(std::make_shared<HelpFormatter>());
   app.get_formatter()->column_width(34);
@@ -341,7 +343,12 @@ formats::Provenance Tool::provenance() const {
 bool Tool::parse(int argc, char** argv) {
   CLI::App& app = state_->app;
   try {
-    app.parse(argc, argv);
+    // "-.5" would be taken for an option.
+    std::vector<std::string> words(argv + 1, argv + argc);
+    for (std::string& word : words)
+      if (word.size() > 2 && word.starts_with("-.") && std::isdigit(static_cast<unsigned char>(word[2]))) word.insert(1, "0");
+    std::reverse(words.begin(), words.end());
+    app.parse(std::move(words));
     return true;
   } catch (const CLI::CallForHelp&) {
     std::fputs(app.help().c_str(), stdout);
@@ -371,7 +378,12 @@ bool Tool::parse(int argc, char** argv) {
 int Tool::work(const std::function<void()>& body) {
   State& s = *state_;
   for (const auto& check : s.checks) check();
-  if (!s.depfile.empty()) checkWritable(s.depfile);
+  if (!s.depfile.empty()) {
+    if (s.outputs.empty())
+      throw Error(ErrorCode::usage, "cli.depfile", "", "--depfile", "nothing is made that could depend on anything",
+                  "ask for an output file, or leave out --depfile");
+    checkWritable(s.depfile);
+  }
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads()));
   body();
   s.reporter.reset();

@@ -24,9 +24,10 @@ class ProgressReporter;
 
 /// What `--help` says about a tool.
 struct ToolInfo {
-  std::string name;     ///< "glint-pyramid"
-  std::string summary;  ///< one or two sentences: what it reads and what it makes
-  std::string example;  ///< one command line that works, shown at the end of the help text
+  std::string name;        ///< "glint-pyramid"
+  std::string summary;     ///< one or two sentences: what it reads and what it makes
+  std::string example;     ///< one command line that works, shown at the end of the help text
+  std::string notes = {};  ///< what options have no room for, such as the form of a file; shown before the example
 };
 
 /// A declared option, for the constraints that are checked while the command line is parsed.

@@ -87,7 +87,10 @@ LightQuery::LightQuery(Tool& tool) : tool_(tool) {
 void LightQuery::check() const {
   if (!asked()) return;
   checkReadable(path_);
-  if (!lobes_path_.empty()) checkReadable(lobes_path_);
+  tool_.addInput(path_);
+  if (lobes_path_.empty()) return;
+  checkReadable(lobes_path_);
+  tool_.addInput(lobes_path_);
 }
 
 LightQuery::Lobe LightQuery::lobe(const NdfAsset& asset, int order) const {

@@ -50,6 +50,7 @@ void QueryCommand::checkTable() const {
       light_.asked() || displacement_.lightGiven() || displacement_.levelGiven())
     usage("--csv asks its own queries", "leave out the others");
   checkReadable(csv_);
+  tool_.addInput(csv_);
 }
 
 void QueryCommand::check() const {
@@ -58,7 +59,10 @@ void QueryCommand::check() const {
     usage(csv_option_->given() ? "--csv needs a place for the answers" : "--samples needs a place for them",
           "add -o OUT.csv, or -o - for stdout");
   if (!makes_table && output_option_->given()) usage("-o is for tables", "add --csv or --samples, or leave it out");
-  if (makes_table && output_ != "-") checkWritable(output_);
+  if (makes_table && output_ != "-") {
+    checkWritable(output_);
+    tool_.addOutput(output_);
+  }
   if (csv_option_->given()) return checkTable();
   if (!uv_option_->given()) usage("no footprint was given", "add --uv U V, or --csv TABLE");
   if (!sigma_option_->given() && !covariance_option_->given() && !box_option_->given() && !displacement_.levelGiven())
@@ -70,10 +74,19 @@ void QueryCommand::check() const {
   if (light_.asked() && (!wo_option_->given() || !(wo_[2] > 0)))
     throw Error(ErrorCode::usage, "query.arguments", "", "--wo", "no outgoing direction above the surface was given",
                 "add --wo X Y Z with Z > 0");
-  if (!image_.empty()) {
-    checkWritable(image_);
-    checkPictureName(image_);
-  }
+  if (covariance_option_->given()) checkCovariance();
+  if (image_.empty()) return;
+  checkWritable(image_);
+  checkPictureName(image_);
+  tool_.addOutput(image_);
+}
+
+void QueryCommand::checkCovariance() const {
+  constexpr double kRounding = 1e-5;  // of a line that has no width
+  const double xx = covariance_[0], xy = covariance_[1], yy = covariance_[2];
+  if (xx >= 0 && yy >= 0 && xy * xy <= (1 + kRounding) * xx * yy) return;
+  usage(fmt::format("--cov {:g} {:g} {:g} is no covariance", xx, xy, yy),
+        "give variances SXX, SYY >= 0, and SXY with SXY^2 <= SXX SYY");
 }
 
 Footprint QueryCommand::footprint() const {

@@ -11,7 +11,7 @@ int main(int argc, char** argv) {
       {"glint-shlobes",
        "Makes tables of spherical harmonics for noise-free glints under large lights: the roughness lobe of a facet "
        "towards every direction (--sigma-r), or an environment or area lights for every outgoing direction (--light).",
-       "glint-shlobes --light studio.exr -o studio.glint --order 60"});
+       "glint-shlobes --light studio.exr -o studio.glint --order 60", apps::kAreaLightNotes});
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of lobes or light");
   const apps::ShLobesCommand command(tool);
 

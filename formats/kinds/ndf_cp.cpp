@@ -42,7 +42,7 @@ double element(ElementType type, const void* data, std::uint64_t index) {
     case ElementType::i32:
       return static_cast<const std::int32_t*>(data)[index];
     case ElementType::f16:
-      return halfToFloat(static_cast<const std::uint16_t*>(data)[index]);
+      return ieeeHalfToFloat(static_cast<const std::uint16_t*>(data)[index]);
     default:
       return static_cast<const float*>(data)[index];
   }
@@ -275,7 +275,7 @@ std::vector<SliceSums> clusterSums(const CompressedNdf& ndf, const NdfCluster& c
     float pixels[kBlockPixels] = {};
     if (cluster.columns == 0) {
       const int count = counts[s];
-      const float rest = halfToFloat(static_cast<std::uint16_t>(counts[cluster.slice_count + s] << 6));
+      const float rest = ieeeHalfToFloat(static_cast<std::uint16_t>(counts[cluster.slice_count + s] << 6));
       std::fill_n(pixels, kBlockPixels, ndf.scales[cluster.first_scale + 1] * rest);
       addSpots(ndf, cluster, spots, count, pixels);
       spots += static_cast<std::uint64_t>(count);
@@ -337,7 +337,8 @@ void checkDensities(const CompressedNdf& ndf, Findings& findings) {
     const double scale = ndf.density_scales[i] * pixel_area;
     double integral = 0, signed_integral = 0;
     for (std::uint32_t b = ndf.first_block[i]; b < ndf.first_block[i + 1]; ++b) {
-      const double mass = sums[b].positive * scale, most = halfToFloat(static_cast<std::uint16_t>(ndf.block_masses[b] << 6));
+      const double mass = sums[b].positive * scale,
+                   most = ieeeHalfToFloat(static_cast<std::uint16_t>(ndf.block_masses[b] << 6));
       integral += mass;
       signed_integral += sums[b].sum * ndf.image_scales[i] * pixel_area;
       bad_masses += !(mass <= most * (1 + kRounding) && most <= mass * (1.0625 + kRounding) + 0x1p-17);

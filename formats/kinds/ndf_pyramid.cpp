@@ -14,7 +14,7 @@ constexpr double kMeanFloor = 0x1p-24;
 std::string levelObject(int l, const char* dataset) { return "/" + levelPath("level_{l}/", l) + dataset; }
 
 float pixel(const NdfPyramid& pyramid, const PyramidLevel& level, std::size_t index) {
-  return pyramid.precision == BlockPrecision::f16 ? halfToFloat(static_cast<const std::uint16_t*>(level.pixels)[index])
+  return pyramid.precision == BlockPrecision::f16 ? ieeeHalfToFloat(static_cast<const std::uint16_t*>(level.pixels)[index])
                                                   : static_cast<const float*>(level.pixels)[index];
 }
 

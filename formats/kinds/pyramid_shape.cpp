@@ -90,7 +90,7 @@ std::size_t imageCount(const PyramidShape& shape) {
   return count;
 }
 
-float halfToFloat(std::uint16_t bits) {
+float ieeeHalfToFloat(std::uint16_t bits) {
   const std::uint32_t sign = static_cast<std::uint32_t>(bits & 0x8000u) << 16;
   const std::uint32_t exponent = (bits >> 10) & 31u;
   const std::uint32_t mantissa = bits & 0x3ffu;

@@ -36,9 +36,7 @@ void checkGrid(const ShGrid& grid, bool may_be_empty, Findings& findings) {
 
 double coefficient(const void* coefficients, ShPrecision precision, std::size_t index) {
   if (precision == ShPrecision::f32) return static_cast<const float*>(coefficients)[index];
-  const std::uint16_t bits = static_cast<const std::uint16_t*>(coefficients)[index];
-  // halfToFloat makes large finite numbers of infinities and NaNs.
-  return (bits & 0x7c00u) == 0x7c00u ? std::nan("") : static_cast<double>(halfToFloat(bits));
+  return ieeeHalfToFloat(static_cast<const std::uint16_t*>(coefficients)[index]);
 }
 
 /// Reports numbers that are not finite, or negative where `signed_values` is false.

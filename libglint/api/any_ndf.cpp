@@ -25,16 +25,17 @@ void requireSameMap(const formats::Asset& asset, const std::filesystem::path& pa
 }
 
 NdfInfo infoOf(const PyramidShape& shape) {
-  return {shape.width,   shape.height,   shape.resolution,  shape.sigma_r,
-          shape.surface, shape.boundary, shape.level_count, finestSigma(shape)};
+  return {shape.width,       shape.height,       shape.resolution,
+          shape.sigma_r,     shape.surface,      shape.boundary,
+          shape.level_count, finestSigma(shape), kFootprintPerStride * shape.levels[shape.level_count - 1].stride};
 }
 
 NdfInfo infoOf(const NormalMap& map, const NdfOptions& options) {
-  return {map.width, map.height, kReferenceResolution, options.sigma_r, options.surface, options.boundary, 0, 0};
+  return {map.width, map.height, kReferenceResolution, options.sigma_r, options.surface, options.boundary, 0, 0, 0};
 }
 
 NdfInfo infoOf(const HistogramSat& sat) {
-  return {sat.width, sat.height, kReferenceResolution, 0, Surface::flat, Boundary::wrap, 0, 0};
+  return {sat.width, sat.height, kReferenceResolution, 0, Surface::flat, Boundary::wrap, 0, 0, 0};
 }
 
 float askedAlpha(const BinMap& map, float alpha, const std::filesystem::path& path) {
@@ -49,8 +50,8 @@ float askedAlpha(const BinMap& map, float alpha, const std::filesystem::path& pa
 }  // namespace
 
 template <class Model, class View>
-void OpenedNdf::setPyramid(const View& view) {
-  model_ = normals_ ? Model(view, normals_->normals()) : Model(view);
+void OpenedNdf::setPyramid(const View& view, int footprint_parts) {
+  model_ = AnisotropicNdf<Model>(normals_ ? Model(view, normals_->normals()) : Model(view), footprint_parts);
   info_ = infoOf(view.shape);
 }
 
@@ -65,14 +66,14 @@ OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& o
     opened.model_ = Reference(asset.normals(), options.sigma_r, options.surface, options.boundary, Reference::Search::pruned);
     opened.info_ = infoOf(asset.normals(), options);
   } else if (asset.kind() == "ndf-pyramid") {
-    opened.setPyramid<PyramidNdf>(asset.pyramid());
+    opened.setPyramid<PyramidNdf>(asset.pyramid(), options.footprint_parts);
   } else if (asset.kind() == "ndf-cp") {
-    opened.setPyramid<CpNdf>(asset.compressed());
+    opened.setPyramid<CpNdf>(asset.compressed(), options.footprint_parts);
   } else if (asset.kind() == "bin-map") {
     const BinMap& map = asset.binMap();
     const BinMapNdf ndf(map, askedAlpha(map, options.alpha, path));
     opened.model_ = ndf;
-    opened.info_ = {map.width, map.height, kReferenceResolution, ndf.sigma(), Surface::flat, Boundary::wrap, 0, 0};
+    opened.info_ = {map.width, map.height, kReferenceResolution, ndf.sigma(), Surface::flat, Boundary::wrap, 0, 0, 0};
   } else if (asset.kind() == "histogram-sat") {
     opened.model_ = HistogramNdf(asset.histograms(), options.gaussian_boxes, options.slant_tolerance);
     opened.info_ = infoOf(asset.histograms());
@@ -88,8 +89,8 @@ OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& o
 }
 
 MapSlopes OpenedNdf::slopes() const {
-  if (const auto* pyramid = std::get_if<PyramidNdf>(&model_)) return pyramid->shape().slopes;
-  if (const auto* compressed = std::get_if<CpNdf>(&model_)) return compressed->shape().slopes;
+  if (const auto* pyramid = roundModel<PyramidNdf>(model_)) return pyramid->shape().slopes;
+  if (const auto* compressed = roundModel<CpNdf>(model_)) return compressed->shape().slopes;
   if (const auto* bins = std::get_if<BinMapNdf>(&model_)) return bins->map().slopes;
   if (const auto* histograms = std::get_if<HistogramNdf>(&model_)) return histograms->sat().slopes;
   const NormalMap& map = asset_.normals();

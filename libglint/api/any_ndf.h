@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "glint/formats/asset_reader.h"
+#include "glint/query/anisotropic_ndf.h"
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/histogram_ndf.h"
@@ -13,8 +14,15 @@
 
 namespace glint::api {
 
-/// Any model of the NDF that an asset can hold.
-using AnyNdf = std::variant<Reference, PyramidNdf, CpNdf, BinMapNdf, HistogramNdf>;
+/// Any model of the NDF that an asset can hold, for footprints of any shape.
+using AnyNdf = std::variant<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, BinMapNdf, HistogramNdf>;
+
+/// The model of round footprints in it; nullptr if there is none of this kind.
+template <class Model>
+const Model* roundModel(const AnyNdf& ndf) {
+  const auto* stretched = std::get_if<AnisotropicNdf<Model>>(&ndf);
+  return stretched ? &stretched->round() : nullptr;
+}
 
 /// What an asset does not say itself about how it is asked.
 struct NdfOptions {
@@ -24,8 +32,10 @@ struct NdfOptions {
   float sigma_r = 0.005f;              ///< kind normals: intrinsic roughness, disk units
   float alpha = 0;                     ///< kind bin-map: Beckmann roughness, in the range of the asset; 0: the smallest
   GaussianBoxes gaussian_boxes = GaussianBoxes::one;  ///< kind histogram-sat: boxes that stand for a Gaussian footprint
-  float slant_tolerance = kSlantTolerance;  ///< kind histogram-sat: share of a slanted footprint that may be misplaced
-  bool verify_hashes = false;               ///< also compare every dataset with its hash; reads the whole file
+  float slant_tolerance = kSlantTolerance;      ///< kind histogram-sat: share of a slanted footprint that may be misplaced
+  int footprint_parts = IsotropicParts::kMost;  ///< kinds ndf-pyramid and ndf-cp: most round footprints that stand for a
+                                                ///< stretched one; 1: one of the same mean square size
+  bool verify_hashes = false;                   ///< also compare every dataset with its hash; reads the whole file
 };
 
 /// What models of every kind have in common.
@@ -38,6 +48,7 @@ struct NdfInfo {
   Boundary boundary = Boundary::wrap;
   int level_count = 0;            ///< footprint sizes that are stored; 0: every size is answered from the texels or their sums
   float finest_sigma_texels = 0;  ///< deviation of the footprints of level 0; 0 where there are no levels
+  float coarsest_sigma_texels = 0;  ///< of the last level, which answers larger footprints; 0 where there are no levels
 };
 
 /// An asset and the model that answers from it, of whichever kind it is.
@@ -62,7 +73,7 @@ class OpenedNdf {
  private:
   explicit OpenedNdf(formats::Asset asset) : asset_(std::move(asset)) {}
   template <class Model, class View>
-  void setPyramid(const View& view);
+  void setPyramid(const View& view, int footprint_parts);
 
   formats::Asset asset_;
   std::optional<formats::Asset> normals_;

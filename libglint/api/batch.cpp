@@ -81,7 +81,7 @@ class PyramidChunk {
   static void weighHalves(const float* weights, const char* const* places, float* products) {
     alignas(64) std::uint16_t halves[kChunk];
     for (int k = 0; k < kChunk; ++k) halves[k] = *reinterpret_cast<const std::uint16_t*>(places[k]);
-    for (int k = 0; k < kChunk; ++k) products[k] = weights[k] * halfToFloat(halves[k]);
+    for (int k = 0; k < kChunk; ++k) products[k] = weights[k] * positiveHalfToFloat(halves[k]);
   }
 
   static void weighFloats(const float* weights, const char* const* places, float* products) {
@@ -113,7 +113,7 @@ struct PyramidSteps {
   void find(SliceChunk& chunk) { findPixels(places, chunk); }
   void finish(const SliceChunk& chunk, float* sums) const {
     addUpPixels(places, chunk, sums);
-    for (int k = 0; k < kChunk; ++k) sums[k] *= scale;
+    for (int k = 0; k < kChunk; ++k) sums[k] = finitePositive(scale * sums[k]);
   }
   PyramidChunk places;
   float scale;
@@ -157,6 +157,22 @@ void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintA
 template <class Model>
 void modelDensities(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                     float* out) {
+  for (std::size_t k = 0; k < count; ++k) out[k] = model.density(footprints[k], halves[k]);
+}
+
+/// Footprints that are round are those of the model inside. A pyramid's batches are of round ones, so others are asked one by
+/// one.
+template <class Model>
+bool allWhole(const AnisotropicNdf<Model>& model, std::size_t count, const FootprintArrays& footprints) {
+  if (footprints.sigma.data != nullptr) return true;
+  for (std::size_t k = 0; k < count; ++k)
+    if (!model.isWhole(footprints[k])) return false;
+  return true;
+}
+
+void modelDensities(const AnisotropicNdf<PyramidNdf>& model, std::size_t count, const FootprintArrays& footprints,
+                    const HalfVectorArrays& halves, float* out) {
+  if (allWhole(model, count, footprints)) return modelDensities(model.round(), count, footprints, halves, out);
   for (std::size_t k = 0; k < count; ++k) out[k] = model.density(footprints[k], halves[k]);
 }
 
@@ -211,7 +227,7 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
       else if (draws[k].place.x < 0)
         out.set(at, {});
       else
-        out.set(at, {pointInPixel(model.shape(), draws[k].place, draws[k].xi), pdfs[k]});
+        out.set(at, drawnAt(pointInPixel(model.shape(), draws[k].place, draws[k].xi), pdfs[k]));
     }
   }
 }
@@ -225,6 +241,18 @@ void modelMeans(const Model& model, std::size_t count, const FootprintArrays& fo
 template <class Model>
 void modelSamples(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
                   const SampleArrays& out) {
+  for (std::size_t k = 0; k < count; ++k) out.set(k, model.sample(footprints[k], xi[k]));
+}
+
+void modelMeans(const AnisotropicNdf<PyramidNdf>& model, std::size_t count, const FootprintArrays& footprints,
+                const RangeArrays& ranges, float* out) {
+  if (allWhole(model, count, footprints)) return modelMeans(model.round(), count, footprints, ranges, out);
+  for (std::size_t k = 0; k < count; ++k) out[k] = model.mean(footprints[k], ranges[k]);
+}
+
+void modelSamples(const AnisotropicNdf<PyramidNdf>& model, std::size_t count, const FootprintArrays& footprints,
+                  const HalfVectorArrays& xi, const SampleArrays& out) {
+  if (allWhole(model, count, footprints)) return modelSamples(model.round(), count, footprints, xi, out);
   for (std::size_t k = 0; k < count; ++k) out.set(k, model.sample(footprints[k], xi[k]));
 }
 

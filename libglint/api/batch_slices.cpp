@@ -38,7 +38,7 @@ GLINT_API_MULTIVERSION void chooseLevels(const PyramidShape& shape, const SliceC
   const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
   const float finest = finestSigma(shape), finest_variance = finest * finest;
   for (int k = 0; k < kChunk; ++k) {
-    const float sum = lanes.xx[k] + lanes.xy[k] + lanes.yy[k];
+    const float sum = 0.25f * lanes.xx[k] + 0.25f * lanes.xy[k] + 0.25f * lanes.yy[k];
     const float mean = 0.5f * (std::min(lanes.xx[k], width * width) + std::min(lanes.yy[k], height * height));
     const float widened = std::max(mean, kLowest);
     const float variance = std::fabs(sum) <= std::numeric_limits<float>::max() ? widened : kLowest;
@@ -65,7 +65,7 @@ template <bool kWrap>
 inline void findNeighbours(const float* __restrict coordinates, const AxisLevels& axis, Neighbours& __restrict out) {
   for (int k = 0; k < kChunk; ++k) {
     const float wrapped = coordinates[k] - std::floor(coordinates[k]);
-    const float u = wrapped >= 0 && wrapped < 1 ? wrapped : 0.0f;
+    const float u = wrapped >= 0 ? std::min(wrapped, kBelowOne) : 0.0f;
     const float last = axis.last[k], at = u * axis.extent[k] - 0.5f;
     if constexpr (kWrap) {
       const float unrolled = at + (at < 0 ? axis.extent[k] : 0.0f);

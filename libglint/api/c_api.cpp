@@ -5,6 +5,7 @@
 #include <string>
 
 #include "glint/api/c_support.h"
+#include "glint/query/ray_footprint.h"
 
 namespace {
 
@@ -81,7 +82,7 @@ using namespace glint::api::c;
 constexpr float kLeastSigmaR = 1e-4f, kMostSigmaR = 0.25f;
 /// Size of the options in the first version of the struct.
 constexpr std::size_t kFirstOptionsSize = offsetof(glint_open_options, verify_hashes) + sizeof(int32_t);
-static_assert(offsetof(glint_open_options, reserved) + sizeof(int32_t) == sizeof(glint_open_options),
+static_assert(offsetof(glint_open_options, footprint_parts) + sizeof(int32_t) == sizeof(glint_open_options),
               "padding at the end would be read as a member by a later library");
 
 /// @return null if the options can be used, else what is wrong
@@ -97,7 +98,8 @@ const char* takeOptions(const glint_open_options* from, glint_open_options& to) 
     return "slant_tolerance is not in 0 to 1; give 0 for 0.06, or GLINT_SLANT_EXACT";
   if (to.gaussian_boxes != 0 && to.gaussian_boxes != 1 && to.gaussian_boxes != 3)
     return "gaussian_boxes is not 1 or 3; give 0 for 1";
-  if (to.reserved != 0) return "reserved is not 0";
+  if (!(to.footprint_parts >= 0 && to.footprint_parts <= IsotropicParts::kMost))
+    return "footprint_parts is not in 1 to 32; give 0 for 32";
   return nullptr;
 }
 
@@ -110,8 +112,14 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   options.verify_hashes = o.verify_hashes != 0;
   options.alpha = o.alpha;
   if (o.slant_tolerance != 0) options.slant_tolerance = std::max(0.0f, o.slant_tolerance);
+  if (o.footprint_parts != 0) options.footprint_parts = o.footprint_parts;
   if (o.gaussian_boxes == 3) options.gaussian_boxes = GaussianBoxes::three;
   return options;
+}
+
+glint_footprint given(const Footprint& gaussian) {
+  const Covariance& c = gaussian.covariance;
+  return {GLINT_FOOTPRINT_GAUSSIAN, gaussian.centre.x, gaussian.centre.y, {c.xx, c.xy, c.yy, 0}};
 }
 
 /// What is wrong with the arguments that all batches have; null if nothing.
@@ -155,6 +163,7 @@ glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* info) {
   all.level_count = from.level_count;
   all.sigma_r = from.sigma_r;
   all.finest_sigma_texels = from.finest_sigma_texels;
+  all.coarsest_sigma_texels = from.coarsest_sigma_texels;
   all.surface = static_cast<int32_t>(from.surface);
   all.boundary = static_cast<int32_t>(from.boundary);
   all.has_normals = ndf->opened.hasNormals() ? 1 : 0;
@@ -163,8 +172,12 @@ glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* info) {
 }
 
 glint_footprint glint_footprint_isotropic(float u, float v, float sigma_texels) {
-  const float variance = sigma_texels * sigma_texels;
-  return {GLINT_FOOTPRINT_GAUSSIAN, u, v, {variance, 0, variance, 0}};
+  return given(Footprint::isotropic({u, v}, sigma_texels));
+}
+
+glint_footprint glint_footprint_from_differentials(float u, float v, float dudx, float dvdx, float dudy, float dvdy,
+                                                   int32_t width, int32_t height) {
+  return given(footprintFromDifferentials({u, v}, {dudx, dvdx}, {dudy, dvdy}, width, height));
 }
 
 glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy, float* density) {

@@ -84,7 +84,8 @@ typedef struct glint_open_options {
   float slant_tolerance;    /* kind histogram-sat: share of a footprint with slanted sides that may be counted in a wrong
                                place, up to 1; 0: 0.06; GLINT_SLANT_EXACT: none, and slower */
   int32_t gaussian_boxes;   /* kind histogram-sat: boxes that stand for a Gaussian footprint, 1 or 3; 0: 1 */
-  int32_t reserved;         /* 0 */
+  int32_t footprint_parts; /* kinds ndf-pyramid and ndf-cp: most round footprints that stand for a stretched one, up to 32, each
+                               at the cost of one; 1: one of the same mean square size, whatever the shape; 0: 32 */
 } glint_open_options;
 
 #define GLINT_SLANT_EXACT (-1.0f)
@@ -107,19 +108,19 @@ GLINT_API void glint_ndf_close(glint_ndf* ndf);
 
 /* What a handle is. Members are added at the end; the library fills those that fit into struct_size. */
 typedef struct glint_ndf_info {
-  size_t struct_size;        /* set by the caller: sizeof(glint_ndf_info) */
-  const char* kind;          /* "normals", "ndf-pyramid", ...; lives as long as the handle */
-  int32_t width;             /* of the normal map, texels */
-  int32_t height;            /* of the normal map, texels */
-  int32_t resolution;        /* pixels along each axis of a stored NDF image; 256 where there are none */
-  int32_t level_count;       /* footprint sizes that are stored; 0: all sizes are answered from the texels */
-  float sigma_r;             /* intrinsic roughness, disk units */
-  float finest_sigma_texels; /* footprint of level 0, deviation in texels; 0 where there are no levels */
-  int32_t surface;           /* GLINT_SURFACE_* */
-  int32_t boundary;          /* GLINT_BOUNDARY_* */
-  int32_t has_normals;       /* 1: footprints below level 0 are answered from the texels */
-  int32_t reserved;          /* 0 */
-  uint64_t file_bytes;       /* size of the asset */
+  size_t struct_size;          /* set by the caller: sizeof(glint_ndf_info) */
+  const char* kind;            /* "normals", "ndf-pyramid", ...; lives as long as the handle */
+  int32_t width;               /* of the normal map, texels */
+  int32_t height;              /* of the normal map, texels */
+  int32_t resolution;          /* pixels along each axis of a stored NDF image; 256 where there are none */
+  int32_t level_count;         /* footprint sizes that are stored; 0: all sizes are answered from the texels */
+  float sigma_r;               /* intrinsic roughness, disk units; bin-map: alpha / sqrt(2); histogram-sat: 0, it has none */
+  float finest_sigma_texels;   /* footprint of level 0, deviation in texels; 0 where there are no levels */
+  int32_t surface;             /* GLINT_SURFACE_* */
+  int32_t boundary;            /* GLINT_BOUNDARY_* */
+  int32_t has_normals;         /* 1: footprints below level 0 are answered from the texels */
+  float coarsest_sigma_texels; /* footprint of the last level; 0 where there are no levels */
+  uint64_t file_bytes;         /* size of the asset */
 } glint_ndf_info;
 
 /* Fills info. Returns GLINT_ERROR_USAGE for null arguments or a struct_size that does not reach beyond itself. */
@@ -137,16 +138,26 @@ typedef struct glint_footprint {
 /* Isotropic Gaussian of deviation sigma, texels. */
 GLINT_API glint_footprint glint_footprint_isotropic(float u, float v, float sigma_texels);
 
+/* The Gaussian footprint of a pixel, from ray differentials: (dudx, dvdx) and (dudy, dvdy) are the changes of uv from one pixel to
+ * the next along x and y. width, height: of the map, texels. The pixel filter is a Gaussian of deviation 0.5 pixels; scale the
+ * differentials for another. What is not a number counts as 0. */
+GLINT_API glint_footprint glint_footprint_from_differentials(float u, float v, float dudx, float dvdx, float dudy, float dvdy,
+                                                             int32_t width, int32_t height);
+
 /* Density towards one half vector.
  *
  * 0 outside the square |x|, |y| <= 1 and for half vectors that are not numbers. Footprints: a centre that is not finite counts
- * as 0; sizes that are too small or not finite count as the narrowest footprint, those larger than the map as the map.
+ * as 0; sizes that are too small or not finite count as the narrowest footprint; those larger than the map are shortened to it,
+ * and kinds with levels answer what is larger than coarsest_sigma_texels as that, around its centre. These know round
+ * footprints: boxes count as the Gaussian of the same moments, and stretched ones as several (footprint_parts).
  * Returns GLINT_ERROR_USAGE for null arguments, else GLINT_OK. */
 GLINT_API glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy,
                                      float* density);
 
 /* Mean density over the box [x0, x1] x [y0, y1] of half vectors, as a light or a pixel of an NDF image asks for it.
  *
+ * The average of glint_density, but for kind ndf-cp: there the density is what the compression leaves above zero, and the mean
+ * counts what lies below, so that they differ by up to the error of the compression.
  * Counts 0 outside the square [-1, 1]^2; 0 for a box that is empty or not finite. Footprints and status as for
  * glint_density. */
 GLINT_API glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, float x0, float y0, float x1,
@@ -323,9 +334,9 @@ GLINT_API glint_status glint_displaced_level(const glint_displaced* displaced, f
  * each with the facet of its own. (u, v): any; what is not finite counts as 0.
  * reflected: red, green and blue, BRDF times the cosine between wi and the facet, 1/sr, each >= 0: multiply by radiance and
  * solid angle. It is that of all the relief below the level; whether the coarse surface hides wi or wo is the caller's to say.
- * pdf: density with which glint_displaced_sample draws wi for this wo, per unit solid angle. Either may be null.
- * 0 for directions behind the facet or within 1e-6 of its plane, longer than a unit vector, or not finite. BRDFs are reciprocal
- * but for rounding. Returns GLINT_ERROR_USAGE for null arguments (reflected and pdf: both), else GLINT_OK. */
+ * 0 for directions behind the facet or within 1e-6 of its plane. Reciprocal but for rounding.
+ * pdf: density with which glint_displaced_sample draws wi for this wo, per unit solid angle, behind the facet too. Either may be
+ * null. Both are 0 for directions longer than a unit vector, or not finite. Returns GLINT_ERROR_USAGE for null arguments (reflected and pdf: both), else GLINT_OK. */
 GLINT_API glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t variant, float level, float u,
                                                 float v, const float wi[3], const float wo[3], float reflected[3], float* pdf);
 

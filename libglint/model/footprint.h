@@ -27,9 +27,11 @@ struct Footprint {
   Vec2 axis_a;
   Vec2 axis_b;
 
-  /// Isotropic Gaussian of standard deviation `sigma_texels`.
+  /// Isotropic Gaussian of standard deviation `sigma_texels`. Deviations above 1e15 are answered like it, as the largest.
   static GLINT_HD constexpr Footprint isotropic(Vec2 centre_uv, float sigma_texels) {
-    const float variance = sigma_texels * sigma_texels;
+    constexpr float kLargest = 1e15f;  // its square is finite
+    const bool large = sigma_texels > kLargest && sigma_texels <= 0x1.fffffep127f;
+    const float variance = large ? kLargest * kLargest : sigma_texels * sigma_texels;
     return gaussian(centre_uv, {variance, 0, variance});
   }
 

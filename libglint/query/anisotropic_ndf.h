@@ -5,6 +5,7 @@
 
 #include "glint/query/footprint_weights.h"
 #include "glint/query/ndf_model.h"
+#include "glint/query/pyramid_slices.h"
 
 namespace glint {
 
@@ -32,12 +33,12 @@ struct PrincipalAxes {
   float longest = 0, shortest = 0;
   Vec2 direction;
 };
-inline GLINT_HD PrincipalAxes principalAxes(const Covariance& c) {
-  const float mean = 0.5f * (c.xx + c.yy), half = 0.5f * (c.xx - c.yy);
-  const float root = std::sqrt(half * half + c.xy * c.xy);
-  const float low = root < mean ? (c.xx * c.yy - c.xy * c.xy) / (mean + root) : 0;
-  const float angle = 0.5f * std::atan2(c.xy, half);
-  return {std::sqrt(mean + root), std::sqrt(std::max(0.0f, low)), {std::cos(angle), std::sin(angle)}};
+inline GLINT_HD PrincipalAxes principalAxes(const UsableCovariance& c) {
+  const double mean = 0.5 * (c.xx + c.yy), half = 0.5 * (c.xx - c.yy), high = mean + std::sqrt(half * half + c.xy * c.xy);
+  const float angle = 0.5f * std::atan2(static_cast<float>(c.xy), static_cast<float>(half));
+  return {static_cast<float>(std::sqrt(high)),
+          static_cast<float>(std::sqrt(c.determinant() / high)),
+          {std::cos(angle), std::sin(angle)}};
 }
 
 /// Splits a footprint along its long axis so that the first and second moments of the parts together are its own.
@@ -48,13 +49,15 @@ inline GLINT_HD PrincipalAxes principalAxes(const Covariance& c) {
 /// (kPartWidening). Boxes are split as the Gaussian of the same moments.
 /// @param narrowest_sigma  texels; what the model that is asked cannot tell apart, e.g. finestSigma(shape) of a pyramid without
 ///                         normals
-/// @return 1 part for round footprints, else 2 to 32
-inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int height, float narrowest_sigma = 0) {
+/// @param most             of the parts, 2 to IsotropicParts::kMost; kMostAspect is less with fewer
+/// @return 1 part for round footprints, else 2 or more
+inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int height, float narrowest_sigma = 0,
+                                              int most = IsotropicParts::kMost) {
   constexpr float kRound = 0.05f;  // a variance larger by less is no length
   const PrincipalAxes axes = principalAxes(usableCovariance(p.covariance, width, height));
   const float narrow = std::max(axes.shortest, narrowest_sigma), narrow2 = narrow * narrow;
-  constexpr float kGapPerLength = 2 * kPartReach / IsotropicParts::kMost;
-  const float gap2 = kGapPerLength * kGapPerLength * (axes.longest * axes.longest - narrow2);
+  const float gap_per_length = 2 * kPartReach / static_cast<float>(most);
+  const float gap2 = gap_per_length * gap_per_length * (axes.longest * axes.longest - narrow2);
   const float sigma = std::sqrt(narrow2 + kPartWidening * std::max(0.0f, gap2 - kPartGap * kPartGap * narrow2));
   const float along2 = axes.longest * axes.longest - sigma * sigma;
   IsotropicParts parts;
@@ -65,8 +68,7 @@ inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int
     return parts;
   }
   const float along = std::sqrt(along2);
-  parts.count =
-      std::clamp(static_cast<int>(std::ceil(2 * kPartReach * along / (kPartGap * sigma))), 2, int{IsotropicParts::kMost});
+  parts.count = std::clamp(static_cast<int>(std::ceil(2 * kPartReach * along / (kPartGap * sigma))), 2, most);
   const float step = 2 * kPartReach / static_cast<float>(parts.count), middle = 0.5f * static_cast<float>(parts.count - 1);
   float total = 0, moment = 0;
   for (int k = 0; k < parts.count; ++k) {
@@ -87,44 +89,63 @@ inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int
 }
 
 /// Answers stretched footprints from a model that knows only round ones (PyramidNdf, CpNdf): each as the sum of up to 32 round
-/// ones along its long axis, at that many times the cost. Round footprints cost what they did.
+/// ones along its long axis, at that many times the cost. Round footprints are asked of the model as they are.
 ///
-/// Holds a pointer to the model, which must outlive it. Thread-safe, allocates nothing.
+/// Thread-safe, allocates nothing; the arrays of the model must outlive it.
 template <NdfModel M>
 class AnisotropicNdf {
  public:
   /// @param width, height    of the map, texels
   /// @param narrowest_sigma  as for isotropicParts
-  GLINT_HD AnisotropicNdf(const M& model, int width, int height, float narrowest_sigma = 0)
-      : model_(&model), width_(width), height_(height), narrowest_sigma_(narrowest_sigma) {}
-  /// For a model of a pyramid.
-  GLINT_HD explicit AnisotropicNdf(const M& model, float narrowest_sigma = 0) requires requires {
+  /// @param most_parts       that a footprint is split into, clamped to 1 to IsotropicParts::kMost; 1: none is split
+  GLINT_HD AnisotropicNdf(const M& model, int width, int height, float narrowest_sigma = 0,
+                          int most_parts = IsotropicParts::kMost)
+      : model_(model),
+        width_(width),
+        height_(height),
+        narrowest_sigma_(narrowest_sigma),
+        most_parts_(std::clamp(most_parts, 1, int{IsotropicParts::kMost})) {}
+  /// For a model of a pyramid: without normals, parts are no narrower than its level 0.
+  GLINT_HD AnisotropicNdf(const M& model, int most_parts = IsotropicParts::kMost) requires requires {
     model.shape();
-  } : AnisotropicNdf(model, model.shape().width, model.shape().height, narrowest_sigma) {
+  } : AnisotropicNdf(model, model.shape().width, model.shape().height, model.hasNormals() ? 0 : finestSigma(model.shape()),
+                     most_parts) {
   }
 
-  GLINT_HD IsotropicParts parts(const Footprint& p) const { return isotropicParts(p, width_, height_, narrowest_sigma_); }
+  /// The model of round footprints.
+  GLINT_HD const M& round() const { return model_; }
+  /// Whether a footprint is asked of the model as it is.
+  GLINT_HD bool isWhole(const Footprint& p) const {
+    return most_parts_ == 1 || (p.covariance.xx == p.covariance.yy && p.covariance.xy == 0);
+  }
+  /// Of a footprint that is split.
+  GLINT_HD IsotropicParts parts(const Footprint& p) const {
+    return isotropicParts(p, width_, height_, narrowest_sigma_, std::max(most_parts_, 2));
+  }
 
   /// Density towards h, >= 0.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
-    return summed(parts(p), [&](const Footprint& part) { return model_->density(part, h); });
+    if (isWhole(p)) return model_.density(p, h);
+    return summed(parts(p), [&](const Footprint& part) { return model_.density(part, h); });
   }
 
   /// Average density over a box of half vectors.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
-    return summed(parts(p), [&](const Footprint& part) { return model_->mean(part, range); });
+    if (isWhole(p)) return model_.mean(p, range);
+    return summed(parts(p), [&](const Footprint& part) { return model_.mean(part, range); });
   }
 
   /// Draws one of the parts by its weight, and from it. The pdf is the density of all parts.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+    if (isWhole(p)) return model_.sample(p, xi);
     const IsotropicParts all = parts(p);
     int chosen = 0;
     float left = xi.x > 0 ? xi.x : 0;
     while (chosen + 1 < all.count && left >= all.weights[chosen]) left -= all.weights[chosen++];
-    const float rescaled = std::min(left / all.weights[chosen], 0x1.fffffep-1f);
-    const HalfVectorSample drawn = model_->sample(all.footprints[chosen], {rescaled, xi.y});
+    const float rescaled = std::min(left / all.weights[chosen], float{kBelowOne});
+    const HalfVectorSample drawn = model_.sample(all.footprints[chosen], {rescaled, xi.y});
     return drawn.pdf > 0
-               ? HalfVectorSample{drawn.h, summed(all, [&](const Footprint& part) { return model_->density(part, drawn.h); })}
+               ? HalfVectorSample{drawn.h, summed(all, [&](const Footprint& part) { return model_.density(part, drawn.h); })}
                : HalfVectorSample{};
   }
 
@@ -136,10 +157,11 @@ class AnisotropicNdf {
     return sum;
   }
 
-  const M* model_;
+  M model_;
   int width_;
   int height_;
   float narrowest_sigma_;
+  int most_parts_;
 };
 
 }  // namespace glint

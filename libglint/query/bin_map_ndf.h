@@ -54,17 +54,16 @@ class BinMapNdf {
     if (!(std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1)) return 0;
     double sum = 0;
     forEachFacet(p, {h, h}, [&](const BinFacet& f) { sum += f.weight * lobe(f, h); });
-    return static_cast<float>(sum);
+    return finitePositive(static_cast<float>(sum));
   }
 
   /// Average density over a box of half vectors; 0 if the box is empty. O(bins that the box reaches and their texels).
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
-    const Box2 box = {{std::max(range.low.x, -1.0f), std::max(range.low.y, -1.0f)},
-                      {std::min(range.high.x, 1.0f), std::min(range.high.y, 1.0f)}};
+    const Box2 box = insideSquare(range);
     if (!(box.width() > 0 && box.height() > 0)) return 0;
     double sum = 0;
     forEachFacet(p, box, [&](const BinFacet& f) { sum += f.weight * mass(f, box); });
-    return static_cast<float>(sum / range.area());
+    return finitePositive(static_cast<float>(sum / range.area()));
   }
 
   /// A half vector with the density of the footprint (Atanasov 2021, section 5.3 and Eq. 18): a point of the footprint, the
@@ -74,7 +73,7 @@ class BinMapNdf {
     if (!sampleNormal(p, xi, normal)) return {};
     const float radius = sigma_ * FacetLobe::radius(xi.x), angle = 2 * kPi * xi.y;
     const Vec2 h = normal + radius * Vec2{std::cos(angle), std::sin(angle)};
-    return {h, density(p, h)};
+    return drawnAt(h, density(p, h));
   }
 
   /// The normal of the texel at a point of the footprint, even over it. Uses up the leading digits of xi and leaves the others,
@@ -91,7 +90,7 @@ class BinMapNdf {
   /// Weights of the bins around h, exact to rounding in single precision; none for h outside the square [-1, 1]^2. O(texels of
   /// the footprint) or less, whichever way is shorter.
   GLINT_HD BinWeights weights(const Footprint& p, Vec2 h) const {
-    if (!(std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1)) return {};
+    if (!insideSquare(h)) return {};
     const BinWindow window(binAt(h.x), binAt(h.y), map().bins_per_axis);
     blocks_.prefetchTiles(window.bins);
     const TexelCover cover(p, map().width, map().height);

@@ -162,15 +162,15 @@ class WindowSum {
   };
 
   GLINT_DEVICE_CALL GLINT_HD void flush() {
-#ifdef GLINT_WIDE
-    hasWideVectors() ? flushWide() : flushBy<SingleTexels>();
+#ifdef GLINT_AVX2
+    hasAvx2() ? flushAvx2() : flushBy<SingleTexels>();
 #else
     flushBy<SingleTexels>();
 #endif
     count_ = 0;
   }
-#ifdef GLINT_WIDE
-  GLINT_WIDE GLINT_FLATTEN void flushWide() { flushBy<WideTexels>(); }
+#ifdef GLINT_AVX2
+  GLINT_AVX2 GLINT_FLATTEN void flushAvx2() { flushBy<Avx2Texels>(); }
 #endif
 
   template <class Texels>

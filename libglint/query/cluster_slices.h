@@ -74,7 +74,7 @@ struct ColumnValues {
 };
 
 template <class Basis, class Coefficient>
-class WideReader;
+class Avx2Reader;
 
 /// What reads the factors of clusters of columns: Basis is the stored type of prefix sums, Coefficient that of coefficients.
 template <class Basis, class Coefficient>
@@ -83,7 +83,7 @@ class ClusterReader {
   GLINT_HD explicit ClusterReader(const CompressedNdf& ndf) : ndf_(ndf) {}
 
   using Row = const Coefficient*;
-  using Wide = WideReader<Basis, Coefficient>;  ///< the same with vectors of eight, where the processor has them
+  using Avx2 = Avx2Reader<Basis, Coefficient>;  ///< the same with vectors of eight, where the processor has them
 
   /// Coefficients of a slice.
   GLINT_HD Row row(const NdfCluster& cluster, std::uint64_t slice) const {
@@ -194,40 +194,49 @@ class ClusterReader {
     if constexpr (std::is_same_v<Coefficient, std::int8_t>) scaleNarrow(scales, layout, c + layout.wide, 0, scaled);
   }
 
-  /// Sums of the rows of a slice, negative pixels included: O(16 rank) for cp and tucker, O(16 columns) for pca.
-  /// @param scaled  its scaledCoefficients
-  GLINT_HD Float16 rowSums(const NdfCluster& cluster, const float* scaled) const {
-    return rowSumsBy(cluster, scaled, WeighPrefixes());
+  /// What rowSums, rowPixels and block ask of a slice. cp and pca: its scaledCoefficients. tucker: these as a matrix, that of
+  /// function a of x and b of y at a + 16 b; 0 where there is no such column, up to a multiple of four b.
+  /// @param weights  [kBlockPixels]
+  GLINT_DEVICE_CALL GLINT_HD void sliceWeights(const NdfCluster& cluster, Row c, float* weights) const {
+    sliceWeightsBy(*this, cluster, c, weights);
+  }
+
+  /// Sums of the rows of a slice, negative pixels included: O(16 rank) for cp, O((16 + rank_x) rank_y) for tucker, O(16
+  /// columns) for pca.
+  /// @param weights  its sliceWeights
+  GLINT_HD Float16 rowSums(const NdfCluster& cluster, const float* weights) const {
+    return rowSumsBy(cluster, weights, WeighPrefixes());
   }
   /// Row y of a slice, negative pixels taken as 0. The cost is that of rowSums.
-  /// @param scaled  its scaledCoefficients
-  GLINT_HD Float16 rowPixels(const NdfCluster& cluster, const float* scaled, int y) const {
-    return rowPixelsBy(cluster, scaled, y, WeighPrefixes());
+  /// @param weights  its sliceWeights
+  GLINT_HD Float16 rowPixels(const NdfCluster& cluster, const float* weights, int y) const {
+    return rowPixelsBy(cluster, weights, y, WeighPrefixes());
   }
 
   /// All pixels of a slice, [16][16], negative ones taken as 0.
-  GLINT_DEVICE_CALL GLINT_HD void block(const NdfCluster& cluster, const float* scaled, float* pixels) const {
-    if (isOf(CompressionMethod::pca)) return sumImages(cluster, scaled, pixels);
+  /// @param weights  its sliceWeights
+  GLINT_DEVICE_CALL GLINT_HD void block(const NdfCluster& cluster, const float* weights, float* pixels) const {
+    if (isOf(CompressionMethod::pca)) return sumImages(cluster, weights, pixels);
     const bool cp = isOf(CompressionMethod::cp);
     const int rx = cp ? cluster.columns : cluster.rank_x, ry = cp ? rx : cluster.rank_y;
     float along_x[kMaxColumns * kBlockSize], along_y[kMaxColumns * kBlockSize];  // [rank][16]
     valuesOfAxis(first(cluster), rx, along_x);
     valuesOfAxis(first(cluster) + kBlockSize * rx, ry, along_y);
-    float weights[kMaxColumns * kBlockSize];  // [rank_x][16]: of the functions of x in each row
-    if (!cp) std::fill(weights, weights + rx * kBlockSize, 0.0f);
-    const std::uint8_t* core = coreOf(cluster);
-    for (int k = 0; k < cluster.columns; ++k) {
-      const int a = cp ? k : core[k] % kBlockSize, b = cp ? k : core[k] / kBlockSize;
+    float in_row[kMaxColumns * kBlockSize];  // [rank_x][16]: weights of the functions of x in each row
+    for (int a = 0; a < rx; ++a) {
       for (int y = 0; y < kBlockSize; y += 4) {
-        const Float4 product = Float4::all(scaled[k]) * Float4::load(along_y + b * kBlockSize + y);
-        float* weight = weights + a * kBlockSize + y;
-        (cp ? product : Float4::load(weight) + product).store(weight);
+        const auto function = [&](int b, float weight) {
+          return Float4::all(weight) * Float4::load(along_y + b * kBlockSize + y);
+        };
+        Float4 sum = cp ? function(a, weights[a]) : Float4::zero();
+        for (int b = 0; !cp && b < ry; ++b) sum = sum + function(b, weights[b * kBlockSize + a]);
+        sum.store(in_row + a * kBlockSize + y);
       }
     }
     for (int y = 0; y < kBlockSize; ++y) {
       Float4 sums[4] = {Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()};
       for (int a = 0; a < rx; ++a) {
-        const Float4 w = Float4::all(weights[a * kBlockSize + y]);
+        const Float4 w = Float4::all(in_row[a * kBlockSize + y]);
         for (int x = 0; x < 4; ++x) sums[x] = sums[x] + w * Float4::load(along_x + a * kBlockSize + 4 * x);
       }
       for (int x = 0; x < 4; ++x) sums[x].positive().store(pixels + y * kBlockSize + 4 * x);
@@ -412,28 +421,42 @@ class ClusterReader {
     int last_at, counted;
   };
 
+  /// Prefix sums as they are stored.
+  struct Stored {
+    GLINT_HD Float4 four(const Basis* at) const { return Float4::load(at); }
+  };
+  /// Prefix sums less those `above` elements before them.
+  struct LessAbove {
+    GLINT_HD Float4 four(const Basis* at) const { return Float4::difference(at, at - above, -1); }
+    std::ptrdiff_t above;
+  };
+
   /// Lane t: sum over k of weights[k] * prefix[t * stride + k].
-  /// @param four_rows  FourRows, or what has the same results
-  template <class Rows>
-  static GLINT_HD Float16 weighPrefixes(const Basis* prefix, int stride, int columns, const float* weights, Rows four_rows) {
-    if (columns < 4) return weighFew(prefix, stride, columns, weights);
+  /// @param load        Stored or LessAbove
+  /// @param eight_rows  EightRows, or what has the same results
+  template <class Load, class Rows>
+  static GLINT_HD Float16 weighPrefixes(const Basis* prefix, int stride, int columns, const float* weights, Load load,
+                                        Rows eight_rows) {
+    if (columns < 4) return weighFew(prefix, stride, columns, weights, load);
     Float16 sums;
+    const Basis* last_rows = prefix + kBlockSize / 2 * stride;
     if (columns < 8) {  // reads what is around a row, but nothing around the block
       float first[8] = {}, last[8] = {};
       for (int k = 0; k < columns; ++k) first[k] = last[8 - columns + k] = weights[k];
-      for (int k = 0; k < 4; ++k)
-        sums.v[k] = four_rows(prefix + 4 * k * stride, stride,
-                              ColumnWeights{weights, 0, k < 2 ? first : last, k < 2 ? 0 : columns - 8, 0});
+      eight_rows(prefix, stride, ColumnWeights{weights, 0, first, 0, 0}, load, sums.v);
+      eight_rows(last_rows, stride, ColumnWeights{weights, 0, last, columns - 8, 0}, load, sums.v + 2);
       return sums;
     }
     const int rest = columns % 8, last_at = columns - 8;
     const ColumnWeights all = {weights, columns - rest, rest > 0 ? weights + last_at : nullptr, last_at, 8 - rest};
-    for (int k = 0; k < 4; ++k) sums.v[k] = four_rows(prefix + 4 * k * stride, stride, all);
+    eight_rows(prefix, stride, all, load, sums.v);
+    eight_rows(last_rows, stride, all, load, sums.v + 2);
     return sums;
   }
 
   /// The same for less than four columns.
-  static GLINT_HD Float16 weighFew(const Basis* prefix, int stride, int columns, const float* weights) {
+  template <class Load>
+  static GLINT_HD Float16 weighFew(const Basis* prefix, int stride, int columns, const float* weights, Load load) {
     float w[3] = {};
     for (int k = 0; k < columns; ++k) w[k] = weights[k];
     const Float4 head = Float4::of(w[0], w[1], w[2], 0);
@@ -441,23 +464,30 @@ class ClusterReader {
                         : columns == 2 ? Float4::of(0, 0, w[0], w[1])
                                        : Float4::of(0, w[0], w[1], w[2]);
     const auto four = [&](const Basis* at, Float4 each) {
-      return sumsOf(each * Float4::load(at), each * Float4::load(at + stride), each * Float4::load(at + 2 * stride),
-                    each * Float4::load(at + 3 * stride));
+      return sumsOf(each * load.four(at), each * load.four(at + stride), each * load.four(at + 2 * stride),
+                    each * load.four(at + 3 * stride));
     };
     // Reads what is around a row, but nothing around the block.
     return {{four(prefix, head), four(prefix + 4 * stride, head), four(prefix + 8 * stride, head),
              four(prefix + 12 * stride + columns - 4, tail)}};
   }
 
-  /// Weighted sums of the columns of four rows: each in eight lanes first, which two groups of four hold.
-  struct FourRows {
-    GLINT_HD Float4 operator()(const Basis* prefix, int stride, const ColumnWeights& columns) const {
+  /// Weighted sums of the columns of eight rows: each in eight lanes first, which two groups of four hold.
+  struct EightRows {
+    template <class Load>
+    GLINT_HD void operator()(const Basis* prefix, int stride, const ColumnWeights& columns, Load load, Float4* sums) const {
+      for (int k = 0; k < 2; ++k) sums[k] = four(prefix + 4 * k * stride, stride, columns, load);
+    }
+
+   private:
+    template <class Load>
+    static GLINT_HD Float4 four(const Basis* prefix, int stride, const ColumnWeights& columns, Load load) {
       Float4 low[4] = {Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()},
              high[4] = {low[0], low[0], low[0], low[0]};
       const auto add = [&](Float4 w0, Float4 w1, const Basis* at) {
         for (int j = 0; j < 4; ++j) {
-          low[j] = low[j] + w0 * Float4::load(at + j * stride);
-          high[j] = high[j] + w1 * Float4::load(at + j * stride + 4);
+          low[j] = low[j] + w0 * load.four(at + j * stride);
+          high[j] = high[j] + w1 * load.four(at + j * stride + 4);
         }
       };
       if (columns.last != nullptr) {
@@ -471,59 +501,88 @@ class ClusterReader {
     }
   };
 
-  /// weighPrefixes by FourRows.
+  /// weighPrefixes by EightRows.
   struct WeighPrefixes {
-    GLINT_DEVICE_CALL GLINT_HD Float16 operator()(const Basis* prefix, int stride, int columns, const float* weights) const {
-      return weighPrefixes(prefix, stride, columns, weights, FourRows());
+    template <class Load>
+    GLINT_DEVICE_CALL GLINT_HD Float16 operator()(const Basis* prefix, int stride, int columns, const float* weights,
+                                                  Load load) const {
+      return weighPrefixes(prefix, stride, columns, weights, load, EightRows());
     }
   };
 
+  /// sliceWeights by the scaledCoefficients of a reader.
+  template <class Reader>
+  GLINT_HD void sliceWeightsBy(const Reader& reader, const NdfCluster& cluster, Row c, float* weights) const {
+    if (!isOf(CompressionMethod::tucker)) return reader.scaledCoefficients(cluster, c, weights);
+    float scaled[kMaxColumns];
+    reader.scaledCoefficients(cluster, c, scaled);
+    std::fill(weights, weights + kBlockSize * ((cluster.rank_y + 3) & ~3), 0.0f);
+    const std::uint8_t* core = coreOf(cluster);
+    for (int k = 0; k < cluster.columns; ++k) weights[core[k]] += scaled[k];
+  }
+
   // rowSums and rowPixels by WeighPrefixes, or by what has the same results.
   template <class Weigh>
-  GLINT_DEVICE_CALL GLINT_HD Float16 rowSumsBy(const NdfCluster& cluster, const float* scaled, Weigh weigh) const {
+  GLINT_DEVICE_CALL GLINT_HD Float16 rowSumsBy(const NdfCluster& cluster, const float* weights, Weigh weigh) const {
     constexpr int kLast = kBlockSize - 1;
     const Basis* basis = first(cluster);
     const int columns = cluster.columns;
     if (isOf(CompressionMethod::pca))
-      return weigh(basis + kLast * columns, kBlockSize * columns, columns, scaled).differences();
-    float weights[kMaxColumns];
+      return weigh(basis + kLast * columns, kBlockSize * columns, columns, weights, Stored()).differences();
+    float in_rows[kMaxColumns];  // weights of the functions of y
     if (isOf(CompressionMethod::cp)) {
       const Basis* along_x = basis + kLast * columns;
-      for (int k = 0; k < columns; ++k) weights[k] = scaled[k] * static_cast<float>(along_x[k]);
-      return weigh(basis + kBlockSize * columns, columns, columns, weights).differences();
+      for (int k = 0; k < columns; ++k) in_rows[k] = weights[k] * static_cast<float>(along_x[k]);
+      return weigh(basis + kBlockSize * columns, columns, columns, in_rows, Stored()).differences();
     }
     const int rx = cluster.rank_x, ry = cluster.rank_y;
-    const std::uint8_t* core = coreOf(cluster);
-    float along_x[kBlockSize];
+    float along_x[kBlockSize] = {};
     for (int a = 0; a < rx; ++a) along_x[a] = static_cast<float>(basis[kLast * rx + a]);
-    std::fill(weights, weights + kBlockSize, 0.0f);
-    for (int k = 0; k < columns; ++k) weights[core[k] / kBlockSize] += scaled[k] * along_x[core[k] % kBlockSize];
-    return weigh(basis + kBlockSize * rx, ry, ry, weights).differences();
+    weighCoreRows(weights, ry, along_x, in_rows);
+    return weigh(basis + kBlockSize * rx, ry, ry, in_rows, Stored()).differences();
   }
 
   template <class Weigh>
-  GLINT_DEVICE_CALL GLINT_HD Float16 rowPixelsBy(const NdfCluster& cluster, const float* scaled, int y, Weigh weigh) const {
+  GLINT_DEVICE_CALL GLINT_HD Float16 rowPixelsBy(const NdfCluster& cluster, const float* weights, int y, Weigh weigh) const {
     const Basis* basis = first(cluster);
     const int columns = cluster.columns;
     if (isOf(CompressionMethod::pca)) {
-      const Basis* row = basis + y * kBlockSize * columns;
-      Float16 sums = weigh(row, columns, columns, scaled);
-      if (y > 0) sums = sums - weigh(row - kBlockSize * columns, columns, columns, scaled);
+      const int row_elements = kBlockSize * columns;
+      const Basis* row = basis + y * row_elements;
+      const Float16 sums = y > 0 ? weigh(row, columns, columns, weights, LessAbove{row_elements})
+                                 : weigh(row, columns, columns, weights, Stored());
       return sums.differences().positive();
     }
-    float weights[kMaxColumns];
+    float along_y[kMaxColumns];
     if (isOf(CompressionMethod::cp)) {
-      Axis(basis + kBlockSize * columns, columns, y).store(weights);
-      for (int k = 0; k < columns; ++k) weights[k] *= scaled[k];
-      return weigh(basis, columns, columns, weights).differences().positive();
+      Axis(basis + kBlockSize * columns, columns, y).store(along_y);
+      for (int k = 0; k < columns; ++k) along_y[k] *= weights[k];
+      return weigh(basis, columns, columns, along_y, Stored()).differences().positive();
     }
     const int rx = cluster.rank_x, ry = cluster.rank_y;
-    const std::uint8_t* core = coreOf(cluster);
-    float along_y[kBlockSize];
     Axis(basis + kBlockSize * rx, ry, y).store(along_y);
-    std::fill(weights, weights + kBlockSize, 0.0f);
-    for (int k = 0; k < columns; ++k) weights[core[k] % kBlockSize] += scaled[k] * along_y[core[k] / kBlockSize];
-    return weigh(basis, rx, rx, weights).differences().positive();
+    float in_row[kBlockSize];  // weights of the functions of x
+    weighCoreColumns(weights, ry, along_y, in_row);
+    return weigh(basis, rx, rx, in_row, Stored()).differences().positive();
+  }
+
+  /// sums[b] = sum over a of matrix[a + 16 b] * weights[a]; for whole groups of four b.
+  static GLINT_HD void weighCoreRows(const float* matrix, int rows, const float* weights, float* sums) {
+    const Float16 w = Float16::load(weights);
+    const auto row = [&](int b) {
+      const Float16 r = Float16::load(matrix + b * kBlockSize);
+      return (w.v[0] * r.v[0] + w.v[1] * r.v[1]) + (w.v[2] * r.v[2] + w.v[3] * r.v[3]);
+    };
+    for (int b = 0; b < rows; b += 4) sumsOf(row(b), row(b + 1), row(b + 2), row(b + 3)).store(sums + b);
+  }
+  /// sums[a] = sum over b of matrix[a + 16 b] * weights[b], [16].
+  static GLINT_HD void weighCoreColumns(const float* matrix, int rows, const float* weights, float* sums) {
+    Float4 lanes[4] = {Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()};
+    for (int b = 0; b < rows; ++b) {
+      const Float4 w = Float4::all(weights[b]);
+      for (int k = 0; k < 4; ++k) lanes[k] = lanes[k] + w * Float4::load(matrix + b * kBlockSize + 4 * k);
+    }
+    for (int k = 0; k < 4; ++k) lanes[k].store(sums + 4 * k);
   }
 
   /// pca: sums the prefix sums of all columns first, and takes differences once.
@@ -532,7 +591,7 @@ class ClusterReader {
     const Basis* at = first(cluster);
     Float16 above = {{Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()}};
     for (int y = 0; y < kBlockSize; ++y, at += kBlockSize * columns) {
-      const Float16 here = WeighPrefixes()(at, columns, columns, scaled).differences();
+      const Float16 here = WeighPrefixes()(at, columns, columns, scaled, Stored()).differences();
       (here - above).positive().store(pixels + y * kBlockSize);
       above = here;
     }

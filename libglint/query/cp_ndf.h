@@ -1,6 +1,7 @@
 #pragma once
 
 #include "glint/model/compressed_ndf.h"
+#include "glint/query/avx2_reader.h"
 #include "glint/query/bits.h"
 #include "glint/query/block_mass.h"
 #include "glint/query/cluster_slices.h"
@@ -8,7 +9,6 @@
 #include "glint/query/reference.h"
 #include "glint/query/sampling.h"
 #include "glint/query/spots.h"
-#include "glint/query/wide_reader.h"
 
 namespace glint {
 
@@ -45,7 +45,8 @@ class CpNdf {
     const PyramidSlices chosen = chooser_.choose(p);
     const PixelPlace place = pixelPlace(shape(), h);
     return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
-      return sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<Reader>{reader, place}, Positive{});
+      return finitePositive(
+          sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<Reader>{reader, place}, Positive{}));
     });
   }
 
@@ -58,8 +59,9 @@ class CpNdf {
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const;
 
   /// Average over a box of half vectors, >= 0, 0 if the box is empty; O(columns) for each block that the box covers.
-  GLINT_HD float mean(const Footprint& p, const Box2& range) const { return std::max(0.0f, signedMean(p, range)); }
+  GLINT_HD float mean(const Footprint& p, const Box2& range) const { return finitePositive(signedMean(p, range)); }
 
+  /// Density with what the approximation leaves below zero. Not checked: infinite, or no number, if numbers of the file are.
   GLINT_HD float signedDensity(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     if (fromTexels(p)) return below_.density(p, h);
@@ -70,6 +72,7 @@ class CpNdf {
     });
   }
 
+  /// Exact average of signedDensity over a box of half vectors, 0 if the box is empty.
   GLINT_HD float signedMean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
     if (fromTexels(p)) return below_.mean(p, range);
@@ -122,8 +125,8 @@ class CpNdf {
   struct PixelOf {
     Reader reader;
     PixelPlace place;
-#ifdef GLINT_WIDE
-    PixelOf<typename Reader::Wide> wide() const { return {typename Reader::Wide(reader), place}; }
+#ifdef GLINT_AVX2
+    PixelOf<typename Reader::Avx2> avx2() const { return {typename Reader::Avx2(reader), place}; }
 #endif
     GLINT_HD void project(const NdfCluster& cluster, const ColumnLayout& layout, float* projection) const {
       reader.pixel(cluster, layout, place.x, place.y, projection);
@@ -144,8 +147,8 @@ class CpNdf {
   struct BoxOf {
     Reader reader;
     BlockBox box;
-#ifdef GLINT_WIDE
-    BoxOf<typename Reader::Wide> wide() const { return {typename Reader::Wide(reader), box}; }
+#ifdef GLINT_AVX2
+    BoxOf<typename Reader::Avx2> avx2() const { return {typename Reader::Avx2(reader), box}; }
 #endif
     GLINT_HD void project(const NdfCluster& cluster, const ColumnLayout& layout, float* projection) const {
       reader.box(cluster, layout, box, projection);
@@ -202,15 +205,15 @@ class CpNdf {
   /// Weighted sum over slices. Those of the same cluster, as those of neighbours mostly are, share its projection.
   template <class Ask, class Part>
   GLINT_HD float sumSlices(const SlicePlaces& places, const Ask& ask, Part part) const {
-#ifdef GLINT_WIDE
-    if (hasWideVectors()) return sumSlicesWide(places, ask, part);
+#ifdef GLINT_AVX2
+    if (hasAvx2()) return sumSlicesAvx2(places, ask, part);
 #endif
     return sumSlicesBy(places, ask, part);
   }
-#ifdef GLINT_WIDE
+#ifdef GLINT_AVX2
   template <class Ask, class Part>
-  GLINT_WIDE GLINT_FLATTEN float sumSlicesWide(const SlicePlaces& places, const Ask& ask, Part part) const {
-    return sumSlicesBy(places, ask.wide(), part);
+  GLINT_AVX2 GLINT_FLATTEN float sumSlicesAvx2(const SlicePlaces& places, const Ask& ask, Part part) const {
+    return sumSlicesBy(places, ask.avx2(), part);
   }
 #endif
 
@@ -286,12 +289,12 @@ class CpNdf {
       if (cluster_.columns == 0)
         spots_ = spotsOf(ndf, cluster_, at.slice);
       else
-        reader.scaledCoefficients(cluster_, reader.row(cluster_, at.slice), scaled_);
+        reader.sliceWeights(cluster_, reader.row(cluster_, at.slice), weights_);
     }
 
     /// What is surely in each row: less by what lies below zero there.
     GLINT_HD Float16 leastSums() const {
-      return cluster_.columns == 0 ? spotRowSums(profile_, spots_) : reader_.rowSums(cluster_, scaled_).positive();
+      return cluster_.columns == 0 ? spotRowSums(profile_, spots_) : reader_.rowSums(cluster_, weights_).positive();
     }
     /// What is in each row besides. Decodes all pixels.
     GLINT_HD Float16 addedSums(const Float16& least) const {
@@ -299,12 +302,12 @@ class CpNdf {
       if (cluster_.columns == 0)  // nothing is below zero
         std::fill(pixels, pixels + kBlockPixels, 0.0f);
       else
-        reader_.block(cluster_, scaled_, pixels);
+        reader_.block(cluster_, weights_, pixels);
       return (sumRows(pixels) - least).positive();
     }
     /// Pixels of a row, >= 0.
     GLINT_HD Float16 row(int y) const {
-      return cluster_.columns == 0 ? spotRow(profile_, spots_, y) : reader_.rowPixels(cluster_, scaled_, y);
+      return cluster_.columns == 0 ? spotRow(profile_, spots_, y) : reader_.rowPixels(cluster_, weights_, y);
     }
 
    private:
@@ -312,7 +315,7 @@ class CpNdf {
     const NdfCluster& cluster_;
     SpotProfile profile_;
     SpotList spots_ = {};
-    float scaled_[kMaxColumns];
+    float weights_[kBlockPixels];
   };
 
   /// Chooses a pixel of the chosen block in proportion to its value: its row with xi.y, its column with xi.x.
@@ -364,16 +367,14 @@ inline GLINT_HD CpNdf::Draw CpNdf::chooseImage(const PyramidSlices& chosen, Vec2
 inline GLINT_HD void CpNdf::chooseBlock(Draw& draw) const {
   if (!draw.possible) return;
   const std::uint32_t* first = ndf_.first_block.data() + draw.image;
-  const std::uint8_t* codes = ndf_.block_masses.data() + first[0];
-  const int count = static_cast<int>(first[1] - first[0]);
-  const std::size_t readable = ndf_.block_masses.size() - first[0];
-  const int rank = chooseOfMany<kMostBlocks>(
-      count, [&](int k) { return loadMasses(codes + k, count - k, readable - static_cast<std::size_t>(k)); }, draw.xi.y);
+  const BlockMasses masses(ndf_.block_masses.data() + first[0], static_cast<int>(first[1] - first[0]),
+                           ndf_.block_masses.size() - first[0]);
+  const int rank = chooseOfMany<kMostBlocks>(masses, draw.xi.y);
   draw.possible = rank >= 0;
   if (!draw.possible) return;
   draw.block_place = placeOfRank(ndf_.block_masks.data() + draw.image * static_cast<std::size_t>(ndf_.placeWords()), rank);
   draw.block = ndf_.place_blocks.data()[draw.block_place];
-  draw.mass = blockMass(codes[rank]);
+  draw.mass = masses[rank];
 }
 
 inline GLINT_HD void CpNdf::findBlockSlice(Draw& draw) const {
@@ -406,8 +407,8 @@ GLINT_HD bool CpNdf::choosePixelOfBlock(const Reader& reader, bool last_try, Dra
 
 template <class Reader>
 GLINT_HD void CpNdf::choosePixel(const Reader& reader, Draw& draw) const {
-#ifdef GLINT_WIDE
-  if (hasWideVectors()) return choosePixelBy(typename Reader::Wide(reader), draw);
+#ifdef GLINT_AVX2
+  if (hasAvx2()) return choosePixelBy(typename Reader::Avx2(reader), draw);
 #endif
   choosePixelBy(reader, draw);
 }
@@ -439,7 +440,7 @@ inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) cons
     if (draw.place.x < 0) return {};
     if (draw.block != block) places = findSlices(chosen, draw.block, ndf_.density_scales.data());
     const float density = sumSlices(places, PixelOf<Reader>{reader, draw.place}, Positive{});
-    return {pointInPixel(shape(), draw.place, draw.xi), density / draw.total};
+    return drawnAt(pointInPixel(shape(), draw.place, draw.xi), finitePositive(density / draw.total));
   });
 }
 

@@ -96,9 +96,10 @@ class DisplacedBrdf {
     const DisplacementLevel& l = asset_.levels[level];
     const std::size_t cell = place(l, uv).cell;
     const float facet = n.z / (ci * co);
-    if (variant == DisplacedVariant::single) return facet * singleLobe(l, cell, wi, wo);
+    if (variant == DisplacedVariant::single) return finitePositive(facet * singleLobe(l, cell, wi, wo));
     const Rgb reflected = facet * timesCosines(l, cell, wi, wo);
-    return variant == DisplacedVariant::full ? spatialScale(level, uv) * angularScale(level, wi, wo) * reflected : reflected;
+    return finitePositive(variant == DisplacedVariant::full ? spatialScale(level, uv) * angularScale(level, wi, wo) * reflected
+                                                            : reflected);
   }
 
   /// Light reflected from wi to wo, BRDF times cosine, blended between levels. Each level has its own facet.
@@ -141,7 +142,7 @@ class DisplacedBrdf {
     for (const std::size_t last = first + static_cast<std::size_t>(asset_.lobe_count) - 1;
          lobe < last && l.lobes[lobe + 1].amplitude > 0 && left >= share; share = lobeShare(l, ++lobe))
       left -= share;
-    const float unit = std::clamp(left / std::max(share, 1e-20f), 0.0f, 0.99999994f);
+    const float unit = clampUnit(left / std::max(share, 1e-20f));
     const Vec3 axis = lobeCentre(l.lobes[lobe]);
     const float angle = 2 * kPi * xi.y;
     Vec3 wi;
@@ -174,7 +175,7 @@ class DisplacedBrdf {
           diffuse ? c * kInversePi : ggxDensity(c, spreadRoughness(lobeAlpha(l, k), l.lobes[k].kappa)) * c / (2 * length);
       density += lobeShare(l, k) * of_lobe;
     }
-    return density / totalShare(l, first);
+    return finitePositive(density / totalShare(l, first));
   }
 
   /// Density of the original's normals towards a half vector, by the lobes of a cell: per unit projected area. Its integral
@@ -258,9 +259,6 @@ class DisplacedBrdf {
   }
 
  private:
-  /// False for what is longer than a unit vector is after rounding, and for NaN.
-  static GLINT_HD bool isDirection(Vec3 w) { return dot(w, w) < 1.001f; }
-
   /// A cell and the place in it.
   struct Place {
     int i, j;

@@ -8,8 +8,13 @@
 #include "glint/model/device.h"
 #include "glint/query/half.h"
 
-#if defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(__CUDA__)
+#if defined(__SSE2__) && !defined(__CUDACC__) && !defined(__CUDA__)
+#define GLINT_SSE
+#ifdef __SSE4_1__
 #include <smmintrin.h>
+#else
+#include <emmintrin.h>
+#endif
 #endif
 
 namespace glint {
@@ -25,9 +30,43 @@ inline GLINT_HD float differenceOf(std::int32_t a, std::int32_t b) {
 }
 inline GLINT_HD float differenceOf(std::int16_t a, std::int16_t b) { return differenceOf(std::int32_t{a}, std::int32_t{b}); }
 
-/// Four floats side by side, from SSE4.1 where the program is compiled for it. Results are the same bits without it.
+#ifdef GLINT_SSE
+/// SSE2, and SSE4.1 where the program is compiled for it: with the same results, and in the same registers, so that parts of a
+/// program that are compiled for other processors can call one another.
+namespace sse {
+#ifdef __SSE4_1__
+inline __m128i integersOf8(__m128i bytes) { return _mm_cvtepi8_epi32(bytes); }
+inline __m128i integersOf16(__m128i shorts) { return _mm_cvtepi16_epi32(shorts); }
+inline __m128i productOf(__m128i a, __m128i b) { return _mm_mullo_epi32(a, b); }
+inline __m128 where(__m128 mask, __m128 yes, __m128 no) { return _mm_blendv_ps(no, yes, mask); }
+inline __m128 floorOf(__m128 v) { return _mm_floor_ps(v); }
+#else
+inline __m128i integersOf8(__m128i bytes) {
+  const __m128i pairs = _mm_unpacklo_epi8(bytes, bytes);
+  return _mm_srai_epi32(_mm_unpacklo_epi16(pairs, pairs), 24);
+}
+inline __m128i integersOf16(__m128i shorts) { return _mm_srai_epi32(_mm_unpacklo_epi16(shorts, shorts), 16); }
+inline __m128i productOf(__m128i a, __m128i b) {
+  const __m128i even = _mm_mul_epu32(a, b), odd = _mm_mul_epu32(_mm_srli_epi64(a, 32), _mm_srli_epi64(b, 32));
+  return _mm_unpacklo_epi32(_mm_shuffle_epi32(even, 0x08), _mm_shuffle_epi32(odd, 0x08));
+}
+inline __m128 where(__m128 mask, __m128 yes, __m128 no) { return _mm_or_ps(_mm_and_ps(mask, yes), _mm_andnot_ps(mask, no)); }
+inline __m128 floorOf(__m128 v) {
+  const __m128 sign = _mm_set1_ps(-0.0f), whole = _mm_cvtepi32_ps(_mm_cvttps_epi32(v));
+  const __m128 below = _mm_sub_ps(whole, _mm_and_ps(_mm_cmplt_ps(v, whole), _mm_set1_ps(1)));
+  // From 2^23 on all numbers are whole; and what is none stays so.
+  const __m128 has_fraction = _mm_cmplt_ps(_mm_andnot_ps(sign, v), _mm_set1_ps(0x1p23f));
+  return where(has_fraction, _mm_or_ps(below, _mm_and_ps(v, sign)), v);
+}
+#endif
+/// Four numbers of 16 bits, without signs.
+inline __m128i loadFour(const void* p) { return _mm_loadl_epi64(static_cast<const __m128i*>(p)); }
+}  // namespace sse
+#endif
+
+/// Four floats side by side. Results are the same bits for every processor.
 struct Float4 {
-#if defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(__CUDA__)
+#ifdef GLINT_SSE
   __m128 v;
 
   static Float4 zero() { return {_mm_setzero_ps()}; }
@@ -42,30 +81,27 @@ struct Float4 {
   static __m128i bytes(const std::int8_t* p) {
     std::int32_t four;
     std::memcpy(&four, p, sizeof four);
-    return _mm_cvtepi8_epi32(_mm_cvtsi32_si128(four));
+    return sse::integersOf8(_mm_cvtsi32_si128(four));
   }
   static Float4 load(const std::int8_t* p) { return {_mm_cvtepi32_ps(bytes(p))}; }
-  static Float4 load(const std::int16_t* p) {
-    return {_mm_cvtepi32_ps(_mm_cvtepi16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))))};
-  }
+  static Float4 load(const std::int16_t* p) { return {_mm_cvtepi32_ps(sse::integersOf16(sse::loadFour(p)))}; }
   static Float4 load(const std::int32_t* p) { return {_mm_cvtepi32_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))}; }
   /// Half-precision numbers.
   static Float4 load(const std::uint16_t* p) {
-    const __m128i bits = _mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
-    const __m128i magnitude = _mm_and_si128(bits, _mm_set1_epi32(0x7fff));
-    const __m128i sign = _mm_slli_epi32(_mm_and_si128(bits, _mm_set1_epi32(0x8000)), 16);
+    const __m128i halves = sse::loadFour(p), signs = _mm_and_si128(halves, _mm_set1_epi16(-0x8000));
+    const __m128i finite = _mm_min_epi16(_mm_andnot_si128(signs, halves), _mm_set1_epi16(kLargestHalf));
+    const __m128i magnitude = _mm_unpacklo_epi16(finite, _mm_setzero_si128());
+    const __m128i sign = _mm_unpacklo_epi16(_mm_setzero_si128(), signs);
     const __m128i normal = _mm_add_epi32(_mm_slli_epi32(magnitude, 13), _mm_set1_epi32(112 << 23));
     // As integers: arithmetic on subnormal floats takes a hundred cycles.
     const __m128 subnormal = _mm_mul_ps(_mm_cvtepi32_ps(magnitude), _mm_set1_ps(0x1p-24f));
     const __m128 is_subnormal = _mm_castsi128_ps(_mm_cmplt_epi32(magnitude, _mm_set1_epi32(0x400)));
-    return {_mm_or_ps(_mm_blendv_ps(_mm_castsi128_ps(normal), subnormal, is_subnormal), _mm_castsi128_ps(sign))};
+    return {_mm_or_ps(sse::where(is_subnormal, subnormal, _mm_castsi128_ps(normal)), _mm_castsi128_ps(sign))};
   }
   /// differenceOf(a[k], b[k]), or a[k] where `mask` is 0 rather than -1.
   static Float4 difference(const std::int16_t* a, const std::int16_t* b, int mask) {
-    const auto wide = [](const std::int16_t* p) {
-      return _mm_cvtepi16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
-    };
-    return {_mm_cvtepi32_ps(_mm_sub_epi32(wide(a), _mm_and_si128(wide(b), _mm_set1_epi32(mask))))};
+    const auto four = [](const std::int16_t* p) { return sse::integersOf16(sse::loadFour(p)); };
+    return {_mm_cvtepi32_ps(_mm_sub_epi32(four(a), _mm_and_si128(four(b), _mm_set1_epi32(mask))))};
   }
   static Float4 difference(const std::int32_t* a, const std::int32_t* b, int mask) {
     const auto four = [](const std::int32_t* p) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(p)); };
@@ -74,26 +110,24 @@ struct Float4 {
   static Float4 difference(const float* a, const float* b, int mask) {
     return {_mm_sub_ps(_mm_loadu_ps(a), _mm_and_ps(_mm_loadu_ps(b), _mm_castsi128_ps(_mm_set1_epi32(mask))))};
   }
-  /// Half-precision numbers >= 0: fewer steps, as there is no sign.
+  /// positiveHalfToFloat: fewer steps, as there is no sign.
   static Float4 loadPositive(const std::uint16_t* p) {
-    return positiveHalves(_mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))));
+    return positiveHalves(_mm_unpacklo_epi16(sse::loadFour(p), _mm_setzero_si128()));
   }
   static Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
     __m128i bits = _mm_insert_epi16(_mm_setzero_si128(), a, 0);
     bits = _mm_insert_epi16(_mm_insert_epi16(bits, b, 2), c, 4);
     return positiveHalves(_mm_insert_epi16(bits, d, 6));
   }
-  /// Half-precision numbers >= 0 times 2^-112, in the fewest steps. Subnormal ones stay subnormal, so they are for sums and
-  /// comparisons only.
-  static Float4 loadTiny(const std::uint16_t* p) {
-    const __m128i bits = _mm_cvtepu16_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
-    return {_mm_castsi128_ps(_mm_slli_epi32(bits, 13))};
-  }
   /// Masses of blocks whose codes (block_mass.h) are the bytes of `codes`, the first of them lowest.
   static Float4 ofMassCodes(std::uint32_t codes) {
-    return positiveHalves(_mm_slli_epi32(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(static_cast<int>(codes))), 6));
+    const __m128i zero = _mm_setzero_si128();
+    const __m128i pairs = _mm_unpacklo_epi8(_mm_cvtsi32_si128(static_cast<int>(codes)), zero);
+    return positiveHalves(_mm_slli_epi32(_mm_unpacklo_epi16(pairs, zero), 6));
   }
-  static Float4 positiveHalves(__m128i bits) {
+  /// @param halves  in the low 16 bits of lanes
+  static Float4 positiveHalves(__m128i halves) {
+    const __m128i bits = _mm_min_epi16(_mm_max_epi16(halves, _mm_setzero_si128()), _mm_set1_epi32(kLargestHalf));
     // Right for normal numbers. A subnormal f 2^-14 comes out as 2^-15 (1 + f): less than twice that minus 2^-14 only if it is
     // normal.
     const __m128 normal = _mm_castsi128_ps(_mm_add_epi32(_mm_slli_epi32(bits, 13), _mm_set1_epi32(112 << 23)));
@@ -108,7 +142,7 @@ struct Float4 {
   friend Float4 operator-(Float4 a, Float4 b) { return {_mm_sub_ps(a.v, b.v)}; }
   friend Float4 operator*(Float4 a, Float4 b) { return {_mm_mul_ps(a.v, b.v)}; }
   friend Float4 operator/(Float4 a, Float4 b) { return {_mm_div_ps(a.v, b.v)}; }
-  friend Float4 floorOf(Float4 a) { return {_mm_floor_ps(a.v)}; }
+  friend Float4 floorOf(Float4 a) { return {sse::floorOf(a.v)}; }
   friend Float4 minOf(Float4 a, Float4 b) { return {_mm_min_ps(a.v, b.v)}; }
   /// In lanes: numbers[k] == number ? yes : 0.
   friend Float4 whereEqual(const std::uint32_t* numbers, std::uint32_t number, Float4 yes) {
@@ -123,12 +157,12 @@ struct Float4 {
   Float4 lanes2233() const { return {_mm_unpackhi_ps(v, v)}; }
   /// out[k] = row[k] * columns + column[k], of whole numbers >= 0.
   friend void storeIndices(Float4 row, std::int32_t columns, Float4 column, std::uint32_t* out) {
-    const __m128i before = _mm_mullo_epi32(_mm_cvttps_epi32(row.v), _mm_set1_epi32(columns));
+    const __m128i before = sse::productOf(_mm_cvttps_epi32(row.v), _mm_set1_epi32(columns));
     _mm_storeu_si128(reinterpret_cast<__m128i*>(out), _mm_add_epi32(before, _mm_cvttps_epi32(column.v)));
   }
   /// In lanes: a < b ? yes : no.
   friend Float4 whereLess(Float4 a, Float4 b, Float4 yes, Float4 no) {
-    return {_mm_blendv_ps(no.v, yes.v, _mm_cmplt_ps(a.v, b.v))};
+    return {sse::where(_mm_cmplt_ps(a.v, b.v), yes.v, no.v)};
   }
   /// In lanes: a < b ? yes : 0.
   friend Float4 whereLess(Float4 a, Float4 b, Float4 yes) { return {_mm_and_ps(yes.v, _mm_cmplt_ps(a.v, b.v))}; }
@@ -145,9 +179,7 @@ struct Float4 {
   Float4 last() const { return {_mm_shuffle_ps(v, v, 0xff)}; }
   float lastLane() const { return _mm_cvtss_f32(last().v); }
   /// Lanes one further, behind the last one of `before`.
-  Float4 shiftedBehind(Float4 before) const {
-    return {_mm_castsi128_ps(_mm_alignr_epi8(_mm_castps_si128(v), _mm_castps_si128(before.v), 12))};
-  }
+  Float4 shiftedBehind(Float4 before) const { return {_mm_shuffle_ps(_mm_shuffle_ps(before.v, v, 0x0f), v, 0x98)}; }
   /// (0 + 2) + (1 + 3).
   float sum() const {
     const __m128 pairs = _mm_add_ps(v, _mm_movehl_ps(v, v));
@@ -176,19 +208,9 @@ struct Float4 {
     for (int k = 0; k < 4; ++k) out.v[k] = differenceOf(a[k], mask != 0 ? b[k] : T{0});
     return out;
   }
-  static GLINT_HD Float4 loadPositive(const std::uint16_t* p) { return load(p); }
+  static GLINT_HD Float4 loadPositive(const std::uint16_t* p) { return ofPositive(p[0], p[1], p[2], p[3]); }
   static GLINT_HD Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
-    return {{halfToFloat(a), halfToFloat(b), halfToFloat(c), halfToFloat(d)}};
-  }
-  /// Half-precision numbers >= 0 times 2^-112, in the fewest steps. Subnormal ones stay subnormal, so they are for sums and
-  /// comparisons only.
-  static GLINT_HD Float4 loadTiny(const std::uint16_t* p) {
-    Float4 out;
-    for (int k = 0; k < 4; ++k) {
-      const std::uint32_t bits = static_cast<std::uint32_t>(p[k]) << 13;
-      std::memcpy(out.v + k, &bits, sizeof bits);
-    }
-    return out;
+    return {{positiveHalfToFloat(a), positiveHalfToFloat(b), positiveHalfToFloat(c), positiveHalfToFloat(d)}};
   }
   /// Masses of blocks whose codes (block_mass.h) are the bytes of `codes`, the first of them lowest.
   static GLINT_HD Float4 ofMassCodes(std::uint32_t codes) {
@@ -277,9 +299,10 @@ struct Float4 {
 
 /// Sums of four vectors, each over its lanes.
 inline GLINT_HD Float4 sumsOf(Float4 a, Float4 b, Float4 c, Float4 d) {
-#if defined(__SSE4_1__) && !defined(__CUDACC__) && !defined(__CUDA__)
-  _MM_TRANSPOSE4_PS(a.v, b.v, c.v, d.v);
-  return (a + c) + (b + d);
+#ifdef GLINT_SSE
+  const Float4 ab = {_mm_add_ps(_mm_unpacklo_ps(a.v, b.v), _mm_unpackhi_ps(a.v, b.v))};
+  const Float4 cd = {_mm_add_ps(_mm_unpacklo_ps(c.v, d.v), _mm_unpackhi_ps(c.v, d.v))};
+  return {_mm_add_ps(_mm_movelh_ps(ab.v, cd.v), _mm_movehl_ps(cd.v, ab.v))};
 #else
   return {{a.sum(), b.sum(), c.sum(), d.sum()}};
 #endif

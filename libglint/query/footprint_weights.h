@@ -24,12 +24,18 @@ inline GLINT_HD int wrapIndex(int i, int n) {
 /// Brings a coordinate of a footprint's centre into [0, 1); what is not finite becomes 0.
 inline GLINT_HD float wrapUnit(float u) {
   const float wrapped = u - std::floor(u);
-  return wrapped >= 0 && wrapped < 1 ? wrapped : 0.0f;
+  return wrapped >= 0 ? std::min(wrapped, float{kBelowOne}) : 0.0f;  // close below 0 it is rounded to 1
 }
+
+/// A covariance of positive definite form, texels^2. Double: in float that of a long footprint would lose its width.
+struct UsableCovariance {
+  double xx, xy, yy;
+  GLINT_HD double determinant() const { return xx * yy - xy * xy; }
+};
 
 /// Covariance of a footprint, made usable: shortened to the sides of the map along u and v (a longer one sees the map evenly,
 /// to 5e-9), widened to kMinSigmaTexels; what is not finite becomes the narrowest one.
-inline GLINT_HD Covariance usableCovariance(Covariance c, int width, int height) {
+inline GLINT_HD UsableCovariance usableCovariance(Covariance c, int width, int height) {
   constexpr float kLowest = kMinSigmaTexels * kMinSigmaTexels;
   if (!(std::isfinite(c.xx) && std::isfinite(c.xy) && std::isfinite(c.yy))) return {kLowest, 0, kLowest};
   const double xx = std::max(0.0, double{c.xx}), yy = std::max(0.0, double{c.yy});
@@ -40,7 +46,7 @@ inline GLINT_HD Covariance usableCovariance(Covariance c, int width, int height)
   const double a = xx * sx * sx, b = xy * sx * sy, d = yy * sy * sy;
   const double smallest = 0.5 * (a + d) - std::sqrt(0.25 * (a - d) * (a - d) + b * b);
   const double shift = std::max(0.0, kLowest - smallest);
-  return {static_cast<float>(a + shift), static_cast<float>(b), static_cast<float>(d + shift)};
+  return {a + shift, b, d + shift};
 }
 
 /// A convex polygon of few corners.
@@ -136,9 +142,8 @@ class FootprintWeights {
     float mean, sigma, share;
   };
   GLINT_HD Line gaussianLine(float y) const {
-    const float dy = y - centre_.y, tilt = inverse_.xy / inverse_.xx;
-    return {centre_.x - tilt * dy, 1 / std::sqrt(inverse_.xx),
-            std::exp(-0.5f * std::max(0.0f, inverse_.yy - tilt * inverse_.xy) * dy * dy)};
+    const float dy = y - centre_.y;
+    return {centre_.x + slant_ * dy, 1 / std::sqrt(across_), std::exp(-0.5f * along_ * dy * dy)};
   }
 
   /// The parallelogram of a box, or its part inside a rectangle of texel space, in the frame where it is [-1, 1]^2.
@@ -158,7 +163,7 @@ class FootprintWeights {
   /// Whether the sum of all texel weights has a closed form, that of `closedFormTotal`, to float precision.
   GLINT_HD bool hasClosedFormTotal() const { return is_box_ || min_sigma_ >= 1; }
   /// Sum of `texel`, as of `triangle`, over the endless plane.
-  GLINT_HD float closedFormTotal() const { return is_box_ ? 4.0f : 2 * 3.14159265358979f * std::sqrt(determinant_); }
+  GLINT_HD float closedFormTotal() const { return is_box_ ? 4.0f : 2 * 3.14159265358979f * root_determinant_; }
 
  private:
   GLINT_HD bool setBox(const Footprint& p, Vec2 longest) {
@@ -176,12 +181,15 @@ class FootprintWeights {
     return true;
   }
 
-  GLINT_HD void setGaussian(const Covariance& c) {
-    determinant_ = c.xx * c.yy - c.xy * c.xy;
-    inverse_ = {c.yy / determinant_, -c.xy / determinant_, c.xx / determinant_};
-    const float mean = 0.5f * (c.xx + c.yy);
-    min_sigma_ = std::sqrt(determinant_ / (mean + std::sqrt(std::max(0.0f, mean * mean - determinant_))));
-    setRange({kFootprintReach * std::sqrt(c.xx), kFootprintReach * std::sqrt(c.yy)});
+  GLINT_HD void setGaussian(const UsableCovariance& c) {
+    const double determinant = c.determinant(), mean = 0.5 * (c.xx + c.yy);
+    const double largest = mean + std::sqrt(std::max(0.0, mean * mean - determinant));
+    slant_ = static_cast<float>(c.xy / c.yy);
+    across_ = static_cast<float>(c.yy / determinant);
+    along_ = static_cast<float>(1 / c.yy);
+    root_determinant_ = static_cast<float>(std::sqrt(determinant));
+    min_sigma_ = static_cast<float>(std::sqrt(determinant / largest));
+    setRange({kFootprintReach * static_cast<float>(std::sqrt(c.xx)), kFootprintReach * static_cast<float>(std::sqrt(c.yy))});
   }
 
   GLINT_HD void setRange(Vec2 reach) {
@@ -193,15 +201,17 @@ class FootprintWeights {
   }
 
   GLINT_HD float gaussian(Vec2 d) const {
-    return std::exp(-0.5f * (inverse_.xx * d.x * d.x + 2 * inverse_.xy * d.x * d.y + inverse_.yy * d.y * d.y));
+    const float x = d.x - slant_ * d.y;
+    return std::exp(-0.5f * (across_ * x * x + along_ * d.y * d.y));
   }
   /// Into the frame where the parallelogram is [-1, 1]^2.
   GLINT_HD Vec2 local(Vec2 d) const { return {dot(row_x_, d), dot(row_y_, d)}; }
 
   Vec2 centre_;
   bool is_box_ = false;
-  Covariance inverse_;
-  float determinant_ = 0;
+  // A Gaussian: exp(-(across (x - slant y)^2 + along y^2) / 2). Nothing cancels that is long and thin.
+  float slant_ = 0, across_ = 0, along_ = 0;
+  float root_determinant_ = 0;  ///< of the covariance
   float min_sigma_ = 0;
   Vec2 row_x_, row_y_;
 };

@@ -16,8 +16,10 @@ namespace glint {
 /// Directions closer to the horizon count as below it: no light is seen along them. Keeps 1 / cosine finite.
 inline constexpr float kHorizon = 1e-6f;
 
-/// Whether a direction can be asked for: above the horizon, and not longer than a unit vector is after rounding. False for NaN.
-inline GLINT_HD bool aboveHorizon(Vec3 w) { return w.z > kHorizon && dot(w, w) < 1.001f; }
+/// Whether a vector is not longer than a unit vector is after rounding. False for NaN.
+inline GLINT_HD bool isDirection(Vec3 w) { return dot(w, w) < 1.001f; }
+/// Whether a direction can be asked for: one above the horizon.
+inline GLINT_HD bool aboveHorizon(Vec3 w) { return w.z > kHorizon && isDirection(w); }
 
 /// The normal of a facet between two directions.
 struct HalfVector {

@@ -86,8 +86,7 @@ class HistogramNdf {
 
   /// Average density over a box of half vectors, the exact average of `density`; 0 if the box is empty.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
-    const Box2 box = {{std::max(range.low.x, -1.0f), std::max(range.low.y, -1.0f)},
-                      {std::min(range.high.x, 1.0f), std::min(range.high.y, 1.0f)}};
+    const Box2 box = insideSquare(range);
     if (!(box.width() > 0 && box.height() > 0)) return 0;
     BinCounts counts;
     const double total = histogram(p, counts);
@@ -118,7 +117,7 @@ class HistogramNdf {
       if (rest < counts.totals[bin]) break;
     }
     const int id = sat_.bin_ids.data()[chosen];
-    const auto within = static_cast<float>(std::clamp(rest / counts.totals[chosen], 0.0, 0.99999994));
+    const auto within = clampUnit(static_cast<float>(rest / counts.totals[chosen]));
     return {bins_.point(id, {within, xi.y}), static_cast<float>(counts.totals[chosen] / (total * bins_.area(id)))};
   }
 
@@ -146,9 +145,8 @@ class HistogramNdf {
       if (area > 0) return area;
     }
     // Half axes of the parallelogram of the same covariance, two of its sides upright: Cholesky's factor times sqrt(3).
-    const Covariance c = usableCovariance(p.covariance, sat_.width, sat_.height);
-    const double xx = c.xx, xy = c.xy, yy = c.yy;
-    const double ax = std::sqrt(3 * xx), ay = xy * std::sqrt(3 / xx), by = std::sqrt(3 * std::max(yy - xy * xy / xx, 1e-6));
+    const UsableCovariance c = usableCovariance(p.covariance, sat_.width, sat_.height);
+    const double ax = std::sqrt(3 * c.xx), ay = c.xy * std::sqrt(3 / c.xx), by = std::sqrt(3 * c.determinant() / c.xx);
     if (gaussian_ == GaussianBoxes::one) return addParallelogram(p.centre, ax, ay, 0, by, 1, sum);
     // Nested boxes for a Gaussian: sizes relative to the box of its covariance, and shares. Fitted: least squared difference
     // under sum of shares 1, sum of shares * scales^2 1.

@@ -404,13 +404,6 @@ class RectangleSums {
     return point(sat_.coarse_sums.data(), sat_.pointsX(sat_.coarse_stride), c, d);
   }
 
-  /// Starts to fetch a cache line.
-  static GLINT_HD void prefetch([[maybe_unused]] const std::uint16_t* at) {
-#if defined(__GNUC__) && !defined(__CUDA_ARCH__)
-    __builtin_prefetch(at);
-#endif
-  }
-
   /// Starts to fetch what a rectangle of the map needs.
   GLINT_HD void prefetchInside(double x0, double x1, double y0, double y1) const {
     const auto [a0, a1, b0, b1] = nearestPoints(x0, x1, y0, y1);

@@ -117,8 +117,6 @@ class MicrofacetBrdf {
   static GLINT_HD float uniformShare(Vec3 wo) { return kUniformShare * std::max(0.0f, 1 - wo.z * wo.z); }
 
  private:
-  static constexpr float kBelowOne = 0x1.fffffep-1f;
-
   GLINT_HD float mixed(float density, const HalfVector& h, Vec3 wo) const {
     const float share = uniformShare(wo);
     return (1 - share) * projectedToIncident(density, h) + share * (0.5f / kPi);

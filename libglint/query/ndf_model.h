@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <concepts>
 
 #include "glint/model/footprint.h"
@@ -10,8 +12,20 @@ namespace glint {
 /// A half vector drawn from a distribution of normals.
 struct HalfVectorSample {
   Vec2 h;
-  float pdf = 0;  ///< density of h per unit projected area: the model's density over its integral; 0 if nothing can be drawn
+  /// Density of h per unit projected area: the model's density over its integral; 0, and h = 0, if nothing can be drawn.
+  float pdf = 0;
 };
+
+/// Where models have any density.
+inline GLINT_HD bool insideSquare(Vec2 h) { return std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1; }
+/// The part of a box of half vectors where models have any density.
+inline GLINT_HD Box2 insideSquare(const Box2& range) {
+  return {{std::max(range.low.x, -1.0f), std::max(range.low.y, -1.0f)},
+          {std::min(range.high.x, 1.0f), std::min(range.high.y, 1.0f)}};
+}
+
+/// The sample at h; none where its density is 0.
+inline GLINT_HD HalfVectorSample drawnAt(Vec2 h, float pdf) { return pdf > 0 ? HalfVectorSample{h, pdf} : HalfVectorSample{}; }
 
 /// A distribution of microscopic normals, filtered over a footprint. Density is per unit projected area: its integral over the
 /// disk is 1, and its value is the usual microfacet D(omega).
@@ -19,6 +33,7 @@ struct HalfVectorSample {
 /// Half vectors are points of [-1, 1]^2, the square that NDF images cover; only those with |h| < 1 are directions. A facet's
 /// blur may spill a little past the unit circle; it is kept there, so that sums stay exact. Outside the square the density is
 /// 0. `mean` is the average of the density over a box, counting 0 outside the square.
+/// Answers are finite, whatever is asked and whatever numbers a file has.
 /// `sample` draws half vectors in proportion to the density from two numbers in [0, 1). Its warp keeps stratification: equal
 /// areas of [0, 1)^2 go to equal masses, neighbours mostly to neighbours. Numbers outside [0, 1) are clamped to it, NaN counts
 /// as 0.

@@ -3,13 +3,13 @@
 #include <type_traits>
 
 #include "glint/model/ndf_pyramid.h"
+#include "glint/query/avx2_blocks.h"
 #include "glint/query/bits.h"
 #include "glint/query/float4.h"
 #include "glint/query/half.h"
 #include "glint/query/pyramid_slices.h"
 #include "glint/query/reference.h"
 #include "glint/query/sampling.h"
-#include "glint/query/wide_blocks.h"
 
 namespace glint {
 
@@ -57,7 +57,7 @@ class PyramidNdf {
     chooseBlock(draw);
     choosePixel(draw);
     if (draw.place.x < 0) return {};
-    return {pointInPixel(shape(), draw.place, draw.xi), pixelDensity(draw.slices, draw.place)};
+    return drawnAt(pointInPixel(shape(), draw.place, draw.xi), pixelDensity(draw.slices, draw.place));
   }
 
   /// Where a place is in the level of every slice.
@@ -79,6 +79,7 @@ class PyramidNdf {
     PixelPlace place = {0, -1, -1};  ///< x = -1: nothing can be drawn
   };
 
+  /// By the weights of the images, with xi.x.
   GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const {
     Draw draw;
     draw.slices = chosen;
@@ -92,6 +93,7 @@ class PyramidNdf {
     return draw;
   }
 
+  /// The blocks that the image stores, whose means it asks for.
   GLINT_HD void findBlocks(Draw& draw) const {
     constexpr int kLine = 16;
     const PyramidLevel& level = levelOf(draw.chosen);
@@ -101,27 +103,20 @@ class PyramidNdf {
     for (int k = 0; k < draw.block_count; k += kLine) prefetch(level.block_means.data() + draw.first_block + k);
   }
 
+  /// By the means of the blocks, with xi.y.
   GLINT_HD void chooseBlock(Draw& draw) const {
     if (!(draw.chosen.weight > 0)) return;
     const PyramidLevel& level = levelOf(draw.chosen);
     constexpr int kMostBlocks = 64 * kMostMaskWords;
-    const float* means = level.block_means.data() + draw.first_block;
-    const int count = draw.block_count;
-    const int rank = chooseOfMany<kMostBlocks>(
-        count,
-        [&](int first) {
-          if (first + 16 <= count) return Float16::load(means + first);
-          float rest[16] = {};
-          for (int k = first; k < count; ++k) rest[k - first] = means[k];
-          return Float16::load(rest);
-        },
-        draw.xi.y);
+    const BlockMeans means{level.block_means.data() + draw.first_block, draw.block_count};
+    const int rank = chooseOfMany<kMostBlocks>(means, draw.xi.y);
     if (rank < 0) return;
     draw.place.block = placeOfRank(maskOf(draw.chosen), rank);
     draw.stored = draw.first_block + static_cast<std::uint64_t>(rank);
     prefetchRows(static_cast<const char*>(level.pixels) + draw.stored * blockBytes(), 0, kBlockSize);
   }
 
+  /// By its value: the row with xi.y, the column with xi.x.
   GLINT_HD void choosePixel(Draw& draw) const {
     if (!(draw.chosen.weight > 0 && draw.place.block >= 0)) return;
     const PyramidLevel& level = levelOf(draw.chosen);
@@ -156,9 +151,9 @@ class PyramidNdf {
     /// Weighted sum of the covered pixels of some blocks.
     template <class Pixel>
     GLINT_HD float sum(const Pixel* const* blocks, const float* weights, int count) const {
-#ifdef GLINT_WIDE
+#ifdef GLINT_AVX2
       if constexpr (std::is_same_v<Pixel, std::uint16_t>)
-        if (hasWideVectors()) return sumCoveredPixels(blocks, weights, count, columns, rows, first_row, end_row);
+        if (hasAvx2()) return sumCoveredPixels(blocks, weights, count, columns, rows, first_row, end_row);
 #endif
       return sumByFour(blocks, weights, count);
     }
@@ -236,7 +231,7 @@ class PyramidNdf {
   GLINT_HD float finishMean(const Box2& range, PendingMean& pending) const {
     addPending(pending);
     const float area = areaInPixels(shape(), range);
-    return area > 0 ? static_cast<float>(pending.sum / area) : 0.0f;
+    return area > 0 ? finitePositive(static_cast<float>(pending.sum / area)) : 0.0f;
   }
 
   /// Asks the memory for where chosen images say which blocks they store.
@@ -255,6 +250,23 @@ class PyramidNdf {
   GLINT_HD const std::uint32_t* ranksOf(const PyramidSlice& slice) const {
     return levelOf(slice).mask_ranks.data() + std::size_t{slice.image} * mask_words_;
   }
+
+  /// Means of the blocks of an image, for chooseOfMany.
+  struct BlockMeans {
+    const float* means;
+    int stored;
+    GLINT_HD int count() const { return stored; }
+    GLINT_HD Float16 group(int g) const {
+      const int first = 16 * g;
+      if (first + 16 <= stored) return Float16::load(means + first);
+      float rest[16] = {};
+      for (int k = first; k < stored; ++k) rest[k - first] = means[k];
+      return Float16::load(rest);
+    }
+    GLINT_HD void sumGroups(float* sums) const {
+      for (int g = 0; 16 * g < stored; ++g) sums[g] = group(g).sum();
+    }
+  };
 
   GLINT_HD float pixelDensity(const PyramidSlices& chosen, const PixelPlace& place) const {
     return pyramid_.precision == BlockPrecision::f16 ? addPixelsOf<std::uint16_t>(findPixelsOf<std::uint16_t>(chosen, place))
@@ -290,7 +302,7 @@ class PyramidNdf {
   GLINT_HD float addPixelsOf(const Places& places) const {
     Float4 sum = fourPixels<Pixel>(places, 0);
     if (places.count > 4) sum = sum + fourPixels<Pixel>(places, 4);
-    return pyramid_.value_scale * sum.sum();
+    return finitePositive(pyramid_.value_scale * sum.sum());
   }
 
   /// Weighted pixels of the four slices from k on.
@@ -346,12 +358,12 @@ class PyramidNdf {
                                        : covered(static_cast<const float*>(nullptr)));
   }
 
-  /// Sums of the rows of a block, or 2^-112 times these: what a choice among the rows needs.
+  /// Sums of the rows of a block.
   template <class Pixel>
   static GLINT_HD Float16 rowSums(const Pixel* block) {
-#ifdef GLINT_WIDE
+#ifdef GLINT_AVX2
     if constexpr (std::is_same_v<Pixel, std::uint16_t>)
-      if (hasWideVectors()) return sumRowsWide(block);
+      if (hasAvx2()) return sumRowsAvx2(block);
 #endif
     return sumRows(block);
   }

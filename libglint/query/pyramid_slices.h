@@ -37,7 +37,8 @@ struct PyramidSlices {
 /// @param largest_u, largest_v  squares of the map's width and height
 inline GLINT_HD float isotropicVariance(float largest_u, float largest_v, const Covariance& c) {
   constexpr float kLowest = kMinSigmaTexels * kMinSigmaTexels;
-  if (!std::isfinite(c.xx + c.xy + c.yy)) return kLowest;
+  constexpr float kQuarter = 0.25f;  // so that the sum of finite numbers is finite
+  if (!std::isfinite(kQuarter * c.xx + kQuarter * c.xy + kQuarter * c.yy)) return kLowest;
   return std::max(0.5f * (std::min(c.xx, largest_u) + std::min(c.yy, largest_v)), kLowest);
 }
 inline GLINT_HD float isotropicVariance(const PyramidShape& shape, const Footprint& p) {
@@ -157,7 +158,7 @@ class SliceChooser {
   };
 
   GLINT_HD Neighbours neighbours(const LevelCentres& a, const LevelCentres& b, Vec2 centre) const {
-    const Float4 zero = Float4::zero(), one = Float4::all(1), below_one = Float4::all(0x1.fffffep-1f);
+    const Float4 zero = Float4::zero(), one = Float4::all(1), below_one = Float4::all(kBelowOne);
     // In [0, 1), and 0 if it is not finite.
     const Float4 uv = Float4::of(centre.x, centre.y, centre.x, centre.y);
     const Float4 wrapped = minOf((uv - floorOf(uv)).positive(), below_one);
@@ -209,8 +210,6 @@ inline GLINT_HD PixelPlace pixelPlace(const PyramidShape& shape, Vec2 h) {
   static_assert(kBlockSize == 16);
   return {(y >> 4) * (shape.resolution >> 4) + (x >> 4), x & 15, y & 15};
 }
-
-inline GLINT_HD bool insideSquare(Vec2 h) { return std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1; }
 
 /// Splits a range of half vectors at the borders of angular blocks: visitor(block, BlockBox). Nothing outside [-1, 1]^2.
 template <class Visitor>

@@ -39,20 +39,19 @@ class Reference {
 
   /// Density towards h, per unit projected area; >= 0, finite.
   GLINT_DEVICE_CALL GLINT_HD float density(const Footprint& p, Vec2 h) const {
-    if (!(std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1)) return 0;
-    return static_cast<float>(average(p, PointLobe{h, sigma_r_}));
+    if (!insideSquare(h)) return 0;
+    return finitePositive(static_cast<float>(average(p, PointLobe{h, sigma_r_})));
   }
 
   /// Average density over a box of half vectors; 0 if the box is empty.
   GLINT_DEVICE_CALL GLINT_HD float mean(const Footprint& p, const Box2& range) const {
-    const Box2 box = {{std::max(range.low.x, -1.0f), std::max(range.low.y, -1.0f)},
-                      {std::min(range.high.x, 1.0f), std::min(range.high.y, 1.0f)}};
+    const Box2 box = insideSquare(range);
     if (!(box.width() > 0 && box.height() > 0)) return 0;
-    return static_cast<float>(average(p, BoxLobe{box, sigma_r_}) / range.area());
+    return finitePositive(static_cast<float>(average(p, BoxLobe{box, sigma_r_}) / range.area()));
   }
 
   /// Draws a texel (or triangle) by its weight in the footprint, a normal of it and the lobe's blur around that. The pdf is the
-  /// density; half vectors that the blur takes out of [-1, 1]^2 have pdf 0.
+  /// density; where the blur leaves [-1, 1]^2, nothing is drawn.
   ///
   /// O(rows + columns) of the footprint for Gaussians (O(area) if they are rotated and the boundary is clamped), O(1) for
   /// boxes, and the density. A choice uses up leading digits of `xi` and the next one those below, so 24 bits are enough for
@@ -71,7 +70,7 @@ class Reference {
       xi = {lowerDigits(xi.x, 7), lowerDigits(xi.y, 7)};
     }
     const Vec2 h = n + sigma_r_ * Vec2{normalQuantile(xi.x), normalQuantile(xi.y)};
-    return {h, density(p, h)};
+    return drawnAt(h, density(p, h));
   }
 
   /// Visits every facet in a footprint: visitor(weight, normal) on a flat surface. Weights sum to the returned total.

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "glint/model/device.h"
+#include "glint/model/vec.h"
 
 namespace glint {
 
@@ -12,11 +12,13 @@ struct Rgb {
 
   static GLINT_HD constexpr Rgb grey(float value) { return {value, value, value}; }
 
-  friend GLINT_HD constexpr Rgb operator+(Rgb a, Rgb b) { return {a.r + b.r, a.g + b.g, a.b + b.b}; }
-  friend GLINT_HD constexpr Rgb operator*(Rgb a, Rgb b) { return {a.r * b.r, a.g * b.g, a.b * b.b}; }
+  friend GLINT_HD constexpr Rgb operator+(Rgb x, Rgb y) { return {x.r + y.r, x.g + y.g, x.b + y.b}; }
+  friend GLINT_HD constexpr Rgb operator*(Rgb x, Rgb y) { return {x.r * y.r, x.g * y.g, x.b * y.b}; }
   friend GLINT_HD constexpr Rgb operator*(float s, Rgb a) { return {s * a.r, s * a.g, s * a.b}; }
   friend constexpr bool operator==(Rgb, Rgb) = default;
 };
+
+inline GLINT_HD Rgb finitePositive(Rgb c) { return {finitePositive(c.r), finitePositive(c.g), finitePositive(c.b)}; }
 
 /// Brightness of linear Rec. 709 colours.
 GLINT_HD constexpr float luminance(Rgb c) { return 0.2126f * c.r + 0.7152f * c.g + 0.0722f * c.b; }

@@ -13,7 +13,7 @@
 namespace glint {
 
 /// Brings a random number into [0, 1); what is not a number becomes 0.
-inline GLINT_HD float clampUnit(float xi) { return xi > 0 ? std::min(xi, 0x1.fffffep-1f) : 0.0f; }
+inline GLINT_HD float clampUnit(float xi) { return xi > 0 ? std::min(xi, float{kBelowOne}) : 0.0f; }
 inline GLINT_HD Vec2 clampUnit(Vec2 xi) { return {clampUnit(xi.x), clampUnit(xi.y)}; }
 
 /// Chooses one of `count` things in proportion to weight(k) >= 0, which sum to `total`, and leaves in `xi` how far into the
@@ -68,19 +68,21 @@ inline GLINT_HD int chooseOf16(const Float16& weights, float& xi) {
 }
 
 /// chooseIndex among many things.
-/// @tparam kMost  most of them
-/// @param load    load(first): Float16 of the weights of things `first` to `first` + 15; 0 beyond the end
-template <int kMost, class Load>
-GLINT_HD int chooseOfMany(int count, Load&& load, float& xi) {
-  float before[(kMost + 15) / 16 + 1];  // before[g]: of groups of 16 before group g
+/// @tparam kMost   most of them
+/// @param weights  count(): of things; group(g): Float16 of the weights of things 16 g to 16 g + 15, 0 beyond the end;
+///                 sumGroups(sums): writes the sums of all groups
+template <int kMost, class Weights>
+GLINT_HD int chooseOfMany(const Weights& weights, float& xi) {
+  float before[(kMost + 15) / 16 + 1];  // before[g]: of groups before group g
   before[0] = 0;
-  const int groups = (count + 15) / 16;
+  const int groups = (weights.count() + 15) / 16;
   if (groups == 0) return -1;
-  for (int g = 0; g < groups; ++g) before[g + 1] = before[g] + load(16 * g).sum();
+  weights.sumGroups(before + 1);
+  for (int g = 0; g < groups; ++g) before[g + 1] += before[g];
   const float reached = xi * before[groups];
   int group = 0;
   for (int g = 1; g < groups; ++g) group += before[g] <= reached ? 1 : 0;
-  const int k = chooseAt(load(16 * group), reached - before[group], xi);
+  const int k = chooseAt(weights.group(group), reached - before[group], xi);
   return k < 0 ? -1 : 16 * group + k;
 }
 
@@ -102,15 +104,12 @@ GLINT_HD Float16 rowOf(const Pixel* pixels, int y) {
   return {{loadPixels(row), loadPixels(row + 4), loadPixels(row + 8), loadPixels(row + 12)}};
 }
 
-inline GLINT_HD Float4 loadTerms(const float* pixels) { return Float4::load(pixels); }
-inline GLINT_HD Float4 loadTerms(const std::uint16_t* pixels) { return Float4::loadTiny(pixels); }
-
-/// Sums of the rows of a block, of half-precision numbers times 2^-112: what a choice among the rows needs.
+/// Sums of the rows of a block.
 template <class Pixel>
 GLINT_HD Float16 sumRows(const Pixel* pixels) {
   const auto four = [&](int y) {
     const Pixel* row = pixels + y * kBlockSize;
-    return (loadTerms(row) + loadTerms(row + 4)) + (loadTerms(row + 8) + loadTerms(row + 12));
+    return (loadPixels(row) + loadPixels(row + 4)) + (loadPixels(row + 8) + loadPixels(row + 12));
   };
   Float16 sums;
   for (int k = 0; k < 4; ++k) sums.v[k] = sumsOf(four(4 * k), four(4 * k + 1), four(4 * k + 2), four(4 * k + 3));

@@ -95,7 +95,7 @@ class ShLightQuery {
                  result.order, highest, options.window, sums);
     for (int c = 0; c < 3; ++c) {
       result.signed_value[c] = static_cast<float>(sums[c]);
-      result.value[c] = std::max(0.0f, result.signed_value[c]);
+      result.value[c] = finitePositive(result.signed_value[c]);
       result.clamped |= sums[c] < 0;
     }
     return result;

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "glint/query/wide_texels.h"
+#include "glint/query/avx2_texels.h"
 
 namespace glint {
 
-/// Adds up what texels count, by slots of a window. `Texels` is SingleTexels or WideTexels, with the same results.
+/// Adds up what texels count, by slots of a window. `Texels` is SingleTexels or Avx2Texels, with the same results.
 class SlotSums {
  public:
   static constexpr int kSlots = SlotFields::kNone;

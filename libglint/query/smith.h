@@ -17,7 +17,7 @@ namespace glint {
 /// counts as w.z, so that nothing is made brighter than unshadowed. Directions are unit vectors with w.z > 0.
 class SmithMasking {
  public:
-  /// @param slopes   of the map: PyramidShape::slopes, or bake::mapSlopes
+  /// @param slopes   of the map: api::OpenedNdf::slopes of any asset, or PyramidShape::slopes
   /// @param sigma_r  intrinsic roughness of its facets; their blur adds sigma_r^2 to both variances, exact for facets that are
   ///                 level
   GLINT_HD SmithMasking(const MapSlopes& slopes, float sigma_r) : mean_(slopes.mean), covariance_(slopes.covariance) {

@@ -164,13 +164,12 @@ class TexelCover {
   }
 
   /// Half axes of length sqrt(3) deviations along the principal axes.
-  static GLINT_HD void gaussianAxes(const Covariance& c, double (&axes)[2][2]) {
-    const double mean = 0.5 * (double{c.xx} + c.yy), half = 0.5 * (double{c.xx} - c.yy);
-    const double split = std::sqrt(half * half + double{c.xy} * c.xy);
-    const double angle = c.xy == 0 ? 0 : 0.5 * std::atan2(2.0 * c.xy, 2 * half);
+  static GLINT_HD void gaussianAxes(const UsableCovariance& c, double (&axes)[2][2]) {
+    const double mean = 0.5 * (c.xx + c.yy), half = 0.5 * (c.xx - c.yy), split = std::sqrt(half * half + c.xy * c.xy);
+    const double angle = c.xy == 0 ? 0 : 0.5 * std::atan2(c.xy, half);
     const double cosine = std::cos(angle), sine = c.xy == 0 ? 0 : std::sin(angle);
     const double first = std::sqrt(3 * (c.xy == 0 ? c.xx : mean + split));
-    const double second = std::sqrt(3 * (c.xy == 0 ? c.yy : std::max(mean - split, 0.0)));
+    const double second = std::sqrt(3 * (c.xy == 0 ? c.yy : c.determinant() / (mean + split)));
     axes[0][0] = first * cosine, axes[0][1] = first * sine;
     axes[1][0] = -second * sine, axes[1][1] = second * cosine;
   }

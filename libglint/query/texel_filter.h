@@ -3,8 +3,8 @@
 #include <cstdint>
 
 #include "glint/model/bin_map.h"
+#include "glint/query/avx2.h"
 #include "glint/query/bits.h"
-#include "glint/query/wide.h"
 
 namespace glint {
 
@@ -34,8 +34,8 @@ class TexelFilter {
   /// Bit k: texel k of `count`, at most kMostAtOnce, has the fields kFields in range.
   template <unsigned kFields>
   GLINT_HD std::uint64_t matches(const std::uint32_t* texels, int count) const {
-#ifdef GLINT_WIDE
-    if (count >= 8 && hasWideVectors()) return matchesWide<kFields>(texels, count);
+#ifdef GLINT_AVX2
+    if (count >= 8 && hasAvx2()) return matchesAvx2<kFields>(texels, count);
 #endif
     std::uint64_t bits = 0;
     for (int k = 0; k < count; ++k) bits |= one<kFields>(texels[k]) << k;
@@ -75,9 +75,9 @@ class TexelFilter {
     return outside < 0 ? 0 : 1;
   }
 
-#ifdef GLINT_WIDE
+#ifdef GLINT_AVX2
   template <unsigned kFields>
-  GLINT_WIDE std::uint64_t matchesWide(const std::uint32_t* texels, int count) const {
+  GLINT_AVX2 std::uint64_t matchesAvx2(const std::uint32_t* texels, int count) const {
     std::uint64_t bits = 0;
     int k = 0;
     for (; k + 8 <= count; k += 8) bits |= eight<kFields>(texels + k) << k;
@@ -86,7 +86,7 @@ class TexelFilter {
   }
 
   template <unsigned kFields>
-  GLINT_WIDE std::uint64_t eight(const std::uint32_t* texels) const {
+  GLINT_AVX2 std::uint64_t eight(const std::uint32_t* texels) const {
     const __m256i loaded = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(texels));
     __m256i outside = _mm256_setzero_si256();
     for (int k = 0; k < 4; ++k) {

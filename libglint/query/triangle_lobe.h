@@ -37,7 +37,8 @@ inline GLINT_HD float triangleDensity(Vec2 n0, Vec2 n1, Vec2 n2, Vec2 h, float s
     return 0;
   }
   const float motion = (s_high - s_low) * std::max({std::fabs(y1 - y0), std::fabs(a1 - a0), std::fabs(a1 - b0)});
-  const int panels = std::clamp(static_cast<int>(std::ceil(motion)), 1, 256);
+  if (!(motion >= 0)) return 0;  // what is asked, or a normal of a file, is no number
+  const int panels = std::max(static_cast<int>(std::min(std::ceil(motion), 256.0f)), 1);
   constexpr float kNode[3] = {-0.7745966692414834f, 0, 0.7745966692414834f};
   constexpr float kWeight[3] = {5.0f / 18, 8.0f / 18, 5.0f / 18};
   float sum = 0;
@@ -63,7 +64,12 @@ inline GLINT_HD float triangleDensity(Vec2 n0, Vec2 n1, Vec2 n2, Vec2 h, float s
 ///
 /// Halves the longest edge until pieces are about a deviation long, then applies a rule of degree 5; pieces that lie deep
 /// inside or far outside the box need no halving.
+/// @return 0 for a triangle that does not fit into the square [-1, 1]^2, as only a broken file has it
 inline GLINT_HD float triangleMass(Vec2 n0, Vec2 n1, Vec2 n2, const Box2& box, float sigma) {
+  constexpr float kDiagonal2 = 8.1f;  // of the square, and some rounding
+  const Vec2 edges[3] = {n1 - n0, n2 - n1, n0 - n2};
+  for (const Vec2 e : edges)
+    if (!(dot(e, e) <= kDiagonal2)) return 0;
   struct Piece {
     Vec2 a, b, c;
     float share;

@@ -83,9 +83,7 @@ inline GLINT_HD float ggxLobe(float alpha, Vec3 centre, float kappa, Vec3 wi, Ve
   const float c = std::max(0.0f, dot(centre, half));
   const float t = (1 - c * c) + width * c * c;
   const float density = width * kInversePi / (t * t);
-  const float mi = 2 * ci / (ci + std::sqrt(a2 + (1 - a2) * ci * ci));
-  const float mo = 2 * co / (co + std::sqrt(a2 + (1 - a2) * co * co));
-  return 0.25f * density * mi * mo;
+  return 0.25f * density * ggxMasking(ci, alpha) * ggxMasking(co, alpha);
 }
 
 }  // namespace glint

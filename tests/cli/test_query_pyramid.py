@@ -362,3 +362,38 @@ def test_pyramid_and_compressed_files_are_valid(glint, assets):
     for kind in ("pyramid", "compressed"):
         if kind in assets:
             assert glint("validate", assets[kind]).returncode == 0
+
+
+@pytest.mark.parametrize("kind", ["pyramid", "compressed"])
+def test_stretched_footprints_are_several_round_ones(ask, kind):
+    half = ["--half", "0.05", "-0.02"]
+
+    def answers(covariance, *options):
+        return number(ask(kind, "--uv", "0.3", "0.7", "--cov", *covariance, *half, *options))
+
+    across, up = ["1600", "0", "225"], ["225", "0", "1600"]
+    assert answers(across) != pytest.approx(answers(up), rel=1e-3)
+    assert answers(across, "--parts", "1") == answers(up, "--parts", "1")
+
+
+def test_covariances_are_checked(ask):
+    for covariance in (["100", "500", "100"], ["-100", "0", "100"]):
+        process = ask("normals", "--uv", "0.3", "0.7", "--cov", *covariance, "--half", "0", "0")
+        assert process.returncode == 1
+        assert "no covariance" in process.stderr
+
+
+def test_depfile_names_what_a_table_comes_from(ask, assets):
+    (ask.folder / "in.csv").write_text("u,v,sigma,hx,hy\n0.3,0.7,20,0,0\n")
+    assert ask("pyramid", "--csv", "in.csv", "-o", "out.csv", "--normals", assets["normals"], "--depfile", "out.d").returncode == 0
+    rule = (ask.folder / "out.d").read_text()
+    assert rule.startswith("out.csv:")
+    for name in ("in.csv", "pyramid.glint", "normals.glint"):
+        assert name in rule
+
+
+def test_options_of_other_kinds_are_warned_of(ask):
+    process = ask("pyramid", *FOOTPRINT, "--half", "0", "0", "--surface", "smooth")
+    assert process.returncode == 0
+    assert "warning: --surface has no effect" in process.stderr
+    assert ask("normals", *FOOTPRINT, "--half", "0", "0", "--surface", "smooth").stderr == ""

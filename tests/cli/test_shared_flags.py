@@ -81,6 +81,24 @@ def test_depfile_is_read_by_make(glint):
     assert subprocess.run(make, cwd=glint.folder, capture_output=True, text=True).returncode == 0
 
 
+def test_depfile_without_an_output_is_a_usage_error(glint):
+    glint("synth", "flakes", "--size", "16", "-o", "flakes.png")
+    glint("ingest", "flakes.png", "-o", "flakes.glint")
+    process = glint("info", "flakes.glint", "--depfile", "out.d")
+    assert process.returncode == 1
+    assert "--depfile" in process.stderr
+    assert not (glint.folder / "out.d").exists()
+
+
+def test_numbers_may_begin_with_a_point(glint):
+    glint("synth", "flakes", "--size", "16", "-o", "flakes.png")
+    glint("ingest", "flakes.png", "-o", "flakes.glint")
+    long = glint("query", "flakes.glint", "--uv", "-0.3", "0.7", "--sigma", "2", "--half", "0.1", "-0.05")
+    short = glint("query", "flakes.glint", "--uv", "-.3", ".7", "--sigma", "2", "--half", ".1", "-.05")
+    assert long.returncode == 0
+    assert short.stdout == long.stdout
+
+
 def test_examples_in_help_parse(glint):
     glint("synth", "flakes", "--size", "16", "-o", "flakes.png")
     for tool in ("synth", "ingest"):

@@ -4,11 +4,14 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 #include <string>
+#include <vector>
 
 #include "glint/query/anisotropic_ndf.h"
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/cp_ndf.h"
+#include "glint/query/displaced_brdf.h"
 #include "glint/query/environment.h"
 #include "glint/query/histogram_ndf.h"
 #include "glint/query/microfacet_brdf.h"
@@ -64,6 +67,8 @@ void forEachBadFootprint(Visitor&& visitor) {
       visit(Footprint::box({u, u}, {size, 1}, {-1, size}), "box", u, size);
       visit(Footprint::box({0.5f, u}, {size, size}, {size, size}), "line", u, size);
     }
+  for (const float variance : {2e6f, 3e38f})
+    visit(Footprint::gaussian({0.2f, 0.3f}, {variance, variance, variance}), "thin", 0, variance);
 }
 
 template <class Model>
@@ -80,6 +85,7 @@ void expectDefinedAnswers(const Model& model, const Footprint& p) {
   for (const Vec2 xi : {Vec2{0.4f, 0.6f}, {0, 0}, {1, 1}, {-2, 7}, {kNan, kNan}, {kInfinity, -kInfinity}}) {
     const HalfVectorSample s = model.sample(p, xi);
     EXPECT_TRUE(defined(s.pdf) && std::isfinite(s.h.x) && std::isfinite(s.h.y)) << xi.x;
+    EXPECT_TRUE(s.pdf > 0 || s.h == Vec2{}) << xi.x;
   }
 }
 
@@ -91,6 +97,84 @@ TEST(BadInput, EveryModelAnswersEveryFootprint) {
       expectDefinedAnswers(model, p);
     });
   });
+}
+
+/// Every third number becomes a bad one.
+template <class Number>
+void spoil(std::vector<Number>& numbers, Number bad) {
+  for (std::size_t k = 0; k < numbers.size(); k += 3) numbers[k] = bad;
+}
+
+/// Calls visitor(model, name) for every model, of a file whose numbers were spoiled: these are not checked when it is opened.
+template <class Visitor>
+void forEachSpoiledModel(float bad, std::uint16_t bad_half, Visitor&& visitor) {
+  auto map = test::sampleNormals(8, 8, false);
+  spoil(map.normals, Vec2{bad, bad});
+  for (const Surface surface : {Surface::flat, Surface::smooth}) visitor(Reference(map.map, 0.25f, surface), "Reference");
+  for (const auto precision : {BlockPrecision::f16, BlockPrecision::f32}) {
+    auto pyramid = test::samplePyramid(kSize, precision);
+    for (auto& level : pyramid.levels) {
+      spoil(level.floats, bad);
+      spoil(level.halves, bad_half);
+      spoil(level.block_means, bad);
+    }
+    visitor(PyramidNdf(pyramid.pyramid), "PyramidNdf");
+  }
+  for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
+    for (const auto type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
+      auto compressed = test::sampleCompressed(kSize, method, type);
+      spoil(compressed.basis_f32, bad);
+      spoil(compressed.coefficients_f32, bad);
+      spoil(compressed.coefficients_f16, bad_half);
+      visitor(CpNdf(compressed.ndf), "CpNdf");
+      spoil(compressed.scales, bad);
+      spoil(compressed.density_scales, bad);
+      spoil(compressed.image_scales, bad);
+      visitor(CpNdf(compressed.ndf), "CpNdf with bad scales");
+    }
+  }
+  auto bins = test::sampleBinMap(kSize, kSize);
+  spoil(bins.block_moments, bad_half);
+  visitor(BinMapNdf(bins.map), "BinMapNdf");
+}
+
+TEST(BadInput, ModelsAnswerFromAnyNumbersOfAFile) {
+  for (const auto& [bad, bad_half] : {std::pair<float, std::uint16_t>{kNan, 0x7e00},
+                                      {-kNan, 0xfe00},
+                                      {kInfinity, 0x7c00},
+                                      {-kInfinity, 0xfc00},
+                                      {kLargest, 0x7bff},
+                                      {-1, 0xbc00}}) {
+    forEachSpoiledModel(bad, bad_half, [&, bad = bad](const auto& model, const char* name) {
+      SCOPED_TRACE(name + std::string(" of ") + std::to_string(bad));
+      for (const Footprint& p : {Footprint::isotropic({0.3f, 0.7f}, 5), Footprint::isotropic({0.1f, 0.9f}, 0.3f),
+                                 Footprint::box({0.5f, 0.5f}, {9, 1}, {-1, 7})})
+        expectDefinedAnswers(model, p);
+    });
+  }
+}
+
+TEST(BadInput, DisplacedBrdfsAnswerFromAnyNumbersOfAFile) {
+  for (const float bad : {kNan, kInfinity, -kInfinity, kLargest, -1.0f}) {
+    auto sample = test::sampleDisplacement(64);
+    for (auto& level : sample.levels) {
+      spoil(level.spatial_scale, bad);
+      spoil(level.lobes, VmfLobe{{bad, bad}, bad, bad});
+    }
+    const DisplacedBrdf brdf(sample.displacement);
+    std::mt19937 random(1);
+    const auto unit = [&] { return static_cast<float>(random() >> 8) * 0x1p-24f; };
+    for (int k = 0; k < 500; ++k) {
+      const Vec2 uv = {unit(), unit()};
+      const Vec3 wo = {0.6f, 0, 0.8f}, wi = {-0.48f, 0.36f, 0.8f};
+      const Rgb f = brdf.evaluate(0, uv, wi, wo);
+      ASSERT_TRUE(std::isfinite(f.r) && f.r >= 0) << bad;
+      const float pdf = brdf.pdf(0, uv, wi, wo);
+      ASSERT_TRUE(std::isfinite(pdf) && pdf >= 0) << bad;
+      const DirectionSample s = brdf.sample(0, uv, wo, {unit(), unit()});
+      ASSERT_TRUE(std::isfinite(s.pdf) && s.pdf >= 0) << bad;
+    }
+  }
 }
 
 TEST(BadInput, EveryModelLightsASurfaceFromAnyDirection) {

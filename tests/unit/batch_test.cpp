@@ -34,7 +34,9 @@ struct Queries {
       hx.push_back(1.2f * unit(random) - 0.6f);
       hy.push_back(1.2f * unit(random) - 0.6f);
       if (k % 41 == 1) u.back() = kNan;
+      if (k % 53 == 1) u.back() = -1e-9f;  // at the end of the map, though it is rounded to the beginning of the next
       if (k % 43 == 2) sigma.back() = kNan;
+      if (k % 59 == 2) sigma.back() = 1.4e19f;  // finite variances, whose sum is not
       if (k % 47 == 3) hx.back() = k % 2 ? kNan : 1.01f;
       if (k % 53 == 4) hx.back() = hy.back() = k % 2 ? 1.0f : -1.0f;
       if (k % 59 == 5) sigma.back() = 1e20f;

@@ -10,6 +10,7 @@
 
 #include "glint.h"
 #include "glint/api/any_ndf.h"
+#include "glint/query/ray_footprint.h"
 
 namespace glint {
 namespace {
@@ -203,6 +204,7 @@ TEST(CApi, InfoSaysWhatTheHandleIs) {
     EXPECT_EQ(info.level_count, normals ? 0 : 3);
     EXPECT_FLOAT_EQ(info.sigma_r, normals ? 0.005f : 0.05f);
     EXPECT_FLOAT_EQ(info.finest_sigma_texels, normals ? 0 : kFootprintPerStride * kSize / 4);
+    EXPECT_FLOAT_EQ(info.coarsest_sigma_texels, normals ? 0 : kFootprintPerStride * kSize);
     EXPECT_EQ(info.has_normals, 0);
     EXPECT_GT(info.file_bytes, 0u);
   }
@@ -291,6 +293,46 @@ TEST(CApi, OptionsOfHistogramsReachTheModel) {
   EXPECT_NE(round_answers[0], round_answers[3]);
 }
 
+TEST(CApi, StretchedFootprintsAreAskedAsSeveralRoundOnes) {
+  const formats::Asset asset = formats::Asset::open(assets().path("ndf-pyramid"));
+  const PyramidNdf round(asset.pyramid());
+  const AnisotropicNdf<PyramidNdf> stretched(round);
+  glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+  options.footprint_parts = 1;
+  const Handle several = openHandle("ndf-pyramid"), one = openHandle("ndf-pyramid", &options);
+  double difference = 0, sum = 0;
+  const Queries q(50);
+  for (std::size_t k = 0; k < q.u.size(); ++k) {
+    const Footprint p = Footprint::gaussian({q.u[k], q.v[k]}, {400, 30, 9});
+    const glint_footprint given = {GLINT_FOOTPRINT_GAUSSIAN, q.u[k], q.v[k], {400, 30, 9, 0}};
+    float answer = -1, batch = -1;
+    glint_density(several.get(), &given, q.hx[k], q.hy[k], &answer);
+    EXPECT_EQ(answer, stretched.density(p, {q.hx[k], q.hy[k]}));
+    glint_footprints arrays = {};
+    arrays.u = {&given.u, 0}, arrays.v = {&given.v, 0};
+    arrays.xx = {&given.m[0], 0}, arrays.xy = {&given.m[1], 0}, arrays.yy = {&given.m[2], 0};
+    glint_density_batch(several.get(), 1, &arrays, {&q.hx[k], 0}, {&q.hy[k], 0}, &batch);
+    EXPECT_EQ(batch, answer);
+    glint_density(one.get(), &given, q.hx[k], q.hy[k], &batch);
+    EXPECT_EQ(batch, round.density(p, {q.hx[k], q.hy[k]}));
+    difference += std::fabs(answer - batch), sum += answer;
+  }
+  EXPECT_GT(difference, 0.02 * sum);  // or the option would not be seen
+}
+
+TEST(CApi, FootprintsFromRayDifferentials) {
+  const Footprint p = footprintFromDifferentials({0.1f, 0.2f}, {0.01f, 0.002f}, {-0.003f, 0.02f}, 512, 256);
+  const glint_footprint c = glint_footprint_from_differentials(0.1f, 0.2f, 0.01f, 0.002f, -0.003f, 0.02f, 512, 256);
+  EXPECT_EQ(c.kind, GLINT_FOOTPRINT_GAUSSIAN);
+  EXPECT_EQ(c.u, 0.1f);
+  EXPECT_EQ(c.v, 0.2f);
+  EXPECT_EQ(c.m[0], p.covariance.xx);
+  EXPECT_EQ(c.m[1], p.covariance.xy);
+  EXPECT_EQ(c.m[2], p.covariance.yy);
+  // Large ones stay large, though their squares are not finite.
+  EXPECT_GT(glint_footprint_isotropic(0, 0, 1e30f).m[0], 1e29f);
+}
+
 TEST(CApi, OptionsOutOfRangeAreRefusedByName) {
   const auto refused = [](auto glint_open_options::*member, auto value, const char* name) {
     glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
@@ -305,7 +347,7 @@ TEST(CApi, OptionsOutOfRangeAreRefusedByName) {
   for (const float value : {-0.1f, 0.3f, kNan}) refused(&glint_open_options::sigma_r, value, "sigma_r");
   refused(&glint_open_options::surface, 2, "surface");
   refused(&glint_open_options::boundary, -1, "boundary");
-  refused(&glint_open_options::reserved, 1, "reserved");
+  for (const int32_t value : {-1, 33}) refused(&glint_open_options::footprint_parts, value, "footprint_parts");
 }
 
 TEST(CApi, OptionsOfAnOlderHeaderHaveTheDefaultsOfLaterOnes) {

@@ -209,6 +209,25 @@ TEST(Environment, PrefilteringIsLinearInTheLights) {
               1e-2f * prefilteredRadiance(brdf, wo, lights[0]).g);
 }
 
+/// What prefilteredRadiance says of itself.
+TEST(PrefilteredRadiance, ErrsByTheWidthOfTheLobeAndTheView) {
+  const BeckmannNdf ndf(kSlopes);
+  const MicrofacetBrdf brdf(ndf, Footprint{}, SmithMasking(kSlopes, 0), Fresnel::mirror());
+  for (const float sharpness : {1.0f, 3.0f, 10.0f, 30.0f, 100.0f}) {
+    for (const double angle : {0.3, 1.2, 1.4}) {
+      const Vec3 wo = direction(std::cos(angle), 1);
+      const SphericalGaussian light = {direction(0.7, 4), sharpness, {1, 1, 1}};
+      const double exact = convergedRadiance(brdf, wo, light);
+      const double few = prefilteredRadiance(brdf, wo, light).r / exact,
+                   most = prefilteredRadiance(brdf, wo, light, 8).r / exact;
+      std::printf("sharpness %g, view at %g rad: %.3f of the radiance with %d cells, %.3f with 8\n", double{sharpness}, angle,
+                  few, kLobeCells, most);
+      EXPECT_NEAR(few, 1, sharpness >= 30 ? 0.025 : sharpness >= 3 ? 0.07 : 0.5);
+      EXPECT_NEAR(most, 1, sharpness >= 30 ? 0.01 : sharpness >= 3 ? 0.035 : 0.2);
+    }
+  }
+}
+
 constexpr int kLights = 5;
 
 /// Wide and narrow lobes, one below the horizon.

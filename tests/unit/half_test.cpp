@@ -13,7 +13,7 @@ namespace glint {
 namespace {
 
 constexpr int kFiniteHalves = 0x7c00;  // bit patterns below this are the finite magnitudes, in order
-constexpr float kLargestHalf = 65504;
+constexpr float kGreatest = 65504;
 
 TEST(Half, EveryFiniteNumberHasItsExactValue) {
   for (int magnitude = 0; magnitude < kFiniteHalves; ++magnitude) {
@@ -37,13 +37,21 @@ TEST(Half, EveryFiniteNumberSurvivesTheRoundTrip) {
 TEST(Half, WhatIsNotFiniteBecomesTheLargestNumber) {
   for (int magnitude = kFiniteHalves; magnitude < 0x8000; ++magnitude) {
     const float value = halfToFloat(static_cast<std::uint16_t>(magnitude));
-    ASSERT_TRUE(std::isfinite(value) && value > kLargestHalf);
-    ASSERT_EQ(floatToHalf(value), 0x7bff);
-    ASSERT_EQ(floatToHalf(halfToFloat(static_cast<std::uint16_t>(0x8000 | magnitude))), 0xfbff);
+    ASSERT_EQ(value, kGreatest);
+    ASSERT_EQ(halfToFloat(static_cast<std::uint16_t>(0x8000 | magnitude)), -kGreatest);
   }
+  EXPECT_EQ(floatToHalf(kGreatest), kLargestHalf);
   EXPECT_EQ(floatToHalf(std::numeric_limits<float>::infinity()), 0x7bff);
   EXPECT_EQ(floatToHalf(std::numeric_limits<float>::max()), 0x7bff);
   EXPECT_TRUE(std::isfinite(halfToFloat(floatToHalf(std::numeric_limits<float>::quiet_NaN()))));
+}
+
+TEST(Half, NegativeNumbersBecome0WhereNoneCanBe) {
+  for (int magnitude = 0; magnitude < 0x8000; ++magnitude) {
+    const auto bits = static_cast<std::uint16_t>(magnitude);
+    ASSERT_EQ(positiveHalfToFloat(bits), halfToFloat(bits));
+    ASSERT_EQ(positiveHalfToFloat(static_cast<std::uint16_t>(0x8000 | magnitude)), 0);
+  }
 }
 
 /// The pattern nearest to a value in [0, 65504], even in a tie, by search over all numbers.
@@ -63,7 +71,7 @@ TEST(Half, RoundsToTheNearestAndTiesToEven) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> exponent(-27, 15.99f);
   for (int k = 0; k < 200000; ++k) {
-    const float value = std::min(std::exp2(exponent(random)), kLargestHalf);
+    const float value = std::min(std::exp2(exponent(random)), float{kGreatest});
     ASSERT_EQ(floatToHalf(value), nearestHalf(value)) << value;
     ASSERT_EQ(floatToHalf(-value), 0x8000 | nearestHalf(value)) << value;
   }

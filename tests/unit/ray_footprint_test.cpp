@@ -33,7 +33,7 @@ TEST(RayFootprint, BadDifferentialsGiveUsableFootprints) {
       const Footprint p = footprintFromDifferentials({a, b}, {a, b}, {b, 0.01f}, 1024, 512);
       const Covariance raw = p.covariance;
       EXPECT_TRUE(std::isfinite(raw.xx) && std::isfinite(raw.xy) && std::isfinite(raw.yy)) << a << ' ' << b;
-      const Covariance c = usableCovariance(raw, 1024, 512);
+      const UsableCovariance c = usableCovariance(raw, 1024, 512);
       EXPECT_TRUE(c.xx > 0 && c.xx <= 1024 * 1024 * 1.01f && c.yy > 0 && c.yy <= 512 * 512 * 1.01f) << a << ' ' << b;
     }
   }

@@ -239,10 +239,11 @@ void expectRowsAreThePixels(const CompressedNdf& ndf, const Reader& reader, Slic
     const ColumnLayout layout(cluster);
     for (std::uint32_t slice = 0; slice < cluster.slice_count; ++slice) {
       const auto row = reader.row(cluster, slice);
-      std::vector<float> scaled(kMaxColumns);
-      reader.scaledCoefficients(cluster, row, scaled.data());
+      float scaled[kMaxColumns], weights[kBlockPixels];
+      reader.scaledCoefficients(cluster, row, scaled);
+      reader.sliceWeights(cluster, row, weights);
       float sums[kBlockSize], pixels[kBlockPixels], largest = 0;
-      reader.rowSums(cluster, scaled.data()).store(sums);
+      reader.rowSums(cluster, weights).store(sums);
       for (int y = 0; y < kBlockSize; ++y) {
         for (int x = 0; x < kBlockSize; ++x) {
           float projection[ColumnLayout::kMost];
@@ -256,7 +257,7 @@ void expectRowsAreThePixels(const CompressedNdf& ndf, const Reader& reader, Slic
       ++(least < 0 ? kinds.with_negatives : kinds.without_negatives);
       for (int y = 0; y < kBlockSize; ++y) {
         float decoded[kBlockSize];
-        reader.rowPixels(cluster, scaled.data(), y).store(decoded);
+        reader.rowPixels(cluster, weights, y).store(decoded);
         double sum = 0, positive = 0;
         for (int x = 0; x < kBlockSize; ++x) {
           const float pixel = pixels[y * kBlockSize + x];

@@ -103,22 +103,22 @@ void expectAreas() {
 
 TEST(SlotSums, AddUpTexelByTexel) { expectAreas<SingleTexels>(); }
 
-#ifdef GLINT_WIDE
+#ifdef GLINT_AVX2
 TEST(SlotSums, AddUpEightTexelsAtATime) {
-  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
-  expectAreas<WideTexels>();
+  if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
+  expectAreas<Avx2Texels>();
 }
 
 /// Ends of any size, whose sums are rounded.
 TEST(SlotSums, AreTheSameToTheBitByEightAndByOne) {
-  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+  if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
   std::mt19937 random(6);
   std::uniform_real_distribution<float> end;
   for (int k = 0; k < 2000; ++k) {
     Case c = randomCase(random);
     c.column_ends = {end(random), end(random)};
     c.row_ends = {end(random), end(random)};
-    EXPECT_EQ((areasBy<WideTexels, 3>(c)), (areasBy<SingleTexels, 3>(c))) << k;
+    EXPECT_EQ((areasBy<Avx2Texels, 3>(c)), (areasBy<SingleTexels, 3>(c))) << k;
   }
 }
 #endif

@@ -1,6 +1,4 @@
 // Vectors of eight against those of four, to the bit: factors of compressed pyramids and pixels of blocks.
-#include "glint/query/wide_reader.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,14 +7,15 @@
 #include <vector>
 
 #include "glint/bake/compress.h"
+#include "glint/query/avx2_blocks.h"
+#include "glint/query/avx2_reader.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/half.h"
 #include "glint/query/pyramid_ndf.h"
-#include "glint/query/wide_blocks.h"
 #include "support/small_pyramid.h"
 #include "support/test_maps.h"
 
-#ifdef GLINT_WIDE
+#ifdef GLINT_AVX2
 
 namespace glint {
 namespace {
@@ -27,8 +26,8 @@ struct Compared {
   int slices = 0, alone = 0;
 };
 
-void expectEqual(const float* wide, const float* narrow, int count, const char* what) {
-  for (int k = 0; k < count; ++k) ASSERT_EQ(wide[k], narrow[k]) << what << " " << k << " of " << count;
+void expectEqual(const float* avx2, const float* expected, int count, const char* what) {
+  for (int k = 0; k < count; ++k) ASSERT_EQ(avx2[k], expected[k]) << what << " " << k << " of " << count;
 }
 
 /// Columns of a projection, in groups of four with zeros up to their ends.
@@ -43,7 +42,7 @@ std::vector<float> projectionOf(const Reader& reader, const NdfCluster& cluster,
 
 template <class Reader>
 void expectReadersAgree(const CompressedNdf& ndf, const Reader& reader, Compared& compared) {
-  const typename Reader::Wide wide(reader);
+  const typename Reader::Avx2 avx2(reader);
   std::mt19937 random(1);
   for (const NdfCluster& cluster : ndf.clusters) {
     if (cluster.columns == 0 || cluster.slice_count == 0) continue;
@@ -53,35 +52,38 @@ void expectReadersAgree(const CompressedNdf& ndf, const Reader& reader, Compared
     const ColumnLayout layout(cluster);
     for (int round = 0; round < 6; ++round) {
       const int x = round == 0 ? 0 : static_cast<int>(random() % 16), y = round == 1 ? 0 : static_cast<int>(random() % 16);
-      const auto projection = projectionOf(reader, cluster, x, y), by_eight = projectionOf(wide, cluster, x, y);
+      const auto projection = projectionOf(reader, cluster, x, y), by_eight = projectionOf(avx2, cluster, x, y);
       expectEqual(by_eight.data(), projection.data(), static_cast<int>(projection.size()), "projection");
       typename Reader::Row rows[4];
       for (auto& row : rows) row = reader.row(cluster, random() % cluster.slice_count);
-      float dots[4], wide_dots[4];
+      float dots[4], avx2_dots[4];
       reader.dots(projection.data(), layout, rows).store(dots);
-      wide.dots(projection.data(), layout, rows).store(wide_dots);
-      expectEqual(wide_dots, dots, 4, "dot product");
+      avx2.dots(projection.data(), layout, rows).store(avx2_dots);
+      expectEqual(avx2_dots, dots, 4, "dot product");
       if (reader.asksAlone(cluster)) {
         ++compared.alone;
-        ASSERT_EQ(wide.valueAlone(cluster, rows[0], x, y), reader.valueAlone(cluster, rows[0], x, y));
+        ASSERT_EQ(avx2.valueAlone(cluster, rows[0], x, y), reader.valueAlone(cluster, rows[0], x, y));
       }
-      float scaled[kMaxColumns], wide_scaled[kMaxColumns], sums[kBlockSize], wide_sums[kBlockSize];
+      float scaled[kMaxColumns], avx2_scaled[kMaxColumns], sums[kBlockSize], avx2_sums[kBlockSize];
+      float weights[kBlockPixels], avx2_weights[kBlockPixels];
       reader.scaledCoefficients(cluster, rows[1], scaled);
-      wide.scaledCoefficients(cluster, rows[1], wide_scaled);
-      expectEqual(wide_scaled, scaled, cluster.columns, "coefficient");
-      reader.rowSums(cluster, scaled).store(sums);
-      wide.rowSums(cluster, scaled).store(wide_sums);
-      expectEqual(wide_sums, sums, kBlockSize, "sum of row");
-      reader.rowPixels(cluster, scaled, y).store(sums);
-      wide.rowPixels(cluster, scaled, y).store(wide_sums);
-      expectEqual(wide_sums, sums, kBlockSize, "pixel");
+      avx2.scaledCoefficients(cluster, rows[1], avx2_scaled);
+      expectEqual(avx2_scaled, scaled, cluster.columns, "coefficient");
+      reader.sliceWeights(cluster, rows[1], weights);
+      avx2.sliceWeights(cluster, rows[1], avx2_weights);
+      reader.rowSums(cluster, weights).store(sums);
+      avx2.rowSums(cluster, avx2_weights).store(avx2_sums);
+      expectEqual(avx2_sums, sums, kBlockSize, "sum of row");
+      reader.rowPixels(cluster, weights, y).store(sums);
+      avx2.rowPixels(cluster, avx2_weights, y).store(avx2_sums);
+      expectEqual(avx2_sums, sums, kBlockSize, "pixel");
       ++compared.slices;
     }
   }
 }
 
-TEST(WideReader, ReadsClustersOfAnyRank) {
-  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+TEST(Avx2Reader, ReadsClustersOfAnyRank) {
+  if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
   const test::OwnedMap map(100, 72, test::roughSurface(100, 72, 0.3f));
   const bake::NdfPyramidData pyramid = test::smallPyramid(map.map());
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
@@ -106,8 +108,8 @@ TEST(WideReader, ReadsClustersOfAnyRank) {
   }
 }
 
-TEST(WideReader, ReadsNarrowColumns) {
-  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+TEST(Avx2Reader, ReadsNarrowColumns) {
+  if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
   const test::OwnedMap map(200, 144, test::synthesised(bake::SynthKind::isotropic, 200, 144, 0.25f));
   const bake::NdfPyramidData pyramid = test::smallPyramid(map.map());
   for (const auto method : {CompressionMethod::tucker, CompressionMethod::pca}) {
@@ -138,8 +140,8 @@ struct Blocks {
   }
 };
 
-TEST(WideBlocks, SumCoveredPixels) {
-  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+TEST(Avx2Blocks, SumCoveredPixels) {
+  if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
   std::mt19937 random(2);
   std::uniform_real_distribution<float> unit(0, 1);
   for (int round = 0; round < 300; ++round) {
@@ -163,41 +165,46 @@ TEST(WideBlocks, SumCoveredPixels) {
   }
 }
 
-TEST(WideBlocks, SumRows) {
-  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+TEST(Avx2Blocks, SumRows) {
+  if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
   std::mt19937 random(3);
   for (int round = 0; round < 100; ++round) {
     const Blocks blocks(random);
-    float sums[kBlockSize], wide_sums[kBlockSize];
+    float sums[kBlockSize], avx2_sums[kBlockSize];
     sumRows(blocks.floats.data()).store(sums);
-    sumRowsWide(blocks.halves.data()).store(wide_sums);
-    expectEqual(wide_sums, sums, kBlockSize, "row");
-    // Times 2^-112 those of subnormal pixels are rounded.
+    sumRowsAvx2(blocks.halves.data()).store(avx2_sums);
+    expectEqual(avx2_sums, sums, kBlockSize, "row");
     sumRows(blocks.halves.data()).store(sums);
-    for (int y = 0; y < kBlockSize; ++y) ASSERT_NEAR(0x1p112 * sums[y], wide_sums[y], 1e-6 * wide_sums[y] + 0x1p-30) << y;
+    expectEqual(avx2_sums, sums, kBlockSize, "row of halves");
   }
 }
 
-/// Values of a file are not checked when it is opened.
+GLINT_AVX2 void convert(const std::uint16_t* halves, float* values, float* positive) {
+  const __m128i eight = _mm_loadu_si128(reinterpret_cast<const __m128i*>(halves));
+  _mm256_storeu_ps(values, floatsOf(eight));
+  _mm256_storeu_ps(positive, positiveFloatsOf(eight));
+}
+
+/// All bits that a file may have.
+TEST(Avx2, ConvertsHalfPrecisionNumbers) {
+  if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
+  for (std::uint32_t first = 0; first < 0x10000; first += 8) {
+    std::uint16_t halves[8];
+    float values[8], positive[8];
+    for (int k = 0; k < 8; ++k) halves[k] = static_cast<std::uint16_t>(first + static_cast<std::uint32_t>(k));
+    convert(halves, values, positive);
+    for (int k = 0; k < 8; ++k) {
+      ASSERT_EQ(values[k], halfToFloat(halves[k])) << halves[k];
+      ASSERT_EQ(positive[k], positiveHalfToFloat(halves[k])) << halves[k];
+    }
+  }
+}
+
+/// Infinities, and what is no number: values of a file are not checked when it is opened.
 constexpr std::uint16_t kNoNumbers[] = {0x7c00, 0xfc00, 0x7e00, 0xfe00};
 
-TEST(WideBlocks, MakeNumbersOfWhatIsNone) {
-  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
-  for (const std::uint16_t bits : kNoNumbers) {
-    const std::vector<std::uint16_t> pixels(kBlockPixels, bits);
-    float sums[kBlockSize];
-    sumRowsWide(pixels.data()).store(sums);
-    for (const float sum : sums) EXPECT_TRUE(sum >= 0 && sum <= 16 * 65536.0f) << bits;
-    PyramidNdf::BlockCover cover;
-    cover.set({3.5f, 2, 9, 7.25f});
-    const std::uint16_t* block = pixels.data();
-    const float weight = 1, sum = cover.sum(&block, &weight, 1);
-    EXPECT_TRUE(sum >= 0 && sum <= 256 * 65536.0f) << bits;
-  }
-}
-
-TEST(WideReader, MakesNumbersOfWhatIsNone) {
-  if (!hasWideVectors()) GTEST_SKIP() << "no AVX2";
+TEST(Avx2Reader, MakesNumbersOfWhatIsNone) {
+  if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
   const test::OwnedMap map(100, 72, test::roughSurface(100, 72, 0.3f));
   const bake::NdfPyramidData pyramid = test::smallPyramid(map.map());
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {

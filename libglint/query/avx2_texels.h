@@ -3,18 +3,18 @@
 #include <array>
 #include <bit>
 
+#include "glint/query/avx2.h"
 #include "glint/query/texel_parts.h"
-#include "glint/query/wide.h"
 
-#ifdef GLINT_WIDE
+#ifdef GLINT_AVX2
 
 namespace glint {
 
 /// Reads lists eight texels at a time, with the results of SingleTexels: to the bit where no product and sum are fused.
-struct WideTexels {
+struct Avx2Texels {
   /// PartRange, in all lanes.
   struct Part {
-    GLINT_WIDE explicit Part(const PartRange& r)
+    GLINT_AVX2 explicit Part(const PartRange& r)
         : mask(all(r.mask)),
           begin(all(r.begin)),
           span(all(r.span)),
@@ -22,7 +22,7 @@ struct WideTexels {
           high(all(r.high)),
           at_low(_mm256_set1_ps(r.at.low)),
           at_high(_mm256_set1_ps(r.at.high)) {}
-    GLINT_WIDE __m256 of(__m256i texels) const {
+    GLINT_AVX2 __m256 of(__m256i texels) const {
       const __m256i value = _mm256_and_si256(texels, mask);
       const __m256i inside = notAbove(_mm256_sub_epi32(value, begin), span);
       const __m256 is_low = _mm256_castsi256_ps(_mm256_cmpeq_epi32(value, low));
@@ -36,9 +36,9 @@ struct WideTexels {
 
   /// TexelParts.
   struct Parts {
-    GLINT_WIDE explicit Parts(const TexelParts& parts) : columns(parts.columns), rows(parts.rows) {}
+    GLINT_AVX2 explicit Parts(const TexelParts& parts) : columns(parts.columns), rows(parts.rows) {}
     template <unsigned kCut>
-    GLINT_WIDE __m256 of(__m256i texels) const {
+    GLINT_AVX2 __m256 of(__m256i texels) const {
       if constexpr (kCut == TexelFilter::kPosition) return _mm256_mul_ps(columns.of(texels), rows.of(texels));
       if constexpr (kCut == TexelFilter::kColumn) return columns.of(texels);
       if constexpr (kCut == TexelFilter::kRow) return rows.of(texels);
@@ -49,7 +49,7 @@ struct WideTexels {
 
   /// SingleTexels::find.
   template <unsigned kCut>
-  GLINT_WIDE static void find(const std::uint32_t* texels, int count, const Parts& parts, const SlotFields& fields,
+  GLINT_AVX2 static void find(const std::uint32_t* texels, int count, const Parts& parts, const SlotFields& fields,
                               FoundTexels& found) {
     const Slots slots(fields);
     int end = found.count, k = 0;
@@ -68,7 +68,7 @@ struct WideTexels {
 
   /// SingleTexels::sum.
   template <unsigned kCut>
-  GLINT_WIDE static float sum(const std::uint32_t* texels, int count, const Parts& parts) {
+  GLINT_AVX2 static float sum(const std::uint32_t* texels, int count, const Parts& parts) {
     __m256 sums = _mm256_setzero_ps();
     int k = 0;
     for (; k + 8 <= count; k += 8) sums = _mm256_add_ps(sums, parts.of<kCut>(load(texels + k)));
@@ -87,13 +87,13 @@ struct WideTexels {
     struct Places {
       __m256i slots, inside;
     };
-    GLINT_WIDE explicit Slots(const SlotFields& f)
+    GLINT_AVX2 explicit Slots(const SlotFields& f)
         : shift_x(_mm_cvtsi32_si128(f.shift_x)),
           shift_y(_mm_cvtsi32_si128(f.shift_y)),
           mask(all(f.mask)),
           first_x(all(f.first_x)),
           first_y(all(f.first_y)) {}
-    GLINT_WIDE Places of(__m256i texels) const {
+    GLINT_AVX2 Places of(__m256i texels) const {
       const __m256i x = _mm256_add_epi32(_mm256_and_si256(_mm256_srl_epi32(texels, shift_x), mask), first_x);
       const __m256i y = _mm256_add_epi32(_mm256_and_si256(_mm256_srl_epi32(texels, shift_y), mask), first_y);
       const __m256i last = all(SlotFields::kSide - 1);
@@ -114,7 +114,7 @@ struct WideTexels {
     return table;
   }();
 
-  GLINT_WIDE static int append(const Slots::Places& places, __m256 parts, FoundTexels& found, int end) {
+  GLINT_AVX2 static int append(const Slots::Places& places, __m256 parts, FoundTexels& found, int end) {
     const auto set = static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(places.inside)));
     const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kLanesOf[set])));
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(found.slots + end), _mm256_permutevar8x32_epi32(places.slots, lanes));
@@ -122,16 +122,16 @@ struct WideTexels {
     return end + std::popcount(set);
   }
 
-  GLINT_WIDE static __m256i all(std::uint32_t x) { return _mm256_set1_epi32(static_cast<int>(x)); }
+  GLINT_AVX2 static __m256i all(std::uint32_t x) { return _mm256_set1_epi32(static_cast<int>(x)); }
   /// In lanes: a <= most, as numbers without sign.
-  GLINT_WIDE static __m256i notAbove(__m256i a, __m256i most) { return _mm256_cmpeq_epi32(_mm256_min_epu32(a, most), a); }
-  GLINT_WIDE static __m256i firstLanes(int count) {
+  GLINT_AVX2 static __m256i notAbove(__m256i a, __m256i most) { return _mm256_cmpeq_epi32(_mm256_min_epu32(a, most), a); }
+  GLINT_AVX2 static __m256i firstLanes(int count) {
     return _mm256_cmpgt_epi32(_mm256_set1_epi32(count), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
   }
-  GLINT_WIDE static __m256i load(const std::uint32_t* texels) {
+  GLINT_AVX2 static __m256i load(const std::uint32_t* texels) {
     return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(texels));
   }
-  GLINT_WIDE static __m256i load(const std::uint32_t* texels, __m256i lanes) {
+  GLINT_AVX2 static __m256i load(const std::uint32_t* texels, __m256i lanes) {
     return _mm256_maskload_epi32(reinterpret_cast<const int*>(texels), lanes);
   }
 };

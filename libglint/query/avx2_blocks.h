@@ -1,22 +1,22 @@
 #pragma once
 
 #include "glint/model/ndf_pyramid.h"
-#include "glint/query/wide.h"
+#include "glint/query/avx2.h"
 
-#ifdef GLINT_WIDE
+#ifdef GLINT_AVX2
 
 namespace glint {
 
-// Blocks of pixels of half precision, [16][16], all >= 0. In a file they may be anything: what is not is taken as 0, or as a
-// large number.
-GLINT_WIDE inline __m256 loadPixelsWide(const std::uint16_t* p) {
-  return floatsOf(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)), 0);
+// Blocks of pixels of half precision, [16][16], all >= 0.
+
+GLINT_AVX2 inline __m256 loadPixelsAvx2(const std::uint16_t* p) {
+  return positiveFloatsOf(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
 }
 
 /// Adds `part` times a row of pixels to its left and its right half.
-GLINT_WIDE inline void addRow(const std::uint16_t* row, float part, __m256& left, __m256& right) {
-  left = _mm256_add_ps(left, _mm256_mul_ps(_mm256_set1_ps(part), loadPixelsWide(row)));
-  right = _mm256_add_ps(right, _mm256_mul_ps(_mm256_set1_ps(part), loadPixelsWide(row + kBlockSize / 2)));
+GLINT_AVX2 inline void addRow(const std::uint16_t* row, float part, __m256& left, __m256& right) {
+  left = _mm256_add_ps(left, _mm256_mul_ps(_mm256_set1_ps(part), loadPixelsAvx2(row)));
+  right = _mm256_add_ps(right, _mm256_mul_ps(_mm256_set1_ps(part), loadPixelsAvx2(row + kBlockSize / 2)));
 }
 
 /// Weighted sum of the pixels of some blocks by how much of their columns and rows is covered, to the bit that of
@@ -24,7 +24,7 @@ GLINT_WIDE inline void addRow(const std::uint16_t* row, float part, __m256& left
 /// @param blocks, weights     [count]
 /// @param columns, rows       [16]; columns that are not covered are 0
 /// @param first_row, end_row  rows that are covered
-GLINT_WIDE inline float sumCoveredPixels(const std::uint16_t* const* blocks, const float* weights, int count,
+GLINT_AVX2 inline float sumCoveredPixels(const std::uint16_t* const* blocks, const float* weights, int count,
                                          const float* columns, const float* rows, int first_row, int end_row) {
   __m256 left = _mm256_setzero_ps(), right = left;
   for (int k = 0; k < count; ++k) {
@@ -45,12 +45,12 @@ GLINT_WIDE inline float sumCoveredPixels(const std::uint16_t* const* blocks, con
   return ((lowFour(left) + highFour(left)) + (lowFour(right) + highFour(right))).sum();
 }
 
-/// Sums of the rows of a block: 2^112 times those of sumRows.
-GLINT_WIDE inline Float16 sumRowsWide(const std::uint16_t* pixels) {
+/// sumRows, to the bit.
+GLINT_AVX2 inline Float16 sumRowsAvx2(const std::uint16_t* pixels) {
   Float4 rows[kBlockSize];
   for (int y = 0; y < kBlockSize; ++y) {
     const std::uint16_t* row = pixels + y * kBlockSize;
-    const __m256 left = loadPixelsWide(row), right = loadPixelsWide(row + kBlockSize / 2);
+    const __m256 left = loadPixelsAvx2(row), right = loadPixelsAvx2(row + kBlockSize / 2);
     rows[y] = (lowFour(left) + highFour(left)) + (lowFour(right) + highFour(right));
   }
   Float16 sums;

@@ -1,0 +1,79 @@
+// What footprints weigh, before any normal is asked.
+#include "glint/query/footprint_weights.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "glint/query/anisotropic_ndf.h"
+#include "glint/query/gaussian.h"
+#include "glint/query/texel_cover.h"
+
+namespace glint {
+namespace {
+
+constexpr int kSize = 2048;
+constexpr double kLeastVariance = double{kMinSigmaTexels} * kMinSigmaTexels;
+
+/// A line of texels along a diagonal, of no width: it is widened to kMinSigmaTexels.
+struct Diagonal {
+  explicit Diagonal(float variance)
+      : footprint(Footprint::gaussian({0.3f, 0.6f}, {variance, variance, variance})), along(2.0 * variance + kLeastVariance) {}
+  double weight(double dx, double dy) const {
+    return std::exp(-0.25 * ((dx - dy) * (dx - dy) / kLeastVariance + (dx + dy) * (dx + dy) / along));
+  }
+  double rootDeterminant() const { return std::sqrt(along * kLeastVariance); }
+  Footprint footprint;
+  double along;  ///< variance
+};
+
+TEST(FootprintWeights, LongGaussiansKeepTheirWidth) {
+  std::mt19937 random(1);
+  for (const float variance : {100.0f, 5e4f, 5e5f, 2e6f, 4e6f}) {
+    SCOPED_TRACE(variance);
+    const Diagonal line(variance);
+    const FootprintWeights weights(line.footprint, kSize, kSize);
+    EXPECT_NEAR(weights.closedFormTotal(), 2 * kPi * line.rootDeterminant(), 1e-5 * weights.closedFormTotal());
+    std::uniform_real_distribution<double> place(-2.5 * std::sqrt(variance), 2.5 * std::sqrt(variance));
+    double sum = 0;
+    for (int k = 0; k < 20000; ++k) {
+      const int i = static_cast<int>(weights.centre().x + place(random)) + static_cast<int>(random() % 5) - 2;
+      const int j = static_cast<int>(static_cast<float>(i) - weights.centre().x + weights.centre().y);
+      const double expected = line.weight(i + 0.5 - weights.centre().x, j + 0.5 - weights.centre().y);
+      ASSERT_NEAR(weights.texel(i, j), expected, 3e-3) << i << ' ' << j;
+      sum += expected;
+    }
+    EXPECT_GT(sum, 3000);
+    const auto row = weights.gaussianLine(weights.centre().y + 30);
+    EXPECT_NEAR(row.mean, weights.centre().x + 30, 1e-3 * 30);
+    EXPECT_NEAR(row.sigma, std::sqrt(2 * kLeastVariance), 1e-3);
+  }
+}
+
+TEST(TexelCover, LongGaussiansKeepTheirArea) {
+  for (const float variance : {100.0f, 5e4f, 5e5f, 2e6f, 4e6f}) {
+    const Diagonal line(variance);
+    EXPECT_NEAR(TexelCover(line.footprint, kSize, kSize).area(), 12 * line.rootDeterminant(), 1e-5 * line.rootDeterminant())
+        << variance;
+  }
+}
+
+TEST(IsotropicParts, LongGaussiansKeepTheirWidth) {
+  const PrincipalAxes axes = principalAxes(usableCovariance({2e6f, 2e6f, 2e6f}, kSize, kSize));
+  EXPECT_NEAR(axes.shortest, kMinSigmaTexels, 1e-5f);
+  EXPECT_NEAR(axes.longest, 2000, 0.01f);
+  EXPECT_NEAR(axes.direction.x, std::sqrt(0.5f), 1e-6f);
+}
+
+TEST(FootprintWeights, CentresCloseBelow0AreAtTheEndOfTheMap) {
+  EXPECT_EQ(wrapUnit(-1e-9f), kBelowOne);
+  EXPECT_EQ(wrapUnit(-0.25f), 0.75f);
+  EXPECT_EQ(wrapUnit(3.25f), 0.25f);
+  EXPECT_EQ(wrapUnit(1), 0);
+  EXPECT_EQ(wrapUnit(std::nanf("")), 0);
+  EXPECT_EQ(wrapUnit(INFINITY), 0);
+}
+
+}  // namespace
+}  // namespace glint
