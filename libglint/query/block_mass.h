@@ -35,50 +35,68 @@ class BlockMasses {
 
   /// Masses 16 g to 16 g + 15; 0 where there are fewer.
   GLINT_HD Float16 group(int g) const {
-    const std::uint8_t* codes = codes_ + kGroup * g;
-    const std::size_t readable = readable_ - static_cast<std::size_t>(kGroup * g);
-    constexpr int kHalf = kGroup / 2;
-    std::uint64_t halves[2] = {};
-    if (readable >= sizeof halves)
-      std::memcpy(halves, codes, sizeof halves);
-    else
-      for (std::size_t k = 0; k < readable; ++k) halves[k / kHalf] |= std::uint64_t{codes[k]} << 8 * (k % kHalf);
+#ifdef GLINT_AVX2
+    if (hasAvx2()) return groupAvx2(g);
+#endif
+    const Codes codes = codesOf(g);
     Float16 masses;
-    for (int half = 0; half < 2; ++half) {
-      const int left = count_ - kGroup * g - half * kHalf;
-      const std::uint64_t kept = left >= kHalf ? halves[half]
-                                 : left > 0    ? halves[half] & ((std::uint64_t{1} << 8 * left) - 1)
-                                               : 0;
-      masses.v[2 * half] = Float4::ofMassCodes(static_cast<std::uint32_t>(kept));
-      masses.v[2 * half + 1] = Float4::ofMassCodes(static_cast<std::uint32_t>(kept >> 32));
-    }
+    for (int k = 0; k < 4; ++k) masses.v[k] = Float4::ofMassCodes(codes.fours[k]);
     return masses;
   }
 
   /// sums[g] = sum of group(g), exactly.
   GLINT_HD void sumGroups(float* sums) const {
-    int g = 0;
 #ifdef GLINT_AVX2
-    if (hasAvx2()) {
-      sumWholeGroups(sums);
-      g = count_ / kGroup;
-    }
+    if (hasAvx2()) return sumGroupsAvx2(sums);
 #endif
-    for (; kGroup * g < count_; ++g) sums[g] = group(g).sum();
+    for (int g = 0; kGroup * g < count_; ++g) sums[g] = group(g).sum();
   }
 
  private:
   static constexpr int kGroup = 16;
 
+  /// Codes of a group, 0 behind the last.
+  struct Codes {
+    std::uint32_t fours[kGroup / 4];
+  };
+  GLINT_HD Codes codesOf(int g) const {
+    Codes codes = {};
+    const int left = count_ - kGroup * g;
+    if (left >= kGroup)
+      std::memcpy(codes.fours, codes_ + kGroup * g, sizeof codes.fours);
+    else
+      for (int k = 0; k < left; ++k) codes.fours[k / 4] |= std::uint32_t{codes_[kGroup * g + k]} << 8 * (k % 4);
+    return codes;
+  }
+
 #ifdef GLINT_AVX2
-  GLINT_AVX2 void sumWholeGroups(float* sums) const {
-    for (int g = 0; kGroup * (g + 1) <= count_; ++g) {
-      const __m128i codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(codes_ + kGroup * g));
-      const __m256i halves = _mm256_slli_epi16(_mm256_cvtepu8_epi16(codes), 6);
-      const __m256 eight =
-          _mm256_add_ps(_mm256_cvtph_ps(_mm256_castsi256_si128(halves)), _mm256_cvtph_ps(_mm256_extracti128_si256(halves, 1)));
+  GLINT_AVX2 Float16 groupAvx2(int g) const {
+    const auto [low, high] = massesOf(g);
+    return {{lowFour(low), highFour(low), lowFour(high), highFour(high)}};
+  }
+  GLINT_AVX2 void sumGroupsAvx2(float* sums) const {
+    for (int g = 0; kGroup * g < count_; ++g) {
+      const auto [low, high] = massesOf(g);
+      const __m256 eight = _mm256_add_ps(low, high);
       sums[g] = (lowFour(eight) + highFour(eight)).sum();
     }
+  }
+
+  struct Eights {
+    __m256 low, high;
+  };
+  GLINT_AVX2 Eights massesOf(int g) const {
+    const __m128i numbers = _mm_setr_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    const __m128i left = _mm_set1_epi8(static_cast<char>(std::min(count_ - kGroup * g, int{kGroup})));
+    __m128i codes;
+    if (readable_ >= static_cast<std::size_t>(kGroup * (g + 1))) {
+      codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(codes_ + kGroup * g));
+    } else {
+      const Codes last = codesOf(g);
+      codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(last.fours));
+    }
+    const __m256i halves = _mm256_slli_epi16(_mm256_cvtepu8_epi16(_mm_and_si128(codes, _mm_cmplt_epi8(numbers, left))), 6);
+    return {_mm256_cvtph_ps(_mm256_castsi256_si128(halves)), _mm256_cvtph_ps(_mm256_extracti128_si256(halves, 1))};
   }
 #endif
 
