@@ -55,17 +55,25 @@ class BlockMasses {
  private:
   static constexpr int kGroup = 16;
 
+  /// Whether all bytes of a group may be read, those behind the last code included.
+  GLINT_HD bool isReadable(int g) const { return readable_ >= static_cast<std::size_t>(kGroup * (g + 1)); }
+
   /// Codes of a group, 0 behind the last.
   struct Codes {
     std::uint32_t fours[kGroup / 4];
   };
   GLINT_HD Codes codesOf(int g) const {
     Codes codes = {};
-    const int left = count_ - kGroup * g;
-    if (left >= kGroup)
-      std::memcpy(codes.fours, codes_ + kGroup * g, sizeof codes.fours);
-    else
+    const int left = std::min(count_ - kGroup * g, int{kGroup});
+    if (!isReadable(g)) {
       for (int k = 0; k < left; ++k) codes.fours[k / 4] |= std::uint32_t{codes_[kGroup * g + k]} << 8 * (k % 4);
+      return codes;
+    }
+    std::memcpy(codes.fours, codes_ + kGroup * g, sizeof codes.fours);
+    for (int k = 0; k < 4; ++k) {
+      const int here = left - 4 * k;
+      codes.fours[k] &= here >= 4 ? ~0u : here > 0 ? (1u << 8 * here) - 1 : 0u;
+    }
     return codes;
   }
 
@@ -89,7 +97,7 @@ class BlockMasses {
     const __m128i numbers = _mm_setr_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
     const __m128i left = _mm_set1_epi8(static_cast<char>(std::min(count_ - kGroup * g, int{kGroup})));
     __m128i codes;
-    if (readable_ >= static_cast<std::size_t>(kGroup * (g + 1))) {
+    if (isReadable(g)) {
       codes = _mm_loadu_si128(reinterpret_cast<const __m128i*>(codes_ + kGroup * g));
     } else {
       const Codes last = codesOf(g);
