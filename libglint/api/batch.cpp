@@ -124,10 +124,11 @@ struct PyramidSteps {
 void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints,
                     const HalfVectorArrays& halves, float* out) {
   struct Stage {
-    SliceChunk chunk;
+    explicit Stage(const PyramidNdf& m) : steps(m) {}
+    SliceChunk chunk;  // every step fills what the next reads: not worth clearing
     PyramidSteps steps;
   };
-  Stage stages[3] = {{{}, PyramidSteps(model)}, {{}, PyramidSteps(model)}, {{}, PyramidSteps(model)}};
+  Stage stages[3] = {Stage(model), Stage(model), Stage(model)};
   const std::size_t chunks = (count + kChunk - 1) / kChunk;
   const auto lanesOf = [&](std::size_t k) { return static_cast<int>(std::min(count - k * kChunk, std::size_t{kChunk})); };
   for (std::size_t step = 0; step < chunks + 2; ++step) {
