@@ -161,22 +161,6 @@ void modelDensities(const Model& model, std::size_t count, const FootprintArrays
   for (std::size_t k = 0; k < count; ++k) out[k] = model.density(footprints[k], halves[k]);
 }
 
-/// Footprints that are round are those of the model inside. A pyramid's batches are of round ones, so others are asked one by
-/// one.
-template <class Model>
-bool allWhole(const AnisotropicNdf<Model>& model, std::size_t count, const FootprintArrays& footprints) {
-  if (footprints.sigma.data != nullptr) return true;
-  for (std::size_t k = 0; k < count; ++k)
-    if (!model.isWhole(footprints[k])) return false;
-  return true;
-}
-
-void modelDensities(const AnisotropicNdf<PyramidNdf>& model, std::size_t count, const FootprintArrays& footprints,
-                    const HalfVectorArrays& halves, float* out) {
-  if (allWhole(model, count, footprints)) return modelDensities(model.round(), count, footprints, halves, out);
-  for (std::size_t k = 0; k < count; ++k) out[k] = model.density(footprints[k], halves[k]);
-}
-
 void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
                 float* out) {
   SliceChunk chunk;
@@ -245,32 +229,36 @@ void modelSamples(const Model& model, std::size_t count, const FootprintArrays& 
   for (std::size_t k = 0; k < count; ++k) out.set(k, model.sample(footprints[k], xi[k]));
 }
 
-void modelMeans(const AnisotropicNdf<PyramidNdf>& model, std::size_t count, const FootprintArrays& footprints,
-                const RangeArrays& ranges, float* out) {
-  if (allWhole(model, count, footprints)) return modelMeans(model.round(), count, footprints, ranges, out);
-  for (std::size_t k = 0; k < count; ++k) out[k] = model.mean(footprints[k], ranges[k]);
+/// Whether no footprint of a batch is split into parts.
+bool allWhole(const AnisotropicNdf<PyramidNdf>& model, std::size_t count, const FootprintArrays& footprints) {
+  if (footprints.sigma.data != nullptr) return true;
+  for (std::size_t k = 0; k < count; ++k)
+    if (!model.isWhole(footprints[k])) return false;
+  return true;
 }
 
-void modelSamples(const AnisotropicNdf<PyramidNdf>& model, std::size_t count, const FootprintArrays& footprints,
-                  const HalfVectorArrays& xi, const SampleArrays& out) {
-  if (allWhole(model, count, footprints)) return modelSamples(model.round(), count, footprints, xi, out);
-  for (std::size_t k = 0; k < count; ++k) out.set(k, model.sample(footprints[k], xi[k]));
+/// Calls ask(model) with the model inside, or with that of round footprints where these are all: it has batches of its own.
+template <class Ask>
+void askModel(const AnyNdf& any, std::size_t count, const FootprintArrays& footprints, Ask&& ask) {
+  const auto* pyramid = std::get_if<AnisotropicNdf<PyramidNdf>>(&any);
+  if (pyramid != nullptr && allWhole(*pyramid, count, footprints)) return ask(pyramid->round());
+  std::visit(ask, any);
 }
 
 }  // namespace
 
 void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                float* out) {
-  std::visit([&](const auto& m) { modelDensities(m, count, footprints, halves, out); }, model);
+  askModel(model, count, footprints, [&](const auto& m) { modelDensities(m, count, footprints, halves, out); });
 }
 
 void means(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges, float* out) {
-  std::visit([&](const auto& m) { modelMeans(m, count, footprints, ranges, out); }, model);
+  askModel(model, count, footprints, [&](const auto& m) { modelMeans(m, count, footprints, ranges, out); });
 }
 
 void samples(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
              const SampleArrays& out) {
-  std::visit([&](const auto& m) { modelSamples(m, count, footprints, xi, out); }, model);
+  askModel(model, count, footprints, [&](const auto& m) { modelSamples(m, count, footprints, xi, out); });
 }
 
 }  // namespace glint::api

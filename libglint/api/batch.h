@@ -62,9 +62,9 @@ struct SampleArrays {
 /// out[k] = density of query k, for k < count. The same values as asking one by one, but for 1e-6 of each where products and
 /// sums are fused or in another order, and the same rules for what is degenerate.
 ///
-/// Pyramids have the cache misses of many round footprints in flight (all of a batch: one that is split into parts has it asked
-/// one by one). A query of any other kind has enough work or misses of its own to
-/// overlap, and gains nothing but the call.
+/// Pyramids have the cache misses of many queries in flight where all footprints of the batch are round; one that is split into
+/// parts has all asked one by one. A query of any other kind has enough work or misses of its own to overlap, and gains nothing
+/// but the call.
 /// @note thread-safe, allocates nothing; split a batch over threads as you like
 void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                float* out);

@@ -84,8 +84,8 @@ typedef struct glint_open_options {
   float slant_tolerance;    /* kind histogram-sat: share of a footprint with slanted sides that may be counted in a wrong
                                place, up to 1; 0: 0.06; GLINT_SLANT_EXACT: none, and slower */
   int32_t gaussian_boxes;   /* kind histogram-sat: boxes that stand for a Gaussian footprint, 1 or 3; 0: 1 */
-  int32_t footprint_parts; /* kinds ndf-pyramid and ndf-cp: most round footprints that stand for a stretched one, up to 32, each
-                               at the cost of one; 1: one of the same mean square size, whatever the shape; 0: 32 */
+  int32_t footprint_parts;  /* kinds ndf-pyramid and ndf-cp: most round footprints that stand for a stretched one, up to 32,
+                               each at the cost of one; 1: one of the same mean square size, whatever the shape; 0: 32 */
 } glint_open_options;
 
 #define GLINT_SLANT_EXACT (-1.0f)
@@ -336,7 +336,8 @@ GLINT_API glint_status glint_displaced_level(const glint_displaced* displaced, f
  * solid angle. It is that of all the relief below the level; whether the coarse surface hides wi or wo is the caller's to say.
  * 0 for directions behind the facet or within 1e-6 of its plane. Reciprocal but for rounding.
  * pdf: density with which glint_displaced_sample draws wi for this wo, per unit solid angle, behind the facet too. Either may be
- * null. Both are 0 for directions longer than a unit vector, or not finite. Returns GLINT_ERROR_USAGE for null arguments (reflected and pdf: both), else GLINT_OK. */
+ * null. Both are 0 for directions longer than a unit vector, or not finite. Returns GLINT_ERROR_USAGE for null arguments
+ * (reflected and pdf: both), else GLINT_OK. */
 GLINT_API glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t variant, float level, float u,
                                                 float v, const float wi[3], const float wo[3], float reflected[3], float* pdf);
 

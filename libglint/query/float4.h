@@ -59,7 +59,7 @@ inline __m128 floorOf(__m128 v) {
   return where(has_fraction, _mm_or_ps(below, _mm_and_ps(v, sign)), v);
 }
 #endif
-/// Four numbers of 16 bits, without signs.
+/// Four numbers of 16 bits, in the lower half.
 inline __m128i loadFour(const void* p) { return _mm_loadl_epi64(static_cast<const __m128i*>(p)); }
 }  // namespace sse
 #endif
