@@ -58,7 +58,7 @@ constexpr std::array kRules = {
     Rule{"shape.resolution", error, invalid_input, "the image resolution is a multiple of 16", kMakeAgain},
     Rule{"shape.strides", error, invalid_input, "each level's stride is twice the one before", kMakeAgain},
     Rule{"shape.slopes", error, invalid_input, "slope_covariance is a covariance", kMakeAgain},
-    Rule{"shape.grid", error, invalid_input, "a level's grid is ceil(size / stride)", kMakeAgain},
+    Rule{"shape.grid", error, invalid_input, "a level's grid is ceil(size / stride), or 1 x 1 of the last level", kMakeAgain},
     Rule{"normals.bounds_levels", error, invalid_input, "the coarsest level of bounds is one node", kMakeAgain},
     Rule{"pyramid.masks", error, invalid_input, "no occupancy bit lies beyond the image's blocks", kMakeAgain},
     Rule{"pyramid.mask_ranks", error, invalid_input, "mask_ranks is the running count of occupancy bits", kMakeAgain},

@@ -15,7 +15,8 @@ PyramidCommand::PyramidCommand(Tool& tool) {
               "each texel is a facet (flat), or normals are interpolated between texels (smooth)");
   tool.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
               "whether the map repeats or ends at its border");
-  tool.option("--levels", levels_, "number of levels; auto: until levels agree to 1 % or the stride reaches the map");
+  tool.option("--levels", levels_,
+              "number of levels besides the mean of the map; auto: until levels agree to 1 % or the stride reaches the map");
   tool.choice("--precision", options_.precision, {{"half", BlockPrecision::f16}, {"float", BlockPrecision::f32}},
               "of stored pixels");
 }
@@ -40,7 +41,8 @@ nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid) {
     const std::size_t level_bytes = blocks * kBlockPixels * (pyramid.precision == BlockPrecision::f16 ? 2 : 4);
     bytes += level_bytes;
     levels.push_back(
-        {{"stride_texels", grid.stride},
+        {{"is_mean", l == pyramid.shape.footprintLevels()},
+         {"stride_texels", grid.stride},
          {"columns", grid.columns},
          {"rows", grid.rows},
          {"blocks", blocks},
@@ -57,9 +59,11 @@ std::string pyramidText(const bake::NdfPyramidData& pyramid) {
   const nlohmann::json json = pyramidJson(pyramid);
   int l = 0;
   for (const auto& level : json["levels"]) {
-    text += fmt::format("{:>5} {:>8.0f} {:>5} x {:<3} {:>9} {:>8.1f}% {:>9.2f}\n", l++, level["stride_texels"].get<double>(),
-                        level["columns"].get<int>(), level["rows"].get<int>(), level["blocks"].get<std::size_t>(),
-                        100 * level["occupied"].get<double>(), 1e-6 * level["size_bytes"].get<double>());
+    const std::string stride =
+        level["is_mean"].get<bool>() ? "mean" : fmt::format("{:.0f}", level["stride_texels"].get<double>());
+    text += fmt::format("{:>5} {:>8} {:>5} x {:<3} {:>9} {:>8.1f}% {:>9.2f}\n", l++, stride, level["columns"].get<int>(),
+                        level["rows"].get<int>(), level["blocks"].get<std::size_t>(), 100 * level["occupied"].get<double>(),
+                        1e-6 * level["size_bytes"].get<double>());
   }
   return text + fmt::format("total {:.2f} MB\n", 1e-6 * json["size_bytes"].get<double>());
 }

@@ -76,10 +76,11 @@ void checkShape(const PyramidShape& shape, Findings& findings) {
     }
     const double columns = std::ceil(static_cast<double>(shape.width) / grid.stride);
     const double rows = std::ceil(static_cast<double>(shape.height) / grid.stride);
-    if (grid.columns != columns || grid.rows != rows) {
+    const bool is_mean = l == shape.footprintLevels();
+    if (!is_mean && (grid.columns != columns || grid.rows != rows)) {
       findings.add("shape.grid", "/@level_columns",
                    "level " + std::to_string(l) + " has " + std::to_string(grid.columns) + " x " + std::to_string(grid.rows) +
-                       " footprints, not ceil(size / stride)");
+                       " footprints, not ceil(size / stride)" + (l + 1 == shape.level_count ? ", nor 1 x 1" : ""));
     }
   }
 }

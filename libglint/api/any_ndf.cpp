@@ -25,9 +25,15 @@ void requireSameMap(const formats::Asset& asset, const std::filesystem::path& pa
 }
 
 NdfInfo infoOf(const PyramidShape& shape) {
-  return {shape.width,       shape.height,       shape.resolution,
-          shape.sigma_r,     shape.surface,      shape.boundary,
-          shape.level_count, finestSigma(shape), kFootprintPerStride * shape.levels[shape.level_count - 1].stride};
+  return {shape.width,
+          shape.height,
+          shape.resolution,
+          shape.sigma_r,
+          shape.surface,
+          shape.boundary,
+          shape.footprintLevels(),
+          finestSigma(shape),
+          kFootprintPerStride * shape.levels[shape.footprintLevels() - 1].stride};
 }
 
 NdfInfo infoOf(const NormalMap& map, const NdfOptions& options) {

@@ -48,7 +48,8 @@ struct NdfInfo {
   Boundary boundary = Boundary::wrap;
   int level_count = 0;            ///< footprint sizes that are stored; 0: every size is answered from the texels or their sums
   float finest_sigma_texels = 0;  ///< deviation of the footprints of level 0; 0 where there are no levels
-  float coarsest_sigma_texels = 0;  ///< of the last level, which answers larger footprints; 0 where there are no levels
+  /// Deviation of the footprints of the last level; larger ones tend to the mean of the map. 0 where there are no levels.
+  float coarsest_sigma_texels = 0;
 };
 
 /// An asset and the model that answers from it, of whichever kind it is.

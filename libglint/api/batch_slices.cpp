@@ -39,10 +39,11 @@ GLINT_API_MULTIVERSION void chooseLevels(const PyramidShape& shape, const SliceC
   const float finest = finestSigma(shape), finest_variance = finest * finest;
   for (int k = 0; k < kChunk; ++k) {
     const float sum = 0.25f * lanes.xx[k] + 0.25f * lanes.xy[k] + 0.25f * lanes.yy[k];
-    const float mean = 0.5f * (std::min(lanes.xx[k], width * width) + std::min(lanes.yy[k], height * height));
-    const float widened = std::max(mean, kLowest);
+    const float xx = std::min(lanes.xx[k], std::max(width * width, lanes.yy[k]));
+    const float yy = std::min(lanes.yy[k], std::max(height * height, lanes.xx[k]));
+    const float widened = std::max(0.5f * xx + 0.5f * yy, kLowest);
     const float variance = std::fabs(sum) <= std::numeric_limits<float>::max() ? widened : kLowest;
-    const LevelPlace level = levelPlace(chooser.sizeRatio(variance));
+    const LevelPlace level = chooser.levelOf(variance);
     chunk.below[k] = variance < finest_variance ? 1 : 0;
     chunk.levels[0][k] = level.first;
     chunk.levels[1][k] = std::min(level.first + 1, shape.level_count - 1);  // with weight 0 at the last

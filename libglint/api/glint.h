@@ -119,7 +119,8 @@ typedef struct glint_ndf_info {
   int32_t surface;             /* GLINT_SURFACE_* */
   int32_t boundary;            /* GLINT_BOUNDARY_* */
   int32_t has_normals;         /* 1: footprints below level 0 are answered from the texels */
-  float coarsest_sigma_texels; /* footprint of the last level; 0 where there are no levels */
+  float coarsest_sigma_texels; /* footprint of the last level, above which answers tend to the mean of the map; 0 where
+                                  there are no levels */
   uint64_t file_bytes;         /* size of the asset */
 } glint_ndf_info;
 

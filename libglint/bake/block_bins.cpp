@@ -17,18 +17,18 @@ GLINT_MULTIVERSION void addTiles(const BlockBins& from, LinearWeight weight, int
   }
 }
 
-/// The quarter's x is x / 2 + cx in the cell, and so is y.
-GLINT_MULTIVERSION void addQuarterTiles(const BlockBins& from, float cx, float cy, BlockBins& to) {
-  const float half_cx = 0.5f * cx, half_cy = 0.5f * cy, both = cx * cy;
+GLINT_MULTIVERSION void addPartTiles(const BlockBins& from, CellPart px, CellPart py, BlockBins& to) {
+  const float sx = px.scale, cx = px.middle, sy = py.scale, cy = py.middle;
+  const float of_xy = sx * sy, of_x = sx * cy, of_y = sy * cx, of_one = cx * cy;
   for (std::size_t t = 0; t < from.tiles().size(); ++t) {
     const float* in = from.values(t);
     float* out = to.take(from.tiles()[t]);
     for (int k = 0; k < kBins; ++k) {
       const float one = in[k], x = in[kBins + k], y = in[2 * kBins + k], xy = in[3 * kBins + k];
       out[k] += one;
-      out[kBins + k] += 0.5f * x + cx * one;
-      out[2 * kBins + k] += 0.5f * y + cy * one;
-      out[3 * kBins + k] += 0.25f * xy + half_cy * x + half_cx * y + both * one;
+      out[kBins + k] += sx * x + cx * one;
+      out[2 * kBins + k] += sy * y + cy * one;
+      out[3 * kBins + k] += of_xy * xy + of_x * x + of_y * y + of_one * one;
     }
   }
 }
@@ -55,8 +55,6 @@ void addAlongX(const BlockBins& moments, LinearWeight weight, BlockBins& sums) {
 
 void addAlongY(const BlockBins& sums, LinearWeight weight, BlockBins& bins) { addTiles(sums, weight, 1, bins); }
 
-void addQuarter(const BlockBins& quarter, bool right, bool upper, BlockBins& cell) {
-  addQuarterTiles(quarter, right ? 0.25f : -0.25f, upper ? 0.25f : -0.25f, cell);
-}
+void addPart(const BlockBins& part, CellPart x, CellPart y, BlockBins& cell) { addPartTiles(part, x, y, cell); }
 
 }  // namespace glint::bake

@@ -56,8 +56,15 @@ struct LinearWeight {
 void addAlongX(const BlockBins& moments, LinearWeight weight, BlockBins& sums);
 /// Integrates y out: adds two channels, the moments 1 and y, under a weight along y to one.
 void addAlongY(const BlockBins& sums, LinearWeight weight, BlockBins& bins);
-/// Adds the moments of a quarter to those of the cell of twice the size.
-/// @param right, upper  which quarter
-void addQuarter(const BlockBins& quarter, bool right, bool upper, BlockBins& cell);
+
+/// Where a cell lies in a larger one along one axis: its x is scale * x + middle there.
+struct CellPart {
+  float scale, middle;
+
+  static constexpr CellPart half(bool high) { return {0.5f, high ? 0.25f : -0.25f}; }
+  static constexpr CellPart whole() { return {1, 0}; }
+};
+/// Adds the moments of a part of a cell to those of the cell.
+void addPart(const BlockBins& part, CellPart x, CellPart y, BlockBins& cell);
 
 }  // namespace glint::bake

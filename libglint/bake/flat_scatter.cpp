@@ -58,6 +58,7 @@ GLINT_MULTIVERSION void splat(const Vec2* normals, const float* weights, float r
 /// Half-open range of texel centres within `reach` of `centre`, limited to the map when it does not repeat.
 struct Range {
   int begin, end;
+  int size() const { return end - begin; }
 };
 Range texelsWithin(float centre, float reach, int size, Boundary boundary) {
   int begin = static_cast<int>(std::ceil(centre - reach - 0.5f)), end = static_cast<int>(std::floor(centre + reach - 0.5f)) + 1;
@@ -65,14 +66,27 @@ Range texelsWithin(float centre, float reach, int size, Boundary boundary) {
   return {begin, end};
 }
 
-std::vector<float> gaussianWeights(Range range, float centre, float sigma) {
+/// Relative weights of texels along one axis.
+struct AxisWeights {
+  Range range;
   std::vector<float> weights;
+  bool folded;  ///< the range is the whole map, and weights are summed over its periodic copies
+};
+
+/// Weights of a Gaussian, cut at its reach. One that is longer than the map is folded: no texel is visited twice.
+AxisWeights gaussianWeights(float centre, float sigma, int size, Boundary boundary) {
+  const Range range = texelsWithin(centre, kPyramidReach * sigma, size, boundary);
+  const bool folded = range.size() > size;
+  AxisWeights axis = {folded ? Range{0, size} : range, {}, folded};
+  axis.weights.assign(static_cast<std::size_t>(axis.range.size()), 0.0f);
   for (int i = range.begin; i < range.end; ++i) {
     const float d = (static_cast<float>(i) + 0.5f - centre) / sigma;
-    weights.push_back(std::exp(-0.5f * d * d));
+    axis.weights[static_cast<std::size_t>(folded ? wrapIndex(i, size) : i - range.begin)] += std::exp(-0.5f * d * d);
   }
-  return weights;
+  return axis;
 }
+
+AxisWeights evenWeights(int size) { return {{0, size}, std::vector<float>(static_cast<std::size_t>(size), 1.0f), true}; }
 
 Target targetOf(DirectionBins& bins) {
   const float half = 0.5f * static_cast<float>(bins.resolution());
@@ -84,49 +98,62 @@ Target targetOf(DirectionBins& bins) {
           0.5f * static_cast<float>(bins.tilesPerAxis())};
 }
 
-}  // namespace
-
-void scatterFlatFootprint(const NormalMap& map, Boundary boundary, Vec2 centre, float sigma, DirectionBins& bins,
-                          DirectionBins& band) {
-  const float reach = kPyramidReach * sigma;
-  const Range rows = texelsWithin(centre.y, reach, map.height, boundary);
-  const Range columns = texelsWithin(centre.x, reach, map.width, boundary);
-  const std::vector<float> wx = gaussianWeights(columns, centre.x, sigma), wy = gaussianWeights(rows, centre.y, sigma);
-
-  const auto columnsOfRow = [&](int j) {  // the part of a row inside the circle
-    const float dy = static_cast<float>(j) + 0.5f - centre.y;
-    const Range r = texelsWithin(centre.x, std::sqrt(std::max(0.0f, reach * reach - dy * dy)), map.width, boundary);
-    return Range{std::max(r.begin, columns.begin), std::min(r.end, columns.end)};
-  };
+/// Adds texels to bins with the normalised product of weights along x and y.
+/// @param columnsOfRow  the part of the columns that count in a row
+template <class ColumnsOfRow>
+void scatter(const NormalMap& map, const AxisWeights& x, const AxisWeights& y, const ColumnsOfRow& columnsOfRow,
+             DirectionBins& bins, DirectionBins& band) {
   double total = 0;
-  for (int j = rows.begin; j < rows.end; ++j) {
+  for (int j = y.range.begin; j < y.range.end; ++j) {
     const Range r = columnsOfRow(j);
     double row = 0;
-    for (int i = r.begin; i < r.end; ++i) row += wx[i - columns.begin];
-    total += row * wy[j - rows.begin];
+    for (int i = r.begin; i < r.end; ++i) row += x.weights[i - x.range.begin];
+    total += row * y.weights[j - y.range.begin];
   }
 
-  const bool banded = (rows.end - rows.begin) * static_cast<std::int64_t>(columns.end - columns.begin) > 2 * kBandTexels;
+  const bool banded = y.range.size() * static_cast<std::int64_t>(x.range.size()) > 2 * kBandTexels;
   const Target target = targetOf(banded ? band : bins);
   const auto flush = [&] {
     band.addTo(bins);
     band.clear();
   };
   int in_band = 0;
-  for (int j = rows.begin; j < rows.end; ++j) {
+  for (int j = y.range.begin; j < y.range.end; ++j) {
     const Range r = columnsOfRow(j);
-    const auto row_weight = static_cast<float>(wy[j - rows.begin] / total);
+    const auto row_weight = static_cast<float>(y.weights[j - y.range.begin] / total);
     const Vec2* row = map.normals.data() + static_cast<std::size_t>(wrapIndex(j, map.height)) * map.width;
     for (int i = r.begin; i < r.end;) {
       const int column = wrapIndex(i, map.width);
       const int count = std::min({r.end - i, map.width - column, kChunk});
-      splat(row + column, wx.data() + (i - columns.begin), row_weight, count, target);
+      splat(row + column, x.weights.data() + (i - x.range.begin), row_weight, count, target);
       i += count;
+      in_band += count;
+      if (banded && in_band >= kBandTexels) flush(), in_band = 0;
     }
-    in_band += r.end - r.begin;
-    if (banded && in_band >= kBandTexels) flush(), in_band = 0;
   }
   if (banded) flush();
+}
+
+}  // namespace
+
+void scatterFlatFootprint(const NormalMap& map, Boundary boundary, Vec2 centre, float sigma, DirectionBins& bins,
+                          DirectionBins& band) {
+  const float reach = kPyramidReach * sigma;
+  const AxisWeights x = gaussianWeights(centre.x, sigma, map.width, boundary);
+  const AxisWeights y = gaussianWeights(centre.y, sigma, map.height, boundary);
+  const auto insideCircle = [&](int j) {
+    if (x.folded || y.folded) return x.range;
+    const float dy = static_cast<float>(j) + 0.5f - centre.y;
+    const Range r = texelsWithin(centre.x, std::sqrt(std::max(0.0f, reach * reach - dy * dy)), map.width, boundary);
+    return Range{std::max(r.begin, x.range.begin), std::min(r.end, x.range.end)};
+  };
+  scatter(map, x, y, insideCircle, bins, band);
+}
+
+void scatterFlatMap(const NormalMap& map, DirectionBins& bins, DirectionBins& band) {
+  const AxisWeights x = evenWeights(map.width), y = evenWeights(map.height);
+  scatter(
+      map, x, y, [&](int) { return x.range; }, bins, band);
 }
 
 }  // namespace glint::bake

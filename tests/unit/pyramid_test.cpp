@@ -79,16 +79,19 @@ std::vector<float> storedImage(const NdfPyramid& pyramid, int level, int i, int 
   return pixels;
 }
 
-TEST(PyramidShape, StridesDoubleWhileTheyAreShorterThanTheMap) {
+TEST(PyramidShape, StridesDoubleWhileTheyAreShorterThanTheMapAndThenComesItsMean) {
   const PyramidShape shape = pyramidShape(350, 200, options(32, 64, 0.02f));
-  ASSERT_EQ(shape.level_count, 4);
-  const PyramidGrid expected[] = {{32, 11, 7}, {64, 6, 4}, {128, 3, 2}, {256, 2, 1}};
-  for (int l = 0; l < 4; ++l) {
+  ASSERT_EQ(shape.level_count, 5);
+  EXPECT_TRUE(shape.endsInMean());
+  EXPECT_EQ(shape.footprintLevels(), 4);
+  const PyramidGrid expected[] = {{32, 11, 7}, {64, 6, 4}, {128, 3, 2}, {256, 2, 1}, {512, 1, 1}};
+  for (int l = 0; l < 5; ++l) {
     EXPECT_EQ(shape.levels[l].stride, expected[l].stride);
     EXPECT_EQ(shape.levels[l].columns, expected[l].columns);
     EXPECT_EQ(shape.levels[l].rows, expected[l].rows);
   }
-  EXPECT_EQ(pyramidShape(8, 8, options(32, 64, 0.02f)).level_count, 1);
+  EXPECT_EQ(pyramidShape(8, 8, options(32, 64, 0.02f)).footprintLevels(), 1);
+  EXPECT_EQ(pyramidShape(1 << 20, 1, options(2, 64, 0.02f)).level_count, kMaxPyramidLevels);
   EXPECT_THROW(pyramidShape(350, 200, withLevels(options(32, 64, 0.02f), 5)), Error);
 }
 
@@ -225,9 +228,9 @@ TEST(Pyramid, AFlatMapIsOneSpotOfTheRoughnesssVariance) {
 
 TEST(Pyramid, LevelsThatAgreeAreDropped) {
   const OwnedMap constant(128, 128, std::vector<Vec2>(128 * 128, Vec2{0.1f, 0}));
-  EXPECT_EQ(buildPyramid(constant.map(), options(16, 64, 0.02f)).shape.level_count, 1);
+  EXPECT_EQ(buildPyramid(constant.map(), options(16, 64, 0.02f)).shape.footprintLevels(), 1);
   const OwnedMap rough(128, 128, test::roughSurface(128, 128, 0.2f));
-  EXPECT_EQ(buildPyramid(rough.map(), options(16, 64, 0.02f)).shape.level_count, 3);
+  EXPECT_EQ(buildPyramid(rough.map(), options(16, 64, 0.02f)).shape.footprintLevels(), 3);
 }
 
 TEST(Pyramid, RepeatedMapsHaveTheSameImagesInEveryTile) {
@@ -262,7 +265,7 @@ void expectExactCentres(const CentreCase& c, Surface surface) {
     const NdfPyramidData data =
         buildPyramid(owned.map(), withLevels(options(c.stride, c.resolution, c.sigma_r, surface, boundary), c.levels));
     const PyramidNdf model(data.view());
-    for (int l = 0; l < data.shape.level_count; ++l) {
+    for (int l = 0; l < data.shape.footprintLevels(); ++l) {
       const PyramidGrid& grid = data.shape.levels[l];
       for (const auto& [i, j] : {std::pair{0, 0}, {grid.columns - 1, grid.rows / 2}}) {
         const Footprint p = footprintOf(data.shape, l, i, j);
