@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -162,11 +163,11 @@ const OwnedMap& oddFlakes() {
   return map;
 }
 
-const OwnedMap* const kMaps[] = {&rough(), &noise(), &oddFlakes()};
+std::array<const OwnedMap*, 3> maps() { return {&rough(), &noise(), &oddFlakes()}; }
 constexpr float kSigmas[] = {0.005f, 0.03f};
 
 void expectBruteForce(RandomQueries& random, const Footprint& p, double tolerance) {
-  for (const OwnedMap* owned : kMaps) {
+  for (const OwnedMap* owned : maps()) {
     for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
       const float sigma_r = kSigmas[static_cast<int>(random.between(0, 1.99f))];
       const Reference reference(owned->map(), sigma_r, Surface::flat, boundary);
@@ -251,7 +252,7 @@ TEST(Reference, PrunedSearchFindsWhatExhaustiveSearchFinds) {
   constexpr double kSkippedDensity = 3e-7, kSkippedMass = 4e-8;
   constexpr double kSumError = 3e-5;  // of float weights against the closed form of their total
   RandomQueries random(4);
-  for (const OwnedMap* owned : kMaps) {
+  for (const OwnedMap* owned : maps()) {
     for (const Surface surface : {Surface::flat, Surface::smooth}) {
       for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
         const float largest = surface == Surface::flat ? 40.0f
@@ -282,7 +283,7 @@ TEST(Reference, ImagesHoldTheMeanOverEveryPixel) {
   RandomQueries random(5);
   for (const Surface surface : {Surface::flat, Surface::smooth}) {
     for (int k = 0; k < 6; ++k) {
-      const OwnedMap& owned = *kMaps[k % 3];
+      const OwnedMap& owned = *maps()[k % 3];
       const Boundary boundary = k < 3 ? Boundary::wrap : Boundary::clamp;
       const Footprint p = random.any(k + k / 3, 0.5f, 1.5f);
       const float sigma_r = 0.02f;
