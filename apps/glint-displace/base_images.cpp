@@ -4,17 +4,16 @@
 
 #include "common/files.h"
 #include "common/image_io.h"
+#include "glint/model/texel_name.h"
 
 namespace glint::apps {
 namespace {
 
-void requireUnitRange(const std::string& path, const std::vector<float>& values, int channels, int width) {
+void requireUnitRange(const std::string& path, const std::vector<float>& values, int channels, int width, int height) {
   for (std::size_t k = 0; k < values.size(); ++k) {
     if (values[k] >= 0 && values[k] <= 1) continue;
-    const std::size_t texel = k / static_cast<std::size_t>(channels);
     throw Error(ErrorCode::invalid_input, "displace.texture", path,
-                fmt::format("column {}, row {} from below", texel % static_cast<std::size_t>(width),
-                            texel / static_cast<std::size_t>(width)),
+                texelName(width, height, k / static_cast<std::size_t>(channels)),
                 fmt::format("the value {} is not in 0..1", values[k]), "scale the image to 0..1: a surface cannot gain light");
   }
 }
@@ -55,13 +54,13 @@ bake::BaseTexture BaseImages::read(int width, int height) const {
   bake::BaseTexture texture;
   if (!roughness_path_.empty()) {
     texture.roughness = channelsOf(readOfSize(roughness_path_, width, height), 1);
-    requireUnitRange(roughness_path_, texture.roughness, 1, width);
+    requireUnitRange(roughness_path_, texture.roughness, 1, width, height);
   }
   if (color_path_.empty()) return texture;
   const Image image = readOfSize(color_path_, width, height);
   texture.channels = image.channels >= 3 ? 3 : 1;
   texture.colors = channelsOf(image, texture.channels);
-  requireUnitRange(color_path_, texture.colors, texture.channels, width);
+  requireUnitRange(color_path_, texture.colors, texture.channels, width, height);
   if (color_space_ == ColorSpace::srgb || (color_space_ == ColorSpace::automatic && !image.floating))
     for (float& value : texture.colors) value = linearFromSrgb(value);
   bool grey = true;

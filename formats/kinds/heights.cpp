@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "glint/formats/kinds/codec.h"
+#include "glint/model/texel_name.h"
 
 namespace glint::formats {
 
@@ -24,17 +25,12 @@ void unpack(const Content& content, HeightMap& map) {
 void checkIndex(const HeightMap&, Findings&) {}
 
 void checkData(const HeightMap& map, Findings& findings) {
-  std::size_t bad = 0;
-  std::size_t first = 0;
-  for (std::size_t k = 0; k < map.heights.size(); ++k) {
-    if (std::isfinite(map.heights[k])) continue;
-    if (bad++ == 0) first = k;
-  }
-  if (bad == 0) return;
-  const std::size_t width = static_cast<std::size_t>(map.width);
+  TexelTally bad(map.width, map.height);
+  for (std::size_t k = 0; k < map.heights.size(); ++k)
+    if (!std::isfinite(map.heights[k])) bad.add(k);
+  if (bad.count() == 0) return;
   findings.add("heights.finite", "/heights",
-               std::to_string(bad) + " texels are not finite (first at column " + std::to_string(first % width) + ", row " +
-                   std::to_string(first / width) + ")");
+               std::to_string(bad.count()) + " texels are not finite (first at " + bad.firstName() + ")");
 }
 
 }  // namespace glint::formats

@@ -2,29 +2,17 @@
 #include <cmath>
 
 #include "glint/formats/kinds/codec.h"
+#include "glint/model/texel_name.h"
 
 namespace glint::formats {
 namespace {
 
-/// Counts the elements that break a rule and remembers the first.
-class Tally {
- public:
-  explicit Tally(int width) : width_(static_cast<std::size_t>(width)) {}
-  void add(std::size_t index) {
-    if (count_++ == 0) first_ = index;
-  }
-  void report(std::string_view rule, const std::string& object, const std::string& what, Findings& findings) const {
-    if (count_ == 0) return;
-    findings.add(rule, object,
-                 std::to_string(count_) + " " + what + " (first at column " + std::to_string(first_ % width_) + ", row " +
-                     std::to_string(first_ / width_) + ")");
-  }
-
- private:
-  std::size_t width_;
-  std::size_t count_ = 0;
-  std::size_t first_ = 0;
-};
+/// Reports elements that break a rule: how many and the first.
+void report(const TexelTally& tally, std::string_view rule, const std::string& object, const std::string& what,
+            Findings& findings) {
+  if (tally.count() == 0) return;
+  findings.add(rule, object, std::to_string(tally.count()) + " " + what + " (first at " + tally.firstName() + ")");
+}
 
 bool holds(const NormalBounds& b, float x, float y) { return b.low_x <= x && x <= b.high_x && b.low_y <= y && y <= b.high_y; }
 
@@ -52,7 +40,7 @@ bool holdsChildren(const NormalBoundsLevel& children, const NormalBounds& node, 
 void checkBounds(const NormalMap& map, Findings& findings) {
   for (int k = 0; k < map.bounds_level_count; ++k) {
     const NormalBoundsLevel& level = map.bounds[k];
-    Tally loose(level.columns);
+    TexelTally loose(level.columns, level.rows);
     for (int j = 0; j < level.rows; ++j) {
       for (int i = 0; i < level.columns; ++i) {
         const std::size_t index = static_cast<std::size_t>(j) * level.columns + i;
@@ -60,7 +48,7 @@ void checkBounds(const NormalMap& map, Findings& findings) {
         if (!(k == 0 ? holdsTexels(map, node, i, j) : holdsChildren(map.bounds[k - 1], node, i, j))) loose.add(index);
       }
     }
-    loose.report("normals.bounds", "/" + levelPath("bounds/level_{l}", k), "nodes do not hold what they cover", findings);
+    report(loose, "normals.bounds", "/" + levelPath("bounds/level_{l}", k), "nodes do not hold what they cover", findings);
   }
 }
 
@@ -106,8 +94,7 @@ void checkIndex(const NormalMap& map, Findings& findings) {
 }
 
 void checkData(const NormalMap& map, Findings& findings) {
-  Tally infinite(map.width);
-  Tally outside(map.width);
+  TexelTally infinite(map.width, map.height), outside(map.width, map.height);
   for (std::size_t k = 0; k < map.normals.size(); ++k) {
     const Vec2 n = map.normals[k];
     if (!std::isfinite(n.x) || !std::isfinite(n.y)) {
@@ -116,8 +103,8 @@ void checkData(const NormalMap& map, Findings& findings) {
       outside.add(k);
     }
   }
-  infinite.report("normals.finite", "/normals", "texels are not finite", findings);
-  outside.report("normals.disk", "/normals", "normals are not inside the unit disk", findings);
+  report(infinite, "normals.finite", "/normals", "texels are not finite", findings);
+  report(outside, "normals.disk", "/normals", "normals are not inside the unit disk", findings);
   checkBounds(map, findings);
 }
 

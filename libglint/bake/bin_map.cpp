@@ -12,6 +12,7 @@
 #include "glint/bake/simd.h"
 #include "glint/bake/slopes.h"
 #include "glint/model/error.h"
+#include "glint/model/texel_name.h"
 #include "glint/query/half.h"
 
 namespace glint::bake {
@@ -93,12 +94,11 @@ std::uint32_t spreadBits(std::uint32_t x) {
 }
 
 [[noreturn]] void throwOutside(const NormalMap& map) {
-  std::size_t count = 0, first = 0;
-  for (std::size_t k = map.normals.size(); k-- > 0;)
-    if (!(dot(map.normals[k], map.normals[k]) < 1)) first = k, ++count;
+  TexelTally outside(map.width, map.height);
+  for (std::size_t k = 0; k < map.normals.size(); ++k)
+    if (!(dot(map.normals[k], map.normals[k]) < 1)) outside.add(k);
   throw Error(ErrorCode::invalid_input, "normals.disk", {}, "/normals",
-              std::to_string(count) + " normals are not inside the unit disk (first at column " +
-                  std::to_string(first % map.width) + ", row " + std::to_string(first / map.width) + ")",
+              std::to_string(outside.count()) + " normals are not inside the unit disk (first at " + outside.firstName() + ")",
               "repair them with glint-ingest --fix-invalid");
 }
 

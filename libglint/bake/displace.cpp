@@ -11,6 +11,7 @@
 #include "glint/bake/scaling_function.h"
 #include "glint/bake/vmf_fit.h"
 #include "glint/model/error.h"
+#include "glint/model/texel_name.h"
 #include "glint/query/half.h"
 
 namespace glint::bake {
@@ -41,22 +42,16 @@ void checkOptions(const DisplaceOptions& o) {
   }
 }
 
-std::string place(std::size_t texel, int width) {
-  return "column " + std::to_string(texel % static_cast<std::size_t>(width)) + ", row " +
-         std::to_string(texel / static_cast<std::size_t>(width));
-}
-
 /// Refuses texels that are bad: bad(k) of `count` numbers, `each` for a texel.
 template <class Bad>
 void requireTexels(const HeightMap& map, std::size_t count, std::size_t each, const char* rule, const char* what,
                    const std::string& range, const char* remedy, Bad bad) {
-  std::size_t number = 0, first = 0;
+  TexelTally found(map.width, map.height);
   for (std::size_t k = 0; k < count; ++k)
-    if (bad(k) && number++ == 0) first = k;
-  if (number == 0) return;
+    if (bad(k)) found.add(k / each);
+  if (found.count() == 0) return;
   throw Error(ErrorCode::invalid_input, rule, "", what,
-              std::to_string(number) + " values are not " + range + " (first at " + place(first / each, map.width) + ")",
-              remedy);
+              std::to_string(found.count()) + " values are not " + range + " (first at " + found.firstName() + ")", remedy);
 }
 
 void checkTexture(const HeightMap& map, const DisplaceOptions& options) {
@@ -105,7 +100,8 @@ void checkMap(const HeightMap& map, const DisplaceOptions& options) {
   for (std::size_t k = 0; k < map.heights.size(); ++k) {
     if (std::isfinite(map.heights[k])) continue;
     throw Error(ErrorCode::invalid_input, "heights.finite", "", "heights",
-                "the texel at " + place(k, map.width) + " is not finite", "repair them with glint-ingest --fix-invalid");
+                "the texel at " + texelName(map.width, map.height, k) + " is not finite",
+                "repair them with glint-ingest --fix-invalid");
   }
   for (const int factor : options.factors) {
     if (map.width % factor == 0 && map.height % factor == 0) continue;
@@ -114,14 +110,14 @@ void checkMap(const HeightMap& map, const DisplaceOptions& options) {
                 "take " + nearestFactors(map, factor) + ", or crop or resample the map");
   }
   const HeightSurface surface(map.width, map.height, map.heights);
-  std::size_t steep = 0, first = 0;
+  TexelTally steep(map.width, map.height);
   for (std::size_t f = 0; f < surface.facetCount(); ++f) {
     const Vec2 slope = surface.slope(f);
-    if (dot(slope, slope) > kSteepestSlope * kSteepestSlope && steep++ == 0) first = f;
+    if (dot(slope, slope) > kSteepestSlope * kSteepestSlope) steep.add(f / 2);
   }
-  if (steep > 0) {
+  if (steep.count() > 0) {
     throw Error(ErrorCode::invalid_input, "displace.steep", "", "heights",
-                std::to_string(steep) + " facets are steeper than 80 degrees (first at " + place(first / 2, map.width) + ")",
+                std::to_string(steep.count()) + " facets are steeper than 80 degrees (first at " + steep.firstName() + ")",
                 "heights are in texels: scale them with glint-ingest --height-scale, or smooth the map");
   }
 }

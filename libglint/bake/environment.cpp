@@ -12,6 +12,7 @@
 #include "glint/bake/fftw_plan.h"
 #include "glint/bake/gauss_legendre.h"
 #include "glint/model/error.h"
+#include "glint/model/texel_name.h"
 #include "glint/model/sh.h"
 
 namespace glint::bake {
@@ -140,16 +141,11 @@ class OrderProjection {
 /// Refuses pixels for which `bad` holds, naming how many and the first.
 template <class Bad>
 void refusePixels(const Environment& e, const std::string& path, const char* rule, const char* what, Bad bad) {
-  std::size_t count = 0, first = 0;
-  for (std::size_t k = 0; k < e.rgb.size(); k += 3) {
-    if (!bad(e.rgb[k]) && !bad(e.rgb[k + 1]) && !bad(e.rgb[k + 2])) continue;
-    if (count++ == 0) first = k / 3;
-  }
-  if (count == 0) return;
-  const auto width = static_cast<std::size_t>(e.width);
-  refuse(path, rule,
-         std::to_string(count) + " pixels " + what + " (first at column " + std::to_string(first % width) + ", row " +
-             std::to_string(first / width) + " from below)",
+  TexelTally found(e.width, e.height);
+  for (std::size_t k = 0; k < e.rgb.size(); k += 3)
+    if (bad(e.rgb[k]) || bad(e.rgb[k + 1]) || bad(e.rgb[k + 2])) found.add(k / 3);
+  if (found.count() == 0) return;
+  refuse(path, rule, std::to_string(found.count()) + " pixels " + what + " (first at " + found.firstName() + ")",
          "repair the image; radiance is finite and not negative");
 }
 

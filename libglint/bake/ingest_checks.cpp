@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "glint/model/error.h"
+#include "glint/model/texel_name.h"
 
 namespace glint::bake {
 namespace {
@@ -71,9 +72,7 @@ std::size_t fillHolesOf(int width, int height, std::vector<T>& values, const std
 }  // namespace
 
 std::string texelName(const PixelArray& image, std::size_t texel) {
-  const std::size_t width = static_cast<std::size_t>(image.width);
-  const std::size_t row = static_cast<std::size_t>(image.height) - 1 - texel / width;
-  return "column " + std::to_string(texel % width) + ", row " + std::to_string(row);
+  return glint::texelName(image.width, image.height, texel);
 }
 
 void checkShape(const PixelArray& image, const std::string& name) {

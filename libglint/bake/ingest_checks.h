@@ -9,7 +9,7 @@
 /// The parts of ingestNormals and ingestHeights that look for wrong inputs and repair them.
 namespace glint::bake {
 
-/// "column 3, row 7" of a texel index (bottom row first), counted from the top left.
+/// The texelName of a texel of the image.
 std::string texelName(const PixelArray& image, std::size_t texel);
 
 /// Throws unless the image has the pixels that it claims and at least `channels` channels.

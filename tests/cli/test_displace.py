@@ -199,7 +199,7 @@ def test_colours_that_no_surface_has_are_refused(glint, heights, shape, value, o
     assert process.returncode == 3, process.stderr
     assert message in process.stderr
     if "0..1" in message:
-        assert "column 7" in process.stderr and "c.exr" in process.stderr
+        assert "column 7, row 2 from the top" in process.stderr and "c.exr" in process.stderr
     assert not (glint.folder / "d.glint").exists()
 
 

@@ -148,7 +148,7 @@ TEST(IngestNormals, NamesTheFirstTexelThatIsNotFinite) {
   map.texel(3, 7)[1] = kNaN;
   map.texel(0, 9)[0] = std::numeric_limits<float>::infinity();
   const Error error = refusal(map.floats());
-  EXPECT_EQ(error.object(), "column 3, row 7");
+  EXPECT_EQ(error.object(), "column 3, row 7 from the top");
   EXPECT_THAT(error.what(), HasSubstr("2 texels are not finite"));
   EXPECT_THAT(error.remedy(), HasSubstr("--fix-invalid"));
 }
@@ -179,7 +179,7 @@ TEST(IngestNormals, RefusesTexelsThatPointDown) {
   map.texel(5, 2)[2] = 0.3f;
   const Error error = refusal(map.floats());
   EXPECT_EQ(error.rule(), "normals.upward");
-  EXPECT_EQ(error.object(), "column 5, row 2");
+  EXPECT_EQ(error.object(), "column 5, row 2 from the top");
 }
 
 TEST(IngestNormals, RefusesTwoChannelsOutsideTheDiskUnlessByRounding) {
@@ -190,7 +190,7 @@ TEST(IngestNormals, RefusesTwoChannelsOutsideTheDiskUnlessByRounding) {
   codes[3] = 200;
   const Error error = refusal({2, 2, 2, std::span<const std::uint8_t>(codes)});
   EXPECT_EQ(error.rule(), "normals.disk");
-  EXPECT_EQ(error.object(), "column 1, row 1");
+  EXPECT_EQ(error.object(), "column 1, row 1 from the top");
 }
 
 TEST(IngestNormals, RefusesColoursThatWentThroughSrgb) {
@@ -305,7 +305,7 @@ TEST(IngestHeights, RefusesColoursAndHoles) {
   heights[1] = 1;
   heights[6] = kNaN;
   const PixelArray image{4, 4, 1, std::span<const float>(heights)};
-  EXPECT_EQ(errorOf([&] { ingestHeights(image, plain()); }).object(), "column 2, row 2");
+  EXPECT_EQ(errorOf([&] { ingestHeights(image, plain()); }).object(), "column 2, row 2 from the top");
   IngestParameters p = plain();
   p.fix_invalid = true;
   EXPECT_EQ(ingestHeights(image, p).heights[6], 0.125f);
