@@ -131,7 +131,7 @@ std::string escapeForMake(const std::string& name) {
 InputFile::InputFile(Tool& tool, const std::string& help, const std::string& name) {
   tool.option(name, path_, help).required().unrecorded();
   tool.addCheck([this, &tool] {
-    checkReadable(path_);
+    checkRegular(path_);
     tool.addInput(path_);
   });
 }
@@ -140,7 +140,7 @@ InputFiles::InputFiles(Tool& tool, const std::string& help, const std::string& n
   tool.parser().add_option(name, paths_, help)->required()->expected(1, CLI::detail::expected_max_vector_size);
   tool.addCheck([this, &tool] {
     for (const std::string& path : paths_) {
-      checkReadable(path);
+      checkRegular(path);
       tool.addInput(path);
     }
   });
@@ -194,6 +194,14 @@ std::string makeDepfile(const std::vector<std::string>& targets, const std::vect
   text += "\n";
   for (const std::string& prerequisite : prerequisites) text += "\n" + escapeForMake(prerequisite) + ":\n";
   return text;
+}
+
+void checkRegular(const std::string& path) {
+  checkReadable(path);
+  struct stat info {};
+  if (::stat(path.c_str(), &info) != 0 || S_ISREG(info.st_mode)) return;
+  const char* what = S_ISFIFO(info.st_mode) || S_ISSOCK(info.st_mode) ? "is a pipe, not a file" : "is a device, not a file";
+  throwIo("input.regular", path, what, "write what it carries to a file and name this: it is read more than once");
 }
 
 void checkReadable(const std::string& path) {

@@ -70,6 +70,9 @@ std::string makeDepfile(const std::vector<std::string>& targets, const std::vect
 /// Throws Error io unless the path is a regular file (or pipe) that can be read.
 void checkReadable(const std::string& path);
 
+/// Throws Error io unless the path is a file that can be read, and more than once: no pipe and no device.
+void checkRegular(const std::string& path);
+
 /// Throws Error io unless a file can be made in the folder of this path.
 void checkWritable(const std::string& path);
 

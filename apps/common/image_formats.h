@@ -9,11 +9,22 @@
 
 namespace glint::apps {
 
+/// An image as its file stores it, bottom row first, and what the file says about showing it.
+struct StoredImage {
+  Image image;
+  int orientation = 1;  ///< 1 to 8, as in Exif
+  /// The display window; its first column and row (from the top) are relative to those of the pixels.
+  struct {
+    int column = 0, row = 0, width = 0, height = 0;
+  } display;
+};
+
 /// The formats of OpenImageIO, in a shared object of their own: programs and inputs that do not need that library must not wait
 /// until it and the hundreds that it links to are loaded.
 struct ImageFormats {
   /// @throws Error invalid_input, unsupported
-  Image (*read)(const std::string& path);
+  /// @param part  number (from 0) or name of one of several images; empty: the first
+  StoredImage (*read)(const std::string& path, const std::string& part);
   /// The bytes of an image file. @throws Error usage, unsupported
   std::vector<unsigned char> (*encode)(const std::string& path, int width, int height, int channels,
                                        std::span<const float> pixels, PixelFormat format);
@@ -28,7 +39,7 @@ const ImageFormats& imageFormats();
 
 /// Reads a PNG without it.
 /// @throws Error invalid_input if the file is damaged or truncated
-Image readPng(const std::string& path);
+StoredImage readPng(const std::string& path);
 
 /// Whether a file starts as every PNG does.
 bool isPng(const std::string& path);
@@ -36,6 +47,14 @@ bool isPng(const std::string& path);
 /// Refuses a header that declares far more than its file can hold, before memory is taken for it.
 /// @throws Error invalid_input
 void checkDeclaredSize(const std::string& path, std::uint64_t pixel_bytes);
+
+/// The number of the part that is meant.
+/// @param names  of all parts
+/// @throws Error invalid_input if there is none
+int findPart(const std::string& path, const std::string& part, const std::vector<std::string>& names);
+
+/// "0 (beauty), 1 (normals)": numbers and names of images, at most eight.
+std::string partList(const std::vector<std::string>& names);
 
 [[noreturn]] void throwDamagedImage(const std::string& path, const std::string& reason);
 

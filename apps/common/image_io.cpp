@@ -9,6 +9,8 @@
 
 #include "common/files.h"
 #include "common/image_formats.h"
+#include "common/image_layout.h"
+#include "common/tiff_tags.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
@@ -40,12 +42,27 @@ void checkJpegComplete(const std::string& path) {
 }
 }  // namespace
 
-Image readImage(const std::string& path) {
-  checkReadable(path);
-  if (isPng(path)) return readPng(path);
-  Image image = imageFormats().read(path);
+Image readImage(const std::string& path, const ImageChoice& choice) {
+  checkRegular(path);
+  const bool png = isPng(path);
+  StoredImage stored = png ? readPng(path) : imageFormats().read(path, choice.part);
+  Image& image = stored.image;
+  if (png) findPart(path, choice.part, image.parts);
   if (image.format == "jpeg") checkJpegComplete(path);
-  return image;
+  if (image.format == "tiff") image.no_data = geoTiffNoData(path, image.part);
+  if (choice.window == ImageChoice::Window::display) cropToDisplay(stored, path);
+  orient(stored);
+  const bool full_names = choice.channels.find('.') != std::string::npos;
+  if (!full_names || !choice.layer.empty()) selectLayer(image, choice.layer, path);
+
+  std::vector<int> channels;
+  if (!choice.channels.empty()) channels = findChannels(image, choice.channels, path);
+  const bool alpha_chosen = std::find(channels.begin(), channels.end(), image.alpha) != channels.end();
+  const bool divides =
+      choice.alpha == ImageChoice::Alpha::divide || (choice.alpha == ImageChoice::Alpha::automatic && image.associated);
+  if (divides && !alpha_chosen) divideByAlpha(image, choice.transparent_holes, path);
+  if (!channels.empty()) selectChannels(image, channels);
+  return std::move(image);
 }
 
 std::vector<float> channelsOf(const Image& image, int channels) {

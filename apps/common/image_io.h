@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
@@ -18,15 +19,39 @@ struct Image {
   std::string format;  ///< of the file, as OpenImageIO names it: "png", "openexr", ...
   int bits = 0;        ///< bits of a channel in the file: 1 to 16 (integers), 16 or 32 (floating point)
   bool floating = false;
+  double code_scale = 1;    ///< number in the file that a pixel value of 1 stands for: 1, or the largest code of integers
+  int alpha = -1;           ///< channel of alpha, if there is one
+  bool associated = false;  ///< the other channels are multiplied by alpha
+  std::optional<double> no_data;    ///< number in the file that pixels without data hold, if the file names one
+  std::vector<std::string> parts;   ///< names of all images of the file, empty where they have none
+  int part = 0;                     ///< the one that was read
+  std::vector<std::string> layers;  ///< names of the layers of this part; that of channels without a layer is empty
+  std::string layer;                ///< the one that was read
+  std::vector<std::string> notes;   ///< what a reader of the file may not expect: clauses
   /// [height][width][channels]. Unsigned integers of up to 8 and 16 bits keep their codes (full range 255 and 65535);
   /// everything else becomes float (integers of more bits scaled to 0..1).
   std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>> pixels;
 };
 
-/// Reads the first image of a file: PNG by libpng, every other format by OpenImageIO. Alpha is not multiplied into the other
-/// channels.
-/// @throws Error io if the file cannot be opened; invalid_input if it is no image, damaged or truncated
-Image readImage(const std::string& path);
+/// Which pixels of a file are meant, and what they mean.
+struct ImageChoice {
+  enum class Window : std::uint8_t { display, data };
+  enum class Alpha : std::uint8_t { automatic, divide, ignore };
+
+  std::string part = {};      ///< number (from 0) or name of one of several images; empty: the first
+  std::string layer = {};     ///< the channels whose names start with this and a point; empty: the layer of the first channel
+  std::string channels = {};  ///< letters such as "rg", or names with commas between them; empty: all of the layer
+  Window window = Window::display;  ///< what the file shows, or what it stores
+  Alpha alpha = Alpha::automatic;   ///< divide colours by alpha: if the file says that they were multiplied; always; never
+  bool transparent_holes = false;   ///< colours that alpha 0 destroyed become NaN; otherwise they are an error
+};
+
+/// Reads an image as a viewer shows it: PNG by libpng, every other format by OpenImageIO. The orientation that the file names
+/// is undone, the display window is cut out, and colours that are multiplied by alpha are divided by it, unless alpha itself
+/// is one of the chosen channels.
+/// @throws Error io if the file cannot be opened; invalid_input if it is no image, damaged or truncated, has pixels missing in
+///         its display window, or lacks what is chosen
+Image readImage(const std::string& path, const ImageChoice& choice = {});
 
 /// The first `channels` channels of every pixel; codes of integers become 0..1.
 /// @param channels  at most those of the image

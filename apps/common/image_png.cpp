@@ -4,8 +4,10 @@
 #include <csetjmp>
 #include <cstdio>
 #include <memory>
+#include <span>
 
 #include "common/image_formats.h"
+#include "common/tiff_tags.h"
 
 namespace glint::apps {
 namespace {
@@ -47,10 +49,20 @@ struct PngReader {
     return true;
   }
 
+  /// Of the Exif metadata, which may come before or after the pixels.
+  int orientation() {
+#ifdef PNG_eXIf_SUPPORTED
+    png_uint_32 size = 0;
+    png_bytep exif = nullptr;
+    if (png_get_eXIf_1(png, info, &size, &exif) != 0) return exifOrientation(std::as_bytes(std::span(exif, size)));
+#endif
+    return 1;
+  }
+
   bool readRows(png_bytepp rows) {
     if (setjmp(png_jmpbuf(png))) return false;
     png_read_image(png, rows);
-    png_read_end(png, nullptr);
+    png_read_end(png, info);
     return true;
   }
 };
@@ -74,24 +86,30 @@ bool isPng(const std::string& path) {
          png_sig_cmp(signature, 0, 8) == 0;
 }
 
-Image readPng(const std::string& path) {
+StoredImage readPng(const std::string& path) {
   PngReader reader(path);
   if (!reader.file || !reader.info || !reader.readHeader()) throwDamagedImage(path, reader.message);
   static const std::vector<std::string> kNames[] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
-  Image image;
+  StoredImage stored;
+  Image& image = stored.image;
   image.width = static_cast<int>(png_get_image_width(reader.png, reader.info));
   image.height = static_cast<int>(png_get_image_height(reader.png, reader.info));
   image.channels = png_get_channels(reader.png, reader.info);
   image.channel_names = kNames[image.channels - 1];
   image.format = "png";
   image.bits = png_get_bit_depth(reader.png, reader.info);
+  image.code_scale = image.bits == 16 ? 65535 : 255;
+  image.alpha = image.channels % 2 == 0 ? image.channels - 1 : -1;
+  image.parts = {""};
+  stored.display = {0, 0, image.width, image.height};
   checkDeclaredSize(path, std::uint64_t{png_get_rowbytes(reader.png, reader.info)} * image.height);
   if (image.bits == 16) {
     image.pixels = readPixels<std::uint16_t>(reader, image, path);
   } else {
     image.pixels = readPixels<std::uint8_t>(reader, image, path);
   }
-  return image;
+  stored.orientation = reader.orientation();
+  return stored;
 }
 
 }  // namespace glint::apps

@@ -43,10 +43,10 @@ NdfAsset::NdfAsset(Tool& tool) : tool_(tool) {
                   "share of a footprint with slanted sides that may be misplaced; 0: exact, and slower (kind histogram-sat)")
           .range(0, 1));
   tool.addCheck([this] {
-    checkReadable(path_);
+    checkRegular(path_);
     tool_.addInput(path_);
     if (normals_path_.empty()) return;
-    checkReadable(normals_path_);
+    checkRegular(normals_path_);
     tool_.addInput(normals_path_);
   });
 }

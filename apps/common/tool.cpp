@@ -107,6 +107,20 @@ class HelpFormatter : public CLI::Formatter {
   }
 };
 
+/// Assets name their inputs in UTF-8, without control characters.
+void requireText(const std::string& path, const std::string& name) {
+  const auto refuse = [&](const char* what) {
+    throw Error(ErrorCode::io, "input.name", path, "", what, "rename the file: assets record the names of their inputs");
+  };
+  if (std::any_of(name.begin(), name.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }))
+    refuse("its name holds a control character");
+  try {
+    (void)json(name).dump();
+  } catch (const json::type_error&) {
+    refuse("its name is not UTF-8");
+  }
+}
+
 /// Paths may hold any bytes; JSON must be UTF-8.
 std::string dump(const json& document) { return document.dump(2, ' ', false, json::error_handler_t::replace); }
 
@@ -335,7 +349,9 @@ std::string Tool::commandJson() const {
 formats::Provenance Tool::provenance() const {
   formats::Provenance provenance{generator(), commandJson(), {}};
   for (const std::string& path : state_->inputs) {
-    provenance.inputs.push_back({std::filesystem::path(path).filename().string(), formats::hashFile(path)});
+    const std::string name = std::filesystem::path(path).filename().string();
+    requireText(path, name);
+    provenance.inputs.push_back({name, formats::hashFile(path)});
   }
   return provenance;
 }

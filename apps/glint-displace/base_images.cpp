@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/files.h"
-#include "common/image_io.h"
+#include "common/image_input.h"
 #include "glint/model/texel_name.h"
 
 namespace glint::apps {
@@ -19,8 +19,8 @@ void requireUnitRange(const std::string& path, const std::vector<float>& values,
 }
 
 /// Reads an image of the size of the heights.
-Image readOfSize(const std::string& path, int width, int height) {
-  Image image = readImage(path);
+Image readOfSize(Tool& tool, const std::string& path, int width, int height) {
+  Image image = readInputImage(tool, path);
   if (image.width == width && image.height == height) return image;
   throw Error(ErrorCode::invalid_input, "displace.texture", path, "",
               fmt::format("the image has {} x {} pixels, the heights {} x {} texels", image.width, image.height, width, height),
@@ -29,11 +29,12 @@ Image readOfSize(const std::string& path, int width, int height) {
 
 }  // namespace
 
-BaseImages::BaseImages(Tool& tool) {
+BaseImages::BaseImages(Tool& tool) : tool_(tool) {
   const Option& color =
       tool.option("--base-color", color_path_,
-                  "image of the map's size whose colours multiply the base's reflectance; grey or RGB, alpha is "
-                  "ignored. The albedo of a diffuse base is then 1 unless --base says it");
+                  "image of the map's size whose colours multiply the base's reflectance; grey or RGB; colours "
+                  "that are multiplied by alpha are divided by it. The albedo of a diffuse base is then 1 unless --base says "
+                  "it");
   tool.option(
       "--base-roughness", roughness_path_,
       "image of the map's size whose first channel, linear, multiplies the base's ALPHA: with ggx:1 it is the roughness");
@@ -44,7 +45,7 @@ BaseImages::BaseImages(Tool& tool) {
   tool.addCheck([this, &tool] {
     for (const std::string& path : {color_path_, roughness_path_}) {
       if (path.empty()) continue;
-      checkReadable(path);
+      checkRegular(path);
       tool.addInput(path);
     }
   });
@@ -53,11 +54,11 @@ BaseImages::BaseImages(Tool& tool) {
 bake::BaseTexture BaseImages::read(int width, int height) const {
   bake::BaseTexture texture;
   if (!roughness_path_.empty()) {
-    texture.roughness = channelsOf(readOfSize(roughness_path_, width, height), 1);
+    texture.roughness = channelsOf(readOfSize(tool_, roughness_path_, width, height), 1);
     requireUnitRange(roughness_path_, texture.roughness, 1, width, height);
   }
   if (color_path_.empty()) return texture;
-  const Image image = readOfSize(color_path_, width, height);
+  const Image image = readOfSize(tool_, color_path_, width, height);
   texture.channels = image.channels >= 3 ? 3 : 1;
   texture.colors = channelsOf(image, texture.channels);
   requireUnitRange(color_path_, texture.colors, texture.channels, width, height);

@@ -86,10 +86,10 @@ LightQuery::LightQuery(Tool& tool) : tool_(tool) {
 
 void LightQuery::check() const {
   if (!asked()) return;
-  checkReadable(path_);
+  checkRegular(path_);
   tool_.addInput(path_);
   if (lobes_path_.empty()) return;
-  checkReadable(lobes_path_);
+  checkRegular(lobes_path_);
   tool_.addInput(lobes_path_);
 }
 

@@ -6,12 +6,15 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
-#include "common/image_io.h"
+#include "common/image_input.h"
 
 namespace glint::apps {
 namespace {
 
 using nlohmann::json;
+
+/// Radiance that is multiplied by alpha is what arrives.
+const ImageChoice kRadiance = {.alpha = ImageChoice::Alpha::ignore};
 
 /// Linear RGB of an image, of which integers are sRGB; grey images have the same in all three.
 std::vector<float> linearRgb(const Image& image, const std::string& path) {
@@ -66,7 +69,7 @@ class LightReader {
     light.radiance[0] = radiance.x, light.radiance[1] = radiance.y, light.radiance[2] = radiance.z;
     if (!light_.contains("texture")) return;
     const std::string texture = (std::filesystem::path(path_).parent_path() / text("texture")).string();
-    const Image image = readImage(texture);
+    const Image image = readInputImage(tool_, texture, kRadiance);
     tool_.addInput(texture);
     light.texture_width = image.width;
     light.texture_height = image.height;
@@ -117,7 +120,7 @@ bake::Environment readAreaLights(Tool& tool, const std::string& path, const Area
 
 bake::Environment readLight(Tool& tool, const std::string& path, const AreaLightOptions& options) {
   if (std::filesystem::path(path).extension() == ".json") return readAreaLights(tool, path, options);
-  const Image image = readImage(path);
+  const Image image = readInputImage(tool, path, kRadiance);
   if (!image.floating)
     throw Error(ErrorCode::invalid_input, "light.range", path, "", "holds integers, which cut off bright light",
                 "give an image of floating-point radiance, such as .exr or .hdr");

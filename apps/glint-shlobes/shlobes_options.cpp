@@ -53,7 +53,7 @@ void ShLobesCommand::check(Tool& tool) {
       throw Error(ErrorCode::usage, "arguments", "", "", "nothing was asked for", "add --sigma-r S for lobes, or --light FILE");
     return;
   }
-  checkReadable(light_);
+  checkRegular(light_);
   tool.addInput(light_);
 }
 

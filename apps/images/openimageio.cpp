@@ -6,7 +6,9 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string_view>
 
 #include "common/image_formats.h"
 #include "glint/model/error.h"
@@ -23,12 +25,13 @@ std::string trimmed(std::string text) {
 
 /// Reads all pixels bottom row first: a negative stride writes the file's first row into the array's last.
 template <class T>
-std::vector<T> readFlipped(OIIO::ImageInput& input, const OIIO::ImageSpec& spec, OIIO::TypeDesc type, const std::string& path) {
+std::vector<T> readFlipped(OIIO::ImageInput& input, int part, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
+                           const std::string& path) {
   const std::size_t row = static_cast<std::size_t>(spec.width) * spec.nchannels;
   std::vector<T> pixels(row * spec.height);
   const auto row_bytes = static_cast<OIIO::stride_t>(row * sizeof(T));
   T* last_row = pixels.data() + row * (spec.height - 1);
-  const bool complete = input.read_image(0, 0, 0, spec.nchannels, type, last_row, OIIO::AutoStride, -row_bytes);
+  const bool complete = input.read_image(part, 0, 0, spec.nchannels, type, last_row, OIIO::AutoStride, -row_bytes);
   if (!complete || input.has_error()) throwDamagedImage(path, trimmed(input.geterror()));
   return pixels;
 }
@@ -100,20 +103,68 @@ std::vector<unsigned char> encode(const std::string& path, const OIIO::ImageSpec
   return bytes;
 }
 
-Image readImageFile(const std::string& path) {
+/// Names of all images of a file: parts of OpenEXR, pages of TIFF. Those after the most are not looked for.
+std::vector<std::string> partNames(OIIO::ImageInput& input) {
+  constexpr int kMost = 1000;
+  std::vector<std::string> names;
+  for (int k = 0; k < kMost && input.seek_subimage(k, 0); ++k)
+    names.push_back(std::string(input.spec().get_string_attribute("oiio:subimagename")));
+  (void)input.geterror();  // says that there is no further one
+  return names;
+}
+
+/// Whether the other channels are multiplied by alpha. Readers of formats that are not listed tell nothing and do nothing.
+bool isAssociated(const OIIO::ImageInput& input, const OIIO::ImageSpec& spec) {
+  static constexpr std::array kFormats = {"openexr", "tiff", "targa", "webp", "psd", "rla", "iff"};
+  return std::find(kFormats.begin(), kFormats.end(), std::string_view(input.format_name())) != kFormats.end() &&
+         spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
+}
+
+/// Number in the file that a value of 1 stands for.
+double codeScale(const OIIO::ImageSpec& spec) {
+  if (spec.format.is_floating_point()) return 1;
+  const int bits = static_cast<int>(spec.format.basesize()) * 8 - (spec.format.is_signed() ? 1 : 0);
+  return std::ldexp(1.0, bits) - 1;
+}
+
+/// OpenImageIO inverts images in which 0 is white for up to 8 bits only.
+void invertWhiteZero(const OIIO::ImageSpec& spec, const std::string& path, Image& image) {
+  if (image.format != "tiff" || spec.get_int_attribute("tiff:PhotometricInterpretation", 1) != 0) return;
+  if (spec.format == OIIO::TypeDesc::UINT8) return;
+  auto* codes = std::get_if<std::vector<std::uint16_t>>(&image.pixels);
+  if (!codes) {
+    throw Error(ErrorCode::unsupported, "image.white_zero", path, "",
+                "0 is white in this image of signed or floating-point pixels",
+                "export it with 0 as black (PhotometricInterpretation 1)");
+  }
+  for (std::uint16_t& code : *codes) code = static_cast<std::uint16_t>(65535 - code);
+}
+
+/// What to do about a file that OpenImageIO cannot read.
+std::string unreadableRemedy(const std::string& reason) {
+  if (reason.find("compression") != std::string::npos)
+    return "convert it to .png, or if it is a DDS of two signed channels (BC5_SNORM) to an unsigned one (BC5_UNORM)";
+  return "check that the file is complete and in a format that oiiotool --info can read";
+}
+
+StoredImage readImageFile(const std::string& path, const std::string& part) {
   // OpenImageIO has threads of its own, which --threads is to limit as well.
   OIIO::attribute("threads", static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   const auto input = OIIO::ImageInput::open(path, &config);
   if (!input) {
-    throw Error(ErrorCode::invalid_input, "image.readable", path, "",
-                "cannot be read as an image: " + trimmed(OIIO::geterror()),
-                "check that the file is complete and in a format that oiiotool --info can read");
+    const std::string reason = trimmed(OIIO::geterror());
+    throw Error(ErrorCode::invalid_input, "image.readable", path, "", "cannot be read as an image: " + reason,
+                unreadableRemedy(reason));
   }
-  const OIIO::ImageSpec& spec = input->spec();
+  StoredImage stored;
+  Image& image = stored.image;
+  image.parts = partNames(*input);
+  image.part = findPart(path, part, image.parts);
+  if (!input->seek_subimage(image.part, 0)) throwDamagedImage(path, trimmed(input->geterror()));
+  const OIIO::ImageSpec spec = input->spec();
   checkSize(spec, path);
-  Image image;
   image.width = spec.width;
   image.height = spec.height;
   image.channels = spec.nchannels;
@@ -121,14 +172,20 @@ Image readImageFile(const std::string& path) {
   image.format = input->format_name();
   image.bits = spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.basesize()) * 8);
   image.floating = spec.format.is_floating_point();
+  image.code_scale = codeScale(spec);
+  image.alpha = spec.alpha_channel < spec.nchannels ? spec.alpha_channel : -1;
+  image.associated = image.alpha >= 0 && isAssociated(*input, spec);
+  stored.orientation = spec.get_int_attribute("Orientation", 1);
+  stored.display = {spec.full_x - spec.x, spec.full_y - spec.y, spec.full_width, spec.full_height};
   if (spec.format == OIIO::TypeDesc::UINT8) {
-    image.pixels = readFlipped<std::uint8_t>(*input, spec, OIIO::TypeDesc::UINT8, path);
+    image.pixels = readFlipped<std::uint8_t>(*input, image.part, spec, OIIO::TypeDesc::UINT8, path);
   } else if (spec.format == OIIO::TypeDesc::UINT16) {
-    image.pixels = readFlipped<std::uint16_t>(*input, spec, OIIO::TypeDesc::UINT16, path);
+    image.pixels = readFlipped<std::uint16_t>(*input, image.part, spec, OIIO::TypeDesc::UINT16, path);
   } else {
-    image.pixels = readFlipped<float>(*input, spec, OIIO::TypeDesc::FLOAT, path);
+    image.pixels = readFlipped<float>(*input, image.part, spec, OIIO::TypeDesc::FLOAT, path);
   }
-  return image;
+  invertWhiteZero(spec, path, image);
+  return stored;
 }
 
 std::vector<unsigned char> encodeImage(const std::string& path, int width, int height, int channels,

@@ -15,7 +15,7 @@ def glint(tmp_path):
 
     def run(name, *arguments):
         command = [str(BIN / f"glint-{name}"), *map(str, arguments)]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, errors="surrogateescape", timeout=120)
 
     run.folder = tmp_path
     run.bin = BIN

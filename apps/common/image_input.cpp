@@ -1,0 +1,55 @@
+#include "common/image_input.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/image_formats.h"
+
+namespace glint::apps {
+namespace {
+
+std::string layerList(const std::vector<std::string>& layers) {
+  constexpr std::size_t kMost = 8;
+  std::vector<std::string> names;
+  for (const std::string& layer : layers) names.push_back(layer.empty() ? "the one without a name" : layer);
+  const bool more = names.size() > kMost;
+  if (more) names.resize(kMost);
+  return fmt::format("{}{}", fmt::join(names, ", "), more ? ", ..." : "");
+}
+
+}  // namespace
+
+void ImageOptions::declare(Tool& tool) {
+  using Window = ImageChoice::Window;
+  using Alpha = ImageChoice::Alpha;
+  tool.option("--subimage", choice_.part, "number, from 0, or name of one of several images in the file (parts, pages)")
+      .defaultText("0, with a warning that names the others");
+  tool.option("--layer", choice_.layer, "channels whose names start with this and a point")
+      .defaultText("the layer of the first channel, with a warning that names the others");
+  tool.option("--channels", choice_.channels,
+              "what to read, in order: letters of r g b a (rg, ag, ...) or names with commas between them. Two channels of a "
+              "normal map are x and y; channels that are named are taken at their word")
+      .defaultText("all");
+  tool.choice("--alpha", choice_.alpha, {{"auto", Alpha::automatic}, {"divide", Alpha::divide}, {"ignore", Alpha::ignore}},
+              "colours that are multiplied by alpha are divided by it; auto: where the file says so");
+  tool.choice("--window", choice_.window, {{"display", Window::display}, {"data", Window::data}},
+              "display: the image as it is shown; data: the pixels that the file stores");
+}
+
+Image readInputImage(Tool& tool, const std::string& path, const ImageChoice& choice, const std::string& remedy) {
+  Image image = readImage(path, choice);
+  for (const std::string& note : image.notes) tool.warn(path + ": " + note);
+  // The first image of a PSD is all of its layers together, as it is shown.
+  if (image.parts.size() > 1 && choice.part.empty() && image.format != "psd") {
+    tool.warn(fmt::format("{}: holds {} images, of which the first was read: {}; {}", path, image.parts.size(),
+                          partList(image.parts), remedy));
+  }
+  if (image.layers.size() > 1 && choice.layer.empty()) {
+    tool.warn(fmt::format("{}: holds {} layers, of which the first was read: {}; {}", path, image.layers.size(),
+                          layerList(image.layers), remedy));
+  }
+  return image;
+}
+
+}  // namespace glint::apps

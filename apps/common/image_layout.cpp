@@ -1,0 +1,238 @@
+#include "common/image_layout.h"
+
+#include <algorithm>
+#include <cctype>
+#include <limits>
+
+#include "glint/model/error.h"
+#include "glint/model/texel_name.h"
+
+namespace glint::apps {
+namespace {
+
+constexpr const char* kChannelLetters[] = {"rx", "gy", "bz", "a"};
+
+/// Makes an image of another size: pixel (i, j) is pixel source(i, j) of the old one, rows counted from the top.
+template <class Source>
+void rearrange(Image& image, int width, int height, const Source& source) {
+  const auto channels = static_cast<std::size_t>(image.channels);
+  std::visit(
+      [&](auto& pixels) {
+        std::decay_t<decltype(pixels)> moved(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * channels);
+        auto target = moved.begin();
+        for (int j = height - 1; j >= 0; --j) {  // the bottom row is stored first
+          for (int i = 0; i < width; ++i) {
+            const auto [column, row] = source(i, j);
+            const std::size_t texel = static_cast<std::size_t>(image.height - 1 - row) * static_cast<std::size_t>(image.width) +
+                                      static_cast<std::size_t>(column);
+            target = std::copy_n(pixels.begin() + static_cast<std::ptrdiff_t>(texel * channels), channels, target);
+          }
+        }
+        pixels = std::move(moved);
+      },
+      image.pixels);
+  image.width = width;
+  image.height = height;
+}
+
+/// "normal" of "normal.X", "" of "R".
+std::string layerOf(const std::string& channel) {
+  const std::size_t point = channel.rfind('.');
+  return point == std::string::npos ? "" : channel.substr(0, point);
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 12;
+  std::string text;
+  for (std::size_t k = 0; k < std::min(names.size(), kMost); ++k) text += (k > 0 ? ", " : "") + names[k];
+  return text + (names.size() > kMost ? ", ..." : "");
+}
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+/// The channel of a letter, or -1.
+int channelOfLetter(const Image& image, char letter) {
+  for (int c = 0; c < image.channels; ++c) {
+    const std::string& name = image.channel_names[static_cast<std::size_t>(c)];
+    if (lower(name.substr(name.rfind('.') + 1)) == std::string(1, letter)) return c;
+  }
+  for (int c = 0; c < std::min(image.channels, 4); ++c)
+    if (std::string(kChannelLetters[c]).find(letter) != std::string::npos) return c;
+  return -1;
+}
+
+/// A pixel value between 0 and 1 if it is that of an integer.
+template <class T>
+float valueOf(T code) {
+  if constexpr (std::is_floating_point_v<T>) return code;
+  return static_cast<float>(code) / static_cast<float>(std::numeric_limits<T>::max());
+}
+
+[[noreturn]] void throwNotAssociated(const Image& image, std::size_t texel, const std::string& what, const std::string& path) {
+  throw Error(ErrorCode::invalid_input, "image.alpha", path, texelName(image.width, image.height, texel),
+              what + ", although the file says that colours are multiplied by alpha",
+              "export the image without alpha, or read the colours as they are with glint-ingest --alpha ignore");
+}
+
+/// The colours of all pixels divided by their alpha; NaN where alpha is 0.
+template <class T>
+std::vector<float> divided(const Image& image, const std::vector<T>& pixels, TexelTally& lost, const std::string& path) {
+  const auto channels = static_cast<std::size_t>(image.channels), alpha = static_cast<std::size_t>(image.alpha);
+  std::vector<float> values(pixels.size());
+  for (std::size_t k = 0; k < pixels.size(); k += channels) {
+    const float a = valueOf(pixels[k + alpha]);
+    if (!(a >= 0)) throwNotAssociated(image, k / channels, "alpha is no number of 0 or more", path);
+    for (std::size_t c = 0; c < channels; ++c) {
+      const float value = valueOf(pixels[k + c]);
+      if (a == 0 && value != 0) throwNotAssociated(image, k / channels, "alpha is 0 and the colour is not", path);
+      if (!std::is_floating_point_v<T> && value > a)
+        throwNotAssociated(image, k / channels, "a colour is larger than alpha", path);
+      values[k + c] = c == alpha ? a : a == 0 ? std::numeric_limits<float>::quiet_NaN() : value / a;
+    }
+    if (a == 0) lost.add(k / channels);
+  }
+  return values;
+}
+
+}  // namespace
+
+void cropToDisplay(StoredImage& stored, const std::string& path) {
+  Image& image = stored.image;
+  const auto [column, row, width, height] = stored.display;
+  if (column == 0 && row == 0 && width == image.width && height == image.height) return;
+  if (column < 0 || row < 0 || column + width > image.width || row + height > image.height) {
+    const int left = std::max(-column, 0), top = std::max(-row, 0);
+    const std::int64_t shown_width = std::max(0, std::min(image.width - column, width) - left);
+    const std::int64_t shown_height = std::max(0, std::min(image.height - row, height) - top);
+    const std::int64_t missing = std::int64_t{width} * height - shown_width * shown_height;
+    throw Error(ErrorCode::invalid_input, "image.window", path, "",
+                "the image has " + std::to_string(width) + " x " + std::to_string(height) + " pixels, of which " +
+                    std::to_string(missing) + " are missing: the file stores " + std::to_string(image.width) + " x " +
+                    std::to_string(image.height) + " from column " + std::to_string(-column) + ", row " + std::to_string(-row) +
+                    " from the top on",
+                "export the whole image, or take the stored pixels for a map with glint-ingest --window data");
+  }
+  image.notes.push_back("its " + std::to_string(image.width) + " x " + std::to_string(image.height) +
+                        " pixels reach beyond the display window, of which the " + std::to_string(width) + " x " +
+                        std::to_string(height) + " pixels were read");
+  rearrange(image, width, height, [column = column, row = row](int i, int j) { return std::pair{i + column, j + row}; });
+  stored.display = {0, 0, width, height};
+}
+
+void orient(StoredImage& stored) {
+  const int w = stored.image.width - 1, h = stored.image.height - 1, orientation = stored.orientation;
+  if (orientation <= 1 || orientation > 8) return;
+  const bool turned = orientation >= 5;
+  rearrange(stored.image, turned ? h + 1 : w + 1, turned ? w + 1 : h + 1, [=](int i, int j) {
+    switch (orientation) {
+      case 2:
+        return std::pair{w - i, j};
+      case 3:
+        return std::pair{w - i, h - j};
+      case 4:
+        return std::pair{i, h - j};
+      case 5:
+        return std::pair{j, i};
+      case 6:
+        return std::pair{j, h - i};
+      case 7:
+        return std::pair{w - j, h - i};
+      default:
+        return std::pair{w - j, i};
+    }
+  });
+  stored.orientation = 1;
+}
+
+void selectLayer(Image& image, const std::string& layer, const std::string& path) {
+  for (const std::string& channel : image.channel_names) {
+    const std::string name = layerOf(channel);
+    if (std::find(image.layers.begin(), image.layers.end(), name) == image.layers.end()) image.layers.push_back(name);
+  }
+  image.layer = layer.empty() ? image.layers.front() : layer;
+  std::vector<int> kept;
+  for (int c = 0; c < image.channels; ++c)
+    if (layerOf(image.channel_names[static_cast<std::size_t>(c)]) == image.layer) kept.push_back(c);
+  if (kept.empty()) {
+    throw Error(ErrorCode::invalid_input, "image.layer", path, "", "has no layer \"" + layer + "\"",
+                "its channels are " + joined(image.channel_names));
+  }
+  selectChannels(image, kept);
+}
+
+std::vector<int> findChannels(const Image& image, const std::string& channels, const std::string& path) {
+  std::vector<int> found;
+  const auto add = [&](int channel, const std::string& name) {
+    if (channel < 0) {
+      throw Error(ErrorCode::invalid_input, "image.channels", path, "", "has no channel \"" + name + "\"",
+                  "its channels are " + joined(image.channel_names) + "; choose among them with --channels");
+    }
+    found.push_back(channel);
+  };
+  const auto named = [&](const std::string& name) {
+    const auto at = std::find(image.channel_names.begin(), image.channel_names.end(), name);
+    return at == image.channel_names.end() ? -1 : static_cast<int>(at - image.channel_names.begin());
+  };
+  if (channels.find(',') == std::string::npos && named(channels) < 0) {
+    for (const char letter : lower(channels)) add(channelOfLetter(image, letter), std::string(1, letter));
+    return found;
+  }
+  for (std::size_t first = 0; first <= channels.size();) {
+    const std::size_t end = std::min(channels.find(',', first), channels.size());
+    const std::string name = channels.substr(first, end - first);
+    add(name.size() == 1 && named(name) < 0 ? channelOfLetter(image, lower(name)[0]) : named(name), name);
+    first = end + 1;
+  }
+  return found;
+}
+
+void selectChannels(Image& image, const std::vector<int>& channels) {
+  bool all = static_cast<int>(channels.size()) == image.channels;
+  for (std::size_t k = 0; k < channels.size(); ++k) all &= channels[k] == static_cast<int>(k);
+  if (all) return;
+  std::visit(
+      [&](auto& pixels) {
+        std::decay_t<decltype(pixels)> kept;
+        kept.reserve(pixels.size() / static_cast<std::size_t>(image.channels) * channels.size());
+        for (std::size_t k = 0; k < pixels.size(); k += static_cast<std::size_t>(image.channels))
+          for (const int channel : channels) kept.push_back(pixels[k + static_cast<std::size_t>(channel)]);
+        pixels = std::move(kept);
+      },
+      image.pixels);
+  std::vector<std::string> names;
+  for (const int channel : channels) names.push_back(image.channel_names[static_cast<std::size_t>(channel)]);
+  const auto alpha = std::find(channels.begin(), channels.end(), image.alpha);
+  image.alpha = image.alpha < 0 || alpha == channels.end() ? -1 : static_cast<int>(alpha - channels.begin());
+  image.associated &= image.alpha >= 0;
+  image.channel_names = std::move(names);
+  image.channels = static_cast<int>(channels.size());
+}
+
+void divideByAlpha(Image& image, bool holes, const std::string& path) {
+  if (image.alpha < 0 || image.channels < 2) return;
+  image.associated = false;
+  TexelTally lost(image.width, image.height);
+  std::vector<float> values;
+  std::visit(
+      [&](const auto& pixels) {
+        const auto channels = static_cast<std::size_t>(image.channels);
+        for (std::size_t k = static_cast<std::size_t>(image.alpha); k < pixels.size(); k += channels) {
+          if (valueOf(pixels[k]) == 1) continue;
+          values = divided(image, pixels, lost, path);
+          return;
+        }
+      },
+      image.pixels);
+  if (lost.count() > 0 && !holes) {
+    throw Error(ErrorCode::invalid_input, "image.transparent", path, "",
+                std::to_string(lost.count()) + " pixels are transparent: alpha 0 left nothing of their colours (first at " +
+                    lost.firstName() + ")",
+                "fill them with glint-ingest --fix-invalid, or export the image without alpha");
+  }
+  if (!values.empty()) image.pixels = std::move(values);
+}
+
+}  // namespace glint::apps

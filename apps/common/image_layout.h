@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+
+#include "common/image_formats.h"
+
+/// The steps from an image as a file stores it to the image that is meant.
+namespace glint::apps {
+
+/// Cuts the display window out of the pixels. What was cut off is noted.
+/// @throws Error invalid_input if the display window has pixels that are not stored
+void cropToDisplay(StoredImage& stored, const std::string& path);
+
+/// Turns and mirrors the pixels as the orientation says.
+void orient(StoredImage& stored);
+
+/// Keeps the channels of one layer: those whose names start with it and a point.
+/// @param layer  empty: that of the first channel
+/// @throws Error invalid_input if there is no such layer
+void selectLayer(Image& image, const std::string& layer, const std::string& path);
+
+/// Numbers of the channels that are meant: names with commas between them, or letters. A letter is the channel of this name,
+/// else one by its place: r and x are the first, g and y the second, b and z the third, a the fourth.
+/// @throws Error invalid_input if one is missing
+std::vector<int> findChannels(const Image& image, const std::string& channels, const std::string& path);
+
+/// Keeps these channels, in this order.
+void selectChannels(Image& image, const std::vector<int>& channels);
+
+/// Divides the other channels by alpha; integers become floats. Where alpha is 1 everywhere nothing changes.
+/// @param holes  colours that alpha 0 destroyed become NaN; otherwise they are an error
+/// @throws Error invalid_input if the colours cannot have been multiplied by alpha
+void divideByAlpha(Image& image, bool holes, const std::string& path);
+
+}  // namespace glint::apps

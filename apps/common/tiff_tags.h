@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+
+namespace glint::apps {
+
+/// The number that pixels without data hold in a GeoTIFF: GDAL's tag 42113, of which OpenImageIO tells nothing.
+/// @param directory  of the file, 0 for its first image
+/// @return nothing if there is no such tag, it is no number, or the file is no TIFF
+std::optional<double> geoTiffNoData(const std::string& path, int directory);
+
+/// Orientation of an image (1 to 8, tag 274) from Exif metadata, which have the form of a TIFF; 1 if they do not tell it.
+int exifOrientation(std::span<const std::byte> exif);
+
+}  // namespace glint::apps
