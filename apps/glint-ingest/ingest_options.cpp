@@ -12,6 +12,31 @@ constexpr double kSuspiciousMeanTilt = 0.5;
 /// Central differences across one texel say little about a surface this steep.
 constexpr float kSuspiciousSteepness_deg = 85;
 
+/// Steps between opposite borders this many times as rough as the roughest place inside tell of heights that do not tile.
+constexpr float kSuspiciousSeam = 1.5f;
+
+/// "auto" and "none", or a number, which may be nan.
+std::optional<double> parseNoData(const std::string& text) {
+  if (text == "auto" || text == "none") return {};
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (!text.empty() && *end == '\0') return value;
+  throw Error(ErrorCode::usage, "cli.usage", "", "--nodata", "\"" + text + "\" is not auto, none or a number",
+              "give the number that the file has where it has no data, such as -9999");
+}
+
+const char* channelsName(bake::NormalChannels channels) {
+  switch (channels) {
+    case bake::NormalChannels::rgb:
+      return "rgb";
+    case bake::NormalChannels::rg:
+      return "rg";
+    case bake::NormalChannels::ag:
+      return "ag";
+  }
+  return "rgb";
+}
+
 const char* encodingName(bake::Encoding encoding) { return encoding == bake::Encoding::snorm ? "snorm" : "unorm"; }
 
 }  // namespace
@@ -23,7 +48,7 @@ IngestOptions::IngestOptions(Tool& tool) {
   bake::IngestParameters& p = parameters_;
   tool.choice("--kind", kind_, {{"normal", Kind::normal}, {"height", Kind::height}}, "what the image holds");
   tool.choice("--to", to_, {{"normals", To::normals}, {"heights", To::heights}},
-              "what to write; normals of heights are central differences, wrapped");
+              "what to write; normals of heights are central differences");
   tool.choice("--convention", p.convention, {{"opengl", Convention::opengl}, {"directx", Convention::directx}},
               "opengl: green is up; directx: green is down");
   tool.choice("--encoding", p.encoding, {{"auto", Encoding::automatic}, {"unorm", Encoding::unorm}, {"snorm", Encoding::snorm}},
@@ -37,12 +62,22 @@ IngestOptions::IngestOptions(Tool& tool) {
                                  .range(-1e9, 1e9)
                                  .excludes(scale)
                                  .needs(texel_size);
-  tool.flag("--fix-invalid", p.fix_invalid, "replace unusable texels by the mean of their neighbours");
+  tool.choice("--boundary", p.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
+              "normals of heights at the border. wrap: the map tiles; clamp: it ends there, differences are one-sided");
+  image_.declare(tool);
+  tool.option("--nodata", no_data_,
+              "number that pixels without data hold: they are filled by their neighbours. auto: the one of a GeoTIFF's tag; "
+              "heights that seem to hold another are refused; none: every number is a height");
+  tool.flag("--fix-invalid", p.fix_invalid,
+            "replace texels that are not finite, transparent or point below the surface by the mean of their neighbours "
+            "(one in 1000 may point below without this)");
   tool.flag("--allow-constant", p.allow_constant, "accept a map that has the same value everywhere");
   tool.choice("--dequantize", p.dequantize,
               {{"auto", Dequantize::automatic}, {"none", Dequantize::none}, {"tpdf", Dequantize::tpdf}},
-              "tpdf: triangular noise of +-1 code hides the steps of integers; auto: for 8 bits only");
+              "tpdf: triangular noise of +-1 code hides the steps of integers; auto: for 8 bits only, also where they were "
+              "scaled to 16 bits or floating point");
   tool.addCheck([this] {
+    parseNoData(no_data_);
     if (kind_ == Kind::normal && to_ == To::heights) {
       throw Error(ErrorCode::usage, "cli.usage", "", "--to", "heights cannot be made from normals",
                   "add --kind height or use --to normals");
@@ -53,16 +88,28 @@ IngestOptions::IngestOptions(Tool& tool) {
   });
 }
 
-bake::IngestParameters IngestOptions::parameters(Tool& tool, const std::string& name) const {
+bake::IngestParameters IngestOptions::parameters(Tool& tool, const std::string& name, const Image& image) const {
   bake::IngestParameters p = parameters_;
   p.name = name;
   p.seed = tool.seed();
+  p.trust_channels = !image_.choice().channels.empty();
+  p.no_data = no_data_ == "auto" ? image.no_data : parseNoData(no_data_);
+  p.refuse_sentinels = no_data_ == "auto";
   if (height_scale_um_option_->given()) p.height_scale = height_scale_um_ / texel_size_um_;
   return p;
 }
 
+Image IngestOptions::read(Tool& tool, const std::string& path) const {
+  ImageChoice choice = image_.choice();
+  choice.transparent_holes = parameters_.fix_invalid;
+  return readInputImage(tool, path, choice, "choose with --subimage or --layer");
+}
+
 bake::PixelArray pixelArray(const Image& image) {
-  bake::PixelArray array{image.width, image.height, image.channels, {}};
+  bake::PixelArray array{image.width, image.height, image.channels, {}, image.code_scale};
+  // Integers with a sign are floats here, and so are those that were divided by alpha.
+  const bool floats = std::holds_alternative<std::vector<float>>(image.pixels);
+  if (floats && !image.floating) array.step = static_cast<float>(1 / image.code_scale);
   std::visit([&](const auto& pixels) { array.pixels = std::span(pixels); }, image.pixels);
   return array;
 }
@@ -70,13 +117,19 @@ bake::PixelArray pixelArray(const Image& image) {
 nlohmann::json reportJson(const bake::IngestReport& r) {
   const Covariance& slopes = r.slopes.covariance;
   return {{"encoding", encodingName(r.encoding)},
+          {"channels", channelsName(r.channels)},
+          {"coarse_codes", r.coarse_codes},
           {"dequantized", r.dequantized},
           {"texels", r.texels},
           {"non_finite", r.non_finite},
           {"downward", r.downward},
           {"clipped", r.clipped},
           {"non_unit", r.non_unit},
+          {"median_length_error", r.median_length_error},
+          {"no_data", r.no_data},
           {"repaired", r.repaired},
+          {"cliffs", r.cliffs},
+          {"seam_roughness", {r.seam.x, r.seam.y}},
           {"mean_normal", {r.mean_normal.x, r.mean_normal.y}},
           {"mean_tilt_deg", r.mean_tilt_deg},
           {"steepest_tilt_deg", r.steepest_tilt_deg},
@@ -95,18 +148,50 @@ std::string reportText(const std::string& name, const Image& image, const bake::
       slopes.xy, slopes.yy, r.non_finite, r.downward, r.clipped, r.non_unit, r.repaired);
 }
 
-void warnAbout(Tool& tool, const std::string& name, const bake::IngestReport& r) {
-  if (r.repaired > 0)
-    tool.warn(fmt::format("{}: {} unusable texels were replaced by their neighbours' mean", name, r.repaired));
-  if (r.clipped > 0) tool.warn(fmt::format("{}: {} texels on the rim of the disk were moved just inside it", name, r.clipped));
-  if (r.non_unit > 0) {
-    tool.warn(fmt::format("{}: {} of {} vectors were not of unit length and were normalised", name, r.non_unit, r.texels));
+namespace {
+
+/// Heights that do not tile have a cliff where they wrap.
+template <class Warn>
+void warnOfSeam(const Warn& warn, Boundary boundary, Vec2 seam) {
+  if (boundary == Boundary::clamp) return;
+  const auto say = [&](float roughness, const char* borders) {
+    if (roughness <= kSuspiciousSeam) return;
+    warn(fmt::format("heights do not meet at the {} borders: the step there is {:.1f} times that of the roughest place inside; "
+                     "if the map does not tile, use --boundary clamp here and in the tools that ask for it",
+                     borders, roughness));
+  };
+  say(seam.x, "left and right");
+  say(seam.y, "upper and lower");
+}
+
+}  // namespace
+
+void warnAbout(Tool& tool, const std::string& name, const bake::IngestParameters& parameters, const bake::IngestReport& r) {
+  const auto warn = [&](const std::string& text) { tool.warn(name + ": " + text); };
+  const auto replaced = [&](std::size_t count, const std::string& what) {
+    if (count > 0) warn(fmt::format("{} {} and were replaced by their neighbours' mean", count, what));
+  };
+  if (r.no_data > 0) replaced(r.no_data, fmt::format("texels hold no data ({})", *parameters.no_data));
+  replaced(r.downward, fmt::format("of {} texels point below the surface", r.texels));
+  replaced(r.non_finite, "texels are not finite");
+  if (r.clipped > 0) warn(fmt::format("{} texels on the rim of the disk were moved just inside it", r.clipped));
+  if (r.cliffs > 0) {
+    warn(fmt::format(
+        "{} normals at cliffs were steeper than 89.9 degrees and were moved there; check --height-scale and --nodata", r.cliffs));
   }
+  if (r.channels == bake::NormalChannels::ag)
+    warn("red is constant: x was read from alpha, y from green, and z follows from them");
+  if (r.blue_ignored) warn("blue is constant and contradicts red and green: z was taken from them, as with --channels rg");
+  if (r.non_unit > 0) {
+    warn(fmt::format("{} of {} vectors were not of unit length (half of all are off by more than {:.3f}) and were normalised",
+                     r.non_unit, r.texels, r.median_length_error));
+  }
+  warnOfSeam(warn, parameters.boundary, r.seam);
   if (std::max(std::abs(r.mean_normal.x), std::abs(r.mean_normal.y)) > kSuspiciousMeanTilt) {
     tool.warn(fmt::format("{}: the mean normal ({:.2f}, {:.2f}) is far from up; is this a tangent-space map?", name,
                           r.mean_normal.x, r.mean_normal.y));
   }
-  if (r.steepest_tilt_deg > kSuspiciousSteepness_deg && r.clipped == 0) {
+  if (r.steepest_tilt_deg > kSuspiciousSteepness_deg && r.clipped + r.cliffs == 0) {
     tool.warn(fmt::format("{}: the steepest normal leans {:.1f} degrees; check --height-scale or --encoding", name,
                           r.steepest_tilt_deg));
   }

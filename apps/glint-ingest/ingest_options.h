@@ -3,7 +3,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "common/image_io.h"
+#include "common/image_input.h"
 #include "common/tool.h"
 #include "glint/bake/ingest.h"
 
@@ -14,8 +14,11 @@ class IngestOptions {
  public:
   explicit IngestOptions(Tool& tool);
 
-  /// Complete parameters for one image. Call after parsing.
-  bake::IngestParameters parameters(Tool& tool, const std::string& name) const;
+  /// Complete parameters for one image, which may name the number for no data itself. Call after parsing.
+  bake::IngestParameters parameters(Tool& tool, const std::string& name, const Image& image) const;
+
+  /// Reads the image that the options choose.
+  Image read(Tool& tool, const std::string& path) const;
 
   bool readsHeights() const { return kind_ == Kind::height; }
   bool writesHeights() const { return to_ == To::heights; }
@@ -30,7 +33,9 @@ class IngestOptions {
   bake::IngestParameters parameters_;
   float height_scale_um_ = 1;
   float texel_size_um_ = 0;
+  std::string no_data_ = "auto";
   Option* height_scale_um_option_;
+  ImageOptions image_;
 };
 
 /// The pixels of an image as the builders take them. Refers to the image.
@@ -43,6 +48,6 @@ nlohmann::json reportJson(const bake::IngestReport& report);
 std::string reportText(const std::string& name, const Image& image, const bake::IngestReport& report);
 
 /// Warns of what was changed on the way in.
-void warnAbout(Tool& tool, const std::string& name, const bake::IngestReport& report);
+void warnAbout(Tool& tool, const std::string& name, const bake::IngestParameters& parameters, const bake::IngestReport& report);
 
 }  // namespace glint::apps

@@ -32,8 +32,8 @@ int main(int argc, char** argv) {
   const apps::IngestOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const apps::Image image = apps::readImage(input.path());
-    const bake::IngestParameters parameters = options.parameters(tool, input.path());
+    const apps::Image image = options.read(tool, input.path());
+    const bake::IngestParameters parameters = options.parameters(tool, input.path(), image);
     const formats::Provenance provenance = tool.provenance();
     bake::IngestReport report;
     if (!options.readsHeights()) {
@@ -47,11 +47,11 @@ int main(int argc, char** argv) {
         const HeightMap map{image.width, image.height, options.texelSize(), result.heights};
         formats::writeAsset(output.path(), map, provenance, output.writeOptions());
       } else {
-        const auto normals = bake::normalsFromHeights(image.width, image.height, result.heights);
+        const auto normals = bake::normalsFromHeights(image.width, image.height, result.heights, parameters.boundary);
         writeNormals(output, image, options.texelSize(), normals, provenance);
       }
     }
-    apps::warnAbout(tool, input.path(), report);
+    apps::warnAbout(tool, input.path(), parameters, report);
     tool.setResult(apps::reportJson(report));
     tool.summary(apps::reportText(input.path(), image, report));
   });

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <numbers>
 
 #include "glint/bake/counter_random.h"
 #include "glint/bake/ingest_checks.h"
+#include "glint/bake/pixel_codes.h"
 #include "glint/bake/slopes.h"
 #include "glint/model/error.h"
 #include "glint/query/slope_sums.h"
@@ -20,10 +22,8 @@ namespace {
 constexpr std::uint64_t kDitherStream = 5;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kDegreesPerRadian = 180 / std::numbers::pi_v<float>;
-/// Normals on the rim of the disk have no nz > 0; they are moved to this radius (a tilt of 89.9 degrees).
-constexpr float kRimRadius = 0.9999985f;
-/// A float counts as unit length within this. 8-bit codes add their rounding, sqrt(3) / 255.
-constexpr float kUnitTolerance = 0.01f;
+/// Scanned and JPEG maps have a few texels that point down: one in so many is repaired without being asked for.
+constexpr std::size_t kTexelsPerDownward = 1000;
 constexpr std::size_t kNoTexel = std::numeric_limits<std::size_t>::max();
 
 /// Faults of some texels, and where the first was.
@@ -32,6 +32,7 @@ struct Faults {
   std::size_t downward = 0;
   std::size_t clipped = 0;
   std::size_t non_unit = 0;
+  std::size_t no_data = 0;
   std::size_t first_non_finite = kNoTexel;
   std::size_t first_downward = kNoTexel;
 
@@ -40,6 +41,7 @@ struct Faults {
     downward += o.downward;
     clipped += o.clipped;
     non_unit += o.non_unit;
+    no_data += o.no_data;
     first_non_finite = std::min(first_non_finite, o.first_non_finite);
     first_downward = std::min(first_downward, o.first_downward);
   }
@@ -75,48 +77,113 @@ struct Decoder {
   }
 };
 
+/// Largest error of a component whose code was rounded.
+float roundingOf(const Decoder& decode, const PixelCodes& codes) {
+  constexpr float kFloatRounding = 1e-6f;
+  return codes.step > 0 ? decode.scale * codes.step : kFloatRounding;
+}
+
+/// Width of the noise that hides the steps of codes, in pixel values; 0: none.
+float noiseOf(const PixelCodes& codes, Dequantize wanted) {
+  const bool noisy = wanted == Dequantize::tpdf || (wanted == Dequantize::automatic && codes.coarse);
+  return noisy ? codes.step : 0;
+}
+
+/// What the pixels of a normal map were found to mean.
+struct MapMeaning {
+  NormalLayout layout;
+  Encoding encoding = Encoding::unorm;
+  PixelCodes codes;
+  VectorEvidence vectors;  ///< of x, y and z as they are stored
+};
+
+/// @throws Error invalid_input if the pixels are no normals
+MapMeaning findMeaning(const PixelArray& image, const IngestParameters& p) {
+  const bool floating = std::holds_alternative<std::span<const float>>(image.pixels);
+  MapMeaning meaning;
+  meaning.layout = findLayout(image, p);
+  EncodingEvidence evidence;
+  const auto weigh = [&] {
+    evidence = weighEncoding(image, meaning.layout);
+    meaning.encoding = p.encoding;
+    if (p.encoding == Encoding::automatic)
+      meaning.encoding = floating && looksSigned(evidence) ? Encoding::snorm : Encoding::unorm;
+  };
+  weigh();
+  meaning.codes = findCodes(image, meaning.layout.used());
+  if (meaning.layout.hasZ()) {
+    const float rounding = std::visit(
+        [&](const auto& pixels) {
+          using T = std::remove_const_t<typename std::decay_t<decltype(pixels)>::element_type>;
+          return roundingOf(Decoder::of<T>(meaning.encoding), meaning.codes);
+        },
+        image.pixels);
+    meaning.vectors = measureVectors(image, meaning.layout, meaning.encoding, rounding);
+    if (!p.trust_channels && meaning.vectors.off > 0 && isConstant(image, 2)) {
+      meaning.layout = {NormalChannels::rg, 0, 1, -1};
+      meaning.vectors = {};
+      weigh();
+    }
+  }
+  checkEncoding(evidence, meaning.encoding, meaning.layout.hasZ(), p.name);
+  if (!p.trust_channels) checkVectors(meaning.vectors, p.name);
+  return meaning;
+}
+
 /// A row of pixels to normals; unusable texels become NaN and are counted.
 template <class T>
 struct NormalDecoder {
   const PixelArray& image;
   const IngestParameters& parameters;
+  NormalLayout layout;
   std::span<const T> pixels;
   Decoder decode;
-  bool dither = false;
+  NoDataTest holds_nothing;
+  float dither = 0;    ///< width of the noise, a component
   float rounding = 0;  ///< largest error of a component
+  float tolerance = 0;  ///< of unit length
 
-  NormalDecoder(const PixelArray& array, const IngestParameters& p, Encoding encoding, bool dithered)
+  NormalDecoder(const PixelArray& array, const IngestParameters& p, const MapMeaning& meaning)
       : image(array),
         parameters(p),
+        layout(meaning.layout),
         pixels(std::get<std::span<const T>>(array.pixels)),
-        decode(Decoder::of<T>(encoding)),
-        dither(dithered),
-        rounding(std::is_floating_point_v<T> ? 1e-6f : decode.scale) {}
+        decode(Decoder::of<T>(meaning.encoding)),
+        holds_nothing(array, p.no_data),
+        dither(decode.scale * noiseOf(meaning.codes, p.dequantize)),
+        rounding(roundingOf(decode, meaning.codes)),
+        tolerance(static_cast<float>(kUnitTolerance) + 1.7320508f * rounding) {}
 
   Vec2 texel(std::size_t t, Faults& faults) const {
     const T* pixel = pixels.data() + t * static_cast<std::size_t>(image.channels);
-    float x = decode(static_cast<float>(pixel[0]));
-    float y = decode(static_cast<float>(pixel[1]));
-    float z = image.channels > 2 ? decode(static_cast<float>(pixel[2])) : 0;
+    const bool three = layout.hasZ();
+    const auto value = [pixel](int channel) { return static_cast<float>(pixel[channel]); };
+    if (holds_nothing(value(layout.x)) && holds_nothing(value(layout.y)) && (!three || holds_nothing(value(layout.z)))) {
+      ++faults.no_data;
+      return {kNaN, kNaN};
+    }
+    float x = decode(value(layout.x));
+    float y = decode(value(layout.y));
+    float z = three ? decode(value(layout.z)) : 0;
     if (!std::isfinite(x + y + z)) {
       if (faults.non_finite++ == 0) faults.first_non_finite = t;
       return {kNaN, kNaN};
     }
-    if (image.channels > 2) {
+    if (three) {
       const float length = std::sqrt(x * x + y * y + z * z);
-      if (std::abs(length - 1) > kUnitTolerance + 1.7320508f * rounding) ++faults.non_unit;
+      if (std::abs(length - 1) > tolerance) ++faults.non_unit;
       if (z <= 0 && z >= -rounding && length > 0.5f) return onRim(x, y, faults);
       if (z <= 0) return downward(t, faults);
     } else if (const float r2 = x * x + y * y; r2 >= 1) {
       const float limit = 1 + rounding;
       return r2 <= limit * limit ? onRim(x, y, faults) : downward(t, faults);
     }
-    if (dither) {
-      const Vec2 noise = decode.scale * triangularNoise(parameters.seed, t);
+    if (dither > 0) {
+      const Vec2 noise = dither * triangularNoise(parameters.seed, t);
       const Vec2 moved = {x + noise.x, y + noise.y};
-      if (image.channels > 2 || dot(moved, moved) < 1) x = moved.x, y = moved.y;
+      if (three || dot(moved, moved) < 1) x = moved.x, y = moved.y;
     }
-    if (image.channels > 2) {
+    if (three) {
       const float scale = 1 / std::sqrt(x * x + y * y + z * z);
       x *= scale;
       y *= scale;
@@ -137,9 +204,8 @@ struct NormalDecoder {
 };
 
 template <class T>
-std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestParameters& p, Encoding encoding, bool dither,
+std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestParameters& p, const NormalDecoder<T>& decoder,
                                 Faults& faults) {
-  const NormalDecoder<T> decoder(image, p, encoding, dither);
   const float green = p.convention == Convention::directx ? -1.0f : 1.0f;
   std::vector<Vec2> normals(static_cast<std::size_t>(image.width) * image.height);
   std::vector<Faults> rows(static_cast<std::size_t>(image.height));
@@ -162,15 +228,15 @@ std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestParameters&
 }
 
 /// @throws Error invalid_input for texels that only fix_invalid makes usable
-void checkFaults(const PixelArray& image, const IngestParameters& p, const Faults& faults) {
+void checkFaults(const PixelArray& image, const IngestParameters& p, bool three, const Faults& faults) {
   if (p.fix_invalid) return;
   const auto plural = [](std::size_t n) { return n == 1 ? std::string("1 texel is ") : std::to_string(n) + " texels are "; };
   if (faults.non_finite > 0) {
     throw Error(ErrorCode::invalid_input, "map.finite", p.name, texelName(image, faults.first_non_finite),
                 plural(faults.non_finite) + "not finite, this is the first", "repair them with glint-ingest --fix-invalid");
   }
-  if (faults.downward > 0) {
-    const bool three = image.channels > 2;
+  const std::size_t texels = static_cast<std::size_t>(image.width) * image.height;
+  if (faults.downward * kTexelsPerDownward > texels) {
     throw Error(ErrorCode::invalid_input, three ? "normals.upward" : "normals.disk", p.name,
                 texelName(image, faults.first_downward),
                 plural(faults.downward) + (three ? "not above the surface (z <= 0)" : "outside the unit disk (x^2 + y^2 > 1)") +
@@ -180,27 +246,42 @@ void checkFaults(const PixelArray& image, const IngestParameters& p, const Fault
   }
 }
 
-bool dithers(const PixelArray& image, Dequantize wanted) {
-  if (wanted == Dequantize::automatic) return std::holds_alternative<std::span<const std::uint8_t>>(image.pixels);
-  return wanted == Dequantize::tpdf && !std::holds_alternative<std::span<const float>>(image.pixels);
+/// Refuses heights among which one number seems to stand for no data.
+void refuseSentinel(const PixelArray& image, const std::string& name) {
+  const std::optional<double> number = findSentinel(image);
+  if (!number) return;
+  char text[32];
+  std::snprintf(text, sizeof text, "%.9g", *number);
+  throw Error(ErrorCode::invalid_input, "heights.no_data", name, "",
+              std::string(text) + " is far from all other heights: it seems to stand for no data",
+              "fill such texels with --nodata " + std::string(text) + ", or take it for a height with --nodata none");
 }
 
 template <class T>
-std::vector<float> decodeHeights(const PixelArray& image, const IngestParameters& p, bool dither, Faults& faults) {
+std::vector<float> decodeHeights(const PixelArray& image, const IngestParameters& p, float noise_width, Faults& faults) {
   const auto pixels = std::get<std::span<const T>>(image.pixels);
   const float scale = p.height_scale / kCodes<T>;
+  const NoDataTest holds_nothing(image, p.no_data);
+  std::vector<std::size_t> no_data(static_cast<std::size_t>(image.height));
   std::vector<float> heights(static_cast<std::size_t>(image.width) * image.height);
   tbb::parallel_for(0, image.height, [&](int j) {
     const std::size_t first = static_cast<std::size_t>(j) * image.width;
     for (std::size_t t = first; t < first + static_cast<std::size_t>(image.width); ++t) {
-      const float noise = dither ? triangularNoise(p.seed, t).x : 0;
-      heights[t] = scale * (static_cast<float>(pixels[t * static_cast<std::size_t>(image.channels)]) + noise);
+      const auto value = static_cast<float>(pixels[t * static_cast<std::size_t>(image.channels)]);
+      const float noise = noise_width > 0 ? noise_width * triangularNoise(p.seed, t).x : 0;
+      heights[t] = scale * (value + noise);
+      if (!holds_nothing(value)) continue;
+      heights[t] = kNaN;
+      ++no_data[static_cast<std::size_t>(j)];
     }
   });
+  for (const std::size_t count : no_data) faults.no_data += count;
   for (int j = image.height - 1; j >= 0; --j) {
     for (int i = 0; i < image.width; ++i) {
       const std::size_t t = static_cast<std::size_t>(j) * image.width + static_cast<std::size_t>(i);
-      if (!std::isfinite(heights[t]) && faults.non_finite++ == 0) faults.first_non_finite = t;
+      if (std::isfinite(heights[t])) continue;
+      if (holds_nothing(static_cast<float>(pixels[t * static_cast<std::size_t>(image.channels)]))) continue;
+      if (faults.non_finite++ == 0) faults.first_non_finite = t;
     }
   }
   return heights;
@@ -274,33 +355,31 @@ IngestedNormals ingestNormals(const PixelArray& image, const IngestParameters& p
     throw Error(ErrorCode::invalid_input, "normals.channels", p.name, "", "has one channel, and normals need three (or two)",
                 "read heights with --kind height");
   }
-  const int channels = std::min(image.channels, 3);
-  const bool floating = std::holds_alternative<std::span<const float>>(image.pixels);
-  const EncodingEvidence evidence = weighEncoding(image, channels);
-  Encoding encoding = p.encoding;
-  if (encoding == Encoding::automatic) {
-    encoding = floating && looksSigned(evidence) ? Encoding::snorm : Encoding::unorm;
-  }
-  checkEncoding(evidence, encoding, channels, p.name);
-
-  const bool dither = dithers(image, p.dequantize);
+  const MapMeaning meaning = findMeaning(image, p);
   Faults faults;
   IngestedNormals result;
   result.normals = std::visit(
       [&](const auto& pixels) {
         using T = std::remove_const_t<typename std::decay_t<decltype(pixels)>::element_type>;
-        return decodeNormals<T>(image, p, encoding, dither, faults);
+        const NormalDecoder<T> decoder(image, p, meaning);
+        return decodeNormals<T>(image, p, decoder, faults);
       },
       image.pixels);
-  checkFaults(image, p, faults);
+  checkFaults(image, p, meaning.layout.hasZ(), faults);
   std::size_t repaired = 0;
-  if (faults.non_finite + faults.downward > 0) repaired = fillHoles(image.width, image.height, result.normals, p.name);
-  if (!p.allow_constant) checkNotConstant(image, channels, p.name);
+  if (faults.non_finite + faults.downward + faults.no_data > 0)
+    repaired = fillHoles(image.width, image.height, result.normals, p.boundary, p.name);
+  if (!p.allow_constant) checkNotConstant(image, meaning.layout.used(), p.name);
 
   result.report = describeNormals(image.width, image.height, result.normals);
-  result.report.encoding = encoding;
-  result.report.dequantized = dither;
+  result.report.encoding = meaning.encoding;
+  result.report.channels = meaning.layout.channels;
+  result.report.blue_ignored = meaning.layout.channels == NormalChannels::rg && image.channels > 2;
+  result.report.median_length_error = meaning.vectors.median_error;
+  result.report.coarse_codes = meaning.codes.coarse;
+  result.report.dequantized = noiseOf(meaning.codes, p.dequantize) > 0;
   result.report.non_finite = faults.non_finite;
+  result.report.no_data = faults.no_data;
   result.report.downward = faults.downward;
   result.report.clipped = faults.clipped;
   result.report.non_unit = faults.non_unit;
@@ -311,24 +390,33 @@ IngestedNormals ingestNormals(const PixelArray& image, const IngestParameters& p
 IngestedHeights ingestHeights(const PixelArray& image, const IngestParameters& p) {
   checkShape(image, p.name);
   checkGrey(image, p);
-  if (!p.allow_constant) checkNotConstant(image, 1, p.name);
-  const bool dither = dithers(image, p.dequantize);
+  if (!p.allow_constant) checkNotConstant(image, {0}, p.name);
+  if (!p.no_data && p.refuse_sentinels) refuseSentinel(image, p.name);
+  const std::array<int, 1> channel = {0};
+  const PixelCodes codes = findCodes(image, channel);
+  const float noise = noiseOf(codes, p.dequantize);
   Faults faults;
   IngestedHeights result;
   result.heights = std::visit(
       [&](const auto& pixels) {
         using T = std::remove_const_t<typename std::decay_t<decltype(pixels)>::element_type>;
-        return decodeHeights<T>(image, p, dither, faults);
+        return decodeHeights<T>(image, p, noise, faults);
       },
       image.pixels);
-  checkFaults(image, p, faults);
+  checkFaults(image, p, false, faults);
   std::size_t repaired = 0;
-  if (faults.non_finite > 0) repaired = fillHoles(image.width, image.height, result.heights, p.name);
-  const std::vector<Vec2> normals = normalsFromHeights(image.width, image.height, result.heights);
+  if (faults.non_finite + faults.no_data > 0)
+    repaired = fillHoles(image.width, image.height, result.heights, p.boundary, p.name);
+  std::size_t cliffs = 0;
+  const std::vector<Vec2> normals = normalsFromHeights(image.width, image.height, result.heights, p.boundary, &cliffs);
   result.report = describeNormals(image.width, image.height, normals);
-  result.report.dequantized = dither;
+  result.report.coarse_codes = codes.coarse;
+  result.report.dequantized = noise > 0;
   result.report.non_finite = faults.non_finite;
+  result.report.no_data = faults.no_data;
   result.report.repaired = repaired;
+  result.report.cliffs = cliffs;
+  result.report.seam = seamRoughness(image.width, image.height, result.heights);
   return result;
 }
 

@@ -174,12 +174,62 @@ TEST(IngestNormals, RepairsHolesWithTheirNeighboursMean) {
   for (const Vec2 n : fixed.normals) ASSERT_LT(dot(n, n), 1);
 }
 
-TEST(IngestNormals, RefusesTexelsThatPointDown) {
-  TestMap map;
+TEST(IngestNormals, RepairsOneTexelInAThousandThatPointsDownAndRefusesMore) {
+  TestMap map;  // 1200 texels
   map.texel(5, 2)[2] = 0.3f;
+  const auto fixed = ingestNormals(map.floats(), plain());
+  EXPECT_EQ(fixed.report.downward, 1u);
+  EXPECT_EQ(fixed.report.repaired, 1u);
+  map.texel(7, 1)[2] = 0.3f;
   const Error error = refusal(map.floats());
   EXPECT_EQ(error.rule(), "normals.upward");
-  EXPECT_EQ(error.object(), "column 5, row 2 from the top");
+  EXPECT_EQ(error.object(), "column 7, row 1 from the top");
+}
+
+TEST(IngestNormals, FillsLargeHolesInLinearTime) {
+  // In passes over the whole hole this takes minutes.
+  TestMap map(1024, 1024);
+  for (int row = 0; row < 1024; ++row)
+    for (int column = 0; column < 500; ++column) map.texel(column, row)[0] = kNaN;
+  IngestParameters p = plain();
+  p.fix_invalid = true;
+  EXPECT_EQ(ingestNormals(map.floats(), p).report.repaired, 500u * 1024);
+}
+
+TEST(IngestNormals, HolesAtTheBorderOfAClampedMapAreFilledFromInside) {
+  TestMap map;
+  IngestParameters p = plain();
+  const auto whole = ingestNormals(map.floats(), p);
+  map.texel(0, 0)[0] = kNaN;
+  p.fix_invalid = true;
+  p.boundary = Boundary::clamp;
+  const auto fixed = ingestNormals(map.floats(), p);
+  Vec2 mean;
+  const std::size_t corner = (map.height - 1) * map.width;
+  for (const std::size_t t : {corner + 1, corner - map.width, corner - map.width + 1})
+    mean = mean + (1 / 3.0f) * whole.normals[t];
+  EXPECT_NEAR(fixed.normals[corner].x, mean.x, 1e-6f);
+  EXPECT_NEAR(fixed.normals[corner].y, mean.y, 1e-6f);
+}
+
+TEST(IngestNormals, TexelsWithoutDataAreFilled) {
+  TestMap map;
+  for (int c = 0; c < 3; ++c) map.texel(3, 7)[c] = 0;
+  IngestParameters p = plain();
+  p.no_data = 0;
+  const auto result = ingestNormals(map.floats(), p);
+  EXPECT_EQ(result.report.no_data, 1u);
+  EXPECT_EQ(result.report.repaired, 1u);
+  EXPECT_EQ(result.report.downward, 0u);
+}
+
+TEST(IngestNormals, TakesNamedChannelsAtTheirWord) {
+  TestMap map;
+  for (std::size_t k = 0; k < map.colours.size(); ++k) map.colours[k] = 0.5f + 0.4f * (2 * map.colours[k] - 1);  // length .8
+  EXPECT_EQ(refusal(map.floats()).rule(), "normals.unit");
+  IngestParameters p = plain();
+  p.trust_channels = true;
+  EXPECT_NEAR(ingestNormals(map.floats(), p).normals[7].x, map.normals[7].x, 1e-6f);
 }
 
 TEST(IngestNormals, RefusesTwoChannelsOutsideTheDiskUnlessByRounding) {

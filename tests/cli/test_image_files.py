@@ -1,0 +1,254 @@
+"""What an image file says about its pixels: window, orientation, alpha, parts, layers, channels."""
+
+import struct
+
+import h5py
+import numpy
+import pytest
+from image_writer import CODE, HALF, codes, data, ingest, refused, surface, unorm, write, write_parts
+
+Image = pytest.importorskip("PIL.Image")
+
+
+# --- the window that is shown
+
+
+@pytest.mark.parametrize("name", ["w.exr", "w.tif"])
+def test_missing_pixels_of_the_display_window_are_refused(glint, name):
+    write(glint.folder / name, unorm(surface(40, 32)), window=(10, 6), display=(64, 48))
+    missing = 64 * 48 - 40 * 32
+    refused(glint, name, f"{missing} are missing", "column 10, row 6", "--window data")
+    ingest(glint, name, "--window", "data")
+    assert data(glint) == pytest.approx(surface(40, 32)[..., :2], abs=HALF)
+
+
+def test_overscan_is_cut_off_and_told(glint):
+    write(glint.folder / "w.exr", unorm(surface(40, 32)), window=(-4, -2), display=(34, 27))
+    assert "display window" in ingest(glint, "w.exr").stderr
+    assert data(glint) == pytest.approx(surface(40, 32)[2:29, 4:38, :2], abs=HALF)
+
+
+def test_environment_that_was_cropped_is_refused(glint):
+    write(glint.folder / "env.exr", numpy.ones((16, 32, 3), numpy.float32), window=(16, 8), display=(64, 32))
+    process = glint("shlobes", "--light", "env.exr", "-o", "o.glint", "--order", 4)
+    assert process.returncode == 3
+    assert "env.exr" in process.stderr and "missing" in process.stderr
+
+
+# --- orientation
+
+TURNS = {
+    1: lambda a: a,
+    2: lambda a: a[:, ::-1],
+    3: lambda a: a[::-1, ::-1],
+    4: lambda a: a[::-1],
+    5: lambda a: a.transpose(1, 0, 2),
+    6: lambda a: numpy.rot90(a, -1),
+    7: lambda a: numpy.rot90(a, 2).transpose(1, 0, 2),
+    8: lambda a: numpy.rot90(a),
+}
+
+
+@pytest.mark.parametrize("orientation", TURNS)
+@pytest.mark.parametrize("name", ["a.exr", "a.tif", "a.png", "a.jpg"])
+def test_orientation_is_that_of_a_viewer(glint, name, orientation):
+    stored, path = surface(), glint.folder / name
+    if name.endswith((".png", ".jpg")):
+        exif = Image.Exif()
+        exif[274] = orientation
+        Image.fromarray(codes(stored)).save(path, exif=exif, **({"quality": 100, "subsampling": 0} if "jpg" in name else {}))
+    else:
+        write(path, unorm(stored), Orientation=orientation)
+    ingest(glint, name)
+    jpeg_error = 0.03  # rounding of frequencies, in components
+    assert data(glint) == pytest.approx(TURNS[orientation](stored)[..., :2], abs=jpeg_error)
+
+
+# --- alpha
+
+
+def with_alpha(values, alpha, multiply=True):
+    values = values * alpha if multiply else values
+    return numpy.concatenate([values, numpy.broadcast_to(alpha, values.shape[:2] + (1,))], axis=-1).astype(numpy.float32)
+
+
+def varying_alpha(width=48, height=40):
+    return 0.55 + 0.45 * numpy.linspace(0, 1, width * height).reshape(height, width, 1)
+
+
+@pytest.mark.parametrize("name, kind, error", [("a.exr", "float", HALF), ("a.exr", "half", 4e-3), ("a.tif", "uint16", HALF),
+                                               ("a.tif", "uint8", 3 * CODE)])
+def test_colours_are_divided_by_associated_alpha(glint, name, kind, error):
+    write(glint.folder / name, with_alpha(unorm(surface()), varying_alpha()), kind)
+    ingest(glint, name)
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=error)
+
+
+@pytest.mark.parametrize("name", ["a.tif", "a.png", "a.tga"])
+def test_straight_alpha_leaves_colours_alone(glint, name):
+    pixels = with_alpha(unorm(surface()), varying_alpha(), multiply=False)
+    write(glint.folder / name, pixels, "uint8", **{"oiio:UnassociatedAlpha": 1})
+    ingest(glint, name)
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
+
+
+def test_transparent_pixels_are_refused_or_filled(glint):
+    alpha = numpy.ones((40, 48, 1))
+    alpha[3, 5] = 0
+    write(glint.folder / "a.exr", with_alpha(unorm(surface()), alpha))
+    refused(glint, "a.exr", "1 pixels are transparent", "column 5, row 3 from the top", "--fix-invalid")
+    ingest(glint, "a.exr", "--fix-invalid")
+    assert numpy.isfinite(data(glint)).all()
+
+
+def test_alpha_that_is_something_else_is_refused_with_a_remedy(glint):
+    alpha = varying_alpha()
+    alpha[3, 5] = 0
+    write(glint.folder / "a.exr", with_alpha(unorm(surface()), alpha, multiply=False))
+    refused(glint, "a.exr", "column 5, row 3 from the top", "alpha is 0 and the colour is not", "--alpha ignore")
+    ingest(glint, "a.exr", "--alpha", "ignore")
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=HALF)
+
+
+def test_base_colours_are_divided_by_associated_alpha(glint):
+    """A grey of .604 (sRGB code 204) under an alpha of one half."""
+    assert glint("synth", "leather", "--size", "32", "--height", "-o", "h.exr").returncode == 0
+    assert glint("ingest", "h.exr", "--kind", "height", "--to", "heights", "-o", "h.glint").returncode == 0
+    code, alpha = 204, 128
+    associated = round(code * alpha / 255)
+    pixels = numpy.empty((32, 32, 4), numpy.uint8)
+    pixels[...] = [associated, associated, associated, alpha]
+    write(glint.folder / "c.tif", pixels, "uint8")
+    straight = numpy.full((32, 32, 3), code, numpy.uint8)
+    write(glint.folder / "d.png", straight, "uint8")
+    for image in ("c.tif", "d.png"):
+        process = glint("displace", "h.glint", "-o", "d.glint", "--factor", "32", "--base", "diffuse:1", "--base-color", image)
+        assert process.returncode == 0, process.stderr
+        with h5py.File(glint.folder / "d.glint") as file:
+            colours = file["level_00/lobe_colors"][...]
+        half_a_code = 0.006  # of the associated value
+        assert colours[colours > 0] == pytest.approx(0.604, abs=half_a_code), image
+
+
+# --- several images in one file
+
+
+def test_the_first_of_several_parts_is_read_with_a_warning(glint):
+    first, second = surface(), surface(steepness=0.2)
+    write_parts(glint.folder / "p.exr", [unorm(first), unorm(second)], names=("rough", "smooth"))
+    process = ingest(glint, "p.exr")
+    assert "0 (rough), 1 (smooth)" in process.stderr and "--subimage" in process.stderr
+    assert data(glint) == pytest.approx(first[..., :2], abs=HALF)
+    for chosen in ("1", "smooth"):
+        assert ingest(glint, "p.exr", "--subimage", chosen).stderr == ""
+        assert data(glint) == pytest.approx(second[..., :2], abs=HALF)
+    (glint.folder / "o.glint").unlink()
+    refused(glint, "p.exr", "smooth", options=["--subimage", "2"])
+
+
+def test_pages_of_a_tiff_are_named(glint):
+    first, second = surface(), surface(steepness=0.2)
+    write_parts(glint.folder / "p.tif", [codes(first), codes(second)], "uint8")
+    assert "holds 2 images" in ingest(glint, "p.tif").stderr
+    ingest(glint, "p.tif", "--subimage", "1")
+    assert data(glint) == pytest.approx(second[..., :2], abs=CODE)
+
+
+def test_layers_are_chosen_by_name(glint):
+    pixels = numpy.concatenate([numpy.full((40, 48, 3), 0.3, numpy.float32), unorm(surface())], axis=-1)
+    names = ("R", "G", "B", "bumps.X", "bumps.Y", "bumps.Z")
+    write(glint.folder / "l.exr", pixels, names=names)
+    process = glint("ingest", "l.exr", "-o", "o.glint", "--allow-constant")
+    assert "bumps" in process.stderr
+    for options in (["--layer", "bumps"], ["--channels", "bumps.X,bumps.Y,bumps.Z"]):
+        assert ingest(glint, "l.exr", *options).stderr == ""
+        assert data(glint) == pytest.approx(surface()[..., :2], abs=HALF)
+    (glint.folder / "o.glint").unlink()
+    refused(glint, "l.exr", "bumps.X", options=["--layer", "bump"])
+    refused(glint, "l.exr", "bumps.X", options=["--layer", "bumps", "--channels", "xya"])
+
+
+# --- conventions for two channels
+
+
+def test_constant_blue_is_not_taken_for_z(glint):
+    for blue in (255, 128, 0):
+        pixels = codes(surface())
+        pixels[..., 2] = blue
+        Image.fromarray(pixels).save(glint.folder / "b.png")
+        assert "blue is constant" in ingest(glint, "b.png").stderr
+        assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
+        assert ingest(glint, "b.png", "--channels", "rg").stderr == ""
+        assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
+
+
+def test_constant_blue_that_is_z_stays(glint):
+    """So gentle that all z round to 255: nothing contradicts."""
+    gentle = surface(steepness=0.01)
+    gentle = surface(steepness=0) * [0.1, 0.1, 1]
+    gentle /= numpy.linalg.norm(gentle, axis=-1, keepdims=True)
+    pixels = codes(gentle)
+    assert (pixels[..., 2] == 255).all()
+    Image.fromarray(pixels).save(glint.folder / "b.png")
+    assert ingest(glint, "b.png").stderr == ""
+
+
+def test_occlusion_in_blue_is_refused_with_a_remedy_that_works(glint):
+    pixels = codes(surface())
+    x, y = numpy.meshgrid(numpy.arange(48), numpy.arange(40))
+    pixels[..., 2] = 255 - 40 * ((x * 7 + y * 13) % 5 == 0)
+    Image.fromarray(pixels).save(glint.folder / "b.png")
+    refused(glint, "b.png", "occlusion", "--channels rg")
+    ingest(glint, "b.png", "--channels", "rg")
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
+
+
+@pytest.mark.parametrize("red, blue", [(255, 255), (0, 0), (255, None)])
+def test_x_in_alpha_is_recognised(glint, red, blue):
+    n = codes(surface())
+    pixels = numpy.empty((40, 48, 4), numpy.uint8)
+    pixels[..., 0], pixels[..., 1], pixels[..., 3] = red, n[..., 1], n[..., 0]
+    pixels[..., 2] = n[..., 1] if blue is None else blue
+    Image.fromarray(pixels).save(glint.folder / "d.png")
+    assert "alpha" in ingest(glint, "d.png").stderr
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
+
+
+@pytest.mark.parametrize("grey, alpha, option", [(1, 0, "ag"), (0, 1, "ra")])
+def test_x_and_y_in_grey_and_alpha_need_a_word(glint, grey, alpha, option):
+    n = codes(surface())
+    pixels = numpy.stack([n[..., grey], n[..., grey], n[..., grey], n[..., alpha]], axis=-1)
+    Image.fromarray(pixels).save(glint.folder / "d.png")
+    refused(glint, "d.png", "--channels ag", "--channels ra")
+    ingest(glint, "d.png", "--channels", option)
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
+
+
+def dds(path, code, dxgi=None):
+    """Four blocks of two channels, 8 x 8 pixels."""
+    block = bytes([200, 100, 0, 0, 0, 0, 0, 0, 60, 20, 1, 2, 3, 4, 5, 6])
+    header = b"DDS " + struct.pack("<7I", 124, 0x1007, 8, 8, 0, 0, 0) + bytes(44)
+    header += struct.pack("<2I4s5I", 32, 4, code, 0, 0, 0, 0, 0) + struct.pack("<5I", 0x1000, 0, 0, 0, 0)
+    if dxgi is not None:
+        header += struct.pack("<5I", dxgi, 3, 0, 1, 0)
+    path.write_bytes(header + 4 * block)
+
+
+@pytest.mark.parametrize("code, dxgi", [(b"BC5S", None), (b"DX10", 84)])
+def test_signed_two_channel_dds_is_refused_with_a_remedy(glint, code, dxgi):
+    dds(glint.folder / "s.dds", code, dxgi)
+    refused(glint, "s.dds", "BC5_UNORM")
+
+
+@pytest.mark.parametrize("length", [0.8, 1.2])
+def test_vectors_far_from_unit_length_are_refused_however_many(glint, length):
+    write(glint.folder / "v.exr", length * surface().astype(numpy.float32))
+    refused(glint, "v.exr", "off unit length", "--channels rgb", options=["--encoding", "snorm"])
+    ingest(glint, "v.exr", "--encoding", "snorm", "--channels", "rgb")
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=HALF)
+
+
+def test_vectors_of_filtered_maps_are_normalised(glint):
+    write(glint.folder / "v.exr", 0.92 * surface().astype(numpy.float32))
+    process = ingest(glint, "v.exr", "--encoding", "snorm")
+    assert "off by more than 0.080" in process.stderr
