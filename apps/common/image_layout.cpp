@@ -53,11 +53,13 @@ std::string lower(std::string text) {
   return text;
 }
 
+/// "x" of "normal.X", "r" of "R".
+std::string layerPart(const std::string& channel) { return lower(channel.substr(channel.rfind('.') + 1)); }
+
 /// The channel of a letter, or -1.
 int channelOfLetter(const Image& image, char letter) {
   for (int c = 0; c < image.channels; ++c) {
-    const std::string& name = image.channel_names[static_cast<std::size_t>(c)];
-    if (lower(name.substr(name.rfind('.') + 1)) == std::string(1, letter)) return c;
+    if (layerPart(image.channel_names[static_cast<std::size_t>(c)]) == std::string(1, letter)) return c;
   }
   for (int c = 0; c < std::min(image.channels, 4); ++c)
     if (std::string(kChannelLetters[c]).find(letter) != std::string::npos) return c;
@@ -160,6 +162,11 @@ void selectLayer(Image& image, const std::string& layer, const std::string& path
     throw Error(ErrorCode::invalid_input, "image.layer", path, "", "has no layer \"" + layer + "\"",
                 "its channels are " + joined(image.channel_names));
   }
+  // Each layer of an OpenEXR file may have an alpha of its own.
+  const auto alpha = std::find_if(kept.begin(), kept.end(), [&](int c) {
+    return layerPart(image.channel_names[static_cast<std::size_t>(c)]) == "a";
+  });
+  if (image.format == "openexr" && alpha != kept.end()) image.alpha = *alpha, image.associated = true;
   selectChannels(image, kept);
 }
 
@@ -212,7 +219,8 @@ void selectChannels(Image& image, const std::vector<int>& channels) {
 }
 
 void divideByAlpha(Image& image, bool holes, const std::string& path) {
-  if (image.alpha < 0 || image.channels < 2) return;
+  if (image.alpha < 0 || image.channels < 2)
+    throw Error(ErrorCode::invalid_input, "image.alpha", path, "", "has no alpha to divide by", "leave out --alpha divide");
   image.associated = false;
   TexelTally lost(image.width, image.height);
   std::vector<float> values;

@@ -99,7 +99,7 @@ std::uint32_t spreadBits(std::uint32_t x) {
     if (!(dot(map.normals[k], map.normals[k]) < 1)) outside.add(k);
   throw Error(ErrorCode::invalid_input, "normals.disk", {}, "/normals",
               std::to_string(outside.count()) + " normals are not inside the unit disk (first at " + outside.firstName() + ")",
-              "repair them with glint-ingest --fix-invalid");
+              "make the map again with glint-ingest, which moves normals on the rim inside");
 }
 
 /// Every second bit of x, from bit 0 on.

@@ -101,7 +101,7 @@ void checkMap(const HeightMap& map, const DisplaceOptions& options) {
     if (std::isfinite(map.heights[k])) continue;
     throw Error(ErrorCode::invalid_input, "heights.finite", "", "heights",
                 "the texel at " + texelName(map.width, map.height, k) + " is not finite",
-                "repair them with glint-ingest --fix-invalid");
+                "make the map again with glint-ingest --fix-invalid");
   }
   for (const int factor : options.factors) {
     if (map.width % factor == 0 && map.height % factor == 0) continue;

@@ -110,7 +110,8 @@ MapMeaning findMeaning(const PixelArray& image, const IngestParameters& p) {
       meaning.encoding = floating && looksSigned(evidence) ? Encoding::snorm : Encoding::unorm;
   };
   weigh();
-  meaning.codes = findCodes(image, meaning.layout.used());
+  // Where z was computed from x and y, only these are codes.
+  meaning.codes = findCodes(image, std::array{meaning.layout.x, meaning.layout.y});
   if (meaning.layout.hasZ()) {
     const float rounding = std::visit(
         [&](const auto& pixels) {

@@ -88,7 +88,7 @@ bool areClose(double a, double b) {
 
 bool isSentinel(double number) {
   constexpr double kHuge = 1e30;  // -3.4e38, 1.7e308, ...: no height
-  static constexpr std::array kUsual = {-999.0,     -9999.0,       -99999.0,     9999.0,        99999.0,
+  static constexpr std::array kUsual = {-999.0,     -9999.0,       -10000.0,     -99999.0,     9999.0,        99999.0,
                                         -32767.0,   -32768.0,      32767.0,      -2147483647.0, -2147483648.0,
                                         2147483647.0, 4294967295.0, -1e10,        -1e20,         1e20};
   return std::abs(number) >= kHuge || std::any_of(kUsual.begin(), kUsual.end(), [&](double u) { return areClose(number, u); });

@@ -163,6 +163,11 @@ def test_layers_are_chosen_by_name(glint):
     for options in (["--layer", "bumps"], ["--channels", "bumps.X,bumps.Y,bumps.Z"]):
         assert ingest(glint, "l.exr", *options).stderr == ""
         assert data(glint) == pytest.approx(surface()[..., :2], abs=HALF)
+    alpha = varying_alpha()
+    pixels = numpy.concatenate([pixels[..., :3], unorm(surface()) * alpha, alpha], axis=-1).astype(numpy.float32)
+    write(glint.folder / "a.exr", pixels, names=(*names, "bumps.A"))
+    ingest(glint, "a.exr", "--layer", "bumps")
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=HALF)
     (glint.folder / "o.glint").unlink()
     refused(glint, "l.exr", "bumps.X", options=["--layer", "bump"])
     refused(glint, "l.exr", "bumps.X", options=["--layer", "bumps", "--channels", "xya"])

@@ -58,6 +58,15 @@ def test_codes_of_eight_bits_are_recognised_in_wider_types(glint, form):
     assert data(glint, asset=f"{name}.glint") == pytest.approx(data(glint, asset="8.png.glint"), abs=scaling)
 
 
+def test_codes_are_recognised_beside_a_computed_z(glint):
+    """What a texture of two channels becomes when its z is computed."""
+    xy = 2 * codes(surface(256, 256))[..., :2] / 255 - 1
+    pixels = numpy.concatenate([xy, numpy.sqrt(1 - (xy**2).sum(axis=-1, keepdims=True))], axis=-1)
+    write(glint.folder / "z.exr", unorm(pixels))
+    process = glint("ingest", "z.exr", "-o", "o.glint", "--json")
+    assert json.loads(process.stdout)["result"]["dequantized"]
+
+
 @pytest.mark.parametrize("name, kind", [("c.png", "uint16"), ("c.exr", "half"), ("c.exr", "float")])
 def test_real_precision_is_left_alone(glint, name, kind):
     write(glint.folder / name, unorm(surface(256, 256)), kind)
