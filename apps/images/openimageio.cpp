@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <string_view>
 
 #include "common/image_formats.h"
@@ -103,13 +104,31 @@ std::vector<unsigned char> encode(const std::string& path, const OIIO::ImageSpec
   return bytes;
 }
 
+/// What to do about a file that OpenImageIO cannot read.
+std::string unreadableRemedy(const std::string& reason) {
+  if (reason.find("compression") != std::string::npos)
+    return "convert it to .png, or if it is a DDS of two signed channels (BC5_SNORM) to an unsigned one (BC5_UNORM)";
+  return "check that the file is complete and in a format that oiiotool --info can read";
+}
+
+std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
+  OIIO::ImageSpec config;
+  config.attribute("oiio:UnassociatedAlpha", 1);
+  auto input = OIIO::ImageInput::open(path, &config);
+  if (input) return input;
+  const std::string reason = trimmed(OIIO::geterror());
+  throw Error(ErrorCode::invalid_input, "image.readable", path, "", "cannot be read as an image: " + reason,
+              unreadableRemedy(reason));
+}
+
 /// Names of all images of a file: parts of OpenEXR, pages of TIFF. Those after the most are not looked for.
-std::vector<std::string> partNames(OIIO::ImageInput& input) {
+std::vector<std::string> partNames(const std::string& path) {
   constexpr int kMost = 1000;
-  std::vector<std::string> names;
-  for (int k = 0; k < kMost && input.seek_subimage(k, 0); ++k)
-    names.push_back(std::string(input.spec().get_string_attribute("oiio:subimagename")));
-  (void)input.geterror();  // says that there is no further one
+  const auto input = open(path);  // of its own: some readers (WebP) cannot go back
+  std::vector<std::string> names = {std::string(input->spec().get_string_attribute("oiio:subimagename"))};
+  while (static_cast<int>(names.size()) < kMost && input->seek_subimage(static_cast<int>(names.size()), 0))
+    names.push_back(std::string(input->spec().get_string_attribute("oiio:subimagename")));
+  (void)input->geterror();  // says that there is no further one
   return names;
 }
 
@@ -140,29 +159,15 @@ void invertWhiteZero(const OIIO::ImageSpec& spec, const std::string& path, Image
   for (std::uint16_t& code : *codes) code = static_cast<std::uint16_t>(65535 - code);
 }
 
-/// What to do about a file that OpenImageIO cannot read.
-std::string unreadableRemedy(const std::string& reason) {
-  if (reason.find("compression") != std::string::npos)
-    return "convert it to .png, or if it is a DDS of two signed channels (BC5_SNORM) to an unsigned one (BC5_UNORM)";
-  return "check that the file is complete and in a format that oiiotool --info can read";
-}
-
 StoredImage readImageFile(const std::string& path, const std::string& part) {
   // OpenImageIO has threads of its own, which --threads is to limit as well.
   OIIO::attribute("threads", static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
-  OIIO::ImageSpec config;
-  config.attribute("oiio:UnassociatedAlpha", 1);
-  const auto input = OIIO::ImageInput::open(path, &config);
-  if (!input) {
-    const std::string reason = trimmed(OIIO::geterror());
-    throw Error(ErrorCode::invalid_input, "image.readable", path, "", "cannot be read as an image: " + reason,
-                unreadableRemedy(reason));
-  }
   StoredImage stored;
   Image& image = stored.image;
-  image.parts = partNames(*input);
+  image.parts = partNames(path);
   image.part = findPart(path, part, image.parts);
-  if (!input->seek_subimage(image.part, 0)) throwDamagedImage(path, trimmed(input->geterror()));
+  const auto input = open(path);
+  if (image.part > 0 && !input->seek_subimage(image.part, 0)) throwDamagedImage(path, trimmed(input->geterror()));
   const OIIO::ImageSpec spec = input->spec();
   checkSize(spec, path);
   image.width = spec.width;

@@ -92,6 +92,13 @@ def test_straight_alpha_leaves_colours_alone(glint, name):
     assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
 
 
+def test_formats_that_are_multiplied_while_they_are_read_are_divided(glint):
+    pixels = numpy.round(255 * with_alpha(unorm(surface()), varying_alpha(), multiply=False)).astype(numpy.uint8)
+    Image.fromarray(pixels).save(glint.folder / "a.webp", lossless=True)
+    ingest(glint, "a.webp")
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=3 * CODE)
+
+
 def test_transparent_pixels_are_refused_or_filled(glint):
     alpha = numpy.ones((40, 48, 1))
     alpha[3, 5] = 0
