@@ -16,21 +16,22 @@ ErrorCode ValidationReport::errorCode() const {
   return ErrorCode::failed;
 }
 
-void Findings::add(std::string_view rule_id, std::string object, std::string message) {
-  const Rule& rule = findRule(rule_id);
-  const auto same = std::count_if(report_.findings.begin(), report_.findings.end(),
-                                  [&](const Finding& finding) { return finding.rule == rule_id; });
-  if (same >= kMaxPerRule) return;
-  report_.findings.push_back(
-      {std::string(rule.id), rule.severity, std::move(object), std::move(message), std::string(rule.remedy)});
+void Findings::add(std::string_view rule_id, const std::string& object, const std::string& message) {
+  addFinding(findRule(rule_id), object, message, std::string(findRule(rule_id).remedy));
 }
 
 void Findings::add(const Error& error) {
-  std::string message = error.what();
-  // what() is "object: message; remedy"; a finding keeps the three apart.
-  if (!error.object().empty()) message.erase(0, error.object().size() + 2);
-  if (!error.remedy().empty()) message.resize(message.size() - error.remedy().size() - 2);
-  add(error.rule().empty() ? "file.readable" : error.rule(), error.object(), std::move(message));
+  const Rule& rule = findRule(error.rule().empty() ? "file.readable" : error.rule());
+  addFinding(rule, error.object(), error.clause(), error.remedy().empty() ? std::string(rule.remedy) : error.remedy());
+}
+
+void Findings::addFinding(const Rule& rule, const std::string& object, const std::string& message, const std::string& remedy) {
+  const auto same = std::count_if(report_.findings.begin(), report_.findings.end(),
+                                  [&](const Finding& finding) { return finding.rule == rule.id; });
+  if (same >= kMaxPerRule) return;
+  // Names and values of a file can be of any length.
+  report_.findings.push_back(
+      {std::string(rule.id), rule.severity, shownText(object, kMostObject), shownText(message, kMostMessage), remedy});
 }
 
 void Findings::throwFirstError() const {

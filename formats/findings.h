@@ -15,8 +15,9 @@ class Findings {
  public:
   explicit Findings(const std::filesystem::path& path) { report_.path = path.string(); }
 
-  /// Adds a finding with the rule's severity and remedy. A rule is reported at most kMaxPerRule times.
-  void add(std::string_view rule, std::string object, std::string message);
+  /// Adds a finding with the rule's severity and remedy, its texts as shownText() shows them. A rule is reported at most
+  /// kMaxPerRule times.
+  void add(std::string_view rule, const std::string& object, const std::string& message);
   /// Adds an error that was thrown while reading.
   void add(const Error& error);
 
@@ -28,7 +29,10 @@ class Findings {
   const std::string& path() const { return report_.path; }
 
  private:
+  void addFinding(const Rule& rule, const std::string& object, const std::string& message, const std::string& remedy);
+
   static constexpr int kMaxPerRule = 20;
+  static constexpr std::size_t kMostObject = 200, kMostMessage = 400;  // bytes
   ValidationReport report_;
 };
 

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <utility>
+
+#include "glint/model/shown_text.h"
 
 namespace glint {
 
@@ -17,7 +20,8 @@ enum class ErrorCode : std::uint8_t {
   differs = 7,        ///< a comparison found a difference
 };
 
-/// The one exception of the libraries: what happened, where, and what to do about it.
+/// The one exception of the libraries: what happened, where, and what to do about it. Its text is one line of at most some
+/// hundred characters of UTF-8, whatever bytes a file's name or another library's message brings in.
 class Error : public std::runtime_error {
  public:
   /// @param rule    stable id of the broken rule, e.g. "normals.finite"; empty if there is none
@@ -27,6 +31,7 @@ class Error : public std::runtime_error {
   /// @param remedy  what the user can do, a clause without a full stop; may be empty
   Error(ErrorCode code, std::string rule, std::string path, std::string object, std::string what, std::string remedy = {})
       : std::runtime_error(message(path, object, what, remedy)),
+        clause_(shownText(what, kMostClause)),
         code_(code),
         rule_(std::move(rule)),
         path_(std::move(path)),
@@ -38,18 +43,23 @@ class Error : public std::runtime_error {
   const std::string& path() const { return path_; }
   const std::string& object() const { return object_; }
   const std::string& remedy() const { return remedy_; }
+  /// What is wrong, without the file, the place and the remedy that what() adds.
+  const std::string& clause() const { return clause_; }
 
  private:
+  static constexpr std::size_t kMostPath = 400, kMostObject = 120, kMostClause = 400, kMostRemedy = 400;
+
   static std::string message(const std::string& path, const std::string& object, const std::string& what,
                              const std::string& remedy) {
     std::string text;
-    if (!path.empty()) text += path + ": ";
-    if (!object.empty()) text += object + ": ";
-    text += what;
-    if (!remedy.empty()) text += "; " + remedy;
+    if (!path.empty()) text += shownPath(path, kMostPath) + ": ";
+    if (!object.empty()) text += shownText(object, kMostObject) + ": ";
+    text += shownText(what, kMostClause);
+    if (!remedy.empty()) text += "; " + shownText(remedy, kMostRemedy);
     return text;
   }
 
+  std::string clause_;
   ErrorCode code_;
   std::string rule_;
   std::string path_;
