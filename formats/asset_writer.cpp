@@ -1,19 +1,10 @@
 #include "glint/formats/asset_writer.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <atomic>
-#include <cerrno>
-#include <chrono>
-#include <cstdio>
-#include <cstring>
 #include <map>
 #include <set>
 
+#include "glint/formats/atomic_file.h"
 #include "glint/formats/hash.h"
 #include "glint/formats/hdf5_handle.h"
 #include "glint/formats/load.h"
@@ -26,103 +17,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMaxTextBytes = 60000;   // an object header message holds less than 64 KiB
 constexpr std::uint64_t kBigBytes = 64 << 10;  // datasets from here on start on a page
 constexpr hsize_t kPageBytes = 4096;
-constexpr hsize_t kLineBytes = 64;            // a cache line: where all other datasets start
-constexpr std::size_t kWriteBytes = 8 << 20;  // of one write call
-
-[[noreturn]] void throwIo(const fs::path& path, const std::string& what, int error) {
-  const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
-  throw Error(ErrorCode::io, "file.writable", path.string(), {}, what + ": " + std::strerror(error),
-              full ? "free some space or write to another disk" : "check the folder and its permissions");
-}
-
-/// A file under a unique hidden name beside the target, removed unless it was renamed to it. It is locked as long as its writer
-/// lives: what killed writers of the same target have left is not, and is removed by the next one.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const fs::path& target) : target_(target) {
-    static std::atomic<unsigned> counter{0};
-    const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-    removeStale(folder);
-    for (int attempt = 0;; ++attempt) {
-      const auto ticks = static_cast<unsigned long long>(std::chrono::steady_clock::now().time_since_epoch().count());
-      char suffix[64];
-      std::snprintf(suffix, sizeof suffix, "%d-%u-%llx%s", static_cast<int>(::getpid()), counter++, ticks, kSuffix);
-      path_ = folder / (prefix() + suffix);
-      file_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-      if (file_ < 0 && (errno != EEXIST || attempt > 100)) throwIo(target, "cannot be created", errno);
-      if (file_ < 0) continue;
-      // Where there are no locks, nobody removes what is not locked. Another writer may have done so before this lock.
-      struct stat status;
-      if (::flock(file_, LOCK_EX) != 0 || ::fstat(file_, &status) != 0 || status.st_nlink > 0) return;
-      ::close(file_);
-    }
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  ~TemporaryFile() {
-    if (file_ >= 0) ::close(file_);
-    if (!renamed_) ::unlink(path_.c_str());
-  }
-
-  const fs::path& path() const { return path_; }
-
-  /// Writes at an offset that the caller knows to be right.
-  void write(const void* data, std::uint64_t size, std::uint64_t offset) {
-    const char* at = static_cast<const char*>(data);
-    while (size > 0) {
-      const ssize_t written = ::pwrite(file_, at, std::min<std::uint64_t>(size, kWriteBytes), static_cast<off_t>(offset));
-      if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) throwIo(target_, "cannot be written", written < 0 ? errno : EIO);
-      at += written;
-      offset += static_cast<std::uint64_t>(written);
-      size -= static_cast<std::uint64_t>(written);
-    }
-  }
-
-  /// Flushes to the disk and takes the target's name.
-  void publish(bool overwrite) {
-    if (::fsync(file_) != 0) throwIo(target_, "cannot be flushed to the disk", errno);
-    if (overwrite) {
-      if (::rename(path_.c_str(), target_.c_str()) != 0) throwIo(target_, "cannot be replaced", errno);
-    } else {
-      // Unlike rename, link fails if another process has made the target meanwhile.
-      if (::link(path_.c_str(), target_.c_str()) != 0) throwIo(target_, "cannot be created", errno);
-      ::unlink(path_.c_str());
-    }
-    renamed_ = true;
-    const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
-    const int directory = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (directory < 0) return;
-    ::fsync(directory);  // some file systems cannot flush folders; the data is safe either way
-    ::close(directory);
-  }
-
- private:
-  static constexpr const char* kSuffix = ".tmp";
-  std::string prefix() const { return "." + target_.filename().string() + "."; }
-
-  bool isTemporary(const std::string& name) const {
-    if (!name.starts_with(prefix()) || !name.ends_with(kSuffix)) return false;
-    return name.find_first_not_of("0123456789abcdef-", prefix().size()) == name.size() - std::strlen(kSuffix);
-  }
-
-  void removeStale(const fs::path& folder) const {
-    std::error_code error;
-    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-      const std::string name = entry->path().filename().string();
-      if (!isTemporary(name)) continue;
-      const int file = ::open(entry->path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
-      if (file < 0) continue;
-      if (::flock(file, LOCK_EX | LOCK_NB) == 0) ::unlink(entry->path().c_str());
-      ::close(file);
-    }
-  }
-
-  fs::path target_;
-  fs::path path_;
-  int file_ = -1;
-  bool renamed_ = false;
-};
+constexpr hsize_t kLineBytes = 64;  // a cache line: where all other datasets start
 
 void writeAttribute(hid_t object, const std::string& name, const AttributeValue& value, const hdf5::TypeTable& types) {
   constexpr ErrorCode io = ErrorCode::io;
@@ -298,29 +193,43 @@ class MetadataWriter {
   std::map<std::string, std::uint64_t> offsets_;
 };
 
+/// Writes the metadata.
+/// @return offset of each dataset by path
+std::map<std::string, std::uint64_t> writeMetadata(AtomicFile& file, const PackedAsset& packed, const Provenance& provenance) {
+  try {
+    return MetadataWriter(file.path(), packed).write(provenance);
+  } catch (const Error& error) {
+    // HDF5 forgets why a file could not grow.
+    std::uint64_t size = kBigBytes;
+    for (const PackedArray& array : packed.arrays) size += array.size_bytes;
+    if (error.rule() == "file.hdf5") file.reserve(size);
+    throw;
+  }
+}
+
 /// Reads the finished file as a reader would.
 void checkWritten(const fs::path& temporary) {
   Findings findings(temporary);
   loadAsset(temporary, findings);
   for (const Finding& finding : findings.report().findings) {
     if (finding.severity != Severity::error) continue;
+    if (findRule(finding.rule).code == ErrorCode::io)
+      throw Error(ErrorCode::io, finding.rule, {}, finding.object, "cannot be read back: " + finding.message, finding.remedy);
     throw Error(ErrorCode::failed, finding.rule, {}, finding.object, "cannot be written as a valid asset: " + finding.message);
   }
 }
 
 void writePacked(const fs::path& path, const PackedAsset& packed, const Provenance& provenance, const WriteOptions& options) {
-  std::error_code ignored;
-  if (fs::is_directory(path, ignored) || !path.has_filename()) throwIo(path, "cannot be written", EISDIR);
-  if (!options.overwrite && fs::exists(fs::symlink_status(path, ignored))) {
+  if (!options.overwrite && findOutput(path).kind == OutputTarget::Kind::file) {
     throw Error(ErrorCode::io, "file.writable", path.string(), {}, "exists", "pass --force to replace it");
   }
-  TemporaryFile temporary(path);
-  const auto offsets = MetadataWriter(temporary.path(), packed).write(provenance);
+  AtomicFile file(path);
+  const auto offsets = writeMetadata(file, packed, provenance);
   for (const PackedArray& array : packed.arrays) {
-    if (array.size_bytes > 0) temporary.write(array.data, array.size_bytes, offsets.at(array.path));
+    if (array.size_bytes > 0) file.write(array.data, array.size_bytes, offsets.at(array.path));
   }
-  checkWritten(temporary.path());
-  temporary.publish(options.overwrite);
+  checkWritten(file.path());
+  file.publish(options.overwrite);
 }
 
 template <class Model>
@@ -330,10 +239,7 @@ void writeModel(const fs::path& path, const Model& model, const Provenance& prov
   } catch (const Error& error) {
     if (!error.path().empty()) throw;
     // Rules and HDF5 know the object only: name the file that was to be written.
-    std::string what = error.what();
-    if (!error.object().empty()) what.erase(0, error.object().size() + 2);
-    if (!error.remedy().empty()) what.resize(what.size() - error.remedy().size() - 2);
-    throw Error(error.code(), error.rule(), path.string(), error.object(), what, error.remedy());
+    throw Error(error.code(), error.rule(), path.string(), error.object(), error.clause(), error.remedy());
   }
 }
 

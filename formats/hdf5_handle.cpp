@@ -1,8 +1,14 @@
 #include "glint/formats/hdf5_handle.h"
 
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
 #include <cstddef>
+#include <cstring>
+#include <string_view>
 
 #include "glint/formats/rules.h"
+#include "glint/formats/system_error.h"
 #include "glint/model/compressed_ndf.h"
 
 namespace glint::formats::hdf5 {
@@ -40,8 +46,27 @@ Handle clusterType() {
   return type;
 }
 
-herr_t keepDeepest(unsigned, const H5E_error2_t* entry, void* text) {
-  if (entry->desc != nullptr) *static_cast<std::string*>(text) = entry->desc;
+/// Number after "errno = " in a message of HDF5; 0 if there is none.
+int systemErrorIn(std::string_view message) {
+  constexpr std::string_view kLabel = "errno = ";
+  const std::size_t place = message.rfind(kLabel);  // a file's name comes before
+  int number = 0;
+  if (place != message.npos) std::from_chars(message.data() + place + kLabel.size(), message.data() + message.size(), number);
+  return number;
+}
+
+/// The message up to the list of "name = value" that HDF5 adds: times, names of files and addresses in memory.
+std::string_view withoutValues(std::string_view message) {
+  const std::size_t equals = message.find(" = ");
+  if (equals == message.npos) return message;
+  return message.substr(0, std::min(message.find_last_of(":,", equals), equals));
+}
+
+herr_t keepDeepest(unsigned, const H5E_error2_t* entry, void* data) {
+  Cause& cause = *static_cast<Cause*>(data);
+  if (entry->desc == nullptr) return 0;
+  if (const int error = systemErrorIn(entry->desc); error != 0) cause.system_error = error;
+  cause.text = withoutValues(entry->desc);
   return 0;
 }
 
@@ -62,19 +87,26 @@ LibraryScope::~LibraryScope() {
   H5Eset_auto2(H5E_DEFAULT, print_, print_data_);
 }
 
-std::string rootCause() {
-  std::string text;
+Cause rootCause() {
+  Cause cause;
   // H5E_WALK_DOWNWARD ends at the function that detected the error.
-  H5Ewalk2(H5E_DEFAULT, H5E_WALK_DOWNWARD, &keepDeepest, &text);
+  H5Ewalk2(H5E_DEFAULT, H5E_WALK_DOWNWARD, &keepDeepest, &cause);
   H5Eclear2(H5E_DEFAULT);
-  return text.empty() ? "unknown error of HDF5" : text;
+  if (cause.text.empty()) cause.text = "unknown error of HDF5";
+  return cause;
 }
 
 void fail(const char* what, const std::string& object, ErrorCode code) {
-  const std::string cause = rootCause();
+  const Cause cause = rootCause();
+  const bool writes = code == ErrorCode::io;
+  // What a damaged file asks for can be nothing that the system has: EINVAL is then the file's fault.
+  if (cause.system_error != 0 && (writes || cause.system_error != EINVAL)) {
+    throw Error(ErrorCode::io, writes ? "file.writable" : "file.readable", {}, object,
+                std::string(what) + ": " + std::strerror(cause.system_error), remedyFor(cause.system_error));
+  }
   const Rule& rule = findRule("file.hdf5");
-  throw Error(code, std::string(rule.id), {}, object, std::string(what) + " (" + cause + ")",
-              code == ErrorCode::io ? "check the disk's space and permissions" : std::string(rule.remedy));
+  throw Error(code, std::string(rule.id), {}, object, std::string(what) + " (" + cause.text + ")",
+              writes ? "check the disk's space and permissions" : std::string(rule.remedy));
 }
 
 herr_t Handle::close() {

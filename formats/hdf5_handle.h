@@ -31,10 +31,17 @@ class LibraryScope {
   void* print_data_ = nullptr;
 };
 
-/// The deepest message of HDF5's error stack, which is then cleared.
-std::string rootCause();
+/// Why a call of HDF5 failed.
+struct Cause {
+  std::string text;      ///< what the function that detected the error says, without names, times and addresses
+  int system_error = 0;  ///< errno of the call of the system that failed, if it was one
+};
 
-/// Throws Error (rule file.hdf5, code `code`) that says what failed and why.
+/// The cause that HDF5's error stack tells, which is then cleared.
+Cause rootCause();
+
+/// Throws Error that says what failed and why: the system's reason (code io, rule file.readable or, if `code` is io,
+/// file.writable), or HDF5's own (rule file.hdf5, code `code`).
 [[noreturn]] void fail(const char* what, const std::string& object, ErrorCode code = ErrorCode::invalid_input);
 
 /// Owner of an HDF5 identifier.

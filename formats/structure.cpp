@@ -11,6 +11,7 @@
 #include <set>
 
 #include "glint/formats/hdf5_handle.h"
+#include "glint/formats/system_error.h"
 
 namespace glint::formats {
 namespace {
@@ -311,10 +312,6 @@ class StructureReader {
   std::set<haddr_t> seen_;
 };
 
-[[noreturn]] void throwUnreadable(int error) {
-  throwBroken("file.readable", {}, std::string("cannot be opened: ") + std::strerror(error));
-}
-
 /// Opens the file in HDF5 without locks (assets never change in place) and makes sure that it is the file we mapped.
 hdf5::Handle openInHdf5(const std::filesystem::path& path, const struct stat& mapped) {
   const hdf5::Handle access(H5Pcreate(H5P_FILE_ACCESS), "cannot create properties", {});
@@ -335,7 +332,7 @@ hdf5::Handle openInHdf5(const std::filesystem::path& path, const struct stat& ma
 
 Mapping::Mapping(int file, std::size_t size) : size_(size) {
   void* address = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, file, 0);
-  if (address == MAP_FAILED) throwBroken("file.readable", {}, std::string("cannot be mapped: ") + std::strerror(errno));
+  if (address == MAP_FAILED) throwUnreadable({}, "cannot be mapped", errno);
   data_ = static_cast<const std::byte*>(address);
 }
 
@@ -348,9 +345,9 @@ FileStructure readStructure(const std::filesystem::path& path, Findings& finding
   try {
     // Non-blocking: opening a pipe or device must not hang; only regular files pass the next check.
     const Descriptor descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-    if (descriptor.id < 0) throwUnreadable(errno);
+    if (descriptor.id < 0) throwUnreadable({}, "cannot be opened", errno);
     struct stat status = {};
-    if (::fstat(descriptor.id, &status) != 0) throwUnreadable(errno);
+    if (::fstat(descriptor.id, &status) != 0) throwUnreadable({}, "cannot be opened", errno);
     if (!S_ISREG(status.st_mode)) throwBroken("file.readable", {}, "is not a regular file");
     if (status.st_size == 0) throwBroken("file.signature", {}, "is empty");
     structure.mapping = Mapping(descriptor.id, static_cast<std::size_t>(status.st_size));

@@ -1,0 +1,16 @@
+#pragma once
+
+// Private to formats/.
+
+#include <filesystem>
+
+namespace glint::formats {
+
+/// Adds a file to those that removeTemporaryFiles() removes, whether it exists yet or not.
+/// @return its slot; -1 if all slots are taken or the path is too long: the file is then left to the next writer
+int registerTemporary(const std::filesystem::path& path);
+
+/// Takes it off again. Ignores -1.
+void forgetTemporary(int slot);
+
+}  // namespace glint::formats
