@@ -7,10 +7,13 @@
 #include <CLI/App.hpp>
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <string_view>
+
+#include "glint/formats/atomic_file.h"
 
 namespace glint::apps {
 namespace {
@@ -36,7 +39,6 @@ class Descriptor {
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   int get() const { return fd_; }
-  int release() { return std::exchange(fd_, -1); }
 
  private:
   int fd_;
@@ -57,59 +59,88 @@ void readPieces(const std::string& path, const Take& take) {
   }
 }
 
-fs::path folderOf(const std::string& path) {
-  const fs::path folder = fs::path(path).parent_path();
+fs::path folderOf(const fs::path& path) {
+  const fs::path folder = path.parent_path();
   return folder.empty() ? fs::path(".") : folder;
 }
 
-/// Whether the first bytes of a file show a format that the output may replace.
-bool mayReplace(const std::string& path, OutputFormat format) {
-  std::string head;
-  readPieces(path, [&](std::span<const std::byte> piece) {
-    if (head.empty()) head.assign(reinterpret_cast<const char*>(piece.data()), std::min<std::size_t>(piece.size(), 4096));
-  });
-  if (head.empty()) return true;
-  if (format == OutputFormat::text) return head.find('\0') == std::string::npos;
-  const std::string_view start = head;
-  if (format == OutputFormat::asset) return start.starts_with("\x89HDF\r\n\x1a\n"sv);
+/// The first bytes of a file.
+std::string headOf(const std::string& path, std::size_t most) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.get() < 0) throwIo("file.readable", path, systemError());
+  std::string head(most, '\0');
+  std::size_t size = 0;
+  while (size < most) {
+    const ssize_t count = ::read(file.get(), head.data() + size, most - size);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throwIo("file.readable", path, systemError());
+    if (count == 0) break;
+    size += static_cast<std::size_t>(count);
+  }
+  head.resize(size);
+  return head;
+}
+
+bool isImage(std::string_view start) {
   static constexpr std::array kImages = {"\x89PNG"sv, "\x76\x2f\x31\x01"sv, "II*\0"sv, "MM\0*"sv, "#?RADIANCE"sv, "PF\n"sv,
                                          "Pf\n"sv,    "\xff\xd8\xff"sv};
   return std::any_of(kImages.begin(), kImages.end(), [&](std::string_view magic) { return start.starts_with(magic); });
 }
 
-void checkOutput(const Tool& tool, const std::string& path, OutputFormat format) {
-  checkWritable(path);
+/// Whether the first bytes of a file show that it is an earlier result of the same kind.
+bool mayReplace(const std::string& path, OutputFormat format) {
+  constexpr std::size_t kHeadBytes = 1 << 20;  // root attributes come first, and are shorter
+  const std::string head = headOf(path, kHeadBytes);
+  if (head.empty()) return true;
+  switch (format) {
+    case OutputFormat::asset:
+      return head.starts_with("\x89HDF\r\n\x1a\n"sv) && head.find("glint_format") != std::string::npos;
+    case OutputFormat::image:
+      return isImage(head);
+    case OutputFormat::table:
+      return isAnswerHeader(std::string_view(head).substr(0, head.find('\n')));
+    case OutputFormat::depfile:
+      return isDepfile(head);
+  }
+  return false;
+}
+
+/// Whether two names lead to one file, which need not exist yet.
+bool isSameFile(const std::string& a, const std::string& b) {
+  struct stat one {}, other {};
+  const bool has_one = ::stat(a.c_str(), &one) == 0, has_other = ::stat(b.c_str(), &other) == 0;
+  if (has_one != has_other) return false;
+  if (has_one) return one.st_dev == other.st_dev && one.st_ino == other.st_ino;
+  const auto place = [](const std::string& path) { return fs::weakly_canonical(fs::absolute(formats::findOutput(path).path)); };
+  return place(a) == place(b);
+}
+
+void checkReplaceable(const std::string& path, const fs::path& target, OutputFormat format) {
   struct stat existing {};
-  if (::stat(path.c_str(), &existing) != 0) return;
-  if (S_ISDIR(existing.st_mode)) throwIo("output.regular", path, "is a folder", "name a file in it");
-  if (!S_ISREG(existing.st_mode)) throwIo("output.regular", path, "is not a regular file", "name a regular file with -o");
-  if (tool.force()) return;
-  for (const std::string& input : tool.inputPaths()) {
-    struct stat other {};
-    if (::stat(input.c_str(), &other) == 0 && other.st_dev == existing.st_dev && other.st_ino == existing.st_ino) {
-      throw Error(ErrorCode::usage, "output.not_input", path, "", "the output is one of the inputs",
-                  "name another file with -o, or replace the input with --force");
-    }
-  }
-  if (!mayReplace(path, format)) {
+  if (::stat(target.c_str(), &existing) != 0) throwIo("output.regular", path, systemError());
+  // Root may write whatever the mode says, but the owner has said no.
+  constexpr mode_t kAnyWrite = S_IWUSR | S_IWGRP | S_IWOTH;
+  if ((existing.st_mode & kAnyWrite) == 0 || ::access(target.c_str(), W_OK) != 0)
+    throwIo("output.read_only", path, "exists and is read-only", "name another file, or replace it with --force");
+  if (!mayReplace(target, format)) {
     throw Error(ErrorCode::usage, "output.ours", path, "", "exists and is not a file of the kind that would replace it",
-                "name another file with -o, or replace it with --force");
+                "name another file, or replace it with --force");
   }
 }
 
-void writeAll(int fd, std::span<const std::byte> bytes, const std::string& path) {
-  while (!bytes.empty()) {
-    const ssize_t count = ::write(fd, bytes.data(), bytes.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) throwIo("file.writable", path, systemError());
-    bytes = bytes.subspan(static_cast<std::size_t>(count));
+/// Checks that an output is no other file of this run. A stream may be several of them.
+void checkApart(const Tool& tool, const std::string& path, std::size_t others) {
+  if (formats::findOutput(path).kind == formats::OutputTarget::Kind::stream) return;
+  const std::vector<std::string> inputs = tool.readPaths();
+  const bool is_input = std::any_of(inputs.begin(), inputs.end(), [&](const std::string& input) { return isSameFile(path, input); });
+  if (is_input && !tool.force()) {
+    throw Error(ErrorCode::usage, "output.not_input", path, "", "the output is one of the inputs",
+                "name another file, or replace the input with --force");
   }
-}
-
-/// Makes a directory entry permanent. Some file systems cannot sync a folder, which is no reason to fail.
-void syncFolder(const fs::path& folder) {
-  const Descriptor handle(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (handle.get() >= 0) ::fsync(handle.get());
+  for (std::size_t k = 0; k < others; ++k) {
+    if (isSameFile(path, tool.outputPaths()[k]))
+      throw Error(ErrorCode::usage, "output.apart", path, "", "two outputs have this name", "name another file for one of them");
+  }
 }
 
 std::string escapeForMake(const std::string& name) {
@@ -160,30 +191,41 @@ std::vector<std::byte> readFile(const std::string& path) {
   return bytes;
 }
 
-void writeFileAtomically(const std::string& path, std::span<const std::byte> bytes) {
-  // Writing through a symbolic link replaces what it points to, as opening it would.
-  std::error_code ignored;
-  const fs::path target = fs::is_symlink(path, ignored) ? fs::weakly_canonical(path) : fs::path(path);
-  const fs::path folder = folderOf(target.string());
-  std::string temporary = (folder / ("." + target.filename().string() + ".XXXXXX")).string();
-  Descriptor file(::mkostemp(temporary.data(), O_CLOEXEC));
-  if (file.get() < 0) throwIo("file.writable", path, systemError(), "check that its folder can be written");
-  try {
-    writeAll(file.get(), bytes, path);
-    const mode_t mask = ::umask(0);
-    ::umask(mask);
-    ::fchmod(file.get(), 0666 & ~mask);  // mkostemp makes files that only the owner can read
-    if (::fsync(file.get()) != 0 || ::close(file.release()) != 0) throwIo("file.writable", path, systemError());
-    if (::rename(temporary.c_str(), target.c_str()) != 0) throwIo("file.writable", path, systemError());
-  } catch (...) {
-    ::unlink(temporary.c_str());
-    throw;
-  }
-  syncFolder(folder);
+void writeTextFile(const std::string& path, const std::string& text) {
+  formats::writeFile(path, std::as_bytes(std::span(text)));
 }
 
-void writeFileAtomically(const std::string& path, const std::string& text) {
-  writeFileAtomically(path, std::as_bytes(std::span(text.data(), text.size())));
+bool isAnswerHeader(std::string_view line) {
+  std::vector<std::string> columns(1);
+  for (const char c : line) {
+    if (c == ',') {
+      columns.emplace_back();
+    } else if (c != ' ' && c != '\t' && c != '\r' && c != '"') {
+      columns.back() += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+  }
+  if (columns.front().starts_with("\xef\xbb\xbf")) columns.front().erase(0, 3);  // a byte-order mark
+  const auto has = [&](const char* name) { return std::find(columns.begin(), columns.end(), name) != columns.end(); };
+  using Names = std::vector<std::string>;
+  if (columns == Names{"hx", "hy", "pdf"} || columns == Names{"wix", "wiy", "wiz", "pdf"}) return true;
+  // Answers come behind the queries.
+  static const Names kAnswers = {"density", "mean", "reflected", "reflected_b"};
+  const bool answered = std::find(kAnswers.begin(), kAnswers.end(), columns.back()) != kAnswers.end();
+  return answered && has("u") && has("v") && (has("hx") || has("x0") || has("wix"));
+}
+
+bool isDepfile(std::string_view text) {
+  bool first = true;
+  for (std::size_t begin = 0; begin < text.size(); first = false) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string_view line = text.substr(begin, end - begin);
+    begin = end + 1;
+    const bool starts_rule = line.ends_with(":") || line.ends_with(": \\");
+    const bool prerequisite = line.starts_with("  ") && line.size() > 2;
+    if (first ? !starts_rule : !starts_rule && !prerequisite && !line.empty()) return false;
+    if (line.find('\0') != line.npos) return false;
+  }
+  return true;
 }
 
 std::string makeDepfile(const std::vector<std::string>& targets, const std::vector<std::string>& prerequisites) {
@@ -211,9 +253,19 @@ void checkReadable(const std::string& path) {
   if (::access(path.c_str(), R_OK) != 0) throwIo("file.readable", path, systemError(), "check its permissions");
 }
 
-void checkWritable(const std::string& path) {
+void checkOutput(Tool& tool, const std::string& path, OutputFormat format) {
   if (path.empty()) throw Error(ErrorCode::usage, "output.name", "", "", "the name of the output is empty", "name a file");
-  const fs::path folder = folderOf(path);
+  if (path == "-")
+    throw Error(ErrorCode::usage, "output.stdout", path, "", "only tables are written to stdout",
+                "name a file; ./- is one of this name");
+  const formats::OutputTarget target = formats::findOutput(path);
+  tool.addLateCheck([&tool, path, others = tool.outputPaths().size()] { checkApart(tool, path, others); });
+  if (target.kind == formats::OutputTarget::Kind::stream) {
+    if (target.descriptor < 0 && ::access(target.path.c_str(), W_OK) != 0)
+      throwIo("file.writable", path, systemError(), "check its permissions");
+    return;
+  }
+  const fs::path folder = folderOf(target.path);
   struct stat info {};
   if (::stat(folder.c_str(), &info) != 0 || !S_ISDIR(info.st_mode)) {
     throwIo("output.folder", path, "there is no folder " + folder.string(), "make it with mkdir -p " + folder.string());
@@ -222,6 +274,7 @@ void checkWritable(const std::string& path) {
     throwIo("output.folder", path, "the folder " + folder.string() + " cannot be written: " + systemError(),
             "check its permissions or name another folder");
   }
+  if (target.kind == formats::OutputTarget::Kind::file && !tool.force()) checkReplaceable(path, target.path, format);
 }
 
 }  // namespace glint::apps

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/tool.h"
@@ -30,18 +31,24 @@ class InputFiles {
   std::vector<std::string> paths_;
 };
 
-/// What may be in a file that an output replaces.
+/// What an output holds, which decides what it may replace.
 enum class OutputFormat : unsigned char {
-  asset,  ///< .glint
-  image,  ///< any image format
-  text,   ///< reports: JSON, CSV, ...
+  asset,    ///< .glint
+  image,    ///< any image format
+  table,    ///< CSV with answers
+  depfile,  ///< rule for Make
 };
 
-/// Mix-in: `-o OUTPUT` (required), written atomically. Checked before the work starts: its folder must exist and be writable.
+/// Checks the name of an output before the work starts, and once all inputs and outputs are known that it is none of them.
 ///
-/// An existing file is replaced without asking only if it looks like something that this tool wrote: an asset replaces an asset
-/// (HDF5 signature), an image an image of a known format, a text any text file. Anything else, and an output that is one of
-/// the inputs, needs --force. Folders and devices are refused.
+/// Its folder must exist and be writable; symbolic links are followed. Devices and pipes are written to; folders, disks and
+/// sockets are refused. Without --force a file is replaced only if it can be written (a mode of 0444 says no, to root too), is no
+/// input, and holds an earlier result: an asset replaces an asset; an image an image of a known format; a table a table with the
+/// columns of answers or samples; a depfile a depfile. An empty file may always be replaced.
+/// @throws Error io, usage
+void checkOutput(Tool& tool, const std::string& path, OutputFormat format);
+
+/// Mix-in: `-o OUTPUT` (required), written atomically and checked by checkOutput().
 class OutputFile {
  public:
   OutputFile(Tool& tool, OutputFormat format, const std::string& help, const std::string& name = "-o,--output");
@@ -53,10 +60,15 @@ class OutputFile {
   std::string path_;
 };
 
-/// Replaces a file by these bytes: unique temporary file in the same folder, fsync, rename. A failure leaves the old file.
+/// Replaces a file by this text, as formats::writeFile does.
 /// @throws Error io
-void writeFileAtomically(const std::string& path, std::span<const std::byte> bytes);
-void writeFileAtomically(const std::string& path, const std::string& text);
+void writeTextFile(const std::string& path, const std::string& text);
+
+/// Whether the first line of a file is the header of a table that glint-query writes: samples, or queries with their answers.
+bool isAnswerHeader(std::string_view line);
+
+/// Whether a text looks as makeDepfile() writes it.
+bool isDepfile(std::string_view text);
 
 /// Reads a whole file.
 /// @throws Error io
@@ -72,8 +84,5 @@ void checkReadable(const std::string& path);
 
 /// Throws Error io unless the path is a file that can be read, and more than once: no pipe and no device.
 void checkRegular(const std::string& path);
-
-/// Throws Error io unless a file can be made in the folder of this path.
-void checkWritable(const std::string& path);
 
 }  // namespace glint::apps

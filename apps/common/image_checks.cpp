@@ -1,13 +1,31 @@
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
+#include <memory>
+#include <vector>
 
 #include "common/image_formats.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
 
+void checkSystemReads(const std::string& path) {
+  const auto fail = [&](int error) {
+    throw Error(ErrorCode::io, "file.readable", path, "", std::string("cannot be read: ") + std::strerror(error),
+                "check the file's permissions and disk, and the limits of the system");
+  };
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), std::fclose);
+  if (!file) fail(errno);
+  std::vector<char> piece(1 << 20);
+  while (std::fread(piece.data(), 1, piece.size(), file.get()) > 0) continue;
+  if (std::ferror(file.get())) fail(errno);
+}
+
 void throwDamagedImage(const std::string& path, const std::string& reason) {
+  checkSystemReads(path);
   throw Error(ErrorCode::invalid_input, "image.complete", path, "",
               "the image is damaged or truncated" + (reason.empty() ? "" : " (" + reason + ")"),
               "copy or export the file again");

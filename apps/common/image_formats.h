@@ -56,6 +56,11 @@ int findPart(const std::string& path, const std::string& part, const std::vector
 /// "0 (beauty), 1 (normals)": numbers and names of images, at most eight.
 std::string partList(const std::vector<std::string>& names);
 
+/// Reads a file to its end, so that what the system has against it is not taken for damage of the file.
+/// @throws Error io
+void checkSystemReads(const std::string& path);
+
+/// @throws Error invalid_input; io if it is the system that does not read the file
 [[noreturn]] void throwDamagedImage(const std::string& path, const std::string& reason);
 
 }  // namespace glint::apps

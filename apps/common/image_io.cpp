@@ -11,6 +11,7 @@
 #include "common/image_formats.h"
 #include "common/image_layout.h"
 #include "common/tiff_tags.h"
+#include "glint/formats/atomic_file.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
@@ -23,6 +24,7 @@ const ImageFormats& imageFormats() {
     void* table = object ? ::dlsym(object, "glint_image_formats") : nullptr;
     if (!table) {
       const char* reason = ::dlerror();
+      if (std::filesystem::exists(path)) checkSystemReads(path);
       throw Error(ErrorCode::failed, "image.formats", path, "",
                   "the part that reads and writes images cannot be loaded" + (reason ? " (" + std::string(reason) + ")" : ""),
                   "install the whole package: this file belongs to the programs");
@@ -89,7 +91,7 @@ float linearFromSrgb(float code) { return code <= 0.04045f ? code / 12.92f : std
 void writeImage(const std::string& path, int width, int height, int channels, std::span<const float> pixels,
                 PixelFormat format) {
   const auto bytes = imageFormats().encode(path, width, height, channels, pixels, format);
-  writeFileAtomically(path, std::as_bytes(std::span(bytes)));
+  formats::writeFile(path, std::as_bytes(std::span(bytes)));
 }
 
 bool isWritableImageName(const std::string& path) { return imageFormats().isWritableName(path); }

@@ -4,8 +4,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
 #include <nlohmann/json.hpp>
+
+#include "common/standard_streams.h"
 
 namespace glint::apps {
 namespace {
@@ -32,7 +33,7 @@ ProgressReporter::ProgressReporter(ProgressMode mode, std::string tool, std::str
 }
 
 ProgressReporter::~ProgressReporter() {
-  if (drawn_) std::fputs("\r\033[K", stderr);  // leaves the line to whatever is printed next
+  if (drawn_) writeStderr("\r\033[K");  // leaves the line to whatever is printed next
 }
 
 void ProgressReporter::update(std::size_t done, std::size_t total) {
@@ -52,10 +53,9 @@ void ProgressReporter::update(std::size_t done, std::size_t total) {
 void ProgressReporter::drawBar(std::size_t done, std::size_t total, double elapsed_s) {
   const double fraction = std::min(1.0, static_cast<double>(done) / static_cast<double>(total));
   const int filled = static_cast<int>(fraction * kBarWidth);
-  fmt::print(stderr, "\r\033[K{}: {} [{:#<{}}{: <{}}] {:3.0f}% {:.3g}/s, {} left", tool_, stage_, "", filled, "",
-             kBarWidth - filled, fraction * 100, static_cast<double>(done) / elapsed_s,
-             duration(remainingSeconds(done, total, elapsed_s)));
-  std::fflush(stderr);
+  writeStderr(fmt::format("\r\033[K{}: {} [{:#<{}}{: <{}}] {:3.0f}% {:.3g}/s, {} left", tool_, stage_, "", filled, "",
+                          kBarWidth - filled, fraction * 100, static_cast<double>(done) / elapsed_s,
+                          duration(remainingSeconds(done, total, elapsed_s))));
   drawn_ = true;
 }
 
@@ -66,7 +66,7 @@ void ProgressReporter::printJson(std::size_t done, std::size_t total, double ela
                                {"elapsed_s", elapsed_s},
                                {"rate_per_s", elapsed_s > 0 ? static_cast<double>(done) / elapsed_s : 0},
                                {"remaining_s", remainingSeconds(done, total, elapsed_s)}};
-  fmt::print(stderr, "{}\n", nlohmann::json{{"progress", line}}.dump());
+  writeStderr(nlohmann::json{{"progress", line}}.dump() + "\n");
 }
 
 }  // namespace glint::apps

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 #include <deque>
 #include <filesystem>
 #include <map>
@@ -20,8 +19,11 @@
 
 #include "common/files.h"
 #include "common/progress_reporter.h"
+#include "common/signals.h"
+#include "common/standard_streams.h"
 #include "common/suggest.h"
 #include "glint/formats/hash.h"
+#include "glint/model/shown_text.h"
 
 namespace glint::apps {
 namespace {
@@ -31,6 +33,7 @@ using nlohmann::json;
 /// Version of the layout of the --json document.
 constexpr int kJsonSchema = 1;
 constexpr int kMaxThreads = 1024;
+constexpr std::size_t kMostWarning = 1000;  // bytes
 
 /// Floats are recorded as the shortest decimal that reads back the same, so that 0.3 stays 0.3.
 json toJson(float value) { return json::parse(fmt::format("{}", value)); }
@@ -180,6 +183,7 @@ struct Tool::State {
   std::deque<Option> options;                                            // deque: references handed out stay valid
   std::vector<std::pair<std::string, std::function<json()>>> recorders;  // one for each option, same order
   std::vector<std::function<void()>> checks;
+  std::vector<std::function<void()>> late_checks;
   std::vector<std::string> inputs;
   std::vector<std::string> outputs;
   json result = json::object();
@@ -245,7 +249,7 @@ void Tool::addStandardOptions() {
       .unrecorded();
   CLI::Option* quiet = app.add_flag("--quiet,-q", s.quiet, "no warnings and no progress")->group(group);
   app.add_flag("--verbose,-v", s.verbose, "print a summary of the result")->group(group)->excludes(quiet);
-  app.add_flag("--force,-f", s.force, "replace an output that is an input or of another kind")->group(group);
+  app.add_flag("--force,-f", s.force, "replace an output that is an input, read-only or of another kind")->group(group);
   app.add_option("--depfile", s.depfile, "write what the output depends on, as a Make rule")->group(group)->type_name("FILE");
 }
 
@@ -294,6 +298,7 @@ Option& Tool::choiceOf(const std::string& name, const std::vector<std::string>& 
 
 CLI::App& Tool::parser() { return state_->app; }
 void Tool::addCheck(std::function<void()> check) { state_->checks.push_back(std::move(check)); }
+void Tool::addLateCheck(std::function<void()> check) { state_->late_checks.push_back(std::move(check)); }
 const std::string& Tool::name() const { return state_->info.name; }
 bool Tool::quiet() const { return state_->quiet; }
 bool Tool::verbose() const { return state_->verbose; }
@@ -304,8 +309,15 @@ void Tool::setResult(const nlohmann::json& result) { state_->result = result; }
 void Tool::setExitCode(ErrorCode code) { state_->exit_code = code; }
 void Tool::addInput(const std::string& path) { state_->inputs.push_back(path); }
 void Tool::addOutput(const std::string& path) { state_->outputs.push_back(path); }
-const std::vector<std::string>& Tool::inputPaths() const { return state_->inputs; }
+const std::vector<std::string>& Tool::outputPaths() const { return state_->outputs; }
 std::string Tool::generator() const { return state_->info.name + " " GLINT_VERSION; }
+
+std::vector<std::string> Tool::readPaths() const {
+  std::vector<std::string> paths = state_->inputs;
+  if (const CLI::Option* config = state_->app.get_config_ptr(); config != nullptr && config->count() > 0)
+    paths.push_back(config->as<std::string>());
+  return paths;
+}
 
 std::uint64_t Tool::seed() {
   state_->seed_used = true;
@@ -323,7 +335,7 @@ bake::ProgressFn Tool::progress(const std::string& stage) {
 void Tool::print(const std::string& text) {
   if (wantsJson()) return;
   state_->reporter.reset();
-  std::fputs(text.c_str(), stdout);
+  writeStdout(text);
 }
 
 void Tool::summary(const std::string& text) {
@@ -331,10 +343,11 @@ void Tool::summary(const std::string& text) {
 }
 
 void Tool::warn(const std::string& text) {
-  state_->warnings.push_back(text);
+  const std::string line = shownText(text, kMostWarning);
+  state_->warnings.push_back(line);
   if (quiet()) return;
   state_->reporter.reset();
-  fmt::print(stderr, "{}: warning: {}\n", name(), text);
+  writeStderr(fmt::format("{}: warning: {}\n", name(), line));
 }
 
 std::string Tool::commandJson() const {
@@ -367,10 +380,10 @@ bool Tool::parse(int argc, char** argv) {
     app.parse(std::move(words));
     return true;
   } catch (const CLI::CallForHelp&) {
-    std::fputs(app.help().c_str(), stdout);
+    writeStdout(app.help());
     return false;
   } catch (const CLI::CallForVersion&) {
-    fmt::print("{}\n", generator());
+    writeStdout(generator() + "\n");
     return false;
   } catch (const CLI::FileError& error) {
     throw Error(ErrorCode::io, "cli.config", "", "", error.what(), "check the name given to --config");
@@ -398,61 +411,69 @@ int Tool::work(const std::function<void()>& body) {
     if (s.outputs.empty())
       throw Error(ErrorCode::usage, "cli.depfile", "", "--depfile", "nothing is made that could depend on anything",
                   "ask for an output file, or leave out --depfile");
-    checkWritable(s.depfile);
+    checkOutput(*this, s.depfile, OutputFormat::depfile);
   }
+  for (const auto& check : s.late_checks) check();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads()));
   body();
   s.reporter.reset();
   if (!s.depfile.empty()) {
-    std::vector<std::string> prerequisites = s.inputs;
-    if (const CLI::Option* config = s.app.get_config_ptr(); config->count() > 0) {
-      prerequisites.push_back(config->as<std::string>());
-    }
-    writeFileAtomically(s.depfile, makeDepfile(s.outputs, prerequisites));
+    writeTextFile(s.depfile, makeDepfile(s.outputs, readPaths()));
   }
   const int code = s.exit_code ? static_cast<int>(*s.exit_code) : 0;
   if (s.json_result) {
     const char* status = s.exit_code ? codeName(*s.exit_code) : "ok";
-    fmt::print("{}\n", dump({{"schema", kJsonSchema},
-                             {"tool", s.info.name},
-                             {"version", GLINT_VERSION},
-                             {"status", status},
-                             {"result", s.result},
-                             {"warnings", s.warnings}}));
+    writeStdout(dump({{"schema", kJsonSchema},
+                      {"tool", s.info.name},
+                      {"version", GLINT_VERSION},
+                      {"status", status},
+                      {"result", s.result},
+                      {"warnings", s.warnings}}) +
+                "\n");
   }
-  if (std::fflush(stdout) != 0) throw Error(ErrorCode::io, "stdout", "", "", "stdout cannot be written", "check its target");
+  flushStdout();
   return code;
 }
 
 int Tool::fail(const Error& error) {
   State& s = *state_;
   s.reporter.reset();
-  fmt::print(stderr, "{}: error: {}\n", s.info.name, error.what());
-  if (s.json_result) {
-    fmt::print("{}\n", dump({{"schema", kJsonSchema},
-                             {"tool", s.info.name},
-                             {"version", GLINT_VERSION},
-                             {"status", "error"},
-                             {"error",
-                              {{"code", codeName(error.code())},
-                               {"rule", error.rule()},
-                               {"path", error.path()},
-                               {"object", error.object()},
-                               {"message", error.what()},
-                               {"remedy", error.remedy()}}},
-                             {"warnings", s.warnings}}));
-    std::fflush(stdout);
-  }
+  writeStderr(fmt::format("{}: error: {}\n", s.info.name, error.what()));
+  if (s.json_result) printFailure(error);
   return static_cast<int>(error.code());
 }
 
+void Tool::printFailure(const Error& error) const {
+  const json document = {{"schema", kJsonSchema},
+                         {"tool", state_->info.name},
+                         {"version", GLINT_VERSION},
+                         {"status", "error"},
+                         {"error",
+                          {{"code", codeName(error.code())},
+                           {"rule", error.rule()},
+                           {"path", error.path()},
+                           {"object", error.object()},
+                           {"message", error.what()},
+                           {"remedy", error.remedy()}}},
+                         {"warnings", state_->warnings}};
+  try {
+    writeStdout(dump(document) + "\n");
+    flushStdout();
+  } catch (const Error&) {
+    // The exit code tells of the first error.
+  }
+}
+
 int Tool::run(int argc, char** argv, const std::function<void()>& body) {
+  openStandardStreams();
+  const SignalScope signals;
   try {
     // Parsing stops at the first error, which may come before --json is seen.
     for (int i = 1; i < argc; ++i) state_->json_result |= std::string(argv[i]) == "--json";
     addStandardOptions();  // last, so that the help begins with what is the tool's own
-    if (!parse(argc, argv)) return 0;
-    return work(body);
+    if (parse(argc, argv)) return work(body);
+    flushStdout();
+    return 0;
   } catch (const Error& error) {
     return fail(error);
   } catch (const std::bad_alloc&) {

@@ -61,7 +61,10 @@ class Option {
 ///
 /// With --json, stdout holds exactly one JSON document: {"schema", "tool", "version", "status": "ok", "result", "warnings"}, or
 /// on failure {..., "status": "error", "error": {"code", "rule", "path", "object", "message", "remedy"}}. The message for
-/// people is on stderr in both cases.
+/// people is on stderr in both cases: one line, whatever goes wrong.
+///
+/// While it runs, signals that end the process remove temporary files first (signals.h). A stdout that cannot be written is an error
+/// (io); a stderr that cannot be written is none.
 class Tool {
  public:
   explicit Tool(ToolInfo info);
@@ -105,6 +108,9 @@ class Tool {
   /// Adds a check that runs after parsing and before the work. It throws glint::Error.
   void addCheck(std::function<void()> check);
 
+  /// Adds a check that runs when every other has run, so that all inputs and outputs are known.
+  void addLateCheck(std::function<void()> check);
+
   /// Parses, checks, works, writes the depfile and the JSON result; turns every exception into a message and an exit code.
   /// @return exit code: 0 ok, or the value of the ErrorCode
   int run(int argc, char** argv, const std::function<void()>& work);
@@ -137,8 +143,10 @@ class Tool {
   void addInput(const std::string& path);
   /// Adds a file that the run makes to the targets of the depfile. The mix-ins of files.h call this.
   void addOutput(const std::string& path);
-  /// Inputs declared so far.
-  const std::vector<std::string>& inputPaths() const;
+  /// Files that the run reads: the inputs declared so far, and the configuration file.
+  std::vector<std::string> readPaths() const;
+  /// Outputs declared so far.
+  const std::vector<std::string>& outputPaths() const;
 
   /// "glint-pyramid 0.1.0".
   std::string generator() const;
@@ -159,6 +167,7 @@ class Tool {
   bool parse(int argc, char** argv);
   int work(const std::function<void()>& work);
   int fail(const Error& error);
+  void printFailure(const Error& error) const;
 
   std::unique_ptr<State> state_;
 };

@@ -59,10 +59,7 @@ void QueryCommand::check() const {
     usage(csv_option_->given() ? "--csv needs a place for the answers" : "--samples needs a place for them",
           "add -o OUT.csv, or -o - for stdout");
   if (!makes_table && output_option_->given()) usage("-o is for tables", "add --csv or --samples, or leave it out");
-  if (makes_table && output_ != "-") {
-    checkWritable(output_);
-    tool_.addOutput(output_);
-  }
+  if (makes_table) checkTableOutput();
   if (csv_option_->given()) return checkTable();
   if (!uv_option_->given()) usage("no footprint was given", "add --uv U V, or --csv TABLE");
   if (!sigma_option_->given() && !covariance_option_->given() && !box_option_->given() && !displacement_.levelGiven())
@@ -76,9 +73,18 @@ void QueryCommand::check() const {
                 "add --wo X Y Z with Z > 0");
   if (covariance_option_->given()) checkCovariance();
   if (image_.empty()) return;
-  checkWritable(image_);
   checkPictureName(image_);
+  checkOutput(tool_, image_, OutputFormat::image);
   tool_.addOutput(image_);
+}
+
+void QueryCommand::checkTableOutput() const {
+  if (output_ == "-") {
+    if (tool_.wantsJson()) usage("--json and -o - both write to stdout", "name a file with -o, or leave out --json");
+    return;
+  }
+  checkOutput(tool_, output_, OutputFormat::table);
+  tool_.addOutput(output_);
 }
 
 void QueryCommand::checkCovariance() const {
@@ -156,7 +162,7 @@ void QueryCommand::writeTable(const std::string& text) {
   if (output_ == "-")
     tool_.print(text);
   else
-    writeFileAtomically(output_, text);
+    writeTextFile(output_, text);
 }
 
 void QueryCommand::writeSamples(NdfAsset& asset) {

@@ -25,6 +25,7 @@ class QueryCommand {
  private:
   void check() const;
   void checkTable() const;
+  void checkTableOutput() const;
   void checkCovariance() const;
   void checkDisplacement() const;
   Footprint footprint() const;

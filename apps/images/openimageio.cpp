@@ -116,6 +116,7 @@ std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
   config.attribute("oiio:UnassociatedAlpha", 1);
   auto input = OIIO::ImageInput::open(path, &config);
   if (input) return input;
+  checkSystemReads(path);
   const std::string reason = trimmed(OIIO::geterror());
   throw Error(ErrorCode::invalid_input, "image.readable", path, "", "cannot be read as an image: " + reason,
               unreadableRemedy(reason));

@@ -8,6 +8,7 @@
 #include "common/files.h"
 #include "common/image_formats.h"
 #include "common/normal_image.h"
+#include "glint/formats/atomic_file.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
@@ -93,7 +94,7 @@ TEST_F(ImageFile, EveryTruncationIsAnError) {
     const auto bytes = readFile(path(name));
     // The last bytes of some formats carry no pixels, so the longest prefix ends 64 bytes before the end.
     for (const std::size_t size : {std::size_t{0}, std::size_t{3}, bytes.size() / 4, bytes.size() / 2, bytes.size() - 64}) {
-      writeFileAtomically(path(name), std::span(bytes).first(size));
+      formats::writeFile(path(name), std::span(bytes).first(size));
       try {
         readImage(path(name));
         ADD_FAILURE() << name << " of " << size << " bytes was read";
@@ -121,7 +122,7 @@ TEST_F(ImageFile, MissingFilesAndOtherContentsAreTold) {
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::io);
   }
-  writeFileAtomically(path("text.png"), std::string("not an image"));
+  writeTextFile(path("text.png"), "not an image");
   EXPECT_THROW(readImage(path("text.png")), Error);
 }
 
