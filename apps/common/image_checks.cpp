@@ -9,6 +9,7 @@
 
 #include "common/image_formats.h"
 #include "glint/model/error.h"
+#include "glint/model/shown_text.h"
 
 namespace glint::apps {
 
@@ -25,9 +26,10 @@ void checkSystemReads(const std::string& path) {
 }
 
 void throwDamagedImage(const std::string& path, const std::string& reason) {
+  constexpr std::size_t kMostReason = 200;  // bytes; decoders can complain about every row
   checkSystemReads(path);
   throw Error(ErrorCode::invalid_input, "image.complete", path, "",
-              "the image is damaged or truncated" + (reason.empty() ? "" : " (" + reason + ")"),
+              "the image is damaged or truncated" + (reason.empty() ? "" : " (" + shownText(reason, kMostReason) + ")"),
               "copy or export the file again");
 }
 

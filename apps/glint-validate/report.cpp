@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "glint/model/shown_text.h"
+
 namespace glint::apps {
 
 using formats::Finding;
@@ -12,7 +14,7 @@ using formats::ValidationReport;
 std::string reportText(const ValidationReport& report) {
   std::string text;
   for (const Finding& finding : report.findings) {
-    text += report.path + ": " + std::string(name(finding.severity)) + ": [" + finding.rule + "] ";
+    text += escapedText(report.path) + ": " + std::string(name(finding.severity)) + ": [" + finding.rule + "] ";
     if (!finding.object.empty()) text += finding.object + ": ";
     text += finding.message + "; " + finding.remedy + "\n";
   }

@@ -374,18 +374,26 @@ def test_ignored_signals_stay_ignored(shell):
 
 
 def test_a_file_that_other_libraries_have_much_to_say_about_makes_one_line(shell):
-    # A TIFF whose text of a million bytes lies beyond its end.
-    entries = [(256, 4, 1, 8), (257, 4, 1, 8), (258, 3, 1, 8), (259, 3, 1, 1), (262, 3, 1, 1), (273, 4, 1, 8), (270, 2, 1000000, 8)]
-    tiff = b"II*\0" + struct.pack("<IH", 8, len(entries)) + b"".join(struct.pack("<HHII", *e) for e in entries) + bytes(80)
+    # A TIFF of 20,000 strips that are all damaged, of each of which libtiff tells.
+    rows, packed = 20000, 32773
+    tags = {256: 64, 257: rows, 258: 8, 259: packed, 262: 2, 273: 8, 277: 3, 278: 1, 279: 100, 284: 1}
+    entries = [struct.pack("<HHII", tag, 4, 1, value) for tag, value in tags.items()]
+    tiff = b"II*\0" + struct.pack("<IH", 8, len(entries)) + b"".join(entries) + bytes(48)
     (shell.folder / "x.tif").write_bytes(tiff)
     process = shell("glint-ingest x.tif -o x.glint")
     assert process.returncode == 3
     assert_one_line(process)
 
 
+def test_an_input_whose_name_an_asset_cannot_record_is_named(shell):
+    os.rename(os.fsencode(shell.folder / "t.png"), os.fsencode(shell.folder) + b"/\xe9.png")
+    process = subprocess.run([BIN / "glint-ingest", b"\xe9.png", "-o", "o.glint"], cwd=shell.folder, capture_output=True)
+    assert process.returncode == 2
+    assert b"\\xe9.png: its name is not UTF-8" in process.stderr and b"rename" in process.stderr
+
+
 def test_a_damaged_asset_makes_one_line_without_addresses(shell):
     good = (shell.folder / "a.glint").read_bytes()
-    (shell.folder / "cut.glint").write_bytes(good[:200])
     for size in range(48, 2048, 97):
         damaged = bytearray(good)
         damaged[size] ^= 0xFF
