@@ -76,9 +76,24 @@ struct Avx2Texels {
       const __m256i exist = firstLanes(count - k);
       sums = _mm256_add_ps(sums, _mm256_and_ps(parts.of<kCut>(load(texels + k, exist)), _mm256_castsi256_ps(exist)));
     }
-    const __m128 four = _mm_add_ps(_mm256_castps256_ps128(sums), _mm256_extractf128_ps(sums, 1));
-    const __m128 two = _mm_add_ps(four, _mm_movehl_ps(four, four));
-    return _mm_cvtss_f32(_mm_add_ss(two, _mm_shuffle_ps(two, two, 1)));
+    return total(sums);
+  }
+
+  /// SingleTexels::moments.
+  template <unsigned kCut>
+  GLINT_AVX2 static PlaceMoments moments(const std::uint32_t* texels, int count, const Parts& parts,
+                                         const PlaceFields& fields) {
+    Moments sums(fields);
+    int k = 0;
+    for (; k + 8 <= count; k += 8) {
+      const __m256i eight = load(texels + k);
+      sums.add(eight, parts.of<kCut>(eight));
+    }
+    if (k < count) {
+      const __m256i exist = firstLanes(count - k), some = load(texels + k, exist);
+      sums.add(some, _mm256_and_ps(parts.of<kCut>(some), _mm256_castsi256_ps(exist)));
+    }
+    return {total(sums.w), total(sums.x), total(sums.y), total(sums.xx), total(sums.xy), total(sums.yy)};
   }
 
  private:
@@ -104,6 +119,36 @@ struct Avx2Texels {
     __m128i shift_x, shift_y;
     __m256i mask, first_x, first_y;
   };
+
+  /// PlaceMoments, in lanes.
+  struct Moments {
+    GLINT_AVX2 explicit Moments(const PlaceFields& f)
+        : shift_x(_mm_cvtsi32_si128(f.shift_x)),
+          shift_y(_mm_cvtsi32_si128(f.shift_y)),
+          mask(all(static_cast<std::uint32_t>(f.mask))),
+          middle(_mm256_set1_ps(f.middle)) {}
+    GLINT_AVX2 __m256 place(__m256i texels, __m128i shift) const {
+      return _mm256_sub_ps(_mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srl_epi32(texels, shift), mask)), middle);
+    }
+    GLINT_AVX2 void add(__m256i texels, __m256 weights) {
+      const __m256 px = place(texels, shift_x), py = place(texels, shift_y);
+      const __m256 wx = _mm256_mul_ps(weights, px), wy = _mm256_mul_ps(weights, py);
+      w = _mm256_add_ps(w, weights), x = _mm256_add_ps(x, wx), y = _mm256_add_ps(y, wy);
+      xx = _mm256_add_ps(xx, _mm256_mul_ps(wx, px));
+      xy = _mm256_add_ps(xy, _mm256_mul_ps(wx, py));
+      yy = _mm256_add_ps(yy, _mm256_mul_ps(wy, py));
+    }
+    __m128i shift_x, shift_y;
+    __m256i mask;
+    __m256 middle;
+    __m256 w = _mm256_setzero_ps(), x = w, y = w, xx = w, xy = w, yy = w;
+  };
+
+  GLINT_AVX2 static float total(__m256 sums) {
+    const __m128 four = _mm_add_ps(_mm256_castps256_ps128(sums), _mm256_extractf128_ps(sums, 1));
+    const __m128 two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+    return _mm_cvtss_f32(_mm_add_ss(two, _mm_shuffle_ps(two, two, 1)));
+  }
 
   /// For each set of lanes their numbers, one after the other, in a byte each.
   static constexpr std::array<std::uint64_t, 256> kLanesOf = [] {

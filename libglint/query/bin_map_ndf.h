@@ -9,6 +9,7 @@
 #include "glint/query/gaussian.h"
 #include "glint/query/half.h"
 #include "glint/query/ndf_model.h"
+#include "glint/query/place_moments.h"
 #include "glint/query/sampling.h"
 
 namespace glint {
@@ -24,7 +25,7 @@ struct BinFacet {
 ///
 /// Each texel in reach counts with its own normal, kept to a fraction of a bin (see blockCode). A block that holds more than a
 /// few hundred texels of the footprint, and is no wider than the lobe allows, counts as one Gaussian with the mean and
-/// covariance of its normals; between kFewTexels and kManyTexels the two are blended, so that the density is continuous in
+/// covariance of those of its normals that are in the footprint; between kFewTexels and kManyTexels the two are blended, so that the density is continuous in
 /// footprint and half vector. Lobes are those of FacetLobe.
 ///
 /// Boxes are answered exactly, Gaussians by the box of the same second moments: see TexelCover, also for boxes without area and
@@ -363,18 +364,33 @@ class BinMapNdf {
         (std::min(std::max(1.0, wider * wider) * expected, cover.area()) - kFewTexels) / (kManyTexels - kFewTexels), 0.0, 1.0);
   }
 
-  /// Area of a block's texels in a footprint, texels.
-  GLINT_DEVICE_CALL GLINT_HD double coveredArea(const TexelCover& cover, const BinBlock& block, CellRows& rows) const {
-    double areas[BinWindow::kSlots] = {};
-    // All of the block in one slot.
-    BinBlock as_bin = block;
-    as_bin.column = as_bin.row = as_bin.side_bits = 0;
-    const WindowBlock all(as_bin, blocks_.code(block), BinWindow(BinWindow::kReach, BinWindow::kReach, map().bins_per_axis));
-    WindowSum sum(map().texels.data(), cover, areas);
-    sum.select(all);
+  /// Sums over all texels of a block.
+  GLINT_HD PlaceMoments momentsOf(const BinBlock& block, const TexelCode& code) const {
+    const std::uint16_t* stored = map().block_moments.data() + 5 * std::size_t{block.number};
+    const double side = 1 << code.place_bits;
+    const double x = side * (halfToFloat(stored[0]) - 0.5), y = side * (halfToFloat(stored[1]) - 0.5);
+    const auto square = [&](int k) { return side * side * halfToFloat(stored[k]); };
+    PlaceMoments moments;
+    moments.add(static_cast<double>(blocks_.end(block) - blocks_.begin(block)),
+                {1, x, y, square(2) + x * x, square(3) + x * y, square(4) + y * y});
+    return moments;
+  }
+
+  /// The texels of a block that are in a footprint as one facet, weighted by their area.
+  GLINT_DEVICE_CALL GLINT_HD BinFacet blockFacet(const TexelCover& cover, const BinBlock& block, CellRows& rows) const {
+    const TexelCode code = blocks_.code(block);
+    PlaceMomentSum sum(map().texels.data(), cover, code, blocks_.begin(block), blocks_.end(block), momentsOf(block, code));
     blocks_.forEachRun(cover, block, rows, sum);
-    sum.finish();
-    return areas[0];
+    const PlaceMoments& sums = sum.finish();
+    if (!(sums.weight > 0)) return {};
+    const double size = placeSize(block, code), squared = size * size;
+    const double x = sums.x / sums.weight, y = sums.y / sums.weight;
+    const double xx = std::max(0.0, sums.xx / sums.weight - x * x), yy = std::max(0.0, sums.yy / sums.weight - y * y);
+    const double limit = std::sqrt(xx * yy), xy = std::clamp(sums.xy / sums.weight - x * y, -limit, limit);
+    const float middle = 0.5f * bin_size_ * static_cast<float>(block.side());
+    const Vec2 mean = {static_cast<float>(size * x), static_cast<float>(size * y)};
+    return {sums.weight, corner(block) + Vec2{middle, middle} + mean,
+            {static_cast<float>(squared * xx), static_cast<float>(squared * xy), static_cast<float>(squared * yy)}};
   }
 
   /// Passes on the texels of a block, in reach and in the footprint, as facets.
@@ -438,19 +454,10 @@ class BinMapNdf {
       blocks_.forEachRun(cover, block, rows, each);
     }
     if (merged > 0) {
-      BinFacet facet = blockFacet(block);
-      facet.weight = merged * coveredArea(cover, block, rows) / cover.area();
-      visitor(facet);
+      BinFacet facet = blockFacet(cover, block, rows);
+      facet.weight *= merged / cover.area();
+      if (facet.weight > 0) visitor(facet);
     }
-  }
-
-  /// All texels of a block as one facet.
-  GLINT_HD BinFacet blockFacet(const BinBlock& block) const {
-    const std::uint16_t* moments = map().block_moments.data() + 5 * std::size_t{block.number};
-    const float side = bin_size_ * static_cast<float>(block.side()), squared = side * side;
-    return {0,
-            corner(block) + side * Vec2{halfToFloat(moments[0]), halfToFloat(moments[1])},
-            {squared * halfToFloat(moments[2]), squared * halfToFloat(moments[3]), squared * halfToFloat(moments[4])}};
   }
 
   GLINT_HD double lobe(const BinFacet& f, Vec2 h) const {

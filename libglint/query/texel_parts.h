@@ -75,6 +75,32 @@ struct FoundTexels {
   float parts[kMost + 8];
 };
 
+/// Sums over texels: of weights, and of weights times places and their products. Places count from the middle of the block.
+struct PlaceMoments {
+  double weight = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+
+  /// Adds `times` other sums.
+  GLINT_HD void add(double times, const PlaceMoments& other) {
+    weight += times * other.weight, x += times * other.x, y += times * other.y;
+    xx += times * other.xx, xy += times * other.xy, yy += times * other.yy;
+  }
+};
+
+/// Where the places of a block's texels are in their codes.
+struct PlaceFields {
+  GLINT_HD explicit PlaceFields(const TexelCode& code)
+      : shift_x(std::min(code.column_bits + code.row_bits, 31)),
+        shift_y(std::min(code.column_bits + code.row_bits + code.place_bits, 31)),
+        mask((1u << code.place_bits) - 1),
+        middle(0.5f * static_cast<float>(mask)) {}
+  GLINT_HD float x(std::uint32_t texel) const { return static_cast<float>(static_cast<int>(texel >> shift_x & mask)) - middle; }
+  GLINT_HD float y(std::uint32_t texel) const { return static_cast<float>(static_cast<int>(texel >> shift_y & mask)) - middle; }
+
+  int shift_x, shift_y;
+  std::uint32_t mask;
+  float middle;  ///< of the block, in places
+};
+
 /// Reads lists one texel after the other.
 struct SingleTexels {
   using Parts = TexelParts;
@@ -96,6 +122,23 @@ struct SingleTexels {
   static GLINT_HD float sum(const std::uint32_t* texels, int count, const Parts& parts) {
     float sums[8] = {};
     for (int k = 0; k < count; ++k) sums[k % 8] += parts.of<kCut>(texels[k]);
+    return total(sums);
+  }
+
+  /// Their moments, in eight sums like `sum`.
+  template <unsigned kCut>
+  static GLINT_HD PlaceMoments moments(const std::uint32_t* texels, int count, const Parts& parts, const PlaceFields& fields) {
+    float sums[6][8] = {};
+    for (int k = 0; k < count; ++k) {
+      const float w = parts.of<kCut>(texels[k]), x = fields.x(texels[k]), y = fields.y(texels[k]), wx = w * x, wy = w * y;
+      const float values[6] = {w, wx, wy, wx * x, wx * y, wy * y};
+      for (int i = 0; i < 6; ++i) sums[i][k % 8] += values[i];
+    }
+    return {total(sums[0]), total(sums[1]), total(sums[2]), total(sums[3]), total(sums[4]), total(sums[5])};
+  }
+
+ private:
+  static GLINT_HD float total(float (&sums)[8]) {
     for (int half = 4; half > 0; half /= 2)
       for (int k = 0; k < half; ++k) sums[k] += sums[k + half];
     return sums[0];

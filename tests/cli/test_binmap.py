@@ -42,6 +42,17 @@ def test_answers_are_those_of_brute_force(glint, assets, box, question):
     assert answer == pytest.approx(expected, rel=DENSITY_TOLERANCE, abs=1e-3)
 
 
+def test_large_footprints_see_their_own_normals_where_these_vary_over_the_map(glint):
+    alpha, merged_error = 0.22, 0.015
+    assert glint("synth", "sawtooth", "--size", "512", "--feature-size", "256", "--slope", "0.08", "-o", "s.exr").returncode == 0
+    assert glint("ingest", "s.exr", "-o", "s.glint").returncode == 0
+    assert glint("binmap", "s.glint", "-o", "b.glint", "--alpha", alpha).returncode == 0
+    question = ["--uv", "0.45", "0.5", "--box", "16", "0", "0", "16", "--half", "-0.0267", "0"]
+    expected = number(glint("query", "s.glint", *question, "--sigma-r", repr(alpha / math.sqrt(2))))
+    assert expected == pytest.approx(5.20, rel=0.005)
+    assert number(glint("query", "b.glint", *question)) == pytest.approx(expected, rel=merged_error)
+
+
 def test_files_are_valid_small_and_do_not_depend_on_threads(glint, assets):
     for threads in ("1", "2"):
         process = glint("binmap", assets / "map.glint", "-o", f"b{threads}.glint", "--alpha", ALPHA, "--threads", threads)

@@ -341,6 +341,57 @@ TEST(BinMapNdf, MergedBinsKeepTheError) {
   EXPECT_LT(std::abs(errors.energy), kEnergyTolerance);
 }
 
+/// 512 x 512 maps on which the normals inside a footprint are not those of the whole map.
+std::vector<Vec2> teeth(int size) {
+  bake::SynthParameters p = bake::defaultSynthParameters(bake::SynthKind::sawtooth);
+  p.width = p.height = size;
+  p.feature_texels = 0.5f * static_cast<float>(size);
+  p.slope = 0.08f;
+  return bake::synthNormals(p);
+}
+std::vector<Vec2> smoothAndRough(int size) {
+  std::vector<Vec2> smooth = test::roughSurface(size, size, 0.05f);
+  const std::vector<Vec2> rough = test::roughSurface(size, size, 0.35f);
+  for (std::size_t k = 0; k < smooth.size(); ++k)
+    if (2 * (k % static_cast<std::size_t>(size)) >= static_cast<std::size_t>(size)) smooth[k] = rough[k];
+  return smooth;
+}
+std::vector<Vec2> ramp(int size) {
+  std::vector<Vec2> normals = test::roughSurface(size, size, 0.01f);
+  for (std::size_t k = 0; k < normals.size(); ++k) {
+    const Vec2 at = test::pixelCentre(k, size);
+    normals[k] = normals[k] + Vec2{0.15f * at.x, 0.1f * at.y};
+  }
+  return normals;
+}
+
+TEST(BinMapNdf, MergedBinsAreOfTheTexelsInTheFootprint) {
+  constexpr int kSize = 512;
+  for (const auto& normals : {teeth(kSize), smoothAndRough(kSize), ramp(kSize)}) {
+    const test::OwnedMap map(kSize, kSize, normals);
+    for (const float alpha : {0.04f, 0.11f, 0.22f, 0.5f}) {
+      const OwnedBinMap bins(map, alpha);
+      for (const float side : {40.0f, 80.0f, 160.0f}) {
+        for (const bool turned : {false, true})
+          EXPECT_LT(densityErrors(map, bins.ndf(), side, turned, 15).median, kNoiseTolerance)
+              << alpha << " " << side << (turned ? " turned" : "");
+      }
+    }
+  }
+}
+
+TEST(BinMapNdf, MergedBinsAreExactWhereFootprintsCoverTheMapSeveralTimes) {
+  // Whole lists are not read: what is stored of the block stands for them.
+  constexpr int kSize = 128;
+  const test::OwnedMap map(kSize, kSize, smoothAndRough(kSize));
+  const OwnedBinMap bins(map, 0.3f);
+  const Footprint once = Footprint::box({0.5f, 0.5f}, {0.5f * kSize, 0}, {0, 0.5f * kSize});
+  const Footprint often = Footprint::box({0.5f, 0.5f}, {1.5f * kSize, 0}, {0, 1.5f * kSize});
+  constexpr float kStoredTolerance = 2e-3f;  // moments are stored in half precision
+  for (const Vec2 h : {Vec2{0, 0}, {0.05f, 0.1f}, {-0.2f, 0.1f}})
+    EXPECT_NEAR(bins.ndf().density(often, h), bins.ndf().density(once, h), kStoredTolerance * bins.ndf().density(once, h));
+}
+
 TEST(BinMapNdf, ConvergesToReferenceAsBinsShrink) {
   // The same lobe over finer and finer bins: what remains is the rounding of normals, which halves with the bins.
   const test::OwnedMap map(256, 256, test::roughSurface(256, 256, 0.3f));

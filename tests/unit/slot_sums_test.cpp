@@ -101,12 +101,71 @@ void expectAreas() {
   }
 }
 
+/// Moments of all texels' places, field by field.
+template <unsigned kCut>
+PlaceMoments expectedMoments(const Case& c) {
+  PlaceMoments moments;
+  const double middle = 0.5 * ((1 << c.code.place_bits) - 1);
+  for (const std::uint32_t texel : c.texels) {
+    const double w = partOf<kCut>(c, texel), x = c.code.placeX(texel) - middle, y = c.code.placeY(texel) - middle;
+    moments.add(w, {1, x, y, x * x, x * y, y * y});
+  }
+  return moments;
+}
+
+template <class Texels>
+void expectMoments() {
+  std::mt19937 random(7);
+  for (int k = 0; k < 3000 && !testing::Test::HasFailure(); ++k) {
+    Case c = randomCase(random);
+    if (c.code.column_bits + c.code.row_bits + 2 * c.code.place_bits > 31) continue;  // shifts of a whole word
+    if (c.texels.size() > 500) c.texels.resize(500);                                  // as many as are summed at once
+    SCOPED_TRACE(k);
+    const typename Texels::Parts parts(c.parts());
+    const auto n = static_cast<int>(c.texels.size());
+    const PlaceMoments sums = Texels::template moments<3>(c.texels.data(), n, parts, PlaceFields(c.code));
+    const PlaceMoments expected = expectedMoments<3>(c);
+    constexpr double kRounding = 1e-5;  // of float sums
+    const double side = 1 << c.code.place_bits, tolerance = kRounding * expected.weight;
+    EXPECT_NEAR(sums.weight, expected.weight, tolerance);
+    EXPECT_NEAR(sums.x, expected.x, tolerance * side);
+    EXPECT_NEAR(sums.y, expected.y, tolerance * side);
+    EXPECT_NEAR(sums.xx, expected.xx, tolerance * side * side);
+    EXPECT_NEAR(sums.xy, expected.xy, tolerance * side * side);
+    EXPECT_NEAR(sums.yy, expected.yy, tolerance * side * side);
+  }
+}
+
+TEST(PlaceMoments, AddUpTexelByTexel) { expectMoments<SingleTexels>(); }
+
 TEST(SlotSums, AddUpTexelByTexel) { expectAreas<SingleTexels>(); }
 
 #ifdef GLINT_AVX2
 TEST(SlotSums, AddUpEightTexelsAtATime) {
   if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
   expectAreas<Avx2Texels>();
+}
+
+TEST(PlaceMoments, AddUpEightTexelsAtATime) {
+  if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
+  expectMoments<Avx2Texels>();
+}
+
+TEST(PlaceMoments, AreTheSameToTheBitByEightAndByOne) {
+  if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
+  std::mt19937 random(8);
+  std::uniform_real_distribution<float> end;
+  for (int k = 0; k < 2000; ++k) {
+    Case c = randomCase(random);
+    c.column_ends = {end(random), end(random)};
+    const auto n = static_cast<int>(std::min<std::size_t>(c.texels.size(), 500));
+    const PlaceFields fields(c.code);
+    const PlaceMoments one = SingleTexels::moments<3>(c.texels.data(), n, c.parts(), fields);
+    const PlaceMoments eight = Avx2Texels::moments<3>(c.texels.data(), n, Avx2Texels::Parts(c.parts()), fields);
+    EXPECT_EQ((std::array{one.weight, one.x, one.y, one.xx, one.xy, one.yy}),
+              (std::array{eight.weight, eight.x, eight.y, eight.xx, eight.xy, eight.yy}))
+        << k;
+  }
 }
 
 /// Ends of any size, whose sums are rounded.
