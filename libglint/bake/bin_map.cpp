@@ -31,8 +31,12 @@ constexpr int kWideTileBits = 3;
 /// Blocks of several bins have at most this many texels, and none of their bins more than kMostOfSharedBin: merging texels (see
 /// BinMapNdf) is for blocks.
 constexpr std::uint64_t kMostOfBlock = 4096, kMostOfSharedBin = 512;
-/// Places in bins are kept to at least this many bits along each axis, where the map is not too large for it.
+/// Places in bins are kept to at least this many bits along each axis, where the map is not too large for it; and to all that a
+/// code can have on maps of few texels, where nothing averages their rounding.
 constexpr int kSurePlaceBits = 5;
+constexpr int kFewPositionBits = 8;
+/// Bits along each axis that a place in a block has at most: half of a code.
+constexpr int kMostBlockPlaceBits = 16;
 /// Texels binned at once.
 constexpr std::size_t kChunk = 512;
 
@@ -145,11 +149,17 @@ class BlockPacker {
   int kept_bits_;
 };
 
-/// Logarithm of the number of cells of a block: about `wanted`, but enough that codes keep places to kSurePlaceBits.
+/// Bits along each axis that places in the bins of a map have at least: one less for each bit of position beyond few.
+int surePlaceBits(const TexelCode& map) {
+  const int beyond = std::max(map.column_bits + map.row_bits - kFewPositionBits, 0);
+  return std::min(std::max(TexelCode::kMaxPlaceBits - beyond, kSurePlaceBits), map.place_bits);
+}
+
+/// Logarithm of the number of cells of a block: about `wanted`, but enough that codes keep places to surePlaceBits.
 int cellBits(const TexelCode& map, int side_bits, std::uint64_t wanted) {
   const int most = map.column_bits + map.row_bits;
   int bits = std::min(wanted == 0 ? 0 : static_cast<int>(std::bit_width(wanted)) - 1, most);
-  const int sure = side_bits + std::min(kSurePlaceBits, map.place_bits);
+  const int sure = side_bits + surePlaceBits(map);
   while (bits < most && blockCode(map, side_bits, bits).place_bits < sure) ++bits;
   return bits;
 }
@@ -332,7 +342,8 @@ class Builder {
   void divide(std::size_t node, std::size_t first_key, Block block) {
     const Filling texels = filling(first_key, block.side_bits);
     if (texels.all == 0) return;
-    if (block.side_bits > 0 && (texels.all > kMostOfBlock || texels.fullest > kMostOfSharedBin)) {
+    const bool is_coarse = block.side_bits + surePlaceBits(code_) > kMostBlockPlaceBits;
+    if (block.side_bits > 0 && (texels.all > kMostOfBlock || texels.fullest > kMostOfSharedBin || is_coarse)) {
       const auto first_child = static_cast<std::uint32_t>(out_.nodes.size() / 2);
       out_.nodes[2 * node] = BinMap::kSplit;
       out_.nodes[2 * node + 1] = first_child;
