@@ -148,7 +148,7 @@ GLINT_API glint_footprint glint_footprint_from_differentials(float u, float v, f
 /* Density towards one half vector.
  *
  * 0 outside the square |x|, |y| <= 1 and for half vectors that are not numbers. Footprints: a centre that is not finite counts
- * as 0; sizes that are too small or not finite count as the narrowest footprint; those larger than the map are shortened to it,
+ * as 0; sizes that are too small or not finite count as the narrowest footprint; those longer than the map wind round it,
  * and kinds with levels answer what is larger than coarsest_sigma_texels as that, around its centre. These know round
  * footprints: boxes count as the Gaussian of the same moments, and stretched ones as several (footprint_parts).
  * Returns GLINT_ERROR_USAGE for null arguments, else GLINT_OK. */

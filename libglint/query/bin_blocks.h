@@ -358,7 +358,12 @@ class BinBlocks {
   template <class Visitor>
   GLINT_HD void forEachWindow(const TexelCover& cover, Visitor&& visitor) const {
     for (int y = 0; y < cover.originY() + cover.rows(); y += map_.height) {
-      for (int x = 0; x < cover.originX() + cover.columns(); x += map_.width) {
+      // Slanted footprints miss most periods of their bounding box.
+      CoverSpan outer, inner;
+      cover.spans(std::max(y - cover.originY(), 0), y + map_.height - cover.originY(), outer, inner);
+      const int first = floorTo(outer.low, cover.columns()) + cover.originX(), last = floorTo(outer.high, cover.columns());
+      for (int x = std::max(0, first - first % map_.width); x <= last + cover.originX(); x += map_.width) {
+        if (x >= cover.originX() + cover.columns()) break;
         visitor(Window{cover.originX() - x, cover.originY() - y, std::max(cover.originX() - x, 0),
                        std::min(cover.originX() + cover.columns() - x, map_.width), std::max(cover.originY() - y, 0),
                        std::min(cover.originY() + cover.rows() - y, map_.height)});

@@ -144,18 +144,20 @@ class HistogramNdf {
       const double area = addBox(p, sum);
       if (area > 0) return area;
     }
-    // Half axes of the parallelogram of the same covariance, two of its sides upright: Cholesky's factor times sqrt(3).
-    const UsableCovariance c = usableCovariance(p.covariance, sat_.width, sat_.height);
-    const double ax = std::sqrt(3 * c.xx), ay = c.xy * std::sqrt(3 / c.xx), by = std::sqrt(3 * c.determinant() / c.xx);
-    if (gaussian_ == GaussianBoxes::one) return addParallelogram(p.centre, ax, ay, 0, by, 1, sum);
+    // The parallelogram of the same covariance, two of its sides upright: Cholesky's factor.
+    const UsableCovariance c = positiveCovariance(p.covariance);
+    const double across = std::sqrt(c.xx);
+    const AxisPair sigma = {{across, c.xy / across}, {0, std::sqrt(c.determinant()) / across}};
+    if (gaussian_ == GaussianBoxes::one)
+      return addParallelogram(p.centre, woundBox(sigma, sat_.width, sat_.height), 1, sum);
     // Nested boxes for a Gaussian: sizes relative to the box of its covariance, and shares. Fitted: least squared difference
     // under sum of shares 1, sum of shares * scales^2 1.
     constexpr double scales[3] = {0.508447702070, 0.812387977981, 1.239504002977};
     constexpr double shares[3] = {0.179460940730, 0.350350560935, 0.470188498334};
     double total = 0;
     for (int k = 0; k < 3; ++k) {
-      const double s = scales[k];
-      total += addParallelogram(p.centre, s * ax, s * ay, 0, s * by, shares[k] / (4 * s * s * ax * by), sum);
+      const AxisPair half = woundBox(sigma.scaled(scales[k], scales[k]), sat_.width, sat_.height);
+      total += addParallelogram(p.centre, half, shares[k] / (4 * std::fabs(half.cross())), sum);
     }
     return total;
   }
@@ -163,25 +165,21 @@ class HistogramNdf {
   /// Adds a box as it is. Returns its area; 0 if it cannot be answered, as where it has none or no finite size.
   template <class Sum>
   GLINT_HD double addBox(const Footprint& p, Sum& sum) const {
-    double ax = p.axis_a.x, ay = p.axis_a.y, bx = p.axis_b.x, by = p.axis_b.y;
-    const double reach_x = std::fabs(ax) + std::fabs(bx), reach_y = std::fabs(ay) + std::fabs(by);
-    const bool aligned = (ay == 0 && bx == 0) || (ax == 0 && by == 0);
-    if (!(std::isfinite(reach_x) && std::isfinite(reach_y))) return 0;
-    // Where it is a hundred periods long, or at an angle and four, the rest makes no difference that is worth its cost.
-    const double most = aligned ? kMostPeriods : 2;
-    const double sx = std::min(1.0, most * sat_.width / std::max(reach_x, 1e-30));
-    const double sy = std::min(1.0, most * sat_.height / std::max(reach_y, 1e-30));
-    ax *= sx, bx *= sx, ay *= sy, by *= sy;
-    const double area = 4 * std::fabs(ax * by - ay * bx);
-    const double longest = 2 * std::max(std::hypot(ax, ay), std::hypot(bx, by));
-    if (!(area > 2 * double{kMinBoxThickness} * longest)) return 0;
-    return addParallelogram(p.centre, ax, ay, bx, by, 1, sum);
+    AxisPair half = halfAxes(p);
+    if (!hasArea(half)) return 0;
+    const bool aligned = (half.a[1] == 0 && half.b[0] == 0) || (half.a[0] == 0 && half.b[1] == 0);
+    if (!aligned) return addParallelogram(p.centre, shortenedBox(half, sat_.width, sat_.height), 1, sum);
+    // Where it is a hundred periods long, the rest makes no difference that is worth its cost.
+    const double most[2] = {kMostPeriods * sat_.width, kMostPeriods * sat_.height};
+    for (double* axis : {half.a, half.b})
+      for (int k = 0; k < 2; ++k) axis[k] = std::clamp(axis[k], -most[k], most[k]);
+    return addParallelogram(p.centre, half, 1, sum);
   }
 
   /// Returns the area that it adds, times the weight.
   template <class Sum>
-  GLINT_DEVICE_CALL GLINT_HD double addParallelogram(Vec2 centre_uv, double ax, double ay, double bx, double by, double weight,
-                                                     Sum& sum) const {
+  GLINT_DEVICE_CALL GLINT_HD double addParallelogram(Vec2 centre_uv, const AxisPair& half, double weight, Sum& sum) const {
+    const double ax = half.a[0], ay = half.a[1], bx = half.b[0], by = half.b[1];
     const double x = double{wrapUnit(centre_uv.x)} * sat_.width, y = double{wrapUnit(centre_uv.y)} * sat_.height;
     if ((ay == 0 && bx == 0) || (ax == 0 && by == 0)) {
       const double rx = std::fabs(ax) + std::fabs(bx), ry = std::fabs(ay) + std::fabs(by);

@@ -127,7 +127,7 @@ class Reference {
     };
     if (surface_ == Surface::smooth && boundary_ == Boundary::clamp)
       p.centre = {onSurface(p.centre.x, map_.width), onSurface(p.centre.y, map_.height)};
-    return {p, map_.width, map_.height};
+    return {p, map_.width, map_.height, boundary_};
   }
 
   template <class Lobe>
@@ -157,7 +157,7 @@ class Reference {
         sum += double{weights.triangle(i, j, 1)} * lobe.triangle(n, up, far);
       }
     };
-    forEachPeriod(weights, [&](const Window& w) { descend(w, support, reach, leaf); });
+    forEachPeriod(weights, [&](const Window& w) { descend(weights, w, support, reach, leaf); });
     const double total =
         boundary_ == Boundary::wrap && weights.hasClosedFormTotal() ? weights.closedFormTotal() : totalWeight(p);
     return total > 0 ? sum / total : 0;
@@ -178,11 +178,13 @@ class Reference {
     const int first_x = wrap ? floorTo(weights.column_begin, map_.width) : 0, last_x = wrap ? weights.column_end : map_.width;
     const int first_y = wrap ? floorTo(weights.row_begin, map_.height) : 0, last_y = wrap ? weights.row_end : map_.height;
     for (int y = first_y; y < last_y; y += map_.height) {
-      for (int x = first_x; x < last_x; x += map_.width) {
+      const auto columns = weights.columnsIn(std::max(weights.row_begin, y), std::min(weights.row_end, y + map_.height));
+      const int begin_x = std::max(first_x, wrap ? floorTo(columns.begin, map_.width) : 0);
+      for (int x = begin_x; x < std::min(last_x, columns.end); x += map_.width) {
         const Window w = {x,
                           y,
-                          std::max(weights.column_begin - x, 0),
-                          std::min(weights.column_end - x, map_.width),
+                          std::max(columns.begin - x, 0),
+                          std::min(columns.end - x, map_.width),
                           std::max(weights.row_begin - y, 0),
                           std::min(weights.row_end - y, map_.height)};
         if (w.column_begin < w.column_end && w.row_begin < w.row_end) visitor(w);
@@ -193,14 +195,19 @@ class Reference {
   template <class Visitor>
   GLINT_HD void forEachCell(const FootprintWeights& weights, Visitor&& visitor) const {
     forEachPeriod(weights, [&](const Window& w) {
-      for (int j = w.row_begin; j < w.row_end; ++j)
-        for (int i = w.column_begin; i < w.column_end; ++i) visitor(w.offset_x + i, w.offset_y + j);
+      for (int j = w.offset_y + w.row_begin; j < w.offset_y + w.row_end; ++j) {
+        const auto columns = weights.columnsIn(j, j + 1);
+        const int begin = std::max(w.offset_x + w.column_begin, columns.begin);
+        const int end = std::min(w.offset_x + w.column_end, columns.end);
+        for (int i = begin; i < end; ++i) visitor(i, j);
+      }
     });
   }
 
   /// Visits the texels of a window whose block bounds come near the lobe.
   template <class Leaf>
-  GLINT_HD void descend(const Window& w, const Box2& support, float reach, Leaf&& leaf) const {
+  GLINT_HD void descend(const FootprintWeights& weights, const Window& w, const Box2& support, float reach,
+                        Leaf&& leaf) const {
     struct Node {
       int level, i, j;
     };
@@ -222,6 +229,10 @@ class Reference {
           const int shift = node.level;  // children cover 2^shift texels
           if ((i << shift) >= w.column_end || ((i + 1) << shift) <= w.column_begin) continue;
           if ((j << shift) >= w.row_end || ((j + 1) << shift) <= w.row_begin) continue;
+          if (shift > 0) {  // slanted footprints miss blocks of their bounding box
+            const auto columns = weights.columnsIn(w.offset_y + (j << shift), w.offset_y + ((j + 1) << shift));
+            if (w.offset_x + (i << shift) >= columns.end || w.offset_x + ((i + 1) << shift) <= columns.begin) continue;
+          }
           if (node.level > 0)
             stack[count++] = {node.level - 1, i, j};
           else

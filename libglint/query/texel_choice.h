@@ -122,17 +122,18 @@ class TexelChooser {
     const Box2 map = {{border, border}, {static_cast<float>(grid_.width) - border, static_cast<float>(grid_.height) - border}};
     const SmallPolygon shape = weights_.localShape(grid_.boundary == Boundary::clamp ? &map : nullptr);
     if (shape.count < 3 || !(std::fabs(shape.twiceSignedArea()) > 0)) return {};
-    const Vec2 at = weights_.fromLocal(pointIn(shape, xi)) - Vec2{border, border};
-    const Vec2 corner = {std::floor(at.x), std::floor(at.y)};
+    double x = 0, y = 0;
+    weights_.fromLocal(pointIn(shape, xi), x, y);
+    x -= border, y -= border;
     TexelChoice texel;
     texel.found = true;
-    texel.i = static_cast<int>(corner.x);
-    texel.j = static_cast<int>(corner.y);
+    texel.i = static_cast<int>(std::floor(x));
+    texel.j = static_cast<int>(std::floor(y));
     if (grid_.boundary == Boundary::clamp) {  // rounding can leave the map
       texel.i = std::clamp(texel.i, columns_.begin, columns_.end - 1);
       texel.j = std::clamp(texel.j, rows_.begin, rows_.end - 1);
     }
-    texel.half = smooth() && at.y - corner.y > at.x - corner.x ? 1 : 0;
+    texel.half = smooth() && y - std::floor(y) > x - std::floor(x) ? 1 : 0;
     xi = {lowerDigits(xi.x, 11), lowerDigits(xi.y, 11)};
     return texel;
   }

@@ -50,15 +50,17 @@ struct CoverSpan {
 /// Its coordinates count texels from the corner (originX, originY) of the map, the texel where its bounding box begins. Texel
 /// (i, j) of the map lies at (i - originX + m width, j - originY + n height) for all integers m, n.
 ///
-/// Boxes are what they say, shortened to four times the map along u and v. Gaussians become the parallelogram with the same
-/// second moments along their principal axes, with the covariance of `usableCovariance`; boxes without area or finite size
-/// become the Gaussian of their moments first (as in FootprintWeights).
+/// Boxes are what they say, very long ones shortened by `shortenedBox`. Gaussians become the parallelogram with the same
+/// second moments along their principal axes, or that of `woundBox` where they are longer than the map; boxes without area or
+/// finite size become the Gaussian of their moments first (as in FootprintWeights).
 class TexelCover {
  public:
   GLINT_DEVICE_CALL GLINT_HD TexelCover(const Footprint& p, int width, int height) : width_(width), height_(height) {
-    double axes[2][2];
-    if (!(p.kind == Footprint::Kind::box && boxAxes(p, axes)))
-      gaussianAxes(usableCovariance(p.covariance, width, height), axes);
+    AxisPair half = halfAxes(p);
+    half = p.kind == Footprint::Kind::box && hasArea(half)
+               ? shortenedBox(half, width, height)
+               : woundBox(deviationsOf(positiveCovariance(p.covariance)), width, height);
+    const double axes[2][2] = {{half.a[0], half.a[1]}, {half.b[0], half.b[1]}};
     const double det = axes[0][0] * axes[1][1] - axes[0][1] * axes[1][0];
     area_ = 4 * std::fabs(det);
     rows_[0][0] = axes[1][1] / det, rows_[0][1] = -axes[1][0] / det;
@@ -145,33 +147,6 @@ class TexelCover {
  private:
   static GLINT_HD double overlap(int x, double low, double high) {
     return std::max(0.0, std::min(x + 1.0, high) - std::max(double(x), low));
-  }
-
-  GLINT_HD bool boxAxes(const Footprint& p, double (&axes)[2][2]) const {
-    const double a[2] = {p.axis_a.x, p.axis_a.y}, b[2] = {p.axis_b.x, p.axis_b.y};
-    const double limit[2] = {2.0 * width_, 2.0 * height_};
-    for (int k = 0; k < 2; ++k) {
-      const double reach = std::fabs(a[k]) + std::fabs(b[k]);
-      if (!std::isfinite(reach)) return false;
-      const double scale = reach > limit[k] ? limit[k] / reach : 1;
-      axes[0][k] = scale * a[k];
-      axes[1][k] = scale * b[k];
-    }
-    const double det = axes[0][0] * axes[1][1] - axes[0][1] * axes[1][0];
-    const double longest = std::sqrt(std::max(axes[0][0] * axes[0][0] + axes[0][1] * axes[0][1],  //
-                                              axes[1][0] * axes[1][0] + axes[1][1] * axes[1][1]));
-    return std::fabs(det) > double{kMinBoxThickness} * longest;
-  }
-
-  /// Half axes of length sqrt(3) deviations along the principal axes.
-  static GLINT_HD void gaussianAxes(const UsableCovariance& c, double (&axes)[2][2]) {
-    const double mean = 0.5 * (c.xx + c.yy), half = 0.5 * (c.xx - c.yy), split = std::sqrt(half * half + c.xy * c.xy);
-    const double angle = c.xy == 0 ? 0 : 0.5 * std::atan2(c.xy, half);
-    const double cosine = std::cos(angle), sine = c.xy == 0 ? 0 : std::sin(angle);
-    const double first = std::sqrt(3 * (c.xy == 0 ? c.xx : mean + split));
-    const double second = std::sqrt(3 * (c.xy == 0 ? c.yy : c.determinant() / (mean + split)));
-    axes[0][0] = first * cosine, axes[0][1] = first * sine;
-    axes[1][0] = -second * sine, axes[1][1] = second * cosine;
   }
 
   static GLINT_HD void place(double centre, double reach, int size, int& origin, int& count, double& low, double& high) {
