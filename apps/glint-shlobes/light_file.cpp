@@ -103,6 +103,10 @@ bake::Environment readAreaLights(Tool& tool, const std::string& path, const Area
       light.axis_u = reader.vector("axis_u");
       light.axis_v = reader.vector("axis_v");
       reader.readSurface(light);
+      if (!bake::facesOrigin(light))
+        tool.warn(path + ": light " + std::to_string(k) +
+                  " faces away from the shading point, which sees nothing of it: a rectangle emits to the side of axis_u x "
+                  "axis_v; negate one of them");
     } else if (type == "sphere") {
       reader.allowOnly({"type", "centre", "radius", "radiance", "texture"});
       bake::SphereLight& light = spheres.emplace_back();
@@ -116,16 +120,23 @@ bake::Environment readAreaLights(Tool& tool, const std::string& path, const Area
   return bake::renderAreaLights(rectangles, spheres, options.height, options.samples);
 }
 
-}  // namespace
-
-bake::Environment readLight(Tool& tool, const std::string& path, const AreaLightOptions& options) {
-  if (std::filesystem::path(path).extension() == ".json") return readAreaLights(tool, path, options);
+bake::Environment readEnvironment(Tool& tool, const std::string& path) {
   const Image image = readInputImage(tool, path, kRadiance);
   if (!image.floating)
     throw Error(ErrorCode::invalid_input, "light.range", path, "", "holds integers, which cut off bright light",
                 "give an image of floating-point radiance, such as .exr or .hdr");
   bake::Environment environment{image.width, image.height, linearRgb(image, path)};
   bake::requireUsable(environment, path);
+  return environment;
+}
+
+}  // namespace
+
+bake::Environment readLight(Tool& tool, const std::string& path, const AreaLightOptions& options) {
+  const bool of_areas = std::filesystem::path(path).extension() == ".json";
+  bake::Environment environment = of_areas ? readAreaLights(tool, path, options) : readEnvironment(tool, path);
+  if (!bake::hasLightAbove(environment))
+    tool.warn(path + ": no light comes from above the surface (z > 0), so that the table is black");
   return environment;
 }
 

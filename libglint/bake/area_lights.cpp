@@ -104,6 +104,8 @@ void requireValid(std::span<const RectangleLight> rectangles, std::span<const Sp
 
 }  // namespace
 
+bool facesOrigin(const RectangleLight& light) { return dot(cross(light.axis_u, light.axis_v), light.centre) < 0; }
+
 Environment renderAreaLights(std::span<const RectangleLight> rectangles, std::span<const SphereLight> spheres, int height,
                              int samples) {
   if (height < 1 || height > kMaxHeight || samples < 1 || samples > kMaxSamples)

@@ -161,6 +161,12 @@ const float* Environment::at(Vec3 direction) const {
   return &rgb[(static_cast<std::size_t>(j) * static_cast<std::size_t>(width) + static_cast<std::size_t>(i)) * 3];
 }
 
+bool hasLightAbove(const Environment& environment) {
+  // Rows from the bottom; the middle one of an odd number reaches above the horizon.
+  const auto first = static_cast<std::ptrdiff_t>(environment.height / 2) * environment.width * 3;
+  return std::any_of(environment.rgb.begin() + first, environment.rgb.end(), [](float radiance) { return radiance > 0; });
+}
+
 void requireUsable(const Environment& e, const std::string& path) {
   if (e.width < 1 || e.height < 1 || e.rgb.size() != 3 * static_cast<std::size_t>(e.width) * static_cast<std::size_t>(e.height))
     refuse(path, "environment.size", "the environment has no pixels", "give a latitude-longitude image of RGB");

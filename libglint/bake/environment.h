@@ -26,6 +26,9 @@ struct Environment {
 /// every pixel finite and not negative.
 void requireUsable(const Environment& environment, const std::string& path = {});
 
+/// Whether any light comes from above the horizon, z > 0: a surface sees no other.
+bool hasLightAbove(const Environment& environment);
+
 /// Spherical harmonics of an environment up to a band: exact integrals over the pixels, in double.
 /// @return [3][shCount(band_limit)], R, G, B
 /// O(height * band_limit^2), and O(width * height log width) for the rows
@@ -41,6 +44,9 @@ struct RectangleLight {
   int texture_height = 0;
   std::vector<float> texture;  ///< [height][width][3], bottom row first; u along axis_u, v along axis_v
 };
+
+/// Whether the shading point is on the side of a rectangle that emits.
+bool facesOrigin(const RectangleLight& light);
 
 /// A sphere that emits outwards; its texture is laid out as an Environment.
 struct SphereLight {

@@ -221,6 +221,44 @@ BAD_LIGHTS = {
 }
 
 
+def radiance_of(glint, light):
+    """Of a flat mirror that looks up."""
+    if not (glint.folder / "flat.glint").exists():
+        glint("synth", "flat", "-o", "flat.png", "--size", 16)
+        glint("ingest", "flat.png", "-o", "flat.glint", "--allow-constant")
+    footprint = ["--uv", 0.5, 0.5, "--sigma", 2, "--sigma-r", 0.05]
+    return ask(glint, "flat.glint", *footprint, "--light", light, "--wo", 0, 0, 1)["radiance"]
+
+
+def test_the_lights_of_the_help_text_shine(glint, folder):
+    text = glint("shlobes", "--help").stdout
+    begin = text.index('{"lights"')
+    example, _ = json.JSONDecoder().raw_decode(text[begin:])
+    for light in example["lights"]:
+        light.pop("texture", None)
+    turned = {"lights": [dict(example["lights"][0], axis_v=[-v for v in example["lights"][0]["axis_v"]])]}
+    above = {"lights": [dict(example["lights"][0], centre=[0, 0, 3])]}
+    for name, lights in {"example": example, "turned": turned, "above": above}.items():
+        (folder / f"{name}.json").write_text(json.dumps(lights))
+        process = glint("shlobes", "--light", f"{name}.json", "-o", f"{name}.glint", "--order", 12, "--grid", "5x8")
+        assert process.returncode == 0
+        if name == "turned":
+            assert "light 0 faces away" in process.stderr and "axis_u x axis_v" in process.stderr
+            assert "no light comes from above" in process.stderr
+        else:
+            assert process.stderr == ""
+    assert radiance_of(glint, "turned.glint") == [0, 0, 0]
+    assert min(radiance_of(glint, "above.glint")) > 1
+
+
+def test_a_black_environment_is_warned_of(glint, folder):
+    below = constant(1)
+    below[: HEIGHT // 2] = 0  # image rows are from the top
+    write_exr(folder / "below.exr", below)
+    process = glint("shlobes", "--light", "below.exr", "-o", "below.glint", "--order", 8, "--grid", "5x8")
+    assert process.returncode == 0 and "no light comes from above" in process.stderr
+
+
 @pytest.mark.parametrize("name", BAD_LIGHTS)
 def test_bad_area_lights_are_refused(glint, folder, name):
     (folder / "bad.json").write_text(BAD_LIGHTS[name])
