@@ -70,17 +70,17 @@ std::optional<std::vector<float>> NdfAsset::scatteredImage(const Footprint& foot
                               size);
 }
 
-void NdfAsset::requireAnswerable(const Footprint& footprint) const {
-  if (opened_->hasNormals()) return;
-  const auto check = [&](const PyramidShape& shape) {
+std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint) const {
+  if (opened_->hasNormals()) return {};
+  const auto check = [&](const PyramidShape& shape) -> std::optional<FootprintFault> {
     const float sigma = isotropicSigma(shape, footprint), finest = finestSigma(shape);
-    if (sigma >= finest * 0.999f) return;
-    throw Error(ErrorCode::usage, "query.footprint", path_, "",
-                fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
-                "add --normals with the asset that the pyramid was made from");
+    if (sigma >= finest * 0.999f) return {};
+    return FootprintFault{fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
+                          "add --normals with the asset that the pyramid was made from"};
   };
-  if (const auto* pyramid = api::roundModel<PyramidNdf>(model())) check(pyramid->shape());
-  if (const auto* compressed = api::roundModel<CpNdf>(model())) check(compressed->shape());
+  if (const auto* pyramid = api::roundModel<PyramidNdf>(model())) return check(pyramid->shape());
+  if (const auto* compressed = api::roundModel<CpNdf>(model())) return check(compressed->shape());
+  return {};
 }
 
 }  // namespace glint::apps

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common/footprint_rules.h"
 #include "common/tool.h"
 #include "glint/api/any_ndf.h"
 
@@ -37,8 +38,8 @@ class NdfAsset {
   /// @return [size][size] pixel means, bottom row first
   std::optional<std::vector<float>> scatteredImage(const Footprint& footprint, int size) const;
 
-  /// Throws Error usage for footprints that the asset cannot answer without --normals.
-  void requireAnswerable(const Footprint& footprint) const;
+  /// Why the asset cannot answer for a footprint without --normals; nothing if it can.
+  std::optional<FootprintFault> unanswerable(const Footprint& footprint) const;
 
  private:
   /// An option that only some kinds of assets use.

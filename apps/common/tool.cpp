@@ -15,9 +15,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <system_error>
 
 #include "common/files.h"
+#include "common/numbers.h"
 #include "common/progress_reporter.h"
 #include "common/signals.h"
 #include "common/standard_streams.h"
@@ -59,10 +61,36 @@ std::string recordKey(const std::string& name) {
   return CLI::detail::to_lower(key);
 }
 
-std::string finiteNumber(const std::string& text) {
-  double value = 0;
-  if (!CLI::detail::lexical_cast(text, value)) return "'" + text + "' is not a number";
-  return std::isfinite(value) ? std::string() : "'" + text + "' is not a finite number";
+template <class T>
+struct ElementOf {
+  using Type = T;
+};
+template <class T>
+struct ElementOf<std::vector<T>> {
+  using Type = T;
+};
+
+/// Reads numbers strictly, and hands them on as CLI11 reads them right: its own reading takes "010" for eight, and wraps "-1".
+template <class T>
+CLI::Validator strictNumber() {
+  return {[](std::string& text) {
+            T value = 0;
+            std::string complaint = parseNumber(text, value);
+            if (complaint.empty()) text = fmt::format("{}", value);
+            return complaint;
+          },
+          "", "number"};
+}
+
+/// Numbers outside [low, high] are refused.
+CLI::Validator numberRange(double low, double high) {
+  const std::string range = fmt::format("{:g} to {:g}", low, high);
+  return {[low, high, range](std::string& text) {
+            double number = 0;
+            if (std::string complaint = parseNumber(text, number); !complaint.empty()) return complaint;
+            return number >= low && number <= high ? std::string() : text + " is not in the range " + range;
+          },
+          range, "range"};
 }
 
 const char* codeName(ErrorCode code) {
@@ -135,17 +163,9 @@ Option& Option::required() {
 }
 
 Option& Option::range(double low, double high) {
-  const std::string text = fmt::format("{:g} to {:g}", low, high);
-  option_->check(CLI::Validator(
-      [low, high, text](std::string& value) {
-        double number = 0;
-        if (!CLI::detail::lexical_cast(value, number)) return "'" + value + "' is not a number";
-        return number >= low && number <= high ? std::string() : value + " is not in the range " + text;
-      },
-      text, "range"));
+  option_->check(numberRange(low, high));
   double number = 0;
-  if (CLI::detail::lexical_cast(option_->get_default_str(), number) && !(number >= low && number <= high))
-    option_->default_str("");
+  if (parseNumber(option_->get_default_str(), number).empty() && !(number >= low && number <= high)) option_->default_str("");
   return *this;
 }
 
@@ -193,7 +213,7 @@ struct Tool::State {
 
   int threads = 0;
   std::uint64_t seed = 1;
-  bool seed_used = false;
+  bool uses_seed = false;
   bool json_result = false;
   bool quiet = false;
   bool verbose = false;
@@ -240,8 +260,12 @@ void Tool::addStandardOptions() {
   app.add_option("--threads", s.threads, "most threads to use; 0: all that the machine has")
       ->group(group)
       ->type_name("N")
-      ->check(CLI::Range(0, kMaxThreads).description(fmt::format("0 to {}", kMaxThreads)));
-  app.add_option("--seed", s.seed, "seed of every random choice")->group(group)->type_name("N");
+      ->transform(strictNumber<int>())
+      ->check(numberRange(0, kMaxThreads));
+  app.add_option("--seed", s.seed, "seed of every random choice")
+      ->group(group)
+      ->type_name("N")
+      ->transform(strictNumber<std::uint64_t>());
   app.add_flag("--json", s.json_result, "print the result, or the error, as one JSON document on stdout")->group(group);
   choice("--progress", s.progress_mode,
          {{"auto", ProgressMode::automatic}, {"none", ProgressMode::none}, {"json", ProgressMode::json}},
@@ -257,9 +281,8 @@ template <class T>
 Option& Tool::option(const std::string& name, T& value, const std::string& help) {
   CLI::Option* option = state_->app.add_option(name, value, help);
   if constexpr (kIsList<T>) option->delimiter(',')->allow_extra_args(false);  // must not swallow the positional arguments
-  if constexpr (std::is_floating_point_v<T> || std::is_same_v<T, std::vector<float>>) {
-    option->check(CLI::Validator(finiteNumber, "", "finite"));
-  }
+  using Element = typename ElementOf<T>::Type;
+  if constexpr (std::is_arithmetic_v<Element>) option->transform(strictNumber<Element>());
   return state_->add(option, name, [&value] { return toJson(value); });
 }
 template Option& Tool::option(const std::string&, int&, const std::string&);
@@ -297,6 +320,7 @@ Option& Tool::choiceOf(const std::string& name, const std::vector<std::string>& 
 }
 
 CLI::App& Tool::parser() { return state_->app; }
+void Tool::usesSeed() { state_->uses_seed = true; }
 void Tool::addCheck(std::function<void()> check) { state_->checks.push_back(std::move(check)); }
 void Tool::addLateCheck(std::function<void()> check) { state_->late_checks.push_back(std::move(check)); }
 const std::string& Tool::name() const { return state_->info.name; }
@@ -319,8 +343,8 @@ std::vector<std::string> Tool::readPaths() const {
   return paths;
 }
 
-std::uint64_t Tool::seed() {
-  state_->seed_used = true;
+std::uint64_t Tool::seed() const {
+  if (!state_->uses_seed) throw std::logic_error(name() + " takes a seed that it does not record");
   return state_->seed;
 }
 
@@ -355,7 +379,7 @@ std::string Tool::commandJson() const {
   for (std::size_t i = 0; i < state_->options.size(); ++i) {
     if (state_->options[i].recorded_) command[state_->recorders[i].first] = state_->recorders[i].second();
   }
-  if (state_->seed_used) command["seed"] = state_->seed;
+  if (state_->uses_seed) command["seed"] = state_->seed;
   return command.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
 }
 

@@ -79,7 +79,7 @@ class Tool {
   /// Declares an option or, when `name` has no dash, a positional argument. `value` holds the default, which the help shows
   /// unless it is empty or out of range, as that of an option is which does nothing until it is given.
   /// T: int, std::uint64_t, float, double, std::string, or std::vector of int, float or std::string (given as a,b,c).
-  /// Numbers that are not finite are a usage error.
+  /// Numbers are read by parseNumber (numbers.h): those that are not finite, or that T cannot hold, are a usage error.
   template <class T>
   Option& option(const std::string& name, T& value, const std::string& help);
 
@@ -105,6 +105,9 @@ class Tool {
   /// The parser, for what the functions above do not cover. Options declared here are not in the `command` record.
   CLI::App& parser();
 
+  /// Declares that the result depends on --seed: `command` records it. Call before run().
+  void usesSeed();
+
   /// Adds a check that runs after parsing and before the work. It throws glint::Error.
   void addCheck(std::function<void()> check);
 
@@ -124,8 +127,9 @@ class Tool {
   bool force() const;
   /// Value of --threads; all the processor's when it was not given. oneTBB is limited to it already.
   int threads() const;
-  /// Value of --seed. Calling this records the seed in `command`, so call it before provenance().
-  std::uint64_t seed();
+  /// Value of --seed.
+  /// @throws std::logic_error if usesSeed() was not called: the record of the run would lack the seed
+  std::uint64_t seed() const;
   /// Progress of a named stage, as --progress asks. The reporter lives until the next call or the end of the run.
   bake::ProgressFn progress(const std::string& stage);
   /// Sets the result that --json prints. An object whose keys are snake_case, with units in their names.
@@ -153,7 +157,7 @@ class Tool {
   /// JSON object of every recorded parameter, defaults included, keys sorted.
   std::string commandJson() const;
   /// What an asset records about this run: generator, command, and name (without folder, so that outputs do not depend on where
-  /// a build runs) and hash of every input. Reads the inputs. Call after seed(), if the seed matters.
+  /// a build runs) and hash of every input. Reads the inputs.
   /// @throws Error io if an input cannot be read
   formats::Provenance provenance() const;
 

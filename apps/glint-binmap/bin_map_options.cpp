@@ -2,10 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "common/numbers.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
@@ -14,27 +14,21 @@ namespace {
 
 /// Reads A or A:B.
 void parseAlpha(const std::string& text, bake::BinMapOptions& options) {
-  const char* const end = text.data() + text.size();
-  const auto fail = [&] {
-    throw Error(ErrorCode::usage, "option.value", {}, "--alpha", '"' + text + "\" is neither a number nor a range",
-                "give a roughness, as 0.01, or the smallest and the largest, as 0.01:0.16");
-  };
-  auto parsed = std::from_chars(text.data(), end, options.alpha);
-  if (parsed.ec != std::errc{}) fail();
-  if (parsed.ptr == end) return;
-  if (*parsed.ptr != ':') fail();
-  parsed = std::from_chars(parsed.ptr + 1, end, options.alpha_max);
-  if (parsed.ec != std::errc{} || parsed.ptr != end || options.alpha_max == 0) fail();
+  const std::size_t colon = text.find(':');
+  const bool range = colon != std::string::npos;
+  const bool read = parseNumber(text.substr(0, colon), options.alpha).empty() &&
+                    (!range || parseNumber(text.substr(colon + 1), options.alpha_max).empty());
+  if (read && (!range || options.alpha_max != 0)) return;
+  throw Error(ErrorCode::usage, "option.value", {}, "--alpha", '"' + text + "\" is neither a number nor a range",
+              "give a roughness, as 0.01, or the smallest and the largest, as 0.01:0.16");
 }
 
 }  // namespace
 
 BinMapCommand::BinMapCommand(Tool& tool) {
-  tool.option(
-          "--alpha", alpha_,
-          "Beckmann roughness of a facet: sqrt(2) times the deviation of its lobe; or a range A:B, for one asset that is asked "
-          "with any roughness between them")
-      .required();
+  tool.option("--alpha", alpha_,
+              "Beckmann roughness of a facet: sqrt(2) times the deviation of its lobe; or a range A:B, for one asset that is "
+              "asked with any roughness between them. The default is the roughness of the other tools' --sigma-r 0.005");
   tool.addCheck([this] { parseAlpha(alpha_, options_); });
   tool.option("--leaf-size", options_.leaf_size, "texels of a cell of the map within a list, on average at least");
 }

@@ -23,7 +23,8 @@ class BinMapCommand {
   BuiltBinMap build(const NormalMap& map, const bake::ProgressFn& progress) const;
 
  private:
-  std::string alpha_;  // A, or A:B
+  /// A, or A:B. The default is sqrt(2) 0.005, so that all methods answer the same question where nobody says otherwise.
+  std::string alpha_ = "0.0070710678";
   bake::BinMapOptions options_;
 };
 

@@ -2,9 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
+
+#include "common/numbers.h"
 
 namespace glint::apps {
 namespace {
@@ -14,11 +15,9 @@ constexpr float kResidual = 0.1f;
 constexpr float kDistant = 0.02f;
 constexpr double kFitError = 0.2;
 
-double number(const std::string& text, const std::string& whole) {
-  double value = 0;
-  const char* end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, value);
-  if (error != std::errc() || stop != end || !std::isfinite(value))
+float number(const std::string& text, const std::string& whole) {
+  float value = 0;
+  if (!parseNumber(text, value).empty())
     throw Error(ErrorCode::usage, "option.base", {}, "--base", "'" + whole + "' has '" + text + "' where a number should be",
                 "give diffuse:RHO, ggx:ALPHA or ggx:ALPHA:ETA,K");
   return value;
@@ -46,6 +45,7 @@ DisplaceCommand::DisplaceCommand(Tool& tool) : images_(tool) {
   tool.option("--spatial", options_.spatial, "patches of the spatial factor along each axis").range(1, 16);
   tool.option("--bounces", bounces_,
               "reflections of a light path at most; 1: shadowing and masking only; auto: until it escapes");
+  tool.usesSeed();
 }
 
 BaseBrdf parseBase(const std::string& text) {
@@ -53,7 +53,7 @@ BaseBrdf parseBase(const std::string& text) {
   const std::string kind = text.substr(0, colon), rest = colon == std::string::npos ? "" : text.substr(colon + 1);
   BaseBrdf base;
   if (kind == "diffuse") {
-    base.albedo = static_cast<float>(number(rest, text));
+    base.albedo = number(rest, text);
     return base;
   }
   if (kind != "ggx")
@@ -61,12 +61,12 @@ BaseBrdf parseBase(const std::string& text) {
                 "give diffuse:RHO, ggx:ALPHA or ggx:ALPHA:ETA,K");
   base.kind = BaseBrdf::Kind::ggx;
   const std::size_t second = rest.find(':');
-  base.alpha = static_cast<float>(number(rest.substr(0, second), text));
+  base.alpha = number(rest.substr(0, second), text);
   if (second == std::string::npos) return base;
   const std::string conductor = rest.substr(second + 1);
   const std::size_t comma = conductor.find(',');
-  base.eta = static_cast<float>(number(conductor.substr(0, comma), text));
-  base.k = static_cast<float>(number(comma == std::string::npos ? "" : conductor.substr(comma + 1), text));
+  base.eta = number(conductor.substr(0, comma), text);
+  base.k = number(comma == std::string::npos ? "" : conductor.substr(comma + 1), text);
   return base;
 }
 
@@ -76,9 +76,7 @@ bake::DisplaceOptions DisplaceCommand::options(const HeightMap& map) const {
   options.base = parseBase(images_.colored() && !base_given_->given() ? "diffuse:1" : base_);
   options.texture = images_.read(map.width, map.height);
   if (bounces_ == "auto") return options;
-  const char* end = bounces_.data() + bounces_.size();
-  const auto [stop, error] = std::from_chars(bounces_.data(), end, options.bounces);
-  if (error != std::errc() || stop != end || options.bounces < 1 || options.bounces > bake::kAllBounces)
+  if (!parseNumber(bounces_, options.bounces).empty() || options.bounces < 1 || options.bounces > bake::kAllBounces)
     throw Error(ErrorCode::usage, "option.range", {}, "--bounces", "'" + bounces_ + "' is not a number of reflections",
                 fmt::format("give auto, or 1 to {}", bake::kAllBounces));
   return options;

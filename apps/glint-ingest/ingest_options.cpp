@@ -76,6 +76,7 @@ IngestOptions::IngestOptions(Tool& tool) {
               {{"auto", Dequantize::automatic}, {"none", Dequantize::none}, {"tpdf", Dequantize::tpdf}},
               "tpdf: triangular noise of +-1 code hides the steps of integers; auto: for 8 bits only, also where they were "
               "scaled to 16 bits or floating point");
+  tool.usesSeed();
   tool.addCheck([this] {
     parseNoData(no_data_);
     if (kind_ == Kind::normal && to_ == To::heights) {

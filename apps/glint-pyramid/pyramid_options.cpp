@@ -2,8 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <nlohmann/json.hpp>
+
+#include "common/numbers.h"
 
 namespace glint::apps {
 
@@ -24,9 +25,7 @@ PyramidCommand::PyramidCommand(Tool& tool) {
 bake::PyramidOptions PyramidCommand::options() const {
   bake::PyramidOptions options = options_;
   if (levels_ == "auto") return options;
-  const char* end = levels_.data() + levels_.size();
-  const auto [stop, error] = std::from_chars(levels_.data(), end, options.levels);
-  if (error != std::errc() || stop != end || options.levels < 1)
+  if (!parseNumber(levels_, options.levels).empty() || options.levels < 1)
     throw Error(ErrorCode::usage, "option.range", {}, "--levels", "'" + levels_ + "' is not a number of levels",
                 "give auto, or 1 or more");
   return options;

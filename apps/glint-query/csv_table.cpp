@@ -3,19 +3,33 @@
 #include <csv.h>
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
 #include <memory>
 
 #include "common/files.h"
+#include "common/numbers.h"
 
 namespace glint::apps {
 namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
 
+std::span<const std::byte> withoutByteOrderMark(std::span<const std::byte> bytes) {
+  constexpr std::array kMark = {std::byte{0xEF}, std::byte{0xBB}, std::byte{0xBF}};
+  const bool marked = bytes.size() >= kMark.size() && std::equal(kMark.begin(), kMark.end(), bytes.begin());
+  return marked ? bytes.subspan(kMark.size()) : bytes;
+}
+
+/// The name of a column as it is looked up: in small letters, without the blanks around it.
+std::string keyOf(const std::string& name) {
+  std::string key(trimBlanks(name));
+  for (char& c : key)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return key;
+}
+
 Rows parseCsv(const std::string& path) {
   const std::vector<std::byte> bytes = readFile(path);
+  const std::span<const std::byte> text = withoutByteOrderMark(bytes);
   csv_parser parser;
   if (csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI) != 0) throw std::bad_alloc();
   const std::unique_ptr<csv_parser, void (*)(csv_parser*)> guard(&parser, csv_free);
@@ -32,7 +46,7 @@ Rows parseCsv(const std::string& path) {
     st->rows.push_back(std::move(st->row));
     st->row.clear();
   };
-  const bool ok = csv_parse(&parser, bytes.data(), bytes.size(), onField, onRow, &state) == bytes.size() &&
+  const bool ok = csv_parse(&parser, text.data(), text.size(), onField, onRow, &state) == text.size() &&
                   csv_fini(&parser, onField, onRow, &state) == 0;
   if (!ok)
     throw Error(ErrorCode::invalid_input, "csv.syntax", path, fmt::format("row {}", state.rows.size() + 1),
@@ -57,28 +71,37 @@ CsvTable CsvTable::read(const std::string& path) {
   CsvTable table;
   table.path_ = path;
   table.rows_ = parseCsv(path);
+  for (const std::string& name : table.rows_.front()) table.keys_.push_back(keyOf(name));
   for (std::size_t r = 1; r < table.rows_.size(); ++r) {
     if (table.rows_[r].size() == table.rows_.front().size()) continue;
-    throw Error(ErrorCode::invalid_input, "csv.row", path, fmt::format("row {}", r),
-                fmt::format("{} fields where the header has {}", table.rows_[r].size(), table.rows_.front().size()),
-                "give every row as many fields");
+    table.fail("csv.row", r - 1,
+               fmt::format("{} fields where the header has {}", table.rows_[r].size(), table.rows_.front().size()),
+               "give every row as many fields");
   }
   return table;
 }
 
 std::size_t CsvTable::find(const std::string& name) const {
-  return static_cast<std::size_t>(std::find(rows_.front().begin(), rows_.front().end(), name) - rows_.front().begin());
+  const auto found = std::find(keys_.begin(), keys_.end(), name);
+  if (found != keys_.end() && std::find(found + 1, keys_.end(), name) != keys_.end())
+    throw Error(ErrorCode::invalid_input, "csv.columns", path_, "header", "two columns are named " + name, "rename one");
+  return static_cast<std::size_t>(found - keys_.begin());
 }
 
-float CsvTable::number(const char* column, std::size_t row) const {
-  const std::string& text = rows_[row + 1][find(column)];
-  const std::size_t first = std::min(text.find_first_not_of(" \t"), text.size()), last = text.find_last_not_of(" \t") + 1;
-  float value = 0;
-  const auto [end, error] = std::from_chars(text.data() + first, text.data() + last, value);
-  if (error != std::errc() || end != text.data() + last || !std::isfinite(value))
-    throw Error(ErrorCode::invalid_input, "csv.number", path_, fmt::format("row {}, column {}", row + 1, column),
-                "'" + text + "' is not a finite number", "correct it");
+template <class T>
+T CsvTable::number(const char* column, std::size_t row) const {
+  T value = 0;
+  const std::string complaint = parseNumber(rows_[row + 1][find(column)], value);
+  if (!complaint.empty()) fail("csv.number", row, fmt::format("column {}: {}", column, complaint), "correct it");
   return value;
+}
+template float CsvTable::number(const char*, std::size_t) const;
+template int CsvTable::number(const char*, std::size_t) const;
+
+std::string CsvTable::header() const { return fmt::format("{}", fmt::join(rows_.front(), ",")); }
+
+void CsvTable::fail(const std::string& rule, std::size_t row, const std::string& what, const std::string& remedy) const {
+  throw Error(ErrorCode::invalid_input, rule, path_, fmt::format("row {}", row + 1), what, remedy);
 }
 
 std::string CsvTable::withColumns(std::span<const std::string> names, std::span<const float> values) const {

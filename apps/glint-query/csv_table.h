@@ -14,7 +14,8 @@ inline constexpr std::array kCentre = {"u", "v"};
 inline constexpr std::array kSigma = {"sigma"};
 inline constexpr std::array kHalf = {"hx", "hy"};
 
-/// A CSV table (RFC 4180) whose header names columns of numbers; further columns are kept as they are.
+/// A CSV table (RFC 4180) whose header names columns of numbers; further columns are kept as they are. A byte-order mark is
+/// skipped. Names of columns are found whatever their case and the blanks around them, and numbers are read by parseNumber.
 class CsvTable {
  public:
   /// @throws Error io; invalid_input that names the row
@@ -26,7 +27,7 @@ class CsvTable {
 
   template <std::size_t N>
   bool has(const std::array<const char*, N>& names) const {
-    return std::all_of(names.begin(), names.end(), [&](const char* name) { return find(name) < rows_.front().size(); });
+    return std::all_of(names.begin(), names.end(), [&](const char* name) { return find(name) < keys_.size(); });
   }
 
   /// Numbers of one row, 0 being the first below the header.
@@ -34,9 +35,17 @@ class CsvTable {
   template <std::size_t N>
   std::array<float, N> numbers(const std::array<const char*, N>& names, std::size_t row) const {
     std::array<float, N> values;
-    for (std::size_t k = 0; k < N; ++k) values[k] = number(names[k], row);
+    for (std::size_t k = 0; k < N; ++k) values[k] = number<float>(names[k], row);
     return values;
   }
+  /// A whole number of one row.
+  /// @throws as numbers
+  int wholeNumber(const char* column, std::size_t row) const { return number<int>(column, row); }
+
+  /// The names of the columns, for messages.
+  std::string header() const;
+  /// What is wrong with a row, 0 being the first below the header.
+  [[noreturn]] void fail(const std::string& rule, std::size_t row, const std::string& what, const std::string& remedy) const;
 
   /// The table with more columns.
   /// @param values  [rows][names]
@@ -44,10 +53,12 @@ class CsvTable {
 
  private:
   std::size_t find(const std::string& name) const;
-  float number(const char* column, std::size_t row) const;
+  template <class T>
+  T number(const char* column, std::size_t row) const;
 
   std::string path_;
   std::vector<std::vector<std::string>> rows_;  // the header first
+  std::vector<std::string> keys_;               // the header in small letters, without blanks
 };
 
 }  // namespace glint::apps

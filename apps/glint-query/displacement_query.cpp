@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
+#include "common/footprint_rules.h"
 #include "glint-query/queries.h"
 #include "glint/bake/counter_random.h"
 
@@ -14,7 +16,8 @@ namespace glint::apps {
 namespace {
 
 constexpr std::array kLevel = {"level"};
-constexpr std::array kDirections = {"wix", "wiy", "wiz", "wox", "woy", "woz"};
+constexpr std::array kLight = {"wix", "wiy", "wiz"};
+constexpr std::array kView = {"wox", "woy", "woz"};
 
 /// Side of the box with the second moments of a Gaussian.
 float diameterOf(float sigma) { return std::sqrt(12.0f) * sigma; }
@@ -30,19 +33,45 @@ std::vector<float> channelsOf(const DisplacedBrdf& brdf, Rgb color) {
   return brdf.asset().channels == 1 ? std::vector<float>{color.r} : std::vector<float>{color.r, color.g, color.b};
 }
 
-LevelBlend oneLevel(const Displacement& asset, int level, const std::string& path, const std::string& where) {
-  if (level >= 0 && level < asset.level_count) return {level, level, 0};
-  throw Error(path.empty() ? ErrorCode::usage : ErrorCode::invalid_input, "query.level", path, where,
-              fmt::format("the asset has no level {}", level), fmt::format("give 0 to {}", asset.level_count - 1));
+/// What is wrong with a level of detail; nothing if the asset has it.
+std::optional<FootprintFault> levelFault(const Displacement& asset, int level) {
+  if (level >= 0 && level < asset.level_count) return {};
+  return FootprintFault{fmt::format("the asset has no level {}", level), fmt::format("give 0 to {}", asset.level_count - 1)};
+}
+
+std::optional<Vec3> unitVector(Vec3 given) {
+  const float length = std::sqrt(dot(given, given));
+  if (!(length > 0 && std::isfinite(length))) return {};
+  return 1 / length * given;
+}
+
+constexpr const char* kDirectionRemedy = "give X Y Z, z out of the surface";
+
+/// A direction in columns of a table.
+Vec3 directionOf(const CsvTable& table, std::size_t row, const std::array<const char*, 3>& columns) {
+  const auto [x, y, z] = table.numbers(columns, row);
+  if (const auto unit = unitVector({x, y, z})) return *unit;
+  table.fail("csv.direction", row, fmt::format("{} is no direction", fmt::join(columns, ",")), kDirectionRemedy);
+}
+
+/// Where a row asks.
+DisplacedPoint pointOf(const DisplacedBrdf& brdf, const CsvTable& table, std::size_t row) {
+  const auto [u, v] = table.numbers(kCentre, row);
+  if (table.has(kSigma)) {
+    const auto [sigma] = table.numbers(kSigma, row);
+    if (const auto fault = sigmaFault(sigma)) table.fail("csv.footprint", row, "the footprint " + fault->what, fault->remedy);
+    return {{u, v}, brdf.levelsFor(diameterOf(sigma))};
+  }
+  const int level = table.wholeNumber(kLevel[0], row);
+  if (const auto fault = levelFault(brdf.asset(), level)) table.fail("query.level", row, fault->what, fault->remedy);
+  return {{u, v}, {level, level, 0}};
 }
 
 }  // namespace
 
 Vec3 directionOf(const std::vector<float>& xyz, const char* option) {
-  const Vec3 given = {xyz[0], xyz[1], xyz[2]};
-  const float length = std::sqrt(dot(given, given));
-  if (length > 0 && std::isfinite(length)) return 1 / length * given;
-  throw Error(ErrorCode::usage, "query.arguments", "", option, "is no direction", "give X Y Z, z out of the surface");
+  if (const auto unit = unitVector({xyz[0], xyz[1], xyz[2]})) return *unit;
+  throw Error(ErrorCode::usage, "query.arguments", "", option, "is no direction", kDirectionRemedy);
 }
 
 DisplacementQuery::DisplacementQuery(Tool& tool) : tool_(tool) {
@@ -63,8 +92,10 @@ DisplacementQuery::DisplacementQuery(Tool& tool) : tool_(tool) {
 }
 
 DisplacedPoint DisplacementQuery::point(const Displacement& asset, Vec2 uv, float sigma) const {
-  if (level_option_->given()) return {uv, oneLevel(asset, level_, "", "--level")};
-  return {uv, DisplacedBrdf(asset).levelsFor(diameterOf(sigma))};
+  if (!level_option_->given()) return {uv, DisplacedBrdf(asset).levelsFor(diameterOf(sigma))};
+  if (const auto fault = levelFault(asset, level_))
+    throw Error(ErrorCode::usage, "query.level", "", "--level", fault->what, fault->remedy);
+  return {uv, {level_, level_, 0}};
 }
 
 void DisplacementQuery::reflect(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int repeats) const {
@@ -109,25 +140,19 @@ std::string DisplacementQuery::samples(const DisplacedBrdf& brdf, const Displace
 
 std::string DisplacementQuery::table(const DisplacedBrdf& brdf, const std::string& path) const {
   const CsvTable table = CsvTable::read(path);
-  const bool reflects = table.has(kDirections);
+  const bool reflects = table.has(kLight) && table.has(kView);
   if (!table.has(kCentre) || table.has(kSigma) == table.has(kLevel) || reflects == table.has(kHalf))
-    throw Error(ErrorCode::invalid_input, "csv.columns", path, "header", "the columns do not make one query of a displacement",
+    throw Error(ErrorCode::invalid_input, "csv.columns", path, "header",
+                "the columns " + table.header() + " do not make one query of a displacement",
                 "name u,v; sigma or level; wix,wiy,wiz,wox,woy,woz or hx,hy");
-  const auto place = [&](std::size_t row) -> DisplacedPoint {
-    const auto [u, v] = table.numbers(kCentre, row);
-    if (table.has(kSigma)) return {{u, v}, brdf.levelsFor(diameterOf(table.numbers(kSigma, row)[0]))};
-    const auto level = static_cast<int>(table.numbers(kLevel, row)[0]);
-    return {{u, v}, oneLevel(brdf.asset(), level, path, fmt::format("row {}, column level", row + 1))};
-  };
   std::vector<std::string> names = {reflects ? "reflected" : "density"};
   if (reflects && brdf.asset().channels == 3) names = {"reflected_r", "reflected_g", "reflected_b"};
   std::vector<float> answers;
   for (std::size_t row = 0; row < table.count(); ++row) {
-    const DisplacedPoint at = place(row);
+    const DisplacedPoint at = pointOf(brdf, table, row);
     if (reflects) {
-      const auto w = table.numbers(kDirections, row);
-      const Rgb color = brdf.reflected(at.levels, at.uv, directionOf({w[0], w[1], w[2]}, "wix,wiy,wiz"),
-                                       directionOf({w[3], w[4], w[5]}, "wox,woy,woz"), variant_);
+      const Rgb color =
+          brdf.reflected(at.levels, at.uv, directionOf(table, row, kLight), directionOf(table, row, kView), variant_);
       for (const float channel : channelsOf(brdf, color)) answers.push_back(channel);
     } else {
       const auto [x, y] = table.numbers(kHalf, row);

@@ -53,7 +53,7 @@ std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int
 /// Further columns are kept.
 class QueryTable {
  public:
-  /// @throws Error io; invalid_input that names the line and the column
+  /// @throws Error io; invalid_input that names the row, for what an option would refuse too
   static QueryTable read(const std::string& path);
 
   const std::vector<Query>& queries() const { return queries_; }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/footprint_rules.h"
 #include "common/ndf_picture.h"
 
 namespace glint::apps {
@@ -21,7 +22,8 @@ QueryCommand::QueryCommand(Tool& tool) : tool_(tool), light_(tool), displacement
   tool.section(Tool::kOptions);
   wo_option_ = &tool.option("--wo", wo_, "--light and --wi: outgoing direction X Y Z, z out of the surface").count(3);
   uv_option_ = &tool.option("--uv", uv_, "centre of the footprint, texture space").count(2);
-  sigma_option_ = &tool.option("--sigma", sigma_, "footprint: deviation of an isotropic Gaussian, texels").range(1e-6, 1e9);
+  sigma_option_ =
+      &tool.option("--sigma", sigma_, "footprint: deviation of an isotropic Gaussian, texels").range(kLeastSigma, kMostSigma);
   covariance_option_ = &tool.option("--cov", covariance_, "footprint: covariance SXX SXY SYY of a Gaussian, texels^2").count(3);
   box_option_ = &tool.option("--box", box_, "footprint: half axes AX AY BX BY of a parallelogram, texels").count(4);
   half_option_ = &tool.option("--half", half_, "ask for the density towards a half vector HX HY").count(2);
@@ -42,6 +44,7 @@ QueryCommand::QueryCommand(Tool& tool) : tool_(tool), light_(tool), displacement
   sigma_option_->excludes(*covariance_option_).excludes(*box_option_);
   covariance_option_->excludes(*box_option_);
   half_option_->excludes(*range_option_);
+  tool.usesSeed();
   tool.addCheck([this] { check(); });
 }
 
@@ -71,7 +74,8 @@ void QueryCommand::check() const {
   if (light_.asked() && (!wo_option_->given() || !(wo_[2] > 0)))
     throw Error(ErrorCode::usage, "query.arguments", "", "--wo", "no outgoing direction above the surface was given",
                 "add --wo X Y Z with Z > 0");
-  if (covariance_option_->given()) checkCovariance();
+  if (covariance_option_->given()) checkFootprint("--cov");
+  if (box_option_->given()) checkFootprint("--box");
   if (image_.empty()) return;
   checkPictureName(image_);
   checkOutput(tool_, image_, OutputFormat::image);
@@ -87,12 +91,8 @@ void QueryCommand::checkTableOutput() const {
   tool_.addOutput(output_);
 }
 
-void QueryCommand::checkCovariance() const {
-  constexpr double kRounding = 1e-5;  // of a line that has no width
-  const double xx = covariance_[0], xy = covariance_[1], yy = covariance_[2];
-  if (xx >= 0 && yy >= 0 && xy * xy <= (1 + kRounding) * xx * yy) return;
-  usage(fmt::format("--cov {:g} {:g} {:g} is no covariance", xx, xy, yy),
-        "give variances SXX, SYY >= 0, and SXY with SXY^2 <= SXX SYY");
+void QueryCommand::checkFootprint(const std::string& option) const {
+  if (const auto fault = footprintFault(footprint())) usage(option + " " + fault->what, fault->remedy);
 }
 
 Footprint QueryCommand::footprint() const {
@@ -143,7 +143,8 @@ void QueryCommand::run(NdfAsset& asset) {
     usage("--wi, --level and --variant ask how a surface reflects; this asset holds how its normals are distributed",
           "ask an asset of kind displacement, from glint-displace; or --half, --range, --samples, --image or --light");
   if (csv_option_->given()) return answerTable(asset);
-  asset.requireAnswerable(footprint());
+  if (const auto fault = asset.unanswerable(footprint()))
+    throw Error(ErrorCode::usage, "query.footprint", asset.path(), "", fault->what, fault->remedy);
   if (!image_.empty()) writePicture(asset);
   if (samples_ > 0) writeSamples(asset);
   if (light_.asked()) return light_.run(asset, footprint(), directionOf(wo_, "--wo"));
@@ -152,7 +153,10 @@ void QueryCommand::run(NdfAsset& asset) {
 
 void QueryCommand::answerTable(NdfAsset& asset) {
   const QueryTable table = QueryTable::read(csv_);
-  for (const Query& query : table.queries()) asset.requireAnswerable(query.footprint);
+  for (std::size_t row = 0; row < table.queries().size(); ++row) {
+    if (const auto fault = asset.unanswerable(table.queries()[row].footprint))
+      throw Error(ErrorCode::usage, "query.footprint", csv_, fmt::format("row {}", row + 1), fault->what, fault->remedy);
+  }
   const std::string text = table.withAnswers(answerAll(asset.model(), table.queries()));
   writeTable(text);
   tool_.setResult({{"queries", table.queries().size()}});

@@ -26,7 +26,7 @@ class QueryCommand {
   void check() const;
   void checkTable() const;
   void checkTableOutput() const;
-  void checkCovariance() const;
+  void checkFootprint(const std::string& option) const;
   void checkDisplacement() const;
   Footprint footprint() const;
   Query query() const;

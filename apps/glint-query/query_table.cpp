@@ -1,5 +1,6 @@
 #include <array>
 
+#include "common/footprint_rules.h"
 #include "glint-query/queries.h"
 
 namespace glint::apps {
@@ -13,15 +14,21 @@ void requireColumns(const CsvTable& columns) {
   const int sizes = columns.has(kSigma) + columns.has(kCovariance) + columns.has(kBox);
   const int targets = columns.has(kHalf) + columns.has(kRange);
   if (columns.has(kCentre) && sizes == 1 && targets == 1) return;
-  throw Error(ErrorCode::invalid_input, "csv.columns", columns.path(), "header", "the columns do not make one query",
+  throw Error(ErrorCode::invalid_input, "csv.columns", columns.path(), "header",
+              "the columns " + columns.header() + " do not make one query",
               "name u,v; one of sigma or sxx,sxy,syy or ax,ay,bx,by; one of hx,hy or x0,y0,x1,y1");
 }
 
 Query readQuery(const CsvTable& columns, std::size_t row) {
+  const auto refuse = [&](const std::optional<FootprintFault>& fault) {
+    if (fault) columns.fail("csv.footprint", row, "the footprint " + fault->what, fault->remedy);
+  };
   Query query;
   const auto [u, v] = columns.numbers(kCentre, row);
   if (columns.has(kSigma)) {
-    query.footprint = Footprint::isotropic({u, v}, columns.numbers(kSigma, row)[0]);
+    const auto [sigma] = columns.numbers(kSigma, row);
+    refuse(sigmaFault(sigma));
+    query.footprint = Footprint::isotropic({u, v}, sigma);
   } else if (columns.has(kCovariance)) {
     const auto [xx, xy, yy] = columns.numbers(kCovariance, row);
     query.footprint = Footprint::gaussian({u, v}, {xx, xy, yy});
@@ -29,6 +36,7 @@ Query readQuery(const CsvTable& columns, std::size_t row) {
     const auto [ax, ay, bx, by] = columns.numbers(kBox, row);
     query.footprint = Footprint::box({u, v}, {ax, ay}, {bx, by});
   }
+  if (!columns.has(kSigma)) refuse(footprintFault(query.footprint));
   if (columns.has(kHalf)) {
     const auto [x, y] = columns.numbers(kHalf, row);
     query.half = Vec2{x, y};

@@ -2,8 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <nlohmann/json.hpp>
+
+#include "common/numbers.h"
 
 namespace glint::apps {
 
@@ -16,12 +17,7 @@ SatOptions::SatOptions(Tool& tool) {
 }
 
 void SatOptions::readBins() {
-  const char* end = bins_.data() + bins_.size();
-  const auto [cross, first_error] = std::from_chars(bins_.data(), end, options_.theta_bins);
-  const bool crossed = first_error == std::errc() && cross != end && *cross == 'x';
-  const auto [stop, second_error] =
-      crossed ? std::from_chars(cross + 1, end, options_.phi_bins) : std::from_chars_result{end, std::errc::invalid_argument};
-  const bool two = second_error == std::errc() && stop == end;
+  const bool two = parseProduct(bins_, options_.theta_bins, options_.phi_bins);
   if (two && options_.theta_bins >= 1 && options_.theta_bins <= HistogramSat::kMaxThetaBins && options_.phi_bins >= 1 &&
       options_.phi_bins <= HistogramSat::kMaxPhiBins && options_.theta_bins * options_.phi_bins <= HistogramSat::kMaxBins) {
     return;

@@ -1,8 +1,10 @@
 #include "glint-shlobes/light_file.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <initializer_list>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
@@ -50,14 +52,14 @@ class LightReader {
   }
   float number(const char* name) const {
     if (!light_.contains(name) || !light_[name].is_number()) fail(std::string("needs a number \"") + name + "\"");
-    return light_[name].get<float>();
+    return floatOf(light_[name], name);
   }
   Vec3 vector(const char* name) const {
     if (!light_.contains(name) || !light_[name].is_array() || light_[name].size() != 3)
       fail(std::string("needs three numbers \"") + name + "\"");
     for (const json& v : light_[name])
       if (!v.is_number()) fail(std::string("needs three numbers \"") + name + "\"");
-    return {light_[name][0].get<float>(), light_[name][1].get<float>(), light_[name][2].get<float>()};
+    return {floatOf(light_[name][0], name), floatOf(light_[name][1], name), floatOf(light_[name][2], name)};
   }
   void allowOnly(std::initializer_list<const char*> names) const {
     for (const auto& [key, value] : light_.items())
@@ -77,6 +79,13 @@ class LightReader {
   }
 
  private:
+  float floatOf(const json& value, const char* name) const {
+    const auto number = value.get<double>();
+    if (!(std::fabs(number) <= std::numeric_limits<float>::max()))
+      fail(std::string("has a number too large in \"") + name + "\"");
+    return static_cast<float>(number);
+  }
+
   const json& light_;
   std::string place_;
   const std::string& path_;

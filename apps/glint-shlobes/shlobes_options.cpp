@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/numbers.h"
 
 namespace glint::apps {
 namespace {
@@ -14,11 +14,7 @@ namespace {
 /// "65x128", or "none" for 0 x 0.
 ShGrid parseGrid(const std::string& text) {
   ShGrid grid;
-  int length = 0;
-  if (text == "none") return grid;
-  if (std::sscanf(text.c_str(), "%6dx%6d%n", &grid.rows, &grid.columns, &length) == 2 &&
-      length == static_cast<int>(text.size()) && grid.rows > 0 && grid.columns > 0)
-    return grid;
+  if (text == "none" || (parseProduct(text, grid.rows, grid.columns) && grid.rows > 0 && grid.columns > 0)) return grid;
   throw Error(ErrorCode::usage, "arguments", "", "--grid", "\"" + text + "\" is no grid of directions",
               "give rows x columns, such as 65x128");
 }

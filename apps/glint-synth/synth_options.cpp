@@ -1,6 +1,6 @@
 #include "glint-synth/synth_options.h"
 
-#include <charconv>
+#include "common/numbers.h"
 
 namespace glint::apps {
 namespace {
@@ -9,15 +9,11 @@ using bake::SynthKind;
 
 /// "N" or "NxM".
 void parseSize(const std::string& text, int& width, int& height) {
-  const char* end = text.data() + text.size();
-  const auto first = std::from_chars(text.data(), end, width);
-  height = width;
-  auto last = first;
-  if (first.ec == std::errc() && first.ptr != end && *first.ptr == 'x') last = std::from_chars(first.ptr + 1, end, height);
-  if (first.ec != std::errc() || last.ec != std::errc() || last.ptr != end) {
+  if (parseProduct(text, width, height)) return;
+  if (!parseNumber(text, width).empty())
     throw Error(ErrorCode::usage, "cli.size", "", "--size", "'" + text + "' is not a size",
                 "write N or NxM, for example 1024x512");
-  }
+  height = width;
 }
 
 }  // namespace
@@ -47,6 +43,7 @@ SynthOptions::SynthOptions(Tool& tool) {
   density_ = &tool.option("--density", p.density, "scratches in 64x64 texels").range(1e-3, 64);
   slope_ = &tool.option("--slope", p.slope, "steepest slope of scratches, leather, weave, sawtooth").range(0, 10);
   for (Option* option : {alpha_, correlation_, feature_, slope_}) option->defaultText(per_kind);
+  tool.usesSeed();
 }
 
 const bake::SynthParameters& SynthOptions::resolve(Tool& tool) {

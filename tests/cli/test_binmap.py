@@ -100,7 +100,7 @@ def test_bad_ranges_are_usage_errors(glint, assets, alpha):
 
 @pytest.mark.parametrize(
     "options",
-    [[], ["--alpha", "0"], ["--alpha", "-0.1"], ["--alpha", "1e9"], ["--alpha", "nan"], ["--alpha", "0.1", "--leaf-size", "0"]],
+    [["--alpha", ""], ["--alpha", "0"], ["--alpha", "-0.1"], ["--alpha", "1e9"], ["--alpha", "nan"], ["--alpha", "0.1", "--leaf-size", "0"]],
     ids=" ".join,
 )
 def test_options_out_of_range_are_usage_errors(glint, assets, options):

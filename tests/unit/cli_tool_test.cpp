@@ -42,6 +42,7 @@ class ToolRun : public ::testing::Test {
     const OutputFile output(tool, OutputFormat::asset, "an asset");
     tool.option("--alpha", alpha_, "roughness").range(0, 1);
     tool.option("--levels", levels_, "levels");
+    if (uses_seed_) tool.usesSeed();
     tool.choice("--surface", surface_, {{"flat", 0}, {"smooth", 1}}, "surface");
     arguments.insert(arguments.begin(), "glint-test");
     std::vector<char*> argv;
@@ -62,6 +63,7 @@ class ToolRun : public ::testing::Test {
   std::filesystem::path folder_;
   float alpha_ = 0.3f;
   std::vector<int> levels_ = {1};
+  bool uses_seed_ = false;
   int surface_ = 0;
 };
 
@@ -80,10 +82,8 @@ TEST_F(ToolRun, ParsesListsWithoutSwallowingInputs) {
 
 TEST_F(ToolRun, RecordsEveryParameterThatChangesTheResult) {
   std::string command;
-  run(goodWith({"--surface", "smooth", "--seed", "7", "--threads", "1"}), [&](Tool& tool) {
-    tool.seed();
-    command = tool.commandJson();
-  });
+  uses_seed_ = true;
+  run(goodWith({"--surface", "smooth", "--seed", "7", "--threads", "1"}), [&](Tool& tool) { command = tool.commandJson(); });
   EXPECT_EQ(command, R"({"alpha":0.3,"levels":[1],"seed":7,"surface":"smooth"})");
 }
 
@@ -102,6 +102,53 @@ TEST_F(ToolRun, LeavesAnUnusedSeedOutOfTheRecord) {
   std::string command;
   run(goodWith({"--seed", "7"}), [&](Tool& tool) { command = tool.commandJson(); });
   EXPECT_FALSE(json::parse(command).contains("seed"));
+}
+
+TEST_F(ToolRun, RefusesToGiveASeedThatItWouldNotRecord) {
+  const Outcome outcome = run(good(), [](Tool& tool) { tool.seed(); });
+  EXPECT_EQ(outcome.code, 4);
+  EXPECT_THAT(outcome.err, HasSubstr("takes a seed that it does not record"));
+}
+
+TEST_F(ToolRun, ReadsNumbersAsDecimalWhereverTheyStand) {
+  std::uint64_t seed = 0;
+  int threads = 0;
+  uses_seed_ = true;
+  const auto look = [&](Tool& tool) {
+    seed = tool.seed();
+    threads = tool.threads();
+  };
+  ASSERT_EQ(run(goodWith({"--seed", "0010", "--threads", "02", "--levels", "010,+8", "--alpha", "00.5"}), look).code, 0);
+  EXPECT_EQ(seed, 10u);
+  EXPECT_EQ(threads, 2);
+  EXPECT_EQ(levels_, (std::vector<int>{10, 8}));
+  EXPECT_EQ(alpha_, 0.5f);
+  std::ofstream(path("run.toml")) << "seed = 0011\nlevels = [07, 017]\n";
+  ASSERT_EQ(run(goodWith({"--config", path("run.toml")}), look).code, 0);
+  EXPECT_EQ(seed, 11u);
+  EXPECT_EQ(levels_, (std::vector<int>{7, 17}));
+  ASSERT_EQ(run(goodWith({"--seed", "18446744073709551615"}), look).code, 0);
+  EXPECT_EQ(seed, ~std::uint64_t{0});
+}
+
+TEST_F(ToolRun, RefusesWholeNumbersThatDoNotFit) {
+  const std::vector<std::vector<std::string>> all = {{"--seed", "18446744073709551616"},
+                                                     {"--seed", "-1"},
+                                                     {"--seed", "1.5"},
+                                                     {"--seed", "0x10"},
+                                                     {"--threads", "4294967297"},
+                                                     {"--threads", "-1"},
+                                                     {"--levels", "1,2147483648"},
+                                                     {"--levels", "1,2.5"},
+                                                     {"--levels", "1e3"},
+                                                     {"--alpha", "+-0.1"},
+                                                     {"--alpha", "0x1p-2"},
+                                                     {"--alpha", "1e-999"}};
+  for (const std::vector<std::string>& arguments : all) {
+    const Outcome outcome = run(goodWith(arguments));
+    EXPECT_EQ(outcome.code, 1) << arguments[1];
+    EXPECT_THAT(outcome.err, HasSubstr(arguments[0] + ": ")) << arguments[1];
+  }
 }
 
 TEST_F(ToolRun, SuggestsTheNearestOption) {
