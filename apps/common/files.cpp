@@ -143,17 +143,44 @@ void checkApart(const Tool& tool, const std::string& path, std::size_t others) {
   }
 }
 
+[[noreturn]] void refuseInDepfile(const std::string& name, const std::string& what) {
+  throw Error(ErrorCode::usage, "depfile.name", name, "", "a name with " + what + " cannot stand in a depfile",
+              "rename the file or leave out --depfile");
+}
+
+/// What Make has no way to write. Of a backslash before a sign that needs one, Make and ninja read different names.
+void checkNameForMake(const std::string& name) {
+  for (const auto& [sign, what] : {std::pair{'\n', "a line break"}, std::pair{'\r', "a line break"}, std::pair{'\t', "a tab"},
+                                   std::pair{';', "';'"}, std::pair{'|', "'|'"}, std::pair{'=', "'='"}})
+    if (name.find(sign) != std::string::npos) refuseInDepfile(name, what);
+  for (const std::string_view pair : {"\\#"sv, "\\:"sv, "\\%"sv})
+    if (name.find(pair) != std::string::npos) refuseInDepfile(name, "'" + std::string(pair) + "'");
+  if (name.ends_with('\\') || name.ends_with('&')) refuseInDepfile(name, "'" + name.substr(name.size() - 1) + "' at its end");
+  if (name.ends_with(')') && name.find('(') != std::string::npos) refuseInDepfile(name, "parentheses at its end");
+}
+
+/// A name as Make reads it: `\ `, `\#` and `\:` are signs of the name, `$$` is one `$`, and a `~` in front is no home. ninja reads the
+/// same names. The signs & ' * ? < > " ` and ^ end a name for ninja up to 1.11, and nothing can be done about it. Make takes * ? and [
+/// for themselves where no other name fits them: escaped, they would not name what is not there any more.
 std::string escapeForMake(const std::string& name) {
-  std::string escaped;
-  for (const char c : name) {
-    if (c == '\n' || c == '\r') {
-      throw Error(ErrorCode::usage, "depfile.name", name, "", "a name with a line break cannot stand in a depfile",
-                  "rename the file or leave out --depfile");
+  checkNameForMake(name);
+  std::string escaped = name.starts_with('~') ? "./" : "";
+  for (std::size_t k = 0; k < name.size(); ++k) {
+    const char c = name[k];
+    if (c == ' ') {  // backslashes before a blank count double
+      for (std::size_t b = k; b > 0 && name[b - 1] == '\\'; --b) escaped += '\\';
     }
-    if (c == ' ' || c == '\t' || c == '#' || c == '%' || c == ':') escaped += '\\';
+    if (c == ' ' || c == '#' || c == ':') escaped += '\\';
     if (c == '$') escaped += '$';
     escaped += c;
   }
+  return escaped;
+}
+
+/// `%` makes a pattern of a target, but is a sign like others among the prerequisites.
+std::string escapeTarget(const std::string& name) {
+  std::string escaped;
+  for (const char c : escapeForMake(name)) escaped += c == '%' ? std::string("\\%") : std::string(1, c);
   return escaped;
 }
 
@@ -230,11 +257,15 @@ bool isDepfile(std::string_view text) {
 
 std::string makeDepfile(const std::vector<std::string>& targets, const std::vector<std::string>& prerequisites) {
   std::string text;
-  for (const std::string& target : targets) text += (text.empty() ? "" : " ") + escapeForMake(target);
+  for (const std::string& target : targets) text += (text.empty() ? "" : " ") + escapeTarget(target);
   text += ":";
   for (const std::string& prerequisite : prerequisites) text += " \\\n  " + escapeForMake(prerequisite);
   text += "\n";
-  for (const std::string& prerequisite : prerequisites) text += "\n" + escapeForMake(prerequisite) + ":\n";
+  // ninja takes a target with `\%` for an output that nobody declared. Where the rule has such a target anyway, it is for Make.
+  const auto holdsPercent = [](const std::string& name) { return name.find('%') != std::string::npos; };
+  const bool for_make = std::any_of(targets.begin(), targets.end(), holdsPercent);
+  for (const std::string& prerequisite : prerequisites)
+    if (for_make || !holdsPercent(prerequisite)) text += "\n" + escapeTarget(prerequisite) + ":\n";
   return text;
 }
 

@@ -75,8 +75,9 @@ bool isDepfile(std::string_view text);
 std::vector<std::byte> readFile(const std::string& path);
 
 /// A Make rule "targets: prerequisites", then an empty rule for each prerequisite so that deleting one is no error (as gcc
-/// -MP). Blanks, '#', '%', ':' and '$' are escaped.
-/// @throws Error usage if a name holds a line break, which Make cannot express
+/// -MP). Blanks, '#', ':', '$' and, in targets, '%' are escaped so that Make and ninja read the same names.
+/// @throws Error usage if a name holds what Make cannot express: line breaks, tabs, ';', '|' and '='; a backslash, '&' or
+///         parentheses at its end; a backslash before '#', ':' or '%'
 std::string makeDepfile(const std::vector<std::string>& targets, const std::vector<std::string>& prerequisites);
 
 /// Throws Error io unless the path is a regular file (or pipe) that can be read.

@@ -244,9 +244,22 @@ TEST_F(ToolRun, WritesADepfile) {
 }
 
 TEST(Depfile, EscapesWhatMakeWouldTakeApart) {
-  EXPECT_EQ(makeDepfile({"a b.glint"}, {"c$d.png", "e#f:g%h"}),
-            "a\\ b.glint: \\\n  c$$d.png \\\n  e\\#f\\:g\\%h\n\nc$$d.png:\n\ne\\#f\\:g\\%h:\n");
-  EXPECT_THROW(makeDepfile({"a"}, {"b\nc"}), Error);
+  EXPECT_EQ(makeDepfile({"a b.glint"}, {"c$d.png", "e#f:g"}),
+            "a\\ b.glint: \\\n  c$$d.png \\\n  e\\#f\\:g\n\nc$$d.png:\n\ne\\#f\\:g:\n");
+  EXPECT_EQ(makeDepfile({"a\\ b"}, {"~c"}), "a\\\\\\ b: \\\n  ./~c\n\n./~c:\n");
+}
+
+TEST(Depfile, TakesPercentForASignAmongPrerequisitesOnly) {
+  EXPECT_EQ(makeDepfile({"a%.glint"}, {"b%.png"}), "a\\%.glint: \\\n  b%.png\n\nb\\%.png:\n");
+  // To ninja the last rule would name an output.
+  EXPECT_EQ(makeDepfile({"a.glint"}, {"b%.png"}), "a.glint: \\\n  b%.png\n");
+}
+
+TEST(Depfile, RefusesNamesThatMakeCannotHold) {
+  for (const char* name : {"b\nc", "b\tc", "b;c", "b|c", "b=c", "b\\#c", "b\\", "b&", "b(c)"}) {
+    EXPECT_THROW(makeDepfile({"a"}, {name}), Error) << name;
+    EXPECT_THROW(makeDepfile({name}, {"a"}), Error) << name;
+  }
 }
 
 TEST(Depfile, IsKnownByItsShape) {
