@@ -41,9 +41,44 @@ inline GLINT_HD PrincipalAxes principalAxes(const UsableCovariance& c) {
           {std::cos(angle), std::sin(angle)}};
 }
 
+/// Parts of a footprint that winds round the map, even along the period that it follows: `count` is 0 where it is shorter than
+/// that. As wide as the footprint is across, or wider where `most` are too few.
+inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p, int width, int height, float narrowest_sigma, int most) {
+  constexpr double kTurns = 0.5;  // variance of turns that is even to 5e-5
+  const double w = width, h = height;
+  const UsableCovariance c = usableCovariance(p.covariance, width, height);
+  IsotropicParts parts;
+  if (c.xx < kTurns * w * w && c.yy < kTurns * h * h) return parts;
+  const AxisPair sigma = deviationsOf(c).scaled(1 / w, 1 / h);
+  const PeriodFrame frame(sigma);
+  const double wide = std::hypot(PeriodFrame::dot(frame.across, sigma.a), PeriodFrame::dot(frame.across, sigma.b));
+  const double turns = std::fabs(sigma.cross()) / wide;
+  if (turns * turns < kTurns) return parts;
+  const Vec2 centre = {wrapUnit(p.centre.x), wrapUnit(p.centre.y)};
+  if (wide * wide >= kTurns) {
+    parts.footprints[0] = Footprint::isotropic(centre, static_cast<float>(std::max(w, h)));
+    parts.weights[0] = 1;
+    parts.count = 1;
+    return parts;
+  }
+  const double length = std::hypot(w * frame.along_period[0], h * frame.along_period[1]);
+  const double across = wide / std::hypot(frame.across[0] / w, frame.across[1] / h);
+  const double narrow = std::max(across, double{narrowest_sigma});
+  parts.count = static_cast<int>(std::clamp(std::ceil(length / (kPartGap * narrow)), 2.0, 1.0 * most));
+  const auto part_sigma = static_cast<float>(std::max(narrow, length / (double{kPartGap} * parts.count)));
+  for (int k = 0; k < parts.count; ++k) {
+    const double turn = (k + 0.5) / parts.count - 0.5;
+    const double u = centre.x + turn * frame.along_period[0], v = centre.y + turn * frame.along_period[1];
+    parts.footprints[k] = Footprint::isotropic({static_cast<float>(u - std::floor(u)), static_cast<float>(v - std::floor(v))},
+                                               part_sigma);
+    parts.weights[k] = 1.0f / static_cast<float>(parts.count);
+  }
+  return parts;
+}
+
 /// Splits a footprint along its long axis so that the first and second moments of the parts together are its own.
 ///
-/// The size is made usable first (usableCovariance). The parts have the short deviation, or `narrowest_sigma` where that is
+/// The size is made usable first (usableCovariance); footprints that wind round the map are `partsOfTurn`. Other parts have the short deviation, or `narrowest_sigma` where that is
 /// larger, and neighbours are at most kPartGap deviations apart. Above an aspect of kMostAspect the parts are too few: they are
 /// wider and further apart, so that the footprint keeps its length, exactly in its second moment, and grows in width
 /// (kPartWidening). Boxes are split as the Gaussian of the same moments.
@@ -54,6 +89,7 @@ inline GLINT_HD PrincipalAxes principalAxes(const UsableCovariance& c) {
 inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int height, float narrowest_sigma = 0,
                                               int most = IsotropicParts::kMost) {
   constexpr float kRound = 0.05f;  // a variance larger by less is no length
+  if (const IsotropicParts turn = partsOfTurn(p, width, height, narrowest_sigma, most); turn.count > 0) return turn;
   const PrincipalAxes axes = principalAxes(usableCovariance(p.covariance, width, height));
   const float narrow = std::max(axes.shortest, narrowest_sigma), narrow2 = narrow * narrow;
   const float gap_per_length = 2 * kPartReach / static_cast<float>(most);

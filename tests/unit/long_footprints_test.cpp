@@ -283,6 +283,30 @@ TEST(LongGaussians, OfBoxesChangeSmoothly) {
   }
 }
 
+TEST(LongGaussians, OfRoundPartsAreEvenAlongTheirWay) {
+  constexpr int kSize = 64;
+  constexpr double kRipple = 0.02;  // parts two deviations apart, and wider ones where they are too few
+  for (const Vec2 way : {Vec2{1, 0}, Vec2{1, 1}, Vec2{2, 1}, Vec2{-3, 1}}) {
+    for (const float turns : {1.0f, 8.0f, 30.0f}) {
+      for (const float narrow : {5.0f, 8.0f, 20.0f}) {
+        const float l = turns * turns * kSize * kSize, n = narrow * narrow, x = way.x, y = way.y, d = x * x + y * y;
+        const Covariance c = {l * x * x + n * y * y / d, l * x * y - n * x * y / d, l * y * y + n * x * x / d};
+        const Footprint p = Footprint::gaussian({0.9f, 0.2f}, c);
+        const IsotropicParts parts = isotropicParts(p, kSize, kSize);
+        Shares shares(kSize, kSize);
+        double weight = 0;
+        for (int k = 0; k < parts.count; ++k) {
+          const Shares part = summed(parts.footprints[k], kSize, kSize);
+          for (std::size_t t = 0; t < part.of.size(); ++t) shares.of[t] += parts.weights[k] * part.of[t];
+          weight += parts.weights[k];
+        }
+        EXPECT_NEAR(weight, 1, 1e-5);
+        EXPECT_LT(distance(shares, byWaves(p, kSize, kSize)), kRipple) << x << ' ' << y << ' ' << turns << ' ' << narrow;
+      }
+    }
+  }
+}
+
 /// A map of four rough quarters, so that footprints that miss some of it are wrong.
 std::vector<Vec2> quarters(int width, int height) {
   std::vector<Vec2> normals = test::randomNormals(width, height, 0.1f, 5);
