@@ -43,7 +43,8 @@ inline GLINT_HD PrincipalAxes principalAxes(const UsableCovariance& c) {
 
 /// Parts of a footprint that winds round the map, even along the period that it follows: `count` is 0 where it is shorter than
 /// that. As wide as the footprint is across, or wider where `most` are too few.
-inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p, int width, int height, float narrowest_sigma, int most) {
+GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p, int width, int height,
+                                                              float narrowest_sigma, int most) {
   constexpr double kTurns = 0.5;  // variance of turns that is even to 5e-5
   const double w = width, h = height;
   const UsableCovariance c = usableCovariance(p.covariance, width, height);
@@ -78,8 +79,9 @@ inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p, int width, int he
 
 /// Splits a footprint along its long axis so that the first and second moments of the parts together are its own.
 ///
-/// The size is made usable first (usableCovariance); footprints that wind round the map are `partsOfTurn`. Other parts have the short deviation, or `narrowest_sigma` where that is
-/// larger, and neighbours are at most kPartGap deviations apart. Above an aspect of kMostAspect the parts are too few: they are
+/// The size is made usable first (usableCovariance); footprints that wind round the map are `partsOfTurn`. Other parts have the
+/// short deviation, or `narrowest_sigma` where that is larger, and neighbours are at most kPartGap deviations apart. Above an
+/// aspect of kMostAspect the parts are too few: they are
 /// wider and further apart, so that the footprint keeps its length, exactly in its second moment, and grows in width
 /// (kPartWidening). Boxes are split as the Gaussian of the same moments.
 /// @param narrowest_sigma  texels; what the model that is asked cannot tell apart, e.g. finestSigma(shape) of a pyramid without

@@ -61,7 +61,7 @@ inline GLINT_HD UsableCovariance positiveCovariance(const Covariance& c) { retur
 
 /// `positiveCovariance`, shortened on a periodic map where a footprint is longer than the map: along the way on which it winds
 /// round it, to one turn of deviation (PeriodFrame). It sees the map as evenly as before, to 5e-9; direction and width stay.
-inline GLINT_HD UsableCovariance usableCovariance(Covariance covariance, int width, int height) {
+GLINT_DEVICE_CALL inline GLINT_HD UsableCovariance usableCovariance(Covariance covariance, int width, int height) {
   const UsableCovariance c = positiveCovariance(covariance);
   const double w = width, h = height;
   if (c.xx <= w * w && c.yy <= h * h) return c;
@@ -130,11 +130,6 @@ inline GLINT_HD SmallPolygon clipToUnitBox(const Vec2* points, int count, Vec2 o
     polygon.count = kept;
   }
   return polygon;
-}
-
-/// Area of the part of a convex polygon that lies in the square [-1, 1]^2. `points` holds `count` <= 4 corners.
-GLINT_DEVICE_CALL inline GLINT_HD float areaInsideUnitBox(const Vec2* points, int count) {
-  return 0.5f * std::fabs(clipToUnitBox(points, count).twiceSignedArea());
 }
 
 /// A footprint made ready for sums over texels.

@@ -77,7 +77,7 @@ struct PeriodFrame {
 /// along its way, and so does one whole turn. Between half a turn and a whole one the parallelogram turns from the one position
 /// to the other, so that it changes smoothly with the covariance.
 /// @param texels  the covariance is a a^T + b b^T
-GLINT_HD inline AxisPair woundBox(const AxisPair& texels, int width, int height) {
+GLINT_DEVICE_CALL inline GLINT_HD AxisPair woundBox(const AxisPair& texels, int width, int height) {
   constexpr double kTurn = 1.0 / 12, kRoot = 1.7320508075688772;  // variance of an even turn; deviations of half of one
   const double w = width, h = height;
   const AxisPair sigma = texels.scaled(1 / w, 1 / h);
@@ -120,10 +120,10 @@ GLINT_HD inline AxisPair woundBox(const AxisPair& texels, int width, int height)
 /// further than kMostBoxPeriods along u and v from their centre.
 inline constexpr double kMostBoxTexels = 1 << 22, kFewestBoxMaps = 16, kMostBoxMaps = 256, kMostBoxPeriods = 256;
 
-/// Half axes, texels, of a box on a periodic map: those given, or where it is longer than can be summed, shortened along the way
-/// on which it winds round the map, to whole turns. Direction, width and drift stay. What it sees changes by less than 3 % of
-/// the footprint, about the last of its turns (tests/unit/long_footprints_test.cpp).
-GLINT_HD inline AxisPair shortenedBox(const AxisPair& texels, int width, int height) {
+/// Half axes, texels, of a box on a periodic map: those given, or where it is longer than can be summed, shortened along the
+/// way on which it winds round the map, to whole turns. Direction, width and drift stay. What it sees changes by less than 3 %
+/// of the footprint, about the last of its turns (tests/unit/long_footprints_test.cpp).
+GLINT_DEVICE_CALL inline GLINT_HD AxisPair shortenedBox(const AxisPair& texels, int width, int height) {
   const double w = width, h = height;
   const double maps = std::clamp(kMostBoxTexels / (w * h), double{kFewestBoxMaps}, double{kMostBoxMaps});
   AxisPair half = texels.scaled(1 / w, 1 / h);
