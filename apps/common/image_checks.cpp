@@ -41,11 +41,11 @@ void checkDeclaredSize(const std::string& path, std::uint64_t pixel_bytes) {
 }
 
 std::string partList(const std::vector<std::string>& names) {
-  constexpr std::size_t kMost = 8;
+  constexpr std::size_t kMost = 8, kMostName = 40;
   std::string list;
   for (std::size_t k = 0; k < std::min(names.size(), kMost); ++k) {
     list += (k > 0 ? ", " : "") + std::to_string(k);
-    if (!names[k].empty()) list += " (" + names[k] + ")";
+    if (!names[k].empty()) list += " (" + shownText(names[k], kMostName) + ")";
   }
   return list + (names.size() > kMost ? ", ..." : "");
 }

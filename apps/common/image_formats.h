@@ -15,7 +15,7 @@ struct StoredImage {
   int orientation = 1;  ///< 1 to 8, as in Exif
   /// The display window; its first column and row (from the top) are relative to those of the pixels.
   struct {
-    int column = 0, row = 0, width = 0, height = 0;
+    std::int64_t column = 0, row = 0, width = 0, height = 0;
   } display;
 };
 

@@ -5,14 +5,15 @@
 #include <algorithm>
 
 #include "common/image_formats.h"
+#include "glint/model/shown_text.h"
 
 namespace glint::apps {
 namespace {
 
 std::string layerList(const std::vector<std::string>& layers) {
-  constexpr std::size_t kMost = 8;
+  constexpr std::size_t kMost = 8, kMostName = 40;
   std::vector<std::string> names;
-  for (const std::string& layer : layers) names.push_back(layer.empty() ? "the one without a name" : layer);
+  for (const std::string& layer : layers) names.push_back(layer.empty() ? "the one without a name" : shownText(layer, kMostName));
   const bool more = names.size() > kMost;
   if (more) names.resize(kMost);
   return fmt::format("{}{}", fmt::join(names, ", "), more ? ", ..." : "");

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "glint/model/error.h"
+#include "glint/model/shown_text.h"
 #include "glint/model/texel_name.h"
 
 namespace glint::apps {
@@ -42,9 +43,9 @@ std::string layerOf(const std::string& channel) {
 }
 
 std::string joined(const std::vector<std::string>& names) {
-  constexpr std::size_t kMost = 12;
+  constexpr std::size_t kMost = 12, kMostName = 40;
   std::string text;
-  for (std::size_t k = 0; k < std::min(names.size(), kMost); ++k) text += (k > 0 ? ", " : "") + names[k];
+  for (std::size_t k = 0; k < std::min(names.size(), kMost); ++k) text += (k > 0 ? ", " : "") + shownText(names[k], kMostName);
   return text + (names.size() > kMost ? ", ..." : "");
 }
 
@@ -106,10 +107,11 @@ void cropToDisplay(StoredImage& stored, const std::string& path) {
   const auto [column, row, width, height] = stored.display;
   if (column == 0 && row == 0 && width == image.width && height == image.height) return;
   if (column < 0 || row < 0 || column + width > image.width || row + height > image.height) {
-    const int left = std::max(-column, 0), top = std::max(-row, 0);
-    const std::int64_t shown_width = std::max(0, std::min(image.width - column, width) - left);
-    const std::int64_t shown_height = std::max(0, std::min(image.height - row, height) - top);
-    const std::int64_t missing = std::int64_t{width} * height - shown_width * shown_height;
+    // How much of one axis is both shown and stored.
+    const auto overlap = [](std::int64_t first, std::int64_t shown, std::int64_t stored_size) {
+      return std::max<std::int64_t>(0, std::min(first + shown, stored_size) - std::max<std::int64_t>(first, 0));
+    };
+    const std::int64_t missing = width * height - overlap(column, width, image.width) * overlap(row, height, image.height);
     throw Error(ErrorCode::invalid_input, "image.window", path, "",
                 "the image has " + std::to_string(width) + " x " + std::to_string(height) + " pixels, of which " +
                     std::to_string(missing) + " are missing: the file stores " + std::to_string(image.width) + " x " +
@@ -120,7 +122,9 @@ void cropToDisplay(StoredImage& stored, const std::string& path) {
   image.notes.push_back("its " + std::to_string(image.width) + " x " + std::to_string(image.height) +
                         " pixels reach beyond the display window, of which the " + std::to_string(width) + " x " +
                         std::to_string(height) + " pixels were read");
-  rearrange(image, width, height, [column = column, row = row](int i, int j) { return std::pair{i + column, j + row}; });
+  const int left = static_cast<int>(column), top = static_cast<int>(row);
+  rearrange(image, static_cast<int>(width), static_cast<int>(height),
+            [=](int i, int j) { return std::pair{i + left, j + top}; });
   stored.display = {0, 0, width, height};
 }
 

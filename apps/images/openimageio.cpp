@@ -182,7 +182,7 @@ StoredImage readImageFile(const std::string& path, const std::string& part) {
   image.alpha = spec.alpha_channel < spec.nchannels ? spec.alpha_channel : -1;
   image.associated = image.alpha >= 0 && isAssociated(*input, spec);
   stored.orientation = spec.get_int_attribute("Orientation", 1);
-  stored.display = {spec.full_x - spec.x, spec.full_y - spec.y, spec.full_width, spec.full_height};
+  stored.display = {std::int64_t{spec.full_x} - spec.x, std::int64_t{spec.full_y} - spec.y, spec.full_width, spec.full_height};
   if (spec.format == OIIO::TypeDesc::UINT8) {
     image.pixels = readFlipped<std::uint8_t>(*input, image.part, spec, OIIO::TypeDesc::UINT8, path);
   } else if (spec.format == OIIO::TypeDesc::UINT16) {
