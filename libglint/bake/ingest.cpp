@@ -408,6 +408,9 @@ IngestedHeights ingestHeights(const PixelArray& image, const IngestParameters& p
   std::size_t repaired = 0;
   if (faults.non_finite + faults.no_data > 0)
     repaired = fillHoles(image.width, image.height, result.heights, p.boundary, p.name);
+  // Holes in a constant map were the only texels that differed.
+  if (repaired > 0 && !p.allow_constant)
+    checkNotConstant({image.width, image.height, 1, std::span<const float>(result.heights)}, {0}, p.name);
   std::size_t cliffs = 0;
   const std::vector<Vec2> normals = normalsFromHeights(image.width, image.height, result.heights, p.boundary, &cliffs);
   result.report = describeNormals(image.width, image.height, normals);

@@ -100,7 +100,7 @@ def test_cliffs_are_moved_to_the_rim_and_counted(glint):
         n = file["normals"][...]
     lengths = numpy.hypot(n[..., 0], n[..., 1])
     assert (lengths > 0.999).sum() == 76  # two texels at each side of 10, less the corners, which have one
-    assert "76 normals at cliffs" in process.stderr
+    assert "76 texels are at cliffs" in process.stderr
 
 
 def test_cliffs_of_any_height_are_cliffs(glint):

@@ -361,6 +361,31 @@ TEST(IngestHeights, RefusesColoursAndHoles) {
   EXPECT_EQ(ingestHeights(image, p).heights[6], 0.125f);
 }
 
+TEST(IngestHeights, MapsThatAreConstantBesideTheirHolesAreConstant) {
+  std::vector<float> heights(16, 3.0f);
+  heights[5] = -9999;
+  const PixelArray image{4, 4, 1, std::span<const float>(heights)};
+  IngestParameters p = plain();
+  p.no_data = -9999;
+  EXPECT_EQ(errorOf([&] { ingestHeights(image, p); }).rule(), "map.varies");
+  p.allow_constant = true;
+  EXPECT_EQ(ingestHeights(image, p).heights[5], 3);
+}
+
+TEST(IngestHeights, EveryFiniteHeightMakesNormalsInsideTheDisk) {
+  std::vector<float> heights;
+  for (std::size_t i = 0; i < 64 * 64; ++i) {
+    const Vec2 random = randomPair(7, 1, i);
+    heights.push_back((random.x - 0.5f) * std::exp2(254 * random.y - 127));  // all magnitudes that floats have
+  }
+  IngestParameters p = plain();
+  p.refuse_sentinels = false;
+  const auto result = ingestHeights({64, 64, 1, std::span<const float>(heights)}, p);
+  EXPECT_GT(result.report.cliffs, 1000u);
+  for (const Boundary boundary : {Boundary::wrap, Boundary::clamp})
+    for (const Vec2 n : normalsFromHeights(64, 64, result.heights, boundary)) ASSERT_LT(dot(n, n), 1);
+}
+
 TEST(IngestReport, GivesTheMomentsOfTheSlopes) {
   const TestMap map(256, 256, 0.2f);
   const IngestReport report = describeNormals(256, 256, map.normals);
