@@ -177,8 +177,8 @@ void warnAbout(Tool& tool, const std::string& name, const bake::IngestParameters
   replaced(r.non_finite, "texels are not finite");
   if (r.clipped > 0) warn(fmt::format("{} texels on the rim of the disk were moved just inside it", r.clipped));
   if (r.cliffs > 0) {
-    warn(fmt::format("{} texels are at cliffs steeper than 89.9 degrees, to which their normals are moved; check --height-scale "
-                     "and --nodata",
+    warn(fmt::format("{} texels are at cliffs steeper than 89.9 degrees, to which their normals are moved; check "
+                     "--height-scale and --nodata",
                      r.cliffs));
   }
   if (r.channels == bake::NormalChannels::ag)

@@ -60,7 +60,7 @@ def test_codes_of_eight_bits_are_recognised_in_wider_types(glint, form):
 
 def test_codes_are_recognised_beside_a_computed_z(glint):
     """What a texture of two channels becomes when its z is computed."""
-    xy = 2 * codes(surface(256, 256))[..., :2] / 255 - 1
+    xy = codes(surface(256, 256))[..., :2] / 127.5 - 1
     pixels = numpy.concatenate([xy, numpy.sqrt(1 - (xy**2).sum(axis=-1, keepdims=True))], axis=-1)
     write(glint.folder / "z.exr", unorm(pixels))
     process = glint("ingest", "z.exr", "-o", "o.glint", "--json")
