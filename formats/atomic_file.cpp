@@ -160,8 +160,9 @@ OutputTarget findOutput(const fs::path& name) {
 }
 
 AtomicFile::AtomicFile(const fs::path& name) : name_(name), target_(findOutput(name)) {
-  const bool elsewhere = target_.kind == OutputTarget::Kind::stream;
-  create(elsewhere ? fs::temp_directory_path() : folderOf(target_.path));
+  std::error_code none;
+  const fs::path elsewhere = fs::temp_directory_path(none);
+  create(target_.kind != OutputTarget::Kind::stream ? folderOf(target_.path) : none ? fs::path("/tmp") : elsewhere);
 }
 
 void AtomicFile::create(const fs::path& folder) {

@@ -25,9 +25,9 @@ OutputTarget findOutput(const std::filesystem::path& name);
 
 /// The one way in which files are made: whole or not at all.
 ///
-/// The bytes go to a file under a unique hidden name in the target's folder, which publish() flushes to the disk and renames. It
-/// has the permissions, and where allowed the owner, of the file that it replaces. A symbolic link stays: what it leads to is
-/// replaced. Devices and pipes are written to in one go at the end, from a temporary file elsewhere.
+/// The bytes go to a file under a unique hidden name in the target's folder, which publish() flushes to the disk and renames.
+/// It has the permissions, and where allowed the owner, of the file that it replaces. A symbolic link stays: what it leads to
+/// is replaced. Devices and pipes are written to in one go at the end, from a temporary file elsewhere.
 ///
 /// The temporary file is locked as long as its writer lives: what killed writers of the same target have left is not, and is
 /// removed by the next one. The lock is one of the open file description, so that HDF5, which may lock the same file by flock,

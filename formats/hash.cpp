@@ -4,11 +4,10 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <memory>
 #include <vector>
 
-#include "glint/model/error.h"
+#include "glint/formats/system_error.h"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -32,12 +31,8 @@ std::string hex(XXH128_hash_t hash) {
 std::string hashBytes(const void* data, std::size_t size_bytes) { return hex(XXH3_128bits(data, size_bytes)); }
 
 std::string hashFile(const std::filesystem::path& path) {
-  const auto fail = [&](int error) {
-    throw Error(ErrorCode::io, "file.readable", path.string(), {}, std::string("cannot be read: ") + std::strerror(error),
-                "check the path and its permissions");
-  };
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) fail(errno);
+  if (file < 0) throwUnreadable(path, "cannot be read", errno);
   const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
   XXH3_128bits_reset(state.get());
   std::vector<char> buffer(1 << 20);
@@ -49,7 +44,7 @@ std::string hashFile(const std::filesystem::path& path) {
   }
   const int error = errno;
   ::close(file);
-  if (count < 0) fail(error);
+  if (count < 0) throwUnreadable(path, "cannot be read", error);
   return hex(XXH3_128bits_digest(state.get()));
 }
 

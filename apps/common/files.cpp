@@ -132,14 +132,16 @@ void checkReplaceable(const std::string& path, const fs::path& target, OutputFor
 void checkApart(const Tool& tool, const std::string& path, std::size_t others) {
   if (formats::findOutput(path).kind == formats::OutputTarget::Kind::stream) return;
   const std::vector<std::string> inputs = tool.readPaths();
-  const bool is_input = std::any_of(inputs.begin(), inputs.end(), [&](const std::string& input) { return isSameFile(path, input); });
+  const bool is_input =
+      std::any_of(inputs.begin(), inputs.end(), [&](const std::string& input) { return isSameFile(path, input); });
   if (is_input && !tool.force()) {
     throw Error(ErrorCode::usage, "output.not_input", path, "", "the output is one of the inputs",
                 "name another file, or replace the input with --force");
   }
   for (std::size_t k = 0; k < others; ++k) {
     if (isSameFile(path, tool.outputPaths()[k]))
-      throw Error(ErrorCode::usage, "output.apart", path, "", "two outputs have this name", "name another file for one of them");
+      throw Error(ErrorCode::usage, "output.apart", path, "", "two outputs have this name",
+                  "name another file for one of them");
   }
 }
 

@@ -42,9 +42,9 @@ enum class OutputFormat : unsigned char {
 /// Checks the name of an output before the work starts, and once all inputs and outputs are known that it is none of them.
 ///
 /// Its folder must exist and be writable; symbolic links are followed. Devices and pipes are written to; folders, disks and
-/// sockets are refused. Without --force a file is replaced only if it can be written (a mode of 0444 says no, to root too), is no
-/// input, and holds an earlier result: an asset replaces an asset; an image an image of a known format; a table a table with the
-/// columns of answers or samples; a depfile a depfile. An empty file may always be replaced.
+/// sockets are refused. Without --force a file is replaced only if it can be written (a mode of 0444 says no, to root too), is
+/// no input, and holds an earlier result: an asset replaces an asset; an image an image of a known format; a table a table with
+/// the columns of answers or samples; a depfile a depfile. An empty file may always be replaced.
 /// @throws Error io, usage
 void checkOutput(Tool& tool, const std::string& path, OutputFormat format);
 

@@ -7,8 +7,9 @@ namespace glint::apps {
 
 /// What signals do while a tool runs; the old ways come back at the end of the scope.
 ///
-/// INT, TERM, HUP and QUIT remove the temporary files and then end the process as they would have (a shell sees 128 + n), unless
-/// they were ignored before (nohup). XFSZ and PIPE are ignored: the call that meets the limit or the broken pipe fails and says so.
+/// INT, TERM, HUP and QUIT remove the temporary files and then end the process as they would have (a shell sees 128 + n),
+/// unless they were ignored before (nohup). XFSZ and PIPE are ignored: the call that meets the limit or the broken pipe fails
+/// and says so.
 class SignalScope {
  public:
   SignalScope();

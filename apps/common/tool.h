@@ -63,8 +63,8 @@ class Option {
 /// on failure {..., "status": "error", "error": {"code", "rule", "path", "object", "message", "remedy"}}. The message for
 /// people is on stderr in both cases: one line, whatever goes wrong.
 ///
-/// While it runs, signals that end the process remove temporary files first (signals.h). A stdout that cannot be written is an error
-/// (io); a stderr that cannot be written is none.
+/// While it runs, signals that end the process remove temporary files first (signals.h). A stdout that cannot be written is an
+/// error (io); a stderr that cannot be written is none.
 class Tool {
  public:
   explicit Tool(ToolInfo info);

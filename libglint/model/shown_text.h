@@ -11,8 +11,9 @@ inline std::size_t shownCharacterBytes(std::string_view text, std::size_t at) {
   const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
   const unsigned char lead = byte(at);
   if (lead < 0x80) return lead >= 0x20 && lead != 0x7f ? 1 : 0;
-  const std::size_t size = lead >= 0xc2 && lead < 0xe0 ? 2 : lead >= 0xe0 && lead < 0xf0 ? 3 : lead >= 0xf0 && lead < 0xf5 ? 4 : 0;
-  if (size == 0 || text.size() - at < size) return 0;
+  if (lead < 0xc2 || lead > 0xf4) return 0;
+  const std::size_t size = lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
+  if (text.size() - at < size) return 0;
   unsigned long code = lead & (0xffu >> (size + 1));
   for (std::size_t k = 1; k < size; ++k) {
     if ((byte(at + k) & 0xc0u) != 0x80) return 0;
