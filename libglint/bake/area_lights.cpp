@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -110,6 +111,12 @@ Environment renderAreaLights(std::span<const RectangleLight> rectangles, std::sp
                              int samples) {
   if (height < 1 || height > kMaxHeight || samples < 1 || samples > kMaxSamples)
     throw Error(ErrorCode::usage, "light.resolution", {}, {}, "a height of 1 to 4096 and 1 to 64 samples are possible");
+  constexpr double kMostRays = 1 << 29;  // half a minute
+  const double rays = 2.0 * height * height * samples * samples;
+  if (rays > kMostRays)
+    throw Error(ErrorCode::usage, "light.resolution", {}, {}, fmt::format("{:.2g} rays are too many to draw lights with", rays),
+                fmt::format("give --area-samples of at most {} with this --area-height",
+                            static_cast<int>(std::sqrt(kMostRays / 2) / height)));
   requireValid(rectangles, spheres);
   Environment environment;
   environment.width = 2 * height;

@@ -1,5 +1,6 @@
 #include "glint/bake/compress.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -30,12 +31,32 @@ void checkOptions(const CompressionOptions& options) {
   require(options.rank >= 1 && options.rank <= kBlockPixels, "compress.rank",
           "the rank is " + std::to_string(options.rank) + "; it must be 1 to 256");
   require(options.tolerance >= 0 && options.tolerance < 1, "compress.tolerance",
-          "the tolerance is " + std::to_string(options.tolerance) + "; it must be at least 0 and below 1");
+          "the tolerance is " + fmt::format("{}", options.tolerance) + "; it must be at least 0 and below 1");
   require(options.regions >= 0 && options.regions <= 255, "compress.regions",
           "the regions are " + std::to_string(options.regions) + " per axis; they must be 0 to 255");
   require(options.min_improvement >= 0 && options.min_improvement < 1, "compress.min_improvement",
-          "the least improvement is " + std::to_string(options.min_improvement) + "; it must be at least 0 and below 1");
+          "the least improvement is " + fmt::format("{}", options.min_improvement) + "; it must be at least 0 and below 1");
   require(options.max_iterations >= 1, "compress.max_iterations", "the iterations must be at least 1");
+}
+
+/// Regions along each axis that are of use: no more than the finest level has images, and so few that clusters without slices, which
+/// take memory all the same, do not outnumber those with slices many times.
+int mostRegions(const NdfPyramid& pyramid) {
+  constexpr int kSureRegions = 8;  // the default of cp
+  constexpr double kSureClusters = 1 << 20, kClustersPerBlock = 4;
+  const PyramidShape& shape = pyramid.shape;
+  double stored = 0;
+  for (int l = 0; l < shape.level_count; ++l) stored += static_cast<double>(pyramid.levels[l].block_means.size());
+  const double clusters = std::max(kSureClusters, kClustersPerBlock * stored) / shape.blocksPerImage();
+  const int images = shape.level_count > 0 ? std::max(shape.levels[0].columns, shape.levels[0].rows) : 0;
+  return std::max(kSureRegions, std::min(images, static_cast<int>(std::sqrt(clusters))));
+}
+
+void checkRegions(const NdfPyramid& pyramid, int regions) {
+  if (const int most = mostRegions(pyramid); regions > most)
+    throw Error(ErrorCode::usage, "compress.regions", "", "",
+                fmt::format("{} regions per axis are more than the pyramid has images to fill", regions),
+                fmt::format("give --regions of at most {}", most));
 }
 
 /// One run: the steps of compressPyramid() and what they pass on.
@@ -199,9 +220,9 @@ class Compressor {
     const double error = groupError(group);
     if (error <= budget(groups_[group])) return;
     throw Error(ErrorCode::failed, "compress.tolerance", "", "",
-                "the tolerance " + std::to_string(options_.tolerance) +
+                "the tolerance " + fmt::format("{}", options_.tolerance) +
                     " cannot be reached with this method and type of coefficient; the least error is " +
-                    std::to_string(std::sqrt(error / groups_[group].energy)),
+                    fmt::format("{:.4g}", std::sqrt(error / groups_[group].energy)),
                 "ask for a larger tolerance, or for coefficients of more bits");
   }
 
@@ -422,6 +443,7 @@ int coefficientElementBytes(CoefficientType type) {
 CompressedNdfData compressPyramid(const NdfPyramid& pyramid, const CompressionOptions& options, CompressionReport* report,
                                   const ProgressFn& progress) {
   checkOptions(options);
+  checkRegions(pyramid, options.regions);
   return Compressor(pyramid, options, progress).run(report);
 }
 

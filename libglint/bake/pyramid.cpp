@@ -1,5 +1,6 @@
 #include "glint/bake/pyramid.h"
 
+#include <fmt/format.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
@@ -39,7 +40,7 @@ void checkOptions(const NormalMap& map, const PyramidOptions& o) {
           "a multiple of 16 from 32 to 1024");
   const float pixel = 2.0f / static_cast<float>(o.resolution);
   require(o.sigma_r >= 0.1f * pixel && o.sigma_r <= 0.25f, "--sigma-r",
-          std::to_string(0.1f * pixel) + " (a tenth of a pixel; raise --resolution for less) to 0.25");
+          fmt::format("{:.4g}", 0.1f * pixel) + " (a tenth of a pixel; raise --resolution for less) to 0.25");
   require(o.levels >= 0 && o.levels <= kMaxFootprintLevels, "--levels", "auto or 1 to " + std::to_string(kMaxFootprintLevels));
   if (map.width < 1 || map.height < 1) throw Error(ErrorCode::invalid_input, "normals.size", {}, {}, "the map has no texels");
 }

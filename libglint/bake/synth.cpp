@@ -1,5 +1,8 @@
 #include "glint/bake/synth.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -16,6 +19,23 @@ void require(bool holds, const char* parameter, const char* range) {
   if (!holds) throw Error(ErrorCode::usage, "synth.range", "", parameter, std::string("is not ") + range, "see the help text");
 }
 
+/// Scratches wider than the map wrap round it many times, and many wide ones lie on each texel: neither shows, and both cost time.
+void checkScratches(const SynthParameters& p) {
+  constexpr int kSureWidth = 64;        // texels that are allowed on any map
+  constexpr float kMeanLength = 128;    // about that of a scratch, texels
+  constexpr double kMostLayers = 1024;  // scratches on a texel, on average
+  const int widest = std::max(kSureWidth, std::min(p.width, p.height));
+  if (p.feature_texels > static_cast<float>(widest))
+    throw Error(ErrorCode::usage, "synth.range", "", "feature size",
+                fmt::format("scratches of {:g} texels are wider than the map", p.feature_texels),
+                fmt::format("give --flake-size of at most {}", widest));
+  const double layers = double{p.density} * p.feature_texels * (p.feature_texels + kMeanLength) / (64 * 64);
+  if (layers > kMostLayers)
+    throw Error(ErrorCode::usage, "synth.range", "", "density", fmt::format("{:.0f} scratches would lie on each texel", layers),
+                fmt::format("give --density of at most {:g}, or a smaller --flake-size",
+                            std::floor(1e3 * p.density * kMostLayers / layers) / 1e3));
+}
+
 void check(const SynthParameters& p) {
   require(p.width >= 1 && p.width <= kMaxSize && p.height >= 1 && p.height <= kMaxSize, "size", "1 to 65536 texels");
   require(p.alpha >= 0 && p.alpha <= 2, "alpha", "0 to 2");
@@ -26,6 +46,7 @@ void check(const SynthParameters& p) {
   require(p.feature_texels >= 1 && p.feature_texels <= kMaxSize, "feature size", "1 to 65536 texels");
   require(p.density > 0 && p.density <= 64, "density", "more than 0, at most 64");
   require(p.slope >= 0 && p.slope <= 10, "slope", "0 to 10");
+  if (p.kind == SynthKind::scratches) checkScratches(p);
 }
 
 void scale(std::vector<float>& heights, double factor) {
