@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <set>
 
+#include "glint/formats/number_text.h"
+
 namespace glint::formats {
 namespace {
 
@@ -74,9 +76,8 @@ bool checkAttribute(const Attributes& attributes, const std::string& object, con
   const auto in_range = [&](double number) { return number >= schema.minimum && number <= schema.maximum; };
   if (!std::all_of(value.numbers.begin(), value.numbers.end(), in_range)) {
     const double bad = *std::find_if_not(value.numbers.begin(), value.numbers.end(), in_range);
-    findings.add(
-        "attribute.value", place,
-        "is " + std::to_string(bad) + ", outside " + std::to_string(schema.minimum) + " to " + std::to_string(schema.maximum));
+    findings.add("attribute.value", place,
+                 "is " + numberText(bad) + ", outside " + numberText(schema.minimum) + " to " + numberText(schema.maximum));
     return false;
   }
   for (const std::string& text : value.texts) {

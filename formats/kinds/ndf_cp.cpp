@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "glint/formats/kinds/pyramid_shape.h"
+#include "glint/formats/number_text.h"
 
 namespace glint::formats {
 namespace {
@@ -350,7 +351,7 @@ void checkDensities(const CompressedNdf& ndf, Findings& findings) {
   }
   if (bad_integrals > 0)
     findings.add("compressed.integral", "/image_scales",
-                 std::to_string(bad_integrals) + " images do not integrate to 1 (worst " + std::to_string(worst) + ")");
+                 std::to_string(bad_integrals) + " images do not integrate to 1 (worst " + numberText(worst) + ")");
   if (bad_images > 0)
     findings.add("compressed.density_scales", "/density_scales",
                  std::to_string(bad_images) + " images do not integrate to 1 without their negative parts");

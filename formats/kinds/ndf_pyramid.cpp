@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "glint/formats/kinds/pyramid_shape.h"
+#include "glint/formats/number_text.h"
 
 namespace glint::formats {
 namespace {
@@ -131,7 +132,7 @@ void checkData(const NdfPyramid& pyramid, Findings& findings) {
     }
     if (bad > 0) {
       findings.add("pyramid.integral", levelObject(l, "pixels"),
-                   std::to_string(bad) + " images do not integrate to 1 (worst " + std::to_string(worst) + ")");
+                   std::to_string(bad) + " images do not integrate to 1 (worst " + numberText(worst) + ")");
     }
   }
 }

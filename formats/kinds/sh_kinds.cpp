@@ -3,6 +3,7 @@
 
 #include "glint/formats/kinds/codec.h"
 #include "glint/formats/kinds/pyramid_shape.h"
+#include "glint/formats/number_text.h"
 
 namespace glint::formats {
 namespace {
@@ -43,7 +44,7 @@ double coefficient(const void* coefficients, ShPrecision precision, std::size_t 
 void checkValues(std::span<const float> values, bool signed_values, const char* object, Findings& findings) {
   for (std::size_t k = 0; k < values.size(); ++k) {
     if (std::isfinite(values[k]) && (signed_values || values[k] >= 0)) continue;
-    findings.add("sh.finite", object, "element " + std::to_string(k) + " is " + std::to_string(values[k]));
+    findings.add("sh.finite", object, "element " + std::to_string(k) + " is " + numberText(values[k]));
     return;
   }
 }

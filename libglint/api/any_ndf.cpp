@@ -4,6 +4,7 @@
 #include <string>
 
 #include "glint/formats/hash.h"
+#include "glint/formats/number_text.h"
 #include "glint/query/slope_sums.h"
 
 namespace glint::api {
@@ -48,8 +49,8 @@ float askedAlpha(const BinMap& map, float alpha, const std::filesystem::path& pa
   if (alpha == 0) return map.alpha_min;
   if (alpha >= map.alpha_min && alpha <= map.alpha_max) return alpha;
   throw Error(ErrorCode::usage, "query.alpha", path.string(), "",
-              "was made for roughnesses of " + std::to_string(map.alpha_min) + " to " + std::to_string(map.alpha_max) +
-                  ", not " + std::to_string(alpha),
+              "was made for roughnesses of " + formats::numberText(map.alpha_min) + " to " +
+                  formats::numberText(map.alpha_max) + ", not " + formats::numberText(alpha),
               "ask within the range, or make it with glint-binmap --alpha A:B");
 }
 

@@ -1,5 +1,6 @@
 #include "glint/bake/displace.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -77,7 +78,7 @@ void checkTexture(const HeightMap& map, const DisplaceOptions& options) {
   if (options.base.kind == BaseBrdf::Kind::diffuse)
     throw Error(ErrorCode::usage, "displace.texture", "", "roughness", "a diffuse base has no roughness", "take a ggx base");
   requireTexels(map, t.roughness.size(), 1, "displace.texture", "roughness",
-                "0.05 to 1 when multiplied by the base's " + std::to_string(options.base.alpha),
+                "0.05 to 1 when multiplied by the base's " + fmt::format("{}", options.base.alpha),
                 "raise the darkest texels of the image", [&](std::size_t k) {
                   return !(options.base.alpha * t.roughness[k] >= kLeastAlpha && options.base.alpha * t.roughness[k] <= 1);
                 });

@@ -1,5 +1,6 @@
 #include "glint/bake/sh_lobes.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -76,7 +77,7 @@ ShLobes ShLobesData::view() const {
 std::vector<double> zonalLobe(double sigma_r, int order) {
   requireOrder(order);
   if (!(sigma_r > 0 && sigma_r <= 1))
-    throw Error(ErrorCode::usage, "sh.sigma_r", {}, {}, "the roughness " + std::to_string(sigma_r) + " is not in (0, 1]");
+    throw Error(ErrorCode::usage, "sh.sigma_r", {}, {}, "the roughness " + fmt::format("{}", sigma_r) + " is not in (0, 1]");
   const double reach = kLobeReachSigmas * sigma_r < 1 ? std::asin(kLobeReachSigmas * sigma_r) : std::numbers::pi / 2;
   const int panels = 8 + static_cast<int>(order * reach / kPanelPhase);
   std::vector<double> f(static_cast<std::size_t>(order) + 1);

@@ -64,7 +64,8 @@ inline __m128i loadFour(const void* p) { return _mm_loadl_epi64(static_cast<cons
 }  // namespace sse
 #endif
 
-/// Four floats side by side. Results are the same bits for every processor.
+/// Four floats side by side. Each operation gives the same bits on every processor. Of a product and a sum together that holds where
+/// the compiler does not fuse them (-ffp-contract=off): it may do so on processors that can, and then rounds once.
 struct Float4 {
 #ifdef GLINT_SSE
   __m128 v;

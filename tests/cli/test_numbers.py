@@ -147,3 +147,11 @@ def test_a_bin_map_has_the_roughness_of_the_other_tools_by_default(glint, assets
     assert bins == pytest.approx(normals, rel=0.02)
     properties = json.loads(glint("info", assets["bins"], "--json").stdout)["result"]["properties"]
     assert properties["alpha"] == pytest.approx(0.005 * 2**0.5, rel=1e-6)
+
+
+def test_messages_print_small_numbers_as_they_are(glint, assets):
+    question = [*PLACE, "--sigma", "20", *HALF]
+    assert "roughnesses of 0.007071068 to 0.007071068, not 0.00015" in glint("query", assets["bins"], *question, "--alpha", "0.00015").stderr
+    process = glint("pyramid", assets["normals"], "-o", "p.glint", "--resolution", "1024", "--sigma-r", "1e-7")
+    assert process.returncode == 1
+    assert "give 0.0001953 (a tenth of a pixel" in process.stderr

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <limits>
 
+#include "glint/formats/number_text.h"
+
 namespace glint::apps {
 namespace {
 
@@ -53,6 +55,12 @@ TEST(Numbers, TooSmallForAFloatBecomeTheNearestOne) {
   float real = 3;
   EXPECT_EQ(parseNumber("1e-60", real), "");
   EXPECT_EQ(real, 0);
+}
+
+TEST(Numbers, InMessagesReadBackAsTheSame) {
+  EXPECT_EQ(formats::numberText(1e-7), "1e-07");
+  EXPECT_EQ(formats::numberText(0.0001f), "0.0001");
+  EXPECT_EQ(formats::numberText(-12), "-12");
 }
 
 TEST(Numbers, InPairsAreJoinedByAnX) {
