@@ -21,9 +21,10 @@ STRIDE = 32
 # Images of the finest level along each axis of a region: as many as 8 x 8 regions of a 2K^2 map have (Deng 2022, section 4.2).
 IMAGES_PER_REGION = 8
 PICTURE_LEVELS = (0, 1, 3)
-# Columns of the picture of all models -> kind in the file's name.
-MODELS = {"Reference": "", "pyramid": "pyramid", "cp, rank 16": "cp", "tucker, 10 %": "tucker10", "pca, rank 16": "pca", "bin map": "binmap",
-          "histograms": "sat"}
+# Columns of the picture of all models -> kind in the file's name, in groups that answer the same footprint exactly. Bin maps and histograms
+# know boxes; they are asked for the box that has the second moments of the Gaussian.
+GAUSSIAN_MODELS = {"Reference, Gaussian": "", "pyramid": "pyramid", "cp, rank 16": "cp", "tucker, 10 %": "tucker10", "pca, rank 16": "pca"}
+BOX_MODELS = {"Reference, box": "", "bin map": "binmap", "histograms": "sat"}
 NOT_DRAWN = {"flakes_256"}  # flakes_1k is
 
 
@@ -43,6 +44,13 @@ class Footprint:
     u: float
     v: float
     sigma: float
+    is_box: bool = False
+
+    def options(self):
+        """As glint-query is asked."""
+        half_axis = 3**0.5 * self.sigma  # of the box with the same second moments
+        size = ["--box", half_axis, 0, 0, half_axis] if self.is_box else ["--sigma", self.sigma]
+        return ["--uv", self.u, self.v, *size]
 
 
 class Chain:
@@ -124,7 +132,7 @@ class Chain:
         """NDF image of one asset, top row first, by glint-query."""
         path = self.folder / "query.exr"
         sigma_r = [] if kind else ["--sigma-r", self.sigma_r]
-        self.tools.run("query", self.path(kind), "--uv", footprint.u, footprint.v, "--sigma", footprint.sigma, "--image", path, *sigma_r)
+        self.tools.run("query", self.path(kind), *footprint.options(), "--image", path, *sigma_r)
         # Not ImageBuf: it remembers files by name.
         image = oiio.ImageInput.open(str(path))
         pixels = image.read_image(oiio.FLOAT)[:, :, 0]
@@ -135,8 +143,7 @@ class Chain:
     def nanoseconds(self, kind, footprint, half):
         """Time of a density query."""
         sigma_r = [] if kind else ["--sigma-r", self.sigma_r]
-        run = self.tools.run("query", self.path(kind), "--uv", footprint.u, footprint.v, "--sigma", footprint.sigma, "--half", *half, "--repeat",
-                             3000, *sigma_r)
+        run = self.tools.run("query", self.path(kind), *footprint.options(), "--half", *half, "--repeat", 3000, *sigma_r)
         return run.result["nanoseconds"]
 
     def error(self, kind):
@@ -182,15 +189,20 @@ def draw_footprints(chain, path):
 
 
 def draw_models(chains, path):
-    """Every model's answer to the same question: the NDF of a footprint at a centre of the finest level."""
+    """The NDF of a footprint at a centre of the finest level, from every model: of a Gaussian, or of the box of its second moments."""
     maps = {}
     for chain in chains:
-        footprint = chain.footprint(0)
-        images = {kind: chain.ndf(kind, footprint) for kind in MODELS.values()}
-        half = brightest(images[""])
-        note = lambda kind: f"{readable_bytes(chain.path(kind).stat().st_size)}, {readable_time(chain.nanoseconds(kind, footprint, half))}"
-        maps[chain.name.replace("_", "\n")] = {title: (images[kind], note(kind)) for title, kind in MODELS.items()}
+        gaussian = chain.footprint(0)
+        half = brightest(chain.ndf("", gaussian))
+        maps[chain.name.replace("_", "\n")] = [answers(chain, models, footprint, half) for models, footprint in (
+            (GAUSSIAN_MODELS, gaussian), (BOX_MODELS, dataclasses.replace(gaussian, is_box=True)))]
     picture.draw_models(maps, path)
+
+
+def answers(chain, models, footprint, half):
+    """Title of a column -> (image, bytes and time of a query)."""
+    note = lambda kind: f"{readable_bytes(chain.path(kind).stat().st_size)}, {readable_time(chain.nanoseconds(kind, footprint, half))}"
+    return {title: (chain.ndf(kind, footprint), note(kind)) for title, kind in models.items()}
 
 
 def main():

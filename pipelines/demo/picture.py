@@ -81,13 +81,16 @@ def draw_footprints(images, columns, path):
 def draw_models(maps, path):
     """One footprint: a row for each map, a column for each model.
 
-    @param maps  title of a row -> {title of a column: (image, note)}; the first column is the truth
+    @param maps  title of a row -> groups of {title of a column: (image, note)}; the first column of a group is the truth of the others
     """
-    figure, axes = grid(list(maps), list(next(iter(maps.values()))), left=0.075)
-    for r, models in enumerate(maps.values()):
-        truth = next(iter(models.values()))[0]
-        margin, _ = crop([truth])
-        for c, (image, note) in enumerate(models.values()):
-            show(axes[r, c], image, truth, margin, f"error {100 * relative(image, truth):.1f} %\n{note}" if c else note)
-    save(figure, "log(1 + density) over half vectors inside one Gaussian footprint (bin map, histograms: the box of its second moments); "
-         "error: relative L2 from the reference; bytes of the file; time of a density query", path)
+    titles = [title for group in next(iter(maps.values())) for title in group]
+    figure, axes = grid(list(maps), titles, left=0.075)
+    for r, groups in enumerate(maps.values()):
+        margin, _ = crop([next(iter(groups[0].values()))[0]])
+        columns = iter(axes[r])
+        for group in groups:
+            truth = next(iter(group.values()))[0]
+            for c, (image, note) in enumerate(group.values()):
+                show(next(columns), image, truth, margin, f"error {100 * relative(image, truth):.1f} %\n{note}" if c else note)
+    save(figure, "log(1 + density) over half vectors inside one Gaussian footprint, or inside the box of its second moments; "
+         "error: relative L2 from the reference of the same footprint; bytes of the file; time of a density query", path)
