@@ -151,7 +151,7 @@ def test_a_bin_map_has_the_roughness_of_the_other_tools_by_default(glint, assets
 
 def test_messages_print_small_numbers_as_they_are(glint, assets):
     question = [*PLACE, "--sigma", "20", *HALF]
-    assert "roughnesses of 0.007071068 to 0.007071068, not 0.00015" in glint("query", assets["bins"], *question, "--alpha", "0.00015").stderr
+    assert "roughnesses of 0.0070710676 to 0.0070710676, not 0.00015" in glint("query", assets["bins"], *question, "--alpha", "0.00015").stderr
     process = glint("pyramid", assets["normals"], "-o", "p.glint", "--resolution", "1024", "--sigma-r", "1e-7")
     assert process.returncode == 1
     assert "give 0.0001953 (a tenth of a pixel" in process.stderr
