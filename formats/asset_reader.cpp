@@ -17,6 +17,8 @@ Asset::~Asset() = default;
 Asset Asset::open(const std::filesystem::path& path, const OpenOptions& options) {
   Findings findings(path);
   auto state = std::make_unique<State>(State{path.string(), loadAsset(path, findings)});
+  // Values first: they say which texel is wrong where a hash can only say which dataset.
+  if (options.check_values && !findings.failed()) state->loaded.codec->check_data(state->loaded.model, findings);
   if (options.verify_hashes && !findings.failed()) checkHashes(state->loaded, findings);
   findings.throwFirstError();
   for (const Finding& finding : findings.report().findings) {

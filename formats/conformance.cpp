@@ -50,16 +50,17 @@ std::string listed(const std::vector<std::uint64_t>& dims) {
   return text + "]";
 }
 
-/// Checks one attribute. Returns whether it can be used.
-bool checkAttribute(const Attributes& attributes, const std::string& object, const AttributeSchema& schema,
-                    const SizeScope& scope, Findings& findings) {
+/// Minor version of the format that the file has; 0 where it does not say.
+int minorOf(const Attributes& root) {
+  const auto found = root.find("format_minor");
+  if (found == root.end() || found->second.type != ElementType::i32 || found->second.numbers.empty()) return 0;
+  return static_cast<int>(found->second.numbers[0]);
+}
+
+/// Checks an attribute that is there. Returns whether it can be used.
+bool checkValue(const AttributeValue& value, const std::string& object, const AttributeSchema& schema, const SizeScope& scope,
+                Findings& findings) {
   const std::string place = object + "@" + std::string(schema.name);
-  const auto found = attributes.find(schema.name);
-  if (found == attributes.end()) {
-    findings.add("attribute.missing", place, "is missing");
-    return false;
-  }
-  const AttributeValue& value = found->second;
   if (value.type != schema.type) {
     findings.add("attribute.type", place, "is " + std::string(name(value.type)) + ", not " + std::string(name(schema.type)));
     return false;
@@ -88,6 +89,16 @@ bool checkAttribute(const Attributes& attributes, const std::string& object, con
   return true;
 }
 
+/// Checks one attribute of a file of a minor version. Returns whether it can be used, or does not have to be there.
+bool checkAttribute(const Attributes& attributes, const std::string& object, const AttributeSchema& schema,
+                    const SizeScope& scope, int minor, Findings& findings) {
+  const auto found = attributes.find(schema.name);
+  if (found != attributes.end()) return checkValue(found->second, object, schema, scope, findings);
+  if (schema.since > minor) return true;
+  findings.add("attribute.missing", object + "@" + std::string(schema.name), "is missing");
+  return false;
+}
+
 void warnOfUnknown(const Attributes& attributes, const std::string& object, std::span<const AttributeSchema> common,
                    std::span<const AttributeSchema> own, Findings& findings) {
   for (const auto& [attribute, value] : attributes) {
@@ -101,17 +112,19 @@ void warnOfUnknown(const Attributes& attributes, const std::string& object, std:
 /// Checks root attributes and derives the values that sizes are made of. Returns whether datasets can be checked.
 bool checkRoot(const FileStructure& structure, const KindSchema& schema, SizeScope& scope, Findings& findings) {
   bool usable = true;
+  const int minor = minorOf(structure.attributes);
   for (const AttributeSchema& attribute : commonAttributes()) {
-    usable &= checkAttribute(structure.attributes, "/", attribute, scope, findings);
+    usable &= checkAttribute(structure.attributes, "/", attribute, scope, minor, findings);
   }
   for (const AttributeSchema& attribute : schema.attributes) {
-    if (!checkAttribute(structure.attributes, "/", attribute, scope, findings)) {
+    if (!checkAttribute(structure.attributes, "/", attribute, scope, minor, findings)) {
       usable = false;
       continue;
     }
-    if (attribute.type != ElementType::i32) continue;
+    const auto found = structure.attributes.find(attribute.name);
+    if (attribute.type != ElementType::i32 || found == structure.attributes.end()) continue;
     std::vector<std::uint64_t>& values = scope.values[std::string(attribute.name)];
-    for (const double number : structure.attributes.find(attribute.name)->second.numbers) {
+    for (const double number : found->second.numbers) {
       values.push_back(static_cast<std::uint64_t>(number));
     }
   }
@@ -128,7 +141,7 @@ void checkDataset(const DatasetRecord& record, const std::string& path, const Da
                   SizeScope& scope, Findings& findings) {
   const std::string object = "/" + path;
   for (const AttributeSchema& attribute : datasetAttributes()) {
-    checkAttribute(record.attributes, object, attribute, scope, findings);
+    checkAttribute(record.attributes, object, attribute, scope, minorOf(root), findings);
   }
   warnOfUnknown(record.attributes, object, datasetAttributes(), {}, findings);
   const auto type =
@@ -162,7 +175,9 @@ const KindSchema* checkHeader(const FileStructure& structure, Findings& findings
       // glint_format has its own rule for its value.
       AttributeSchema relaxed = schema;
       if (wanted == "glint_format") relaxed.values = {};
-      if (!checkAttribute(structure.attributes, "/", relaxed, scope, findings)) return nullptr;
+      // What every version has: without it, the version is not known either.
+      relaxed.since = 0;
+      if (!checkAttribute(structure.attributes, "/", relaxed, scope, 0, findings)) return nullptr;
     }
     return &structure.attributes.find(wanted)->second;
   };
@@ -220,7 +235,7 @@ void checkConformance(const FileStructure& structure, const KindSchema& schema, 
         const auto found = structure.datasets.find(path);
         if (found != structure.datasets.end()) {
           checkDataset(found->second, path, dataset, structure.attributes, use, findings);
-        } else if (dataset.required) {
+        } else if (dataset.required && dataset.since <= minorOf(structure.attributes)) {
           findings.add("dataset.missing", "/" + path, "is missing");
         }
       }

@@ -1,5 +1,7 @@
 #include "glint/formats/load.h"
 
+#include <algorithm>
+
 #include "glint/formats/conformance.h"
 #include "glint/formats/hash.h"
 
@@ -44,6 +46,24 @@ AssetInfo describe(const FileStructure& structure) {
   return info;
 }
 
+/// Looks for bytes that belong to no object and are not 0.
+void checkPadding(const FileStructure& structure, Findings& findings) {
+  if (!structure.places.complete) return;
+  const std::byte* bytes = structure.mapping.data();
+  const auto check = [&](std::uint64_t begin, std::uint64_t end) {
+    const std::byte* bad = std::find_if(bytes + begin, bytes + end, [](std::byte b) { return b != std::byte{0}; });
+    if (bad == bytes + end) return;
+    findings.add("file.padding", {},
+                 "has a byte that is not 0 at offset " + std::to_string(bad - bytes) + ", where no object is");
+  };
+  std::uint64_t end = 0;
+  for (const Extent& extent : structure.places.extents) {
+    if (extent.begin > end) check(end, extent.begin);
+    end = std::max(end, extent.end);
+  }
+  check(end, structure.mapping.size());
+}
+
 }  // namespace
 
 LoadedAsset loadAsset(const std::filesystem::path& path, Findings& findings) {
@@ -63,6 +83,7 @@ LoadedAsset loadAsset(const std::filesystem::path& path, Findings& findings) {
 }
 
 void checkHashes(const LoadedAsset& asset, Findings& findings) {
+  checkPadding(asset.structure, findings);
   for (const auto& [path, record] : asset.structure.datasets) {
     const std::string stored = textOf(record.attributes, "xxh3_128");
     const std::string actual = hashBytes(record.data, record.size_bytes);

@@ -20,7 +20,7 @@ struct LoadedAsset {
 /// Reads a file and checks structure, schema and indices. Broken rules are added to `findings`.
 LoadedAsset loadAsset(const std::filesystem::path& path, Findings& findings);
 
-/// Compares every dataset with its hash attribute.
+/// Compares every dataset with its hash attribute, and the bytes between objects with 0: then every bit of the file is checked.
 void checkHashes(const LoadedAsset& asset, Findings& findings);
 
 }  // namespace glint::formats

@@ -12,6 +12,7 @@ using enum ErrorCode;
 
 constexpr std::string_view kMakeAgain = "make the file again from its inputs";
 constexpr std::string_view kDamaged = "the file is damaged: make it again or restore a copy";
+constexpr std::string_view kAppended = "remove what was appended to the file, or make it again";
 constexpr std::string_view kForeign = "write assets with the glint tools, or follow formats/SPEC.md";
 constexpr std::string_view kHostile = "do not trust this file";
 constexpr std::string_view kUpdate = "read it with a newer version of glint";
@@ -22,6 +23,7 @@ constexpr std::array kRules = {
     Rule{"file.superblock", error, invalid_input, "the superblock is version 2 or 3 with base address 0 and no extension",
          kForeign},
     Rule{"file.truncated", error, invalid_input, "the file is as long as its superblock says", kDamaged},
+    Rule{"file.trailing", error, invalid_input, "the file is not longer than its superblock says", kAppended},
     Rule{"file.hdf5", error, invalid_input, "HDF5 can read the file's metadata and its checksums hold", kDamaged},
     Rule{"group.depth", error, invalid_input, "groups are nested at most 4 deep", kHostile},
     Rule{"group.size", error, invalid_input, "a group has at most 1024 links with names of at most 255 bytes", kHostile},
@@ -85,6 +87,7 @@ constexpr std::array kRules = {
     Rule{"sh.grid", error, invalid_input, "a grid is 0 x 0 (lobes only) or has at least 2 rows and 3 columns", kMakeAgain},
     Rule{"displacement.levels", error, invalid_input, "factors ascend, and each divides the map into the level's cells",
          kMakeAgain},
+    Rule{"file.padding", error, invalid_input, "bytes between objects are 0", kDamaged},
     Rule{"dataset.hash", error, invalid_input, "a dataset's bytes have the hash of its attribute xxh3_128", kDamaged},
     Rule{"normals.finite", error, invalid_input, "normals are finite", "make it again with glint-ingest --fix-invalid"},
     Rule{"normals.disk", error, invalid_input, "normals lie inside the unit disk",

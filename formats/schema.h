@@ -33,6 +33,7 @@ struct AttributeSchema {
   double minimum = 0;            ///< smallest valid number
   double maximum = 0;            ///< largest valid number
   std::string_view values = {};  ///< valid texts, separated by '|'; empty for any
+  int since = 0;                 ///< minor version of the format that added it: files of older ones need not have it
 };
 
 /// The type of a dataset when all of `when` hold: "a=x|y & b=z" of text attributes; empty always holds.
@@ -50,6 +51,7 @@ struct DatasetSchema {
   std::string_view units;
   std::string_view long_name;
   bool required = true;
+  int since = 0;  ///< minor version of the format that added it: files of older ones need not have it
 };
 
 /// A size that follows from attributes.

@@ -11,6 +11,8 @@
 #include <set>
 
 #include "glint/formats/hdf5_handle.h"
+#include "glint/formats/hdf5_precheck.h"
+#include "glint/formats/plain_text.h"
 #include "glint/formats/system_error.h"
 
 namespace glint::formats {
@@ -70,27 +72,10 @@ void checkSuperblock(const Mapping& mapping) {
         "file.truncated", {},
         "has " + std::to_string(mapping.size()) + " bytes of the " + std::to_string(end) + " that its superblock declares");
   }
-}
-
-/// Whether a text can be shown: well-formed UTF-8 without control characters (a name could otherwise drive a terminal).
-bool isPlainText(std::string_view text) {
-  for (std::size_t k = 0; k < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[k++]);
-    if (lead < 0x80) {
-      if ((lead < 0x20 && lead != '\n' && lead != '\t' && lead != '\r') || lead == 0x7f) return false;
-      continue;
-    }
-    const int more = lead >= 0xc2 && lead < 0xe0 ? 1 : lead >= 0xe0 && lead < 0xf0 ? 2 : lead >= 0xf0 && lead < 0xf5 ? 3 : 0;
-    if (more == 0) return false;
-    std::uint32_t code = lead & (0x3fu >> more);
-    for (int i = 0; i < more; ++i) {
-      if (k >= text.size() || (static_cast<unsigned char>(text[k]) & 0xc0u) != 0x80) return false;
-      code = code << 6 | (static_cast<unsigned char>(text[k++]) & 0x3fu);
-    }
-    constexpr std::uint32_t kSmallest[] = {0, 0x80, 0x800, 0x10000};
-    if (code < kSmallest[more] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000) || code < 0xa0) return false;
+  if (end < mapping.size()) {
+    throwBroken("file.trailing", {},
+                "has " + std::to_string(mapping.size() - end) + " bytes after the end that its superblock declares");
   }
-  return true;
 }
 
 /// Names and kinds of the links of a group, collected by HDF5's iteration.
@@ -352,6 +337,7 @@ FileStructure readStructure(const std::filesystem::path& path, Findings& finding
     if (status.st_size == 0) throwBroken("file.signature", {}, "is empty");
     structure.mapping = Mapping(descriptor.id, static_cast<std::size_t>(status.st_size));
     checkSuperblock(structure.mapping);
+    structure.places = checkObjectHeaders({structure.mapping.data(), structure.mapping.size()});
     const hdf5::LibraryScope scope;
     const hdf5::Handle file = openInHdf5(path, status);
     StructureReader(structure, findings).readFile(file);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "glint/formats/findings.h"
+#include "glint/formats/hdf5_precheck.h"
 #include "glint/formats/schema.h"
 
 namespace glint::formats {
@@ -65,6 +66,7 @@ struct DatasetRecord {
 /// Everything that a file holds, apart from what it means.
 struct FileStructure {
   Mapping mapping;
+  ObjectPlaces places;
   Attributes attributes;                          ///< of the root
   std::map<std::string, DatasetRecord> datasets;  ///< by path without the leading '/'
 };

@@ -15,6 +15,7 @@ ordered_json attributeJson(const AttributeSchema& attribute) {
   if (!attribute.count.empty()) json["count"] = attribute.count;
   if (attribute.type != ElementType::text) json["range"] = {attribute.minimum, attribute.maximum};
   if (!attribute.values.empty()) json["values"] = attribute.values;
+  if (attribute.since > 0) json["since_minor"] = attribute.since;
   json["units"] = attribute.units;
   json["long_name"] = attribute.long_name;
   return json;
@@ -39,6 +40,7 @@ ordered_json datasetJson(const DatasetSchema& dataset) {
   json["types"] = std::move(types);
   json["dims"] = dataset.dims;
   json["required"] = dataset.required;
+  if (dataset.since > 0) json["since_minor"] = dataset.since;
   json["units"] = dataset.units;
   json["long_name"] = dataset.long_name;
   return json;

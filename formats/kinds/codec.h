@@ -38,6 +38,10 @@ class Content {
   const std::string& text(std::string_view attribute) const { return structure_.attributes.find(attribute)->second.texts[0]; }
   bool is(std::string_view attribute, std::string_view value) const { return text(attribute) == value; }
 
+  /// Whether an attribute or dataset is there: ask before reading one that older minor versions do not have (its `since`).
+  bool hasAttribute(std::string_view attribute) const { return structure_.attributes.contains(attribute); }
+  bool hasDataset(const std::string& path) const { return structure_.datasets.contains(path); }
+
   const DatasetRecord& dataset(const std::string& path) const { return structure_.datasets.at(path); }
   /// The whole dataset as a list of T; T may span several elements, e.g. Vec2.
   template <class T>

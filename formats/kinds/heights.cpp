@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "glint/formats/kinds/codec.h"
-#include "glint/model/texel_name.h"
+#include "glint/formats/kinds/texel_tally.h"
 
 namespace glint::formats {
 
@@ -25,12 +25,10 @@ void unpack(const Content& content, HeightMap& map) {
 void checkIndex(const HeightMap&, Findings&) {}
 
 void checkData(const HeightMap& map, Findings& findings) {
-  TexelTally bad(map.width, map.height);
+  TexelTally infinite(map.width, map.height);
   for (std::size_t k = 0; k < map.heights.size(); ++k)
-    if (!std::isfinite(map.heights[k])) bad.add(k);
-  if (bad.count() == 0) return;
-  findings.add("heights.finite", "/heights",
-               std::to_string(bad.count()) + " texels are not finite (first at " + bad.firstName() + ")");
+    if (!std::isfinite(map.heights[k])) infinite.add(k);
+  report(infinite, "heights.finite", "/heights", "texels are not finite", findings);
 }
 
 }  // namespace glint::formats

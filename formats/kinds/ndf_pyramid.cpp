@@ -1,8 +1,10 @@
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
 #include "glint/formats/kinds/pyramid_shape.h"
 #include "glint/formats/number_text.h"
+#include "glint/model/texel_name.h"
 
 namespace glint::formats {
 namespace {
@@ -17,6 +19,14 @@ std::string levelObject(int l, const char* dataset) { return "/" + levelPath("le
 float pixel(const NdfPyramid& pyramid, const PyramidLevel& level, std::size_t index) {
   return pyramid.precision == BlockPrecision::f16 ? ieeeHalfToFloat(static_cast<const std::uint16_t*>(level.pixels)[index])
                                                   : static_cast<const float*>(level.pixels)[index];
+}
+
+/// "the image at column 3, row 7 from the top" that a stored block of a level belongs to.
+std::string imageOf(const NdfPyramid& pyramid, int l, std::size_t block) {
+  const std::span<const std::uint32_t> ranks = pyramid.levels[l].mask_ranks;
+  const auto word = static_cast<std::size_t>(std::upper_bound(ranks.begin(), ranks.end(), block) - ranks.begin()) - 1;
+  const PyramidGrid& grid = pyramid.shape.levels[l];
+  return "the image at " + texelName(grid.columns, grid.rows, word / static_cast<std::size_t>(pyramid.shape.maskWords()));
 }
 
 /// Checks the pixels of one level against its means. Returns the sum of the pixels of each block.
@@ -40,12 +50,12 @@ std::vector<double> checkBlocks(const NdfPyramid& pyramid, int l, Findings& find
   if (bad_pixels > 0) {
     findings.add(
         "pyramid.pixels", levelObject(l, "pixels"),
-        std::to_string(bad_pixels) + " pixels are negative or not finite (first in block " + std::to_string(first_pixel) + ")");
+        std::to_string(bad_pixels) + " pixels are negative or not finite (first in " + imageOf(pyramid, l, first_pixel) + ")");
   }
   if (bad_means > 0) {
     findings.add(
         "pyramid.block_means", levelObject(l, "block_means"),
-        std::to_string(bad_means) + " means differ from the pixels' (first in block " + std::to_string(first_mean) + ")");
+        std::to_string(bad_means) + " means differ from the pixels' (first in " + imageOf(pyramid, l, first_mean) + ")");
   }
   return sums;
 }

@@ -2,17 +2,10 @@
 #include <cmath>
 
 #include "glint/formats/kinds/codec.h"
-#include "glint/model/texel_name.h"
+#include "glint/formats/kinds/texel_tally.h"
 
 namespace glint::formats {
 namespace {
-
-/// Reports elements that break a rule: how many and the first.
-void report(const TexelTally& tally, std::string_view rule, const std::string& object, const std::string& what,
-            Findings& findings) {
-  if (tally.count() == 0) return;
-  findings.add(rule, object, std::to_string(tally.count()) + " " + what + " (first at " + tally.firstName() + ")");
-}
 
 bool holds(const NormalBounds& b, float x, float y) { return b.low_x <= x && x <= b.high_x && b.low_y <= y && y <= b.high_y; }
 
@@ -94,7 +87,8 @@ void checkIndex(const NormalMap& map, Findings& findings) {
 }
 
 void checkData(const NormalMap& map, Findings& findings) {
-  TexelTally infinite(map.width, map.height), outside(map.width, map.height);
+  TexelTally infinite(map.width, map.height);
+  TexelTally outside(map.width, map.height);
   for (std::size_t k = 0; k < map.normals.size(); ++k) {
     const Vec2 n = map.normals[k];
     if (!std::isfinite(n.x) || !std::isfinite(n.y)) {

@@ -189,6 +189,9 @@ std::vector<Fixture> fileFixtures() {
          H5Fclose(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT));  // HDF5's default: version 0
        }},
       {"file.truncated", Base::heights, [](const fs::path& path) { fs::resize_file(path, fs::file_size(path) - 1); }},
+      {"file.trailing", Base::heights,
+       [](const fs::path& path) { std::ofstream(path, std::ios::binary | std::ios::app) << "more"; }},
+      {"file.padding", Base::heights, [](const fs::path& path) { overwrite(path, 60, "x"); }, true},
       {"file.hdf5", Base::heights, [](const fs::path& path) { overwrite(path, 44, "damaged checksum"); }},
       {"file.hdf5", Base::heights, [](const fs::path& path) { overwrite(path, 70, "damaged header"); }},
   };

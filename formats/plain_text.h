@@ -1,0 +1,12 @@
+#pragma once
+
+// Private to formats/.
+
+#include <string_view>
+
+namespace glint::formats {
+
+/// Whether a text can be shown: well-formed UTF-8 without control characters (a name could otherwise drive a terminal).
+bool isPlainText(std::string_view text);
+
+}  // namespace glint::formats
