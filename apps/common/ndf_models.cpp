@@ -55,8 +55,10 @@ void NdfAsset::useOnly(std::vector<std::string> kinds, const std::string& name, 
   kind_options_.push_back({std::move(kinds), name, &option});
 }
 
-void NdfAsset::open() {
+void NdfAsset::open(const formats::OpenOptions& checks) {
   options_.normals = normals_path_;
+  options_.verify_hashes = checks.verify_hashes;
+  options_.check_values = checks.check_values;
   opened_ = api::OpenedNdf::open(path_, options_);
   const auto kind = opened_->asset().kind();
   for (const KindOption& o : kind_options_)

@@ -21,8 +21,9 @@ class NdfAsset {
 
   /// Opens the asset, and warns of options that are for other kinds. Call once, in the work; the model lives as long as this
   /// object.
+  /// @param checks  of the asset and of --normals, beyond those that opening always makes
   /// @throws Error invalid_input if --normals is not the map that the asset was made from
-  void open();
+  void open(const formats::OpenOptions& checks = {});
   const std::string& path() const { return path_; }
   const AnyNdf& model() const { return opened_->model(); }
 

@@ -20,7 +20,7 @@ int main(int argc, char** argv) {
   apps::BinMapCommand command(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::open(input.path());
+    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
     const formats::Provenance provenance = tool.provenance();
     const apps::BuiltBinMap built = command.build(asset.normals(), tool.progress("passes"));
     formats::writeAsset(output.path(), built.data.view(), provenance, output.writeOptions());

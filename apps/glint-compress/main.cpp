@@ -18,8 +18,9 @@ int main(int argc, char** argv) {
   const apps::CompressOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::open(input.path());
-    const formats::Provenance provenance = tool.provenance();
+    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    // The map that the pyramid was made from is named, too: --normals of queries must be this map.
+    const formats::Provenance provenance = formats::chained(tool.provenance(), asset.info().provenance);
     bake::CompressionReport report;
     const auto data = bake::compressPyramid(asset.pyramid(), options.options(), &report, tool.progress("compress"));
     formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());

@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
   apps::DisplaceCommand command(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::open(input.path());
+    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
     bake::DisplaceOptions options = command.options(asset.heights());
     options.seed = tool.seed();
     const formats::Provenance provenance = tool.provenance();

@@ -20,7 +20,7 @@ int main(int argc, char** argv) {
   apps::PyramidCommand command(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::open(input.path());
+    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
     const formats::Provenance provenance = tool.provenance();
     const bake::NdfPyramidData pyramid = bake::buildPyramid(asset.normals(), command.options(), tool.progress("images"));
     formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());

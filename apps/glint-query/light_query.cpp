@@ -95,7 +95,7 @@ void LightQuery::check() const {
 
 LightQuery::Lobe LightQuery::lobe(const NdfAsset& asset, int order) const {
   if (!lobes_path_.empty()) {
-    const formats::Asset lobes = formats::Asset::open(lobes_path_);
+    const formats::Asset lobes = formats::Asset::openForBuilding(lobes_path_);
     return {{lobes.shLobes().zonal.begin(), lobes.shLobes().zonal.end()}, lobes.shLobes().sigma_r};
   }
   const std::vector<double> f = bake::zonalLobe(asset.facetRoughness(), order);
@@ -128,7 +128,7 @@ void LightQuery::run(const NdfAsset& asset, const Footprint& footprint, Vec3 wo)
   if (asset.info().surface != Surface::flat)
     throw Error(ErrorCode::unsupported, "query.light", "", "--surface", "light is summed over facets, not over smooth surfaces",
                 "leave out --surface smooth");
-  const formats::Asset light_asset = formats::Asset::open(path_);
+  const formats::Asset light_asset = formats::Asset::openForBuilding(path_);
   const ShLight& light = light_asset.shLight();
   const Lobe lobe = this->lobe(asset, light.order);
   const auto ask = [&](const auto& histogram) {

@@ -15,9 +15,11 @@ int main(int argc, char** argv) {
   apps::QueryCommand command(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset file = formats::Asset::open(asset.path());
-    if (file.kind() == "displacement") return command.run(file.displacement());
-    asset.open();
+    const formats::OpenOptions checks = command.checks();
+    // An asset of another kind is opened, and checked, with its own options.
+    const bool displacement = formats::Asset::open(asset.path()).kind() == "displacement";
+    if (displacement) return command.run(formats::Asset::open(asset.path(), checks).displacement());
+    asset.open(checks);
     command.run(asset);
   });
 }

@@ -110,6 +110,11 @@ Query QueryCommand::query() const {
   return query;
 }
 
+formats::OpenOptions QueryCommand::checks() const {
+  const bool all = !image_.empty() || csv_option_->given() || samples_ > 0 || light_.asked();
+  return {.verify_hashes = all, .check_values = all};
+}
+
 void QueryCommand::checkDisplacement() const {
   if (covariance_option_->given() || box_option_->given())
     usage("a displacement has levels, not footprints of any shape", "give --sigma S or --level L");

@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
   apps::SatOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::open(input.path());
+    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
     const formats::Provenance provenance = tool.provenance();
     const bake::HistogramSatData sat = bake::buildHistogramSat(asset.normals(), options.get(), tool.progress("tables"));
     formats::writeAsset(output.path(), sat.view(), provenance, output.writeOptions());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 #include "glint/formats/hash.h"
 #include "glint/formats/number_text.h"
@@ -15,11 +16,15 @@ constexpr int kReferenceResolution = 256;
 
 void requireSameMap(const formats::Asset& asset, const std::filesystem::path& path, const NdfInfo& info, const NormalMap& map,
                     const std::filesystem::path& normals_path) {
-  // A pyramid names its map as an input; what was compressed from a pyramid names that, so only the size can be compared.
-  const auto& inputs = asset.info().provenance.inputs;
-  const std::string hash = asset.kind() == "ndf-pyramid" ? formats::hashFile(normals_path) : std::string();
-  const bool named = hash.empty() || inputs.empty() ||
-                     std::any_of(inputs.begin(), inputs.end(), [&](const auto& input) { return input.hash_hex == hash; });
+  // A pyramid names its map as an input; what was compressed from a pyramid names it as an input of that. Files that name no
+  // such input (made by other programs, or compressed before inputs were chained) can be compared by size only.
+  const bool pyramid = asset.kind() == "ndf-pyramid";
+  std::vector<formats::InputRecord> maps;
+  for (const formats::InputRecord& input : asset.info().provenance.inputs)
+    if (pyramid || formats::isChained(input)) maps.push_back(input);
+  const std::string hash = maps.empty() ? std::string() : formats::hashFile(normals_path);
+  const bool named =
+      maps.empty() || std::any_of(maps.begin(), maps.end(), [&](const auto& input) { return input.hash_hex == hash; });
   if (named && map.width == info.width && map.height == info.height) return;
   throw Error(ErrorCode::invalid_input, "query.normals", normals_path.string(), "",
               "this is not the map that " + path.string() + " was made from", "give the asset that glint-pyramid read");
@@ -45,6 +50,14 @@ NdfInfo infoOf(const HistogramSat& sat) {
   return {sat.width, sat.height, kReferenceResolution, 0, Surface::flat, Boundary::wrap, 0, 0, 0};
 }
 
+MapSlopes slopesOf(const NormalMap& map) {
+  const auto width = static_cast<std::size_t>(map.width);
+  SlopeSums sums;
+  for (std::size_t j = 0; j < static_cast<std::size_t>(map.height); ++j)
+    sums.add(slopeSums(map.normals.data() + j * width, width));
+  return sums.moments(static_cast<double>(map.width) * map.height);
+}
+
 float askedAlpha(const BinMap& map, float alpha, const std::filesystem::path& path) {
   if (alpha == 0) return map.alpha_min;
   if (alpha >= map.alpha_min && alpha <= map.alpha_max) return alpha;
@@ -63,8 +76,8 @@ void OpenedNdf::setPyramid(const View& view, int footprint_parts) {
 }
 
 OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& options) {
-  const formats::OpenOptions open_options = {options.verify_hashes};
-  OpenedNdf opened(formats::Asset::open(path, open_options));
+  const formats::OpenOptions open_options = {options.verify_hashes, options.check_values};
+  OpenedNdf opened(path, formats::Asset::open(path, open_options));
   if (!options.normals.empty()) opened.normals_ = formats::Asset::open(options.normals, open_options);
   const formats::Asset& asset = opened.asset_;
 
@@ -96,16 +109,13 @@ OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& o
 }
 
 MapSlopes OpenedNdf::slopes() const {
-  if (const auto* pyramid = roundModel<PyramidNdf>(model_)) return pyramid->shape().slopes;
-  if (const auto* compressed = roundModel<CpNdf>(model_)) return compressed->shape().slopes;
-  if (const auto* bins = std::get_if<BinMapNdf>(&model_)) return bins->map().slopes;
-  if (const auto* histograms = std::get_if<HistogramNdf>(&model_)) return histograms->sat().slopes;
-  const NormalMap& map = asset_.normals();
-  const auto width = static_cast<std::size_t>(map.width);
-  SlopeSums sums;
-  for (std::size_t j = 0; j < static_cast<std::size_t>(map.height); ++j)
-    sums.add(slopeSums(map.normals.data() + j * width, width));
-  return sums.moments(static_cast<double>(map.width) * map.height);
+  return std::visit(
+      Overloaded{[&](const Reference&) { return slopesOf(asset_.normals()); },
+                 [](const AnisotropicNdf<PyramidNdf>& pyramid) { return pyramid.round().shape().slopes; },
+                 [](const AnisotropicNdf<CpNdf>& compressed) { return compressed.round().shape().slopes; },
+                 [](const BinMapNdf& bins) { return bins.map().slopes; },
+                 [](const HistogramNdf& histograms) { return histograms.sat().slopes; }},
+      model_);
 }
 
 }  // namespace glint::api

@@ -24,6 +24,14 @@ const Model* roundModel(const AnyNdf& ndf) {
   return stretched ? &stretched->round() : nullptr;
 }
 
+/// A visitor of a variant from one function for each alternative: one that is missing does not compile.
+template <class... F>
+struct Overloaded : F... {
+  using F::operator()...;
+};
+template <class... F>
+Overloaded(F...) -> Overloaded<F...>;
+
 /// What an asset does not say itself about how it is asked.
 struct NdfOptions {
   std::filesystem::path normals;       ///< asset that the pyramid was made from, for footprints below level 0; empty: none
@@ -36,6 +44,7 @@ struct NdfOptions {
   int footprint_parts = IsotropicParts::kMost;  ///< kinds ndf-pyramid and ndf-cp: most round footprints that stand for a
                                                 ///< stretched one; 1: one of the same mean square size
   bool verify_hashes = false;                   ///< also compare every dataset with its hash; reads the whole file
+  bool check_values = false;                    ///< also check values (finite, in the disk, ...); reads the whole file
 };
 
 /// What models of every kind have in common.
@@ -57,13 +66,14 @@ class OpenedNdf {
  public:
   /// Opens an asset of a kind that answers an NDF.
   /// @throws Error  as formats::Asset::open; unsupported for other kinds; invalid_input if `options.normals` is not the map
-  ///                that the asset was made from
+  ///                that the asset was made from, by the hash that the asset names, or by size where it names none
   static OpenedNdf open(const std::filesystem::path& path, const NdfOptions& options = {});
 
   /// Points into the mapped asset: lives as long as this object, also when that is moved.
   const AnyNdf& model() const { return model_; }
   const NdfInfo& info() const { return info_; }
   const formats::Asset& asset() const { return asset_; }
+  const std::filesystem::path& path() const { return path_; }
   /// Whether footprints below level 0 are answered from the texels.
   bool hasNormals() const { return normals_.has_value(); }
   /// The map that answers them; nullptr if there is none.
@@ -72,10 +82,11 @@ class OpenedNdf {
   MapSlopes slopes() const;
 
  private:
-  explicit OpenedNdf(formats::Asset asset) : asset_(std::move(asset)) {}
+  OpenedNdf(std::filesystem::path path, formats::Asset asset) : path_(std::move(path)), asset_(std::move(asset)) {}
   template <class Model, class View>
   void setPyramid(const View& view, int footprint_parts);
 
+  std::filesystem::path path_;
   formats::Asset asset_;
   std::optional<formats::Asset> normals_;
   AnyNdf model_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "glint/model/displacement.h"
 #include "glint/query/base_brdf.h"
@@ -84,7 +85,10 @@ class DisplacedBrdf {
     const float scale = 1 / static_cast<float>(l.factor);
     const bool lower = p.x + p.y < 1;
     const float sx = scale * (lower ? h10 - h00 : h11 - h01), sy = scale * (lower ? h01 - h00 : h11 - h10);
-    const float z = 1 / std::sqrt(1 + sx * sx + sy * sy);
+    const float square = 1 + sx * sx + sy * sy;
+    // Heights of a file are not checked: where they are no numbers, or too large, the surface is flat.
+    if (!(square <= std::numeric_limits<float>::max())) return {0, 0, 1};
+    const float z = 1 / std::sqrt(square);
     return {-sx * z, -sy * z, z};
   }
 
@@ -155,7 +159,7 @@ class DisplacedBrdf {
       if (c <= 0) return {};
       wi = 2 * c * h - wo;
     }
-    return {wi, pdf(level, uv, wi, wo)};
+    return isDirection(wi) ? DirectionSample{wi, pdf(level, uv, wi, wo)} : DirectionSample{};
   }
 
   /// Density of `sample` per solid angle. Directions below the horizon can be drawn; `evaluate` is 0 there.
@@ -193,7 +197,7 @@ class DisplacedBrdf {
       const float kappa = least_variance * lobe.kappa > 1 ? 1 / least_variance : lobe.kappa;
       density += lobe.amplitude * vmfDensity(dot(lobeCentre(lobe), n), kappa);
     }
-    return density;
+    return finitePositive(density);
   }
 
   /// T, linear between the centres of its patches; periodic.

@@ -1,0 +1,158 @@
+"""Tools that build from all of an asset refuse values that are none, and say where they are; no query crashes on them."""
+
+import math
+import shutil
+import struct
+import subprocess
+
+import pytest
+from conftest import BIN
+
+h5py = pytest.importorskip("h5py")
+
+SIZE = 64
+BAD = {"nan": math.nan, "infinite": math.inf, "outside": 1.5}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with one small asset of every kind that something is made from."""
+    folder = tmp_path_factory.mktemp("assets")
+    runs = [
+        ("synth", "isotropic", "--size", SIZE, "-o", "map.exr"),
+        ("ingest", "map.exr", "-o", "normals.glint"),
+        ("synth", "isotropic", "--height", "--size", SIZE, "-o", "heights.exr"),
+        ("ingest", "heights.exr", "--kind", "height", "--to", "heights", "-o", "heights.glint"),
+        ("pyramid", "normals.glint", "-o", "pyramid.glint", "--stride", "16"),
+        ("compress", "pyramid.glint", "-o", "compressed.glint", "--rank", "4"),
+        ("sat", "normals.glint", "-o", "sat.glint"),
+        ("displace", "heights.glint", "-o", "displaced.glint", "--factor", "16", "--base", "diffuse:0.8"),
+    ]
+    for tool, *arguments in runs:
+        subprocess.run([BIN / f"glint-{tool}", *map(str, arguments)], cwd=folder, check=True, timeout=120)
+    return folder
+
+
+@pytest.fixture
+def assets(glint, made):
+    """The folder of the test, with copies of these assets."""
+    for path in made.glob("*.glint"):
+        shutil.copy(path, glint.folder)
+    return glint.folder
+
+
+def with_value(folder, source, dataset, element, value, name="bad.glint"):
+    """A copy of an asset with one f32 element of a dataset replaced."""
+    shutil.copy(folder / source, folder / name)
+    with h5py.File(folder / source, "r") as file:
+        place = file[dataset].id.get_offset() + 4 * element
+        assert file[dataset].dtype == "<f4"
+    with open(folder / name, "r+b") as file:
+        file.seek(place)
+        file.write(struct.pack("<f", value))
+    return name
+
+
+# Column 3, row 7 from the top; rows are stored from the bottom.
+TEXEL = (SIZE - 1 - 7) * SIZE + 3
+
+
+@pytest.mark.parametrize("value", BAD.values(), ids=BAD.keys())
+@pytest.mark.parametrize(
+    "tool, arguments",
+    [
+        ("pyramid", ["-o", "out.glint"]),
+        ("sat", ["-o", "out.glint"]),
+        ("binmap", ["-o", "out.glint", "--alpha", "0.02"]),
+        ("query", ["--uv", ".5", ".5", "--sigma", "9", "--image", "out.exr"]),
+        ("query", ["--uv", ".5", ".5", "--sigma", "9", "--samples", "10", "-o", "out.csv"]),
+        ("query", ["--uv", ".5", ".5", "--sigma", "9", "--surface", "smooth", "--image", "out.exr"]),
+    ],
+    ids=["pyramid", "sat", "binmap", "image", "samples", "smooth-image"],
+)
+def test_normals_that_are_none_are_named_by_their_texel(glint, assets, tool, arguments, value):
+    bad = with_value(assets, "normals.glint", "normals", 2 * TEXEL, value)
+    process = glint(tool, bad, *arguments)
+    assert process.returncode == 3, process.stderr
+    assert "column 3, row 7 from the top" in process.stderr and "bad.glint" in process.stderr
+    assert not any((assets / name).exists() for name in ["out.glint", "out.exr", "out.csv"])
+
+
+@pytest.mark.parametrize("value", BAD.values(), ids=BAD.keys())
+def test_one_query_of_normals_that_are_none_is_finite(glint, assets, value):
+    bad = with_value(assets, "normals.glint", "normals", 2 * TEXEL, value)
+    for question in [["--half", ".1", ".05"], ["--range", "-.2", "-.2", ".2", ".2"]]:
+        for surface in ["flat", "smooth"]:
+            at = ["--uv", (3 + 0.5) / SIZE, 1 - (7 + 0.5) / SIZE]
+            process = glint("query", bad, *at, "--sigma", "2", "--surface", surface, *question)
+            assert process.returncode == 0, process.stderr
+            answer = float(process.stdout)
+            assert 0 <= answer < math.inf
+    assert glint("info", bad).returncode in (0, 3)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf], ids=["nan", "infinite"])
+def test_heights_that_are_none_are_named_by_their_texel(glint, assets, value):
+    bad = with_value(assets, "heights.glint", "heights", TEXEL, value)
+    process = glint("displace", bad, "-o", "out.glint", "--factor", "16", "--base", "diffuse:0.8")
+    assert process.returncode == 3
+    assert "column 3, row 7 from the top" in process.stderr
+    assert not (assets / "out.glint").exists()
+
+
+def test_pyramids_with_bad_means_are_not_compressed(glint, assets):
+    bad = with_value(assets, "pyramid.glint", "level_00/block_means", 0, math.nan)
+    process = glint("compress", bad, "-o", "out.glint", "--rank", "4")
+    assert process.returncode == 3
+    assert "pyramid.block_means" in process.stderr or "from the top" in process.stderr
+    assert not (assets / "out.glint").exists()
+
+
+@pytest.mark.parametrize(
+    "source, dataset",
+    [
+        ("pyramid.glint", "level_00/block_means"),
+        ("compressed.glint", "image_scales"),
+        ("compressed.glint", "scales"),
+        ("sat.glint", "bin_normals"),
+    ],
+)
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1e30], ids=["nan", "infinite", "negative"])
+def test_other_kinds_answer_finitely_or_refuse(glint, assets, source, dataset, value):
+    bad = with_value(assets, source, dataset, 0, value)
+    footprint = ["--uv", ".1", ".1", "--sigma", "20"]
+    process = glint("query", bad, *footprint, "--half", ".02", ".01")
+    assert process.returncode == 0, process.stderr
+    assert 0 <= float(process.stdout) < math.inf
+    for question in [["--image", "out.exr"], ["--samples", "5", "-o", "out.csv"]]:
+        assert glint("query", bad, *footprint, *question).returncode == 3
+
+
+@pytest.mark.parametrize("dataset", ["heights", "lobes", "slopes", "spatial_scale"])
+def test_displacements_answer_finitely_or_refuse(glint, assets, dataset):
+    bad = with_value(assets, "displaced.glint", f"level_00/{dataset}", 0, math.nan)
+    place = ["--uv", ".05", ".05", "--level", "0"]
+    light = ["--wi", ".3", ".1", ".9", "--wo", "-.2", ".1", ".9"]
+    process = glint("query", bad, *place, *light)
+    assert process.returncode == 0, process.stderr
+    assert all(0 <= float(number) < math.inf for number in process.stdout.split()[:1])
+    assert glint("query", bad, *place, "--image", "out.exr").returncode == 3
+
+
+def test_normals_of_another_map_are_refused(glint, assets):
+    other = [
+        ("synth", "isotropic", "--size", SIZE, "--seed", "5", "-o", "other.exr"),
+        ("ingest", "other.exr", "-o", "other.glint"),
+    ]
+    assert all(glint(*run).returncode == 0 for run in other)
+    question = ["--uv", ".5", ".5", "--sigma", "2", "--half", ".1", "0"]
+    for asset in ["pyramid.glint", "compressed.glint"]:
+        assert glint("query", asset, "--normals", "normals.glint", *question).returncode == 0
+        process = glint("query", asset, "--normals", "other.glint", *question)
+        assert process.returncode == 3
+        assert "is not the map" in process.stderr
+
+
+def test_the_inputs_of_a_compressed_pyramid_name_its_map(glint, assets):
+    text = glint("info", "compressed.glint").stdout
+    assert "pyramid.glint/normals.glint" in text
