@@ -199,6 +199,30 @@ ordered_json summarizeDisplacement(const Displacement& d) {
   return {{"reliable_within_deg", 75}, {"levels", std::move(levels)}};
 }
 
+const char* nameOf(CompressionMethod method) {
+  switch (method) {
+    case CompressionMethod::cp:
+      return "cp";
+    case CompressionMethod::tucker:
+      return "tucker";
+    case CompressionMethod::pca:
+      return "pca";
+  }
+  return "unknown";
+}
+
+const char* nameOf(CoefficientType type) {
+  switch (type) {
+    case CoefficientType::i8:
+      return "i8";
+    case CoefficientType::f16:
+      return "f16";
+    case CoefficientType::f32:
+      return "f32";
+  }
+  return "unknown";
+}
+
 void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json& statistics) {
   if (asset.kind() == "normals") {
     const NormalMap& map = asset.normals();
@@ -220,10 +244,8 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
   } else if (asset.kind() == "ndf-cp") {
     const CompressedNdf& ndf = asset.compressed();
     properties = shapeProperties(ndf.shape);
-    constexpr const char* kMethods[] = {"cp", "tucker", "pca"};
-    constexpr const char* kTypes[] = {"i8", "f16", "f32"};
-    properties["method"] = kMethods[static_cast<int>(ndf.method)];
-    properties["coefficient_type"] = kTypes[static_cast<int>(ndf.coefficient_type)];
+    properties["method"] = nameOf(ndf.method);
+    properties["coefficient_type"] = nameOf(ndf.coefficient_type);
     properties["regions"] = ndf.regions;
     statistics = summarizeCompressed(ndf, asset.info());
   } else if (asset.kind() == "bin-map") {

@@ -48,6 +48,12 @@ glint_status usage(const char* where, const char* what) {
   return fail(GLINT_ERROR_USAGE, message, "api.arguments");
 }
 
+glint_status nullArgument(const char* where, std::initializer_list<Argument> arguments) {
+  const auto isNull = [](const Argument& argument) { return argument.pointer == nullptr; };
+  const Argument* first = std::find_if(arguments.begin(), arguments.end(), isNull);
+  return usage(where, (std::string(first->name) + " is null").c_str());
+}
+
 const char* missingIn(const glint_footprints& p) {
   if (p.u.data == nullptr || p.v.data == nullptr) return "u and v of the footprints must be given";
   const bool gaussian = p.xx.data != nullptr && p.yy.data != nullptr;
@@ -168,7 +174,7 @@ glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* info) {
   all.boundary = static_cast<int32_t>(from.boundary);
   all.has_normals = ndf->opened.hasNormals() ? 1 : 0;
   all.file_bytes = ndf->opened.asset().info().file_bytes;
-  return giveSized(all, info) ? GLINT_OK : usage("glint_ndf_info", "struct_size is not the size of the struct");
+  return giveSized(all, info) ? GLINT_OK : usage("glint_ndf_info", kWrongStructSize);
 }
 
 glint_footprint glint_footprint_isotropic(float u, float v, float sigma_texels) {
@@ -181,7 +187,8 @@ glint_footprint glint_footprint_from_differentials(float u, float v, float dudx,
 }
 
 glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy, float* density) {
-  if (ndf == nullptr || footprint == nullptr || density == nullptr) return usage("glint_density", "an argument is null");
+  if (ndf == nullptr || footprint == nullptr || density == nullptr)
+    return nullArgument("glint_density", {{ndf, "ndf"}, {footprint, "footprint"}, {density, "density"}});
   *density = std::visit(
       [&](const auto& model) {
         return model.density(footprintOf(*footprint), {hx, hy});
@@ -192,7 +199,8 @@ glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprin
 
 glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, float x0, float y0, float x1, float y1,
                         float* mean) {
-  if (ndf == nullptr || footprint == nullptr || mean == nullptr) return usage("glint_mean", "an argument is null");
+  if (ndf == nullptr || footprint == nullptr || mean == nullptr)
+    return nullArgument("glint_mean", {{ndf, "ndf"}, {footprint, "footprint"}, {mean, "mean"}});
   *mean = std::visit(
       [&](const auto& model) {
         return model.mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}});
@@ -204,7 +212,7 @@ glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, 
 glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint, float xi1, float xi2, float* hx, float* hy,
                           float* pdf) {
   if (ndf == nullptr || footprint == nullptr || hx == nullptr || hy == nullptr || pdf == nullptr)
-    return usage("glint_sample", "an argument is null");
+    return nullArgument("glint_sample", {{ndf, "ndf"}, {footprint, "footprint"}, {hx, "hx"}, {hy, "hy"}, {pdf, "pdf"}});
   const HalfVectorSample drawn = std::visit(
       [&](const auto& model) {
         return model.sample(footprintOf(*footprint), {xi1, xi2});

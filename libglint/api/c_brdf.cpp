@@ -182,7 +182,7 @@ void glint_brdf_destroy(glint_brdf* brdf) { delete brdf; }
 glint_status glint_brdf_evaluate(const glint_brdf* brdf, const glint_footprint* footprint, const float wi[3], const float wo[3],
                                  float f[3], float* pdf) {
   if (brdf == nullptr || footprint == nullptr || wi == nullptr || wo == nullptr)
-    return usage("glint_brdf_evaluate", "an argument is null");
+    return nullArgument("glint_brdf_evaluate", {{brdf, "brdf"}, {footprint, "footprint"}, {wi, "wi"}, {wo, "wo"}});
   if (f == nullptr && pdf == nullptr) return usage("glint_brdf_evaluate", "f and pdf are null");
   const Values out = {f, pdf};
   out.set(0, atFootprint(*brdf, footprintOf(*footprint),
@@ -193,7 +193,12 @@ glint_status glint_brdf_evaluate(const glint_brdf* brdf, const glint_footprint* 
 glint_status glint_brdf_sample(const glint_brdf* brdf, const glint_footprint* footprint, const float wo[3], float xi1,
                                float xi2, float wi[3], float weight[3], float* pdf) {
   if (brdf == nullptr || footprint == nullptr || wo == nullptr || wi == nullptr || weight == nullptr || pdf == nullptr)
-    return usage("glint_brdf_sample", "an argument is null");
+    return nullArgument("glint_brdf_sample", {{brdf, "brdf"},
+                                              {footprint, "footprint"},
+                                              {wo, "wo"},
+                                              {wi, "wi"},
+                                              {weight, "weight"},
+                                              {pdf, "pdf"}});
   const BrdfSample drawn = atFootprint(*brdf, footprintOf(*footprint), [&](const auto& b) {
     return b.sample(vectorOf(wo), clampUnit(Vec2{xi1, xi2}));
   });

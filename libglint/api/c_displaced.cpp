@@ -85,13 +85,14 @@ glint_status glint_displaced_get_info(const glint_displaced* displaced, glint_di
   all.texel_size_um = from.texel_size_um;
   all.file_bytes = displaced->asset.info().file_bytes;
   for (int l = 0; l < from.level_count; ++l) all.factors[l] = from.levels[l].factor;
-  return giveSized(all, info) ? GLINT_OK : usage("glint_displaced_info", "struct_size is not the size of the struct");
+  return giveSized(all, info) ? GLINT_OK : usage("glint_displaced_info", kWrongStructSize);
 }
 
 glint_status glint_displaced_heights(const glint_displaced* displaced, int32_t level, const float** heights, int32_t* columns,
                                      int32_t* rows) {
   if (displaced == nullptr || heights == nullptr || columns == nullptr || rows == nullptr)
-    return usage("glint_displaced_heights", "an argument is null");
+    return nullArgument("glint_displaced_heights",
+                        {{displaced, "displaced"}, {heights, "heights"}, {columns, "columns"}, {rows, "rows"}});
   const Displacement& asset = displaced->brdf.asset();
   if (level < 0 || level >= asset.level_count) return usage("glint_displaced_heights", "the asset has no such level");
   *heights = asset.levels[level].heights.data();
@@ -101,7 +102,8 @@ glint_status glint_displaced_heights(const glint_displaced* displaced, int32_t l
 }
 
 glint_status glint_displaced_level(const glint_displaced* displaced, float sigma_texels, float* level) {
-  if (displaced == nullptr || level == nullptr) return usage("glint_displaced_level", "an argument is null");
+  if (displaced == nullptr || level == nullptr)
+    return nullArgument("glint_displaced_level", {{displaced, "displaced"}, {level, "level"}});
   const LevelBlend levels = displaced->brdf.levelsFor(std::sqrt(12.0f) * sigma_texels);
   *level = static_cast<float>(levels.first) + levels.weight;
   return GLINT_OK;
@@ -109,7 +111,8 @@ glint_status glint_displaced_level(const glint_displaced* displaced, float sigma
 
 glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t variant, float level, float u, float v,
                                       const float wi[3], const float wo[3], float reflected[3], float* pdf) {
-  if (displaced == nullptr || wi == nullptr || wo == nullptr) return usage("glint_displaced_evaluate", "an argument is null");
+  if (displaced == nullptr || wi == nullptr || wo == nullptr)
+    return nullArgument("glint_displaced_evaluate", {{displaced, "displaced"}, {wi, "wi"}, {wo, "wo"}});
   if (reflected == nullptr && pdf == nullptr) return usage("glint_displaced_evaluate", "reflected and pdf are null");
   Point(*displaced, variant, level, {u, v}).evaluate(vectorOf(wi), vectorOf(wo), reflected, pdf);
   return GLINT_OK;
@@ -118,7 +121,8 @@ glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t 
 glint_status glint_displaced_sample(const glint_displaced* displaced, int32_t variant, float level, float u, float v,
                                     const float wo[3], float xi1, float xi2, float wi[3], float weight[3], float* pdf) {
   if (displaced == nullptr || wo == nullptr || wi == nullptr || weight == nullptr || pdf == nullptr)
-    return usage("glint_displaced_sample", "an argument is null");
+    return nullArgument("glint_displaced_sample",
+                        {{displaced, "displaced"}, {wo, "wo"}, {wi, "wi"}, {weight, "weight"}, {pdf, "pdf"}});
   Point(*displaced, variant, level, {u, v}).sample(vectorOf(wo), {xi1, xi2}, wi, weight, pdf);
   return GLINT_OK;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
+#include <initializer_list>
 #include <new>
 #include <string>
 
@@ -29,6 +30,15 @@ glint_status fail(glint_status status, const char* message, const char* rule = "
 /// @param what   is wrong with it
 glint_status usage(const char* where, const char* what);
 
+/// An argument that must not be null.
+struct Argument {
+  const void* pointer;
+  const char* name;
+};
+
+/// Fails for the first of these arguments that is null, by its name. One of them must be.
+glint_status nullArgument(const char* where, std::initializer_list<Argument> arguments);
+
 /// Runs work that may throw.
 template <class Work>
 glint_status guarded(Work&& work) noexcept {
@@ -46,13 +56,17 @@ glint_status guarded(Work&& work) noexcept {
   }
 }
 
+/// More than any struct will ever have: a larger struct_size is no size, and would be read beyond the caller's memory.
+inline constexpr std::size_t kMostStructSize = GLINT_MOST_STRUCT_SIZE;
+inline constexpr const char* kWrongStructSize = "struct_size is not the size of the struct";
+
 /// Takes a struct of options of an older or newer header: members that the caller does not have stay as they are, those that
 /// this library does not have must be 0.
 /// @param first_size  of the struct in its first version; no caller's is smaller
 /// @return null if the options can be used, else what is wrong
 template <class Options>
 const char* takeSized(const Options& from, std::size_t first_size, Options& to) {
-  if (from.struct_size < first_size) return "struct_size is not the size of the struct";
+  if (from.struct_size < first_size || from.struct_size > kMostStructSize) return kWrongStructSize;
   std::memcpy(&to, &from, std::min(from.struct_size, sizeof to));
   const char* bytes = reinterpret_cast<const char*>(&from);
   const bool unknown = from.struct_size > sizeof to &&
@@ -61,10 +75,10 @@ const char* takeSized(const Options& from, std::size_t first_size, Options& to) 
 }
 
 /// Fills as much of a struct of answers as its caller has.
-/// @return whether that is anything
+/// @return whether struct_size is one that a caller can have
 template <class Info>
 bool giveSized(Info all, Info* info) {
-  if (info->struct_size <= sizeof info->struct_size) return false;
+  if (info->struct_size <= sizeof info->struct_size || info->struct_size > kMostStructSize) return false;
   all.struct_size = info->struct_size;
   std::memcpy(info, &all, std::min(info->struct_size, sizeof all));
   return true;

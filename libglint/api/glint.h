@@ -70,6 +70,10 @@ typedef struct glint_ndf glint_ndf;
 enum { GLINT_SURFACE_FLAT = 0, GLINT_SURFACE_SMOOTH = 1 };
 enum { GLINT_BOUNDARY_WRAP = 0, GLINT_BOUNDARY_CLAMP = 1 };
 
+/* Structs that start with a struct_size may grow: it says which version of the struct the caller has. A size that is smaller
+ * than the first version's or above this is no size of a struct, and GLINT_ERROR_USAGE. */
+#define GLINT_MOST_STRUCT_SIZE 4096
+
 /* What an asset does not say itself. Zero is the default of every member but the first; options of other kinds are ignored, but
  * have to be in range. Members are added at the end; a library that does not know one accepts 0 there. */
 typedef struct glint_open_options {
@@ -124,7 +128,8 @@ typedef struct glint_ndf_info {
   uint64_t file_bytes;         /* size of the asset */
 } glint_ndf_info;
 
-/* Fills info. Returns GLINT_ERROR_USAGE for null arguments or a struct_size that does not reach beyond itself. */
+/* Fills info. Returns GLINT_ERROR_USAGE for null arguments or a struct_size that does not reach beyond itself or is
+ * above GLINT_MOST_STRUCT_SIZE. */
 GLINT_API glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* info);
 
 /* The region of texture space that a shading point sees. */
@@ -313,7 +318,8 @@ typedef struct glint_displaced_info {
   int32_t factors[GLINT_DISPLACED_MAX_LEVELS];
 } glint_displaced_info;
 
-/* Fills info. Returns GLINT_ERROR_USAGE for null arguments or a struct_size that does not reach beyond itself. */
+/* Fills info. Returns GLINT_ERROR_USAGE for null arguments or a struct_size that does not reach beyond itself or is
+ * above GLINT_MOST_STRUCT_SIZE. */
 GLINT_API glint_status glint_displaced_get_info(const glint_displaced* displaced, glint_displaced_info* info);
 
 /* The coarse surface of one level, on which its reflectance is asked: heights in texels of the original, [rows][columns],

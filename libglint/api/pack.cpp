@@ -1,6 +1,8 @@
 #include "glint/api/pack.h"
 
+#include <cstdint>
 #include <cstring>
+#include <string>
 
 namespace glint::api {
 namespace {
@@ -133,12 +135,38 @@ std::vector<std::byte> pack(const NormalMap& normals, float sigma_r, Surface sur
 }
 
 std::vector<std::byte> pack(const OpenedNdf& opened) {
+  using Buffer = std::vector<std::byte>;
   const formats::Asset& asset = opened.asset();
   const NormalMap* normals = opened.normals();
+  const auto refuse = [&]() -> Buffer {
+    throw Error(ErrorCode::unsupported, "format.kind", opened.path().string(), "",
+                "is of kind " + std::string(asset.kind()) + ", which has no packed form",
+                "pack an asset of kind normals, ndf-pyramid or ndf-cp");
+  };
   // A new kind is a line here, and an overload above.
-  if (asset.kind() == "ndf-pyramid") return pack(asset.pyramid(), normals);
-  if (asset.kind() == "ndf-cp") return pack(asset.compressed(), normals);
-  return pack(asset.normals(), opened.info().sigma_r, opened.info().surface, opened.info().boundary);
+  return std::visit(Overloaded{[&](const Reference&) {
+                                 const NdfInfo& info = opened.info();
+                                 return pack(asset.normals(), info.sigma_r, info.surface, info.boundary);
+                               },
+                               [&](const AnisotropicNdf<PyramidNdf>&) { return pack(asset.pyramid(), normals); },
+                               [&](const AnisotropicNdf<CpNdf>&) { return pack(asset.compressed(), normals); },
+                               [&](const BinMapNdf&) { return refuse(); }, [&](const HistogramNdf&) { return refuse(); }},
+                    opened.model());
+}
+
+PackedNdfView viewPacked(std::span<const std::byte> buffer) {
+  const auto refuse = [](const std::string& fault) {
+    throw Error(ErrorCode::invalid_input, "packed.header", {}, {}, fault, "make the buffer with the same version of glint");
+  };
+  if (buffer.size() < sizeof(PackedHeader))
+    refuse("a packed buffer of " + std::to_string(buffer.size()) + " bytes has no header");
+  if (reinterpret_cast<std::uintptr_t>(buffer.data()) % 16 != 0) refuse("a packed buffer is not aligned to 16 bytes");
+  const auto& header = *reinterpret_cast<const PackedHeader*>(buffer.data());
+  if (header.magic != kPackedMagic) refuse("this is no packed buffer");
+  if (header.version != kPackedVersion)
+    refuse("a packed buffer has version " + std::to_string(header.version) + ", not " + std::to_string(kPackedVersion));
+  if (header.size_bytes != buffer.size()) refuse("a packed buffer is not whole");
+  return PackedNdfView(buffer.data());
 }
 
 }  // namespace glint::api

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "glint/api/any_ndf.h"
 #include "glint/model/packed_ndf.h"
+#include "glint/query/packed_ndf_view.h"
 
 namespace glint::api {
 
@@ -18,6 +20,12 @@ std::vector<std::byte> pack(const NormalMap& normals, float sigma_r, Surface sur
                             Boundary boundary = Boundary::wrap);
 
 /// Whatever was opened, with the normals that it was opened with.
+/// @throws Error  unsupported: of a kind that has no packed form (bin-map, histogram-sat)
 std::vector<std::byte> pack(const OpenedNdf& opened);
+
+/// The models of a buffer that came from elsewhere, such as another process.
+/// @param buffer  aligned to 16 bytes; must live as long as the view and its models
+/// @throws Error  invalid_input: its magic, version or size are not those that pack() of this version writes
+PackedNdfView viewPacked(std::span<const std::byte> buffer);
 
 }  // namespace glint::api

@@ -36,7 +36,8 @@ struct PackedGrid {
 };
 static_assert(sizeof(PackedGrid) == 16);
 
-enum class PackedKind : std::uint32_t { normals = 0, pyramid = 1, compressed = 2 };
+/// `unknown`: never written; what a buffer of another version, or no buffer at all, holds.
+enum class PackedKind : std::uint32_t { normals = 0, pyramid = 1, compressed = 2, unknown = 0xffffffff };
 
 inline constexpr std::uint32_t kPackedMagic = 0x6e6c6721;  // "!gln"
 inline constexpr std::uint32_t kPackedVersion = 3;

@@ -7,7 +7,8 @@
 
 namespace glint {
 
-/// Makes the models of a packed buffer. Trusts the header, which must come from glint::api::pack.
+/// Makes the models of a packed buffer. Trusts the header beyond magic and version: it must come from glint::api::pack. A host
+/// that has the whole buffer makes the view with glint::api::viewPacked, which says what is wrong.
 ///
 /// Header and arrays are given apart, because the processor that makes the model need not be the one that asks it: a host reads
 /// its own copy of the header, and gives the address of the buffer on the device. On the device both are the buffer.
@@ -20,8 +21,10 @@ class PackedNdfView {
       : header_(header), base_(static_cast<const unsigned char*>(base)) {}
   GLINT_HD explicit PackedNdfView(const void* buffer) : PackedNdfView(*static_cast<const PackedHeader*>(buffer), buffer) {}
 
-  GLINT_HD PackedKind kind() const { return header_.kind; }
-  GLINT_HD bool hasNormals() const { return header_.normals.count > 0; }
+  /// Whether pack() of this version wrote the header. If not, kind() is unknown and no model may be made.
+  GLINT_HD bool known() const { return header_.magic == kPackedMagic && header_.version == kPackedVersion; }
+  GLINT_HD PackedKind kind() const { return known() ? header_.kind : PackedKind::unknown; }
+  GLINT_HD bool hasNormals() const { return known() && header_.normals.count > 0; }
 
   /// Kind normals.
   GLINT_HD Reference reference() const {

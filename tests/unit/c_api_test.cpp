@@ -240,6 +240,39 @@ TEST(CApi, StructsOfAnOlderOrNewerHeaderAreUnderstood) {
   EXPECT_EQ(refused, nullptr);
 }
 
+TEST(CApi, StructSizesThatNoStructHasAreRefused) {
+  const Handle ndf = openHandle("ndf-cp");
+  for (const std::size_t size : {std::size_t{GLINT_MOST_STRUCT_SIZE} + 1, SIZE_MAX}) {
+    glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+    options.struct_size = size;
+    glint_ndf* refused = nullptr;
+    EXPECT_EQ(glint_ndf_open(assets().path("ndf-cp").c_str(), &options, &refused), GLINT_ERROR_USAGE);
+    EXPECT_EQ(refused, nullptr);
+    EXPECT_NE(std::string(glint_error_message()).find("struct_size"), std::string::npos);
+    glint_ndf_info info = {};
+    info.struct_size = size;
+    EXPECT_EQ(glint_ndf_get_info(ndf.get(), &info), GLINT_ERROR_USAGE);
+    EXPECT_EQ(info.width, 0);
+  }
+}
+
+TEST(CApi, ErrorsNameTheArgumentThatIsNull) {
+  const Handle ndf = openHandle("ndf-cp");
+  const glint_footprint p = glint_footprint_isotropic(0.1f, 0.9f, 5);
+  float a = 0, b = 0;
+  const auto message = [](glint_status status) {
+    EXPECT_EQ(status, GLINT_ERROR_USAGE);
+    return std::string(glint_error_message());
+  };
+  EXPECT_EQ(message(glint_density(nullptr, &p, 0, 0, &a)), "glint_density: ndf is null");
+  EXPECT_EQ(message(glint_density(ndf.get(), nullptr, 0, 0, &a)), "glint_density: footprint is null");
+  EXPECT_EQ(message(glint_density(ndf.get(), &p, 0, 0, nullptr)), "glint_density: density is null");
+  EXPECT_EQ(message(glint_mean(ndf.get(), &p, 0, 0, 1, 1, nullptr)), "glint_mean: mean is null");
+  EXPECT_EQ(message(glint_sample(ndf.get(), &p, 0, 0, &a, nullptr, &b)), "glint_sample: hy is null");
+  EXPECT_EQ(message(glint_brdf_evaluate(nullptr, &p, nullptr, nullptr, nullptr, nullptr)), "glint_brdf_evaluate: brdf is null");
+  EXPECT_EQ(message(glint_displaced_level(nullptr, 1, &a)), "glint_displaced_level: displaced is null");
+}
+
 TEST(CApi, OptionsReachTheModel) {
   glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
   options.sigma_r = 0.1f;

@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "glint/api/pack.h"
+#include "glint/formats/asset_writer.h"
 #include "glint/query/packed_ndf_view.h"
 #include "support/sample_assets.h"
+#include "support/temp_folder.h"
 
 namespace glint {
 namespace {
@@ -65,6 +67,47 @@ TEST(PackedNdf, MovedPyramidsAnswerBitForBit) {
       expectSameBits(view.pyramidNdf(), PyramidNdf(sample.pyramid));
       const Relocated with_normals(api::pack(sample.pyramid, &map.map), offset);
       expectSameBits(PackedNdfView(with_normals.data()).pyramidNdf(), PyramidNdf(sample.pyramid, map.map), kFewQueries);
+    }
+  }
+}
+
+TEST(PackedNdf, BuffersOfOtherVersionsAndNoBuffersAreKnown) {
+  const auto sample = test::samplePyramid(kSize, BlockPrecision::f16);
+  const std::vector<std::byte> good = api::pack(sample.pyramid);
+  const auto fault = [&](std::size_t place, std::size_t size) -> std::string {
+    std::vector<std::byte> changed = good;
+    if (place < changed.size()) changed[place] ^= std::byte{1};
+    const Relocated buffer(changed, 0);
+    EXPECT_EQ(PackedNdfView(buffer.data()).kind(), place < 8 ? PackedKind::unknown : PackedKind::pyramid);
+    try {
+      api::viewPacked({static_cast<const std::byte*>(buffer.data()), size});
+      return "";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::invalid_input);
+      return error.what();
+    }
+  };
+  constexpr std::size_t kMagic = 0, kVersion = 4, kNone = SIZE_MAX;
+  EXPECT_EQ(fault(kNone, good.size()), "");
+  EXPECT_NE(fault(kMagic, good.size()).find("no packed buffer"), std::string::npos);
+  EXPECT_NE(fault(kVersion, good.size()).find("version"), std::string::npos);
+  EXPECT_NE(fault(kNone, good.size() - 64).find("not whole"), std::string::npos);
+  EXPECT_NE(fault(kNone, 100).find("no header"), std::string::npos);
+}
+
+TEST(PackedNdf, KindsWithoutAPackedFormAreNamed) {
+  const test::TempFolder folder;
+  formats::writeAsset(folder / "bins.glint", test::sampleBinMap(kSize, kSize).map, test::sampleProvenance());
+  formats::writeAsset(folder / "sums.glint", test::sampleHistograms(kSize, kSize).sat, test::sampleProvenance());
+  for (const char* name : {"bins.glint", "sums.glint"}) {
+    const api::OpenedNdf opened = api::OpenedNdf::open(folder / name);
+    try {
+      api::pack(opened);
+      ADD_FAILURE() << name;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::unsupported);
+      EXPECT_NE(std::string(error.what()).find("no packed form"), std::string::npos) << error.what();
+      EXPECT_EQ(error.path(), (folder / name).string());
     }
   }
 }
