@@ -1,28 +1,90 @@
-// Opens arbitrary bytes as an asset and follows every index of what opens. Anything but a clean refusal or a valid asset is a
-// defect: a crash, a hang, a sanitizer report or an exception that is no glint::Error.
-
-#include <sys/mman.h>
-#include <unistd.h>
+// Opens arbitrary bytes as an asset, follows every index of what opens, and asks it. Anything but a clean refusal, or a valid
+// asset with finite answers, is a defect: a crash, a hang, a sanitizer report or an exception that is no glint::Error.
 
 #include <cstddef>
 #include <cstdint>
-#include <string>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+#include <variant>
 
-#include "glint/formats/asset_reader.h"
+#include "glint/api/any_ndf.h"
 #include "glint/formats/validate.h"
+#include "glint/query/displaced_brdf.h"
+#include "support/hdf5_bytes.h"
+#include "support/temp_folder.h"
+
+namespace {
+
+using namespace glint;
+
+/// A file of its own: HDF5 opens paths, and none in /proc/self/fd. The folder goes when the program ends.
+const std::filesystem::path& filePath() {
+  static const test::TempFolder folder;
+  static const std::filesystem::path path = folder / "fuzz.glint";
+  return path;
+}
+
+bool isDensity(float value) { return value >= 0 && value < std::numeric_limits<float>::infinity(); }
+bool isDensity(Rgb value) { return isDensity(value.r) && isDensity(value.g) && isDensity(value.b); }
+
+void require(bool finite) {
+  if (finite) return;
+  std::fprintf(stderr, "an answer is negative or not finite\n");
+  std::abort();
+}
+
+/// Asks an NDF a few queries.
+void ask(const api::AnyNdf& ndf) {
+  for (const float sigma : {0.7f, 3.0f, 40.0f}) {
+    const Footprint p = Footprint::isotropic({0.3f, 0.6f}, sigma);
+    std::visit(
+        [&](const auto& model) {
+          require(isDensity(model.density(p, {0.1f, -0.05f})));
+          require(isDensity(model.mean(p, {{-0.2f, -0.3f}, {0.3f, 0.1f}})));
+          require(isDensity(model.sample(p, {0.4f, 0.7f}).pdf));
+        },
+        ndf);
+  }
+}
+
+/// Asks a displacement for light and normals.
+void ask(const Displacement& displacement) {
+  const DisplacedBrdf brdf(displacement);
+  const Vec3 wi = {0.6f, 0, 0.8f}, wo = {-0.48f, 0.6f, 0.64f};
+  for (const float diameter : {1.0f, 20.0f, 500.0f}) {
+    const LevelBlend levels = brdf.levelsFor(diameter);
+    const Vec2 uv = {0.3f, 0.6f};
+    for (const auto variant : {DisplacedVariant::full, DisplacedVariant::lobes, DisplacedVariant::single})
+      require(isDensity(brdf.reflected(levels, uv, wi, wo, variant)));
+    require(isDensity(brdf.normalDensity(levels.first, uv, {0.1f, -0.05f})));
+    require(isDensity(brdf.sample(levels, uv, wo, {0.4f, 0.7f}).pdf));
+  }
+}
+
+}  // namespace
+
+/// Whether the bytes opened as an asset.
+bool opensAsset(const std::uint8_t* data, std::size_t size) {
+  const auto* bytes = reinterpret_cast<const std::byte*>(data);
+  test::writeBytes(filePath().string(), test::Bytes(bytes, bytes + size));
+  try {
+    const formats::Asset asset = formats::Asset::open(filePath());
+    // Data checks evaluate every block and cluster, through the same indices as queries.
+    formats::validateAsset(filePath());
+    if (asset.kind() == "displacement") {
+      ask(asset.displacement());
+    } else if (asset.kind() != "heights" && !asset.kind().starts_with("sh-")) {
+      ask(api::OpenedNdf::open(filePath()).model());
+    }
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  const int file = memfd_create("glint-fuzz", MFD_CLOEXEC);
-  if (file < 0) return 0;
-  const std::string path = "/proc/self/fd/" + std::to_string(file);
-  if (write(file, data, size) == static_cast<ssize_t>(size)) {
-    try {
-      const glint::formats::Asset asset = glint::formats::Asset::open(path);
-      // Data checks evaluate every block and cluster, through the same indices as queries.
-      glint::formats::validateAsset(path);
-    } catch (const glint::Error&) {
-    }
-  }
-  close(file);
+  opensAsset(data, size);
   return 0;
 }
