@@ -42,6 +42,9 @@ enum class Message : std::uint8_t {
   reference_count = 22,
 };
 
+/// "an attribute", "a link".
+std::string withArticle(std::string_view noun) { return (noun[0] == 'a' || noun[0] == 'o' ? "an " : "a ") + std::string(noun); }
+
 /// Reads numbers one after the other; reading beyond the end throws.
 class Cursor {
  public:
@@ -49,7 +52,7 @@ class Cursor {
       : bytes_(bytes), object_(object), what_(what) {}
 
   [[noreturn]] void fail(const std::string& fault) const {
-    throwBroken("file.hdf5", object_, std::string("has a ") + what_ + " " + fault);
+    throwBroken("file.hdf5", object_, "has " + withArticle(what_) + " " + fault);
   }
   void require(bool holds, const char* fault) const {
     if (!holds) fail(fault);
@@ -211,7 +214,7 @@ class HeaderWalk {
     std::uint32_t stored = 0;
     std::memcpy(&stored, bytes.data() + bytes.size() - kChecksumBytes, kChecksumBytes);
     if (stored == hdf5Checksum(bytes.first(bytes.size() - kChecksumBytes))) return;
-    throwBroken("file.hdf5", object, std::string("has a ") + what + " with a wrong checksum");
+    throwBroken("file.hdf5", object, "has " + withArticle(what) + " with a wrong checksum");
   }
 
   /// Notes a part of the metadata. Parts that lie over each other would let a small file have endless ones.
