@@ -218,8 +218,8 @@ void AtomicFile::keepPermissions() {
   const bool same_owner = ::fchown(file_, old.st_uid, old.st_gid) == 0;
   const bool same_group = same_owner || ::fchown(file_, static_cast<uid_t>(-1), old.st_gid) == 0;
   mode_t mode = old.st_mode & 07777;
-  if (!same_owner) mode &= 0777;                         // not to run as somebody else
-  if (!same_group) mode &= ~(S_IRWXG & ~(mode << 3));    // another group gets no more than others do
+  if (!same_owner) mode &= 0777;                       // not to run as somebody else
+  if (!same_group) mode &= ~(S_IRWXG & ~(mode << 3));  // another group gets no more than others do
   if (::fchmod(file_, mode) != 0) throwUnwritable(name_, "cannot be given the permissions of the old file", errno);
 }
 

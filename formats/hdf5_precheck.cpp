@@ -20,9 +20,9 @@ constexpr std::uint64_t kSuperblockBytes = 48;
 constexpr std::uint64_t kRootAddress = 36;  // its place in the superblock
 constexpr std::uint64_t kChecksumBytes = 4;
 constexpr unsigned kMaxRank = 32;
-constexpr unsigned kMaxMembers = 64;       // of a compound
-constexpr int kMaxGroupDepth = 64;         // of the walk; rule group.depth is stricter
-constexpr std::size_t kMaxParts = 256;     // of an object header
+constexpr unsigned kMaxMembers = 64;        // of a compound
+constexpr int kMaxGroupDepth = 64;          // of the walk; rule group.depth is stricter
+constexpr std::size_t kMaxParts = 256;      // of an object header
 constexpr std::size_t kMaxNameBytes = 255;  // of a link
 
 enum class Message : std::uint8_t {

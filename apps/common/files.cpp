@@ -107,7 +107,8 @@ bool mayReplace(const std::string& path, OutputFormat format) {
 
 /// Whether two names lead to one file, which need not exist yet.
 bool isSameFile(const std::string& a, const std::string& b) {
-  struct stat one {}, other {};
+  struct stat one {
+  }, other{};
   const bool has_one = ::stat(a.c_str(), &one) == 0, has_other = ::stat(b.c_str(), &other) == 0;
   if (has_one != has_other) return false;
   if (has_one) return one.st_dev == other.st_dev && one.st_ino == other.st_ino;

@@ -13,7 +13,8 @@ namespace {
 std::string layerList(const std::vector<std::string>& layers) {
   constexpr std::size_t kMost = 8, kMostName = 40;
   std::vector<std::string> names;
-  for (const std::string& layer : layers) names.push_back(layer.empty() ? "the one without a name" : shownText(layer, kMostName));
+  for (const std::string& layer : layers)
+    names.push_back(layer.empty() ? "the one without a name" : shownText(layer, kMostName));
   const bool more = names.size() > kMost;
   if (more) names.resize(kMost);
   return fmt::format("{}{}", fmt::join(names, ", "), more ? ", ..." : "");

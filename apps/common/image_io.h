@@ -19,10 +19,10 @@ struct Image {
   std::string format;  ///< of the file, as OpenImageIO names it: "png", "openexr", ...
   int bits = 0;        ///< bits of a channel in the file: 1 to 16 (integers), 16 or 32 (floating point)
   bool floating = false;
-  double code_scale = 1;    ///< number in the file that a pixel value of 1 stands for: 1, or the largest code of integers
-  int alpha = -1;           ///< channel of alpha, if there is one
-  bool associated = false;  ///< the other channels are multiplied by alpha
-  std::optional<double> no_data;    ///< number in the file that pixels without data hold, if the file names one
+  double code_scale = 1;          ///< number in the file that a pixel value of 1 stands for: 1, or the largest code of integers
+  int alpha = -1;                 ///< channel of alpha, if there is one
+  bool associated = false;        ///< the other channels are multiplied by alpha
+  std::optional<double> no_data;  ///< number in the file that pixels without data hold, if the file names one
   std::vector<std::string> parts;   ///< names of all images of the file, empty where they have none
   int part = 0;                     ///< the one that was read
   std::vector<std::string> layers;  ///< names of the layers of this part; that of channels without a layer is empty

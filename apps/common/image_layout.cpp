@@ -123,8 +123,9 @@ void cropToDisplay(StoredImage& stored, const std::string& path) {
                         " pixels reach beyond the display window, of which the " + std::to_string(width) + " x " +
                         std::to_string(height) + " pixels were read");
   const int left = static_cast<int>(column), top = static_cast<int>(row);
-  rearrange(image, static_cast<int>(width), static_cast<int>(height),
-            [=](int i, int j) { return std::pair{i + left, j + top}; });
+  rearrange(image, static_cast<int>(width), static_cast<int>(height), [=](int i, int j) {
+    return std::pair{i + left, j + top};
+  });
   stored.display = {0, 0, width, height};
 }
 
@@ -167,9 +168,8 @@ void selectLayer(Image& image, const std::string& layer, const std::string& path
                 "its channels are " + joined(image.channel_names));
   }
   // Each layer of an OpenEXR file may have an alpha of its own.
-  const auto alpha = std::find_if(kept.begin(), kept.end(), [&](int c) {
-    return layerPart(image.channel_names[static_cast<std::size_t>(c)]) == "a";
-  });
+  const auto alpha = std::find_if(kept.begin(), kept.end(),
+                                  [&](int c) { return layerPart(image.channel_names[static_cast<std::size_t>(c)]) == "a"; });
   if (image.format == "openexr" && alpha != kept.end()) image.alpha = *alpha, image.associated = true;
   selectChannels(image, kept);
 }

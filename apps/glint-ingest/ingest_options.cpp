@@ -157,9 +157,10 @@ void warnOfSeam(const Warn& warn, Boundary boundary, Vec2 seam) {
   if (boundary == Boundary::clamp) return;
   const auto say = [&](float roughness, const char* borders) {
     if (roughness <= kSuspiciousSeam) return;
-    warn(fmt::format("heights do not meet at the {} borders: the step there is {:.1f} times that of the roughest place inside; "
-                     "if the map does not tile, use --boundary clamp here and in the tools that ask for it",
-                     borders, roughness));
+    warn(
+        fmt::format("heights do not meet at the {} borders: the step there is {:.1f} times that of the roughest place inside; "
+                    "if the map does not tile, use --boundary clamp here and in the tools that ask for it",
+                    borders, roughness));
   };
   say(seam.x, "left and right");
   say(seam.y, "upper and lower");
@@ -177,9 +178,10 @@ void warnAbout(Tool& tool, const std::string& name, const bake::IngestParameters
   replaced(r.non_finite, "texels are not finite");
   if (r.clipped > 0) warn(fmt::format("{} texels on the rim of the disk were moved just inside it", r.clipped));
   if (r.cliffs > 0) {
-    warn(fmt::format("{} texels are at cliffs steeper than 89.9 degrees, to which their normals are moved; check "
-                     "--height-scale and --nodata",
-                     r.cliffs));
+    warn(
+        fmt::format("{} texels are at cliffs steeper than 89.9 degrees, to which their normals are moved; check "
+                    "--height-scale and --nodata",
+                    r.cliffs));
   }
   if (r.channels == bake::NormalChannels::ag)
     warn("red is constant: x was read from alpha, y from green, and z follows from them");

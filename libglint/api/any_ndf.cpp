@@ -109,13 +109,12 @@ OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& o
 }
 
 MapSlopes OpenedNdf::slopes() const {
-  return std::visit(
-      Overloaded{[&](const Reference&) { return slopesOf(asset_.normals()); },
-                 [](const AnisotropicNdf<PyramidNdf>& pyramid) { return pyramid.round().shape().slopes; },
-                 [](const AnisotropicNdf<CpNdf>& compressed) { return compressed.round().shape().slopes; },
-                 [](const BinMapNdf& bins) { return bins.map().slopes; },
-                 [](const HistogramNdf& histograms) { return histograms.sat().slopes; }},
-      model_);
+  return std::visit(Overloaded{[&](const Reference&) { return slopesOf(asset_.normals()); },
+                               [](const AnisotropicNdf<PyramidNdf>& pyramid) { return pyramid.round().shape().slopes; },
+                               [](const AnisotropicNdf<CpNdf>& compressed) { return compressed.round().shape().slopes; },
+                               [](const BinMapNdf& bins) { return bins.map().slopes; },
+                               [](const HistogramNdf& histograms) { return histograms.sat().slopes; }},
+                    model_);
 }
 
 }  // namespace glint::api

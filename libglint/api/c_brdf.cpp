@@ -193,12 +193,8 @@ glint_status glint_brdf_evaluate(const glint_brdf* brdf, const glint_footprint* 
 glint_status glint_brdf_sample(const glint_brdf* brdf, const glint_footprint* footprint, const float wo[3], float xi1,
                                float xi2, float wi[3], float weight[3], float* pdf) {
   if (brdf == nullptr || footprint == nullptr || wo == nullptr || wi == nullptr || weight == nullptr || pdf == nullptr)
-    return nullArgument("glint_brdf_sample", {{brdf, "brdf"},
-                                              {footprint, "footprint"},
-                                              {wo, "wo"},
-                                              {wi, "wi"},
-                                              {weight, "weight"},
-                                              {pdf, "pdf"}});
+    return nullArgument("glint_brdf_sample",
+                        {{brdf, "brdf"}, {footprint, "footprint"}, {wo, "wo"}, {wi, "wi"}, {weight, "weight"}, {pdf, "pdf"}});
   const BrdfSample drawn = atFootprint(*brdf, footprintOf(*footprint), [&](const auto& b) {
     return b.sample(vectorOf(wo), clampUnit(Vec2{xi1, xi2}));
   });

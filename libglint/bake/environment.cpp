@@ -12,8 +12,8 @@
 #include "glint/bake/fftw_plan.h"
 #include "glint/bake/gauss_legendre.h"
 #include "glint/model/error.h"
-#include "glint/model/texel_name.h"
 #include "glint/model/sh.h"
+#include "glint/model/texel_name.h"
 
 namespace glint::bake {
 namespace {

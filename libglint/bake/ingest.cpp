@@ -140,8 +140,8 @@ struct NormalDecoder {
   std::span<const T> pixels;
   Decoder decode;
   NoDataTest holds_nothing;
-  float dither = 0;    ///< width of the noise, a component
-  float rounding = 0;  ///< largest error of a component
+  float dither = 0;     ///< width of the noise, a component
+  float rounding = 0;   ///< largest error of a component
   float tolerance = 0;  ///< of unit length
 
   NormalDecoder(const PixelArray& array, const IngestParameters& p, const MapMeaning& meaning)

@@ -57,11 +57,11 @@ struct IngestParameters {
   bool trust_channels = false;  ///< the channels are x, y (and z) whatever they look like
   /// Number that texels without data hold, as it is in the file. They are replaced as by fix_invalid, and counted.
   std::optional<double> no_data;
-  bool refuse_sentinels = true;           ///< without no_data: refuse heights that seem to hold such a number
-  Boundary boundary = Boundary::wrap;     ///< of slopes of heights, and of the neighbours of texels that are replaced
-  bool allow_constant = false;  ///< accept a map of a single value
-  float height_scale = 1;       ///< height in texels of a pixel value of 1 (the largest code of an integer)
-  std::uint64_t seed = 1;       ///< of the noise
+  bool refuse_sentinels = true;        ///< without no_data: refuse heights that seem to hold such a number
+  Boundary boundary = Boundary::wrap;  ///< of slopes of heights, and of the neighbours of texels that are replaced
+  bool allow_constant = false;         ///< accept a map of a single value
+  float height_scale = 1;              ///< height in texels of a pixel value of 1 (the largest code of an integer)
+  std::uint64_t seed = 1;              ///< of the noise
 };
 
 /// What a map was found to be. Moments are of the result.
@@ -77,12 +77,12 @@ struct IngestReport {
   std::size_t repaired = 0;    ///< texels that were replaced by their neighbours' mean
   std::size_t cliffs = 0;      ///< normals of heights that are steeper than 89.9 degrees: moved there
   NormalChannels channels = NormalChannels::rgb;
-  bool blue_ignored = false;        ///< there is a blue channel, but it is constant and contradicts x and y
-  bool coarse_codes = false;        ///< the pixels are codes of 8 bits at most, whatever they are stored in
-  double median_length_error = 0;   ///< of vectors (x, y, z): half of them are farther from unit length
-  Vec2 seam;                        ///< of heights: seamRoughness
-  Vec2 mean_normal;            ///< mean of (nx, ny)
-  double mean_tilt_deg = 0;    ///< mean angle between normal and z
+  bool blue_ignored = false;       ///< there is a blue channel, but it is constant and contradicts x and y
+  bool coarse_codes = false;       ///< the pixels are codes of 8 bits at most, whatever they are stored in
+  double median_length_error = 0;  ///< of vectors (x, y, z): half of them are farther from unit length
+  Vec2 seam;                       ///< of heights: seamRoughness
+  Vec2 mean_normal;                ///< mean of (nx, ny)
+  double mean_tilt_deg = 0;        ///< mean angle between normal and z
   MapSlopes slopes;
   float steepest_tilt_deg = 0;
 };

@@ -72,9 +72,7 @@ double componentOf(const PixelArray& image, std::size_t texel, int channel, Enco
 /// Sums over pairs of numbers.
 class Covariances {
  public:
-  void add(double a, double b) {
-    n_ += 1, a_ += a, b_ += b, aa_ += a * a, ab_ += a * b, bb_ += b * b;
-  }
+  void add(double a, double b) { n_ += 1, a_ += a, b_ += b, aa_ += a * a, ab_ += a * b, bb_ += b * b; }
   double spread() const { return n_ > 0 ? std::sqrt(std::max(0.0, bb_ / n_ - b_ / n_ * (b_ / n_))) : 0; }
   double distance() const { return n_ > 0 ? std::sqrt(std::max(0.0, aa_ - 2 * ab_ + bb_) / n_) : 0; }
   /// 1 if they are all the same, 0 if only the first ones are.
@@ -155,9 +153,7 @@ std::size_t fillHolesOf(int width, int height, std::vector<T>& values, Boundary 
 
 }  // namespace
 
-std::string texelName(const PixelArray& image, std::size_t texel) {
-  return glint::texelName(image.width, image.height, texel);
-}
+std::string texelName(const PixelArray& image, std::size_t texel) { return glint::texelName(image.width, image.height, texel); }
 
 void checkShape(const PixelArray& image, const std::string& name) {
   const auto count = std::visit([](const auto& pixels) { return pixels.size(); }, image.pixels);
@@ -308,11 +304,12 @@ VectorEvidence measureVectors(const PixelArray& image, const NormalLayout& layou
 
 void checkVectors(const VectorEvidence& e, const std::string& name) {
   if (e.median_error > kMostMedianError) {
-    throwInvalid("normals.unit", name, "",
-                 "half of the vectors are off unit length by more than " + std::to_string(e.median_error).substr(0, 4) +
-                     ": this is no tangent-space normal map, or in another encoding",
-                 "give the normal map, or set --encoding; --channels rg takes z from x and y, --channels rgb takes vectors of any "
-                 "length");
+    throwInvalid(
+        "normals.unit", name, "",
+        "half of the vectors are off unit length by more than " + std::to_string(e.median_error).substr(0, 4) +
+            ": this is no tangent-space normal map, or in another encoding",
+        "give the normal map, or set --encoding; --channels rg takes z from x and y, --channels rgb takes vectors of any "
+        "length");
   }
   const bool longer = e.too_long > kMostTooLong && e.correlation < kLowCorrelation;
   const bool unrelated = e.spread > kVisibleSpread && e.correlation < kNoCorrelation && e.distance > kFarBlue;

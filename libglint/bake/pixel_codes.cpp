@@ -32,10 +32,8 @@ struct Grid {
 };
 
 std::vector<Grid> candidatesOf16Bits() {
-  return {{257, 0, kFewestCodes, kScalingRounding},
-          {256, 0, kFewestOfPowers},
-          {128, 0, kFewestOfPowers},
-          {1, 0, kFewestOfPowers}};
+  return {
+      {257, 0, kFewestCodes, kScalingRounding}, {256, 0, kFewestOfPowers}, {128, 0, kFewestOfPowers}, {1, 0, kFewestOfPowers}};
 }
 
 /// @param normals  whether components of vectors are looked for, which may have a sign
@@ -88,9 +86,9 @@ bool areClose(double a, double b) {
 
 bool isSentinel(double number) {
   constexpr double kHuge = 1e30;  // -3.4e38, 1.7e308, ...: no height
-  static constexpr std::array kUsual = {-999.0,     -9999.0,       -10000.0,     -99999.0,     9999.0,        99999.0,
-                                        -32767.0,   -32768.0,      32767.0,      -2147483647.0, -2147483648.0,
-                                        2147483647.0, 4294967295.0, -1e10,        -1e20,         1e20};
+  static constexpr std::array kUsual = {-999.0,       -9999.0,  -10000.0, -99999.0,      9999.0,        99999.0,
+                                        -32767.0,     -32768.0, 32767.0,  -2147483647.0, -2147483648.0, 2147483647.0,
+                                        4294967295.0, -1e10,    -1e20,    1e20};
   return std::abs(number) >= kHuge || std::any_of(kUsual.begin(), kUsual.end(), [&](double u) { return areClose(number, u); });
 }
 

@@ -43,8 +43,8 @@ inline GLINT_HD PrincipalAxes principalAxes(const UsableCovariance& c) {
 
 /// Parts of a footprint that winds round the map, even along the period that it follows: `count` is 0 where it is shorter than
 /// that. As wide as the footprint is across, or wider where `most` are too few.
-GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p, int width, int height,
-                                                              float narrowest_sigma, int most) {
+GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p, int width, int height, float narrowest_sigma,
+                                                             int most) {
   constexpr double kTurns = 0.5;  // variance of turns that is even to 5e-5
   const double w = width, h = height;
   const UsableCovariance c = usableCovariance(p.covariance, width, height);
@@ -70,8 +70,8 @@ GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p,
   for (int k = 0; k < parts.count; ++k) {
     const double turn = (k + 0.5) / parts.count - 0.5;
     const double u = centre.x + turn * frame.along_period[0], v = centre.y + turn * frame.along_period[1];
-    parts.footprints[k] = Footprint::isotropic({static_cast<float>(u - std::floor(u)), static_cast<float>(v - std::floor(v))},
-                                               part_sigma);
+    parts.footprints[k] =
+        Footprint::isotropic({static_cast<float>(u - std::floor(u)), static_cast<float>(v - std::floor(v))}, part_sigma);
     parts.weights[k] = 1.0f / static_cast<float>(parts.count);
   }
   return parts;

@@ -389,7 +389,8 @@ class BinMapNdf {
     const double limit = std::sqrt(xx * yy), xy = std::clamp(sums.xy / sums.weight - x * y, -limit, limit);
     const float middle = 0.5f * bin_size_ * static_cast<float>(block.side());
     const Vec2 mean = {static_cast<float>(size * x), static_cast<float>(size * y)};
-    return {sums.weight, corner(block) + Vec2{middle, middle} + mean,
+    return {sums.weight,
+            corner(block) + Vec2{middle, middle} + mean,
             {static_cast<float>(squared * xx), static_cast<float>(squared * xy), static_cast<float>(squared * yy)}};
   }
 

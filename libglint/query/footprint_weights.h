@@ -79,9 +79,7 @@ GLINT_DEVICE_CALL inline GLINT_HD UsableCovariance usableCovariance(Covariance c
 }
 
 /// Half axes of a box, texels.
-inline GLINT_HD AxisPair halfAxes(const Footprint& box) {
-  return {{box.axis_a.x, box.axis_a.y}, {box.axis_b.x, box.axis_b.y}};
-}
+inline GLINT_HD AxisPair halfAxes(const Footprint& box) { return {{box.axis_a.x, box.axis_a.y}, {box.axis_b.x, box.axis_b.y}}; }
 
 /// Whether a box is finite and thicker than kMinBoxThickness.
 inline GLINT_HD bool hasArea(const AxisPair& half) {
@@ -237,8 +235,8 @@ class FootprintWeights {
     const double ax = half.a[0], ay = half.a[1], bx = half.b[0], by = half.b[1], det = half.cross();
     row_x_[0] = by / det, row_x_[1] = -bx / det;
     row_y_[0] = -ay / det, row_y_[1] = ax / det;
-    half_texel_ = 0.5f * Vec2{std::fabs(columnStep().x) + std::fabs(rowStep().x),
-                              std::fabs(columnStep().y) + std::fabs(rowStep().y)};
+    half_texel_ =
+        0.5f * Vec2{std::fabs(columnStep().x) + std::fabs(rowStep().x), std::fabs(columnStep().y) + std::fabs(rowStep().y)};
     scale_ = std::fabs(det);
     const double sides[2][2] = {{by, bx}, {ay, ax}};
     for (int k = 0; k < 2; ++k) {

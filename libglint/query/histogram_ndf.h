@@ -148,8 +148,7 @@ class HistogramNdf {
     const UsableCovariance c = positiveCovariance(p.covariance);
     const double across = std::sqrt(c.xx);
     const AxisPair sigma = {{across, c.xy / across}, {0, std::sqrt(c.determinant()) / across}};
-    if (gaussian_ == GaussianBoxes::one)
-      return addParallelogram(p.centre, woundBox(sigma, sat_.width, sat_.height), 1, sum);
+    if (gaussian_ == GaussianBoxes::one) return addParallelogram(p.centre, woundBox(sigma, sat_.width, sat_.height), 1, sum);
     // Nested boxes for a Gaussian: sizes relative to the box of its covariance, and shares. Fitted: least squared difference
     // under sum of shares 1, sum of shares * scales^2 1.
     constexpr double scales[3] = {0.508447702070, 0.812387977981, 1.239504002977};

@@ -29,8 +29,8 @@ struct PeriodFrame {
 
   double across[2], along[2];                ///< the wave, and one that counts turns
   double across_period[2], along_period[2];  ///< periods: a step of 1 by one wave and of 0 by the other
-  double across_variance = 0;  ///< of the footprint by the wave `across`, those of waves above kFinest included
-  double turns_variance = 0;   ///< of its turns at each place across
+  double across_variance = 0;                ///< of the footprint by the wave `across`, those of waves above kFinest included
+  double turns_variance = 0;                 ///< of its turns at each place across
 
   /// Shortest wave by the variance of a footprint (Gauss's reduction of a quadratic form).
   /// @param sigma  in units of the map's sides: the footprint's covariance is a a^T + b b^T
@@ -106,8 +106,8 @@ GLINT_DEVICE_CALL inline GLINT_HD AxisPair woundBox(const AxisPair& texels, int 
   // In coordinates where the covariance is 1, parallelograms are squares: a mean of angles that are the same after a quarter.
   const double given = 4 * std::atan2((along[0] - slope * across[0]) / turns, across[0] / wide);
   const double other = -4 * std::atan2(rest, turns);
-  const double angle = 0.25 * std::atan2(std::sin(given) + second * std::sin(other),
-                                         std::cos(given) + first + second * std::cos(other));
+  const double angle =
+      0.25 * std::atan2(std::sin(given) + second * std::sin(other), std::cos(given) + first + second * std::cos(other));
   const auto axis = [&](double x, double y, double(&result)[2]) {
     frame.vector(kRoot * wide * x, kRoot * (slope * wide * x + turns * y), result);
   };

@@ -70,8 +70,8 @@ class PlaceMomentSum {
     constexpr std::uint64_t kMostSummed = 512;  // as floats
     const typename Texels::Parts parts(of_run);
     for (std::uint64_t k = run.begin; k < run.end; k += kMostSummed)
-      sums_.add(1, Texels::template moments<kCut>(texels_ + k, static_cast<int>(std::min(run.end - k, kMostSummed)), parts,
-                                                  fields_));
+      sums_.add(
+          1, Texels::template moments<kCut>(texels_ + k, static_cast<int>(std::min(run.end - k, kMostSummed)), parts, fields_));
   }
 
   /// A footprint with sides along no axis.

@@ -206,8 +206,7 @@ class Reference {
 
   /// Visits the texels of a window whose block bounds come near the lobe.
   template <class Leaf>
-  GLINT_HD void descend(const FootprintWeights& weights, const Window& w, const Box2& support, float reach,
-                        Leaf&& leaf) const {
+  GLINT_HD void descend(const FootprintWeights& weights, const Window& w, const Box2& support, float reach, Leaf&& leaf) const {
     struct Node {
       int level, i, j;
     };

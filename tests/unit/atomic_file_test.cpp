@@ -18,8 +18,8 @@ namespace glint::formats {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
 using test::TempFolder;
+using ::testing::HasSubstr;
 
 void writeText(const fs::path& path, const std::string& text) { writeFile(path, std::as_bytes(std::span(text))); }
 

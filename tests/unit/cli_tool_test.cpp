@@ -271,9 +271,9 @@ TEST(Depfile, IsKnownByItsShape) {
 }
 
 TEST(AnswerTable, IsKnownByItsColumns) {
-  for (const char* ours : {"hx,hy,pdf", "wix,wiy,wiz,pdf", "u,v,sigma,hx,hy,density", "name,u,v,sxx,sxy,syy,x0,y0,x1,y1,mean\r",
-                           "\xef\xbb\xbfU, V, Sigma, HX, HY,density",
-                           "u,v,level,wix,wiy,wiz,wox,woy,woz,reflected_r,reflected_g,reflected_b"})
+  for (const char* ours :
+       {"hx,hy,pdf", "wix,wiy,wiz,pdf", "u,v,sigma,hx,hy,density", "name,u,v,sxx,sxy,syy,x0,y0,x1,y1,mean\r",
+        "\xef\xbb\xbfU, V, Sigma, HX, HY,density", "u,v,level,wix,wiy,wiz,wox,woy,woz,reflected_r,reflected_g,reflected_b"})
     EXPECT_TRUE(isAnswerHeader(ours)) << ours;
   for (const char* other : {"", "a letter", "u,v,sigma,hx,hy", "material,density", "u,v,density", "hx,hy,pdf,more", "pdf"})
     EXPECT_FALSE(isAnswerHeader(other)) << other;

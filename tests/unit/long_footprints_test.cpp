@@ -120,8 +120,10 @@ Shares byWaves(const Footprint& p, int width, int height) {
       if (power < 1e-12) continue;
       for (int j = 0; j < height; ++j)
         for (int i = 0; i < width; ++i)
-          shares.at(i, j) += power * std::cos(2 * 3.141592653589793 * (ku * ((i + 0.5) / width - double{p.centre.x}) +
-                                                                      kv * ((j + 0.5) / height - double{p.centre.y})));
+          shares.at(i, j) +=
+              power *
+              std::cos(2 * 3.141592653589793 *
+                       (ku * ((i + 0.5) / width - double{p.centre.x}) + kv * ((j + 0.5) / height - double{p.centre.y})));
     }
   }
   shares.normalise();
@@ -273,7 +275,8 @@ TEST(LongGaussians, OfBoxesChangeSmoothly) {
       for (double size = 2; size < 120; size *= kStep) {
         const auto l = static_cast<float>(size * size), n = l / (aspect * aspect);
         const Shares now = covered(Footprint::gaussian({0.3f, 0.6f}, {l * d.x * d.x + n * d.y * d.y, (l - n) * d.x * d.y,
-                                                                      l * d.y * d.y + n * d.x * d.x}), 32, 48);
+                                                                      l * d.y * d.y + n * d.x * d.x}),
+                                   32, 48);
         if (size > 2) {
           EXPECT_LT(distance(now, last), aspect < 10 ? kMostOfThick : kMost) << aspect << ' ' << angle << ' ' << size;
         }

@@ -1,3 +1,5 @@
+#include "glint/formats/provenance.h"
+
 #include <gtest/gtest.h>
 
 #include <string>
@@ -6,7 +8,6 @@
 #include "glint/api/any_ndf.h"
 #include "glint/formats/asset_writer.h"
 #include "glint/formats/hash.h"
-#include "glint/formats/provenance.h"
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 

@@ -32,7 +32,7 @@ TEST(NormalsFromHeights, CountsCliffs) {
   heights[3 * 8 + 5] = std::numeric_limits<float>::lowest();
   std::size_t cliffs = 0;
   const auto normals = normalsFromHeights(8, 8, heights, Boundary::wrap, &cliffs);
-  EXPECT_EQ(cliffs, 7u);  // four around each, of which one is the same
+  EXPECT_EQ(cliffs, 7u);                    // four around each, of which one is the same
   EXPECT_GT(normals[3 * 8 + 4].x, 0.999f);  // falls from one to the other
   for (const Vec2 n : normals) ASSERT_LT(dot(n, n), 1);
 }
