@@ -6,7 +6,7 @@
 
 namespace glint::formats {
 
-/// The shortest decimal that reads back as the same number, for messages: 0.0001 and not 0.000100, nor 0.000000 for 1e-7.
+/// The shortest decimal that reads back as the same number, for messages: 0.001 and not 0.001000, nor 0.000000 for 1e-7.
 template <class T>
 std::string numberText(T value) {
   std::array<char, 32> text;

@@ -15,6 +15,9 @@ struct AxisPair {
   GLINT_HD AxisPair scaled(double x, double y) const { return {{x * a[0], y * a[1]}, {x * b[0], y * b[1]}}; }
 };
 
+/// std::round, which device code does not have everywhere; halves go up.
+inline GLINT_HD double nearestInteger(double x) { return std::floor(x + 0.5); }
+
 /// The periods of a map in which a footprint is least long.
 ///
 /// A long footprint winds round the map. What it sees depends on the waves exp(2 pi i k . x), k whole, that it does not average
@@ -42,7 +45,7 @@ struct PeriodFrame {
     if (variance(q, q) < variance(k, k)) swapWaves(k, q);
     constexpr int kMostSteps = 100;  // each one but the last halves a variance
     for (int step = 0; step < kMostSteps; ++step) {
-      const double times = std::round(variance(k, q) / variance(k, k));
+      const double times = nearestInteger(variance(k, q) / variance(k, k));
       q[0] -= times * k[0], q[1] -= times * k[1];
       if (!(variance(q, q) < variance(k, k))) break;
       swapWaves(k, q);
@@ -50,7 +53,7 @@ struct PeriodFrame {
     across_variance = variance(k, k);
     turns_variance = variance(q, q) - variance(k, q) * variance(k, q) / across_variance;
     // Any wave counts turns that has no part of the other: the shortest one.
-    const double rest = std::round(dot(k, q) / dot(k, k));
+    const double rest = nearestInteger(dot(k, q) / dot(k, k));
     for (int i = 0; i < 2; ++i) across[i] = k[i], along[i] = q[i] - rest * k[i];
     const double turn = across[0] * along[1] - across[1] * along[0];  // 1 or -1
     across_period[0] = along[1] * turn, across_period[1] = -along[0] * turn;
@@ -96,7 +99,7 @@ GLINT_DEVICE_CALL inline GLINT_HD AxisPair woundBox(const AxisPair& texels, int 
     return half.scaled(w, h);
   }
   // How much each of the two shortest waves decides, which take the place of one another.
-  const double slope = PeriodFrame::dot(across, along) / (wide * wide), rest = (slope - std::round(slope)) * wide;
+  const double slope = PeriodFrame::dot(across, along) / (wide * wide), rest = (slope - nearestInteger(slope)) * wide;
   const auto pull = [&](double deviation) {
     const double t = std::clamp(2 * deviation / turn - 1, 0.0, 1.0), smooth = t * t * (3 - 2 * t);
     return smooth / std::max(1 - smooth, 1e-9);

@@ -146,7 +146,7 @@ TEST(Batch, WhatEmptyClustersSayIsNotFollowed) {
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     bake::CompressionOptions c;
     c.method = method;
-    c.regions = 12;
+    c.regions = 8;
     bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), c);
     int empty = 0;
     for (NdfCluster& cluster : data.clusters) {

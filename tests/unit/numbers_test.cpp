@@ -59,7 +59,7 @@ TEST(Numbers, TooSmallForAFloatBecomeTheNearestOne) {
 
 TEST(Numbers, InMessagesReadBackAsTheSame) {
   EXPECT_EQ(formats::numberText(1e-7), "1e-07");
-  EXPECT_EQ(formats::numberText(0.0001f), "0.0001");
+  EXPECT_EQ(formats::numberText(0.001f), "0.001");
   EXPECT_EQ(formats::numberText(-12), "-12");
 }
 
