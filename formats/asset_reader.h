@@ -45,8 +45,9 @@ struct AssetInfo {
 };
 
 struct OpenOptions {
-  bool verify_hashes = false;  ///< also compare every dataset with its hash; reads the whole file
-  bool check_values = false;   ///< also check values as validateAsset() does (finite, in the disk, ...); reads the whole file
+  bool verify_hashes =
+      false;  ///< also compare datasets with their hashes, and bytes between objects with 0; reads the whole file
+  bool check_values = false;  ///< also check values as validateAsset() does (finite, in the disk, ...); reads the whole file
 };
 
 /// An asset of any kind, mapped read-only. The structs that it returns point into the mapping and live as long as it does.

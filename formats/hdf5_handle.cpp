@@ -99,7 +99,7 @@ Cause rootCause() {
 void fail(const char* what, const std::string& object, ErrorCode code) {
   const Cause cause = rootCause();
   const bool writes = code == ErrorCode::io;
-  // What a damaged file asks for can be nothing that the system has: EINVAL is then the file's fault.
+  // A damaged file can ask for an impossible call: EINVAL is then the file's fault.
   if (cause.system_error != 0 && (writes || cause.system_error != EINVAL)) {
     throw Error(ErrorCode::io, writes ? "file.writable" : "file.readable", {}, object,
                 std::string(what) + ": " + std::strerror(cause.system_error), remedyFor(cause.system_error));

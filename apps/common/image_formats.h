@@ -56,7 +56,7 @@ int findPart(const std::string& path, const std::string& part, const std::vector
 /// "0 (beauty), 1 (normals)": numbers and names of images, at most eight.
 std::string partList(const std::vector<std::string>& names);
 
-/// Reads a file to its end, so that what the system has against it is not taken for damage of the file.
+/// Reads a file to its end, so that errors of the system are not taken for damage of the file.
 /// @throws Error io
 void checkSystemReads(const std::string& path);
 

@@ -7,7 +7,7 @@
 
 namespace glint::apps {
 
-/// The number that pixels without data hold in a GeoTIFF: GDAL's tag 42113, of which OpenImageIO tells nothing.
+/// The number that pixels without data hold in a GeoTIFF: GDAL's tag 42113, which OpenImageIO does not report.
 /// @param directory  of the file, 0 for its first image
 /// @return nothing if there is no such tag, it is no number, or the file is no TIFF
 std::optional<double> geoTiffNoData(const std::string& path, int directory);

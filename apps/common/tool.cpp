@@ -140,16 +140,9 @@ class HelpFormatter : public CLI::Formatter {
 
 /// Assets name their inputs in UTF-8, without control characters.
 void requireText(const std::string& path, const std::string& name) {
-  const auto refuse = [&](const char* what) {
-    throw Error(ErrorCode::io, "input.name", path, "", what, "rename the file: assets record the names of their inputs");
-  };
-  if (std::any_of(name.begin(), name.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }))
-    refuse("its name holds a control character");
-  try {
-    (void)json(name).dump();
-  } catch (const json::type_error&) {
-    refuse("its name is not UTF-8");
-  }
+  if (escapedText(name) == name) return;
+  throw Error(ErrorCode::io, "input.name", path, "", "its name is not UTF-8, or holds a control character",
+              "rename the file: assets record the names of their inputs");
 }
 
 /// Paths may hold any bytes; JSON must be UTF-8.

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <limits>
 #include <nlohmann/json.hpp>
+
+#include "common/numbers.h"
 
 namespace glint::apps {
 namespace {
@@ -18,9 +21,9 @@ constexpr float kSuspiciousSeam = 1.5f;
 /// "auto" and "none", or a number, which may be nan.
 std::optional<double> parseNoData(const std::string& text) {
   if (text == "auto" || text == "none") return {};
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (!text.empty() && *end == '\0') return value;
+  if (trimBlanks(text) == "nan") return std::numeric_limits<double>::quiet_NaN();
+  double value = 0;
+  if (parseNumber(text, value).empty()) return value;
   throw Error(ErrorCode::usage, "cli.usage", "", "--nodata", "\"" + text + "\" is not auto, none or a number",
               "give the number that the file has where it has no data, such as -9999");
 }

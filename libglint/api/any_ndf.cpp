@@ -17,7 +17,7 @@ constexpr int kReferenceResolution = 256;
 void requireSameMap(const formats::Asset& asset, const std::filesystem::path& path, const NdfInfo& info, const NormalMap& map,
                     const std::filesystem::path& normals_path) {
   // A pyramid names its map as an input; what was compressed from a pyramid names it as an input of that. Files that name no
-  // such input (made by other programs, or compressed before inputs were chained) can be compared by size only.
+  // such input can be compared by size only.
   const bool pyramid = asset.kind() == "ndf-pyramid";
   std::vector<formats::InputRecord> maps;
   for (const formats::InputRecord& input : asset.info().provenance.inputs)

@@ -43,8 +43,9 @@ struct NdfOptions {
   float slant_tolerance = kSlantTolerance;      ///< kind histogram-sat: share of a slanted footprint that may be misplaced
   int footprint_parts = IsotropicParts::kMost;  ///< kinds ndf-pyramid and ndf-cp: most round footprints that stand for a
                                                 ///< stretched one; 1: one of the same mean square size
-  bool verify_hashes = false;                   ///< also compare every dataset with its hash; reads the whole file
-  bool check_values = false;                    ///< also check values (finite, in the disk, ...); reads the whole file
+  /// Also compare every dataset with its hash, and bytes between objects with 0; reads the whole file.
+  bool verify_hashes = false;
+  bool check_values = false;  ///< also check values (finite, in the disk, ...); reads the whole file
 };
 
 /// What models of every kind have in common.

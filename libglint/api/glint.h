@@ -83,7 +83,7 @@ typedef struct glint_open_options {
   float sigma_r;            /* kind normals: intrinsic roughness, disk units, 1e-4 to 0.25; 0: 0.005 */
   int32_t surface;          /* kind normals: GLINT_SURFACE_* */
   int32_t boundary;         /* kind normals: GLINT_BOUNDARY_* */
-  int32_t verify_hashes;    /* not 0: compare every dataset with its hash; reads the whole file */
+  int32_t verify_hashes;    /* not 0: compare datasets with their hashes, and bytes between objects with 0; reads all */
   float alpha;              /* kind bin-map: Beckmann roughness, in the range that the asset was made for; 0: the smallest */
   float slant_tolerance;    /* kind histogram-sat: share of a footprint with slanted sides that may be counted in a wrong
                                place, up to 1; 0: 0.06; GLINT_SLANT_EXACT: none, and slower */
@@ -154,8 +154,9 @@ GLINT_API glint_footprint glint_footprint_from_differentials(float u, float v, f
  *
  * 0 outside the square |x|, |y| <= 1 and for half vectors that are not numbers. Footprints: a centre that is not finite counts
  * as 0; sizes that are too small or not finite count as the narrowest footprint; those longer than the map wind round it,
- * and kinds with levels answer what is larger than coarsest_sigma_texels as that, around its centre. These know round
- * footprints: boxes count as the Gaussian of the same moments, and stretched ones as several (footprint_parts).
+ * and with levels answers tend to the mean of the map above coarsest_sigma_texels (files without that mean answer as their last
+ * level does). Levels know round footprints: boxes count as the Gaussian of the same moments, and stretched ones as several
+ * (footprint_parts).
  * Returns GLINT_ERROR_USAGE for null arguments, else GLINT_OK. */
 GLINT_API glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy,
                                      float* density);
@@ -298,7 +299,7 @@ enum {
   GLINT_DISPLACED_SINGLE = 2 /* one Beckmann lobe with Smith's shadowing */
 };
 
-/* Opens an asset of kind displacement; as glint_ndf_open. verify_hashes: not 0: compare every dataset with its hash. */
+/* Opens an asset of kind displacement; as glint_ndf_open. verify_hashes: as glint_open_options. */
 GLINT_API glint_status glint_displaced_open(const char* path, int32_t verify_hashes, glint_displaced** displaced);
 
 /* Closes a handle; null is ignored. No thread may be asking it. */

@@ -1,11 +1,11 @@
 #include "glint/bake/ingest.h"
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 
@@ -251,11 +251,10 @@ void checkFaults(const PixelArray& image, const IngestParameters& p, bool three,
 void refuseSentinel(const PixelArray& image, const std::string& name) {
   const std::optional<double> number = findSentinel(image);
   if (!number) return;
-  char text[32];
-  std::snprintf(text, sizeof text, "%.9g", *number);
+  const std::string text = fmt::format("{:.9g}", *number);
   throw Error(ErrorCode::invalid_input, "heights.no_data", name, "",
-              std::string(text) + " is far from all other heights: it seems to stand for no data",
-              "fill such texels with --nodata " + std::string(text) + ", or take it for a height with --nodata none");
+              text + " is far from all other heights: it seems to stand for no data",
+              "fill such texels with --nodata " + text + ", or take it for a height with --nodata none");
 }
 
 template <class T>

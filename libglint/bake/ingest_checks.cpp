@@ -1,5 +1,7 @@
 #include "glint/bake/ingest_checks.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -306,7 +308,7 @@ void checkVectors(const VectorEvidence& e, const std::string& name) {
   if (e.median_error > kMostMedianError) {
     throwInvalid(
         "normals.unit", name, "",
-        "half of the vectors are off unit length by more than " + std::to_string(e.median_error).substr(0, 4) +
+        "half of the vectors are off unit length by more than " + fmt::format("{:.2f}", e.median_error) +
             ": this is no tangent-space normal map, or in another encoding",
         "give the normal map, or set --encoding; --channels rg takes z from x and y, --channels rgb takes vectors of any "
         "length");

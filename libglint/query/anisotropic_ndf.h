@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "glint/query/footprint_weights.h"
+#include "glint/query/gaussian.h"
 #include "glint/query/ndf_model.h"
 #include "glint/query/pyramid_slices.h"
 
@@ -27,6 +28,9 @@ inline constexpr float kMostAspect = 14.58f;
 /// width adds others; this leaves the least squared error on a map of unrelated texels, to a tenth
 /// (tests/unit/anisotropic_test.cpp).
 inline constexpr float kPartWidening = 0.055f;
+
+/// A footprint is round if its variance along it is larger than the variance of its parts by less than this share.
+inline constexpr float kRoundLength = 0.05f;
 
 /// Deviations along the axes of a covariance, and the direction of the longer one.
 struct PrincipalAxes {
@@ -77,20 +81,65 @@ GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p,
   return parts;
 }
 
+/// Parts of a footprint on a map that ends: those near the map, weighed by how much of them lies over it. Parts beyond the
+/// border are answered at the border.
+GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOverMap(const Footprint& p, int width, int height, float narrowest_sigma,
+                                                              int most) {
+  const PrincipalAxes axes = principalAxes(positiveCovariance(p.covariance));
+  const float narrow = std::max(axes.shortest, narrowest_sigma);
+  const float along2 = axes.longest * axes.longest - narrow * narrow;
+  IsotropicParts parts;
+  if (!(along2 > kRoundLength * narrow * narrow)) {
+    parts.footprints[0] = Footprint::isotropic(p.centre, std::max(narrow, axes.longest));
+    parts.weights[0] = 1;
+    parts.count = 1;
+    return parts;
+  }
+  // The stretch of the long axis, in texels from the centre, that comes within kPartReach deviations of a part of the map.
+  const float along = std::sqrt(along2), size[2] = {static_cast<float>(width), static_cast<float>(height)};
+  const float centre[2] = {wrapUnit(p.centre.x) * size[0], wrapUnit(p.centre.y) * size[1]};
+  const float direction[2] = {axes.direction.x, axes.direction.y};
+  float low = -kPartReach * along, high = kPartReach * along;
+  for (int k = 0; k < 2; ++k) {
+    if (direction[k] == 0) continue;
+    const float a = (-kPartReach * narrow - centre[k]) / direction[k];
+    const float b = (size[k] + kPartReach * narrow - centre[k]) / direction[k];
+    low = std::max(low, std::min(a, b));
+    high = std::min(high, std::max(a, b));
+  }
+  parts.count = std::clamp(static_cast<int>(std::ceil((high - low) / (kPartGap * narrow))), 2, most);
+  const float step = (high - low) / static_cast<float>(parts.count), sigma = std::max(narrow, step / kPartGap);
+  float total = 0;
+  for (int k = 0; k < parts.count; ++k) {
+    const float x = low + (static_cast<float>(k) + 0.5f) * step, from_centre = x / along;
+    float uv[2], inside = 1;
+    for (int axis = 0; axis < 2; ++axis) {
+      const float at = centre[axis] + x * direction[axis];
+      inside *= gaussianMass(0, size[axis], at, sigma);
+      uv[axis] = std::clamp(at / size[axis], 0.0f, float{kBelowOne});
+    }
+    parts.footprints[k] = Footprint::isotropic({uv[0], uv[1]}, sigma);
+    parts.weights[k] = std::exp(-0.5f * from_centre * from_centre) * inside;
+    total += parts.weights[k];
+  }
+  for (int k = 0; k < parts.count; ++k) parts.weights[k] /= total;
+  return parts;
+}
+
 /// Splits a footprint along its long axis so that the first and second moments of the parts together are its own.
 ///
 /// The size is made usable first (usableCovariance); footprints that wind round the map are `partsOfTurn`. Other parts have the
 /// short deviation, or `narrowest_sigma` where that is larger, and neighbours are at most kPartGap deviations apart. Above an
-/// aspect of kMostAspect the parts are too few: they are
-/// wider and further apart, so that the footprint keeps its length, exactly in its second moment, and grows in width
-/// (kPartWidening). Boxes are split as the Gaussian of the same moments.
+/// aspect of kMostAspect the parts are too few: they are wider and further apart, so that the footprint keeps its length,
+/// exactly in its second moment, and grows in width (kPartWidening). Boxes are split as the Gaussian of the same moments.
 /// @param narrowest_sigma  texels; what the model that is asked cannot tell apart, e.g. finestSigma(shape) of a pyramid without
 ///                         normals
 /// @param most             of the parts, 2 to IsotropicParts::kMost; kMostAspect is less with fewer
+/// @param boundary         clamp: the parts are those of partsOverMap
 /// @return 1 part for round footprints, else 2 or more
 inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int height, float narrowest_sigma = 0,
-                                              int most = IsotropicParts::kMost) {
-  constexpr float kRound = 0.05f;  // a variance larger by less is no length
+                                              int most = IsotropicParts::kMost, Boundary boundary = Boundary::wrap) {
+  if (boundary == Boundary::clamp) return partsOverMap(p, width, height, narrowest_sigma, most);
   if (const IsotropicParts turn = partsOfTurn(p, width, height, narrowest_sigma, most); turn.count > 0) return turn;
   const PrincipalAxes axes = principalAxes(usableCovariance(p.covariance, width, height));
   const float narrow = std::max(axes.shortest, narrowest_sigma), narrow2 = narrow * narrow;
@@ -99,7 +148,7 @@ inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int
   const float sigma = std::sqrt(narrow2 + kPartWidening * std::max(0.0f, gap2 - kPartGap * kPartGap * narrow2));
   const float along2 = axes.longest * axes.longest - sigma * sigma;
   IsotropicParts parts;
-  if (!(along2 > kRound * sigma * sigma)) {
+  if (!(along2 > kRoundLength * sigma * sigma)) {
     parts.footprints[0] = Footprint::isotropic(p.centre, std::max(sigma, axes.longest));
     parts.weights[0] = 1;
     parts.count = 1;
@@ -136,18 +185,20 @@ class AnisotropicNdf {
   /// @param width, height    of the map, texels
   /// @param narrowest_sigma  as for isotropicParts
   /// @param most_parts       that a footprint is split into, clamped to 1 to IsotropicParts::kMost; 1: none is split
+  /// @param boundary         of the map
   GLINT_HD AnisotropicNdf(const M& model, int width, int height, float narrowest_sigma = 0,
-                          int most_parts = IsotropicParts::kMost)
+                          int most_parts = IsotropicParts::kMost, Boundary boundary = Boundary::wrap)
       : model_(model),
         width_(width),
         height_(height),
         narrowest_sigma_(narrowest_sigma),
-        most_parts_(std::clamp(most_parts, 1, int{IsotropicParts::kMost})) {}
+        most_parts_(std::clamp(most_parts, 1, int{IsotropicParts::kMost})),
+        boundary_(boundary) {}
   /// For a model of a pyramid: without normals, parts are no narrower than its level 0.
   GLINT_HD AnisotropicNdf(const M& model, int most_parts = IsotropicParts::kMost) requires requires {
     model.shape();
   } : AnisotropicNdf(model, model.shape().width, model.shape().height, model.hasNormals() ? 0 : finestSigma(model.shape()),
-                     most_parts) {
+                     most_parts, model.shape().boundary) {
   }
 
   /// The model of round footprints.
@@ -158,7 +209,7 @@ class AnisotropicNdf {
   }
   /// Of a footprint that is split.
   GLINT_HD IsotropicParts parts(const Footprint& p) const {
-    return isotropicParts(p, width_, height_, narrowest_sigma_, std::max(most_parts_, 2));
+    return isotropicParts(p, width_, height_, narrowest_sigma_, std::max(most_parts_, 2), boundary_);
   }
 
   /// Density towards h, >= 0.
@@ -200,6 +251,7 @@ class AnisotropicNdf {
   int height_;
   float narrowest_sigma_;
   int most_parts_;
+  Boundary boundary_;
 };
 
 }  // namespace glint

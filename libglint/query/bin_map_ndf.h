@@ -25,7 +25,7 @@ struct BinFacet {
 ///
 /// Each texel in reach counts with its own normal, kept to a fraction of a bin (see blockCode). A block that holds more than a
 /// few hundred texels of the footprint, and is no wider than the lobe allows, counts as one Gaussian with the mean and
-/// covariance of those of its normals that are in the footprint; between kFewTexels and kManyTexels the two are blended, so
+/// covariance of its normals inside the footprint; between kFewTexels and kManyTexels the two are blended, so
 /// that the density is continuous in footprint and half vector. Lobes are those of FacetLobe.
 ///
 /// Boxes are answered exactly, Gaussians by the box of the same second moments: see TexelCover, also for boxes without area and

@@ -6,7 +6,7 @@ import subprocess
 import pytest
 from conftest import BIN
 
-# What a small map may take: far below what the extreme values took (minutes, gigabytes), far above what the tools need on a busy machine.
+# What a small map may take: far above what the tools need on a busy machine.
 SECONDS = 60
 BYTES = 4 << 30
 

@@ -196,7 +196,6 @@ def test_constant_blue_is_not_taken_for_z(glint):
 
 def test_constant_blue_that_is_z_stays(glint):
     """So gentle that all z round to 255: nothing contradicts."""
-    gentle = surface(steepness=0.01)
     gentle = surface(steepness=0) * [0.1, 0.1, 1]
     gentle /= numpy.linalg.norm(gentle, axis=-1, keepdims=True)
     pixels = codes(gentle)

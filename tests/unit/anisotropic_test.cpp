@@ -238,8 +238,7 @@ TEST(AnisotropicNdf, MeanOverPixelsIsTheMeanOfPointQueries) {
 
 TEST(AnisotropicNdf, IsClearlyCloserToTheTexelsThanARoundFootprint) {
   // Mean relative errors over three footprints of short deviation 4 to 8 texels at each aspect, beside those of the round
-  // footprint of the same mean square size. Recorded as properties: the chart of issue 3. What is left is the pyramid's own
-  // error.
+  // footprint of the same mean square size. Recorded as properties, for charts. What is left is the pyramid's own error.
   for (const auto& [kind, name] : {std::pair{bake::SynthKind::isotropic, "isotropic"},
                                    {bake::SynthKind::flakes, "flakes"},
                                    {bake::SynthKind::brushed, "brushed"}}) {
@@ -266,6 +265,36 @@ TEST(AnisotropicNdf, IsClearlyCloserToTheTexelsThanARoundFootprint) {
       }
     }
   }
+}
+
+TEST(AnisotropicNdf, AMapThatEndsIsNotSeenFromItsOtherSide) {
+  // The halves of the map lean to either side: of a footprint near the left border, parts that wrapped would be of the right half.
+  constexpr double kBetweenCentres = 0.08;  // of the share of the right half: what interpolation between images widens
+  std::vector<Vec2> normals;
+  for (int k = 0; k < 128 * 128; ++k) normals.push_back({k % 128 < 64 ? -0.3f : 0.3f, 0});
+  const test::OwnedMap map(128, 128, std::move(normals));
+  bake::PyramidOptions options;
+  options.stride = 8;
+  options.resolution = kResolution;
+  options.sigma_r = 0.04f;
+  options.boundary = Boundary::clamp;
+  const bake::NdfPyramidData data = bake::buildPyramid(map.map(), options);
+  const PyramidNdf round(data.view());
+  const AnisotropicNdf ndf(round);
+  const Reference reference(map.map(), 0.04f, Surface::flat, Boundary::clamp);
+  const Box2 right = {{0.0625f, -0.25f}, {0.5625f, 0.25f}};
+  Random random(9);
+  double moved = 0;
+  for (int k = 0; k < 60; ++k) {
+    const float shortest = 4 + 4 * random.unit();
+    const Footprint p = random.stretched(shortest * std::exp2(1 + 7 * random.unit()), shortest);
+    const double exact = right.area() * reference.mean(p, right);
+    EXPECT_NEAR(right.area() * ndf.mean(p, right), exact, kBetweenCentres)
+        << p.centre.x << ' ' << p.centre.y << ' ' << p.covariance.xx << ' ' << p.covariance.xy << ' ' << p.covariance.yy;
+    const AnisotropicNdf wrapping(round, 128, 128, finestSigma(data.shape));
+    moved = std::max(moved, std::abs(right.area() * wrapping.mean(p, right) - exact));
+  }
+  EXPECT_GT(moved, 0.2);  // what wrapped parts would err by
 }
 
 TEST(AnisotropicNdf, AnswersCompressedModelsAlike) {

@@ -85,6 +85,7 @@ double worstError(const Model& model, const NormalMap& map, Boundary boundary, d
     const Vec2 uv = {unit(random), unit(random)};
     const double exact = truth(map, boundary, uv, sigma, kHighlight);
     const double answer = model.mean(Footprint::isotropic(uv, static_cast<float>(sigma)), kHighlight);
+    EXPECT_TRUE(std::isfinite(answer)) << uv.x << ' ' << uv.y;
     worst = std::max(worst, std::abs(answer - exact) / exact);
   }
   return worst;
@@ -111,7 +112,9 @@ TEST(FarField, TendsToTheMeanOfTheMapWhereverOneAsks) {
         EXPECT_LT(worstError(model, owned.map(), Boundary::wrap, maps * width), kFarError)
             << width << 'x' << height << ", " << maps << " maps";
       }
-      EXPECT_LT(worstError(model, owned.map(), Boundary::wrap, 100.0 * width) * (surface == Surface::flat), kImageError);
+      if (surface == Surface::flat) {
+        EXPECT_LT(worstError(model, owned.map(), Boundary::wrap, 100.0 * width), kImageError);
+      }
     }
   }
 }
@@ -188,7 +191,6 @@ TEST(ThinMaps, ChooseImagesThatThereAre) {
   }
 }
 
-/// A surface whose NDF is the same along u, and varies along v where the map is high enough.
 TEST(ThinMaps, AnswerAsTheTexelsDo) {
   // What interpolation between the centres of levels costs on unrelated texels, for footprints of at least 3,000 of them.
   constexpr double kBetweenCentres = 0.04;

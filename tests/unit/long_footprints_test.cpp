@@ -474,7 +474,7 @@ TEST(LongFootprints, SeeOnlyTheMapWhereItEnds) {
     for (const Footprint& p : {Footprint::box({0.3f, 0.6f}, {size, 0.3f * size}, {-0.4f * size, size}),
                                Footprint::box({0.3f, 0.6f}, {size, 0}, {0, size}), Footprint::isotropic({0.1f, 0.9f}, size)})
       EXPECT_NEAR(reference.density(p, h), mean, kRounding * mean) << size;
-    // A strip: texels weigh what of them is inside, whatever is outside.
+    // A strip: a texel weighs its area inside the strip, whatever is outside.
     const Footprint strip = Footprint::box({0.3f, 0.6f}, {size, 0.5f * size}, {-1, 3});
     const Footprint as_long_as_needed = Footprint::box({0.3f, 0.6f}, {400, 200}, {-1, 3});
     EXPECT_NEAR(reference.density(strip, h), reference.density(as_long_as_needed, h), kRounding * mean) << size;
