@@ -54,4 +54,11 @@ std::optional<FootprintFault> sigmaFault(float sigma_texels) {
                         sizeRemedy()};
 }
 
+std::optional<FootprintFault> rangeFault(const Box2& range) {
+  if (range.width() > 0 && range.height() > 0) return {};
+  return FootprintFault{
+      fmt::format("{:g} {:g} {:g} {:g} is an empty box", range.low.x, range.low.y, range.high.x, range.high.y),
+      "give X0 Y0 X1 Y1 with X0 < X1 and Y0 < Y1"};
+}
+
 }  // namespace glint::apps

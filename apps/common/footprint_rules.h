@@ -4,6 +4,7 @@
 #include <string>
 
 #include "glint/model/footprint.h"
+#include "glint/model/vec.h"
 
 namespace glint::apps {
 
@@ -23,5 +24,8 @@ std::optional<FootprintFault> footprintFault(const Footprint& footprint);
 
 /// The same of an isotropic footprint. Footprint::isotropic would hide the sign.
 std::optional<FootprintFault> sigmaFault(float sigma_texels);
+
+/// The same of a box of half vectors that a mean is asked over: it has an area.
+std::optional<FootprintFault> rangeFault(const Box2& range);
 
 }  // namespace glint::apps

@@ -76,6 +76,9 @@ void QueryCommand::check() const {
                 "add --wo X Y Z with Z > 0");
   if (covariance_option_->given()) checkFootprint("--cov");
   if (box_option_->given()) checkFootprint("--box");
+  if (range_option_->given()) {
+    if (const auto fault = rangeFault(*query().range)) usage("--range " + fault->what, fault->remedy);
+  }
   if (image_.empty()) return;
   checkPictureName(image_);
   checkOutput(tool_, image_, OutputFormat::image);
@@ -108,11 +111,6 @@ Query QueryCommand::query() const {
   if (range_option_->given()) query.range = Box2{{range_[0], range_[1]}, {range_[2], range_[3]}};
   if (half_option_->given()) query.half = Vec2{half_[0], half_[1]};
   return query;
-}
-
-formats::OpenOptions QueryCommand::checks() const {
-  const bool all = !image_.empty() || csv_option_->given() || samples_ > 0 || light_.asked();
-  return {.verify_hashes = all, .check_values = all};
 }
 
 void QueryCommand::checkDisplacement() const {

@@ -16,9 +16,6 @@ class QueryCommand {
  public:
   explicit QueryCommand(Tool& tool);
 
-  /// What has to be checked of the asset: all that it holds for images, tables, samples and light; one query answers fast.
-  formats::OpenOptions checks() const;
-
   /// Answers what was asked of a distribution: one query, a table of them, an image, or the time of a query.
   void run(NdfAsset& asset);
 

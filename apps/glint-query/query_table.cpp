@@ -43,6 +43,7 @@ Query readQuery(const CsvTable& columns, std::size_t row) {
   } else {
     const auto [x0, y0, x1, y1] = columns.numbers(kRange, row);
     query.range = Box2{{x0, y0}, {x1, y1}};
+    if (const auto fault = rangeFault(*query.range)) columns.fail("csv.range", row, "the range " + fault->what, fault->remedy);
   }
   return query;
 }

@@ -248,8 +248,8 @@ void checkFaults(const PixelArray& image, const IngestParameters& p, bool three,
 }
 
 /// Refuses heights among which one number seems to stand for no data.
-void refuseSentinel(const PixelArray& image, const std::string& name) {
-  const std::optional<double> number = findSentinel(image);
+void refuseSentinel(const PixelArray& image, const std::optional<double>& no_data, const std::string& name) {
+  const std::optional<double> number = findSentinel(image, NoDataTest(image, no_data));
   if (!number) return;
   const std::string text = fmt::format("{:.9g}", *number);
   throw Error(ErrorCode::invalid_input, "heights.no_data", name, "",
@@ -391,7 +391,7 @@ IngestedHeights ingestHeights(const PixelArray& image, const IngestParameters& p
   checkShape(image, p.name);
   checkGrey(image, p);
   if (!p.allow_constant) checkNotConstant(image, {0}, p.name);
-  if (!p.no_data && p.refuse_sentinels) refuseSentinel(image, p.name);
+  if (p.refuse_sentinels) refuseSentinel(image, p.no_data, p.name);
   const std::array<int, 1> channel = {0};
   const PixelCodes codes = findCodes(image, channel);
   const float noise = noiseOf(codes, p.dequantize);

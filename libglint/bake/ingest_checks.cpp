@@ -25,10 +25,13 @@ constexpr double kSrgbBias = 0.25;
 
 /// Maps of flakes that were filtered have vectors that are off unit length by up to .12 in the median.
 constexpr double kMostMedianError = 0.15;
+/// Blue that is z goes with sqrt(1 - x^2 - y^2): a correlation of .16 or more is left on maps that JPEG has compressed at a quality
+/// of 50; occlusion has none.
+constexpr double kNoCorrelation = 0.1;
 /// Filtering makes vectors shorter, never longer. Scaling x and y makes them longer, but z still goes with them.
-constexpr double kTooLong = 0.03, kMostTooLong = 0.05, kLowCorrelation = 0.5;
+constexpr double kTooLong = 0.03, kMostTooLong = 0.05;
 /// Where sqrt(1 - x^2 - y^2) varies visibly, even the z of a filtered map goes with it.
-constexpr double kVisibleSpread = 0.02, kNoCorrelation = 0.1, kFarBlue = 0.05;
+constexpr double kVisibleSpread = 0.02, kFarBlue = 0.05;
 /// Red that is nearer to 0 or 1 than this means |x| > .98.
 constexpr float kRedEnd = 0.01f;
 
@@ -313,7 +316,7 @@ void checkVectors(const VectorEvidence& e, const std::string& name) {
         "give the normal map, or set --encoding; --channels rg takes z from x and y, --channels rgb takes vectors of any "
         "length");
   }
-  const bool longer = e.too_long > kMostTooLong && e.correlation < kLowCorrelation;
+  const bool longer = e.too_long > kMostTooLong && e.correlation < kNoCorrelation;
   const bool unrelated = e.spread > kVisibleSpread && e.correlation < kNoCorrelation && e.distance > kFarBlue;
   if (longer || unrelated) {
     throwInvalid("normals.blue", name, "",

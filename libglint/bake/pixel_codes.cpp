@@ -78,10 +78,10 @@ bool isHalf(std::span<const float> pixels) {
                      [](float v) { return !std::isfinite(v) || halfToFloat(floatToHalf(v)) == v; });
 }
 
-/// Whether two numbers are the same but for the rounding of floats and of their digits.
+/// Whether two numbers are the same but for the rounding of floats and of texts of six digits.
 bool areClose(double a, double b) {
   if (std::isinf(a) || std::isinf(b)) return a == b;
-  return std::abs(a - b) <= 1e-6 * std::abs(b);
+  return std::abs(a - b) <= 5e-6 * std::abs(b);
 }
 
 bool isSentinel(double number) {
@@ -143,12 +143,12 @@ bool NoDataTest::operator()(float value) const {
   return areClose(scale_ * value, number_);
 }
 
-std::optional<double> findSentinel(const PixelArray& image) {
+std::optional<double> findSentinel(const PixelArray& image, const NoDataTest& known) {
   const auto* pixels = std::get_if<std::span<const float>>(&image.pixels);
   if (!pixels) return {};  // unsigned codes of 8 and 16 bits have no such numbers
   Extremes e;
   for (std::size_t k = 0; k < pixels->size(); k += static_cast<std::size_t>(image.channels))
-    if (std::isfinite((*pixels)[k])) e.add(image.code_scale * (*pixels)[k]);
+    if (std::isfinite((*pixels)[k]) && !known((*pixels)[k])) e.add(image.code_scale * (*pixels)[k]);
   if (!(e.lowest < e.highest)) return {};
   if (standsAlone(e.lowest, e.second_lowest - e.lowest, e.highest - e.second_lowest)) return e.lowest;
   if (standsAlone(e.highest, e.highest - e.second_highest, e.second_highest - e.lowest)) return e.highest;

@@ -38,6 +38,7 @@ class NoDataTest {
 
 /// The lowest or highest number of channel 0, as it is in the file, if it seems to stand for no data: it is farther from all
 /// others than these are from each other, and is a usual one such as -9999 or -3.4e38, or a hundred times farther.
-std::optional<double> findSentinel(const PixelArray& image);
+/// @param known  pixels that are known to stand for no data, and are left out
+std::optional<double> findSentinel(const PixelArray& image, const NoDataTest& known);
 
 }  // namespace glint::bake

@@ -1,4 +1,4 @@
-"""Tools that build from all of an asset refuse values that are none, and say where they are; no query crashes on them."""
+"""Tools refuse assets that hold values which are none, and say where they are."""
 
 import math
 import shutil
@@ -79,15 +79,14 @@ def test_normals_that_are_none_are_named_by_their_texel(glint, assets, tool, arg
 
 
 @pytest.mark.parametrize("value", BAD.values(), ids=BAD.keys())
-def test_one_query_of_normals_that_are_none_is_finite(glint, assets, value):
+def test_one_query_of_normals_that_are_none_is_refused(glint, assets, value):
     bad = with_value(assets, "normals.glint", "normals", 2 * TEXEL, value)
     for question in [["--half", ".1", ".05"], ["--range", "-.2", "-.2", ".2", ".2"]]:
         for surface in ["flat", "smooth"]:
             at = ["--uv", (3 + 0.5) / SIZE, 1 - (7 + 0.5) / SIZE]
             process = glint("query", bad, *at, "--sigma", "2", "--surface", surface, *question)
-            assert process.returncode == 0, process.stderr
-            answer = float(process.stdout)
-            assert 0 <= answer < math.inf
+            assert process.returncode == 3 and process.stdout == ""
+            assert "column 3, row 7 from the top" in process.stderr
     assert glint("info", bad).returncode in (0, 3)
 
 
@@ -118,26 +117,21 @@ def test_pyramids_with_bad_means_are_not_compressed(glint, assets):
     ],
 )
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1e30], ids=["nan", "infinite", "negative"])
-def test_other_kinds_answer_finitely_or_refuse(glint, assets, source, dataset, value):
+def test_queries_of_other_kinds_with_bad_values_are_refused(glint, assets, source, dataset, value):
     bad = with_value(assets, source, dataset, 0, value)
     footprint = ["--uv", ".1", ".1", "--sigma", "20"]
-    process = glint("query", bad, *footprint, "--half", ".02", ".01")
-    assert process.returncode == 0, process.stderr
-    assert 0 <= float(process.stdout) < math.inf
-    for question in [["--image", "out.exr"], ["--samples", "5", "-o", "out.csv"]]:
+    for question in [["--half", ".02", ".01"], ["--image", "out.exr"], ["--samples", "5", "-o", "out.csv"]]:
         assert glint("query", bad, *footprint, *question).returncode == 3
 
 
 @pytest.mark.parametrize("dataset", ["heights", "lobes", "slopes", "spatial_scale"])
-def test_displacements_answer_finitely_or_refuse(glint, assets, dataset):
+def test_queries_of_displacements_with_bad_values_are_refused(glint, assets, dataset):
     bad = with_value(assets, "displaced.glint", f"level_00/{dataset}", 0, math.nan)
     place = ["--uv", ".05", ".05", "--level", "0"]
     light = ["--wi", ".3", ".1", ".9", "--wo", "-.2", ".1", ".9"]
-    process = glint("query", bad, *place, *light)
-    assert process.returncode == 0, process.stderr
-    numbers = process.stdout.split()
-    assert numbers and all(0 <= float(number) < math.inf for number in numbers)
-    assert glint("query", bad, *place, "--image", "out.exr").returncode == 3
+    for question in [light, ["--image", "out.exr"]]:
+        process = glint("query", bad, *place, *question)
+        assert process.returncode == 3 and process.stdout == ""
 
 
 def test_normals_of_another_map_are_refused(glint, assets):

@@ -220,3 +220,15 @@ def test_the_longest_names_work(glint):
     name = "n" * 251 + ".png"
     Image.fromarray(codes(surface())).save(glint.folder / name)
     ingest(glint, name)
+
+
+@pytest.mark.parametrize("quality", [50, 80])
+@pytest.mark.parametrize("kind, options", [("leather", []), ("isotropic", ["--alpha", "0.3"])])
+def test_maps_that_jpeg_has_compressed_are_read(glint, kind, options, quality):
+    """The noise of JPEG in blue is no occlusion: blue still goes with z."""
+    assert glint("synth", kind, "--size", "256", *options, "-o", "map.png").returncode == 0
+    Image.open(glint.folder / "map.png").convert("RGB").save(glint.folder / "map.jpg", quality=quality)
+    process = glint("ingest", "map.jpg", "-o", "map.glint")
+    assert process.returncode == 0, process.stderr
+    assert "not of unit length" in process.stderr
+    assert glint("validate", "map.glint").returncode == 0

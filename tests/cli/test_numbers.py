@@ -76,6 +76,16 @@ def test_what_is_no_footprint_is_refused_as_an_option_and_as_a_row(glint, assets
         assert "q.csv: row 2: " in row.stderr
 
 
+@pytest.mark.parametrize("values", [".2 .2 -.2 -.2", ".1 -.2 .1 .2", "0 .3 .3 0"])
+def test_a_range_without_area_is_refused_as_an_option_and_as_a_row(glint, assets, values):
+    words = values.split()
+    for kind in KINDS:
+        option = glint("query", assets[kind], *PLACE, "--sigma", "20", "--range", *words)
+        assert option.returncode == 1 and "--range" in option.stderr
+        row = ask_table(glint, assets[kind], f"u,v,sigma,x0,y0,x1,y1\n.3,.7,20,0,0,.1,.1\n.3,.7,20,{','.join(words)}\n")
+        assert row.returncode == 3 and "q.csv: row 2: " in row.stderr
+
+
 # Footprints without a width are footprints: rounding makes them of thin ones.
 @pytest.mark.parametrize("form, values", [("--cov", "400 400 400"), ("--cov", "400 0 0"), ("--cov", "0 0 400"), ("--cov", "400 400.0001 400"),
                                           ("--sigma", "20"), ("--box", "20 0 0 20")])

@@ -96,8 +96,15 @@ TEST(NoData, NumbersBeyondFloatsAreInfiniteOnes) {
   EXPECT_FALSE(test(pixels[2]));
 }
 
-std::optional<double> sentinelOf(const std::vector<float>& pixels) {
-  return findSentinel({static_cast<int>(pixels.size()), 1, 1, std::span<const float>(pixels)});
+std::optional<double> sentinelOf(const std::vector<float>& pixels, std::optional<double> no_data = {}) {
+  const PixelArray image = {static_cast<int>(pixels.size()), 1, 1, std::span<const float>(pixels)};
+  return findSentinel(image, NoDataTest(image, no_data));
+}
+
+TEST(Sentinel, IsLookedForBesideTheNumberThatIsNamed) {
+  EXPECT_EQ(sentinelOf({1, 3, -9999, 2}, -32768), -9999);
+  EXPECT_EQ(sentinelOf({1, 3, -9999, 2}, -9999), std::nullopt);
+  EXPECT_EQ(sentinelOf({1, 3, -3.4028235e38f, 2}, -3.40282e+38), std::nullopt);  // a text of six digits
 }
 
 TEST(Sentinel, IsFarFromAllHeights) {
