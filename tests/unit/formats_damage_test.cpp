@@ -145,7 +145,8 @@ TEST(DamagedFiles, BuildersAreToldTheTexelOfABadValue) {
     writeAsset(path, sample.map, test::sampleProvenance(), {.overwrite = true});
     test::Bytes bytes = test::readBytes(path.string());
     std::uint64_t offset = 0;
-    for (const DatasetInfo& dataset : Asset::open(path).info().datasets)
+    const Asset asset = Asset::open(path);
+    for (const DatasetInfo& dataset : asset.info().datasets)
       if (dataset.path == "/normals") offset = dataset.offset;
     // Column 3 of row 7 from the top; rows are stored from the bottom.
     std::memcpy(bytes.data() + offset + ((24 - 1 - 7) * 32 + 3) * sizeof(Vec2), &bad, sizeof bad);
