@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "glint/formats/descriptor.h"
 #include "glint/formats/hash.h"
 #include "glint/formats/system_error.h"
 #include "glint/formats/temporary_registry.h"
@@ -30,17 +31,6 @@ constexpr std::string_view kSuffix = ".tmp";
 constexpr std::size_t kNumberBytes = 64;  // of process, counter, time and suffix in a temporary name
 
 fs::path folderOf(const fs::path& path) { return path.has_parent_path() ? path.parent_path() : fs::path("."); }
-
-/// Closes a file descriptor at the end of its scope.
-struct Descriptor {
-  explicit Descriptor(int file) : id(file) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (id >= 0) ::close(id);
-  }
-  int id;
-};
 
 /// Number of the descriptor that a path of /proc/self/fd names; -1 if it names none.
 int ownDescriptor(const fs::path& path) {

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <set>
 
+#include "glint/formats/descriptor.h"
 #include "glint/formats/hdf5_handle.h"
 #include "glint/formats/hdf5_precheck.h"
 #include "glint/formats/plain_text.h"
@@ -36,17 +37,6 @@ T load(const std::byte* at) {
   std::memcpy(&value, at, sizeof(T));
   return value;
 }
-
-/// An open file descriptor.
-struct Descriptor {
-  explicit Descriptor(int file) : id(file) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (id >= 0) ::close(id);
-  }
-  int id;
-};
 
 /// Looks at the superblock before HDF5 does. Metadata reached from superblock version 2 or 3 is checksummed, so HDF5 detects
 /// damage in it; older files, extensions and user blocks would bring in code that trusts what it reads.

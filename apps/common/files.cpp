@@ -14,6 +14,7 @@
 #include <string_view>
 
 #include "glint/formats/atomic_file.h"
+#include "glint/formats/descriptor.h"
 
 namespace glint::apps {
 namespace {
@@ -29,29 +30,14 @@ constexpr std::size_t kReadChunk = std::size_t{1} << 20;
 
 std::string systemError() { return std::strerror(errno); }
 
-/// Closes a file descriptor at the end of its scope.
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-
- private:
-  int fd_;
-};
-
 /// Calls `take` with successive pieces of a file.
 template <class Take>
 void readPieces(const std::string& path, const Take& take) {
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (file.get() < 0) throwIo("file.readable", path, systemError());
+  const formats::Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.id < 0) throwIo("file.readable", path, systemError());
   std::vector<std::byte> piece(kReadChunk);
   while (true) {
-    const ssize_t count = ::read(file.get(), piece.data(), piece.size());
+    const ssize_t count = ::read(file.id, piece.data(), piece.size());
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) throwIo("file.readable", path, systemError());
     if (count == 0) return;
@@ -66,12 +52,12 @@ fs::path folderOf(const fs::path& path) {
 
 /// The first bytes of a file.
 std::string headOf(const std::string& path, std::size_t most) {
-  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (file.get() < 0) throwIo("file.readable", path, systemError());
+  const formats::Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.id < 0) throwIo("file.readable", path, systemError());
   std::string head(most, '\0');
   std::size_t size = 0;
   while (size < most) {
-    const ssize_t count = ::read(file.get(), head.data() + size, most - size);
+    const ssize_t count = ::read(file.id, head.data() + size, most - size);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) throwIo("file.readable", path, systemError());
     if (count == 0) break;
