@@ -3,7 +3,7 @@ include(CMakePackageConfigHelpers)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/glint)
 install(TARGETS glint_c EXPORT glint-c LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(TARGETS glint_model glint_query glint_formats glint_reader glint_api EXPORT glint-cxx
+install(TARGETS glint_math glint_model glint_query glint_formats glint_reader glint_api EXPORT glint-cxx
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT glint-c NAMESPACE glint:: FILE glint-c.cmake DESTINATION ${package_dir})
 install(EXPORT glint-cxx NAMESPACE glint:: FILE glint-cxx.cmake DESTINATION ${package_dir})
@@ -14,13 +14,15 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/glint-config-version.cmak
 install(FILES ${PROJECT_BINARY_DIR}/glint-config.cmake ${PROJECT_BINARY_DIR}/glint-config-version.cmake DESTINATION ${package_dir})
 
 # Headers keep their rooms; those that say that they are private stay here.
-foreach(room libglint/model libglint/query libglint/api formats)
-  file(GLOB headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${room}/*.h)
+foreach(room libglint/math libglint/model libglint/query libglint/api formats)
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${room}/*.h)
   get_filename_component(room_name ${room} NAME)
   foreach(header IN LISTS headers)
     file(STRINGS ${header} private REGEX "^// Private to ")
     if(NOT private AND NOT header MATCHES "/glint\\.h$")
-      install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/glint/${room_name})
+      file(RELATIVE_PATH name ${PROJECT_SOURCE_DIR}/${room} ${header})
+      get_filename_component(folder ${name} DIRECTORY)
+      install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/glint/${room_name}/${folder})
     endif()
   endforeach()
 endforeach()

@@ -33,7 +33,7 @@ endif()
 # In the tree as in an installed package, headers are included as "glint/<room>/<header>.h", and the C interface as "glint.h".
 set(GLINT_INCLUDE_DIR ${PROJECT_BINARY_DIR}/include)
 file(MAKE_DIRECTORY ${GLINT_INCLUDE_DIR}/glint)
-foreach(room model query api bake)
+foreach(room math model query api bake)
   file(CREATE_LINK ${PROJECT_SOURCE_DIR}/libglint/${room} ${GLINT_INCLUDE_DIR}/glint/${room} SYMBOLIC)
 endforeach()
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/formats ${GLINT_INCLUDE_DIR}/glint/formats SYMBOLIC)

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "glint/query/footprint_weights.h"
+#include "glint/query/detail/common/footprint_weights.h"
 
 namespace glint::apps {
 namespace {

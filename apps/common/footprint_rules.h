@@ -3,8 +3,8 @@
 #include <optional>
 #include <string>
 
+#include "glint/math/vec.h"
 #include "glint/model/footprint.h"
-#include "glint/model/vec.h"
 
 namespace glint::apps {
 

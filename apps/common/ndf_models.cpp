@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "common/files.h"
-#include "glint/bake/reference_image.h"
+#include "glint/bake/common/reference_image.h"
 
 namespace glint::apps {
 

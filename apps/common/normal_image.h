@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/image_io.h"
-#include "glint/model/vec.h"
+#include "glint/math/vec.h"
 
 namespace glint::apps {
 

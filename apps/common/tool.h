@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "glint/bake/progress.h"
+#include "glint/bake/common/progress.h"
 #include "glint/formats/provenance.h"
 #include "glint/model/error.h"
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "common/tool.h"
-#include "glint/bake/bin_map.h"
+#include "glint/bake/bin_map/bin_map.h"
 
 namespace glint::apps {
 

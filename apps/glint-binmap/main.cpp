@@ -3,7 +3,7 @@
 #include "common/files.h"
 #include "common/tool.h"
 #include "glint-binmap/bin_map_options.h"
-#include "glint/bake/bin_map.h"
+#include "glint/bake/bin_map/bin_map.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "common/tool.h"
-#include "glint/bake/compress.h"
+#include "glint/bake/compressed/compress.h"
 
 namespace glint::apps {
 

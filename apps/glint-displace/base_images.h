@@ -4,7 +4,7 @@
 #include <string>
 
 #include "common/tool.h"
-#include "glint/bake/base_texture.h"
+#include "glint/bake/displace/base_texture.h"
 
 namespace glint::apps {
 

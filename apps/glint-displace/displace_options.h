@@ -6,7 +6,7 @@
 
 #include "common/tool.h"
 #include "glint-displace/base_images.h"
-#include "glint/bake/displace.h"
+#include "glint/bake/displace/displace.h"
 
 namespace glint::apps {
 

@@ -6,7 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "glint/bake/ingest.h"
+#include "glint/bake/ingest/ingest.h"
 
 namespace glint::apps {
 namespace {

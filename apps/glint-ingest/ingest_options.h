@@ -5,7 +5,7 @@
 
 #include "common/image_input.h"
 #include "common/tool.h"
-#include "glint/bake/ingest.h"
+#include "glint/bake/ingest/ingest.h"
 
 namespace glint::apps {
 

@@ -2,8 +2,8 @@
 
 #include "common/files.h"
 #include "glint-ingest/ingest_options.h"
-#include "glint/bake/normal_bounds.h"
-#include "glint/bake/slopes.h"
+#include "glint/bake/common/slopes.h"
+#include "glint/bake/ingest/normal_bounds.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;

@@ -3,7 +3,7 @@
 #include "common/files.h"
 #include "common/tool.h"
 #include "glint-pyramid/pyramid_options.h"
-#include "glint/bake/pyramid.h"
+#include "glint/bake/pyramid/pyramid.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 

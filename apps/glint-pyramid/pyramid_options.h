@@ -4,7 +4,7 @@
 #include <string>
 
 #include "common/tool.h"
-#include "glint/bake/pyramid.h"
+#include "glint/bake/pyramid/pyramid.h"
 
 namespace glint::apps {
 

@@ -10,7 +10,7 @@
 
 #include "common/footprint_rules.h"
 #include "glint-query/queries.h"
-#include "glint/bake/counter_random.h"
+#include "glint/bake/common/counter_random.h"
 
 namespace glint::apps {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/tool.h"
-#include "glint/query/displaced_brdf.h"
+#include "glint/query/brdf/displaced_brdf.h"
 
 namespace glint::apps {
 

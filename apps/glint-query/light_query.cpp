@@ -8,7 +8,7 @@
 #include <type_traits>
 
 #include "common/files.h"
-#include "glint/bake/sh_lobes.h"
+#include "glint/bake/sh/lobes.h"
 #include "glint/formats/asset_reader.h"
 
 namespace glint::apps {

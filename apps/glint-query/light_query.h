@@ -5,8 +5,8 @@
 
 #include "common/ndf_models.h"
 #include "common/tool.h"
-#include "glint/query/sh_light_query.h"
-#include "glint/query/sh_transfer.h"
+#include "glint/query/light/sh_light_query.h"
+#include "glint/query/light/sh_transfer.h"
 
 namespace glint::apps {
 

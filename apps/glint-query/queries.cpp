@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "glint/bake/counter_random.h"
+#include "glint/bake/common/counter_random.h"
 
 namespace glint::apps {
 

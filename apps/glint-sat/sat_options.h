@@ -4,7 +4,7 @@
 #include <string>
 
 #include "common/tool.h"
-#include "glint/bake/histogram_sat.h"
+#include "glint/bake/histogram/histogram_sat.h"
 
 namespace glint::apps {
 

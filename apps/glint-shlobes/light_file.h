@@ -3,7 +3,7 @@
 #include <string>
 
 #include "common/tool.h"
-#include "glint/bake/environment.h"
+#include "glint/bake/sh/environment.h"
 
 namespace glint::apps {
 

@@ -6,8 +6,8 @@
 
 #include "common/tool.h"
 #include "glint-shlobes/light_file.h"
-#include "glint/bake/sh_light.h"
-#include "glint/bake/sh_lobes.h"
+#include "glint/bake/sh/light.h"
+#include "glint/bake/sh/lobes.h"
 
 namespace glint::apps {
 

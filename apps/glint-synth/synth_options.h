@@ -3,7 +3,7 @@
 #include <string>
 
 #include "common/tool.h"
-#include "glint/bake/synth.h"
+#include "glint/bake/synth/synth.h"
 
 namespace glint::apps {
 

@@ -6,7 +6,7 @@
 
 #include "glint/formats/hash.h"
 #include "glint/formats/number_text.h"
-#include "glint/query/slope_sums.h"
+#include "glint/query/brdf/slope_sums.h"
 
 namespace glint::api {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "glint/api/batch_slices.h"
 #include "glint/api/multiversion.h"
-#include "glint/query/bits.h"
+#include "glint/math/bits.h"
 
 namespace glint::api {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "glint/api/batch.h"
-#include "glint/query/pyramid_slices.h"
+#include "glint/query/detail/pyramid/pyramid_slices.h"
 
 namespace glint::api {
 

@@ -3,9 +3,9 @@
 #include <variant>
 
 #include "glint/api/c_support.h"
-#include "glint/query/bin_map_brdf.h"
-#include "glint/query/microfacet_brdf.h"
-#include "glint/query/sampling.h"
+#include "glint/query/brdf/bin_map_brdf.h"
+#include "glint/query/brdf/microfacet_brdf.h"
+#include "glint/query/detail/common/sampling.h"
 
 struct glint_brdf {
   const glint_ndf* ndf;

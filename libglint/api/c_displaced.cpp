@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "glint/api/c_support.h"
-#include "glint/query/displaced_brdf.h"
+#include "glint/query/brdf/displaced_brdf.h"
 
 struct glint_displaced {
   explicit glint_displaced(glint::formats::Asset opened) : asset(std::move(opened)), brdf(asset.displacement()) {}

@@ -12,8 +12,8 @@
 #include "glint/api/any_ndf.h"
 #include "glint/api/batch.h"
 #include "glint/api/glint.h"
-#include "glint/model/vec.h"
-#include "glint/query/rgb.h"
+#include "glint/math/rgb.h"
+#include "glint/math/vec.h"
 
 struct glint_ndf {
   glint::api::OpenedNdf opened;

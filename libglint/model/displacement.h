@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <span>
 
+#include "glint/math/vec.h"
 #include "glint/model/map_slopes.h"
-#include "glint/model/vec.h"
 
 namespace glint {
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "glint/model/vec.h"
+#include "glint/math/vec.h"
 
 namespace glint {
 

@@ -1,7 +1,7 @@
 #pragma once
 
+#include "glint/math/vec.h"
 #include "glint/model/footprint.h"
-#include "glint/model/vec.h"
 
 namespace glint {
 

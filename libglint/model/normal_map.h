@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "glint/model/vec.h"
+#include "glint/math/vec.h"
 
 namespace glint {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "glint/model/device.h"
+#include "glint/math/device.h"
 
 namespace glint {
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "glint/query/footprint_weights.h"
-#include "glint/query/gaussian.h"
+#include "glint/math/gaussian.h"
+#include "glint/query/detail/common/footprint_weights.h"
+#include "glint/query/detail/pyramid/pyramid_slices.h"
 #include "glint/query/ndf_model.h"
-#include "glint/query/pyramid_slices.h"
 
 namespace glint {
 

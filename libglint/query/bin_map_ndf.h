@@ -4,13 +4,13 @@
 #include <cmath>
 #include <cstdint>
 
-#include "glint/query/bin_window.h"
-#include "glint/query/facet_lobe.h"
-#include "glint/query/gaussian.h"
-#include "glint/query/half.h"
+#include "glint/math/gaussian.h"
+#include "glint/math/half.h"
+#include "glint/query/detail/bin_map/bin_window.h"
+#include "glint/query/detail/bin_map/facet_lobe.h"
+#include "glint/query/detail/bin_map/place_moments.h"
+#include "glint/query/detail/common/sampling.h"
 #include "glint/query/ndf_model.h"
-#include "glint/query/place_moments.h"
-#include "glint/query/sampling.h"
 
 namespace glint {
 

@@ -1,14 +1,14 @@
 #pragma once
 
+#include "glint/math/bits.h"
 #include "glint/model/compressed_ndf.h"
-#include "glint/query/avx2_reader.h"
-#include "glint/query/bits.h"
-#include "glint/query/block_mass.h"
-#include "glint/query/cluster_slices.h"
-#include "glint/query/pyramid_slices.h"
+#include "glint/query/detail/common/sampling.h"
+#include "glint/query/detail/compressed/avx2_reader.h"
+#include "glint/query/detail/compressed/cluster_slices.h"
+#include "glint/query/detail/compressed/spots.h"
+#include "glint/query/detail/pyramid/block_mass.h"
+#include "glint/query/detail/pyramid/pyramid_slices.h"
 #include "glint/query/reference.h"
-#include "glint/query/sampling.h"
-#include "glint/query/spots.h"
 
 namespace glint {
 

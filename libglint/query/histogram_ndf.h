@@ -5,13 +5,13 @@
 #include <cstdint>
 
 #include "glint/model/histogram_sat.h"
-#include "glint/query/footprint_weights.h"
-#include "glint/query/histogram_sums.h"
+#include "glint/query/detail/common/footprint_weights.h"
+#include "glint/query/detail/common/sampling.h"
+#include "glint/query/detail/histogram/histogram_sums.h"
+#include "glint/query/detail/histogram/parallelogram_strips.h"
+#include "glint/query/detail/histogram/parallelogram_sums.h"
+#include "glint/query/detail/histogram/spherical_bins.h"
 #include "glint/query/ndf_model.h"
-#include "glint/query/parallelogram_strips.h"
-#include "glint/query/parallelogram_sums.h"
-#include "glint/query/sampling.h"
-#include "glint/query/spherical_bins.h"
 
 namespace glint {
 

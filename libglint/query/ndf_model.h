@@ -4,8 +4,8 @@
 #include <cmath>
 #include <concepts>
 
+#include "glint/math/vec.h"
 #include "glint/model/footprint.h"
-#include "glint/model/vec.h"
 
 namespace glint {
 

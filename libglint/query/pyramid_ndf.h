@@ -2,14 +2,14 @@
 
 #include <type_traits>
 
+#include "glint/math/bits.h"
+#include "glint/math/float4.h"
+#include "glint/math/half.h"
 #include "glint/model/ndf_pyramid.h"
-#include "glint/query/avx2_blocks.h"
-#include "glint/query/bits.h"
-#include "glint/query/float4.h"
-#include "glint/query/half.h"
-#include "glint/query/pyramid_slices.h"
+#include "glint/query/detail/common/sampling.h"
+#include "glint/query/detail/pyramid/avx2_blocks.h"
+#include "glint/query/detail/pyramid/pyramid_slices.h"
 #include "glint/query/reference.h"
-#include "glint/query/sampling.h"
 
 namespace glint {
 

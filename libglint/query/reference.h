@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "glint/math/gaussian.h"
 #include "glint/model/normal_map.h"
-#include "glint/query/footprint_weights.h"
-#include "glint/query/gaussian.h"
+#include "glint/query/detail/common/footprint_weights.h"
+#include "glint/query/detail/common/sampling.h"
+#include "glint/query/detail/common/texel_choice.h"
+#include "glint/query/detail/common/triangle_lobe.h"
 #include "glint/query/ndf_model.h"
-#include "glint/query/sampling.h"
-#include "glint/query/texel_choice.h"
-#include "glint/query/triangle_lobe.h"
 
 namespace glint {
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "glint/bake/reference_image.h"
+#include "glint/bake/common/reference_image.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"

@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "glint/bake/bin_map.h"
-#include "glint/bake/synth.h"
+#include "glint/bake/bin_map/bin_map.h"
+#include "glint/bake/synth/synth.h"
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/reference.h"
 

@@ -7,10 +7,10 @@
 #include <functional>
 #include <numeric>
 
-#include "glint/bake/compress.h"
-#include "glint/bake/compress_cp.h"
-#include "glint/bake/pyramid.h"
-#include "glint/bake/synth.h"
+#include "glint/bake/compressed/compress.h"
+#include "glint/bake/compressed/cp.h"
+#include "glint/bake/pyramid/pyramid.h"
+#include "glint/bake/synth/synth.h"
 #include "support/test_maps.h"
 #include "unit/compress_fixture.h"
 #include "unit/compress_reference.h"

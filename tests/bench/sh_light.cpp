@@ -3,8 +3,6 @@
 // Prints one JSON object. Errors are RMS over outgoing directions and colours, relative to the RMS of the truth. Times are
 // thread CPU time, medians.
 
-#include "glint/bake/sh_light.h"
-
 #include <time.h>
 
 #include <algorithm>
@@ -16,9 +14,10 @@
 #include <string>
 #include <vector>
 
-#include "glint/bake/sh_lobes.h"
-#include "glint/query/sh_light_query.h"
-#include "glint/query/sh_lobe_table.h"
+#include "glint/bake/sh/light.h"
+#include "glint/bake/sh/lobes.h"
+#include "glint/query/light/sh_light_query.h"
+#include "glint/query/light/sh_lobe_table.h"
 #include "support/light_reference.h"
 
 namespace {

@@ -1,12 +1,12 @@
 // Compiled to PTX by clang, with or without a GPU: an error says which host function the query headers call from device code.
 #include "device/kernels.h"
 #include "glint/query/anisotropic_ndf.h"
-#include "glint/query/displaced_brdf.h"
-#include "glint/query/environment.h"
+#include "glint/query/brdf/displaced_brdf.h"
+#include "glint/query/light/environment.h"
 #include "glint/query/histogram_ndf.h"
 #include "glint/query/ray_footprint.h"
-#include "glint/query/sh_light_query.h"
-#include "glint/query/sh_transfer.h"
+#include "glint/query/light/sh_light_query.h"
+#include "glint/query/light/sh_transfer.h"
 
 namespace glint::device {
 

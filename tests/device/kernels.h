@@ -1,6 +1,6 @@
 #pragma once
 
-#include "glint/query/bin_map_brdf.h"
+#include "glint/query/brdf/bin_map_brdf.h"
 #include "glint/query/packed_ndf_view.h"
 
 namespace glint::device {

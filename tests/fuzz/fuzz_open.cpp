@@ -11,7 +11,7 @@
 
 #include "glint/api/any_ndf.h"
 #include "glint/formats/validate.h"
-#include "glint/query/displaced_brdf.h"
+#include "glint/query/brdf/displaced_brdf.h"
 #include "support/hdf5_bytes.h"
 #include "support/temp_folder.h"
 

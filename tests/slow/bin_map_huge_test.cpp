@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "glint/bake/bin_map.h"
+#include "glint/bake/bin_map/bin_map.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 #include "glint/formats/validate.h"

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "glint/bake/effective_brdf.h"
+#include "glint/bake/displace/effective_brdf.h"
 #include "support/test_heights.h"
 
 namespace glint::bake {

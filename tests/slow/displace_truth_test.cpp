@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "glint/bake/effective_brdf.h"
+#include "glint/bake/displace/effective_brdf.h"
 #include "support/path_tracer.h"
 #include "support/test_heights.h"
 

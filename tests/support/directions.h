@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "glint/model/vec.h"
+#include "glint/math/vec.h"
 
 namespace glint::test {
 

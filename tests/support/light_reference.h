@@ -8,8 +8,8 @@
 #include <numbers>
 #include <vector>
 
-#include "glint/bake/environment.h"
-#include "glint/bake/gauss_legendre.h"
+#include "glint/bake/sh/environment.h"
+#include "glint/bake/sh/gauss_legendre.h"
 #include "glint/model/footprint.h"
 
 namespace glint::test {

@@ -10,9 +10,9 @@
 #include <span>
 #include <vector>
 
-#include "glint/bake/base_texture.h"
-#include "glint/bake/counter_random.h"
-#include "glint/query/base_brdf.h"
+#include "glint/bake/common/counter_random.h"
+#include "glint/bake/displace/base_texture.h"
+#include "glint/query/brdf/base_brdf.h"
 #include "support/traced_surface.h"
 
 namespace glint::test {

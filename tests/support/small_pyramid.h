@@ -1,6 +1,6 @@
 #pragma once
 
-#include "glint/bake/pyramid.h"
+#include "glint/bake/pyramid/pyramid.h"
 
 namespace glint::test {
 

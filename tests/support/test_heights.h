@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
-#include "glint/bake/base_texture.h"
-#include "glint/bake/height_surface.h"
-#include "glint/bake/synth.h"
+#include "glint/bake/displace/base_texture.h"
+#include "glint/bake/displace/height_surface.h"
+#include "glint/bake/synth/synth.h"
 
 namespace glint::test {
 

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "glint/bake/normal_bounds.h"
-#include "glint/bake/synth.h"
+#include "glint/bake/ingest/normal_bounds.h"
+#include "glint/bake/synth/synth.h"
 #include "glint/model/footprint.h"
 #include "glint/model/normal_map.h"
 

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
-#include "glint/bake/height_surface.h"
-#include "glint/bake/height_tracer.h"
+#include "glint/bake/displace/height_surface.h"
+#include "glint/bake/displace/height_tracer.h"
 
 namespace glint::test {
 

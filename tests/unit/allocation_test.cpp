@@ -7,9 +7,9 @@
 #include <cstdlib>
 #include <new>
 
-#include "glint/bake/compress.h"
-#include "glint/bake/counter_random.h"
-#include "glint/bake/pyramid.h"
+#include "glint/bake/common/counter_random.h"
+#include "glint/bake/compressed/compress.h"
+#include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"
 #include "support/c_api.h"

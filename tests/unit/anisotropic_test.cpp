@@ -4,9 +4,9 @@
 #include <limits>
 #include <random>
 
-#include "glint/bake/compress.h"
-#include "glint/bake/pyramid.h"
-#include "glint/bake/reference_image.h"
+#include "glint/bake/common/reference_image.h"
+#include "glint/bake/compressed/compress.h"
+#include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/anisotropic_ndf.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "glint/bake/compress.h"
-#include "glint/query/avx2_blocks.h"
-#include "glint/query/avx2_reader.h"
+#include "glint/bake/compressed/compress.h"
+#include "glint/math/half.h"
 #include "glint/query/cp_ndf.h"
-#include "glint/query/half.h"
+#include "glint/query/detail/compressed/avx2_reader.h"
+#include "glint/query/detail/pyramid/avx2_blocks.h"
 #include "glint/query/pyramid_ndf.h"
 #include "support/small_pyramid.h"
 #include "support/test_maps.h"

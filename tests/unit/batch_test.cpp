@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "glint/bake/compress.h"
+#include "glint/bake/compressed/compress.h"
 #include "support/sample_assets.h"
 #include "support/small_pyramid.h"
 #include "support/test_maps.h"

@@ -1,4 +1,4 @@
-#include "glint/query/bin_map_brdf.h"
+#include "glint/query/brdf/bin_map_brdf.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <numbers>
 #include <vector>
 
-#include "glint/bake/bin_map.h"
-#include "glint/bake/slopes.h"
+#include "glint/bake/bin_map/bin_map.h"
+#include "glint/bake/common/slopes.h"
 #include "glint/query/reference.h"
 #include "support/directions.h"
 #include "support/test_maps.h"

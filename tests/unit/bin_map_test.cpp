@@ -1,4 +1,4 @@
-#include "glint/bake/bin_map.h"
+#include "glint/bake/bin_map/bin_map.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

@@ -1,5 +1,5 @@
 // Masses of blocks in one byte: rounding, and groups of sixteen.
-#include "glint/query/block_mass.h"
+#include "glint/query/detail/pyramid/block_mass.h"
 
 #include <gtest/gtest.h>
 

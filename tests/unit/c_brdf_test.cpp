@@ -10,10 +10,10 @@
 
 #include "glint.h"
 #include "glint/api/any_ndf.h"
-#include "glint/bake/slopes.h"
-#include "glint/query/bin_map_brdf.h"
-#include "glint/query/displaced_brdf.h"
-#include "glint/query/microfacet_brdf.h"
+#include "glint/bake/common/slopes.h"
+#include "glint/query/brdf/bin_map_brdf.h"
+#include "glint/query/brdf/displaced_brdf.h"
+#include "glint/query/brdf/microfacet_brdf.h"
 #include "support/c_api.h"
 #include "support/directions.h"
 

@@ -1,11 +1,10 @@
-#include "glint/bake/compress_cp.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
 
+#include "glint/bake/compressed/cp.h"
 #include "unit/compress_fixture.h"
 #include "unit/compress_reference.h"
 

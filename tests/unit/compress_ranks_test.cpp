@@ -1,10 +1,10 @@
-#include "glint/bake/compress_ranks.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <functional>
 #include <random>
+
+#include "glint/bake/compressed/ranks.h"
 
 namespace glint::bake {
 namespace {

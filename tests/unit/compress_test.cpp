@@ -1,4 +1,4 @@
-#include "glint/bake/compress.h"
+#include "glint/bake/compressed/compress.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

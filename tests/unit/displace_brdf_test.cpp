@@ -2,8 +2,8 @@
 
 #include <numbers>
 
-#include "glint/bake/effective_brdf.h"
-#include "glint/query/base_brdf.h"
+#include "glint/bake/displace/effective_brdf.h"
+#include "glint/query/brdf/base_brdf.h"
 #include "support/test_heights.h"
 
 namespace glint::bake {

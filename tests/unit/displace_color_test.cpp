@@ -4,8 +4,8 @@
 
 #include <numbers>
 
-#include "glint/bake/displace.h"
-#include "glint/query/displaced_brdf.h"
+#include "glint/bake/displace/displace.h"
+#include "glint/query/brdf/displaced_brdf.h"
 #include "support/path_tracer.h"
 #include "support/test_heights.h"
 

@@ -3,7 +3,7 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "glint/bake/downsample_heights.h"
+#include "glint/bake/displace/downsample_heights.h"
 #include "support/test_heights.h"
 
 namespace glint::bake {

@@ -3,9 +3,9 @@
 #include <numbers>
 #include <random>
 
-#include "glint/bake/vmf_fit.h"
-#include "glint/query/concentric_map.h"
-#include "glint/query/vmf_lobe.h"
+#include "glint/bake/displace/vmf_fit.h"
+#include "glint/math/concentric_map.h"
+#include "glint/query/brdf/vmf_lobe.h"
 
 namespace glint::bake {
 namespace {

@@ -1,4 +1,4 @@
-#include "glint/bake/displace.h"
+#include "glint/bake/displace/displace.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <random>
 
 #include "glint/model/error.h"
-#include "glint/query/displaced_brdf.h"
+#include "glint/query/brdf/displaced_brdf.h"
 #include "support/test_heights.h"
 
 namespace glint::bake {

@@ -3,8 +3,8 @@
 
 #include <random>
 
-#include "glint/bake/effective_brdf.h"
-#include "glint/bake/visibility_masks.h"
+#include "glint/bake/displace/effective_brdf.h"
+#include "glint/bake/displace/visibility_masks.h"
 #include "support/test_heights.h"
 #include "support/traced_surface.h"
 

@@ -1,12 +1,12 @@
-#include "glint/query/environment.h"
+#include "glint/query/light/environment.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <random>
 
-#include "glint/bake/compress.h"
-#include "glint/bake/pyramid.h"
+#include "glint/bake/compressed/compress.h"
+#include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"
 #include "support/beckmann_ndf.h"

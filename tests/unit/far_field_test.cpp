@@ -6,11 +6,11 @@
 #include <random>
 #include <vector>
 
-#include "glint/bake/compress.h"
-#include "glint/bake/pyramid.h"
+#include "glint/bake/compressed/compress.h"
+#include "glint/bake/pyramid/pyramid.h"
+#include "glint/math/gaussian.h"
 #include "glint/query/anisotropic_ndf.h"
 #include "glint/query/cp_ndf.h"
-#include "glint/query/gaussian.h"
 #include "glint/query/pyramid_ndf.h"
 #include "support/test_maps.h"
 

@@ -1,5 +1,5 @@
 // Vectors of four, lane by lane against scalar code. Built for SSE4.1, for SSE2 alone, and without either: all must pass.
-#include "glint/query/float4.h"
+#include "glint/math/float4.h"
 
 #include <gtest/gtest.h>
 

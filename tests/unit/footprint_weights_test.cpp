@@ -1,14 +1,14 @@
 // What footprints weigh, before any normal is asked.
-#include "glint/query/footprint_weights.h"
+#include "glint/query/detail/common/footprint_weights.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
+#include "glint/math/gaussian.h"
 #include "glint/query/anisotropic_ndf.h"
-#include "glint/query/gaussian.h"
-#include "glint/query/texel_cover.h"
+#include "glint/query/detail/bin_map/texel_cover.h"
 
 namespace glint {
 namespace {

@@ -13,13 +13,13 @@
 #include <limits>
 #include <set>
 
-#include "glint/bake/bin_map.h"
+#include "glint/bake/bin_map/bin_map.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 #include "glint/formats/findings.h"
 #include "glint/formats/kinds/codec.h"
 #include "glint/formats/validate.h"
-#include "glint/query/bin_blocks.h"
+#include "glint/query/detail/bin_map/bin_blocks.h"
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 #include "support/test_maps.h"

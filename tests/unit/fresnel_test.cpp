@@ -1,4 +1,4 @@
-#include "glint/query/fresnel.h"
+#include "glint/math/fresnel.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "glint/query/half.h"
+#include "glint/math/half.h"
 
 #include <gtest/gtest.h>
 

@@ -7,13 +7,13 @@
 #include <random>
 #include <vector>
 
-#include "glint/bake/histogram_sat.h"
-#include "glint/bake/reference_image.h"
-#include "glint/bake/sh_light.h"
-#include "glint/bake/sh_lobes.h"
+#include "glint/bake/common/reference_image.h"
+#include "glint/bake/histogram/histogram_sat.h"
+#include "glint/bake/sh/light.h"
+#include "glint/bake/sh/lobes.h"
 #include "glint/query/histogram_ndf.h"
-#include "glint/query/sh_light_query.h"
-#include "glint/query/sh_transfer.h"
+#include "glint/query/light/sh_light_query.h"
+#include "glint/query/light/sh_transfer.h"
 #include "support/light_reference.h"
 #include "support/test_maps.h"
 

@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "glint/bake/histogram_sat.h"
+#include "glint/bake/histogram/histogram_sat.h"
 #include "glint/model/error.h"
 #include "glint/query/histogram_ndf.h"
 #include "glint/query/reference.h"

@@ -6,11 +6,11 @@
 #include <limits>
 
 #include "common/normal_image.h"
-#include "glint/bake/counter_random.h"
-#include "glint/bake/ingest.h"
-#include "glint/bake/normal_bounds.h"
-#include "glint/bake/slopes.h"
-#include "glint/bake/synth.h"
+#include "glint/bake/common/counter_random.h"
+#include "glint/bake/common/slopes.h"
+#include "glint/bake/ingest/ingest.h"
+#include "glint/bake/ingest/normal_bounds.h"
+#include "glint/bake/synth/synth.h"
 #include "glint/model/error.h"
 
 namespace glint::bake {

@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "glint/bake/bin_map.h"
-#include "glint/bake/histogram_sat.h"
+#include "glint/bake/bin_map/bin_map.h"
+#include "glint/bake/histogram/histogram_sat.h"
 #include "glint/query/anisotropic_ndf.h"
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/histogram_ndf.h"

@@ -1,13 +1,13 @@
-#include "glint/query/microfacet_brdf.h"
+#include "glint/query/brdf/microfacet_brdf.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 #include <random>
 
-#include "glint/bake/compress.h"
-#include "glint/bake/pyramid.h"
-#include "glint/bake/slopes.h"
+#include "glint/bake/common/slopes.h"
+#include "glint/bake/compressed/compress.h"
+#include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"
 #include "support/beckmann_ndf.h"

@@ -1,4 +1,4 @@
-#include "glint/bake/pixel_codes.h"
+#include "glint/bake/ingest/pixel_codes.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "glint/bake/counter_random.h"
+#include "glint/bake/common/counter_random.h"
 
 namespace glint::bake {
 namespace {

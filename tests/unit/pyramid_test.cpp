@@ -1,4 +1,4 @@
-#include "glint/bake/pyramid.h"
+#include "glint/bake/pyramid/pyramid.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -8,8 +8,8 @@
 #include <numbers>
 #include <span>
 
-#include "glint/bake/pyramid_agreement.h"
-#include "glint/bake/reference_image.h"
+#include "glint/bake/common/reference_image.h"
+#include "glint/bake/pyramid/agreement.h"
 #include "glint/model/error.h"
 #include "glint/query/pyramid_ndf.h"
 #include "support/test_maps.h"

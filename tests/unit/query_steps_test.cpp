@@ -10,10 +10,10 @@
 #include <random>
 #include <vector>
 
-#include "glint/query/bits.h"
-#include "glint/query/cluster_slices.h"
-#include "glint/query/float4.h"
-#include "glint/query/pyramid_slices.h"
+#include "glint/math/bits.h"
+#include "glint/math/float4.h"
+#include "glint/query/detail/compressed/cluster_slices.h"
+#include "glint/query/detail/pyramid/pyramid_slices.h"
 
 namespace glint {
 namespace {

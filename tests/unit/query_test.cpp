@@ -6,8 +6,8 @@
 #include <random>
 #include <tuple>
 
-#include "glint/bake/compress.h"
-#include "glint/bake/pyramid.h"
+#include "glint/bake/compressed/compress.h"
+#include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"
 #include "support/test_maps.h"

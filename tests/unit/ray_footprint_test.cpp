@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "glint/query/footprint_weights.h"
+#include "glint/query/detail/common/footprint_weights.h"
 
 namespace glint {
 namespace {

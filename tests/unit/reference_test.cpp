@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "glint/bake/reference_image.h"
+#include "glint/bake/common/reference_image.h"
 #include "support/test_maps.h"
 
 namespace glint {

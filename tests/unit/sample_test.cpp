@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "glint/bake/bin_map.h"
-#include "glint/bake/compress.h"
-#include "glint/bake/counter_random.h"
-#include "glint/bake/histogram_sat.h"
-#include "glint/bake/pyramid.h"
+#include "glint/bake/bin_map/bin_map.h"
+#include "glint/bake/common/counter_random.h"
+#include "glint/bake/compressed/compress.h"
+#include "glint/bake/histogram/histogram_sat.h"
+#include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/histogram_ndf.h"

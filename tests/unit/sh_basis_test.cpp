@@ -1,4 +1,4 @@
-#include "glint/query/sh_basis.h"
+#include "glint/query/light/sh_basis.h"
 
 #include <gtest/gtest.h>
 
@@ -7,11 +7,11 @@
 #include <random>
 #include <vector>
 
-#include "glint/bake/gauss_legendre.h"
-#include "glint/bake/sh_lobes.h"
-#include "glint/bake/sh_rotation.h"
+#include "glint/bake/sh/gauss_legendre.h"
+#include "glint/bake/sh/lobes.h"
+#include "glint/bake/sh/rotation.h"
 #include "glint/model/error.h"
-#include "glint/query/sh_lobe_table.h"
+#include "glint/query/light/sh_lobe_table.h"
 
 namespace glint {
 namespace {

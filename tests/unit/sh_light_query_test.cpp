@@ -1,4 +1,4 @@
-#include "glint/query/sh_light_query.h"
+#include "glint/query/light/sh_light_query.h"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <random>
 #include <vector>
 
-#include "glint/bake/sh_light.h"
-#include "glint/bake/sh_lobes.h"
-#include "glint/query/sh_transfer.h"
+#include "glint/bake/sh/light.h"
+#include "glint/bake/sh/lobes.h"
+#include "glint/query/light/sh_transfer.h"
 #include "support/light_reference.h"
 
 namespace glint {

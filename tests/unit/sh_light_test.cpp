@@ -1,5 +1,3 @@
-#include "glint/bake/sh_light.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,10 +7,11 @@
 #include <random>
 #include <vector>
 
-#include "glint/bake/gauss_legendre.h"
+#include "glint/bake/sh/gauss_legendre.h"
+#include "glint/bake/sh/light.h"
+#include "glint/math/half.h"
 #include "glint/model/error.h"
-#include "glint/query/half.h"
-#include "glint/query/sh_basis.h"
+#include "glint/query/light/sh_basis.h"
 
 namespace glint::bake {
 namespace {

@@ -1,4 +1,4 @@
-#include "glint/bake/slopes.h"
+#include "glint/bake/common/slopes.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "glint/query/slot_sums.h"
+#include "glint/query/detail/bin_map/slot_sums.h"
 
 #include <gtest/gtest.h>
 

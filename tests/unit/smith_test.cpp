@@ -1,13 +1,13 @@
-#include "glint/query/smith.h"
+#include "glint/query/brdf/smith.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "glint/bake/compress.h"
-#include "glint/bake/histogram_sat.h"
-#include "glint/bake/pyramid.h"
-#include "glint/bake/slopes.h"
+#include "glint/bake/common/slopes.h"
+#include "glint/bake/compressed/compress.h"
+#include "glint/bake/histogram/histogram_sat.h"
+#include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/reference.h"
 #include "support/beckmann_ndf.h"
 #include "support/directions.h"

@@ -6,8 +6,8 @@
 #include <cstring>
 #include <set>
 
-#include "glint/bake/slopes.h"
-#include "glint/bake/synth.h"
+#include "glint/bake/common/slopes.h"
+#include "glint/bake/synth/synth.h"
 #include "glint/model/error.h"
 
 namespace glint::bake {

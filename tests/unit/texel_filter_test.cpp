@@ -1,4 +1,4 @@
-#include "glint/query/texel_filter.h"
+#include "glint/query/detail/bin_map/texel_filter.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "glint/query/triangle_lobe.h"
+#include "glint/query/detail/common/triangle_lobe.h"
 
 #include <gtest/gtest.h>
 

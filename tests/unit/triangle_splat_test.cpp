@@ -1,4 +1,4 @@
-#include "glint/bake/triangle_splat.h"
+#include "glint/bake/pyramid/triangle_splat.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "glint/math/vec.h"
+
+namespace glint::bake {
+
+/// 64 random bits for element `index` of stream `stream`: SplitMix64's finaliser over a counter, so that any thread can draw
+/// the numbers of any element and results do not depend on the order of the work.
+inline std::uint64_t randomBits(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) {
+  const auto mix = [](std::uint64_t z) {
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+  };
+  const std::uint64_t key = mix(seed + 0x9e3779b97f4a7c15u * (stream + 1));
+  return mix(key + 0x9e3779b97f4a7c15u * (index + 1));
+}
+
+/// Two independent numbers, uniform in the open interval (0, 1).
+inline Vec2 randomPair(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) {
+  constexpr float kScale = 1.0f / 8388608;  // 2^-23: with the half added below, 23 bits are exact and never 0 or 1
+  const std::uint64_t bits = randomBits(seed, stream, index);
+  return {(static_cast<float>(bits >> 41) + 0.5f) * kScale, (static_cast<float>((bits >> 9) & 0x7fffff) + 0.5f) * kScale};
+}
+
+/// Two independent numbers of the standard normal distribution (Box and Muller).
+inline Vec2 randomGaussians(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) {
+  const Vec2 xi = randomPair(seed, stream, index);
+  const float radius = std::sqrt(-2 * std::log(xi.x));
+  const float angle = 2 * std::numbers::pi_v<float> * xi.y;
+  return {radius * std::cos(angle), radius * std::sin(angle)};
+}
+
+}  // namespace glint::bake

@@ -1,0 +1,450 @@
+#include "glint/bake/compressed/compress.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <optional>
+#include <span>
+#include <string>
+#include <type_traits>
+
+#include "glint/bake/compressed/encode.h"
+#include "glint/bake/compressed/model.h"
+#include "glint/bake/compressed/ranks.h"
+#include "glint/bake/compressed/slices.h"
+#include "glint/model/error.h"
+#include "glint/query/detail/pyramid/block_mass.h"
+
+namespace glint::bake {
+namespace {
+
+// An image that decodes to this much of its energy or less is not scaled up: what is left of it is mostly error.
+constexpr double kLeastEnergy = 0.5;
+
+void checkOptions(const CompressionOptions& options) {
+  const auto require = [](bool valid, const char* rule, const std::string& what) {
+    if (!valid) throw Error(ErrorCode::usage, rule, "", "", what);
+  };
+  require(options.rank >= 1 && options.rank <= kBlockPixels, "compress.rank",
+          "the rank is " + std::to_string(options.rank) + "; it must be 1 to 256");
+  require(options.tolerance >= 0 && options.tolerance < 1, "compress.tolerance",
+          "the tolerance is " + fmt::format("{}", options.tolerance) + "; it must be at least 0 and below 1");
+  require(options.regions >= 0 && options.regions <= 255, "compress.regions",
+          "the regions are " + std::to_string(options.regions) + " per axis; they must be 0 to 255");
+  require(options.min_improvement >= 0 && options.min_improvement < 1, "compress.min_improvement",
+          "the least improvement is " + fmt::format("{}", options.min_improvement) + "; it must be at least 0 and below 1");
+  require(options.max_iterations >= 1, "compress.max_iterations", "the iterations must be at least 1");
+}
+
+/// Regions along each axis that are of use: no more than the finest level has images, and so few that clusters without slices, which
+/// take memory all the same, do not outnumber those with slices many times.
+int mostRegions(const NdfPyramid& pyramid) {
+  constexpr int kSureRegions = 8;  // the default of cp
+  constexpr double kSureClusters = 1 << 20, kClustersPerBlock = 4;
+  const PyramidShape& shape = pyramid.shape;
+  double stored = 0;
+  for (int l = 0; l < shape.level_count; ++l) stored += static_cast<double>(pyramid.levels[l].block_means.size());
+  const double clusters = std::max(kSureClusters, kClustersPerBlock * stored) / shape.blocksPerImage();
+  const int images = shape.level_count > 0 ? std::max(shape.levels[0].columns, shape.levels[0].rows) : 0;
+  return std::max(kSureRegions, std::min(images, static_cast<int>(std::sqrt(clusters))));
+}
+
+void checkRegions(const NdfPyramid& pyramid, int regions) {
+  if (const int most = mostRegions(pyramid); regions > most)
+    throw Error(ErrorCode::usage, "compress.regions", "", "",
+                fmt::format("{} regions per axis are more than the pyramid has images to fill", regions),
+                fmt::format("give --regions of at most {}", most));
+}
+
+/// One run: the steps of compressPyramid() and what they pass on.
+class Compressor {
+ public:
+  Compressor(const NdfPyramid& pyramid, const CompressionOptions& options, const ProgressFn& progress)
+      : pyramid_(pyramid),
+        options_(options),
+        index_(pyramid, regions(options), levelGroups(options)),
+        groups_(index_.levelGroupCount()),
+        progress_(progress, 3 * index_.clusterCount()),
+        statistics_(index_.clusterCount()),
+        encoded_(index_.clusterCount()),
+        selection_(index_.clusterCount(), -1),
+        encoded_gains_(index_.clusterCount(), 0.0),
+        image_scales_(index_.imageCount(), 1.0f),
+        density_scales_(index_.imageCount(), 0.0f) {}
+
+  CompressedNdfData run(CompressionReport* report) {
+    forEachCluster([&](std::size_t c) { statistics_[c] = measureCluster(index_, c); });
+    for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
+      groupOf(c).energy += statistics_[c].energy;
+      groupOf(c).slices += static_cast<std::uint64_t>(index_.sliceCount(c));
+      energy_ += statistics_[c].energy;
+    }
+    decompose();
+    if (options_.tolerance > 0) {
+      meetTolerance();
+    } else {
+      encode(std::vector<int>(index_.clusterCount(), 0));
+    }
+    CompressedNdfData data = pack();
+    if (report) *report = makeReport(data);
+    return data;
+  }
+
+ private:
+  /// Levels whose clusters hold no slices of other levels: each group meets a tolerance by itself.
+  struct LevelGroup {
+    double energy = 0;
+    std::uint64_t slices = 0;
+    double gain_per_byte = 0;  ///< error that a byte has to take off
+  };
+
+  std::size_t clustersPerGroup() const { return index_.clusterCount() / groups_.size(); }
+  LevelGroup& groupOf(std::size_t cluster) { return groups_[cluster / clustersPerGroup()]; }
+  double budget(const LevelGroup& group) const { return options_.tolerance * options_.tolerance * group.energy; }
+
+  static int regions(const CompressionOptions& options) {
+    if (options.regions > 0) return options.regions;
+    return options.method == CompressionMethod::cp ? 8 : 1;
+  }
+
+  // The finest levels differ most from the others and hold most of the slices. Axes of tucker cost little: it can have more of
+  // them.
+  static int levelGroups(const CompressionOptions& options) { return options.method == CompressionMethod::tucker ? 3 : 1; }
+
+  template <class Work>
+  void forEachCluster(Work work) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, index_.clusterCount(), 1),
+                      [&](const tbb::blocked_range<std::size_t>& range) {
+                        for (std::size_t c = range.begin(); c != range.end(); ++c) {
+                          work(c);
+                          progress_.advance();
+                        }
+                      });
+  }
+
+  void decompose() {
+    std::vector<std::optional<ClusterModel>> models(index_.clusterCount());
+    forEachCluster([&](std::size_t c) {
+      // Finishing all clusters to this error leaves 1 part in 400 of the budget: further columns are not worth their memory.
+      const LevelGroup& group = groupOf(c);
+      const double share =
+          static_cast<double>(index_.sliceCount(c)) / static_cast<double>(std::max<std::uint64_t>(1, group.slices));
+      models[c].emplace(index_, c, statistics_[c], options_, 0.0025 * budget(group) * share);
+    });
+    models_.reserve(models.size());
+    for (auto& model : models) models_.push_back(std::move(*model));
+  }
+
+  /// Encodes the clusters whose choice, or price of a byte, changed, and scales the images.
+  void encode(const std::vector<int>& selection) {
+    forEachCluster([&](std::size_t c) {
+      const double gain_per_byte = groupOf(c).gain_per_byte;
+      if (selection[c] == selection_[c] && gain_per_byte == encoded_gains_[c]) return;
+      encoded_gains_[c] = gain_per_byte;
+      encoded_[c] = encodeCluster(index_, c, statistics_[c], models_[c].basis(selection[c]), options_.method,
+                                  options_.coefficient_type, pyramid_.value_scale, gain_per_byte);
+    });
+    selection_ = selection;
+    scaleImages();
+  }
+
+  void scaleImages() {
+    std::vector<double> sums(index_.imageCount(), 0.0);
+    std::vector<double> positive(index_.imageCount(), 0.0);
+    for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
+      for (int s = 0; s < index_.sliceCount(c); ++s) {
+        const std::uint32_t image = index_.image(index_.firstSlice(c) + s);
+        sums[image] += static_cast<double>(encoded_[c].slices[s].sum) * statistics_[c].peak;
+        positive[image] += static_cast<double>(encoded_[c].slices[s].positive) * statistics_[c].peak;
+      }
+    }
+    const double pixel = 2.0 / pyramid_.shape.resolution;
+    unscaled_images_ = 0;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      const double integral = sums[i] * pyramid_.value_scale * pixel * pixel;
+      const bool scaled = integral > kLeastEnergy;
+      image_scales_[i] = scaled ? static_cast<float>(1 / integral) : 1.0f;
+      unscaled_images_ += !scaled;
+      const auto density_scale = static_cast<float>(1 / (positive[i] * pyramid_.value_scale * pixel * pixel));
+      density_scales_[i] = std::isfinite(density_scale) ? density_scale : 0.0f;
+    }
+  }
+
+  /// Squared error of a slice as a reader decodes it, with the scale of its image.
+  double sliceError(std::size_t cluster, int slice) const {
+    // slice - scale decoded = (slice - decoded) + (1 - scale) decoded
+    const SliceError& e = encoded_[cluster].slices[slice];
+    const double rest = 1.0 - image_scales_[index_.image(index_.firstSlice(cluster) + slice)];
+    const double peak = statistics_[cluster].peak;
+    return std::max(0.0, e.error + 2 * rest * e.cross + rest * rest * e.power) * peak * peak;
+  }
+
+  /// Squared error of the clusters of a group.
+  double groupError(std::size_t group) const {
+    double sum = 0;
+    for (std::size_t c = group * clustersPerGroup(); c < (group + 1) * clustersPerGroup(); ++c)
+      for (int s = 0; s < index_.sliceCount(c); ++s) sum += sliceError(c, s);
+    return sum;
+  }
+
+  void meetTolerance() {
+    std::vector<ToleranceSearch> searches;
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      std::vector<std::span<const SizeChoice>> clusters;
+      for (const ClusterModel& model : std::span(models_).subspan(g * clustersPerGroup(), clustersPerGroup()))
+        clusters.emplace_back(model.choices());
+      searches.emplace_back(std::move(clusters), budget(groups_[g]));
+    }
+    const auto encodeChosen = [&] {
+      std::vector<int> selection;
+      for (std::size_t g = 0; g < groups_.size(); ++g) {
+        selection.insert(selection.end(), searches[g].selection().begin(), searches[g].selection().end());
+        if (options_.method != CompressionMethod::cp) groups_[g].gain_per_byte = searches[g].gainPerByte();
+      }
+      progress_.grow(index_.clusterCount());
+      encode(selection);
+    };
+    for (bool searching = true; searching;) {
+      encodeChosen();
+      searching = false;
+      for (std::size_t g = 0; g < groups_.size(); ++g) searching |= searches[g].next(groupError(g));
+    }
+    encodeChosen();
+    for (std::size_t g = 0; g < groups_.size(); ++g) requireMet(g);
+  }
+
+  void requireMet(std::size_t group) const {
+    const double error = groupError(group);
+    if (error <= budget(groups_[group])) return;
+    throw Error(ErrorCode::failed, "compress.tolerance", "", "",
+                "the tolerance " + fmt::format("{}", options_.tolerance) +
+                    " cannot be reached with this method and type of coefficient; the least error is " +
+                    fmt::format("{:.4g}", std::sqrt(error / groups_[group].energy)),
+                "ask for a larger tolerance, or for coefficients of more bits");
+  }
+
+  CompressedNdfData pack() {
+    CompressedNdfData data;
+    index_.describe(data);
+    data.header.method = options_.method;
+    data.header.coefficient_type = options_.coefficient_type;
+    data.image_scales = image_scales_;
+    data.density_scales = density_scales_;
+    numberBlocks(data);
+    const std::size_t blocks = pyramid_.shape.blocksPerImage();
+    for (int region = 0; region < index_.regionCount(); ++region)
+      for (const std::uint16_t block : data.place_blocks) packCluster(region, region * blocks + block, data);
+    data.coefficients.resize(data.coefficients.size() +
+                             static_cast<std::size_t>(kRowPadding) * coefficientElementBytes(options_.coefficient_type));
+    packBlockMasses(data);
+    if (std::any_of(encoded_.begin(), encoded_.end(), [](const EncodedCluster& e) { return e.spots > 0; }))
+      data.spot_sums = SpotFinder(index_.sigmaPixels()).sums();
+    return data;
+  }
+
+  /// Places for the blocks that any image still has.
+  void numberBlocks(CompressedNdfData& data) const {
+    const std::size_t blocks = pyramid_.shape.blocksPerImage();
+    data.block_places.assign(blocks, kNoBlockPlace);
+    for (std::size_t block = 0; block < blocks; ++block) {
+      bool occurs = false;
+      for (int region = 0; region < index_.regionCount(); ++region) occurs |= !encoded_[region * blocks + block].kept.empty();
+      if (!occurs) continue;
+      data.block_places[block] = static_cast<std::uint16_t>(data.place_blocks.size());
+      data.place_blocks.push_back(static_cast<std::uint16_t>(block));
+    }
+    data.header.places = static_cast<int>(data.place_blocks.size());
+  }
+
+  /// Appends one cluster: its record, mask and factors.
+  void packCluster(int region, std::size_t c, CompressedNdfData& data) {
+    const EncodedCluster& e = encoded_[c];
+    const int coefficient_bytes = coefficientElementBytes(options_.coefficient_type);
+    // Spots begin where their numbers are aligned.
+    if (e.spots > 0) data.coefficients.resize((data.coefficients.size() + 3) / 4 * 4);
+    NdfCluster cluster;
+    cluster.first_basis =
+        static_cast<std::uint32_t>(data.basis.size() / basisElementBytes(options_.method, options_.coefficient_type));
+    cluster.first_coefficient = data.coefficients.size() / coefficient_bytes;
+    cluster.first_scale = static_cast<std::uint32_t>(data.scales.size());
+    cluster.first_word = static_cast<std::uint32_t>(data.masks.size());
+    cluster.slice_count = static_cast<std::uint32_t>(e.kept.size());
+    cluster.columns = static_cast<std::uint16_t>(e.columns);
+    cluster.narrow_columns = static_cast<std::uint16_t>(e.narrow_columns);
+    cluster.rank_x = static_cast<std::uint8_t>(e.rank_x);
+    cluster.rank_y = static_cast<std::uint8_t>(e.rank_y);
+    data.clusters.push_back(cluster);
+    const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+    append(data.basis, e.basis);
+    append(data.coefficients, e.coefficients);
+    append(data.scales, e.scales);
+    append(data.core, e.core);
+    data.masks.resize(data.masks.size() + (index_.slotCount(region) + 63) / 64, 0);
+    for (const std::uint32_t s : e.kept) {
+      const std::uint16_t slot = index_.slot(index_.image(index_.firstSlice(c) + s));
+      data.masks[cluster.first_word + slot / 64] |= std::uint64_t{1} << (slot % 64);
+    }
+    std::uint32_t count = 0;
+    for (std::size_t w = cluster.first_word; w < data.masks.size(); ++w) {
+      data.mask_ranks.push_back(count);
+      count += static_cast<std::uint32_t>(std::popcount(data.masks[w]));
+    }
+  }
+
+  /// The blocks of every image and their shares of it, from the slices of all clusters.
+  void packBlockMasses(CompressedNdfData& data) const {
+    // A reader adds up the pixels in another order: its share must not exceed the stored one.
+    constexpr float kRounding = 1 + 1e-5f;
+    const std::size_t images = index_.imageCount(), blocks = pyramid_.shape.blocksPerImage();
+    const auto places = static_cast<std::size_t>(data.header.places),
+               words = static_cast<std::size_t>(data.header.placeWords());
+    const double pixel = 2.0 / pyramid_.shape.resolution;
+    std::vector<float> masses(images * places, -1);
+    for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
+      const double unit = pixel * pixel * pyramid_.value_scale * statistics_[c].peak;
+      for (const std::uint32_t s : encoded_[c].kept) {
+        const std::size_t image = index_.image(index_.firstSlice(c) + s);
+        masses[image * places + data.block_places[c % blocks]] =
+            static_cast<float>(unit * encoded_[c].slices[s].positive * density_scales_[image]) * kRounding;
+      }
+    }
+    data.block_masks.assign(images * words, 0);
+    data.first_block.assign(1, 0);
+    for (std::size_t image = 0; image < images; ++image) {
+      for (std::size_t k = 0; k < places; ++k) {
+        if (masses[image * places + k] < 0) continue;
+        data.block_masks[image * words + k / 64] |= std::uint64_t{1} << (k % 64);
+        data.block_masses.push_back(blockMassCode(masses[image * places + k]));
+      }
+      data.first_block.push_back(static_cast<std::uint32_t>(data.block_masses.size()));
+    }
+  }
+
+  CompressionReport makeReport(const CompressedNdfData& data) const {
+    CompressionReport report;
+    measureLevels(data, report);
+    measureBytes(data, report);
+    report.unscaled_images = unscaled_images_;
+    for (const EncodedCluster& e : encoded_) {
+      report.spots += e.spots;
+      if (e.spots > 0) report.spot_slices += e.kept.size();
+    }
+    for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
+      if (index_.sliceCount(c) == 0) continue;
+      const auto columns = static_cast<std::size_t>(encoded_[c].columns);
+      if (report.rank_histogram.size() <= columns) report.rank_histogram.resize(columns + 1, 0);
+      ++report.rank_histogram[columns];
+    }
+    return report;
+  }
+
+  void measureLevels(const CompressedNdfData& data, CompressionReport& report) const {
+    const int levels = pyramid_.shape.level_count;
+    const std::uint32_t* first = data.header.first_image;
+    std::vector<double> errors(levels, 0.0);
+    std::vector<double> energies(levels, 0.0);
+    report.levels.resize(levels);
+    for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
+      const double peak = statistics_[c].peak;
+      for (int s = 0; s < index_.sliceCount(c); ++s) {
+        const std::uint32_t image = index_.image(index_.firstSlice(c) + s);
+        const auto level = std::upper_bound(first, first + levels, image) - first - 1;
+        const SliceError& e = encoded_[c].slices[s];
+        ++report.levels[level].slices;
+        errors[level] += sliceError(c, s);
+        energies[level] += (static_cast<double>(e.error) + 2.0 * e.cross + e.power) * peak * peak;
+      }
+    }
+    double error = 0;
+    for (int l = 0; l < levels; ++l) {
+      report.levels[l].rel_l2 = energies[l] > 0 ? std::sqrt(errors[l] / energies[l]) : 0;
+      error += errors[l];
+    }
+    report.total = {index_.totalSlices(), energy_ > 0 ? std::sqrt(error / energy_) : 0};
+  }
+
+  void measureBytes(const CompressedNdfData& data, CompressionReport& report) const {
+    const auto bytes = [](const auto& array) {
+      return array.size() * sizeof(typename std::remove_cvref_t<decltype(array)>::value_type);
+    };
+    report.basis_bytes = bytes(data.basis);
+    report.coefficient_bytes = bytes(data.coefficients) + bytes(data.scales) + bytes(data.spot_sums);
+    report.index_bytes = bytes(data.image_regions) + bytes(data.image_slots) + bytes(data.image_scales) + bytes(data.clusters) +
+                         bytes(data.masks) + bytes(data.mask_ranks) + bytes(data.density_scales) + bytes(data.block_masks) +
+                         bytes(data.first_block) + bytes(data.block_masses) + bytes(data.block_places) +
+                         bytes(data.place_blocks) + bytes(data.core);
+    report.total_bytes = report.basis_bytes + report.coefficient_bytes + report.index_bytes;
+    const double pixels = static_cast<double>(pyramid_.shape.resolution) * pyramid_.shape.resolution;
+    const double dense = static_cast<double>(index_.imageCount()) * pixels * sizeof(float);
+    double stored =
+        static_cast<double>(index_.totalSlices()) * kBlockPixels * (pyramid_.precision == BlockPrecision::f16 ? 2 : 4);
+    for (int l = 0; l < pyramid_.shape.level_count; ++l) {
+      const PyramidLevel& level = pyramid_.levels[l];
+      stored += static_cast<double>(level.masks.size_bytes() + level.mask_ranks.size_bytes() + level.block_means.size_bytes());
+    }
+    report.ratio_to_dense = dense / static_cast<double>(report.total_bytes);
+    report.ratio_to_stored = stored / static_cast<double>(report.total_bytes);
+  }
+
+  const NdfPyramid& pyramid_;
+  const CompressionOptions& options_;
+  SliceIndex index_;
+  std::vector<LevelGroup> groups_;
+  ProgressCounter progress_;
+  std::vector<ClusterStatistics> statistics_;
+  double energy_ = 0;
+  std::vector<ClusterModel> models_;
+  std::vector<EncodedCluster> encoded_;
+  std::vector<int> selection_;
+  std::vector<double> encoded_gains_;  // [clusters]: gain_per_byte that they were encoded for
+  std::vector<float> image_scales_;
+  std::vector<float> density_scales_;
+  std::uint64_t unscaled_images_ = 0;
+};
+
+}  // namespace
+
+CompressedNdf CompressedNdfData::view() const {
+  CompressedNdf v = header;
+  v.image_regions = image_regions;
+  v.image_slots = image_slots;
+  v.image_scales = image_scales;
+  v.density_scales = density_scales;
+  v.block_masks = block_masks;
+  v.first_block = first_block;
+  v.block_masses = block_masses;
+  v.block_places = block_places;
+  v.place_blocks = place_blocks;
+  v.clusters = clusters;
+  v.masks = masks;
+  v.mask_ranks = mask_ranks;
+  v.basis = basis.data();
+  v.basis_count = basis.size() / basisElementBytes(header.method, header.coefficient_type);
+  v.coefficients = coefficients.data();
+  v.coefficient_count = coefficients.size() / coefficientElementBytes(header.coefficient_type);
+  v.scales = scales;
+  v.core = core;
+  v.spot_sums = spot_sums;
+  return v;
+}
+
+int basisElementBytes(CompressionMethod method, CoefficientType type) {
+  if (type == CoefficientType::f32) return sizeof(float);
+  return method == CompressionMethod::pca ? sizeof(std::int32_t) : sizeof(std::int16_t);
+}
+
+int coefficientElementBytes(CoefficientType type) {
+  return type == CoefficientType::i8 ? 1 : type == CoefficientType::f16 ? 2 : 4;
+}
+
+CompressedNdfData compressPyramid(const NdfPyramid& pyramid, const CompressionOptions& options, CompressionReport* report,
+                                  const ProgressFn& progress) {
+  checkOptions(options);
+  checkRegions(pyramid, options.regions);
+  return Compressor(pyramid, options, progress).run(report);
+}
+
+}  // namespace glint::bake

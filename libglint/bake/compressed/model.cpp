@@ -1,0 +1,455 @@
+#include "glint/bake/compressed/model.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+#include <string>
+
+#include "glint/bake/compressed/kernels.h"
+#include "glint/bake/compressed/quantize.h"
+#include "glint/model/error.h"
+
+namespace glint::bake {
+namespace {
+
+// Below this no reciprocal exists in float; a density so small is an empty cluster.
+constexpr float kSmallestPeak = 1e-30f;
+
+// Eigenvalues that float cannot tell from rounding, relative to the largest.
+constexpr float kEigenvalueFloor = 4e-7f;
+
+// Squares of the rounding of the core's entries, relative to the energy.
+constexpr double kCoreFloor = 1e-11;
+
+// Largest rank of cp that a tolerance chooses: decompositions get slow.
+constexpr int kMostCpRank = 64;
+
+// Spots of a slice at most, and slices that tell whether more of them are worth a search.
+constexpr int kMostSpots = 48;
+constexpr int kProbes = 24;
+// Spots that gain less than so many times what is negligible in a slice are not looked for.
+constexpr double kLeastGain = 40;
+// Probes decide against spots where columns take less than this part of their bytes.
+constexpr double kProbeMargin = 0.7;
+
+// Bytes of a slice of spots besides its spots: its count, its part of the running count and its rest; and of any slice: its
+// block mass.
+constexpr double kSpotSliceBytes = 2.25;
+constexpr double kSliceBytes = 1;
+
+/// Slices of a cluster, divided by its peak, a panel at a time: visit(panel, slices).
+template <class Visit>
+void forEachPanel(const SliceIndex& index, std::size_t cluster, float peak, Visit visit) {
+  const int count = index.sliceCount(cluster);
+  std::vector<float> panel(static_cast<std::size_t>(std::min(count, kPanelSlices)) * kSliceStride, 0.0f);
+  for (int first = 0; first < count; first += kPanelSlices) {
+    const int slices = std::min(kPanelSlices, count - first);
+    index.load(cluster, first, slices, 1 / peak, panel.data());
+    visit(panel.data(), slices);
+  }
+}
+
+/// Sum over the slices of slice slice^T, [256][256]. 131 kflop per slice.
+std::vector<float> gramMatrix(const SliceIndex& index, std::size_t cluster, float peak) {
+  std::vector<float> gram(static_cast<std::size_t>(kBlockPixels) * kBlockPixels, 0.0f);
+  forEachPanel(index, cluster, peak, [&](const float* panel, int slices) {
+    addGram(panel, kSliceStride, slices, kBlockPixels, gram.data(), kBlockPixels);
+  });
+  for (int i = 0; i < kBlockPixels; ++i)
+    for (int j = i + 1; j < kBlockPixels; ++j) gram[i * kBlockPixels + j] = gram[j * kBlockPixels + i];
+  return gram;
+}
+
+struct Components {
+  std::vector<float> images;    // [K][256]
+  std::vector<float> energies;  // [K], falling
+};
+
+/// Eigenvectors of a Gram matrix of images, largest eigenvalue first.
+Components componentsOfGram(const std::vector<float>& gram) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXf> solver(
+      Eigen::Map<const Eigen::MatrixXf>(gram.data(), kBlockPixels, kBlockPixels));
+  Components result;
+  const float floor = kEigenvalueFloor * solver.eigenvalues()[kBlockPixels - 1];
+  for (int k = kBlockPixels - 1; k >= 0 && solver.eigenvalues()[k] > floor; --k) {
+    result.energies.push_back(solver.eigenvalues()[k]);
+    result.images.insert(result.images.end(), solver.eigenvectors().col(k).data(),
+                         solver.eigenvectors().col(k).data() + kBlockPixels);
+  }
+  return result;
+}
+
+/// The same from fewer slices than pixels, through the Gram matrix of the slices.
+Components componentsOfSlices(const float* panel, int slices) {
+  const int stride = paddedColumns(slices);
+  std::vector<float> transposed(static_cast<std::size_t>(kBlockPixels) * stride, 0.0f);
+  for (int s = 0; s < slices; ++s)
+    for (int p = 0; p < kBlockPixels; ++p) transposed[p * stride + s] = panel[s * kSliceStride + p];
+  std::vector<float> gram(static_cast<std::size_t>(slices) * stride);
+  multiply({panel, kSliceStride, 1}, transposed.data(), stride, gram.data(), stride, slices, stride, kBlockPixels);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXf> solver(
+      Eigen::Map<const Eigen::MatrixXf, 0, Eigen::OuterStride<>>(gram.data(), slices, slices, Eigen::OuterStride<>(stride)));
+  Components result;
+  const float floor = kEigenvalueFloor * solver.eigenvalues()[slices - 1];
+  int count = 0;
+  while (count < slices && solver.eigenvalues()[slices - 1 - count] > floor) ++count;
+  // Row k of `weights`: eigenvector / singular value. Images = weights T.
+  std::vector<float> weights(static_cast<std::size_t>(count) * slices);
+  for (int k = 0; k < count; ++k) {
+    const float energy = solver.eigenvalues()[slices - 1 - k];
+    result.energies.push_back(energy);
+    for (int s = 0; s < slices; ++s) weights[k * slices + s] = solver.eigenvectors()(s, slices - 1 - k) / std::sqrt(energy);
+  }
+  result.images.resize(static_cast<std::size_t>(count) * kBlockPixels);
+  multiply({weights.data(), slices, 1}, panel, kSliceStride, result.images.data(), kBlockPixels, count, kBlockPixels, slices);
+  return result;
+}
+
+}  // namespace
+
+ClusterStatistics measureCluster(const SliceIndex& index, std::size_t cluster) {
+  ClusterStatistics statistics;
+  float slice[kSliceStride];
+  for (int s = 0; s < index.sliceCount(cluster); ++s) {
+    index.load(cluster, s, 1, 1, slice);
+    // Squares of the largest floats do not overflow in double, and a NaN or infinity stays in the sum.
+    double energy = 0;
+    float peak = 0;
+    for (int p = 0; p < kBlockPixels; ++p) {
+      energy += static_cast<double>(slice[p]) * slice[p];
+      peak = std::max(peak, std::abs(slice[p]));
+    }
+    if (!std::isfinite(energy))
+      throw Error(ErrorCode::invalid_input, "pyramid.finite", "",
+                  "image " + std::to_string(index.image(index.firstSlice(cluster) + s)), "a density is not finite",
+                  "build the pyramid again with glint-pyramid");
+    statistics.energy += energy;
+    statistics.peak = std::max(statistics.peak, peak);
+  }
+  return statistics;
+}
+
+ClusterModel::ClusterModel(const SliceIndex& index, std::size_t cluster, const ClusterStatistics& statistics,
+                           const CompressionOptions& options, double negligible)
+    : method_(options.method),
+      type_(options.coefficient_type),
+      cluster_(cluster),
+      slice_count_(index.sliceCount(cluster)),
+      peak_(statistics.peak),
+      energy_(0),
+      index_(&index),
+      min_improvement_(options.min_improvement),
+      max_iterations_(options.max_iterations) {
+  if (slice_count_ == 0 || peak_ < kSmallestPeak) {
+    choices_.push_back({false, 0, statistics.energy, 0});
+    return;
+  }
+  const double square = static_cast<double>(peak_) * peak_;
+  energy_ = statistics.energy / square;
+  if (options.tolerance > 0) choices_.push_back({false, 0, statistics.energy, 0});
+  if (method_ == CompressionMethod::tucker) decomposeTucker(index, options, negligible / square);
+  if (method_ == CompressionMethod::pca) decomposePca(index, options, negligible / square);
+  if (method_ == CompressionMethod::cp) boundCpRanks(index, options, negligible / square);
+  if (options.tolerance > 0 && options.spots && type_ == CoefficientType::i8 && method_ != CompressionMethod::cp)
+    addSpots(index, negligible / square);
+  if (options.tolerance > 0) keepHull();
+}
+
+/// Steps of one column: from nothing to narrow coefficients, and on to wide ones.
+void ClusterModel::addColumnSteps(int column, const float* coefficients, double basis_bytes) {
+  const double first_bytes = basis_bytes + sizeof(float);
+  if (type_ != CoefficientType::i8) {
+    double energy = 0;
+    for (int s = 0; s < slice_count_; ++s) energy += static_cast<double>(coefficients[s]) * coefficients[s];
+    steps_.push_back({column, 8, energy, first_bytes + static_cast<double>(slice_count_) * coefficientElementBytes(type_)});
+    return;
+  }
+  const double half = 0.5 * slice_count_;
+  const ColumnErrors errors = roundingErrors(coefficients, slice_count_);
+  const Step narrow{column, 4, errors.energy - errors.narrow, first_bytes + half};
+  const Step wide{column, 8, errors.narrow - errors.wide, half};
+  if (narrow.gain * wide.bytes > wide.gain * narrow.bytes) {
+    steps_.push_back(narrow);
+    steps_.push_back(wide);
+  } else {
+    steps_.push_back({column, 8, errors.energy - errors.wide, first_bytes + 2 * half});
+  }
+}
+
+/// A choice after each step, in the order of what they gain per byte.
+/// @param error  without any column
+void ClusterModel::addStepChoices(double error) {
+  std::erase_if(steps_, [](const Step& step) { return !(step.gain > 0); });
+  std::stable_sort(steps_.begin(), steps_.end(),
+                   [](const Step& a, const Step& b) { return a.gain * b.bytes > b.gain * a.bytes; });
+  double bytes = kSliceBytes * slice_count_;
+  for (std::size_t k = 0; k < steps_.size(); ++k) {
+    error -= steps_[k].gain;
+    bytes += steps_[k].bytes;
+    choices_.push_back(
+        {false, static_cast<int>(k) + 1, std::max(0.0, error) * peak_ * peak_, static_cast<std::uint64_t>(std::ceil(bytes))});
+  }
+}
+
+std::vector<ClusterColumn> ClusterModel::columnsAfter(int steps) const {
+  std::vector<ClusterColumn> columns;
+  for (int k = 0; k < steps; ++k) {
+    const auto same =
+        std::find_if(columns.begin(), columns.end(), [&](const ClusterColumn& c) { return c.index == steps_[k].column; });
+    if (same != columns.end())
+      same->bits = steps_[k].bits;
+    else
+      columns.push_back({steps_[k].column, steps_[k].bits});
+  }
+  std::stable_sort(columns.begin(), columns.end(),
+                   [](const ClusterColumn& a, const ClusterColumn& b) { return a.bits > b.bits; });
+  return columns;
+}
+
+/// Choices of spots: those that gain most, of all slices. A few slices tell whether that can cost less than columns.
+void ClusterModel::addSpots(const SliceIndex& index, double negligible) {
+  const float sigma = index.sigmaPixels();
+  if (!SpotFinder::suits(sigma)) return;
+  const SpotFinder finder(sigma);
+  const auto least = static_cast<float>(kLeastGain * negligible / slice_count_);
+  std::vector<float> slice(kSliceStride);
+  const auto energyOf = [&] {
+    double energy = 0;
+    for (int p = 0; p < kBlockPixels; ++p) energy += static_cast<double>(slice[p]) * slice[p];
+    return energy;
+  };
+  // The probes: what they leave, and the bytes of columns that leave as little.
+  double left = 0, probed = 0;
+  std::size_t count = 0;
+  int probes = 0;
+  for (int s = 0; s < slice_count_; s += std::max(1, slice_count_ / kProbes), ++probes) {
+    index.load(cluster_, s, 1, 1 / peak_, slice.data());
+    probed += energyOf();
+    count += finder.find(slice.data(), kMostSpots, least).size();
+    left += energyOf();
+  }
+  const double share = probed > 0 ? left / probed : 1;
+  const double spot_bytes = static_cast<double>(sizeof(NdfSpot)) * static_cast<double>(count) / probes * slice_count_;
+  const auto as_good = std::find_if(choices_.begin(), choices_.end(),
+                                    [&](const SizeChoice& c) { return c.error <= share * energy_ * peak_ * peak_; });
+  if (as_good != choices_.end() && static_cast<double>(as_good->bytes) < kProbeMargin * spot_bytes) return;
+  std::vector<float> sums(slice_count_, 0.0f);
+  for (int s = 0; s < slice_count_; ++s) {
+    index.load(cluster_, s, 1, 1 / peak_, slice.data());
+    sums[s] = std::accumulate(slice.begin(), slice.begin() + kBlockPixels, 0.0f);
+    spots_.push_back(finder.find(slice.data(), kMostSpots, least));
+  }
+  addSpotChoices(finder, std::move(sums));
+}
+
+/// @param rests  sums of the slices
+void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<float> rests) {
+  struct Candidate {
+    float gain;
+    float share;
+    int slice;
+  };
+  std::vector<Candidate> candidates;
+  for (int s = 0; s < slice_count_; ++s)
+    for (const Spot& spot : spots_[s]) candidates.push_back({spot.gain, spot.weight * finder.share(spot), s});
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
+  for (const Candidate& c : candidates) spot_gains_.push_back(c.gain);
+  // An even rest takes the square of its sum over 256 off the error.
+  const auto evened = [](float sum) { return sum > 0 ? static_cast<double>(sum) * sum / kBlockPixels : 0.0; };
+  double error = energy_;
+  for (const float sum : rests) error -= evened(sum);
+  constexpr std::size_t kChoices = 64;
+  const std::size_t stride = candidates.size() / kChoices + 1;
+  const double slice_bytes = (kSpotSliceBytes + kSliceBytes) * slice_count_ + 2 * sizeof(float);
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    float& rest = rests[candidates[k].slice];
+    error += evened(rest) - candidates[k].gain;
+    rest -= candidates[k].share;
+    error -= evened(rest);
+    // Spots of one gain are kept or left together.
+    const bool last = k + 1 == candidates.size();
+    if ((k % stride == stride - 1 || last) && (last || candidates[k + 1].gain < candidates[k].gain))
+      choices_.push_back({true, static_cast<int>(k) + 1, std::max(0.0, error) * peak_ * peak_,
+                          static_cast<std::uint64_t>(slice_bytes) + sizeof(NdfSpot) * (k + 1)});
+  }
+}
+
+void ClusterModel::keepHull() {
+  std::stable_sort(choices_.begin(), choices_.end(), [](const SizeChoice& a, const SizeChoice& b) {
+    return a.bytes != b.bytes ? a.bytes < b.bytes : a.error < b.error;
+  });
+  std::vector<SizeChoice> hull;
+  for (const SizeChoice& next : choices_) {
+    if (!hull.empty() && next.error >= hull.back().error) continue;
+    const auto gain = [](const SizeChoice& a, const SizeChoice& b) {
+      return (a.error - b.error) / static_cast<double>(b.bytes - a.bytes);
+    };
+    while (hull.size() > 1 && gain(hull[hull.size() - 2], hull.back()) <= gain(hull.back(), next)) hull.pop_back();
+    hull.push_back(next);
+  }
+  choices_ = std::move(hull);
+}
+
+TuckerAxes ClusterModel::analyseAxes(const SliceIndex& index) const {
+  TuckerAnalysis analysis;
+  forEachPanel(index, cluster_, peak_, [&](const float* panel, int slices) { analysis.addMoments(panel, slices); });
+  analysis.solveAxes();
+  forEachPanel(index, cluster_, peak_, [&](const float* panel, int slices) { analysis.addEnergies(panel, slices); });
+  return analysis.axes();
+}
+
+/// Coefficients of orthonormal images, [images][slices].
+std::vector<float> ClusterModel::project(const SliceIndex& index, const std::vector<float>& images, int count) const {
+  const int stride = paddedColumns(count);
+  std::vector<float> transposed(static_cast<std::size_t>(kBlockPixels) * stride, 0.0f);
+  for (int k = 0; k < count; ++k)
+    for (int p = 0; p < kBlockPixels; ++p) transposed[p * stride + k] = images[k * kBlockPixels + p];
+  std::vector<float> result(static_cast<std::size_t>(count) * slice_count_);
+  std::vector<float> products(static_cast<std::size_t>(kPanelSlices) * stride);
+  int first = 0;
+  forEachPanel(index, cluster_, peak_, [&](const float* panel, int slices) {
+    multiply({panel, kSliceStride, 1}, transposed.data(), stride, products.data(), stride, slices, stride, kBlockPixels);
+    for (int s = 0; s < slices; ++s)
+      for (int k = 0; k < count; ++k) result[static_cast<std::size_t>(k) * slice_count_ + first + s] = products[s * stride + k];
+    first += slices;
+  });
+  return result;
+}
+
+void ClusterModel::decomposeTucker(const SliceIndex& index, const CompressionOptions& options, double negligible) {
+  axes_ = analyseAxes(index);
+  std::vector<int> pairs(kBlockPixels);
+  std::iota(pairs.begin(), pairs.end(), 0);
+  const auto energy = [&](int pair) { return axes_.energy[pair % kBlockSize][pair / kBlockSize]; };
+  std::stable_sort(pairs.begin(), pairs.end(), [&](int p, int q) { return energy(p) > energy(q); });
+  // Columns that bring nothing are left out.
+  int count = 0;
+  double error = energy_;
+  const int most = options.tolerance > 0 ? kBlockPixels : options.rank;
+  while (count < most && energy(pairs[count]) > kCoreFloor * energy_ && (count == 0 || error > negligible))
+    error -= energy(pairs[count++]);
+  if (!(options.tolerance > 0)) {
+    for (int k = 0; k < count; ++k) steps_.push_back({pairs[k], 8, energy(pairs[k]), 1});
+    choices_.push_back({false, count, std::max(0.0, error) * peak_ * peak_, 0});
+    return;
+  }
+  std::vector<float> images(static_cast<std::size_t>(count) * kBlockPixels);
+  for (int k = 0; k < count; ++k)
+    for (int p = 0; p < kBlockPixels; ++p)
+      images[k * kBlockPixels + p] = axes_.u[p % kBlockSize * kBlockSize + pairs[k] % kBlockSize] *
+                                     axes_.v[p / kBlockSize * kBlockSize + pairs[k] / kBlockSize];
+  const std::vector<float> coefficients = project(index, images, count);
+  // An entry of the core, and what a new function along an axis costs on average.
+  constexpr double kBasisBytes = 1 + 8;
+  for (int k = 0; k < count; ++k)
+    addColumnSteps(pairs[k], coefficients.data() + static_cast<std::size_t>(k) * slice_count_, kBasisBytes);
+  addStepChoices(energy_);
+}
+
+void ClusterModel::decomposePca(const SliceIndex& index, const CompressionOptions& options, double negligible) {
+  Components components;
+  if (slice_count_ < kBlockPixels)
+    forEachPanel(index, cluster_, peak_,
+                 [&](const float* panel, int slices) { components = componentsOfSlices(panel, slices); });
+  else
+    components = componentsOfGram(gramMatrix(index, cluster_, peak_));
+  const int available = static_cast<int>(components.energies.size());
+  const int most = options.tolerance > 0 ? available : std::min(available, options.rank);
+  double error = energy_;
+  int rank = 0;
+  while (rank < most && (rank == 0 || error > negligible || !(options.tolerance > 0))) error -= components.energies[rank++];
+  // A copy, so that the memory of the columns that are not kept is freed.
+  components_.assign(components.images.begin(), components.images.begin() + static_cast<std::ptrdiff_t>(rank) * kBlockPixels);
+  if (!(options.tolerance > 0)) {
+    for (int k = 0; k < rank; ++k) steps_.push_back({k, 8, components.energies[k], 1});
+    choices_.push_back({false, rank, std::max(0.0, error) * peak_ * peak_, 0});
+    return;
+  }
+  const std::vector<float> coefficients = project(index, components_, rank);
+  const double basis_bytes = static_cast<double>(kBlockPixels) * basisElementBytes(method_, type_);
+  for (int k = 0; k < rank; ++k)
+    addColumnSteps(k, coefficients.data() + static_cast<std::size_t>(k) * slice_count_, basis_bytes);
+  addStepChoices(energy_);
+}
+
+/// Ranks of cp and bounds of their errors. A column for each of the largest entries of the core is where the decomposition
+/// starts from; it ends with less error, by a like factor in all clusters.
+void ClusterModel::boundCpRanks(const SliceIndex& index, const CompressionOptions& options, double negligible) {
+  axes_ = analyseAxes(index);
+  std::vector<double> energies(axes_.energy[0], axes_.energy[0] + kBlockPixels);
+  std::sort(energies.begin(), energies.end(), std::greater<>());
+  const std::uint64_t column_bytes = 2ull * kBlockSize * basisElementBytes(method_, type_) + sizeof(float) +
+                                     static_cast<std::uint64_t>(slice_count_) * coefficientElementBytes(type_);
+  const bool one = !(options.tolerance > 0);
+  const int most = one ? options.rank : kMostCpRank;
+  double error = energy_;
+  for (int rank = 1; rank <= std::min(most, kBlockPixels); ++rank) {
+    error -= energies[rank - 1];
+    if (!one || rank == most)
+      choices_.push_back({false, rank, std::max(0.0, error) * peak_ * peak_,
+                          static_cast<std::uint64_t>(kSliceBytes * slice_count_) + column_bytes * rank});
+    if (!one && error <= negligible) break;
+  }
+}
+
+CpFactors ClusterModel::decompose(int rank) const {
+  CpTensor tensor;
+  tensor.count = slice_count_;
+  tensor.energy = energy_;
+  std::vector<float> data;
+  if (slice_count_ > CpTensor::kMostSlices) {
+    data = gramMatrix(*index_, cluster_, peak_);
+    tensor.gram = data.data();
+  } else {
+    data.resize(static_cast<std::size_t>(slice_count_) * kSliceStride);
+    index_->load(cluster_, 0, slice_count_, 1 / peak_, data.data());
+    tensor.slices = data.data();
+  }
+  return decomposeCp(tensor, axes_, {rank, min_improvement_, max_iterations_});
+}
+
+ClusterBasis ClusterModel::basis(int choice) const {
+  const SizeChoice& c = choices_[choice];
+  ClusterBasis basis;
+  if (c.count == 0) return basis;
+  if (c.spots) {
+    const float least = spot_gains_[c.count - 1];
+    for (const SliceSpots& found : spots_) {
+      const auto end = std::find_if(found.begin(), found.end(), [&](const Spot& spot) { return spot.gain < least; });
+      basis.spots.emplace_back(found.begin(), end);
+    }
+    return basis;
+  }
+  if (method_ == CompressionMethod::cp) {
+    CpFactors factors = decompose(c.count);
+    for (int k = 0; k < factors.rank; ++k) basis.columns.push_back({k, 8});
+    basis.rank_x = basis.rank_y = factors.rank;
+    basis.x = std::move(factors.x);
+    basis.y = std::move(factors.y);
+    return basis;
+  }
+  basis.columns = columnsAfter(c.count);
+  const int columns = static_cast<int>(basis.columns.size());
+  if (method_ == CompressionMethod::tucker) {
+    for (const ClusterColumn& column : basis.columns) {
+      basis.rank_x = std::max(basis.rank_x, column.index % kBlockSize + 1);
+      basis.rank_y = std::max(basis.rank_y, column.index / kBlockSize + 1);
+    }
+    for (int i = 0; i < kBlockSize; ++i) {
+      basis.x.insert(basis.x.end(), axes_.u + i * kBlockSize, axes_.u + i * kBlockSize + basis.rank_x);
+      basis.y.insert(basis.y.end(), axes_.v + i * kBlockSize, axes_.v + i * kBlockSize + basis.rank_y);
+    }
+    return basis;
+  }
+  basis.rank_x = columns;
+  basis.x.resize(static_cast<std::size_t>(kBlockPixels) * columns);
+  for (int k = 0; k < columns; ++k)
+    for (int p = 0; p < kBlockPixels; ++p) basis.x[p * columns + k] = components_[basis.columns[k].index * kBlockPixels + p];
+  return basis;
+}
+
+}  // namespace glint::bake

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "glint/bake/compressed/compress.h"
+
+namespace glint::bake {
+
+/// Floats between the slices of a panel. Not a power of two: columns of slices would share a few cache sets.
+inline constexpr int kSliceStride = kBlockPixels + 16;
+/// Slices that kernels work on at once (278 kB: the second-level cache).
+inline constexpr int kPanelSlices = 256;
+
+/// The clusters of a pyramid: which slices each holds, in the order of compressed_ndf.h.
+///
+/// Densities are divided by the largest magnitude of the cluster, so that kernels in float neither overflow nor underflow.
+class SliceIndex {
+ public:
+  /// @param regions       per axis, 1..255
+  /// @param level_groups  levels in regions of their own, the last with all coarser ones; >= 1
+  /// @throw Error usage if a region has more than 65536 images, invalid_input if the arrays of the pyramid do not fit its shape
+  SliceIndex(const NdfPyramid& pyramid, int regions, int level_groups);
+
+  /// @return groups of levels; the clusters of each follow those of the one before, and are as many
+  int levelGroupCount() const { return level_groups_; }
+  int regionCount() const { return static_cast<int>(region_slots_.size()); }
+  /// @return images of a region
+  std::uint32_t slotCount(int region) const { return region_slots_[region]; }
+  /// @return slot of an image in its region
+  std::uint16_t slot(std::uint32_t image) const { return slots_[image]; }
+  /// @return pixels of an image in a unit of area of the disk's square
+  double pixelsPerArea() const { return 0.25 * pyramid_.shape.resolution * pyramid_.shape.resolution; }
+  /// @return deviation of a facet's image, pixels
+  float sigmaPixels() const { return pyramid_.shape.sigma_r * 0.5f * static_cast<float>(pyramid_.shape.resolution); }
+
+  std::size_t clusterCount() const { return first_slices_.size() - 1; }
+  std::size_t imageCount() const { return slots_.size(); }
+  /// @return slices of one cluster
+  int sliceCount(std::size_t cluster) const { return static_cast<int>(first_slices_[cluster + 1] - first_slices_[cluster]); }
+  std::uint64_t totalSlices() const { return first_slices_.back(); }
+  std::uint64_t firstSlice(std::size_t cluster) const { return first_slices_[cluster]; }
+  /// @return image of a slice, numbered over all levels
+  std::uint32_t image(std::uint64_t slice) const { return images_[slice]; }
+
+  /// Converts slices first..first+count-1 of a cluster, multiplied by `factor`.
+  /// @param out  [count][kSliceStride]; the padding is not written
+  void load(std::size_t cluster, int first, int count, float factor, float* out) const;
+
+  /// Fills the shape, regions and slots of `data`.
+  void describe(CompressedNdfData& data) const;
+
+ private:
+  void assignImages();
+  void assignSlices();
+
+  const NdfPyramid& pyramid_;
+  int regions_;
+  int level_groups_;
+  std::vector<std::uint32_t> region_slots_;   // [regions]: images
+  std::vector<std::uint32_t> first_image_;    // [levels + 1]
+  std::vector<std::uint16_t> image_regions_;  // [images]
+  std::vector<std::uint16_t> slots_;          // [images]
+  std::vector<std::uint64_t> first_slices_;   // [clusters + 1]
+  std::vector<std::uint32_t> images_;         // [slices]
+  std::vector<std::uint64_t> blocks_;         // [slices]: number of the block in its level
+};
+
+}  // namespace glint::bake

@@ -1,0 +1,96 @@
+#include "glint/bake/compressed/spots.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "glint/query/detail/compressed/spots.h"
+
+namespace glint::bake {
+namespace {
+
+// A spot whose part inside the block has less of its norm than this is left to the neighbouring block.
+constexpr float kLeastNorm = 0.05f;
+
+}  // namespace
+
+SpotFinder::SpotFinder(float sigma_pixels) : sums_(kSpotSums), reach_(static_cast<int>(std::ceil(3 * sigma_pixels)) + 1) {
+  for (int k = 0; k < kSpotSums; ++k) {
+    const double pixels = static_cast<double>(k - kSpotSums / 2) / kSpotSteps;
+    sums_[k] = static_cast<float>(0.5 * std::erfc(-pixels / (sigma_pixels * std::sqrt(2.0))));
+  }
+  for (int place = 0; place <= kLastSpotPlace; ++place) {
+    float power = 0, share = 0;
+    for (int p = 0; p < kBlockSize; ++p) {
+      const float* edge = sums_.data() + kSpotSteps * p + kLastSpotPlace - place;
+      profiles_.push_back(edge[kSpotSteps] - edge[0]);
+      power += profiles_.back() * profiles_.back();
+      share += profiles_.back();
+    }
+    shares_.push_back(share);
+    norms_.push_back(std::sqrt(power));
+  }
+}
+
+/// Dot product of the slice with the spot at a place, over the norm of the spot.
+float SpotFinder::match(const float* slice, int x, int y) const {
+  const float norm = norms_[x] * norms_[y];
+  if (norm < kLeastNorm) return 0;
+  const int px = x / kSpotSteps - kSpotReach, py = y / kSpotSteps - kSpotReach;
+  const int x0 = std::max(0, px - reach_), x1 = std::min(kBlockSize, px + reach_ + 1);
+  const int y0 = std::max(0, py - reach_), y1 = std::min(kBlockSize, py + reach_ + 1);
+  float sum = 0;
+  for (int j = y0; j < y1; ++j) {
+    float row = 0;
+    for (int i = x0; i < x1; ++i) row += profile(x)[i] * slice[j * kBlockSize + i];
+    sum += profile(y)[j] * row;
+  }
+  return sum / norm;
+}
+
+/// Climbs to the best place near (x, y), with steps of half a pixel down to an eighth.
+void SpotFinder::refine(const float* slice, int& x, int& y, float& best) const {
+  for (int step = kSpotSteps / 2; step > 0; step /= 2) {
+    for (bool moved = true; moved;) {
+      moved = false;
+      for (const auto& [dx, dy] : {std::pair{-step, 0}, {step, 0}, {0, -step}, {0, step}}) {
+        const int to_x = x + dx, to_y = y + dy;
+        if (to_x < 0 || to_y < 0 || to_x > kLastSpotPlace || to_y > kLastSpotPlace) continue;
+        const float value = match(slice, to_x, to_y);
+        if (!(value > best)) continue;
+        best = value;
+        x = to_x;
+        y = to_y;
+        moved = true;
+      }
+    }
+  }
+}
+
+void SpotFinder::add(int x, int y, float weight, float* pixels) const {
+  for (int j = 0; j < kBlockSize; ++j) {
+    const float row = weight * profile(y)[j];
+    if (row == 0) continue;
+    for (int i = 0; i < kBlockSize; ++i) pixels[j * kBlockSize + i] += row * profile(x)[i];
+  }
+}
+
+SliceSpots SpotFinder::find(float* slice, int most, float least) const {
+  SliceSpots spots;
+  while (static_cast<int>(spots.size()) < most) {
+    const int peak = static_cast<int>(std::max_element(slice, slice + kBlockPixels) - slice);
+    if (!(slice[peak] > 0)) break;
+    int x = (peak % kBlockSize + kSpotReach) * kSpotSteps + kSpotSteps / 2;
+    int y = (peak / kBlockSize + kSpotReach) * kSpotSteps + kSpotSteps / 2;
+    float best = match(slice, x, y);
+    refine(slice, x, y, best);
+    const float gain = std::min(best * best, spots.empty() ? best * best : spots.back().gain);
+    if (!(best > 0) || gain < least) break;
+    const float weight = best / (norms_[x] * norms_[y]);
+    add(x, y, -weight, slice);
+    spots.push_back({static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), weight, gain});
+  }
+  return spots;
+}
+
+}  // namespace glint::bake

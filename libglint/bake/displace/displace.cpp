@@ -1,0 +1,299 @@
+#include "glint/bake/displace/displace.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "glint/bake/displace/downsample_heights.h"
+#include "glint/bake/displace/low_brdf.h"
+#include "glint/bake/displace/scaling_function.h"
+#include "glint/bake/displace/vmf_fit.h"
+#include "glint/math/half.h"
+#include "glint/model/error.h"
+#include "glint/model/texel_name.h"
+
+namespace glint::bake {
+namespace {
+
+constexpr std::size_t kProgressUnits = 100;  // of each level
+constexpr float kLeastAlpha = 0.05f;
+
+void require(bool holds, const char* parameter, const std::string& range) {
+  if (!holds) throw Error(ErrorCode::usage, "displace.range", "", parameter, "is not " + range, "see the help text");
+}
+
+void checkOptions(const DisplaceOptions& o) {
+  require(!o.factors.empty() && o.factors.size() <= kMaxDisplacementLevels, "factors", "a list of 1 to 8 numbers");
+  for (std::size_t k = 0; k < o.factors.size(); ++k)
+    require(o.factors[k] >= 2 && (k == 0 || o.factors[k] > o.factors[k - 1]), "factors", "2 or more and ascending");
+  require(o.lobes >= 1 && o.lobes <= kMaxLobes, "lobes", "1 to 6");
+  require(o.angular >= 3 && o.angular <= 25, "angular", "3 to 25");
+  require(o.spatial >= 1 && o.spatial <= 16, "spatial", "1 to 16");
+  require(o.bounces >= 1 && o.bounces <= kAllBounces, "bounces", "1 to 64");
+  if (o.base.kind == BaseBrdf::Kind::diffuse) {
+    require(o.base.albedo > 0 && o.base.albedo <= 1, "base",
+            "an albedo above 0 and at most 1: a base may neither absorb all light nor gain any");
+  } else {
+    require(o.base.alpha >= kLeastAlpha && o.base.alpha <= 1, "base", "a roughness of 0.05 to 1");
+    require(o.base.eta > 0 && o.base.eta <= 100 && o.base.k >= 0 && o.base.k <= 100, "base",
+            "a refractive index above 0 and an extinction of 0 or more, both at most 100");
+  }
+}
+
+/// Refuses texels that are bad: bad(k) of `count` numbers, `each` for a texel.
+template <class Bad>
+void requireTexels(const HeightMap& map, std::size_t count, std::size_t each, const char* rule, const char* what,
+                   const std::string& range, const char* remedy, Bad bad) {
+  TexelTally found(map.width, map.height);
+  for (std::size_t k = 0; k < count; ++k)
+    if (bad(k)) found.add(k / each);
+  if (found.count() == 0) return;
+  throw Error(ErrorCode::invalid_input, rule, "", what,
+              std::to_string(found.count()) + " values are not " + range + " (first at " + found.firstName() + ")", remedy);
+}
+
+void checkTexture(const HeightMap& map, const DisplaceOptions& options) {
+  const BaseTexture& t = options.texture;
+  const auto channels = static_cast<std::size_t>(t.channels);
+  require(t.channels == 1 || (t.channels == 3 && !t.colors.empty()), "texture.channels", "1, or 3 of colours");
+  const auto requireSize = [&](std::size_t count, std::size_t wanted, const char* what) {
+    if (count == 0 || count == wanted) return;
+    throw Error(ErrorCode::invalid_input, "displace.texture", "", what,
+                "does not have one value for each texel of the heights, " + std::to_string(map.width) + " x " +
+                    std::to_string(map.height),
+                "crop or resample it to the size of the heights");
+  };
+  requireSize(t.colors.size(), map.heights.size() * channels, "colours");
+  requireSize(t.roughness.size(), map.heights.size(), "roughness");
+  requireTexels(map, t.colors.size(), channels, "displace.texture", "colours", "0 to 1",
+                "a base may not gain light: scale the image to 0..1",
+                [&](std::size_t k) { return !(t.colors[k] >= 0 && t.colors[k] <= 1); });
+  if (!t.colors.empty() && std::none_of(t.colors.begin(), t.colors.end(), [](float c) { return c > 0; }))
+    throw Error(ErrorCode::invalid_input, "displace.texture", "", "colours", "are all black: nothing is reflected",
+                "give an image with some light in it");
+  if (t.roughness.empty()) return;
+  if (options.base.kind == BaseBrdf::Kind::diffuse)
+    throw Error(ErrorCode::usage, "displace.texture", "", "roughness", "a diffuse base has no roughness", "take a ggx base");
+  requireTexels(map, t.roughness.size(), 1, "displace.texture", "roughness",
+                "0.05 to 1 when multiplied by the base's " + fmt::format("{}", options.base.alpha),
+                "raise the darkest texels of the image", [&](std::size_t k) {
+                  return !(options.base.alpha * t.roughness[k] >= kLeastAlpha && options.base.alpha * t.roughness[k] <= 1);
+                });
+}
+
+/// The factors next to this one that divide both sides of a map, in words.
+std::string nearestFactors(const HeightMap& map, int factor) {
+  const auto divides = [&](int f) { return map.width % f == 0 && map.height % f == 0; };
+  const int most = std::min(map.width, map.height);
+  int below = std::min(factor, most), above = factor;
+  while (below >= 2 && !divides(below)) --below;
+  while (above <= most && !divides(above)) ++above;
+  if (below < 2 && above > most) return "another map: no factor divides both sides of this one";
+  return below < 2      ? std::to_string(above)
+         : above > most ? std::to_string(below)
+                        : std::to_string(below) + " or " + std::to_string(above);
+}
+
+void checkMap(const HeightMap& map, const DisplaceOptions& options) {
+  for (std::size_t k = 0; k < map.heights.size(); ++k) {
+    if (std::isfinite(map.heights[k])) continue;
+    throw Error(ErrorCode::invalid_input, "heights.finite", "", "heights",
+                "the texel at " + texelName(map.width, map.height, k) + " is not finite",
+                "make the map again with glint-ingest --fix-invalid");
+  }
+  for (const int factor : options.factors) {
+    if (map.width % factor == 0 && map.height % factor == 0) continue;
+    throw Error(ErrorCode::invalid_input, "displace.factor", "", "factor " + std::to_string(factor),
+                "does not divide " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels",
+                "take " + nearestFactors(map, factor) + ", or crop or resample the map");
+  }
+  const HeightSurface surface(map.width, map.height, map.heights);
+  TexelTally steep(map.width, map.height);
+  for (std::size_t f = 0; f < surface.facetCount(); ++f) {
+    const Vec2 slope = surface.slope(f);
+    if (dot(slope, slope) > kSteepestSlope * kSteepestSlope) steep.add(f / 2);
+  }
+  if (steep.count() > 0) {
+    throw Error(ErrorCode::invalid_input, "displace.steep", "", "heights",
+                std::to_string(steep.count()) + " facets are steeper than 80 degrees (first at " + steep.firstName() + ")",
+                "heights are in texels: scale them with glint-ingest --height-scale, or smooth the map");
+  }
+}
+
+/// What is collected of one cell, of each facet.
+struct CellFacets {
+  std::vector<WeightedNormal> normals;
+  std::vector<float> colors;  ///< [facets][channels], if there are any
+  std::vector<float> widths;  ///< squares of alphas, if they vary
+};
+
+/// Weighted normals, base and slope moments of one cell.
+void collectCell(const HeightSurface& surface, const FacetBase& base, int factor, int column, int row, CellFacets& facets,
+                 MapSlopes& moments) {
+  facets.normals.clear(), facets.colors.clear(), facets.widths.clear();
+  const float share = 0.5f / (static_cast<float>(factor) * static_cast<float>(factor));
+  double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  for (int j = row * factor; j < (row + 1) * factor; ++j) {
+    for (int i = column * factor; i < (column + 1) * factor; ++i) {
+      for (std::size_t half = 0; half < 2; ++half) {
+        const std::size_t facet = 2 * (static_cast<std::size_t>(j) * surface.width() + static_cast<std::size_t>(i)) + half;
+        const Vec2 s = surface.slope(facet);
+        const Vec3 n = surface.normal(facet);
+        facets.normals.push_back({n, share / n.z});
+        if (base.colored()) {
+          const Color color = base.color(facet);
+          facets.colors.insert(facets.colors.end(), color.begin(), color.begin() + base.channels());
+        }
+        if (base.rough()) facets.widths.push_back(base.of(facet).alpha * base.of(facet).alpha);
+        x += s.x, y += s.y, xx += s.x * s.x, xy += s.x * s.y, yy += s.y * s.y;
+      }
+    }
+  }
+  x *= share, y *= share;
+  moments.mean = {static_cast<float>(x), static_cast<float>(y)};
+  moments.covariance.xx = static_cast<float>(std::max(0.0, share * xx - x * x));
+  moments.covariance.xy = static_cast<float>(share * xy - x * y);
+  moments.covariance.yy = static_cast<float>(std::max(0.0, share * yy - y * y));
+}
+
+/// Downsampled heights in cells.
+std::vector<float> lowHeights(const HeightMap& map, int factor) {
+  double mean = 0;
+  for (const float h : map.heights) mean += h;
+  mean /= static_cast<double>(map.heights.size()) * factor;
+  const auto heights =
+      heightsFromSlopes(map.width / factor, map.height / factor, meanSlopes(map.width, map.height, map.heights, factor), mean);
+  return {heights.begin(), heights.end()};
+}
+
+PatchGrid patchGrid(const HeightMap& map, int factor, int spatial) {
+  const int columns = map.width / factor, rows = map.height / factor;
+  return {std::min(spatial, columns), std::min(spatial, rows), columns, rows, factor};
+}
+
+/// Whether two grids cut the map at the same places.
+bool samePatches(const PatchGrid& a, const PatchGrid& b) {
+  if (a.columns != b.columns || a.rows != b.rows) return false;
+  for (int c = 0; c <= a.columns; ++c)
+    if (a.firstColumn(c) != b.firstColumn(c)) return false;
+  for (int r = 0; r <= a.rows; ++r)
+    if (a.firstRow(r) != b.firstRow(r)) return false;
+  return true;
+}
+
+/// T and S of all channels, and the worst of their measures.
+void factorChannels(const EffectiveBrdf& original, const EffectiveBrdf& low, std::span<const Vec3> directions,
+                    const PatchGrid& grid, DisplacementLevel& shape, DisplacementData::Level& level) {
+  std::vector<ScalingFactors> factors;
+  for (std::size_t c = 0; c < original.channels; ++c) factors.push_back(factorScaling(original, low, directions, grid, c));
+  for (std::size_t p = 0; p < factors[0].spatial.size(); ++p)
+    for (const ScalingFactors& f : factors) level.spatial_scale.push_back(f.spatial[p]);
+  for (std::size_t k = 0; k < factors[0].angular.size(); ++k)
+    for (const ScalingFactors& f : factors) level.angular_scale.push_back(floatToHalf(f.angular[k]));
+  shape.rank1_residual = 0, shape.rank1_energy = 1;
+  for (const ScalingFactors& f : factors) {
+    shape.rank1_residual = std::max(shape.rank1_residual, f.rank1_residual);
+    shape.rank1_energy = std::min(shape.rank1_energy, f.rank1_energy);
+  }
+}
+
+/// Everything of one level.
+void buildLevel(const HeightMap& map, const DisplaceOptions& options, const PatchGrid& grid, const EffectiveBrdf& original,
+                std::span<const Vec3> directions, DisplacementLevel& shape, DisplacementData::Level& level) {
+  const HeightSurface surface(map.width, map.height, map.heights);
+  const std::vector<float> heights = lowHeights(map, grid.factor);
+  for (const float h : heights) level.heights.push_back(h * static_cast<float>(grid.factor));
+  fitCells(surface, FacetBase(surface, options.base, options.texture), grid.factor, options.lobes, level);
+  const LobeField field{options.base,      static_cast<std::size_t>(options.lobes),
+                        original.channels, level.lobes,
+                        level.lobe_colors, level.lobe_alphas};
+  const EffectiveBrdf low = lowBrdf(heights, field, directions, grid);
+  factorChannels(original, low, directions, grid, shape, level);
+  shape.factor = grid.factor;
+  shape.columns = grid.coarse_x, shape.rows = grid.coarse_y;
+  shape.spatial_columns = grid.columns, shape.spatial_rows = grid.rows;
+}
+
+}  // namespace
+
+Displacement DisplacementData::view() const {
+  Displacement out = shape;
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    DisplacementLevel& to = out.levels[l];
+    const Level& from = levels[l];
+    to.heights = from.heights, to.lobes = from.lobes, to.slopes = from.slopes;
+    to.lobe_colors = from.lobe_colors, to.lobe_alphas = from.lobe_alphas;
+    to.fit_errors = from.fit_errors, to.spatial_scale = from.spatial_scale, to.angular_scale = from.angular_scale;
+  }
+  return out;
+}
+
+void fitCells(const HeightSurface& surface, const FacetBase& base, int factor, int lobe_count, DisplacementData::Level& level) {
+  const int columns = surface.width() / factor, rows = surface.height() / factor;
+  const std::size_t cells = static_cast<std::size_t>(columns) * rows;
+  const auto lobes = static_cast<std::size_t>(lobe_count), channels = static_cast<std::size_t>(base.channels());
+  level.lobes.resize(cells * lobes);
+  level.lobe_colors.resize(base.colored() ? cells * lobes * channels : 0);
+  level.lobe_alphas.resize(base.rough() ? cells * lobes : 0);
+  level.slopes.resize(cells);
+  level.fit_errors.resize(cells);
+  tbb::parallel_for(0, rows, [&](int row) {
+    CellFacets facets;
+    for (int column = 0; column < columns; ++column) {
+      const std::size_t cell = static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column);
+      collectCell(surface, base, factor, column, row, facets, level.slopes[cell]);
+      const std::span<VmfLobe> out(&level.lobes[cell * lobes], lobes);
+      fitLobes(facets.normals, out);
+      level.fit_errors[cell] = lobeError(facets.normals, out);
+      if (base.colored())
+        averageOverLobes(facets.normals, out, facets.colors, {&level.lobe_colors[cell * lobes * channels], lobes * channels});
+      if (!base.rough()) continue;
+      const std::span<float> alphas(&level.lobe_alphas[cell * lobes], lobes);
+      averageOverLobes(facets.normals, out, facets.widths, alphas);
+      for (float& alpha : alphas) alpha = alpha > 0 ? std::sqrt(alpha) : base.base().alpha;
+    }
+  });
+}
+
+DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, const ProgressFn& progress) {
+  checkOptions(options);
+  checkMap(map, options);
+  checkTexture(map, options);
+  const std::vector<Vec3> directions = angularDirections(options.angular);
+  const HeightSurface surface(map.width, map.height, map.heights);
+  const VisibilityMasks masks(surface, directions);
+  DisplacementData data;
+  data.shape.width = map.width, data.shape.height = map.height, data.shape.texel_size_um = map.texel_size_um;
+  data.shape.base = options.base, data.shape.channels = options.texture.channels;
+  data.shape.lobe_count = options.lobes, data.shape.angular = options.angular;
+  data.shape.level_count = static_cast<int>(options.factors.size());
+  data.levels.resize(options.factors.size());
+
+  EffectiveOptions effective{options.base, options.bounces, options.seed, {}, 0, 0, options.texture};
+  for (const int factor : options.factors) effective.distant_cells.push_back(static_cast<float>(factor));
+  const std::size_t total = kProgressUnits * options.factors.size();
+  EffectiveBrdf original;
+  PatchGrid cut;
+  for (std::size_t l = 0; l < options.factors.size(); ++l) {
+    const PatchGrid grid = patchGrid(map, options.factors[l], options.spatial);
+    // Levels whose patches have the same borders share the light paths of the original.
+    if (l == 0 || !samePatches(grid, cut)) {
+      const auto share = [&](std::size_t done, std::size_t all) {
+        if (progress) progress(l * kProgressUnits + done * (kProgressUnits / 2) / all, total);
+      };
+      original = effectiveBrdf(surface, masks, directions, grid, effective, share);
+      cut = grid;
+    }
+    DisplacementLevel& shape = data.shape.levels[l];
+    shape.interreflected_share = static_cast<float>(original.interreflected);
+    shape.distant_share = static_cast<float>(original.distant[l]);
+    buildLevel(map, options, grid, original, directions, shape, data.levels[l]);
+    if (progress) progress((l + 1) * kProgressUnits, total);
+  }
+  return data;
+}
+
+}  // namespace glint::bake

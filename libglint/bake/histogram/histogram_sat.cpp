@@ -1,0 +1,231 @@
+#include "glint/bake/histogram/histogram_sat.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+#include "glint/bake/common/slopes.h"
+#include "glint/model/error.h"
+#include "glint/query/detail/histogram/spherical_bins.h"
+
+namespace glint::bake {
+namespace {
+
+constexpr int kTile = HistogramSat::kTileSize;
+constexpr std::uint64_t kMostTexels = std::uint64_t{1} << 32;
+/// Parts in which texels are binned: sums over them are taken in this order, whatever the threads.
+constexpr int kParts = 64;
+/// Distance of the points of the coarse table: at most 2^16 texels in a frame of this width around 2K texels.
+constexpr int kCoarseTexels = 32;
+/// Counters that one task sums down a table: they stay in the nearest cache.
+constexpr std::size_t kColumnCounters = 4096;
+
+void checkOptions(const NormalMap& map, const HistogramSatOptions& options) {
+  const auto require = [](bool holds, const char* object, const std::string& what, const char* remedy) {
+    if (!holds) throw Error(ErrorCode::usage, "option.range", {}, object, what, remedy);
+  };
+  require(options.theta_bins >= 1 && options.theta_bins <= HistogramSat::kMaxThetaBins && options.phi_bins >= 1 &&
+              options.phi_bins <= HistogramSat::kMaxPhiBins && options.theta_bins * options.phi_bins <= HistogramSat::kMaxBins,
+          "bins", std::to_string(options.theta_bins) + "x" + std::to_string(options.phi_bins) + " is out of range",
+          "give 1 to 64 rings of elevation, 1 to 256 sectors of azimuth, at most 2048 bins");
+  require(options.stride >= 1 && options.stride <= HistogramSat::kMaxStride, "stride",
+          std::to_string(options.stride) + " is out of range", "give 1 to 128 texels");
+  if (static_cast<std::uint64_t>(map.width) * static_cast<std::uint64_t>(map.height) > kMostTexels) {
+    throw Error(ErrorCode::unsupported, "histogram.map_size", {}, "",
+                "a map of " + std::to_string(map.width) + " x " + std::to_string(map.height) +
+                    " texels is more than the counters of a histogram table hold, 2^32",
+                "cut the map into tiles");
+  }
+}
+
+HistogramSat shapeFor(const NormalMap& map, const HistogramSatOptions& options) {
+  HistogramSat shape;
+  shape.width = map.width;
+  shape.height = map.height;
+  shape.theta_bins = options.theta_bins;
+  shape.phi_bins = options.phi_bins;
+  shape.stride = options.stride;
+  shape.coarse_stride = options.stride * std::max(1, kCoarseTexels / options.stride);
+  // Coarser with the stride, so that the tables of lines stay the smaller part.
+  shape.line_stride = std::clamp(64 * options.stride, 256, 512);
+  return shape;
+}
+
+/// Splits [0, count) in kParts parts.
+template <class Visitor>
+void forEachPart(int count, Visitor&& visitor) {
+  tbb::parallel_for(0, kParts, [&](int part) {
+    const auto begin = static_cast<int>(std::int64_t{count} * part / kParts);
+    visitor(part, begin, static_cast<int>(std::int64_t{count} * (part + 1) / kParts));
+  });
+}
+
+/// What is known of each bin of directions after binning.
+struct BinStatistics {
+  std::vector<std::uint64_t> counts;
+  std::vector<double> sums_x, sums_y;
+
+  explicit BinStatistics(int bins) : counts(bins), sums_x(bins), sums_y(bins) {}
+  void add(int bin, Vec2 n) {
+    ++counts[bin];
+    sums_x[bin] += n.x;
+    sums_y[bin] += n.y;
+  }
+  void add(const BinStatistics& other) {
+    for (std::size_t k = 0; k < counts.size(); ++k) {
+      counts[k] += other.counts[k];
+      sums_x[k] += other.sums_x[k];
+      sums_y[k] += other.sums_y[k];
+    }
+  }
+};
+
+/// Writes the bin of every texel, of all bins of directions.
+BinStatistics binTexels(const NormalMap& map, const SphericalBins& bins, HistogramSatData& sat) {
+  std::vector<BinStatistics> parts(kParts, BinStatistics(bins.count()));
+  forEachPart(sat.shape.tileRows(), [&](int part, int begin, int end) {
+    const std::size_t tile_row = static_cast<std::size_t>(sat.shape.tileColumns()) * kTile * kTile;
+    std::fill(sat.texels.values.get() + begin * tile_row, sat.texels.values.get() + end * tile_row, std::uint16_t{0});
+    for (int j = begin * kTile; j < std::min(end * kTile, map.height); ++j) {
+      for (int i = 0; i < map.width; ++i) {
+        const Vec2 n = map.at(i, j);
+        const int bin = bins.find(n);
+        parts[part].add(bin, n);
+        sat.texels.values[sat.shape.texelIndex(i, j)] = static_cast<std::uint16_t>(bin);
+      }
+    }
+  });
+  BinStatistics total(bins.count());
+  for (const BinStatistics& part : parts) total.add(part);
+  return total;
+}
+
+/// Keeps the bins that occur and renumbers the texels.
+void keepOccurring(const BinStatistics& statistics, HistogramSatData& sat) {
+  std::vector<std::uint16_t> place(statistics.counts.size());
+  for (std::size_t id = 0; id < statistics.counts.size(); ++id) {
+    const std::uint64_t count = statistics.counts[id];
+    if (count == 0) continue;
+    place[id] = static_cast<std::uint16_t>(sat.bin_ids.size());
+    sat.bin_ids.push_back(static_cast<std::uint16_t>(id));
+    sat.bin_totals.push_back(count);
+    const auto texels = static_cast<double>(count);
+    sat.bin_normals.push_back(
+        {static_cast<float>(statistics.sums_x[id] / texels), static_cast<float>(statistics.sums_y[id] / texels)});
+  }
+  sat.shape.bin_count = static_cast<int>(sat.bin_ids.size());
+  forEachPart(sat.shape.tileRows(), [&](int, int begin, int end) {
+    for (int j = begin * kTile; j < std::min(end * kTile, sat.shape.height); ++j) {
+      for (int i = 0; i < sat.shape.width; ++i) {
+        std::uint16_t& bin = sat.texels.values[sat.shape.texelIndex(i, j)];
+        bin = place[bin];
+      }
+    }
+  });
+}
+
+/// Adds each row of counters to the next: sums down a table of `rows` rows.
+template <class Counter>
+void sumDown(Counter* table, std::size_t rows, std::size_t row_counters) {
+  tbb::parallel_for(std::size_t{0}, (row_counters + kColumnCounters - 1) / kColumnCounters, [&](std::size_t chunk) {
+    const std::size_t begin = chunk * kColumnCounters, end = std::min(begin + kColumnCounters, row_counters);
+    for (std::size_t b = 1; b < rows; ++b) {
+      const Counter* above = table + (b - 1) * row_counters;
+      Counter* here = table + b * row_counters;
+      for (std::size_t k = begin; k < end; ++k) here[k] = static_cast<Counter>(here[k] + above[k]);
+    }
+  });
+}
+
+/// The table of sums at every `stride` texels.
+template <class Counter>
+void buildTable(const HistogramSatData& sat, int stride, CounterArray<Counter>& table, ProgressCounter& progress) {
+  const HistogramSat& shape = sat.shape;
+  const std::size_t length = shape.rowLength();
+  const std::size_t points_x = shape.pointsX(stride), points_y = shape.pointsY(stride);
+  table.allocate(points_x * points_y * length);
+  std::fill_n(table.values.get(), points_x * length, Counter{0});
+  tbb::parallel_for(std::size_t{1}, points_y, [&](std::size_t b) {
+    Counter* row = table.values.get() + b * points_x * length;
+    std::fill_n(row, length, Counter{0});
+    const int top = static_cast<int>(std::min<std::int64_t>(static_cast<std::int64_t>(b) * stride, shape.height));
+    for (std::size_t a = 1; a < points_x; ++a) {
+      Counter* here = row + a * length;
+      std::memcpy(here, here - length, length * sizeof(Counter));
+      const int right = static_cast<int>(std::min<std::int64_t>(static_cast<std::int64_t>(a) * stride, shape.width));
+      for (int j = (static_cast<int>(b) - 1) * stride; j < top; ++j)
+        for (int i = (static_cast<int>(a) - 1) * stride; i < right; ++i) ++here[sat.texels.values[shape.texelIndex(i, j)]];
+    }
+    progress.advance();
+  });
+  sumDown(table.values.get(), points_y, points_x * length);
+}
+
+/// Sums along every row (or column) of texels.
+template <bool kColumns>
+void buildLines(const HistogramSatData& sat, CounterArray<std::uint16_t>& table, ProgressCounter& progress) {
+  const HistogramSat& shape = sat.shape;
+  const int stride = shape.line_stride, lines = kColumns ? shape.width : shape.height;
+  const int texels = kColumns ? shape.height : shape.width;
+  const std::size_t length = shape.rowLength();
+  const std::size_t points = kColumns ? shape.pointsY(stride) : shape.pointsX(stride);
+  table.allocate(static_cast<std::size_t>(lines) * points * length);
+  // Lines of one tile together: their texels lie side by side.
+  tbb::parallel_for(0, (lines + kTile - 1) / kTile, [&](int tile) {
+    for (int line = tile * kTile; line < std::min((tile + 1) * kTile, lines); ++line) {
+      std::uint16_t* here = table.values.get() + static_cast<std::size_t>(line) * points * length;
+      std::fill_n(here, length, std::uint16_t{0});
+      for (std::size_t a = 1; a < points; ++a, here += length) {
+        std::memcpy(here + length, here, length * sizeof *here);
+        const int begin = (static_cast<int>(a) - 1) * stride;
+        for (int k = begin; k < std::min(begin + stride, texels); ++k)
+          ++here[length + sat.texels.values[kColumns ? shape.texelIndex(line, k) : shape.texelIndex(k, line)]];
+      }
+    }
+    progress.advance();
+  });
+}
+
+}  // namespace
+
+HistogramSat HistogramSatData::view() const {
+  HistogramSat sat = shape;
+  sat.bin_ids = bin_ids;
+  sat.bin_normals = bin_normals;
+  sat.bin_totals = bin_totals;
+  sat.texels = texels.view();
+  sat.sums = sums.view();
+  sat.coarse_sums = coarse_sums.view();
+  sat.row_sums = row_sums.view();
+  sat.column_sums = column_sums.view();
+  return sat;
+}
+
+std::size_t HistogramSatData::sizeBytes() const {
+  const HistogramSat sat = view();
+  return sat.bin_ids.size_bytes() + sat.bin_normals.size_bytes() + sat.bin_totals.size_bytes() + sat.texels.size_bytes() +
+         sat.sums.size_bytes() + sat.coarse_sums.size_bytes() + sat.row_sums.size_bytes() + sat.column_sums.size_bytes();
+}
+
+HistogramSatData buildHistogramSat(const NormalMap& map, const HistogramSatOptions& options, const ProgressFn& progress) {
+  checkOptions(map, options);
+  HistogramSatData sat;
+  sat.shape = shapeFor(map, options);
+  sat.shape.slopes = mapSlopes(map);
+  const HistogramSat& shape = sat.shape;
+  sat.texels.allocate(static_cast<std::size_t>(shape.tileColumns()) * shape.tileRows() * kTile * kTile);
+  const SphericalBins bins(options.theta_bins, options.phi_bins);
+  keepOccurring(binTexels(map, bins, sat), sat);
+  ProgressCounter counter(progress, static_cast<std::size_t>(shape.pointsY(shape.stride)) + shape.pointsY(shape.coarse_stride) -
+                                        2 + shape.tileRows() + shape.tileColumns());
+  buildTable(sat, shape.stride, sat.sums, counter);
+  buildTable(sat, shape.coarse_stride, sat.coarse_sums, counter);
+  buildLines<false>(sat, sat.row_sums, counter);
+  buildLines<true>(sat, sat.column_sums, counter);
+  return sat;
+}
+
+}  // namespace glint::bake

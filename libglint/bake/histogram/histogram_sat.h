@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "glint/bake/common/progress.h"
+#include "glint/model/histogram_sat.h"
+#include "glint/model/normal_map.h"
+
+namespace glint::bake {
+
+struct HistogramSatOptions {
+  int theta_bins = 9;  ///< rings of elevation, 1..64
+  int phi_bins = 32;   ///< sectors of azimuth, 1..256; at most 2048 bins together
+  int stride = 8;      ///< texels between the points of the fine table, 1..128: memory against time
+};
+
+/// A large array that is not zeroed first.
+template <class T>
+struct CounterArray {
+  std::unique_ptr<T[]> values;
+  std::size_t size = 0;
+
+  /// @throws std::bad_alloc
+  void allocate(std::size_t count) {
+    values = std::make_unique_for_overwrite<T[]>(count);
+    size = count;
+  }
+  std::span<const T> view() const { return {values.get(), size}; }
+};
+
+/// A HistogramSat that owns its arrays.
+class HistogramSatData {
+ public:
+  HistogramSat shape;  ///< sizes, strides and slopes; its spans are empty
+  std::vector<std::uint16_t> bin_ids;
+  std::vector<Vec2> bin_normals;
+  std::vector<std::uint64_t> bin_totals;
+  CounterArray<std::uint16_t> texels, sums, row_sums, column_sums;
+  CounterArray<std::uint32_t> coarse_sums;
+
+  /// Spans over the arrays; valid while this object lives and is not changed.
+  HistogramSat view() const;
+  std::size_t sizeBytes() const;
+};
+
+/// Accumulates the histograms of a map (Gamboa 2018, section 4.1).
+///
+/// Texels are binned, then counted in the cells of each table, summed along rows and down columns: every counter is written
+/// once and added to once. Integers, so the result does not depend on threads.
+/// @throws Error (usage) for options out of range; (unsupported) for maps of more than 2^32 texels
+HistogramSatData buildHistogramSat(const NormalMap& map, const HistogramSatOptions& options, const ProgressFn& progress = {});
+
+}  // namespace glint::bake

@@ -1,0 +1,426 @@
+#include "glint/bake/ingest/ingest.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "glint/bake/common/counter_random.h"
+#include "glint/bake/common/slopes.h"
+#include "glint/bake/ingest/checks.h"
+#include "glint/bake/ingest/pixel_codes.h"
+#include "glint/model/error.h"
+#include "glint/query/brdf/slope_sums.h"
+
+namespace glint::bake {
+namespace {
+
+constexpr std::uint64_t kDitherStream = 5;
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kDegreesPerRadian = 180 / std::numbers::pi_v<float>;
+/// Scanned and JPEG maps have a few texels that point down: one in so many is repaired without being asked for.
+constexpr std::size_t kTexelsPerDownward = 1000;
+constexpr std::size_t kNoTexel = std::numeric_limits<std::size_t>::max();
+
+/// Faults of some texels, and where the first was.
+struct Faults {
+  std::size_t non_finite = 0;
+  std::size_t downward = 0;
+  std::size_t clipped = 0;
+  std::size_t non_unit = 0;
+  std::size_t no_data = 0;
+  std::size_t first_non_finite = kNoTexel;
+  std::size_t first_downward = kNoTexel;
+
+  void add(const Faults& o) {
+    non_finite += o.non_finite;
+    downward += o.downward;
+    clipped += o.clipped;
+    non_unit += o.non_unit;
+    no_data += o.no_data;
+    first_non_finite = std::min(first_non_finite, o.first_non_finite);
+    first_downward = std::min(first_downward, o.first_downward);
+  }
+};
+
+/// Two independent values of triangular density on (-1, 1), one for each of x and y.
+Vec2 triangularNoise(std::uint64_t seed, std::size_t texel) {
+  constexpr float kScale = 1.0f / 65536;
+  const std::uint64_t bits = randomBits(seed, kDitherStream, texel);
+  const auto part = [&](int shift) { return static_cast<float>((bits >> shift) & 0xffff) * kScale; };
+  return {part(0) - part(16), part(32) - part(48)};
+}
+
+template <class T>
+constexpr float kCodes = std::is_floating_point_v<T> ? 1.0f : static_cast<float>(std::numeric_limits<T>::max());
+
+/// Maps pixel values to components of a vector: n = scale * value + offset. One code is `scale` wide.
+struct Decoder {
+  float scale = 2;
+  float offset = -1;
+  float floor = -std::numeric_limits<float>::max();  ///< the lowest code of snorm means -1, as in every graphics interface
+
+  template <class T>
+  static Decoder of(Encoding encoding) {
+    if (encoding == Encoding::unorm) return {2 / kCodes<T>, -1};
+    if constexpr (std::is_floating_point_v<T>) return {1, 0};
+    const float half = static_cast<float>((std::numeric_limits<T>::max() + 1) / 2);
+    return {1 / (half - 1), -half / (half - 1), -1};
+  }
+  float operator()(float value) const {
+    const float n = scale * value + offset;
+    return n < floor ? floor : n;  // not std::max, which would turn NaN into a number
+  }
+};
+
+/// Largest error of a component whose code was rounded.
+float roundingOf(const Decoder& decode, const PixelCodes& codes) {
+  constexpr float kFloatRounding = 1e-6f;
+  return codes.step > 0 ? decode.scale * codes.step : kFloatRounding;
+}
+
+/// Width of the noise that hides the steps of codes, in pixel values; 0: none.
+float noiseOf(const PixelCodes& codes, Dequantize wanted) {
+  const bool noisy = wanted == Dequantize::tpdf || (wanted == Dequantize::automatic && codes.coarse);
+  return noisy ? codes.step : 0;
+}
+
+/// What the pixels of a normal map were found to mean.
+struct MapMeaning {
+  NormalLayout layout;
+  Encoding encoding = Encoding::unorm;
+  PixelCodes codes;
+  VectorEvidence vectors;  ///< of x, y and z as they are stored
+};
+
+/// @throws Error invalid_input if the pixels are no normals
+MapMeaning findMeaning(const PixelArray& image, const IngestParameters& p) {
+  const bool floating = std::holds_alternative<std::span<const float>>(image.pixels);
+  MapMeaning meaning;
+  meaning.layout = findLayout(image, p);
+  EncodingEvidence evidence;
+  const auto weigh = [&] {
+    evidence = weighEncoding(image, meaning.layout);
+    meaning.encoding = p.encoding;
+    if (p.encoding == Encoding::automatic)
+      meaning.encoding = floating && looksSigned(evidence) ? Encoding::snorm : Encoding::unorm;
+  };
+  weigh();
+  // Where z was computed from x and y, only these are codes.
+  meaning.codes = findCodes(image, std::array{meaning.layout.x, meaning.layout.y});
+  if (meaning.layout.hasZ()) {
+    const float rounding = std::visit(
+        [&](const auto& pixels) {
+          using T = std::remove_const_t<typename std::decay_t<decltype(pixels)>::element_type>;
+          return roundingOf(Decoder::of<T>(meaning.encoding), meaning.codes);
+        },
+        image.pixels);
+    meaning.vectors = measureVectors(image, meaning.layout, meaning.encoding, rounding);
+    if (!p.trust_channels && meaning.vectors.off > 0 && isConstant(image, 2)) {
+      meaning.layout = {NormalChannels::rg, 0, 1, -1};
+      meaning.vectors = {};
+      weigh();
+    }
+  }
+  checkEncoding(evidence, meaning.encoding, meaning.layout.hasZ(), p.name);
+  if (!p.trust_channels) checkVectors(meaning.vectors, p.name);
+  return meaning;
+}
+
+/// A row of pixels to normals; unusable texels become NaN and are counted.
+template <class T>
+struct NormalDecoder {
+  const PixelArray& image;
+  const IngestParameters& parameters;
+  NormalLayout layout;
+  std::span<const T> pixels;
+  Decoder decode;
+  NoDataTest holds_nothing;
+  float dither = 0;     ///< width of the noise, a component
+  float rounding = 0;   ///< largest error of a component
+  float tolerance = 0;  ///< of unit length
+
+  NormalDecoder(const PixelArray& array, const IngestParameters& p, const MapMeaning& meaning)
+      : image(array),
+        parameters(p),
+        layout(meaning.layout),
+        pixels(std::get<std::span<const T>>(array.pixels)),
+        decode(Decoder::of<T>(meaning.encoding)),
+        holds_nothing(array, p.no_data),
+        dither(decode.scale * noiseOf(meaning.codes, p.dequantize)),
+        rounding(roundingOf(decode, meaning.codes)),
+        tolerance(static_cast<float>(kUnitTolerance) + 1.7320508f * rounding) {}
+
+  Vec2 texel(std::size_t t, Faults& faults) const {
+    const T* pixel = pixels.data() + t * static_cast<std::size_t>(image.channels);
+    const bool three = layout.hasZ();
+    const auto value = [pixel](int channel) { return static_cast<float>(pixel[channel]); };
+    if (holds_nothing(value(layout.x)) && holds_nothing(value(layout.y)) && (!three || holds_nothing(value(layout.z)))) {
+      ++faults.no_data;
+      return {kNaN, kNaN};
+    }
+    float x = decode(value(layout.x));
+    float y = decode(value(layout.y));
+    float z = three ? decode(value(layout.z)) : 0;
+    if (!std::isfinite(x + y + z)) {
+      if (faults.non_finite++ == 0) faults.first_non_finite = t;
+      return {kNaN, kNaN};
+    }
+    if (three) {
+      const float length = std::sqrt(x * x + y * y + z * z);
+      if (std::abs(length - 1) > tolerance) ++faults.non_unit;
+      if (z <= 0 && z >= -rounding && length > 0.5f) return onRim(x, y, faults);
+      if (z <= 0) return downward(t, faults);
+    } else if (const float r2 = x * x + y * y; r2 >= 1) {
+      const float limit = 1 + rounding;
+      return r2 <= limit * limit ? onRim(x, y, faults) : downward(t, faults);
+    }
+    if (dither > 0) {
+      const Vec2 noise = dither * triangularNoise(parameters.seed, t);
+      const Vec2 moved = {x + noise.x, y + noise.y};
+      if (three || dot(moved, moved) < 1) x = moved.x, y = moved.y;
+    }
+    if (three) {
+      const float scale = 1 / std::sqrt(x * x + y * y + z * z);
+      x *= scale;
+      y *= scale;
+      if (x * x + y * y >= 1) return onRim(x, y, faults);
+    }
+    return {x, y};
+  }
+
+ private:
+  static Vec2 onRim(float x, float y, Faults& faults) {
+    ++faults.clipped;
+    return kRimRadius / std::sqrt(x * x + y * y) * Vec2{x, y};
+  }
+  static Vec2 downward(std::size_t t, Faults& faults) {
+    if (faults.downward++ == 0) faults.first_downward = t;
+    return {kNaN, kNaN};
+  }
+};
+
+template <class T>
+std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestParameters& p, const NormalDecoder<T>& decoder,
+                                Faults& faults) {
+  const float green = p.convention == Convention::directx ? -1.0f : 1.0f;
+  std::vector<Vec2> normals(static_cast<std::size_t>(image.width) * image.height);
+  std::vector<Faults> rows(static_cast<std::size_t>(image.height));
+  tbb::parallel_for(0, image.height, [&](int j) {
+    const std::size_t first = static_cast<std::size_t>(j) * image.width;
+    Faults found;
+    for (std::size_t t = first; t < first + static_cast<std::size_t>(image.width); ++t) {
+      const Vec2 n = decoder.texel(t, found);
+      normals[t] = {n.x, green * n.y};
+    }
+    rows[static_cast<std::size_t>(j)] = found;
+  });
+  // Image viewers count rows from the top, so the first texel at fault is in the last row that has one.
+  for (auto row = rows.rbegin(); row != rows.rend(); ++row) {
+    if (faults.first_non_finite != kNoTexel) row->first_non_finite = kNoTexel;
+    if (faults.first_downward != kNoTexel) row->first_downward = kNoTexel;
+    faults.add(*row);
+  }
+  return normals;
+}
+
+/// @throws Error invalid_input for texels that only fix_invalid makes usable
+void checkFaults(const PixelArray& image, const IngestParameters& p, bool three, const Faults& faults) {
+  if (p.fix_invalid) return;
+  const auto plural = [](std::size_t n) { return n == 1 ? std::string("1 texel is ") : std::to_string(n) + " texels are "; };
+  if (faults.non_finite > 0) {
+    throw Error(ErrorCode::invalid_input, "map.finite", p.name, texelName(image, faults.first_non_finite),
+                plural(faults.non_finite) + "not finite, this is the first", "repair them with glint-ingest --fix-invalid");
+  }
+  const std::size_t texels = static_cast<std::size_t>(image.width) * image.height;
+  if (faults.downward * kTexelsPerDownward > texels) {
+    throw Error(ErrorCode::invalid_input, three ? "normals.upward" : "normals.disk", p.name,
+                texelName(image, faults.first_downward),
+                plural(faults.downward) + (three ? "not above the surface (z <= 0)" : "outside the unit disk (x^2 + y^2 > 1)") +
+                    ", this is the first",
+                three ? "export a tangent-space map or set --encoding, or repair them with glint-ingest --fix-invalid"
+                      : "set --encoding, or repair them with glint-ingest --fix-invalid");
+  }
+}
+
+/// Refuses heights among which one number seems to stand for no data.
+void refuseSentinel(const PixelArray& image, const std::optional<double>& no_data, const std::string& name) {
+  const std::optional<double> number = findSentinel(image, NoDataTest(image, no_data));
+  if (!number) return;
+  const std::string text = fmt::format("{:.9g}", *number);
+  throw Error(ErrorCode::invalid_input, "heights.no_data", name, "",
+              text + " is far from all other heights: it seems to stand for no data",
+              "fill such texels with --nodata " + text + ", or take it for a height with --nodata none");
+}
+
+template <class T>
+std::vector<float> decodeHeights(const PixelArray& image, const IngestParameters& p, float noise_width, Faults& faults) {
+  const auto pixels = std::get<std::span<const T>>(image.pixels);
+  const float scale = p.height_scale / kCodes<T>;
+  const NoDataTest holds_nothing(image, p.no_data);
+  std::vector<std::size_t> no_data(static_cast<std::size_t>(image.height));
+  std::vector<float> heights(static_cast<std::size_t>(image.width) * image.height);
+  tbb::parallel_for(0, image.height, [&](int j) {
+    const std::size_t first = static_cast<std::size_t>(j) * image.width;
+    for (std::size_t t = first; t < first + static_cast<std::size_t>(image.width); ++t) {
+      const auto value = static_cast<float>(pixels[t * static_cast<std::size_t>(image.channels)]);
+      const float noise = noise_width > 0 ? noise_width * triangularNoise(p.seed, t).x : 0;
+      heights[t] = scale * (value + noise);
+      if (!holds_nothing(value)) continue;
+      heights[t] = kNaN;
+      ++no_data[static_cast<std::size_t>(j)];
+    }
+  });
+  for (const std::size_t count : no_data) faults.no_data += count;
+  for (int j = image.height - 1; j >= 0; --j) {
+    for (int i = 0; i < image.width; ++i) {
+      const std::size_t t = static_cast<std::size_t>(j) * image.width + static_cast<std::size_t>(i);
+      if (std::isfinite(heights[t])) continue;
+      if (holds_nothing(static_cast<float>(pixels[t * static_cast<std::size_t>(image.channels)]))) continue;
+      if (faults.non_finite++ == 0) faults.first_non_finite = t;
+    }
+  }
+  return heights;
+}
+
+/// @throws Error invalid_input if the colour channels differ, as in a photograph or a normal map
+void checkGrey(const PixelArray& image, const IngestParameters& p) {
+  if (image.channels < 3) return;
+  const std::size_t texels = static_cast<std::size_t>(image.width) * image.height;
+  for (std::size_t t = 0; t < texels; ++t) {
+    const float first = pixelValue(image, t, 0);
+    for (int c = 1; c < 3; ++c) {
+      const float other = pixelValue(image, t, c);
+      if (first == other || (std::isnan(first) && std::isnan(other))) continue;
+      throw Error(ErrorCode::invalid_input, "heights.grey", p.name, texelName(image, t),
+                  "red, green and blue differ: this is no height field",
+                  "read normal maps with --kind normal; export heights as one channel");
+    }
+  }
+}
+
+/// Sums over one row, then over rows in order.
+struct Moments {
+  double n[2] = {};
+  double tilt = 0;
+  SlopeSums slopes;
+  float lowest_z = 1;
+};
+
+Moments rowMoments(std::span<const Vec2> normals) {
+  Moments m;
+  m.slopes = slopeSums(normals.data(), normals.size());
+  for (const Vec2 n : normals) {
+    const float z = std::sqrt(std::max(1e-12f, 1 - dot(n, n)));
+    m.n[0] += n.x;
+    m.n[1] += n.y;
+    m.tilt += std::acos(z);
+    m.lowest_z = std::min(m.lowest_z, z);
+  }
+  return m;
+}
+
+}  // namespace
+
+IngestReport describeNormals(int width, int height, std::span<const Vec2> normals) {
+  std::vector<Moments> rows(static_cast<std::size_t>(height));
+  tbb::parallel_for(0, height, [&](int j) {
+    rows[static_cast<std::size_t>(j)] =
+        rowMoments(normals.subspan(static_cast<std::size_t>(j) * width, static_cast<std::size_t>(width)));
+  });
+  Moments sum;
+  for (const Moments& row : rows) {
+    for (int k = 0; k < 2; ++k) sum.n[k] += row.n[k];
+    sum.slopes.add(row.slopes);
+    sum.tilt += row.tilt;
+    sum.lowest_z = std::min(sum.lowest_z, row.lowest_z);
+  }
+  const auto count = static_cast<double>(normals.size());
+  IngestReport report;
+  report.texels = normals.size();
+  report.mean_normal = {static_cast<float>(sum.n[0] / count), static_cast<float>(sum.n[1] / count)};
+  report.mean_tilt_deg = kDegreesPerRadian * sum.tilt / count;
+  report.steepest_tilt_deg = kDegreesPerRadian * std::acos(sum.lowest_z);
+  report.slopes = sum.slopes.moments(count);
+  return report;
+}
+
+IngestedNormals ingestNormals(const PixelArray& image, const IngestParameters& p) {
+  checkShape(image, p.name);
+  if (image.channels < 2) {
+    throw Error(ErrorCode::invalid_input, "normals.channels", p.name, "", "has one channel, and normals need three (or two)",
+                "read heights with --kind height");
+  }
+  const MapMeaning meaning = findMeaning(image, p);
+  Faults faults;
+  IngestedNormals result;
+  result.normals = std::visit(
+      [&](const auto& pixels) {
+        using T = std::remove_const_t<typename std::decay_t<decltype(pixels)>::element_type>;
+        const NormalDecoder<T> decoder(image, p, meaning);
+        return decodeNormals<T>(image, p, decoder, faults);
+      },
+      image.pixels);
+  checkFaults(image, p, meaning.layout.hasZ(), faults);
+  std::size_t repaired = 0;
+  if (faults.non_finite + faults.downward + faults.no_data > 0)
+    repaired = fillHoles(image.width, image.height, result.normals, p.boundary, p.name);
+  if (!p.allow_constant) checkNotConstant(image, meaning.layout.used(), p.name);
+
+  result.report = describeNormals(image.width, image.height, result.normals);
+  result.report.encoding = meaning.encoding;
+  result.report.channels = meaning.layout.channels;
+  result.report.blue_ignored = meaning.layout.channels == NormalChannels::rg && image.channels > 2;
+  result.report.median_length_error = meaning.vectors.median_error;
+  result.report.coarse_codes = meaning.codes.coarse;
+  result.report.dequantized = noiseOf(meaning.codes, p.dequantize) > 0;
+  result.report.non_finite = faults.non_finite;
+  result.report.no_data = faults.no_data;
+  result.report.downward = faults.downward;
+  result.report.clipped = faults.clipped;
+  result.report.non_unit = faults.non_unit;
+  result.report.repaired = repaired;
+  return result;
+}
+
+IngestedHeights ingestHeights(const PixelArray& image, const IngestParameters& p) {
+  checkShape(image, p.name);
+  checkGrey(image, p);
+  if (!p.allow_constant) checkNotConstant(image, {0}, p.name);
+  if (p.refuse_sentinels) refuseSentinel(image, p.no_data, p.name);
+  const std::array<int, 1> channel = {0};
+  const PixelCodes codes = findCodes(image, channel);
+  const float noise = noiseOf(codes, p.dequantize);
+  Faults faults;
+  IngestedHeights result;
+  result.heights = std::visit(
+      [&](const auto& pixels) {
+        using T = std::remove_const_t<typename std::decay_t<decltype(pixels)>::element_type>;
+        return decodeHeights<T>(image, p, noise, faults);
+      },
+      image.pixels);
+  checkFaults(image, p, false, faults);
+  std::size_t repaired = 0;
+  if (faults.non_finite + faults.no_data > 0)
+    repaired = fillHoles(image.width, image.height, result.heights, p.boundary, p.name);
+  // Holes in a constant map were the only texels that differed.
+  if (repaired > 0 && !p.allow_constant)
+    checkNotConstant({image.width, image.height, 1, std::span<const float>(result.heights)}, {0}, p.name);
+  std::size_t cliffs = 0;
+  const std::vector<Vec2> normals = normalsFromHeights(image.width, image.height, result.heights, p.boundary, &cliffs);
+  result.report = describeNormals(image.width, image.height, normals);
+  result.report.coarse_codes = codes.coarse;
+  result.report.dequantized = noise > 0;
+  result.report.non_finite = faults.non_finite;
+  result.report.no_data = faults.no_data;
+  result.report.repaired = repaired;
+  result.report.cliffs = cliffs;
+  result.report.seam = seamRoughness(image.width, image.height, result.heights);
+  return result;
+}
+
+}  // namespace glint::bake

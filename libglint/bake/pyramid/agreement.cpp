@@ -1,0 +1,68 @@
+#include "glint/bake/pyramid/agreement.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <vector>
+
+#include "glint/bake/common/stored_block.h"
+
+namespace glint::bake {
+namespace {
+
+/// All pixels of an image, by block, empty ones included.
+void decodeImage(const NdfPyramid& pyramid, int l, std::size_t image, std::vector<float>& pixels) {
+  const PyramidLevel& level = pyramid.levels[l];
+  const int words = pyramid.shape.maskWords();
+  pixels.assign(static_cast<std::size_t>(pyramid.shape.blocksPerImage()) * kBlockPixels, 0.0f);
+  std::size_t stored = level.mask_ranks[image * words];
+  for (int w = 0; w < words; ++w) {
+    for (std::uint64_t mask = level.masks[image * words + w]; mask; mask &= mask - 1) {
+      float* block = pixels.data() + static_cast<std::size_t>(64 * w + std::countr_zero(mask)) * kBlockPixels;
+      loadStoredBlock(pyramid, level, stored++, block);
+    }
+  }
+}
+
+double squaredDistance(const std::vector<float>& a, const std::vector<float>& b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < a.size(); ++k) sum += double{a[k] - b[k]} * (a[k] - b[k]);
+  return sum;
+}
+
+double squaredNorm(const std::vector<float>& a) {
+  double sum = 0;
+  for (const float v : a) sum += double{v} * v;
+  return sum;
+}
+
+}  // namespace
+
+double levelDisagreement(const NdfPyramid& pyramid, int level) {
+  const PyramidGrid& fine = pyramid.shape.levels[level];
+  const PyramidGrid& coarse = pyramid.shape.levels[level + 1];
+  struct Sums {
+    double difference = 0, norm = 0;
+  };
+  std::vector<Sums> sums(coarse.imageCount());
+  tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t image) {
+    const int i = static_cast<int>(image) % coarse.columns, j = static_cast<int>(image) / coarse.columns;
+    std::vector<float> parent, child;
+    decodeImage(pyramid, level + 1, image, parent);
+    const double norm = squaredNorm(parent);
+    for (int y = 2 * j; y < std::min(2 * j + 2, fine.rows); ++y) {
+      for (int x = 2 * i; x < std::min(2 * i + 2, fine.columns); ++x) {
+        decodeImage(pyramid, level, static_cast<std::size_t>(y) * fine.columns + x, child);
+        sums[image].difference += squaredDistance(child, parent);
+        sums[image].norm += norm;
+      }
+    }
+  });
+  Sums total;
+  for (const Sums& s : sums) total.difference += s.difference, total.norm += s.norm;
+  return total.norm > 0 ? std::sqrt(total.difference / total.norm) : 0;
+}
+
+}  // namespace glint::bake

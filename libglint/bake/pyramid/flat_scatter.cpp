@@ -1,0 +1,159 @@
+#include "glint/bake/pyramid/flat_scatter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "glint/bake/common/simd.h"
+#include "glint/model/ndf_pyramid.h"
+#include "glint/query/detail/common/footprint_weights.h"
+
+namespace glint::bake {
+namespace {
+
+constexpr int kChunk = 128;  // texels binned at once
+
+struct Target {
+  float* bins;
+  std::uint8_t* touched;
+  int pitch;
+  int tiles;
+  float bins_per_unit;   // bins in half the square
+  float tiles_per_unit;  // tiles in half the square
+};
+
+using Float4 = float __attribute__((vector_size(16), aligned(4), may_alias));
+
+/// Adds `count` <= kChunk neighbouring texels with weights row_weight * weights[k].
+GLINT_MULTIVERSION void splat(const Vec2* normals, const float* weights, float row_weight, int count, const Target& target) {
+  float fx[kChunk], fy[kChunk];
+  std::int32_t offset[kChunk], tile[kChunk];
+  for (int k = 0; k < count; ++k) {
+    const float x = (normals[k].x + 1) * target.bins_per_unit, y = (normals[k].y + 1) * target.bins_per_unit;
+    const int ix = static_cast<int>(x), iy = static_cast<int>(y);
+    fx[k] = x - static_cast<float>(ix);
+    fy[k] = y - static_cast<float>(iy);
+    offset[k] = (iy - 1) * target.pitch + ix - 1;
+    const int tx = std::min(static_cast<int>((normals[k].x + 1) * target.tiles_per_unit), target.tiles - 1);
+    const int ty = std::min(static_cast<int>((normals[k].y + 1) * target.tiles_per_unit), target.tiles - 1);
+    tile[k] = ty * target.tiles + tx;
+  }
+  for (int k = 0; k < count; ++k) {
+    const float w = row_weight * weights[k];
+    const float x = fx[k], y = fy[k], rx = 1 - x, ry = 1 - y;
+    // Quadratic B-spline weights of the bins before, at and after the facet; the fourth lane adds 0.
+    const Float4 across = {0.5f * w * rx * rx, w * (0.5f + x * rx), 0.5f * w * x * x, 0};
+    float* bin = target.bins + offset[k];
+    Float4* row0 = reinterpret_cast<Float4*>(bin);
+    Float4* row1 = reinterpret_cast<Float4*>(bin + target.pitch);
+    Float4* row2 = reinterpret_cast<Float4*>(bin + 2 * static_cast<std::ptrdiff_t>(target.pitch));
+    *row0 += across * (0.5f * ry * ry);
+    *row1 += across * (0.5f + y * ry);
+    *row2 += across * (0.5f * y * y);
+    target.touched[tile[k]] = 1;
+  }
+}
+
+/// Half-open range of texel centres within `reach` of `centre`, limited to the map when it does not repeat.
+struct Range {
+  int begin, end;
+  int size() const { return end - begin; }
+};
+Range texelsWithin(float centre, float reach, int size, Boundary boundary) {
+  int begin = static_cast<int>(std::ceil(centre - reach - 0.5f)), end = static_cast<int>(std::floor(centre + reach - 0.5f)) + 1;
+  if (boundary == Boundary::clamp) begin = std::max(begin, 0), end = std::min(end, size);
+  return {begin, end};
+}
+
+/// Relative weights of texels along one axis.
+struct AxisWeights {
+  Range range;
+  std::vector<float> weights;
+  bool folded;  ///< the range is the whole map, and weights are summed over its periodic copies
+};
+
+/// Weights of a Gaussian, cut at its reach. One that is longer than the map is folded: no texel is visited twice.
+AxisWeights gaussianWeights(float centre, float sigma, int size, Boundary boundary) {
+  const Range range = texelsWithin(centre, kPyramidReach * sigma, size, boundary);
+  const bool folded = range.size() > size;
+  AxisWeights axis = {folded ? Range{0, size} : range, {}, folded};
+  axis.weights.assign(static_cast<std::size_t>(axis.range.size()), 0.0f);
+  for (int i = range.begin; i < range.end; ++i) {
+    const float d = (static_cast<float>(i) + 0.5f - centre) / sigma;
+    axis.weights[static_cast<std::size_t>(folded ? wrapIndex(i, size) : i - range.begin)] += std::exp(-0.5f * d * d);
+  }
+  return axis;
+}
+
+AxisWeights evenWeights(int size) { return {{0, size}, std::vector<float>(static_cast<std::size_t>(size), 1.0f), true}; }
+
+Target targetOf(DirectionBins& bins) {
+  const float half = 0.5f * static_cast<float>(bins.resolution());
+  return {bins.origin(),
+          bins.touched(),
+          bins.pitch(),
+          bins.tilesPerAxis(),
+          half * static_cast<float>(bins.subdivision()),
+          0.5f * static_cast<float>(bins.tilesPerAxis())};
+}
+
+/// Adds texels to bins with the normalised product of weights along x and y.
+/// @param columnsOfRow  the part of the columns that count in a row
+template <class ColumnsOfRow>
+void scatter(const NormalMap& map, const AxisWeights& x, const AxisWeights& y, const ColumnsOfRow& columnsOfRow,
+             DirectionBins& bins, DirectionBins& band) {
+  double total = 0;
+  for (int j = y.range.begin; j < y.range.end; ++j) {
+    const Range r = columnsOfRow(j);
+    double row = 0;
+    for (int i = r.begin; i < r.end; ++i) row += x.weights[i - x.range.begin];
+    total += row * y.weights[j - y.range.begin];
+  }
+
+  const bool banded = y.range.size() * static_cast<std::int64_t>(x.range.size()) > 2 * kBandTexels;
+  const Target target = targetOf(banded ? band : bins);
+  const auto flush = [&] {
+    band.addTo(bins);
+    band.clear();
+  };
+  int in_band = 0;
+  for (int j = y.range.begin; j < y.range.end; ++j) {
+    const Range r = columnsOfRow(j);
+    const auto row_weight = static_cast<float>(y.weights[j - y.range.begin] / total);
+    const Vec2* row = map.normals.data() + static_cast<std::size_t>(wrapIndex(j, map.height)) * map.width;
+    for (int i = r.begin; i < r.end;) {
+      const int column = wrapIndex(i, map.width);
+      const int count = std::min({r.end - i, map.width - column, kChunk});
+      splat(row + column, x.weights.data() + (i - x.range.begin), row_weight, count, target);
+      i += count;
+      in_band += count;
+      if (banded && in_band >= kBandTexels) flush(), in_band = 0;
+    }
+  }
+  if (banded) flush();
+}
+
+}  // namespace
+
+void scatterFlatFootprint(const NormalMap& map, Boundary boundary, Vec2 centre, float sigma, DirectionBins& bins,
+                          DirectionBins& band) {
+  const float reach = kPyramidReach * sigma;
+  const AxisWeights x = gaussianWeights(centre.x, sigma, map.width, boundary);
+  const AxisWeights y = gaussianWeights(centre.y, sigma, map.height, boundary);
+  const auto insideCircle = [&](int j) {
+    if (x.folded || y.folded) return x.range;
+    const float dy = static_cast<float>(j) + 0.5f - centre.y;
+    const Range r = texelsWithin(centre.x, std::sqrt(std::max(0.0f, reach * reach - dy * dy)), map.width, boundary);
+    return Range{std::max(r.begin, x.range.begin), std::min(r.end, x.range.end)};
+  };
+  scatter(map, x, y, insideCircle, bins, band);
+}
+
+void scatterFlatMap(const NormalMap& map, DirectionBins& bins, DirectionBins& band) {
+  const AxisWeights x = evenWeights(map.width), y = evenWeights(map.height);
+  scatter(
+      map, x, y, [&](int) { return x.range; }, bins, band);
+}
+
+}  // namespace glint::bake

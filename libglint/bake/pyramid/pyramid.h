@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "glint/bake/common/progress.h"
+#include "glint/model/ndf_pyramid.h"
+
+namespace glint::bake {
+
+struct PyramidOptions {
+  float stride = 32;       ///< texels between the footprints of level 0; >= 2
+  int resolution = 256;    ///< pixels of an NDF image along each axis: a multiple of 16 in [32, 1024]
+  float sigma_r = 0.005f;  ///< intrinsic roughness, disk units: at least 0.1 pixel of an NDF image, at most 0.25
+  Surface surface = Surface::flat;
+  Boundary boundary = Boundary::wrap;
+  /// Of footprints, besides the mean of the map; 0: until neighbouring levels agree (see kAgreement) or the stride reaches the
+  /// map.
+  int levels = 0;
+  BlockPrecision precision = BlockPrecision::f16;
+};
+
+/// With automatic levels, the coarsest level of footprints is dropped while `levelDisagreement` with the one below is less than this.
+inline constexpr double kAgreement = 0.01;
+
+/// Blocks that hold less than this share of their image are not stored.
+inline constexpr float kBlockMassThreshold = 1e-6f;
+
+/// An NdfPyramid that owns its arrays.
+class NdfPyramidData {
+ public:
+  struct Level {
+    std::vector<std::uint64_t> masks;
+    std::vector<std::uint32_t> mask_ranks;
+    std::vector<float> block_means;
+    std::vector<std::uint16_t> half_pixels;  ///< used with BlockPrecision::f16
+    std::vector<float> float_pixels;         ///< used with BlockPrecision::f32
+  };
+
+  PyramidShape shape;
+  BlockPrecision precision = BlockPrecision::f16;
+  float value_scale = 1;
+  std::vector<Level> levels;
+
+  /// Spans over the arrays; valid while this object lives and is not changed.
+  NdfPyramid view() const;
+};
+
+/// The grids of levels that a map of the given size gets: strides stride 2^l while the stride is shorter than the longest side,
+/// then the mean of the map.
+PyramidShape pyramidShape(int width, int height, const PyramidOptions& options);
+
+/// Builds the NDF images of every level (Deng 2022, section 4.1).
+///
+/// Facets are scattered, not gathered: each texel adds its footprint weight to bins of directions, then one separable filter
+/// per image turns bins into pixel means of the blurred density. Gaussian footprints are cut at kPyramidReach.
+/// @throws Error (usage) for options out of range
+NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options, const ProgressFn& progress = {});
+
+}  // namespace glint::bake

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <vector>
+
+#include "glint/bake/synth/synth.h"
+
+/// The surfaces behind synthHeights and synthNormals, each [height][width]. Heights are not scaled yet.
+namespace glint::bake {
+
+/// Gaussian random field of correlation exp(-(x/correlation_x)^2 - (y/correlation_y)^2). O(n log n).
+std::vector<float> noiseHeights(const SynthParameters& parameters, float correlation_x, float correlation_y);
+
+std::vector<Vec2> flakeNormals(const SynthParameters& parameters);
+std::vector<float> leatherHeights(const SynthParameters& parameters);
+std::vector<float> scratchHeights(const SynthParameters& parameters);
+std::vector<float> weaveHeights(const SynthParameters& parameters);
+std::vector<float> sawtoothHeights(const SynthParameters& parameters);
+
+}  // namespace glint::bake

@@ -1,0 +1,137 @@
+#include "glint/bake/synth/synth.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "glint/bake/common/slopes.h"
+#include "glint/bake/synth/kinds.h"
+#include "glint/model/error.h"
+
+namespace glint::bake {
+namespace {
+
+constexpr int kMaxSize = 65536;
+
+void require(bool holds, const char* parameter, const char* range) {
+  if (!holds) throw Error(ErrorCode::usage, "synth.range", "", parameter, std::string("is not ") + range, "see the help text");
+}
+
+/// Scratches wider than the map wrap round it many times, and many wide ones lie on each texel: neither shows, and both cost time.
+void checkScratches(const SynthParameters& p) {
+  constexpr int kSureWidth = 64;        // texels that are allowed on any map
+  constexpr float kMeanLength = 128;    // about that of a scratch, texels
+  constexpr double kMostLayers = 1024;  // scratches on a texel, on average
+  const int widest = std::max(kSureWidth, std::min(p.width, p.height));
+  if (p.feature_texels > static_cast<float>(widest))
+    throw Error(ErrorCode::usage, "synth.range", "", "feature size",
+                fmt::format("scratches of {:g} texels are wider than the map", p.feature_texels),
+                fmt::format("give --flake-size of at most {}", widest));
+  const double layers = double{p.density} * p.feature_texels * (p.feature_texels + kMeanLength) / (64 * 64);
+  if (layers > kMostLayers)
+    throw Error(ErrorCode::usage, "synth.range", "", "density", fmt::format("{:.0f} scratches would lie on each texel", layers),
+                fmt::format("give --density of at most {:g}, or a smaller --flake-size",
+                            std::floor(1e3 * p.density * kMostLayers / layers) / 1e3));
+}
+
+void check(const SynthParameters& p) {
+  require(p.width >= 1 && p.width <= kMaxSize && p.height >= 1 && p.height <= kMaxSize, "size", "1 to 65536 texels");
+  require(p.alpha >= 0 && p.alpha <= 2, "alpha", "0 to 2");
+  require(p.kind != SynthKind::flakes || (p.alpha >= 1e-4f && p.alpha <= 0.999f), "alpha", "0.0001 to 0.999 for flakes");
+  require(p.gamma >= 0.1f && p.gamma <= 20, "gamma", "0.1 to 20");
+  require(p.correlation_texels >= 0 && p.correlation_texels <= kMaxSize, "correlation", "0 to 65536 texels");
+  require(p.streak_texels >= 0 && p.streak_texels <= kMaxSize, "streak", "0 to 65536 texels");
+  require(p.feature_texels >= 1 && p.feature_texels <= kMaxSize, "feature size", "1 to 65536 texels");
+  require(p.density > 0 && p.density <= 64, "density", "more than 0, at most 64");
+  require(p.slope >= 0 && p.slope <= 10, "slope", "0 to 10");
+  if (p.kind == SynthKind::scratches) checkScratches(p);
+}
+
+void scale(std::vector<float>& heights, double factor) {
+  for (float& h : heights) h = static_cast<float>(h * factor);
+}
+
+/// Noise whose slopes have the wanted variance. A map too small to have slopes (1 or 2 texels) stays flat.
+std::vector<float> scaledNoise(const SynthParameters& p) {
+  const bool brushed = p.kind == SynthKind::brushed;
+  std::vector<float> heights = noiseHeights(p, brushed ? p.streak_texels : p.correlation_texels, p.correlation_texels);
+  const SlopeMoments moments = slopeMoments(p.width, p.height, heights);
+  const double variance = brushed ? moments.variance_y : 0.5 * (moments.variance_x + moments.variance_y);
+  scale(heights, variance > 0 ? p.alpha / std::sqrt(2 * variance) : 0);
+  return heights;
+}
+
+std::vector<float> pattern(const SynthParameters& p) {
+  switch (p.kind) {
+    case SynthKind::scratches:
+      return scratchHeights(p);
+    case SynthKind::leather:
+      return leatherHeights(p);
+    case SynthKind::weave:
+      return weaveHeights(p);
+    case SynthKind::sawtooth:
+      return sawtoothHeights(p);
+    default:
+      return std::vector<float>(static_cast<std::size_t>(p.width) * p.height, 0.0f);
+  }
+}
+
+}  // namespace
+
+SynthParameters defaultSynthParameters(SynthKind kind) {
+  SynthParameters p;
+  p.kind = kind;
+  switch (kind) {
+    case SynthKind::isotropic:
+      break;
+    case SynthKind::brushed:
+      p.alpha = 0.15f, p.correlation_texels = 2;
+      break;
+    case SynthKind::flakes:
+      p.alpha = 0.15f;
+      break;
+    case SynthKind::scratches:
+      p.alpha = 0.01f, p.feature_texels = 4;
+      break;
+    case SynthKind::leather:
+      p.alpha = 0.05f, p.feature_texels = 32;
+      break;
+    case SynthKind::weave:
+      p.alpha = 0.03f, p.feature_texels = 32, p.slope = 2;
+      break;
+    case SynthKind::sawtooth:
+      p.alpha = 0, p.feature_texels = 16;
+      break;
+    case SynthKind::flat:
+      p.alpha = 0;
+      break;
+  }
+  return p;
+}
+
+std::vector<float> synthHeights(const SynthParameters& p) {
+  check(p);
+  if (p.kind == SynthKind::flakes) {
+    throw Error(ErrorCode::unsupported, "synth.flakes_height", "", "",
+                "flakes are separate facets without a common height field", "make their normals instead, or another kind");
+  }
+  if (p.kind == SynthKind::isotropic || p.kind == SynthKind::brushed) return scaledNoise(p);
+  std::vector<float> heights = pattern(p);
+  const float steepest = slopeMoments(p.width, p.height, heights).steepest;
+  scale(heights, steepest > 0 ? p.slope / steepest : 0);
+  if (p.alpha > 0 && p.kind != SynthKind::flat) {
+    const std::vector<float> noise = scaledNoise(p);
+    for (std::size_t i = 0; i < heights.size(); ++i) heights[i] += noise[i];
+  }
+  return heights;
+}
+
+std::vector<Vec2> synthNormals(const SynthParameters& p) {
+  check(p);
+  if (p.kind == SynthKind::flakes) return flakeNormals(p);
+  return normalsFromHeights(p.width, p.height, synthHeights(p));
+}
+
+}  // namespace glint::bake

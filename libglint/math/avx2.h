@@ -1,0 +1,56 @@
+#pragma once
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__CUDACC__) && !defined(__CUDA__)
+
+#include <immintrin.h>
+
+#include <cstdint>
+
+#include "glint/math/float4.h"
+
+/// Marks functions for AVX2 and F16C, to be called only where hasAvx2(). Only such functions may hand vectors of eight
+/// to one another: compiled for other processors these are passed in other ways.
+#define GLINT_AVX2 [[gnu::target("avx2,f16c")]]
+
+namespace glint {
+
+/// Whether this processor has what functions that are marked GLINT_AVX2 need: all that have AVX2 have F16C, which clang cannot
+/// be asked for before version 18. Never decided by how a source is compiled: the linker keeps one copy for all of a program.
+inline bool hasAvx2() { return __builtin_cpu_supports("avx2") != 0; }
+
+/// p[0] to p[7] as floats.
+GLINT_AVX2 inline __m256 loadEight(const float* p) { return _mm256_loadu_ps(p); }
+/// halfToFloat of eight numbers.
+GLINT_AVX2 inline __m256 floatsOf(__m128i halves) {
+  const __m128i largest = _mm_or_si128(_mm_and_si128(halves, _mm_set1_epi16(-0x8000)), _mm_set1_epi16(kLargestHalf));
+  return _mm256_cvtph_ps(_mm_min_epi16(halves, largest));
+}
+/// positiveHalfToFloat of eight numbers.
+GLINT_AVX2 inline __m256 positiveFloatsOf(__m128i halves) {
+  return _mm256_cvtph_ps(_mm_min_epi16(_mm_max_epi16(halves, _mm_setzero_si128()), _mm_set1_epi16(kLargestHalf)));
+}
+/// Half-precision numbers.
+GLINT_AVX2 inline __m256 loadEight(const std::uint16_t* p) {
+  return floatsOf(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
+}
+/// p[0] to p[7] as integers of 32 bits.
+GLINT_AVX2 inline __m256i integersOf(const std::int8_t* p) {
+  return _mm256_cvtepi8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
+}
+GLINT_AVX2 inline __m256i integersOf(const std::int16_t* p) {
+  return _mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
+}
+GLINT_AVX2 inline __m256i integersOf(const std::int32_t* p) { return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)); }
+/// Integers.
+template <class Integer>
+GLINT_AVX2 inline __m256 loadEight(const Integer* p) {
+  return _mm256_cvtepi32_ps(integersOf(p));
+}
+
+// Lanes 0 to 3, and 4 to 7.
+GLINT_AVX2 inline Float4 lowFour(__m256 v) { return {_mm256_castps256_ps128(v)}; }
+GLINT_AVX2 inline Float4 highFour(__m256 v) { return {_mm256_extractf128_ps(v, 1)}; }
+
+}  // namespace glint
+
+#endif

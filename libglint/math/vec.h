@@ -1,0 +1,52 @@
+#pragma once
+
+#include "glint/math/device.h"
+
+namespace glint {
+
+/// The largest number below 1.
+inline constexpr float kBelowOne = 0x1.fffffep-1f;
+
+/// What can only be positive, for an answer: the numbers of a file are not checked when it is opened, so sums of them may be
+/// infinite, negative, or no number. These become 0.
+inline GLINT_HD float finitePositive(float x) { return x > 0 && x <= 0x1.fffffep127f ? x : 0.0f; }
+
+/// A point or vector of the plane: texture space, or the unit disk that holds normals and half vectors.
+struct Vec2 {
+  float x = 0;
+  float y = 0;
+
+  friend GLINT_HD constexpr Vec2 operator+(Vec2 a, Vec2 b) { return {a.x + b.x, a.y + b.y}; }
+  friend GLINT_HD constexpr Vec2 operator-(Vec2 a, Vec2 b) { return {a.x - b.x, a.y - b.y}; }
+  friend GLINT_HD constexpr Vec2 operator*(float s, Vec2 a) { return {s * a.x, s * a.y}; }
+  friend constexpr bool operator==(Vec2, Vec2) = default;
+};
+
+GLINT_HD constexpr float dot(Vec2 a, Vec2 b) { return a.x * b.x + a.y * b.y; }
+
+/// A direction of the tangent frame: x along dp/du, y along dp/dv, z out of the surface.
+struct Vec3 {
+  float x = 0;
+  float y = 0;
+  float z = 0;
+
+  friend GLINT_HD constexpr Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+  friend GLINT_HD constexpr Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+  friend GLINT_HD constexpr Vec3 operator*(float s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
+  friend constexpr bool operator==(Vec3, Vec3) = default;
+};
+
+GLINT_HD constexpr float dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+
+/// Axis-aligned box [low.x, high.x] x [low.y, high.y].
+struct Box2 {
+  Vec2 low;
+  Vec2 high;
+
+  GLINT_HD constexpr float width() const { return high.x - low.x; }
+  GLINT_HD constexpr float height() const { return high.y - low.y; }
+  GLINT_HD constexpr float area() const { return width() * height(); }
+  friend constexpr bool operator==(Box2, Box2) = default;
+};
+
+}  // namespace glint

@@ -1,0 +1,148 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "glint/model/bin_map.h"
+#include "glint/query/detail/bin_map/texel_filter.h"
+
+namespace glint {
+
+/// What texels count whose field is at the ends of a range; those between count as 1.
+struct RangeEnds {
+  float low = 1, high = 1;  ///< the same where the range is one number
+};
+
+/// What texels count by one field of their codes. Numbers stay in the place of the field.
+struct PartRange {
+  /// @param shift, bits  of the field; shift below 32
+  GLINT_HD PartRange(int shift, int bits, IndexRange range, RangeEnds ends) : at(ends) {
+    const int largest = static_cast<int>((1u << bits) - 1);
+    const int first = std::max(range.low, 0), last = std::min(range.high, largest);
+    mask = static_cast<std::uint32_t>(largest) << shift;
+    if (first <= last) {
+      begin = static_cast<std::uint32_t>(first) << shift;
+      span = static_cast<std::uint32_t>(last - first) << shift;
+    }
+    if (range.low == first) low = begin;
+    if (range.high == last) high = begin + span;
+  }
+  GLINT_HD float part(std::uint32_t texel) const {
+    const std::uint32_t value = texel & mask;
+    if (value - begin > span) return 0;
+    return value == low ? at.low : value == high ? at.high : 1;
+  }
+
+  static constexpr std::uint32_t kNever = ~std::uint32_t{0};  ///< no field fills a code
+  std::uint32_t mask;
+  std::uint32_t begin = kNever, span = 0;     ///< those that count
+  std::uint32_t low = kNever, high = kNever;  ///< the ends, if texels can have them
+  RangeEnds at;
+};
+
+/// What texels count by column and row.
+struct TexelParts {
+  /// @tparam kCut  the fields of TexelFilter that matter
+  template <unsigned kCut>
+  GLINT_HD float of(std::uint32_t texel) const {
+    float product = 1;
+    if constexpr ((kCut & TexelFilter::kColumn) != 0) product *= columns.part(texel);
+    if constexpr ((kCut & TexelFilter::kRow) != 0) product *= rows.part(texel);
+    return product;
+  }
+  PartRange columns, rows;
+};
+
+/// The slot that a texel of a block of several bins has in a window of kSide x kSide bins.
+struct SlotFields {
+  static constexpr std::uint32_t kSide = 5, kNone = kSide * kSide;
+
+  GLINT_HD std::uint32_t slotOf(std::uint32_t texel) const {
+    const std::uint32_t x = (texel >> shift_x & mask) + first_x, y = (texel >> shift_y & mask) + first_y;
+    return x < kSide && y < kSide ? y * kSide + x : kNone;
+  }
+
+  int shift_x, shift_y;            ///< of the bin in a code
+  std::uint32_t mask;              ///< bins of the block along each axis, less 1
+  std::uint32_t first_x, first_y;  ///< the window's column and row of the block's first bin; modulo 2^32
+};
+
+/// Texels that are in a window: their slots, and what they count.
+struct FoundTexels {
+  static constexpr int kMost = 256;
+  int count = 0;
+  std::uint32_t slots[kMost + 8];  // a group of texels is stored whole
+  float parts[kMost + 8];
+};
+
+/// Sums over texels: of weights, and of weights times places and their products. Places count from the middle of the block.
+struct PlaceMoments {
+  double weight = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+
+  /// Adds `times` other sums.
+  GLINT_HD void add(double times, const PlaceMoments& other) {
+    weight += times * other.weight, x += times * other.x, y += times * other.y;
+    xx += times * other.xx, xy += times * other.xy, yy += times * other.yy;
+  }
+};
+
+/// Where the places of a block's texels are in their codes.
+struct PlaceFields {
+  GLINT_HD explicit PlaceFields(const TexelCode& code)
+      : shift_x(std::min(code.column_bits + code.row_bits, 31)),
+        shift_y(std::min(code.column_bits + code.row_bits + code.place_bits, 31)),
+        mask((1u << code.place_bits) - 1),
+        middle(0.5f * static_cast<float>(mask)) {}
+  GLINT_HD float x(std::uint32_t texel) const { return static_cast<float>(static_cast<int>(texel >> shift_x & mask)) - middle; }
+  GLINT_HD float y(std::uint32_t texel) const { return static_cast<float>(static_cast<int>(texel >> shift_y & mask)) - middle; }
+
+  int shift_x, shift_y;
+  std::uint32_t mask;
+  float middle;  ///< of the block, in places
+};
+
+/// Reads lists one texel after the other.
+struct SingleTexels {
+  using Parts = TexelParts;
+
+  /// Appends those of `count` texels that are in the window. There must be room for all.
+  template <unsigned kCut>
+  static GLINT_HD void find(const std::uint32_t* texels, int count, const Parts& parts, const SlotFields& fields,
+                            FoundTexels& found) {
+    for (int k = 0; k < count; ++k) {
+      const std::uint32_t slot = fields.slotOf(texels[k]);
+      found.slots[found.count] = slot;
+      found.parts[found.count] = parts.of<kCut>(texels[k]);
+      found.count += slot != SlotFields::kNone ? 1 : 0;
+    }
+  }
+
+  /// What all of them count, in eight sums: those of texels 8 k + i.
+  template <unsigned kCut>
+  static GLINT_HD float sum(const std::uint32_t* texels, int count, const Parts& parts) {
+    float sums[8] = {};
+    for (int k = 0; k < count; ++k) sums[k % 8] += parts.of<kCut>(texels[k]);
+    return total(sums);
+  }
+
+  /// Their moments, in eight sums like `sum`.
+  template <unsigned kCut>
+  static GLINT_HD PlaceMoments moments(const std::uint32_t* texels, int count, const Parts& parts, const PlaceFields& fields) {
+    float sums[6][8] = {};
+    for (int k = 0; k < count; ++k) {
+      const float w = parts.of<kCut>(texels[k]), x = fields.x(texels[k]), y = fields.y(texels[k]), wx = w * x, wy = w * y;
+      const float values[6] = {w, wx, wy, wx * x, wx * y, wy * y};
+      for (int i = 0; i < 6; ++i) sums[i][k % 8] += values[i];
+    }
+    return {total(sums[0]), total(sums[1]), total(sums[2]), total(sums[3]), total(sums[4]), total(sums[5])};
+  }
+
+ private:
+  static GLINT_HD float total(float (&sums)[8]) {
+    for (int half = 4; half > 0; half /= 2)
+      for (int k = 0; k < half; ++k) sums[k] += sums[k + half];
+    return sums[0];
+  }
+};
+
+}  // namespace glint

@@ -1,0 +1,133 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "glint/math/bits.h"
+#include "glint/math/float4.h"
+#include "glint/model/ndf_pyramid.h"
+#include "glint/query/detail/pyramid/pyramid_slices.h"
+#include "glint/query/ndf_model.h"
+
+namespace glint {
+
+/// Brings a random number into [0, 1); what is not a number becomes 0.
+inline GLINT_HD float clampUnit(float xi) { return xi > 0 ? std::min(xi, float{kBelowOne}) : 0.0f; }
+inline GLINT_HD Vec2 clampUnit(Vec2 xi) { return {clampUnit(xi.x), clampUnit(xi.y)}; }
+
+/// Chooses one of `count` things in proportion to weight(k) >= 0, which sum to `total`, and leaves in `xi` how far into the
+/// share of the chosen one it fell: again uniform in [0, 1), so that one number serves a chain of choices and stratified
+/// numbers stay so.
+/// @return index, or -1 if no weight is positive
+template <class Weight>
+GLINT_HD int chooseIndex(int count, float total, Weight&& weight, float& xi) {
+  float rest = xi * total;
+  int chosen = -1;
+  float share = 1;
+  for (int k = 0; k < count; ++k) {
+    const float w = weight(k);
+    if (!(w > 0)) continue;
+    if (chosen >= 0) rest -= share;
+    chosen = k;
+    share = w;
+    if (rest < w) break;
+  }
+  xi = clampUnit(rest / share);
+  return chosen;
+}
+
+/// The one of 16 things at which the sum of their weights passes `reached`. Nothing branches on the weights, which cannot be
+/// predicted.
+/// @param sums  runningSums of the weights
+/// @param xi    set to how far into its share
+/// @return index, or -1 if no weight is positive
+inline GLINT_HD int chooseAt(const Float16& weights, const Float16& sums, float reached, float& xi) {
+  float before[17], each[16];  // before[k]: of the first k
+  before[0] = 0;
+  sums.store(before + 1);
+  weights.store(each);
+  const int k = lowestBit(~std::uint64_t{sums.notAbove(reached)});
+  // Sums are rounded, so that the last one may be passed, or something without weight be met.
+  if (k == 16 || !(each[k] > 0)) {
+    xi = clampUnit(reached / before[16]);
+    return chooseIndex(
+        16, before[16], [&](int i) { return each[i]; }, xi);
+  }
+  xi = clampUnit((reached - before[k]) / each[k]);
+  return k;
+}
+inline GLINT_HD int chooseAt(const Float16& weights, float reached, float& xi) {
+  return chooseAt(weights, weights.runningSums(), reached, xi);
+}
+
+/// chooseIndex among 16 things.
+inline GLINT_HD int chooseOf16(const Float16& weights, float& xi) {
+  const Float16 sums = weights.runningSums();
+  return chooseAt(weights, sums, xi * sums.v[3].lastLane(), xi);
+}
+
+/// chooseIndex among many things.
+/// @tparam kMost   most of them
+/// @param weights  count(): of things; group(g): Float16 of the weights of things 16 g to 16 g + 15, 0 beyond the end;
+///                 sumGroups(sums): writes the sums of all groups
+template <int kMost, class Weights>
+GLINT_HD int chooseOfMany(const Weights& weights, float& xi) {
+  float before[(kMost + 15) / 16 + 1];  // before[g]: of groups before group g
+  before[0] = 0;
+  const int groups = (weights.count() + 15) / 16;
+  if (groups == 0) return -1;
+  weights.sumGroups(before + 1);
+  for (int g = 0; g < groups; ++g) before[g + 1] += before[g];
+  const float reached = xi * before[groups];
+  int group = 0;
+  for (int g = 1; g < groups; ++g) group += before[g] <= reached ? 1 : 0;
+  const int k = chooseAt(weights.group(group), reached - before[group], xi);
+  return k < 0 ? -1 : 16 * group + k;
+}
+
+/// Number of the set bit of a mask that has `rank` set bits below it.
+inline GLINT_HD int placeOfRank(const std::uint64_t* mask, int rank) {
+  int word = 0;
+  for (int bits = setBits(mask[0]); bits <= rank; bits = setBits(mask[++word])) rank -= bits;
+  return 64 * word + selectBit(mask[word], rank);
+}
+
+inline GLINT_HD Float4 loadPixels(const float* pixels) { return Float4::load(pixels); }
+inline GLINT_HD Float4 loadPixels(const std::uint16_t* pixels) { return Float4::loadPositive(pixels); }
+
+/// Row y of a block.
+/// @param pixels  floats, or half-precision numbers >= 0
+template <class Pixel>
+GLINT_HD Float16 rowOf(const Pixel* pixels, int y) {
+  const Pixel* row = pixels + y * kBlockSize;
+  return {{loadPixels(row), loadPixels(row + 4), loadPixels(row + 8), loadPixels(row + 12)}};
+}
+
+/// Sums of the rows of a block.
+template <class Pixel>
+GLINT_HD Float16 sumRows(const Pixel* pixels) {
+  const auto four = [&](int y) {
+    const Pixel* row = pixels + y * kBlockSize;
+    return (loadPixels(row) + loadPixels(row + 4)) + (loadPixels(row + 8) + loadPixels(row + 12));
+  };
+  Float16 sums;
+  for (int k = 0; k < 4; ++k) sums.v[k] = sumsOf(four(4 * k), four(4 * k + 1), four(4 * k + 2), four(4 * k + 3));
+  return sums;
+}
+static_assert(kBlockSize == 16);
+
+/// The half vector at position `xi` of a pixel. Kept 2^-23 resolution from the pixel's border, so that rounding does not take
+/// it into a neighbour.
+inline GLINT_HD Vec2 pointInPixel(const PyramidShape& shape, const PixelPlace& place, Vec2 xi) {
+  const float margin = 0x1p-23f * static_cast<float>(shape.resolution);
+  const int blocks = shape.blocksPerAxis();
+  const auto coordinate = [&](int pixel, float t) {
+    const float inside = margin + (1 - 2 * margin) * t;
+    return (static_cast<float>(pixel - shape.resolution / 2) + inside) * (2 / static_cast<float>(shape.resolution));
+  };
+  return {coordinate(place.block % blocks * kBlockSize + place.x, xi.x),
+          coordinate(place.block / blocks * kBlockSize + place.y, xi.y)};
+}
+
+}  // namespace glint

@@ -1,0 +1,119 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+
+#include "glint/model/compressed_ndf.h"
+#include "glint/query/detail/pyramid/block_mass.h"
+#include "glint/query/detail/pyramid/pyramid_slices.h"
+
+namespace glint {
+
+/// The spots of one slice.
+struct SpotList {
+  const NdfSpot* spots;
+  int count;
+  float scale;  ///< of weights
+  float rest;   ///< density of what is no spot
+};
+
+inline GLINT_HD std::uint32_t sumOfBytes(std::uint64_t bytes) {
+  constexpr std::uint64_t kEven = 0x00ff00ff00ff00ffu;
+  const std::uint64_t pairs = (bytes & kEven) + (bytes >> 8 & kEven);
+  return static_cast<std::uint32_t>(pairs * 0x0001000100010001u >> 48);
+}
+
+inline GLINT_HD SpotList spotsOf(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t slice) {
+  const auto* first = static_cast<const std::uint8_t*>(ndf.coefficients) + cluster.first_coefficient;
+  const std::uint8_t* counts = first + spotCountsOffset(cluster.slice_count);
+  const std::uint64_t group = slice / kSpotGroup;
+  const int inside = static_cast<int>(slice % kSpotGroup);
+  std::uint32_t before;
+  std::memcpy(&before, first + 4 * group, sizeof before);
+  std::uint64_t low, high;  // what is read beyond the counts is masked
+  std::memcpy(&low, counts + group * kSpotGroup, sizeof low);
+  std::memcpy(&high, counts + group * kSpotGroup + 8, sizeof high);
+  low &= inside >= 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << 8 * inside) - 1;
+  high &= inside > 8 ? (std::uint64_t{1} << 8 * (inside - 8)) - 1 : 0;
+  before += sumOfBytes(low) + sumOfBytes(high);
+  const float* scales = ndf.scales.data() + cluster.first_scale;
+  return {reinterpret_cast<const NdfSpot*>(first + firstSpotOffset(cluster.slice_count)) + before, counts[slice], scales[0],
+          scales[1] * blockMass(counts[cluster.slice_count + slice])};
+}
+
+/// Profiles of spots: shares of a spot along one axis.
+class SpotProfile {
+ public:
+  GLINT_HD explicit SpotProfile(const CompressedNdf& ndf) : sums_(ndf.spot_sums.data()) {}
+
+  /// Share that lies in pixel `p` of the block.
+  GLINT_HD float pixel(int p, int place) const {
+    const float* at = edge(p, place);
+    return at[kSpotSteps] - at[0];
+  }
+  /// Share that lies in the block.
+  GLINT_HD float whole(int place) const {
+    const float* at = edge(0, place);
+    return at[kSpotSteps * kBlockSize] - at[0];
+  }
+  /// Share that lies before position `x` in [0, 16], which may cut a pixel.
+  GLINT_HD float before(float x, int place) const {
+    const int p = std::min(static_cast<int>(x), kBlockSize - 1);
+    const float* at = edge(p, place);
+    return at[0] + (x - static_cast<float>(p)) * (at[kSpotSteps] - at[0]);
+  }
+
+ private:
+  GLINT_HD const float* edge(int p, int place) const { return sums_ + (kSpotSteps * p + kLastSpotPlace - place); }
+
+  const float* sums_;
+};
+
+/// Density at one pixel.
+inline GLINT_HD float spotsAt(const SpotProfile& profile, const SpotList& list, int x, int y) {
+  float sum = 0;
+  for (int k = 0; k < list.count; ++k) {
+    const NdfSpot spot = list.spots[k];
+    sum += static_cast<float>(spot.weight) * profile.pixel(x, spot.x) * profile.pixel(y, spot.y);
+  }
+  return list.scale * sum + list.rest;
+}
+
+/// Sum over a box of pixels.
+inline GLINT_HD float spotsIn(const SpotProfile& profile, const SpotList& list, const BlockBox& box) {
+  float sum = 0;
+  for (int k = 0; k < list.count; ++k) {
+    const NdfSpot spot = list.spots[k];
+    sum += static_cast<float>(spot.weight) * (profile.before(box.x1, spot.x) - profile.before(box.x0, spot.x)) *
+           (profile.before(box.y1, spot.y) - profile.before(box.y0, spot.y));
+  }
+  return list.scale * sum + list.rest * (box.x1 - box.x0) * (box.y1 - box.y0);
+}
+
+/// Sum of each row of a slice.
+inline GLINT_HD Float16 spotRowSums(const SpotProfile& profile, const SpotList& list) {
+  float sums[kBlockSize];
+  for (int y = 0; y < kBlockSize; ++y) sums[y] = kBlockSize * list.rest;
+  for (int k = 0; k < list.count; ++k) {
+    const NdfSpot spot = list.spots[k];
+    const float share = list.scale * static_cast<float>(spot.weight) * profile.whole(spot.x);
+    for (int y = 0; y < kBlockSize; ++y) sums[y] += share * profile.pixel(y, spot.y);
+  }
+  return Float16::load(sums);
+}
+
+/// Row y of a slice.
+inline GLINT_HD Float16 spotRow(const SpotProfile& profile, const SpotList& list, int y) {
+  float pixels[kBlockSize];
+  for (int x = 0; x < kBlockSize; ++x) pixels[x] = list.rest;
+  for (int k = 0; k < list.count; ++k) {
+    const NdfSpot spot = list.spots[k];
+    const float row = list.scale * static_cast<float>(spot.weight) * profile.pixel(y, spot.y);
+    if (row == 0) continue;
+    for (int x = 0; x < kBlockSize; ++x) pixels[x] += row * profile.pixel(x, spot.x);
+  }
+  return Float16::load(pixels);
+}
+
+}  // namespace glint
