@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "glint/bake/compressed/kernels.h"
+#include "glint/bake/common/half_array.h"
 #include "glint/model/ndf_pyramid.h"
 
 namespace glint::bake {
@@ -15,7 +15,7 @@ namespace glint::bake {
 inline void loadStoredBlock(const NdfPyramid& pyramid, const PyramidLevel& level, std::uint64_t block, float* out) {
   const std::size_t first = static_cast<std::size_t>(block) * kBlockPixels;
   if (pyramid.precision == BlockPrecision::f16)
-    halfToFloat(static_cast<const std::uint16_t*>(level.pixels) + first, kBlockPixels, out);
+    halvesToFloats(static_cast<const std::uint16_t*>(level.pixels) + first, kBlockPixels, out);
   else
     std::copy_n(static_cast<const float*>(level.pixels) + first, kBlockPixels, out);
 }

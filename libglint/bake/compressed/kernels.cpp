@@ -119,13 +119,6 @@ bool InvertPositive(float* a, int n, int stride) {
   return true;
 }
 
-void HalfToFloat(const std::uint16_t* in, std::size_t count, float* out) {
-  const Floats d;
-  const hn::Rebind<hwy::float16_t, Floats> half;
-  const auto* values = reinterpret_cast<const hwy::float16_t*>(in);
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) hn::StoreU(hn::PromoteTo(d, hn::LoadU(half, values + i)), d, out + i);
-}
-
 }  // namespace glint::bake::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -138,7 +131,6 @@ HWY_EXPORT(KhatriRao);
 HWY_EXPORT(ContractY);
 HWY_EXPORT(ContractX);
 HWY_EXPORT(InvertPositive);
-HWY_EXPORT(HalfToFloat);
 
 void multiply(StridedMatrix a, const float* b, std::ptrdiff_t b_stride, float* c, std::ptrdiff_t c_stride, int m, int n, int p,
               Store store) {
@@ -156,8 +148,6 @@ void contractY(const float* w, const float* y, int columns, float* out) { HWY_DY
 void contractX(const float* w, const float* x, int columns, float* out) { HWY_DYNAMIC_DISPATCH(ContractX)(w, x, columns, out); }
 
 bool invertPositive(float* a, int n, int stride) { return HWY_DYNAMIC_DISPATCH(InvertPositive)(a, n, stride); }
-
-void halfToFloat(const std::uint16_t* in, std::size_t count, float* out) { HWY_DYNAMIC_DISPATCH(HalfToFloat)(in, count, out); }
 
 }  // namespace glint::bake
 #endif

@@ -49,7 +49,4 @@ void contractX(const float* w, const float* x, int columns, float* out);
 /// @return false if a pivot is not positive; `a` is then useless
 bool invertPositive(float* a, int n, int stride);
 
-/// IEEE half to float. @param count a multiple of 8
-void halfToFloat(const std::uint16_t* in, std::size_t count, float* out);
-
 }  // namespace glint::bake
