@@ -5,6 +5,7 @@
 #include "glint/api/batch_slices.h"
 #include "glint/api/multiversion.h"
 #include "glint/math/bits.h"
+#include "glint/query/detail/pyramid/pyramid_reader.h"
 
 namespace glint::api {
 namespace {
@@ -123,6 +124,7 @@ struct PyramidSteps {
 /// to come.
 void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints,
                     const HalfVectorArrays& halves, float* out) {
+  const SliceChooser chooser(model.shape());
   struct Stage {
     explicit Stage(const PyramidNdf& m) : steps(m) {}
     SliceChunk chunk;  // every step fills what the next reads: not worth clearing
@@ -134,7 +136,7 @@ void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintA
   for (std::size_t step = 0; step < chunks + 2; ++step) {
     if (step < chunks) {
       Stage& stage = stages[step % 3];
-      selectChunk(model.shape(), model.chooser(), footprints, halves, step * kChunk, lanesOf(step), stage.chunk);
+      selectChunk(model.shape(), chooser, footprints, halves, step * kChunk, lanesOf(step), stage.chunk);
       stage.steps.begin(stage.chunk);
     }
     if (step >= 1 && step - 1 < chunks) {
@@ -163,41 +165,45 @@ void modelDensities(const Model& model, std::size_t count, const FootprintArrays
 
 void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
                 float* out) {
+  const SliceChooser chooser(model.shape());
+  const PyramidReader reader(model.pyramid());
   SliceChunk chunk;
-  PyramidNdf::PendingMean pending[2];
+  PyramidReader::PendingMean pending[2];
   for (std::size_t first = 0; first < count; first += kChunk) {
     const int lanes = static_cast<int>(std::min(count - first, std::size_t{kChunk}));
-    selectChunk(model.shape(), model.chooser(), footprints, {ranges.x0, ranges.y0}, first, lanes, chunk);
-    for (int k = 0; k < lanes; ++k) model.prefetchIndex(chunk.slices(k));
+    selectChunk(model.shape(), chooser, footprints, {ranges.x0, ranges.y0}, first, lanes, chunk);
+    for (int k = 0; k < lanes; ++k) reader.prefetchIndex(chunk.slices(k));
     const auto fromTexels = [&](int k) { return model.hasNormals() && chunk.below[k] != 0; };
     // A mean is long work next to its cache misses, and reads many lines: only the next one's are asked ahead.
     const auto begin = [&](int k) {
       if (fromTexels(k)) return;
-      model.beginMean(chunk.slices(k), ranges[first + static_cast<std::size_t>(k)], pending[k % 2]);
+      reader.beginMean(chunk.slices(k), ranges[first + static_cast<std::size_t>(k)], pending[k % 2]);
     };
     begin(0);
     for (int k = 0; k < lanes; ++k) {
       const std::size_t at = first + static_cast<std::size_t>(k);
       if (k + 1 < lanes) begin(k + 1);
-      out[at] = fromTexels(k) ? model.mean(footprints[at], ranges[at]) : model.finishMean(ranges[at], pending[k % 2]);
+      out[at] = fromTexels(k) ? model.mean(footprints[at], ranges[at]) : reader.finishMean(ranges[at], pending[k % 2]);
     }
   }
 }
 
 void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
                   const SampleArrays& out) {
+  const SliceChooser chooser(model.shape());
+  const PyramidReader reader(model.pyramid());
   SliceChunk chunk;
   PyramidSteps steps(model);
-  PyramidNdf::Draw draws[kChunk];
+  PyramidReader::Draw draws[kChunk];
   for (std::size_t first = 0; first < count; first += kChunk) {
     const int lanes = static_cast<int>(std::min(count - first, std::size_t{kChunk}));
-    selectChunk(model.shape(), model.chooser(), footprints, xi, first, lanes, chunk);
+    selectChunk(model.shape(), chooser, footprints, xi, first, lanes, chunk);
     steps.begin(chunk);
-    for (int k = 0; k < lanes; ++k) draws[k] = model.chooseImage(chunk.slices(k), xi[first + static_cast<std::size_t>(k)]);
-    for (int k = 0; k < lanes; ++k) model.findBlocks(draws[k]);
-    for (int k = 0; k < lanes; ++k) model.chooseBlock(draws[k]);
+    for (int k = 0; k < lanes; ++k) draws[k] = reader.chooseImage(chunk.slices(k), xi[first + static_cast<std::size_t>(k)]);
+    for (int k = 0; k < lanes; ++k) reader.findBlocks(draws[k]);
+    for (int k = 0; k < lanes; ++k) reader.chooseBlock(draws[k]);
     for (int k = 0; k < lanes; ++k) {
-      model.choosePixel(draws[k]);
+      reader.choosePixel(draws[k]);
       const PixelPlace place = draws[k].place;
       chunk.blocks[k] = std::max(place.block, 0);
       chunk.pixels[k] = std::max(place.y * kBlockSize + place.x, 0);

@@ -7,6 +7,7 @@
 #include "glint/query/detail/compressed/cluster_slices.h"
 #include "glint/query/detail/compressed/spots.h"
 #include "glint/query/detail/pyramid/block_mass.h"
+#include "glint/query/detail/pyramid/block_rows.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
 #include "glint/query/reference.h"
 

@@ -1,13 +1,9 @@
 #pragma once
 
-#include <type_traits>
-
-#include "glint/math/bits.h"
-#include "glint/math/float4.h"
-#include "glint/math/half.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/query/detail/common/sampling.h"
-#include "glint/query/detail/pyramid/avx2_blocks.h"
+#include "glint/query/detail/pyramid/block_rows.h"
+#include "glint/query/detail/pyramid/pyramid_reader.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
 #include "glint/query/reference.h"
 
@@ -20,30 +16,25 @@ namespace glint {
 /// The density is constant over a pixel. Thread-safe, allocates nothing; the arrays must outlive it.
 class PyramidNdf {
  public:
-  GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid)
-      : pyramid_(pyramid), chooser_(pyramid.shape), mask_words_(pyramid.shape.maskWords()) {}
+  GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid) : reader_(pyramid), chooser_(pyramid.shape) {}
   GLINT_HD PyramidNdf(const NdfPyramid& pyramid, const NormalMap& normals)
-      : pyramid_(pyramid),
+      : reader_(pyramid),
         chooser_(pyramid.shape),
-        mask_words_(pyramid.shape.maskWords()),
         below_(Reference(normals, pyramid.shape.sigma_r, pyramid.shape.surface, pyramid.shape.boundary,
                          Reference::Search::pruned)) {}
 
-  GLINT_HD const NdfPyramid& pyramid() const { return pyramid_; }
+  GLINT_HD const NdfPyramid& pyramid() const { return reader_.pyramid(); }
+  GLINT_HD const PyramidShape& shape() const { return pyramid().shape; }
   /// Whether footprints below level 0 are answered from the texels.
   GLINT_HD bool hasNormals() const { return below_.hasMap(); }
-  GLINT_HD const PyramidShape& shape() const { return pyramid_.shape; }
   /// Whether this footprint is answered from the texels.
   GLINT_HD bool fromTexels(const Footprint& p) const { return hasNormals() && belowFinest(shape(), p); }
-  /// The images that answer a footprint that is not answered from the texels.
-  GLINT_HD PyramidSlices chooseSlices(const Footprint& p) const { return chooser_.choose(p); }
-  GLINT_HD const SliceChooser& chooser() const { return chooser_; }
 
   /// Density towards h, >= 0; O(1): one pixel in each of 8 images.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     if (fromTexels(p)) return below_.density(p, h);
-    return pixelDensity(chooseSlices(p), pixelPlace(shape(), h));
+    return reader_.pixelDensity(chooser_.choose(p), pixelPlace(shape(), h));
   }
 
   /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly
@@ -51,338 +42,27 @@ class PyramidNdf {
   /// the format, 1e-5 as they are built. O(stored blocks of one image + 256).
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     if (fromTexels(p)) return below_.sample(p, clampUnit(xi));
-    Draw draw = chooseImage(chooseSlices(p), xi);
-    findBlocks(draw);
-    prefetchIndex(draw.slices);
-    chooseBlock(draw);
-    choosePixel(draw);
+    PyramidReader::Draw draw = reader_.chooseImage(chooser_.choose(p), xi);
+    reader_.findBlocks(draw);
+    reader_.prefetchIndex(draw.slices);
+    reader_.chooseBlock(draw);
+    reader_.choosePixel(draw);
     if (draw.place.x < 0) return {};
-    return drawnAt(pointInPixel(shape(), draw.place, draw.xi), pixelDensity(draw.slices, draw.place));
+    return drawnAt(pointInPixel(shape(), draw.place, draw.xi), reader_.pixelDensity(draw.slices, draw.place));
   }
-
-  /// Where a place is in the level of every slice.
-  struct Places {
-    const void* pixels[PyramidSlices::kMost];
-    float weights[PyramidSlices::kMost];  ///< 0 where nothing is stored: then the pixel is something else, which can be read
-    int count = 0;
-  };
-
-  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock and choosePixel make it, in this order. Each
-  /// reads what the one before has asked the memory for, so the cache misses of many samples can be under way together.
-  struct Draw {
-    PyramidSlices slices;
-    Vec2 xi;
-    PyramidSlice chosen = {0, 0, 0};  ///< weight 0: nothing can be drawn
-    std::uint64_t first_block = 0;    ///< of the chosen image
-    int block_count = 0;
-    std::uint64_t stored = 0;        ///< the chosen block
-    PixelPlace place = {0, -1, -1};  ///< x = -1: nothing can be drawn
-  };
-
-  /// By the weights of the images, with xi.x.
-  GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const {
-    Draw draw;
-    draw.slices = chosen;
-    draw.xi = clampUnit(xi);
-    const int k = chooseIndex(
-        draw.slices.count, 1, [&](int i) { return draw.slices.weights[i]; }, draw.xi.x);
-    if (k < 0) return draw;
-    draw.chosen = draw.slices[k];
-    prefetch(maskOf(draw.chosen));
-    prefetch(ranksOf(draw.chosen));
-    return draw;
-  }
-
-  /// The blocks that the image stores, whose means it asks for.
-  GLINT_HD void findBlocks(Draw& draw) const {
-    constexpr int kLine = 16;
-    const PyramidLevel& level = levelOf(draw.chosen);
-    const std::uint32_t *ranks = ranksOf(draw.chosen), end = ranks[mask_words_];
-    draw.first_block = ranks[0];
-    draw.block_count = static_cast<int>(end - ranks[0]);
-    for (int k = 0; k < draw.block_count; k += kLine) prefetch(level.block_means.data() + draw.first_block + k);
-  }
-
-  /// By the means of the blocks, with xi.y.
-  GLINT_HD void chooseBlock(Draw& draw) const {
-    if (!(draw.chosen.weight > 0)) return;
-    const PyramidLevel& level = levelOf(draw.chosen);
-    constexpr int kMostBlocks = 64 * kMostMaskWords;
-    const BlockMeans means{level.block_means.data() + draw.first_block, draw.block_count};
-    const int rank = chooseOfMany<kMostBlocks>(means, draw.xi.y);
-    if (rank < 0) return;
-    draw.place.block = placeOfRank(maskOf(draw.chosen), rank);
-    draw.stored = draw.first_block + static_cast<std::uint64_t>(rank);
-    prefetchRows(static_cast<const char*>(level.pixels) + draw.stored * blockBytes(), 0, kBlockSize);
-  }
-
-  /// By its value: the row with xi.y, the column with xi.x.
-  GLINT_HD void choosePixel(Draw& draw) const {
-    if (!(draw.chosen.weight > 0 && draw.place.block >= 0)) return;
-    const PyramidLevel& level = levelOf(draw.chosen);
-    const auto choose = [&](const auto* pixels) {
-      const auto* block = pixels + draw.stored * kBlockPixels;
-      const int y = chooseOf16(rowSums(block), draw.xi.y);
-      if (y >= 0) draw.place = {draw.place.block, chooseOf16(rowOf(block, y), draw.xi.x), y};
-    };
-    pyramid_.precision == BlockPrecision::f16 ? choose(static_cast<const std::uint16_t*>(level.pixels))
-                                              : choose(static_cast<const float*>(level.pixels));
-  }
-
-  /// How much of each row and column of a block a box covers.
-  class BlockCover {
-   public:
-    GLINT_HD void set(const BlockBox& box) {
-      constexpr float kFull = kBlockSize;
-      whole_ = box.x0 <= 0 && box.y0 <= 0 && box.x1 >= kFull && box.y1 >= kFull;
-      for (int k = 0; k < kBlockSize; ++k) {
-        columns[k] = covered(box.x0, box.x1, k);
-        rows[k] = covered(box.y0, box.y1, k);
-      }
-      first_row = static_cast<int>(box.y0);
-      end_row = std::min(static_cast<int>(std::ceil(box.y1)), int{kBlockSize});
-      first_column = static_cast<int>(box.x0) / 4 * 4;
-      end_column = std::min(static_cast<int>(std::ceil(box.x1)), int{kBlockSize});
-    }
-    int first_row, end_row, first_column, end_column;  ///< the first column is a multiple of 4
-    float columns[kBlockSize], rows[kBlockSize];       ///< covered parts, 0 to 1
-    GLINT_HD bool isWhole() const { return whole_; }
-
-    /// Weighted sum of the covered pixels of some blocks.
-    template <class Pixel>
-    GLINT_HD float sum(const Pixel* const* blocks, const float* weights, int count) const {
-#ifdef GLINT_AVX2
-      if constexpr (std::is_same_v<Pixel, std::uint16_t>)
-        if (hasAvx2()) return sumCoveredPixels(blocks, weights, count, columns, rows, first_row, end_row);
-#endif
-      return sumByFour(blocks, weights, count);
-    }
-    /// The same without vectors of eight.
-    template <class Pixel>
-    GLINT_HD float sumByFour(const Pixel* const* blocks, const float* weights, int count) const {
-      Float4 sums[kBlockSize / 4] = {Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()};
-      for (int x = first_column; x < end_column; x += 4) {
-        Float4 sum = Float4::zero();
-        for (int k = 0; k < count; ++k) {
-          // Two sums, since an addition waits for the one before it.
-          Float4 even = Float4::zero(), odd = Float4::zero();
-          const auto row = [&](int y) { return Float4::all(rows[y]) * loadPixels(blocks[k] + y * kBlockSize + x); };
-          int y = first_row;
-          for (; y + 2 <= end_row; y += 2) even = even + row(y), odd = odd + row(y + 1);
-          if (y < end_row) even = even + row(y);
-          sum = sum + Float4::all(weights[k]) * (even + odd);
-        }
-        sums[x / 4] = Float4::load(columns + x) * sum;
-      }
-      return ((sums[0] + sums[1]) + (sums[2] + sums[3])).sum();
-    }
-
-   private:
-    static GLINT_HD float covered(float low, float high, int k) {
-      return std::max(0.0f, std::min(high, static_cast<float>(k + 1)) - std::max(low, static_cast<float>(k)));
-    }
-    bool whole_;
-  };
 
   /// Average density over a box of half vectors, 0 if it is empty. O(1) for each block that the box covers: whole blocks have
   /// their mean stored, others sum at most 256 pixels.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     if (fromTexels(p)) return below_.mean(p, range);
-    PendingMean pending;
-    beginMean(chooseSlices(p), range, pending);
-    return finishMean(range, pending);
-  }
-
-  /// Stored blocks in one place of the chosen images.
-  struct StoredBlocks {
-    int count;
-    float weights[PyramidSlices::kMost];
-    const void* pixels[PyramidSlices::kMost];
-    const float* means[PyramidSlices::kMost];
-  };
-
-  /// A mean on its way: what it reads is asked for, and not yet read.
-  struct PendingMean {
-    static constexpr int kMost = 4;
-    double sum;  ///< of densities times pixels, so far
-    int count;
-    BlockCover covers[kMost];
-    StoredBlocks blocks[kMost];
-  };
-
-  /// Begins a mean from chosen images: finds what is stored and asks the memory for it. Ranges of more than
-  /// PendingMean::kMost blocks are summed on the way.
-  GLINT_HD void beginMean(const PyramidSlices& chosen, const Box2& range, PendingMean& pending) const {
-    pending.sum = 0;
-    pending.count = 0;
-    if (!(range.width() > 0 && range.height() > 0)) return;
-    forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
-      if (pending.count == PendingMean::kMost) addPending(pending);
-      BlockCover& cover = pending.covers[pending.count];
-      StoredBlocks& stored = pending.blocks[pending.count++];
-      cover.set(box);
-      findStored(chosen, block, stored);
-      for (int k = 0; k < stored.count; ++k)
-        cover.isWhole() ? prefetch(stored.means[k]) : prefetchRows(stored.pixels[k], cover.first_row, cover.end_row);
-    });
-  }
-
-  /// The mean that was begun with the same range; 0 if the range is empty.
-  GLINT_HD float finishMean(const Box2& range, PendingMean& pending) const {
-    addPending(pending);
-    const float area = areaInPixels(shape(), range);
-    return area > 0 ? finitePositive(static_cast<float>(pending.sum / area)) : 0.0f;
-  }
-
-  /// Asks the memory for where chosen images say which blocks they store.
-  GLINT_HD void prefetchIndex(const PyramidSlices& chosen) const {
-    for (int k = 0; k < chosen.count; ++k) {
-      prefetch(maskOf(chosen[k]));
-      prefetch(ranksOf(chosen[k]));
-    }
+    PyramidReader::PendingMean pending;
+    reader_.beginMean(chooser_.choose(p), range, pending);
+    return reader_.finishMean(range, pending);
   }
 
  private:
-  GLINT_HD const PyramidLevel& levelOf(const PyramidSlice& slice) const { return pyramid_.levels[slice.level]; }
-  GLINT_HD const std::uint64_t* maskOf(const PyramidSlice& slice) const {
-    return levelOf(slice).masks.data() + std::size_t{slice.image} * mask_words_;
-  }
-  GLINT_HD const std::uint32_t* ranksOf(const PyramidSlice& slice) const {
-    return levelOf(slice).mask_ranks.data() + std::size_t{slice.image} * mask_words_;
-  }
-
-  /// Means of the blocks of an image, for chooseOfMany.
-  struct BlockMeans {
-    const float* means;
-    int stored;
-    GLINT_HD int count() const { return stored; }
-    GLINT_HD Float16 group(int g) const {
-      const int first = 16 * g;
-      if (first + 16 <= stored) return Float16::load(means + first);
-      float rest[16] = {};
-      for (int k = first; k < stored; ++k) rest[k - first] = means[k];
-      return Float16::load(rest);
-    }
-    GLINT_HD void sumGroups(float* sums) const {
-      for (int g = 0; 16 * g < stored; ++g) sums[g] = group(g).sum();
-    }
-  };
-
-  GLINT_HD float pixelDensity(const PyramidSlices& chosen, const PixelPlace& place) const {
-    return pyramid_.precision == BlockPrecision::f16 ? addPixelsOf<std::uint16_t>(findPixelsOf<std::uint16_t>(chosen, place))
-                                                     : addPixelsOf<float>(findPixelsOf<float>(chosen, place));
-  }
-
-  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be
-  /// predicted, so the cache misses of all slices are under way together.
-  template <class Pixel>
-  GLINT_HD Places findPixelsOf(const PyramidSlices& chosen, const PixelPlace& place) const {
-    constexpr std::uint64_t kBlockBytes = kBlockPixels * sizeof(Pixel);
-    const unsigned word = static_cast<unsigned>(place.block) / 64, bit = static_cast<unsigned>(place.block) % 64;
-    Places places;
-    places.count = chosen.count;
-    for (int step = 0; 4 * step < chosen.count; ++step) {
-      const PyramidLevel& level = pyramid_.levels[chosen.levels[step]];
-      // Where nothing is stored a pixel of the first block is read; a level may have none.
-      const void* pixels = level.masks.data();
-      if (!level.block_means.empty()) pixels = static_cast<const Pixel*>(level.pixels) + (place.y * kBlockSize + place.x);
-      for (int k = 4 * step; k < 4 * step + 4; ++k) {
-        const std::size_t at = std::size_t{chosen.images[k]} * mask_words_ + word;
-        const BitRank rank(level.masks.data()[at], bit);
-        const std::uint64_t stored = level.mask_ranks.data()[at] + rank.below;
-        places.pixels[k] = static_cast<const char*>(pixels) + (stored * kBlockBytes & rank.kept);
-        places.weights[k] = keepIf(rank.kept, chosen.weights[k]);
-        prefetch(places.pixels[k]);
-      }
-    }
-    return places;
-  }
-
-  template <class Pixel>
-  GLINT_HD float addPixelsOf(const Places& places) const {
-    Float4 sum = fourPixels<Pixel>(places, 0);
-    if (places.count > 4) sum = sum + fourPixels<Pixel>(places, 4);
-    return finitePositive(pyramid_.value_scale * sum.sum());
-  }
-
-  /// Weighted pixels of the four slices from k on.
-  template <class Pixel>
-  static GLINT_HD Float4 fourPixels(const Places& places, int k) {
-    const auto pixel = [&](int j) { return *static_cast<const Pixel*>(places.pixels[k + j]); };
-    const Float4 weights = Float4::load(places.weights + k);
-    if constexpr (std::is_same_v<Pixel, float>) {
-      // Values of a file are not checked: a slice that does not count must not bring an infinity.
-      return whereLess(Float4::zero(), weights, weights * Float4::of(pixel(0), pixel(1), pixel(2), pixel(3)));
-    } else {
-      return weights * Float4::ofPositive(pixel(0), pixel(1), pixel(2), pixel(3));
-    }
-  }
-
-  /// Nothing branches on what is stored, as in findPixelsOf.
-  GLINT_HD void findStored(const PyramidSlices& chosen, int block, StoredBlocks& out) const {
-    const unsigned word = static_cast<unsigned>(block) / 64, bit = static_cast<unsigned>(block) % 64;
-    int count = 0;
-    for (int k = 0; k < chosen.count; ++k) {
-      const PyramidLevel& level = pyramid_.levels[chosen.level(k)];
-      const std::size_t at = std::size_t{chosen.images[k]} * mask_words_ + word;
-      const BitRank rank(level.masks.data()[at], bit);
-      const std::uint64_t stored = level.mask_ranks.data()[at] + rank.below;
-      out.weights[count] = chosen.weights[k];
-      out.pixels[count] = static_cast<const char*>(level.pixels) + stored * blockBytes();
-      out.means[count] = level.block_means.data() + stored;
-      // Those of weight 0 would cost as much; and values of a file are not checked, so that 0 times one may be no number.
-      count += static_cast<int>(rank.kept & 1) & static_cast<int>(chosen.weights[k] > 0);
-    }
-    out.count = count;
-  }
-
-  GLINT_HD void addPending(PendingMean& pending) const {
-    for (int k = 0; k < pending.count; ++k) pending.sum += double{blockSum(pending.covers[k], pending.blocks[k])};
-    pending.count = 0;
-  }
-
-  /// Weighted sum of the densities of the covered pixels, in pixels.
-  GLINT_HD float blockSum(const BlockCover& cover, const StoredBlocks& blocks) const {
-    if (cover.isWhole()) {
-      float means = 0;
-      for (int k = 0; k < blocks.count; ++k) means += blocks.weights[k] * *blocks.means[k];
-      return kBlockPixels * means;
-    }
-    const auto covered = [&]<class Pixel>(const Pixel*) {
-      const Pixel* pixels[PyramidSlices::kMost];
-      for (int k = 0; k < blocks.count; ++k) pixels[k] = static_cast<const Pixel*>(blocks.pixels[k]);
-      return cover.sum(pixels, blocks.weights, blocks.count);
-    };
-    return pyramid_.value_scale * (pyramid_.precision == BlockPrecision::f16
-                                       ? covered(static_cast<const std::uint16_t*>(nullptr))
-                                       : covered(static_cast<const float*>(nullptr)));
-  }
-
-  /// Sums of the rows of a block.
-  template <class Pixel>
-  static GLINT_HD Float16 rowSums(const Pixel* block) {
-#ifdef GLINT_AVX2
-    if constexpr (std::is_same_v<Pixel, std::uint16_t>)
-      if (hasAvx2()) return sumRowsAvx2(block);
-#endif
-    return sumRows(block);
-  }
-
-  GLINT_HD std::size_t blockBytes() const {
-    return kBlockPixels * (pyramid_.precision == BlockPrecision::f16 ? sizeof(std::uint16_t) : sizeof(float));
-  }
-
-  /// Asks the memory for rows of a block's pixels.
-  GLINT_HD void prefetchRows(const void* pixels, int first_row, int end_row) const {
-    constexpr int kCacheLine = 64;
-    const int row_bytes = static_cast<int>(blockBytes()) / kBlockSize;
-    for (int k = first_row * row_bytes / kCacheLine * kCacheLine; k < end_row * row_bytes; k += kCacheLine)
-      prefetch(static_cast<const char*>(pixels) + k);
-  }
-
-  NdfPyramid pyramid_;
+  PyramidReader reader_;
   SliceChooser chooser_;
-  std::size_t mask_words_;
   Reference below_;
 };
 

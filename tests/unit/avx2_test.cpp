@@ -11,6 +11,8 @@
 #include "glint/query/cp_ndf.h"
 #include "glint/query/detail/compressed/avx2_reader.h"
 #include "glint/query/detail/pyramid/avx2_blocks.h"
+#include "glint/query/detail/pyramid/block_cover.h"
+#include "glint/query/detail/pyramid/block_rows.h"
 #include "glint/query/pyramid_ndf.h"
 #include "support/small_pyramid.h"
 #include "support/test_maps.h"
@@ -147,7 +149,7 @@ TEST(Avx2Blocks, SumCoveredPixels) {
   for (int round = 0; round < 300; ++round) {
     const Blocks blocks(random);
     const float x = 16 * unit(random), y = 16 * unit(random);
-    PyramidNdf::BlockCover cover;
+    BlockCover cover;
     cover.set({x, y, x + (16 - x) * unit(random), y + (16 - y) * unit(random)});
     const std::uint16_t* halves[8];
     const float* floats[8];

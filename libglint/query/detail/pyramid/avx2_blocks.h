@@ -20,7 +20,7 @@ GLINT_AVX2 inline void addRow(const std::uint16_t* row, float part, __m256& left
 }
 
 /// Weighted sum of the pixels of some blocks by how much of their columns and rows is covered, to the bit that of
-/// PyramidNdf::BlockCover::sumByFour.
+/// BlockCover::sumByFour.
 /// @param blocks, weights     [count]
 /// @param columns, rows       [16]; columns that are not covered are 0
 /// @param first_row, end_row  rows that are covered

@@ -1,0 +1,289 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "glint/math/bits.h"
+#include "glint/math/float4.h"
+#include "glint/model/ndf_pyramid.h"
+#include "glint/query/detail/common/sampling.h"
+#include "glint/query/detail/pyramid/avx2_blocks.h"
+#include "glint/query/detail/pyramid/block_cover.h"
+#include "glint/query/detail/pyramid/block_rows.h"
+#include "glint/query/detail/pyramid/pyramid_slices.h"
+
+namespace glint {
+
+/// Reads the images that answer a footprint. Long answers come in steps, each of which asks the memory for what the next one
+/// reads: a batch takes a step for many queries before the next step, so that their cache misses are under way together.
+class PyramidReader {
+ public:
+  GLINT_HD explicit PyramidReader(const NdfPyramid& pyramid) : pyramid_(pyramid), mask_words_(pyramid.shape.maskWords()) {}
+
+  GLINT_HD const NdfPyramid& pyramid() const { return pyramid_; }
+  GLINT_HD const PyramidShape& shape() const { return pyramid_.shape; }
+
+  /// Density of a pixel, >= 0; O(1).
+  GLINT_HD float pixelDensity(const PyramidSlices& chosen, const PixelPlace& place) const {
+    return pyramid_.precision == BlockPrecision::f16 ? addPixelsOf<std::uint16_t>(findPixelsOf<std::uint16_t>(chosen, place))
+                                                     : addPixelsOf<float>(findPixelsOf<float>(chosen, place));
+  }
+
+  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock and choosePixel make it, in this order. Each
+  /// reads what the one before has asked the memory for, so the cache misses of many samples can be under way together.
+  struct Draw {
+    PyramidSlices slices;
+    Vec2 xi;
+    PyramidSlice chosen = {0, 0, 0};  ///< weight 0: nothing can be drawn
+    std::uint64_t first_block = 0;    ///< of the chosen image
+    int block_count = 0;
+    std::uint64_t stored = 0;        ///< the chosen block
+    PixelPlace place = {0, -1, -1};  ///< x = -1: nothing can be drawn
+  };
+
+  /// By the weights of the images, with xi.x.
+  GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const {
+    Draw draw;
+    draw.slices = chosen;
+    draw.xi = clampUnit(xi);
+    const int k = chooseIndex(
+        draw.slices.count, 1, [&](int i) { return draw.slices.weights[i]; }, draw.xi.x);
+    if (k < 0) return draw;
+    draw.chosen = draw.slices[k];
+    prefetch(maskOf(draw.chosen));
+    prefetch(ranksOf(draw.chosen));
+    return draw;
+  }
+
+  /// The blocks that the image stores, whose means it asks for.
+  GLINT_HD void findBlocks(Draw& draw) const {
+    constexpr int kLine = 16;
+    const PyramidLevel& level = levelOf(draw.chosen);
+    const std::uint32_t *ranks = ranksOf(draw.chosen), end = ranks[mask_words_];
+    draw.first_block = ranks[0];
+    draw.block_count = static_cast<int>(end - ranks[0]);
+    for (int k = 0; k < draw.block_count; k += kLine) prefetch(level.block_means.data() + draw.first_block + k);
+  }
+
+  /// By the means of the blocks, with xi.y.
+  GLINT_HD void chooseBlock(Draw& draw) const {
+    if (!(draw.chosen.weight > 0)) return;
+    const PyramidLevel& level = levelOf(draw.chosen);
+    constexpr int kMostBlocks = 64 * kMostMaskWords;
+    const BlockMeans means{level.block_means.data() + draw.first_block, draw.block_count};
+    const int rank = chooseOfMany<kMostBlocks>(means, draw.xi.y);
+    if (rank < 0) return;
+    draw.place.block = placeOfRank(maskOf(draw.chosen), rank);
+    draw.stored = draw.first_block + static_cast<std::uint64_t>(rank);
+    prefetchRows(static_cast<const char*>(level.pixels) + draw.stored * blockBytes(), 0, kBlockSize);
+  }
+
+  /// By its value: the row with xi.y, the column with xi.x.
+  GLINT_HD void choosePixel(Draw& draw) const {
+    if (!(draw.chosen.weight > 0 && draw.place.block >= 0)) return;
+    const PyramidLevel& level = levelOf(draw.chosen);
+    const auto choose = [&](const auto* pixels) {
+      const auto* block = pixels + draw.stored * kBlockPixels;
+      const int y = chooseOf16(rowSums(block), draw.xi.y);
+      if (y >= 0) draw.place = {draw.place.block, chooseOf16(rowOf(block, y), draw.xi.x), y};
+    };
+    pyramid_.precision == BlockPrecision::f16 ? choose(static_cast<const std::uint16_t*>(level.pixels))
+                                              : choose(static_cast<const float*>(level.pixels));
+  }
+
+  /// Stored blocks in one place of the chosen images.
+  struct StoredBlocks {
+    int count;
+    float weights[PyramidSlices::kMost];
+    const void* pixels[PyramidSlices::kMost];
+    const float* means[PyramidSlices::kMost];
+  };
+
+  /// A mean on its way: what it reads is asked for, and not yet read.
+  struct PendingMean {
+    static constexpr int kMost = 4;
+    double sum;  ///< of densities times pixels, so far
+    int count;
+    BlockCover covers[kMost];
+    StoredBlocks blocks[kMost];
+  };
+
+  /// Begins a mean from chosen images: finds what is stored and asks the memory for it. Ranges of more than
+  /// PendingMean::kMost blocks are summed on the way.
+  GLINT_HD void beginMean(const PyramidSlices& chosen, const Box2& range, PendingMean& pending) const {
+    pending.sum = 0;
+    pending.count = 0;
+    if (!(range.width() > 0 && range.height() > 0)) return;
+    forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
+      if (pending.count == PendingMean::kMost) addPending(pending);
+      BlockCover& cover = pending.covers[pending.count];
+      StoredBlocks& stored = pending.blocks[pending.count++];
+      cover.set(box);
+      findStored(chosen, block, stored);
+      for (int k = 0; k < stored.count; ++k)
+        cover.isWhole() ? prefetch(stored.means[k]) : prefetchRows(stored.pixels[k], cover.first_row, cover.end_row);
+    });
+  }
+
+  /// The mean that was begun with the same range; 0 if the range is empty.
+  GLINT_HD float finishMean(const Box2& range, PendingMean& pending) const {
+    addPending(pending);
+    const float area = areaInPixels(shape(), range);
+    return area > 0 ? finitePositive(static_cast<float>(pending.sum / area)) : 0.0f;
+  }
+
+  /// Asks the memory for where chosen images say which blocks they store.
+  GLINT_HD void prefetchIndex(const PyramidSlices& chosen) const {
+    for (int k = 0; k < chosen.count; ++k) {
+      prefetch(maskOf(chosen[k]));
+      prefetch(ranksOf(chosen[k]));
+    }
+  }
+
+ private:
+  GLINT_HD const PyramidLevel& levelOf(const PyramidSlice& slice) const { return pyramid_.levels[slice.level]; }
+  GLINT_HD const std::uint64_t* maskOf(const PyramidSlice& slice) const {
+    return levelOf(slice).masks.data() + std::size_t{slice.image} * mask_words_;
+  }
+  GLINT_HD const std::uint32_t* ranksOf(const PyramidSlice& slice) const {
+    return levelOf(slice).mask_ranks.data() + std::size_t{slice.image} * mask_words_;
+  }
+
+  /// Where a place is in the level of every slice.
+  struct Places {
+    const void* pixels[PyramidSlices::kMost];
+    float weights[PyramidSlices::kMost];  ///< 0 where nothing is stored: then the pixel is something else, which can be read
+    int count = 0;
+  };
+
+  /// Means of the blocks of an image, for chooseOfMany.
+  struct BlockMeans {
+    const float* means;
+    int stored;
+    GLINT_HD int count() const { return stored; }
+    GLINT_HD Float16 group(int g) const {
+      const int first = 16 * g;
+      if (first + 16 <= stored) return Float16::load(means + first);
+      float rest[16] = {};
+      for (int k = first; k < stored; ++k) rest[k - first] = means[k];
+      return Float16::load(rest);
+    }
+    GLINT_HD void sumGroups(float* sums) const {
+      for (int g = 0; 16 * g < stored; ++g) sums[g] = group(g).sum();
+    }
+  };
+
+  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be
+  /// predicted, so the cache misses of all slices are under way together.
+  template <class Pixel>
+  GLINT_HD Places findPixelsOf(const PyramidSlices& chosen, const PixelPlace& place) const {
+    constexpr std::uint64_t kBlockBytes = kBlockPixels * sizeof(Pixel);
+    const unsigned word = static_cast<unsigned>(place.block) / 64, bit = static_cast<unsigned>(place.block) % 64;
+    Places places;
+    places.count = chosen.count;
+    for (int step = 0; 4 * step < chosen.count; ++step) {
+      const PyramidLevel& level = pyramid_.levels[chosen.levels[step]];
+      // Where nothing is stored a pixel of the first block is read; a level may have none.
+      const void* pixels = level.masks.data();
+      if (!level.block_means.empty()) pixels = static_cast<const Pixel*>(level.pixels) + (place.y * kBlockSize + place.x);
+      for (int k = 4 * step; k < 4 * step + 4; ++k) {
+        const std::size_t at = std::size_t{chosen.images[k]} * mask_words_ + word;
+        const BitRank rank(level.masks.data()[at], bit);
+        const std::uint64_t stored = level.mask_ranks.data()[at] + rank.below;
+        places.pixels[k] = static_cast<const char*>(pixels) + (stored * kBlockBytes & rank.kept);
+        places.weights[k] = keepIf(rank.kept, chosen.weights[k]);
+        prefetch(places.pixels[k]);
+      }
+    }
+    return places;
+  }
+
+  template <class Pixel>
+  GLINT_HD float addPixelsOf(const Places& places) const {
+    Float4 sum = fourPixels<Pixel>(places, 0);
+    if (places.count > 4) sum = sum + fourPixels<Pixel>(places, 4);
+    return finitePositive(pyramid_.value_scale * sum.sum());
+  }
+
+  /// Weighted pixels of the four slices from k on.
+  template <class Pixel>
+  static GLINT_HD Float4 fourPixels(const Places& places, int k) {
+    const auto pixel = [&](int j) { return *static_cast<const Pixel*>(places.pixels[k + j]); };
+    const Float4 weights = Float4::load(places.weights + k);
+    if constexpr (std::is_same_v<Pixel, float>) {
+      // Values of a file are not checked: a slice that does not count must not bring an infinity.
+      return whereLess(Float4::zero(), weights, weights * Float4::of(pixel(0), pixel(1), pixel(2), pixel(3)));
+    } else {
+      return weights * Float4::ofPositive(pixel(0), pixel(1), pixel(2), pixel(3));
+    }
+  }
+
+  /// Nothing branches on what is stored, as in findPixelsOf.
+  GLINT_HD void findStored(const PyramidSlices& chosen, int block, StoredBlocks& out) const {
+    const unsigned word = static_cast<unsigned>(block) / 64, bit = static_cast<unsigned>(block) % 64;
+    int count = 0;
+    for (int k = 0; k < chosen.count; ++k) {
+      const PyramidLevel& level = pyramid_.levels[chosen.level(k)];
+      const std::size_t at = std::size_t{chosen.images[k]} * mask_words_ + word;
+      const BitRank rank(level.masks.data()[at], bit);
+      const std::uint64_t stored = level.mask_ranks.data()[at] + rank.below;
+      out.weights[count] = chosen.weights[k];
+      out.pixels[count] = static_cast<const char*>(level.pixels) + stored * blockBytes();
+      out.means[count] = level.block_means.data() + stored;
+      // Those of weight 0 would cost as much; and values of a file are not checked, so that 0 times one may be no number.
+      count += static_cast<int>(rank.kept & 1) & static_cast<int>(chosen.weights[k] > 0);
+    }
+    out.count = count;
+  }
+
+  GLINT_HD void addPending(PendingMean& pending) const {
+    for (int k = 0; k < pending.count; ++k) pending.sum += double{blockSum(pending.covers[k], pending.blocks[k])};
+    pending.count = 0;
+  }
+
+  /// Weighted sum of the densities of the covered pixels, in pixels.
+  GLINT_HD float blockSum(const BlockCover& cover, const StoredBlocks& blocks) const {
+    if (cover.isWhole()) {
+      float means = 0;
+      for (int k = 0; k < blocks.count; ++k) means += blocks.weights[k] * *blocks.means[k];
+      return kBlockPixels * means;
+    }
+    const auto covered = [&]<class Pixel>(const Pixel*) {
+      const Pixel* pixels[PyramidSlices::kMost];
+      for (int k = 0; k < blocks.count; ++k) pixels[k] = static_cast<const Pixel*>(blocks.pixels[k]);
+      return cover.sum(pixels, blocks.weights, blocks.count);
+    };
+    return pyramid_.value_scale * (pyramid_.precision == BlockPrecision::f16
+                                       ? covered(static_cast<const std::uint16_t*>(nullptr))
+                                       : covered(static_cast<const float*>(nullptr)));
+  }
+
+  /// Sums of the rows of a block.
+  template <class Pixel>
+  static GLINT_HD Float16 rowSums(const Pixel* block) {
+#ifdef GLINT_AVX2
+    if constexpr (std::is_same_v<Pixel, std::uint16_t>)
+      if (hasAvx2()) return sumRowsAvx2(block);
+#endif
+    return sumRows(block);
+  }
+
+  GLINT_HD std::size_t blockBytes() const {
+    return kBlockPixels * (pyramid_.precision == BlockPrecision::f16 ? sizeof(std::uint16_t) : sizeof(float));
+  }
+
+  /// Asks the memory for rows of a block's pixels.
+  GLINT_HD void prefetchRows(const void* pixels, int first_row, int end_row) const {
+    constexpr int kCacheLine = 64;
+    const int row_bytes = static_cast<int>(blockBytes()) / kBlockSize;
+    for (int k = first_row * row_bytes / kCacheLine * kCacheLine; k < end_row * row_bytes; k += kCacheLine)
+      prefetch(static_cast<const char*>(pixels) + k);
+  }
+
+  NdfPyramid pyramid_;
+  std::size_t mask_words_;
+};
+
+}  // namespace glint
