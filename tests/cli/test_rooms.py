@@ -22,6 +22,14 @@ MAY_USE = {
     "formats": {"formats", "model", "math"},
 }
 
+# The folders inside the rooms, and which of them each may include besides itself. A method has the same name in every room.
+FOLDERS = {
+    "bake": {"common": set(), "ingest": {"common"}, "synth": {"common"}, "pyramid": {"common"}, "compressed": {"common"},
+             "bin_map": {"common"}, "histogram": {"common"}, "sh": {"common"}, "displace": {"common"}},
+    "query/detail": {"common": set(), "pyramid": {"common"}, "compressed": {"common", "pyramid"}, "bin_map": {"common"},
+                     "histogram": {"common"}},
+}
+
 # Headers of others that are kept in few places: pattern -> folders, relative to the root.
 KEPT_IN = {
     r"^(hdf5|H5\w*)(\.h|\.hpp)$|^highfive/": ["formats"],
@@ -79,6 +87,20 @@ def test_room_includes_only_the_rooms_below_it(room):
             used = room_of(path, name)
             if used is not None and used not in MAY_USE[room]:
                 wrong.append(f"{name_of(path)} includes {name}")
+    assert wrong == []
+
+
+@pytest.mark.parametrize("parent", FOLDERS)
+def test_folder_of_a_method_includes_only_itself_and_its_foundations(parent):
+    home = ROOT / "libglint" / parent
+    assert {path.parent.relative_to(home).as_posix() for path in sources(home)} == set(FOLDERS[parent])
+    wrong = []
+    for folder, foundations in FOLDERS[parent].items():
+        for path in sources(home / folder):
+            for _, name in includes(path):
+                match = re.match(rf"glint/{parent}/(\w+)/", name)
+                if match and match[1] not in {folder, *foundations}:
+                    wrong.append(f"{name_of(path)} includes {name}")
     assert wrong == []
 
 
