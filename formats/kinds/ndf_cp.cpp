@@ -5,6 +5,7 @@
 
 #include "glint/formats/kinds/pyramid_shape.h"
 #include "glint/formats/number_text.h"
+#include "glint/math/half.h"
 
 namespace glint::formats {
 namespace {

@@ -4,6 +4,7 @@
 
 #include "glint/formats/kinds/pyramid_shape.h"
 #include "glint/formats/number_text.h"
+#include "glint/math/half.h"
 #include "glint/model/texel_name.h"
 
 namespace glint::formats {

@@ -1,6 +1,5 @@
 #include "glint/formats/kinds/pyramid_shape.h"
 
-#include <bit>
 #include <cmath>
 
 namespace glint::formats {
@@ -89,18 +88,6 @@ std::size_t imageCount(const PyramidShape& shape) {
   std::size_t count = 0;
   for (int l = 0; l < shape.level_count; ++l) count += shape.levels[l].imageCount();
   return count;
-}
-
-float ieeeHalfToFloat(std::uint16_t bits) {
-  const std::uint32_t sign = static_cast<std::uint32_t>(bits & 0x8000u) << 16;
-  const std::uint32_t exponent = (bits >> 10) & 31u;
-  const std::uint32_t mantissa = bits & 0x3ffu;
-  if (exponent == 0) {
-    const float magnitude = static_cast<float>(mantissa) * 0x1p-24f;
-    return sign != 0 ? -magnitude : magnitude;
-  }
-  const std::uint32_t biased = exponent == 31 ? 255u : exponent + 112u;
-  return std::bit_cast<float>(sign | (biased << 23) | (mantissa << 13));
 }
 
 }  // namespace glint::formats

@@ -18,7 +18,4 @@ void checkShape(const PyramidShape& shape, Findings& findings);
 /// Images of all levels together.
 std::size_t imageCount(const PyramidShape& shape);
 
-/// Value of a half-precision number, infinities and NaNs included: what a check must see, and a query must not.
-float ieeeHalfToFloat(std::uint16_t bits);
-
 }  // namespace glint::formats

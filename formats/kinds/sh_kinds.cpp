@@ -4,6 +4,7 @@
 #include "glint/formats/kinds/codec.h"
 #include "glint/formats/kinds/pyramid_shape.h"
 #include "glint/formats/number_text.h"
+#include "glint/math/half.h"
 
 namespace glint::formats {
 namespace {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <cstring>
+#include <limits>
 
 #include "glint/math/device.h"
 
@@ -18,6 +19,13 @@ inline GLINT_HD float halfToFloat(std::uint16_t half) {
   std::memcpy(&value, &magnitude, sizeof value);
   value *= 0x1p112f;  // moves the exponent's bias from 15 to 127, subnormals included
   return half & 0x8000u ? -value : value;
+}
+
+/// The same with infinities and NaNs as they are: a check must see them, a query must not.
+inline GLINT_HD float ieeeHalfToFloat(std::uint16_t half) {
+  if ((half & 0x7c00u) != 0x7c00u) return halfToFloat(half);
+  if (half & 0x3ffu) return std::numeric_limits<float>::quiet_NaN();
+  return half & 0x8000u ? -std::numeric_limits<float>::infinity() : std::numeric_limits<float>::infinity();
 }
 
 /// The same for what cannot be negative: negative numbers, which a file may have, become 0.

@@ -46,6 +46,19 @@ TEST(Half, WhatIsNotFiniteBecomesTheLargestNumber) {
   EXPECT_TRUE(std::isfinite(halfToFloat(floatToHalf(std::numeric_limits<float>::quiet_NaN()))));
 }
 
+TEST(Half, ChecksSeeInfinitiesAndNans) {
+  for (const int sign : {0, 0x8000}) {
+    for (int magnitude = 0; magnitude < kFiniteHalves; ++magnitude)
+      ASSERT_EQ(ieeeHalfToFloat(static_cast<std::uint16_t>(sign | magnitude)),
+                halfToFloat(static_cast<std::uint16_t>(sign | magnitude)));
+    const float infinity = ieeeHalfToFloat(static_cast<std::uint16_t>(sign | kFiniteHalves));
+    EXPECT_TRUE(std::isinf(infinity));
+    EXPECT_EQ(std::signbit(infinity), sign != 0);
+    for (int magnitude = kFiniteHalves + 1; magnitude < 0x8000; ++magnitude)
+      ASSERT_TRUE(std::isnan(ieeeHalfToFloat(static_cast<std::uint16_t>(sign | magnitude))));
+  }
+}
+
 TEST(Half, NegativeNumbersBecome0WhereNoneCanBe) {
   for (int magnitude = 0; magnitude < 0x8000; ++magnitude) {
     const auto bits = static_cast<std::uint16_t>(magnitude);
