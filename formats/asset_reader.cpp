@@ -32,21 +32,21 @@ std::string_view Asset::kind() const { return state_->loaded.info.kind; }
 const AssetInfo& Asset::info() const { return state_->loaded.info; }
 
 template <class Model>
-const Model& Asset::get(std::string_view wanted) const {
+const Model& Asset::get() const {
   if (const Model* model = std::get_if<Model>(&state_->loaded.model)) return *model;
+  const std::string wanted(kindName<Model>());
   throw Error(ErrorCode::unsupported, "format.kind", state_->path, {},
-              "is of kind " + state_->loaded.info.kind + ", not " + std::string(wanted),
-              "pass an asset of kind " + std::string(wanted));
+              "is of kind " + state_->loaded.info.kind + ", not " + wanted, "pass an asset of kind " + wanted);
 }
 
-const NormalMap& Asset::normals() const { return get<NormalMap>("normals"); }
-const HeightMap& Asset::heights() const { return get<HeightMap>("heights"); }
-const NdfPyramid& Asset::pyramid() const { return get<NdfPyramid>("ndf-pyramid"); }
-const CompressedNdf& Asset::compressed() const { return get<CompressedNdf>("ndf-cp"); }
-const BinMap& Asset::binMap() const { return get<BinMap>("bin-map"); }
-const HistogramSat& Asset::histograms() const { return get<HistogramSat>("histogram-sat"); }
-const ShLight& Asset::shLight() const { return get<ShLight>("sh-light"); }
-const ShLobes& Asset::shLobes() const { return get<ShLobes>("sh-lobes"); }
-const Displacement& Asset::displacement() const { return get<Displacement>("displacement"); }
+template const NormalMap& Asset::get() const;
+template const HeightMap& Asset::get() const;
+template const NdfPyramid& Asset::get() const;
+template const NdfCp& Asset::get() const;
+template const BinMap& Asset::get() const;
+template const HistogramSat& Asset::get() const;
+template const ShLight& Asset::get() const;
+template const ShLobes& Asset::get() const;
+template const Displacement& Asset::get() const;
 
 }  // namespace glint::formats

@@ -10,10 +10,10 @@
 #include "glint/formats/provenance.h"
 #include "glint/formats/schema.h"
 #include "glint/model/bin_map.h"
-#include "glint/model/compressed_ndf.h"
 #include "glint/model/displacement.h"
 #include "glint/model/error.h"
 #include "glint/model/histogram_sat.h"
+#include "glint/model/ndf_cp.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
 #include "glint/model/sh.h"
@@ -77,22 +77,14 @@ class Asset {
   std::string_view kind() const;
   const AssetInfo& info() const;
 
-  /// Typed access. Throws Error (unsupported) that names both kinds if the asset is of another one.
-  const NormalMap& normals() const;
-  const HeightMap& heights() const;
-  const NdfPyramid& pyramid() const;
-  const CompressedNdf& compressed() const;
-  const BinMap& binMap() const;
-  const HistogramSat& histograms() const;
-  const ShLight& shLight() const;
-  const ShLobes& shLobes() const;
-  const Displacement& displacement() const;
+  /// The asset as the struct of its kind, e.g. get<NdfPyramid>(). Throws Error (unsupported) that names both kinds if the asset is
+  /// of another one.
+  template <class Model>
+  const Model& get() const;
 
  private:
   struct State;
   explicit Asset(std::unique_ptr<State> state);
-  template <class Model>
-  const Model& get(std::string_view wanted) const;
 
   std::unique_ptr<State> state_;
 };

@@ -257,7 +257,7 @@ void writeAsset(const fs::path& path, const NdfPyramid& pyramid, const Provenanc
   writeModel(path, pyramid, provenance, options);
 }
 
-void writeAsset(const fs::path& path, const CompressedNdf& ndf, const Provenance& provenance, const WriteOptions& options) {
+void writeAsset(const fs::path& path, const NdfCp& ndf, const Provenance& provenance, const WriteOptions& options) {
   writeModel(path, ndf, provenance, options);
 }
 

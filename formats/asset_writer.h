@@ -4,10 +4,10 @@
 
 #include "glint/formats/provenance.h"
 #include "glint/model/bin_map.h"
-#include "glint/model/compressed_ndf.h"
 #include "glint/model/displacement.h"
 #include "glint/model/error.h"
 #include "glint/model/histogram_sat.h"
+#include "glint/model/ndf_cp.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
 #include "glint/model/sh.h"
@@ -31,7 +31,7 @@ void writeAsset(const std::filesystem::path& path, const HeightMap& map, const P
                 const WriteOptions& options = {});
 void writeAsset(const std::filesystem::path& path, const NdfPyramid& pyramid, const Provenance& provenance,
                 const WriteOptions& options = {});
-void writeAsset(const std::filesystem::path& path, const CompressedNdf& ndf, const Provenance& provenance,
+void writeAsset(const std::filesystem::path& path, const NdfCp& ndf, const Provenance& provenance,
                 const WriteOptions& options = {});
 void writeAsset(const std::filesystem::path& path, const BinMap& map, const Provenance& provenance,
                 const WriteOptions& options = {});

@@ -9,7 +9,7 @@
 
 #include "glint/formats/rules.h"
 #include "glint/formats/system_error.h"
-#include "glint/model/compressed_ndf.h"
+#include "glint/model/ndf_cp.h"
 
 namespace glint::formats::hdf5 {
 namespace {

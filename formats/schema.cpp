@@ -5,9 +5,9 @@
 #include <charconv>
 
 #include "glint/model/bin_map.h"
-#include "glint/model/compressed_ndf.h"
 #include "glint/model/displacement.h"
 #include "glint/model/histogram_sat.h"
+#include "glint/model/ndf_cp.h"
 #include "glint/model/sh.h"
 
 namespace glint::formats {

@@ -68,8 +68,8 @@ void NdfAsset::open(const formats::OpenOptions& checks) {
 
 std::optional<std::vector<float>> NdfAsset::scatteredImage(const Footprint& footprint, int size) const {
   if (!std::holds_alternative<Reference>(model()) || options_.surface != Surface::flat) return std::nullopt;
-  return bake::referenceImage(opened_->asset().normals(), options_.sigma_r, options_.surface, options_.boundary, footprint,
-                              size);
+  return bake::referenceImage(opened_->asset().get<NormalMap>(), options_.sigma_r, options_.surface, options_.boundary,
+                              footprint, size);
 }
 
 std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint) const {

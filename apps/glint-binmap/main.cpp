@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = formats::Asset::openForBuilding(input.path());
     const formats::Provenance provenance = tool.provenance();
-    const apps::BuiltBinMap built = command.build(asset.normals(), tool.progress("passes"));
+    const apps::BuiltBinMap built = command.build(asset.get<NormalMap>(), tool.progress("passes"));
     formats::writeAsset(output.path(), built.data.view(), provenance, output.writeOptions());
     tool.setResult(apps::binMapJson(built));
     tool.summary(apps::binMapText(built));

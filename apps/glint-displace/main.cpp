@@ -19,10 +19,10 @@ int main(int argc, char** argv) {
 
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = formats::Asset::openForBuilding(input.path());
-    bake::DisplaceOptions options = command.options(asset.heights());
+    bake::DisplaceOptions options = command.options(asset.get<HeightMap>());
     options.seed = tool.seed();
     const formats::Provenance provenance = tool.provenance();
-    const bake::DisplacementData data = bake::displace(asset.heights(), options, tool.progress("levels"));
+    const bake::DisplacementData data = bake::displace(asset.get<HeightMap>(), options, tool.progress("levels"));
     formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
     apps::warnAbout(tool, data);
     tool.setResult(apps::displacementJson(data));

@@ -85,7 +85,7 @@ ordered_json summarizePyramid(const NdfPyramid& pyramid) {
           {"levels", std::move(levels)}};
 }
 
-ordered_json summarizeCompressed(const CompressedNdf& ndf, const formats::AssetInfo& info) {
+ordered_json summarizeNdfCp(const NdfCp& ndf, const formats::AssetInfo& info) {
   std::map<int, std::uint64_t> ranks;
   std::uint64_t slices = 0, spot_slices = 0;
   std::uint64_t empty = 0;
@@ -225,38 +225,38 @@ const char* nameOf(CoefficientType type) {
 
 void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json& statistics) {
   if (asset.kind() == "normals") {
-    const NormalMap& map = asset.normals();
+    const NormalMap& map = asset.get<NormalMap>();
     properties = {{"width", map.width}, {"height", map.height}, {"texel_size_um", map.texel_size_um}};
     statistics = summarizeNormals(map);
   } else if (asset.kind() == "heights") {
-    const HeightMap& map = asset.heights();
+    const HeightMap& map = asset.get<HeightMap>();
     properties = {{"width", map.width}, {"height", map.height}, {"texel_size_um", map.texel_size_um}};
     statistics = summarizeHeights(map);
   } else if (asset.kind() == "ndf-pyramid") {
-    const NdfPyramid& pyramid = asset.pyramid();
+    const NdfPyramid& pyramid = asset.get<NdfPyramid>();
     properties = shapeProperties(pyramid.shape);
     properties["precision"] = pyramid.precision == BlockPrecision::f16 ? "f16" : "f32";
     properties["value_scale"] = pyramid.value_scale;
     statistics = summarizePyramid(pyramid);
   } else if (asset.kind() == "displacement") {
-    properties = displacementProperties(asset.displacement());
-    statistics = summarizeDisplacement(asset.displacement());
+    properties = displacementProperties(asset.get<Displacement>());
+    statistics = summarizeDisplacement(asset.get<Displacement>());
   } else if (asset.kind() == "ndf-cp") {
-    const CompressedNdf& ndf = asset.compressed();
+    const NdfCp& ndf = asset.get<NdfCp>();
     properties = shapeProperties(ndf.shape);
     properties["method"] = nameOf(ndf.method);
     properties["coefficient_type"] = nameOf(ndf.coefficient_type);
     properties["regions"] = ndf.regions;
-    statistics = summarizeCompressed(ndf, asset.info());
+    statistics = summarizeNdfCp(ndf, asset.info());
   } else if (asset.kind() == "bin-map") {
-    const BinMap& map = asset.binMap();
+    const BinMap& map = asset.get<BinMap>();
     properties = {{"width", map.width},         {"height", map.height},       {"alpha", map.alpha},
                   {"alpha_min", map.alpha_min}, {"alpha_max", map.alpha_max}, {"bins_per_axis", map.bins_per_axis},
                   {"leaf_size", map.leaf_size}};
     addSlopes(map.slopes, properties);
     statistics = summarizeBinMap(map);
   } else if (asset.kind() == "histogram-sat") {
-    const HistogramSat& sat = asset.histograms();
+    const HistogramSat& sat = asset.get<HistogramSat>();
     properties = {{"width", sat.width},
                   {"height", sat.height},
                   {"directions", std::to_string(sat.theta_bins) + "x" + std::to_string(sat.phi_bins)},
@@ -266,12 +266,12 @@ void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json
     addSlopes(sat.slopes, properties);
     statistics = summarizeHistograms(sat, asset.info());
   } else if (asset.kind() == "sh-lobes") {
-    const ShLobes& lobes = asset.shLobes();
+    const ShLobes& lobes = asset.get<ShLobes>();
     properties = shProperties(lobes.order, lobes.grid, lobes.precision);
     properties["sigma_r"] = lobes.sigma_r;
     statistics = {{"mean", lobes.zonal[0]}, {"last_band", lobes.zonal.back()}};
   } else if (asset.kind() == "sh-light") {
-    const ShLight& light = asset.shLight();
+    const ShLight& light = asset.get<ShLight>();
     properties = shProperties(light.order, light.grid, light.precision);
     statistics = summarizeLight(light);
   }

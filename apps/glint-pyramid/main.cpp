@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = formats::Asset::openForBuilding(input.path());
     const formats::Provenance provenance = tool.provenance();
-    const bake::NdfPyramidData pyramid = bake::buildPyramid(asset.normals(), command.options(), tool.progress("images"));
+    const bake::NdfPyramidData pyramid = bake::buildPyramid(asset.get<NormalMap>(), command.options(), tool.progress("images"));
     formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
     tool.setResult(apps::pyramidJson(pyramid));
     tool.summary(apps::pyramidText(pyramid));

@@ -96,7 +96,7 @@ void LightQuery::check() const {
 LightQuery::Lobe LightQuery::lobe(const NdfAsset& asset, int order) const {
   if (!lobes_path_.empty()) {
     const formats::Asset lobes = formats::Asset::openForBuilding(lobes_path_);
-    return {{lobes.shLobes().zonal.begin(), lobes.shLobes().zonal.end()}, lobes.shLobes().sigma_r};
+    return {{lobes.get<ShLobes>().zonal.begin(), lobes.get<ShLobes>().zonal.end()}, lobes.get<ShLobes>().sigma_r};
   }
   const std::vector<double> f = bake::zonalLobe(asset.facetRoughness(), order);
   return {{f.begin(), f.end()}, asset.facetRoughness()};
@@ -129,7 +129,7 @@ void LightQuery::run(const NdfAsset& asset, const Footprint& footprint, Vec3 wo)
     throw Error(ErrorCode::unsupported, "query.light", "", "--surface", "light is summed over facets, not over smooth surfaces",
                 "leave out --surface smooth");
   const formats::Asset light_asset = formats::Asset::openForBuilding(path_);
-  const ShLight& light = light_asset.shLight();
+  const ShLight& light = light_asset.get<ShLight>();
   const Lobe lobe = this->lobe(asset, light.order);
   const auto ask = [&](const auto& histogram) {
     return light.order <= kShFloatOrder

@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
     constexpr formats::OpenOptions checks = {.verify_hashes = true, .check_values = true};
     // An asset of another kind is opened, and checked, with its own options.
     const bool displacement = formats::Asset::open(asset.path()).kind() == "displacement";
-    if (displacement) return command.run(formats::Asset::open(asset.path(), checks).displacement());
+    if (displacement) return command.run(formats::Asset::open(asset.path(), checks).get<Displacement>());
     asset.open(checks);
     command.run(asset);
   });

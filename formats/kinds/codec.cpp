@@ -6,8 +6,8 @@ namespace glint::formats {
 namespace {
 
 template <class Model>
-constexpr Codec codecOf(std::string_view kind) {
-  return {kind,
+Codec codec() {
+  return {kindName<Model>(),
           [](const Content& content) {
             Model model;
             unpack(content, model);
@@ -17,16 +17,50 @@ constexpr Codec codecOf(std::string_view kind) {
           [](const AnyAsset& asset, Findings& findings) { checkData(std::get<Model>(asset), findings); }};
 }
 
-constexpr std::array kCodecs = {codecOf<BinMap>("bin-map"),       codecOf<Displacement>("displacement"),
-                                codecOf<HeightMap>("heights"),    codecOf<HistogramSat>("histogram-sat"),
-                                codecOf<CompressedNdf>("ndf-cp"), codecOf<NdfPyramid>("ndf-pyramid"),
-                                codecOf<NormalMap>("normals"),    codecOf<ShLight>("sh-light"),
-                                codecOf<ShLobes>("sh-lobes")};
-
 }  // namespace
 
+template <>
+std::string_view kindName<BinMap>() {
+  return "bin-map";
+}
+template <>
+std::string_view kindName<Displacement>() {
+  return "displacement";
+}
+template <>
+std::string_view kindName<HeightMap>() {
+  return "heights";
+}
+template <>
+std::string_view kindName<HistogramSat>() {
+  return "histogram-sat";
+}
+template <>
+std::string_view kindName<NdfCp>() {
+  return "ndf-cp";
+}
+template <>
+std::string_view kindName<NdfPyramid>() {
+  return "ndf-pyramid";
+}
+template <>
+std::string_view kindName<NormalMap>() {
+  return "normals";
+}
+template <>
+std::string_view kindName<ShLight>() {
+  return "sh-light";
+}
+template <>
+std::string_view kindName<ShLobes>() {
+  return "sh-lobes";
+}
+
 const Codec* findCodec(std::string_view kind) {
-  for (const Codec& codec : kCodecs) {
+  static const std::array codecs = {codec<BinMap>(),       codec<Displacement>(), codec<HeightMap>(),
+                                    codec<HistogramSat>(), codec<NdfCp>(),        codec<NdfPyramid>(),
+                                    codec<NormalMap>(),    codec<ShLight>(),      codec<ShLobes>()};
+  for (const Codec& codec : codecs) {
     if (codec.kind == kind) return &codec;
   }
   return nullptr;

@@ -13,9 +13,9 @@
 #include "glint/formats/findings.h"
 #include "glint/formats/structure.h"
 #include "glint/model/bin_map.h"
-#include "glint/model/compressed_ndf.h"
 #include "glint/model/displacement.h"
 #include "glint/model/histogram_sat.h"
+#include "glint/model/ndf_cp.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
 #include "glint/model/sh.h"
@@ -23,8 +23,8 @@
 namespace glint::formats {
 
 /// The model struct of any kind. Its spans point into a Mapping.
-using AnyAsset = std::variant<std::monostate, NormalMap, HeightMap, NdfPyramid, CompressedNdf, BinMap, HistogramSat, ShLight,
-                              ShLobes, Displacement>;
+using AnyAsset =
+    std::variant<std::monostate, NormalMap, HeightMap, NdfPyramid, NdfCp, BinMap, HistogramSat, ShLight, ShLobes, Displacement>;
 
 /// Typed access to a file that has passed the checks against its schema.
 class Content {
@@ -84,7 +84,7 @@ struct PackedAsset {
 PackedAsset pack(const NormalMap& map);
 PackedAsset pack(const HeightMap& map);
 PackedAsset pack(const NdfPyramid& pyramid);
-PackedAsset pack(const CompressedNdf& ndf);
+PackedAsset pack(const NdfCp& ndf);
 PackedAsset pack(const BinMap& map);
 PackedAsset pack(const HistogramSat& sat);
 PackedAsset pack(const ShLight& light);
@@ -94,7 +94,7 @@ PackedAsset pack(const Displacement& displacement);
 void unpack(const Content& content, NormalMap& map);
 void unpack(const Content& content, HeightMap& map);
 void unpack(const Content& content, NdfPyramid& pyramid);
-void unpack(const Content& content, CompressedNdf& ndf);
+void unpack(const Content& content, NdfCp& ndf);
 void unpack(const Content& content, BinMap& map);
 void unpack(const Content& content, HistogramSat& sat);
 void unpack(const Content& content, ShLight& light);
@@ -105,7 +105,7 @@ void unpack(const Content& content, Displacement& displacement);
 void checkIndex(const NormalMap& map, Findings& findings);
 void checkIndex(const HeightMap& map, Findings& findings);
 void checkIndex(const NdfPyramid& pyramid, Findings& findings);
-void checkIndex(const CompressedNdf& ndf, Findings& findings);
+void checkIndex(const NdfCp& ndf, Findings& findings);
 void checkIndex(const BinMap& map, Findings& findings);
 void checkIndex(const HistogramSat& sat, Findings& findings);
 void checkIndex(const ShLight& light, Findings& findings);
@@ -116,7 +116,7 @@ void checkIndex(const Displacement& displacement, Findings& findings);
 void checkData(const NormalMap& map, Findings& findings);
 void checkData(const HeightMap& map, Findings& findings);
 void checkData(const NdfPyramid& pyramid, Findings& findings);
-void checkData(const CompressedNdf& ndf, Findings& findings);
+void checkData(const NdfCp& ndf, Findings& findings);
 void checkData(const BinMap& map, Findings& findings);
 void checkData(const HistogramSat& sat, Findings& findings);
 void checkData(const ShLight& light, Findings& findings);
@@ -130,6 +130,10 @@ struct Codec {
   void (*check_index)(const AnyAsset&, Findings&);
   void (*check_data)(const AnyAsset&, Findings&);
 };
+
+/// Name of the kind whose assets are of this struct.
+template <class Model>
+std::string_view kindName();
 
 /// The codec of a kind, or nullptr.
 const Codec* findCodec(std::string_view kind);

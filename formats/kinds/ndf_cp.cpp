@@ -14,7 +14,7 @@ constexpr double kIntegralTolerance = 1e-3;
 constexpr std::string_view kMethods[] = {"cp", "tucker", "pca"};
 constexpr std::string_view kCoefficientTypes[] = {"i8", "f16", "f32"};
 
-ElementType basisType(const CompressedNdf& ndf) {
+ElementType basisType(const NdfCp& ndf) {
   if (ndf.coefficient_type == CoefficientType::f32) return ElementType::f32;
   return ndf.method == CompressionMethod::pca ? ElementType::i32 : ElementType::i16;
 }
@@ -51,7 +51,7 @@ double element(ElementType type, const void* data, std::uint64_t index) {
 }
 
 /// Whether the sizes of a cluster with slices fit its method and type.
-bool ranksHold(const CompressedNdf& ndf, const NdfCluster& cluster) {
+bool ranksHold(const NdfCp& ndf, const NdfCluster& cluster) {
   const bool i8 = ndf.coefficient_type == CoefficientType::i8;
   if (cluster.columns == 0) return i8 && cluster.narrow_columns == 0 && !ndf.spot_sums.empty();
   if (cluster.columns > kBlockPixels || cluster.narrow_columns > (i8 ? cluster.columns : 0)) return false;
@@ -61,13 +61,13 @@ bool ranksHold(const CompressedNdf& ndf, const NdfCluster& cluster) {
 
 bool inside(std::uint64_t first, std::uint64_t count, std::uint64_t size) { return first <= size && count <= size - first; }
 
-std::string clusterName(const CompressedNdf& ndf, std::size_t cluster) {
+std::string clusterName(const NdfCp& ndf, std::size_t cluster) {
   const auto places = static_cast<std::size_t>(ndf.places);
   return "cluster [" + std::to_string(cluster / places) + "][" + std::to_string(cluster % places) + "]";
 }
 
 /// Checks regions and slots of images. Returns the number of slots of each region; empty if they are wrong.
-std::vector<std::uint32_t> checkImages(const CompressedNdf& ndf, Findings& findings) {
+std::vector<std::uint32_t> checkImages(const NdfCp& ndf, Findings& findings) {
   const std::size_t images = imageCount(ndf.shape);
   if (ndf.image_slots.size() != images || images > UINT32_MAX) {
     findings.add("compressed.images", "/image_slots",
@@ -102,7 +102,7 @@ std::vector<std::uint32_t> checkImages(const CompressedNdf& ndf, Findings& findi
 }
 
 /// Checks that places and blocks name each other.
-bool checkPlaces(const CompressedNdf& ndf, Findings& findings) {
+bool checkPlaces(const NdfCp& ndf, Findings& findings) {
   const auto blocks = static_cast<std::size_t>(ndf.shape.blocksPerImage());
   bool holds = true;
   std::size_t next = 0;
@@ -117,7 +117,7 @@ bool checkPlaces(const CompressedNdf& ndf, Findings& findings) {
   return holds;
 }
 
-void checkFirstBlock(const CompressedNdf& ndf, Findings& findings) {
+void checkFirstBlock(const NdfCp& ndf, Findings& findings) {
   const auto words = static_cast<std::size_t>(ndf.placeWords());
   const int tail_bits = ndf.places % 64;
   const std::uint64_t beyond = tail_bits == 0 ? 0 : ~std::uint64_t{0} << tail_bits;
@@ -134,7 +134,7 @@ void checkFirstBlock(const CompressedNdf& ndf, Findings& findings) {
 }
 
 /// Checks the mask of one cluster, whose words are inside the array. Returns the broken rule, or nothing.
-std::string_view checkMask(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint32_t slots) {
+std::string_view checkMask(const NdfCp& ndf, const NdfCluster& cluster, std::uint32_t slots) {
   const std::size_t words = (slots + 63) / 64;
   std::uint32_t count = 0;
   for (std::size_t w = 0; w < words; ++w) {
@@ -148,7 +148,7 @@ std::string_view checkMask(const CompressedNdf& ndf, const NdfCluster& cluster, 
 }
 
 /// Whether the counts of a cluster of spots agree and its spots are inside the array and near the block.
-bool spotsHold(const CompressedNdf& ndf, const NdfCluster& cluster) {
+bool spotsHold(const NdfCp& ndf, const NdfCluster& cluster) {
   const std::uint64_t head = firstSpotOffset(cluster.slice_count);
   if (cluster.first_coefficient % sizeof(NdfSpot) != 0 || !inside(cluster.first_coefficient, head, ndf.coefficient_count))
     return false;
@@ -166,7 +166,7 @@ bool spotsHold(const CompressedNdf& ndf, const NdfCluster& cluster) {
 }
 
 /// Whether the pairs of functions of a cluster's columns are below its ranks.
-bool coreHolds(const CompressedNdf& ndf, const NdfCluster& cluster) {
+bool coreHolds(const NdfCp& ndf, const NdfCluster& cluster) {
   const auto* core = ndf.core.data() + cluster.first_scale;
   return std::all_of(core, core + cluster.columns, [&](std::uint8_t pair) {
     return pair % kBlockSize < cluster.rank_x && pair / kBlockSize < cluster.rank_y;
@@ -174,7 +174,7 @@ bool coreHolds(const CompressedNdf& ndf, const NdfCluster& cluster) {
 }
 
 /// Checks where the factors of a cluster with slices are. Returns the broken rule, or nothing.
-std::string_view checkFactors(const CompressedNdf& ndf, const NdfCluster& cluster) {
+std::string_view checkFactors(const NdfCp& ndf, const NdfCluster& cluster) {
   if (!ranksHold(ndf, cluster)) return "compressed.ranks";
   const std::uint64_t columns = cluster.columns == 0 ? 2 : cluster.columns;
   if (!inside(cluster.first_scale, columns, ndf.scales.size())) return "compressed.ranges";
@@ -190,7 +190,7 @@ std::string_view checkFactors(const CompressedNdf& ndf, const NdfCluster& cluste
 }
 
 /// Number of the first slot of each region, in one list of the slots of all regions.
-std::vector<std::size_t> firstSlots(const CompressedNdf& ndf) {
+std::vector<std::size_t> firstSlots(const NdfCp& ndf) {
   std::vector<std::size_t> first(static_cast<std::size_t>(ndf.regions) + 1);
   for (const std::uint16_t region : ndf.image_regions) ++first[region + 1u];
   for (std::size_t r = 0; r < static_cast<std::size_t>(ndf.regions); ++r) first[r + 1] += first[r];
@@ -198,7 +198,7 @@ std::vector<std::size_t> firstSlots(const CompressedNdf& ndf) {
 }
 
 /// Basis images of a cluster with their scales, [columns][256].
-std::vector<float> basisImages(const CompressedNdf& ndf, const NdfCluster& cluster) {
+std::vector<float> basisImages(const NdfCp& ndf, const NdfCluster& cluster) {
   const auto at = [&](std::uint64_t index) { return element(basisType(ndf), ndf.basis, cluster.first_basis + index); };
   const bool tucker = ndf.method == CompressionMethod::tucker;
   const std::uint64_t columns = cluster.columns, rx = tucker ? cluster.rank_x : columns, ry = tucker ? cluster.rank_y : columns;
@@ -225,7 +225,7 @@ std::vector<float> basisImages(const CompressedNdf& ndf, const NdfCluster& clust
 }
 
 /// Coefficient k of a slice.
-float coefficient(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t slice, int k) {
+float coefficient(const NdfCp& ndf, const NdfCluster& cluster, std::uint64_t slice, int k) {
   const std::uint64_t row = cluster.first_coefficient + slice * static_cast<std::uint64_t>(rowElements(cluster));
   const int wide = cluster.columns - cluster.narrow_columns, half = (cluster.narrow_columns + 1) / 2, j = k - wide;
   if (j < 0)
@@ -253,7 +253,7 @@ SliceSums sumsOf(const float* pixels) {
 
 /// Adds the spots of a slice to its pixels.
 /// @param first  number of the slice's first spot in the cluster
-void addSpots(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t first, int count, float* pixels) {
+void addSpots(const NdfCp& ndf, const NdfCluster& cluster, std::uint64_t first, int count, float* pixels) {
   const auto* bytes = static_cast<const std::uint8_t*>(ndf.coefficients) + cluster.first_coefficient;
   const auto* spots = reinterpret_cast<const NdfSpot*>(bytes + firstSpotOffset(cluster.slice_count)) + first;
   const auto share = [&](int pixel, int place) {
@@ -267,7 +267,7 @@ void addSpots(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t
 }
 
 /// Sums of all slices of a cluster.
-std::vector<SliceSums> clusterSums(const CompressedNdf& ndf, const NdfCluster& cluster) {
+std::vector<SliceSums> clusterSums(const NdfCp& ndf, const NdfCluster& cluster) {
   std::vector<SliceSums> sums;
   const std::vector<float> images = basisImages(ndf, cluster);
   const std::uint8_t* counts =
@@ -293,7 +293,7 @@ std::vector<SliceSums> clusterSums(const CompressedNdf& ndf, const NdfCluster& c
 }
 
 /// Sums of all slices in the order of block_masses. Empty, with a finding, if block_masks contradict the clusters.
-std::vector<SliceSums> sliceSums(const CompressedNdf& ndf, Findings& findings) {
+std::vector<SliceSums> sliceSums(const NdfCp& ndf, Findings& findings) {
   const std::vector<std::size_t> first = firstSlots(ndf);
   std::vector<std::size_t> image_of(ndf.image_slots.size());
   for (std::size_t i = 0; i < image_of.size(); ++i) image_of[first[ndf.image_regions[i]] + ndf.image_slots[i]] = i;
@@ -328,7 +328,7 @@ std::vector<SliceSums> sliceSums(const CompressedNdf& ndf, Findings& findings) {
 }
 
 /// Checks what means, densities and sampling rest on: the scales of each image and the shares of its blocks.
-void checkDensities(const CompressedNdf& ndf, Findings& findings) {
+void checkDensities(const NdfCp& ndf, Findings& findings) {
   constexpr double kRounding = 1e-3;  // of sums of float products
   const std::vector<SliceSums> sums = sliceSums(ndf, findings);
   if (sums.size() != ndf.block_masses.size()) return;
@@ -375,7 +375,7 @@ void checkAll(std::uint64_t count, Condition holds, std::string_view rule, const
 
 }  // namespace
 
-PackedAsset pack(const CompressedNdf& ndf) {
+PackedAsset pack(const NdfCp& ndf) {
   PackedAsset packed{"ndf-cp", {}, {}};
   packShape(ndf.shape, packed);
   std::uint32_t first_image = 0;
@@ -414,7 +414,7 @@ PackedAsset pack(const CompressedNdf& ndf) {
   return packed;
 }
 
-void unpack(const Content& content, CompressedNdf& ndf) {
+void unpack(const Content& content, NdfCp& ndf) {
   unpackShape(content, ndf.shape);
   ndf.method = fromText<CompressionMethod>(kMethods, content.text("method"));
   ndf.coefficient_type = fromText<CoefficientType>(kCoefficientTypes, content.text("coefficient_type"));
@@ -446,7 +446,7 @@ void unpack(const Content& content, CompressedNdf& ndf) {
   ndf.spot_sums = content.array<float>("spot_sums");
 }
 
-void checkIndex(const CompressedNdf& ndf, Findings& findings) {
+void checkIndex(const NdfCp& ndf, Findings& findings) {
   checkShape(ndf.shape, findings);
   const std::vector<std::uint32_t> slots = checkImages(ndf, findings);
   if (slots.empty()) return;
@@ -473,7 +473,7 @@ void checkIndex(const CompressedNdf& ndf, Findings& findings) {
   }
 }
 
-void checkData(const CompressedNdf& ndf, Findings& findings) {
+void checkData(const NdfCp& ndf, Findings& findings) {
   checkAll(
       ndf.image_scales.size(), [&](std::uint64_t k) { return std::isfinite(ndf.image_scales[k]) && ndf.image_scales[k] > 0; },
       "compressed.image_scales", "/image_scales", "not finite and positive", findings);

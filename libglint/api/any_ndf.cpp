@@ -71,7 +71,7 @@ float askedAlpha(const BinMap& map, float alpha, const std::filesystem::path& pa
 
 template <class Model, class View>
 void OpenedNdf::setPyramid(const View& view, int footprint_parts) {
-  model_ = AnisotropicNdf<Model>(normals_ ? Model(view, normals_->normals()) : Model(view), footprint_parts);
+  model_ = AnisotropicNdf<Model>(normals_ ? Model(view, normals_->get<NormalMap>()) : Model(view), footprint_parts);
   info_ = infoOf(view.shape);
 }
 
@@ -83,20 +83,21 @@ OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& o
 
   // A new kind is a line here, and its model in AnyNdf.
   if (asset.kind() == "normals") {
-    opened.model_ = Reference(asset.normals(), options.sigma_r, options.surface, options.boundary, Reference::Search::pruned);
-    opened.info_ = infoOf(asset.normals(), options);
+    opened.model_ =
+        Reference(asset.get<NormalMap>(), options.sigma_r, options.surface, options.boundary, Reference::Search::pruned);
+    opened.info_ = infoOf(asset.get<NormalMap>(), options);
   } else if (asset.kind() == "ndf-pyramid") {
-    opened.setPyramid<PyramidNdf>(asset.pyramid(), options.footprint_parts);
+    opened.setPyramid<PyramidNdf>(asset.get<NdfPyramid>(), options.footprint_parts);
   } else if (asset.kind() == "ndf-cp") {
-    opened.setPyramid<CpNdf>(asset.compressed(), options.footprint_parts);
+    opened.setPyramid<CpNdf>(asset.get<NdfCp>(), options.footprint_parts);
   } else if (asset.kind() == "bin-map") {
-    const BinMap& map = asset.binMap();
+    const BinMap& map = asset.get<BinMap>();
     const BinMapNdf ndf(map, askedAlpha(map, options.alpha, path));
     opened.model_ = ndf;
     opened.info_ = {map.width, map.height, kReferenceResolution, ndf.sigma(), Surface::flat, Boundary::wrap, 0, 0, 0};
   } else if (asset.kind() == "histogram-sat") {
-    opened.model_ = HistogramNdf(asset.histograms(), options.gaussian_boxes, options.slant_tolerance);
-    opened.info_ = infoOf(asset.histograms());
+    opened.model_ = HistogramNdf(asset.get<HistogramSat>(), options.gaussian_boxes, options.slant_tolerance);
+    opened.info_ = infoOf(asset.get<HistogramSat>());
   } else {
     throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",
                 "is of kind " + std::string(asset.kind()) + ", which holds no distribution of normals",
@@ -104,12 +105,12 @@ OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& o
                     ? "ask for the light that it reflects, with DisplacedBrdf or glint_displaced_open"
                     : "pass an asset of kind normals, ndf-pyramid, ndf-cp, bin-map or histogram-sat");
   }
-  if (opened.normals_) requireSameMap(asset, path, opened.info_, opened.normals_->normals(), options.normals);
+  if (opened.normals_) requireSameMap(asset, path, opened.info_, opened.normals_->get<NormalMap>(), options.normals);
   return opened;
 }
 
 MapSlopes OpenedNdf::slopes() const {
-  return std::visit(Overloaded{[&](const Reference&) { return slopesOf(asset_.normals()); },
+  return std::visit(Overloaded{[&](const Reference&) { return slopesOf(asset_.get<NormalMap>()); },
                                [](const AnisotropicNdf<PyramidNdf>& pyramid) { return pyramid.round().shape().slopes; },
                                [](const AnisotropicNdf<CpNdf>& compressed) { return compressed.round().shape().slopes; },
                                [](const BinMapNdf& bins) { return bins.map().slopes; },

@@ -78,7 +78,7 @@ class OpenedNdf {
   /// Whether footprints below level 0 are answered from the texels.
   bool hasNormals() const { return normals_.has_value(); }
   /// The map that answers them; nullptr if there is none.
-  const NormalMap* normals() const { return normals_ ? &normals_->normals() : nullptr; }
+  const NormalMap* normals() const { return normals_ ? &normals_->get<NormalMap>() : nullptr; }
   /// Moments of the map's slopes, for SmithMasking. Kind normals: sums over all texels; other kinds hold them.
   MapSlopes slopes() const;
 

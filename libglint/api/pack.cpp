@@ -93,7 +93,7 @@ std::vector<std::byte> pack(const NdfPyramid& pyramid, const NormalMap* normals)
   return packer.finish();
 }
 
-std::vector<std::byte> pack(const CompressedNdf& ndf, const NormalMap* normals) {
+std::vector<std::byte> pack(const NdfCp& ndf, const NormalMap* normals) {
   Packer packer;
   PackedHeader& header = packer.header();
   header.kind = PackedKind::compressed;
@@ -146,10 +146,10 @@ std::vector<std::byte> pack(const OpenedNdf& opened) {
   // A new kind is a line here, and an overload above.
   return std::visit(Overloaded{[&](const Reference&) {
                                  const NdfInfo& info = opened.info();
-                                 return pack(asset.normals(), info.sigma_r, info.surface, info.boundary);
+                                 return pack(asset.get<NormalMap>(), info.sigma_r, info.surface, info.boundary);
                                },
-                               [&](const AnisotropicNdf<PyramidNdf>&) { return pack(asset.pyramid(), normals); },
-                               [&](const AnisotropicNdf<CpNdf>&) { return pack(asset.compressed(), normals); },
+                               [&](const AnisotropicNdf<PyramidNdf>&) { return pack(asset.get<NdfPyramid>(), normals); },
+                               [&](const AnisotropicNdf<CpNdf>&) { return pack(asset.get<NdfCp>(), normals); },
                                [&](const BinMapNdf&) { return refuse(); }, [&](const HistogramNdf&) { return refuse(); }},
                     opened.model());
 }

@@ -14,7 +14,7 @@ namespace glint::api {
 /// layout, and PackedNdfView for asking it. Same bytes for the same model.
 /// @param normals  map for footprints below level 0; nullptr: left out
 std::vector<std::byte> pack(const NdfPyramid& pyramid, const NormalMap* normals = nullptr);
-std::vector<std::byte> pack(const CompressedNdf& compressed, const NormalMap* normals = nullptr);
+std::vector<std::byte> pack(const NdfCp& compressed, const NormalMap* normals = nullptr);
 /// @param sigma_r  intrinsic roughness that it is asked with, disk units
 std::vector<std::byte> pack(const NormalMap& normals, float sigma_r, Surface surface = Surface::flat,
                             Boundary boundary = Boundary::wrap);

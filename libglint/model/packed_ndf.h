@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "glint/model/compressed_ndf.h"
+#include "glint/model/ndf_cp.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/model/normal_map.h"
 

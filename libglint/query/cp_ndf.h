@@ -1,7 +1,7 @@
 #pragma once
 
 #include "glint/math/bits.h"
-#include "glint/model/compressed_ndf.h"
+#include "glint/model/ndf_cp.h"
 #include "glint/query/detail/common/sampling.h"
 #include "glint/query/detail/compressed/avx2_reader.h"
 #include "glint/query/detail/compressed/cluster_slices.h"
@@ -26,13 +26,13 @@ class CpNdf {
   static constexpr int kMostBlocks = 64 * 64;  // of 1024^2 pixels, the largest image
 
  public:
-  GLINT_HD explicit CpNdf(const CompressedNdf& ndf) : ndf_(ndf), chooser_(ndf.shape) {}
-  GLINT_HD CpNdf(const CompressedNdf& ndf, const NormalMap& normals)
+  GLINT_HD explicit CpNdf(const NdfCp& ndf) : ndf_(ndf), chooser_(ndf.shape) {}
+  GLINT_HD CpNdf(const NdfCp& ndf, const NormalMap& normals)
       : ndf_(ndf),
         chooser_(ndf.shape),
         below_(Reference(normals, ndf.shape.sigma_r, ndf.shape.surface, ndf.shape.boundary, Reference::Search::pruned)) {}
 
-  GLINT_HD const CompressedNdf& compressed() const { return ndf_; }
+  GLINT_HD const NdfCp& ndfCp() const { return ndf_; }
   /// Whether footprints below level 0 are answered from the texels.
   GLINT_HD bool hasNormals() const { return below_.hasMap(); }
   GLINT_HD const PyramidShape& shape() const { return ndf_.shape; }
@@ -100,7 +100,7 @@ class CpNdf {
     return std::size_t{ndf_.first_image[slice.level]} + slice.image;
   }
 
-  /// @param block_place  as in CompressedNdf
+  /// @param block_place  as in NdfCp
   GLINT_HD SlicePlace findSlice(std::size_t image, int block_place) const {
     const std::size_t at =
         static_cast<std::size_t>(ndf_.image_regions.data()[image]) * static_cast<std::size_t>(ndf_.places) + block_place;
@@ -285,7 +285,7 @@ class CpNdf {
   template <class Reader>
   class SliceRows {
    public:
-    GLINT_HD SliceRows(const CompressedNdf& ndf, const Reader& reader, const SlicePlace& at)
+    GLINT_HD SliceRows(const NdfCp& ndf, const Reader& reader, const SlicePlace& at)
         : reader_(reader), cluster_(ndf.clusters.data()[at.cluster]), profile_(ndf) {
       if (cluster_.columns == 0)
         spots_ = spotsOf(ndf, cluster_, at.slice);
@@ -331,7 +331,7 @@ class CpNdf {
   template <class Reader>
   GLINT_HD void choosePixelBy(const Reader& reader, Draw& draw) const;
 
-  CompressedNdf ndf_;
+  NdfCp ndf_;
   SliceChooser chooser_;
   Reference below_;
 };

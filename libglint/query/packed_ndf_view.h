@@ -34,7 +34,7 @@ class PackedNdfView {
   /// Kind pyramid, with its normals if they were packed.
   GLINT_HD PyramidNdf pyramidNdf() const { return hasNormals() ? PyramidNdf(pyramid(), normalMap()) : PyramidNdf(pyramid()); }
   /// Kind compressed, with its normals if they were packed.
-  GLINT_HD CpNdf cpNdf() const { return hasNormals() ? CpNdf(compressed(), normalMap()) : CpNdf(compressed()); }
+  GLINT_HD CpNdf cpNdf() const { return hasNormals() ? CpNdf(ndfCp(), normalMap()) : CpNdf(ndfCp()); }
 
   GLINT_HD NormalMap normalMap() const {
     NormalMap map;
@@ -61,9 +61,9 @@ class PackedNdfView {
     return out;
   }
 
-  GLINT_HD CompressedNdf compressed() const {
+  GLINT_HD NdfCp ndfCp() const {
     const PackedArray* arrays = header_.arrays;
-    CompressedNdf out;
+    NdfCp out;
     out.shape = shape();
     out.method = static_cast<CompressionMethod>(header_.method);
     out.coefficient_type = static_cast<CoefficientType>(header_.element_type);

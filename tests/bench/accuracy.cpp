@@ -113,11 +113,12 @@ class Truth {
 };
 
 const PyramidShape& shapeOf(const formats::Asset& asset) {
-  return asset.kind() == "ndf-cp" ? asset.compressed().shape : asset.pyramid().shape;
+  return asset.kind() == "ndf-cp" ? asset.get<NdfCp>().shape : asset.get<NdfPyramid>().shape;
 }
 
 nlohmann::ordered_json errorsOf(const Truth& truth, const formats::Asset& asset) {
-  return asset.kind() == "ndf-cp" ? truth.errorsOf(CpNdf(asset.compressed())) : truth.errorsOf(PyramidNdf(asset.pyramid()));
+  return asset.kind() == "ndf-cp" ? truth.errorsOf(CpNdf(asset.get<NdfCp>()))
+                                  : truth.errorsOf(PyramidNdf(asset.get<NdfPyramid>()));
 }
 
 bool sameGrid(const PyramidShape& a, const PyramidShape& b) {
@@ -128,7 +129,7 @@ bool sameGrid(const PyramidShape& a, const PyramidShape& b) {
 
 nlohmann::ordered_json measure(const std::string& normals_path, const std::vector<std::string>& paths, int samples) {
   const formats::Asset normals = formats::Asset::open(normals_path);
-  const NormalMap& map = normals.normals();
+  const NormalMap& map = normals.get<NormalMap>();
   std::vector<formats::Asset> assets;
   nlohmann::ordered_json result = nlohmann::ordered_json::array();
   for (const std::string& path : paths) {

@@ -307,15 +307,15 @@ int main(int argc, char** argv) {
       addOpenBenchmark(path, name);
       const formats::Asset& asset = assets.emplace_back(formats::Asset::open(path));
       if (asset.kind() == "ndf-cp")
-        models.emplace_back(CpNdf(asset.compressed()));
+        models.emplace_back(CpNdf(asset.get<NdfCp>()));
       else
-        models.emplace_back(PyramidNdf(asset.pyramid()));
+        models.emplace_back(PyramidNdf(asset.get<NdfPyramid>()));
       std::visit(
           [&](const auto& model) {
             const PyramidShape& shape = model.shape();
             const float finest = finestSigma(shape),
                         coarsest = kFootprintPerStride * shape.levels[shape.level_count - 1].stride;
-            addModelBenchmarks(name, model, queries.emplace_back(randomQueries(normals.normals(), finest, coarsest)));
+            addModelBenchmarks(name, model, queries.emplace_back(randomQueries(normals.get<NormalMap>(), finest, coarsest)));
           },
           models.back());
     }

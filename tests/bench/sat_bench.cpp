@@ -102,7 +102,7 @@ int main(int argc, char** argv) try {
   nlohmann::json assets = nlohmann::json::array();
   for (int k = 1; k < argc; ++k) {
     const formats::Asset asset = formats::Asset::open(argv[k]);
-    const HistogramSat& sat = asset.histograms();
+    const HistogramSat& sat = asset.get<HistogramSat>();
     assets.push_back({{"asset", argv[k]},
                       {"file_bytes", std::filesystem::file_size(argv[k])},
                       {"stride_texels", sat.stride},

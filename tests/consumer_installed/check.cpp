@@ -16,7 +16,7 @@ int main(int argc, char** argv) try {
   const glint::Vec2 half = {0.1f, -0.05f};
   const float density = std::visit([&](const auto& model) { return model.density(footprint, half); }, opened.model());
   const auto asset = glint::formats::Asset::open(argv[1]);
-  const float typed = asset.kind() == "ndf-cp" ? glint::CpNdf(asset.compressed()).density(footprint, half) : density;
+  const float typed = asset.kind() == "ndf-cp" ? glint::CpNdf(asset.get<glint::NdfCp>()).density(footprint, half) : density;
 
   glint_ndf* ndf = nullptr;
   float c_density = -1;

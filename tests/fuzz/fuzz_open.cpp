@@ -74,7 +74,7 @@ bool opensAsset(const std::uint8_t* data, std::size_t size) {
     // Data checks evaluate every block and cluster, through the same indices as queries.
     formats::validateAsset(filePath());
     if (asset.kind() == "displacement") {
-      ask(asset.displacement());
+      ask(asset.get<Displacement>());
     } else if (asset.kind() != "heights" && !asset.kind().starts_with("sh-")) {
       ask(api::OpenedNdf::open(filePath()).model());
     }

@@ -49,7 +49,7 @@ TEST(HugeBinMap, WeightsOf268MillionTexelsEqualBruteForce) {
     const formats::Asset asset = formats::Asset::open(path, {.verify_hashes = true});
     for (const formats::Finding& finding : formats::validateAsset(path).findings)
       ADD_FAILURE() << finding.rule << finding.message;
-    const BinMapNdf ndf(asset.binMap());
+    const BinMapNdf ndf(asset.get<BinMap>());
     EXPECT_LT(std::filesystem::file_size(path), 6 * normals.size());
     std::mt19937 random(3);
     const auto unit = [&] { return static_cast<float>(random() >> 8) * 0x1p-24f; };

@@ -30,7 +30,7 @@ class Assets {
     formats::writeAsset(path("normals"), normals.map, sampleProvenance());
     const auto pyramid = samplePyramid(kSize, BlockPrecision::f16);
     formats::writeAsset(path("ndf-pyramid"), pyramid.pyramid, sampleProvenance());
-    const auto compressed = sampleCompressed(kSize, CompressionMethod::cp, CoefficientType::i8);
+    const auto compressed = sampleNdfCp(kSize, CompressionMethod::cp, CoefficientType::i8);
     formats::writeAsset(path("ndf-cp"), compressed.ndf, sampleProvenance());
     formats::writeAsset(path("bin-map"), sampleBinMap(kSize, kSize).map, sampleProvenance());
     formats::writeAsset(path("histogram-sat"), sampleHistograms(kSize, kSize).sat, sampleProvenance());

@@ -171,7 +171,7 @@ std::vector<double> basisSums(CompressionMethod method) {
 int columnsOf(CompressionMethod method) { return method == CompressionMethod::tucker ? 4 : 3; }
 
 /// Adds the coefficients of one cluster, [slices][columns], and its scales.
-void addCoefficients(SampleCompressed& sample, const std::vector<std::vector<double>>& slices, std::size_t narrow) {
+void addCoefficients(SampleNdfCp& sample, const std::vector<std::vector<double>>& slices, std::size_t narrow) {
   const CompressionMethod method = sample.ndf.method;
   const double unit = method == CompressionMethod::pca ? kBasisUnit : kBasisUnit * kBasisUnit;
   const auto columns = static_cast<std::size_t>(columnsOf(method));
@@ -207,7 +207,7 @@ void addCoefficients(SampleCompressed& sample, const std::vector<std::vector<dou
 }
 
 /// Every slice as a spot that holds half of it, at a place of its own, and an even rest.
-void addSpotSlices(SampleCompressed& sample, const std::vector<double>& means) {
+void addSpotSlices(SampleNdfCp& sample, const std::vector<double>& means) {
   auto& bytes = sample.coefficients_i8;
   const auto append = [&](const auto& value) {
     const auto* first = reinterpret_cast<const std::int8_t*>(&value);
@@ -230,11 +230,11 @@ void addSpotSlices(SampleCompressed& sample, const std::vector<double>& means) {
                    static_cast<std::uint16_t>(std::lround(65535 * means[s] / most))});
 }
 
-std::uint64_t coefficientCount(const SampleCompressed& sample) {
+std::uint64_t coefficientCount(const SampleNdfCp& sample) {
   return sample.coefficients_i8.size() + sample.coefficients_f16.size() + sample.coefficients_f32.size();
 }
 
-void addBasis(SampleCompressed& sample) {
+void addBasis(SampleNdfCp& sample) {
   for (const double sum : basisSums(sample.ndf.method)) {
     if (sample.ndf.coefficient_type == CoefficientType::f32) {
       sample.basis_f32.push_back(static_cast<float>(sum));
@@ -246,7 +246,7 @@ void addBasis(SampleCompressed& sample) {
   }
 }
 
-void addCluster(SampleCompressed& sample, const std::vector<const Image*>& slots, int block, SampleForm form) {
+void addCluster(SampleNdfCp& sample, const std::vector<const Image*>& slots, int block, SampleForm form) {
   NdfCluster cluster;
   if (form == SampleForm::spots) sample.coefficients_i8.resize((sample.coefficients_i8.size() + 3) / 4 * 4);
   cluster.first_basis = static_cast<std::uint32_t>(sample.basis_i16.size() + sample.basis_i32.size() + sample.basis_f32.size());
@@ -284,8 +284,8 @@ void addCluster(SampleCompressed& sample, const std::vector<const Image*>& slots
   sample.mask_ranks.push_back(0);
 }
 
-void linkSpans(SampleCompressed& sample) {
-  CompressedNdf& ndf = sample.ndf;
+void linkSpans(SampleNdfCp& sample) {
+  NdfCp& ndf = sample.ndf;
   ndf.image_regions = sample.image_regions;
   ndf.image_slots = sample.image_slots;
   ndf.image_scales = sample.image_scales;
@@ -311,13 +311,13 @@ void linkSpans(SampleCompressed& sample) {
   ndf.coefficient_count = coefficientCount(sample);
 }
 
-double basisElement(const CompressedNdf& ndf, std::uint64_t index) {
+double basisElement(const NdfCp& ndf, std::uint64_t index) {
   if (ndf.coefficient_type == CoefficientType::f32) return static_cast<const float*>(ndf.basis)[index];
   if (ndf.method == CompressionMethod::pca) return static_cast<const std::int32_t*>(ndf.basis)[index];
   return static_cast<const std::int16_t*>(ndf.basis)[index];
 }
 
-double coefficientElement(const CompressedNdf& ndf, std::uint64_t index) {
+double coefficientElement(const NdfCp& ndf, std::uint64_t index) {
   switch (ndf.coefficient_type) {
     case CoefficientType::i8:
       return static_cast<const std::int8_t*>(ndf.coefficients)[index];
@@ -329,7 +329,7 @@ double coefficientElement(const CompressedNdf& ndf, std::uint64_t index) {
 }
 
 /// Value of a column's basis image at a pixel of its block: differences of the prefix sums.
-double basisValue(const CompressedNdf& ndf, const NdfCluster& cluster, int column, int x, int y) {
+double basisValue(const NdfCp& ndf, const NdfCluster& cluster, int column, int x, int y) {
   const auto sum = [&](std::uint64_t index) { return basisElement(ndf, cluster.first_basis + index); };
   const auto at = [&](std::uint64_t first, int rank, int t, int c) {
     const auto here = sum(first + static_cast<std::uint64_t>(t * rank + c));
@@ -353,7 +353,7 @@ double basisValue(const CompressedNdf& ndf, const NdfCluster& cluster, int colum
   }
 }
 
-double coefficientValue(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t slice, int column) {
+double coefficientValue(const NdfCp& ndf, const NdfCluster& cluster, std::uint64_t slice, int column) {
   const std::uint64_t row = cluster.first_coefficient + slice * static_cast<std::uint64_t>(rowElements(cluster));
   const int narrow = column - (cluster.columns - cluster.narrow_columns);
   if (narrow < 0) return coefficientElement(ndf, row + static_cast<std::uint64_t>(column));
@@ -365,7 +365,7 @@ double coefficientValue(const CompressedNdf& ndf, const NdfCluster& cluster, std
 }
 
 /// Density of a slice of spots at a pixel of its block. The samples have one spot in each.
-double spotValue(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t slice, int x, int y) {
+double spotValue(const NdfCp& ndf, const NdfCluster& cluster, std::uint64_t slice, int x, int y) {
   const auto* bytes = static_cast<const std::uint8_t*>(ndf.coefficients) + cluster.first_coefficient;
   const NdfSpot spot = reinterpret_cast<const NdfSpot*>(bytes + firstSpotOffset(cluster.slice_count))[slice];
   const auto share = [&](int pixel, int place) {
@@ -378,8 +378,8 @@ double spotValue(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint6
 }
 
 /// The share of each block in the positive part of its image, rounded up to a code: the first that is not below.
-void addBlockMasses(SampleCompressed& sample) {
-  const CompressedNdf& ndf = sample.ndf;
+void addBlockMasses(SampleNdfCp& sample) {
+  const NdfCp& ndf = sample.ndf;
   const int blocks = ndf.shape.blocksPerImage();
   sample.first_block.push_back(0);
   for (std::size_t image = 0; image < sample.image_scales.size(); ++image) {
@@ -387,7 +387,7 @@ void addBlockMasses(SampleCompressed& sample) {
     double total = 0;
     for (int p = 0; p < kResolution * kResolution; ++p) {
       const int x = p % kResolution, y = p / kResolution;
-      const double value = std::max(0.0f, compressedPixel(ndf, static_cast<int>(image), x, y)) / sample.image_scales[image];
+      const double value = std::max(0.0f, ndfCpPixel(ndf, static_cast<int>(image), x, y)) / sample.image_scales[image];
       sums[static_cast<std::size_t>(y / kBlockSize * ndf.shape.blocksPerAxis() + x / kBlockSize)] += value;
       total += value;
     }
@@ -526,10 +526,10 @@ SamplePyramid samplePyramid(int size, BlockPrecision precision) {
   return sample;
 }
 
-SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type, SampleForm form) {
-  SampleCompressed sample;
+SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type, SampleForm form) {
+  SampleNdfCp sample;
   const SampleNormals normals = sampleNormals(size, size, false);
-  CompressedNdf& ndf = sample.ndf;
+  NdfCp& ndf = sample.ndf;
   ndf.shape = sampleShape(size);
   ndf.method = method;
   ndf.coefficient_type = type;
@@ -572,7 +572,7 @@ SampleCompressed sampleCompressed(int size, CompressionMethod method, Coefficien
   for (std::size_t k = 0; k < images.size(); ++k) {
     double sum = 0;
     for (int p = 0; p < kResolution * kResolution; ++p)
-      sum += compressedPixel(ndf, static_cast<int>(k), p % kResolution, p / kResolution);
+      sum += ndfCpPixel(ndf, static_cast<int>(k), p % kResolution, p / kResolution);
     sample.image_scales[k] = static_cast<float>(kResolution * kResolution / 4 / sum);
   }
   addBlockMasses(sample);
@@ -819,7 +819,7 @@ float pyramidPixel(const NdfPyramid& pyramid, int level, int image, int x, int y
   return pyramid.value_scale * stored;
 }
 
-float compressedPixel(const CompressedNdf& ndf, int image, int x, int y) {
+float ndfCpPixel(const NdfCp& ndf, int image, int x, int y) {
   const auto k = static_cast<std::size_t>(image);
   const int block = y / kBlockSize * ndf.shape.blocksPerAxis() + x / kBlockSize;
   const auto c =

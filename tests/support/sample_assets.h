@@ -49,7 +49,7 @@ struct SamplePyramid {
   NdfPyramid pyramid;
 };
 
-struct SampleCompressed {
+struct SampleNdfCp {
   std::vector<std::uint16_t> image_regions;
   std::vector<std::uint16_t> image_slots;
   std::vector<float> image_scales;
@@ -71,7 +71,7 @@ struct SampleCompressed {
   std::vector<std::uint16_t> block_places;
   std::vector<std::uint16_t> place_blocks;
   std::vector<float> spot_sums;
-  CompressedNdf ndf;
+  NdfCp ndf;
 };
 
 /// How the slices of a sample with coefficients of i8 are stored.
@@ -119,7 +119,7 @@ SampleDisplacement sampleDisplacement(int size, bool colored = false);
 /// NDF images of sampleNormals(size, size) at strides size/4, size/2 and size, 64^2 pixels, sigma_r 0.05.
 SamplePyramid samplePyramid(int size, BlockPrecision precision);
 /// The same images, each block approximated by a constant and slopes; two regions.
-SampleCompressed sampleCompressed(int size, CompressionMethod method, CoefficientType type, SampleForm form = SampleForm::wide);
+SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type, SampleForm form = SampleForm::wide);
 
 /// sampleNormals(width, height) in 9 x 9 bins; lists of more than 64 texels have grids of 4 cells. Every second bin starts a
 /// class.
@@ -138,6 +138,6 @@ float halfToFloat(std::uint16_t bits);
 
 /// Pixel (x, y) of an image, read as SPEC.md says.
 float pyramidPixel(const NdfPyramid& pyramid, int level, int image, int x, int y);
-float compressedPixel(const CompressedNdf& ndf, int image, int x, int y);
+float ndfCpPixel(const NdfCp& ndf, int image, int x, int y);
 
 }  // namespace glint::test

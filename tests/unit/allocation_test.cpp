@@ -61,7 +61,7 @@ TEST(Queries, AllocateNothing) {
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     bake::CompressionOptions o;
     o.method = method;
-    const bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), o);
+    const bake::NdfCpData data = bake::compressPyramid(pyramid.view(), o);
     expectNoAllocation(CpNdf(data.view()));
   }
 }

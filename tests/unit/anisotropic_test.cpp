@@ -301,7 +301,7 @@ TEST(AnisotropicNdf, AnswersCompressedModelsAlike) {
   const Baked baked(bake::SynthKind::flakes, 8);
   bake::CompressionOptions options;
   options.tolerance = 0.05;
-  const bake::CompressedNdfData data = bake::compressPyramid(baked.pyramid.view(), options);
+  const bake::NdfCpData data = bake::compressPyramid(baked.pyramid.view(), options);
   const CpNdf round(data.view(), baked.map.map());
   const AnisotropicNdf ndf(round);
   const Footprint p = Random(6).stretched(40, 5);

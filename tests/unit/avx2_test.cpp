@@ -43,7 +43,7 @@ std::vector<float> projectionOf(const Reader& reader, const NdfCluster& cluster,
 }
 
 template <class Reader>
-void expectReadersAgree(const CompressedNdf& ndf, const Reader& reader, Compared& compared) {
+void expectReadersAgree(const NdfCp& ndf, const Reader& reader, Compared& compared) {
   const typename Reader::Avx2 avx2(reader);
   std::mt19937 random(1);
   for (const NdfCluster& cluster : ndf.clusters) {
@@ -99,7 +99,7 @@ TEST(Avx2Reader, ReadsClustersOfAnyRank) {
         c.coefficient_type = type;
         c.rank = rank;
         c.regions = 2;
-        const bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), c);
+        const bake::NdfCpData data = bake::compressPyramid(pyramid.view(), c);
         Compared compared;
         withReader(data.view(), [&](const auto& reader) { expectReadersAgree(data.view(), reader, compared); });
         EXPECT_GE(compared.columns, std::min(rank, 8));
@@ -121,7 +121,7 @@ TEST(Avx2Reader, ReadsNarrowColumns) {
       bake::CompressionOptions c;
       c.method = method;
       c.tolerance = tolerance;
-      const bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), c);
+      const bake::NdfCpData data = bake::compressPyramid(pyramid.view(), c);
       withReader(data.view(), [&](const auto& reader) { expectReadersAgree(data.view(), reader, compared); });
     }
     EXPECT_GE(compared.narrow, 17);  // more than eight in each half
@@ -214,8 +214,8 @@ TEST(Avx2Reader, MakesNumbersOfWhatIsNone) {
     c.method = method;
     c.coefficient_type = CoefficientType::f16;
     c.rank = 9;
-    const bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), c);
-    CompressedNdf ndf = data.view();
+    const bake::NdfCpData data = bake::compressPyramid(pyramid.view(), c);
+    NdfCp ndf = data.view();
     for (const std::uint16_t bits : kNoNumbers) {
       const std::vector<std::uint16_t> coefficients(1 << 20, bits);
       ndf.coefficients = coefficients.data();

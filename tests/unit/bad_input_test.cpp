@@ -44,7 +44,7 @@ void forEachModel(Visitor&& visitor) {
     visitor(AnisotropicNdf<PyramidNdf>(round), "AnisotropicNdf");
   }
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
-    const auto compressed = test::sampleCompressed(kSize, method, CoefficientType::i8);
+    const auto compressed = test::sampleNdfCp(kSize, method, CoefficientType::i8);
     visitor(CpNdf(compressed.ndf), "CpNdf");
     visitor(CpNdf(compressed.ndf, map.map), "CpNdf with texels");
   }
@@ -122,7 +122,7 @@ void forEachSpoiledModel(float bad, std::uint16_t bad_half, Visitor&& visitor) {
   }
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     for (const auto type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
-      auto compressed = test::sampleCompressed(kSize, method, type);
+      auto compressed = test::sampleNdfCp(kSize, method, type);
       spoil(compressed.basis_f32, bad);
       spoil(compressed.coefficients_f32, bad);
       spoil(compressed.coefficients_f16, bad_half);

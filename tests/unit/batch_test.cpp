@@ -129,13 +129,13 @@ TEST(Batch, DensitiesOfCompressedPyramidsAreThoseOfSingleQueries) {
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     for (const auto type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
       SCOPED_TRACE("method " + std::to_string(int(method)) + " type " + std::to_string(int(type)));
-      const auto sample = test::sampleCompressed(kSize, method, type);
+      const auto sample = test::sampleNdfCp(kSize, method, type);
       expectBatchesEqualSingleQueries(CpNdf(sample.ndf));
     }
   }
   for (const auto form : {test::SampleForm::narrow, test::SampleForm::spots}) {
     SCOPED_TRACE("form " + std::to_string(int(form)));
-    const auto sample = test::sampleCompressed(kSize, CompressionMethod::tucker, CoefficientType::i8, form);
+    const auto sample = test::sampleNdfCp(kSize, CompressionMethod::tucker, CoefficientType::i8, form);
     expectBatchesEqualSingleQueries(CpNdf(sample.ndf));
   }
 }
@@ -147,7 +147,7 @@ TEST(Batch, WhatEmptyClustersSayIsNotFollowed) {
     bake::CompressionOptions c;
     c.method = method;
     c.regions = 8;
-    bake::CompressedNdfData data = bake::compressPyramid(pyramid.view(), c);
+    bake::NdfCpData data = bake::compressPyramid(pyramid.view(), c);
     int empty = 0;
     for (NdfCluster& cluster : data.clusters) {
       if (cluster.slice_count > 0) continue;
@@ -166,7 +166,7 @@ TEST(Batch, FootprintsBelowTheFinestLevelAreAnsweredFromTheTexels) {
   const auto map = test::sampleNormals(kSize, kSize);
   const auto pyramid = test::samplePyramid(kSize, BlockPrecision::f16);
   expectBatchesEqualSingleQueries(PyramidNdf(pyramid.pyramid, map.map), 60);
-  const auto compressed = test::sampleCompressed(kSize, CompressionMethod::cp, CoefficientType::i8);
+  const auto compressed = test::sampleNdfCp(kSize, CompressionMethod::cp, CoefficientType::i8);
   expectBatchesEqualSingleQueries(CpNdf(compressed.ndf, map.map), 60);
 }
 

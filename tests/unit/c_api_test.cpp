@@ -328,7 +328,7 @@ TEST(CApi, OptionsOfHistogramsReachTheModel) {
 
 TEST(CApi, StretchedFootprintsAreAskedAsSeveralRoundOnes) {
   const formats::Asset asset = formats::Asset::open(assets().path("ndf-pyramid"));
-  const PyramidNdf round(asset.pyramid());
+  const PyramidNdf round(asset.get<NdfPyramid>());
   const AnisotropicNdf<PyramidNdf> stretched(round);
   glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
   options.footprint_parts = 1;

@@ -68,11 +68,11 @@ struct Directions {
 /// The masking that C++ programs take of the same asset.
 SmithMasking maskingOf(const api::OpenedNdf& opened, const std::string& kind) {
   const formats::Asset& asset = opened.asset();
-  if (kind == "ndf-pyramid") return {asset.pyramid().shape.slopes, asset.pyramid().shape.sigma_r};
-  if (kind == "ndf-cp") return {asset.compressed().shape.slopes, asset.compressed().shape.sigma_r};
-  if (kind == "bin-map") return {asset.binMap().slopes, BinMapNdf(asset.binMap()).sigma()};
-  if (kind == "histogram-sat") return {asset.histograms().slopes, 0};
-  return {bake::mapSlopes(asset.normals()), 0.005f};
+  if (kind == "ndf-pyramid") return {asset.get<NdfPyramid>().shape.slopes, asset.get<NdfPyramid>().shape.sigma_r};
+  if (kind == "ndf-cp") return {asset.get<NdfCp>().shape.slopes, asset.get<NdfCp>().shape.sigma_r};
+  if (kind == "bin-map") return {asset.get<BinMap>().slopes, BinMapNdf(asset.get<BinMap>()).sigma()};
+  if (kind == "histogram-sat") return {asset.get<HistogramSat>().slopes, 0};
+  return {bake::mapSlopes(asset.get<NormalMap>()), 0.005f};
 }
 
 /// The builders sum slopes on several threads and with other instructions: rounding of floats.

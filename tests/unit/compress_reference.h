@@ -6,7 +6,7 @@
 #include <cstring>
 #include <vector>
 
-#include "glint/model/compressed_ndf.h"
+#include "glint/model/ndf_cp.h"
 
 namespace glint::test {
 
@@ -19,20 +19,20 @@ inline double decodeHalf(std::uint16_t bits) {
 }
 
 /// Element of an array that is stored as the first type that applies.
-inline double basisElement(const CompressedNdf& c, std::uint64_t i) {
+inline double basisElement(const NdfCp& c, std::uint64_t i) {
   if (c.coefficient_type == CoefficientType::f32) return static_cast<const float*>(c.basis)[i];
   if (c.method == CompressionMethod::pca) return static_cast<const std::int32_t*>(c.basis)[i];
   return static_cast<const std::int16_t*>(c.basis)[i];
 }
 
-inline double coefficientElement(const CompressedNdf& c, std::uint64_t i) {
+inline double coefficientElement(const NdfCp& c, std::uint64_t i) {
   if (c.coefficient_type == CoefficientType::f32) return static_cast<const float*>(c.coefficients)[i];
   if (c.coefficient_type == CoefficientType::f16) return decodeHalf(static_cast<const std::uint16_t*>(c.coefficients)[i]);
   return static_cast<const std::int8_t*>(c.coefficients)[i];
 }
 
 /// Value of basis column k at a pixel, in stored units: differences of the prefix sums.
-inline double basisValue(const CompressedNdf& c, const NdfCluster& cluster, int k, int x, int y) {
+inline double basisValue(const NdfCp& c, const NdfCluster& cluster, int k, int x, int y) {
   const auto along = [&](std::uint64_t first, int columns, int column, int i) {
     const double before = i > 0 ? basisElement(c, first + static_cast<std::uint64_t>(i - 1) * columns + column) : 0;
     return basisElement(c, first + static_cast<std::uint64_t>(i) * columns + column) - before;
@@ -52,7 +52,7 @@ inline double basisValue(const CompressedNdf& c, const NdfCluster& cluster, int 
 }
 
 /// Coefficient k of a slice.
-inline double coefficientValue(const CompressedNdf& c, const NdfCluster& cluster, int slice, int k) {
+inline double coefficientValue(const NdfCp& c, const NdfCluster& cluster, int slice, int k) {
   const int wide = cluster.columns - cluster.narrow_columns, half = (cluster.narrow_columns + 1) / 2;
   const std::uint64_t row = cluster.first_coefficient + static_cast<std::uint64_t>(slice) * (wide + half);
   if (k < wide) return coefficientElement(c, row + k);
@@ -63,7 +63,7 @@ inline double coefficientValue(const CompressedNdf& c, const NdfCluster& cluster
 }
 
 /// Pixel of a slice of spots, before its image's scale.
-inline double spotValue(const CompressedNdf& c, const NdfCluster& cluster, int slice, int x, int y) {
+inline double spotValue(const NdfCp& c, const NdfCluster& cluster, int slice, int x, int y) {
   const auto* bytes = static_cast<const std::uint8_t*>(c.coefficients) + cluster.first_coefficient;
   const std::uint8_t* counts = bytes + spotCountsOffset(cluster.slice_count);
   const auto* spots = reinterpret_cast<const NdfSpot*>(bytes + firstSpotOffset(cluster.slice_count));
@@ -80,8 +80,8 @@ inline double spotValue(const CompressedNdf& c, const NdfCluster& cluster, int s
   return sum * c.scales[cluster.first_scale] + rest * c.scales[cluster.first_scale + 1];
 }
 
-/// All pixels of an image, [resolution][resolution], densities. Plain loops after the comments of compressed_ndf.h.
-inline std::vector<double> decodeImage(const CompressedNdf& c, std::uint32_t image) {
+/// All pixels of an image, [resolution][resolution], densities. Plain loops after the comments of ndf_cp.h.
+inline std::vector<double> decodeImage(const NdfCp& c, std::uint32_t image) {
   const int n = c.shape.resolution;
   const int blocks = c.shape.blocksPerAxis();
   std::vector<double> pixels(static_cast<std::size_t>(n) * n, 0.0);

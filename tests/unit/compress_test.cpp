@@ -50,7 +50,7 @@ struct Measured {
 };
 
 /// Error and energy of the decoded data, by the slow decoder.
-Measured measure(const NdfPyramid& pyramid, const CompressedNdf& compressed) {
+Measured measure(const NdfPyramid& pyramid, const NdfCp& compressed) {
   Measured result;
   double errors = 0, energies = 0;
   for (int l = 0; l < pyramid.shape.level_count; ++l) {
@@ -332,7 +332,7 @@ TEST(Compress, TakesAPyramidOfZeros) {
 
 TEST(Compress, PutsImagesInTheRegionOfTheirLevelAndCentre) {
   const auto data = compressPyramid(noise().view(), options(CompressionMethod::tucker, CoefficientType::i8, 4, 3));
-  const CompressedNdf c = data.view();
+  const NdfCp c = data.view();
   std::vector<int> next(27, 0);
   for (int l = 0; l < c.shape.level_count; ++l) {
     const PyramidGrid& grid = c.shape.levels[l];
@@ -350,7 +350,7 @@ TEST(Compress, PutsImagesInTheRegionOfTheirLevelAndCentre) {
 TEST(Compress, StoresIntegersOfTwelveBits) {
   for (const auto method : kMethods) {
     const auto data = compressPyramid(noise().view(), options(method));
-    const CompressedNdf c = data.view();
+    const NdfCp c = data.view();
     int checked = 0;
     for (const NdfCluster& cluster : c.clusters) {
       const int columns = method == CompressionMethod::tucker ? 0 : cluster.columns;

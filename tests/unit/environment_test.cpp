@@ -135,7 +135,7 @@ struct RoughMap {
   SmithMasking masking() const { return SmithMasking(pyramid.shape.slopes, pyramid.shape.sigma_r); }
   test::OwnedMap map;
   bake::NdfPyramidData pyramid;
-  bake::CompressedNdfData compressed;
+  bake::NdfCpData compressed;
 };
 
 const RoughMap& roughMap() {

@@ -92,7 +92,7 @@ TEST(AssetRoundTrip, NormalsComeBackBitExact) {
     writeAsset(folder / "a.glint", sample.map, test::sampleProvenance(), {.overwrite = true});
     const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
     EXPECT_EQ(asset.kind(), "normals");
-    const NormalMap& map = asset.normals();
+    const NormalMap& map = asset.get<NormalMap>();
     EXPECT_EQ(map.width, width);
     EXPECT_EQ(map.height, height);
     EXPECT_EQ(map.texel_size_um, 2.5f);
@@ -112,9 +112,9 @@ TEST(AssetRoundTrip, HeightsComeBackBitExact) {
   const auto sample = test::sampleHeights(31, 7);
   writeAsset(folder / "a.glint", sample.map, test::sampleProvenance());
   const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
-  EXPECT_EQ(asset.heights().width, 31);
-  EXPECT_EQ(asset.heights().height, 7);
-  expectSame(asset.heights().heights, sample.map.heights);
+  EXPECT_EQ(asset.get<HeightMap>().width, 31);
+  EXPECT_EQ(asset.get<HeightMap>().height, 7);
+  expectSame(asset.get<HeightMap>().heights, sample.map.heights);
   EXPECT_TRUE(validateAsset(folder / "a.glint").findings.empty());
 }
 
@@ -124,7 +124,7 @@ TEST(AssetRoundTrip, DisplacementsComeBackBitExact) {
     const auto sample = test::sampleDisplacement(32, colored);
     writeAsset(folder / "a.glint", sample.displacement, test::sampleProvenance(), {.overwrite = true});
     const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
-    const Displacement& d = asset.displacement();
+    const Displacement& d = asset.get<Displacement>();
     EXPECT_EQ(std::tuple(d.width, d.height, d.texel_size_um, d.lobe_count, d.angular, d.level_count),
               std::tuple(32, 16, 2.5f, 2, 3, 2));
     EXPECT_EQ(d.base.kind, BaseBrdf::Kind::ggx);
@@ -157,7 +157,7 @@ TEST(AssetRoundTrip, PyramidsComeBackBitExact) {
     const auto sample = test::samplePyramid(32, precision);
     writeAsset(folder / "a.glint", sample.pyramid, test::sampleProvenance(), {.overwrite = true});
     const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
-    const NdfPyramid& pyramid = asset.pyramid();
+    const NdfPyramid& pyramid = asset.get<NdfPyramid>();
     expectSame(pyramid.shape, sample.pyramid.shape);
     EXPECT_EQ(pyramid.precision, precision);
     EXPECT_EQ(pyramid.value_scale, 4);
@@ -181,7 +181,7 @@ TEST(AssetRoundTrip, HistogramsComeBackBitExact) {
     writeAsset(folder / "a.glint", sample.sat, test::sampleProvenance(), {.overwrite = true});
     const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
     EXPECT_EQ(asset.kind(), "histogram-sat");
-    const HistogramSat& sat = asset.histograms();
+    const HistogramSat& sat = asset.get<HistogramSat>();
     EXPECT_EQ(sat.width, width);
     EXPECT_EQ(sat.height, height);
     EXPECT_EQ(sat.theta_bins, 12);
@@ -212,10 +212,10 @@ TEST(AssetRoundTrip, CompressedPyramidsOfEveryMethodAndTypeComeBackBitExact) {
                                      {CoefficientType::i8, test::SampleForm::spots},
                                      {CoefficientType::f16, test::SampleForm::wide},
                                      {CoefficientType::f32, test::SampleForm::wide}}) {
-      const auto sample = test::sampleCompressed(32, method, type, form);
+      const auto sample = test::sampleNdfCp(32, method, type, form);
       writeAsset(folder / "a.glint", sample.ndf, test::sampleProvenance(), {.overwrite = true});
       const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
-      const CompressedNdf& ndf = asset.compressed();
+      const NdfCp& ndf = asset.get<NdfCp>();
       expectSame(ndf.shape, sample.ndf.shape);
       EXPECT_EQ(ndf.method, method);
       EXPECT_EQ(ndf.coefficient_type, type);
@@ -254,7 +254,7 @@ TEST(AssetRoundTrip, BinMapsComeBackBitExact) {
     const auto sample = test::sampleBinMap(width, height);
     writeAsset(folder / "a.glint", sample.map, test::sampleProvenance(), {.overwrite = true});
     const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
-    const BinMap& map = asset.binMap();
+    const BinMap& map = asset.get<BinMap>();
     EXPECT_EQ(std::tuple(map.width, map.height, map.alpha, map.bins_per_axis, map.leaf_size),
               std::tuple(width, height, sample.map.alpha, sample.map.bins_per_axis, sample.map.leaf_size));
     EXPECT_EQ(std::tuple(map.alpha_min, map.alpha_max), std::tuple(sample.map.alpha_min, sample.map.alpha_max));
@@ -280,25 +280,25 @@ TEST(AssetRoundTrip, SphericalHarmonicsComeBackBitExact) {
   const test::SampleShLobes lobes = test::sampleShLobes();
   writeAsset(folder / "lobes.glint", lobes.lobes, test::sampleProvenance());
   const Asset lobes_back = Asset::open(folder / "lobes.glint");
-  EXPECT_EQ(lobes_back.shLobes().order, 1);
-  EXPECT_EQ(lobes_back.shLobes().sigma_r, 0.1f);
-  EXPECT_EQ(lobes_back.shLobes().grid.columns, 4);
-  EXPECT_EQ(lobes_back.shLobes().precision, ShPrecision::f32);
-  EXPECT_EQ(std::memcmp(lobes_back.shLobes().coefficients, lobes.coefficients.data(), 4 * lobes.coefficients.size()), 0);
+  EXPECT_EQ(lobes_back.get<ShLobes>().order, 1);
+  EXPECT_EQ(lobes_back.get<ShLobes>().sigma_r, 0.1f);
+  EXPECT_EQ(lobes_back.get<ShLobes>().grid.columns, 4);
+  EXPECT_EQ(lobes_back.get<ShLobes>().precision, ShPrecision::f32);
+  EXPECT_EQ(std::memcmp(lobes_back.get<ShLobes>().coefficients, lobes.coefficients.data(), 4 * lobes.coefficients.size()), 0);
   const test::SampleShLight light = test::sampleShLight();
   writeAsset(folder / "light.glint", light.light, test::sampleProvenance());
   const Asset light_back = Asset::open(folder / "light.glint");
-  EXPECT_EQ(light_back.shLight().precision, ShPrecision::f16);
-  EXPECT_TRUE(std::ranges::equal(light_back.shLight().scales, light.scales));
-  EXPECT_TRUE(std::ranges::equal(light_back.shLight().band_norms, light.band_norms));
-  EXPECT_EQ(std::memcmp(light_back.shLight().coefficients, light.coefficients.data(), 2 * light.coefficients.size()), 0);
+  EXPECT_EQ(light_back.get<ShLight>().precision, ShPrecision::f16);
+  EXPECT_TRUE(std::ranges::equal(light_back.get<ShLight>().scales, light.scales));
+  EXPECT_TRUE(std::ranges::equal(light_back.get<ShLight>().band_norms, light.band_norms));
+  EXPECT_EQ(std::memcmp(light_back.get<ShLight>().coefficients, light.coefficients.data(), 2 * light.coefficients.size()), 0);
 }
 
 TEST(AssetRoundTrip, LobesNeedNoTable) {
   const test::TempFolder folder;
   const std::vector<float> zonal = {0.28f, 0.4f};
   writeAsset(folder / "zonal.glint", ShLobes{1, 0.1f, {}, ShPrecision::f16, zonal, nullptr}, test::sampleProvenance());
-  EXPECT_TRUE(std::ranges::equal(Asset::open(folder / "zonal.glint").shLobes().zonal, zonal));
+  EXPECT_TRUE(std::ranges::equal(Asset::open(folder / "zonal.glint").get<ShLobes>().zonal, zonal));
 }
 
 TEST(AssetRoundTrip, ProvenanceComesBack) {
@@ -329,7 +329,7 @@ TEST(AssetRoundTrip, AskingForAnotherKindNamesBoth) {
   writeAsset(folder / "a.glint", test::sampleHeights(4, 4).map, {});
   const Asset asset = Asset::open(folder / "a.glint");
   try {
-    asset.pyramid();
+    asset.get<NdfPyramid>();
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::unsupported);
@@ -343,11 +343,11 @@ TEST(AssetRoundTrip, MovedAssetsKeepTheirData) {
   const auto sample = test::sampleHeights(9, 9);
   writeAsset(folder / "a.glint", sample.map, {});
   Asset first = Asset::open(folder / "a.glint");
-  const float* data = first.heights().heights.data();
+  const float* data = first.get<HeightMap>().heights.data();
   const Asset second = std::move(first);
-  EXPECT_EQ(second.heights().heights.data(), data);
+  EXPECT_EQ(second.get<HeightMap>().heights.data(), data);
   fs::remove(folder / "a.glint");
-  expectSame(second.heights().heights, sample.map.heights);
+  expectSame(second.get<HeightMap>().heights, sample.map.heights);
 }
 
 TEST(AssetWriter, TwoRunsGiveTheSameBytes) {
@@ -516,7 +516,7 @@ TEST(DamagedAsset, EveryFlippedByteIsFoundByValidation) {
     ++unnoticed;
     // What nobody notices must be a gap between objects: the asset is the same.
     const Asset other = Asset::open(folder / "b.glint", {.verify_hashes = true});
-    expectSame(other.heights().heights, asset.heights().heights);
+    expectSame(other.get<HeightMap>().heights, asset.get<HeightMap>().heights);
     EXPECT_EQ(other.info().provenance, asset.info().provenance);
   }
   EXPECT_LT(unnoticed, static_cast<std::size_t>(kFlips / 2));

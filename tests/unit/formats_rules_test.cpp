@@ -58,17 +58,16 @@ void writeBase(const fs::path& path, Base base) {
     case Base::pyramid:
       return writeAsset(path, test::samplePyramid(32, BlockPrecision::f32).pyramid, provenance);
     case Base::compressed:
-      return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
+      return writeAsset(path, test::sampleNdfCp(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
     case Base::displacement:
       return writeAsset(path, test::sampleDisplacement(32).displacement, provenance);
     case Base::spots:
-      return writeAsset(path,
-                        test::sampleCompressed(32, CompressionMethod::tucker, CoefficientType::i8, test::SampleForm::spots).ndf,
-                        provenance);
+      return writeAsset(
+          path, test::sampleNdfCp(32, CompressionMethod::tucker, CoefficientType::i8, test::SampleForm::spots).ndf, provenance);
     case Base::displacement_rgb:
       return writeAsset(path, test::sampleDisplacement(32, true).displacement, provenance);
     case Base::compressed_f32:
-      return writeAsset(path, test::sampleCompressed(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
+      return writeAsset(path, test::sampleNdfCp(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
     case Base::bin_map:
       return writeAsset(path, test::sampleBinMap(64, 48).map, provenance);
     case Base::histograms:
@@ -435,7 +434,7 @@ std::vector<Fixture> pyramidFixtures() {
   };
 }
 
-std::vector<Fixture> compressedFixtures() {
+std::vector<Fixture> ndfCpFixtures() {
   return {
       patched("compressed.images", Base::compressed,
               [](const Patch& patch) {
@@ -736,7 +735,7 @@ std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
   for (auto list :
        {fileFixtures(), linkFixtures(), attributeFixtures(), storageFixtures(), datasetFixtures(), pyramidFixtures(),
-        compressedFixtures(), dataFixtures(), histogramFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
+        ndfCpFixtures(), dataFixtures(), histogramFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
@@ -886,7 +885,7 @@ TEST(FormatVersions, ANewerMinorIsReadWithAWarning) {
   const Asset asset = Asset::open(folder / "a.glint");
   ASSERT_EQ(asset.info().warnings.size(), 1u);
   EXPECT_THAT(asset.info().warnings[0], testing::HasSubstr("1.9"));
-  EXPECT_EQ(asset.heights().width, static_cast<int>(kSize));
+  EXPECT_EQ(asset.get<HeightMap>().width, static_cast<int>(kSize));
 }
 
 TEST(FormatVersions, ANewerMajorIsRefusedNamingBothVersions) {
@@ -917,31 +916,31 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   const fs::path folder = fs::path(GLINT_SOURCE_DIR) / "tests/golden/v1.0";
   const Asset normals = Asset::open(folder / "normals.glint");
-  EXPECT_EQ(normals.normals().at(5, 3).x, 0.194547504f);
-  EXPECT_EQ(normals.normals().at(63, 47).y, -0.139912933f);
-  EXPECT_EQ(normals.normals().bounds[3].nodes[2].high_x, 0.283465505f);
-  EXPECT_EQ(Asset::open(folder / "heights.glint").heights().heights[3 * 64 + 5], 0.0129489619f);
+  EXPECT_EQ(normals.get<NormalMap>().at(5, 3).x, 0.194547504f);
+  EXPECT_EQ(normals.get<NormalMap>().at(63, 47).y, -0.139912933f);
+  EXPECT_EQ(normals.get<NormalMap>().bounds[3].nodes[2].high_x, 0.283465505f);
+  EXPECT_EQ(Asset::open(folder / "heights.glint").get<HeightMap>().heights[3 * 64 + 5], 0.0129489619f);
   const Asset displacement = Asset::open(folder / "displacement.glint");
-  EXPECT_EQ(displacement.displacement().base.eta, 1.5f);
-  EXPECT_EQ(displacement.displacement().levels[1].lobes[1].amplitude, 0.375f);
-  EXPECT_EQ(displacement.displacement().levels[1].angular_scale[44], 0x3f80);  // 1.875
+  EXPECT_EQ(displacement.get<Displacement>().base.eta, 1.5f);
+  EXPECT_EQ(displacement.get<Displacement>().levels[1].lobes[1].amplitude, 0.375f);
+  EXPECT_EQ(displacement.get<Displacement>().levels[1].angular_scale[44], 0x3f80);  // 1.875
   const Asset colored = Asset::open(folder / "displacement-rgb.glint");
-  EXPECT_EQ(colored.displacement().levels[1].lobe_colors[4], 0.625f);
-  EXPECT_EQ(colored.displacement().levels[1].angular_scale[3 * 44 + 2], 0x3f80);
+  EXPECT_EQ(colored.get<Displacement>().levels[1].lobe_colors[4], 0.625f);
+  EXPECT_EQ(colored.get<Displacement>().levels[1].angular_scale[3 * 44 + 2], 0x3f80);
   const Asset pyramid = Asset::open(folder / "ndf-pyramid.glint");
-  EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 0, 5, 30, 33), 4.3046875f);
-  EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 1, 2, 35, 29), 4.7890625f);
-  EXPECT_EQ(test::pyramidPixel(pyramid.pyramid(), 2, 0, 24, 32), 6.00390625f);
+  EXPECT_EQ(test::pyramidPixel(pyramid.get<NdfPyramid>(), 0, 5, 30, 33), 4.3046875f);
+  EXPECT_EQ(test::pyramidPixel(pyramid.get<NdfPyramid>(), 1, 2, 35, 29), 4.7890625f);
+  EXPECT_EQ(test::pyramidPixel(pyramid.get<NdfPyramid>(), 2, 0, 24, 32), 6.00390625f);
   const Asset histograms = Asset::open(folder / "histogram-sat.glint");
-  const HistogramSat& sat = histograms.histograms();
+  const HistogramSat& sat = histograms.get<HistogramSat>();
   ASSERT_EQ(sat.bin_count, 20);
   EXPECT_EQ(sat.bin_ids[9], 9);
   EXPECT_EQ(sat.bin_totals[9], 3u);
   EXPECT_FLOAT_EQ(sat.bin_normals[9].x, 0.0831450075f);
   EXPECT_EQ(sat.sums[(4 * 7 + 5) * 32 + 9], 1);
   EXPECT_EQ(sat.slopes.covariance.xy, 0.03125f);
-  EXPECT_EQ(static_cast<const float*>(Asset::open(folder / "sh-lobes.glint").shLobes().coefficients)[5 * 4 + 3], 0.4f);
-  EXPECT_EQ(Asset::open(folder / "sh-light.glint").shLight().band_norms[7], 12.2799206f);
+  EXPECT_EQ(static_cast<const float*>(Asset::open(folder / "sh-lobes.glint").get<ShLobes>().coefficients)[5 * 4 + 3], 0.4f);
+  EXPECT_EQ(Asset::open(folder / "sh-light.glint").get<ShLight>().band_norms[7], 12.2799206f);
   struct Recorded {
     const char* file;
     float values[3];
@@ -953,9 +952,9 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
                                    Recorded{"spots-i8", {0.513697445f, 0.513941109f, 0.515995741f}},
                                    Recorded{"cp-f32", {3.49453115f, 3.00421071f, 2.98451018f}}}) {
     const Asset asset = Asset::open(folder / ("ndf-cp-" + std::string(recorded.file) + ".glint"));
-    EXPECT_FLOAT_EQ(test::compressedPixel(asset.compressed(), 5, 30, 33), recorded.values[0]);
-    EXPECT_FLOAT_EQ(test::compressedPixel(asset.compressed(), 18, 35, 29), recorded.values[1]);
-    EXPECT_FLOAT_EQ(test::compressedPixel(asset.compressed(), 20, 24, 32), recorded.values[2]);
+    EXPECT_FLOAT_EQ(test::ndfCpPixel(asset.get<NdfCp>(), 5, 30, 33), recorded.values[0]);
+    EXPECT_FLOAT_EQ(test::ndfCpPixel(asset.get<NdfCp>(), 18, 35, 29), recorded.values[1]);
+    EXPECT_FLOAT_EQ(test::ndfCpPixel(asset.get<NdfCp>(), 20, 24, 32), recorded.values[2]);
   }
 }
 

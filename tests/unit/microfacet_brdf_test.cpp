@@ -252,7 +252,7 @@ class MapModels {
  private:
   test::OwnedMap map_;
   bake::NdfPyramidData pyramid_;
-  bake::CompressedNdfData compressed_;
+  bake::NdfCpData compressed_;
 };
 
 const MapModels& mapModels() {

@@ -116,7 +116,7 @@ TEST(PackedNdf, MovedCompressionsAnswerBitForBit) {
   const auto map = test::sampleNormals(kSize, kSize);
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     for (const auto type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
-      const auto sample = test::sampleCompressed(kSize, method, type);
+      const auto sample = test::sampleNdfCp(kSize, method, type);
       const Relocated alone(api::pack(sample.ndf), 16);
       ASSERT_EQ(PackedNdfView(alone.data()).kind(), PackedKind::compressed);
       expectSameBits(PackedNdfView(alone.data()).cpNdf(), CpNdf(sample.ndf));
@@ -139,12 +139,12 @@ TEST(PackedNdf, MovedNormalsAnswerBitForBit) {
 
 TEST(PackedNdf, HeaderAndArraysMayBeInDifferentMemories) {
   // As with a GPU: the header is read here, and the arrays are at an address that only those who ask can read.
-  const auto sample = test::sampleCompressed(kSize, CompressionMethod::cp, CoefficientType::i8);
+  const auto sample = test::sampleNdfCp(kSize, CompressionMethod::cp, CoefficientType::i8);
   const std::vector<std::byte> buffer = api::pack(sample.ndf);
   PackedHeader header;
   std::memcpy(&header, buffer.data(), sizeof header);
   const void* elsewhere = reinterpret_cast<const void*>(std::uintptr_t{0x10000});
-  const CompressedNdf view = PackedNdfView(header, elsewhere).compressed();
+  const NdfCp view = PackedNdfView(header, elsewhere).ndfCp();
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(view.masks.data()), 0x10000 + header.arrays[4].offset);
   EXPECT_EQ(view.masks.size(), sample.ndf.masks.size());
 }

@@ -32,7 +32,7 @@ TEST(Provenance, NormalsOfAnotherMapAreRefusedForCompressedPyramidsToo) {
   another.normals = changed;
   another.bounds_level_count = 0;
   writeAsset(folder / "another.glint", another, test::sampleProvenance());
-  const auto sample = test::sampleCompressed(64, CompressionMethod::cp, CoefficientType::i8);
+  const auto sample = test::sampleNdfCp(64, CompressionMethod::cp, CoefficientType::i8);
   const Provenance pyramid = {"glint-pyramid", "{}", {{"map.glint", hashFile(folder / "map.glint")}}};
   const Provenance run = chained({"glint-compress", "{}", {{"pyramid.glint", std::string(32, '0')}}}, pyramid);
   writeAsset(folder / "cp.glint", sample.ndf, run);

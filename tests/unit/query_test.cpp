@@ -16,7 +16,7 @@
 namespace glint {
 namespace {
 
-using bake::CompressedNdfData;
+using bake::NdfCpData;
 using bake::NdfPyramidData;
 using test::OwnedMap;
 
@@ -49,8 +49,8 @@ const NdfPyramidData& pyramid(Boundary boundary = Boundary::wrap, BlockPrecision
   return built[key];
 }
 
-const CompressedNdfData& compressed(CompressionMethod method, CoefficientType type) {
-  static std::map<std::pair<CompressionMethod, CoefficientType>, CompressedNdfData> built;
+const NdfCpData& compressed(CompressionMethod method, CoefficientType type) {
+  static std::map<std::pair<CompressionMethod, CoefficientType>, NdfCpData> built;
   const auto key = std::pair{method, type};
   if (!built.contains(key)) {
     bake::CompressionOptions o;
@@ -64,8 +64,8 @@ const CompressedNdfData& compressed(CompressionMethod method, CoefficientType ty
 }
 
 /// With a tolerance: columns of 4 bits.
-const CompressedNdfData& compressedToTolerance(CompressionMethod method) {
-  static std::map<CompressionMethod, CompressedNdfData> built;
+const NdfCpData& compressedToTolerance(CompressionMethod method) {
+  static std::map<CompressionMethod, NdfCpData> built;
   if (!built.contains(method)) {
     bake::CompressionOptions o;
     o.method = method;
@@ -79,8 +79,8 @@ const CompressedNdfData& compressedToTolerance(CompressionMethod method) {
 }
 
 /// A pyramid of few facets, stored as spots.
-const CompressedNdfData& compressedSpots() {
-  static const CompressedNdfData data = [] {
+const NdfCpData& ndfCpSpots() {
+  static const NdfCpData data = [] {
     const OwnedMap flakes(100, 72, test::synthesised(bake::SynthKind::flakes, 100, 72, 0.3f));
     bake::PyramidOptions p;
     p.stride = 16;
@@ -111,7 +111,7 @@ void forEachCompression(Visitor&& visitor) {
     visitor(CpNdf(compressedToTolerance(method).view()), compressedToTolerance(method));
   }
   SCOPED_TRACE("spots");
-  visitor(CpNdf(compressedSpots().view()), compressedSpots());
+  visitor(CpNdf(ndfCpSpots().view()), ndfCpSpots());
 }
 
 class RandomQueries {
@@ -188,7 +188,7 @@ TEST(PyramidNdf, PartsOfPixelsCountByTheirArea) {
 }
 
 TEST(CpNdf, SignedMeanOverPixelsIsTheMeanOfSignedPointQueries) {
-  forEachCompression([](const CpNdf& model, const CompressedNdfData&) {
+  forEachCompression([](const CpNdf& model, const NdfCpData&) {
     RandomQueries random(3);
     int negative = 0;
     for (int k = 0; k < 60; ++k) {
@@ -209,8 +209,8 @@ TEST(CpNdf, SignedMeanOverPixelsIsTheMeanOfSignedPointQueries) {
 
 TEST(CpNdf, EqualsASlowDecoderAtItsCentres) {
   constexpr double kFactorError = 1e-5;  // of the largest value: products of floats
-  forEachCompression([](const CpNdf& model, const CompressedNdfData& data) {
-    const CompressedNdf view = data.view();
+  forEachCompression([](const CpNdf& model, const NdfCpData& data) {
+    const NdfCp view = data.view();
     for (int l = 0; l < view.shape.level_count; ++l) {
       const PyramidGrid& grid = view.shape.levels[l];
       const float sigma = l < view.shape.footprintLevels() ? kFootprintPerStride * grid.stride : 1e6f;  // the mean of the map
@@ -241,7 +241,7 @@ TEST(CpNdf, AFullRankBasisReproducesThePyramid) {
   o.method = CompressionMethod::pca;
   o.coefficient_type = CoefficientType::f32;
   o.rank = 64;
-  const CompressedNdfData data = bake::compressPyramid(pyramid().view(), o);
+  const NdfCpData data = bake::compressPyramid(pyramid().view(), o);
   const PyramidNdf exact(pyramid().view());
   const CpNdf model(data.view());
   RandomQueries random(4);
@@ -269,7 +269,7 @@ TEST(PyramidNdf, MeanOverTheWholeSquareIsAQuarter) {
 }
 
 TEST(CpNdf, MeanOverTheWholeSquareIsAQuarter) {
-  forEachCompression([](const CpNdf& model, const CompressedNdfData&) {
+  forEachCompression([](const CpNdf& model, const NdfCpData&) {
     expectEnergyOfOne([&](const Footprint& p, const Box2& b) { return model.signedMean(p, b); }, 1e-4);
   });
 }
@@ -398,7 +398,7 @@ TEST(PyramidNdf, BelowTheFinestLevelTheTexelsAnswerAndFarAboveTheLastTheMean) {
 }
 
 TEST(CpNdf, BelowTheFinestLevelTheTexelsAnswerAndFarAboveTheLastTheMean) {
-  const CompressedNdf view = compressed(CompressionMethod::tucker, CoefficientType::f16).view();
+  const NdfCp view = compressed(CompressionMethod::tucker, CoefficientType::f16).view();
   expectLevelsAreExtended(CpNdf(view), CpNdf(view, map().map()), Boundary::wrap);
 }
 
@@ -443,7 +443,7 @@ TEST(PyramidNdf, DegenerateQueriesHaveDocumentedAnswers) {
 }
 
 TEST(CpNdf, DegenerateQueriesHaveDocumentedAnswers) {
-  forEachCompression([](const CpNdf& model, const CompressedNdfData& data) {
+  forEachCompression([](const CpNdf& model, const NdfCpData& data) {
     expectDegenerateQueriesAreAnswered(model);
     expectDegenerateQueriesAreAnswered(CpNdf(data.view(), map().map()));
   });

@@ -22,7 +22,7 @@
 namespace glint {
 namespace {
 
-using bake::CompressedNdfData;
+using bake::NdfCpData;
 using bake::NdfPyramidData;
 using bake::SynthKind;
 using test::OwnedMap;
@@ -132,7 +132,7 @@ const std::vector<std::unique_ptr<Case>>& cases() {
   return built;
 }
 
-CompressedNdfData compress(const Case& c, CompressionMethod method, CoefficientType type, int rank = 7) {
+NdfCpData compress(const Case& c, CompressionMethod method, CoefficientType type, int rank = 7) {
   bake::CompressionOptions o;
   o.method = method;
   o.coefficient_type = type;
@@ -232,7 +232,7 @@ int placeOf(const ColumnLayout& layout, int column) {
 
 /// Compares the rows of every slice with its pixels, asked one by one as density does.
 template <class Reader>
-void expectRowsAreThePixels(const CompressedNdf& ndf, const Reader& reader, SliceKinds& kinds) {
+void expectRowsAreThePixels(const NdfCp& ndf, const Reader& reader, SliceKinds& kinds) {
   constexpr float kRounding = 2e-6f;  // of sums of floats, in the largest of the numbers that cancel
   for (const NdfCluster& cluster : ndf.clusters) {
     if (cluster.columns == 0) continue;
@@ -279,8 +279,8 @@ TEST(Sample, OfCompressedPyramidsFollowsTheDensity) {
                                              {CompressionMethod::tucker, CoefficientType::f16, "tucker f16 "},
                                              {CompressionMethod::pca, CoefficientType::i8, "pca i8 "},
                                              {CompressionMethod::pca, CoefficientType::f32, "pca f32 "}}) {
-      const CompressedNdfData data = compress(*c, method, type);
-      const CompressedNdf ndf = data.view();
+      const NdfCpData data = compress(*c, method, type);
+      const NdfCp ndf = data.view();
       expectSamplesFollowThePixels(CpNdf(ndf), name + c->name, 20000);
       SliceKinds kinds;
       withReader(ndf, [&](const auto& reader) { expectRowsAreThePixels(ndf, reader, kinds); });
@@ -304,8 +304,8 @@ TEST(Sample, RowsOfCompressedSlicesAreTheirPixels) {
       for (const int rank : {1, 2, 3, 4, 7, 8}) {
         SCOPED_TRACE("method " + std::to_string(int(method)) + " type " + std::to_string(int(type)) + " rank " +
                      std::to_string(rank));
-        const CompressedNdfData data = compress(*cases()[0], method, type, rank);
-        const CompressedNdf ndf = data.view();
+        const NdfCpData data = compress(*cases()[0], method, type, rank);
+        const NdfCp ndf = data.view();
         SliceKinds kinds;
         withReader(ndf, [&](const auto& reader) { expectRowsAreThePixels(ndf, reader, kinds); });
         EXPECT_GT(kinds.mass, 0);
@@ -319,7 +319,7 @@ TEST(Sample, OfSpotsAndNarrowColumnsFollowsTheDensity) {
     bake::CompressionOptions o;
     o.tolerance = 0.3;
     bake::CompressionReport report;
-    const CompressedNdfData data = bake::compressPyramid(c->pyramid.view(), o, &report);
+    const NdfCpData data = bake::compressPyramid(c->pyramid.view(), o, &report);
     if (c->name == "flakes") {
       EXPECT_GT(report.spot_slices, 0u);
     }
@@ -420,7 +420,7 @@ TEST(Sample, TheTestNoticesAWrongSampler) {
 TEST(Sample, CompressedDensitiesIntegrateToOne) {
   for (const auto& c : cases()) {
     for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
-      const CompressedNdfData data = compress(*c, method, CoefficientType::i8);
+      const NdfCpData data = compress(*c, method, CoefficientType::i8);
       const CpNdf model(data.view());
       for (int k = 0; k < 10; ++k) {
         double sum = 0;
@@ -458,7 +458,7 @@ TEST(Sample, StratifiedNumbersStayStratified) {
   // Cells of 64 x 64 numbers, drawn from in each: counts vary only by the cells that a border cuts.
   constexpr double kMostOfRandom = 0.7;
   const Case& c = *cases()[0];
-  const CompressedNdfData data = compress(c, CompressionMethod::tucker, CoefficientType::i8);
+  const NdfCpData data = compress(c, CompressionMethod::tucker, CoefficientType::i8);
   const auto expectStratified = [&](const auto& model, const char* name) {
     double random = 0, stratified = 0;
     for (int k = 0; k < 2; ++k) {
@@ -514,7 +514,7 @@ TEST(Sample, DegenerateQueriesHaveFiniteAnswers) {
   expectDegenerateSamplesAreAnswered(PyramidNdf(c.pyramid.view()));
   expectDegenerateSamplesAreAnswered(PyramidNdf(c.pyramid.view(), c.map.map()));
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
-    const CompressedNdfData data = compress(c, method, CoefficientType::i8);
+    const NdfCpData data = compress(c, method, CoefficientType::i8);
     expectDegenerateSamplesAreAnswered(CpNdf(data.view()));
     expectDegenerateSamplesAreAnswered(CpNdf(data.view(), c.map.map()));
   }

@@ -75,7 +75,7 @@ class Compressor {
         image_scales_(index_.imageCount(), 1.0f),
         density_scales_(index_.imageCount(), 0.0f) {}
 
-  CompressedNdfData run(CompressionReport* report) {
+  NdfCpData run(CompressionReport* report) {
     forEachCluster([&](std::size_t c) { statistics_[c] = measureCluster(index_, c); });
     for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
       groupOf(c).energy += statistics_[c].energy;
@@ -88,7 +88,7 @@ class Compressor {
     } else {
       encode(std::vector<int>(index_.clusterCount(), 0));
     }
-    CompressedNdfData data = pack();
+    NdfCpData data = pack();
     if (report) *report = makeReport(data);
     return data;
   }
@@ -226,8 +226,8 @@ class Compressor {
                 "ask for a larger tolerance, or for coefficients of more bits");
   }
 
-  CompressedNdfData pack() {
-    CompressedNdfData data;
+  NdfCpData pack() {
+    NdfCpData data;
     index_.describe(data);
     data.header.method = options_.method;
     data.header.coefficient_type = options_.coefficient_type;
@@ -246,7 +246,7 @@ class Compressor {
   }
 
   /// Places for the blocks that any image still has.
-  void numberBlocks(CompressedNdfData& data) const {
+  void numberBlocks(NdfCpData& data) const {
     const std::size_t blocks = pyramid_.shape.blocksPerImage();
     data.block_places.assign(blocks, kNoBlockPlace);
     for (std::size_t block = 0; block < blocks; ++block) {
@@ -260,7 +260,7 @@ class Compressor {
   }
 
   /// Appends one cluster: its record, mask and factors.
-  void packCluster(int region, std::size_t c, CompressedNdfData& data) {
+  void packCluster(int region, std::size_t c, NdfCpData& data) {
     const EncodedCluster& e = encoded_[c];
     const int coefficient_bytes = coefficientElementBytes(options_.coefficient_type);
     // Spots begin where their numbers are aligned.
@@ -295,7 +295,7 @@ class Compressor {
   }
 
   /// The blocks of every image and their shares of it, from the slices of all clusters.
-  void packBlockMasses(CompressedNdfData& data) const {
+  void packBlockMasses(NdfCpData& data) const {
     // A reader adds up the pixels in another order: its share must not exceed the stored one.
     constexpr float kRounding = 1 + 1e-5f;
     const std::size_t images = index_.imageCount(), blocks = pyramid_.shape.blocksPerImage();
@@ -323,7 +323,7 @@ class Compressor {
     }
   }
 
-  CompressionReport makeReport(const CompressedNdfData& data) const {
+  CompressionReport makeReport(const NdfCpData& data) const {
     CompressionReport report;
     measureLevels(data, report);
     measureBytes(data, report);
@@ -341,7 +341,7 @@ class Compressor {
     return report;
   }
 
-  void measureLevels(const CompressedNdfData& data, CompressionReport& report) const {
+  void measureLevels(const NdfCpData& data, CompressionReport& report) const {
     const int levels = pyramid_.shape.level_count;
     const std::uint32_t* first = data.header.first_image;
     std::vector<double> errors(levels, 0.0);
@@ -366,7 +366,7 @@ class Compressor {
     report.total = {index_.totalSlices(), energy_ > 0 ? std::sqrt(error / energy_) : 0};
   }
 
-  void measureBytes(const CompressedNdfData& data, CompressionReport& report) const {
+  void measureBytes(const NdfCpData& data, CompressionReport& report) const {
     const auto bytes = [](const auto& array) {
       return array.size() * sizeof(typename std::remove_cvref_t<decltype(array)>::value_type);
     };
@@ -407,8 +407,8 @@ class Compressor {
 
 }  // namespace
 
-CompressedNdf CompressedNdfData::view() const {
-  CompressedNdf v = header;
+NdfCp NdfCpData::view() const {
+  NdfCp v = header;
   v.image_regions = image_regions;
   v.image_slots = image_slots;
   v.image_scales = image_scales;
@@ -440,8 +440,8 @@ int coefficientElementBytes(CoefficientType type) {
   return type == CoefficientType::i8 ? 1 : type == CoefficientType::f16 ? 2 : 4;
 }
 
-CompressedNdfData compressPyramid(const NdfPyramid& pyramid, const CompressionOptions& options, CompressionReport* report,
-                                  const ProgressFn& progress) {
+NdfCpData compressPyramid(const NdfPyramid& pyramid, const CompressionOptions& options, CompressionReport* report,
+                          const ProgressFn& progress) {
   checkOptions(options);
   checkRegions(pyramid, options.regions);
   return Compressor(pyramid, options, progress).run(report);

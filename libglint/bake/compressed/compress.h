@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "glint/bake/common/progress.h"
-#include "glint/model/compressed_ndf.h"
+#include "glint/model/ndf_cp.h"
 #include "glint/model/ndf_pyramid.h"
 
 namespace glint::bake {
@@ -59,9 +59,9 @@ struct CompressionReport {
 };
 
 /// A compressed pyramid and the arrays that it points to.
-class CompressedNdfData {
+class NdfCpData {
  public:
-  CompressedNdf header;  ///< sizes and parameters; its spans and pointers are not set (see view())
+  NdfCp header;  ///< sizes and parameters; its spans and pointers are not set (see view())
   std::vector<std::uint16_t> image_regions;
   std::vector<std::uint16_t> image_slots;
   std::vector<float> image_scales;
@@ -74,20 +74,20 @@ class CompressedNdfData {
   std::vector<NdfCluster> clusters;
   std::vector<std::uint64_t> masks;
   std::vector<std::uint32_t> mask_ranks;
-  std::vector<std::byte> basis;         ///< of the element type of CompressedNdf::basis
-  std::vector<std::byte> coefficients;  ///< of the element type of CompressedNdf::coefficients
+  std::vector<std::byte> basis;         ///< of the element type of NdfCp::basis
+  std::vector<std::byte> coefficients;  ///< of the element type of NdfCp::coefficients
   std::vector<float> scales;
   std::vector<std::uint8_t> core;
   std::vector<float> spot_sums;
 
   /// @return what a model queries; valid while this object lives and is not changed
-  CompressedNdf view() const;
+  NdfCp view() const;
 };
 
-/// @return bytes of one element of CompressedNdf::basis
+/// @return bytes of one element of NdfCp::basis
 int basisElementBytes(CompressionMethod method, CoefficientType type);
 
-/// @return bytes of one element of CompressedNdf::coefficients
+/// @return bytes of one element of NdfCp::coefficients
 int coefficientElementBytes(CoefficientType type);
 
 /// Compresses the images of a pyramid (Deng 2022, section 4.2).
@@ -102,7 +102,7 @@ int coefficientElementBytes(CoefficientType type);
 ///        tolerance that this method and coefficient type cannot reach, naming the best that they do
 /// @note Parallel over clusters; the result does not depend on the number of threads. Besides the result it holds the bases of
 ///       all clusters in float, and the pyramid is converted cluster by cluster.
-CompressedNdfData compressPyramid(const NdfPyramid& pyramid, const CompressionOptions& options,
-                                  CompressionReport* report = nullptr, const ProgressFn& progress = {});
+NdfCpData compressPyramid(const NdfPyramid& pyramid, const CompressionOptions& options, CompressionReport* report = nullptr,
+                          const ProgressFn& progress = {});
 
 }  // namespace glint::bake

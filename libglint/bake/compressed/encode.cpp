@@ -281,7 +281,7 @@ std::uint8_t nearestMassCode(float mass) {
   return above > 0 && mass - blockMass(above - 1) < blockMass(above) - mass ? above - 1 : above;
 }
 
-/// Writes a cluster of spots as compressed_ndf.h says, and decodes it.
+/// Writes a cluster of spots as ndf_cp.h says, and decodes it.
 void encodeSpots(const SliceIndex& index, std::size_t cluster, float peak, const std::vector<SliceSpots>& spots,
                  EncodedCluster& out) {
   const SpotFinder finder(index.sigmaPixels());

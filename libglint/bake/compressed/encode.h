@@ -17,14 +17,14 @@ struct SliceError {
   float positive = 0;  ///< sum of decoded where it is positive
 };
 
-/// A cluster as CompressedNdf stores it.
+/// A cluster as NdfCp stores it.
 struct EncodedCluster {
   int columns = 0;
   int narrow_columns = 0;
   int rank_x = 0;  ///< tucker
   int rank_y = 0;
   std::vector<std::byte> basis;
-  std::vector<std::byte> coefficients;  ///< rows of `kept`, without padding; spots: as in compressed_ndf.h
+  std::vector<std::byte> coefficients;  ///< rows of `kept`, without padding; spots: as in ndf_cp.h
   std::vector<float> scales;
   std::vector<std::uint8_t> core;
   std::vector<std::uint32_t> kept;  ///< slices that are stored, rising; the others decode to 0

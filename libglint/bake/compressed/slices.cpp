@@ -13,7 +13,7 @@
 namespace glint::bake {
 namespace {
 
-/// Region of column i of a level: where its centre lies (compressed_ndf.h).
+/// Region of column i of a level: where its centre lies (ndf_cp.h).
 int regionOf(int i, float stride, int size, int regions) {
   return std::min(regions - 1, static_cast<int>(std::floor((2.0 * i + 1) * stride * regions / (2.0 * size))));
 }
@@ -126,8 +126,8 @@ void SliceIndex::load(std::size_t cluster, int first, int count, float factor, f
   }
 }
 
-void SliceIndex::describe(CompressedNdfData& data) const {
-  CompressedNdf& header = data.header;
+void SliceIndex::describe(NdfCpData& data) const {
+  NdfCp& header = data.header;
   header.shape = pyramid_.shape;
   header.regions = regionCount();
   std::copy(first_image_.begin(), first_image_.end() - 1, header.first_image);

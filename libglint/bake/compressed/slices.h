@@ -13,7 +13,7 @@ inline constexpr int kSliceStride = kBlockPixels + 16;
 /// Slices that kernels work on at once (278 kB: the second-level cache).
 inline constexpr int kPanelSlices = 256;
 
-/// The clusters of a pyramid: which slices each holds, in the order of compressed_ndf.h.
+/// The clusters of a pyramid: which slices each holds, in the order of ndf_cp.h.
 ///
 /// Densities are divided by the largest magnitude of the cluster, so that kernels in float neither overflow nor underflow.
 class SliceIndex {
@@ -49,7 +49,7 @@ class SliceIndex {
   void load(std::size_t cluster, int first, int count, float factor, float* out) const;
 
   /// Fills the shape, regions and slots of `data`.
-  void describe(CompressedNdfData& data) const;
+  void describe(NdfCpData& data) const;
 
  private:
   void assignImages();

@@ -30,7 +30,7 @@ class SpotFinder {
   /// @return at most `most` spots, gains not rising
   SliceSpots find(float* slice, int most, float least) const;
 
-  /// As CompressedNdf::spot_sums.
+  /// As NdfCp::spot_sums.
   const std::vector<float>& sums() const { return sums_; }
   /// Share of a spot that lies in the block.
   float share(const Spot& spot) const { return shares_[spot.x] * shares_[spot.y]; }

@@ -21,8 +21,8 @@ GLINT_HD inline float transferFactor(float fresnel, float shadowing, float wo_do
 /// direction with heights correlated. All that a renderer needs for a pixel that sees `footprint` of an asset of kind
 /// histogram-sat:
 ///
-///   const HistogramNdf ndf(asset.histograms());
-///   const SmithMasking masking(asset.histograms().slopes, sigma_r);
+///   const HistogramNdf ndf(asset.get<HistogramSat>());
+///   const SmithMasking masking(asset.get<HistogramSat>().slopes, sigma_r);
 ///   const ShLightIntegral light = query.integral(ndf, footprint, frame, wo_world, {}, scratch);
 ///   const Rgb integral = {light.value[0], light.value[1], light.value[2]};
 ///   const Rgb radiance = transferFactor(Fresnel::conductor(eta, k), masking, wo) * integral;

@@ -7,7 +7,7 @@
 
 #include "glint/math/float4.h"
 #include "glint/math/half.h"
-#include "glint/model/compressed_ndf.h"
+#include "glint/model/ndf_cp.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
 
 namespace glint {
@@ -80,7 +80,7 @@ class Avx2Reader;
 template <class Basis, class Coefficient>
 class ClusterReader {
  public:
-  GLINT_HD explicit ClusterReader(const CompressedNdf& ndf) : ndf_(ndf) {}
+  GLINT_HD explicit ClusterReader(const NdfCp& ndf) : ndf_(ndf) {}
 
   using Row = const Coefficient*;
   using Avx2 = Avx2Reader<Basis, Coefficient>;  ///< the same with vectors of eight, where the processor has them
@@ -597,12 +597,12 @@ class ClusterReader {
     }
   }
 
-  const CompressedNdf& ndf_;
+  const NdfCp& ndf_;
 };
 
 /// Calls visitor(ClusterReader) for the types that a compressed NDF stores.
 template <class Visitor>
-GLINT_HD auto withReader(const CompressedNdf& ndf, Visitor&& visitor) {
+GLINT_HD auto withReader(const NdfCp& ndf, Visitor&& visitor) {
   const bool pca = ndf.method == CompressionMethod::pca;
   if (ndf.coefficient_type == CoefficientType::f32) return visitor(ClusterReader<float, float>(ndf));
   if (ndf.coefficient_type == CoefficientType::f16)

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "glint/model/compressed_ndf.h"
+#include "glint/model/ndf_cp.h"
 #include "glint/query/detail/pyramid/block_mass.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
 
@@ -24,7 +24,7 @@ inline GLINT_HD std::uint32_t sumOfBytes(std::uint64_t bytes) {
   return static_cast<std::uint32_t>(pairs * 0x0001000100010001u >> 48);
 }
 
-inline GLINT_HD SpotList spotsOf(const CompressedNdf& ndf, const NdfCluster& cluster, std::uint64_t slice) {
+inline GLINT_HD SpotList spotsOf(const NdfCp& ndf, const NdfCluster& cluster, std::uint64_t slice) {
   const auto* first = static_cast<const std::uint8_t*>(ndf.coefficients) + cluster.first_coefficient;
   const std::uint8_t* counts = first + spotCountsOffset(cluster.slice_count);
   const std::uint64_t group = slice / kSpotGroup;
@@ -45,7 +45,7 @@ inline GLINT_HD SpotList spotsOf(const CompressedNdf& ndf, const NdfCluster& clu
 /// Profiles of spots: shares of a spot along one axis.
 class SpotProfile {
  public:
-  GLINT_HD explicit SpotProfile(const CompressedNdf& ndf) : sums_(ndf.spot_sums.data()) {}
+  GLINT_HD explicit SpotProfile(const NdfCp& ndf) : sums_(ndf.spot_sums.data()) {}
 
   /// Share that lies in pixel `p` of the block.
   GLINT_HD float pixel(int p, int place) const {

@@ -49,7 +49,7 @@ inline constexpr int kSpotSteps = 8;
 inline constexpr int kSpotReach = 3;
 /// Largest place of a spot along an axis.
 inline constexpr int kLastSpotPlace = (kBlockSize + 2 * kSpotReach) * kSpotSteps;
-/// Elements of CompressedNdf::spot_sums: distances of an edge of pixels from a centre, -(16 + 3) to 16 + 3 pixels.
+/// Elements of NdfCp::spot_sums: distances of an edge of pixels from a centre, -(16 + 3) to 16 + 3 pixels.
 inline constexpr int kSpotSums = 2 * (kBlockSize + kSpotReach) * kSpotSteps + 1;
 
 // A cluster of n slices of spots has, from its first coefficient on (a multiple of 4):
@@ -81,7 +81,7 @@ inline constexpr std::uint16_t kNoBlockPlace = 0xffff;
 /// any
 /// image are numbered: that is their place. Cluster (region, place) lists the slots where the block is occupied as a bit mask;
 /// the slice of a slot is the number of set bits below it, found from `mask_ranks` (running counts) and one popcount.
-struct CompressedNdf {
+struct NdfCp {
   PyramidShape shape;
   CompressionMethod method = CompressionMethod::cp;
   CoefficientType coefficient_type = CoefficientType::i8;
@@ -122,7 +122,7 @@ struct CompressedNdf {
   GLINT_HD constexpr int placeWords() const { return (places + 63) / 64; }
 };
 
-/// Elements after the last row of CompressedNdf::coefficients.
+/// Elements after the last row of NdfCp::coefficients.
 inline constexpr int kRowPadding = 16;
 
 /// Elements of a row of coefficients.
