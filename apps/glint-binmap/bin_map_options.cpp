@@ -25,7 +25,7 @@ void parseAlpha(const std::string& text, bake::BinMapOptions& options) {
 
 }  // namespace
 
-BinMapCommand::BinMapCommand(Tool& tool) {
+BinMapOptions::BinMapOptions(Tool& tool) {
   tool.option("--alpha", alpha_,
               "Beckmann roughness of a facet: sqrt(2) times the deviation of its lobe; or a range A:B, for one asset that is "
               "asked with any roughness between them. The default is the roughness of the other tools' --sigma-r 0.005");
@@ -33,7 +33,7 @@ BinMapCommand::BinMapCommand(Tool& tool) {
   tool.option("--leaf-size", options_.leaf_size, "texels of a cell of the map within a list, on average at least");
 }
 
-BuiltBinMap BinMapCommand::build(const NormalMap& map, const bake::ProgressFn& progress) const {
+BuiltBinMap BinMapOptions::build(const NormalMap& map, const bake::ProgressFn& progress) const {
   const auto start = std::chrono::steady_clock::now();
   BuiltBinMap built{bake::buildBinMap(map, options_, progress), 0};
   built.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

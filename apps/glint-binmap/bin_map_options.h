@@ -15,9 +15,9 @@ struct BuiltBinMap {
 };
 
 /// The options of glint-binmap.
-class BinMapCommand {
+class BinMapOptions {
  public:
-  explicit BinMapCommand(Tool& tool);
+  explicit BinMapOptions(Tool& tool);
 
   /// @throws what bake::buildBinMap throws
   BuiltBinMap build(const NormalMap& map, const bake::ProgressFn& progress) const;

@@ -17,12 +17,12 @@ int main(int argc, char** argv) {
        "glint-binmap flakes.glint -o flakes.bins.glint --alpha 0.01"});
   const apps::InputFile input(tool, "asset of kind normals, from glint-ingest", "NORMALS");
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind bin-map");
-  apps::BinMapCommand command(tool);
+  apps::BinMapOptions options(tool);
 
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = formats::Asset::openForBuilding(input.path());
     const formats::Provenance provenance = tool.provenance();
-    const apps::BuiltBinMap built = command.build(asset.get<NormalMap>(), tool.progress("passes"));
+    const apps::BuiltBinMap built = options.build(asset.get<NormalMap>(), tool.progress("passes"));
     formats::writeAsset(output.path(), built.data.view(), provenance, output.writeOptions());
     tool.setResult(apps::binMapJson(built));
     tool.summary(apps::binMapText(built));

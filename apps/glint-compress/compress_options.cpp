@@ -16,27 +16,27 @@ std::string format(const char* pattern, Values... values) {
 }  // namespace
 
 CompressOptions::CompressOptions(Tool& tool) {
-  tool.choice("--method", options_.method,
+  tool.choice("--method", values_.method,
               {{"cp", CompressionMethod::cp}, {"tucker", CompressionMethod::tucker}, {"pca", CompressionMethod::pca}},
               "decomposition of the blocks: canonical polyadic, Tucker-2 or principal components");
-  const Option& rank = tool.option("--rank", options_.rank, "columns of every cluster").range(1, 256);
-  tool.option("--tolerance", options_.tolerance,
+  const Option& rank = tool.option("--rank", values_.rank, "columns of every cluster").range(1, 256);
+  tool.option("--tolerance", values_.tolerance,
               "instead of --rank: relative error of all images together (tucker: also of level 0, of level 1 and of the "
               "coarser ones); columns and bits of every cluster are chosen to meet it in the fewest bytes")
       .range(1e-6, 0.99)
       .excludes(rank)
       .defaultText("none");
-  tool.choice("--quantize", options_.coefficient_type,
+  tool.choice("--quantize", values_.coefficient_type,
               {{"f32", CoefficientType::f32}, {"f16", CoefficientType::f16}, {"i8", CoefficientType::i8}},
               "type of the coefficients");
-  tool.choice("--spots", options_.spots, {{"auto", true}, {"off", false}},
+  tool.choice("--spots", values_.spots, {{"auto", true}, {"off", false}},
               "with --tolerance, tucker or pca, and i8: store slices of few facets as spots where that costs less");
-  tool.option("--regions", options_.regions, "regions of the map along each axis")
+  tool.option("--regions", values_.regions, "regions of the map along each axis")
       .range(1, 255)
       .defaultText("8 for cp, otherwise 1");
-  tool.option("--min-improvement", options_.min_improvement, "cp: end when a sweep improves the relative error by less")
+  tool.option("--min-improvement", values_.min_improvement, "cp: end when a sweep improves the relative error by less")
       .range(0, 0.99);
-  tool.option("--max-iterations", options_.max_iterations, "cp: sweeps at most").range(1, 1e6);
+  tool.option("--max-iterations", values_.max_iterations, "cp: sweeps at most").range(1, 1e6);
 }
 
 nlohmann::json compressionJson(const bake::CompressionReport& report) {

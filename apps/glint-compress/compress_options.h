@@ -8,16 +8,16 @@
 
 namespace glint::apps {
 
-/// Mix-in: what glint-compress lets the user choose.
+/// The options of glint-compress.
 class CompressOptions {
  public:
   explicit CompressOptions(Tool& tool);
 
   /// What was asked for. Valid after parsing.
-  const bake::CompressionOptions& options() const { return options_; }
+  const bake::CompressionOptions& values() const { return values_; }
 
  private:
-  bake::CompressionOptions options_;
+  bake::CompressionOptions values_;
 };
 
 /// The report as --json prints it. Sizes in bytes, errors relative.

@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
     // The map that the pyramid was made from is named, too: --normals of queries must be this map.
     const formats::Provenance provenance = formats::chained(tool.provenance(), asset.info().provenance);
     bake::CompressionReport report;
-    const auto data = bake::compressPyramid(asset.get<NdfPyramid>(), options.options(), &report, tool.progress("compress"));
+    const auto data = bake::compressPyramid(asset.get<NdfPyramid>(), options.values(), &report, tool.progress("compress"));
     formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
     if (report.unscaled_images > 0)
       tool.warn(std::to_string(report.unscaled_images) +

@@ -31,7 +31,7 @@ double meanFitError(const bake::DisplacementData::Level& level) {
 
 }  // namespace
 
-DisplaceCommand::DisplaceCommand(Tool& tool) : images_(tool) {
+DisplaceOptions::DisplaceOptions(Tool& tool) : images_(tool) {
   const Option& factor =
       tool.option("--factor", factor_, "texels of the map along a side of a downsampled cell").range(2, 65536);
   factors_given_ =
@@ -40,9 +40,9 @@ DisplaceCommand::DisplaceCommand(Tool& tool) : images_(tool) {
       &tool.option("--base", base_,
                    "reflectance of the surface: diffuse:RHO (albedo above 0, at most 1), ggx:ALPHA (0.05 to 1; reflects "
                    "all light) or ggx:ALPHA:ETA,K (a conductor)");
-  tool.option("--lobes", options_.lobes, "lobes of normals in each cell").range(1, kMaxLobes);
-  tool.option("--angular", options_.angular, "directions of light and view: the square of this").range(3, 25);
-  tool.option("--spatial", options_.spatial, "patches of the spatial factor along each axis").range(1, 16);
+  tool.option("--lobes", values_.lobes, "lobes of normals in each cell").range(1, kMaxLobes);
+  tool.option("--angular", values_.angular, "directions of light and view: the square of this").range(3, 25);
+  tool.option("--spatial", values_.spatial, "patches of the spatial factor along each axis").range(1, 16);
   tool.option("--bounces", bounces_,
               "reflections of a light path at most; 1: shadowing and masking only; auto: until it escapes");
   tool.usesSeed();
@@ -70,8 +70,8 @@ BaseBrdf parseBase(const std::string& text) {
   return base;
 }
 
-bake::DisplaceOptions DisplaceCommand::options(const HeightMap& map) const {
-  bake::DisplaceOptions options = options_;
+bake::DisplaceOptions DisplaceOptions::values(const HeightMap& map) const {
+  bake::DisplaceOptions options = values_;
   options.factors = factors_given_->given() ? factors_ : std::vector<int>{factor_};
   options.base = parseBase(images_.colored() && !base_given_->given() ? "diffuse:1" : base_);
   options.texture = images_.read(map.width, map.height);

@@ -11,13 +11,13 @@
 namespace glint::apps {
 
 /// The options of glint-displace.
-class DisplaceCommand {
+class DisplaceOptions {
  public:
-  explicit DisplaceCommand(Tool& tool);
+  explicit DisplaceOptions(Tool& tool);
 
   /// Valid after parsing; reads the images of the base.
   /// @throws Error usage if --base or --bounces cannot be read; invalid_input if an image does not fit the map
-  bake::DisplaceOptions options(const HeightMap& map) const;
+  bake::DisplaceOptions values(const HeightMap& map) const;
 
  private:
   int factor_ = 16;
@@ -25,7 +25,7 @@ class DisplaceCommand {
   std::string base_ = "diffuse:0.8";
   BaseImages images_;
   std::string bounces_ = "auto";
-  bake::DisplaceOptions options_;
+  bake::DisplaceOptions values_;
   const Option* factors_given_ = nullptr;
   const Option* base_given_ = nullptr;
 };

@@ -15,14 +15,14 @@ int main(int argc, char** argv) {
                    "glint-displace weave.glint -o weave.displaced.glint --factor 16 --base diffuse:0.8"});
   const apps::InputFile input(tool, "asset of kind heights, from glint-ingest --kind height --to heights", "HEIGHTS");
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind displacement");
-  apps::DisplaceCommand command(tool);
+  apps::DisplaceOptions options(tool);
 
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = formats::Asset::openForBuilding(input.path());
-    bake::DisplaceOptions options = command.options(asset.get<HeightMap>());
-    options.seed = tool.seed();
+    bake::DisplaceOptions values = options.values(asset.get<HeightMap>());
+    values.seed = tool.seed();
     const formats::Provenance provenance = tool.provenance();
-    const bake::DisplacementData data = bake::displace(asset.get<HeightMap>(), options, tool.progress("levels"));
+    const bake::DisplacementData data = bake::displace(asset.get<HeightMap>(), values, tool.progress("levels"));
     formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
     apps::warnAbout(tool, data);
     tool.setResult(apps::displacementJson(data));

@@ -48,7 +48,7 @@ IngestOptions::IngestOptions(Tool& tool) {
   using bake::Convention;
   using bake::Dequantize;
   using bake::Encoding;
-  bake::IngestParameters& p = parameters_;
+  bake::IngestOptions& p = values_;
   tool.choice("--kind", kind_, {{"normal", Kind::normal}, {"height", Kind::height}}, "what the image holds");
   tool.choice("--to", to_, {{"normals", To::normals}, {"heights", To::heights}},
               "what to write; normals of heights are central differences");
@@ -92,8 +92,8 @@ IngestOptions::IngestOptions(Tool& tool) {
   });
 }
 
-bake::IngestParameters IngestOptions::parameters(Tool& tool, const std::string& name, const Image& image) const {
-  bake::IngestParameters p = parameters_;
+bake::IngestOptions IngestOptions::values(Tool& tool, const std::string& name, const Image& image) const {
+  bake::IngestOptions p = values_;
   p.name = name;
   p.seed = tool.seed();
   p.trust_channels = !image_.choice().channels.empty();
@@ -105,7 +105,7 @@ bake::IngestParameters IngestOptions::parameters(Tool& tool, const std::string& 
 
 Image IngestOptions::read(Tool& tool, const std::string& path) const {
   ImageChoice choice = image_.choice();
-  choice.transparent_holes = parameters_.fix_invalid;
+  choice.transparent_holes = values_.fix_invalid;
   return readInputImage(tool, path, choice, "choose with --subimage or --layer");
 }
 
@@ -171,12 +171,12 @@ void warnOfSeam(const Warn& warn, Boundary boundary, Vec2 seam) {
 
 }  // namespace
 
-void warnAbout(Tool& tool, const std::string& name, const bake::IngestParameters& parameters, const bake::IngestReport& r) {
+void warnAbout(Tool& tool, const std::string& name, const bake::IngestOptions& values, const bake::IngestReport& r) {
   const auto warn = [&](const std::string& text) { tool.warn(name + ": " + text); };
   const auto replaced = [&](std::size_t count, const std::string& what) {
     if (count > 0) warn(fmt::format("{} {} and were replaced by their neighbours' mean", count, what));
   };
-  if (r.no_data > 0) replaced(r.no_data, fmt::format("texels hold no data ({})", *parameters.no_data));
+  if (r.no_data > 0) replaced(r.no_data, fmt::format("texels hold no data ({})", *values.no_data));
   replaced(r.downward, fmt::format("of {} texels point below the surface", r.texels));
   replaced(r.non_finite, "texels are not finite");
   if (r.clipped > 0) warn(fmt::format("{} texels on the rim of the disk were moved just inside it", r.clipped));
@@ -193,7 +193,7 @@ void warnAbout(Tool& tool, const std::string& name, const bake::IngestParameters
     warn(fmt::format("{} of {} vectors were not of unit length (half of all are off by more than {:.3f}) and were normalised",
                      r.non_unit, r.texels, r.median_length_error));
   }
-  warnOfSeam(warn, parameters.boundary, r.seam);
+  warnOfSeam(warn, values.boundary, r.seam);
   if (std::max(std::abs(r.mean_normal.x), std::abs(r.mean_normal.y)) > kSuspiciousMeanTilt) {
     tool.warn(fmt::format("{}: the mean normal ({:.2f}, {:.2f}) is far from up; is this a tangent-space map?", name,
                           r.mean_normal.x, r.mean_normal.y));

@@ -14,8 +14,8 @@ class IngestOptions {
  public:
   explicit IngestOptions(Tool& tool);
 
-  /// Complete parameters for one image, which may name the number for no data itself. Call after parsing.
-  bake::IngestParameters parameters(Tool& tool, const std::string& name, const Image& image) const;
+  /// Complete options for one image, which may name the number for no data itself. Call after parsing.
+  bake::IngestOptions values(Tool& tool, const std::string& name, const Image& image) const;
 
   /// Reads the image that the options choose.
   Image read(Tool& tool, const std::string& path) const;
@@ -30,7 +30,7 @@ class IngestOptions {
 
   Kind kind_ = Kind::normal;
   To to_ = To::normals;
-  bake::IngestParameters parameters_;
+  bake::IngestOptions values_;
   float height_scale_um_ = 1;
   float texel_size_um_ = 0;
   std::string no_data_ = "auto";
@@ -48,6 +48,6 @@ nlohmann::json reportJson(const bake::IngestReport& report);
 std::string reportText(const std::string& name, const Image& image, const bake::IngestReport& report);
 
 /// Warns of what was changed on the way in.
-void warnAbout(Tool& tool, const std::string& name, const bake::IngestParameters& parameters, const bake::IngestReport& report);
+void warnAbout(Tool& tool, const std::string& name, const bake::IngestOptions& values, const bake::IngestReport& report);
 
 }  // namespace glint::apps

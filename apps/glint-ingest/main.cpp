@@ -33,25 +33,25 @@ int main(int argc, char** argv) {
 
   return tool.run(argc, argv, [&] {
     const apps::Image image = options.read(tool, input.path());
-    const bake::IngestParameters parameters = options.parameters(tool, input.path(), image);
+    const bake::IngestOptions values = options.values(tool, input.path(), image);
     const formats::Provenance provenance = tool.provenance();
     bake::IngestReport report;
     if (!options.readsHeights()) {
-      const bake::IngestedNormals result = bake::ingestNormals(apps::pixelArray(image), parameters);
+      const bake::IngestedNormals result = bake::ingestNormals(apps::pixelArray(image), values);
       report = result.report;
       writeNormals(output, image, options.texelSize(), result.normals, provenance);
     } else {
-      const bake::IngestedHeights result = bake::ingestHeights(apps::pixelArray(image), parameters);
+      const bake::IngestedHeights result = bake::ingestHeights(apps::pixelArray(image), values);
       report = result.report;
       if (options.writesHeights()) {
         const HeightMap map{image.width, image.height, options.texelSize(), result.heights};
         formats::writeAsset(output.path(), map, provenance, output.writeOptions());
       } else {
-        const auto normals = bake::normalsFromHeights(image.width, image.height, result.heights, parameters.boundary);
+        const auto normals = bake::normalsFromHeights(image.width, image.height, result.heights, values.boundary);
         writeNormals(output, image, options.texelSize(), normals, provenance);
       }
     }
-    apps::warnAbout(tool, input.path(), parameters, report);
+    apps::warnAbout(tool, input.path(), values, report);
     tool.setResult(apps::reportJson(report));
     tool.summary(apps::reportText(input.path(), image, report));
   });

@@ -17,12 +17,12 @@ int main(int argc, char** argv) {
        "glint-pyramid flakes.glint -o flakes.pyramid.glint --stride 32 --sigma-r 0.005"});
   const apps::InputFile input(tool, "asset of kind normals, from glint-ingest", "NORMALS");
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind ndf-pyramid");
-  apps::PyramidCommand command(tool);
+  apps::PyramidOptions options(tool);
 
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = formats::Asset::openForBuilding(input.path());
     const formats::Provenance provenance = tool.provenance();
-    const bake::NdfPyramidData pyramid = bake::buildPyramid(asset.get<NormalMap>(), command.options(), tool.progress("images"));
+    const bake::NdfPyramidData pyramid = bake::buildPyramid(asset.get<NormalMap>(), options.values(), tool.progress("images"));
     formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
     tool.setResult(apps::pyramidJson(pyramid));
     tool.summary(apps::pyramidText(pyramid));

@@ -8,22 +8,22 @@
 
 namespace glint::apps {
 
-PyramidCommand::PyramidCommand(Tool& tool) {
-  tool.option("--stride", options_.stride, "texels between the footprints of the finest level").range(2, 65536);
-  tool.option("--resolution", options_.resolution, "pixels of an NDF image along each axis, a multiple of 16").range(32, 1024);
-  tool.option("--sigma-r", options_.sigma_r, "intrinsic roughness: standard deviation of a facet's lobe, disk units");
-  tool.choice("--surface", options_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
+PyramidOptions::PyramidOptions(Tool& tool) {
+  tool.option("--stride", values_.stride, "texels between the footprints of the finest level").range(2, 65536);
+  tool.option("--resolution", values_.resolution, "pixels of an NDF image along each axis, a multiple of 16").range(32, 1024);
+  tool.option("--sigma-r", values_.sigma_r, "intrinsic roughness: standard deviation of a facet's lobe, disk units");
+  tool.choice("--surface", values_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
               "each texel is a facet (flat), or normals are interpolated between texels (smooth)");
-  tool.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
+  tool.choice("--boundary", values_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
               "whether the map repeats or ends at its border");
   tool.option("--levels", levels_,
               "number of levels besides the mean of the map; auto: until levels agree to 1 % or the stride reaches the map");
-  tool.choice("--precision", options_.precision, {{"half", BlockPrecision::f16}, {"float", BlockPrecision::f32}},
+  tool.choice("--precision", values_.precision, {{"half", BlockPrecision::f16}, {"float", BlockPrecision::f32}},
               "of stored pixels");
 }
 
-bake::PyramidOptions PyramidCommand::options() const {
-  bake::PyramidOptions options = options_;
+bake::PyramidOptions PyramidOptions::values() const {
+  bake::PyramidOptions options = values_;
   if (levels_ == "auto") return options;
   if (!parseNumber(levels_, options.levels).empty() || options.levels < 1)
     throw Error(ErrorCode::usage, "option.range", {}, "--levels", "'" + levels_ + "' is not a number of levels",

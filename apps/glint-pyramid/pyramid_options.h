@@ -9,15 +9,15 @@
 namespace glint::apps {
 
 /// The options of glint-pyramid.
-class PyramidCommand {
+class PyramidOptions {
  public:
-  explicit PyramidCommand(Tool& tool);
+  explicit PyramidOptions(Tool& tool);
 
   /// Valid after parsing. @throws Error usage if --levels is neither `auto` nor a number
-  bake::PyramidOptions options() const;
+  bake::PyramidOptions values() const;
 
  private:
-  bake::PyramidOptions options_;
+  bake::PyramidOptions values_;
   std::string levels_ = "auto";
 };
 

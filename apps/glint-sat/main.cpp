@@ -21,7 +21,8 @@ int main(int argc, char** argv) {
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = formats::Asset::openForBuilding(input.path());
     const formats::Provenance provenance = tool.provenance();
-    const bake::HistogramSatData sat = bake::buildHistogramSat(asset.get<NormalMap>(), options.get(), tool.progress("tables"));
+    const bake::HistogramSatData sat =
+        bake::buildHistogramSat(asset.get<NormalMap>(), options.values(), tool.progress("tables"));
     formats::writeAsset(output.path(), sat.view(), provenance, output.writeOptions());
     tool.setResult(apps::satJson(sat));
     tool.summary(apps::satText(sat));

@@ -10,16 +10,16 @@ namespace glint::apps {
 
 SatOptions::SatOptions(Tool& tool) {
   tool.option("--bins", bins_, "rings of elevation x sectors of azimuth: 1 to 64 x 1 to 256, at most 2048 together");
-  tool.option("--stride", options_.stride,
+  tool.option("--stride", values_.stride,
               "texels between the points of the table: bytes go down with its square, the time of a query goes up with it")
       .range(1, HistogramSat::kMaxStride);
   tool.addCheck([this] { readBins(); });
 }
 
 void SatOptions::readBins() {
-  const bool two = parseProduct(bins_, options_.theta_bins, options_.phi_bins);
-  if (two && options_.theta_bins >= 1 && options_.theta_bins <= HistogramSat::kMaxThetaBins && options_.phi_bins >= 1 &&
-      options_.phi_bins <= HistogramSat::kMaxPhiBins && options_.theta_bins * options_.phi_bins <= HistogramSat::kMaxBins) {
+  const bool two = parseProduct(bins_, values_.theta_bins, values_.phi_bins);
+  if (two && values_.theta_bins >= 1 && values_.theta_bins <= HistogramSat::kMaxThetaBins && values_.phi_bins >= 1 &&
+      values_.phi_bins <= HistogramSat::kMaxPhiBins && values_.theta_bins * values_.phi_bins <= HistogramSat::kMaxBins) {
     return;
   }
   throw Error(ErrorCode::usage, "option.range", {}, "--bins",

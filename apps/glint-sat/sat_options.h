@@ -14,12 +14,12 @@ class SatOptions {
   explicit SatOptions(Tool& tool);
 
   /// Valid after parsing.
-  const bake::HistogramSatOptions& get() const { return options_; }
+  const bake::HistogramSatOptions& values() const { return values_; }
 
  private:
   void readBins();
 
-  bake::HistogramSatOptions options_;
+  bake::HistogramSatOptions values_;
   std::string bins_ = "9x32";
 };
 

@@ -13,19 +13,19 @@ int main(int argc, char** argv) {
        "towards every direction (--sigma-r), or an environment or area lights for every outgoing direction (--light).",
        "glint-shlobes --light studio.exr -o studio.glint --order 60", apps::kAreaLightNotes});
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of lobes or light");
-  const apps::ShLobesCommand command(tool);
+  const apps::ShLobesOptions options(tool);
 
   return tool.run(argc, argv, [&] {
     nlohmann::json result;
-    if (command.light().empty()) {
+    if (options.light().empty()) {
       const formats::Provenance provenance = tool.provenance();
-      const bake::ShLobesData lobes = bake::buildShLobes(command.lobesOptions(), tool.progress("directions"));
+      const bake::ShLobesData lobes = bake::buildShLobes(options.lobesOptions(), tool.progress("directions"));
       formats::writeAsset(output.path(), lobes.view(), provenance, output.writeOptions());
       result = apps::lobesJson(lobes.view());
     } else {
-      const bake::Environment environment = apps::readLight(tool, command.light(), command.areaLights());
+      const bake::Environment environment = apps::readLight(tool, options.light(), options.areaLights());
       const formats::Provenance provenance = tool.provenance();
-      const bake::ShLightData light = bake::buildShLight(environment, command.lightOptions(), tool.progress("directions"));
+      const bake::ShLightData light = bake::buildShLight(environment, options.lightOptions(), tool.progress("directions"));
       formats::writeAsset(output.path(), light.view(), provenance, output.writeOptions());
       result = apps::lightJson(light.view());
     }

@@ -21,7 +21,7 @@ ShGrid parseGrid(const std::string& text) {
 
 }  // namespace
 
-ShLobesCommand::ShLobesCommand(Tool& tool) {
+ShLobesOptions::ShLobesOptions(Tool& tool) {
   sigma_option_ = &tool.option("--sigma-r", sigma_r_, "lobes: intrinsic roughness, disk units").range(1e-6, 1);
   tool.option("--light", light_,
               "instead of lobes: light, as a 2:1 latitude-longitude image (.exr, .hdr; z up, first column at +x towards +y), "
@@ -42,7 +42,7 @@ ShLobesCommand::ShLobesCommand(Tool& tool) {
   tool.addCheck([this, &tool] { check(tool); });
 }
 
-void ShLobesCommand::check(Tool& tool) {
+void ShLobesOptions::check(Tool& tool) {
   grid({});
   if (light_.empty()) {
     if (!sigma_option_->given())
@@ -53,9 +53,9 @@ void ShLobesCommand::check(Tool& tool) {
   tool.addInput(light_);
 }
 
-ShGrid ShLobesCommand::grid(ShGrid other) const { return grid_.empty() ? other : parseGrid(grid_); }
+ShGrid ShLobesOptions::grid(ShGrid other) const { return grid_.empty() ? other : parseGrid(grid_); }
 
-bake::ShLobesOptions ShLobesCommand::lobesOptions() const {
+bake::ShLobesOptions ShLobesOptions::lobesOptions() const {
   bake::ShLobesOptions options;
   options.sigma_r = sigma_r_;
   options.order = order_;
@@ -65,7 +65,7 @@ bake::ShLobesOptions ShLobesCommand::lobesOptions() const {
   return options;
 }
 
-bake::ShLightOptions ShLobesCommand::lightOptions() const {
+bake::ShLightOptions ShLobesOptions::lightOptions() const {
   bake::ShLightOptions options;
   options.order = order_;
   options.grid = grid(options.grid);

@@ -11,10 +11,10 @@
 
 namespace glint::apps {
 
-/// Mix-in: what glint-shlobes lets the user choose.
-class ShLobesCommand {
+/// The options of glint-shlobes.
+class ShLobesOptions {
  public:
-  explicit ShLobesCommand(Tool& tool);
+  explicit ShLobesOptions(Tool& tool);
 
   /// File of the light; empty when lobes are asked for.
   const std::string& light() const { return light_; }

@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
   });
 
   return tool.run(argc, argv, [&] {
-    const bake::SynthParameters& p = options.resolve(tool);
+    const bake::SynthOptions& p = options.values(tool);
     const apps::PixelFormat format = apps::pixelFormat(output.path(), bits);
     if (heights) {
       apps::writeImage(output.path(), p.width, p.height, 1, bake::synthHeights(p), format);

@@ -19,7 +19,7 @@ void parseSize(const std::string& text, int& width, int& height) {
 }  // namespace
 
 SynthOptions::SynthOptions(Tool& tool) {
-  bake::SynthParameters& p = parameters_;
+  bake::SynthOptions& p = values_;
   const std::string per_kind = "depends on KIND";
   tool.choice("KIND", p.kind,
               {{"isotropic", SynthKind::isotropic},
@@ -46,9 +46,9 @@ SynthOptions::SynthOptions(Tool& tool) {
   tool.usesSeed();
 }
 
-const bake::SynthParameters& SynthOptions::resolve(Tool& tool) {
-  bake::SynthParameters& p = parameters_;
-  const bake::SynthParameters defaults = bake::defaultSynthParameters(p.kind);
+const bake::SynthOptions& SynthOptions::values(Tool& tool) {
+  bake::SynthOptions& p = values_;
+  const bake::SynthOptions defaults = bake::defaultSynthOptions(p.kind);
   if (!alpha_->given()) p.alpha = defaults.alpha;
   if (!gamma_->given()) p.gamma = defaults.gamma;
   if (!correlation_->given()) p.correlation_texels = defaults.correlation_texels;

@@ -7,17 +7,17 @@
 
 namespace glint::apps {
 
-/// The options of glint-synth. Declared with "unset" values; resolve() replaces those by the defaults of the chosen kind.
+/// The options of glint-synth. Declared with "unset" values; values() replaces those by the defaults of the chosen kind.
 class SynthOptions {
  public:
   explicit SynthOptions(Tool& tool);
 
-  /// Complete parameters. Call after parsing; the `command` record then holds the values that were used.
+  /// Complete options. Call after parsing; the `command` record then holds the values that were used.
   /// @throws Error usage for a malformed size
-  const bake::SynthParameters& resolve(Tool& tool);
+  const bake::SynthOptions& values(Tool& tool);
 
  private:
-  bake::SynthParameters parameters_;
+  bake::SynthOptions values_;
   std::string size_ = "512";
   Option* alpha_;
   Option* gamma_;

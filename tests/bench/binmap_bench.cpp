@@ -45,7 +45,7 @@ Map finish(std::string name, int size, std::vector<Vec2> normals, std::vector<fl
 }
 
 std::vector<Vec2> synthesised(bake::SynthKind kind, int size, float alpha) {
-  bake::SynthParameters p = bake::defaultSynthParameters(kind);
+  bake::SynthOptions p = bake::defaultSynthOptions(kind);
   p.width = p.height = size;
   p.alpha = alpha;
   return bake::synthNormals(p);

@@ -22,7 +22,7 @@ namespace {
 /// with the most energy. As a pyramid of images of that block alone.
 const test::TestPyramid& oneBlock() {
   static const test::TestPyramid pyramid = [] {
-    SynthParameters p = defaultSynthParameters(SynthKind::isotropic);
+    SynthOptions p = defaultSynthOptions(SynthKind::isotropic);
     p.width = p.height = 256;
     const test::OwnedMap map(256, 256, synthNormals(p));
     PyramidOptions o;

@@ -19,7 +19,7 @@ struct OwnedSurface {
 };
 
 inline OwnedSurface synthSurface(bake::SynthKind kind, int width, int height, float scale = 1) {
-  bake::SynthParameters p = bake::defaultSynthParameters(kind);
+  bake::SynthOptions p = bake::defaultSynthOptions(kind);
   p.width = width, p.height = height;
   if (kind == bake::SynthKind::isotropic) p.alpha = 0.5f;
   if (kind == bake::SynthKind::scratches) p.density = 4;

@@ -39,7 +39,7 @@ class OwnedMap {
 };
 
 inline std::vector<Vec2> synthesised(bake::SynthKind kind, int width, int height, float alpha, float correlation_texels = 4) {
-  bake::SynthParameters p = bake::defaultSynthParameters(kind);
+  bake::SynthOptions p = bake::defaultSynthOptions(kind);
   p.width = width;
   p.height = height;
   p.alpha = alpha;

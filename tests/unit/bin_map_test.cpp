@@ -365,7 +365,7 @@ TEST(BinMapNdf, MergedBinsKeepTheError) {
 
 /// 512 x 512 maps on which the normals inside a footprint are not those of the whole map.
 std::vector<Vec2> teeth(int size) {
-  bake::SynthParameters p = bake::defaultSynthParameters(bake::SynthKind::sawtooth);
+  bake::SynthOptions p = bake::defaultSynthOptions(bake::SynthKind::sawtooth);
   p.width = p.height = size;
   p.feature_texels = 0.5f * static_cast<float>(size);
   p.slope = 0.08f;

@@ -27,7 +27,7 @@ struct TestMap {
   std::vector<float> colours;
 
   explicit TestMap(int w = 40, int h = 30, float alpha = 0.3f) : width(w), height(h) {
-    SynthParameters p = defaultSynthParameters(SynthKind::isotropic);
+    SynthOptions p = defaultSynthOptions(SynthKind::isotropic);
     p.width = w;
     p.height = h;
     p.alpha = alpha;
@@ -46,8 +46,8 @@ struct TestMap {
   }
 };
 
-IngestParameters plain() {
-  IngestParameters p;
+IngestOptions plain() {
+  IngestOptions p;
   p.name = "map.png";
   p.dequantize = Dequantize::none;
   return p;
@@ -64,7 +64,7 @@ Error errorOf(const Action& action) {
   return {ErrorCode::failed, "", "", "", ""};
 }
 
-Error refusal(const PixelArray& image, const IngestParameters& p = plain()) {
+Error refusal(const PixelArray& image, const IngestOptions& p = plain()) {
   const Error error = errorOf([&] { ingestNormals(image, p); });
   EXPECT_EQ(error.code(), ErrorCode::invalid_input);
   EXPECT_EQ(error.path(), "map.png");
@@ -117,14 +117,14 @@ TEST(IngestNormals, FindsSignedFloats) {
 
 TEST(IngestNormals, SignedCodesHaveAnExactZero) {
   std::vector<std::uint8_t> codes = {128, 128, 255, 255, 128, 128 + 2};
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.encoding = Encoding::snorm;
   EXPECT_EQ(ingestNormals({2, 1, 3, std::span<const std::uint8_t>(codes)}, p).normals[0], (Vec2{0, 0}));
 }
 
 TEST(IngestNormals, DirectxNegatesGreen) {
   const TestMap map;
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   const auto opengl = ingestNormals(map.floats(), p);
   p.convention = Convention::directx;
   const auto directx = ingestNormals(map.floats(), p);
@@ -160,7 +160,7 @@ TEST(IngestNormals, RepairsHolesWithTheirNeighboursMean) {
     for (int column = 20; column < 23; ++column) map.texel(column, row)[0] = kNaN;
   }
   map.texel(0, 0)[2] = 0.2f;  // points down
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.fix_invalid = true;
   const auto fixed = ingestNormals(map.floats(), p);
   EXPECT_EQ(fixed.report.repaired, 10u);
@@ -191,14 +191,14 @@ TEST(IngestNormals, FillsLargeHolesInLinearTime) {
   TestMap map(1024, 1024);
   for (int row = 0; row < 1024; ++row)
     for (int column = 0; column < 500; ++column) map.texel(column, row)[0] = kNaN;
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.fix_invalid = true;
   EXPECT_EQ(ingestNormals(map.floats(), p).report.repaired, 500u * 1024);
 }
 
 TEST(IngestNormals, HolesAtTheBorderOfAClampedMapAreFilledFromInside) {
   TestMap map;
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   const auto whole = ingestNormals(map.floats(), p);
   map.texel(0, 0)[0] = kNaN;
   p.fix_invalid = true;
@@ -215,7 +215,7 @@ TEST(IngestNormals, HolesAtTheBorderOfAClampedMapAreFilledFromInside) {
 TEST(IngestNormals, TexelsWithoutDataAreFilled) {
   TestMap map;
   for (int c = 0; c < 3; ++c) map.texel(3, 7)[c] = 0;
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.no_data = 0;
   const auto result = ingestNormals(map.floats(), p);
   EXPECT_EQ(result.report.no_data, 1u);
@@ -227,7 +227,7 @@ TEST(IngestNormals, TakesNamedChannelsAtTheirWord) {
   TestMap map;
   for (std::size_t k = 0; k < map.colours.size(); ++k) map.colours[k] = 0.5f + 0.4f * (2 * map.colours[k] - 1);  // length .8
   EXPECT_EQ(refusal(map.floats()).rule(), "normals.unit");
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.trust_channels = true;
   EXPECT_NEAR(ingestNormals(map.floats(), p).normals[7].x, map.normals[7].x, 1e-6f);
 }
@@ -274,7 +274,7 @@ TEST(IngestNormals, RefusesAConstantMapUnlessItIsMeant) {
   for (int t = 0; t < 16; ++t) colours.insert(colours.end(), {0.5f, 0.5f, 1.0f});
   const PixelArray image{4, 4, 3, std::span<const float>(colours)};
   EXPECT_EQ(refusal(image).rule(), "map.varies");
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.allow_constant = true;
   EXPECT_EQ(ingestNormals(image, p).normals[5], (Vec2{0, 0}));
 }
@@ -288,7 +288,7 @@ TEST(Dequantize, FillsTheCombWithoutMovingTheMean) {
   const TestMap map(256, 256, 0.2f);
   const auto codes = map.codes<std::uint8_t>();
   const PixelArray image{256, 256, 3, std::span<const std::uint8_t>(codes)};
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   const auto raw = ingestNormals(image, p);
   p.dequantize = Dequantize::automatic;
   const auto dithered = ingestNormals(image, p);
@@ -321,7 +321,7 @@ TEST(Dequantize, FillsTheCombWithoutMovingTheMean) {
 TEST(Dequantize, LeavesFloatsAndSixteenBitsAlone) {
   const TestMap map;
   const auto codes = map.codes<std::uint16_t>();
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.dequantize = Dequantize::automatic;
   EXPECT_FALSE(ingestNormals(map.floats(), p).report.dequantized);
   EXPECT_FALSE(ingestNormals({map.width, map.height, 3, std::span<const std::uint16_t>(codes)}, p).report.dequantized);
@@ -331,7 +331,7 @@ TEST(IngestNormals, SameResultForAnyNumberOfThreads) {
   const TestMap map(123, 77);
   const auto codes = map.codes<std::uint8_t>();
   const PixelArray image{123, 77, 3, std::span<const std::uint8_t>(codes)};
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.dequantize = Dequantize::tpdf;
   const auto many = ingestNormals(image, p);
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
@@ -342,7 +342,7 @@ TEST(IngestNormals, SameResultForAnyNumberOfThreads) {
 
 TEST(IngestHeights, ScalesToTexels) {
   const std::vector<std::uint16_t> codes = {0, 65535, 13107, 0};
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.height_scale = 5;
   const auto result = ingestHeights({2, 2, 1, std::span<const std::uint16_t>(codes)}, p);
   EXPECT_EQ(result.heights, (std::vector<float>{0, 5, 1, 0}));
@@ -356,7 +356,7 @@ TEST(IngestHeights, RefusesColoursAndHoles) {
   heights[6] = kNaN;
   const PixelArray image{4, 4, 1, std::span<const float>(heights)};
   EXPECT_EQ(errorOf([&] { ingestHeights(image, plain()); }).object(), "column 2, row 2 from the top");
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.fix_invalid = true;
   EXPECT_EQ(ingestHeights(image, p).heights[6], 0.125f);
 }
@@ -365,7 +365,7 @@ TEST(IngestHeights, MapsThatAreConstantBesideTheirHolesAreConstant) {
   std::vector<float> heights(16, 3.0f);
   heights[5] = -9999;
   const PixelArray image{4, 4, 1, std::span<const float>(heights)};
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.no_data = -9999;
   EXPECT_EQ(errorOf([&] { ingestHeights(image, p); }).rule(), "map.varies");
   p.allow_constant = true;
@@ -378,7 +378,7 @@ TEST(IngestHeights, EveryFiniteHeightMakesNormalsInsideTheDisk) {
     const Vec2 random = randomPair(7, 1, i);
     heights.push_back((random.x - 0.5f) * std::exp2(254 * random.y - 127));  // all magnitudes that floats have
   }
-  IngestParameters p = plain();
+  IngestOptions p = plain();
   p.refuse_sentinels = false;
   const auto result = ingestHeights({64, 64, 1, std::span<const float>(heights)}, p);
   EXPECT_GT(result.report.cliffs, 1000u);

@@ -16,8 +16,8 @@ namespace {
 constexpr SynthKind kAllKinds[] = {SynthKind::isotropic, SynthKind::brushed, SynthKind::flakes,   SynthKind::scratches,
                                    SynthKind::leather,   SynthKind::weave,   SynthKind::sawtooth, SynthKind::flat};
 
-SynthParameters sized(SynthKind kind, int width, int height) {
-  SynthParameters p = defaultSynthParameters(kind);
+SynthOptions sized(SynthKind kind, int width, int height) {
+  SynthOptions p = defaultSynthOptions(kind);
   p.width = width;
   p.height = height;
   return p;
@@ -44,7 +44,7 @@ Stats slopeStats(const std::vector<Vec2>& normals, const Value& value) {
 }
 
 TEST(SynthIsotropic, HasTheSlopeVarianceOfItsBeckmannRoughness) {
-  SynthParameters p = sized(SynthKind::isotropic, 512, 384);
+  SynthOptions p = sized(SynthKind::isotropic, 512, 384);
   p.alpha = 0.3f;
   const auto normals = synthNormals(p);
   const Stats x = slopeStats(normals, [](Vec2 n) { return n.x; });
@@ -70,7 +70,7 @@ TEST(SynthBrushed, IsRoughAcrossTheStreaksOnly) {
 
 TEST(SynthFlakes, TiltsFollowTheGtrDistribution) {
   for (const float gamma : {1.0f, 2.0f, 3.5f}) {
-    SynthParameters p = sized(SynthKind::flakes, 512, 512);
+    SynthOptions p = sized(SynthKind::flakes, 512, 512);
     p.gamma = gamma;
     p.alpha = 0.3f;
     p.feature_texels = 4;
@@ -106,7 +106,7 @@ TEST(SynthFlat, PointsUpEverywhere) {
 }
 
 TEST(SynthSawtooth, HasTheTwoSlopesOfItsRamps) {
-  SynthParameters p = sized(SynthKind::sawtooth, 64, 4);
+  SynthOptions p = sized(SynthKind::sawtooth, 64, 4);
   p.feature_texels = 16;
   p.slope = 0.6f;
   std::set<int> slopes;
@@ -120,7 +120,7 @@ TEST(SynthSawtooth, HasTheTwoSlopesOfItsRamps) {
 
 TEST(Synth, PatternsReachTheSlopeAskedFor) {
   for (const SynthKind kind : {SynthKind::scratches, SynthKind::leather, SynthKind::weave, SynthKind::sawtooth}) {
-    SynthParameters p = sized(kind, 256, 192);
+    SynthOptions p = sized(kind, 256, 192);
     p.alpha = 0;
     p.slope = 0.8f;
     EXPECT_NEAR(slopeMoments(256, 192, synthHeights(p)).steepest, 0.8f, 1e-4f) << static_cast<int>(kind);
@@ -153,7 +153,7 @@ TEST(Synth, TilesWithoutASeam) {
 }
 
 TEST(SynthIsotropic, SeamIsAsSmoothAsTheInside) {
-  SynthParameters p = sized(SynthKind::isotropic, 256, 256);
+  SynthOptions p = sized(SynthKind::isotropic, 256, 256);
   p.correlation_texels = 16;  // neighbours differ by 1 % of the variance, so a seam would stand out a hundredfold
   const auto n = synthNormals(p);
   double seam = 0, inside = 0;
@@ -167,7 +167,7 @@ TEST(SynthIsotropic, SeamIsAsSmoothAsTheInside) {
 
 TEST(Synth, SameBytesForAnyNumberOfThreads) {
   for (const SynthKind kind : kAllKinds) {
-    const SynthParameters p = sized(kind, 133, 97);
+    const SynthOptions p = sized(kind, 133, 97);
     const auto many = synthNormals(p);
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     const auto single = synthNormals(p);
@@ -177,7 +177,7 @@ TEST(Synth, SameBytesForAnyNumberOfThreads) {
 
 TEST(Synth, SeedsDiffer) {
   for (const SynthKind kind : {SynthKind::isotropic, SynthKind::flakes, SynthKind::scratches, SynthKind::leather}) {
-    SynthParameters p = sized(kind, 64, 64);
+    SynthOptions p = sized(kind, 64, 64);
     const auto first = synthNormals(p);
     p.seed = 2;
     EXPECT_NE(first, synthNormals(p)) << static_cast<int>(kind);
@@ -202,7 +202,7 @@ TEST(Synth, FlakesHaveNoHeights) {
 }
 
 TEST(Synth, RefusesParametersOutOfRange) {
-  SynthParameters p = sized(SynthKind::flakes, 8, 8);
+  SynthOptions p = sized(SynthKind::flakes, 8, 8);
   p.alpha = 1;
   EXPECT_THROW(synthNormals(p), Error);
   p = sized(SynthKind::isotropic, 0, 8);

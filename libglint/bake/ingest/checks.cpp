@@ -197,7 +197,7 @@ bool areSame(const PixelArray& image, int a, int b) {
   return everyTexel(image, [=](const auto* pixel, const auto*) { return pixel[a] == pixel[b]; });
 }
 
-NormalLayout findLayout(const PixelArray& image, const IngestParameters& p) {
+NormalLayout findLayout(const PixelArray& image, const IngestOptions& p) {
   NormalLayout layout;
   if (image.channels == 2) layout = {NormalChannels::rg, 0, 1, -1};
   if (image.channels < 3 || p.trust_channels) return layout;

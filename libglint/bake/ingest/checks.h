@@ -32,7 +32,7 @@ struct NormalLayout {
 
 /// Finds the channels. Blue counts as z here even where it is constant: only its vectors tell (measureVectors).
 /// @throws Error invalid_input if two channels are not enough to tell: red, green and blue are the same
-NormalLayout findLayout(const PixelArray& image, const IngestParameters& parameters);
+NormalLayout findLayout(const PixelArray& image, const IngestOptions& options);
 
 /// Whether a channel has the same value everywhere.
 bool isConstant(const PixelArray& image, int channel);

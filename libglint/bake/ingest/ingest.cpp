@@ -98,7 +98,7 @@ struct MapMeaning {
 };
 
 /// @throws Error invalid_input if the pixels are no normals
-MapMeaning findMeaning(const PixelArray& image, const IngestParameters& p) {
+MapMeaning findMeaning(const PixelArray& image, const IngestOptions& p) {
   const bool floating = std::holds_alternative<std::span<const float>>(image.pixels);
   MapMeaning meaning;
   meaning.layout = findLayout(image, p);
@@ -135,7 +135,7 @@ MapMeaning findMeaning(const PixelArray& image, const IngestParameters& p) {
 template <class T>
 struct NormalDecoder {
   const PixelArray& image;
-  const IngestParameters& parameters;
+  const IngestOptions& options;
   NormalLayout layout;
   std::span<const T> pixels;
   Decoder decode;
@@ -144,9 +144,9 @@ struct NormalDecoder {
   float rounding = 0;   ///< largest error of a component
   float tolerance = 0;  ///< of unit length
 
-  NormalDecoder(const PixelArray& array, const IngestParameters& p, const MapMeaning& meaning)
+  NormalDecoder(const PixelArray& array, const IngestOptions& p, const MapMeaning& meaning)
       : image(array),
-        parameters(p),
+        options(p),
         layout(meaning.layout),
         pixels(std::get<std::span<const T>>(array.pixels)),
         decode(Decoder::of<T>(meaning.encoding)),
@@ -180,7 +180,7 @@ struct NormalDecoder {
       return r2 <= limit * limit ? onRim(x, y, faults) : downward(t, faults);
     }
     if (dither > 0) {
-      const Vec2 noise = dither * triangularNoise(parameters.seed, t);
+      const Vec2 noise = dither * triangularNoise(options.seed, t);
       const Vec2 moved = {x + noise.x, y + noise.y};
       if (three || dot(moved, moved) < 1) x = moved.x, y = moved.y;
     }
@@ -205,7 +205,7 @@ struct NormalDecoder {
 };
 
 template <class T>
-std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestParameters& p, const NormalDecoder<T>& decoder,
+std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestOptions& p, const NormalDecoder<T>& decoder,
                                 Faults& faults) {
   const float green = p.convention == Convention::directx ? -1.0f : 1.0f;
   std::vector<Vec2> normals(static_cast<std::size_t>(image.width) * image.height);
@@ -229,7 +229,7 @@ std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestParameters&
 }
 
 /// @throws Error invalid_input for texels that only fix_invalid makes usable
-void checkFaults(const PixelArray& image, const IngestParameters& p, bool three, const Faults& faults) {
+void checkFaults(const PixelArray& image, const IngestOptions& p, bool three, const Faults& faults) {
   if (p.fix_invalid) return;
   const auto plural = [](std::size_t n) { return n == 1 ? std::string("1 texel is ") : std::to_string(n) + " texels are "; };
   if (faults.non_finite > 0) {
@@ -258,7 +258,7 @@ void refuseSentinel(const PixelArray& image, const std::optional<double>& no_dat
 }
 
 template <class T>
-std::vector<float> decodeHeights(const PixelArray& image, const IngestParameters& p, float noise_width, Faults& faults) {
+std::vector<float> decodeHeights(const PixelArray& image, const IngestOptions& p, float noise_width, Faults& faults) {
   const auto pixels = std::get<std::span<const T>>(image.pixels);
   const float scale = p.height_scale / kCodes<T>;
   const NoDataTest holds_nothing(image, p.no_data);
@@ -288,7 +288,7 @@ std::vector<float> decodeHeights(const PixelArray& image, const IngestParameters
 }
 
 /// @throws Error invalid_input if the colour channels differ, as in a photograph or a normal map
-void checkGrey(const PixelArray& image, const IngestParameters& p) {
+void checkGrey(const PixelArray& image, const IngestOptions& p) {
   if (image.channels < 3) return;
   const std::size_t texels = static_cast<std::size_t>(image.width) * image.height;
   for (std::size_t t = 0; t < texels; ++t) {
@@ -349,7 +349,7 @@ IngestReport describeNormals(int width, int height, std::span<const Vec2> normal
   return report;
 }
 
-IngestedNormals ingestNormals(const PixelArray& image, const IngestParameters& p) {
+IngestedNormals ingestNormals(const PixelArray& image, const IngestOptions& p) {
   checkShape(image, p.name);
   if (image.channels < 2) {
     throw Error(ErrorCode::invalid_input, "normals.channels", p.name, "", "has one channel, and normals need three (or two)",
@@ -387,7 +387,7 @@ IngestedNormals ingestNormals(const PixelArray& image, const IngestParameters& p
   return result;
 }
 
-IngestedHeights ingestHeights(const PixelArray& image, const IngestParameters& p) {
+IngestedHeights ingestHeights(const PixelArray& image, const IngestOptions& p) {
   checkShape(image, p.name);
   checkGrey(image, p);
   if (!p.allow_constant) checkNotConstant(image, {0}, p.name);

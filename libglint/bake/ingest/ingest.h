@@ -48,7 +48,7 @@ enum class NormalChannels : std::uint8_t {
 };
 
 /// How pixels become normals or heights.
-struct IngestParameters {
+struct IngestOptions {
   std::string name;  ///< of the image, for error messages
   Convention convention = Convention::opengl;
   Encoding encoding = Encoding::automatic;
@@ -103,12 +103,12 @@ struct IngestedHeights {
 /// @throws Error invalid_input, naming the first texel at fault (texelName): one channel, a constant map, values that were
 ///         converted to or from sRGB, vectors far from unit length (a photograph), blue or alpha that hold something else,
 ///         texels that are not finite, more texels that point below the surface (unless fix_invalid)
-IngestedNormals ingestNormals(const PixelArray& image, const IngestParameters& parameters);
+IngestedNormals ingestNormals(const PixelArray& image, const IngestOptions& options);
 
 /// Heights of a height field: the first channel times height_scale.
 /// @throws Error invalid_input: channels that differ, a constant map, texels that are not finite (unless fix_invalid), numbers
 ///         that seem to stand for no data (refuse_sentinels)
-IngestedHeights ingestHeights(const PixelArray& image, const IngestParameters& parameters);
+IngestedHeights ingestHeights(const PixelArray& image, const IngestOptions& options);
 
 /// Moments and counts of a map of normals: everything of the report that does not need the pixels.
 IngestReport describeNormals(int width, int height, std::span<const Vec2> normals);

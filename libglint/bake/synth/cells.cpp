@@ -17,7 +17,7 @@ constexpr std::uint64_t kOrientationStream = 3;
 /// One random point in each cell of a periodic grid. Cells are as near to square of the wanted size as the map's size allows.
 class JitteredGrid {
  public:
-  JitteredGrid(const SynthParameters& p, float cell_texels)
+  JitteredGrid(const SynthOptions& p, float cell_texels)
       : columns_(std::max(1, static_cast<int>(std::lround(static_cast<float>(p.width) / cell_texels)))),
         rows_(std::max(1, static_cast<int>(std::lround(static_cast<float>(p.height) / cell_texels)))),
         cell_width_(static_cast<float>(p.width) / static_cast<float>(columns_)),
@@ -112,7 +112,7 @@ float domeHeight(const JitteredGrid& grid, Vec2 point, float rim) {
 
 }  // namespace
 
-std::vector<Vec2> flakeNormals(const SynthParameters& p) {
+std::vector<Vec2> flakeNormals(const SynthOptions& p) {
   const JitteredGrid grid(p, p.feature_texels);
   const double last_quantile = gtrQuantile(kMinFlakeCosine * kMinFlakeCosine, p.alpha, p.gamma);
   std::vector<Vec2> orientations(grid.cellCount());
@@ -133,7 +133,7 @@ std::vector<Vec2> flakeNormals(const SynthParameters& p) {
   return normals;
 }
 
-std::vector<float> leatherHeights(const SynthParameters& p) {
+std::vector<float> leatherHeights(const SynthOptions& p) {
   const JitteredGrid pebbles(p, p.feature_texels);
   const float rim = 0.35f * p.feature_texels;  // pebbles are rounded this far in from the groove
   std::vector<float> heights(static_cast<std::size_t>(p.width) * p.height);

@@ -8,12 +8,12 @@
 namespace glint::bake {
 
 /// Gaussian random field of correlation exp(-(x/correlation_x)^2 - (y/correlation_y)^2). O(n log n).
-std::vector<float> noiseHeights(const SynthParameters& parameters, float correlation_x, float correlation_y);
+std::vector<float> noiseHeights(const SynthOptions& options, float correlation_x, float correlation_y);
 
-std::vector<Vec2> flakeNormals(const SynthParameters& parameters);
-std::vector<float> leatherHeights(const SynthParameters& parameters);
-std::vector<float> scratchHeights(const SynthParameters& parameters);
-std::vector<float> weaveHeights(const SynthParameters& parameters);
-std::vector<float> sawtoothHeights(const SynthParameters& parameters);
+std::vector<Vec2> flakeNormals(const SynthOptions& options);
+std::vector<float> leatherHeights(const SynthOptions& options);
+std::vector<float> scratchHeights(const SynthOptions& options);
+std::vector<float> weaveHeights(const SynthOptions& options);
+std::vector<float> sawtoothHeights(const SynthOptions& options);
 
 }  // namespace glint::bake

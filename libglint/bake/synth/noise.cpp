@@ -16,7 +16,7 @@ constexpr std::uint64_t kNoiseStream = 1;
 
 }  // namespace
 
-std::vector<float> noiseHeights(const SynthParameters& p, float correlation_x, float correlation_y) {
+std::vector<float> noiseHeights(const SynthOptions& p, float correlation_x, float correlation_y) {
   const int columns = p.width / 2 + 1;
   const std::size_t padded = 2 * static_cast<std::size_t>(columns);
   const std::unique_ptr<double, FftwFree> memory(

@@ -37,7 +37,7 @@ struct Scratch {
   }
 };
 
-std::vector<Scratch> drawScratches(const SynthParameters& p) {
+std::vector<Scratch> drawScratches(const SynthOptions& p) {
   const double squares = static_cast<double>(p.width) * p.height / (64.0 * 64.0);
   std::vector<Scratch> scratches(static_cast<std::size_t>(std::max(1.0, std::round(squares * p.density))));
   for (std::size_t i = 0; i < scratches.size(); ++i) {
@@ -58,7 +58,7 @@ std::vector<Scratch> drawScratches(const SynthParameters& p) {
 
 /// Cuts one scratch, moved by (shift_x, shift_y), into rows [first_row, last_row). The deepest cut wins, so order does not
 /// matter.
-void carve(const SynthParameters& p, Scratch scratch, int shift_x, int shift_y, int first_row, int last_row,
+void carve(const SynthOptions& p, Scratch scratch, int shift_x, int shift_y, int first_row, int last_row,
            std::vector<float>& heights) {
   scratch.start = scratch.start + Vec2{static_cast<float>(shift_x), static_cast<float>(shift_y)};
   const Vec2 end = scratch.start + scratch.length * scratch.along;
@@ -101,7 +101,7 @@ float threadHeight(float across, float along, float crossing) {
 
 }  // namespace
 
-std::vector<float> scratchHeights(const SynthParameters& p) {
+std::vector<float> scratchHeights(const SynthOptions& p) {
   const std::vector<Scratch> scratches = drawScratches(p);
   std::vector<float> heights(static_cast<std::size_t>(p.width) * p.height, 0.0f);
   float reach = 0;
@@ -123,7 +123,7 @@ std::vector<float> scratchHeights(const SynthParameters& p) {
   return heights;
 }
 
-std::vector<float> weaveHeights(const SynthParameters& p) {
+std::vector<float> weaveHeights(const SynthOptions& p) {
   const float warp_width = static_cast<float>(p.width) / static_cast<float>(threadCount(p.width, p.feature_texels));
   const float weft_width = static_cast<float>(p.height) / static_cast<float>(threadCount(p.height, p.feature_texels));
   std::vector<float> heights(static_cast<std::size_t>(p.width) * p.height);
@@ -142,7 +142,7 @@ std::vector<float> weaveHeights(const SynthParameters& p) {
   return heights;
 }
 
-std::vector<float> sawtoothHeights(const SynthParameters& p) {
+std::vector<float> sawtoothHeights(const SynthOptions& p) {
   constexpr float kRise = 0.75f;
   const float teeth = std::max(1.0f, std::round(static_cast<float>(p.width) / p.feature_texels));
   const float period = static_cast<float>(p.width) / teeth;

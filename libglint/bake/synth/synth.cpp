@@ -20,7 +20,7 @@ void require(bool holds, const char* parameter, const char* range) {
 }
 
 /// Scratches wider than the map wrap round it many times, and many wide ones lie on each texel: neither shows, and both cost time.
-void checkScratches(const SynthParameters& p) {
+void checkScratches(const SynthOptions& p) {
   constexpr int kSureWidth = 64;        // texels that are allowed on any map
   constexpr float kMeanLength = 128;    // about that of a scratch, texels
   constexpr double kMostLayers = 1024;  // scratches on a texel, on average
@@ -36,7 +36,7 @@ void checkScratches(const SynthParameters& p) {
                             std::floor(1e3 * p.density * kMostLayers / layers) / 1e3));
 }
 
-void check(const SynthParameters& p) {
+void check(const SynthOptions& p) {
   require(p.width >= 1 && p.width <= kMaxSize && p.height >= 1 && p.height <= kMaxSize, "size", "1 to 65536 texels");
   require(p.alpha >= 0 && p.alpha <= 2, "alpha", "0 to 2");
   require(p.kind != SynthKind::flakes || (p.alpha >= 1e-4f && p.alpha <= 0.999f), "alpha", "0.0001 to 0.999 for flakes");
@@ -54,7 +54,7 @@ void scale(std::vector<float>& heights, double factor) {
 }
 
 /// Noise whose slopes have the wanted variance. A map too small to have slopes (1 or 2 texels) stays flat.
-std::vector<float> scaledNoise(const SynthParameters& p) {
+std::vector<float> scaledNoise(const SynthOptions& p) {
   const bool brushed = p.kind == SynthKind::brushed;
   std::vector<float> heights = noiseHeights(p, brushed ? p.streak_texels : p.correlation_texels, p.correlation_texels);
   const SlopeMoments moments = slopeMoments(p.width, p.height, heights);
@@ -63,7 +63,7 @@ std::vector<float> scaledNoise(const SynthParameters& p) {
   return heights;
 }
 
-std::vector<float> pattern(const SynthParameters& p) {
+std::vector<float> pattern(const SynthOptions& p) {
   switch (p.kind) {
     case SynthKind::scratches:
       return scratchHeights(p);
@@ -80,8 +80,8 @@ std::vector<float> pattern(const SynthParameters& p) {
 
 }  // namespace
 
-SynthParameters defaultSynthParameters(SynthKind kind) {
-  SynthParameters p;
+SynthOptions defaultSynthOptions(SynthKind kind) {
+  SynthOptions p;
   p.kind = kind;
   switch (kind) {
     case SynthKind::isotropic:
@@ -111,7 +111,7 @@ SynthParameters defaultSynthParameters(SynthKind kind) {
   return p;
 }
 
-std::vector<float> synthHeights(const SynthParameters& p) {
+std::vector<float> synthHeights(const SynthOptions& p) {
   check(p);
   if (p.kind == SynthKind::flakes) {
     throw Error(ErrorCode::unsupported, "synth.flakes_height", "", "",
@@ -128,7 +128,7 @@ std::vector<float> synthHeights(const SynthParameters& p) {
   return heights;
 }
 
-std::vector<Vec2> synthNormals(const SynthParameters& p) {
+std::vector<Vec2> synthNormals(const SynthOptions& p) {
   check(p);
   if (p.kind == SynthKind::flakes) return flakeNormals(p);
   return normalsFromHeights(p.width, p.height, synthHeights(p));

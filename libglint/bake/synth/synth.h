@@ -20,7 +20,7 @@ enum class SynthKind : std::uint8_t {
 };
 
 /// What shapes a synthetic map. Lengths are in texels.
-struct SynthParameters {
+struct SynthOptions {
   SynthKind kind = SynthKind::isotropic;
   int width = 512;
   int height = 512;
@@ -37,19 +37,19 @@ struct SynthParameters {
 };
 
 /// Parameters that look right for a kind.
-SynthParameters defaultSynthParameters(SynthKind kind);
+SynthOptions defaultSynthOptions(SynthKind kind);
 
 /// Heights of a periodic procedural surface. Same result for any number of threads.
 /// @return [height][width], texels, bottom row first. The noise is scaled so that the variance of its central-difference slopes
 /// is
 ///         alpha^2 / 2 per axis (brushed: across); a pattern so that its steepest central-difference slope is `slope`
 /// @throws Error unsupported for flakes, which have no common height field; usage if a parameter is out of range
-std::vector<float> synthHeights(const SynthParameters& parameters);
+std::vector<float> synthHeights(const SynthOptions& options);
 
 /// Normals of a periodic procedural surface: of synthHeights by normalsFromHeights, or of the flakes.
 /// @return [height][width], projections on the disk, bottom row first
 /// @throws Error usage if a parameter is out of range
-std::vector<Vec2> synthNormals(const SynthParameters& parameters);
+std::vector<Vec2> synthNormals(const SynthOptions& options);
 
 /// Flakes lean at most this much: cos(85 degrees). Steeper ones of the GTR distribution's tail are left out, since an 8-bit
 /// image could not tell them from normals that point below the surface.
