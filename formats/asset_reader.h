@@ -7,16 +7,10 @@
 #include <string_view>
 #include <vector>
 
+#include "glint/formats/kinds.h"
 #include "glint/formats/provenance.h"
 #include "glint/formats/schema.h"
-#include "glint/model/bin_map.h"
-#include "glint/model/displacement.h"
 #include "glint/model/error.h"
-#include "glint/model/histogram_sat.h"
-#include "glint/model/ndf_cp.h"
-#include "glint/model/ndf_pyramid.h"
-#include "glint/model/normal_map.h"
-#include "glint/model/sh.h"
 
 namespace glint::formats {
 
@@ -32,6 +26,18 @@ struct DatasetInfo {
   std::string long_name;
 };
 
+/// One attribute of an asset's kind.
+struct AttributeInfo {
+  std::string name;  ///< as in SPEC.md
+  std::string type;  ///< "i32", "f32" or "text"
+  bool scalar = true;
+  bool of_levels = false;       ///< one value for each level
+  std::vector<double> numbers;  ///< empty for texts
+  std::vector<std::string> texts;
+  std::string units;
+  std::string long_name;
+};
+
 /// What a file says about itself.
 struct AssetInfo {
   std::string kind;
@@ -40,6 +46,7 @@ struct AssetInfo {
   std::vector<std::string> required_features;
   Provenance provenance;
   std::uint64_t file_bytes = 0;
+  std::vector<AttributeInfo> attributes;  ///< of the kind, in the order of SPEC.md
   std::vector<DatasetInfo> datasets;  ///< by path
   std::vector<std::string> warnings;  ///< things that a reader tolerates, e.g. a newer minor version
 };
@@ -80,11 +87,19 @@ class Asset {
   /// The asset as the struct of its kind, e.g. get<NdfPyramid>(). Throws Error (unsupported) that names both kinds if the asset is
   /// of another one.
   template <class Model>
-  const Model& get() const;
+  const Model& get() const {
+    const Model* asset = std::get_if<Model>(&any());
+    if (asset == nullptr) refuse(Model());
+    return *asset;
+  }
+
+  /// The asset, whatever its kind: for std::visit.
+  const AnyAsset& any() const;
 
  private:
   struct State;
   explicit Asset(std::unique_ptr<State> state);
+  [[noreturn]] void refuse(const AnyAsset& wanted) const;
 
   std::unique_ptr<State> state_;
 };

@@ -71,20 +71,6 @@ Attributes commonValues(std::string_view kind, const Provenance& provenance) {
           {"inputs", {ElementType::text, false, {}, std::move(inputs)}}};
 }
 
-/// The schema entry that a packed array belongs to.
-const DatasetSchema& schemaOf(const KindSchema& kind, const std::string& path) {
-  for (const DatasetSchema& dataset : kind.datasets) {
-    const std::size_t place = dataset.path.find("{l}");
-    if (place == std::string_view::npos
-            ? path == dataset.path
-            : path.size() == dataset.path.size() - 1 && path.starts_with(dataset.path.substr(0, place)) &&
-                  path.ends_with(dataset.path.substr(place + 3))) {
-      return dataset;
-    }
-  }
-  throw Error(ErrorCode::failed, "dataset.unknown", {}, "/" + path, "is not in the schema");
-}
-
 /// Writes everything but the datasets' bytes and finds where those go.
 ///
 /// HDF5 only reserves the space: the bytes are then written with plain calls, at the speed of the disk and with its errors.
@@ -177,9 +163,8 @@ class MetadataWriter {
     const hdf5::Handle dataset(
         H5Dcreate2(file, array.path.c_str(), types[array.type], space, H5P_DEFAULT, properties, H5P_DEFAULT),
         "cannot be written", object, kIo);
-    const DatasetSchema& schema = schemaOf(*findKindSchema(packed_.kind), array.path);
-    writeAttribute(dataset, "long_name", text(std::string(schema.long_name)), types);
-    writeAttribute(dataset, "units", text(std::string(schema.units)), types);
+    writeAttribute(dataset, "long_name", text(std::string(array.long_name)), types);
+    writeAttribute(dataset, "units", text(std::string(array.units)), types);
     writeAttribute(dataset, "xxh3_128", text(hashes_.at(array.path)), types);
     if (array.size_bytes == 0) return;
     const haddr_t offset = H5Dget_offset(dataset);
@@ -232,54 +217,16 @@ void writePacked(const fs::path& path, const PackedAsset& packed, const Provenan
   file.publish(options.overwrite);
 }
 
-template <class Model>
-void writeModel(const fs::path& path, const Model& model, const Provenance& provenance, const WriteOptions& options) {
+}  // namespace
+
+void writeAsset(const fs::path& path, const AnyAsset& asset, const Provenance& provenance, const WriteOptions& options) {
   try {
-    writePacked(path, pack(model), provenance, options);
+    writePacked(path, kinds()[asset.index()]->pack(asset), provenance, options);
   } catch (const Error& error) {
     if (!error.path().empty()) throw;
     // Rules and HDF5 know the object only: name the file that was to be written.
     throw Error(error.code(), error.rule(), path.string(), error.object(), error.clause(), error.remedy());
   }
-}
-
-}  // namespace
-
-void writeAsset(const fs::path& path, const NormalMap& map, const Provenance& provenance, const WriteOptions& options) {
-  writeModel(path, map, provenance, options);
-}
-
-void writeAsset(const fs::path& path, const HeightMap& map, const Provenance& provenance, const WriteOptions& options) {
-  writeModel(path, map, provenance, options);
-}
-
-void writeAsset(const fs::path& path, const NdfPyramid& pyramid, const Provenance& provenance, const WriteOptions& options) {
-  writeModel(path, pyramid, provenance, options);
-}
-
-void writeAsset(const fs::path& path, const NdfCp& ndf, const Provenance& provenance, const WriteOptions& options) {
-  writeModel(path, ndf, provenance, options);
-}
-
-void writeAsset(const fs::path& path, const BinMap& map, const Provenance& provenance, const WriteOptions& options) {
-  writeModel(path, map, provenance, options);
-}
-
-void writeAsset(const fs::path& path, const HistogramSat& sat, const Provenance& provenance, const WriteOptions& options) {
-  writeModel(path, sat, provenance, options);
-}
-
-void writeAsset(const fs::path& path, const ShLight& light, const Provenance& provenance, const WriteOptions& options) {
-  writeModel(path, light, provenance, options);
-}
-
-void writeAsset(const fs::path& path, const ShLobes& lobes, const Provenance& provenance, const WriteOptions& options) {
-  writeModel(path, lobes, provenance, options);
-}
-
-void writeAsset(const fs::path& path, const Displacement& displacement, const Provenance& provenance,
-                const WriteOptions& options) {
-  writeModel(path, displacement, provenance, options);
 }
 
 }  // namespace glint::formats

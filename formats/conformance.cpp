@@ -3,46 +3,12 @@
 #include <algorithm>
 #include <set>
 
+#include "glint/formats/choices.h"
 #include "glint/formats/number_text.h"
+#include "glint/formats/size_expression.h"
 
 namespace glint::formats {
 namespace {
-
-/// Calls `use` with each part of `list` between separators.
-template <class Use>
-void split(std::string_view list, char separator, Use use) {
-  while (true) {
-    const std::size_t end = list.find(separator);
-    use(list.substr(0, end));
-    if (end == std::string_view::npos) return;
-    list.remove_prefix(end + 1);
-  }
-}
-
-bool isOneOf(std::string_view value, std::string_view choices) {
-  bool found = false;
-  split(choices, '|', [&](std::string_view choice) { found |= choice == value; });
-  return found;
-}
-
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
-  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
-  return text;
-}
-
-/// Whether the condition of a TypeChoice holds.
-bool holds(std::string_view when, const Attributes& attributes) {
-  if (when.empty()) return true;
-  bool all = true;
-  split(when, '&', [&](std::string_view term) {
-    const std::size_t equal = term.find('=');
-    const auto found = attributes.find(trimmed(term.substr(0, equal)));
-    all &= found != attributes.end() && found->second.texts.size() == 1 &&
-           isOneOf(found->second.texts[0], trimmed(term.substr(equal + 1)));
-  });
-  return all;
-}
 
 std::string listed(const std::vector<std::uint64_t>& dims) {
   std::string text = "[";
@@ -82,7 +48,7 @@ bool checkValue(const AttributeValue& value, const std::string& object, const At
     return false;
   }
   for (const std::string& text : value.texts) {
-    if (schema.values.empty() || isOneOf(text, schema.values)) continue;
+    if (schema.values.empty() || indexOf(text, schema.values) >= 0) continue;
     findings.add("attribute.value", place, "is \"" + text + "\", not one of " + std::string(schema.values));
     return false;
   }
@@ -145,7 +111,7 @@ void checkDataset(const DatasetRecord& record, const std::string& path, const Da
   }
   warnOfUnknown(record.attributes, object, datasetAttributes(), {}, findings);
   const auto type =
-      std::find_if(schema.types.begin(), schema.types.end(), [&](const TypeChoice& c) { return holds(c.when, root); });
+      std::find_if(schema.types.begin(), schema.types.end(), [&](const TypeChoice& c) { return conditionHolds(c.when, root); });
   if (type == schema.types.end() || !record.known_type || record.type != type->type) {
     findings.add("dataset.type", object,
                  "has elements of type " + std::string(record.known_type ? name(record.type) : "unknown") + ", not " +

@@ -46,6 +46,20 @@ AssetInfo describe(const FileStructure& structure) {
   return info;
 }
 
+/// Attributes of the kind that the file has.
+std::vector<AttributeInfo> describe(const Attributes& attributes, const KindSchema& schema) {
+  std::vector<AttributeInfo> list;
+  for (const AttributeSchema& attribute : schema.attributes) {
+    const auto found = attributes.find(attribute.name);
+    if (found == attributes.end()) continue;
+    const AttributeValue& value = found->second;
+    list.push_back({std::string(attribute.name), std::string(name(value.type)), value.scalar,
+                    attribute.count == "level_count", value.numbers, value.texts, std::string(attribute.units),
+                    std::string(attribute.long_name)});
+  }
+  return list;
+}
+
 /// Looks for bytes that belong to no object and are not 0.
 void checkPadding(const FileStructure& structure, Findings& findings) {
   if (!structure.places.complete) return;
@@ -67,24 +81,27 @@ void checkPadding(const FileStructure& structure, Findings& findings) {
 }  // namespace
 
 LoadedAsset loadAsset(const std::filesystem::path& path, Findings& findings) {
-  LoadedAsset asset;
-  asset.structure = readStructure(path, findings);
-  if (asset.structure.attributes.empty() && findings.failed()) return asset;
-  asset.info = describe(asset.structure);
-  findings.report().kind = asset.info.kind;
-  const KindSchema* schema = checkHeader(asset.structure, findings);
-  if (schema != nullptr) checkConformance(asset.structure, *schema, findings);
-  if (findings.failed()) return asset;
-  const Codec* codec = findCodec(asset.info.kind);
-  asset.model = codec->unpack(Content(asset.structure));
-  codec->check_index(asset.model, findings);
-  if (!findings.failed()) asset.codec = codec;
-  return asset;
+  LoadedAsset loaded;
+  loaded.structure = readStructure(path, findings);
+  if (loaded.structure.attributes.empty() && findings.failed()) return loaded;
+  loaded.info = describe(loaded.structure);
+  findings.report().kind = loaded.info.kind;
+  const KindSchema* schema = checkHeader(loaded.structure, findings);
+  if (schema != nullptr) checkConformance(loaded.structure, *schema, findings);
+  if (findings.failed()) return loaded;
+  const Kind* kind = findKind(loaded.info.kind);
+  loaded.info.attributes = describe(loaded.structure.attributes, *schema);
+  const AnyAsset asset = kind->read(loaded.structure);
+  kind->check_index(asset, findings);
+  if (findings.failed()) return loaded;
+  loaded.asset = asset;
+  loaded.kind = kind;
+  return loaded;
 }
 
-void checkHashes(const LoadedAsset& asset, Findings& findings) {
-  checkPadding(asset.structure, findings);
-  for (const auto& [path, record] : asset.structure.datasets) {
+void checkHashes(const LoadedAsset& loaded, Findings& findings) {
+  checkPadding(loaded.structure, findings);
+  for (const auto& [path, record] : loaded.structure.datasets) {
     const std::string stored = textOf(record.attributes, "xxh3_128");
     const std::string actual = hashBytes(record.data, record.size_bytes);
     if (stored != actual) {

@@ -23,6 +23,9 @@ struct Rule {
   std::string_view remedy;                    ///< what the user can do when it does not
 };
 
+/// Remedy for what only the maker of a file can get wrong.
+inline constexpr std::string_view kMakeAgain = "make the file again from its inputs";
+
 /// All rules, in the order in which they are checked.
 std::span<const Rule> rules();
 /// The rule with this id. The id must exist.

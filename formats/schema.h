@@ -61,7 +61,7 @@ struct DerivedValue {
   std::string_view long_name;
 };
 
-/// What one kind of asset holds. The table of kinds is the one source of truth of writer, reader, validator and schema.json.
+/// What one kind of asset holds: what its description in formats/kinds/ says. Reader, writer, validator and schema.json use it.
 struct KindSchema {
   std::string_view name;   ///< value of root attribute `kind`
   std::string_view title;  ///< one line for people
@@ -70,8 +70,8 @@ struct KindSchema {
   std::vector<DatasetSchema> datasets;
 };
 
-/// All kinds of this format version, by name.
-std::span<const KindSchema> kindSchemas();
+/// Schemas of all kinds of this format version, by name.
+std::vector<const KindSchema*> kindSchemas();
 /// The schema of a kind, or nullptr.
 const KindSchema* findKindSchema(std::string_view kind);
 /// Root attributes that every kind has.
@@ -81,15 +81,5 @@ std::span<const AttributeSchema> datasetAttributes();
 
 /// `path` with "{l}" replaced by the level.
 std::string levelPath(std::string_view path, int level);
-
-/// Values of the names in size expressions.
-struct SizeScope {
-  std::map<std::string, std::vector<std::uint64_t>, std::less<>> values;
-  std::uint64_t level = 0;  ///< value of `l`
-};
-
-/// Evaluates a size expression: integers, names, `name[l]`, `l`, `+`, `*`, `ceil_div(a, b)`, `pow2(a)` and parentheses.
-/// @return nothing if a name is not bound, the syntax is wrong, a divisor is 0 or the value needs more than 64 bits
-std::optional<std::uint64_t> evaluateSize(std::string_view expression, const SizeScope& scope);
 
 }  // namespace glint::formats

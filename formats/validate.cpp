@@ -6,10 +6,10 @@ namespace glint::formats {
 
 ValidationReport validateAsset(const std::filesystem::path& path, const ValidateOptions& options) {
   Findings findings(path);
-  const LoadedAsset asset = loadAsset(path, findings);
-  if (options.hashes) checkHashes(asset, findings);
+  const LoadedAsset loaded = loadAsset(path, findings);
+  if (options.hashes) checkHashes(loaded, findings);
   // Values are only looked at through indices that hold.
-  if (options.data && asset.codec != nullptr) asset.codec->check_data(asset.model, findings);
+  if (options.data && loaded.asset) loaded.kind->check_values(*loaded.asset, findings);
   return std::move(findings.report());
 }
 

@@ -65,7 +65,7 @@ ordered_json schemaJson() {
                        {"root_attributes", attributesJson(commonAttributes())},
                        {"dataset_attributes", attributesJson(datasetAttributes())}};
   json["kinds"] = ordered_json::array();
-  for (const KindSchema& kind : kindSchemas()) json["kinds"].push_back(kindJson(kind));
+  for (const KindSchema* kind : kindSchemas()) json["kinds"].push_back(kindJson(*kind));
   return json;
 }
 

@@ -1,280 +1,39 @@
 #include "glint-info/summary.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <map>
 #include <nlohmann/json.hpp>
 
-#include "glint/bake/ingest/ingest.h"
+#include "glint-info/statistics.h"
 
 namespace glint::apps {
 namespace {
 
 using nlohmann::ordered_json;
 
-void addSlopes(const MapSlopes& slopes, ordered_json& properties) {
-  properties["mean_slope"] = {slopes.mean.x, slopes.mean.y};
-  properties["slope_covariance_xx"] = slopes.covariance.xx;
-  properties["slope_covariance_xy"] = slopes.covariance.xy;
-  properties["slope_covariance_yy"] = slopes.covariance.yy;
+/// Value number k of an attribute, all digits of its type.
+ordered_json valueOf(const formats::AttributeInfo& attribute, std::size_t k) {
+  if (attribute.type == "text") return attribute.texts[k];
+  if (attribute.type == "i32") return static_cast<int>(attribute.numbers[k]);
+  return attribute.numbers[k];
 }
 
-ordered_json summarizeNormals(const NormalMap& map) {
-  Vec2 low{1, 1};
-  Vec2 high{-1, -1};
-  for (const Vec2 n : map.normals) {
-    low = {std::min(low.x, n.x), std::min(low.y, n.y)};
-    high = {std::max(high.x, n.x), std::max(high.y, n.y)};
-  }
-  const bake::IngestReport report = bake::describeNormals(map.width, map.height, map.normals);
-  ordered_json properties = {{"mean_tilt_deg", report.mean_tilt_deg},
-                             {"max_tilt_deg", report.steepest_tilt_deg},
-                             {"normal_range_x", {low.x, high.x}},
-                             {"normal_range_y", {low.y, high.y}}};
-  addSlopes(report.slopes, properties);
-  properties["bounds_levels"] = map.bounds_level_count;
-  return properties;
-}
-
-ordered_json summarizeHeights(const HeightMap& map) {
-  double sum = 0;
-  double squares = 0;
-  const auto [low, high] = std::minmax_element(map.heights.begin(), map.heights.end());
-  for (const float h : map.heights) sum += h, squares += static_cast<double>(h) * h;
-  const auto count = static_cast<double>(map.heights.size());
-  const double mean = sum / count;
-  return {{"min_texels", *low},
-          {"max_texels", *high},
-          {"mean_texels", mean},
-          {"deviation_texels", std::sqrt(std::max(0.0, squares / count - mean * mean))}};
-}
-
-ordered_json shapeProperties(const PyramidShape& shape) {
-  ordered_json properties = {{"width", shape.width},
-                             {"height", shape.height},
-                             {"resolution", shape.resolution},
-                             {"sigma_r", shape.sigma_r},
-                             {"surface", shape.surface == Surface::flat ? "flat" : "smooth"},
-                             {"boundary", shape.boundary == Boundary::wrap ? "wrap" : "clamp"},
-                             {"levels", shape.level_count}};
-  addSlopes(shape.slopes, properties);
-  return properties;
-}
-
-ordered_json levelJson(const PyramidGrid& grid) {
-  return {{"stride_texels", grid.stride}, {"columns", grid.columns}, {"rows", grid.rows}};
-}
-
-ordered_json summarizePyramid(const NdfPyramid& pyramid) {
-  ordered_json levels = ordered_json::array();
-  std::uint64_t blocks = 0;
-  std::uint64_t places = 0;
-  for (int l = 0; l < pyramid.shape.level_count; ++l) {
-    const PyramidGrid& grid = pyramid.shape.levels[l];
-    const std::uint64_t level_blocks = pyramid.levels[l].block_means.size();
-    const std::uint64_t level_places = grid.imageCount() * static_cast<std::uint64_t>(pyramid.shape.blocksPerImage());
-    levels.push_back(levelJson(grid));
-    levels.back()["blocks"] = level_blocks;
-    levels.back()["occupied_share"] = static_cast<double>(level_blocks) / static_cast<double>(level_places);
-    blocks += level_blocks;
-    places += level_places;
-  }
-  return {{"blocks", blocks},
-          {"occupied_share", static_cast<double>(blocks) / static_cast<double>(places)},
-          {"levels", std::move(levels)}};
-}
-
-ordered_json summarizeNdfCp(const NdfCp& ndf, const formats::AssetInfo& info) {
-  std::map<int, std::uint64_t> ranks;
-  std::uint64_t slices = 0, spot_slices = 0;
-  std::uint64_t empty = 0;
-  for (const NdfCluster& cluster : ndf.clusters) {
-    slices += cluster.slice_count;
-    if (cluster.slice_count == 0) {
-      ++empty;
-    } else if (cluster.columns == 0) {
-      spot_slices += cluster.slice_count;
+/// Attributes by name. Those with a value for each level are a table of levels, under their names without "level_".
+ordered_json propertiesOf(const formats::AssetInfo& info) {
+  ordered_json properties = ordered_json::object(), levels = ordered_json::array();
+  for (const formats::AttributeInfo& attribute : info.attributes) {
+    const std::size_t count = attribute.type == "text" ? attribute.texts.size() : attribute.numbers.size();
+    if (attribute.scalar) {
+      properties[attribute.name] = valueOf(attribute, 0);
+    } else if (attribute.of_levels) {
+      const std::string column = attribute.name.substr(std::string("level_").size());
+      for (std::size_t k = 0; k < count; ++k) levels[k][column] = valueOf(attribute, k);
     } else {
-      ++ranks[cluster.columns];
+      for (std::size_t k = 0; k < count; ++k) properties[attribute.name].push_back(valueOf(attribute, k));
     }
   }
-  ordered_json histogram = ordered_json::array();
-  for (const auto& [columns, clusters] : ranks) histogram.push_back({{"columns", columns}, {"clusters", clusters}});
-  std::uint64_t bytes = 0;
-  for (const formats::DatasetInfo& dataset : info.datasets) bytes += dataset.size_bytes;
-  ordered_json levels = ordered_json::array();
-  for (int l = 0; l < ndf.shape.level_count; ++l) levels.push_back(levelJson(ndf.shape.levels[l]));
-  return {{"clusters", ndf.clusters.size()},
-          {"empty_clusters", empty},
-          {"slices", slices},
-          {"spot_slices", spot_slices},
-          {"bytes_per_slice", slices == 0 ? 0.0 : static_cast<double>(bytes) / static_cast<double>(slices)},
-          {"ranks", std::move(histogram)},
-          {"levels", std::move(levels)}};
-}
-
-ordered_json summarizeBinMap(const BinMap& map) {
-  return {{"bins", static_cast<std::uint64_t>(map.bins_per_axis) * static_cast<std::uint64_t>(map.bins_per_axis)},
-          {"bins_of_a_tile", std::uint64_t{1} << 2 * map.tile_bits},
-          {"blocks", map.blockCount()},
-          {"texels_of_a_block", static_cast<double>(map.texels.size()) / static_cast<double>(map.blockCount())},
-          {"cells", map.cell_starts.size() - 1},
-          {"classes", map.classCount()}};
-}
-
-ordered_json summarizeHistograms(const HistogramSat& sat, const formats::AssetInfo& info) {
-  std::uint64_t bytes = 0;
-  for (const formats::DatasetInfo& dataset : info.datasets) bytes += dataset.size_bytes;
-  const auto fullest = std::max_element(sat.bin_totals.begin(), sat.bin_totals.end());
-  const double texels = static_cast<double>(sat.width) * sat.height;
-  return {{"bins", sat.bin_count},
-          {"fullest_bin", sat.bin_ids[static_cast<std::size_t>(fullest - sat.bin_totals.begin())]},
-          {"fullest_share", static_cast<double>(*fullest) / texels},
-          {"bytes_per_texel", static_cast<double>(bytes) / texels}};
-}
-
-ordered_json shProperties(int order, const ShGrid& grid, ShPrecision precision) {
-  return {{"order", order},
-          {"coefficients", shCount(order)},
-          {"grid", std::to_string(grid.rows) + "x" + std::to_string(grid.columns)},
-          {"precision", precision == ShPrecision::f16 ? "f16" : "f32"}};
-}
-
-/// How much of the light the bands hold, over all outgoing directions: shares of the sum of squares.
-ordered_json summarizeLight(const ShLight& light) {
-  const std::size_t bands = static_cast<std::size_t>(light.order) + 1;
-  double total = 0, first = 0, upper = 0;
-  for (std::size_t k = 0; k < light.band_norms.size(); ++k) {
-    const double square = double{light.band_norms[k]} * light.band_norms[k];
-    total += square;
-    if (k % bands == 0) first += square;
-    if (k % bands > bands / 2) upper += square;
-  }
-  return {{"share_of_band_0", total > 0 ? first / total : 0.0}, {"share_of_upper_half", total > 0 ? upper / total : 0.0}};
-}
-
-ordered_json displacementProperties(const Displacement& d) {
-  ordered_json properties = {{"width", d.width}, {"height", d.height}, {"texel_size_um", d.texel_size_um}};
-  if (d.base.kind == BaseBrdf::Kind::diffuse) {
-    properties["base"] = "diffuse";
-    properties["albedo"] = d.base.albedo;
-  } else {
-    properties["base"] = "ggx";
-    properties["alpha"] = d.base.alpha;
-    properties["eta"] = d.base.eta;
-    properties["k"] = d.base.k;
-  }
-  properties["channels"] = d.channels;
-  properties["lobes"] = d.lobe_count;
-  properties["base_color"] = d.levels[0].lobe_colors.empty() ? "one"
-                             : d.channels == 3               ? "rgb of each lobe"
-                                                             : "grey of each lobe";
-  if (d.base.kind == BaseBrdf::Kind::ggx)
-    properties["base_roughness"] = d.levels[0].lobe_alphas.empty() ? "one" : "of each lobe";
-  properties["angular"] = d.angular;
-  properties["levels"] = d.level_count;
+  if (!levels.empty()) properties["levels"] = std::move(levels);
   return properties;
-}
-
-ordered_json summarizeDisplacement(const Displacement& d) {
-  ordered_json levels = ordered_json::array();
-  for (int l = 0; l < d.level_count; ++l) {
-    const DisplacementLevel& level = d.levels[l];
-    double error = 0;
-    for (const float e : level.fit_errors) error += e;
-    const auto [low, high] = std::minmax_element(level.spatial_scale.begin(), level.spatial_scale.end());
-    levels.push_back({{"factor", level.factor},
-                      {"columns", level.columns},
-                      {"rows", level.rows},
-                      {"mean_fit_error", error / static_cast<double>(level.fit_errors.size())},
-                      {"min_T", *low},
-                      {"max_T", *high},
-                      {"rank1_residual", level.rank1_residual},
-                      {"rank1_energy", level.rank1_energy},
-                      {"interreflected_share", level.interreflected_share},
-                      {"distant_share", level.distant_share},
-                      {"scale_bytes", level.spatial_scale.size_bytes() + level.angular_scale.size_bytes()}});
-  }
-  return {{"reliable_within_deg", 75}, {"levels", std::move(levels)}};
-}
-
-const char* nameOf(CompressionMethod method) {
-  switch (method) {
-    case CompressionMethod::cp:
-      return "cp";
-    case CompressionMethod::tucker:
-      return "tucker";
-    case CompressionMethod::pca:
-      return "pca";
-  }
-  return "unknown";
-}
-
-const char* nameOf(CoefficientType type) {
-  switch (type) {
-    case CoefficientType::i8:
-      return "i8";
-    case CoefficientType::f16:
-      return "f16";
-    case CoefficientType::f32:
-      return "f32";
-  }
-  return "unknown";
-}
-
-void addKind(const formats::Asset& asset, ordered_json& properties, ordered_json& statistics) {
-  if (asset.kind() == "normals") {
-    const NormalMap& map = asset.get<NormalMap>();
-    properties = {{"width", map.width}, {"height", map.height}, {"texel_size_um", map.texel_size_um}};
-    statistics = summarizeNormals(map);
-  } else if (asset.kind() == "heights") {
-    const HeightMap& map = asset.get<HeightMap>();
-    properties = {{"width", map.width}, {"height", map.height}, {"texel_size_um", map.texel_size_um}};
-    statistics = summarizeHeights(map);
-  } else if (asset.kind() == "ndf-pyramid") {
-    const NdfPyramid& pyramid = asset.get<NdfPyramid>();
-    properties = shapeProperties(pyramid.shape);
-    properties["precision"] = pyramid.precision == BlockPrecision::f16 ? "f16" : "f32";
-    properties["value_scale"] = pyramid.value_scale;
-    statistics = summarizePyramid(pyramid);
-  } else if (asset.kind() == "displacement") {
-    properties = displacementProperties(asset.get<Displacement>());
-    statistics = summarizeDisplacement(asset.get<Displacement>());
-  } else if (asset.kind() == "ndf-cp") {
-    const NdfCp& ndf = asset.get<NdfCp>();
-    properties = shapeProperties(ndf.shape);
-    properties["method"] = nameOf(ndf.method);
-    properties["coefficient_type"] = nameOf(ndf.coefficient_type);
-    properties["regions"] = ndf.regions;
-    statistics = summarizeNdfCp(ndf, asset.info());
-  } else if (asset.kind() == "bin-map") {
-    const BinMap& map = asset.get<BinMap>();
-    properties = {{"width", map.width},         {"height", map.height},       {"alpha", map.alpha},
-                  {"alpha_min", map.alpha_min}, {"alpha_max", map.alpha_max}, {"bins_per_axis", map.bins_per_axis},
-                  {"leaf_size", map.leaf_size}};
-    addSlopes(map.slopes, properties);
-    statistics = summarizeBinMap(map);
-  } else if (asset.kind() == "histogram-sat") {
-    const HistogramSat& sat = asset.get<HistogramSat>();
-    properties = {{"width", sat.width},
-                  {"height", sat.height},
-                  {"directions", std::to_string(sat.theta_bins) + "x" + std::to_string(sat.phi_bins)},
-                  {"stride_texels", sat.stride},
-                  {"coarse_stride_texels", sat.coarse_stride},
-                  {"line_stride_texels", sat.line_stride}};
-    addSlopes(sat.slopes, properties);
-    statistics = summarizeHistograms(sat, asset.info());
-  } else if (asset.kind() == "sh-lobes") {
-    const ShLobes& lobes = asset.get<ShLobes>();
-    properties = shProperties(lobes.order, lobes.grid, lobes.precision);
-    properties["sigma_r"] = lobes.sigma_r;
-    statistics = {{"mean", lobes.zonal[0]}, {"last_band", lobes.zonal.back()}};
-  } else if (asset.kind() == "sh-light") {
-    const ShLight& light = asset.get<ShLight>();
-    properties = shProperties(light.order, light.grid, light.precision);
-    statistics = summarizeLight(light);
-  }
 }
 
 std::string listed(const ordered_json& dims) {
@@ -357,17 +116,14 @@ ordered_json summarize(const formats::Asset& asset) {
   // The command is JSON, but the file may hold anything: then it is shown as text.
   ordered_json command = ordered_json::parse(info.provenance.command_json, nullptr, false);
   if (command.is_discarded()) command = info.provenance.command_json;
-  ordered_json properties = ordered_json::object();
-  ordered_json statistics = ordered_json::object();
-  addKind(asset, properties, statistics);
   return {{"schema_version", kSummarySchemaVersion},
           {"kind", asset.kind()},
           {"format_version", std::to_string(info.format_major) + "." + std::to_string(info.format_minor)},
           {"file_bytes", info.file_bytes},
           {"provenance",
            {{"generator", info.provenance.generator}, {"command", std::move(command)}, {"inputs", std::move(inputs)}}},
-          {"properties", std::move(properties)},
-          {"statistics", std::move(statistics)},
+          {"properties", propertiesOf(info)},
+          {"statistics", statisticsOf(asset)},
           {"datasets", std::move(datasets)}};
 }
 

@@ -8,10 +8,10 @@
 namespace glint::apps {
 
 /// Version of the JSON that summarize makes: grows when a key changes its meaning or goes away.
-inline constexpr int kSummarySchemaVersion = 1;
+inline constexpr int kSummarySchemaVersion = 2;
 
 /// What an asset is: {"schema_version", "kind", "format_version", "file_bytes", "provenance", "properties", "statistics",
-/// "datasets"}.
+/// "datasets"}. Properties are the attributes of SPEC.md.
 /// @note reads all values of normals and heights; O(clusters) for compressed pyramids
 nlohmann::ordered_json summarize(const formats::Asset& asset);
 

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "glint/formats/kinds/codec.h"
-#include "glint/formats/kinds/pyramid_shape.h"
+#include "glint/formats/kinds/description.h"
+#include "glint/formats/kinds/shared_fields.h"
 
 namespace glint::formats {
 namespace {
@@ -157,86 +157,90 @@ bool momentsHold(std::span<const std::uint16_t> moments) {
 
 }  // namespace
 
-PackedAsset pack(const BinMap& map) {
-  PackedAsset packed{"bin-map", {}, {}};
-  packed.integer("width", map.width);
-  packed.integer("height", map.height);
-  packed.real("alpha", map.alpha);
-  packed.real("alpha_min", map.alpha_min);
-  packed.real("alpha_max", map.alpha_max);
-  packSlopes(map.slopes, packed);
-  packed.integer("bins_per_axis", map.bins_per_axis);
-  packed.integer("leaf_size", map.leaf_size);
-  packed.integer("tile_bits", map.tile_bits);
-  packed.integer("cell_starts_shift", map.cell_starts.shift);
-  const auto list = [&](const char* path, ElementType type, const auto& values, std::uint64_t count) {
-    packed.array(path, type, {count}, values.data(), values.size());
-  };
-  const std::uint64_t step = std::uint64_t{1} << map.cell_starts.shift;
-  packed.array("nodes", ElementType::u32, {map.nodes.size() / 2, 2}, map.nodes.data(), map.nodes.size());
-  packed.array("block_moments", ElementType::f16, {map.blockCount(), 5}, map.block_moments.data(), map.block_moments.size());
-  list("cell_starts/offsets", ElementType::u16, map.cell_starts.offsets, map.cell_starts.size());
-  list("cell_starts/bases", ElementType::u64, map.cell_starts.bases, (map.cell_starts.size() + step - 1) / step);
-  list("texels", ElementType::u32, map.texels, texelCount(map));
-  list("class_keys", ElementType::u32, map.class_keys, map.class_keys.size());
-  list("texel_classes", ElementType::u16, map.texel_classes, (texelCount(map) * BinMap::kClassBits + 15) / 16);
-  return packed;
-}
+template <>
+struct KindDescription<BinMap> {
+  static constexpr std::string_view kName = "bin-map";
+  static constexpr std::string_view kTitle = "Inverse bin map";
 
-void unpack(const Content& content, BinMap& map) {
-  map.width = content.integer("width");
-  map.height = content.integer("height");
-  map.alpha = content.real("alpha");
-  map.alpha_min = content.real("alpha_min");
-  map.alpha_max = content.real("alpha_max");
-  map.slopes = unpackSlopes(content);
-  map.bins_per_axis = content.integer("bins_per_axis");
-  map.leaf_size = content.integer("leaf_size");
-  map.tile_bits = content.integer("tile_bits");
-  map.nodes = content.array<std::uint32_t>("nodes");
-  map.block_moments = content.array<std::uint16_t>("block_moments");
-  map.cell_starts = {content.array<std::uint64_t>("cell_starts/bases"), content.array<std::uint16_t>("cell_starts/offsets"),
-                     content.integer("cell_starts_shift")};
-  map.texels = content.array<std::uint32_t>("texels");
-  map.class_keys = content.array<std::uint32_t>("class_keys");
-  map.texel_classes = content.array<std::uint16_t>("texel_classes");
-}
+  static std::vector<Rule> indexRules() {
+    return {Rule{"bin_map.size", Severity::error, ErrorCode::unsupported,
+                 "columns and rows of the map need at most 28 bits together", kMakeAgain},
+            errorRule("bin_map.alpha", "alpha is between alpha_min and alpha_max"),
+            errorRule("bin_map.cells", "cell_starts rise from 0 to the number of texels"),
+            errorRule("bin_map.nodes", "nodes divide the bins in blocks of texels, numbered in order"),
+            errorRule("bin_map.classes", "classes divide the keys of bins, and every texel has one")};
+  }
+  static std::vector<Rule> valueRules() {
+    return {errorRule("bin_map.texels", "every texel of the map is listed once, in its class and in a bin of the square"),
+            errorRule("bin_map.moments", "block_moments are those of a distribution inside the block")};
+  }
 
-void checkIndex(const BinMap& map, Findings& findings) {
-  if (!(map.alpha_min <= map.alpha && map.alpha <= map.alpha_max))
-    findings.add("bin_map.alpha", "/@alpha", "is not between alpha_min and alpha_max");
-  checkSlopes(map.slopes, findings);
-  if (texelCode(map.width, map.height).place_bits < 0) {
-    findings.add("bin_map.size", "/", "has " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels");
-    return;
+  static void describe(auto& fields, auto& map) {
+    describeMapSize(fields, map);
+    fields.real("alpha", map.alpha, kDiskUnits, "1", "Beckmann roughness that the bins are made for");
+    fields.real("alpha_min", map.alpha_min, kDiskUnits, "1", "smallest Beckmann roughness of a facet");
+    fields.real("alpha_max", map.alpha_max, kDiskUnits, "1", "largest Beckmann roughness of a facet");
+    describeSlopes(fields, map.slopes);
+    fields.integer("bins_per_axis", map.bins_per_axis, {1, 4096}, "1", "bins of directions along each axis of [-1, 1]^2");
+    fields.integer("leaf_size", map.leaf_size, {1, 1024}, "texel",
+                   "texels of a cell, on average at least, where a block is not sparse");
+    fields.integer("tile_bits", map.tile_bits, {0, BinMap::kMaxTileBits}, "1",
+                   "bins along each axis of a tile, logarithm to base 2");
+    fields.integer("cell_starts_shift", map.cell_starts.shift, {0, CompactCounts::kMaxShift}, "1",
+                   "values of cell_starts that share a base, logarithm to base 2");
+    fields.array("nodes", map.nodes, {"node_count", "2"}, "1", "kind and block number, and first child or cell, of each node");
+    fields.halves("block_moments", map.block_moments, {"block_count", "5"}, "1",
+                  "mean x, y and covariance xx, xy, yy of the block's normals, in its sides from its lower left corner");
+    fields.array("cell_starts/offsets", map.cell_starts.offsets, {"cell_bounds"}, "1",
+                 "first texel of each cell, and their number, less its base");
+    fields.array("cell_starts/bases", map.cell_starts.bases, {"ceil_div(cell_bounds, pow2(cell_starts_shift))"}, "1",
+                 "bases of cell_starts");
+    fields.array("texels", map.texels, {"height * width"}, "1",
+                 "column and row in its cell and place in its block of each texel, listed by block and cell");
+    fields.array("class_keys", map.class_keys, {"class_bounds"}, "1",
+                 "first key of each class of bins, and the number of keys");
+    fields.array("texel_classes", map.texel_classes, {"ceil_div(height * width * 12, 16)"}, "1",
+                 "class of each texel of the map, 12 bits each");
   }
-  if (!startsHold(map)) {
-    findings.add("bin_map.cells", "/cell_starts/offsets", "does not rise from 0 to the number of texels");
-    return;
-  }
-  if (!TreeWalk(map).walk([](const BlockOfNode&) { return true; }))
-    findings.add("bin_map.nodes", "/nodes", "does not divide the bins in blocks of texels, numbered in order");
-  checkClasses(map, findings);
-}
 
-void checkData(const BinMap& map, Findings& findings) {
-  std::vector<bool> seen(texelCount(map));
-  std::size_t number = 0;
-  const auto inOwnClass = [&](const BlockOfNode& block) {
-    const std::size_t c = number++;
-    const std::uint64_t end_key = block.first_key + (std::uint64_t{1} << 2 * block.side_bits);
-    return block.first_key >= map.class_keys[c] && end_key <= map.class_keys[c + 1];
-  };
-  if (map.classCount() == map.blockCount() && !TreeWalk(map).walk(inOwnClass))
-    findings.add("bin_map.classes", "/class_keys", "has as many classes as blocks, but not one for each");
-  if (!TreeWalk(map).walk([&](const BlockOfNode& block) { return listHolds(map, block, seen); }))
-    findings.add("bin_map.texels", "/texels", "does not list every texel once, in its class and in a bin of the square");
-  for (std::size_t b = 0; b < map.blockCount(); ++b) {
-    if (momentsHold(map.block_moments.subspan(5 * b, 5))) continue;
-    findings.add("bin_map.moments", "/block_moments",
-                 "block " + std::to_string(b) + " has moments of no distribution in a block");
-    return;
+  static void checkIndex(const BinMap& map, Findings& findings) {
+    if (!(map.alpha_min <= map.alpha && map.alpha <= map.alpha_max))
+      findings.add("bin_map.alpha", "/@alpha", "is not between alpha_min and alpha_max");
+    checkSlopes(map.slopes, findings);
+    if (texelCode(map.width, map.height).place_bits < 0) {
+      findings.add("bin_map.size", "/", "has " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels");
+      return;
+    }
+    if (!startsHold(map)) {
+      findings.add("bin_map.cells", "/cell_starts/offsets", "does not rise from 0 to the number of texels");
+      return;
+    }
+    if (!TreeWalk(map).walk([](const BlockOfNode&) { return true; }))
+      findings.add("bin_map.nodes", "/nodes", "does not divide the bins in blocks of texels, numbered in order");
+    checkClasses(map, findings);
   }
-}
+
+  static void checkValues(const BinMap& map, Findings& findings) {
+    std::vector<bool> seen(texelCount(map));
+    std::size_t number = 0;
+    const auto inOwnClass = [&](const BlockOfNode& block) {
+      const std::size_t c = number++;
+      const std::uint64_t end_key = block.first_key + (std::uint64_t{1} << 2 * block.side_bits);
+      return block.first_key >= map.class_keys[c] && end_key <= map.class_keys[c + 1];
+    };
+    if (map.classCount() == map.blockCount() && !TreeWalk(map).walk(inOwnClass))
+      findings.add("bin_map.classes", "/class_keys", "has as many classes as blocks, but not one for each");
+    if (!TreeWalk(map).walk([&](const BlockOfNode& block) { return listHolds(map, block, seen); }))
+      findings.add("bin_map.texels", "/texels", "does not list every texel once, in its class and in a bin of the square");
+    for (std::size_t b = 0; b < map.blockCount(); ++b) {
+      if (momentsHold(map.block_moments.subspan(5 * b, 5))) continue;
+      findings.add("bin_map.moments", "/block_moments",
+                   "block " + std::to_string(b) + " has moments of no distribution in a block");
+      return;
+    }
+  }
+};
+
+template const Kind& kindOf<BinMap>();
 
 }  // namespace glint::formats

@@ -1,19 +1,10 @@
 #include <cmath>
 
-#include "glint/formats/kinds/codec.h"
+#include "glint/formats/kinds/description.h"
+#include "glint/formats/kinds/shared_fields.h"
 
 namespace glint::formats {
 namespace {
-
-std::string pathOf(int level, const char* dataset) { return levelPath("level_{l}/", level) + dataset; }
-
-/// Calls add(level) for each level and collects the results.
-template <class Get>
-std::vector<double> listed(const Displacement& displacement, Get get) {
-  std::vector<double> values;
-  for (int l = 0; l < displacement.level_count; ++l) values.push_back(static_cast<double>(get(displacement.levels[l])));
-  return values;
-}
 
 /// Adds a finding if some of `count` elements are bad.
 template <class Bad>
@@ -23,142 +14,143 @@ void report(Findings& findings, const char* rule, int level, const char* dataset
   for (std::size_t k = 0; k < count; ++k)
     if (bad(k) && number++ == 0) first = k;
   if (number == 0) return;
-  findings.add(rule, "/" + pathOf(level, dataset),
+  findings.add(rule, "/" + levelPath("level_{l}/", level) + dataset,
                std::to_string(number) + " " + what + " (first is element " + std::to_string(first) + ")");
 }
 
-bool hasColors(const Displacement& d) { return d.level_count > 0 && !d.levels[0].lobe_colors.empty(); }
-bool hasAlphas(const Displacement& d) { return d.level_count > 0 && !d.levels[0].lobe_alphas.empty(); }
+void describeBase(auto& fields, auto& base) {
+  fields.choice("base", base.kind, "diffuse|ggx", "reflectance of a facet of the original surface");
+  fields.real("albedo", base.albedo, {0, 1}, "1", "diffuse: albedo; ggx: 1");
+  fields.real("alpha", base.alpha, {0, 1}, "1", "ggx: roughness; diffuse: 0");
+  fields.real("eta", base.eta, {FLT_MIN, 100}, "1", "ggx: refractive index of the conductor");
+  fields.real("k", base.k, {0, 100}, "1", "ggx: extinction of the conductor; with eta 1 and k 0 it reflects all light");
+}
+
+void describeLevelSizes(auto& fields, auto& d) {
+  const auto integers = [&](const char* name, auto member, Range range, const char* units, const char* long_name) {
+    fields.levelIntegers(
+        name, d.level_count, [&](int l) -> auto& { return d.levels[l].*member; }, range, units, long_name);
+  };
+  const auto reals = [&](const char* name, auto member, Range range, const char* long_name) {
+    fields.levelReals(
+        name, d.level_count, [&](int l) -> auto& { return d.levels[l].*member; }, range, "1", long_name);
+  };
+  using Level = DisplacementLevel;
+  integers("level_factors", &Level::factor, {2, kMaxMapSize}, "texel", "side of a cell of each level");
+  integers("level_columns", &Level::columns, kMapSize, "1", "cells along u of each level");
+  integers("level_rows", &Level::rows, kMapSize, "1", "cells along v of each level");
+  integers("level_spatial_columns", &Level::spatial_columns, {1, 16}, "1", "patches of the spatial scale along u");
+  integers("level_spatial_rows", &Level::spatial_rows, {1, 16}, "1", "patches of the spatial scale along v");
+  reals("level_rank1_residuals", &Level::rank1_residual, {0, FLT_MAX}, "norm of R - T S over that of R");
+  reals("level_rank1_energies", &Level::rank1_energy, {0, 1}, "share of the largest singular value's square of R");
+  reals("level_interreflected", &Level::interreflected_share, {0, 1},
+        "share of the reflected light that was scattered more than once");
+  reals("level_distant", &Level::distant_share, {0, 1}, "share of the reflected light that hopped farther than a cell");
+}
+
+void describeLevel(auto& fields, auto& level) {
+  fields.array("level_{l}/heights", level.heights, {"level_rows[l]", "level_columns[l]"}, "texel", "height of each vertex");
+  fields.array("level_{l}/lobes", level.lobes, {"level_rows[l]", "level_columns[l]", "lobe_count", "4"}, "1",
+               "centre (x, y) on the disk, bandwidth and amplitude of each lobe of each cell");
+  fields.array("level_{l}/slopes", level.slopes, {"level_rows[l]", "level_columns[l]", "5"}, "1",
+               "mean slope along u and v, variances uu, uv, vv of each cell");
+  fields.array("level_{l}/fit_errors", level.fit_errors, {"level_rows[l]", "level_columns[l]"}, "1",
+               "relative error of each cell's lobes, blurred by 8 degrees");
+  fields.array("level_{l}/spatial_scale", level.spatial_scale,
+               {"level_spatial_rows[l]", "level_spatial_columns[l]", "channels"}, "1", "T: factors of each patch");
+  fields.halves("level_{l}/angular_scale", level.angular_scale, {"angular_pairs", "channels"}, "1",
+                "S: factors of each pair of directions i <= o at o (o + 1) / 2 + i");
+}
 
 }  // namespace
 
-PackedAsset pack(const Displacement& displacement) {
-  PackedAsset packed{"displacement", {}, {}};
-  const Displacement& d = displacement;
-  packed.integer("width", d.width);
-  packed.integer("height", d.height);
-  packed.real("texel_size_um", d.texel_size_um);
-  packed.text("base", d.base.kind == BaseBrdf::Kind::diffuse ? "diffuse" : "ggx");
-  packed.real("albedo", d.base.albedo);
-  packed.real("alpha", d.base.alpha);
-  packed.real("eta", d.base.eta);
-  packed.real("k", d.base.k);
-  packed.integer("rgb", d.channels == 3);
-  packed.integer("lobe_count", d.lobe_count);
-  packed.integer("has_lobe_colors", hasColors(d));
-  packed.integer("has_lobe_alphas", hasAlphas(d));
-  packed.integer("angular", d.angular);
-  packed.integer("level_count", d.level_count);
-  packed.integers("level_factors", listed(d, [](const DisplacementLevel& l) { return l.factor; }));
-  packed.integers("level_columns", listed(d, [](const DisplacementLevel& l) { return l.columns; }));
-  packed.integers("level_rows", listed(d, [](const DisplacementLevel& l) { return l.rows; }));
-  packed.integers("level_spatial_columns", listed(d, [](const DisplacementLevel& l) { return l.spatial_columns; }));
-  packed.integers("level_spatial_rows", listed(d, [](const DisplacementLevel& l) { return l.spatial_rows; }));
-  packed.reals("level_rank1_residuals", listed(d, [](const DisplacementLevel& l) { return l.rank1_residual; }));
-  packed.reals("level_rank1_energies", listed(d, [](const DisplacementLevel& l) { return l.rank1_energy; }));
-  packed.reals("level_interreflected", listed(d, [](const DisplacementLevel& l) { return l.interreflected_share; }));
-  packed.reals("level_distant", listed(d, [](const DisplacementLevel& l) { return l.distant_share; }));
-  const auto directions = static_cast<std::uint64_t>(d.angular) * static_cast<std::uint64_t>(d.angular);
-  const auto channels = static_cast<std::uint64_t>(d.channels), lobes = static_cast<std::uint64_t>(d.lobe_count);
-  for (int l = 0; l < d.level_count; ++l) {
-    const DisplacementLevel& level = d.levels[l];
-    const auto rows = static_cast<std::uint64_t>(level.rows), columns = static_cast<std::uint64_t>(level.columns);
-    packed.array(pathOf(l, "heights"), ElementType::f32, {rows, columns}, level.heights.data(), level.heights.size());
-    packed.array(pathOf(l, "lobes"), ElementType::f32, {rows, columns, lobes, 4}, level.lobes.data(), 4 * level.lobes.size());
-    packed.array(pathOf(l, "slopes"), ElementType::f32, {rows, columns, 5}, level.slopes.data(), 5 * level.slopes.size());
-    packed.array(pathOf(l, "fit_errors"), ElementType::f32, {rows, columns}, level.fit_errors.data(), level.fit_errors.size());
-    packed.array(pathOf(l, "spatial_scale"), ElementType::f32,
-                 {static_cast<std::uint64_t>(level.spatial_rows), static_cast<std::uint64_t>(level.spatial_columns), channels},
-                 level.spatial_scale.data(), level.spatial_scale.size());
-    packed.array(pathOf(l, "angular_scale"), ElementType::f16, {directions * (directions + 1) / 2, channels},
-                 level.angular_scale.data(), level.angular_scale.size());
-    if (hasColors(d))
-      packed.array(pathOf(l, "lobe_colors"), ElementType::f32, {rows, columns, lobes, channels}, level.lobe_colors.data(),
-                   level.lobe_colors.size());
-    if (hasAlphas(d))
-      packed.array(pathOf(l, "lobe_alphas"), ElementType::f32, {rows, columns, lobes}, level.lobe_alphas.data(),
-                   level.lobe_alphas.size());
-  }
-  return packed;
-}
+template <>
+struct KindDescription<Displacement> {
+  static constexpr std::string_view kName = "displacement";
+  static constexpr std::string_view kTitle = "Downsampled displacement map that keeps its appearance";
 
-void unpack(const Content& content, Displacement& displacement) {
-  displacement.width = content.integer("width");
-  displacement.height = content.integer("height");
-  displacement.texel_size_um = content.real("texel_size_um");
-  displacement.base.kind = content.is("base", "diffuse") ? BaseBrdf::Kind::diffuse : BaseBrdf::Kind::ggx;
-  displacement.base.albedo = content.real("albedo");
-  displacement.base.alpha = content.real("alpha");
-  displacement.base.eta = content.real("eta");
-  displacement.base.k = content.real("k");
-  displacement.channels = content.integer("rgb") == 1 ? 3 : 1;
-  displacement.lobe_count = content.integer("lobe_count");
-  displacement.angular = content.integer("angular");
-  displacement.level_count = content.integer("level_count");
-  for (int l = 0; l < displacement.level_count; ++l) {
-    DisplacementLevel& level = displacement.levels[l];
-    level.factor = content.integer("level_factors", l);
-    level.columns = content.integer("level_columns", l);
-    level.rows = content.integer("level_rows", l);
-    level.spatial_columns = content.integer("level_spatial_columns", l);
-    level.spatial_rows = content.integer("level_spatial_rows", l);
-    level.rank1_residual = content.real("level_rank1_residuals", l);
-    level.rank1_energy = content.real("level_rank1_energies", l);
-    level.interreflected_share = content.real("level_interreflected", l);
-    level.distant_share = content.real("level_distant", l);
-    level.heights = content.array<float>(pathOf(l, "heights"));
-    level.lobes = content.array<VmfLobe>(pathOf(l, "lobes"));
-    level.slopes = content.array<MapSlopes>(pathOf(l, "slopes"));
-    level.fit_errors = content.array<float>(pathOf(l, "fit_errors"));
-    level.spatial_scale = content.array<float>(pathOf(l, "spatial_scale"));
-    level.angular_scale = content.array<std::uint16_t>(pathOf(l, "angular_scale"));
-    if (content.integer("has_lobe_colors") == 1) level.lobe_colors = content.array<float>(pathOf(l, "lobe_colors"));
-    if (content.integer("has_lobe_alphas") == 1) level.lobe_alphas = content.array<float>(pathOf(l, "lobe_alphas"));
+  static std::vector<Rule> indexRules() {
+    return {errorRule("displacement.levels", "factors ascend, and each divides the map into the level's cells")};
   }
-}
-
-void checkIndex(const Displacement& displacement, Findings& findings) {
-  for (int l = 0; l < displacement.level_count; ++l) {
-    const DisplacementLevel& level = displacement.levels[l];
-    const auto covers = [&](int cells, int texels) { return static_cast<std::int64_t>(cells) * level.factor == texels; };
-    if (covers(level.columns, displacement.width) && covers(level.rows, displacement.height) &&
-        (l == 0 || level.factor > displacement.levels[l - 1].factor))
-      continue;
-    findings.add("displacement.levels", "/@level_factors",
-                 "level " + std::to_string(l) + " has " + std::to_string(level.columns) + " x " + std::to_string(level.rows) +
-                     " cells of " + std::to_string(level.factor) + " texels on a map of " + std::to_string(displacement.width) +
-                     " x " + std::to_string(displacement.height));
+  static std::vector<Rule> valueRules() {
+    return {errorRule("displacement.heights", "downsampled heights are finite"),
+            errorRule("displacement.lobes", "lobes have centres in the disk, bandwidths up to 1e6 and amplitudes of 0 or more"),
+            errorRule("displacement.bases", "colours of lobes are 0 to 1, and their alphas above 0 and at most 1"),
+            errorRule("displacement.scales", "scaling functions are finite and not negative"),
+            errorRule("displacement.moments", "slope moments and fit errors are finite")};
   }
-}
 
-void checkData(const Displacement& displacement, Findings& findings) {
-  for (int l = 0; l < displacement.level_count; ++l) {
-    const DisplacementLevel& level = displacement.levels[l];
-    report(findings, "displacement.heights", l, "heights", level.heights.size(), "heights are not finite",
-           [&](std::size_t k) { return !std::isfinite(level.heights[k]); });
-    report(findings, "displacement.lobes", l, "lobes", level.lobes.size(), "lobes are out of range", [&](std::size_t k) {
-      const VmfLobe& lobe = level.lobes[k];
-      return !(dot(lobe.mu, lobe.mu) <= 1 && lobe.kappa >= 0 && lobe.kappa <= kMaxKappa && lobe.amplitude >= 0 &&
-               std::isfinite(lobe.amplitude));
+  static void describe(auto& fields, auto& d) {
+    describeMap(fields, d);
+    describeBase(fields, d.base);
+    int rgb = d.channels == 3, has_colors = !d.levels[0].lobe_colors.empty(), has_alphas = !d.levels[0].lobe_alphas.empty();
+    fields.integer("rgb", rgb, {0, 1}, "1", "1 if colours, T and S are linear red, green and blue, not grey");
+    fields.set(d.channels, 2 * rgb + 1);
+    fields.integer("lobe_count", d.lobe_count, {1, kMaxLobes}, "1", "lobes of a cell");
+    fields.integer("has_lobe_colors", has_colors, {0, 1}, "1", "1 if lobes have colours of their own");
+    fields.integer("has_lobe_alphas", has_alphas, {0, 1}, "1", "1 if lobes have a roughness of their own");
+    fields.integer("angular", d.angular, {3, 25}, "1", "cells of the concentric map along each axis, for either direction");
+    fields.integer("level_count", d.level_count, {1, kMaxDisplacementLevels}, "1", "levels of detail");
+    describeLevelSizes(fields, d);
+    fields.derived("angular_pairs", "ceil_div(angular * angular * (angular * angular + 1), 2)", "pairs of directions");
+    fields.derived("channels", "2 * rgb + 1", "numbers of a colour, of T and of S");
+    fields.levels("level_count", d.level_count, [&](int l) { describeLevel(fields, d.levels[l]); });
+    fields.levels("level_count * has_lobe_colors", d.level_count * has_colors, [&](int l) {
+      fields.array("level_{l}/lobe_colors", d.levels[l].lobe_colors,
+                   {"level_rows[l]", "level_columns[l]", "lobe_count", "channels"}, "1",
+                   "factors of the base's reflectance of each lobe");
     });
-    report(findings, "displacement.bases", l, "lobe_colors", level.lobe_colors.size(), "colours are out of range",
-           [&](std::size_t k) { return !(level.lobe_colors[k] >= 0 && level.lobe_colors[k] <= 1); });
-    report(findings, "displacement.bases", l, "lobe_alphas", level.lobe_alphas.size(), "alphas are out of range",
-           [&](std::size_t k) { return !(level.lobe_alphas[k] > 0 && level.lobe_alphas[k] <= 1); });
-    report(findings, "displacement.moments", l, "slopes", level.slopes.size(), "cells have moments that are not finite",
-           [&](std::size_t k) {
-             const MapSlopes& m = level.slopes[k];
-             return !std::isfinite(m.mean.x + m.mean.y + m.covariance.xx + m.covariance.xy + m.covariance.yy);
-           });
-    report(findings, "displacement.moments", l, "fit_errors", level.fit_errors.size(), "errors are not finite",
-           [&](std::size_t k) { return !std::isfinite(level.fit_errors[k]); });
-    report(findings, "displacement.scales", l, "spatial_scale", level.spatial_scale.size(),
-           "factors are negative or not finite",
-           [&](std::size_t k) { return !(std::isfinite(level.spatial_scale[k]) && level.spatial_scale[k] >= 0); });
-    report(
-        findings, "displacement.scales", l, "angular_scale", level.angular_scale.size(), "factors are negative or not finite",
-        [&](std::size_t k) { return (level.angular_scale[k] & 0x7c00) == 0x7c00 || (level.angular_scale[k] & 0x8000) != 0; });
+    fields.levels("level_count * has_lobe_alphas", d.level_count * has_alphas, [&](int l) {
+      fields.array("level_{l}/lobe_alphas", d.levels[l].lobe_alphas, {"level_rows[l]", "level_columns[l]", "lobe_count"}, "1",
+                   "ggx: roughness of the base of each lobe");
+    });
   }
-}
+
+  static void checkIndex(const Displacement& displacement, Findings& findings) {
+    for (int l = 0; l < displacement.level_count; ++l) {
+      const DisplacementLevel& level = displacement.levels[l];
+      const auto covers = [&](int cells, int texels) { return static_cast<std::int64_t>(cells) * level.factor == texels; };
+      if (covers(level.columns, displacement.width) && covers(level.rows, displacement.height) &&
+          (l == 0 || level.factor > displacement.levels[l - 1].factor))
+        continue;
+      findings.add("displacement.levels", "/@level_factors",
+                   "level " + std::to_string(l) + " has " + std::to_string(level.columns) + " x " + std::to_string(level.rows) +
+                       " cells of " + std::to_string(level.factor) + " texels on a map of " +
+                       std::to_string(displacement.width) + " x " + std::to_string(displacement.height));
+    }
+  }
+
+  static void checkValues(const Displacement& displacement, Findings& findings) {
+    for (int l = 0; l < displacement.level_count; ++l) {
+      const DisplacementLevel& level = displacement.levels[l];
+      report(findings, "displacement.heights", l, "heights", level.heights.size(), "heights are not finite",
+             [&](std::size_t k) { return !std::isfinite(level.heights[k]); });
+      report(findings, "displacement.lobes", l, "lobes", level.lobes.size(), "lobes are out of range", [&](std::size_t k) {
+        const VmfLobe& lobe = level.lobes[k];
+        return !(dot(lobe.mu, lobe.mu) <= 1 && lobe.kappa >= 0 && lobe.kappa <= kMaxKappa && lobe.amplitude >= 0 &&
+                 std::isfinite(lobe.amplitude));
+      });
+      report(findings, "displacement.bases", l, "lobe_colors", level.lobe_colors.size(), "colours are out of range",
+             [&](std::size_t k) { return !(level.lobe_colors[k] >= 0 && level.lobe_colors[k] <= 1); });
+      report(findings, "displacement.bases", l, "lobe_alphas", level.lobe_alphas.size(), "alphas are out of range",
+             [&](std::size_t k) { return !(level.lobe_alphas[k] > 0 && level.lobe_alphas[k] <= 1); });
+      report(findings, "displacement.moments", l, "slopes", level.slopes.size(), "cells have moments that are not finite",
+             [&](std::size_t k) {
+               const MapSlopes& m = level.slopes[k];
+               return !std::isfinite(m.mean.x + m.mean.y + m.covariance.xx + m.covariance.xy + m.covariance.yy);
+             });
+      report(findings, "displacement.moments", l, "fit_errors", level.fit_errors.size(), "errors are not finite",
+             [&](std::size_t k) { return !std::isfinite(level.fit_errors[k]); });
+      report(findings, "displacement.scales", l, "spatial_scale", level.spatial_scale.size(),
+             "factors are negative or not finite",
+             [&](std::size_t k) { return !(std::isfinite(level.spatial_scale[k]) && level.spatial_scale[k] >= 0); });
+      report(
+          findings, "displacement.scales", l, "angular_scale", level.angular_scale.size(), "factors are negative or not finite",
+          [&](std::size_t k) { return (level.angular_scale[k] & 0x7c00) == 0x7c00 || (level.angular_scale[k] & 0x8000) != 0; });
+    }
+  }
+};
+
+template const Kind& kindOf<Displacement>();
 
 }  // namespace glint::formats

@@ -1,34 +1,36 @@
 #include <cmath>
 
-#include "glint/formats/kinds/codec.h"
+#include "glint/formats/kinds/description.h"
+#include "glint/formats/kinds/shared_fields.h"
 #include "glint/formats/kinds/texel_tally.h"
 
 namespace glint::formats {
 
-PackedAsset pack(const HeightMap& map) {
-  PackedAsset packed{"heights", {}, {}};
-  packed.integer("width", map.width);
-  packed.integer("height", map.height);
-  packed.real("texel_size_um", map.texel_size_um);
-  packed.array("heights", ElementType::f32, {static_cast<std::uint64_t>(map.height), static_cast<std::uint64_t>(map.width)},
-               map.heights.data(), map.heights.size());
-  return packed;
-}
+template <>
+struct KindDescription<HeightMap> {
+  static constexpr std::string_view kName = "heights";
+  static constexpr std::string_view kTitle = "Height field";
 
-void unpack(const Content& content, HeightMap& map) {
-  map.width = content.integer("width");
-  map.height = content.integer("height");
-  map.texel_size_um = content.real("texel_size_um");
-  map.heights = content.array<float>("heights");
-}
+  static std::vector<Rule> indexRules() { return {}; }
+  static std::vector<Rule> valueRules() {
+    return {errorRule("heights.finite", "heights are finite", "make it again with glint-ingest --fix-invalid")};
+  }
 
-void checkIndex(const HeightMap&, Findings&) {}
+  static void describe(auto& fields, auto& map) {
+    describeMap(fields, map);
+    fields.array("heights", map.heights, {"height", "width"}, "texel", "height over the base plane, bottom row first");
+  }
 
-void checkData(const HeightMap& map, Findings& findings) {
-  TexelTally infinite(map.width, map.height);
-  for (std::size_t k = 0; k < map.heights.size(); ++k)
-    if (!std::isfinite(map.heights[k])) infinite.add(k);
-  report(infinite, "heights.finite", "/heights", "texels are not finite", findings);
-}
+  static void checkIndex(const HeightMap&, Findings&) {}
+
+  static void checkValues(const HeightMap& map, Findings& findings) {
+    TexelTally infinite(map.width, map.height);
+    for (std::size_t k = 0; k < map.heights.size(); ++k)
+      if (!std::isfinite(map.heights[k])) infinite.add(k);
+    report(infinite, "heights.finite", "/heights", "texels are not finite", findings);
+  }
+};
+
+template const Kind& kindOf<HeightMap>();
 
 }  // namespace glint::formats

@@ -2,7 +2,8 @@
 #include <array>
 #include <cmath>
 
-#include "glint/formats/kinds/pyramid_shape.h"
+#include "glint/formats/kinds/description.h"
+#include "glint/formats/kinds/shared_fields.h"
 
 namespace glint::formats {
 namespace {
@@ -89,91 +90,86 @@ bool totalsCount(const HistogramSat& sat) {
 
 }  // namespace
 
-PackedAsset pack(const HistogramSat& sat) {
-  PackedAsset packed{"histogram-sat", {}, {}};
-  packed.integer("width", sat.width);
-  packed.integer("height", sat.height);
-  packed.integer("theta_bins", sat.theta_bins);
-  packed.integer("phi_bins", sat.phi_bins);
-  packed.integer("bin_count", sat.bin_count);
-  packed.integer("stride", sat.stride);
-  packed.integer("coarse_stride", sat.coarse_stride);
-  packed.integer("line_stride", sat.line_stride);
-  packSlopes(sat.slopes, packed);
-  const std::uint64_t bins = size(sat.bin_count);
-  const std::uint64_t length = size(sat.rowLength());
-  const std::uint64_t tile = HistogramSat::kTileSize;
-  const auto points_x = [&](int stride) { return size(sat.pointsX(stride)); };
-  const auto points_y = [&](int stride) { return size(sat.pointsY(stride)); };
-  packed.array("bin_ids", ElementType::u16, {bins}, sat.bin_ids.data(), sat.bin_ids.size());
-  packed.array("bin_normals", ElementType::f32, {bins, 2}, sat.bin_normals.data(), sat.bin_normals.size() * 2);
-  packed.array("bin_totals", ElementType::u64, {bins}, sat.bin_totals.data(), sat.bin_totals.size());
-  packed.array("texels", ElementType::u16, {size(sat.tileRows()), size(sat.tileColumns()), tile, tile}, sat.texels.data(),
-               sat.texels.size());
-  packed.array("sums", ElementType::u16, {points_y(sat.stride), points_x(sat.stride), length}, sat.sums.data(),
-               sat.sums.size());
-  packed.array("coarse_sums", ElementType::u32, {points_y(sat.coarse_stride), points_x(sat.coarse_stride), length},
-               sat.coarse_sums.data(), sat.coarse_sums.size());
-  packed.array("row_sums", ElementType::u16, {size(sat.height), points_x(sat.line_stride), length}, sat.row_sums.data(),
-               sat.row_sums.size());
-  packed.array("column_sums", ElementType::u16, {size(sat.width), points_y(sat.line_stride), length}, sat.column_sums.data(),
-               sat.column_sums.size());
-  return packed;
-}
+template <>
+struct KindDescription<HistogramSat> {
+  static constexpr std::string_view kName = "histogram-sat";
+  static constexpr std::string_view kTitle = "Accumulated histograms of normals";
 
-void unpack(const Content& content, HistogramSat& sat) {
-  sat.width = content.integer("width");
-  sat.height = content.integer("height");
-  sat.theta_bins = content.integer("theta_bins");
-  sat.phi_bins = content.integer("phi_bins");
-  sat.bin_count = content.integer("bin_count");
-  sat.stride = content.integer("stride");
-  sat.coarse_stride = content.integer("coarse_stride");
-  sat.line_stride = content.integer("line_stride");
-  sat.slopes = unpackSlopes(content);
-  sat.bin_ids = content.array<std::uint16_t>("bin_ids");
-  sat.bin_normals = content.array<Vec2>("bin_normals");
-  sat.bin_totals = content.array<std::uint64_t>("bin_totals");
-  sat.texels = content.array<std::uint16_t>("texels");
-  sat.sums = content.array<std::uint16_t>("sums");
-  sat.coarse_sums = content.array<std::uint32_t>("coarse_sums");
-  sat.row_sums = content.array<std::uint16_t>("row_sums");
-  sat.column_sums = content.array<std::uint16_t>("column_sums");
-}
+  static std::vector<Rule> indexRules() {
+    return {errorRule("histogram.bins", "bin_ids increase, below theta_bins * phi_bins, which is at most 2048"),
+            errorRule("histogram.strides", "coarse_stride is a multiple of stride"),
+            errorRule("histogram.texels", "every texel's bin is below bin_count")};
+  }
+  static std::vector<Rule> valueRules() {
+    return {errorRule("histogram.bin_normals", "the mean normals of bins lie inside the unit disk"),
+            errorRule("histogram.totals", "bin_totals are the numbers of texels of each bin, above 0"),
+            errorRule("histogram.sums", "the tables of sums count the texels of each bin")};
+  }
 
-void checkIndex(const HistogramSat& sat, Findings& findings) {
-  const int directions = sat.theta_bins * sat.phi_bins;
-  bool increasing = directions <= HistogramSat::kMaxBins && sat.bin_ids.back() < directions;
-  for (std::size_t k = 1; k < sat.bin_ids.size(); ++k) increasing &= sat.bin_ids[k - 1] < sat.bin_ids[k];
-  if (!increasing) {
-    findings.add("histogram.bins", "/bin_ids",
-                 "are not increasing numbers below " + std::to_string(directions) + ", at most 2048 of them");
+  static void describe(auto& fields, auto& sat) {
+    describeMapSize(fields, sat);
+    fields.integer("theta_bins", sat.theta_bins, {1, HistogramSat::kMaxThetaBins}, "1", "rings of elevation");
+    fields.integer("phi_bins", sat.phi_bins, {1, HistogramSat::kMaxPhiBins}, "1", "sectors of azimuth");
+    fields.integer("bin_count", sat.bin_count, {1, HistogramSat::kMaxBins}, "1", "bins that occur");
+    fields.integer("stride", sat.stride, {1, HistogramSat::kMaxStride}, "texel", "distance between the points of sums");
+    fields.integer("coarse_stride", sat.coarse_stride, {1, HistogramSat::kMaxStride}, "texel",
+                   "distance between the points of coarse_sums; a multiple of stride");
+    fields.integer("line_stride", sat.line_stride, {1, HistogramSat::kMaxLineStride}, "texel",
+                   "distance between the points of row_sums, column_sums");
+    describeSlopes(fields, sat.slopes);
+    fields.derived("row_length", "ceil_div(bin_count, 16) * 16", "counters of a point");
+    fields.array("bin_ids", sat.bin_ids, {"bin_count"}, "1", "ring * phi_bins + sector of each bin that occurs, increasing");
+    fields.array("bin_normals", sat.bin_normals, {"bin_count", "2"}, "1", "mean (nx, ny) of the texels of each bin");
+    fields.array("bin_totals", sat.bin_totals, {"bin_count"}, "1", "texels of each bin");
+    fields.array("texels", sat.texels, {"ceil_div(height, 8)", "ceil_div(width, 8)", "8", "8"}, "1",
+                 "bin of each texel, in tiles");
+    fields.array("sums", sat.sums, {"ceil_div(height, stride) + 1", "ceil_div(width, stride) + 1", "row_length"}, "1",
+                 "texels of each bin below and left of each point, modulo 2^16");
+    fields.array("coarse_sums", sat.coarse_sums,
+                 {"ceil_div(height, coarse_stride) + 1", "ceil_div(width, coarse_stride) + 1", "row_length"}, "1",
+                 "texels of each bin below and left of each point, modulo 2^32");
+    fields.array("row_sums", sat.row_sums, {"height", "ceil_div(width, line_stride) + 1", "row_length"}, "1",
+                 "texels of each bin in a row left of each point, modulo 2^16");
+    fields.array("column_sums", sat.column_sums, {"width", "ceil_div(height, line_stride) + 1", "row_length"}, "1",
+                 "texels of each bin in a column below each point, modulo 2^16");
   }
-  if (sat.coarse_stride % sat.stride != 0) {
-    findings.add("histogram.strides", "/@coarse_stride",
-                 "is " + std::to_string(sat.coarse_stride) + ", not a multiple of " + std::to_string(sat.stride));
-  }
-  const auto bins = static_cast<std::uint16_t>(sat.bin_count);
-  const auto highest = std::max_element(sat.texels.begin(), sat.texels.end());
-  if (*highest >= bins) {
-    findings.add("histogram.texels", "/texels",
-                 "name bin " + std::to_string(*highest) + " of " + std::to_string(sat.bin_count));
-  }
-  checkSlopes(sat.slopes, findings);
-}
 
-void checkData(const HistogramSat& sat, Findings& findings) {
-  const auto inside = [](Vec2 n) { return dot(n, n) < 1; };
-  if (!std::all_of(sat.bin_normals.begin(), sat.bin_normals.end(), inside))
-    findings.add("histogram.bin_normals", "/bin_normals", "are not all inside the unit disk");
-  if (!totalsCount(sat)) findings.add("histogram.totals", "/bin_totals", "are not the numbers of texels, all above 0");
-  const auto check = [&](bool counts, const char* object) {
-    if (!counts) findings.add("histogram.sums", object, "do not count the texels");
-  };
-  check(tableCounts(sat, sat.sums, sat.stride), "/sums");
-  check(tableCounts(sat, sat.coarse_sums, sat.coarse_stride), "/coarse_sums");
-  check(linesCount(sat, sat.row_sums, false), "/row_sums");
-  check(linesCount(sat, sat.column_sums, true), "/column_sums");
-}
+  static void checkIndex(const HistogramSat& sat, Findings& findings) {
+    const int directions = sat.theta_bins * sat.phi_bins;
+    bool increasing = directions <= HistogramSat::kMaxBins && sat.bin_ids.back() < directions;
+    for (std::size_t k = 1; k < sat.bin_ids.size(); ++k) increasing &= sat.bin_ids[k - 1] < sat.bin_ids[k];
+    if (!increasing) {
+      findings.add("histogram.bins", "/bin_ids",
+                   "are not increasing numbers below " + std::to_string(directions) + ", at most 2048 of them");
+    }
+    if (sat.coarse_stride % sat.stride != 0) {
+      findings.add("histogram.strides", "/@coarse_stride",
+                   "is " + std::to_string(sat.coarse_stride) + ", not a multiple of " + std::to_string(sat.stride));
+    }
+    const auto bins = static_cast<std::uint16_t>(sat.bin_count);
+    const auto highest = std::max_element(sat.texels.begin(), sat.texels.end());
+    if (*highest >= bins) {
+      findings.add("histogram.texels", "/texels",
+                   "name bin " + std::to_string(*highest) + " of " + std::to_string(sat.bin_count));
+    }
+    checkSlopes(sat.slopes, findings);
+  }
+
+  static void checkValues(const HistogramSat& sat, Findings& findings) {
+    const auto inside = [](Vec2 n) { return dot(n, n) < 1; };
+    if (!std::all_of(sat.bin_normals.begin(), sat.bin_normals.end(), inside))
+      findings.add("histogram.bin_normals", "/bin_normals", "are not all inside the unit disk");
+    if (!totalsCount(sat)) findings.add("histogram.totals", "/bin_totals", "are not the numbers of texels, all above 0");
+    const auto check = [&](bool counts, const char* object) {
+      if (!counts) findings.add("histogram.sums", object, "do not count the texels");
+    };
+    check(tableCounts(sat, sat.sums, sat.stride), "/sums");
+    check(tableCounts(sat, sat.coarse_sums, sat.coarse_stride), "/coarse_sums");
+    check(linesCount(sat, sat.row_sums, false), "/row_sums");
+    check(linesCount(sat, sat.column_sums, true), "/column_sums");
+  }
+};
+
+template const Kind& kindOf<HistogramSat>();
 
 }  // namespace glint::formats

@@ -3,7 +3,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "glint/formats/kinds/pyramid_shape.h"
+#include "glint/formats/kinds/description.h"
+#include "glint/formats/kinds/shared_fields.h"
 #include "glint/formats/number_text.h"
 #include "glint/math/half.h"
 
@@ -11,8 +12,6 @@ namespace glint::formats {
 namespace {
 
 constexpr double kIntegralTolerance = 1e-3;
-constexpr std::string_view kMethods[] = {"cp", "tucker", "pca"};
-constexpr std::string_view kCoefficientTypes[] = {"i8", "f16", "f32"};
 
 ElementType basisType(const NdfCp& ndf) {
   if (ndf.coefficient_type == CoefficientType::f32) return ElementType::f32;
@@ -28,11 +27,6 @@ ElementType coefficientElement(CoefficientType type) {
     default:
       return ElementType::f32;
   }
-}
-
-template <class Enum, std::size_t N>
-Enum fromText(const std::string_view (&names)[N], const std::string& text) {
-  return static_cast<Enum>(std::find(names, names + N, text) - names);
 }
 
 double element(ElementType type, const void* data, std::uint64_t index) {
@@ -375,126 +369,141 @@ void checkAll(std::uint64_t count, Condition holds, std::string_view rule, const
 
 }  // namespace
 
-PackedAsset pack(const NdfCp& ndf) {
-  PackedAsset packed{"ndf-cp", {}, {}};
-  packShape(ndf.shape, packed);
+namespace {
+
+/// Numbers the images of all levels.
+void describeImages(auto& fields, auto& ndf) {
   std::uint32_t first_image = 0;
   for (int l = 0; l < ndf.shape.level_count; ++l) {
-    if (ndf.first_image[l] != first_image) {
+    fields.set(ndf.first_image[l], first_image);
+    if (ndf.first_image[l] != first_image)
       throw Error(ErrorCode::usage, "compressed.images", {}, {}, "first_image does not count the images of the levels below");
-    }
     first_image += static_cast<std::uint32_t>(ndf.shape.levels[l].imageCount());
   }
-  packed.text("method", kMethods[static_cast<int>(ndf.method)]);
-  packed.text("coefficient_type", kCoefficientTypes[static_cast<int>(ndf.coefficient_type)]);
-  packed.integer("regions", ndf.regions);
-  packed.integer("places", ndf.places);
-  const std::uint64_t images = ndf.image_regions.size();
-  const auto regions = static_cast<std::uint64_t>(ndf.regions), places = static_cast<std::uint64_t>(ndf.places);
-  const auto blocks = static_cast<std::uint64_t>(ndf.shape.blocksPerImage());
-  packed.array("image_regions", ElementType::u16, {images}, ndf.image_regions.data(), images);
-  packed.array("image_slots", ElementType::u16, {images}, ndf.image_slots.data(), ndf.image_slots.size());
-  packed.array("image_scales", ElementType::f32, {images}, ndf.image_scales.data(), ndf.image_scales.size());
-  packed.array("density_scales", ElementType::f32, {images}, ndf.density_scales.data(), ndf.density_scales.size());
-  packed.array("block_places", ElementType::u16, {blocks}, ndf.block_places.data(), ndf.block_places.size());
-  packed.array("place_blocks", ElementType::u16, {places}, ndf.place_blocks.data(), ndf.place_blocks.size());
-  packed.array("block_masks", ElementType::u64, {images, static_cast<std::uint64_t>(ndf.placeWords())}, ndf.block_masks.data(),
-               ndf.block_masks.size());
-  packed.array("first_block", ElementType::u32, {images + 1}, ndf.first_block.data(), ndf.first_block.size());
-  packed.array("block_masses", ElementType::u8, {ndf.block_masses.size()}, ndf.block_masses.data(), ndf.block_masses.size());
-  packed.array("clusters", ElementType::ndf_cluster, {regions, places}, ndf.clusters.data(), ndf.clusters.size());
-  packed.array("masks", ElementType::u64, {ndf.masks.size()}, ndf.masks.data(), ndf.masks.size());
-  packed.array("mask_ranks", ElementType::u32, {ndf.masks.size()}, ndf.mask_ranks.data(), ndf.mask_ranks.size());
-  packed.array("basis", basisType(ndf), {ndf.basis_count}, ndf.basis, ndf.basis_count);
-  packed.array("coefficients", coefficientElement(ndf.coefficient_type), {ndf.coefficient_count}, ndf.coefficients,
-               ndf.coefficient_count);
-  packed.array("scales", ElementType::f32, {ndf.scales.size()}, ndf.scales.data(), ndf.scales.size());
-  packed.array("core", ElementType::u8, {ndf.core.size()}, ndf.core.data(), ndf.core.size());
-  packed.array("spot_sums", ElementType::f32, {ndf.spot_sums.size()}, ndf.spot_sums.data(), ndf.spot_sums.size());
-  return packed;
+  fields.array("image_regions", ndf.image_regions, {"images"}, "1", "region that an image belongs to");
+  fields.array("image_slots", ndf.image_slots, {"images"}, "1", "slot of an image in its region");
+  fields.array("image_scales", ndf.image_scales, {"images"}, "1", "factor that makes an image integrate to 1");
+  fields.array("density_scales", ndf.density_scales, {"images"}, "1",
+               "factor that makes an image without its negative parts integrate to 1");
+  fields.array("block_places", ndf.block_places, {"blocks_per_image"}, "1", "place of a block; 65535: it occurs in no image");
+  fields.array("place_blocks", ndf.place_blocks, {"places"}, "1", "block of a place");
+  fields.array("block_masks", ndf.block_masks, {"images", "place_words"}, "1",
+               "bit b of word w: the block of place 64 w + b of the image has a slice");
+  fields.array("first_block", ndf.first_block, {"images + 1"}, "1",
+               "slices of all images before this one; the last value is their total");
+  fields.array("block_masses", ndf.block_masses, {"slice_total"}, "1",
+               "share of each slice in its image, rounded up: bits 6 to 13 of a half-precision number");
 }
 
-void unpack(const Content& content, NdfCp& ndf) {
-  unpackShape(content, ndf.shape);
-  ndf.method = fromText<CompressionMethod>(kMethods, content.text("method"));
-  ndf.coefficient_type = fromText<CoefficientType>(kCoefficientTypes, content.text("coefficient_type"));
-  ndf.regions = content.integer("regions");
-  ndf.places = content.integer("places");
-  std::uint32_t first_image = 0;
-  for (int l = 0; l < ndf.shape.level_count; ++l) {
-    ndf.first_image[l] = first_image;
-    first_image += static_cast<std::uint32_t>(ndf.shape.levels[l].imageCount());
-  }
-  ndf.image_regions = content.array<std::uint16_t>("image_regions");
-  ndf.image_slots = content.array<std::uint16_t>("image_slots");
-  ndf.image_scales = content.array<float>("image_scales");
-  ndf.density_scales = content.array<float>("density_scales");
-  ndf.block_places = content.array<std::uint16_t>("block_places");
-  ndf.place_blocks = content.array<std::uint16_t>("place_blocks");
-  ndf.block_masks = content.array<std::uint64_t>("block_masks");
-  ndf.first_block = content.array<std::uint32_t>("first_block");
-  ndf.block_masses = content.array<std::uint8_t>("block_masses");
-  ndf.clusters = content.array<NdfCluster>("clusters");
-  ndf.masks = content.array<std::uint64_t>("masks");
-  ndf.mask_ranks = content.array<std::uint32_t>("mask_ranks");
-  ndf.basis = content.dataset("basis").data;
-  ndf.basis_count = content.dataset("basis").dims[0];
-  ndf.coefficients = content.dataset("coefficients").data;
-  ndf.coefficient_count = content.dataset("coefficients").dims[0];
-  ndf.scales = content.array<float>("scales");
-  ndf.core = content.array<std::uint8_t>("core");
-  ndf.spot_sums = content.array<float>("spot_sums");
+/// The factors of the clusters.
+void describeClusters(auto& fields, auto& ndf) {
+  using enum ElementType;
+  fields.array("clusters", ndf.clusters, {"regions", "places"}, "1", "place and size of each cluster's factors");
+  fields.array("masks", ndf.masks, {"word_count"}, "1", "bit b of word w of a cluster: slot 64 w + b has a slice in it");
+  fields.array("mask_ranks", ndf.mask_ranks, {"word_count"}, "1", "set bits of the cluster before this word");
+  fields.data("basis", ndf.basis, ndf.basis_count,
+              {{"coefficient_type=f32", f32}, {"method=cp|tucker", i16}, {"method=pca", i32}}, {"basis_count"}, "1",
+              "inclusive prefix sums of each cluster's basis, columns fastest");
+  fields.data("coefficients", ndf.coefficients, ndf.coefficient_count,
+              {{"coefficient_type=i8", i8}, {"coefficient_type=f16", f16}, {"coefficient_type=f32", f32}},
+              {"coefficient_count"}, "1", "coefficients of each cluster, a row for each slice; or its spots");
+  fields.array("scales", ndf.scales, {"scale_count"}, "1", "scale of each column of each cluster");
+  fields.array("core", ndf.core, {"core_count"}, "1", "tucker: a + 16 b of each column of each cluster");
+  fields.array("spot_sums", ndf.spot_sums, {"spot_sum_count"}, "1", "share of a spot up to edges of pixels, or nothing");
 }
 
-void checkIndex(const NdfCp& ndf, Findings& findings) {
-  checkShape(ndf.shape, findings);
-  const std::vector<std::uint32_t> slots = checkImages(ndf, findings);
-  if (slots.empty()) return;
-  if (!checkPlaces(ndf, findings)) return;
-  checkFirstBlock(ndf, findings);
-  if (!ndf.spot_sums.empty() && ndf.spot_sums.size() != static_cast<std::size_t>(kSpotSums)) {
-    findings.add("compressed.spots", "/spot_sums", "does not have " + std::to_string(kSpotSums) + " values");
-    return;
+}  // namespace
+
+template <>
+struct KindDescription<NdfCp> {
+  static constexpr std::string_view kName = "ndf-cp";
+  static constexpr std::string_view kTitle = "Compressed pyramid of NDF images";
+
+  static std::vector<Rule> indexRules() {
+    return {errorRule("compressed.images", "there is one record for each image of each level"),
+            errorRule("compressed.slots", "images have valid regions, and slots 0..n-1 in each region"),
+            errorRule("compressed.places", "block_places number the blocks of place_blocks in turn"),
+            errorRule("compressed.masks", "mask bits are slots of the region and their number is slice_count"),
+            errorRule("compressed.mask_ranks", "mask_ranks is the running count of mask bits"),
+            errorRule("compressed.first_block", "first_block is the running count of the bits of block_masks"),
+            errorRule("compressed.ranks", "cluster ranks are valid for the method"),
+            errorRule("compressed.ranges", "every cluster's factors lie inside their arrays"),
+            errorRule("compressed.spots", "spots are near their block, and their counts agree")};
   }
-  const auto places = static_cast<std::size_t>(ndf.places);
-  for (std::size_t c = 0; c < ndf.clusters.size(); ++c) {
-    const NdfCluster& cluster = ndf.clusters[c];
-    const std::uint32_t region_slots = slots[c / places];
-    if (!inside(cluster.first_word, (region_slots + 63) / 64, ndf.masks.size())) {
-      findings.add("compressed.ranges", "/clusters", clusterName(ndf, c) + " reaches beyond the masks");
-      continue;
+  static std::vector<Rule> valueRules() {
+    return {errorRule("compressed.image_scales", "image_scales are finite and positive"),
+            errorRule("compressed.density_scales", "density_scales make the positive parts of images integrate to 1"),
+            errorRule("compressed.block_masks", "block_masks name the slices of the clusters"),
+            errorRule("compressed.block_masses", "block_masses are the shares of the slices, rounded up"),
+            errorRule("compressed.scales", "scales are finite"),
+            errorRule("compressed.factors", "bases and coefficients are finite"),
+            warningRule("compressed.integral", "every image integrates to 1 within 1e-3")};
+  }
+
+  static void describe(auto& fields, auto& ndf) {
+    describeShape(fields, ndf.shape);
+    fields.choice("method", ndf.method, "cp|tucker|pca", "how the basis images of a cluster are made");
+    fields.choice("coefficient_type", ndf.coefficient_type, "i8|f16|f32", "type of the stored coefficients");
+    fields.integer("regions", ndf.regions, {1, 65535}, "1", "regions of images, by place on the map or by level");
+    fields.integer("places", ndf.places, {0, 4096}, "1", "angular blocks that occur in any image");
+    fields.derived("blocks_per_image", "ceil_div(resolution * resolution, 256)", "angular blocks of an image");
+    fields.derived("place_words", "ceil_div(places, 64)", "64-bit words of occupancy bits of an image");
+    describeImages(fields, ndf);
+    describeClusters(fields, ndf);
+  }
+
+  static void checkIndex(const NdfCp& ndf, Findings& findings) {
+    checkShape(ndf.shape, findings);
+    const std::vector<std::uint32_t> slots = checkImages(ndf, findings);
+    if (slots.empty()) return;
+    if (!checkPlaces(ndf, findings)) return;
+    checkFirstBlock(ndf, findings);
+    if (!ndf.spot_sums.empty() && ndf.spot_sums.size() != static_cast<std::size_t>(kSpotSums)) {
+      findings.add("compressed.spots", "/spot_sums", "does not have " + std::to_string(kSpotSums) + " values");
+      return;
     }
-    if (const std::string_view rule = checkMask(ndf, cluster, region_slots); !rule.empty())
-      findings.add(rule, "/masks", clusterName(ndf, c) + " has a mask that does not agree with its counts");
-    if (cluster.slice_count == 0) continue;
-    if (const std::string_view rule = checkFactors(ndf, cluster); !rule.empty())
-      findings.add(rule, "/clusters",
-                   clusterName(ndf, c) + ", " + std::to_string(cluster.columns) + " columns, has factors that do not fit");
+    const auto places = static_cast<std::size_t>(ndf.places);
+    for (std::size_t c = 0; c < ndf.clusters.size(); ++c) {
+      const NdfCluster& cluster = ndf.clusters[c];
+      const std::uint32_t region_slots = slots[c / places];
+      if (!inside(cluster.first_word, (region_slots + 63) / 64, ndf.masks.size())) {
+        findings.add("compressed.ranges", "/clusters", clusterName(ndf, c) + " reaches beyond the masks");
+        continue;
+      }
+      if (const std::string_view rule = checkMask(ndf, cluster, region_slots); !rule.empty())
+        findings.add(rule, "/masks", clusterName(ndf, c) + " has a mask that does not agree with its counts");
+      if (cluster.slice_count == 0) continue;
+      if (const std::string_view rule = checkFactors(ndf, cluster); !rule.empty())
+        findings.add(rule, "/clusters",
+                     clusterName(ndf, c) + ", " + std::to_string(cluster.columns) + " columns, has factors that do not fit");
+    }
   }
-}
 
-void checkData(const NdfCp& ndf, Findings& findings) {
-  checkAll(
-      ndf.image_scales.size(), [&](std::uint64_t k) { return std::isfinite(ndf.image_scales[k]) && ndf.image_scales[k] > 0; },
-      "compressed.image_scales", "/image_scales", "not finite and positive", findings);
-  checkAll(
-      ndf.scales.size(), [&](std::uint64_t k) { return std::isfinite(ndf.scales[k]); }, "compressed.scales", "/scales",
-      "not finite", findings);
-  if (ndf.coefficient_type != CoefficientType::i8) {
-    const ElementType type = coefficientElement(ndf.coefficient_type);
+  static void checkValues(const NdfCp& ndf, Findings& findings) {
     checkAll(
-        ndf.coefficient_count, [&](std::uint64_t k) { return std::isfinite(element(type, ndf.coefficients, k)); },
-        "compressed.factors", "/coefficients", "not finite", findings);
-  }
-  if (basisType(ndf) == ElementType::f32) {
+        ndf.image_scales.size(), [&](std::uint64_t k) { return std::isfinite(ndf.image_scales[k]) && ndf.image_scales[k] > 0; },
+        "compressed.image_scales", "/image_scales", "not finite and positive", findings);
     checkAll(
-        ndf.basis_count, [&](std::uint64_t k) { return std::isfinite(element(ElementType::f32, ndf.basis, k)); },
-        "compressed.factors", "/basis", "not finite", findings);
+        ndf.scales.size(), [&](std::uint64_t k) { return std::isfinite(ndf.scales[k]); }, "compressed.scales", "/scales",
+        "not finite", findings);
+    if (ndf.coefficient_type != CoefficientType::i8) {
+      const ElementType type = coefficientElement(ndf.coefficient_type);
+      checkAll(
+          ndf.coefficient_count, [&](std::uint64_t k) { return std::isfinite(element(type, ndf.coefficients, k)); },
+          "compressed.factors", "/coefficients", "not finite", findings);
+    }
+    if (basisType(ndf) == ElementType::f32) {
+      checkAll(
+          ndf.basis_count, [&](std::uint64_t k) { return std::isfinite(element(ElementType::f32, ndf.basis, k)); },
+          "compressed.factors", "/basis", "not finite", findings);
+    }
+    checkAll(
+        ndf.spot_sums.size(), [&](std::uint64_t k) { return ndf.spot_sums[k] >= 0 && ndf.spot_sums[k] <= 1; },
+        "compressed.factors", "/spot_sums", "not between 0 and 1", findings);
+    checkDensities(ndf, findings);
   }
-  checkAll(
-      ndf.spot_sums.size(), [&](std::uint64_t k) { return ndf.spot_sums[k] >= 0 && ndf.spot_sums[k] <= 1; },
-      "compressed.factors", "/spot_sums", "not between 0 and 1", findings);
-  checkDensities(ndf, findings);
-}
+};
+
+template const Kind& kindOf<NdfCp>();
 
 }  // namespace glint::formats

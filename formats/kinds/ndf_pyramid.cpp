@@ -2,7 +2,8 @@
 #include <bit>
 #include <cmath>
 
-#include "glint/formats/kinds/pyramid_shape.h"
+#include "glint/formats/kinds/description.h"
+#include "glint/formats/kinds/shared_fields.h"
 #include "glint/formats/number_text.h"
 #include "glint/math/half.h"
 #include "glint/model/texel_name.h"
@@ -63,89 +64,88 @@ std::vector<double> checkBlocks(const NdfPyramid& pyramid, int l, Findings& find
 
 }  // namespace
 
-PackedAsset pack(const NdfPyramid& pyramid) {
-  PackedAsset packed{"ndf-pyramid", {}, {}};
-  const PyramidShape& shape = pyramid.shape;
-  packShape(shape, packed);
-  packed.text("precision", pyramid.precision == BlockPrecision::f16 ? "f16" : "f32");
-  packed.real("value_scale", pyramid.value_scale);
-  for (int l = 0; l < shape.level_count; ++l) {
-    const PyramidLevel& level = pyramid.levels[l];
-    const auto path = [&](const char* dataset) { return levelPath("level_{l}/", l) + dataset; };
-    const auto rows = static_cast<std::uint64_t>(shape.levels[l].rows);
-    const auto columns = static_cast<std::uint64_t>(shape.levels[l].columns);
-    const auto words = static_cast<std::uint64_t>(shape.maskWords());
-    const std::uint64_t blocks = level.block_means.size();
-    packed.array(path("masks"), ElementType::u64, {rows, columns, words}, level.masks.data(), level.masks.size());
-    packed.array(path("mask_ranks"), ElementType::u32, {rows * columns * words + 1}, level.mask_ranks.data(),
-                 level.mask_ranks.size());
-    packed.array(path("block_means"), ElementType::f32, {blocks}, level.block_means.data(), blocks);
-    // The pixels are a bare pointer: the running count is the only witness of how many there are.
-    packed.array(path("pixels"), pyramid.precision == BlockPrecision::f16 ? ElementType::f16 : ElementType::f32,
-                 {blocks, kBlockSize, kBlockSize}, level.pixels,
-                 std::uint64_t{level.mask_ranks.empty() ? 0 : level.mask_ranks.back()} * kBlockPixels);
-  }
-  return packed;
-}
+template <>
+struct KindDescription<NdfPyramid> {
+  static constexpr std::string_view kName = "ndf-pyramid";
+  static constexpr std::string_view kTitle = "Pyramid of NDF images";
 
-void unpack(const Content& content, NdfPyramid& pyramid) {
-  unpackShape(content, pyramid.shape);
-  pyramid.precision = content.is("precision", "f16") ? BlockPrecision::f16 : BlockPrecision::f32;
-  pyramid.value_scale = content.real("value_scale");
-  for (int l = 0; l < pyramid.shape.level_count; ++l) {
-    const auto path = [&](const char* dataset) { return levelPath("level_{l}/", l) + dataset; };
-    PyramidLevel& level = pyramid.levels[l];
-    level.masks = content.array<std::uint64_t>(path("masks"));
-    level.mask_ranks = content.array<std::uint32_t>(path("mask_ranks"));
-    level.block_means = content.array<float>(path("block_means"));
-    level.pixels = content.dataset(path("pixels")).data;
+  static std::vector<Rule> indexRules() {
+    return {errorRule("pyramid.masks", "no occupancy bit lies beyond the image's blocks"),
+            errorRule("pyramid.mask_ranks", "mask_ranks is the running count of occupancy bits")};
   }
-}
+  static std::vector<Rule> valueRules() {
+    return {errorRule("pyramid.pixels", "pixels are finite and not negative"),
+            errorRule("pyramid.block_means", "block_means are the means of the pixels"),
+            warningRule("pyramid.integral", "every image integrates to 1 within 1e-3")};
+  }
 
-void checkIndex(const NdfPyramid& pyramid, Findings& findings) {
-  checkShape(pyramid.shape, findings);
-  const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
-  const int tail_bits = pyramid.shape.blocksPerImage() % 64;
-  const std::uint64_t beyond = tail_bits == 0 ? 0 : ~std::uint64_t{0} << tail_bits;
-  for (int l = 0; l < pyramid.shape.level_count; ++l) {
-    const PyramidLevel& level = pyramid.levels[l];
-    std::uint64_t count = 0;
-    std::uint64_t stray = 0;
-    bool counts_hold = true;
-    for (std::size_t word = 0; word < level.masks.size(); ++word) {
-      counts_hold &= level.mask_ranks[word] == count;
-      count += static_cast<std::uint64_t>(std::popcount(level.masks[word]));
-      if ((word + 1) % words == 0) stray |= level.masks[word] & beyond;
-    }
-    counts_hold &= level.mask_ranks.back() == count && count == level.block_means.size();
-    if (stray != 0) findings.add("pyramid.masks", levelObject(l, "masks"), "has bits beyond the blocks of an image");
-    if (!counts_hold) {
-      findings.add("pyramid.mask_ranks", levelObject(l, "mask_ranks"), "is not the running count of the bits in masks");
-    }
+  static void describe(auto& fields, auto& pyramid) {
+    describeShape(fields, pyramid.shape);
+    fields.choice("precision", pyramid.precision, "f16|f32", "type of the stored pixels");
+    fields.real("value_scale", pyramid.value_scale, kPositive, "1", "density = value_scale * stored pixel");
+    fields.derived("mask_words", "ceil_div(resolution * resolution, 16384)", "64-bit words of occupancy bits of an image");
+    fields.levels("level_count", pyramid.shape.level_count, [&](int l) {
+      auto& level = pyramid.levels[l];
+      fields.array("level_{l}/masks", level.masks, {"level_rows[l]", "level_columns[l]", "mask_words"}, "1",
+                   "bit b of word w: block 64 w + b of the image is stored");
+      fields.array("level_{l}/mask_ranks", level.mask_ranks, {"level_rows[l] * level_columns[l] * mask_words + 1"}, "1",
+                   "stored blocks of the level before those of this word; the last value is their total");
+      fields.array("level_{l}/block_means", level.block_means, {"stored_blocks"}, "1", "mean density of each stored block");
+      // The pixels are a bare pointer: the running count is the only witness of how many there are.
+      const std::uint64_t blocks = level.mask_ranks.empty() ? 0 : level.mask_ranks.back();
+      fields.data("level_{l}/pixels", level.pixels, blocks * kBlockPixels,
+                  {{"precision=f16", ElementType::f16}, {"precision=f32", ElementType::f32}}, {"stored_blocks", "16", "16"},
+                  "1", "mean density of each pixel of each stored block, divided by value_scale");
+    });
   }
-}
 
-void checkData(const NdfPyramid& pyramid, Findings& findings) {
-  const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
-  const double pixel_area = 4.0 / (static_cast<double>(pyramid.shape.resolution) * pyramid.shape.resolution);
-  for (int l = 0; l < pyramid.shape.level_count; ++l) {
-    const PyramidLevel& level = pyramid.levels[l];
-    const std::vector<double> sums = checkBlocks(pyramid, l, findings);
-    std::size_t bad = 0;
-    double worst = 1;
-    for (std::size_t first = 0; first + words < level.mask_ranks.size(); first += words) {
-      double integral = 0;
-      for (std::uint32_t b = level.mask_ranks[first]; b < level.mask_ranks[first + words]; ++b) integral += sums[b];
-      integral *= pyramid.value_scale * pixel_area;
-      if (std::abs(integral - 1) <= kIntegralTolerance) continue;
-      ++bad;
-      if (!(std::abs(integral - 1) <= std::abs(worst - 1))) worst = integral;
-    }
-    if (bad > 0) {
-      findings.add("pyramid.integral", levelObject(l, "pixels"),
-                   std::to_string(bad) + " images do not integrate to 1 (worst " + numberText(worst) + ")");
+  static void checkIndex(const NdfPyramid& pyramid, Findings& findings) {
+    checkShape(pyramid.shape, findings);
+    const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
+    const int tail_bits = pyramid.shape.blocksPerImage() % 64;
+    const std::uint64_t beyond = tail_bits == 0 ? 0 : ~std::uint64_t{0} << tail_bits;
+    for (int l = 0; l < pyramid.shape.level_count; ++l) {
+      const PyramidLevel& level = pyramid.levels[l];
+      std::uint64_t count = 0;
+      std::uint64_t stray = 0;
+      bool counts_hold = true;
+      for (std::size_t word = 0; word < level.masks.size(); ++word) {
+        counts_hold &= level.mask_ranks[word] == count;
+        count += static_cast<std::uint64_t>(std::popcount(level.masks[word]));
+        if ((word + 1) % words == 0) stray |= level.masks[word] & beyond;
+      }
+      counts_hold &= level.mask_ranks.back() == count && count == level.block_means.size();
+      if (stray != 0) findings.add("pyramid.masks", levelObject(l, "masks"), "has bits beyond the blocks of an image");
+      if (!counts_hold) {
+        findings.add("pyramid.mask_ranks", levelObject(l, "mask_ranks"), "is not the running count of the bits in masks");
+      }
     }
   }
-}
+
+  static void checkValues(const NdfPyramid& pyramid, Findings& findings) {
+    const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
+    const double pixel_area = 4.0 / (static_cast<double>(pyramid.shape.resolution) * pyramid.shape.resolution);
+    for (int l = 0; l < pyramid.shape.level_count; ++l) {
+      const PyramidLevel& level = pyramid.levels[l];
+      const std::vector<double> sums = checkBlocks(pyramid, l, findings);
+      std::size_t bad = 0;
+      double worst = 1;
+      for (std::size_t first = 0; first + words < level.mask_ranks.size(); first += words) {
+        double integral = 0;
+        for (std::uint32_t b = level.mask_ranks[first]; b < level.mask_ranks[first + words]; ++b) integral += sums[b];
+        integral *= pyramid.value_scale * pixel_area;
+        if (std::abs(integral - 1) <= kIntegralTolerance) continue;
+        ++bad;
+        if (!(std::abs(integral - 1) <= std::abs(worst - 1))) worst = integral;
+      }
+      if (bad > 0) {
+        findings.add("pyramid.integral", levelObject(l, "pixels"),
+                     std::to_string(bad) + " images do not integrate to 1 (worst " + numberText(worst) + ")");
+      }
+    }
+  }
+};
+
+template const Kind& kindOf<NdfPyramid>();
 
 }  // namespace glint::formats

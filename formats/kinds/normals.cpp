@@ -1,11 +1,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "glint/formats/kinds/codec.h"
+#include "glint/formats/kinds/description.h"
+#include "glint/formats/kinds/shared_fields.h"
 #include "glint/formats/kinds/texel_tally.h"
 
 namespace glint::formats {
 namespace {
+
+/// Nodes of level l of the bounds along an axis of so many texels.
+int nodesAlong(int texels, int l) { return static_cast<int>((std::int64_t{texels} + (std::int64_t{2} << l) - 1) >> (l + 1)); }
 
 bool holds(const NormalBounds& b, float x, float y) { return b.low_x <= x && x <= b.high_x && b.low_y <= y && y <= b.high_y; }
 
@@ -47,59 +51,61 @@ void checkBounds(const NormalMap& map, Findings& findings) {
 
 }  // namespace
 
-PackedAsset pack(const NormalMap& map) {
-  PackedAsset packed{"normals", {}, {}};
-  packed.integer("width", map.width);
-  packed.integer("height", map.height);
-  packed.real("texel_size_um", map.texel_size_um);
-  packed.integer("bounds_level_count", map.bounds_level_count);
-  packed.array("normals", ElementType::f32, {static_cast<std::uint64_t>(map.height), static_cast<std::uint64_t>(map.width), 2},
-               map.normals.data(), map.normals.size() * 2);
-  for (int k = 0; k < std::min(map.bounds_level_count, NormalMap::kMaxBoundsLevels); ++k) {
-    const NormalBoundsLevel& level = map.bounds[k];
-    packed.array(levelPath("bounds/level_{l}", k), ElementType::f32,
-                 {static_cast<std::uint64_t>(level.rows), static_cast<std::uint64_t>(level.columns), 4}, level.nodes.data(),
-                 level.nodes.size() * 4);
-  }
-  return packed;
-}
+template <>
+struct KindDescription<NormalMap> {
+  static constexpr std::string_view kName = "normals";
+  static constexpr std::string_view kTitle = "Normal map";
 
-void unpack(const Content& content, NormalMap& map) {
-  map.width = content.integer("width");
-  map.height = content.integer("height");
-  map.texel_size_um = content.real("texel_size_um");
-  map.normals = content.array<Vec2>("normals");
-  map.bounds_level_count = content.integer("bounds_level_count");
-  for (int k = 0; k < map.bounds_level_count; ++k) {
-    const std::string path = levelPath("bounds/level_{l}", k);
-    const std::vector<std::uint64_t>& dims = content.dataset(path).dims;
-    map.bounds[k] = {static_cast<int>(dims[1]), static_cast<int>(dims[0]), content.array<NormalBounds>(path)};
+  static std::vector<Rule> indexRules() {
+    return {errorRule("normals.bounds_levels", "the coarsest level of bounds is one node")};
   }
-}
-
-void checkIndex(const NormalMap& map, Findings& findings) {
-  if (map.bounds_level_count == 0) return;
-  const NormalBoundsLevel& top = map.bounds[map.bounds_level_count - 1];
-  if (top.columns != 1 || top.rows != 1) {
-    findings.add("normals.bounds_levels", "/" + levelPath("bounds/level_{l}", map.bounds_level_count - 1),
-                 "has " + std::to_string(top.columns) + " x " + std::to_string(top.rows) + " nodes, not one");
+  static std::vector<Rule> valueRules() {
+    return {errorRule("normals.finite", "normals are finite", "make it again with glint-ingest --fix-invalid"),
+            errorRule("normals.disk", "normals lie inside the unit disk",
+                      "make it again with glint-ingest, which moves normals on the rim inside"),
+            errorRule("normals.bounds", "bounds hold the normals that they cover")};
   }
-}
 
-void checkData(const NormalMap& map, Findings& findings) {
-  TexelTally infinite(map.width, map.height);
-  TexelTally outside(map.width, map.height);
-  for (std::size_t k = 0; k < map.normals.size(); ++k) {
-    const Vec2 n = map.normals[k];
-    if (!std::isfinite(n.x) || !std::isfinite(n.y)) {
-      infinite.add(k);
-    } else if (!(dot(n, n) < 1)) {
-      outside.add(k);
+  static void describe(auto& fields, auto& map) {
+    describeMap(fields, map);
+    fields.integer("bounds_level_count", map.bounds_level_count, {0, NormalMap::kMaxBoundsLevels}, "1",
+                   "levels of the min-max pyramid; 0 when there is none");
+    fields.array("normals", map.normals, {"height", "width", "2"}, "1", "(nx, ny) on the unit disk, bottom row first");
+    fields.levels("bounds_level_count", map.bounds_level_count, [&](int l) {
+      auto& level = map.bounds[l];
+      fields.set(level.columns, nodesAlong(map.width, l));
+      fields.set(level.rows, nodesAlong(map.height, l));
+      fields.array("bounds/level_{l}", level.nodes, {"ceil_div(height, pow2(l + 1))", "ceil_div(width, pow2(l + 1))", "4"}, "1",
+                   "low nx, low ny, high nx, high ny of the texels of each node and one more row and column, wrapped");
+    });
+  }
+
+  static void checkIndex(const NormalMap& map, Findings& findings) {
+    if (map.bounds_level_count == 0) return;
+    const NormalBoundsLevel& top = map.bounds[map.bounds_level_count - 1];
+    if (top.columns != 1 || top.rows != 1) {
+      findings.add("normals.bounds_levels", "/" + levelPath("bounds/level_{l}", map.bounds_level_count - 1),
+                   "has " + std::to_string(top.columns) + " x " + std::to_string(top.rows) + " nodes, not one");
     }
   }
-  report(infinite, "normals.finite", "/normals", "texels are not finite", findings);
-  report(outside, "normals.disk", "/normals", "normals are not inside the unit disk", findings);
-  checkBounds(map, findings);
-}
+
+  static void checkValues(const NormalMap& map, Findings& findings) {
+    TexelTally infinite(map.width, map.height);
+    TexelTally outside(map.width, map.height);
+    for (std::size_t k = 0; k < map.normals.size(); ++k) {
+      const Vec2 n = map.normals[k];
+      if (!std::isfinite(n.x) || !std::isfinite(n.y)) {
+        infinite.add(k);
+      } else if (!(dot(n, n) < 1)) {
+        outside.add(k);
+      }
+    }
+    report(infinite, "normals.finite", "/normals", "texels are not finite", findings);
+    report(outside, "normals.disk", "/normals", "normals are not inside the unit disk", findings);
+    checkBounds(map, findings);
+  }
+};
+
+template const Kind& kindOf<NormalMap>();
 
 }  // namespace glint::formats

@@ -4,7 +4,7 @@
 #include "glint/query/brdf/displaced_brdf.h"
 
 struct glint_displaced {
-  explicit glint_displaced(glint::formats::Asset opened) : asset(std::move(opened)), brdf(asset.get<Displacement>()) {}
+  explicit glint_displaced(glint::formats::Asset opened) : asset(std::move(opened)), brdf(asset.get<glint::Displacement>()) {}
 
   glint::formats::Asset asset;
   glint::DisplacedBrdf brdf;

@@ -17,7 +17,7 @@
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 #include "glint/formats/findings.h"
-#include "glint/formats/kinds/codec.h"
+#include "glint/formats/kinds/kind.h"
 #include "glint/formats/validate.h"
 #include "glint/query/detail/bin_map/bin_blocks.h"
 #include "support/sample_assets.h"
@@ -819,7 +819,7 @@ TEST(FormatRules, BinMapsOfTooManyTexelsAreRefused) {
   const auto broken = [&](int width, int height) {
     sample.map.width = width, sample.map.height = height;
     Findings findings("huge.glint");
-    checkIndex(sample.map, findings);
+    kindOf<BinMap>().check_index(sample.map, findings);
     EXPECT_EQ(findings.report().findings.size(), 1u);
     return findings.report().findings.at(0).rule;
   };
@@ -838,7 +838,7 @@ TEST(FormatRules, TexelsInBinsBeyondTheSquareAreFound) {
   bake::BinMapData data = bake::buildBinMap(map, {0.01f});
   const auto found = [&] {
     Findings findings("a.glint");
-    checkData(data.view(), findings);
+    kindOf<BinMap>().check_values(data.view(), findings);
     return findings.report().findings;
   };
   EXPECT_TRUE(found().empty());

@@ -6,6 +6,7 @@
 #include "common/schema_json.h"
 #include "glint/formats/rules.h"
 #include "glint/formats/schema.h"
+#include "glint/formats/size_expression.h"
 
 namespace glint::formats {
 namespace {
@@ -29,12 +30,12 @@ TEST(Schema, SpecNamesEveryRuleKindAndDataset) {
         "| `" + std::string(rule.id) + "` | " + std::string(name(rule.severity)) + " | " + std::string(rule.summary) + " |";
     EXPECT_NE(spec.find(line), std::string::npos) << line;
   }
-  for (const KindSchema& kind : kindSchemas()) {
-    EXPECT_NE(spec.find("`" + std::string(kind.name) + "`"), std::string::npos) << kind.name;
-    for (const AttributeSchema& attribute : kind.attributes) {
+  for (const KindSchema* kind : kindSchemas()) {
+    EXPECT_NE(spec.find("`" + std::string(kind->name) + "`"), std::string::npos) << kind->name;
+    for (const AttributeSchema& attribute : kind->attributes) {
       EXPECT_NE(spec.find("`" + std::string(attribute.name) + "`"), std::string::npos) << attribute.name;
     }
-    for (const DatasetSchema& dataset : kind.datasets) {
+    for (const DatasetSchema& dataset : kind->datasets) {
       const std::string path(dataset.path.substr(dataset.path.rfind('/') + 1));
       const std::string written = path == "level_{l}" ? "bounds/level_LL" : path;
       EXPECT_NE(spec.find("`" + written + "`"), std::string::npos) << dataset.path;

@@ -1,0 +1,43 @@
+#include "glint/formats/kinds/shared_fields.h"
+
+#include <cmath>
+
+namespace glint::formats {
+
+void checkSlopes(const MapSlopes& slopes, Findings& findings) {
+  constexpr double kRounding = 1e-6;  // of three floats
+  const Covariance& c = slopes.covariance;
+  const double square = double{c.xy} * c.xy;
+  if (c.xx >= 0 && c.yy >= 0 && square <= (1 + kRounding) * c.xx * c.yy) return;
+  findings.add("shape.slopes", "/@slope_covariance",
+               "is not a covariance: a variance is negative, or the covariance too large");
+}
+
+void checkShape(const PyramidShape& shape, Findings& findings) {
+  if (shape.resolution % kBlockSize != 0) {
+    findings.add("shape.resolution", "/@resolution", "is " + std::to_string(shape.resolution) + ", not a multiple of 16");
+  }
+  checkSlopes(shape.slopes, findings);
+  for (int l = 0; l < shape.level_count; ++l) {
+    const PyramidGrid& grid = shape.levels[l];
+    if (l > 0 && grid.stride != 2 * shape.levels[l - 1].stride) {
+      findings.add("shape.strides", "/@level_strides", "level " + std::to_string(l) + " is not twice the level before");
+    }
+    const double columns = std::ceil(static_cast<double>(shape.width) / grid.stride);
+    const double rows = std::ceil(static_cast<double>(shape.height) / grid.stride);
+    const bool is_mean = l == shape.footprintLevels();
+    if (!is_mean && (grid.columns != columns || grid.rows != rows)) {
+      findings.add("shape.grid", "/@level_columns",
+                   "level " + std::to_string(l) + " has " + std::to_string(grid.columns) + " x " + std::to_string(grid.rows) +
+                       " footprints, not ceil(size / stride)" + (l + 1 == shape.level_count ? ", nor 1 x 1" : ""));
+    }
+  }
+}
+
+std::size_t imageCount(const PyramidShape& shape) {
+  std::size_t count = 0;
+  for (int l = 0; l < shape.level_count; ++l) count += shape.levels[l].imageCount();
+  return count;
+}
+
+}  // namespace glint::formats
