@@ -780,6 +780,32 @@ SampleShLight sampleShLight() {
   return s;
 }
 
+std::vector<SampleAsset> sampleAssets() {
+  std::vector<SampleAsset> samples;
+  const auto add = [&](std::string name, auto sample, auto member) {
+    const auto memory = std::make_shared<const decltype(sample)>(std::move(sample));
+    samples.push_back({std::move(name), (*memory).*member, memory});
+  };
+  using enum CompressionMethod;
+  using enum CoefficientType;
+  add("bin-map", sampleBinMap(64, 48), &SampleBinMap::map);
+  add("displacement", sampleDisplacement(64), &SampleDisplacement::displacement);
+  add("displacement-rgb", sampleDisplacement(64, true), &SampleDisplacement::displacement);
+  add("heights", sampleHeights(64, 48), &SampleHeights::map);
+  add("histogram-sat", sampleHistograms(22, 19), &SampleHistograms::sat);
+  add("ndf-cp-cp-i8", sampleNdfCp(64, cp, i8), &SampleNdfCp::ndf);
+  add("ndf-cp-tucker-f16", sampleNdfCp(64, tucker, f16), &SampleNdfCp::ndf);
+  add("ndf-cp-pca-i8", sampleNdfCp(64, pca, i8), &SampleNdfCp::ndf);
+  add("ndf-cp-narrow-i8", sampleNdfCp(64, tucker, i8, SampleForm::narrow), &SampleNdfCp::ndf);
+  add("ndf-cp-spots-i8", sampleNdfCp(64, tucker, i8, SampleForm::spots), &SampleNdfCp::ndf);
+  add("ndf-cp-cp-f32", sampleNdfCp(64, cp, f32), &SampleNdfCp::ndf);
+  add("ndf-pyramid", samplePyramid(64, BlockPrecision::f16), &SamplePyramid::pyramid);
+  add("normals", sampleNormals(64, 48), &SampleNormals::map);
+  add("sh-light", sampleShLight(), &SampleShLight::light);
+  add("sh-lobes", sampleShLobes(), &SampleShLobes::lobes);
+  return samples;
+}
+
 formats::Provenance sampleProvenance() {
   return {"sample_assets 1.0",
           R"({"size":64})",

@@ -4,6 +4,9 @@
 // builders of glint::bake are not involved, so that the format can be tested on its own.
 
 #include <cstdint>
+#include <memory>
+#include <ostream>
+#include <string>
 #include <vector>
 
 #include "glint/formats/asset_writer.h"
@@ -130,6 +133,19 @@ SampleHistograms sampleHistograms(int width, int height);
 SampleShLobes sampleShLobes();
 /// Constant light of radiance 1, 2 and 3 in red, green and blue, order 2, on a grid of 3 x 4 directions.
 SampleShLight sampleShLight();
+
+/// An asset of any kind and the memory behind it.
+struct SampleAsset {
+  std::string name;  ///< of its golden file, without the extension
+  formats::AnyAsset asset;
+  std::shared_ptr<const void> memory;
+};
+
+/// How tests name a sample.
+inline void PrintTo(const SampleAsset& sample, std::ostream* out) { *out << sample.name; }
+
+/// Samples of all kinds, and of the ways in which a kind can be stored. A new kind is added here.
+std::vector<SampleAsset> sampleAssets();
 
 formats::Provenance sampleProvenance();
 

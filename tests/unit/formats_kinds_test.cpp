@@ -1,0 +1,206 @@
+// What holds for every kind of asset, by what its description says: a new kind is tested here as soon as it has a sample.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "glint/formats/asset_reader.h"
+#include "glint/formats/asset_writer.h"
+#include "glint/formats/conformance.h"
+#include "glint/formats/kinds/kind.h"
+#include "glint/formats/validate.h"
+#include "support/sample_assets.h"
+#include "support/temp_folder.h"
+
+namespace glint::formats {
+namespace {
+
+namespace fs = std::filesystem;
+using test::SampleAsset;
+
+std::string bytesOf(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+const Kind& kindOfSample(const SampleAsset& sample) { return *kinds()[sample.asset.index()]; }
+
+class EveryKind : public testing::TestWithParam<SampleAsset> {
+ protected:
+  EveryKind() : path_(folder_ / "a.glint"), kind_(kindOfSample(GetParam())) {
+    writeAsset(path_, GetParam().asset, test::sampleProvenance());
+  }
+
+  /// What the file holds, to be broken.
+  FileStructure structure() const {
+    Findings findings(path_);
+    FileStructure read = readStructure(path_, findings);
+    EXPECT_FALSE(findings.failed());
+    return read;
+  }
+
+  /// "rule object" of everything in which a structure differs from the schema.
+  std::set<std::string> broken(const FileStructure& structure) const {
+    Findings findings(path_);
+    checkConformance(structure, kind_.schema, findings);
+    std::set<std::string> rules;
+    for (const Finding& finding : findings.report().findings) rules.insert(finding.rule + " " + finding.object);
+    return rules;
+  }
+
+  /// Paths of a dataset of the schema that the file has.
+  std::vector<std::string> pathsOf(const FileStructure& structure, const DatasetSchema& dataset) const {
+    std::set<std::string> paths;
+    for (int level = 0; level < 20; ++level)
+      if (structure.datasets.contains(levelPath(dataset.path, level))) paths.insert(levelPath(dataset.path, level));
+    return {paths.begin(), paths.end()};
+  }
+
+  const test::TempFolder folder_;
+  const fs::path path_;
+  const Kind& kind_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Samples, EveryKind, testing::ValuesIn(test::sampleAssets()), [](const auto& info) {
+  std::string name = info.param.name;
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+});
+
+TEST(Kinds, HaveSamplesAndAreSorted) {
+  std::set<std::string_view> sampled, known;
+  for (const SampleAsset& sample : test::sampleAssets()) sampled.insert(kindOfSample(sample).schema.name);
+  for (const Kind* kind : kinds()) {
+    EXPECT_TRUE(known.empty() || *known.rbegin() < kind->schema.name) << kind->schema.name;
+    known.insert(kind->schema.name);
+    EXPECT_EQ(findKind(kind->schema.name), kind);
+  }
+  EXPECT_EQ(sampled, known);
+  EXPECT_EQ(findKind("unknown"), nullptr);
+}
+
+TEST(Kinds, NameEachAttributeAndArrayOnce) {
+  for (const Kind* kind : kinds()) {
+    std::set<std::string_view> names, paths;
+    for (const AttributeSchema& attribute : kind->schema.attributes) {
+      EXPECT_TRUE(names.insert(attribute.name).second) << attribute.name;
+      EXPECT_LE(attribute.minimum, attribute.maximum) << attribute.name;
+      EXPECT_FALSE(attribute.long_name.empty() || attribute.units.empty()) << attribute.name;
+    }
+    for (const DatasetSchema& dataset : kind->schema.datasets) {
+      EXPECT_TRUE(paths.insert(dataset.path).second) << dataset.path;
+      EXPECT_FALSE(dataset.long_name.empty() || dataset.units.empty()) << dataset.path;
+    }
+  }
+}
+
+TEST_P(EveryKind, IsWrittenAsItsGoldenFile) {
+  const fs::path golden = fs::path(GLINT_SOURCE_DIR) / "tests/golden/v1.0" / (GetParam().name + ".glint");
+  EXPECT_EQ(bytesOf(path_), bytesOf(golden)) << golden;
+}
+
+TEST_P(EveryKind, IsValidAndKnowsItsKind) {
+  EXPECT_THAT(validateAsset(path_).findings, testing::IsEmpty());
+  const Asset asset = Asset::openForBuilding(path_);
+  EXPECT_EQ(asset.kind(), kind_.schema.name);
+  EXPECT_EQ(asset.any().index(), GetParam().asset.index());
+}
+
+TEST_P(EveryKind, ComesBackBitExact) {
+  const Asset asset = Asset::open(path_);
+  const PackedAsset before = kind_.pack(GetParam().asset), after = kind_.pack(asset.any());
+  ASSERT_EQ(before.attributes.size(), after.attributes.size());
+  for (std::size_t k = 0; k < before.attributes.size(); ++k) {
+    EXPECT_EQ(before.attributes[k].first, after.attributes[k].first);
+    EXPECT_EQ(before.attributes[k].second.numbers, after.attributes[k].second.numbers) << before.attributes[k].first;
+    EXPECT_EQ(before.attributes[k].second.texts, after.attributes[k].second.texts) << before.attributes[k].first;
+  }
+  ASSERT_EQ(before.arrays.size(), after.arrays.size());
+  for (std::size_t k = 0; k < before.arrays.size(); ++k) {
+    const PackedArray &a = before.arrays[k], &b = after.arrays[k];
+    EXPECT_EQ(a.path, b.path);
+    EXPECT_EQ(a.dims, b.dims) << a.path;
+    ASSERT_EQ(a.size_bytes, b.size_bytes) << a.path;
+    const auto bytes = [](const PackedArray& array) {
+      return std::string_view(static_cast<const char*>(array.data), static_cast<std::size_t>(array.size_bytes));
+    };
+    if (a.size_bytes > 0) EXPECT_EQ(bytes(a), bytes(b)) << a.path;
+  }
+}
+
+TEST_P(EveryKind, TellsTheAttributesOfItsSchema) {
+  const Asset asset = Asset::open(path_);
+  ASSERT_EQ(asset.info().attributes.size(), kind_.schema.attributes.size());
+  for (std::size_t k = 0; k < kind_.schema.attributes.size(); ++k)
+    EXPECT_EQ(asset.info().attributes[k].name, kind_.schema.attributes[k].name);
+}
+
+TEST_P(EveryKind, NeedsEachAttribute) {
+  for (const AttributeSchema& attribute : kind_.schema.attributes) {
+    FileStructure file = structure();
+    file.attributes.erase(file.attributes.find(attribute.name));
+    EXPECT_THAT(broken(file), testing::Contains("attribute.missing /@" + std::string(attribute.name)));
+  }
+}
+
+TEST_P(EveryKind, RefusesAttributesOfAnotherType) {
+  for (const AttributeSchema& attribute : kind_.schema.attributes) {
+    FileStructure file = structure();
+    file.attributes.find(attribute.name)->second.type = ElementType::u8;
+    EXPECT_THAT(broken(file), testing::Contains("attribute.type /@" + std::string(attribute.name)));
+  }
+}
+
+TEST_P(EveryKind, RefusesAttributesOutOfRange) {
+  for (const AttributeSchema& attribute : kind_.schema.attributes) {
+    const auto expectRefused = [&](auto change) {
+      FileStructure file = structure();
+      change(file.attributes.find(attribute.name)->second);
+      EXPECT_THAT(broken(file), testing::Contains("attribute.value /@" + std::string(attribute.name)));
+    };
+    if (attribute.type == ElementType::text) {
+      expectRefused([](AttributeValue& value) { value.texts[0] = "neither"; });
+      continue;
+    }
+    for (const double bad : {attribute.minimum - std::max(1.0, std::abs(attribute.minimum)),
+                             attribute.maximum + std::max(1.0, std::abs(attribute.maximum)), std::nan("")})
+      expectRefused([&](AttributeValue& value) { value.numbers.back() = bad; });
+  }
+}
+
+TEST_P(EveryKind, NeedsEachArray) {
+  for (const DatasetSchema& dataset : kind_.schema.datasets) {
+    for (const std::string& path : pathsOf(structure(), dataset)) {
+      FileStructure file = structure();
+      file.datasets.erase(path);
+      EXPECT_THAT(broken(file), testing::Contains("dataset.missing /" + path));
+    }
+  }
+}
+
+TEST_P(EveryKind, RefusesArraysOfAnotherTypeOrRank) {
+  for (const DatasetSchema& dataset : kind_.schema.datasets) {
+    for (const std::string& path : pathsOf(structure(), dataset)) {
+      FileStructure file = structure();
+      file.datasets.at(path).type = ElementType::text;
+      EXPECT_THAT(broken(file), testing::ElementsAre("dataset.type /" + path));
+      file = structure();
+      file.datasets.at(path).dims.push_back(1);
+      EXPECT_THAT(broken(file), testing::ElementsAre("dataset.dims /" + path));
+    }
+  }
+}
+
+TEST_P(EveryKind, WarnsOfWhatItsSchemaDoesNotHave) {
+  FileStructure file = structure();
+  file.attributes["colour"] = {ElementType::i32, true, {1}, {}};
+  file.datasets["colours"] = file.datasets.begin()->second;
+  EXPECT_THAT(broken(file), testing::UnorderedElementsAre("attribute.unknown /@colour", "dataset.unknown /colours"));
+}
+
+}  // namespace
+}  // namespace glint::formats
