@@ -47,8 +47,8 @@ struct AssetInfo {
   Provenance provenance;
   std::uint64_t file_bytes = 0;
   std::vector<AttributeInfo> attributes;  ///< of the kind, in the order of SPEC.md
-  std::vector<DatasetInfo> datasets;  ///< by path
-  std::vector<std::string> warnings;  ///< things that a reader tolerates, e.g. a newer minor version
+  std::vector<DatasetInfo> datasets;      ///< by path
+  std::vector<std::string> warnings;      ///< things that a reader tolerates, e.g. a newer minor version
 };
 
 struct OpenOptions {

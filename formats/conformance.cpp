@@ -60,7 +60,7 @@ bool checkAttribute(const Attributes& attributes, const std::string& object, con
                     const SizeScope& scope, int minor, Findings& findings) {
   const auto found = attributes.find(schema.name);
   if (found != attributes.end()) return checkValue(found->second, object, schema, scope, findings);
-  if (schema.since > minor) return true;
+  if (!schema.required || schema.since > minor) return true;
   findings.add("attribute.missing", object + "@" + std::string(schema.name), "is missing");
   return false;
 }

@@ -34,6 +34,7 @@ struct AttributeSchema {
   double maximum = 0;            ///< largest valid number
   std::string_view values = {};  ///< valid texts, separated by '|'; empty for any
   int since = 0;                 ///< minor version of the format that added it: files of older ones need not have it
+  bool required = true;
 };
 
 /// The type of a dataset when all of `when` hold: "a=x|y & b=z" of text attributes; empty always holds.

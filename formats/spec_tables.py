@@ -76,20 +76,25 @@ def version(schema, entry):
     return f"{schema['format_major']}.{entry['since_minor']}" if entry.get("since_minor", 0) > 0 else ""
 
 
+def presence(entry):
+    """What follows the name of an attribute or dataset that files may lack."""
+    return "" if entry.get("required", True) else " (MAY be absent)"
+
+
 def attribute_table(schema, attributes):
     """A table of attributes. Texts have no units."""
     rows = []
     for attribute in attributes:
         count = f"[{attribute['count']}]" if "count" in attribute else ""
         units = "" if attribute["type"] == "text" else attribute["units"]
-        rows.append([code(attribute["name"]), code(attribute["type"] + count), valid_values(attribute), units, attribute["long_name"],
+        rows.append([code(attribute["name"]) + presence(attribute), code(attribute["type"] + count), valid_values(attribute), units, attribute["long_name"],
                      version(schema, attribute)])
     return table(["attribute", "type", "value", "units", "meaning", "since"], rows)
 
 
 def dataset_row(schema, dataset):
     """The row of a dataset, or of the datasets of all levels."""
-    path = code(dataset["path"].replace("{l}", "LL")) + ("" if dataset["required"] else " (MAY be absent)")
+    path = code(dataset["path"].replace("{l}", "LL")) + presence(dataset)
     size = code("".join(f"[{size}]" for size in dataset["dims"]))
     return [path, element_type(dataset["types"]), size, dataset["units"], dataset["long_name"], version(schema, dataset)]
 

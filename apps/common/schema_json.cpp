@@ -15,6 +15,7 @@ ordered_json attributeJson(const AttributeSchema& attribute) {
   if (!attribute.count.empty()) json["count"] = attribute.count;
   if (attribute.type != ElementType::text) json["range"] = {attribute.minimum, attribute.maximum};
   if (!attribute.values.empty()) json["values"] = attribute.values;
+  if (!attribute.required) json["required"] = false;
   if (attribute.since > 0) json["since_minor"] = attribute.since;
   json["units"] = attribute.units;
   json["long_name"] = attribute.long_name;

@@ -11,12 +11,13 @@ using namespace glint;
 namespace {
 /// Adds the min-max pyramid and writes the asset.
 void writeNormals(const apps::OutputFile& output, const apps::Image& image, float texel_size_um, std::span<const Vec2> normals,
-                  const formats::Provenance& provenance) {
+                  const MapSlopes& slopes, const formats::Provenance& provenance) {
   NormalMap map;
   map.width = image.width;
   map.height = image.height;
   map.texel_size_um = texel_size_um;
   map.normals = normals;
+  map.slopes = slopes;
   const auto bounds = bake::buildNormalBounds(map.width, map.height, map.normals);
   bake::attachBounds(map, bounds);
   formats::writeAsset(output.path(), map, provenance, output.writeOptions());
@@ -39,7 +40,7 @@ int main(int argc, char** argv) {
     if (!options.readsHeights()) {
       const bake::IngestedNormals result = bake::ingestNormals(apps::pixelArray(image), values);
       report = result.report;
-      writeNormals(output, image, options.texelSize(), result.normals, provenance);
+      writeNormals(output, image, options.texelSize(), result.normals, report.slopes, provenance);
     } else {
       const bake::IngestedHeights result = bake::ingestHeights(apps::pixelArray(image), values);
       report = result.report;
@@ -48,7 +49,7 @@ int main(int argc, char** argv) {
         formats::writeAsset(output.path(), map, provenance, output.writeOptions());
       } else {
         const auto normals = bake::normalsFromHeights(image.width, image.height, result.heights, values.boundary);
-        writeNormals(output, image, options.texelSize(), normals, provenance);
+        writeNormals(output, image, options.texelSize(), normals, report.slopes, provenance);
       }
     }
     apps::warnAbout(tool, input.path(), values, report);

@@ -17,7 +17,7 @@ namespace glint::formats {
 ///   static void checkValues(const Model&, Findings&);
 ///
 /// describe() calls a function of `fields` for each: integer, real, choice, reals, levelIntegers, levelReals, derived, array,
-/// halves, data; levels() repeats arrays. It is called with a model that is constant (to write it, to make the schema) and with
+/// halves, data; levels() repeats arrays, optional() has attributes that a file may lack. It is called with a model that is constant (to write it, to make the schema) and with
 /// one that is to be filled, and fields.set() changes only the latter.
 template <class Model>
 struct KindDescription;

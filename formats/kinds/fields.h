@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -89,6 +90,12 @@ class SchemaFields {
   }
   template <class T, class U>
   void set(const T&, const U&) {}
+  template <class T, class Body>
+  void optional(const std::optional<T>&, Body body) {
+    required_ = false;
+    body(T());
+    required_ = true;
+  }
 
   void derived(std::string_view name, std::string_view expression, std::string_view long_name) {
     schema_.derived.push_back({name, expression, long_name});
@@ -115,13 +122,17 @@ class SchemaFields {
   }
 
  private:
-  void add(AttributeSchema attribute) { schema_.attributes.push_back(attribute); }
+  void add(AttributeSchema attribute) {
+    attribute.required = required_;
+    schema_.attributes.push_back(attribute);
+  }
   void add(std::string_view path, Types types, Dims dims, std::string_view units, std::string_view long_name, int since) {
     schema_.datasets.push_back({path, repeat_, types, dims, units, long_name, true, since});
   }
 
   KindSchema& schema_;
   std::string_view repeat_;
+  bool required_ = true;
 };
 
 /// Packs a struct for writing.
@@ -152,6 +163,10 @@ class PackFields {
   }
   template <class T, class U>
   void set(const T&, const U&) {}
+  template <class T, class Body>
+  void optional(const std::optional<T>& value, Body body) {
+    if (value) body(*value);
+  }
 
   void derived(std::string_view name, std::string_view expression, std::string_view);
   template <class Body>
@@ -207,6 +222,7 @@ class ReadFields {
   void reals(std::string_view name, std::string_view, std::initializer_list<float*> values, Range, std::string_view,
              std::string_view, int = 0) {
     const AttributeValue* found = find(name);
+    missing_ |= found == nullptr;
     if (found == nullptr) return;
     auto number = found->numbers.begin();
     for (float* value : values) *value = static_cast<float>(*number++);
@@ -222,6 +238,14 @@ class ReadFields {
   template <class T, class U>
   void set(T& target, const U& value) {
     target = value;
+  }
+  /// Takes the value only if the file has all that body() describes.
+  template <class T, class Body>
+  void optional(std::optional<T>& value, Body body) {
+    T read;
+    missing_ = false;
+    body(read);
+    if (!missing_) value = read;
   }
 
   void derived(std::string_view, std::string_view, std::string_view) {}
@@ -256,6 +280,7 @@ class ReadFields {
 
   const FileStructure& file_;
   int level_ = 0;
+  bool missing_ = false;
 };
 
 }  // namespace glint::formats

@@ -49,6 +49,35 @@ void checkBounds(const NormalMap& map, Findings& findings) {
   }
 }
 
+/// Moments of the slopes of normals inside the disk, by plain sums.
+MapSlopes slopesOf(const NormalMap& map) {
+  double p = 0, q = 0, pp = 0, pq = 0, qq = 0;
+  for (const Vec2 n : map.normals) {
+    const double z = std::sqrt(std::max(1e-12, 1 - double{n.x} * n.x - double{n.y} * n.y)), x = -n.x / z, y = -n.y / z;
+    p += x, q += y, pp += x * x, pq += x * y, qq += y * y;
+  }
+  const auto count = static_cast<double>(map.normals.size());
+  p /= count, q /= count;
+  return {
+      {static_cast<float>(p), static_cast<float>(q)},
+      {static_cast<float>(pp / count - p * p), static_cast<float>(pq / count - p * q), static_cast<float>(qq / count - q * q)}};
+}
+
+/// Compares the stored slopes with the normals'.
+void checkStoredSlopes(const NormalMap& map, Findings& findings) {
+  constexpr float kTolerance = 1e-3f;  // relative: slopes near the rim lose digits
+  const MapSlopes &stored = *map.slopes, actual = slopesOf(map);
+  const float variance = actual.covariance.xx + actual.covariance.yy;
+  const auto near = [](float a, float b, float scale) { return std::abs(a - b) <= kTolerance * scale + 1e-6f; };
+  const float size = std::sqrt(std::max(0.0f, variance)) + std::abs(actual.mean.x) + std::abs(actual.mean.y);
+  if (near(stored.mean.x, actual.mean.x, size) && near(stored.mean.y, actual.mean.y, size) &&
+      near(stored.covariance.xx, actual.covariance.xx, size * size) &&
+      near(stored.covariance.xy, actual.covariance.xy, size * size) &&
+      near(stored.covariance.yy, actual.covariance.yy, size * size))
+    return;
+  findings.add("normals.slopes", "/@slope_covariance", "and slope_mean are not those of the normals");
+}
+
 }  // namespace
 
 template <>
@@ -63,11 +92,13 @@ struct KindDescription<NormalMap> {
     return {errorRule("normals.finite", "normals are finite", "make it again with glint-ingest --fix-invalid"),
             errorRule("normals.disk", "normals lie inside the unit disk",
                       "make it again with glint-ingest, which moves normals on the rim inside"),
-            errorRule("normals.bounds", "bounds hold the normals that they cover")};
+            errorRule("normals.bounds", "bounds hold the normals that they cover"),
+            errorRule("normals.slopes", "slope_mean and slope_covariance, where there are any, are those of the normals")};
   }
 
   static void describe(auto& fields, auto& map) {
     describeMap(fields, map);
+    fields.optional(map.slopes, [&](auto&& slopes) { describeSlopes(fields, slopes); });
     fields.integer("bounds_level_count", map.bounds_level_count, {0, NormalMap::kMaxBoundsLevels}, "1",
                    "levels of the min-max pyramid; 0 when there is none");
     fields.array("normals", map.normals, {"height", "width", "2"}, "1", "(nx, ny) on the unit disk, bottom row first");
@@ -81,6 +112,7 @@ struct KindDescription<NormalMap> {
   }
 
   static void checkIndex(const NormalMap& map, Findings& findings) {
+    if (map.slopes) checkSlopes(*map.slopes, findings);
     if (map.bounds_level_count == 0) return;
     const NormalBoundsLevel& top = map.bounds[map.bounds_level_count - 1];
     if (top.columns != 1 || top.rows != 1) {
@@ -103,6 +135,7 @@ struct KindDescription<NormalMap> {
     report(infinite, "normals.finite", "/normals", "texels are not finite", findings);
     report(outside, "normals.disk", "/normals", "normals are not inside the unit disk", findings);
     checkBounds(map, findings);
+    if (map.slopes && infinite.count() == 0 && outside.count() == 0) checkStoredSlopes(map, findings);
   }
 };
 

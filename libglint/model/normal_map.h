@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "glint/math/vec.h"
+#include "glint/model/map_slopes.h"
 
 namespace glint {
 
@@ -43,10 +45,11 @@ struct NormalBoundsLevel {
 struct NormalMap {
   static constexpr int kMaxBoundsLevels = 20;
 
-  int width = 0;                  ///< texels
-  int height = 0;                 ///< texels
-  float texel_size_um = 0;        ///< 0 when unknown
-  std::span<const Vec2> normals;  ///< [height][width]
+  int width = 0;                    ///< texels
+  int height = 0;                   ///< texels
+  float texel_size_um = 0;          ///< 0 when unknown
+  std::span<const Vec2> normals;    ///< [height][width]
+  std::optional<MapSlopes> slopes;  ///< of the texels; nothing when not computed
 
   /// Min-max pyramid from the finest level (2x2 texels) to the coarsest (one node); empty when not built.
   int bounds_level_count = 0;

@@ -12,6 +12,7 @@
 #include <iterator>
 #include <random>
 
+#include "glint/bake/common/slopes.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 #include "glint/formats/validate.h"
@@ -105,6 +106,32 @@ TEST(AssetRoundTrip, NormalsComeBackBitExact) {
     }
     EXPECT_TRUE(validateAsset(folder / "a.glint").findings.empty());
   }
+}
+
+TEST(AssetRoundTrip, SlopesOfNormalsComeBackIfThereAreAny) {
+  const TempFolder folder;
+  auto sample = test::sampleNormals(64, 48);
+  writeAsset(folder / "without.glint", sample.map, test::sampleProvenance());
+  EXPECT_FALSE(Asset::open(folder / "without.glint").get<NormalMap>().slopes);
+  sample.map.slopes = bake::mapSlopes(sample.map);
+  writeAsset(folder / "with.glint", sample.map, test::sampleProvenance());
+  EXPECT_TRUE(validateAsset(folder / "with.glint").findings.empty());
+  expectSame(*Asset::open(folder / "with.glint").get<NormalMap>().slopes, *sample.map.slopes);
+}
+
+TEST(AssetRoundTrip, SlopesThatAreNotOfTheNormalsAreFound) {
+  const TempFolder folder;
+  auto sample = test::sampleNormals(64, 48);
+  const MapSlopes slopes = bake::mapSlopes(sample.map);
+  const auto found = [&](MapSlopes wrong) {
+    sample.map.slopes = wrong;
+    writeAsset(folder / "a.glint", sample.map, test::sampleProvenance(), {.overwrite = true});
+    const auto findings = validateAsset(folder / "a.glint").findings;
+    return findings.empty() ? std::string() : findings[0].rule;
+  };
+  EXPECT_EQ(found(slopes), "");
+  EXPECT_EQ(found({{slopes.mean.x + 0.01f, slopes.mean.y}, slopes.covariance}), "normals.slopes");
+  EXPECT_EQ(found({slopes.mean, {1.1f * slopes.covariance.xx, slopes.covariance.xy, slopes.covariance.yy}}), "normals.slopes");
 }
 
 TEST(AssetRoundTrip, HeightsComeBackBitExact) {

@@ -566,6 +566,14 @@ std::vector<Fixture> dataFixtures() {
           [](const Patch& patch) { patch.change<NormalBounds>("bounds/level_02", 3, [](auto& node) { node.high_x = -1; }); },
           true),
       patched(
+          "normals.slopes", Base::normals,
+          [](const Patch& patch) {
+            const float mean[] = {0, 0}, covariance[] = {4, 0, 4};
+            patch.set("/", "slope_mean", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, mean, 2);
+            patch.set("/", "slope_covariance", H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, covariance, 3);
+          },
+          true),
+      patched(
           "heights.finite", Base::heights,
           [](const Patch& patch) { patch.change<float>("heights", 7, [](float& h) { h = -INFINITY; }); }, true),
       patched(

@@ -123,6 +123,7 @@ SlopeMoments slopeMoments(int width, int height, std::span<const float> heights)
 }
 
 MapSlopes mapSlopes(const NormalMap& map) {
+  if (map.slopes) return *map.slopes;
   std::vector<SlopeSums> rows(static_cast<std::size_t>(map.height));
   const auto width = static_cast<std::size_t>(map.width);
   tbb::parallel_for(std::size_t{0}, rows.size(),

@@ -38,7 +38,7 @@ struct SlopeMoments {
 };
 SlopeMoments slopeMoments(int width, int height, std::span<const float> heights);
 
-/// Mean and covariance of the slopes of all texels of a map. The same for any number of threads.
+/// Mean and covariance of the slopes of all texels of a map: what the map says, or computed. The same for any number of threads.
 MapSlopes mapSlopes(const NormalMap& map);
 
 }  // namespace glint::bake
