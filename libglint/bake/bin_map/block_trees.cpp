@@ -1,0 +1,130 @@
+#include "glint/bake/bin_map/block_trees.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+namespace glint::bake {
+namespace {
+
+/// Blocks of several bins have at most this many texels, and none of their bins more than kMostOfSharedBin: merging texels (see
+/// BinMapNdf) is for blocks.
+constexpr std::uint64_t kMostOfBlock = 4096, kMostOfSharedBin = 512;
+/// Bits along each axis that a place in a block has at most: half of a code.
+constexpr int kMostBlockPlaceBits = 16;
+/// Places in bins are kept to all bits that a code can have on maps of few texels, where nothing averages their rounding.
+constexpr int kFewPositionBits = 8;
+
+/// Texels of each bin, by key.
+std::vector<std::uint32_t> countBins(const BinGrid& grid, const TexelBuckets& buckets) {
+  std::vector<std::uint32_t> counts(grid.key_count, 0);
+  tbb::parallel_for(std::size_t{0}, buckets.count(), [&](std::size_t bucket) {
+    for (std::uint64_t k = buckets.first_texels[bucket]; k < buckets.first_texels[bucket + 1]; ++k)
+      ++counts[buckets.texels[k].key];
+  });
+  return counts;
+}
+
+/// Bits along each axis that places in the bins of a map have at least: one less for each bit of position beyond few.
+int surePlaceBits(const TexelCode& map) {
+  const int beyond = std::max(map.column_bits + map.row_bits - kFewPositionBits, 0);
+  return std::min(std::max(TexelCode::kMaxPlaceBits - beyond, kSurePlaceBits), map.place_bits);
+}
+
+/// Logarithm of the number of cells of a block: about `wanted`, but enough that codes keep places to surePlaceBits.
+int cellBits(const TexelCode& map, int side_bits, std::uint64_t wanted) {
+  const int most = map.column_bits + map.row_bits;
+  int bits = std::min(wanted == 0 ? 0 : static_cast<int>(std::bit_width(wanted)) - 1, most);
+  const int sure = side_bits + surePlaceBits(map);
+  while (bits < most && blockCode(map, side_bits, bits).place_bits < sure) ++bits;
+  return bits;
+}
+
+/// Divides one tile after the other.
+class TileDivider {
+ public:
+  /// @param bin_counts  [keys]: texels
+  TileDivider(const TexelCode& code, const BinGrid& grid, std::vector<std::uint32_t> bin_counts, int leaf_size)
+      : code_(code), tile_bits_(grid.tile_bits), leaf_size_(leaf_size) {
+    trees_.bin_blocks = std::move(bin_counts);
+    trees_.nodes.assign(2 * grid.tileCount(), 0);
+  }
+
+  std::size_t blockCount() const { return trees_.blocks.size(); }
+  void divideTile(std::size_t tile) { divide(tile, tile << 2 * tile_bits_, tile_bits_); }
+  BlockTrees finish() { return std::move(trees_); }
+
+ private:
+  /// Texels of some bins, and of the fullest of them.
+  struct Filling {
+    std::uint64_t all = 0, fullest = 0;
+  };
+  Filling filling(std::size_t first_key, int side_bits) const {
+    Filling result;
+    for (std::size_t key = first_key; key < first_key + (std::size_t{1} << 2 * side_bits); ++key) {
+      result.all += trees_.bin_blocks[key];
+      result.fullest = std::max<std::uint64_t>(result.fullest, trees_.bin_blocks[key]);
+    }
+    return result;
+  }
+
+  /// Makes a node a block, or the parent of four nodes, if it has texels.
+  void divide(std::size_t node, std::size_t first_key, int side_bits) {
+    const Filling texels = filling(first_key, side_bits);
+    if (texels.all == 0) return;
+    const bool is_coarse = side_bits + surePlaceBits(code_) > kMostBlockPlaceBits;
+    if (side_bits > 0 && (texels.all > kMostOfBlock || texels.fullest > kMostOfSharedBin || is_coarse))
+      split(node, first_key, side_bits);
+    else
+      addBlock(node, first_key, side_bits, texels.all);
+  }
+
+  void split(std::size_t node, std::size_t first_key, int side_bits) {
+    const auto first_child = static_cast<std::uint32_t>(trees_.nodes.size() / 2);
+    trees_.nodes[2 * node] = BinMap::kSplit;
+    trees_.nodes[2 * node + 1] = first_child;
+    trees_.nodes.resize(trees_.nodes.size() + 8);
+    const int child_bits = side_bits - 1;
+    for (std::size_t quadrant = 0; quadrant < 4; ++quadrant)
+      divide(first_child + quadrant, first_key + (quadrant << 2 * child_bits), child_bits);
+  }
+
+  void addBlock(std::size_t node, std::size_t first_key, int side_bits, std::uint64_t texels) {
+    const int cell_bits = cellBits(code_, side_bits, texels / leaf_size_);
+    const auto number = static_cast<std::uint32_t>(trees_.blocks.size());
+    const BinBlock block{static_cast<std::uint32_t>(first_key), static_cast<std::uint32_t>(trees_.cell_count),
+                         static_cast<std::uint32_t>(texels), static_cast<std::uint8_t>(side_bits),
+                         static_cast<std::uint8_t>(cell_bits)};
+    trees_.nodes[2 * node] = (block.cell_bits + 1u) | number << BinMap::kKindBits;
+    trees_.nodes[2 * node + 1] = block.first_cell;
+    trees_.cell_count += std::size_t{1} << cell_bits;
+    // The counts of these bins have been used: from now on their entries name the block.
+    std::fill_n(trees_.bin_blocks.begin() + static_cast<std::ptrdiff_t>(first_key), std::size_t{1} << 2 * side_bits, number);
+    trees_.blocks.push_back(block);
+  }
+
+  TexelCode code_;
+  int tile_bits_, leaf_size_;
+  BlockTrees trees_;  ///< bin_blocks hold the counts of bins whose block is not made yet
+};
+
+}  // namespace
+
+BlockTrees divideTiles(const TexelCode& code, const BinGrid& grid, const TexelBuckets& buckets, int leaf_size) {
+  TileDivider divider(code, grid, countBins(grid, buckets), leaf_size);
+  std::vector<std::uint32_t> bucket_first_blocks;
+  std::size_t bucket = 0;
+  for (std::size_t tile = 0; tile < grid.tileCount(); ++tile) {
+    for (; bucket < buckets.count() && buckets.first_tiles[bucket] == tile; ++bucket)
+      bucket_first_blocks.push_back(static_cast<std::uint32_t>(divider.blockCount()));
+    divider.divideTile(tile);
+  }
+  bucket_first_blocks.push_back(static_cast<std::uint32_t>(divider.blockCount()));
+  BlockTrees trees = divider.finish();
+  trees.bucket_first_blocks = std::move(bucket_first_blocks);
+  return trees;
+}
+
+}  // namespace glint::bake
