@@ -1,0 +1,221 @@
+#include "glint/bake/displace/glossy_estimator.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include "glint/bake/common/counter_random.h"
+#include "glint/bake/displace/brdf_sums.h"
+#include "glint/bake/displace/effective_kernels.h"
+#include "glint/query/brdf/base_brdf.h"
+
+namespace glint::bake {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+/// Quadrature of single reflections from GGX facets, without Fresnel's factor and 1 / (4 pi).
+void addSamples(const BrdfScene& scene, const PatchFacets& facets, const SampleChunk& chunk, std::span<const Vec3> half,
+                ChunkSums& sums) {
+  const std::size_t n = scene.directions.count, channels = scene.channels();
+  std::vector<float> x(kKernelSamples), y(kKernelSamples), z(kKernelSamples), bend(kKernelSamples), colors(3 * kKernelSamples),
+      masked(n * kKernelSamples), row(scene.directions.padded);
+  for (std::size_t start = chunk.first; start < chunk.last; start += kKernelSamples) {
+    const std::size_t count = std::min(kKernelSamples, chunk.last - start), used = (count + 7) / 8 * 8;
+    for (std::size_t k = 0; k < used; ++k) {
+      const bool padding = k >= count;  // the last facet again, without light
+      const std::uint64_t index = std::min(start + k, chunk.last - 1) * static_cast<std::size_t>(scene.grid.count()) +
+                                  static_cast<std::size_t>(chunk.patch);
+      const std::size_t facet =
+          facets.facet(std::min(start + k, chunk.last - 1), randomPair(scene.options.seed, kFacetStream, index).x);
+      const Vec3 normal = scene.surface.normal(facet);
+      const Color color = scene.base.color(facet);
+      const float alpha = scene.base.of(facet).alpha;
+      x[k] = normal.x, y[k] = normal.y, z[k] = normal.z, bend[k] = alpha * alpha - 1;
+      for (std::size_t c = 0; c < channels; ++c) colors[c * kKernelSamples + k] = color[c];
+      scene.facingRow(facet, row.data());
+      const float area = padding ? 0 : 1 / normal.z;
+      // Rows are multiplied by each other, so half of a facet's weight is in each. That of a grey facet includes its colour.
+      const float weight = alpha * std::sqrt(channels == 1 ? area * color[0] : area);
+      for (std::size_t d = 0; d < n; ++d) masked[d * used + k] = row[d] > 0 ? weight * ggxMasking(row[d], alpha) : 0.0f;
+      for (std::size_t d = 0; d < n; ++d) sums.areas[d] += area * row[d];
+    }
+    const FacetArrays arrays{x.data(), y.data(), z.data(), bend.data(), masked.data(), used};
+    if (channels == 1)
+      addGgxPairs(arrays, half, n, scene.directions.padded, sums.pairs.data());
+    else
+      addColoredGgxPairs(arrays, colors.data(), kKernelSamples, half, n, scene.directions.padded, sums.pairs.data());
+  }
+}
+
+/// Normal that a GGX facet shows towards a view, drawn from those visible (Heitz 2018). All vectors in the facet's frame.
+Vec3 visibleGgxNormal(Vec3 view, float alpha, Vec2 xi) {
+  const Vec3 stretched = {alpha * view.x, alpha * view.y, view.z};
+  const Vec3 v = (1 / std::sqrt(dot(stretched, stretched))) * stretched;
+  const float across = v.x * v.x + v.y * v.y;
+  const Vec3 t1 = across > 0 ? (1 / std::sqrt(across)) * Vec3{-v.y, v.x, 0} : Vec3{1, 0, 0};
+  const Vec3 t2 = {v.y * t1.z - v.z * t1.y, v.z * t1.x - v.x * t1.z, v.x * t1.y - v.y * t1.x};
+  const float r = std::sqrt(xi.x), angle = 2 * kPi * xi.y;
+  const float p1 = r * std::cos(angle), s = 0.5f * (1 + v.z);
+  const float p2 = (1 - s) * std::sqrt(std::max(0.0f, 1 - p1 * p1)) + s * r * std::sin(angle);
+  const Vec3 n = p1 * t1 + p2 * t2 + std::sqrt(std::max(0.0f, 1 - p1 * p1 - p2 * p2)) * v;
+  const Vec3 m = {alpha * n.x, alpha * n.y, std::max(1e-6f, n.z)};
+  return (1 / std::sqrt(dot(m, m))) * m;
+}
+
+/// Rows over all directions that a walk needs.
+struct Scratch {
+  std::vector<float> visible, light;
+  std::vector<float> sum;  ///< [channels][padded directions]
+};
+
+/// Follows a view through glossy reflections and adds the light that every facet after the first one reflects into it.
+void walk(const BrdfScene& scene, std::size_t facet, std::size_t view, std::uint64_t index, float scale, Scratch& scratch,
+          LightShares& shares) {
+  const std::size_t channels = scene.channels(), n = scene.directions.count;
+  Vec3 point = scene.pointOf(facet, index), back = scene.directions.at(view);
+  BaseBrdf base = scene.base.of(facet);
+  Color throughput = scene.base.color(facet);
+  float largest = 1, longest = 0;
+  for (int bounce = 1; bounce < scene.options.bounces && largest > kLeastThroughput; ++bounce) {
+    const FacetFrame frame(scene.surface.normal(facet));
+    const Vec3 local = frame.toLocal(back);
+    const Vec2 xi = randomPair(scene.options.seed, kTurnStream + static_cast<std::uint64_t>(bounce), index);
+    const Vec3 m = visibleGgxNormal(local, base.alpha, xi);
+    const float cosine = dot(m, local);
+    const Vec3 turned = 2 * cosine * m - local;
+    if (turned.z <= 0) return;
+    const float reflected = conductorFresnel(cosine, base.eta, base.k) * ggxMasking(turned.z, base.alpha);
+    const Vec3 direction = frame.toWorld(turned);
+    const auto hit = scene.tracer.trace(facet, point, direction);
+    if (!hit) return;
+    facet = hit->facet, point = hit->point, back = -1.0f * direction;
+    base = scene.base.of(facet);
+    largest = attenuate(throughput, scene.base.color(facet), reflected, channels);
+    longest = std::max(longest, hit->distance);
+    scene.masks.expand(facet, scratch.visible.data());
+    std::fill(scratch.light.begin(), scratch.light.end(), 0.0f);
+    addGgxLights(scene.directions, scratch.visible.data(), scene.surface.normal(facet), back, base, scale,
+                 scratch.light.data());
+    double light = 0;
+    for (std::size_t d = 0; d < n; ++d) light += scratch.light[d];
+    for (std::size_t c = 0; c < channels; ++c)
+      for (std::size_t d = 0; d < n; ++d) scratch.sum[c * scene.directions.padded + d] += throughput[c] * scratch.light[d];
+    shares.addHop(meanOf(throughput, channels) * light, longest, scene.options.distant_cells);
+  }
+}
+
+/// Interreflections seen from one direction, in all patches.
+LightShares followView(const BrdfScene& scene, const std::vector<PatchFacets>& patches, std::size_t view, BrdfSums& sums) {
+  LightShares shares;
+  Scratch scratch{std::vector<float>(scene.directions.padded), std::vector<float>(scene.directions.padded),
+                  std::vector<float>(scene.channels() * scene.directions.padded)};
+  const Vec3 direction = scene.directions.at(view);
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    std::fill(scratch.sum.begin(), scratch.sum.end(), 0.0f);
+    for (std::size_t s = 0; s < patches[p].samples(); ++s) {
+      const std::uint64_t index = (s * patches.size() + p) * scene.directions.count + view;
+      const std::size_t facet = patches[p].facet(s, randomPair(scene.options.seed, kFacetStream, index).x);
+      const Vec3 normal = scene.surface.normal(facet);
+      const float cosine = dot(normal, direction);
+      if (cosine <= 0 || !scene.masks.visible(facet, view)) continue;
+      walk(scene, facet, view, index, cosine / (normal.z * static_cast<float>(patches[p].samples())), scratch, shares);
+    }
+    for (std::size_t c = 0; c < scene.channels(); ++c)
+      for (std::size_t i = 0; i < scene.directions.count; ++i)
+        sums.at(c, p, i, view) += scratch.sum[c * scene.directions.padded + i];
+  }
+  return shares;
+}
+
+/// Completes sums of single reflections of pairs i <= o: Fresnel's factor, and the pairs the other way round.
+void completePairs(const BrdfScene& scene, BrdfSums& sums) {
+  std::vector<double>& values = sums.values();
+  const std::size_t n = scene.directions.count;
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t o = i; o < n; ++o) {
+      const Vec3 sum = scene.directions.at(i) + scene.directions.at(o);
+      const float fresnel = conductorFresnel(0.5f * std::sqrt(dot(sum, sum)), scene.options.base.eta, scene.options.base.k);
+      for (std::size_t plane = 0; plane < values.size(); plane += n * n)  // channels and patches
+        values[plane + o * n + i] = values[plane + i * n + o] *= fresnel;
+    }
+  }
+}
+
+/// Facets of the quadrature, and walks of each view: narrow lobes need more for the same noise.
+struct GlossySamples {
+  std::size_t facets;
+  std::size_t walks;
+};
+
+GlossySamples samplesFor(float alpha) {
+  if (alpha >= 0.25f) return {1 << 18, 1 << 13};
+  if (alpha >= 0.15f) return {1 << 19, 1 << 15};
+  return {1 << 21, 5 << 15};
+}
+
+/// Unit half vectors of all pairs of directions.
+std::vector<Vec3> halfVectors(const DirectionTable& directions) {
+  const std::size_t n = directions.count;
+  std::vector<Vec3> half(n * n);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t o = 0; o < n; ++o) {
+      const Vec3 sum = directions.at(i) + directions.at(o);
+      half[i * n + o] = (1 / std::sqrt(dot(sum, sum))) * sum;
+    }
+  }
+  return half;
+}
+
+void addSingleReflections(const BrdfScene& scene, const std::vector<PatchFacets>& patches,
+                          const std::vector<SampleChunk>& chunks, ProgressCounter& counter, BrdfSums& sums) {
+  const std::vector<Vec3> half = halfVectors(scene.directions);
+  std::vector<ChunkSums> chunk_sums(chunks.size());
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
+    chunk_sums[c] = emptySums(scene);
+    addSamples(scene, patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], half, chunk_sums[c]);
+    counter.advance();
+  });
+  for (std::size_t c = 0; c < chunks.size(); ++c)
+    sums.addChunk(scene, chunks[c], chunk_sums[c],
+                  static_cast<double>(patches[static_cast<std::size_t>(chunks[c].patch)].samples()), 1 / (4 * kPi));
+  completePairs(scene, sums);
+}
+
+/// Adds the light of walks, after all single reflections were added.
+/// @param walks  of each view
+LightShares addInterreflections(const BrdfScene& scene, std::size_t walks, ProgressCounter& counter, BrdfSums& sums) {
+  LightShares total;
+  for (const double value : sums.values()) total.all += value / static_cast<double>(scene.channels());
+  const std::vector<PatchFacets> starts = scene.patches(walks);
+  std::vector<LightShares> shares(scene.directions.count);
+  tbb::parallel_for(std::size_t{0}, shares.size(), [&](std::size_t view) {
+    shares[view] = followView(scene, starts, view, sums);
+    counter.advance();
+  });
+  for (const LightShares& share : shares) total.add(share);
+  total.all += total.interreflected;
+  return total;
+}
+
+}  // namespace
+
+EffectiveBrdf estimateGlossy(const BrdfScene& scene, const ProgressFn& progress) {
+  const EffectiveOptions& options = scene.options;
+  const GlossySamples samples = samplesFor(scene.base.leastAlpha());
+  const std::vector<PatchFacets> patches = scene.patches(options.facet_samples > 0 ? options.facet_samples : samples.facets);
+  const std::vector<SampleChunk> chunks = makeChunks(patches);
+  const bool follow = options.bounces > 1;
+  ProgressCounter counter(progress, chunks.size() + (follow ? scene.directions.count : 0));
+  BrdfSums sums(scene);
+  addSingleReflections(scene, patches, chunks, counter, sums);
+  LightShares shares;
+  if (follow) shares = addInterreflections(scene, options.walks > 0 ? options.walks : samples.walks, counter, sums);
+  return sums.finish(scene, shares);
+}
+
+}  // namespace glint::bake

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "glint/bake/common/progress.h"
+#include "glint/bake/displace/brdf_scene.h"
+
+namespace glint::bake {
+
+/// Estimates the effective BRDFs of a surface with a GGX base. Single reflections are summed over facets; interreflections come
+/// from walks that start from each view and collect light from all directions at every facet that they visit.
+EffectiveBrdf estimateGlossy(const BrdfScene& scene, const ProgressFn& progress);
+
+}  // namespace glint::bake
