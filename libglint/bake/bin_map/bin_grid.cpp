@@ -5,13 +5,14 @@
 namespace glint::bake {
 namespace {
 
-/// Bit k of x becomes bit 2 k.
+/// Moves bit k of x to bit 2 k. The bits of a column and of a row, spread and interleaved, are the key of a bin in its tile.
 std::uint32_t spreadBits(std::uint32_t x) {
   std::uint32_t spread = 0;
   for (int k = 0; k < 16; ++k) spread |= (x >> k & 1) << 2 * k;
   return spread;
 }
 
+/// binNormals without references to structs, which would keep the compiler from making vectors.
 GLINT_MULTIVERSION bool binAll(const Vec2* normals, std::size_t count, int bins, int place_bits, std::uint16_t* columns,
                                std::uint16_t* rows, std::uint16_t* places) {
   const float half = 0.5f * static_cast<float>(bins);

@@ -10,16 +10,16 @@
 
 namespace glint::bake {
 
-/// Parts of a map that threads visit on their own. Their number must not depend on the number of threads.
+/// Number of parts of a map that threads visit independently. Results depend on it, so it must not depend on the threads.
 inline constexpr std::size_t kMapParts = 16;
-/// Texels whose normals are binned at once.
+/// Number of texels that one call of binNormals takes.
 inline constexpr std::size_t kBinChunk = 512;
 
 /// The bins of a map and their keys (see BinMap). The key of a bin is the sum of the keys of its column and its row.
 struct BinGrid {
   int bins_per_axis = 0;
   int tile_bits = 0;   ///< logarithm of the bins along an axis of a tile
-  int place_bits = 0;  ///< bits along each axis that tell where in its bin a normal lies
+  int place_bits = 0;  ///< bits, along each axis, of the place of a normal inside its bin
   int tiles_per_axis = 0;
   std::size_t key_count = 0;
   std::vector<std::uint32_t> column_keys, row_keys;  ///< [bins_per_axis]
@@ -28,22 +28,23 @@ struct BinGrid {
   std::size_t keysPerTile() const { return std::size_t{1} << 2 * tile_bits; }
 };
 
+/// @param place_bits  of the map's texelCode
 BinGrid makeBinGrid(int bins_per_axis, int tile_bits, int place_bits);
 
-/// Texels that follow each other in a map, with the bins of their normals.
+/// Texels that follow each other in a map, with the bins that their normals lie in.
 struct BinnedChunk {
   std::size_t first, count;
   const std::uint32_t* keys;    ///< [count]
-  const std::uint16_t* places;  ///< [count]: x | y << place_bits, each the part of the bin that the normal lies in
+  const std::uint16_t* places;  ///< [count]: places of the normals inside their bins, x | y << place_bits
 };
 
-/// First texel of a part of a map; that of part kMapParts is the end of the map.
+/// First texel of a part of a map. Part kMapParts begins at the end of the map.
 /// @return a multiple of kBinChunk, or the number of texels
 inline std::size_t firstTexel(std::size_t texels, std::size_t part) {
   return std::min(texels, part * (texels / kMapParts / kBinChunk + 1) * kBinChunk);
 }
 
-/// Columns, rows and places of the bins that normals lie in.
+/// Finds the column and row of the bin that each normal lies in, and its place inside the bin.
 /// @return false if a normal is outside the disk
 bool binNormals(const Vec2* normals, std::size_t count, const BinGrid& grid, std::uint16_t* columns, std::uint16_t* rows,
                 std::uint16_t* places);

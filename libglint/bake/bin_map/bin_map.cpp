@@ -16,8 +16,8 @@
 namespace glint::bake {
 namespace {
 
-/// Tiles have about this many texels, or are the bins themselves; but tiles of more bins than 8 x 8, which large footprints
-/// would have to search, only where they have few texels.
+/// A tile has about kTexelsOfTile texels on average, or is a single bin. Queries with large footprints take long to search a
+/// tile of more than 8 x 8 bins (kWideTileBits), so only tiles with about kFewTexelsOfTile texels are that wide.
 constexpr std::size_t kTexelsOfTile = 1024, kFewTexelsOfTile = 64;
 constexpr int kWideTileBits = 3;
 
@@ -45,7 +45,7 @@ int binsPerAxis(float alpha) {
 }
 
 int tileBits(int bins_per_axis, std::size_t texels) {
-  // The fewest bits with at most `most` tiles.
+  // The fewest bits that leave at most `most` tiles.
   const auto bitsFor = [&](std::size_t most) {
     int bits = 0;
     for (; bits < BinMap::kMaxTileBits; ++bits)
@@ -110,6 +110,7 @@ BinMapData buildBinMap(const NormalMap& map, const BinMapOptions& options, const
   const auto step = [&](std::size_t done) {
     if (progress) progress(done, 4);
   };
+  // Choose the bins for the roughness, and tiles for the number of texels.
   const TexelCode code = texelCode(map.width, map.height);
   BinMapData data;
   data.width = map.width;
@@ -121,14 +122,17 @@ BinMapData buildBinMap(const NormalMap& map, const BinMapOptions& options, const
   data.bins_per_axis = binsPerAxis(data.alpha);
   data.tile_bits = tileBits(data.bins_per_axis, map.normals.size());
 
+  // Move texels to buckets of neighbouring bins, which fit the cache.
   const BinGrid grid = makeBinGrid(data.bins_per_axis, data.tile_bits, code.place_bits);
   const RunCounts counts = countRuns(map, grid);
   step(1);
   const TexelBuckets buckets = fillBuckets(map, code, grid, counts);
   step(2);
+  // Divide the bins into blocks, and list the texels of each block by cell.
   BlockTrees trees = divideTiles(code, grid, buckets, options.leaf_size);
   step(3);
   TexelLists lists = listTexels(code, buckets, trees);
+  // Note for every texel which block has it.
   TexelClasses classes = classifyTexels(map, grid, trees);
 
   data.nodes = std::move(trees.nodes);

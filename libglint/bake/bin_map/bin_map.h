@@ -11,26 +11,27 @@ namespace glint::bake {
 
 struct BinMapOptions {
   float alpha = 0.01f;  ///< Beckmann roughness of the facets, kMinBinAlpha to 1; the smallest, if there is a range
-  int leaf_size = 16;   ///< texels of a cell, on average at least, 1 to 1024; sparse blocks have fewer
-  float alpha_max = 0;  ///< largest roughness that will be asked for, at most kMaxAlphaRange times alpha; 0: alpha
+  int leaf_size = 16;   ///< mean number of texels of a cell, at least, 1 to 1024; cells of sparse blocks have fewer
+  float alpha_max = 0;  ///< largest roughness that a query may ask for, at most kMaxAlphaRange times alpha; 0: alpha
 };
 
 /// Smallest roughness: the number of bins grows with 1 / alpha^2.
 inline constexpr float kMinBinAlpha = 5e-4f;
-/// Largest quotient of the roughnesses of one bin map: a lobe of the largest reaches bins in proportion to its square.
+/// Largest quotient of the largest and the smallest roughness of one bin map. A lobe of the largest roughness reaches a number
+/// of bins that grows with the square of the quotient.
 inline constexpr float kMaxAlphaRange = 64;
-/// Bins along each axis at most, reached near the smallest roughness.
+/// Most bins along each axis. Roughnesses near kMinBinAlpha need that many.
 inline constexpr int kMaxBinsPerAxis = 4096;
 
-/// Bins along each axis for a roughness: 5 / sin(arctan(3 sigma)), so that five bins span six deviations (Atanasov 2021, Eq. 16
-/// and table 4, which rounds down).
+/// Number of bins along each axis for a roughness: 5 / sin(arctan(3 sigma)), so that five bins span six deviations of a lobe
+/// (Atanasov 2021, Eq. 16). Rounded down, as in table 4 of the paper.
 int binsPerAxis(float alpha);
 
-/// Logarithm of the bins along each axis of a tile: 0 where texels are many.
+/// Logarithm of the number of bins along each axis of a tile. 0, tiles of one bin, where bins have many texels.
 int tileBits(int bins_per_axis, std::size_t texels);
 
-/// Roughness of the bins that serve a range of roughnesses: the geometric mean, but not so rough that a normal is known to less
-/// than a sixteenth of the bins of the smallest, or the smallest itself.
+/// Roughness for which bins are made when queries may ask for any roughness from alpha_min to alpha_max: the geometric mean of
+/// the two, or less where codes have few bits. A code must tell a normal to a sixteenth of a bin that is made for alpha_min.
 float binAlpha(float alpha_min, float alpha_max, int place_bits);
 
 /// A CompactCounts that owns its arrays.
@@ -42,7 +43,7 @@ struct CompactCountsData {
   CompactCounts view() const { return {bases, offsets, shift}; }
 };
 
-/// Packs a non-decreasing sequence, with as few bases as its steps allow.
+/// Packs a non-decreasing sequence with as few bases as 16-bit offsets allow.
 CompactCountsData compactCounts(const std::vector<std::uint64_t>& values);
 
 /// A BinMap that owns its arrays.
@@ -63,10 +64,11 @@ struct BinMapData {
   std::size_t sizeBytes() const;
 };
 
-/// Sorts the texels of a normal map by the blocks of their normals (Atanasov 2021, section 5.4, with blocks of bins for its
-/// bins), each list by cells.
+/// Sorts the texels of a normal map by the blocks of bins that their normals lie in, and the texels of a block by cell of the
+/// map (Atanasov 2021, section 5.4; there each bin has a list of its own).
 ///
-/// Two passes: into about 512 buckets of neighbouring tiles, then each bucket by cell in the cache. O(texels + bins).
+/// Two passes: the first moves texels to about 512 buckets of neighbouring tiles, the second sorts each bucket by cell, inside
+/// the cache. O(texels + bins).
 /// @throws Error usage for options out of range; invalid_input for normals outside the disk; unsupported for maps whose columns
 ///         and rows need more than 28 bits together (16384 x 16384)
 BinMapData buildBinMap(const NormalMap& map, const BinMapOptions& options, const ProgressFn& progress = {});

@@ -9,15 +9,16 @@
 namespace glint::bake {
 namespace {
 
-/// Blocks of several bins have at most this many texels, and none of their bins more than kMostOfSharedBin: merging texels (see
-/// BinMapNdf) is for blocks.
+/// Most texels of a block of several bins, and of each of its bins. A query may merge all texels of a block into one lobe (see
+/// BinMapNdf), and merging more would cost accuracy.
 constexpr std::uint64_t kMostOfBlock = 4096, kMostOfSharedBin = 512;
-/// Bits along each axis that a place in a block has at most: half of a code.
+/// Most bits, along each axis, of a place inside a block: half of a code.
 constexpr int kMostBlockPlaceBits = 16;
-/// Places in bins are kept to all bits that a code can have on maps of few texels, where nothing averages their rounding.
+/// A map with at most this many bits of position (column and row) has few texels. Sums over few texels do not average the
+/// rounding of their places, so codes then keep all bits of places that they have room for.
 constexpr int kFewPositionBits = 8;
 
-/// Texels of each bin, by key.
+/// Number of texels of each bin, by key.
 std::vector<std::uint32_t> countBins(const BinGrid& grid, const TexelBuckets& buckets) {
   std::vector<std::uint32_t> counts(grid.key_count, 0);
   tbb::parallel_for(std::size_t{0}, buckets.count(), [&](std::size_t bucket) {
@@ -27,13 +28,14 @@ std::vector<std::uint32_t> countBins(const BinGrid& grid, const TexelBuckets& bu
   return counts;
 }
 
-/// Bits along each axis that places in the bins of a map have at least: one less for each bit of position beyond few.
+/// Fewest bits, along each axis, of places inside bins: one less for each bit of position beyond kFewPositionBits.
 int surePlaceBits(const TexelCode& map) {
   const int beyond = std::max(map.column_bits + map.row_bits - kFewPositionBits, 0);
   return std::min(std::max(TexelCode::kMaxPlaceBits - beyond, kSurePlaceBits), map.place_bits);
 }
 
-/// Logarithm of the number of cells of a block: about `wanted`, but enough that codes keep places to surePlaceBits.
+/// Logarithm of the number of cells of a block: of `wanted`, or more where codes would have no room for surePlaceBits. Smaller
+/// cells leave more bits of a code to places.
 int cellBits(const TexelCode& map, int side_bits, std::uint64_t wanted) {
   const int most = map.column_bits + map.row_bits;
   int bits = std::min(wanted == 0 ? 0 : static_cast<int>(std::bit_width(wanted)) - 1, most);
@@ -42,10 +44,10 @@ int cellBits(const TexelCode& map, int side_bits, std::uint64_t wanted) {
   return bits;
 }
 
-/// Divides one tile after the other.
+/// Divides tiles into blocks, one tile after the other.
 class TileDivider {
  public:
-  /// @param bin_counts  [keys]: texels
+  /// @param bin_counts  [keys]: number of texels
   TileDivider(const TexelCode& code, const BinGrid& grid, std::vector<std::uint32_t> bin_counts, int leaf_size)
       : code_(code), tile_bits_(grid.tile_bits), leaf_size_(leaf_size) {
     trees_.bin_blocks = std::move(bin_counts);
@@ -57,7 +59,7 @@ class TileDivider {
   BlockTrees finish() { return std::move(trees_); }
 
  private:
-  /// Texels of some bins, and of the fullest of them.
+  /// Number of texels of all bins of a square, and of the bin that has most.
   struct Filling {
     std::uint64_t all = 0, fullest = 0;
   };
@@ -70,7 +72,7 @@ class TileDivider {
     return result;
   }
 
-  /// Makes a node a block, or the parent of four nodes, if it has texels.
+  /// Makes a node with texels a block, or the parent of four nodes.
   void divide(std::size_t node, std::size_t first_key, int side_bits) {
     const Filling texels = filling(first_key, side_bits);
     if (texels.all == 0) return;
@@ -100,14 +102,14 @@ class TileDivider {
     trees_.nodes[2 * node] = (block.cell_bits + 1u) | number << BinMap::kKindBits;
     trees_.nodes[2 * node + 1] = block.first_cell;
     trees_.cell_count += std::size_t{1} << cell_bits;
-    // The counts of these bins have been used: from now on their entries name the block.
+    // Nothing reads the counts of these bins again: from now on their entries hold the number of the block.
     std::fill_n(trees_.bin_blocks.begin() + static_cast<std::ptrdiff_t>(first_key), std::size_t{1} << 2 * side_bits, number);
     trees_.blocks.push_back(block);
   }
 
   TexelCode code_;
   int tile_bits_, leaf_size_;
-  BlockTrees trees_;  ///< bin_blocks hold the counts of bins whose block is not made yet
+  BlockTrees trees_;  ///< bin_blocks holds counts of texels for bins whose block is not made yet
 };
 
 }  // namespace

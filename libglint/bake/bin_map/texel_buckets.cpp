@@ -12,9 +12,9 @@
 namespace glint::bake {
 namespace {
 
-/// Runs of keys at most: their counts for one part of the map are 256 kB.
+/// Most runs of keys. Their counts for one part of the map take 256 kB, which a second-level cache holds.
 constexpr std::size_t kMostRuns = 1 << 16;
-/// Buckets, about: as many streams as a processor writes at once.
+/// Approximate number of buckets. A processor writes about so many streams at once without waiting for memory.
 constexpr std::size_t kBuckets = 512;
 
 [[noreturn]] void throwOutside(const NormalMap& map) {
@@ -26,7 +26,7 @@ constexpr std::size_t kBuckets = 512;
               "make the map again with glint-ingest, which moves normals on the rim inside");
 }
 
-/// Joins tiles to buckets.
+/// Joins neighbouring tiles to buckets of about equal numbers of texels.
 /// @param run_buckets  [runs]: bucket of each run
 TexelBuckets joinTiles(const BinGrid& grid, const RunCounts& counts, std::size_t texel_count,
                        std::vector<std::uint16_t>& run_buckets) {
@@ -55,7 +55,7 @@ TexelBuckets joinTiles(const BinGrid& grid, const RunCounts& counts, std::size_t
   return buckets;
 }
 
-/// Where each part of the map writes its first texel of each bucket: after those of the parts before it.
+/// For each part of the map, the index in each bucket at which it writes its first texel: after the texels of earlier parts.
 std::vector<std::vector<std::uint64_t>> firstPlaces(const RunCounts& counts, const std::vector<std::uint16_t>& run_buckets,
                                                     const TexelBuckets& buckets) {
   std::vector<std::vector<std::uint64_t>> cursors(kMapParts, std::vector<std::uint64_t>(buckets.count()));

@@ -10,7 +10,8 @@
 
 namespace glint::bake {
 
-/// Texels of each part of a map in each run of neighbouring keys. Runs instead of bins keep the counts in the cache.
+/// Number of texels of each part of a map in each run of neighbouring keys. Counts of runs stay in the cache, as counts of
+/// single bins would not.
 struct RunCounts {
   int shift = 0;  ///< a run has 2^shift keys
   std::size_t runs = 0;
@@ -27,10 +28,10 @@ struct BinnedTexel {
   std::uint32_t key;   ///< of the bin
 };
 
-/// The texels of a map in buckets: each has the texels of a few neighbouring tiles, in the order of the map.
+/// The texels of a map in buckets. A bucket has the texels of a few neighbouring tiles, in the order of the map.
 struct TexelBuckets {
   std::vector<std::size_t> first_tiles;     ///< [buckets + 1]
-  std::vector<std::uint64_t> first_texels;  ///< [buckets + 1]: where in `texels` a bucket begins
+  std::vector<std::uint64_t> first_texels;  ///< [buckets + 1]: index in `texels` at which a bucket begins
   std::unique_ptr<BinnedTexel[]> texels;
 
   std::size_t count() const { return first_tiles.size() - 1; }

@@ -9,11 +9,11 @@
 namespace glint::bake {
 namespace {
 
-// Four texels' classes fill three words, so parts of a map, which begin at multiples of four texels, never share a word.
+// Classes of four texels fill three words. Parts of a map begin at multiples of four texels, so no two threads write one word.
 static_assert(4 * BinMap::kClassBits == 3 * 16 && kBinChunk % 4 == 0);
 
 /// Makes a class of every block, or of several blocks with about equal numbers of texels.
-/// @param block_classes  [blocks]
+/// @param block_classes  [blocks]: class of each block
 /// @return as BinMap::class_keys
 std::vector<std::uint32_t> makeClasses(const BlockTrees& trees, std::size_t texel_count, std::size_t key_count,
                                        std::vector<std::uint16_t>& block_classes) {

@@ -15,7 +15,8 @@ struct TexelClasses {
   std::vector<std::uint16_t> texel_classes;  ///< as BinMap::texel_classes
 };
 
-/// Makes a class of every block, or of several neighbouring blocks where there are more blocks than classes. O(texels + blocks).
+/// Makes a class of every block, or of several neighbouring blocks where there are more blocks than classes can be, and writes
+/// the class of every texel. O(texels + blocks).
 TexelClasses classifyTexels(const NormalMap& map, const BinGrid& grid, const BlockTrees& trees);
 
 }  // namespace glint::bake

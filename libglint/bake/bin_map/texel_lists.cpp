@@ -9,7 +9,7 @@
 namespace glint::bake {
 namespace {
 
-/// Every second bit of x, from bit 0 on.
+/// Gathers every second bit of x, from bit 0 on: the column of a bin from its key. The inverse of spreading bits.
 std::uint32_t gatherBits(std::uint32_t x) {
   x &= 0x55555555;
   x = (x | x >> 1) & 0x33333333;
@@ -22,7 +22,7 @@ std::uint32_t gatherBits(std::uint32_t x) {
 class BlockPacker {
  public:
   /// @param map         code of the texels in their buckets
-  /// @param first_cell  of the cells that are counted from 0
+  /// @param first_cell  cell that `cell` counts as 0
   BlockPacker(const TexelCode& map, const BinBlock& block, std::uint32_t first_cell)
       : map_(map),
         code_(blockCode(map, block.side_bits, block.cell_bits)),
@@ -69,7 +69,7 @@ void storeMoments(const TexelCode& code, const std::vector<std::uint32_t>& texel
   for (int k = 0; k < 5; ++k) moments[k] = floatToHalf(static_cast<float>(values[k]));
 }
 
-/// Sorts the texels of one bucket by cell: counts, then moves, then shifts the ends of the cells to their starts.
+/// Sorts the texels of one bucket by cell: a counting sort.
 void listBucket(const TexelCode& code, const TexelBuckets& buckets, const BlockTrees& trees, std::size_t bucket,
                 TexelLists& lists) {
   const std::uint32_t first = trees.bucket_first_blocks[bucket], end = trees.bucket_first_blocks[bucket + 1];
@@ -81,6 +81,7 @@ void listBucket(const TexelCode& code, const TexelBuckets& buckets, const BlockT
     return packers[trees.bin_blocks[texel.key] - first];
   };
 
+  // Count the texels of each cell.
   const std::uint64_t begin = buckets.first_texels[bucket];
   const BinnedTexel* texels = buckets.texels.get() + begin;
   const std::size_t count = buckets.first_texels[bucket + 1] - begin;
@@ -88,20 +89,22 @@ void listBucket(const TexelCode& code, const TexelBuckets& buckets, const BlockT
   std::uint64_t* cells = lists.cell_starts.data() + first_cell;
   const std::size_t cell_count = trees.firstCell(end) - first_cell;
   for (std::size_t k = 0; k < count; ++k) ++cells[texel_cells[k] = packerOf(texels[k]).cell(texels[k])];
+  // Turn counts into starts, and move every texel to the next free index of its cell.
   std::uint64_t next = begin;
   for (std::size_t c = 0; c < cell_count; ++c) next += std::exchange(cells[c], next);
   for (std::size_t k = 0; k < count; ++k) lists.texels[cells[texel_cells[k]]++] = packerOf(texels[k]).pack(texels[k]);
-  // Each cursor ended where the next cell begins.
+  // The start of each cell has advanced to the start of the next one: shift the starts back.
   for (std::size_t c = cell_count; c-- > 1;) cells[c] = cells[c - 1];
   cells[0] = begin;
 }
 
+/// Stores the moments of all blocks of one bucket.
 void storeBucketMoments(const TexelCode& code, const TexelBuckets& buckets, const BlockTrees& trees, std::size_t bucket,
                         TexelLists& lists) {
   const std::uint32_t first = trees.bucket_first_blocks[bucket], end = trees.bucket_first_blocks[bucket + 1];
   for (std::uint32_t b = first; b < end; ++b) {
     const BinBlock& block = trees.blocks[b];
-    // The start of the next bucket's first cell may not be written yet.
+    // The last block ends with the bucket: another thread may not have written the start of the next cell yet.
     const std::uint64_t last =
         b + 1 < end ? lists.cell_starts[trees.blocks[b + 1].first_cell] : buckets.first_texels[bucket + 1];
     storeMoments(blockCode(code, block.side_bits, block.cell_bits), lists.texels, lists.cell_starts[block.first_cell], last,

@@ -12,11 +12,11 @@ namespace glint::bake {
 /// The texels of all blocks, sorted by cell.
 struct TexelLists {
   std::vector<std::uint32_t> texels;         ///< as BinMap::texels
-  std::vector<std::uint64_t> cell_starts;    ///< [cells + 1]: where in `texels` a cell begins
+  std::vector<std::uint64_t> cell_starts;    ///< [cells + 1]: index in `texels` at which a cell begins
   std::vector<std::uint16_t> block_moments;  ///< as BinMap::block_moments
 };
 
-/// Sorts the texels of every bucket by the cells of their blocks. O(texels), each bucket in the cache.
+/// Sorts the texels of every bucket by the cells of their blocks. O(texels); a bucket stays in the cache.
 TexelLists listTexels(const TexelCode& code, const TexelBuckets& buckets, const BlockTrees& trees);
 
 }  // namespace glint::bake
