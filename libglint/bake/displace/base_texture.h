@@ -10,9 +10,9 @@
 
 namespace glint::bake {
 
-/// How the reflectance of a displacement map varies: factors of the base for each texel, bottom row first.
+/// How the reflectance of a displacement map varies: factors that multiply the base BRDF, for each texel, bottom row first.
 struct BaseTexture {
-  int channels = 1;              ///< of colours: 1, or 3 for linear red, green and blue
+  int channels = 1;              ///< channels of colours: 1, or 3 for linear red, green and blue
   std::vector<float> colors;     ///< [texels][channels], 0 to 1: factors of the reflectance; empty: all 1
   std::vector<float> roughness;  ///< [texels]: factors of the base's alpha (ggx only); empty: all 1
 };
@@ -20,8 +20,8 @@ struct BaseTexture {
 /// One number for each channel.
 using Color = std::array<float, 3>;
 
-/// The base of every facet. Colours and roughness are linear between texels as heights are, so a facet has the mean of its
-/// corners.
+/// The base BRDF of every facet. Colours and roughness are interpolated linearly between texels, as heights are, so a facet has
+/// the mean of its corners.
 class FacetBase {
  public:
   FacetBase(const HeightSurface& surface, const BaseBrdf& base, const BaseTexture& texture)
@@ -32,7 +32,7 @@ class FacetBase {
   bool colored() const { return !texture_.colors.empty(); }
   bool rough() const { return !texture_.roughness.empty(); }
 
-  /// Factor of the base's reflectance; 1 where there are no colours.
+  /// Colour of a facet: the factor of the base's reflectance, 1 where there are no colours.
   Color color(std::size_t facet) const {
     Color color = {1, 1, 1};
     if (!colored()) return color;
@@ -45,12 +45,12 @@ class FacetBase {
     return color;
   }
 
-  /// Roughness of the smoothest texel.
+  /// Alpha of the smoothest texel.
   float leastAlpha() const {
     return base_.alpha * (rough() ? *std::min_element(texture_.roughness.begin(), texture_.roughness.end()) : 1.0f);
   }
 
-  /// The base with the facet's own roughness, without its colour.
+  /// The base with the roughness of a facet, without its colour.
   BaseBrdf of(std::size_t facet) const {
     BaseBrdf base = base_;
     if (!rough()) return base;

@@ -28,6 +28,7 @@ void BrdfScene::facingRow(std::size_t facet, float* row) const {
 
 Vec3 BrdfScene::pointOf(std::size_t facet, std::uint64_t index) const {
   Vec2 xi = randomPair(options.seed, kPointStream, index);
+  // Fold the unit square onto its lower triangle.
   if (xi.x + xi.y > 1) xi = {1 - xi.x, 1 - xi.y};
   return surface.point(facet, xi.x, xi.y);
 }

@@ -15,14 +15,14 @@
 
 namespace glint::bake {
 
-/// Samples of one call of a kernel: two rows of them stay in the cache.
+/// Number of samples that one call of a kernel takes: two rows over so many samples stay in the cache.
 inline constexpr std::size_t kKernelSamples = 128;
-/// Walks end when they carry less than this part of the light.
+/// A walk ends when it carries less than this part of the light that it started with.
 inline constexpr float kLeastThroughput = 1e-4f;
-/// Streams of random numbers; the turns of bounce b have the stream kTurnStream + b.
+/// Streams of random numbers for the choice of facets, for points on facets, and for the turn at bounce b (kTurnStream + b).
 inline constexpr std::uint64_t kFacetStream = 101, kPointStream = 102, kTurnStream = 103;
 
-/// The frame of a facet.
+/// An orthonormal frame with the normal of a facet as z axis.
 struct FacetFrame {
   Vec3 n;
   Tangents tangents;
@@ -31,7 +31,7 @@ struct FacetFrame {
   Vec3 toLocal(Vec3 v) const { return {dot(v, tangents.s), dot(v, tangents.t), dot(v, n)}; }
 };
 
-/// All that an estimator reads: the surface, its base and masks, and the directions.
+/// Everything that an estimator reads: the surface, its base BRDF and visibility masks, and the directions.
 struct BrdfScene {
   /// @param surface, masks  must outlive the scene
   BrdfScene(const HeightSurface& surface, const VisibilityMasks& masks, std::span<const Vec3> directions, const PatchGrid& grid,
@@ -48,16 +48,18 @@ struct BrdfScene {
   const FacetBase base;
 
   std::size_t channels() const { return static_cast<std::size_t>(base.channels()); }
-  /// The facets of every patch, with `samples` samples in all patches together.
+  /// Lists the facets of every patch, and shares `samples` samples among the patches.
   std::vector<PatchFacets> patches(std::size_t samples) const;
-  /// Cosines of a facet towards all directions, 0 where the direction is hidden.
+  /// Computes the cosines of a facet towards all directions, 0 where the direction is hidden.
   /// @param row  [padded directions]
   void facingRow(std::size_t facet, float* row) const;
-  /// A random point of a facet.
+  /// Draws a point of a facet, evenly.
+  /// @param index  number of the sample
   Vec3 pointOf(std::size_t facet, std::uint64_t index) const;
 };
 
-/// a *= scale * b in the first `channels`; returns the largest of them.
+/// a *= scale * b in the first `channels` channels.
+/// @return the largest of the products
 inline float attenuate(Color& a, const Color& b, float scale, std::size_t channels) {
   float largest = 0;
   for (std::size_t c = 0; c < channels; ++c) largest = std::max(largest, a[c] *= scale * b[c]);

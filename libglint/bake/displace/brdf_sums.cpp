@@ -6,8 +6,8 @@
 namespace glint::bake {
 namespace {
 
-constexpr std::size_t kChunkSamples = 8192;  // samples whose sum is kept in float
-constexpr double kMostCorrection = 1.25;     // of visible areas
+constexpr std::size_t kChunkSamples = 8192;  // samples whose sum a float holds exactly enough
+constexpr double kMostCorrection = 1.25;     // largest factor that corrects a visible area
 
 }  // namespace
 
@@ -40,7 +40,7 @@ void BrdfSums::addChunk(const BrdfScene& scene, const SampleChunk& chunk, const 
   }
 }
 
-/// Factors that make the visible areas exact.
+/// Factors of the directions that make the visible areas exact.
 std::vector<double> BrdfSums::corrections(const BrdfScene& scene) const {
   std::vector<double> corrections(directions_, 1.0);
   for (std::size_t d = 0; d < directions_; ++d)
@@ -57,6 +57,7 @@ EffectiveBrdf BrdfSums::finish(const BrdfScene& scene, const LightShares& shares
   for (std::size_t k = 0; k < scene.options.distant_cells.size(); ++k)
     result.distant.push_back(shares.all > 0 ? shares.distant[k] / shares.all : 0);
 
+  // Average the two estimates of every pair, and measure how much they differ.
   const std::size_t n = directions_;
   const std::vector<float>& z = scene.directions.z;
   const std::vector<double> correction = corrections(scene);

@@ -15,15 +15,18 @@ namespace glint::bake {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr std::size_t kWalks = 1 << 18;  // unless the options say how many
+constexpr std::size_t kWalks = 1 << 18;  // walks in all patches together, unless the options give a number
 
-/// Follows light from a facet through diffuse reflections: rows[channel * stride + d], which hold the facet's masked cosines,
-/// become the light that it reflects, in units of the base, from directions d.
+/// Follows a random walk from a facet through diffuse reflections, and collects the light from every direction that reaches the
+/// facet along it.
+/// @param rows  rows[channel * stride + d]: on entry, channel 0 has the masked cosines of the facet towards directions d; on
+///              return, each channel has the light from direction d that the facet reflects, without the base's albedo / pi
 void walk(const BrdfScene& scene, std::size_t facet, std::uint64_t index, std::size_t stride, float* rows, float* scratch,
           LightShares& shares) {
   const std::size_t channels = scene.channels(), n = scene.directions.count;
   Color throughput = scene.base.color(facet);
   float largest = 1, longest = 0;
+  // Light that arrives directly, from all directions.
   double light = 0;
   for (std::size_t d = 0; d < n; ++d) light += rows[d];
   shares.all += meanOf(throughput, channels) * light;
@@ -32,6 +35,7 @@ void walk(const BrdfScene& scene, std::size_t facet, std::uint64_t index, std::s
       for (std::size_t d = 0; d < n; ++d) rows[c * stride + d] = throughput[c] * rows[d];
   Vec3 point = scene.pointOf(facet, index);
   for (int bounce = 1; bounce < scene.options.bounces && largest > kLeastThroughput; ++bounce) {
+    // Turn to a random direction, with a density in proportion to its cosine, and go to the facet that lies there.
     const Vec2 xi = randomPair(scene.options.seed, kTurnStream + static_cast<std::uint64_t>(bounce), index);
     const float radius = std::sqrt(xi.x), angle = 2 * kPi * xi.y;
     const Vec3 local = {radius * std::cos(angle), radius * std::sin(angle), std::sqrt(1 - xi.x)};
@@ -40,6 +44,7 @@ void walk(const BrdfScene& scene, std::size_t facet, std::uint64_t index, std::s
     facet = hit->facet, point = hit->point;
     largest = attenuate(throughput, scene.base.color(facet), scene.options.base.albedo, channels);
     longest = std::max(longest, hit->distance);
+    // Add the light that arrives at this facet and comes back along the walk.
     scene.facingRow(facet, scratch);
     light = 0;
     for (std::size_t d = 0; d < n; ++d) light += scratch[d];
@@ -51,6 +56,7 @@ void walk(const BrdfScene& scene, std::size_t facet, std::uint64_t index, std::s
   }
 }
 
+/// Adds the samples of a chunk: a matrix product of the light that facets reflect and the area that they show to each view.
 void addSamples(const BrdfScene& scene, const PatchFacets& facets, const SampleChunk& chunk, ChunkSums& sums,
                 LightShares& shares) {
   const std::size_t size = scene.directions.padded, stride = kKernelSamples * size;
@@ -87,7 +93,7 @@ EffectiveBrdf estimateDiffuse(const BrdfScene& scene, const ProgressFn& progress
     counter.advance();
   });
 
-  // In the order of the chunks, so that sums do not depend on threads.
+  // Add in the order of the chunks, so that sums do not depend on threads.
   BrdfSums sums(scene);
   LightShares total;
   for (std::size_t c = 0; c < chunks.size(); ++c) {

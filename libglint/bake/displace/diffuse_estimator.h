@@ -5,8 +5,8 @@
 
 namespace glint::bake {
 
-/// Estimates the effective BRDFs of a surface with a diffuse base. Each sampled facet is where one walk starts, and the walk
-/// serves all pairs of directions at once.
+/// Estimates the effective BRDFs of a surface with a diffuse base. One walk starts from each sampled facet. A diffuse facet
+/// sends the same light to all directions, so that one walk serves all pairs of directions.
 EffectiveBrdf estimateDiffuse(const BrdfScene& scene, const ProgressFn& progress);
 
 }  // namespace glint::bake

@@ -18,7 +18,7 @@
 namespace glint::bake {
 namespace {
 
-constexpr std::size_t kProgressUnits = 100;  // of each level
+constexpr std::size_t kProgressUnits = 100;  // units of progress for each level
 constexpr float kLeastAlpha = 0.05f;
 
 void require(bool holds, const char* parameter, const std::string& range) {
@@ -43,7 +43,9 @@ void checkOptions(const DisplaceOptions& o) {
   }
 }
 
-/// Refuses texels that are bad: bad(k) of `count` numbers, `each` for a texel.
+/// Refuses a map with bad values.
+/// @param count  number of values, `each` of them for a texel
+/// @param bad    bad(k): whether value k is bad
 template <class Bad>
 void requireTexels(const HeightMap& map, std::size_t count, std::size_t each, const char* rule, const char* what,
                    const std::string& range, const char* remedy, Bad bad) {
@@ -84,7 +86,7 @@ void checkTexture(const HeightMap& map, const DisplaceOptions& options) {
                 });
 }
 
-/// The factors next to this one that divide both sides of a map, in words.
+/// Names, for an error message, the next smaller and larger factors that divide both sides of a map.
 std::string nearestFactors(const HeightMap& map, int factor) {
   const auto divides = [&](int f) { return map.width % f == 0 && map.height % f == 0; };
   const int most = std::min(map.width, map.height);
@@ -123,14 +125,14 @@ void checkMap(const HeightMap& map, const DisplaceOptions& options) {
   }
 }
 
-/// What is collected of one cell, of each facet.
+/// Normals and base BRDFs of the facets of one cell.
 struct CellFacets {
   std::vector<WeightedNormal> normals;
-  std::vector<float> colors;  ///< [facets][channels], if there are any
-  std::vector<float> widths;  ///< squares of alphas, if they vary
+  std::vector<float> colors;  ///< [facets][channels]; empty where colours do not vary
+  std::vector<float> widths;  ///< [facets]: squares of alphas; empty where alphas do not vary
 };
 
-/// Weighted normals, base and slope moments of one cell.
+/// Collects the facets of one cell, and computes the moments of their slopes.
 void collectCell(const HeightSurface& surface, const FacetBase& base, int factor, int column, int row, CellFacets& facets,
                  MapSlopes& moments) {
   facets.normals.clear(), facets.colors.clear(), facets.widths.clear();
@@ -159,7 +161,8 @@ void collectCell(const HeightSurface& surface, const FacetBase& base, int factor
   moments.covariance.yy = static_cast<float>(std::max(0.0, share * yy - y * y));
 }
 
-/// Downsampled heights in cells.
+/// Downsamples the heights.
+/// @return heights in the cells of the downsampled map
 std::vector<float> lowHeights(const HeightMap& map, int factor) {
   double mean = 0;
   for (const float h : map.heights) mean += h;
@@ -174,7 +177,7 @@ PatchGrid patchGrid(const HeightMap& map, int factor, int spatial) {
   return {std::min(spatial, columns), std::min(spatial, rows), columns, rows, factor};
 }
 
-/// Whether two grids cut the map at the same places.
+/// Whether two grids cut the map along the same lines.
 bool samePatches(const PatchGrid& a, const PatchGrid& b) {
   if (a.columns != b.columns || a.rows != b.rows) return false;
   for (int c = 0; c <= a.columns; ++c)
@@ -184,7 +187,7 @@ bool samePatches(const PatchGrid& a, const PatchGrid& b) {
   return true;
 }
 
-/// T and S of all channels, and the worst of their measures.
+/// Computes T and S of all channels. The measures of the level are those of the worst channel.
 void factorChannels(const EffectiveBrdf& original, const EffectiveBrdf& low, std::span<const Vec3> directions,
                     const PatchGrid& grid, DisplacementLevel& shape, DisplacementData::Level& level) {
   std::vector<ScalingFactors> factors;
@@ -200,7 +203,8 @@ void factorChannels(const EffectiveBrdf& original, const EffectiveBrdf& low, std
   }
 }
 
-/// Everything of one level.
+/// Builds one level: heights, lobes, and scaling functions.
+/// @param original  effective BRDFs of the original surface, on the same patches
 void buildLevel(const HeightMap& map, const DisplaceOptions& options, const PatchGrid& grid, const EffectiveBrdf& original,
                 std::span<const Vec3> directions, DisplacementLevel& shape, DisplacementData::Level& level) {
   const HeightSurface surface(map.width, map.height, map.heights);
@@ -262,6 +266,7 @@ DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, 
   checkOptions(options);
   checkMap(map, options);
   checkTexture(map, options);
+  // Find which facets see which directions, once for all levels.
   const std::vector<Vec3> directions = angularDirections(options.angular);
   const HeightSurface surface(map.width, map.height, map.heights);
   const VisibilityMasks masks(surface, directions);
@@ -272,6 +277,7 @@ DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, 
   data.shape.level_count = static_cast<int>(options.factors.size());
   data.levels.resize(options.factors.size());
 
+  // Estimate the light that the original reflects, and factor it for each level.
   EffectiveOptions effective{options.base, options.bounces, options.seed, {}, 0, 0, options.texture};
   for (const int factor : options.factors) effective.distant_cells.push_back(static_cast<float>(factor));
   const std::size_t total = kProgressUnits * options.factors.size();

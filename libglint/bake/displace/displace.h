@@ -11,17 +11,17 @@
 namespace glint::bake {
 
 struct DisplaceOptions {
-  std::vector<int> factors = {16};  ///< one level for each: ascending, dividing both sizes of the map
+  std::vector<int> factors = {16};  ///< factor of each level: ascending, dividing both sizes of the map
   BaseBrdf base;
   BaseTexture texture;        ///< how the base varies over the map
-  int lobes = kMaxLobes;      ///< of each cell, 1 to kMaxLobes
+  int lobes = kMaxLobes;      ///< lobes of each cell, 1 to kMaxLobes
   int angular = 15;           ///< N: N^2 directions, 3 to 25
   int spatial = 4;            ///< M: T has M^2 patches, 1 to 16; fewer where a level has fewer cells
-  int bounces = kAllBounces;  ///< scattering events of a light path at most; 1: shadowing and masking only
+  int bounces = kAllBounces;  ///< most scattering events of a light path; 1: shadowing and masking only
   std::uint64_t seed = 1;
 };
 
-/// Steepest slope that is accepted: 80 degrees. Light between steeper walls is not resolved by one normal for each facet.
+/// Steepest slope that `displace` accepts: 80 degrees. One normal for each facet does not resolve light between steeper walls.
 inline constexpr float kSteepestSlope = 5.6712818f;
 
 /// A Displacement that owns its arrays.
@@ -38,26 +38,27 @@ class DisplacementData {
     std::vector<std::uint16_t> angular_scale;
   };
 
-  Displacement shape;  ///< without spans
+  Displacement shape;  ///< sizes and parameters; its spans are empty
   std::vector<Level> levels;
 
   /// Spans over the arrays; valid while this object lives and is not changed.
   Displacement view() const;
 };
 
-/// Downsamples a displacement map and computes what keeps its appearance (Wu 2019): lobes for each cell, and the scaling
-/// functions T and S that add shadowing, masking and interreflections.
+/// Downsamples a displacement map so that it looks the same from afar (Wu 2019). Lobes describe the normals of each cell. The
+/// scaling functions T and S restore the shadowing, masking and interreflections that the downsampled surface lacks.
 ///
-/// Where the base varies, every lobe has the mean colour and roughness of its normals, and each channel its own T and S, so
-/// that what colours and normals have to do with each other is kept (Fig. 14).
+/// Where the base varies, every lobe has the mean colour and roughness of its normals, and each channel its own T and S. So the
+/// result keeps the correlation of colours and normals (Fig. 14).
 ///
-/// The original surface is the periodic triangulation of the heights (HeightSurface); the map may be flat, then T = S = 1.
+/// The original surface is the periodic triangulation of the heights (HeightSurface). On a flat map T = S = 1.
 /// @throws Error usage if an option is out of range; invalid_input if heights are not finite, a facet is steeper than 80
 ///         degrees, a factor does not divide the map, or the texture is not of the map's size or out of range
-/// @note memory: about 85 bytes for each texel of the map. The same result for any number of threads
+/// @note memory: about 85 bytes for each texel of the map. The result does not depend on the number of threads
 DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, const ProgressFn& progress = {});
 
-/// Lobes with their colours and roughness, slope moments and errors of the cells of a coarser grid.
+/// Fits lobes to the normals of every cell of a coarser grid, and fills the lobes, their colours and roughness, the slope
+/// moments and the errors of the fit in `level`.
 void fitCells(const HeightSurface& surface, const FacetBase& base, int factor, int lobe_count, DisplacementData::Level& level);
 
 }  // namespace glint::bake

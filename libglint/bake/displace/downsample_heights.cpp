@@ -14,7 +14,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// Complex field [rows][columns] with its transforms.
+/// A complex field [rows][columns], and its Fourier transforms in place.
 class Spectrum {
  public:
   Spectrum(int columns, int rows) : values_(allocate(static_cast<std::size_t>(columns) * rows)) {
@@ -65,7 +65,7 @@ std::vector<Vec2> meanSlopes(int width, int height, std::span<const float> heigh
 
 std::vector<double> heightsFromSlopes(int columns, int rows, std::span<const Vec2> slopes, double mean) {
   const std::size_t count = slopes.size();
-  // Both slopes in one transform: x is its real part, y its imaginary part.
+  // Transform both slopes at once: x as real part, y as imaginary part.
   Spectrum field(columns, rows);
   for (std::size_t k = 0; k < count; ++k) field[k] = {slopes[k].x, slopes[k].y};
   field.forward();
@@ -76,6 +76,7 @@ std::vector<double> heightsFromSlopes(int columns, int rows, std::span<const Vec
     const Complex ey = turn(j, rows);
     for (int i = 0; i < columns; ++i) {
       const std::size_t here = static_cast<std::size_t>(j) * columns + i;
+      // Part the spectra of x and y, which are symmetric because x and y are real.
       const Complex a = field[here];
       const Complex b = std::conj(field[static_cast<std::size_t>(mirrored(j, rows)) * columns + mirrored(i, columns)]);
       const Complex sx = 0.5 * (a + b), sy = Complex(0, -0.5) * (a - b);

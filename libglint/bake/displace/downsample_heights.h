@@ -10,18 +10,18 @@ namespace glint::bake {
 /// Weight of the Laplacian in the fit of a downsampled height field (w in Wu 2019, Eq. 10).
 inline constexpr double kLaplacianWeight = 0.01;
 
-/// Mean slopes of the surface over each cell of a coarser grid (Wu 2019, Eq. 1). Cell (I, J) covers the cells I factor <= i <
-/// (I + 1) factor of the surface and the same along j. Exact for triangles and for bilinear patches: the area integral of a
-/// slope is the integral of the height differences of opposite sides.
+/// Mean slopes of the surface over each cell of a coarser grid (Wu 2019, Eq. 1). Cell (I, J) covers cells (i, j) of the surface
+/// with I factor <= i < (I + 1) factor and J factor <= j < (J + 1) factor. Exact for triangles and for bilinear patches: the
+/// integral of a slope over an area is the integral of the height difference between opposite sides.
 /// @param factor  divides width and height
 /// @return [height / factor][width / factor]
 std::vector<Vec2> meanSlopes(int width, int height, std::span<const float> heights, int factor);
 
 /// The periodic height field whose bilinear patches have slopes as close as possible to the given ones (Wu 2019, Eq. 9 and 10):
-/// minimises the sum of |slope - slope*|^2 + 0.01 |Laplacian h|^2. Lengths are in cells of the result; the Laplacian is that of
-/// five points. Solved in the frequency domain, where the least-squares problem is diagonal.
+/// minimises the sum of |slope - slope*|^2 + kLaplacianWeight |Laplacian h|^2, with the Laplacian of five points. Lengths are
+/// in cells of the result. Solved in the frequency domain, where the least-squares problem is diagonal.
 /// @param slopes  [rows][columns], dh/dx and dh/dy of the patches
-/// @param mean    mean of the result, which slopes do not determine
+/// @param mean    mean height of the result, which slopes do not determine
 /// @return [rows][columns] heights of the vertices; patch (I, J) lies between vertices (I, J) and (I + 1, J + 1)
 std::vector<double> heightsFromSlopes(int columns, int rows, std::span<const Vec2> slopes, double mean);
 

@@ -11,7 +11,8 @@
 namespace glint::bake {
 namespace {
 
-// Vectors of the compiler's: sums over k may then be taken in eight lanes, which plain loops may not.
+// The compiler may not reorder a sum, so it makes no vectors of a plain loop that sums. With eight lanes written out, each lane
+// sums every eighth term.
 using Lanes = float __attribute__((vector_size(32)));
 
 inline void load(const float* from, Lanes& to) { std::memcpy(&to, from, sizeof to); }
@@ -51,7 +52,7 @@ GLINT_MULTIVERSION void addProducts(const float* a, const float* b, std::size_t 
 
 namespace {
 
-/// Sums of one pair of directions. Inlined into each version of its callers.
+/// Sums the facets for one pair of directions. Inlined, so that each version of a caller has it in its own instructions.
 template <std::size_t Channels>
 [[gnu::always_inline]] inline void sumGgxPair(const FacetArrays& facets, const float* colors, std::size_t color_stride, Vec3 h,
                                               const float* row_i, const float* row_o, float* totals) {
@@ -117,7 +118,8 @@ GLINT_MULTIVERSION void addGgxLights(const DirectionTable& directions, const flo
     const float ci = std::max(0.0f, x[d] * normal.x + y[d] * normal.y + z[d] * normal.z);
     const float squared = std::max(1e-6f, 2 + 2 * (x[d] * view.x + y[d] * view.y + z[d] * view.z));
     const float ch = ci + cosine_view;
-    // At least alpha^2: behind the facet the cosine to the half vector is not one, and 0 there may not become 0 / 0.
+    // t is at least alpha^2 for directions in front of the facet. Behind the facet, where the result is 0, `ch` is no cosine:
+    // the bound keeps 0 / 0 away.
     const float t = std::max(a2, 1 + (a2 - 1) * ch * ch / squared);
     const float masking = 2 * ci / (ci + std::sqrt(a2 + (1 - a2) * ci * ci));
     out[d] +=

@@ -18,7 +18,7 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
-/// Quadrature of single reflections from GGX facets, without Fresnel's factor and 1 / (4 pi).
+/// Adds single reflections from the GGX facets of a chunk, without Fresnel's factor and 1 / (4 pi).
 void addSamples(const BrdfScene& scene, const PatchFacets& facets, const SampleChunk& chunk, std::span<const Vec3> half,
                 ChunkSums& sums) {
   const std::size_t n = scene.directions.count, channels = scene.channels();
@@ -27,7 +27,8 @@ void addSamples(const BrdfScene& scene, const PatchFacets& facets, const SampleC
   for (std::size_t start = chunk.first; start < chunk.last; start += kKernelSamples) {
     const std::size_t count = std::min(kKernelSamples, chunk.last - start), used = (count + 7) / 8 * 8;
     for (std::size_t k = 0; k < used; ++k) {
-      const bool padding = k >= count;  // the last facet again, without light
+      // Fill up to a multiple of 8 with the last facet, without light.
+      const bool padding = k >= count;
       const std::uint64_t index = std::min(start + k, chunk.last - 1) * static_cast<std::size_t>(scene.grid.count()) +
                                   static_cast<std::size_t>(chunk.patch);
       const std::size_t facet =
@@ -39,7 +40,8 @@ void addSamples(const BrdfScene& scene, const PatchFacets& facets, const SampleC
       for (std::size_t c = 0; c < channels; ++c) colors[c * kKernelSamples + k] = color[c];
       scene.facingRow(facet, row.data());
       const float area = padding ? 0 : 1 / normal.z;
-      // Rows are multiplied by each other, so half of a facet's weight is in each. That of a grey facet includes its colour.
+      // The kernel multiplies the rows of two directions, so each row has the root of the facet's weight. The weight includes
+      // the colour where there is one channel.
       const float weight = alpha * std::sqrt(channels == 1 ? area * color[0] : area);
       for (std::size_t d = 0; d < n; ++d) masked[d * used + k] = row[d] > 0 ? weight * ggxMasking(row[d], alpha) : 0.0f;
       for (std::size_t d = 0; d < n; ++d) sums.areas[d] += area * row[d];
@@ -52,7 +54,8 @@ void addSamples(const BrdfScene& scene, const PatchFacets& facets, const SampleC
   }
 }
 
-/// Normal that a GGX facet shows towards a view, drawn from those visible (Heitz 2018). All vectors in the facet's frame.
+/// Draws a microscopic normal of a GGX facet from the normals that a view sees (Heitz 2018). All vectors are in the frame of
+/// the facet.
 Vec3 visibleGgxNormal(Vec3 view, float alpha, Vec2 xi) {
   const Vec3 stretched = {alpha * view.x, alpha * view.y, view.z};
   const Vec3 v = (1 / std::sqrt(dot(stretched, stretched))) * stretched;
@@ -67,13 +70,14 @@ Vec3 visibleGgxNormal(Vec3 view, float alpha, Vec2 xi) {
   return (1 / std::sqrt(dot(m, m))) * m;
 }
 
-/// Rows over all directions that a walk needs.
+/// Rows over all directions, which walks use again.
 struct Scratch {
   std::vector<float> visible, light;
-  std::vector<float> sum;  ///< [channels][padded directions]
+  std::vector<float> sum;  ///< [channels][padded directions]: light of all walks
 };
 
-/// Follows a view through glossy reflections and adds the light that every facet after the first one reflects into it.
+/// Follows a view through glossy reflections, and adds the light that every facet after the first one reflects into the view.
+/// @param scale  weight of the walk
 void walk(const BrdfScene& scene, std::size_t facet, std::size_t view, std::uint64_t index, float scale, Scratch& scratch,
           LightShares& shares) {
   const std::size_t channels = scene.channels(), n = scene.directions.count;
@@ -82,6 +86,7 @@ void walk(const BrdfScene& scene, std::size_t facet, std::size_t view, std::uint
   Color throughput = scene.base.color(facet);
   float largest = 1, longest = 0;
   for (int bounce = 1; bounce < scene.options.bounces && largest > kLeastThroughput; ++bounce) {
+    // Mirror the view at a microscopic normal, and go to the facet that lies there.
     const FacetFrame frame(scene.surface.normal(facet));
     const Vec3 local = frame.toLocal(back);
     const Vec2 xi = randomPair(scene.options.seed, kTurnStream + static_cast<std::uint64_t>(bounce), index);
@@ -97,6 +102,7 @@ void walk(const BrdfScene& scene, std::size_t facet, std::size_t view, std::uint
     base = scene.base.of(facet);
     largest = attenuate(throughput, scene.base.color(facet), reflected, channels);
     longest = std::max(longest, hit->distance);
+    // Add the light from every direction that this facet reflects back along the walk.
     scene.masks.expand(facet, scratch.visible.data());
     std::fill(scratch.light.begin(), scratch.light.end(), 0.0f);
     addGgxLights(scene.directions, scratch.visible.data(), scene.surface.normal(facet), back, base, scale,
@@ -109,7 +115,7 @@ void walk(const BrdfScene& scene, std::size_t facet, std::size_t view, std::uint
   }
 }
 
-/// Interreflections seen from one direction, in all patches.
+/// Adds the interreflections that one view sees, in all patches.
 LightShares followView(const BrdfScene& scene, const std::vector<PatchFacets>& patches, std::size_t view, BrdfSums& sums) {
   LightShares shares;
   Scratch scratch{std::vector<float>(scene.directions.padded), std::vector<float>(scene.directions.padded),
@@ -132,7 +138,8 @@ LightShares followView(const BrdfScene& scene, const std::vector<PatchFacets>& p
   return shares;
 }
 
-/// Completes sums of single reflections of pairs i <= o: Fresnel's factor, and the pairs the other way round.
+/// Completes the sums of single reflections, which have pairs i <= o only: multiplies by Fresnel's factor, and copies each pair
+/// to the pair with light and view exchanged.
 void completePairs(const BrdfScene& scene, BrdfSums& sums) {
   std::vector<double>& values = sums.values();
   const std::size_t n = scene.directions.count;
@@ -146,7 +153,8 @@ void completePairs(const BrdfScene& scene, BrdfSums& sums) {
   }
 }
 
-/// Facets of the quadrature, and walks of each view: narrow lobes need more for the same noise.
+/// Number of facets that single reflections are summed over, and of walks from each view. Narrow lobes need more samples for
+/// the same noise.
 struct GlossySamples {
   std::size_t facets;
   std::size_t walks;
@@ -171,6 +179,7 @@ std::vector<Vec3> halfVectors(const DirectionTable& directions) {
   return half;
 }
 
+/// Adds the single reflections of all chunks.
 void addSingleReflections(const BrdfScene& scene, const std::vector<PatchFacets>& patches,
                           const std::vector<SampleChunk>& chunks, ProgressCounter& counter, BrdfSums& sums) {
   const std::vector<Vec3> half = halfVectors(scene.directions);
@@ -186,8 +195,8 @@ void addSingleReflections(const BrdfScene& scene, const std::vector<PatchFacets>
   completePairs(scene, sums);
 }
 
-/// Adds the light of walks, after all single reflections were added.
-/// @param walks  of each view
+/// Adds the light of random walks to sums that hold all single reflections.
+/// @param walks  number of walks from each view, in all patches together
 LightShares addInterreflections(const BrdfScene& scene, std::size_t walks, ProgressCounter& counter, BrdfSums& sums) {
   LightShares total;
   for (const double value : sums.values()) total.all += value / static_cast<double>(scene.channels());

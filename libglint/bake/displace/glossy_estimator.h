@@ -5,8 +5,8 @@
 
 namespace glint::bake {
 
-/// Estimates the effective BRDFs of a surface with a GGX base. Single reflections are summed over facets; interreflections come
-/// from walks that start from each view and collect light from all directions at every facet that they visit.
+/// Estimates the effective BRDFs of a surface with a GGX base. Single reflections are sums over facets. Interreflections come
+/// from random walks: walks start from each view, and collect light from all directions at every facet that they visit.
 EffectiveBrdf estimateGlossy(const BrdfScene& scene, const ProgressFn& progress);
 
 }  // namespace glint::bake

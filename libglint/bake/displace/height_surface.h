@@ -36,15 +36,15 @@ class HeightSurface {
     return facet % 2 == 0 ? Vec2{c.h10 - c.h00, c.h01 - c.h00} : Vec2{c.h11 - c.h01, c.h11 - c.h10};
   }
 
-  /// Unit normal of a facet. The facet's area over its projected area is 1 / z.
+  /// Unit normal of a facet. 1 / z is the area of the facet over its projected area.
   Vec3 normal(std::size_t facet) const {
     const Vec2 s = slope(facet);
     const float z = 1 / std::sqrt(1 + dot(s, s));
     return {-s.x * z, -s.y * z, z};
   }
 
-  /// The point of a facet that lies u, v cells from its corner at vertex (i, j), or v, u from the corner at (i + 1, j + 1)
-  /// for the other half; u, v >= 0, u + v <= 1.
+  /// A point of a facet: u and v cells along x and y from vertex (i, j), or for the other half of the cell, u and v cells
+  /// backwards from vertex (i + 1, j + 1). u, v >= 0, u + v <= 1.
   Vec3 point(std::size_t facet, float u, float v) const {
     const std::size_t cell = facet / 2;
     const Corners c = corners(cell);
@@ -54,7 +54,7 @@ class HeightSurface {
     return {i + 1 - u, j + 1 - v, c.h11 + u * (c.h01 - c.h11) + v * (c.h10 - c.h11)};
   }
 
-  /// Vertices of a facet as numbers j * width + i.
+  /// Corners of a facet: vertices, numbered j * width + i.
   std::array<std::size_t, 3> cornerTexels(std::size_t facet) const {
     const std::size_t cell = facet / 2, width = static_cast<std::size_t>(width_);
     const std::size_t i = cell % width, row = cell - i;

@@ -8,17 +8,18 @@ namespace glint::bake {
 
 namespace {
 constexpr float kNever = std::numeric_limits<float>::infinity();
-/// Periods of the map after which a ray that neither rises nor falls counts as escaped.
+/// A ray that has crossed so many periods of the map counts as escaped, as a level ray that meets nothing must.
 constexpr int kMaxWraps = 256;
 }  // namespace
 
-/// A ray inside one copy of the map; t runs along the direction.
+/// A ray inside one period of the map. The point at t is origin + t * direction.
 struct HeightTracer::Ray {
   Vec3 origin;
   Vec3 direction;
   float heightAt(float t) const { return origin.z + t * direction.z; }
 
-  /// Starts again in the next copy of the map, with small coordinates, if cell (i, j) is outside. Returns whether it was.
+  /// If cell (i, j) is outside the map, moves the ray and the cell into the map by a period, so that coordinates stay small.
+  /// @return whether the cell was outside
   bool wrap(Vec3 exit, int width, int height, int& i, int& j) {
     if (i >= 0 && i < width && j >= 0 && j < height) return false;
     origin = exit;
@@ -55,8 +56,9 @@ HeightTracer::HeightTracer(const HeightSurface& surface) : surface_(surface) {
   }
 }
 
-/// Where the ray falls below one of the two facets of a cell between t_in and t_out. A facet is hit where the ray ends up below
-/// it, so that rounding at edges lets nothing through.
+/// Finds where the ray falls below one of the two facets of a cell, between t_in and t_out. The ray meets a facet if it is
+/// below the facet where it leaves, so that rounding at edges lets no ray through.
+/// @return kNever if the ray meets neither facet
 float HeightTracer::hitCell(const Ray& ray, int i, int j, float t_in, float t_out, std::size_t& facet) const {
   const std::size_t cell = static_cast<std::size_t>(j) * surface_.width() + i;
   const auto c = surface_.corners(cell);
@@ -91,7 +93,7 @@ std::optional<SurfaceHit> HeightTracer::trace(std::size_t facet, Vec3 origin, Ve
   int level = 0;
   for (int wraps = 0; wraps < kMaxWraps;) {
     if (direction.z >= 0 && ray.heightAt(t) > top) return std::nullopt;
-    // The block that holds cell (i, j), cut off at the border of the map.
+    // The square of this level that holds cell (i, j), cut off at the border of the map, and where the ray leaves it.
     const int x0 = (i >> level) << level, y0 = (j >> level) << level;
     const int x1 = std::min(x0 + (1 << level), width), y1 = std::min(y0 + (1 << level), height);
     const float tx = direction.x != 0 ? (static_cast<float>(direction.x > 0 ? x1 : x0) - ray.origin.x) * inverse_x : kNever;
@@ -99,8 +101,9 @@ std::optional<SurfaceHit> HeightTracer::trace(std::size_t facet, Vec3 origin, Ve
     const float t_out = std::max(t, std::min(tx, ty));
     const Level& block = levels_[static_cast<std::size_t>(level)];
     const float highest = block.highest[static_cast<std::size_t>(j >> level) * block.columns + (i >> level)];
-    // A vertical ray stays in its block; it can only go up.
+    // A vertical ray never leaves its square, and goes up since it starts on the upper side of a facet.
     if (t_out == kNever) return std::nullopt;
+    // If the ray is low enough to meet the square, look at smaller squares, and at last at facets.
     if (std::min(ray.heightAt(t), ray.heightAt(t_out)) <= highest) {
       if (level > 0) {
         --level;
@@ -113,7 +116,7 @@ std::optional<SurfaceHit> HeightTracer::trace(std::size_t facet, Vec3 origin, Ve
         return SurfaceHit{hit, point, travelled + t_hit * horizontal};
       }
     }
-    // Leave the block.
+    // Go on to the next square, and look at larger squares again.
     const Vec3 exit = ray.origin + t_out * direction;
     if (tx <= ty) {
       i = direction.x > 0 ? x1 : x0 - 1;

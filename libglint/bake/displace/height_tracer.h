@@ -15,13 +15,14 @@ struct SurfaceHit {
   float distance = 0;  ///< horizontal, cells
 };
 
-/// Traces rays against a periodic height surface through a pyramid of the largest heights of blocks of 2^k x 2^k cells.
-/// Needs a third of the heights' memory, and no copies of the map for rays that leave it.
+/// Traces rays against a periodic height surface. A pyramid with the largest height of every square of 2^k x 2^k cells lets
+/// rays skip squares that they pass above. The pyramid takes a third more memory than heights do; a ray that leaves the map
+/// enters at the opposite side.
 class HeightTracer {
  public:
   explicit HeightTracer(const HeightSurface& surface);
 
-  /// First facet that the ray meets from above after it has left `facet`.
+  /// Finds the first facet that a ray meets from above after it has left `facet`.
   /// @param origin     a point of `facet`
   /// @param direction  unit vector on the upper side of `facet`
   /// @return nothing if the ray escapes
@@ -31,7 +32,7 @@ class HeightTracer {
   struct Level {
     int columns = 0;
     int rows = 0;
-    std::vector<float> highest;  ///< [rows][columns]
+    std::vector<float> highest;  ///< [rows][columns]: largest height of a square
   };
   struct Ray;
   float hitCell(const Ray& ray, int i, int j, float t_in, float t_out, std::size_t& facet) const;

@@ -14,10 +14,11 @@
 namespace glint::bake {
 namespace {
 
-constexpr std::size_t kMostCells = 4096;  // that are summed
-constexpr std::size_t kChunkCells = 32;   // whose sum is kept in float
+constexpr std::size_t kMostCells = 4096;  // cells that are summed, in all patches together
+constexpr std::size_t kChunkCells = 32;   // cells whose sum a float holds exactly enough
 
-/// The same triangles with `parts` times the vertices along each axis. Lengths are in the new cells.
+/// Cuts a surface into smaller cells: the same triangles with `parts` times the vertices along each axis.
+/// @return heights of the vertices, in the smaller cells
 std::vector<float> refined(int columns, int rows, std::span<const float> heights, int parts) {
   const HeightSurface surface(columns, rows, heights);
   std::vector<float> out(heights.size() * static_cast<std::size_t>(parts) * parts);
@@ -33,9 +34,9 @@ std::vector<float> refined(int columns, int rows, std::span<const float> heights
   return out;
 }
 
-/// What pairs of directions need for GGX lobes.
+/// Half vectors and Fresnel factors of all pairs of directions: GGX lobes of all cells share them.
 struct PairTable {
-  std::vector<float> x, y, z, fresnel;  ///< [directions][padded directions]: half vectors
+  std::vector<float> x, y, z, fresnel;  ///< [directions][padded directions]; x, y and z are half vectors
   PairTable(const DirectionTable& directions, const BaseBrdf& base) {
     const std::size_t size = directions.count * directions.padded;
     x.resize(size), y.resize(size), z.resize(size), fresnel.resize(size);
@@ -51,7 +52,7 @@ struct PairTable {
   }
 };
 
-/// row[o] = ggxLobe with Fresnel's factor of one light and every view from `first` on.
+/// row[o] = ggxLobe times Fresnel's factor, for one light direction and every view direction o from `first` on.
 GLINT_MULTIVERSION void ggxLobeRow(const DirectionTable& directions, const PairTable& pairs, float alpha, const VmfLobe& lobe,
                                    std::size_t light, std::size_t first, float* row) {
   const Vec3 centre = lobeCentre(lobe), wi = directions.at(light);
@@ -62,7 +63,7 @@ GLINT_MULTIVERSION void ggxLobeRow(const DirectionTable& directions, const PairT
     row[o] = fresnel[o] * ggxLobe(alpha, centre, lobe.kappa, wi, {ox[o], oy[o], oz[o]}, {hx[o], hy[o], hz[o]});
 }
 
-/// out[channel][i][o] += weight of the channel * ggxLobe for i <= o.
+/// out[channel][i][o] += weights[channel] * ggxLobe * Fresnel's factor, for i <= o.
 void addGgxLobe(const DirectionTable& directions, const PairTable& pairs, float alpha, const VmfLobe& lobe,
                 std::span<const float> weights, float* row, float* out) {
   const std::size_t padded = directions.padded;
@@ -74,10 +75,11 @@ void addGgxLobe(const DirectionTable& directions, const PairTable& pairs, float 
   }
 }
 
-/// The rows whose products are lobeCosines: five for every lobe, one for each term of a moment. Scales hold the moments.
+/// lobeCosines of a pair of directions as a sum of products of one factor for each direction: five rows of factors for every
+/// lobe, one for each term of the lobe's moments. A matrix product then sums all pairs and lobes.
 struct DiffuseRows {
   std::vector<float> values;  ///< [rows][padded directions]
-  std::vector<float> scales;  ///< [rows]
+  std::vector<float> scales;  ///< [rows]: moment of the term, times the lobe's amplitude
 };
 
 void fillDiffuseRows(const DirectionTable& directions, std::span<const VmfLobe> lobes, DiffuseRows& rows) {
@@ -101,7 +103,7 @@ void fillDiffuseRows(const DirectionTable& directions, std::span<const VmfLobe> 
   }
 }
 
-/// Sums the cells of a downsampled surface.
+/// Sums the light that the cells of a downsampled surface reflect.
 class LowEstimator {
  public:
   LowEstimator(std::span<const float> heights, const LobeField& field, std::span<const Vec3> directions, const PatchGrid& grid)
@@ -117,12 +119,14 @@ class LowEstimator {
         masks_(surface_, directions) {}
 
   EffectiveBrdf sum() const {
+    // Zeros for all patches.
     EffectiveBrdf result;
     const std::size_t n = directions_.count;
     result.directions = n;
     result.patches = static_cast<std::size_t>(grid_.count());
     result.channels = field_.channels;
     result.values.resize(result.channels * result.patches * n * n);
+    // Cut the cells of every patch into chunks, and sum each chunk in float.
     struct Chunk {
       int patch;
       std::size_t first, last;
@@ -141,6 +145,7 @@ class LowEstimator {
       addCells(std::span(cells[static_cast<std::size_t>(chunk.patch)]).subspan(chunk.first, chunk.last - chunk.first),
                sums[c].data());
     });
+    // Add the chunks in order, so that sums do not depend on threads. Pairs i > o are the same as o < i.
     for (std::size_t c = 0; c < chunks.size(); ++c) {
       const auto patch = static_cast<std::size_t>(chunks[c].patch);
       const float scale = 1 / static_cast<float>(cells[patch].size());
@@ -154,7 +159,7 @@ class LowEstimator {
   }
 
  private:
-  /// Cells of a patch, or an even choice of them.
+  /// Cells of a patch, or an even choice from them where there are more than kMostCells.
   std::vector<std::size_t> cellsOf(int patch) const {
     const int c = patch % grid_.columns, r = patch / grid_.columns;
     std::vector<std::size_t> all;
@@ -168,7 +173,7 @@ class LowEstimator {
     return some;
   }
 
-  /// For each direction, one bit for each facet of a cell that sees and faces it.
+  /// Sets bit k of bits[d] where facet k of a cell faces direction d and is visible from there. A cell has at most 32 facets.
   void facetBits(std::size_t cell, std::vector<std::uint64_t>& bits) const {
     std::fill(bits.begin(), bits.end(), 0);
     const std::size_t i = cell % static_cast<std::size_t>(grid_.coarse_x), j = cell / static_cast<std::size_t>(grid_.coarse_x);
@@ -185,7 +190,7 @@ class LowEstimator {
     }
   }
 
-  /// Scratch of one task.
+  /// Memory that one task uses again for every cell.
   struct Scratch {
     Scratch(const DirectionTable& directions, std::size_t channels)
         : pairs(channels * directions.padded * directions.padded),
@@ -195,18 +200,18 @@ class LowEstimator {
       rows.values.resize(left.size());
     }
     std::vector<float> pairs;  ///< [channels][padded directions][padded directions]
-    std::vector<float> left;   ///< as DiffuseRows, weighted
+    std::vector<float> left;   ///< rows of DiffuseRows, times their scales
     std::vector<float> row;
     DiffuseRows rows;
     std::vector<std::uint64_t> bits;
   };
 
-  /// Factor of the base for a lobe.
+  /// Colour of a lobe: its factor of the base.
   float color(std::size_t lobe, std::size_t channel) const {
     return field_.colors.empty() ? 1.0f : field_.colors[lobe * field_.channels + channel];
   }
 
-  /// The integral of f cos(wi) cos(wo) D of a cell for all pairs i <= o.
+  /// Computes the integral of f cos(wi) cos(wo) D of a cell, for all pairs i <= o.
   void fillPairs(std::size_t cell, Scratch& s) const {
     std::fill(s.pairs.begin(), s.pairs.end(), 0.0f);
     const std::size_t first = cell * field_.lobe_count, padded = directions_.padded;
@@ -230,6 +235,7 @@ class LowEstimator {
     }
   }
 
+  /// Adds the light that cells reflect, times the share of each cell's facets that both directions see.
   void addCells(std::span<const std::size_t> cells, float* sums) const {
     const std::size_t n = directions_.count, padded = directions_.padded;
     Scratch s(directions_, field_.channels);
@@ -251,7 +257,7 @@ class LowEstimator {
   DirectionTable directions_;
   PairTable pairs_;
   PatchGrid grid_;
-  int parts_;  ///< vertices added along a side of a cell, so that partly shadowed cells are
+  int parts_;  ///< smaller cells along a side of a cell, so that a cell can be shadowed in part
   std::vector<float> heights_;
   HeightSurface surface_;
   VisibilityMasks masks_;

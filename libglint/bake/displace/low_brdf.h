@@ -8,20 +8,23 @@
 
 namespace glint::bake {
 
-/// The lobes of the cells of a level, with the base that each stands for.
+/// The lobes of all cells of a downsampled level. A lobe stands for facets with the base BRDF, in its own colour and roughness.
 struct LobeField {
   BaseBrdf base;
-  std::size_t lobe_count = 0;  ///< of a cell
+  std::size_t lobe_count = 0;  ///< lobes of one cell
   std::size_t channels = 1;
   std::span<const VmfLobe> lobes;  ///< [coarse_y][coarse_x][lobe_count]
-  std::span<const float> colors;   ///< [coarse_y][coarse_x][lobe_count][channels]; empty: 1
-  std::span<const float> alphas;   ///< [coarse_y][coarse_x][lobe_count]; empty: that of the base
+  std::span<const float> colors;   ///< [coarse_y][coarse_x][lobe_count][channels]; empty: all 1
+  std::span<const float> alphas;   ///< [coarse_y][coarse_x][lobe_count]; empty: all the base's alpha
 };
 
-/// Effective BRDFs of a downsampled surface whose cells have the multi-lobe BRDF f'_low, single scattering only: the
-/// denominators of the scaling function (Wu 2019, Eq. 12 and 20), times the visible projected area of the view.
-/// @param heights  [coarse_y][coarse_x] of the vertices, cells
-/// @note of more than 4096 cells, an even choice of as many is summed
+/// Computes what a downsampled surface reflects when every cell has its multi-lobe BRDF f'_low (Wu 2019, Eq. 12), with
+/// shadowing and masking and without interreflections: the effective BRDF of each patch, times the visible projected area of
+/// the view.
+///
+/// These are the denominators of the scaling function (Eq. 20), which corrects the downsampled surface to look as the original.
+/// @param heights  [coarse_y][coarse_x], heights of the vertices in cells
+/// @note sums at most 4096 cells, evenly chosen, where there are more
 EffectiveBrdf lowBrdf(std::span<const float> heights, const LobeField& field, std::span<const Vec3> directions,
                       const PatchGrid& grid);
 

@@ -7,7 +7,7 @@
 
 namespace glint::bake {
 
-/// The facets of one patch as a list, of which `samples` are drawn evenly.
+/// The facets of one patch as a list, from which samples are drawn evenly.
 class PatchFacets {
  public:
   PatchFacets(const PatchGrid& grid, int patch, std::size_t wanted)
@@ -17,8 +17,10 @@ class PatchFacets {
     repeats_ = std::max<std::size_t>(1, wanted / facets_);
     samples_ = wanted < facets_ ? std::max<std::size_t>(wanted, 1) : facets_ * repeats_;
   }
+  /// Number of samples: about `wanted`, but the same number of each facet where there are enough for all.
   std::size_t samples() const { return samples_; }
-  /// Facet of sample s: each as often as any other, or one of each of `samples` equal parts of the list.
+  /// Facet of sample s. Where there are fewer samples than facets, the list is cut into as many equal parts as there are
+  /// samples, and `random`, in (0, 1), chooses a facet in part s.
   std::size_t facet(std::size_t s, float random) const {
     const std::size_t k =
         samples_ >= facets_

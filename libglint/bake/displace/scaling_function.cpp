@@ -6,11 +6,12 @@
 namespace glint::bake {
 namespace {
 
-/// Denominators below this share of those of a flat mirror of all light count as dark: S is 1 there.
+/// Where a denominator is below this share of what a flat surface with a BRDF of 1 has, S is 1: there is no light to scale.
 constexpr double kDark = 1e-6;
 constexpr double kMostScale = 1000;  // S stays finite in half precision
 
-/// Pairs (i, o), i <= o, of directions that are not grazing and where the downsampled surface reflects in every patch.
+/// Lists the pairs (i, o), i <= o, of directions that are not grazing and in which every patch of the downsampled surface
+/// reflects light.
 std::vector<std::pair<std::size_t, std::size_t>> usablePairs(const EffectiveBrdf& low, std::span<const Vec3> directions,
                                                              std::size_t channel) {
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
@@ -27,7 +28,7 @@ std::vector<std::pair<std::size_t, std::size_t>> usablePairs(const EffectiveBrdf
   return pairs;
 }
 
-/// Compares R with T S, and finds what the best rank-1 matrix would keep from the eigenvalues of R R^T.
+/// Compares R with T S, and finds from the eigenvalues of R R^T how much of R the best matrix of rank 1 keeps.
 void measure(const EffectiveBrdf& original, const EffectiveBrdf& low, std::span<const Vec3> directions, std::size_t channel,
              ScalingFactors& factors) {
   const auto pairs = usablePairs(low, directions, channel);
@@ -59,6 +60,7 @@ ScalingFactors factorScaling(const EffectiveBrdf& original, const EffectiveBrdf&
   const std::size_t n = directions.size();
   const auto patches = static_cast<std::size_t>(grid.count());
   const std::vector<double> total = original.mean(grid, channel), total_low = low.mean(grid, channel);
+  // T of each patch: its light over the light that it would have with R of the whole map.
   ScalingFactors factors;
   double mean = 0;
   std::vector<double> spatial(patches);
@@ -76,6 +78,7 @@ ScalingFactors factorScaling(const EffectiveBrdf& original, const EffectiveBrdf&
     mean += grid.share(static_cast<int>(p)) * spatial[p];
   }
   for (double& t : spatial) factors.spatial.push_back(static_cast<float>(mean > 0 ? t / mean : 1));
+  // S of each pair: what the map reflects over what it would reflect with T alone.
   for (std::size_t o = 0; o < n; ++o) {
     for (std::size_t i = 0; i <= o; ++i) {
       const std::size_t k = i * n + o;

@@ -11,15 +11,16 @@
 namespace glint::bake {
 namespace {
 
-constexpr int kBatch = 16;         // directions of a task: one 16-bit word of each facet
+constexpr int kBatch = 16;         // directions of a task: they fill one 16-bit word of each facet
 constexpr float kLowest = -1e30f;  // a horizon that hides nothing
 
-/// The surface seen along one axis: lines run along the major axis, kernels over the minor one.
+/// The surface, stored for sweeps along one of its axes. The major axis is the axis that sweeps advance along; kernels run over
+/// the minor axis.
 struct Orientation {
   int major = 0;
   int minor = 0;
-  std::vector<float> rows;          ///< [major][minor + 1] heights, the first repeated at the end
-  std::vector<float> centroids[2];  ///< [major][minor] heights of the centroids of the two facets of a cell
+  std::vector<float> rows;          ///< [major][minor + 1]: heights of vertices, the first height repeated at the end
+  std::vector<float> centroids[2];  ///< [major][minor]: heights of the centroids of the two facets of a cell
   std::size_t major_step = 0;       ///< cells between neighbours along the major axis
   std::size_t minor_step = 0;
 };
@@ -49,7 +50,7 @@ Orientation orient(const HeightSurface& surface, bool along_x) {
   return o;
 }
 
-/// A whole number of cells and the rest of a position along the minor axis, wrapped.
+/// A position along the minor axis, wrapped into the map: whole cells and the rest.
 struct Shift {
   int whole;
   float part;
@@ -61,7 +62,7 @@ Shift shiftOf(double position, int size) {
   return {static_cast<int>(wrapped) % size, static_cast<float>(position - whole)};
 }
 
-/// horizon[k] = max(horizon[k] - drop, height at k + shift).
+/// Advances the horizon by a row: horizon[k] = max(horizon[k] - drop, height at k + shift), heights interpolated.
 GLINT_MULTIVERSION void advance(const float* row, int size, Shift shift, float drop, float* horizon) {
   const auto part = [&](int first, int last, const float* from) {
     for (int k = first; k < last; ++k) horizon[k] = std::max(horizon[k] - drop, from[k] + shift.part * (from[k + 1] - from[k]));
@@ -71,22 +72,22 @@ GLINT_MULTIVERSION void advance(const float* row, int size, Shift shift, float d
   horizon[size] = horizon[0];
 }
 
-/// What lies ahead of a row of points: the row of heights that they look over, and the horizon that lines brought from beyond
-/// it.
+/// What lies ahead of a row of points: the nearest row of heights, and the horizon of all rows beyond it. The shifts say where
+/// a point looks over each.
 struct Ahead {
   const float* row;
   Shift on_row;
   const float* horizon;
   Shift on_horizon;
-  float drop;  ///< of the horizon to the row
+  float drop;  ///< how much the line of sight falls from the horizon's row to the nearest row
 };
 
-/// Sets `bit` of words[k] where height[k] + rise is below neither. The row is taken where the point looks over it, so only what
-/// is farther away is interpolated between lines.
+/// Sets `bit` of words[k] where height[k] + rise is above both the nearest row and the horizon. The nearest row is taken
+/// exactly where the point looks over it; only the horizon, farther away, is interpolated between lines.
 GLINT_MULTIVERSION void compare(const float* height, const Ahead& ahead, int size, float rise, std::uint32_t bit,
                                 std::uint32_t* words) {
   const float row_part = ahead.on_row.part, horizon_part = ahead.on_horizon.part, drop = ahead.drop;
-  // Both shifts wrap somewhere: three stretches without a seam.
+  // Both shifts wrap somewhere, so the row is cut into three stretches without a seam.
   const int seam_row = size - ahead.on_row.whole, seam_horizon = size - ahead.on_horizon.whole;
   const int seams[4] = {0, std::min(seam_row, seam_horizon), std::max(seam_row, seam_horizon), size};
   for (int stretch = 0; stretch < 3; ++stretch) {
@@ -101,15 +102,16 @@ GLINT_MULTIVERSION void compare(const float* height, const Ahead& ahead, int siz
   }
 }
 
-/// One direction in an orientation.
+/// The sweep of one direction along the major axis.
 struct Sweep {
   double drift = 0;  ///< cells along the minor axis for each cell along the major axis, signed
   float rise = 0;    ///< cells of height for each cell along the major axis, > 0
-  int reach = 0;     ///< steps beyond the map after which nothing can hide anything
+  int reach = 0;     ///< cells beyond the map from which the highest vertex can still hide the lowest
   std::vector<float> horizon;
 };
 
-/// Sweeps up to 16 directions of one sector; calls store(cell along the major axis, half, words).
+/// Sweeps up to 16 directions of one sector together. Calls store(cell along the major axis, facet of the cell (0 or 1), words)
+/// with one word of bits for each cell along the minor axis.
 template <class Store>
 void sweepBatch(const Orientation& o, bool positive, std::vector<Sweep>& sweeps, const Store& store) {
   int reach = 0;
@@ -118,9 +120,9 @@ void sweepBatch(const Orientation& o, bool positive, std::vector<Sweep>& sweeps,
     reach = std::max(reach, sweep.reach);
   }
   std::vector<std::uint32_t> words(static_cast<std::size_t>(o.minor));
-  // Lines keep their number while they drift: line k is at k + drift * step.
+  // A line of sight keeps its number while it drifts along the minor axis: line k is at k + drift * step.
   for (int n = -reach; n <= o.major; ++n) {
-    const int step = positive ? o.major - n : n - 1;  // towards the viewer of the horizon: from far ahead to the map
+    const int step = positive ? o.major - n : n - 1;  // from far ahead back to the map
     const int wrapped = ((step % o.major) + o.major) % o.major;
     const float* row = &o.rows[static_cast<std::size_t>(wrapped) * (o.minor + 1)];
     const int cell = positive ? step - 1 : step;  // the cell whose far side the lines are about to reach
@@ -143,12 +145,14 @@ void sweepBatch(const Orientation& o, bool positive, std::vector<Sweep>& sweeps,
   }
 }
 
+/// Directions that one task sweeps: all in the same sector.
 struct Batch {
   bool along_x;
   bool positive;
   std::vector<std::size_t> directions;
 };
 
+/// Sorts directions into four sectors, by their longer axis and its sign, and cuts each sector into batches.
 std::vector<Batch> makeBatches(std::span<const Vec3> directions) {
   std::vector<Batch> batches;
   for (int sector = 0; sector < 4; ++sector) {
@@ -166,6 +170,7 @@ std::vector<Batch> makeBatches(std::span<const Vec3> directions) {
   return batches;
 }
 
+/// @param relief  difference of the largest and the smallest height
 Sweep makeSweep(Vec3 direction, bool along_x, float relief) {
   const double major = std::max(1e-6, static_cast<double>(std::abs(along_x ? direction.x : direction.y)));
   const double signed_major = (along_x ? direction.x : direction.y) < 0 ? -major : major;

@@ -8,17 +8,18 @@
 
 namespace glint::bake {
 
-/// Which facets of a periodic surface see which directions: one bit for each, taken at the facet's centroid.
+/// Tells which directions each facet of a periodic surface sees: one bit for each direction, found at the centroid of the
+/// facet.
 ///
-/// One running maximum is swept over the whole map for each direction: towards the horizon and back along lines that advance by
-/// one cell of the direction's longer axis at a time; heights between the cells of the shorter axis are interpolated. So the
-/// cost does not depend on how far shadows reach, O(facets x directions).
+/// For each direction, a running maximum of heights (the horizon) sweeps once over the map, from far ahead in that direction.
+/// It advances one cell at a time along the longer axis of the direction, and interpolates heights along the shorter axis. So
+/// the cost does not depend on how far shadows reach: O(facets x directions).
 ///
-/// Bits say nothing about whether a facet faces the direction: multiply by its cosine.
+/// A bit does not say whether the facet faces the direction: multiply by its cosine.
 class VisibilityMasks {
  public:
   /// @param directions  unit vectors with z > 0
-  /// @note memory: 2 bytes for every 16 directions and facet
+  /// @note memory: 2 bytes for every facet and 16 directions
   VisibilityMasks(const HeightSurface& surface, std::span<const Vec3> directions);
 
   bool visible(std::size_t facet, std::size_t direction) const {
@@ -32,7 +33,7 @@ class VisibilityMasks {
   }
 
  private:
-  std::size_t slots_ = 0;             ///< 16-bit words of each facet
+  std::size_t slots_ = 0;             ///< number of 16-bit words of a facet
   std::vector<std::uint16_t> place_;  ///< [directions]: slot * 16 + bit
   std::vector<std::uint16_t> bits_;   ///< [facets][slots_]
 };

@@ -15,13 +15,13 @@ namespace glint::bake {
 namespace {
 
 constexpr int kIterations = 24;
-constexpr float kSeedKappa = 20;     // of the first guess: lobes of 13 degrees overlap enough to move
-constexpr float kBlurKappa = 51.3f;  // a deviation of 8 degrees
+constexpr float kSeedKappa = 20;  // bandwidth of the first guess: lobes of 13 degrees overlap, so that normals can change lobe
+constexpr float kBlurKappa = 51.3f;  // bandwidth of a lobe with a deviation of 8 degrees
 constexpr int kTestNormals = 32;
-/// Lobes with less than this share of the weight are dropped.
+/// A lobe with less than this share of the weight is dropped.
 constexpr double kEmptyShare = 1e-5;
 
-/// exp(x) for x <= 0, relative error below 3e-6; plain arithmetic, so that loops of it are vectorised. 0 below -87.
+/// exp(x) for x <= 0, with a relative error below 3e-6; 0 below -87. Plain arithmetic, of which the compiler makes vectors.
 inline float fastExp(float x) {
   const float clamped = std::max(x, -87.0f) * 1.44269504f;
   const float whole = std::floor(clamped);
@@ -37,7 +37,7 @@ struct Lobe {
   double weight = 0;
 };
 
-/// Normals as arrays, for the compiler's vectors.
+/// Normals as arrays, of which the compiler makes vectors.
 struct Normals {
   std::vector<float> x, y, z, weight;
   std::size_t size() const { return x.size(); }
@@ -53,7 +53,8 @@ Normals split(std::span<const WeightedNormal> normals) {
   return out;
 }
 
-/// out[k] = scale * exp(kappa (dot(centre, n_k) - 1)). The cosine is taken from the chord, which keeps its digits near 1.
+/// out[k] = scale * exp(kappa (dot(centre, n_k) - 1)). 1 - cosine is computed from the chord, which keeps digits that the
+/// cosine loses near 1.
 GLINT_MULTIVERSION void lobeValues(const float* x, const float* y, const float* z, std::size_t count, Vec3 centre, float kappa,
                                    float scale, float* out) {
   for (std::size_t k = 0; k < count; ++k) {
@@ -62,16 +63,19 @@ GLINT_MULTIVERSION void lobeValues(const float* x, const float* y, const float* 
   }
 }
 
+/// Factor that makes a lobe integrate to 2 pi over the sphere.
 float lobeScale(float kappa) { return kappa / (1 - std::exp(-2 * kappa)); }
 
-/// The lobe with these moments. `scatter` is the weighted mean of |n - centre|^2 / 2 around the mean direction.
+/// Bandwidth of the lobe with these moments.
+/// @param scatter  weighted mean of |n - centre|^2 / 2 around the mean direction
 float kappaOf(double scatter) {
   // Mean cosine r = 1 - scatter; kappa = r (3 - r^2) / (1 - r^2) (Banerjee et al. 2005).
   const double r = std::max(0.0, 1 - scatter);
   return static_cast<float>(std::min<double>(kMaxKappa, r * (3 - r * r) / std::max(1e-9, scatter * (1 + r))));
 }
 
-/// k-means++: each centre is a normal drawn with probability weight * squared distance to the centres so far.
+/// Draws the first centres from the normals (k-means++): a normal with probability in proportion to its weight times its
+/// squared distance to the nearest centre so far.
 std::vector<Lobe> firstLobes(const Normals& normals, std::size_t count) {
   std::vector<Lobe> lobes;
   std::vector<double> distance(normals.size(), 4);
@@ -97,13 +101,13 @@ std::vector<Lobe> firstLobes(const Normals& normals, std::size_t count) {
   return lobes;
 }
 
-/// Scratch of one fit.
+/// Share of each normal in each lobe: memory of one fit.
 struct Shares {
   std::array<std::vector<float>, kMaxLobes> values;
   std::vector<float> inverse;
 };
 
-/// Expectation: values[l][k] = weight of normal k times its share in lobe l.
+/// Turns values of lobes into shares: values[l][k] becomes the weight of normal k times the share that lobe l has in it.
 GLINT_MULTIVERSION void normalise(const float* weight, std::size_t count, std::size_t lobes, Shares& shares) {
   float* inverse = shares.inverse.data();
   for (std::size_t k = 0; k < count; ++k) inverse[k] = 1e-30f;
@@ -114,7 +118,7 @@ GLINT_MULTIVERSION void normalise(const float* weight, std::size_t count, std::s
     for (std::size_t k = 0; k < count; ++k) shares.values[l][k] *= inverse[k];
 }
 
-/// The whole expectation step.
+/// The expectation step: computes the share of every normal in every lobe.
 void shareOut(const Normals& normals, std::span<const Lobe> lobes, Shares& shares) {
   const std::size_t count = normals.size();
   for (std::size_t l = 0; l < lobes.size(); ++l) {
@@ -126,7 +130,7 @@ void shareOut(const Normals& normals, std::span<const Lobe> lobes, Shares& share
   normalise(normals.weight.data(), count, lobes.size(), shares);
 }
 
-/// Maximisation of one lobe.
+/// The maximisation step of one lobe: moves it to the mean of its normals.
 void updateLobe(const Normals& normals, const std::vector<float>& share, double total, Lobe& lobe) {
   double w = 0, x = 0, y = 0, z = 0;
   for (std::size_t k = 0; k < normals.size(); ++k) {

@@ -15,21 +15,21 @@ struct WeightedNormal {
 
 /// Fits von Mises-Fisher lobes to weighted unit normals by expectation maximisation (Wu 2019, Eq. 4; Han et al. 2007).
 ///
-/// Starts from a weighted k-means++ choice with fixed random numbers, so the same normals give the same lobes. Bandwidths are
-/// at most kMaxKappa: normals that are all the same give one lobe of that bandwidth and empty lobes.
+/// Starts from a weighted k-means++ choice with fixed random numbers, so the same normals give the same lobes. A bandwidth is
+/// at most kMaxKappa: normals that are all the same give one lobe of kMaxKappa, and empty lobes.
 /// @param normals  z > 0; at least one, weights > 0
-/// @param lobes    at most kMaxLobes; largest amplitude first, empty lobes last with amplitude 0. Amplitudes add up to the
-///                 weights
+/// @param lobes    at most kMaxLobes; largest amplitude first, empty lobes with amplitude 0 last. The sum of the amplitudes is
+///                 the sum of the weights
 void fitLobes(std::span<const WeightedNormal> normals, std::span<VmfLobe> lobes);
 
-/// Means over each lobe of numbers that normals carry, weighted by the normals' shares in it: the lobe's colour, say.
+/// Averages numbers that normals carry, such as colours, over each lobe. A normal counts by its share in the lobe.
 /// @param values  [normals][count]
-/// @param means   [lobes][count]; 0 for empty lobes
+/// @param means   [lobes][count]: the result; 0 for empty lobes
 void averageOverLobes(std::span<const WeightedNormal> normals, std::span<const VmfLobe> lobes, std::span<const float> values,
                       std::span<float> means);
 
-/// How well lobes represent normals: both distributions blurred by a lobe of 8 degrees, compared at up to 32 of the normals;
-/// norm of the difference over the norm.
+/// Relative error of lobes as a distribution of normals: the distributions of the normals and of the lobes are both blurred by
+/// a lobe of 8 degrees and compared at up to 32 of the normals. Norm of the difference over the norm.
 float lobeError(std::span<const WeightedNormal> normals, std::span<const VmfLobe> lobes);
 
 }  // namespace glint::bake
