@@ -21,7 +21,7 @@
 namespace glint::bake {
 namespace {
 
-// An image that decodes to this much of its energy or less is not scaled up: what is left of it is mostly error.
+// An image that decodes to this share of its mass or less is mostly error, and is not scaled up.
 constexpr double kLeastEnergy = 0.5;
 
 void checkOptions(const CompressionOptions& options) {
@@ -39,10 +39,10 @@ void checkOptions(const CompressionOptions& options) {
   require(options.max_iterations >= 1, "compress.max_iterations", "the iterations must be at least 1");
 }
 
-/// Regions along each axis that are of use: no more than the finest level has images, and so few that clusters without slices, which
-/// take memory all the same, do not outnumber those with slices many times.
+/// Most regions along each axis that are of use. More regions than the finest level has images stay empty. Clusters without
+/// slices take memory too, so their number is bounded by a few times the number of slices.
 int mostRegions(const NdfPyramid& pyramid) {
-  constexpr int kSureRegions = 8;  // the default of cp
+  constexpr int kSureRegions = 8;  // allowed for every pyramid: the default of cp
   constexpr double kSureClusters = 1 << 20, kClustersPerBlock = 4;
   const PyramidShape& shape = pyramid.shape;
   double stored = 0;
@@ -59,7 +59,7 @@ void checkRegions(const NdfPyramid& pyramid, int regions) {
                 fmt::format("give --regions of at most {}", most));
 }
 
-/// One run: the steps of compressPyramid() and what they pass on.
+/// One run of compressPyramid(): its steps, and the data that they pass on.
 class Compressor {
  public:
   Compressor(const NdfPyramid& pyramid, const CompressionOptions& options, const ProgressFn& progress)
@@ -76,12 +76,14 @@ class Compressor {
         density_scales_(index_.imageCount(), 0.0f) {}
 
   NdfCpData run(CompressionReport* report) {
+    // Measure the clusters, and how much energy and how many slices each group of levels has.
     forEachCluster([&](std::size_t c) { statistics_[c] = measureCluster(index_, c); });
     for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
       groupOf(c).energy += statistics_[c].energy;
       groupOf(c).slices += static_cast<std::uint64_t>(index_.sliceCount(c));
       energy_ += statistics_[c].energy;
     }
+    // Decompose all clusters, choose their sizes, and encode them.
     decompose();
     if (options_.tolerance > 0) {
       meetTolerance();
@@ -94,15 +96,16 @@ class Compressor {
   }
 
  private:
-  /// Levels whose clusters hold no slices of other levels: each group meets a tolerance by itself.
+  /// Neighbouring levels that share clusters. Each group meets a tolerance by itself.
   struct LevelGroup {
     double energy = 0;
     std::uint64_t slices = 0;
-    double gain_per_byte = 0;  ///< error that a byte has to take off
+    double gain_per_byte = 0;  ///< squared error that a byte must remove to be worth storing
   };
 
   std::size_t clustersPerGroup() const { return index_.clusterCount() / groups_.size(); }
   LevelGroup& groupOf(std::size_t cluster) { return groups_[cluster / clustersPerGroup()]; }
+  /// Squared error that a group may have.
   double budget(const LevelGroup& group) const { return options_.tolerance * options_.tolerance * group.energy; }
 
   static int regions(const CompressionOptions& options) {
@@ -110,8 +113,8 @@ class Compressor {
     return options.method == CompressionMethod::cp ? 8 : 1;
   }
 
-  // The finest levels differ most from the others and hold most of the slices. Axes of tucker cost little: it can have more of
-  // them.
+  // The finest levels differ most from other levels and have most of the slices. Bases of tucker are small, so level groups can
+  // have bases of their own.
   static int levelGroups(const CompressionOptions& options) { return options.method == CompressionMethod::tucker ? 3 : 1; }
 
   template <class Work>
@@ -128,7 +131,7 @@ class Compressor {
   void decompose() {
     std::vector<std::optional<ClusterModel>> models(index_.clusterCount());
     forEachCluster([&](std::size_t c) {
-      // Finishing all clusters to this error leaves 1 part in 400 of the budget: further columns are not worth their memory.
+      // With this error in every cluster, the sum is 1/400 of the budget: more columns are not worth their memory.
       const LevelGroup& group = groupOf(c);
       const double share =
           static_cast<double>(index_.sliceCount(c)) / static_cast<double>(std::max<std::uint64_t>(1, group.slices));
@@ -138,7 +141,7 @@ class Compressor {
     for (auto& model : models) models_.push_back(std::move(*model));
   }
 
-  /// Encodes the clusters whose choice, or price of a byte, changed, and scales the images.
+  /// Encodes every cluster whose choice changed, or whose group's gain per byte changed, and scales the images.
   void encode(const std::vector<int>& selection) {
     forEachCluster([&](std::size_t c) {
       const double gain_per_byte = groupOf(c).gain_per_byte;
@@ -151,6 +154,7 @@ class Compressor {
     scaleImages();
   }
 
+  /// Finds the scale with which each image integrates to 1.
   void scaleImages() {
     std::vector<double> sums(index_.imageCount(), 0.0);
     std::vector<double> positive(index_.imageCount(), 0.0);
@@ -173,7 +177,7 @@ class Compressor {
     }
   }
 
-  /// Squared error of a slice as a reader decodes it, with the scale of its image.
+  /// Squared error of a slice as a reader decodes it: with the scale of its image.
   double sliceError(std::size_t cluster, int slice) const {
     // slice - scale decoded = (slice - decoded) + (1 - scale) decoded
     const SliceError& e = encoded_[cluster].slices[slice];
@@ -190,6 +194,7 @@ class Compressor {
     return sum;
   }
 
+  /// Searches the smallest choices of all clusters with which every group meets the tolerance, and encodes them.
   void meetTolerance() {
     std::vector<ToleranceSearch> searches;
     for (std::size_t g = 0; g < groups_.size(); ++g) {
@@ -226,6 +231,7 @@ class Compressor {
                 "ask for a larger tolerance, or for coefficients of more bits");
   }
 
+  /// Puts the encoded clusters into the arrays of NdfCp.
   NdfCpData pack() {
     NdfCpData data;
     index_.describe(data);
@@ -245,7 +251,7 @@ class Compressor {
     return data;
   }
 
-  /// Places for the blocks that any image still has.
+  /// Numbers the places: the blocks that occur in any image.
   void numberBlocks(NdfCpData& data) const {
     const std::size_t blocks = pyramid_.shape.blocksPerImage();
     data.block_places.assign(blocks, kNoBlockPlace);
@@ -259,11 +265,11 @@ class Compressor {
     data.header.places = static_cast<int>(data.place_blocks.size());
   }
 
-  /// Appends one cluster: its record, mask and factors.
+  /// Appends one cluster: its record, factors and mask.
   void packCluster(int region, std::size_t c, NdfCpData& data) {
     const EncodedCluster& e = encoded_[c];
     const int coefficient_bytes = coefficientElementBytes(options_.coefficient_type);
-    // Spots begin where their numbers are aligned.
+    // A reader loads 32-bit numbers of spots, so they begin at a multiple of four bytes.
     if (e.spots > 0) data.coefficients.resize((data.coefficients.size() + 3) / 4 * 4);
     NdfCluster cluster;
     cluster.first_basis =
@@ -282,6 +288,7 @@ class Compressor {
     append(data.coefficients, e.coefficients);
     append(data.scales, e.scales);
     append(data.core, e.core);
+    // Mark the images of the region that have a slice in this cluster, and count them word by word.
     data.masks.resize(data.masks.size() + (index_.slotCount(region) + 63) / 64, 0);
     for (const std::uint32_t s : e.kept) {
       const std::uint16_t slot = index_.slot(index_.image(index_.firstSlice(c) + s));
@@ -294,9 +301,9 @@ class Compressor {
     }
   }
 
-  /// The blocks of every image and their shares of it, from the slices of all clusters.
+  /// Notes for every image which places it has, and the share of its mass in each.
   void packBlockMasses(NdfCpData& data) const {
-    // A reader adds up the pixels in another order: its share must not exceed the stored one.
+    // A reader sums the pixels of a block in another order. The stored mass must not be below the reader's.
     constexpr float kRounding = 1 + 1e-5f;
     const std::size_t images = index_.imageCount(), blocks = pyramid_.shape.blocksPerImage();
     const auto places = static_cast<std::size_t>(data.header.places),
@@ -399,7 +406,7 @@ class Compressor {
   std::vector<ClusterModel> models_;
   std::vector<EncodedCluster> encoded_;
   std::vector<int> selection_;
-  std::vector<double> encoded_gains_;  // [clusters]: gain_per_byte that they were encoded for
+  std::vector<double> encoded_gains_;  // [clusters]: gain_per_byte with which the cluster was encoded
   std::vector<float> image_scales_;
   std::vector<float> density_scales_;
   std::uint64_t unscaled_images_ = 0;

@@ -10,52 +10,54 @@
 
 namespace glint::bake {
 
-/// What compressPyramid() makes.
+/// How compressPyramid() compresses.
 struct CompressionOptions {
   CompressionMethod method = CompressionMethod::tucker;
 
-  /// Columns of every cluster, 1..256 (fewer where a cluster has no more to give). Not used when a tolerance is given.
+  /// Columns of every cluster, 1..256. A cluster that is exact with fewer columns has fewer. Not used with a tolerance.
   int rank = 16;
 
-  /// If > 0: choose the columns of every cluster, and with i8 the bits of their coefficients (8 or 4; cp: 8), so that the
-  /// relative error of all images together, ||D' - D|| / ||D||, is at most this and the bytes are as few as possible. With
-  /// tucker also that of level 0, of level 1, and of the coarser ones together: else all of it would be left to where a byte
-  /// takes off least, the coarser levels of flakes. Below 1.
+  /// If > 0: chooses the columns of every cluster, and with i8 the bits of their coefficients (8 or 4; cp: 8). The relative
+  /// error of all images together, ||D' - D|| / ||D||, is then at most this, and the bytes are as few as possible. With tucker,
+  /// the errors of level 0, of level 1, and of all coarser levels together are each at most this. One bound for all levels
+  /// would leave the error to levels in which a byte removes least of it, such as the coarse levels of flakes. Below 1.
   double tolerance = 0;
 
-  /// With a tolerance, tucker and pca, i8: store slices as spots where they cost less.
+  /// Stores the slices of a cluster as spots where spots take fewer bytes. Needs a tolerance, tucker or pca, and i8.
   bool spots = true;
 
   CoefficientType coefficient_type = CoefficientType::i8;
 
   /// Regions along each axis of the map, 1..255. 0: the default of the method, 8 for cp (Deng 2022, section 4.2) and 1
-  /// otherwise. With tucker, the first two levels have regions of their own, as the others have together.
+  /// otherwise. With tucker, level 0 and level 1 have regions of their own, and all coarser levels share theirs.
   int regions = 0;
 
-  double min_improvement = 1e-4;  ///< cp: stop when a sweep improves the relative error of a cluster by less, >= 0
-  int max_iterations = 500;       ///< cp: sweeps at most, >= 1
+  double min_improvement = 1e-4;  ///< cp: the search ends when a sweep improves the relative error of a cluster by less, >= 0
+  int max_iterations = 500;       ///< cp: most sweeps, >= 1
 };
 
-/// One level of the pyramid, or all of them.
+/// Size and error of one level of the pyramid, or of all levels.
 struct CompressionLevelReport {
-  std::uint64_t slices = 0;  ///< stored blocks
+  std::uint64_t slices = 0;  ///< blocks that the pyramid stores
   double rel_l2 = 0;  ///< ||D' - D|| / ||D|| over the pixels of these slices, D' as a reader decodes it; 0 for an empty level
 };
 
-/// What compressPyramid() achieved. Bytes are those of the arrays, without the overhead of a file.
+/// Errors and bytes that compressPyramid() reached. Bytes are sizes of arrays, without the overhead of a file.
 struct CompressionReport {
   std::vector<CompressionLevelReport> levels;
   CompressionLevelReport total;
   std::uint64_t basis_bytes = 0;
-  std::uint64_t coefficient_bytes = 0;  ///< with the scale of every column, and spots
+  std::uint64_t coefficient_bytes = 0;  ///< coefficients, scales of columns, and spots
   std::uint64_t index_bytes = 0;        ///< clusters, masks, core; regions, slots, scales and block masses of images
   std::uint64_t total_bytes = 0;
-  double ratio_to_dense = 0;                  ///< bytes of the uncompressed f32 images, empty blocks included, over total_bytes
-  double ratio_to_stored = 0;                 ///< bytes of the pyramid as it is stored, over total_bytes
-  std::vector<std::uint64_t> rank_histogram;  ///< [columns]: occupied clusters that have so many columns (spots: 0)
-  std::uint64_t spot_slices = 0;              ///< slices that are stored as spots
+  double ratio_to_dense = 0;   ///< bytes of f32 images with their empty blocks, over total_bytes
+  double ratio_to_stored = 0;  ///< bytes of the pyramid as a file stores it, over total_bytes
+  std::vector<std::uint64_t>
+      rank_histogram;             ///< [columns]: clusters with slices that have so many columns (clusters of spots: 0 columns)
+  std::uint64_t spot_slices = 0;  ///< slices that are stored as spots
   std::uint64_t spots = 0;
-  std::uint64_t unscaled_images = 0;  ///< images that decode to half their energy or less, so that they cannot be normalised
+  std::uint64_t unscaled_images =
+      0;  ///< images that decode to half their mass or less, and so are not scaled to integrate to 1
 };
 
 /// A compressed pyramid and the arrays that it points to.
@@ -80,7 +82,7 @@ class NdfCpData {
   std::vector<std::uint8_t> core;
   std::vector<float> spot_sums;
 
-  /// @return what a model queries; valid while this object lives and is not changed
+  /// @return spans over the arrays; valid while this object lives and is not changed
   NdfCp view() const;
 };
 
@@ -92,16 +94,16 @@ int coefficientElementBytes(CoefficientType type);
 
 /// Compresses the images of a pyramid (Deng 2022, section 4.2).
 ///
-/// The blocks of all images that share an angular block and a spatial region are the slices of a 16x16xL tensor. Each tensor is
-/// decomposed (`cp`: alternating least squares, Eq. 5; `tucker`, `pca`: eigenvectors), the bases are quantised, the
-/// coefficients are solved again for the quantised bases and quantised, and each image is scaled to integrate to 1.
+/// A cluster has the slices of all images in one spatial region, inside one angular block: a 16x16xL tensor. Each tensor is
+/// decomposed (`cp`: alternating least squares, Eq. 5; `tucker`, `pca`: eigenvectors). Its basis is quantised, its coefficients
+/// are solved for the quantised basis and quantised, and each image is scaled to integrate to 1.
 /// @param pyramid   f16 or f32; densities must be finite
 /// @param report    filled when not null
 /// @param progress  units of work, several per cluster; may be empty
-/// @throw Error usage for options out of range; invalid_input for a pyramid that is not what ndf_pyramid.h says; failed for a
-///        tolerance that this method and coefficient type cannot reach, naming the best that they do
-/// @note Parallel over clusters; the result does not depend on the number of threads. Besides the result it holds the bases of
-///       all clusters in float, and the pyramid is converted cluster by cluster.
+/// @throw Error usage for options out of range; invalid_input for a pyramid that breaks a rule of ndf_pyramid.h; failed for a
+///        tolerance that this method and coefficient type cannot reach (the error names the smallest that they can)
+/// @note Parallel over clusters; the result does not depend on the number of threads. Memory, besides the result: the bases of
+///       all clusters in float, and one cluster of the pyramid for each thread.
 NdfCpData compressPyramid(const NdfPyramid& pyramid, const CompressionOptions& options, CompressionReport* report = nullptr,
                           const ProgressFn& progress = {});
 

@@ -13,17 +13,18 @@ namespace {
 
 constexpr int kSize = kBlockSize;
 
-// Weight of the ridge (third factor) and of the proximal term (first two), relative to the mean diagonal of the normal
-// equations. It bounds nearly parallel columns.
+// Weight of the ridge (third factor) and of the proximal term (first two factors), relative to the mean diagonal of the normal
+// equations. It bounds the coefficients of nearly parallel columns.
 constexpr float kRegularisation = 1e-3f;
 
-// Extrapolation: start, growth after a good sweep, limit, and shrinkage after a sweep that was taken back.
+// Step of the extrapolation: its start, its growth after a good sweep, its limit, and its shrinkage after a sweep whose
+// extrapolation was taken back.
 constexpr float kFirstStep = 0.5f;
 constexpr float kStepGrowth = 1.2f;
 constexpr float kMostStep = 2;
 constexpr float kStepShrink = 0.5f;
 
-// Squared relative error that float sums cannot see below.
+// Squared relative errors below this drown in the rounding of float sums.
 constexpr double kErrorFloor = 1e-10;
 
 /// Eigenvectors of a symmetric 16x16 matrix as columns of `axes`, largest eigenvalue first.
@@ -34,7 +35,7 @@ void sortedAxes(const double* moments, float* axes) {
     for (int i = 0; i < kSize; ++i) axes[i * kSize + k] = static_cast<float>(solver.eigenvectors()(i, kSize - 1 - k));
 }
 
-/// Alternating least squares with the third factor eliminated.
+/// Alternating least squares over X and Y; the third factor is always the best one for X and Y.
 class CpSolver {
  public:
   CpSolver(const CpTensor& tensor, int rank)
@@ -55,7 +56,7 @@ class CpSolver {
         scratch_(square()),
         solved_(kSize * stride_) {}
 
-  /// Columns of X and Y: the pairs of axes that hold the most energy.
+  /// Starts with the pairs of axes that have the most energy as columns of X and Y.
   void start(const TuckerAxes& axes, const std::vector<int>& pairs) {
     for (int r = 0; r < rank_; ++r) {
       for (int i = 0; i < kSize; ++i) {
@@ -73,6 +74,7 @@ class CpSolver {
     int sweep = 0;
     while (sweep < limits.max_iterations && best_error > kErrorFloor * tensor_.energy) {
       ++sweep;
+      // Solve X and Y, and extrapolate; without extrapolation if the error would rise.
       updateFactors();
       const std::vector<float> plain_x = x_;
       const std::vector<float> plain_y = y_;
@@ -85,13 +87,14 @@ class CpSolver {
         y_ = plain_y;
         error = solveThird();
       }
+      // Keep the best factors so far, and stop where a sweep improves too little.
       step = taken_back ? step * kStepShrink : std::min(kMostStep, step * kStepGrowth);
       if (!(error < best_error)) break;
       const double improvement = (std::sqrt(best_error) - std::sqrt(error)) / std::sqrt(tensor_.energy);
       best_x = x_;
       best_y = y_;
       best_error = error;
-      // A sweep without extrapolation improves less than those that follow it: it does not end the search.
+      // A sweep without extrapolation improves less than the sweeps after it, so it does not end the search.
       if (improvement < limits.min_improvement && !taken_back) break;
     }
     return pack(best_x, best_y, best_error, sweep);
@@ -105,9 +108,10 @@ class CpSolver {
     multiply({a, 1, stride_}, a, stride_, out, stride_, stride_, stride_, rows);
   }
 
-  /// Solves the third factor for the current X and Y, in the form that back() needs.
+  /// Solves the third factor for the current X and Y: its inverse normal matrix and its Gram matrix, not the factor itself.
   /// @return squared error; infinity where the normal equations are not positive
   double solveThird() {
+    // M = T (X o Y) and M^T M, from the slices or from their Gram matrix.
     khatriRao(x_.data(), y_.data(), stride_, khatri_rao_.data());
     gramOf(x_.data(), kSize, overlap_x_.data());
     gramOf(y_.data(), kSize, overlap_y_.data());
@@ -121,12 +125,14 @@ class CpSolver {
       multiply({khatri_rao_.data(), 1, stride_}, projection_.data(), stride_, moments_.data(), stride_, stride_, stride_,
                kBlockPixels);
     }
+    // H = (X^T X * Y^T Y + ridge)^-1, with an elementwise product.
     for (std::size_t i = 0; i < square(); ++i) inverse_[i] = overlap_x_[i] * overlap_y_[i];
     for (int r = 0; r < rank_; ++r) inverse_[r * (stride_ + 1)] += kRegularisation;
     if (!invertPositive(inverse_.data(), rank_, stride_)) return std::numeric_limits<double>::infinity();
-    // Z = M H with M the projection and H the inverse: Z^T Z = H (M^T M) H.
+    // The third factor is Z = M H, so Z^T Z = H (M^T M) H.
     multiply({moments_.data(), stride_, 1}, inverse_.data(), stride_, scratch_.data(), stride_, stride_, stride_, stride_);
     multiply({inverse_.data(), stride_, 1}, scratch_.data(), stride_, third_gram_.data(), stride_, stride_, stride_, stride_);
+    // Squared error = energy - 2 <T, model> + |model|^2.
     double captured = 0;
     for (int i = 0; i < rank_; ++i)
       for (int j = 0; j < rank_; ++j) {
@@ -136,7 +142,7 @@ class CpSolver {
     return std::max(0.0, tensor_.energy - captured);
   }
 
-  /// back_ = T^T Z: [256][stride].
+  /// Computes back_ = T^T Z, [256][stride].
   void contractThird() {
     if (tensor_.slices) {
       multiply({projection_.data(), stride_, 1}, inverse_.data(), stride_, third_.data(), stride_, tensor_.count, stride_,
@@ -149,7 +155,7 @@ class CpSolver {
     }
   }
 
-  /// One block update of X, then of Y, for the third factor of solveThird().
+  /// Updates X, then Y, for the third factor of solveThird().
   void updateFactors() {
     contractThird();
     contractY(back_.data(), y_.data(), stride_, solved_.data());
@@ -159,8 +165,8 @@ class CpSolver {
     solveFactor(overlap_x_.data(), y_);
   }
 
-  /// factor = (solved_ + mu factor) (third_gram o overlap + mu)^-1, columns normalised. Columns without energy stay as they
-  /// are.
+  /// factor = (solved_ + mu factor) (third_gram * overlap + mu)^-1 with an elementwise product, then columns of norm 1. mu is
+  /// the weight of the proximal term. Where the matrix has no inverse, the factor stays.
   void solveFactor(const float* overlap, std::vector<float>& factor) {
     float trace = 0;
     for (std::size_t i = 0; i < square(); ++i) scratch_[i] = third_gram_[i] * overlap[i];
@@ -182,7 +188,7 @@ class CpSolver {
     }
   }
 
-  /// next += step (next - previous), columns normalised.
+  /// next += step (next - previous), then columns of norm 1.
   void extrapolate(const std::vector<float>& previous, float step, std::vector<float>& next) const {
     for (std::size_t i = 0; i < next.size(); ++i) next[i] += step * (next[i] - previous[i]);
     normalise(next);
@@ -212,13 +218,14 @@ class CpSolver {
 }  // namespace
 
 void TuckerAnalysis::addMoments(const float* slices, int count) {
-  // The padding of a slice is a row of zeros, so a panel is one matrix of 17 count rows of 16.
+  // A slice is padded by a row of zeros, so a panel is one matrix of 17 * count rows of 16 values.
   static_assert(kSliceStride == kBlockPixels + kSize);
   const auto addTo = [&](const float* rows, double* moments) {
     float sums[kBlockPixels] = {};
     addGram(rows, kSize, count * (kSize + 1), kSize, sums, kSize);
     for (int i = 0; i < kBlockPixels; ++i) moments[i] += sums[i];
   };
+  // Along x, then along y with every slice transposed.
   addTo(slices, moments_x_);
   for (int s = 0; s < count; ++s)
     for (int y = 0; y < kSize; ++y)

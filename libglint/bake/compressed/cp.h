@@ -6,21 +6,22 @@
 
 namespace glint::bake {
 
-/// Second moments of a 16x16xL tensor along its first two modes.
+/// The axes of a 16x16xL tensor along its first two modes (HOSVD), and the energy of each pair of axes.
 struct TuckerAxes {
   float u[kBlockPixels];                       ///< [x][a]: orthonormal columns, most energy first
-  float v[kBlockPixels];                       ///< [y][b]
+  float v[kBlockPixels];                       ///< [y][b]: the same along y
   double energy[kBlockSize][kBlockSize] = {};  ///< [a][b]: sum over slices of (u_a^T slice v_b)^2
 };
 
-/// Adds the Gram matrices of panels and, in a second pass, the energies of the core (HOSVD, Tucker-2).
+/// Finds the axes of a tensor in two passes over its slices: the first sums Gram matrices along each mode, the second sums the
+/// energies of pairs of axes (HOSVD, Tucker-2).
 class TuckerAnalysis {
  public:
   /// @param slices  [count][kSliceStride], the padding 0; count <= kPanelSlices
   void addMoments(const float* slices, int count);
-  /// Call once, after all moments.
+  /// Computes the axes. Call once, after addMoments() for all panels.
   void solveAxes();
-  /// Call for all panels again, after solveAxes().
+  /// Call for all panels again, after solveAxes(). Parameters as for addMoments().
   void addEnergies(const float* slices, int count);
   const TuckerAxes& axes() const { return axes_; }
 
@@ -31,38 +32,39 @@ class TuckerAnalysis {
   std::vector<float> work_ = std::vector<float>(static_cast<std::size_t>(kPanelSlices) * kSliceStride);
 };
 
-/// A 16x16xL tensor as alternating least squares needs it: L slices, or their 256x256 Gram matrix when L is larger than that
-/// saves. With the Gram matrix the third factor never appears and a sweep costs the same for any L.
+/// A 16x16xL tensor for alternating least squares: L slices, or their 256x256 Gram matrix where L is above kMostSlices. With
+/// the Gram matrix no sweep computes the third factor, so its cost does not depend on L.
 struct CpTensor {
   const float* slices = nullptr;  ///< [count][kSliceStride]; null: use `gram`
   int count = 0;                  ///< L
   const float* gram = nullptr;    ///< [256][256]: sum over slices of slice slice^T
-  double energy = 0;              ///< sum of squares
+  double energy = 0;              ///< sum of the squares of all values
 
   /// L above which a sweep over the Gram matrix is cheaper.
   static constexpr int kMostSlices = 128;
 };
 
+/// Limits of the search for factors.
 struct CpLimits {
   int rank = 16;
-  double min_improvement = 1e-4;  ///< of the relative error, per sweep
-  int max_iterations = 500;
+  double min_improvement = 1e-4;  ///< least improvement of the relative error by a sweep
+  int max_iterations = 500;       ///< most sweeps
 };
 
-/// Factors of the first two modes, columns of norm 1. The third follows from them by least squares.
+/// Factors of the first two modes, with columns of norm 1. Least squares give the third factor from these two.
 struct CpFactors {
   int rank = 0;
   std::vector<float> x;  ///< [16][rank]
   std::vector<float> y;  ///< [16][rank]
-  double error = 0;      ///< squared, of the best third factor (regularised)
+  double error = 0;      ///< squared error with the best third factor (regularised)
   int sweeps = 0;
 };
 
 /// Canonical polyadic decomposition by alternating least squares (Deng 2022, Eq. 5).
 ///
-/// Starts from the pairs of HOSVD axes with the largest energy. The third factor is eliminated: each sweep solves it exactly
-/// for the current X and Y. X and Y are solved with a proximal term, so that nearly parallel columns stay stable, and
-/// extrapolated; a sweep that makes the error worse is taken back and repeated without extrapolation, so the error never rises.
+/// Starts from the pairs of HOSVD axes with the largest energy. Each sweep solves the third factor exactly for the current X
+/// and Y, then X, then Y. A proximal term keeps nearly parallel columns stable. X and Y are then extrapolated; if that makes
+/// the error larger, the extrapolation is taken back, so the error never rises.
 /// @return at most min(rank, 16 L, number of axis pairs that hold energy) columns; none for a tensor of zeros
 CpFactors decomposeCp(const CpTensor& tensor, const TuckerAxes& axes, const CpLimits& limits);
 

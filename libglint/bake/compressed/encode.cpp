@@ -14,11 +14,11 @@
 namespace glint::bake {
 namespace {
 
-// Largest integer of a quantised basis: 12 bits with the sign, so that 16 of them sum to less than 2^15.
+// Largest integer of a quantised basis. 12 bits with the sign, so that the prefix sums of 16 integers fit 16 bits.
 constexpr float kBasisPeak = 2047;
 
-// Ridge of the coefficients, relative to the mean square norm of a basis image. Nearly parallel columns of cp would otherwise
-// get large coefficients of opposite signs, and lose more in quantisation than the ridge costs.
+// Ridge of the least squares for coefficients, relative to the mean square norm of a basis image. Without it, nearly parallel
+// columns of cp would get large coefficients of opposite signs, whose quantisation costs more accuracy than the ridge does.
 constexpr double kCpRidge = 1e-3;
 constexpr double kOrthogonalRidge = 1e-9;
 
@@ -29,13 +29,13 @@ void append(std::vector<std::byte>& bytes, T value) {
   std::memcpy(bytes.data() + size, &value, sizeof(T));
 }
 
-/// Values of a basis along one axis, or over both, as the reader sees them.
+/// Quantised functions of a basis: along one axis, or images.
 struct QuantizedFactor {
-  std::vector<float> values;  // [rows][columns]: of the size of the input
+  std::vector<float> values;  // [rows][columns]: integers, or for f32 numbers up to 1
   std::vector<float> scales;  // [columns]: value = scale * stored
 };
 
-/// Rounds each column to integers with the largest at kBasisPeak, or for f32 divides it by its largest value.
+/// Scales each column so that its largest magnitude is kBasisPeak and rounds it to integers, or for f32 scales it to 1.
 QuantizedFactor quantizeFactor(const std::vector<float>& factor, int rows, int columns, bool integers) {
   QuantizedFactor result{factor, std::vector<float>(columns, 0.0f)};
   for (int k = 0; k < columns; ++k) {
@@ -52,8 +52,8 @@ QuantizedFactor quantizeFactor(const std::vector<float>& factor, int rows, int c
   return result;
 }
 
-/// Writes the prefix sums of [lines][16][columns] along the middle axis as elements of type T, and replaces the values by the
-/// differences that a reader gets.
+/// Writes the prefix sums of [16][columns] along the first axis as elements of type T, and replaces the values by the
+/// differences of these sums, as a reader decodes them.
 template <class T>
 void writePrefixSums(std::vector<float>& values, int columns, std::vector<std::byte>& bytes) {
   std::vector<double> sums(columns, 0.0);
@@ -69,7 +69,8 @@ void writePrefixSums(std::vector<float>& values, int columns, std::vector<std::b
   }
 }
 
-/// The same for images [16][16][columns], summed over both axes.
+/// Writes the sums of images [16][16][columns] over the pixels below and left of each pixel, and replaces the values by the
+/// differences of these sums, as a reader decodes them.
 template <class T>
 void writeAreaSums(std::vector<float>& values, int columns, std::vector<std::byte>& bytes) {
   std::vector<double> above(static_cast<std::size_t>(kBlockSize) * columns, 0.0);
@@ -96,13 +97,13 @@ void writeAreaSums(std::vector<float>& values, int columns, std::vector<std::byt
   }
 }
 
-/// Quantised basis images and what solves for their coefficients.
+/// Quantised basis images, as a reader decodes them, and the matrix that gives their coefficients for a slice.
 struct DecodedBasis {
   int columns = 0;
-  int stride = 0;             // columns, padded
+  int stride = 0;             // columns with padding
   std::vector<float> images;  // [columns][256]
   std::vector<float> dual;    // [256][stride]: coefficients = slice * dual
-  std::vector<float> scales;  // [columns]: of the stored integers
+  std::vector<float> scales;  // [columns]: value of a stored 1
 };
 
 /// Appends the basis image x_a(x) y_b(y).
@@ -114,7 +115,7 @@ void appendProduct(const QuantizedFactor& x, int rank_x, int a, const QuantizedF
     for (int i = 0; i < kBlockSize; ++i) out.images.push_back(scale * x.values[i * rank_x + a] * y.values[j * rank_y + b]);
 }
 
-/// dual = images^T (images images^T + ridge)^-1, the regularised least squares for all slices at once.
+/// Computes dual = images^T (images images^T + ridge)^-1: regularised least squares for the coefficients of any slice.
 void solveDual(DecodedBasis& basis, double ridge) {
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> images(
@@ -130,7 +131,7 @@ void solveDual(DecodedBasis& basis, double ridge) {
     for (int p = 0; p < kBlockPixels; ++p) basis.dual[p * basis.stride + k] = static_cast<float>(solved(k, p));
 }
 
-/// Writes the basis to `bytes` and decodes it.
+/// Quantises the basis, writes it to `bytes`, and decodes it again.
 DecodedBasis encodeBasis(const ClusterBasis& basis, CompressionMethod method, CoefficientType type,
                          std::vector<std::byte>& bytes) {
   const bool integers = type != CoefficientType::f32;
@@ -160,7 +161,7 @@ DecodedBasis encodeBasis(const ClusterBasis& basis, CompressionMethod method, Co
   return out;
 }
 
-/// Coefficients of all slices, [slices][stride].
+/// Solves the coefficients of all slices, [slices][stride].
 std::vector<float> solveCoefficients(const SliceIndex& index, std::size_t cluster, float peak, const DecodedBasis& basis) {
   const int count = index.sliceCount(cluster);
   std::vector<float> coefficients(static_cast<std::size_t>(count) * basis.stride);
@@ -175,7 +176,8 @@ std::vector<float> solveCoefficients(const SliceIndex& index, std::size_t cluste
   return coefficients;
 }
 
-/// Steps of the columns, of which coefficients are multiples (f16 and f32: parts of the largest).
+/// Chooses the step of each column. Coefficients of i8 are multiples of the step; of f16 and f32 they are divided by it, and
+/// the step is the largest magnitude.
 std::vector<float> columnSteps(const std::vector<float>& coefficients, int count, int stride,
                                const std::vector<ClusterColumn>& columns, CoefficientType type) {
   std::vector<float> steps(columns.size(), 0.0f);
@@ -191,8 +193,8 @@ std::vector<float> columnSteps(const std::vector<float>& coefficients, int count
   return steps;
 }
 
-/// Rounds the coefficients to `type`, column by column, writes them, and replaces them by what a reader decodes.
-/// @return scale of each column
+/// Rounds the coefficients to `type`, writes them row by row, and replaces them by the values that a reader decodes.
+/// @return value of a stored 1, of each column
 std::vector<float> quantizeCoefficients(std::vector<float>& coefficients, int count, int stride,
                                         const std::vector<ClusterColumn>& columns, CoefficientType type,
                                         std::vector<std::byte>& bytes) {
@@ -204,7 +206,7 @@ std::vector<float> quantizeCoefficients(std::vector<float>& coefficients, int co
   std::vector<float> inverses(columns.size(), 0.0f);
   for (int k = 0; k < all; ++k) {
     if (scales[k] > 0) inverses[k] = 1 / scales[k];
-    // Smaller than any float can invert: a column of zeros.
+    // A step too small for a float to invert makes a column of zeros.
     if (!std::isfinite(inverses[k])) inverses[k] = scales[k] = 0;
   }
   std::vector<int> halves(2 * static_cast<std::size_t>(half));
@@ -228,11 +230,13 @@ std::vector<float> quantizeCoefficients(std::vector<float>& coefficients, int co
       }
       value = stored * scales[k];
     }
+    // Two coefficients of 4 bits share a byte: those of the first and of the second half of the narrow columns.
     for (int j = 0; j < half; ++j) append(bytes, static_cast<std::uint8_t>((halves[j] & 15) | halves[half + j] << 4));
   }
   return scales;
 }
 
+/// Compares a slice with its decoded form.
 SliceError compare(const float* slice, const float* decoded) {
   SliceError r;
   for (int p = 0; p < kBlockPixels; ++p) {
@@ -247,7 +251,7 @@ SliceError compare(const float* slice, const float* decoded) {
   return r;
 }
 
-/// Decodes every slice and compares. A basis without columns decodes to zeros.
+/// Decodes every slice and compares it with the original. A basis without columns decodes to zeros.
 std::vector<SliceError> measureSlices(const SliceIndex& index, std::size_t cluster, float peak, const DecodedBasis& basis,
                                       const std::vector<float>& coefficients) {
   const int count = index.sliceCount(cluster);
@@ -267,7 +271,7 @@ std::vector<SliceError> measureSlices(const SliceIndex& index, std::size_t clust
   return result;
 }
 
-/// What is left of a slice besides its spots, as the density of an even rest, >= 0.
+/// Density of the rest of a slice, >= 0: the mass that its spots leave, spread evenly over the block.
 float restOf(const float* slice, const SliceSpots& spots, const SpotFinder& finder) {
   float sum = 0;
   for (int p = 0; p < kBlockPixels; ++p) sum += slice[p];
@@ -275,15 +279,16 @@ float restOf(const float* slice, const SliceSpots& spots, const SpotFinder& find
   return std::max(0.0f, sum / kBlockPixels);
 }
 
-/// The code whose mass is nearest.
+/// The code (see blockMassCode) whose mass is nearest.
 std::uint8_t nearestMassCode(float mass) {
   const std::uint8_t above = blockMassCode(mass);
   return above > 0 && mass - blockMass(above - 1) < blockMass(above) - mass ? above - 1 : above;
 }
 
-/// Writes a cluster of spots as ndf_cp.h says, and decodes it.
+/// Quantises a cluster of spots, writes it as ndf_cp.h says, and compares its decoded slices with the originals.
 void encodeSpots(const SliceIndex& index, std::size_t cluster, float peak, const std::vector<SliceSpots>& spots,
                  EncodedCluster& out) {
+  // Find the largest weight and rest of all slices, which give the scales.
   const SpotFinder finder(index.sigmaPixels());
   const auto all = static_cast<std::uint32_t>(spots.size());
   std::vector<float> slice(kSliceStride), decoded(kBlockPixels), rests;
@@ -295,11 +300,13 @@ void encodeSpots(const SliceIndex& index, std::size_t cluster, float peak, const
     for (const Spot& spot : spots[s]) most_weight = std::max(most_weight, spot.weight);
   }
   out.scales = {most_weight / 65535, most_rest};
+  // Keep the slices that have a rest or spots.
   std::vector<std::uint8_t> codes(all);
   for (std::uint32_t s = 0; s < all; ++s) {
     codes[s] = most_rest > 0 ? nearestMassCode(rests[s] / most_rest) : 0;
     if (codes[s] > 0 || !spots[s].empty()) out.kept.push_back(s);
   }
+  // Write the index of spots: a running count for each group of slices, and count and rest of each slice.
   const auto count = static_cast<std::uint32_t>(out.kept.size());
   out.coefficients.assign(firstSpotOffset(count), std::byte{0});
   for (std::uint32_t k = 0; k < count; ++k) {
@@ -309,6 +316,7 @@ void encodeSpots(const SliceIndex& index, std::size_t cluster, float peak, const
     out.coefficients[spotCountsOffset(count) + count + k] = static_cast<std::byte>(codes[out.kept[k]]);
     out.spots += spots[out.kept[k]].size();
   }
+  // Write the spots, and decode every slice as a reader does.
   for (std::uint32_t s = 0; s < all; ++s) {
     index.load(cluster, static_cast<int>(s), 1, 1 / peak, slice.data());
     std::fill(decoded.begin(), decoded.end(), most_rest * blockMass(codes[s]));
@@ -321,7 +329,7 @@ void encodeSpots(const SliceIndex& index, std::size_t cluster, float peak, const
   }
 }
 
-/// Slices that hold the energy `least`, or more than a 256th of their image.
+/// Slices that are worth storing: they hold at least the energy `least`, or more than a 256th of the mass of their image.
 std::vector<std::uint32_t> worthyRows(const SliceIndex& index, std::size_t cluster, float peak, float unit, double least) {
   constexpr double kMostOfImage = 1.0 / 256;
   const double pixel_area = 1.0 / index.pixelsPerArea();
@@ -342,14 +350,14 @@ std::vector<std::uint32_t> worthyRows(const SliceIndex& index, std::size_t clust
   return kept;
 }
 
-/// Moves the rows that are kept to the front.
+/// Moves the rows of kept slices to the front.
 void keepRows(const std::vector<std::uint32_t>& kept, int stride, std::vector<float>& rows) {
   for (std::size_t k = 0; k < kept.size(); ++k)
     std::copy_n(rows.begin() + static_cast<std::ptrdiff_t>(kept[k]) * stride, stride,
                 rows.begin() + static_cast<std::ptrdiff_t>(k) * stride);
 }
 
-/// Moves them back, and clears the others.
+/// Moves the rows of kept slices back to where keepRows() took them from, and clears all other rows.
 void spreadRows(const std::vector<std::uint32_t>& kept, int count, int stride, std::vector<float>& rows) {
   std::vector<float> all(static_cast<std::size_t>(count) * stride, 0.0f);
   for (std::size_t k = 0; k < kept.size(); ++k)
@@ -363,6 +371,7 @@ void spreadRows(const std::vector<std::uint32_t>& kept, int count, int stride, s
 EncodedCluster encodeCluster(const SliceIndex& index, std::size_t cluster, const ClusterStatistics& statistics,
                              const ClusterBasis& basis, CompressionMethod method, CoefficientType type, float unit,
                              double per_byte) {
+  // Spots, and clusters of nothing, have no columns.
   EncodedCluster out;
   const int count = index.sliceCount(cluster);
   if (!basis.spots.empty()) {
@@ -375,6 +384,7 @@ EncodedCluster encodeCluster(const SliceIndex& index, std::size_t cluster, const
     out.slices = measureSlices(index, cluster, std::max(statistics.peak, std::numeric_limits<float>::min()), {}, {});
     return out;
   }
+  // Quantise the basis, and solve the coefficients of every slice for it.
   out.columns = static_cast<int>(basis.columns.size());
   if (method == CompressionMethod::tucker) {
     out.rank_x = basis.rank_x;
@@ -385,6 +395,7 @@ EncodedCluster encodeCluster(const SliceIndex& index, std::size_t cluster, const
     for (const ClusterColumn& column : basis.columns) out.narrow_columns += column.bits == 4;
   const DecodedBasis decoded = encodeBasis(basis, method, type, out.basis);
   std::vector<float> coefficients = solveCoefficients(index, cluster, statistics.peak, decoded);
+  // Leave out slices that are not worth their bytes, and quantise the coefficients of all others.
   const double row_bytes =
       type == CoefficientType::i8 ? out.columns - 0.5 * out.narrow_columns : 1.0 * out.columns * coefficientElementBytes(type);
   out.kept = worthyRows(index, cluster, statistics.peak, unit, (row_bytes + 1) * per_byte);
@@ -392,6 +403,7 @@ EncodedCluster encodeCluster(const SliceIndex& index, std::size_t cluster, const
   out.scales = quantizeCoefficients(coefficients, static_cast<int>(out.kept.size()), decoded.stride, basis.columns, type,
                                     out.coefficients);
   for (int k = 0; k < decoded.columns; ++k) out.scales[k] *= decoded.scales[k] * statistics.peak * unit;
+  // Measure the error as a reader sees it.
   spreadRows(out.kept, count, decoded.stride, coefficients);
   out.slices = measureSlices(index, cluster, statistics.peak, decoded, coefficients);
   return out;

@@ -9,10 +9,10 @@ HWY_BEFORE_NAMESPACE();
 namespace glint::bake::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// No vector is wider than the padding of a row, so no kernel needs a tail of columns.
+// No vector is wider than the padding of a row, so no kernel needs a loop for columns that are left over.
 using Floats = hn::CappedTag<float, kColumnPadding>;
 
-/// One tile of C: kRows rows by kVectors vectors, held in registers over the whole of p.
+/// Computes one tile of C, kRows rows by kVectors vectors, whose sums stay in registers.
 template <int kRows, int kVectors>
 HWY_INLINE void tile(const StridedMatrix& a, const float* HWY_RESTRICT b, std::ptrdiff_t b_stride, float* HWY_RESTRICT c,
                      std::ptrdiff_t c_stride, int p, Store store) {
@@ -40,7 +40,7 @@ HWY_INLINE void tile(const StridedMatrix& a, const float* HWY_RESTRICT b, std::p
   }
 }
 
-/// All rows of one strip of columns.
+/// Computes all rows of one strip of columns of C.
 template <int kRows, int kVectors>
 HWY_INLINE void strip(StridedMatrix a, const float* b, std::ptrdiff_t b_stride, float* c, std::ptrdiff_t c_stride, int m, int p,
                       Store store) {

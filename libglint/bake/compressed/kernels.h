@@ -5,13 +5,13 @@
 
 namespace glint::bake {
 
-/// Columns of the matrices below come in multiples of this many floats, the rest of a row being zero.
+/// Rows of the matrices below have a multiple of this many floats. Padding at the end of a row is zero.
 inline constexpr int kColumnPadding = 8;
 
 /// @return `columns` rounded up to a multiple of kColumnPadding
 constexpr int paddedColumns(int columns) { return (columns + kColumnPadding - 1) / kColumnPadding * kColumnPadding; }
 
-/// A matrix read through two strides, so that a transpose costs nothing. Strides are in floats.
+/// A matrix that is read through two strides, in floats. Exchanging the strides transposes it at no cost.
 struct StridedMatrix {
   const float* data = nullptr;
   std::ptrdiff_t row_stride = 0;
@@ -20,21 +20,21 @@ struct StridedMatrix {
 
 enum class Store : std::uint8_t { set, add, subtract };
 
-/// C[m][n] = A B, or C += A B, or C -= A B, in SIMD of the best instruction set of this machine.
+/// C[m][n] = A B, C += A B, or C -= A B, in SIMD of the best instruction set of the machine.
 /// @param a   m x p
 /// @param b   p x n, rows contiguous, `b_stride` floats apart
 /// @param c   m x n, rows contiguous, `c_stride` floats apart; overlaps neither input
 /// @param n   a multiple of kColumnPadding
-/// @note Every element is summed in the order of p whatever m and n are.
+/// @note sums every element in the order of p, whatever m and n are
 void multiply(StridedMatrix a, const float* b, std::ptrdiff_t b_stride, float* c, std::ptrdiff_t c_stride, int m, int n, int p,
               Store store = Store::set);
 
-/// Lower triangle (and some of the upper) of C[n][n] += A^T A, in steps of 16 columns.
+/// C[n][n] += A^T A for the lower triangle, and for the part of the upper triangle inside squares of 16 on the diagonal.
 /// @param a  rows x n, n a multiple of 16
 void addGram(const float* a, std::ptrdiff_t a_stride, int rows, int n, float* c, std::ptrdiff_t c_stride);
 
 /// Column-wise Khatri-Rao product: out[16 y + x][r] = Y[y][r] X[x][r] for 16 x and 16 y.
-/// @param columns  of X, Y and out: a multiple of kColumnPadding, and the stride of all three
+/// @param columns  columns of X, Y and out, which is also their stride: a multiple of kColumnPadding
 void khatriRao(const float* x, const float* y, int columns, float* out);
 
 /// out[x][r] = sum over y of w[16 y + x][r] Y[y][r]; layouts as in khatriRao.

@@ -15,32 +15,33 @@
 namespace glint::bake {
 namespace {
 
-// Below this no reciprocal exists in float; a density so small is an empty cluster.
+// A cluster with a smaller peak counts as empty: floats hardly have a reciprocal of the peak.
 constexpr float kSmallestPeak = 1e-30f;
 
-// Eigenvalues that float cannot tell from rounding, relative to the largest.
+// Eigenvalues below this part of the largest are rounding of floats.
 constexpr float kEigenvalueFloor = 4e-7f;
 
-// Squares of the rounding of the core's entries, relative to the energy.
+// Energies of the core's entries below this part of the whole are rounding of floats.
 constexpr double kCoreFloor = 1e-11;
 
-// Largest rank of cp that a tolerance chooses: decompositions get slow.
+// Largest rank of cp that a tolerance chooses. Decompositions of higher rank are slow.
 constexpr int kMostCpRank = 64;
 
-// Spots of a slice at most, and slices that tell whether more of them are worth a search.
+// Most spots of a slice.
 constexpr int kMostSpots = 48;
+// Number of slices (probes) that are searched for spots first, to see whether a search of all slices is worth its time.
 constexpr int kProbes = 24;
-// Spots that gain less than so many times what is negligible in a slice are not looked for.
+// The search for spots ends at gains below this many times the negligible error of a slice.
 constexpr double kLeastGain = 40;
-// Probes decide against spots where columns take less than this part of their bytes.
+// Where columns take less than this part of the bytes of spots, by the estimate from probes, spots are not searched.
 constexpr double kProbeMargin = 0.7;
 
-// Bytes of a slice of spots besides its spots: its count, its part of the running count and its rest; and of any slice: its
-// block mass.
+// Bytes of a slice of spots besides its spots: its count, its rest, and its part of the running count of its group.
 constexpr double kSpotSliceBytes = 2.25;
+// Bytes of any slice besides its coefficients: its block mass.
 constexpr double kSliceBytes = 1;
 
-/// Slices of a cluster, divided by its peak, a panel at a time: visit(panel, slices).
+/// Loads the slices of a cluster, divided by its peak, a panel at a time, and calls visit(panel, number of slices).
 template <class Visit>
 void forEachPanel(const SliceIndex& index, std::size_t cluster, float peak, Visit visit) {
   const int count = index.sliceCount(cluster);
@@ -52,7 +53,7 @@ void forEachPanel(const SliceIndex& index, std::size_t cluster, float peak, Visi
   }
 }
 
-/// Sum over the slices of slice slice^T, [256][256]. 131 kflop per slice.
+/// Gram matrix of the pixels: the sum over slices of slice slice^T, [256][256]. 131 kflop for each slice.
 std::vector<float> gramMatrix(const SliceIndex& index, std::size_t cluster, float peak) {
   std::vector<float> gram(static_cast<std::size_t>(kBlockPixels) * kBlockPixels, 0.0f);
   forEachPanel(index, cluster, peak, [&](const float* panel, int slices) {
@@ -63,12 +64,13 @@ std::vector<float> gramMatrix(const SliceIndex& index, std::size_t cluster, floa
   return gram;
 }
 
+/// Principal components of slices.
 struct Components {
-  std::vector<float> images;    // [K][256]
+  std::vector<float> images;    // [K][256], orthonormal
   std::vector<float> energies;  // [K], falling
 };
 
-/// Eigenvectors of a Gram matrix of images, largest eigenvalue first.
+/// Components from the Gram matrix of the pixels, largest energy first.
 Components componentsOfGram(const std::vector<float>& gram) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXf> solver(
       Eigen::Map<const Eigen::MatrixXf>(gram.data(), kBlockPixels, kBlockPixels));
@@ -82,7 +84,7 @@ Components componentsOfGram(const std::vector<float>& gram) {
   return result;
 }
 
-/// The same from fewer slices than pixels, through the Gram matrix of the slices.
+/// Components of fewer slices than pixels, from the smaller Gram matrix of the slices.
 Components componentsOfSlices(const float* panel, int slices) {
   const int stride = paddedColumns(slices);
   std::vector<float> transposed(static_cast<std::size_t>(kBlockPixels) * stride, 0.0f);
@@ -115,7 +117,7 @@ ClusterStatistics measureCluster(const SliceIndex& index, std::size_t cluster) {
   float slice[kSliceStride];
   for (int s = 0; s < index.sliceCount(cluster); ++s) {
     index.load(cluster, s, 1, 1, slice);
-    // Squares of the largest floats do not overflow in double, and a NaN or infinity stays in the sum.
+    // In double, squares of the largest floats do not overflow, so a sum that is not finite shows a value that is not.
     double energy = 0;
     float peak = 0;
     for (int p = 0; p < kBlockPixels; ++p) {
@@ -158,7 +160,9 @@ ClusterModel::ClusterModel(const SliceIndex& index, std::size_t cluster, const C
   if (options.tolerance > 0) keepHull();
 }
 
-/// Steps of one column: from nothing to narrow coefficients, and on to wide ones.
+/// Adds the steps of one column: from nothing to narrow coefficients, and from narrow to wide; or straight to wide coefficients
+/// where the second of the two steps would gain more per byte than the first.
+/// @param coefficients  [slices]
 void ClusterModel::addColumnSteps(int column, const float* coefficients, double basis_bytes) {
   const double first_bytes = basis_bytes + sizeof(float);
   if (type_ != CoefficientType::i8) {
@@ -179,8 +183,8 @@ void ClusterModel::addColumnSteps(int column, const float* coefficients, double 
   }
 }
 
-/// A choice after each step, in the order of what they gain per byte.
-/// @param error  without any column
+/// Sorts the steps by gain per byte, and adds a choice after each.
+/// @param error  squared error without any column
 void ClusterModel::addStepChoices(double error) {
   std::erase_if(steps_, [](const Step& step) { return !(step.gain > 0); });
   std::stable_sort(steps_.begin(), steps_.end(),
@@ -194,6 +198,7 @@ void ClusterModel::addStepChoices(double error) {
   }
 }
 
+/// Columns and their bits after the first steps.
 std::vector<ClusterColumn> ClusterModel::columnsAfter(int steps) const {
   std::vector<ClusterColumn> columns;
   for (int k = 0; k < steps; ++k) {
@@ -209,7 +214,7 @@ std::vector<ClusterColumn> ClusterModel::columnsAfter(int steps) const {
   return columns;
 }
 
-/// Choices of spots: those that gain most, of all slices. A few slices tell whether that can cost less than columns.
+/// Adds choices of spots, unless a few slices show that columns take fewer bytes.
 void ClusterModel::addSpots(const SliceIndex& index, double negligible) {
   const float sigma = index.sigmaPixels();
   if (!SpotFinder::suits(sigma)) return;
@@ -221,7 +226,7 @@ void ClusterModel::addSpots(const SliceIndex& index, double negligible) {
     for (int p = 0; p < kBlockPixels; ++p) energy += static_cast<double>(slice[p]) * slice[p];
     return energy;
   };
-  // The probes: what they leave, and the bytes of columns that leave as little.
+  // Search the probes for spots, and compare with the bytes of columns that leave the same share of the energy.
   double left = 0, probed = 0;
   std::size_t count = 0;
   int probes = 0;
@@ -236,6 +241,7 @@ void ClusterModel::addSpots(const SliceIndex& index, double negligible) {
   const auto as_good = std::find_if(choices_.begin(), choices_.end(),
                                     [&](const SizeChoice& c) { return c.error <= share * energy_ * peak_ * peak_; });
   if (as_good != choices_.end() && static_cast<double>(as_good->bytes) < kProbeMargin * spot_bytes) return;
+  // Search all slices.
   std::vector<float> sums(slice_count_, 0.0f);
   for (int s = 0; s < slice_count_; ++s) {
     index.load(cluster_, s, 1, 1 / peak_, slice.data());
@@ -245,7 +251,8 @@ void ClusterModel::addSpots(const SliceIndex& index, double negligible) {
   addSpotChoices(finder, std::move(sums));
 }
 
-/// @param rests  sums of the slices
+/// Adds choices with the spots of all slices that gain most, from few spots to all.
+/// @param rests  sum of the pixels of each slice
 void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<float> rests) {
   struct Candidate {
     float gain;
@@ -258,7 +265,7 @@ void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<float> r
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
   for (const Candidate& c : candidates) spot_gains_.push_back(c.gain);
-  // An even rest takes the square of its sum over 256 off the error.
+  // Spread evenly over the block, a rest lowers the squared error by the square of its sum over 256.
   const auto evened = [](float sum) { return sum > 0 ? static_cast<double>(sum) * sum / kBlockPixels : 0.0; };
   double error = energy_;
   for (const float sum : rests) error -= evened(sum);
@@ -270,7 +277,7 @@ void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<float> r
     error += evened(rest) - candidates[k].gain;
     rest -= candidates[k].share;
     error -= evened(rest);
-    // Spots of one gain are kept or left together.
+    // A choice is known by its smallest gain, so spots of equal gain are in it together.
     const bool last = k + 1 == candidates.size();
     if ((k % stride == stride - 1 || last) && (last || candidates[k + 1].gain < candidates[k].gain))
       choices_.push_back({true, static_cast<int>(k) + 1, std::max(0.0, error) * peak_ * peak_,
@@ -278,6 +285,7 @@ void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<float> r
   }
 }
 
+/// Keeps the choices on the lower convex hull of (bytes, error).
 void ClusterModel::keepHull() {
   std::stable_sort(choices_.begin(), choices_.end(), [](const SizeChoice& a, const SizeChoice& b) {
     return a.bytes != b.bytes ? a.bytes < b.bytes : a.error < b.error;
@@ -302,7 +310,8 @@ TuckerAxes ClusterModel::analyseAxes(const SliceIndex& index) const {
   return analysis.axes();
 }
 
-/// Coefficients of orthonormal images, [images][slices].
+/// Projects the slices on orthonormal images.
+/// @return coefficients, [images][slices]
 std::vector<float> ClusterModel::project(const SliceIndex& index, const std::vector<float>& images, int count) const {
   const int stride = paddedColumns(count);
   std::vector<float> transposed(static_cast<std::size_t>(kBlockPixels) * stride, 0.0f);
@@ -320,13 +329,14 @@ std::vector<float> ClusterModel::project(const SliceIndex& index, const std::vec
   return result;
 }
 
+/// Tucker-2: columns are pairs of axes, and gain the energy of their entries of the core.
 void ClusterModel::decomposeTucker(const SliceIndex& index, const CompressionOptions& options, double negligible) {
   axes_ = analyseAxes(index);
   std::vector<int> pairs(kBlockPixels);
   std::iota(pairs.begin(), pairs.end(), 0);
   const auto energy = [&](int pair) { return axes_.energy[pair % kBlockSize][pair / kBlockSize]; };
   std::stable_sort(pairs.begin(), pairs.end(), [&](int p, int q) { return energy(p) > energy(q); });
-  // Columns that bring nothing are left out.
+  // Leave out pairs whose energy is rounding, and with a tolerance, pairs after the error is negligible.
   int count = 0;
   double error = energy_;
   const int most = options.tolerance > 0 ? kBlockPixels : options.rank;
@@ -337,19 +347,21 @@ void ClusterModel::decomposeTucker(const SliceIndex& index, const CompressionOpt
     choices_.push_back({false, count, std::max(0.0, error) * peak_ * peak_, 0});
     return;
   }
+  // Project the slices on the product of each pair, to know how coefficients round.
   std::vector<float> images(static_cast<std::size_t>(count) * kBlockPixels);
   for (int k = 0; k < count; ++k)
     for (int p = 0; p < kBlockPixels; ++p)
       images[k * kBlockPixels + p] = axes_.u[p % kBlockSize * kBlockSize + pairs[k] % kBlockSize] *
                                      axes_.v[p / kBlockSize * kBlockSize + pairs[k] / kBlockSize];
   const std::vector<float> coefficients = project(index, images, count);
-  // An entry of the core, and what a new function along an axis costs on average.
+  // Bytes of a column: an entry of the core, and the mean cost of a new function along an axis.
   constexpr double kBasisBytes = 1 + 8;
   for (int k = 0; k < count; ++k)
     addColumnSteps(pairs[k], coefficients.data() + static_cast<std::size_t>(k) * slice_count_, kBasisBytes);
   addStepChoices(energy_);
 }
 
+/// Principal components of the slices: columns are images, and gain their eigenvalues.
 void ClusterModel::decomposePca(const SliceIndex& index, const CompressionOptions& options, double negligible) {
   Components components;
   if (slice_count_ < kBlockPixels)
@@ -362,7 +374,7 @@ void ClusterModel::decomposePca(const SliceIndex& index, const CompressionOption
   double error = energy_;
   int rank = 0;
   while (rank < most && (rank == 0 || error > negligible || !(options.tolerance > 0))) error -= components.energies[rank++];
-  // A copy, so that the memory of the columns that are not kept is freed.
+  // A copy of the components that are kept frees the memory of all others.
   components_.assign(components.images.begin(), components.images.begin() + static_cast<std::ptrdiff_t>(rank) * kBlockPixels);
   if (!(options.tolerance > 0)) {
     for (int k = 0; k < rank; ++k) steps_.push_back({k, 8, components.energies[k], 1});
@@ -376,8 +388,9 @@ void ClusterModel::decomposePca(const SliceIndex& index, const CompressionOption
   addStepChoices(energy_);
 }
 
-/// Ranks of cp and bounds of their errors. A column for each of the largest entries of the core is where the decomposition
-/// starts from; it ends with less error, by a like factor in all clusters.
+/// Bounds the error of cp at each rank, without decomposing. A decomposition starts from a column for each of the largest
+/// entries of the core, so it ends with less error than theirs: by about the same factor in all clusters, so that the bounds
+/// serve to compare clusters.
 void ClusterModel::boundCpRanks(const SliceIndex& index, const CompressionOptions& options, double negligible) {
   axes_ = analyseAxes(index);
   std::vector<double> energies(axes_.energy[0], axes_.energy[0] + kBlockPixels);
@@ -396,6 +409,7 @@ void ClusterModel::boundCpRanks(const SliceIndex& index, const CompressionOption
   }
 }
 
+/// Decomposes the cluster by cp.
 CpFactors ClusterModel::decompose(int rank) const {
   CpTensor tensor;
   tensor.count = slice_count_;

@@ -9,28 +9,28 @@
 
 namespace glint::bake {
 
-/// One size that a cluster can have, and what it costs.
+/// One size that a cluster can have, with its error and its bytes.
 struct SizeChoice {
-  bool spots = false;       ///< of spots, not of columns
-  int count = 0;            ///< steps of columns (cp: rank), or spots
-  double error = 0;         ///< squared, stored units (cp: a bound of it)
-  std::uint64_t bytes = 0;  ///< bases, coefficients, scales and block masses
+  bool spots = false;       ///< whether the cluster has spots instead of columns
+  int count = 0;            ///< number of spots, or of steps of columns (cp: rank)
+  double error = 0;         ///< squared error, stored units (cp: an upper bound)
+  std::uint64_t bytes = 0;  ///< bytes of bases, coefficients, scales and block masses
 };
 
 /// A column of a cluster and the bits of its coefficients.
 struct ClusterColumn {
-  int index = 0;  ///< cp: of the factors; tucker: a + 16 b; pca: of the components
-  int bits = 8;   ///< 4 or 8; the other coefficient types do not look at it
+  int index = 0;  ///< cp: column of the factors; tucker: axes a + 16 b; pca: number of the component
+  int bits = 8;   ///< 4 or 8, for coefficients of type i8
 };
 
-/// What a choice stands for: real-valued basis images, or spots.
+/// The content of a choice before quantisation: basis images, or spots.
 struct ClusterBasis {
-  std::vector<ClusterColumn> columns;  ///< wide ones first
-  int rank_x = 0;                      ///< functions in x and y; pca: images in x
-  int rank_y = 0;
-  std::vector<float> x;           ///< cp: X[16][R]; tucker: U[16][rank_x]; pca: images [256][K]
-  std::vector<float> y;           ///< cp: Y[16][R]; tucker: V[16][rank_y]; pca: empty
-  std::vector<SliceSpots> spots;  ///< of each slice; empty for columns
+  std::vector<ClusterColumn> columns;  ///< wide columns first
+  int rank_x = 0;                      ///< number of functions of x; pca: of images
+  int rank_y = 0;                      ///< number of functions of y
+  std::vector<float> x;                ///< cp: X[16][R]; tucker: U[16][rank_x]; pca: images [256][K]
+  std::vector<float> y;                ///< cp: Y[16][R]; tucker: V[16][rank_y]; pca: empty
+  std::vector<SliceSpots> spots;       ///< [slices]; empty where the cluster has columns
 };
 
 /// Size and scale of a cluster.
@@ -39,28 +39,29 @@ struct ClusterStatistics {
   double energy = 0;  ///< sum of squares, stored units
 };
 
+/// Measures a cluster.
 /// @throw Error invalid_input if a value is not finite
 ClusterStatistics measureCluster(const SliceIndex& index, std::size_t cluster);
 
-/// A decomposed cluster: the sizes worth choosing, and what each stands for.
+/// A decomposed cluster: the sizes that are worth choosing, and the basis of each.
 class ClusterModel {
  public:
   /// @param index       must outlive the model
-  /// @param options     a tolerance of 0 gives one choice, `options.rank`; else the choices on the lower convex hull of (bytes,
-  ///                    error), starting with nothing at all
-  /// @param negligible  squared error in stored units below which more columns are of no interest (for a tolerance)
+  /// @param options     a tolerance of 0 gives one choice, `options.rank`. Any other tolerance gives the choices on the lower
+  ///                    convex hull of (bytes, error), the first of which stores nothing
+  /// @param negligible  with a tolerance: squared error, in stored units, below which no more columns are looked for
   ClusterModel(const SliceIndex& index, std::size_t cluster, const ClusterStatistics& statistics,
                const CompressionOptions& options, double negligible);
 
-  /// From few bytes to many; never empty.
+  /// Choices from few bytes to many; at least one.
   const std::vector<SizeChoice>& choices() const { return choices_; }
 
-  /// cp: decomposes the cluster.
+  /// Basis of a choice. With cp, decomposes the cluster for it.
   /// @param choice  0..choices().size()-1
   ClusterBasis basis(int choice) const;
 
  private:
-  /// A column, or more bits for its coefficients, in the order of gain per byte.
+  /// One step of a growing cluster: a new column, or more bits for the coefficients of a column.
   struct Step {
     int column;
     int bits;
@@ -86,14 +87,14 @@ class ClusterModel {
   std::size_t cluster_;
   int slice_count_;
   float peak_;
-  double energy_;  // of the slices divided by peak_
+  double energy_;  // energy of the slices, in units of peak_^2
   const SliceIndex* index_;
   double min_improvement_;
   int max_iterations_;
   std::vector<SizeChoice> choices_;
   std::vector<Step> steps_;        // tucker, pca
-  std::vector<SliceSpots> spots_;  // of each slice, falling gains
-  std::vector<float> spot_gains_;  // of all spots, falling
+  std::vector<SliceSpots> spots_;  // [slices], the spots of a slice in the order of falling gains
+  std::vector<float> spot_gains_;  // gains of all spots, falling
   TuckerAxes axes_;                // tucker, cp
   std::vector<float> components_;  // pca: [K][256], orthonormal
 };

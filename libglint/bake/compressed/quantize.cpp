@@ -7,25 +7,27 @@
 namespace glint::bake {
 namespace {
 
-// Parts of the largest coefficient that the largest step of 4 bits may stand for.
+// Parts of the largest coefficient that the largest 4-bit integer is tried for.
 constexpr float kCuts[] = {1.0f, 0.8f, 0.64f, 0.51f, 0.41f, 0.33f, 0.26f, 0.21f};
 
+/// Largest magnitude of the coefficients.
 float largest(const float* coefficients, int count, int stride) {
   float peak = 0;
   for (int s = 0; s < count; ++s) peak = std::max(peak, std::abs(coefficients[static_cast<std::ptrdiff_t>(s) * stride]));
   return peak;
 }
 
+/// Squared error of 4-bit coefficients with this step.
 double errorOfStep(const float* coefficients, int count, int stride, float step) {
   const float inverse = 1 / step;
   double error = 0;
-  // Sums of floats over short runs: a run of 256 stays exact to 1e-5.
+  // Float sums over runs of 256 terms are exact to 1e-5; double sums over the runs lose nothing.
   for (int first = 0; first < count; first += 256) {
     float sum = 0;
     for (int s = first; s < std::min(count, first + 256); ++s) {
       const float value = coefficients[static_cast<std::ptrdiff_t>(s) * stride];
       const float cut = std::min(kNarrowPeak, std::max(-kNarrowPeak, value * inverse));
-      // Rounds to the nearest integer for magnitudes below 2^22.
+      // Adding and subtracting 1.5 * 2^23 rounds magnitudes below 2^22 to integers, without a call.
       const float rounded = (cut + 0x1.8p23f) - 0x1.8p23f;
       const float e = value - rounded * step;
       sum += e * e;
@@ -47,7 +49,7 @@ NarrowStep bestNarrowStep(const float* coefficients, int count, int stride) {
     const float step = peak * cut / kNarrowPeak;
     if (!std::isnormal(step) || !std::isfinite(1 / step)) break;
     const double error = errorOfStep(coefficients, count, stride, step);
-    // The error has one valley.
+    // The error falls and then rises as the step shrinks: the first rise ends the search.
     if (best.step > 0 && error >= best.error) break;
     best = {step, error};
   }
@@ -62,7 +64,7 @@ ColumnErrors roundingErrors(const float* coefficients, int count) {
   const NarrowStep narrow = bestNarrowStep(coefficients, count, 1);
   errors.narrow = narrow.step > 0 ? std::min(narrow.error, errors.energy) : errors.energy;
   const double wide_step = largest(coefficients, count, 1) / kWidePeak;
-  // Rounding errors are even over a step.
+  // Rounding errors are uniform over a step, so their mean square is step^2 / 12.
   errors.wide = std::min(errors.narrow, count * wide_step * wide_step / 12);
   return errors;
 }

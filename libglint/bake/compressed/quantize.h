@@ -2,21 +2,23 @@
 
 namespace glint::bake {
 
-/// Largest coefficients of wide and of narrow columns.
+/// Largest integers of wide (8 bits) and of narrow (4 bits) coefficients.
 inline constexpr float kWidePeak = 127;
 inline constexpr float kNarrowPeak = 7;
 
-/// Squared errors of one column, summed over its coefficients.
+/// Squared errors of the coefficients of one column, summed.
 struct ColumnErrors {
-  double energy = 0;  ///< without the column
-  double narrow = 0;  ///< with 4 bits
-  double wide = 0;    ///< with 8 bits
+  double energy = 0;  ///< error without the column
+  double narrow = 0;  ///< error with 4 bits
+  double wide = 0;    ///< error with 8 bits
 };
 
-/// Rounding of a column's coefficients to the steps that leave least.
+/// Errors of a column when its coefficients are rounded to the best steps.
+/// @param coefficients  [count]
 ColumnErrors roundingErrors(const float* coefficients, int count);
 
-/// Step of 4-bit coefficients that leaves the smallest error: large ones are cut where most are small.
+/// Step of 4-bit coefficients with the smallest error. Where most coefficients are small, a small step that cuts large
+/// coefficients off is better than a step that reaches them.
 /// @param stride  floats between coefficients
 float narrowStep(const float* coefficients, int count, int stride);
 

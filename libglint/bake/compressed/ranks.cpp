@@ -6,7 +6,7 @@
 namespace glint::bake {
 namespace {
 
-// The measured error lies between this part of the tolerance and all of it, unless single steps are larger.
+// The search ends when the measured error lies between this part of the tolerance and all of it.
 constexpr double kTightness = 0.985;
 constexpr int kMostCorrections = 16;
 
@@ -23,7 +23,7 @@ RankAllocator::RankAllocator(std::vector<std::span<const SizeChoice>> clusters) 
       steps_.push_back({gain / bytes, static_cast<std::uint32_t>(c), static_cast<std::uint32_t>(i)});
     }
   }
-  // Gains fall along a hull, so a stable sort keeps the steps of a cluster in order.
+  // Gains per byte fall along a hull, so a stable sort keeps the steps of a cluster in order.
   std::stable_sort(steps_.begin(), steps_.end(),
                    [](const Step& a, const Step& b) { return a.gain_per_byte > b.gain_per_byte; });
   errors_.push_back(error);
@@ -58,6 +58,7 @@ ToleranceSearch::ToleranceSearch(std::vector<std::span<const SizeChoice>> cluste
 
 bool ToleranceSearch::next(double measured) {
   if (done_) return false;
+  // Note whether this target met the budget, and stop if it did so closely enough.
   const bool met = measured <= budget_;
   if (met) {
     met_ = std::max(met_, target_);
@@ -66,6 +67,7 @@ bool ToleranceSearch::next(double measured) {
     failed_ = failed_ > 0 ? std::min(failed_, target_) : target_;
   }
   if (++corrections_ == kMostCorrections || (!met && target_ <= allocator_.smallestError())) return finish(met_);
+  // Aim in proportion, at the middle of the wanted interval; inside the known interval, or beyond its open end.
   target_ = allocator_.error(selection_) * budget_ * (1 + kTightness * kTightness) / (2 * measured);
   const bool outside = (met_ > 0 && target_ <= met_) || (failed_ > 0 && target_ >= failed_);
   if (outside && met_ > 0 && failed_ > 0)

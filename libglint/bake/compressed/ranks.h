@@ -8,20 +8,20 @@
 
 namespace glint::bake {
 
-/// Chooses a rank for every cluster: the fewest bytes for a squared error summed over all clusters.
+/// Chooses a size for every cluster: the fewest bytes with which the squared error of all clusters together meets a bound.
 ///
-/// The choices of a cluster lie on a convex hull, so steps along it bring less and less error per byte. Taking the steps of all
-/// clusters in the order of their gain per byte is the minimum of bytes + lambda error for every lambda.
+/// The choices of a cluster lie on a convex hull, so each step along it removes less error per byte than the step before.
+/// Taking the steps of all clusters in the order of error removed per byte minimises bytes + lambda error, for every lambda.
 class RankAllocator {
  public:
-  /// @param clusters  choices of each, on a convex hull from few bytes to many; must outlive the allocator
+  /// @param clusters  choices of each cluster, on a convex hull from few bytes to many; must outlive the allocator
   explicit RankAllocator(std::vector<std::span<const SizeChoice>> clusters);
 
-  /// Fewest bytes for at most this error.
-  /// @return choice of each cluster; the last of each if even that has a larger error
+  /// Selects the fewest bytes with at most this error.
+  /// @return choice of each cluster; the last choice of every cluster if even these have a larger error
   std::vector<int> allocate(double squared_error) const;
 
-  /// Squared error that the last byte of allocate(squared_error) takes off.
+  /// Squared error per byte that the last step of allocate(squared_error) removes.
   double gainPerByte(double squared_error) const;
 
   /// Sum of the errors of a selection, before quantisation.
@@ -42,21 +42,22 @@ class RankAllocator {
 
   std::vector<std::span<const SizeChoice>> clusters_;
   std::vector<Step> steps_;
-  std::vector<double> errors_;  // [steps + 1]: after so many steps
+  std::vector<double> errors_;  // [steps + 1]: squared error after so many steps
 };
 
-/// Searches the error that an allocator has to aim at so that the measured one, after quantisation, meets a budget.
+/// Searches the error for an allocator to aim at so that the error measured after quantisation meets a budget.
 ///
-/// The two are nearly proportional, so a few corrections suffice; where they are not, the search halves the interval.
+/// The two errors are nearly proportional, so a few corrections of the target suffice. Where they are not, the search halves
+/// the interval between a target that met the budget and a target that failed.
 class ToleranceSearch {
  public:
-  /// @param budget  squared error that must not be exceeded, and is used up as far as single steps allow
+  /// @param budget  largest squared error that is allowed; the search uses it up as far as single steps allow
   ToleranceSearch(std::vector<std::span<const SizeChoice>> clusters, double budget);
 
-  /// Choices to encode and measure next; those to keep once the search is done.
+  /// Choices to encode and measure next; once the search is done, the choices to keep.
   const std::vector<int>& selection() const { return selection_; }
 
-  /// Squared error that a byte has to take off to be worth it beside those of selection(); 0 when every byte is.
+  /// Squared error that a byte must remove to be as good as the last byte of selection(); 0 when every byte is worth storing.
   double gainPerByte() const { return target_ > 0 ? allocator_.gainPerByte(target_) : 0; }
 
   /// @param measured  squared error of selection()
@@ -68,7 +69,7 @@ class ToleranceSearch {
 
   RankAllocator allocator_;
   double budget_, target_;
-  double met_ = 0, failed_ = 0;  // targets; 0: none yet
+  double met_ = 0, failed_ = 0;  // largest target that met the budget, smallest that failed; 0: none yet
   int corrections_ = 0;
   bool done_ = false;
   std::vector<int> selection_;

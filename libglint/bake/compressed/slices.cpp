@@ -13,7 +13,7 @@
 namespace glint::bake {
 namespace {
 
-/// Region of column i of a level: where its centre lies (ndf_cp.h).
+/// Region, along one axis, that has the centre of column i of a level (ndf_cp.h).
 int regionOf(int i, float stride, int size, int regions) {
   return std::min(regions - 1, static_cast<int>(std::floor((2.0 * i + 1) * stride * regions / (2.0 * size))));
 }
@@ -23,7 +23,7 @@ int regionOf(int i, float stride, int size, int regions) {
               "build the pyramid again with glint-pyramid");
 }
 
-/// The arrays of a level must have the sizes that its shape and masks ask for.
+/// Checks that the arrays of a level have the sizes that its shape and masks ask for.
 void checkLevel(const NdfPyramid& pyramid, int level) {
   const PyramidShape& shape = pyramid.shape;
   const PyramidLevel& data = pyramid.levels[level];
@@ -64,6 +64,7 @@ SliceIndex::SliceIndex(const NdfPyramid& pyramid, int regions, int level_groups)
   assignSlices();
 }
 
+/// Gives every image its region, and a slot in the region.
 void SliceIndex::assignImages() {
   const PyramidShape& shape = pyramid_.shape;
   first_image_.push_back(0);
@@ -87,11 +88,12 @@ void SliceIndex::assignImages() {
                 "a region holds " + std::to_string(most) + " images, and 65536 is the limit", "ask for more regions");
 }
 
+/// Sorts the blocks of all images by cluster.
 void SliceIndex::assignSlices() {
   const PyramidShape& shape = pyramid_.shape;
   const std::size_t blocks = shape.blocksPerImage();
   const std::size_t words = shape.maskWords();
-  // visit(cluster, image, block of the level) for every stored block, images in the order of their slots.
+  // Calls visit(cluster, image, number of the block in its level) for every stored block, images in the order of their slots.
   const auto forEachBlock = [&](auto visit) {
     for (int l = 0; l < shape.level_count; ++l) {
       const PyramidLevel& level = pyramid_.levels[l];

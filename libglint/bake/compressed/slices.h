@@ -8,43 +8,46 @@
 
 namespace glint::bake {
 
-/// Floats between the slices of a panel. Not a power of two: columns of slices would share a few cache sets.
+/// Floats from one slice of a panel to the next. With a power of two, the same pixel of all slices would compete for a few
+/// lines of the cache.
 inline constexpr int kSliceStride = kBlockPixels + 16;
-/// Slices that kernels work on at once (278 kB: the second-level cache).
+/// Slices of a panel, which kernels work on at once: 278 kB, which fit the second-level cache.
 inline constexpr int kPanelSlices = 256;
 
-/// The clusters of a pyramid: which slices each holds, in the order of ndf_cp.h.
+/// Tells which slices of a pyramid each cluster has, in the order of ndf_cp.h.
 ///
-/// Densities are divided by the largest magnitude of the cluster, so that kernels in float neither overflow nor underflow.
+/// load() multiplies by a factor: callers divide densities by the peak of the cluster, so that floats neither overflow nor
+/// underflow.
 class SliceIndex {
  public:
-  /// @param regions       per axis, 1..255
-  /// @param level_groups  levels in regions of their own, the last with all coarser ones; >= 1
+  /// @param regions       regions along each axis, 1..255
+  /// @param level_groups  groups of levels with regions of their own, >= 1: each of the finest levels is a group, and the last
+  ///                      group has all coarser levels
   /// @throw Error usage if a region has more than 65536 images, invalid_input if the arrays of the pyramid do not fit its shape
   SliceIndex(const NdfPyramid& pyramid, int regions, int level_groups);
 
-  /// @return groups of levels; the clusters of each follow those of the one before, and are as many
+  /// @return number of groups of levels. All groups have the same number of clusters, and clusters are in the order of groups
   int levelGroupCount() const { return level_groups_; }
   int regionCount() const { return static_cast<int>(region_slots_.size()); }
-  /// @return images of a region
+  /// @return number of images of a region
   std::uint32_t slotCount(int region) const { return region_slots_[region]; }
   /// @return slot of an image in its region
   std::uint16_t slot(std::uint32_t image) const { return slots_[image]; }
-  /// @return pixels of an image in a unit of area of the disk's square
+  /// @return pixels of an image in an area of 1 of the disk
   double pixelsPerArea() const { return 0.25 * pyramid_.shape.resolution * pyramid_.shape.resolution; }
-  /// @return deviation of a facet's image, pixels
+  /// @return deviation of the lobe of a facet, in pixels
   float sigmaPixels() const { return pyramid_.shape.sigma_r * 0.5f * static_cast<float>(pyramid_.shape.resolution); }
 
   std::size_t clusterCount() const { return first_slices_.size() - 1; }
   std::size_t imageCount() const { return slots_.size(); }
-  /// @return slices of one cluster
+  /// @return number of slices of a cluster
   int sliceCount(std::size_t cluster) const { return static_cast<int>(first_slices_[cluster + 1] - first_slices_[cluster]); }
   std::uint64_t totalSlices() const { return first_slices_.back(); }
   std::uint64_t firstSlice(std::size_t cluster) const { return first_slices_[cluster]; }
-  /// @return image of a slice, numbered over all levels
+  /// @return image that has a slice; images are numbered over all levels
   std::uint32_t image(std::uint64_t slice) const { return images_[slice]; }
 
-  /// Converts slices first..first+count-1 of a cluster, multiplied by `factor`.
+  /// Converts slices first..first+count-1 of a cluster to floats, multiplied by `factor`.
   /// @param out  [count][kSliceStride]; the padding is not written
   void load(std::size_t cluster, int first, int count, float factor, float* out) const;
 
@@ -58,7 +61,7 @@ class SliceIndex {
   const NdfPyramid& pyramid_;
   int regions_;
   int level_groups_;
-  std::vector<std::uint32_t> region_slots_;   // [regions]: images
+  std::vector<std::uint32_t> region_slots_;   // [regions]: number of images
   std::vector<std::uint32_t> first_image_;    // [levels + 1]
   std::vector<std::uint16_t> image_regions_;  // [images]
   std::vector<std::uint16_t> slots_;          // [images]

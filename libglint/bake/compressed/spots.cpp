@@ -9,7 +9,7 @@
 namespace glint::bake {
 namespace {
 
-// A spot whose part inside the block has less of its norm than this is left to the neighbouring block.
+// A spot whose profile inside the block has a norm below this lies mostly in the neighbouring block, which stores it.
 constexpr float kLeastNorm = 0.05f;
 
 }  // namespace
@@ -32,7 +32,7 @@ SpotFinder::SpotFinder(float sigma_pixels) : sums_(kSpotSums), reach_(static_cas
   }
 }
 
-/// Dot product of the slice with the spot at a place, over the norm of the spot.
+/// Dot product of the slice with the spot at a position, over the norm of the spot.
 float SpotFinder::match(const float* slice, int x, int y) const {
   const float norm = norms_[x] * norms_[y];
   if (norm < kLeastNorm) return 0;
@@ -48,7 +48,7 @@ float SpotFinder::match(const float* slice, int x, int y) const {
   return sum / norm;
 }
 
-/// Climbs to the best place near (x, y), with steps of half a pixel down to an eighth.
+/// Climbs from (x, y) to the best position near it, with steps from half a pixel down to an eighth.
 void SpotFinder::refine(const float* slice, int& x, int& y, float& best) const {
   for (int step = kSpotSteps / 2; step > 0; step /= 2) {
     for (bool moved = true; moved;) {
