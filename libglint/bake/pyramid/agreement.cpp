@@ -12,7 +12,7 @@
 namespace glint::bake {
 namespace {
 
-/// All pixels of an image, by block, empty ones included.
+/// Decodes all pixels of an image, block by block; pixels of blocks that are not stored are 0.
 void decodeImage(const NdfPyramid& pyramid, int l, std::size_t image, std::vector<float>& pixels) {
   const PyramidLevel& level = pyramid.levels[l];
   const int words = pyramid.shape.maskWords();

@@ -4,8 +4,9 @@
 
 namespace glint::bake {
 
-/// How much level `level + 1` of a pyramid differs from the level below it: rel_l2 between every image and the up to four
-/// images of `level` nearest to it, over the whole level. Where it is small, `level` answers larger footprints as well.
+/// Measures how much level `level + 1` of a pyramid differs from `level`: rel_l2 between every image of the former and the up
+/// to four images of the latter nearest to it, over the whole level. Where the difference is small, `level` can answer the
+/// larger footprints too.
 /// @param level  0 to level_count - 2
 double levelDisagreement(const NdfPyramid& pyramid, int level);
 

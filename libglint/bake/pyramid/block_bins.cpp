@@ -7,7 +7,7 @@ namespace {
 
 constexpr int kBins = BlockBins::kTileBins;
 
-/// to[c] += weight.mean * from[2c] + weight.slope * from[2c + 1] for channels c of 64 values.
+/// to[c] += weight.mean * from[2c] + weight.slope * from[2c + 1] for each channel c of each tile.
 GLINT_MULTIVERSION void addTiles(const BlockBins& from, LinearWeight weight, int channels, BlockBins& to) {
   for (std::size_t t = 0; t < from.tiles().size(); ++t) {
     const float* in = from.values(t);
@@ -17,6 +17,7 @@ GLINT_MULTIVERSION void addTiles(const BlockBins& from, LinearWeight weight, int
   }
 }
 
+/// Moments after the change of variables x -> px.scale x + px.middle, y -> py.scale y + py.middle.
 GLINT_MULTIVERSION void addPartTiles(const BlockBins& from, CellPart px, CellPart py, BlockBins& to) {
   const float sx = px.scale, cx = px.middle, sy = py.scale, cy = py.middle;
   const float of_xy = sx * sy, of_x = sx * cy, of_y = sy * cx, of_one = cx * cy;

@@ -32,8 +32,8 @@ bool DirectionBins::touchedNear(int block_x, int block_y, int distance) const {
 
 template <class Visitor>
 void DirectionBins::forEachTouchedRow(Visitor&& visitor) const {
-  // A splat reaches one bin past the tile of its centre, so rows of tiles are widened by a tile each way; bins past the border
-  // of the square belong to the outermost tiles.
+  // A splat reaches one bin past the tile of its centre, so the neighbours of touched tiles are visited too. Bins outside the
+  // square belong to the outermost tiles.
   const int size = tileSize();
   const auto begin = [&](int tile) { return tile == 0 ? -margin_ : tile * size; };
   const auto end = [&](int tile) { return tile == tiles_ - 1 ? pitch_ - margin_ : (tile + 1) * size; };
@@ -67,6 +67,7 @@ void DirectionBins::addTo(DirectionBins& other) const {
 
 namespace {
 
+/// Value of a B-spline at distance x from its middle.
 double splineAt(Spline spline, double x) {
   x = std::fabs(x);
   const auto power = [](double v, int n) { return v <= 0 ? 0 : n == 2 ? v * v : v * v * v; };
@@ -74,8 +75,8 @@ double splineAt(Spline spline, double x) {
   return (power(2 - x, 3) - 4 * power(1 - x, 3)) / 6;
 }
 
-/// Solves sum over s of gram(t - s) taps[s] = right[t], where gram are the inner products of splines (values of the spline of
-/// twice the order), by Gauss and Seidel's iteration, which gains a digit in a few dozen sweeps.
+/// Solves sum over s of gram(t - s) taps[s] = right[t], where gram are the inner products of shifted splines (values of the
+/// spline of twice the order). The Gauss-Seidel iteration gains a digit in a few dozen sweeps.
 std::vector<double> solveSplines(Spline spline, const std::vector<double>& right) {
   constexpr double kQuadratic[4] = {66.0 / 120, 26.0 / 120, 1.0 / 120, 0};
   constexpr double kCubic[4] = {2416.0 / 5040, 1191.0 / 5040, 120.0 / 5040, 1.0 / 5040};
@@ -99,9 +100,10 @@ PixelFilter::PixelFilter(float sigma_pixels, int subdivision, Spline spline) : s
   const double bin = 1.0 / subdivision, sigma = sigma_pixels;
   radius_ = static_cast<int>(std::ceil(kFilterReach * sigma * subdivision));
   const auto cumulative = [&](double x) { return 0.5 * std::erf(x / (sigma * std::sqrt(2.0))); };
-  const auto share = [&](double x) { return cumulative(1 - x) - cumulative(-x); };  // of a facet x pixels from the left side
-  // Least squares over all places of a facet: inner products of its share with the splines, by the midpoint rule.
-  constexpr int kSteps = 64;  // in a bin
+  // Share of a lobe in a pixel, for a facet x pixels from the left side of the pixel.
+  const auto share = [&](double x) { return cumulative(1 - x) - cumulative(-x); };
+  // Least squares over all positions of a facet: inner products of its share with the splines, by the midpoint rule.
+  constexpr int kSteps = 64;  // points in a bin
   std::vector<double> right;
   for (int t = -radius_; t < subdivision + radius_; ++t) {
     double sum = 0;
@@ -112,7 +114,7 @@ PixelFilter::PixelFilter(float sigma_pixels, int subdivision, Spline spline) : s
     right.push_back(sum);
   }
   for (const double tap : solveSplines(spline, right)) taps_.push_back(static_cast<float>(tap));
-  // Each bin gives all of its mass: over the pixels it reaches, its shares are taps a subdivision apart.
+  // A bin must give all of its mass: its shares in the pixels that it reaches, which are every subdivision-th tap, sum to 1.
   for (int phase = 0; phase < subdivision; ++phase) {
     double sum = 0;
     for (std::size_t t = phase; t < taps_.size(); t += subdivision) sum += taps_[t];
@@ -122,12 +124,13 @@ PixelFilter::PixelFilter(float sigma_pixels, int subdivision, Spline spline) : s
 
 namespace {
 
-/// Largest filter: 16 pixels and five deviations on either side, at the largest roughness and resolution (see PyramidOptions).
+/// Bins across the widest block: 16 pixels and the filter on either side, at the largest roughness and resolution (see
+/// PyramidOptions).
 constexpr int kMaxColumns = 2048;
-/// Columns filtered at once; their sums stay in registers.
+/// Number of columns that are filtered at once. Their sums stay in registers.
 constexpr int kStrip = 16;
 
-/// rows[p][c] = sum over t of taps[t] * bins[p * step + t][c], for 16 rows of `columns` values, a multiple of kStrip.
+/// rows[p][c] = sum over t of taps[t] * bins[p * step + t][c], for 16 rows p and `columns` columns c, a multiple of kStrip.
 GLINT_MULTIVERSION void filterRows(const float* bins, int pitch, int step, const float* taps, int tap_count, int columns,
                                    float* rows) {
   for (int c = 0; c < columns; c += kStrip) {
@@ -141,15 +144,15 @@ GLINT_MULTIVERSION void filterRows(const float* bins, int pitch, int step, const
   }
 }
 
-/// pixels[p][x] += sum over t of taps[t] * rows[p][x * step + t]. Every step-th value of a row is gathered first, so that the
-/// sums run over neighbours.
+/// pixels[p][x] += sum over t of taps[t] * rows[p][x * step + t]. Gathers every step-th value of a row first, so that vectors
+/// of neighbouring pixels x load neighbouring values.
 GLINT_MULTIVERSION void filterColumns(const float* rows, int columns, int step, const float* taps, int tap_count,
                                       float* pixels) {
   float phases[kMaxColumns + kBlockSize];
   const int phase_size = (columns + step - 1) / step;
   for (int p = 0; p < kBlockSize; ++p) {
     const float* row = rows + static_cast<std::size_t>(p) * columns;
-    if (step == 2) {  // the usual one, which the compiler vectorises
+    if (step == 2) {  // the usual step, a loop of which the compiler makes vectors
       for (int k = 0; k < columns / 2; ++k) phases[k] = row[2 * k], phases[phase_size + k] = row[2 * k + 1];
     } else {
       for (int phase = 0; phase < step; ++phase)

@@ -12,8 +12,9 @@
 namespace glint::bake {
 namespace {
 
-constexpr int kChunk = 128;  // texels binned at once
+constexpr int kChunk = 128;  // texels that one call of splat takes
 
+/// The bins that texels are added to.
 struct Target {
   float* bins;
   std::uint8_t* touched;
@@ -25,8 +26,9 @@ struct Target {
 
 using Float4 = float __attribute__((vector_size(16), aligned(4), may_alias));
 
-/// Adds `count` <= kChunk neighbouring texels with weights row_weight * weights[k].
+/// Adds `count` <= kChunk neighbouring texels with weights row_weight * weights[k] to 3x3 bins each.
 GLINT_MULTIVERSION void splat(const Vec2* normals, const float* weights, float row_weight, int count, const Target& target) {
+  // Find the bins and tiles of all texels, in a loop of which the compiler makes vectors; then add texel by texel.
   float fx[kChunk], fy[kChunk];
   std::int32_t offset[kChunk], tile[kChunk];
   for (int k = 0; k < count; ++k) {
@@ -42,7 +44,7 @@ GLINT_MULTIVERSION void splat(const Vec2* normals, const float* weights, float r
   for (int k = 0; k < count; ++k) {
     const float w = row_weight * weights[k];
     const float x = fx[k], y = fy[k], rx = 1 - x, ry = 1 - y;
-    // Quadratic B-spline weights of the bins before, at and after the facet; the fourth lane adds 0.
+    // Quadratic B-spline weights of the bins before, at and after the normal; the fourth lane adds 0.
     const Float4 across = {0.5f * w * rx * rx, w * (0.5f + x * rx), 0.5f * w * x * x, 0};
     float* bin = target.bins + offset[k];
     Float4* row0 = reinterpret_cast<Float4*>(bin);
@@ -55,25 +57,27 @@ GLINT_MULTIVERSION void splat(const Vec2* normals, const float* weights, float r
   }
 }
 
-/// Half-open range of texel centres within `reach` of `centre`, limited to the map when it does not repeat.
+/// Texels [begin, end) along one axis.
 struct Range {
   int begin, end;
   int size() const { return end - begin; }
 };
+/// Texels whose centres lie within `reach` of `centre`: of the map only, if it does not repeat.
 Range texelsWithin(float centre, float reach, int size, Boundary boundary) {
   int begin = static_cast<int>(std::ceil(centre - reach - 0.5f)), end = static_cast<int>(std::floor(centre + reach - 0.5f)) + 1;
   if (boundary == Boundary::clamp) begin = std::max(begin, 0), end = std::min(end, size);
   return {begin, end};
 }
 
-/// Relative weights of texels along one axis.
+/// Weights of texels along one axis, not normalised.
 struct AxisWeights {
   Range range;
   std::vector<float> weights;
-  bool folded;  ///< the range is the whole map, and weights are summed over its periodic copies
+  bool folded;  ///< whether the texels are the whole map, with weights summed over its periods
 };
 
-/// Weights of a Gaussian, cut at its reach. One that is longer than the map is folded: no texel is visited twice.
+/// Weights of a Gaussian up to its reach. If the Gaussian is longer than the map, the weights are folded, so that no texel is
+/// visited twice.
 AxisWeights gaussianWeights(float centre, float sigma, int size, Boundary boundary) {
   const Range range = texelsWithin(centre, kPyramidReach * sigma, size, boundary);
   const bool folded = range.size() > size;
@@ -86,6 +90,7 @@ AxisWeights gaussianWeights(float centre, float sigma, int size, Boundary bounda
   return axis;
 }
 
+/// Equal weights of all texels.
 AxisWeights evenWeights(int size) { return {{0, size}, std::vector<float>(static_cast<std::size_t>(size), 1.0f), true}; }
 
 Target targetOf(DirectionBins& bins) {
@@ -98,11 +103,12 @@ Target targetOf(DirectionBins& bins) {
           0.5f * static_cast<float>(bins.tilesPerAxis())};
 }
 
-/// Adds texels to bins with the normalised product of weights along x and y.
-/// @param columnsOfRow  the part of the columns that count in a row
+/// Adds texels to bins with the product of the weights along x and y, normalised.
+/// @param columnsOfRow  columnsOfRow(j): columns that have weight in row j
 template <class ColumnsOfRow>
 void scatter(const NormalMap& map, const AxisWeights& x, const AxisWeights& y, const ColumnsOfRow& columnsOfRow,
              DirectionBins& bins, DirectionBins& band) {
+  // Sum all weights, to normalise them.
   double total = 0;
   for (int j = y.range.begin; j < y.range.end; ++j) {
     const Range r = columnsOfRow(j);
@@ -111,6 +117,7 @@ void scatter(const NormalMap& map, const AxisWeights& x, const AxisWeights& y, c
     total += row * y.weights[j - y.range.begin];
   }
 
+  // Add rows of texels in pieces that do not cross the border of the map.
   const bool banded = y.range.size() * static_cast<std::int64_t>(x.range.size()) > 2 * kBandTexels;
   const Target target = targetOf(banded ? band : bins);
   const auto flush = [&] {

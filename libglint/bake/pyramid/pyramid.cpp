@@ -45,7 +45,7 @@ void checkOptions(const NormalMap& map, const PyramidOptions& o) {
   if (map.width < 1 || map.height < 1) throw Error(ErrorCode::invalid_input, "normals.size", {}, {}, "the map has no texels");
 }
 
-/// One image with its empty blocks left out, before it is packed with its level.
+/// The blocks of one image that are stored, before its level is packed.
 struct PackedImage {
   std::vector<std::uint64_t> mask;
   std::vector<float> means;
@@ -53,7 +53,7 @@ struct PackedImage {
   std::vector<float> float_pixels;
 };
 
-/// Sum of the pixels of a block: of each column first, which the processor adds side by side.
+/// Sum of the pixels of a block: first of each column, with one lane of a vector for each, then of the columns.
 GLINT_MULTIVERSION float sumBlock(const float* pixels) {
   float columns[kBlockSize] = {};
   for (int y = 0; y < kBlockSize; ++y)
@@ -71,7 +71,7 @@ void toHalfPortably(const float* from, float scale, std::uint16_t* to, float* ro
 }
 
 #ifdef __x86_64__
-/// The same bits by the processor's own conversion.
+/// toHalfPortably with the processor's own conversion, which gives the same bits.
 __attribute__((target("avx,f16c"))) void toHalfByInstruction(const float* from, float scale, std::uint16_t* to,
                                                              float* rounded) {
   const __m256 scales = _mm256_set1_ps(scale), largest = _mm256_set1_ps(65504);
@@ -84,7 +84,8 @@ __attribute__((target("avx,f16c"))) void toHalfByInstruction(const float* from, 
 }
 #endif
 
-/// Half-precision numbers of scale * from, not negative, and what they stand for.
+/// Converts scale * from, which is not negative, to half precision.
+/// @param rounded  [kBlockPixels]: the halves, converted back to float
 void toHalf(const float* from, float scale, std::uint16_t* to, float* rounded) {
 #ifdef __x86_64__
   static const bool has_instruction = __builtin_cpu_supports("avx") && __builtin_cpu_supports("f16c");
@@ -93,6 +94,7 @@ void toHalf(const float* from, float scale, std::uint16_t* to, float* rounded) {
   toHalfPortably(from, scale, to, rounded);
 }
 
+/// Bins, and the filter that makes pixels of them.
 struct Layer {
   DirectionBins* bins;
   const PixelFilter* filter;
@@ -104,7 +106,7 @@ void appendMean(PyramidShape& shape) {
   ++shape.level_count;
 }
 
-/// Filters bins into pixels and keeps the blocks that hold something.
+/// Filters bins into pixels, and keeps the blocks that have enough mass.
 class ImagePacker {
  public:
   ImagePacker(const PyramidShape& shape, BlockPrecision precision, float value_scale) : shape_(shape), precision_(precision) {
@@ -113,13 +115,15 @@ class ImagePacker {
     value_scale_ = value_scale;
   }
 
-  /// @param layers  bins whose pixels are added
+  /// Makes one image.
+  /// @param layers        bins; the pixels of all layers are added
+  /// @param inverse_mass  1 over the mass of all bins
   PackedImage pack(std::span<const Layer> layers, float inverse_mass) const {
     PackedImage image;
     image.mask.assign(shape_.maskWords(), 0);
     const int blocks = shape_.blocksPerAxis();
     std::vector<std::array<float, kBlockPixels>> stored;
-    float excess = 0;  // mass that clearing negative pixels adds
+    float excess = 0;  // mass that is added by setting negative pixels to 0
     for (int b = 0; b < blocks * blocks; ++b) {
       std::array<float, kBlockPixels> pixels = {};
       bool empty = true;
@@ -139,6 +143,7 @@ class ImagePacker {
       image.mask[b / 64] |= std::uint64_t{1} << (b % 64);
       stored.push_back(pixels);
     }
+    // Normalise to the mass with the excess, so that the image integrates to 1.
     const float scale = inverse_mass / (1 + excess * inverse_mass);
     image.means.reserve(stored.size());
     (precision_ == BlockPrecision::f16 ? image.half_pixels.reserve(stored.size() * kBlockPixels)
@@ -166,6 +171,7 @@ class ImagePacker {
   float value_scale_;
 };
 
+/// Joins the images of a level.
 NdfPyramidData::Level packLevel(std::vector<PackedImage>& images, BlockPrecision precision) {
   NdfPyramidData::Level level;
   std::size_t blocks = 0;
@@ -185,17 +191,20 @@ NdfPyramidData::Level packLevel(std::vector<PackedImage>& images, BlockPrecision
     append(level.block_means, image.means);
     append(level.half_pixels, image.half_pixels);
     append(level.float_pixels, image.float_pixels);
-    image = {};  // frees as it goes: the level is held once
+    image = {};  // frees the memory of the image, so that the level is in memory once
   }
   return level;
 }
 
+/// Bins of one thread.
 struct Scratch {
   Scratch(int resolution, const PixelFilter& filter)
       : bins(resolution, filter.subdivision(), filter.margin()), band(resolution, filter.subdivision(), filter.margin()) {}
   DirectionBins bins, band;
 };
 
+/// Makes the images of all levels of a flat surface.
+/// @return [levels][images]
 std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const PyramidShape& shape, const ImagePacker& packer,
                                                 const PixelFilter& filter, const ProgressFn& progress) {
   std::size_t total = 0;
@@ -223,7 +232,7 @@ std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const Pyra
   return images;
 }
 
-/// Copies sparse bins to the raster that the filter reads.
+/// Copies the tiles of one grid from sparse bins to the raster that the filter reads, and flags its tiles.
 void unpackBins(const BlockBins& sparse, const DirectionTiles::Grid& grid, DirectionBins& bins) {
   constexpr int kTile = BlockBins::kTile;
   const auto touchedTile = [&](int bin) { return std::clamp(bin / bins.tileSize(), 0, bins.tilesPerAxis() - 1); };
@@ -239,6 +248,8 @@ void unpackBins(const BlockBins& sparse, const DirectionTiles::Grid& grid, Direc
   }
 }
 
+/// Makes the images of all levels of a smooth surface, from a fine and a coarse grid of bins.
+/// @return [levels][images]
 std::vector<std::vector<PackedImage>> buildSmooth(const NormalMap& map, const PyramidShape& shape, const ImagePacker& packer,
                                                   int subdivision, const ProgressFn& progress) {
   const float sigma_pixels = 0.5f * shape.sigma_r * static_cast<float>(shape.resolution);
@@ -270,7 +281,7 @@ std::vector<std::vector<PackedImage>> buildSmooth(const NormalMap& map, const Py
   return images;
 }
 
-/// Drops the coarsest levels of footprints while the level below them says the same. The mean of the map stays.
+/// Drops the coarsest level of footprints while the next finer level agrees with it. The mean of the map stays the last level.
 void dropAgreeingLevels(NdfPyramidData& pyramid) {
   PyramidShape& shape = pyramid.shape;
   int kept = shape.footprintLevels();
@@ -326,14 +337,14 @@ NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options,
   pyramid.shape = pyramidShape(map.width, map.height, options);
   pyramid.shape.slopes = mapSlopes(map);
   pyramid.precision = options.precision;
-  // Pixel means reach (resolution / 2)^2; half precision ends at 65504.
+  // A pixel mean can reach (resolution / 2)^2, and the largest half is 65504: scale down images of more than 256 pixels.
   pyramid.value_scale =
       options.resolution > 256 ? static_cast<float>(options.resolution * options.resolution) / (256 * 256) : 1;
 
   const float sigma_pixels = 0.5f * options.sigma_r * static_cast<float>(options.resolution);
   const int subdivision = subdivisionFor(sigma_pixels);
   const ImagePacker packer(pyramid.shape, options.precision, pyramid.value_scale);
-  // The coarse grid of smooth surfaces has half the bins.
+  // The coarse grid of smooth surfaces has half the bins along each axis, so the subdivision must be even.
   auto images = options.surface == Surface::flat
                     ? buildFlat(map, pyramid.shape, packer, PixelFilter(sigma_pixels, subdivision, Spline::quadratic), progress)
                     : buildSmooth(map, pyramid.shape, packer, subdivision + subdivision % 2, progress);

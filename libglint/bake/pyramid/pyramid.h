@@ -14,16 +14,17 @@ struct PyramidOptions {
   float sigma_r = 0.005f;  ///< intrinsic roughness, disk units: at least 0.1 pixel of an NDF image, at most 0.25
   Surface surface = Surface::flat;
   Boundary boundary = Boundary::wrap;
-  /// Of footprints, besides the mean of the map; 0: until neighbouring levels agree (see kAgreement) or the stride reaches the
-  /// map.
+  /// Number of levels with footprints, besides the level that is the mean of the map. 0: levels are added until two
+  /// neighbouring levels agree (see kAgreement) or the stride reaches the size of the map.
   int levels = 0;
   BlockPrecision precision = BlockPrecision::f16;
 };
 
-/// With automatic levels, the coarsest level of footprints is dropped while `levelDisagreement` with the one below is less than this.
+/// With automatic levels, the coarsest level of footprints is dropped while its `levelDisagreement` with the next finer level
+/// is less than this.
 inline constexpr double kAgreement = 0.01;
 
-/// Blocks that hold less than this share of their image are not stored.
+/// A block that has less than this share of the mass of its image is not stored.
 inline constexpr float kBlockMassThreshold = 1e-6f;
 
 /// An NdfPyramid that owns its arrays.
@@ -46,14 +47,14 @@ class NdfPyramidData {
   NdfPyramid view() const;
 };
 
-/// The grids of levels that a map of the given size gets: strides stride 2^l while the stride is shorter than the longest side,
-/// then the mean of the map.
+/// The shape of the pyramid for a map of this size. Level l has stride `stride 2^l`, for all strides shorter than the longer
+/// side of the map; the last level is the mean of the map.
 PyramidShape pyramidShape(int width, int height, const PyramidOptions& options);
 
 /// Builds the NDF images of every level (Deng 2022, section 4.1).
 ///
-/// Facets are scattered, not gathered: each texel adds its footprint weight to bins of directions, then one separable filter
-/// per image turns bins into pixel means of the blurred density. Gaussian footprints are cut at kPyramidReach.
+/// Facets are scattered: each texel of a footprint adds its weight to bins of directions. Then one separable filter for each
+/// image turns bins into pixel means of the blurred density. Gaussian footprints end at kPyramidReach deviations.
 /// @throws Error (usage) for options out of range
 NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options, const ProgressFn& progress = {});
 

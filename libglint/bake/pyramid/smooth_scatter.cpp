@@ -22,10 +22,10 @@ namespace {
 
 constexpr int kCellsPerStride = 8;
 
-using CellRow = std::vector<BlockBins>;  // moments of each cell of a row of the lattice
-using RowSums = std::vector<BlockBins>;  // for each column of images: a row of cells, weighted along x
+using CellRow = std::vector<BlockBins>;  // [cells]: moments of a row of the lattice
+using RowSums = std::vector<BlockBins>;  // [columns of images]: a row of cells, summed with the weights of the images along x
 
-/// Rows of empty bins that keep the memory of their last use.
+/// Rows of empty bins. Bins that are given back keep their memory for their next use.
 class SpareRows {
  public:
   SpareRows(int size, std::size_t tiles, int channels) : size_(size), tiles_(tiles), channels_(channels) {}
@@ -54,21 +54,21 @@ class SpareRows {
 
 /// The lattice of one level along one axis.
 struct Axis {
-  float size;     // of the map, texels
-  float spacing;  // texels
+  float size;     // texels of the map
+  float spacing;  // texels of a cell
   int cells;
   bool wrap;
 
-  /// Whether the lattice of the next level has half the cells. A single cell, of a map that is thin beside its level, stays.
+  /// Whether the lattice of the next level has half the cells. Along the short side of a narrow map, a single cell stays one.
   bool halves() const { return cells > 1; }
   Axis coarser() const { return halves() ? Axis{size, 2 * spacing, cells / 2, wrap} : *this; }
-  /// The cell of the next level that holds a cell, and where.
+  /// The cell of the next level that has this cell as a part, and the position of the part.
   int parent(int cell) const { return halves() ? cell / 2 : cell; }
   CellPart partOf(int cell) const { return halves() ? CellPart::half(cell % 2 != 0) : CellPart::whole(); }
-  /// Whether no other cell of the same parent follows.
+  /// Whether this cell is the last part of its parent.
   bool endsParent(int cell) const { return !halves() || cell % 2 != 0; }
 
-  /// Cells that a footprint may reach, in rising order.
+  /// Cells that a footprint may reach, in ascending order.
   std::vector<int> cellsWithin(float centre, float reach) const {
     const int first = static_cast<int>(std::floor((centre - reach) / spacing)) - 1;
     const int last = static_cast<int>(std::floor((centre + reach) / spacing)) + 1;
@@ -82,14 +82,15 @@ struct Axis {
     return found;
   }
 
-  /// Best linear approximation over a cell of the relative weight in a Gaussian footprint, summed over its periodic copies.
+  /// Approximates the weight of a Gaussian footprint over a cell by the best linear function, summed over the periods of the
+  /// map.
   LinearWeight weight(int cell, float centre, float sigma) const {
     const float reach = kPyramidReach * sigma;
     float d = (static_cast<float>(cell) + 0.5f) * spacing - centre;
     LinearWeight sum = {0, 0};
-    if (wrap) d -= size * std::floor((d + reach) / size);  // first copy at or right of -reach
+    if (wrap) d -= size * std::floor((d + reach) / size);  // the first period at or right of -reach
     for (; std::fabs(d) <= reach; d += size) {
-      for (int k = 0; k < 4; ++k) {  // Gauss and Legendre's rule on [-1/2, 1/2]
+      for (int k = 0; k < 4; ++k) {  // Gauss-Legendre quadrature on [-1/2, 1/2]
         constexpr float kPlaces[4] = {-0.43056816f, -0.16999052f, 0.16999052f, 0.43056816f};
         constexpr float kShares[4] = {0.17392742f, 0.32607258f, 0.32607258f, 0.17392742f};
         const float x = (d + kPlaces[k] * spacing) / sigma;
@@ -105,14 +106,14 @@ struct Axis {
 
 Axis finestAxis(int size, float stride, int levels, bool wrap) {
   const int wanted = static_cast<int>(std::ceil(static_cast<float>(size) * kCellsPerStride / stride));
-  // Every level halves the lattice until one cell is left, so the count of cells is a multiple of a power of two, and the
-  // spacing a little finer for it.
+  // Every level halves the lattice until one cell is left, so the number of cells is a multiple of a power of two. Cells are a
+  // little smaller than an eighth of a stride for it.
   const int multiple = std::min(1 << (levels - 1), static_cast<int>(std::bit_ceil(static_cast<unsigned>(wanted))));
   const int cells = (wanted + multiple - 1) / multiple * multiple;
   return {static_cast<float>(size), static_cast<float>(size) / static_cast<float>(cells), cells, wrap};
 }
 
-/// The images of one level along one axis: their weights of the cells of the lattice.
+/// Weights of the cells of a lattice in the images of one level, along one axis.
 class AxisWeights {
  public:
   struct Entry {
@@ -120,7 +121,7 @@ class AxisWeights {
     LinearWeight weight;
   };
 
-  /// Of Gaussian footprints.
+  /// Weights of Gaussian footprints.
   AxisWeights(const Axis& axis, int images, float stride) : images_of_(axis.cells), cells_of_(images) {
     const float sigma = kFootprintPerStride * stride;
     for (int i = 0; i < images; ++i) {
@@ -129,7 +130,7 @@ class AxisWeights {
     }
   }
 
-  /// Of one image that sees all cells alike.
+  /// Equal weights of all cells, for a single image.
   static AxisWeights even(const Axis& axis) {
     AxisWeights weights(axis);
     for (int c = 0; c < axis.cells; ++c) weights.add(0, c, {1, 0});
@@ -151,7 +152,7 @@ class AxisWeights {
   std::vector<std::vector<Entry>> images_of_, cells_of_;
 };
 
-/// The images of one level, open ones only.
+/// The images of one level. An image is in memory from its first row of cells to its last.
 class Level {
  public:
   Level(const PyramidShape& shape, int level, const Axis& x, const Axis& y, std::size_t tiles, const ImageSink& sink)
@@ -172,12 +173,12 @@ class Level {
   RowSums takeSums() { return spare_sums_.take(); }
   void giveSums(RowSums& sums) { spare_sums_.give(sums); }
 
-  /// Adds cell c of a row to the sums of every image that it is in.
+  /// Adds cell c of a row to the sums of every image that the cell has a weight in.
   void addCell(int c, const BlockBins& cell, RowSums& sums) const {
     for (const auto& [i, weight] : x_.imagesOf(c)) addAlongX(cell, weight, sums[i]);
   }
 
-  /// The same for a whole row.
+  /// Sums a whole row of cells for every column of images.
   RowSums sumsOf(const CellRow& row) {
     RowSums sums = takeSums();
     tbb::parallel_for(0, columns_, [&](int i) {
@@ -186,7 +187,7 @@ class Level {
     return sums;
   }
 
-  /// Adds row r of cells to its images, and hands over those that are complete. Rows come in order.
+  /// Adds row r of cells to its images, and gives the images that end with this row to the sink. Call in the order of rows.
   void addRow(int r, const RowSums& sums) {
     for (const auto& [j, weight] : y_.imagesOf(r)) {
       std::vector<BlockBins>& images = image_rows_[j];
@@ -214,13 +215,13 @@ class Level {
   SpareRows spare_images_, spare_sums_;
 };
 
-/// Rasterises the cells of the map into cells of the lattice.
+/// Rasterises the triangles of the map into cells of the lattice.
 class Rasteriser {
  public:
   Rasteriser(const NormalMap& map, const Axis& x, const Axis& y, const DirectionTiles& tiles, float sigma_bins)
       : map_(map), x_(x), y_(y), splatters_([=] { return TriangleSplatter(tiles, sigma_bins); }) {}
 
-  /// Moments of the surface in cell (a, b) of the lattice are added to `cell`.
+  /// Adds the moments of the surface in cell (a, b) of the lattice to `cell`.
   void addCell(int a, int b, BlockBins& cell) {
     TriangleSplatter& splatter = splatters_.local();
     const auto [j0, j1] = texelsIn(y_, b, map_.height);
@@ -231,8 +232,8 @@ class Rasteriser {
   }
 
  private:
-  /// Cells of four texel centres whose middle (i + 1) lies in lattice cell `a`; the last cell of a map that does not wrap is
-  /// none.
+  /// Squares of four texel centres, along one axis, whose middle (i + 1 for square i) lies in cell `a` of the lattice: [first,
+  /// end). A map that does not wrap has no square after its last texel.
   static std::pair<int, int> texelsIn(const Axis& axis, int a, int size) {
     const auto first = [&](int cell) {
       return cell >= axis.cells ? size : static_cast<int>(std::ceil(static_cast<float>(cell) * axis.spacing)) - 1;
@@ -246,7 +247,7 @@ class Rasteriser {
     const int right = left + 1 < map_.width ? left + 1 : 0, top = bottom + 1 < map_.height ? bottom + 1 : 0;
     const Vec2 n00 = map_.at(left, bottom), n10 = map_.at(right, bottom), n01 = map_.at(left, top), n11 = map_.at(right, top);
     for (int half = 0; half < 2; ++half) {
-      // Centroids lie a sixth of a texel off the middle of the cell.
+      // The centroid of a triangle lies a sixth of a texel off the middle of the square.
       const float sixth = 1.0f / 6, sign = half == 0 ? 1.0f : -1.0f;
       const float x = (static_cast<float>(i + 1) + sign * sixth) / x_.spacing - static_cast<float>(a) - 0.5f;
       const float y = (static_cast<float>(j + 1) - sign * sixth) / y_.spacing - static_cast<float>(b) - 0.5f;
@@ -260,7 +261,7 @@ class Rasteriser {
   tbb::enumerable_thread_specific<TriangleSplatter> splatters_;
 };
 
-/// Cells of a row, added to the row of cells of the next level.
+/// Adds the cells of a row to the row of cells of the next level.
 void addParts(const CellRow& row, const Axis& x, CellPart y, CellRow& coarser) {
   const int parts = x.halves() ? 2 : 1;
   tbb::parallel_for(0, static_cast<int>(coarser.size()), [&](int c) {
@@ -268,7 +269,7 @@ void addParts(const CellRow& row, const Axis& x, CellPart y, CellRow& coarser) {
   });
 }
 
-/// Levels above the finest: rows of cells come in order, and go on in pairs.
+/// All levels but the finest. Rows of cells come in order, and every two rows make a row of the next level.
 class CoarseLevels {
  public:
   CoarseLevels(std::deque<Level>& levels, std::size_t tiles) : levels_(levels), tiles_(tiles), halves_(levels.size()) {}
@@ -290,18 +291,18 @@ class CoarseLevels {
  private:
   std::deque<Level>& levels_;
   std::size_t tiles_;
-  std::vector<CellRow> halves_;  // of each level: the row of the next level that is not complete
+  std::vector<CellRow> halves_;  // [levels]: row of the next level that is not complete yet
 };
 
-/// What one task makes: a row of cells of the second level, and the sums of the two rows of the finest under it. With a single
-/// level there are no cells, and the second row may be missing.
+/// The result of one task: a row of cells of the second level, and the sums of the two rows of the finest level that are its
+/// parts. With a single level there is no row of cells, and there may be one row of sums only.
 struct Band {
   int index;
   RowSums sums[2];
   CellRow coarser;
 };
 
-/// A map whose columns are the rows of another, with the same normals.
+/// Exchanges rows and columns of a map. Normals are not turned.
 std::vector<Vec2> transposed(const NormalMap& map) {
   std::vector<Vec2> normals(map.normals.size());
   tbb::parallel_for(0, map.width, [&](int i) {
@@ -316,7 +317,7 @@ PyramidShape transposed(PyramidShape shape) {
   return shape;
 }
 
-/// Rows of cells are held whole.
+/// Computes all images, with whole rows of cells in memory: the caller makes rows the shorter side.
 void scatterByRows(const NormalMap& map, const PyramidShape& shape, const DirectionTiles& direction_tiles,
                    const ImageSink& sink, const ProgressFn& progress) {
   const bool wrap = shape.boundary == Boundary::wrap;
@@ -326,7 +327,7 @@ void scatterByRows(const NormalMap& map, const PyramidShape& shape, const Direct
   const float sigma_bins = 0.5f * shape.sigma_r * static_cast<float>(direction_tiles.fine.bins_per_axis);
   Rasteriser rasteriser(map, finest_x, finest_y, direction_tiles, sigma_bins);
 
-  std::deque<Level> levels;  // they do not move
+  std::deque<Level> levels;  // a deque, since a level cannot be moved
   Axis x = finest_x, y = finest_y;
   for (int l = 0; l < shape.level_count; ++l, x = x.coarser(), y = y.coarser())
     levels.emplace_back(shape, l, x, y, tiles, sink);
@@ -334,6 +335,7 @@ void scatterByRows(const NormalMap& map, const PyramidShape& shape, const Direct
   const bool has_coarser = shape.level_count > 1;
   SpareRows spare_cells(finest_x.coarser().cells, tiles, kMoments);
 
+  // Tasks rasterise bands in parallel.
   tbb::enumerable_thread_specific<BlockBins> scratch([=] { return BlockBins(tiles, kMoments); });
   const auto makeBand = [&](int index) {
     Band band = {index, {}, {}};
@@ -350,6 +352,7 @@ void scatterByRows(const NormalMap& map, const PyramidShape& shape, const Direct
     }
     return std::make_shared<Band>(std::move(band));
   };
+  // One task after the other adds its band to the images.
   const auto addBand = [&](Band& band) {
     for (int upper = 0; upper < 2 && 2 * band.index + upper < finest_y.cells; ++upper) {
       levels[0].addRow(2 * band.index + upper, band.sums[upper]);
@@ -380,7 +383,8 @@ void scatterByRows(const NormalMap& map, const PyramidShape& shape, const Direct
 void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const DirectionTiles& direction_tiles,
                    const ImageSink& sink, const ProgressFn& progress) {
   if (map.width <= map.height) return scatterByRows(map, shape, direction_tiles, sink, progress);
-  // Memory grows with the length of a row: rows are the short side. The cut of cells of texels is symmetric.
+  // Memory grows with the length of a row, so rows must be the shorter side. The diagonal that cuts squares into triangles is
+  // the same after rows and columns are exchanged.
   const std::vector<Vec2> normals = transposed(map);
   NormalMap turned;
   turned.width = map.height;

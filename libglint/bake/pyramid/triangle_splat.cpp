@@ -10,19 +10,19 @@ namespace glint::bake {
 namespace {
 
 constexpr int kTile = BlockBins::kTile;
-// All lengths below are as large as the error of images allows: 1 % rel_l2, which
-// Pyramid.SmoothImagesAreTheExactOnesAtTheirCentres holds.
+// All lengths below are as large as an error of images of 1 % rel_l2 allows. The test
+// Pyramid.SmoothImagesAreTheExactOnesAtTheirCentres holds that bound.
 
-/// Longest piece of a small triangle, in deviations of the blur.
+/// Length of the longest piece of a small triangle, in deviations of the blur.
 constexpr float kPiecePerSigma = 0.7f;
-/// Pieces of large triangles are a tenth of their length, up to twice that.
+/// Pieces of a large triangle have a tenth of its length, but at most twice the length of pieces of small triangles.
 constexpr float kPiecePerLength = 0.1f;
-/// Triangles longer than this many pieces go to the coarse grid.
+/// A triangle longer than this many pieces goes to the coarse grid.
 constexpr float kLongPieces = 9;
-/// Triangles are drawn by rows if their height on the longest edge is more than this many pieces, and their extent along y more
-/// than twice as many.
+/// A triangle is fat, and drawn by rows, if its height on the longest edge is more than this many pieces, and its extent along
+/// y more than twice as many.
 constexpr float kFatPieces = 2;
-/// Distance of such rows, pieces.
+/// Distance of the rows of a fat triangle, in pieces.
 constexpr float kRowPieces = 0.6f;
 
 }  // namespace
@@ -39,16 +39,19 @@ TriangleSplatter::TriangleSplatter(const DirectionTiles& tiles, float sigma_bins
     : fine_(tiles.fine), coarse_(tiles.coarse), piece_(kPiecePerSigma * sigma_bins) {}
 
 void TriangleSplatter::add(Vec2 a, Vec2 b, Vec2 c, const float weights[kMoments]) {
+  // A triangle much smaller than a piece is a point.
   const auto squared = [&](Vec2 e) { return fine_.half * fine_.half * dot(e, e); };
   const float e0 = squared(b - a), e1 = squared(c - b), e2 = squared(a - c);
   const float longest = std::max({e0, e1, e2});
   if (4 * longest < piece_ * piece_) return splatPoint(fine_.place((1.0f / 3) * (a + b + c)), 1, weights, fine_.view());
+  // Choose the grid and the length of pieces.
   const bool is_long = longest > kLongPieces * kLongPieces * piece_ * piece_;
   Raster& raster = is_long ? coarse_ : fine_;
   Vec2 p[3] = {raster.place(a), raster.place(b), raster.place(c)};
   const float length = (is_long ? 0.5f : 1.0f) * std::sqrt(longest);
   const float shortest_piece = is_long ? 0.5f * piece_ : piece_;
   const float piece = std::clamp(kPiecePerLength * length, shortest_piece, 2 * shortest_piece);
+  // Draw a fat triangle by rows from bottom to top, and a thin one by columns on its longest edge.
   const Vec2 side = p[1] - p[0], other = p[2] - p[0];
   const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
   if (std::fabs(side.x * other.y - side.y * other.x) > kFatPieces * piece * length && high - low > 2 * kFatPieces * piece) {
@@ -64,7 +67,7 @@ void TriangleSplatter::add(Vec2 a, Vec2 b, Vec2 c, const float weights[kMoments]
 
 namespace {
 
-/// Adds a tile of [row][column][moment] to `to`, [moment][64], and clears it.
+/// Adds a tile of the raster, [row][column][moment], to `to`, [moment][64], and clears the tile.
 GLINT_MULTIVERSION void moveTile(float* row, int pitch, float* to) {
   for (int y = 0; y < kTile; ++y, row += static_cast<std::size_t>(pitch) * kMoments, to += kTile) {
     for (int k = 0; k < kMoments; ++k)

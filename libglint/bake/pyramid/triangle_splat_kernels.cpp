@@ -12,14 +12,14 @@ HWY_BEFORE_NAMESPACE();
 namespace glint::bake::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int kTaps = 4;  // bins that a point is added to along either axis
+constexpr int kTaps = 4;  // number of bins along either axis that a point is added to
 using Wide = hn::CappedTag<float, kTaps * kMoments>;
 using Quad = hn::CappedTag<float, kTaps>;
 constexpr int kLanes = static_cast<int>(hn::MaxLanes(Wide()));
 static_assert(kLanes % kMoments == 0);
 
-// Cubic B-spline weights of the bins around a point as polynomials of its place between the middle two: by power, of each bin;
-// and with each bin once for every moment.
+// Cubic B-spline weights of the bins around a point, as polynomials of its position between the middle two bins:
+// kSpline[power][bin], and the same with each bin repeated for every moment.
 #define GLINT_REPEATED(a, b, c, d) \
   { a, a, a, a, b, b, b, b, c, c, c, c, d, d, d, d }
 HWY_ALIGN constexpr float kSpline[4][kTaps] = {
@@ -29,6 +29,7 @@ HWY_ALIGN constexpr float kSplineOfMoments[4][kTaps * kMoments] = {
     GLINT_REPEATED(-1.0f / 6, 0.5f, -0.5f, 1.0f / 6)};
 #undef GLINT_REPEATED
 
+/// Evaluates the polynomials at x for a vector of bins.
 template <class D>
 HWY_INLINE hn::Vec<D> splineWeights(D d, const float* powers, int pitch, float x) {
   const auto v = hn::Set(d, x);
@@ -38,6 +39,7 @@ HWY_INLINE hn::Vec<D> splineWeights(D d, const float* powers, int pitch, float x
 
 HWY_INLINE void addPoint(Vec2 point, float share, const float* weights, const SplatRaster& raster) {
   constexpr int kTile = BlockBins::kTile;
+  // Weights along y, times the share.
   const float x = point.x - 0.5f, y = point.y - 0.5f;
   const int ix = static_cast<int>(x), iy = static_cast<int>(y);
   const Quad quad;
@@ -45,6 +47,7 @@ HWY_INLINE void addPoint(Vec2 point, float share, const float* weights, const Sp
   const float fy = y - static_cast<float>(iy);
   for (int k = 0; k < kTaps; k += static_cast<int>(hn::Lanes(quad)))
     hn::Store(hn::Mul(hn::Set(quad, share), splineWeights(quad, kSpline[0] + k, kTaps, fy)), quad, down + k);
+  // Weights along x, times the weights of moments; add their products to the bins.
   const Wide d;
   const float fx = x - static_cast<float>(ix);
   float* corner = raster.bins + (static_cast<std::size_t>(iy - 1) * raster.pitch + ix - 1) * kMoments;
@@ -54,6 +57,7 @@ HWY_INLINE void addPoint(Vec2 point, float share, const float* weights, const Sp
     for (int dy = 0; dy < kTaps; ++dy, row += static_cast<std::size_t>(raster.pitch) * kMoments)
       hn::StoreU(hn::MulAdd(across, hn::Set(d, down[dy]), hn::LoadU(d, row)), d, row);
   }
+  // Flag the tiles of the corners: the bins reach no other tile.
   const unsigned left = static_cast<unsigned>(ix - 1), bottom = static_cast<unsigned>(iy - 1);
   const unsigned first = left / kTile, last = (left + kTaps - 1) / kTile;
   std::uint8_t* lower = raster.touched + bottom / kTile * raster.tiles;
@@ -61,10 +65,11 @@ HWY_INLINE void addPoint(Vec2 point, float share, const float* weights, const Sp
   lower[first] = lower[last] = upper[first] = upper[last] = 1;
 }
 
-/// A triangle as seen along an axis from one corner to another: its width grows from 0 to 1 at `apex` and falls to 0 again.
+/// A triangle along an axis from one corner to another: its width across the axis grows from 0 to 1 at `apex` and falls to 0
+/// again. Positions along the axis are in [0, 1].
 ///
-/// It is cut into slabs of equal thickness that hold their mass at their middles. These are moved and spread out a little, and
-/// their widths scaled, so that mean and spread along the axis and the mean width are the triangle's.
+/// It is cut into slabs of equal thickness, each with its mass at its middle. The middles are moved and spread out a little,
+/// and the widths are scaled, so that the mean and spread along the axis and the mean width are those of the triangle.
 class Slabs {
  public:
   Slabs(float apex, int count) : apex_(apex), count_(count), thickness_(1 / static_cast<float>(count)) {
@@ -76,7 +81,7 @@ class Slabs {
     offset_ = mean - stretch_ * sum;
   }
 
-  /// visitor(place along the axis, relative width, share of the mass)
+  /// Calls visitor(position along the axis, relative width, share of the mass) for every slab.
   template <class Visitor>
   HWY_INLINE void forEach(Visitor&& visitor) const {
     forEachMiddle([&](float t, float mass) { visitor(offset_ + stretch_ * t, width_per_mass_ * mass, mass); });
@@ -100,6 +105,7 @@ class Slabs {
   float thickness_, stretch_, offset_, width_per_mass_;
 };
 
+/// Number of slabs.
 int slabsOf(float length, float piece) { return std::max(2, static_cast<int>(length / piece + 1)); }
 
 void SplatPoint(Vec2 point, float share, const float* weights, const SplatRaster& raster) {
@@ -130,7 +136,7 @@ HWY_INLINE hn::Vec<Wide> splineIntegral(hn::Vec<Wide> t) {
   return hn::CopySign(hn::IfThenElse(hn::Lt(a, hn::Set(d, 1.0f)), inner, outer), t);
 }
 
-/// Multiplies sums by the moments' weights, adds them to the raster, and clears them.
+/// Multiplies the sums of a patch by the weights of moments, adds the products to the raster, and clears the sums.
 HWY_INLINE void movePatch(SplatPatch& patch, int rows, int pitch, int left, int bottom, const float* weights,
                           const SplatRaster& raster) {
   constexpr int kTile = BlockBins::kTile, kBins = kLanes / kMoments;
@@ -159,7 +165,7 @@ void SplatRows(const Vec2* p, float piece, const float* weights, SplatPatch& pat
   const float height = p[2].y - p[0].y, apex = (p[1].y - p[0].y) / height;
   const float lean = p[2].x - p[0].x, width = p[1].x - (p[0].x + apex * lean);
   const Slabs slabs(apex, slabsOf(height, piece));
-  // Slabs are moved out by less than half a bin.
+  // The bounding box with a margin: slabs move out by less than half a bin, and splines reach two bins farther.
   const int left = static_cast<int>(low) - 3, bottom = static_cast<int>(p[0].y) - 3;
   const int rows = static_cast<int>(p[2].y) + 4 - bottom, columns = static_cast<int>(high) + 4 - left;
   const int pitch = (columns + 2 * kLanes - 1) / kLanes * kLanes;
@@ -167,9 +173,10 @@ void SplatRows(const Vec2* p, float piece, const float* weights, SplatPatch& pat
   if (patch.sums.size() < size) patch.sums.resize(size, 0.0f);
   if (patch.spans.size() < static_cast<std::size_t>(rows)) patch.spans.resize(rows);
   std::fill_n(patch.spans.begin(), rows, SplatPatch::Span{pitch, 0});
+  // Add each slab as a segment along x.
   const Wide d;
   slabs.forEach([&](float t, float relative_width, float mass) {
-    constexpr float kPoint = 0.01f;  // bins: shorter segments are as good as this one
+    constexpr float kPoint = 0.01f;  // length, in bins, of the shortest segment: shorter ones give the same weights
     const float middle = p[0].x + t * lean + 0.5f * relative_width * width - static_cast<float>(left);
     const float half = 0.5f * std::max(std::fabs(relative_width * width), kPoint);
     const float y = p[0].y + t * height - 0.5f - static_cast<float>(bottom);
@@ -178,6 +185,7 @@ void SplatRows(const Vec2* p, float piece, const float* weights, SplatPatch& pat
     float down[kTaps];
     for (int k = 0; k < kTaps; ++k)
       down[k] = density * (kSpline[0][k] + fy * (kSpline[1][k] + fy * (kSpline[2][k] + fy * kSpline[3][k])));
+    // Integrate the spline over the segment for each bin that it reaches.
     const int begin = static_cast<int>(middle - half - 1.5f), end = static_cast<int>(middle + half + 2.5f);
     float* row = patch.sums.data() + static_cast<std::size_t>(iy - 1) * pitch;
     for (int x = begin; x < end; x += kLanes) {
