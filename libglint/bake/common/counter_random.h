@@ -8,8 +8,8 @@
 
 namespace glint::bake {
 
-/// 64 random bits for element `index` of stream `stream`: SplitMix64's finaliser over a counter, so that any thread can draw
-/// the numbers of any element and results do not depend on the order of the work.
+/// 64 random bits for element `index` of stream `stream`: the finaliser of SplitMix64 over a counter. Any thread can draw the
+/// numbers of any element, so results do not depend on the order of the work.
 inline std::uint64_t randomBits(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) {
   const auto mix = [](std::uint64_t z) {
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -22,7 +22,7 @@ inline std::uint64_t randomBits(std::uint64_t seed, std::uint64_t stream, std::u
 
 /// Two independent numbers, uniform in the open interval (0, 1).
 inline Vec2 randomPair(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) {
-  constexpr float kScale = 1.0f / 8388608;  // 2^-23: with the half added below, 23 bits are exact and never 0 or 1
+  constexpr float kScale = 1.0f / 8388608;  // 2^-23: 23 bits plus a half are exact in float, and never reach 0 or 1
   const std::uint64_t bits = randomBits(seed, stream, index);
   return {(static_cast<float>(bits >> 41) + 0.5f) * kScale, (static_cast<float>((bits >> 9) & 0x7fffff) + 0.5f) * kScale};
 }

@@ -8,11 +8,12 @@
 
 namespace glint::bake {
 
+/// Frees memory of fftw_malloc.
 struct FftwFree {
   void operator()(void* memory) const { fftw_free(memory); }
 };
 
-/// Making and destroying plans, unlike executing them, is not thread-safe.
+/// Guards making and destroying plans, which FFTW does not allow from several threads at once. Executing plans needs no guard.
 inline std::mutex& fftwPlannerMutex() {
   static std::mutex mutex;
   return mutex;
@@ -27,7 +28,8 @@ struct DestroyFftwPlan {
 using FftwPlan = std::unique_ptr<std::remove_pointer_t<fftw_plan>, DestroyFftwPlan>;
 
 /// Makes a plan.
-/// @param plan  plan(flags) -> fftw_plan. FFTW_ESTIMATE: measuring would choose algorithms, and so roundings, by the clock
+/// @param plan  plan(flags) -> fftw_plan. The flags are FFTW_ESTIMATE: FFTW_MEASURE would choose algorithms, and so the
+///              rounding of results, by the clock
 template <class Plan>
 FftwPlan makeFftwPlan(Plan&& plan) {
   const std::lock_guard lock(fftwPlannerMutex());

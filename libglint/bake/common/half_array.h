@@ -5,7 +5,7 @@
 
 namespace glint::bake {
 
-/// Converts IEEE halves to floats, in SIMD of the best instruction set of this machine.
+/// Converts IEEE halves to floats, in SIMD of the best instruction set of the machine.
 /// @param in     [count] halves; infinities and NaNs stay what they are
 /// @param count  a multiple of 8
 /// @param out    [count]

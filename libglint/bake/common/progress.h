@@ -6,19 +6,20 @@
 
 namespace glint::bake {
 
-/// Called now and then while a builder works: `done` of `total` units, from any thread but never concurrently, `done` never
-/// decreasing. An empty function is fine.
+/// A function that a builder calls from time to time: `done` of `total` units of work are finished. Calls come from any thread,
+/// but never two at once, and `done` never decreases. May be empty.
 using ProgressFn = std::function<void(std::size_t done, std::size_t total)>;
 
-/// Counts units of work as threads finish them, and reports one at a time.
+/// Counts units of work that threads finish, and reports each.
 class ProgressCounter {
  public:
   /// @param report  must outlive the counter
   ProgressCounter(const ProgressFn& report, std::size_t total) : report_(report), total_(total) {}
 
-  /// More work than was known at first. Not while threads count.
+  /// Adds units to the total, when there is more work than was known. Not while threads call advance().
   void grow(std::size_t units) { total_ += units; }
 
+  /// Reports one more finished unit.
   void advance() {
     if (!report_) return;
     const std::lock_guard lock(mutex_);

@@ -6,13 +6,14 @@
 namespace glint::bake {
 namespace {
 
-/// Six deviations: 2e-9 of a lobe's mass lies outside.
+/// Lobes end at so many deviations, beyond which 2e-9 of their mass lies.
 constexpr float kImageReach = 6;
 
-/// Shares of a lobe's mass in the pixels along one axis, by its place in the middle one: tabulated, and linear between places.
+/// Shares of a lobe's mass in the pixels along one axis, for any position of its centre in the middle pixel. Tabulated for a
+/// number of positions, and linear between them.
 class LobeProfile {
  public:
-  /// @param sigma_pixels  deviation of the lobe
+  /// @param sigma_pixels  deviation of the lobe, in pixels
   explicit LobeProfile(float sigma_pixels)
       : radius_(static_cast<int>(std::ceil(kImageReach * sigma_pixels))), count_(2 * radius_ + 1) {
     table_.reserve(static_cast<std::size_t>(kPlaces + 1) * count_);
@@ -26,7 +27,7 @@ class LobeProfile {
   int radius() const { return radius_; }
   int count() const { return count_; }
 
-  /// @param place   in the middle pixel, [0, 1]
+  /// @param place   position of the centre in the middle pixel, [0, 1]
   /// @param shares  count() values
   void at(float place, double* shares) const {
     const int k = std::min(static_cast<int>(place * kPlaces), kPlaces - 1);
@@ -37,13 +38,14 @@ class LobeProfile {
   }
 
  private:
-  static constexpr int kPlaces = 1024;  // of a lobe of a tenth of a pixel, the narrowest: 1e-5 off halfway; 3e-7 at 0.6 pixels
+  // Halfway between two positions, shares are 1e-5 off for the narrowest lobe (0.1 pixel), and 3e-7 off for 0.6 pixels.
+  static constexpr int kPlaces = 1024;
 
   int radius_, count_;
   std::vector<float> table_;
 };
 
-/// Adds lobes to pixels.
+/// An image to which lobes are added.
 class LobeImage {
  public:
   LobeImage(int resolution, float sigma)
@@ -63,8 +65,8 @@ class LobeImage {
     }
   }
 
-  /// n^2 equal triangles, each at its centroid, with edges of at most 0.4 deviations: a rule of degree 1 on a
-  /// grid, weakest at the borders of a triangle. Tests hold it against Reference::mean.
+  /// Adds a triangle as the centroids of n^2 equal triangles, with edges of at most 0.4 deviations. Tests compare the result
+  /// with Reference::mean.
   void addTriangle(double weight, Vec2 a, Vec2 b, Vec2 c) {
     const float longest = std::sqrt(std::max({dot(b - a, b - a), dot(c - b, c - b), dot(a - c, a - c)}));
     const int n = std::max(1, static_cast<int>(std::ceil(longest / (0.4f * sigma_))));
@@ -89,9 +91,9 @@ class LobeImage {
 
  private:
   struct Span {
-    int first, count;  // pixels, some perhaps outside the image
+    int first, count;  // pixels; some can lie outside the image
   };
-  /// The pixels that a lobe reaches along one axis, and its shares in them.
+  /// Finds the pixels that a lobe reaches along one axis, and its shares in these pixels.
   Span place(float n, std::vector<double>& shares) const {
     const float at = (n + 1) * 0.5f * static_cast<float>(resolution_), pixel = std::floor(at);
     profile_.at(at - pixel, shares.data());

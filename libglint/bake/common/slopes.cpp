@@ -12,7 +12,7 @@
 namespace glint::bake {
 namespace {
 
-/// The neighbours of place i of `count` along an axis, and the reciprocal of their distance.
+/// The neighbours of texel i of `count` along an axis, and the reciprocal of their distance.
 struct Neighbours {
   int before, after;
   float scale = 0.5f;
@@ -36,17 +36,18 @@ void visitSlopes(int width, int height, std::span<const float> heights, int j, B
   const float* above = row(y.after);
   for (int i = 0; i < width; ++i) {
     const Neighbours x(i, width, boundary);
-    // Scaled before the difference, which would overflow between heights of 3e38.
+    // Scale heights before their difference, which would overflow between heights of 3e38 and -3e38.
     visit(i, Vec2{x.scale * here[x.after] - x.scale * here[x.before], y.scale * above[i] - y.scale * below[i]});
   }
 }
 
-/// Whether a normal with these slopes is farther out than kRimRadius. Not a number is not.
+/// Whether a normal with these slopes is longer than kRimRadius on the disk. False for NaN.
 bool isCliff(Vec2 slope) {
   constexpr float kSteepest = 577.35f;  // r / sqrt(1 - r^2)
   return dot(slope, slope) > kSteepest * kSteepest;
 }
 
+/// slopeSums, inlined into each version so that it uses the instructions of that version.
 [[gnu::flatten]] GLINT_MULTIVERSION SlopeSums rowSums(const Vec2* normals, std::size_t count) {
   return slopeSums(normals, count);
 }
@@ -85,7 +86,8 @@ Vec2 seamRoughness(int width, int height, std::span<const float> heights) {
     const double step = static_cast<double>(heights[a]) - heights[b];
     return step * step;
   };
-  std::vector<double> between_columns(columns), between_rows(rows);  // the step after each; after the last one is the seam
+  // Sums of squared steps from each column (row) to the next; from the last to the first, across the seam.
+  std::vector<double> between_columns(columns), between_rows(rows);
   for (std::size_t j = 0; j < rows; ++j) {
     const std::size_t here = j * columns, above = (j + 1) % rows * columns;
     for (std::size_t i = 0; i < columns; ++i) {

@@ -9,36 +9,38 @@
 
 namespace glint::bake {
 
-/// Normals nearer to the rim of the disk than this are moved here, a tilt of 89.9 degrees (a slope of 577): floats near the rim
-/// do not tell nz, and on it there is none.
+/// Largest radius of a normal on the disk: a tilt of 89.9 degrees, a slope of 577. Steeper normals are moved to this radius,
+/// since nz = sqrt(1 - r^2) loses all digits of a float nearer to the rim, and must not be 0.
 inline constexpr float kRimRadius = 0.9999985f;
 
-/// Normal of the surface z = h(x, y) with these slopes: (-p, -q, 1) normalised, projected on the disk; at most kRimRadius long.
+/// Normal of the surface z = h(x, y) with these slopes: (-dh/dx, -dh/dy, 1), normalised and projected on the disk. At most
+/// kRimRadius long.
 Vec2 normalFromSlopes(float dh_dx, float dh_dy);
 
-/// Normals of a height field. Slopes are central differences, (h[i+1] - h[i-1]) / 2: the exact derivative of the field that is
-/// quadratic between neighbours, and the scheme of every tool that turns heights into normals. At the border they are wrapped,
-/// or one-sided (h[1] - h[0]) under `clamp`.
+/// Computes the normals of a height field. Slopes are central differences, (h[i+1] - h[i-1]) / 2: the exact slopes of a
+/// parabola through three heights, and the scheme of other tools that turn heights into normals. At the border, differences
+/// wrap around the map, or under `clamp` are one-sided (h[1] - h[0]).
 /// @param heights  [height][width], texels, bottom row first
-/// @param cliffs   number of normals that were moved to kRimRadius
-/// @return [height][width]; texels whose neighbours are not finite have NaN
+/// @param cliffs   if not null, gets the number of normals that were moved to kRimRadius
+/// @return [height][width]; NaN where a neighbouring height is not finite
 std::vector<Vec2> normalsFromHeights(int width, int height, std::span<const float> heights, Boundary boundary = Boundary::wrap,
                                      std::size_t* cliffs = nullptr);
 
-/// How much more heights step from one border to the opposite one than inside: the root mean square of the steps from the last
-/// column to the first over that of the roughest pair of columns inside, and the same for rows. About 1 or less if the map
-/// tiles; 0 where there are fewer than three columns (rows).
+/// Measures whether a height map tiles. x: root mean square of the height steps from the last column to the first, over the
+/// largest root mean square of the steps between two neighbouring columns inside. y: the same for rows. About 1 or less if the
+/// map tiles; 0 with fewer than three columns (rows).
 Vec2 seamRoughness(int width, int height, std::span<const float> heights);
 
-/// Moments of the slopes of a height field under the same scheme.
+/// Moments of the slopes of a periodic height field, by the central differences of normalsFromHeights.
 struct SlopeMoments {
-  double variance_x = 0;  ///< mean of p^2; the mean slope of a periodic field is 0
+  double variance_x = 0;  ///< mean of (dh/dx)^2; the mean slope of a periodic field is 0
   double variance_y = 0;
-  float steepest = 0;  ///< largest length of (p, q)
+  float steepest = 0;  ///< largest length of (dh/dx, dh/dy)
 };
 SlopeMoments slopeMoments(int width, int height, std::span<const float> heights);
 
-/// Mean and covariance of the slopes of all texels of a map: what the map says, or computed. The same for any number of threads.
+/// Mean and covariance of the slopes of all texels of a map: as the map says, or computed. Does not depend on the number of
+/// threads.
 MapSlopes mapSlopes(const NormalMap& map);
 
 }  // namespace glint::bake

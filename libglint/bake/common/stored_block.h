@@ -9,8 +9,8 @@
 
 namespace glint::bake {
 
-/// Pixels of a stored block of a pyramid, in the order of ndf_pyramid.h and without value_scale.
-/// @param block  number among the stored blocks of the level
+/// Loads the pixels of a stored block of a pyramid, in the order of ndf_pyramid.h, without multiplying by value_scale.
+/// @param block  number of the block among the stored blocks of the level
 /// @param out    [kBlockPixels]
 inline void loadStoredBlock(const NdfPyramid& pyramid, const PyramidLevel& level, std::uint64_t block, float* out) {
   const std::size_t first = static_cast<std::size_t>(block) * kBlockPixels;
