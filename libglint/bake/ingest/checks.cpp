@@ -13,26 +13,29 @@
 namespace glint::bake {
 namespace {
 
-/// At most this many texels, evenly spread, are looked at to find the encoding.
+/// Number of texels, evenly spread, of a sample.
 constexpr std::size_t kSampleTexels = 65536;
-/// Vectors this far from unit length are not a normal map's, and nor are those that point down.
+/// A vector whose length is off by more than this, or that points down, is far from a normal.
 constexpr double kFarFromUnit = 0.25;
-/// Maps of flakes that were filtered have up to an eighth of such vectors; of colours spread over the cube it would be three
-/// quarters.
+/// Largest share of such vectors in a normal map. Filtered maps of flakes have up to an eighth of them; random colours would
+/// have three quarters.
 constexpr double kMostFar = 0.3;
-/// 0.5 becomes 0.735 when encoded as sRGB (a component of +0.47) and 0.214 when decoded (-0.57).
+/// Means of x and y beyond this show an sRGB conversion: 0.5 becomes 0.735 when encoded as sRGB (a component of +0.47) and
+/// 0.214 when decoded (-0.57).
 constexpr double kSrgbBias = 0.25;
 
-/// Maps of flakes that were filtered have vectors that are off unit length by up to .12 in the median.
+/// Largest median of |length - 1| of a normal map. Filtered maps of flakes have up to .12.
 constexpr double kMostMedianError = 0.15;
-/// Blue that is z goes with sqrt(1 - x^2 - y^2): a correlation of .16 or more is left on maps that JPEG has compressed at a quality
-/// of 50; occlusion has none.
+/// Smallest correlation of z and sqrt(1 - x^2 - y^2) of a normal map. Compression by JPEG at a quality of 50 leaves .16 or
+/// more; where blue is occlusion there is none.
 constexpr double kNoCorrelation = 0.1;
-/// Filtering makes vectors shorter, never longer. Scaling x and y makes them longer, but z still goes with them.
+/// Filtering makes vectors shorter, never longer. So a share kMostTooLong of vectors longer than 1 + kTooLong shows that blue
+/// is not z, unless x and y were scaled: then z still correlates with them.
 constexpr double kTooLong = 0.03, kMostTooLong = 0.05;
-/// Where sqrt(1 - x^2 - y^2) varies visibly, even the z of a filtered map goes with it.
+/// Where sqrt(1 - x^2 - y^2) varies by more than kVisibleSpread, z correlates with it even on filtered maps. A blue that does
+/// not, and is kFarBlue away, is not z.
 constexpr double kVisibleSpread = 0.02, kFarBlue = 0.05;
-/// Red that is nearer to 0 or 1 than this means |x| > .98.
+/// Red within this distance of 0 or 1 would mean |x| > .98.
 constexpr float kRedEnd = 0.01f;
 
 double srgbToLinear(double v) { return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4); }
@@ -48,7 +51,7 @@ std::size_t sampleStep(const PixelArray& image) {
   return std::max<std::size_t>(1, texels / kSampleTexels) | 1;  // odd: does not keep to some columns only
 }
 
-/// Whether holds(pixel, first pixel) for every pixel.
+/// Whether holds(pixel, first pixel of the image) is true for every pixel.
 template <class Holds>
 bool everyTexel(const PixelArray& image, const Holds& holds) {
   return std::visit(
@@ -60,7 +63,7 @@ bool everyTexel(const PixelArray& image, const Holds& holds) {
       image.pixels);
 }
 
-/// A component of a vector. Integers are 0 .. 1 here, so that the zero of their snorm is a little beside a half.
+/// A component of a vector. pixelValue scales integers to 0 .. 1, so the code for 0 of snorm is a little above a half.
 double componentOf(const PixelArray& image, std::size_t texel, int channel, Encoding encoding) {
   const double value = pixelValue(image, texel, channel);
   if (encoding == Encoding::unorm) return 2 * value - 1;
@@ -74,13 +77,13 @@ double componentOf(const PixelArray& image, std::size_t texel, int channel, Enco
       image.pixels);
 }
 
-/// Sums over pairs of numbers.
+/// Sums over pairs of numbers (a, b), and statistics that follow from them.
 class Covariances {
  public:
   void add(double a, double b) { n_ += 1, a_ += a, b_ += b, aa_ += a * a, ab_ += a * b, bb_ += b * b; }
   double spread() const { return n_ > 0 ? std::sqrt(std::max(0.0, bb_ / n_ - b_ / n_ * (b_ / n_))) : 0; }
   double distance() const { return n_ > 0 ? std::sqrt(std::max(0.0, aa_ - 2 * ab_ + bb_) / n_) : 0; }
-  /// 1 if they are all the same, 0 if only the first ones are.
+  /// Correlation of a and b. 1 if all b are the same, 0 if all a are the same but not all b.
   double correlation() const {
     const double aa = aa_ * n_ - a_ * a_, bb = bb_ * n_ - b_ * b_;
     constexpr double kRounding = 1e-9;
@@ -97,7 +100,7 @@ double lengthError(double x, double y, double z) { return std::abs(std::sqrt(x *
 bool isFinite(float v) { return std::isfinite(v); }
 bool isFinite(Vec2 v) { return std::isfinite(v.x) && std::isfinite(v.y); }
 
-/// Calls visit(texel) for a texel and the eight around it.
+/// Calls visit(texel) for a texel and its eight neighbours.
 template <class Visit>
 void visitNeighbours(int width, int height, Boundary boundary, std::size_t texel, const Visit& visit) {
   const int i = static_cast<int>(texel % static_cast<std::size_t>(width));
@@ -113,6 +116,7 @@ void visitNeighbours(int width, int height, Boundary boundary, std::size_t texel
 
 template <class T>
 std::size_t fillHolesOf(int width, int height, std::vector<T>& values, Boundary boundary, const std::string& name) {
+  // Find the rim: holes that have a finite neighbour.
   std::vector<std::size_t> rim;
   std::size_t count = 0;
   const auto touchesValue = [&](std::size_t t) {
@@ -130,6 +134,7 @@ std::size_t fillHolesOf(int width, int height, std::vector<T>& values, Boundary 
                  std::to_string(count) + " of " + std::to_string(values.size()) + " texels are unusable",
                  "more than half cannot be repaired; export the map again");
   }
+  // Fill the rim of all holes; the new rim is their neighbours that are still holes.
   std::vector<T> filled;
   while (!rim.empty()) {
     filled.clear();
@@ -211,7 +216,7 @@ NormalLayout findLayout(const PixelArray& image, const IngestOptions& p) {
     throwInvalid("normals.channels", p.name, "", "red, green and blue are the same, so x and y are among grey and alpha",
                  "say which is x and which is y: --channels ag or --channels ra");
   }
-  // Red at an end of its range leaves no room for y and z.
+  // DXT5nm has x in alpha, and red constant at 0 or 1. As x, such a red would leave no room for y and z.
   const float red = pixelValue(image, 0, 0);
   if (!alpha || !isConstant(image, 0) || (red > kRedEnd && red < 1 - kRedEnd) || isConstant(image, 1)) return layout;
   if (!isConstant(image, 2) && !areSame(image, 1, 2)) {
@@ -222,7 +227,7 @@ NormalLayout findLayout(const PixelArray& image, const IngestOptions& p) {
 }
 
 bool looksSigned(const EncodingEvidence& e) {
-  // A map that was converted from sRGB is also nearer to unit length as snorm, but not this near.
+  // A unorm map that was converted from sRGB is also nearer to unit length as snorm, but not as near as this.
   constexpr double kNearUnit = 0.01;
   return e.snorm < e.unorm && (e.negative || e.snorm < kNearUnit);
 }

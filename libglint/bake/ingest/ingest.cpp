@@ -22,11 +22,11 @@ namespace {
 constexpr std::uint64_t kDitherStream = 5;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kDegreesPerRadian = 180 / std::numbers::pi_v<float>;
-/// Scanned and JPEG maps have a few texels that point down: one in so many is repaired without being asked for.
+/// Scanned and JPEG maps have a few texels that point down. Up to one texel in so many is repaired even without fix_invalid.
 constexpr std::size_t kTexelsPerDownward = 1000;
 constexpr std::size_t kNoTexel = std::numeric_limits<std::size_t>::max();
 
-/// Faults of some texels, and where the first was.
+/// Counts of faulty texels, and the first texels at fault.
 struct Faults {
   std::size_t non_finite = 0;
   std::size_t downward = 0;
@@ -47,7 +47,7 @@ struct Faults {
   }
 };
 
-/// Two independent values of triangular density on (-1, 1), one for each of x and y.
+/// Draws two independent values of triangular density on (-1, 1), one for x and one for y.
 Vec2 triangularNoise(std::uint64_t seed, std::size_t texel) {
   constexpr float kScale = 1.0f / 65536;
   const std::uint64_t bits = randomBits(seed, kDitherStream, texel);
@@ -55,14 +55,16 @@ Vec2 triangularNoise(std::uint64_t seed, std::size_t texel) {
   return {part(0) - part(16), part(32) - part(48)};
 }
 
+/// Pixel value that stands for 1.
 template <class T>
 constexpr float kCodes = std::is_floating_point_v<T> ? 1.0f : static_cast<float>(std::numeric_limits<T>::max());
 
-/// Maps pixel values to components of a vector: n = scale * value + offset. One code is `scale` wide.
+/// Decodes pixel values to components of a vector: n = scale * value + offset. Neighbouring codes differ by `scale`.
 struct Decoder {
   float scale = 2;
   float offset = -1;
-  float floor = -std::numeric_limits<float>::max();  ///< the lowest code of snorm means -1, as in every graphics interface
+  float floor =
+      -std::numeric_limits<float>::max();  ///< smallest component: the lowest code of snorm means -1, as in graphics APIs
 
   template <class T>
   static Decoder of(Encoding encoding) {
@@ -73,30 +75,31 @@ struct Decoder {
   }
   float operator()(float value) const {
     const float n = scale * value + offset;
-    return n < floor ? floor : n;  // not std::max, which would turn NaN into a number
+    return n < floor ? floor : n;  // unlike std::max, keeps NaN
   }
 };
 
-/// Largest error of a component whose code was rounded.
+/// Largest rounding error of a component.
 float roundingOf(const Decoder& decode, const PixelCodes& codes) {
   constexpr float kFloatRounding = 1e-6f;
   return codes.step > 0 ? decode.scale * codes.step : kFloatRounding;
 }
 
-/// Width of the noise that hides the steps of codes, in pixel values; 0: none.
+/// Width of the noise that hides the steps of codes, in pixel values; 0: no noise.
 float noiseOf(const PixelCodes& codes, Dequantize wanted) {
   const bool noisy = wanted == Dequantize::tpdf || (wanted == Dequantize::automatic && codes.coarse);
   return noisy ? codes.step : 0;
 }
 
-/// What the pixels of a normal map were found to mean.
+/// The meaning of the pixels of a normal map, as findMeaning found it.
 struct MapMeaning {
   NormalLayout layout;
   Encoding encoding = Encoding::unorm;
   PixelCodes codes;
-  VectorEvidence vectors;  ///< of x, y and z as they are stored
+  VectorEvidence vectors;  ///< measures of x, y and z as the map has them
 };
 
+/// Finds channels, encoding and codes of a normal map.
 /// @throws Error invalid_input if the pixels are no normals
 MapMeaning findMeaning(const PixelArray& image, const IngestOptions& p) {
   const bool floating = std::holds_alternative<std::span<const float>>(image.pixels);
@@ -110,7 +113,7 @@ MapMeaning findMeaning(const PixelArray& image, const IngestOptions& p) {
       meaning.encoding = floating && looksSigned(evidence) ? Encoding::snorm : Encoding::unorm;
   };
   weigh();
-  // Where z was computed from x and y, only these are codes.
+  // x and y alone: z may be computed from them, and then is no code.
   meaning.codes = findCodes(image, std::array{meaning.layout.x, meaning.layout.y});
   if (meaning.layout.hasZ()) {
     const float rounding = std::visit(
@@ -120,6 +123,7 @@ MapMeaning findMeaning(const PixelArray& image, const IngestOptions& p) {
         },
         image.pixels);
     meaning.vectors = measureVectors(image, meaning.layout, meaning.encoding, rounding);
+    // A constant blue with which vectors are off unit length is not z: compute z from x and y.
     if (!p.trust_channels && meaning.vectors.off > 0 && isConstant(image, 2)) {
       meaning.layout = {NormalChannels::rg, 0, 1, -1};
       meaning.vectors = {};
@@ -131,7 +135,7 @@ MapMeaning findMeaning(const PixelArray& image, const IngestOptions& p) {
   return meaning;
 }
 
-/// A row of pixels to normals; unusable texels become NaN and are counted.
+/// Decodes pixels to normals. Unusable texels become NaN, and are counted.
 template <class T>
 struct NormalDecoder {
   const PixelArray& image;
@@ -140,9 +144,9 @@ struct NormalDecoder {
   std::span<const T> pixels;
   Decoder decode;
   NoDataTest holds_nothing;
-  float dither = 0;     ///< width of the noise, a component
+  float dither = 0;     ///< width of the noise of a component
   float rounding = 0;   ///< largest error of a component
-  float tolerance = 0;  ///< of unit length
+  float tolerance = 0;  ///< largest |length - 1| that rounding explains
 
   NormalDecoder(const PixelArray& array, const IngestOptions& p, const MapMeaning& meaning)
       : image(array),
@@ -163,6 +167,7 @@ struct NormalDecoder {
       ++faults.no_data;
       return {kNaN, kNaN};
     }
+    // Decode the components.
     float x = decode(value(layout.x));
     float y = decode(value(layout.y));
     float z = three ? decode(value(layout.z)) : 0;
@@ -170,6 +175,7 @@ struct NormalDecoder {
       if (faults.non_finite++ == 0) faults.first_non_finite = t;
       return {kNaN, kNaN};
     }
+    // Sort out vectors that do not point up: by rounding alone onto the rim, others as unusable.
     if (three) {
       const float length = std::sqrt(x * x + y * y + z * z);
       if (std::abs(length - 1) > tolerance) ++faults.non_unit;
@@ -179,6 +185,7 @@ struct NormalDecoder {
       const float limit = 1 + rounding;
       return r2 <= limit * limit ? onRim(x, y, faults) : downward(t, faults);
     }
+    // Add noise, and project on the disk.
     if (dither > 0) {
       const Vec2 noise = dither * triangularNoise(options.seed, t);
       const Vec2 moved = {x + noise.x, y + noise.y};
@@ -204,6 +211,7 @@ struct NormalDecoder {
   }
 };
 
+/// Decodes all texels of a map, and adds up their faults.
 template <class T>
 std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestOptions& p, const NormalDecoder<T>& decoder,
                                 Faults& faults) {
@@ -219,7 +227,7 @@ std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestOptions& p,
     }
     rows[static_cast<std::size_t>(j)] = found;
   });
-  // Image viewers count rows from the top, so the first texel at fault is in the last row that has one.
+  // Image viewers count rows from the top, so the first texel at fault is in the last row with a fault.
   for (auto row = rows.rbegin(); row != rows.rend(); ++row) {
     if (faults.first_non_finite != kNoTexel) row->first_non_finite = kNoTexel;
     if (faults.first_downward != kNoTexel) row->first_downward = kNoTexel;
@@ -228,7 +236,8 @@ std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestOptions& p,
   return normals;
 }
 
-/// @throws Error invalid_input for texels that only fix_invalid makes usable
+/// Refuses a map with faults that are repaired with fix_invalid only.
+/// @throws Error invalid_input
 void checkFaults(const PixelArray& image, const IngestOptions& p, bool three, const Faults& faults) {
   if (p.fix_invalid) return;
   const auto plural = [](std::size_t n) { return n == 1 ? std::string("1 texel is ") : std::to_string(n) + " texels are "; };
@@ -247,7 +256,7 @@ void checkFaults(const PixelArray& image, const IngestOptions& p, bool three, co
   }
 }
 
-/// Refuses heights among which one number seems to stand for no data.
+/// Refuses heights among which one number seems to mark texels without data.
 void refuseSentinel(const PixelArray& image, const std::optional<double>& no_data, const std::string& name) {
   const std::optional<double> number = findSentinel(image, NoDataTest(image, no_data));
   if (!number) return;
@@ -257,6 +266,7 @@ void refuseSentinel(const PixelArray& image, const std::optional<double>& no_dat
               "fill such texels with --nodata " + text + ", or take it for a height with --nodata none");
 }
 
+/// Decodes the heights of all texels, and counts faults. Unusable texels become NaN.
 template <class T>
 std::vector<float> decodeHeights(const PixelArray& image, const IngestOptions& p, float noise_width, Faults& faults) {
   const auto pixels = std::get<std::span<const T>>(image.pixels);
@@ -287,7 +297,8 @@ std::vector<float> decodeHeights(const PixelArray& image, const IngestOptions& p
   return heights;
 }
 
-/// @throws Error invalid_input if the colour channels differ, as in a photograph or a normal map
+/// Refuses an image whose colour channels differ, as in a photograph or a normal map.
+/// @throws Error invalid_input
 void checkGrey(const PixelArray& image, const IngestOptions& p) {
   if (image.channels < 3) return;
   const std::size_t texels = static_cast<std::size_t>(image.width) * image.height;
@@ -303,7 +314,7 @@ void checkGrey(const PixelArray& image, const IngestOptions& p) {
   }
 }
 
-/// Sums over one row, then over rows in order.
+/// Sums over normals: over each row, and then over rows in order.
 struct Moments {
   double n[2] = {};
   double tilt = 0;
@@ -407,7 +418,7 @@ IngestedHeights ingestHeights(const PixelArray& image, const IngestOptions& p) {
   std::size_t repaired = 0;
   if (faults.non_finite + faults.no_data > 0)
     repaired = fillHoles(image.width, image.height, result.heights, p.boundary, p.name);
-  // Holes in a constant map were the only texels that differed.
+  // A constant map with holes is found constant once its holes are filled.
   if (repaired > 0 && !p.allow_constant)
     checkNotConstant({image.width, image.height, 1, std::span<const float>(result.heights)}, {0}, p.name);
   std::size_t cliffs = 0;

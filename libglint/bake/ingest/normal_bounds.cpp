@@ -16,8 +16,8 @@ NormalBounds merged(const NormalBounds& a, const NormalBounds& b) {
   return {std::min(a.low_x, b.low_x), std::min(a.low_y, b.low_y), std::max(a.high_x, b.high_x), std::max(a.high_y, b.high_y)};
 }
 
-/// Bounds of texels i .. i+2 of each of the rows j .. j+2. Wrapped; a block that sticks out of the map is cut, since its
-/// triangles start inside.
+/// Bounds the normals of texels 2 i .. 2 i + 2 in rows 2 j .. 2 j + 2, wrapped around the map. At the border of a map of odd
+/// size, the square of a node is cut: triangles start inside the map only.
 NormalBoundsStorage finestLevel(int width, int height, std::span<const Vec2> normals) {
   NormalBoundsStorage level;
   level.columns = (width + 1) / 2;
@@ -45,6 +45,7 @@ NormalBoundsStorage finestLevel(int width, int height, std::span<const Vec2> nor
   return level;
 }
 
+/// Joins squares of 2x2 nodes.
 NormalBoundsStorage coarserLevel(const NormalBoundsStorage& finer) {
   NormalBoundsStorage level;
   level.columns = (finer.columns + 1) / 2;
@@ -52,7 +53,7 @@ NormalBoundsStorage coarserLevel(const NormalBoundsStorage& finer) {
   level.nodes.resize(static_cast<std::size_t>(level.columns) * level.rows);
   for (int row = 0; row < level.rows; ++row) {
     for (int column = 0; column < level.columns; ++column) {
-      // A child's extra row and column are those of its parent or inside it.
+      // The extra row and column of a child are inside its parent, or are the extra row and column of the parent.
       NormalBounds bounds = kEmpty;
       for (int y = 2 * row; y < std::min(2 * row + 2, finer.rows); ++y) {
         for (int x = 2 * column; x < std::min(2 * column + 2, finer.columns); ++x) {

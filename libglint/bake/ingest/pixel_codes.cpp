@@ -14,20 +14,20 @@ namespace glint::bake {
 namespace {
 
 constexpr int kCodes = 256;
-/// Fewer codes, such as those of a mask, may have these values by themselves. Powers of two are also the steps of surfaces that
-/// somebody made with a ruler.
+/// Images with fewer different codes, such as masks, may lie on a grid by chance. Grids with steps that are powers of two need
+/// more codes: heights that somebody drew by hand often lie on them.
 constexpr int kFewestCodes = 8, kFewestOfPowers = 24;
-/// Floats that were computed from codes are off by some roundings: at most this part of a code.
+/// Floats that were computed from codes are off by a few roundings: by at most this part of a code.
 constexpr float kFloatRounding = 1e-3f;
-/// Half-precision numbers are off by half a unit in the last of 11 bits.
+/// Halves are off by at most this part of their value: half a unit in the last of 11 bits.
 constexpr float kHalfRounding = 1.0f / 2048;
-/// Photoshop's 16 bits are 15 bits and one code; what comes back is off by so much.
+/// Photoshop keeps 16 bits as 0 .. 32768. Codes that went through it are off by at most this much.
 constexpr float kScalingRounding = 2;
 
-/// Values origin + k step, k = 0 .. 255, each within `absolute` and `relative` of its value.
+/// The numbers origin + k step, k = 0 .. 255. A value lies on the grid if it is off by at most absolute + relative * |value|.
 struct Grid {
   float step, origin;
-  int fewest = kFewestCodes;
+  int fewest = kFewestCodes;  // different codes that an image must have
   float absolute = 0, relative = 0;
 };
 
@@ -36,9 +36,9 @@ std::vector<Grid> candidatesOf16Bits() {
       {257, 0, kFewestCodes, kScalingRounding}, {256, 0, kFewestOfPowers}, {128, 0, kFewestOfPowers}, {1, 0, kFewestOfPowers}};
 }
 
-/// @param normals  whether components of vectors are looked for, which may have a sign
-/// @param half     whether all values have half precision
-/// @param step     of the integers that the floats were computed from, if any
+/// @param normals  whether values are components of vectors, which may have a sign
+/// @param half     whether all values are halves
+/// @param step     step of the integers that the floats were computed from; 0: unknown
 std::vector<Grid> candidatesOfFloats(bool normals, bool half, float step) {
   std::vector<Grid> grids = {{1 / 255.0f, 0}};
   if (normals) {
@@ -55,7 +55,7 @@ std::vector<Grid> candidatesOfFloats(bool normals, bool half, float step) {
   return grids;
 }
 
-/// Whether all finite values are on a grid, and on enough places of it.
+/// Whether all finite values lie on a grid, and on enough different numbers of it.
 template <class T>
 bool liesOn(const Grid& grid, const PixelArray& image, std::span<const T> pixels, std::span<const int> channels) {
   std::array<bool, kCodes> seen{};
@@ -78,12 +78,13 @@ bool isHalf(std::span<const float> pixels) {
                      [](float v) { return !std::isfinite(v) || halfToFloat(floatToHalf(v)) == v; });
 }
 
-/// Whether two numbers are the same but for the rounding of floats and of texts of six digits.
+/// Whether two numbers are the same but for rounding to float, or to a text of six digits.
 bool areClose(double a, double b) {
   if (std::isinf(a) || std::isinf(b)) return a == b;
   return std::abs(a - b) <= 5e-6 * std::abs(b);
 }
 
+/// Whether a number is a usual marker of missing data.
 bool isSentinel(double number) {
   constexpr double kHuge = 1e30;  // -3.4e38, 1.7e308, ...: no height
   static constexpr std::array kUsual = {-999.0,       -9999.0,  -10000.0, -99999.0,      9999.0,        99999.0,
@@ -92,15 +93,15 @@ bool isSentinel(double number) {
   return std::abs(number) >= kHuge || std::any_of(kUsual.begin(), kUsual.end(), [&](double u) { return areClose(number, u); });
 }
 
-/// Whether a number is as far from all others as only one that means something else.
-/// @param gap    between it and the next
-/// @param range  of all others
+/// Whether a number is so far from all other numbers that it must mean something else.
+/// @param gap    distance to the nearest other number
+/// @param range  difference of the largest and the smallest other number
 bool standsAlone(double number, double gap, double range) {
   constexpr double kFewDigits = 99, kManyRanges = 100;
   return gap > range && (isSentinel(number) || (std::abs(number) >= kFewDigits && range > 0 && gap > kManyRanges * range));
 }
 
-/// The lowest and highest values, and the next to them.
+/// The lowest and the highest of some values, and the values next to these.
 struct Extremes {
   double lowest = std::numeric_limits<double>::infinity(), second_lowest = lowest;
   double highest = -lowest, second_highest = -lowest;
@@ -138,14 +139,14 @@ NoDataTest::NoDataTest(const PixelArray& image, std::optional<double> number) : 
 bool NoDataTest::operator()(float value) const {
   if (!used_) return false;
   if (std::isnan(number_)) return std::isnan(value);
-  // A number of double precision became infinite when its pixels became floats.
+  // A number beyond the largest float became infinite when pixels became floats.
   if (std::isinf(value)) return std::abs(number_) > std::numeric_limits<float>::max() && (value < 0) == (number_ < 0);
   return areClose(scale_ * value, number_);
 }
 
 std::optional<double> findSentinel(const PixelArray& image, const NoDataTest& known) {
   const auto* pixels = std::get_if<std::span<const float>>(&image.pixels);
-  if (!pixels) return {};  // unsigned codes of 8 and 16 bits have no such numbers
+  if (!pixels) return {};  // unsigned codes of 8 and 16 bits have no usual marker
   Extremes e;
   for (std::size_t k = 0; k < pixels->size(); k += static_cast<std::size_t>(image.channels))
     if (std::isfinite((*pixels)[k]) && !known((*pixels)[k])) e.add(image.code_scale * (*pixels)[k]);
