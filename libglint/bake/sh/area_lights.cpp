@@ -18,7 +18,7 @@ constexpr int kMaxSamples = 64;
 
 Vec3 cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 
-/// What a ray from the origin hits: its distance, and radiance.
+/// The nearest light that a ray from the origin hits.
 struct Hit {
   float distance = kFar;
   float radiance[3] = {0, 0, 0};
@@ -35,7 +35,7 @@ void intersect(const RectangleLight& light, Vec3 direction, Hit& hit) {
   const float distance = dot(normal, light.centre) / facing;
   if (!(distance > 0 && distance < hit.distance)) return;
   const Vec3 offset = distance * direction - light.centre;
-  // Coordinates in the frame of the half axes, which need not be orthogonal.
+  // Coordinates along the two axes, which need not be orthogonal.
   const float area = dot(normal, normal);
   const float u = dot(cross(offset, light.axis_v), normal) / area, v = dot(cross(light.axis_u, offset), normal) / area;
   if (!(std::fabs(u) <= 1 && std::fabs(v) <= 1)) return;
@@ -111,7 +111,7 @@ Environment renderAreaLights(std::span<const RectangleLight> rectangles, std::sp
                              int samples) {
   if (height < 1 || height > kMaxHeight || samples < 1 || samples > kMaxSamples)
     throw Error(ErrorCode::usage, "light.resolution", {}, {}, "a height of 1 to 4096 and 1 to 64 samples are possible");
-  constexpr double kMostRays = 1 << 29;  // half a minute
+  constexpr double kMostRays = 1 << 29;  // take about half a minute
   const double rays = 2.0 * height * height * samples * samples;
   if (rays > kMostRays)
     throw Error(ErrorCode::usage, "light.resolution", {}, {}, fmt::format("{:.2g} rays are too many to draw lights with", rays),
@@ -127,7 +127,7 @@ Environment renderAreaLights(std::span<const RectangleLight> rectangles, std::sp
     for (int i = 0; i < environment.width; ++i) {
       double sums[3] = {0, 0, 0};
       for (int s = 0; s < samples * samples; ++s) {
-        // Rows of samples share a pixel's solid angle alike: equal steps of cos(theta).
+        // Rows of samples have equal shares of the pixel's solid angle: equal steps of cos(theta).
         const double low = std::cos(kPi * (1 - static_cast<double>(j) / height));
         const double high = std::cos(kPi * (1 - static_cast<double>(j + 1) / height));
         const double z = low + (high - low) * (s / samples + 0.5) / samples;

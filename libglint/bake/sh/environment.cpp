@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// Fourier sums of every row and channel: [3][height][width / 2 + 1], sum over x of radiance exp(-2 pi i k x / width).
+/// Fourier transforms of every row and channel, [3][height][width / 2 + 1]: sums over x of radiance exp(-2 pi i k x / width).
 std::vector<std::complex<double>> rowSpectra(const Environment& environment) {
   const auto width = static_cast<std::size_t>(environment.width), bins = width / 2 + 1;
   const auto rows = static_cast<std::size_t>(environment.height);
@@ -41,7 +41,7 @@ std::vector<std::complex<double>> rowSpectra(const Environment& environment) {
   return spectra;
 }
 
-/// Integrals over a row's pixels of radiance exp(-i m phi) dphi, for one row and channel.
+/// Integral of radiance exp(-i m phi) dphi over the pixels of one row and channel.
 std::complex<double> rowIntegral(const std::complex<double>* spectrum, int width, int m) {
   const int k = m % width;
   const std::complex<double> sum = k <= width / 2 ? spectrum[k] : std::conj(spectrum[width - k]);
@@ -50,7 +50,8 @@ std::complex<double> rowIntegral(const std::complex<double>* spectrum, int width
   return sum * std::polar(pixel, -m * half_pixel);
 }
 
-/// Quadrature nodes over the polar angle: whole pixels, so that integrals are exact although the radiance jumps between rows.
+/// Quadrature nodes over the polar angle. Each row of pixels has nodes of its own, so that integrals are exact although
+/// radiance jumps between rows.
 struct PolarNodes {
   std::vector<double> z, sine, weights;
   std::size_t per_row = 0;
@@ -59,7 +60,8 @@ struct PolarNodes {
 PolarNodes polarNodes(int height, int band_limit) {
   PolarNodes nodes;
   const double step = kPi / height;
-  // Functions of a band limit B turn by B * step inside a row; 0.8 nodes a radian and 4 more reach double precision.
+  // The phase of a function of band limit B advances by B * step radians in a row. 0.8 nodes for each radian and 4 more reach
+  // double precision.
   const int n = 4 + static_cast<int>(0.8 * band_limit * step);
   nodes.per_row = static_cast<std::size_t>(n);
   for (int j = 0; j < height; ++j) {
@@ -74,12 +76,13 @@ PolarNodes polarNodes(int height, int band_limit) {
   return nodes;
 }
 
-/// Coefficients of one m: sums of P_l^m over the nodes, band by band, against the rows' cosines and sines in three channels.
+/// Computes the coefficients of one m: for each band l, sums over the nodes of P_l^m times the integrals of the rows against
+/// cos(m phi) and sin(m phi), in three channels.
 class OrderProjection {
  public:
   OrderProjection(const PolarNodes& nodes, int m) : nodes_(nodes), m_(m), before_(nodes.z.size()), current_(nodes.z.size()) {}
 
-  /// Multiplies the rows' integrals by the nodes' weights.
+  /// Multiplies the integrals of the rows by the weights of the nodes.
   void setRows(const std::vector<std::complex<double>>& spectra, int width, int height) {
     const std::size_t bins = static_cast<std::size_t>(width) / 2 + 1;
     for (int c = 0; c < 3; ++c) {
@@ -97,6 +100,7 @@ class OrderProjection {
     }
   }
 
+  /// Computes all bands.
   void run(int band_limit, std::vector<double>& result) {
     const std::size_t count = shCount(band_limit);
     for (std::size_t k = 0; k < nodes_.z.size(); ++k) {
@@ -121,6 +125,7 @@ class OrderProjection {
     return total;
   }
 
+  /// Recurrence of the normalised P_l^m over l.
   void step(int l) {
     const double ll = static_cast<double>(l) * l, mm = static_cast<double>(m_) * m_, p = l - 1.0;
     const double a = std::sqrt((4 * ll - 1) / (ll - mm)), b = l > m_ + 1 ? std::sqrt((p * p - mm) / (4 * p * p - 1)) : 0;
@@ -138,7 +143,7 @@ class OrderProjection {
   throw Error(ErrorCode::invalid_input, rule, path, {}, what, remedy);
 }
 
-/// Refuses pixels for which `bad` holds, naming how many and the first.
+/// Refuses an environment with pixels for which `bad` is true. The error says how many there are, and where the first is.
 template <class Bad>
 void refusePixels(const Environment& e, const std::string& path, const char* rule, const char* what, Bad bad) {
   TexelTally found(e.width, e.height);
@@ -162,7 +167,7 @@ const float* Environment::at(Vec3 direction) const {
 }
 
 bool hasLightAbove(const Environment& environment) {
-  // Rows from the bottom; the middle one of an odd number reaches above the horizon.
+  // Rows are in order from the bottom. The middle row of an odd number of rows reaches above the horizon.
   const auto first = static_cast<std::ptrdiff_t>(environment.height / 2) * environment.width * 3;
   return std::any_of(environment.rgb.begin() + first, environment.rgb.end(), [](float radiance) { return radiance > 0; });
 }

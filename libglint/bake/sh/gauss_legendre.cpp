@@ -8,7 +8,7 @@ namespace glint::bake {
 GaussLegendre gaussLegendre(int n, double low, double high) {
   GaussLegendre rule{std::vector<double>(static_cast<std::size_t>(n)), std::vector<double>(static_cast<std::size_t>(n))};
   for (int k = 0; k < n; ++k) {
-    // Newton's method from Tricomi's estimate finds the k-th root from the right.
+    // Newton's method finds the k-th root of P_n from the right, from Tricomi's estimate.
     double x = std::cos(std::numbers::pi * (k + 0.75) / (n + 0.5)), slope = 1;
     for (int step = 0; step < 100; ++step) {
       double value = 1, before = 0;

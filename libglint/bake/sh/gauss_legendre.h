@@ -10,7 +10,7 @@ struct GaussLegendre {
   std::vector<double> weights;
 };
 
-/// The rule of n >= 1 nodes on [low, high].
+/// Nodes and weights of the rule with n >= 1 nodes on [low, high].
 GaussLegendre gaussLegendre(int n, double low = -1, double high = 1);
 
 }  // namespace glint::bake

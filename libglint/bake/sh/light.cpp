@@ -19,12 +19,13 @@ namespace {
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using MatrixView = Eigen::Map<const Matrix>;
 
-/// Half precision holds 6e-5 to 65504 with full accuracy: coefficients from 1 down to 2e-9 of the largest.
+/// The largest coefficient of a direction is scaled to this. Halves from 6e-5 to 65504 have full accuracy, so coefficients down
+/// to 2e-9 of the largest do.
 constexpr float kLargestHalf = 32768;
-/// Memory of one task, so that high orders do not take gigabytes for each thread.
+/// Memory of one task. Without the limit, high orders would take gigabytes for each thread.
 constexpr std::size_t kTaskBytes = std::size_t{64} << 20;
 
-/// P_l^m, l = m .. order, at every node: [order - m + 1][nodes].
+/// Normalised P_l^m(z), l = m .. order, at every node: [order - m + 1][nodes].
 Matrix legendre(int m, int order, const std::vector<double>& z) {
   Matrix p(order - m + 1, static_cast<Eigen::Index>(z.size()));
   for (std::size_t k = 0; k < z.size(); ++k) {
@@ -44,15 +45,15 @@ Matrix legendre(int m, int order, const std::vector<double>& z) {
   return p;
 }
 
-/// Everything that tasks share.
+/// Data that all tasks read.
 struct Setup {
   const ShLightOptions& options;
   int band_limit;
-  std::vector<double> light;                   ///< [3][shCount(band_limit)], faded
-  std::vector<std::vector<double>> transfers;  ///< of every m
+  std::vector<double> light;                   ///< [3][shCount(band_limit)]: environment, times lightTaper
+  std::vector<std::vector<double>> transfers;  ///< [order + 1]: halfVectorTransfer of every m
 };
 
-/// The coefficients of some neighbouring columns of one row of the grid.
+/// Computes the coefficients of some neighbouring columns of one row of the grid.
 class LightTask {
  public:
   LightTask(const Setup& setup, int row, int first_column, int columns)
@@ -70,7 +71,7 @@ class LightTask {
   }
 
  private:
-  /// Turns the environment to the outgoing directions; bands beyond the order lose their highest m, which do not matter.
+  /// Turns the environment to the outgoing directions. Only m up to the order matter, so bands beyond the order lose higher m.
   void turn() {
     const int order = s_.options.order;
     for (int m = 0; m <= order; ++m) {
@@ -92,7 +93,7 @@ class LightTask {
     }
   }
 
-  /// Band l of the environment turned about z by each column's azimuth: f'(phi) = f(phi + azimuth).
+  /// Turns band l of the environment about z by the azimuth of each column: f'(phi) = f(phi + azimuth).
   void azimuth(int l, Matrix& cosines, Matrix& sines) {
     cosines.resize(l + 1, width_);
     sines.resize(l + 1, width_);
@@ -112,6 +113,7 @@ class LightTask {
     }
   }
 
+  /// Stores the coefficients of one outgoing direction, their scale, and the norm of each band.
   void store(int column, ShLightData& data) {
     const int order = s_.options.order;
     const std::size_t count = shCount(order);
@@ -146,7 +148,7 @@ class LightTask {
 
   const Setup& s_;
   int row_, first_, columns_, width_;
-  std::vector<Matrix> turned_cosines_, turned_sines_;  ///< of every m: [bands][3 columns]
+  std::vector<Matrix> turned_cosines_, turned_sines_;  ///< one matrix [bands][3 columns] for every m
 };
 
 void requireUsableOptions(const ShLightOptions& options) {
@@ -193,13 +195,13 @@ ShLight ShLightData::view() const {
 double lightTaper(int l, int band_limit) {
   const double x = (2.0 * l - band_limit) / (band_limit + 1.0);
   if (x <= 0) return 1;
-  // Smooth to every order at both ends: what is cut off falls faster than any power of the band.
+  // All derivatives are continuous at both ends, so the error of the cut falls faster than any power of the band.
   const double rise = std::exp(-1 / x), fall = std::exp(-1 / (1 - x));
   return fall / (rise + fall);
 }
 
 std::vector<double> halfVectorTransfer(int m, int order, int band_limit) {
-  // The integrand is a polynomial in t of degree 2 band_limit + order + 1.
+  // The integrand is a polynomial in t of degree 2 band_limit + order + 1, for which so many nodes are exact.
   const GaussLegendre rule = gaussLegendre(band_limit + order / 2 + 2, 0, 1);
   std::vector<double> mirrored;
   for (const double t : rule.nodes) mirrored.push_back(2 * t * t - 1);
@@ -214,6 +216,7 @@ std::vector<double> halfVectorTransfer(int m, int order, int band_limit) {
 ShLightData buildShLight(const Environment& environment, const ShLightOptions& options, const ProgressFn& progress) {
   requireUsable(environment);
   requireUsableOptions(options);
+  // Project the environment, fade its upper bands out, and compute the transfer to half vectors.
   Setup setup{options, options.band_limit > 0 ? options.band_limit : lightBandLimit(options.order), {}, {}};
   setup.light = projectEnvironment(environment, setup.band_limit);
   for (std::size_t channel = 0; channel < 3; ++channel)
@@ -224,6 +227,7 @@ ShLightData buildShLight(const Environment& environment, const ShLightOptions& o
   tbb::parallel_for(0, options.order + 1,
                     [&](int m) { setup.transfers[m] = halfVectorTransfer(m, options.order, setup.band_limit); });
 
+  // A task has as many columns of a row as its memory allows.
   ShLightData data = emptyTable(options);
   const std::size_t column_bytes = 2 * 3 * sizeof(double) * (static_cast<std::size_t>(options.order) + 1) * setup.band_limit;
   const int columns = std::clamp(static_cast<int>(kTaskBytes / column_bytes), 1, options.grid.columns);

@@ -18,9 +18,9 @@ namespace glint::bake {
 namespace {
 
 constexpr int kPanelNodes = 16;
-/// A panel of 16 nodes integrates half a period of P_l exactly enough (error below 1e-16).
+/// A panel of 16 nodes integrates half a period of P_l with an error below 1e-16.
 constexpr double kPanelPhase = std::numbers::pi;
-/// exp(-sin^2 / (2 sigma^2)) is below 1e-17 of the peak beyond this many sigma.
+/// The lobe exp(-sin^2 / (2 sigma^2)) is below 1e-17 of its peak beyond this many sigma.
 constexpr double kLobeReachSigmas = 9;
 
 void requireOrder(int order) {
@@ -29,11 +29,11 @@ void requireOrder(int order) {
               "give an order in that range");
 }
 
-/// The table's directions of one polar angle.
+/// Fills the directions of one polar angle.
 void fillRow(int row, const std::vector<double>& f, const ShRecurrence<double>& recurrence, ShLobesData& data) {
   const int order = data.lobes.order, columns = data.lobes.grid.columns;
   const std::size_t count = shCount(order), bands = static_cast<std::size_t>(order) + 1;
-  // Directions of a row differ in azimuth only: at azimuth 0 the cosines' coefficients are sqrt(2) P_l^m.
+  // At azimuth 0, harmonics of cosines are sqrt(2) P_l^m. Other directions of the row differ from these in azimuth only.
   std::vector<double> first(count), scratch(ShAccumulator<double>::scratchSize(order));
   ShAccumulator<double> sum(recurrence, order, first, scratch);
   const bool pole = row == 0 || row == data.lobes.grid.rows - 1;

@@ -24,7 +24,8 @@ ShRotationY::ShRotationY(double angle, int order, int rows)
 
 int ShRotationY::rowCount() const { return std::min(rows_, l_) + 1; }
 
-/// d_mk^l where l is the larger of |m| and |k|: one term, sqrt(binomial(2l, l + other)) cos^(..) sin^(..).
+/// Starts the recurrence: d_mk^l where |m| or |k| is l. It has one term, sqrt(binomial(2l, l + other)) times powers of
+/// cos(angle/2) and sin(angle/2), where `other` is the index that need not be l.
 double ShRotationY::seed(int l, int m, int k) const {
   const bool from_m = m == l;  // else |k| == l
   const int other = from_m ? k : k > 0 ? m : -m;
@@ -39,7 +40,8 @@ double ShRotationY::seed(int l, int m, int k) const {
   return negative ? -std::exp(log_value) : std::exp(log_value);
 }
 
-/// Replaces d^(l-2) in `before` by d^l, from d^(l-1) in `current`; `sign` is that of the second index.
+/// Replaces d^(l-2) in `before` by d^l, from d^(l-1) in `current`.
+/// @param sign  sign of the second index: the matrix has d(m, sign k)
 void ShRotationY::advance(std::vector<double>& before, const std::vector<double>& current, int sign) const {
   const int l = l_ + 1;
   const double ll = static_cast<double>(l) * l, p = l - 1.0;
@@ -59,6 +61,7 @@ void ShRotationY::advance(std::vector<double>& before, const std::vector<double>
   }
 }
 
+/// Computes the matrices of the real basis from d(m, k) and d(m, -k).
 void ShRotationY::combine() {
   const std::size_t columns = static_cast<std::size_t>(l_) + 1;
   cosines_.resize(static_cast<std::size_t>(rowCount()) * columns);

@@ -7,20 +7,20 @@ namespace glint::bake {
 
 /// Turns spherical harmonics about the y axis, one band after the other: f'(w) = f(R_y(angle) w).
 ///
-/// In the real basis the cosines m >= 0 and the sines m > 0 of a band mix among themselves only:
-///   c'_m = sum over m' of cosines(m, m') c_m',  s'_m = sum of sines(m, m') s_m'.
-/// Entries are sums of Wigner's d_mm'^l, from the recurrence over l, which is stable for every angle; d underflows only where
-/// it is negligible (see ShRecurrence).
+/// In the real basis, the coefficients of cosines (m >= 0) mix with each other only, and so do those of sines (m > 0):
+///   c'_m = sum over m' of cosines(m, m') c_m',  s'_m = sum over m' of sines(m, m') s_m'.
+/// Entries are sums of Wigner's d_mm'^l. The recurrence over l that computes d is stable for every angle. d underflows only
+/// where it is negligible (see ShRecurrence).
 class ShRotationY {
  public:
   /// @param angle   radians, in [0, pi]
   /// @param order   highest band
-  /// @param rows    rows m = 0 .. rows of the matrices that are wanted
+  /// @param rows    rows m = 0 .. rows of the matrices are computed
   ShRotationY(double angle, int order, int rows);
 
-  /// Band that the matrices are of; starts at 0.
+  /// Band l of the current matrices; starts at 0.
   int band() const { return l_; }
-  /// Rows and columns of a matrix: rowCount() x (band() + 1), row by row.
+  /// Number of rows of a matrix. Matrices are rowCount() x (band() + 1), row by row.
   int rowCount() const;
   const std::vector<double>& cosines() const { return cosines_; }
   const std::vector<double>& sines() const { return sines_; }
