@@ -16,11 +16,12 @@ namespace {
 
 constexpr int kTile = HistogramSat::kTileSize;
 constexpr std::uint64_t kMostTexels = std::uint64_t{1} << 32;
-/// Parts in which texels are binned: sums over them are taken in this order, whatever the threads.
+/// Number of parts in which texels are binned. Results are summed in the order of parts, so they do not depend on threads.
 constexpr int kParts = 64;
-/// Distance of the points of the coarse table: at most 2^16 texels in a frame of this width around 2K texels.
+/// Distance, in texels, of points of the coarse table. A frame of this width and a length of 2K texels has 2^16 texels, as many
+/// as the 16-bit counters of the fine table tell apart.
 constexpr int kCoarseTexels = 32;
-/// Counters that one task sums down a table: they stay in the nearest cache.
+/// Number of counters that one task sums down a table. They stay in the first-level cache.
 constexpr std::size_t kColumnCounters = 4096;
 
 void checkOptions(const NormalMap& map, const HistogramSatOptions& options) {
@@ -41,6 +42,7 @@ void checkOptions(const NormalMap& map, const HistogramSatOptions& options) {
   }
 }
 
+/// Sizes and strides of the tables.
 HistogramSat shapeFor(const NormalMap& map, const HistogramSatOptions& options) {
   HistogramSat shape;
   shape.width = map.width;
@@ -49,12 +51,12 @@ HistogramSat shapeFor(const NormalMap& map, const HistogramSatOptions& options) 
   shape.phi_bins = options.phi_bins;
   shape.stride = options.stride;
   shape.coarse_stride = options.stride * std::max(1, kCoarseTexels / options.stride);
-  // Coarser with the stride, so that the tables of lines stay the smaller part.
+  // The stride along lines grows with the stride of the tables, so that tables of lines stay the smaller part of the memory.
   shape.line_stride = std::clamp(64 * options.stride, 256, 512);
   return shape;
 }
 
-/// Splits [0, count) in kParts parts.
+/// Splits [0, count) into kParts parts, and calls visitor(part, begin, end) for each.
 template <class Visitor>
 void forEachPart(int count, Visitor&& visitor) {
   tbb::parallel_for(0, kParts, [&](int part) {
@@ -63,7 +65,7 @@ void forEachPart(int count, Visitor&& visitor) {
   });
 }
 
-/// What is known of each bin of directions after binning.
+/// Number of texels of each bin of directions, and sums of their normals.
 struct BinStatistics {
   std::vector<std::uint64_t> counts;
   std::vector<double> sums_x, sums_y;
@@ -83,7 +85,7 @@ struct BinStatistics {
   }
 };
 
-/// Writes the bin of every texel, of all bins of directions.
+/// Writes the bin of every texel. Bins are numbered as SphericalBins does, with bins that do not occur.
 BinStatistics binTexels(const NormalMap& map, const SphericalBins& bins, HistogramSatData& sat) {
   std::vector<BinStatistics> parts(kParts, BinStatistics(bins.count()));
   forEachPart(sat.shape.tileRows(), [&](int part, int begin, int end) {
@@ -103,7 +105,7 @@ BinStatistics binTexels(const NormalMap& map, const SphericalBins& bins, Histogr
   return total;
 }
 
-/// Keeps the bins that occur and renumbers the texels.
+/// Keeps the bins that occur, and writes their new numbers to all texels.
 void keepOccurring(const BinStatistics& statistics, HistogramSatData& sat) {
   std::vector<std::uint16_t> place(statistics.counts.size());
   for (std::size_t id = 0; id < statistics.counts.size(); ++id) {
@@ -127,7 +129,7 @@ void keepOccurring(const BinStatistics& statistics, HistogramSatData& sat) {
   });
 }
 
-/// Adds each row of counters to the next: sums down a table of `rows` rows.
+/// Sums down a table of `rows` rows: adds each row of counters to the next.
 template <class Counter>
 void sumDown(Counter* table, std::size_t rows, std::size_t row_counters) {
   tbb::parallel_for(std::size_t{0}, (row_counters + kColumnCounters - 1) / kColumnCounters, [&](std::size_t chunk) {
@@ -140,7 +142,7 @@ void sumDown(Counter* table, std::size_t rows, std::size_t row_counters) {
   });
 }
 
-/// The table of sums at every `stride` texels.
+/// Builds the summed-area table with points at every `stride` texels.
 template <class Counter>
 void buildTable(const HistogramSatData& sat, int stride, CounterArray<Counter>& table, ProgressCounter& progress) {
   const HistogramSat& shape = sat.shape;
@@ -152,6 +154,7 @@ void buildTable(const HistogramSatData& sat, int stride, CounterArray<Counter>& 
     Counter* row = table.values.get() + b * points_x * length;
     std::fill_n(row, length, Counter{0});
     const int top = static_cast<int>(std::min<std::int64_t>(static_cast<std::int64_t>(b) * stride, shape.height));
+    // Count the texels of each cell, and add the counts of all cells before it in the row.
     for (std::size_t a = 1; a < points_x; ++a) {
       Counter* here = row + a * length;
       std::memcpy(here, here - length, length * sizeof(Counter));
@@ -164,7 +167,7 @@ void buildTable(const HistogramSatData& sat, int stride, CounterArray<Counter>& 
   sumDown(table.values.get(), points_y, points_x * length);
 }
 
-/// Sums along every row (or column) of texels.
+/// Builds the table of sums along every row (or column) of texels.
 template <bool kColumns>
 void buildLines(const HistogramSatData& sat, CounterArray<std::uint16_t>& table, ProgressCounter& progress) {
   const HistogramSat& shape = sat.shape;
@@ -173,7 +176,7 @@ void buildLines(const HistogramSatData& sat, CounterArray<std::uint16_t>& table,
   const std::size_t length = shape.rowLength();
   const std::size_t points = kColumns ? shape.pointsY(stride) : shape.pointsX(stride);
   table.allocate(static_cast<std::size_t>(lines) * points * length);
-  // Lines of one tile together: their texels lie side by side.
+  // One task has all lines of a tile, whose texels lie side by side in memory.
   tbb::parallel_for(0, (lines + kTile - 1) / kTile, [&](int tile) {
     for (int line = tile * kTile; line < std::min((tile + 1) * kTile, lines); ++line) {
       std::uint16_t* here = table.values.get() + static_cast<std::size_t>(line) * points * length;
@@ -217,6 +220,7 @@ HistogramSatData buildHistogramSat(const NormalMap& map, const HistogramSatOptio
   sat.shape.slopes = mapSlopes(map);
   const HistogramSat& shape = sat.shape;
   sat.texels.allocate(static_cast<std::size_t>(shape.tileColumns()) * shape.tileRows() * kTile * kTile);
+  // Bin the texels, then count them in every table.
   const SphericalBins bins(options.theta_bins, options.phi_bins);
   keepOccurring(binTexels(map, bins, sat), sat);
   ProgressCounter counter(progress, static_cast<std::size_t>(shape.pointsY(shape.stride)) + shape.pointsY(shape.coarse_stride) -

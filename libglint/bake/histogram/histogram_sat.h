@@ -14,11 +14,11 @@ namespace glint::bake {
 
 struct HistogramSatOptions {
   int theta_bins = 9;  ///< rings of elevation, 1..64
-  int phi_bins = 32;   ///< sectors of azimuth, 1..256; at most 2048 bins together
-  int stride = 8;      ///< texels between the points of the fine table, 1..128: memory against time
+  int phi_bins = 32;   ///< sectors of azimuth, 1..256; at most 2048 bins in all
+  int stride = 8;  ///< texels between points of the fine table, 1..128; small strides take memory, large ones time of queries
 };
 
-/// A large array that is not zeroed first.
+/// A large array whose values are not set when it is allocated, since builders write all of them.
 template <class T>
 struct CounterArray {
   std::unique_ptr<T[]> values;
@@ -49,8 +49,8 @@ class HistogramSatData {
 
 /// Accumulates the histograms of a map (Gamboa 2018, section 4.1).
 ///
-/// Texels are binned, then counted in the cells of each table, summed along rows and down columns: every counter is written
-/// once and added to once. Integers, so the result does not depend on threads.
+/// Each texel gets the bin of its normal. Then each table counts the texels of its cells, and sums counts along rows and down
+/// columns: every counter is written once and added to once. Sums of integers do not depend on the number of threads.
 /// @throws Error (usage) for options out of range; (unsupported) for maps of more than 2^32 texels
 HistogramSatData buildHistogramSat(const NormalMap& map, const HistogramSatOptions& options, const ProgressFn& progress = {});
 
