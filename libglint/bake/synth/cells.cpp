@@ -14,7 +14,8 @@ namespace {
 constexpr std::uint64_t kSiteStream = 2;
 constexpr std::uint64_t kOrientationStream = 3;
 
-/// One random point in each cell of a periodic grid. Cells are as near to square of the wanted size as the map's size allows.
+/// A periodic grid with one random point (site) in each cell. Cells are as nearly square, and of the wanted size, as the map's
+/// size allows.
 class JitteredGrid {
  public:
   JitteredGrid(const SynthOptions& p, float cell_texels)
@@ -28,10 +29,10 @@ class JitteredGrid {
 
   struct Site {
     int cell;       ///< row * columns + column, wrapped
-    Vec2 position;  ///< texels, not wrapped
+    Vec2 position;  ///< texels, not wrapped into the map
   };
 
-  /// Calls visit(site) for the 5 x 5 cells around a point, which are sure to hold its nearest two sites.
+  /// Calls visit(site) for the 5 x 5 cells around a point. The two sites nearest to the point are always among them.
   template <class Visit>
   void visitNear(Vec2 point, const Visit& visit) const {
     const int column = static_cast<int>(point.x / cell_width_);
@@ -83,7 +84,7 @@ double gtrCosineSquared(double u, double alpha, double gamma) {
   return (1 - std::pow(std::pow(a2, 1 - gamma) * (1 - u) + u, 1 / (1 - gamma))) / (1 - a2);
 }
 
-/// The inverse: the quantile of cos^2.
+/// Quantile of cos^2 of the tilt: the inverse of gtrCosineSquared.
 double gtrQuantile(double cosine_squared, double alpha, double gamma) {
   const double a2 = alpha * alpha;
   const double t = 1 - cosine_squared * (1 - a2);
@@ -92,8 +93,8 @@ double gtrQuantile(double cosine_squared, double alpha, double gamma) {
   return (std::pow(t, 1 - gamma) - a) / (1 - a);
 }
 
-/// A dome over the Voronoi cell of a point: 0 on the cell's border, 1 farther than `rim` from it. A product over the sides, so
-/// that corners are rounded and no crease runs inwards from them.
+/// Height, at a point, of the dome over its Voronoi cell: 0 on the border of the cell, 1 farther than `rim` from it. The height
+/// is a product over the sides of the cell, so that corners are rounded and no crease runs inwards from them.
 float domeHeight(const JitteredGrid& grid, Vec2 point, float rim) {
   const JitteredGrid::Site own = grid.nearest(point);
   float height = 1;
@@ -103,7 +104,7 @@ float domeHeight(const JitteredGrid& grid, Vec2 point, float rim) {
     if (length2 < 1e-8f) return;
     const Vec2 middle = 0.5f * (site.position + own.position);
     const float along = dot(middle - point, across);
-    if (along * along >= rim * rim * length2) return;  // farther than the rim from this side
+    if (along * along >= rim * rim * length2) return;  // the point is farther than the rim from this side
     const float inside = std::max(0.0f, along) / (rim * std::sqrt(length2));
     height *= inside * (2 - inside);
   });
@@ -114,6 +115,7 @@ float domeHeight(const JitteredGrid& grid, Vec2 point, float rim) {
 
 std::vector<Vec2> flakeNormals(const SynthOptions& p) {
   const JitteredGrid grid(p, p.feature_texels);
+  // Draw an orientation for each flake, then find the flake of each texel.
   const double last_quantile = gtrQuantile(kMinFlakeCosine * kMinFlakeCosine, p.alpha, p.gamma);
   std::vector<Vec2> orientations(grid.cellCount());
   for (std::size_t cell = 0; cell < orientations.size(); ++cell) {
@@ -135,7 +137,7 @@ std::vector<Vec2> flakeNormals(const SynthOptions& p) {
 
 std::vector<float> leatherHeights(const SynthOptions& p) {
   const JitteredGrid pebbles(p, p.feature_texels);
-  const float rim = 0.35f * p.feature_texels;  // pebbles are rounded this far in from the groove
+  const float rim = 0.35f * p.feature_texels;  // width of the rounded border of a pebble
   std::vector<float> heights(static_cast<std::size_t>(p.width) * p.height);
   tbb::parallel_for(0, p.height, [&](int j) {
     float* line = heights.data() + static_cast<std::size_t>(j) * p.width;

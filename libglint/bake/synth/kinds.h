@@ -4,10 +4,11 @@
 
 #include "glint/bake/synth/synth.h"
 
-/// The surfaces behind synthHeights and synthNormals, each [height][width]. Heights are not scaled yet.
+/// Private to synthHeights and synthNormals: one function for each kind of surface. Results are [height][width]; heights are
+/// not scaled.
 namespace glint::bake {
 
-/// Gaussian random field of correlation exp(-(x/correlation_x)^2 - (y/correlation_y)^2). O(n log n).
+/// Gaussian random field with the correlation exp(-(x/correlation_x)^2 - (y/correlation_y)^2). O(n log n) for n texels.
 std::vector<float> noiseHeights(const SynthOptions& options, float correlation_x, float correlation_y);
 
 std::vector<Vec2> flakeNormals(const SynthOptions& options);

@@ -29,7 +29,7 @@ std::vector<float> noiseHeights(const SynthOptions& p, float correlation_x, floa
   const FftwPlan backward =
       makeFftwPlan([&](unsigned flags) { return fftw_plan_dft_c2r_2d(p.height, p.width, spectrum, field, flags); });
 
-  // White noise is drawn in space rather than in frequency: the transform then has the symmetry of a real field for any size.
+  // Draw white noise in space, not in frequency: its transform then has the symmetry of a real field for any size.
   tbb::parallel_for(0, p.height, [&](int j) {
     double* line = field + static_cast<std::size_t>(j) * padded;
     for (int i = 0; i < p.width; i += 2) {
@@ -41,7 +41,7 @@ std::vector<float> noiseHeights(const SynthOptions& p, float correlation_x, floa
   });
   fftw_execute(forward.get());
 
-  // The square root of the power spectrum of exp(-r^2/t^2) is exp(-k^2 t^2 / 8).
+  // Filter the noise. The square root of the power spectrum of the correlation exp(-r^2/t^2) is exp(-k^2 t^2 / 8).
   const auto amplitude = [](int index, int size, float correlation) {
     const int signed_index = index <= size / 2 ? index : index - size;
     const double k = 2 * std::numbers::pi * signed_index / size * correlation;

@@ -14,14 +14,14 @@ namespace {
 constexpr float kPi = std::numbers::pi_v<float>;
 constexpr std::uint64_t kScratchStream = 4;
 
-/// A groove in its own frame: s runs along it from 0 to `length`, t across it.
+/// A groove. In its own frame, s runs along it from 0 to `length`, and t across it.
 struct Scratch {
   Vec2 start;
   Vec2 along;  ///< unit length
   float length = 0;
   float half_width = 0;
-  float depth = 0;  ///< relative to its width
-  float bend = 0;   ///< largest t of the centre line
+  float depth = 0;  ///< depth over half_width
+  float bend = 0;   ///< largest t of the bent centre line
 
   /// Height of the groove at a point; 0 outside.
   float heightAt(Vec2 point) const {
@@ -31,12 +31,13 @@ struct Scratch {
     const float centre = 4 * bend * s * (1 - s);
     const float t = (along.x * d.y - along.y * d.x - centre) / half_width;
     if (std::abs(t) >= 1) return 0;
-    const float ends = std::min(1.0f, 8 * std::min(s, 1 - s));  // runs out over an eighth of its length
+    const float ends = std::min(1.0f, 8 * std::min(s, 1 - s));  // the groove runs out over an eighth of its length
     const float profile = (1 - t * t) * (1 - t * t);
     return -depth * half_width * profile * ends * ends * (3 - 2 * ends);
   }
 };
 
+/// Draws the positions and shapes of all scratches.
 std::vector<Scratch> drawScratches(const SynthOptions& p) {
   const double squares = static_cast<double>(p.width) * p.height / (64.0 * 64.0);
   std::vector<Scratch> scratches(static_cast<std::size_t>(std::max(1.0, std::round(squares * p.density))));
@@ -56,8 +57,8 @@ std::vector<Scratch> drawScratches(const SynthOptions& p) {
   return scratches;
 }
 
-/// Cuts one scratch, moved by (shift_x, shift_y), into rows [first_row, last_row). The deepest cut wins, so order does not
-/// matter.
+/// Cuts one scratch, moved by (shift_x, shift_y), into rows [first_row, last_row). The deepest cut stays, so the order of
+/// scratches does not matter.
 void carve(const SynthOptions& p, Scratch scratch, int shift_x, int shift_y, int first_row, int last_row,
            std::vector<float>& heights) {
   scratch.start = scratch.start + Vec2{static_cast<float>(shift_x), static_cast<float>(shift_y)};
@@ -69,7 +70,8 @@ void carve(const SynthOptions& p, Scratch scratch, int shift_x, int shift_y, int
     float low = std::min(scratch.start.x, end.x) - margin;
     float high = std::max(scratch.start.x, end.x) + margin;
     const float y = static_cast<float>(j) + 0.5f;
-    if (std::abs(scratch.along.y) > 0.05f) {  // the part of the row within the margin of the chord
+    // Limit the row to the part near the straight line from end to end.
+    if (std::abs(scratch.along.y) > 0.05f) {
       const float x = scratch.start.x + (y - scratch.start.y) * scratch.along.x / scratch.along.y;
       const float reach = margin / std::abs(scratch.along.y);
       low = std::max(low, x - reach);
@@ -83,14 +85,18 @@ void carve(const SynthOptions& p, Scratch scratch, int shift_x, int shift_y, int
   }
 }
 
-/// Nearest even number of threads (at least 2) that fill `size`, so that over and under alternate across the seam.
+/// Nearest even number of threads (at least 2) that fill `size`. An even number keeps over and under alternating across the
+/// border of the map.
 int threadCount(int size, float thread_texels) {
   return 2 * std::max(1, static_cast<int>(std::lround(static_cast<float>(size) / thread_texels / 2)));
 }
 
-/// Height of a thread: `across` in [0, 1] is the position in its width, `along` in threads, `crossing` +1 where it lies on top.
+/// Height of a thread.
+/// @param across    position across the thread, in [0, 1]
+/// @param along     position along the thread, in widths of the threads that cross it
+/// @param crossing  +1 where the thread lies on top, -1 where it lies below
 float threadHeight(float across, float along, float crossing) {
-  constexpr float kRoundness = 0.9f;  // of 1: the sides of the thread are steep but not vertical
+  constexpr float kRoundness = 0.9f;  // below 1, so that the sides of a thread are steep but not vertical
   constexpr float kFibreDepth = 0.02f;
   constexpr float kFibres = 3;
   const float side = 2 * across - 1;

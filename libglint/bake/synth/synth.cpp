@@ -19,11 +19,12 @@ void require(bool holds, const char* parameter, const char* range) {
   if (!holds) throw Error(ErrorCode::usage, "synth.range", "", parameter, std::string("is not ") + range, "see the help text");
 }
 
-/// Scratches wider than the map wrap round it many times, and many wide ones lie on each texel: neither shows, and both cost time.
+/// Refuses scratches that take long and do not show: wider than the map, so that they wrap around it many times, or so many and
+/// so wide that a great number lie on each texel.
 void checkScratches(const SynthOptions& p) {
-  constexpr int kSureWidth = 64;        // texels that are allowed on any map
-  constexpr float kMeanLength = 128;    // about that of a scratch, texels
-  constexpr double kMostLayers = 1024;  // scratches on a texel, on average
+  constexpr int kSureWidth = 64;        // width, in texels, that is allowed on any map
+  constexpr float kMeanLength = 128;    // about the mean length of a scratch, in texels
+  constexpr double kMostLayers = 1024;  // largest mean number of scratches on a texel
   const int widest = std::max(kSureWidth, std::min(p.width, p.height));
   if (p.feature_texels > static_cast<float>(widest))
     throw Error(ErrorCode::usage, "synth.range", "", "feature size",
@@ -53,7 +54,7 @@ void scale(std::vector<float>& heights, double factor) {
   for (float& h : heights) h = static_cast<float>(h * factor);
 }
 
-/// Noise whose slopes have the wanted variance. A map too small to have slopes (1 or 2 texels) stays flat.
+/// Makes noise whose slopes have the variance of the options. A map too small to have slopes (1 or 2 texels) is flat.
 std::vector<float> scaledNoise(const SynthOptions& p) {
   const bool brushed = p.kind == SynthKind::brushed;
   std::vector<float> heights = noiseHeights(p, brushed ? p.streak_texels : p.correlation_texels, p.correlation_texels);
