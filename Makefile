@@ -33,6 +33,16 @@ bench: build  ## time whole commands and queries on 2K^2 maps; writes build/benc
 bench-report: bench  ## the same, and write docs/BENCHMARKS.md and its charts
 	@$(PYTHON) tests/bench/report.py build/bench/results.json --docs docs
 
+# Doxygen and graphviz are asked for here only: nothing else needs them.
+.PHONY: docs
+docs:  ## the API reference, in build/docs/html; lists public names without a contract
+	@for tool in doxygen:doxygen dot:graphviz; do \
+	  command -v $${tool%:*} >/dev/null || { echo "make docs needs $${tool%:*}: install the package $${tool#*:}" >&2; exit 1; }; done
+	@mkdir -p build/docs
+	@private=$$(grep -rl --include='*.h' '^// Private to ' libglint formats | xargs); \
+	  (cat docs/Doxyfile; echo "EXCLUDE += $$private") | doxygen - 2>&1 | sed 's,^$(CURDIR)/,,' | tee build/docs/warnings.txt
+	@echo "build/docs/html/index.html; $$(wc -l <build/docs/warnings.txt) warnings, also in build/docs/warnings.txt"
+
 .PHONY: build
 build: build/build.ninja  ## the optimised build, in build/
 	cmake --build --preset release --parallel $(JOBS)
