@@ -1,24 +1,30 @@
-"""What the README says is so: its session, its example of the reader, its links and its tables."""
+"""What the README and the pages of docs/ say is so: commands, examples, links, paths and tables."""
 
 import math
 import pathlib
 import re
 import shlex
 
+import pytest
+
 ROOT = pathlib.Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
+LINKING = (ROOT / "docs/LINKING.md").read_text()
+DOCUMENTS = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md")))]
 # Sums in another order, as another processor's vectors give, and the digits that were printed.
 TOLERANCE = 5e-3
+# One screen and a half.
+MOST_README_LINES = 75
 
 
-def blocks(language):
-    return re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+def blocks(text, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-def session():
-    """[(command, expected output)] of the console block."""
+def session_of(text):
+    """[(command, expected output)] of all console blocks."""
     steps = []
-    for line in blocks("console")[0].splitlines():
+    for line in "".join(blocks(text, "console")).splitlines():
         if line.startswith("$ "):
             steps.append((line[2:], []))
         else:
@@ -41,11 +47,17 @@ def same(text, expected):
     return True
 
 
-def test_session_gives_what_is_printed(glint):
-    steps = session()
-    assert len(steps) > 5
+def anchors(text):
+    """Names of the headings of a page, as links use them."""
+    headings = re.findall(r"^#+ (.*)", text, re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_chain_gives_what_is_printed(glint):
+    steps = session_of(README)
+    assert len(steps) == 5
     for command, expected in steps:
-        program, *arguments = shlex.split(command)
+        program, *arguments = shlex.split(command, comments=True)
         process = glint(program.removeprefix("glint-"), *arguments)
         assert process.returncode == 0, f"{command}\n{process.stderr}"
         assert same(process.stdout, expected), f"{command}\n{process.stdout}"
@@ -58,37 +70,63 @@ def test_comparison_of_sessions_sees_differences():
     assert not same("a 1.0", "a 1.0 b")
 
 
-def test_example_is_the_consumer_that_is_built():
-    assert blocks("cpp") == [(ROOT / "tests/consumer/main.cpp").read_text()]
-    assert blocks("cmake")[0] in (ROOT / "tests/consumer/CMakeLists.txt").read_text()
+def test_readme_is_short():
+    assert len(README.splitlines()) <= MOST_README_LINES, "move the details to docs/"
 
 
-def test_c_example_is_the_program_that_is_built_against_an_installed_package():
-    assert blocks("c") == [(ROOT / "tests/consumer_installed/main.c").read_text()]
+def test_projects_that_link_are_those_that_are_built():
+    inside, installed = blocks(LINKING, "cmake")
+    assert inside in (ROOT / "tests/consumer/CMakeLists.txt").read_text()
     project = (ROOT / "tests/consumer_installed/CMakeLists.txt").read_text()
-    assert all(line in project for line in blocks("cmake")[1].splitlines())
+    assert all(line in project for line in installed.splitlines())
 
 
-def test_links_lead_somewhere():
-    for document in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md"):
-        text = (ROOT / document).read_text()
-        targets = [t for t in re.findall(r"\]\(([^)#]+)", text) if not t.startswith("http")]
-        assert [t for t in targets if not (ROOT / t).exists()] == [], document
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_links_lead_somewhere(document):
+    path = ROOT / document
+    prose = re.sub(r"^```.*?^```", "", path.read_text(), flags=re.MULTILINE | re.DOTALL)
+    for target in re.findall(r"\]\(([^)]+)", prose):
+        if target.startswith("http"):
+            continue
+        name, _, anchor = target.partition("#")
+        linked = path.parent / name if name else path
+        assert linked.exists(), target
+        assert not anchor or anchor in anchors(linked.read_text()), target
+
+
+@pytest.mark.parametrize("document", ["docs/ARCHITECTURE.md", "docs/METHODS.md", "docs/FORMAT.md", "docs/TOOLS.md", "docs/LINKING.md"])
+def test_files_that_are_named_exist(document):
+    rooms = r"(?:libglint|formats|apps|tests|pipelines)/"
+    named = set(re.findall(rf"`({rooms}[\w./-]+)`", (ROOT / document).read_text()))
+    assert [name for name in named if "METHOD" not in name and not (ROOT / name).exists()] == []
+
+
+def test_headers_that_are_named_exist():
+    for header in set(re.findall(r"`((?:light/|brdf/)?\w+\.h)`", LINKING)) - {"glint.h"}:
+        assert (ROOT / "libglint/query" / header).exists(), header
+    for header in re.findall(r"`glint/([\w/]+\.h)`", LINKING):
+        assert (ROOT / "libglint" / header).exists(), header
 
 
 def test_every_tool_and_kind_is_in_a_table():
     tools = {path.parent.name for path in (ROOT / "apps").glob("glint-*/main.cpp")}
-    assert set(re.findall(r"^\| `(glint-\w+)` \|", README, re.MULTILINE)) == tools
+    assert set(re.findall(r"^\| `(glint-\w+)` \|", (ROOT / "docs/TOOLS.md").read_text(), re.MULTILINE)) == tools
     kinds = set(re.findall(r"^## \d+\. Kinds? `([a-z-]+)`(?: and `([a-z-]+)`)?", (ROOT / "formats/SPEC.md").read_text(), re.MULTILINE))
     named = {kind for pair in kinds for kind in pair if kind}
     assert {"normals", "ndf-pyramid"} <= named
-    assert all(f"| `{kind}` |" in README for kind in named)
+    assert set(re.findall(r"^\| `([a-z-]+)` \|", (ROOT / "docs/FORMAT.md").read_text(), re.MULTILINE)) == named
 
 
-def test_make_has_the_targets_that_the_documents_name():
+def test_glossary_is_in_order_and_says_each_word_once():
+    words = re.findall(r"^\*\*([^*]+)\*\*:", (ROOT / "docs/GLOSSARY.md").read_text(), re.MULTILINE)
+    assert len(words) > 40
+    assert words == sorted(set(words), key=str.lower)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_make_has_the_targets_that_the_documents_name(document):
     makefile = (ROOT / "Makefile").read_text()
-    for document in ("README.md", "CONTRIBUTING.md"):
-        targets = set(re.findall(r"^(?:make |.*?`make )([a-z-]+)", (ROOT / document).read_text(), re.MULTILINE))
-        assert {"test"} <= targets
-        for target in targets:
-            assert re.search(rf"^{target}:.*## ", makefile, re.MULTILINE), f"{document}: make {target}"
+    targets = set(re.findall(r"(?:^|`)make ([a-z][a-z-]*)", (ROOT / document).read_text(), re.MULTILINE))
+    assert document not in ("README.md", "CONTRIBUTING.md") or "test" in targets
+    for target in targets:
+        assert re.search(rf"^{target}:.*## ", makefile, re.MULTILINE), f"{document}: make {target}"
