@@ -33,7 +33,7 @@ bench: build  ## time whole commands and queries on 2K^2 maps; writes build/benc
 bench-report: bench  ## the same, and write docs/BENCHMARKS.md and its charts
 	@$(PYTHON) tests/bench/report.py build/bench/results.json --docs docs
 
-# Doxygen and graphviz are asked for here only: nothing else needs them.
+# Asks for Doxygen and graphviz here only: nothing else needs them.
 .PHONY: docs
 docs:  ## the API reference, in build/docs/html; lists public names without a contract
 	@for tool in doxygen:doxygen dot:graphviz; do \
@@ -42,6 +42,17 @@ docs:  ## the API reference, in build/docs/html; lists public names without a co
 	@private=$$(grep -rl --include='*.h' '^// Private to ' libglint formats | xargs); \
 	  (cat docs/Doxyfile; echo "EXCLUDE += $$private") | doxygen - 2>&1 | sed 's,^$(CURDIR)/,,' | tee build/docs/warnings.txt
 	@echo "build/docs/html/index.html; $$(wc -l <build/docs/warnings.txt) warnings, also in build/docs/warnings.txt"
+
+# Asks for help2man here only, as make docs does for its tools.
+.PHONY: man
+man:  ## manual pages of the tools from their --help, in build/man
+	@command -v help2man >/dev/null || { echo 'make man needs help2man: install the package help2man' >&2; exit 1; }
+	@$(MAKE) build
+	@mkdir -p build/man
+	@for folder in apps/glint-*; do tool=$${folder#apps/}; \
+	  summary=$$(build/bin/$$tool --help | sed -n '1s/\. .*\|\.$$//p'); \
+	  help2man --no-info --manual glint --name "$$summary" --output build/man/$$tool.1 build/bin/$$tool; done
+	@echo "build/man; for example: man -l build/man/glint-query.1"
 
 .PHONY: build
 build: build/build.ninja  ## the optimised build, in build/
