@@ -1,0 +1,184 @@
+"""The schemas of docs/json describe exactly what the tools print with --json and --progress json."""
+
+import copy
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+import h5py
+import jsonschema
+import pytest
+from conftest import BIN
+
+ROOT = pathlib.Path(__file__).parents[2]
+FOLDER = ROOT / "docs/json"
+TOOLS = sorted(path.parent.name for path in (ROOT / "apps").glob("glint-*/main.cpp"))
+SCHEMAS = {path.name.removesuffix(".schema.json"): json.loads(path.read_text()) for path in sorted(FOLDER.glob("*.schema.json"))}
+
+LIGHTS = {"lights": [{"type": "sphere", "centre": [1, 0, 3], "radius": 0.5, "radiance": [3, 2, 1]}]}
+QUERIES = {"half.csv": "u,v,sigma,hx,hy\n.3,.3,4,0,0\n.1,.2,5,.1,0\n", "displaced.csv": "u,v,level,hx,hy\n.3,.3,0,0,0\n"}
+ASSETS = ("normals", "smooth", "heights", "flat", "damaged", "pyramid", "cp", "tucker", "pca", "bins", "range", "sat", "lobes", "zonal", "light",
+          "displaced", "rough", "colored")
+
+# Commands in the order that they run: each may read what the commands before it wrote.
+MAKE = [
+    "synth flakes --size 32 -o n.exr",
+    "synth weave --size 32 -o h.exr --height",
+    "synth flat --size 16 -o flat.exr --height",
+    "synth isotropic --size 32 -o n.png --bits 16",
+    "ingest n.exr -o normals.glint",
+    "ingest n.png -o smooth.glint --texel-size-um 5",
+    "ingest h.exr --kind height --to heights -o heights.glint",
+    "ingest flat.exr --kind height --to heights --allow-constant -o flat.glint",
+    "pyramid normals.glint -o pyramid.glint --resolution 64 --stride 8 --sigma-r .02",
+    "pyramid smooth.glint -o p2.glint --resolution 32 --stride 16 --surface smooth --boundary clamp --precision float --sigma-r .03",
+    "compress pyramid.glint -o cp.glint --method cp --rank 8",
+    "compress pyramid.glint -o tucker.glint --method tucker --tolerance .1",
+    "compress pyramid.glint -o pca.glint --method pca --rank 4 --quantize f32",
+    "binmap normals.glint -o bins.glint --alpha .05",
+    "binmap normals.glint -o range.glint --alpha .02:.1",
+    "sat normals.glint -o sat.glint --bins 6x20",
+    "shlobes -o lobes.glint --sigma-r .1 --order 6 --grid 5x8 --precision f32",
+    "shlobes -o zonal.glint --sigma-r .1 --order 6 --grid none",
+    "shlobes --light lights.json -o light.glint --order 6 --grid 5x8",
+    "displace heights.glint -o displaced.glint --factors 4,16 --angular 3 --spatial 2",
+    "displace heights.glint -o rough.glint --base ggx:.3:1,2 --factor 8 --angular 3 --spatial 2",
+    "displace heights.glint -o colored.glint --base-color n.png --factor 8 --angular 3 --spatial 2",
+    "displace flat.glint -o level.glint --factor 8 --angular 3 --spatial 2",
+]
+QUERY = "query {asset}.glint --uv .3 .6 --sigma 4 {asked}"
+ASKED = [
+    *(QUERY.format(asset=asset, asked="--half 0 .1") for asset in ("normals", "pyramid", "cp", "bins", "sat", "displaced")),
+    *(QUERY.format(asset=asset, asked="--half .1 0 --repeat 15") for asset in ("pyramid", "displaced")),
+    *(QUERY.format(asset=asset, asked="--image ndf.png --image-size 16") for asset in ("tucker", "displaced")),
+    *(QUERY.format(asset=asset, asked="--range -1 -1 1 1 --repeat 15") for asset in ("normals", "sat")),
+    "query normals.glint --uv .3 .6 --box 3 0 0 2 --range -1 -1 1 1",
+    "query pyramid.glint --uv .3 .6 --cov 16 0 20 --half 0 0",
+    QUERY.format(asset="cp", asked="--samples 3 -o samples.csv"),
+    "query pyramid.glint --csv half.csv -o answers.csv",
+    *(QUERY.format(asset=asset, asked="--light light.glint --wo .1 0 1") for asset in ("normals", "sat")),
+    "query displaced.glint --uv .3 .6 --level 1 --wi .5 0 1 --wo -.2 0 1",
+    "query colored.glint --uv .3 .6 --sigma 3 --wi .5 0 1 --wo -.2 0 1 --repeat 15",
+    "query displaced.glint --uv .3 .6 --level 0 --wo 0 0 1 --samples 3 -o samples.csv",
+    "query displaced.glint --csv displaced.csv -o answers.csv",
+]
+FOUND = [*(f"info {asset}.glint" for asset in ASSETS), "validate normals.glint pyramid.glint"]
+REFUSED = [
+    "validate damaged.glint lights.json normals.glint",
+    "validate missing.glint",
+    *(f"{tool.removeprefix('glint-')} --nonsense" for tool in TOOLS),
+]
+PROGRESS = "pyramid normals.glint -o pyramid.glint --resolution 64 --stride 8 --force --progress json"
+
+
+def run(folder, command):
+    program, *arguments = command.split()
+    return subprocess.run([BIN / f"glint-{program}", *arguments], cwd=folder, capture_output=True, text=True, timeout=60)
+
+
+@pytest.fixture(scope="module")
+def documents(tmp_path_factory):
+    """[(schema, command, document)] of every command, and of the lines of progress."""
+    folder = tmp_path_factory.mktemp("json")
+    (folder / "lights.json").write_text(json.dumps(LIGHTS))
+    for name, text in QUERIES.items():
+        (folder / name).write_text(text)
+    found = []
+    for command in MAKE + ASKED + FOUND + REFUSED:
+        process = run(folder, command + " --json")
+        assert (process.returncode == 0) == (command not in REFUSED), f"{command}\n{process.stderr}"
+        found.append(("glint-" + command.split()[0], command, json.loads(process.stdout)))
+        if command == MAKE[-1]:
+            shutil.copy(folder / "heights.glint", folder / "damaged.glint")
+            with h5py.File(folder / "damaged.glint", "r+") as file:
+                file["heights"][...] = float("nan")
+    lines = run(folder, PROGRESS).stderr.splitlines()
+    assert lines
+    return found + [("progress", PROGRESS, json.loads(line)) for line in lines]
+
+
+def validator(name, schemas=SCHEMAS):
+    """Checks documents against a schema, with references to other files."""
+    address = {other: f"{FOLDER.as_uri()}/{other}.schema.json" for other in schemas}
+    store = {address[other]: schema for other, schema in schemas.items()}
+    resolver = jsonschema.RefResolver(address[name], schemas[name], store=store)
+    return jsonschema.Draft202012Validator(schemas[name], resolver=resolver)
+
+
+def nodes(schema, path=()):
+    """(path, node) of every object and list within a schema."""
+    yield path, schema
+    for key, value in schema.items() if isinstance(schema, dict) else enumerate(schema):
+        if isinstance(value, (dict, list)):
+            yield from nodes(value, (*path, key))
+
+
+def closed_objects(schema):
+    return [(path, node) for path, node in nodes(schema) if isinstance(node, dict) and "additionalProperties" in node]
+
+
+def test_every_tool_has_a_schema():
+    assert set(SCHEMAS) == {*TOOLS, "common", "properties", "progress"}
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_schema_is_valid_closed_and_described(name):
+    jsonschema.Draft202012Validator.check_schema(SCHEMAS[name])
+    for path, node in nodes(SCHEMAS[name]):
+        if isinstance(node, dict) and node.get("type") == "object" and "properties" in node:
+            assert node.get("additionalProperties") is False, path
+    for path, node in closed_objects(SCHEMAS[name]):
+        for key, value in node["properties"].items():
+            assert value.get("description", "").endswith("."), (*path, key)
+
+
+def test_documents_are_as_described(documents):
+    problems = [f"{command}: {error.message} at {list(error.absolute_path)}" for name, command, document in documents
+                for error in validator(name).iter_errors(document)]
+    assert problems == []
+
+
+def test_every_kind_is_asked(documents):
+    kinds = {document["result"]["kind"] for name, _, document in documents if name == "glint-info" and "result" in document}
+    assert kinds == {kind["kind"] for kind in json.loads((ROOT / "formats/schema.json").read_text())["kinds"]}
+
+
+@pytest.mark.parametrize("name", SCHEMAS)
+def test_a_property_that_a_schema_lacks_is_found(documents, name):
+    """Each property is in some document, and without it in the schema that document is refused."""
+    reader = {"properties": "glint-info", "common": "glint-synth"}.get(name, name)
+    asked = [document for schema, _, document in documents if schema == reader]
+    for path, node in closed_objects(SCHEMAS[name]):
+        for key in node["properties"]:
+            schemas = SCHEMAS | {name: copy.deepcopy(SCHEMAS[name])}
+            changed = schemas[name]
+            for step in path:
+                changed = changed[step]
+            del changed["properties"][key]
+            changed["required"] = [other for other in changed.get("required", []) if other != key]
+            check = validator(reader, schemas)
+            assert not all(check.is_valid(document) for document in asked), (*path, key)
+
+
+def test_properties_are_those_of_the_format():
+    process = subprocess.run([sys.executable, FOLDER / "properties.py", "--check"], capture_output=True, text=True, timeout=60)
+    assert (process.returncode, process.stderr) == (0, "")
+
+
+def test_other_properties_are_found(tmp_path):
+    schema = json.loads((ROOT / "formats/schema.json").read_text())
+    schema["kinds"][0]["attributes"].pop()
+    (tmp_path / "schema.json").write_text(json.dumps(schema))
+    process = subprocess.run([sys.executable, FOLDER / "properties.py", "--check", "--schema", tmp_path / "schema.json"], capture_output=True, timeout=60)
+    assert process.returncode == 1
+
+
+def test_commands_of_the_readme_check_a_result(tmp_path):
+    commands = re.search(r"^```sh\n(.*?)^```", (FOLDER / "README.md").read_text(), re.MULTILINE | re.DOTALL)[1]
+    environment = os.environ | {"PATH": f"{BIN}:/usr/bin:{os.environ['PATH']}", "SCHEMAS": str(FOLDER)}
+    process = subprocess.run(["sh", "-ec", commands], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60)
+    assert (process.returncode, process.stdout) == (0, ""), process.stderr
