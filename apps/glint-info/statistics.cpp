@@ -30,11 +30,6 @@ ordered_json statisticsOf(const NormalMap& map, const formats::AssetInfo&) {
                              {"max_tilt_deg", report.steepest_tilt_deg},
                              {"normal_range_x", {low.x, high.x}},
                              {"normal_range_y", {low.y, high.y}}};
-  if (!map.slopes) {
-    const Covariance& covariance = report.slopes.covariance;
-    statistics["slope_mean"] = {report.slopes.mean.x, report.slopes.mean.y};
-    statistics["slope_covariance"] = {covariance.xx, covariance.xy, covariance.yy};
-  }
   return statistics;
 }
 

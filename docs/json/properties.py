@@ -36,8 +36,8 @@ def property_schema(attribute):
 
 
 def closed_object(description, attributes, names):
-    """An object of these attributes and of no others. Attributes of later minor versions may be missing."""
-    required = [name for name, attribute in zip(names, attributes) if attribute.get("since_minor", 0) == 0]
+    """An object of these attributes and of no others. Attributes of later minor versions may be missing, and those that files may lack."""
+    required = [name for name, attribute in zip(names, attributes) if attribute.get("required", True) and attribute.get("since_minor", 0) == 0]
     return {"description": description, "type": "object", "properties": dict(zip(names, map(property_schema, attributes))), "required": required,
             "additionalProperties": False}
 
