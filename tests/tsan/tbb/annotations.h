@@ -11,6 +11,16 @@ struct Order {
   char begin, end;
 };
 
+/// Release and acquire at the end of a scope, also where an exception leaves it.
+struct ReleaseAtEnd {
+  char* address;
+  ~ReleaseAtEnd() { __tsan_release(address); }
+};
+struct AcquireAtEnd {
+  char* address;
+  ~AcquireAtEnd() { __tsan_acquire(address); }
+};
+
 /// A body of a loop. Its members, and the range that it gets, lie in memory that the library hands from thread to thread.
 template <class Body>
 struct AnnotatedBody {
@@ -21,8 +31,8 @@ struct AnnotatedBody {
   __attribute__((no_sanitize("thread"))) void operator()(const Range& range) const {
     const Range own = range;
     __tsan_acquire(&order->begin);
+    const ReleaseAtEnd release{&order->end};
     (*body)(own);
-    __tsan_release(&order->end);
   }
 };
 
@@ -31,8 +41,8 @@ template <class Body, class Loop>
 void runAnnotated(const Body& body, const Loop& loop) {
   Order order;
   __tsan_release(&order.begin);
+  const AcquireAtEnd acquire{&order.end};
   loop(AnnotatedBody<Body>{&order, &body});
-  __tsan_acquire(&order.end);
 }
 
 }  // namespace glint::tsan

@@ -32,8 +32,8 @@ auto annotatedFilter(filter_mode mode, const Body& body) {
 template <class Filter>
 void annotatedParallelPipeline(std::size_t most_tokens, const Filter& filter) {
   __tsan_release(&glint::tsan::pipelineOrder().end);
+  const glint::tsan::AcquireAtEnd acquire{&glint::tsan::pipelineOrder().end};
   parallel_pipeline(most_tokens, filter);
-  __tsan_acquire(&glint::tsan::pipelineOrder().end);
 }
 
 }  // namespace tbb
