@@ -1,6 +1,6 @@
 #include "common/ndf_models.h"
 #include "common/tool.h"
-#include "glint-query/query_command.h"
+#include "glint-query/distribution_command.h"
 #include "glint/formats/asset_reader.h"
 
 using namespace glint;
@@ -12,7 +12,7 @@ int main(int argc, char** argv) {
        "a range of them, or a picture of the whole distribution; or how much light a displacement reflects.",
        "glint-query flakes.pyramid.glint --uv 0.3 0.7 --sigma 20 --half 0.1 -0.05"});
   apps::NdfAsset asset(tool);
-  apps::QueryCommand command(tool);
+  apps::DistributionCommand command(tool);
 
   return tool.run(argc, argv, [&] {
     constexpr formats::OpenOptions checks = {.verify_hashes = true, .check_values = true};

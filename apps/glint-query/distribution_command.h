@@ -5,16 +5,16 @@
 
 #include "common/ndf_models.h"
 #include "common/tool.h"
-#include "glint-query/displacement_query.h"
-#include "glint-query/light_query.h"
+#include "glint-query/light_command.h"
 #include "glint-query/queries.h"
+#include "glint-query/reflectance_command.h"
 
 namespace glint::apps {
 
 /// The options of glint-query and what they ask for.
-class QueryCommand {
+class DistributionCommand {
  public:
-  explicit QueryCommand(Tool& tool);
+  explicit DistributionCommand(Tool& tool);
 
   /// Answers what was asked of a distribution: one query, a table of them, an image, or the time of a query.
   void run(NdfAsset& asset);
@@ -37,8 +37,8 @@ class QueryCommand {
   void writePicture(NdfAsset& asset);
 
   Tool& tool_;
-  LightQuery light_;
-  DisplacementQuery displacement_;
+  LightCommand light_;
+  ReflectanceCommand displacement_;
   std::vector<float> uv_, covariance_, box_, half_, range_, wo_;
   float sigma_ = 0;
   std::string image_, csv_, output_;

@@ -1,4 +1,4 @@
-#include "glint-query/light_query.h"
+#include "glint-query/light_command.h"
 
 #include <fmt/format.h>
 
@@ -46,7 +46,7 @@ ShLightIntegral integrate(const ShLight& light, std::span<const float> zonal, fl
 
 }  // namespace
 
-LightQuery::LightQuery(Tool& tool) : tool_(tool) {
+LightCommand::LightCommand(Tool& tool) : tool_(tool) {
   tool.section("Light (kinds normals and histogram-sat)");
   const Option& light = tool.option(
       "--light", path_, "ask for the light that the footprint reflects: table of kind sh-light, in the frame of the surface");
@@ -84,7 +84,7 @@ LightQuery::LightQuery(Tool& tool) : tool_(tool) {
   tool.addCheck([this] { check(); });
 }
 
-void LightQuery::check() const {
+void LightCommand::check() const {
   if (!asked()) return;
   checkRegular(path_);
   tool_.addInput(path_);
@@ -93,7 +93,7 @@ void LightQuery::check() const {
   tool_.addInput(lobes_path_);
 }
 
-LightQuery::Lobe LightQuery::lobe(const NdfAsset& asset, int order) const {
+LightCommand::Lobe LightCommand::lobe(const NdfAsset& asset, int order) const {
   if (!lobes_path_.empty()) {
     const formats::Asset lobes = formats::Asset::openForBuilding(lobes_path_);
     return {{lobes.get<ShLobes>().zonal.begin(), lobes.get<ShLobes>().zonal.end()}, lobes.get<ShLobes>().sigma_r};
@@ -102,7 +102,7 @@ LightQuery::Lobe LightQuery::lobe(const NdfAsset& asset, int order) const {
   return {{f.begin(), f.end()}, asset.facetRoughness()};
 }
 
-Rgb LightQuery::transfer(const NdfAsset& asset, float sigma_r, Vec3 wo) const {
+Rgb LightCommand::transfer(const NdfAsset& asset, float sigma_r, Vec3 wo) const {
   const Rgb given = {fresnel_[0], fresnel_[1], fresnel_[2]};
   Fresnel fresnel = Fresnel::mirror();
   if (ior_ > 0) fresnel = Fresnel::dielectric(ior_);
@@ -111,7 +111,7 @@ Rgb LightQuery::transfer(const NdfAsset& asset, float sigma_r, Vec3 wo) const {
   return given * transferFactor(fresnel, SmithMasking(asset.slopes(), sigma_r), wo);
 }
 
-void LightQuery::report(const ShLightIntegral& integral, Rgb transfer) {
+void LightCommand::report(const ShLightIntegral& integral, Rgb transfer) {
   const Rgb value = {integral.value[0], integral.value[1], integral.value[2]}, radiance = transfer * value;
   tool_.print(fmt::format("{:.6g} {:.6g} {:.6g}\n", radiance.r, radiance.g, radiance.b));
   if (integral.clamped)
@@ -124,7 +124,7 @@ void LightQuery::report(const ShLightIntegral& integral, Rgb transfer) {
                    {"order", integral.order}});
 }
 
-void LightQuery::run(const NdfAsset& asset, const Footprint& footprint, Vec3 wo) {
+void LightCommand::run(const NdfAsset& asset, const Footprint& footprint, Vec3 wo) {
   if (asset.info().surface != Surface::flat)
     throw Error(ErrorCode::unsupported, "query.light", "", "--surface", "light is summed over facets, not over smooth surfaces",
                 "leave out --surface smooth");

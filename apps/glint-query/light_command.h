@@ -11,9 +11,9 @@
 namespace glint::apps {
 
 /// Mix-in: light that a footprint reflects, from a table of glint-shlobes (--light and what belongs to it).
-class LightQuery {
+class LightCommand {
  public:
-  explicit LightQuery(Tool& tool);
+  explicit LightCommand(Tool& tool);
 
   /// Whether --light was given.
   bool asked() const { return !path_.empty(); }

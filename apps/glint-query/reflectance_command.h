@@ -16,9 +16,9 @@ struct DisplacedPoint {
 };
 
 /// Mix-in: what only displacement assets answer: the light that they reflect from --wi to --wo.
-class DisplacementQuery {
+class ReflectanceCommand {
  public:
-  explicit DisplacementQuery(Tool& tool);
+  explicit ReflectanceCommand(Tool& tool);
 
   /// Whether one of --wi, --level and --variant was given.
   bool asked() const { return wi_option_->given() || level_option_->given() || variant_option_->given(); }

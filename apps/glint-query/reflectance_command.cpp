@@ -1,4 +1,4 @@
-#include "glint-query/displacement_query.h"
+#include "glint-query/reflectance_command.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -74,7 +74,7 @@ Vec3 directionOf(const std::vector<float>& xyz, const char* option) {
   throw Error(ErrorCode::usage, "query.arguments", "", option, "is no direction", kDirectionRemedy);
 }
 
-DisplacementQuery::DisplacementQuery(Tool& tool) : tool_(tool) {
+ReflectanceCommand::ReflectanceCommand(Tool& tool) : tool_(tool) {
   tool.section("Reflectance (kind displacement)");
   wi_option_ =
       &tool.option(
@@ -91,14 +91,14 @@ DisplacementQuery::DisplacementQuery(Tool& tool) : tool_(tool) {
       "shadowing");
 }
 
-DisplacedPoint DisplacementQuery::point(const Displacement& asset, Vec2 uv, float sigma) const {
+DisplacedPoint ReflectanceCommand::point(const Displacement& asset, Vec2 uv, float sigma) const {
   if (!level_option_->given()) return {uv, DisplacedBrdf(asset).levelsFor(diameterOf(sigma))};
   if (const auto fault = levelFault(asset, level_))
     throw Error(ErrorCode::usage, "query.level", "", "--level", fault->what, fault->remedy);
   return {uv, {level_, level_, 0}};
 }
 
-void DisplacementQuery::reflect(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int repeats) const {
+void ReflectanceCommand::reflect(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int repeats) const {
   const Vec3 wi = directionOf(wi_, "--wi");
   const std::vector<float> value = channelsOf(brdf, brdf.reflected(at.levels, at.uv, wi, wo, variant_));
   nlohmann::json result = {{"reflected", value},
@@ -116,7 +116,7 @@ void DisplacementQuery::reflect(const DisplacedBrdf& brdf, const DisplacedPoint&
   tool_.setResult(result);
 }
 
-void DisplacementQuery::density(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec2 half, int repeats) const {
+void ReflectanceCommand::density(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec2 half, int repeats) const {
   const float value = blendedDensity(brdf, at, half);
   nlohmann::json result = {{"density", value}};
   tool_.print(fmt::format("{:.9g}\n", value));
@@ -128,7 +128,7 @@ void DisplacementQuery::density(const DisplacedBrdf& brdf, const DisplacedPoint&
   tool_.setResult(result);
 }
 
-std::string DisplacementQuery::samples(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int count) const {
+std::string ReflectanceCommand::samples(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int count) const {
   std::string text = "wix,wiy,wiz,pdf\n";
   for (int k = 0; k < count; ++k) {
     const DirectionSample s =
@@ -138,7 +138,7 @@ std::string DisplacementQuery::samples(const DisplacedBrdf& brdf, const Displace
   return text;
 }
 
-std::string DisplacementQuery::table(const DisplacedBrdf& brdf, const std::string& path) const {
+std::string ReflectanceCommand::table(const DisplacedBrdf& brdf, const std::string& path) const {
   const CsvTable table = CsvTable::read(path);
   const bool reflects = table.has(kLight) && table.has(kView);
   if (!table.has(kCentre) || table.has(kSigma) == table.has(kLevel) || reflects == table.has(kHalf))

@@ -1,4 +1,4 @@
-#include "glint-query/query_command.h"
+#include "glint-query/distribution_command.h"
 
 #include <fmt/format.h>
 
@@ -18,7 +18,7 @@ namespace {
 
 }  // namespace
 
-QueryCommand::QueryCommand(Tool& tool) : tool_(tool), light_(tool), displacement_(tool) {
+DistributionCommand::DistributionCommand(Tool& tool) : tool_(tool), light_(tool), displacement_(tool) {
   tool.section(Tool::kOptions);
   wo_option_ = &tool.option("--wo", wo_, "--light and --wi: outgoing direction X Y Z, z out of the surface").count(3);
   uv_option_ = &tool.option("--uv", uv_, "centre of the footprint, texture space").count(2);
@@ -48,7 +48,7 @@ QueryCommand::QueryCommand(Tool& tool) : tool_(tool), light_(tool), displacement
   tool.addCheck([this] { check(); });
 }
 
-void QueryCommand::checkTable() const {
+void DistributionCommand::checkTable() const {
   if (uv_option_->given() || samples_ > 0 || !image_.empty() || half_option_->given() || range_option_->given() ||
       light_.asked() || displacement_.lightGiven() || displacement_.levelGiven())
     usage("--csv asks its own queries", "leave out the others");
@@ -56,7 +56,7 @@ void QueryCommand::checkTable() const {
   tool_.addInput(csv_);
 }
 
-void QueryCommand::check() const {
+void DistributionCommand::check() const {
   const bool makes_table = csv_option_->given() || samples_ > 0;
   if (makes_table && !output_option_->given())
     usage(csv_option_->given() ? "--csv needs a place for the answers" : "--samples needs a place for them",
@@ -85,7 +85,7 @@ void QueryCommand::check() const {
   tool_.addOutput(image_);
 }
 
-void QueryCommand::checkTableOutput() const {
+void DistributionCommand::checkTableOutput() const {
   if (output_ == "-") {
     if (tool_.wantsJson()) usage("--json and -o - both write to stdout", "name a file with -o, or leave out --json");
     return;
@@ -94,18 +94,18 @@ void QueryCommand::checkTableOutput() const {
   tool_.addOutput(output_);
 }
 
-void QueryCommand::checkFootprint(const std::string& option) const {
+void DistributionCommand::checkFootprint(const std::string& option) const {
   if (const auto fault = footprintFault(footprint())) usage(option + " " + fault->what, fault->remedy);
 }
 
-Footprint QueryCommand::footprint() const {
+Footprint DistributionCommand::footprint() const {
   const Vec2 centre = {uv_[0], uv_[1]};
   if (covariance_option_->given()) return Footprint::gaussian(centre, {covariance_[0], covariance_[1], covariance_[2]});
   if (box_option_->given()) return Footprint::box(centre, {box_[0], box_[1]}, {box_[2], box_[3]});
   return Footprint::isotropic(centre, sigma_);
 }
 
-Query QueryCommand::query() const {
+Query DistributionCommand::query() const {
   Query query;
   query.footprint = footprint();
   if (range_option_->given()) query.range = Box2{{range_[0], range_[1]}, {range_[2], range_[3]}};
@@ -113,7 +113,7 @@ Query QueryCommand::query() const {
   return query;
 }
 
-void QueryCommand::checkDisplacement() const {
+void DistributionCommand::checkDisplacement() const {
   if (covariance_option_->given() || box_option_->given())
     usage("a displacement has levels, not footprints of any shape", "give --sigma S or --level L");
   if (sigma_option_->given() && displacement_.levelGiven()) usage("the level was given twice", "give --sigma S or --level L");
@@ -126,7 +126,7 @@ void QueryCommand::checkDisplacement() const {
     usage("light and normals were both asked for", "give --wi and --wo, or --half");
 }
 
-void QueryCommand::run(const Displacement& asset) {
+void DistributionCommand::run(const Displacement& asset) {
   checkDisplacement();
   const DisplacedBrdf brdf(asset);
   if (csv_option_->given()) return writeTable(displacement_.table(brdf, csv_));
@@ -141,7 +141,7 @@ void QueryCommand::run(const Displacement& asset) {
   if (half_option_->given()) displacement_.density(brdf, at, {half_[0], half_[1]}, repeat_);
 }
 
-void QueryCommand::run(NdfAsset& asset) {
+void DistributionCommand::run(NdfAsset& asset) {
   if (displacement_.asked())
     usage("--wi, --level and --variant ask how a surface reflects; this asset holds how its normals are distributed",
           "ask an asset of kind displacement, from glint-displace; or --half, --range, --samples, --image or --light");
@@ -154,7 +154,7 @@ void QueryCommand::run(NdfAsset& asset) {
   if (half_option_->given() || range_option_->given()) answerOne(asset);
 }
 
-void QueryCommand::answerTable(NdfAsset& asset) {
+void DistributionCommand::answerTable(NdfAsset& asset) {
   const QueryTable table = QueryTable::read(csv_);
   for (std::size_t row = 0; row < table.queries().size(); ++row) {
     if (const auto fault = asset.unanswerable(table.queries()[row].footprint))
@@ -165,20 +165,20 @@ void QueryCommand::answerTable(NdfAsset& asset) {
   tool_.setResult({{"queries", table.queries().size()}});
 }
 
-void QueryCommand::writeTable(const std::string& text) {
+void DistributionCommand::writeTable(const std::string& text) {
   if (output_ == "-")
     tool_.print(text);
   else
     writeTextFile(output_, text);
 }
 
-void QueryCommand::writeSamples(NdfAsset& asset) {
+void DistributionCommand::writeSamples(NdfAsset& asset) {
   const std::vector<HalfVectorSample> samples = drawSamples(asset.model(), footprint(), samples_, tool_.seed());
   writeTable(sampleTable(samples));
   tool_.setResult({{"samples", samples.size()}});
 }
 
-void QueryCommand::answerOne(NdfAsset& asset) {
+void DistributionCommand::answerOne(NdfAsset& asset) {
   const Query q = query();
   const float value = answer(asset.model(), q);
   nlohmann::json result = {{q.range ? "mean" : "density", value}};
@@ -191,7 +191,7 @@ void QueryCommand::answerOne(NdfAsset& asset) {
   tool_.setResult(result);
 }
 
-void QueryCommand::writePicture(NdfAsset& asset) {
+void DistributionCommand::writePicture(NdfAsset& asset) {
   const int size = image_size_ > 0 ? image_size_ : asset.resolution();
   auto densities = asset.scatteredImage(footprint(), size);
   if (!densities) densities = ndfImage(asset.model(), footprint(), size, tool_.progress("rows"));
