@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <concepts>
+#include <utility>
 
+#include "glint/math/rgb.h"
 #include "glint/math/vec.h"
 #include "glint/model/footprint.h"
 
@@ -27,6 +29,14 @@ inline GLINT_HD Box2 insideSquare(const Box2& range) {
 /// The sample at h; none where its density is 0.
 inline GLINT_HD HalfVectorSample drawnAt(Vec2 h, float pdf) { return pdf > 0 ? HalfVectorSample{h, pdf} : HalfVectorSample{}; }
 
+/// A density, or one for each of red, green and blue where the distribution depends on the wavelength.
+template <class V>
+concept NdfValue = std::same_as<V, float> || std::same_as<V, Rgb>;
+
+/// The value that a model answers: the type of its density.
+template <class M>
+using NdfValueOf = decltype(std::declval<const M&>().density(Footprint{}, Vec2{}));
+
 /// A distribution of microscopic normals, filtered over a footprint. Density is per unit projected area: its integral over the
 /// disk is 1, and its value is the usual microfacet D(omega).
 ///
@@ -39,8 +49,8 @@ inline GLINT_HD HalfVectorSample drawnAt(Vec2 h, float pdf) { return pdf > 0 ? H
 /// as 0.
 template <class M>
 concept NdfModel = requires(const M& m, const Footprint& p, Vec2 h, Box2 range, Vec2 xi) {
-  { m.density(p, h) } -> std::same_as<float>;
-  { m.mean(p, range) } -> std::same_as<float>;
+  { m.density(p, h) } -> NdfValue;
+  { m.mean(p, range) } -> std::same_as<NdfValueOf<M>>;
   { m.sample(p, xi) } -> std::same_as<HalfVectorSample>;
 };
 
