@@ -57,8 +57,7 @@ void NdfAsset::useOnly(std::vector<std::string> kinds, const std::string& name, 
 
 void NdfAsset::open(const formats::OpenOptions& checks) {
   options_.normals = normals_path_;
-  options_.verify_hashes = checks.verify_hashes;
-  options_.check_values = checks.check_values;
+  options_.checks = checks;
   opened_ = api::OpenedNdf::open(path_, options_);
   const auto kind = opened_->asset().kind();
   for (const KindOption& o : kind_options_)
@@ -74,15 +73,19 @@ std::optional<std::vector<float>> NdfAsset::scatteredImage(const Footprint& foot
 
 std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint) const {
   if (opened_->hasNormals()) return {};
-  const auto check = [&](const PyramidShape& shape) -> std::optional<FootprintFault> {
-    const float sigma = isotropicSigma(shape, footprint), finest = finestSigma(shape);
-    if (sigma >= finest * 0.999f) return {};
-    return FootprintFault{fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
-                          "add --normals with the asset that the pyramid was made from"};
-  };
-  if (const auto* pyramid = api::roundModel<PyramidNdf>(model())) return check(pyramid->shape());
-  if (const auto* compressed = api::roundModel<CpNdf>(model())) return check(compressed->shape());
-  return {};
+  return std::visit(
+      [&](const auto& m) -> std::optional<FootprintFault> {
+        if constexpr (requires { m.round().shape(); }) {
+          const float sigma = isotropicSigma(m.round().shape(), footprint), finest = info().finest_sigma_texels;
+          if (sigma >= finest * 0.999f) return {};
+          return FootprintFault{
+              fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
+              "add --normals with the asset that the pyramid was made from"};
+        } else {
+          return {};
+        }
+      },
+      model());
 }
 
 }  // namespace glint::apps

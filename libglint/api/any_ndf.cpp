@@ -4,15 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "glint/api/alternatives.h"
 #include "glint/formats/hash.h"
-#include "glint/formats/number_text.h"
-#include "glint/query/brdf/slope_sums.h"
 
 namespace glint::api {
 namespace {
-
-/// Pixels of a picture of a model that has no images of its own.
-constexpr int kReferenceResolution = 256;
 
 void requireSameMap(const formats::Asset& asset, const std::filesystem::path& path, const NdfInfo& info, const NormalMap& map,
                     const std::filesystem::path& normals_path) {
@@ -30,92 +26,43 @@ void requireSameMap(const formats::Asset& asset, const std::filesystem::path& pa
               "this is not the map that " + path.string() + " was made from", "give the asset that glint-pyramid read");
 }
 
-NdfInfo infoOf(const PyramidShape& shape) {
-  return {shape.width,
-          shape.height,
-          shape.resolution,
-          shape.sigma_r,
-          shape.surface,
-          shape.boundary,
-          shape.footprintLevels(),
-          finestSigma(shape),
-          kFootprintPerStride * shape.levels[shape.footprintLevels() - 1].stride};
-}
-
-NdfInfo infoOf(const NormalMap& map, const NdfOptions& options) {
-  return {map.width, map.height, kReferenceResolution, options.sigma_r, options.surface, options.boundary, 0, 0, 0};
-}
-
-NdfInfo infoOf(const HistogramSat& sat) {
-  return {sat.width, sat.height, kReferenceResolution, 0, Surface::flat, Boundary::wrap, 0, 0, 0};
-}
-
-MapSlopes slopesOf(const NormalMap& map) {
-  const auto width = static_cast<std::size_t>(map.width);
-  SlopeSums sums;
-  for (std::size_t j = 0; j < static_cast<std::size_t>(map.height); ++j)
-    sums.add(slopeSums(map.normals.data() + j * width, width));
-  return sums.moments(static_cast<double>(map.width) * map.height);
-}
-
-float askedAlpha(const BinMap& map, float alpha, const std::filesystem::path& path) {
-  if (alpha == 0) return map.alpha_min;
-  if (alpha >= map.alpha_min && alpha <= map.alpha_max) return alpha;
-  throw Error(ErrorCode::usage, "query.alpha", path.string(), "",
-              "was made for roughnesses of " + formats::numberText(map.alpha_min) + " to " +
-                  formats::numberText(map.alpha_max) + ", not " + formats::numberText(alpha),
-              "ask within the range, or make it with glint-binmap --alpha A:B");
+[[noreturn]] void refuseKind(std::string_view kind, const std::filesystem::path& path) {
+  throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",
+              "is of kind " + std::string(kind) + ", which holds no distribution of normals",
+              kind == "displacement" ? "ask for the light that it reflects, with DisplacedBrdf or glint_displaced_open"
+                                     : "pass an asset of kind " + alternatives(ndfKinds()));
 }
 
 }  // namespace
 
-template <class Model, class View>
-void OpenedNdf::setPyramid(const View& view, int footprint_parts) {
-  model_ = AnisotropicNdf<Model>(normals_ ? Model(view, normals_->get<NormalMap>()) : Model(view), footprint_parts);
-  info_ = infoOf(view.shape);
+bool answersNdf(std::string_view kind) {
+  const std::vector<std::string_view> kinds = ndfKinds();
+  return std::find(kinds.begin(), kinds.end(), kind) != kinds.end();
+}
+
+std::vector<std::string_view> ndfKinds() {
+  std::vector<std::string_view> kinds;
+  NdfModels::forEach([&]<class Model>(std::type_identity<Model>) { kinds.push_back(NdfTraits<Model>::kKind); });
+  return kinds;
 }
 
 OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& options) {
-  const formats::OpenOptions open_options = {options.verify_hashes, options.check_values};
-  OpenedNdf opened(path, formats::Asset::open(path, open_options));
-  if (!options.normals.empty()) opened.normals_ = formats::Asset::open(options.normals, open_options);
-  const formats::Asset& asset = opened.asset_;
-
-  // A new kind is a line here, and its model in AnyNdf.
-  if (asset.kind() == "normals") {
-    opened.model_ =
-        Reference(asset.get<NormalMap>(), options.sigma_r, options.surface, options.boundary, Reference::Search::pruned);
-    opened.info_ = infoOf(asset.get<NormalMap>(), options);
-  } else if (asset.kind() == "ndf-pyramid") {
-    opened.setPyramid<PyramidNdf>(asset.get<NdfPyramid>(), options.footprint_parts);
-  } else if (asset.kind() == "ndf-cp") {
-    opened.setPyramid<CpNdf>(asset.get<NdfCp>(), options.footprint_parts);
-  } else if (asset.kind() == "bin-map") {
-    const BinMap& map = asset.get<BinMap>();
-    const BinMapNdf ndf(map, askedAlpha(map, options.alpha, path));
-    opened.model_ = ndf;
-    opened.info_ = {map.width, map.height, kReferenceResolution, ndf.sigma(), Surface::flat, Boundary::wrap, 0, 0, 0};
-  } else if (asset.kind() == "histogram-sat") {
-    opened.model_ = HistogramNdf(asset.get<HistogramSat>(), options.gaussian_boxes, options.slant_tolerance);
-    opened.info_ = infoOf(asset.get<HistogramSat>());
-  } else {
-    throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",
-                "is of kind " + std::string(asset.kind()) + ", which holds no distribution of normals",
-                asset.kind() == "displacement"
-                    ? "ask for the light that it reflects, with DisplacedBrdf or glint_displaced_open"
-                    : "pass an asset of kind normals, ndf-pyramid, ndf-cp, bin-map or histogram-sat");
-  }
-  if (opened.normals_) requireSameMap(asset, path, opened.info_, opened.normals_->get<NormalMap>(), options.normals);
+  OpenedNdf opened(path, options);
+  if (!options.normals.empty()) opened.normals_ = formats::Asset::open(options.normals, options.checks);
+  const std::string_view kind = opened.asset_.kind();
+  if (!answersNdf(kind)) refuseKind(kind, path);
+  NdfModels::forEach([&]<class Model>(std::type_identity<Model>) {
+    if (kind != NdfTraits<Model>::kKind) return;
+    const auto source = opened.source<Model>();
+    opened.model_ = NdfTraits<Model>::open(source);
+    opened.info_ = NdfTraits<Model>::info(source);
+  });
+  if (opened.normals_) requireSameMap(opened.asset_, path, opened.info_, opened.normals_->get<NormalMap>(), options.normals);
   return opened;
 }
 
 MapSlopes OpenedNdf::slopes() const {
-  return std::visit(Overloaded{[&](const Reference&) { return slopesOf(asset_.get<NormalMap>()); },
-                               [](const AnisotropicNdf<PyramidNdf>& pyramid) { return pyramid.round().shape().slopes; },
-                               [](const AnisotropicNdf<CpNdf>& compressed) { return compressed.round().shape().slopes; },
-                               [](const BinMapNdf& bins) { return bins.map().slopes; },
-                               [](const HistogramNdf& histograms) { return histograms.sat().slopes; }},
-                    model_);
+  return std::visit([&]<class Model>(const Model&) { return NdfTraits<Model>::slopes(asset_.get<AssetOf<Model>>()); }, model_);
 }
 
 }  // namespace glint::api

@@ -115,7 +115,7 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   if (o.sigma_r != 0) options.sigma_r = o.sigma_r;
   options.surface = static_cast<Surface>(o.surface);
   options.boundary = static_cast<Boundary>(o.boundary);
-  options.verify_hashes = o.verify_hashes != 0;
+  options.checks.verify_hashes = o.verify_hashes != 0;
   options.alpha = o.alpha;
   if (o.slant_tolerance != 0) options.slant_tolerance = std::max(0.0f, o.slant_tolerance);
   if (o.footprint_parts != 0) options.footprint_parts = o.footprint_parts;

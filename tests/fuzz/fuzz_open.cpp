@@ -75,7 +75,7 @@ bool opensAsset(const std::uint8_t* data, std::size_t size) {
     formats::validateAsset(filePath());
     if (asset.kind() == "displacement") {
       ask(asset.get<Displacement>());
-    } else if (asset.kind() != "heights" && !asset.kind().starts_with("sh-")) {
+    } else if (api::answersNdf(asset.kind())) {
       ask(api::OpenedNdf::open(filePath()).model());
     }
     return true;

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <type_traits>
+#include <variant>
+
+#include "glint/api/models/bin_map.h"
+#include "glint/api/models/compressed.h"
+#include "glint/api/models/histogram.h"
+#include "glint/api/models/pyramid.h"
+#include "glint/api/models/reference.h"
+
+namespace glint::api {
+
+/// A list of models. A model whose traits lack a member cannot be in it.
+template <DescribedNdf... Models>
+struct NdfModelList {
+  /// Any model of the list.
+  using Any = std::variant<Models...>;
+
+  /// Calls visit(std::type_identity<Model>{}) for each model.
+  template <class Visit>
+  static void forEach(Visit&& visit) {
+    (visit(std::type_identity<Models>{}), ...);
+  }
+};
+
+/// Every model that an asset can hold, for footprints of any shape. A new model is a line here and a file of traits in models/:
+/// opening, the C interface, packing, the tools, and the tests of all models take it from here.
+///
+/// A plane of tiles is one line, not one for each model of its tiles. It holds its tiles as a variant over a list of the models
+/// that tiles may have, and visits the variant once in each question, after it has chosen the tile. Its traits open a tile by
+/// the traits of the tile's model.
+using NdfModels = NdfModelList<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, BinMapNdf, HistogramNdf>;
+
+}  // namespace glint::api

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "glint/model/ndf_pyramid.h"
+#include "glint/model/packed_ndf.h"
+
+namespace glint::api {
+
+/// Appends arrays to a packed buffer whose header is written last.
+class Packer {
+ public:
+  Packer() : bytes_(sizeof(PackedHeader)) {
+    header_.magic = kPackedMagic;
+    header_.version = kPackedVersion;
+  }
+
+  PackedHeader& header() { return header_; }
+
+  /// Appends an array. Returns its place, for the header.
+  template <class T>
+  PackedArray add(std::span<const T> values) {
+    return addBytes(values.data(), values.size(), sizeof(T));
+  }
+
+  /// Appends an array whose elements have no type of their own.
+  PackedArray addBytes(const void* values, std::size_t count, std::size_t element_bytes) {
+    if (count == 0) return {bytes_.size(), 0};
+    const PackedArray array = {bytes_.size(), count};
+    const std::size_t size = count * element_bytes;
+    bytes_.resize((bytes_.size() + size + kPackedAlignment - 1) / kPackedAlignment * kPackedAlignment);
+    std::memcpy(bytes_.data() + array.offset, values, size);
+    return array;
+  }
+
+  /// Fills the members of the header that pyramids and compressed pyramids share.
+  void addShape(const PyramidShape& shape) {
+    header_.width = shape.width;
+    header_.height = shape.height;
+    header_.resolution = shape.resolution;
+    header_.sigma_r = shape.sigma_r;
+    header_.surface = static_cast<std::uint32_t>(shape.surface);
+    header_.boundary = static_cast<std::uint32_t>(shape.boundary);
+    header_.level_count = shape.level_count;
+    header_.slope_mean[0] = shape.slopes.mean.x;
+    header_.slope_mean[1] = shape.slopes.mean.y;
+    header_.slope_covariance[0] = shape.slopes.covariance.xx;
+    header_.slope_covariance[1] = shape.slopes.covariance.xy;
+    header_.slope_covariance[2] = shape.slopes.covariance.yy;
+    for (int l = 0; l < shape.level_count; ++l)
+      header_.levels[l] = {shape.levels[l].stride, shape.levels[l].columns, shape.levels[l].rows, 0};
+  }
+
+  /// Appends a normal map and its bounds.
+  void addNormals(const NormalMap& map) {
+    header_.width = map.width;
+    header_.height = map.height;
+    header_.texel_size_um = map.texel_size_um;
+    header_.normals = add(map.normals);
+    header_.bounds_level_count = map.bounds_level_count;
+    for (int k = 0; k < map.bounds_level_count; ++k) {
+      header_.bounds_columns[k] = map.bounds[k].columns;
+      header_.bounds_rows[k] = map.bounds[k].rows;
+      header_.bounds[k] = add(map.bounds[k].nodes);
+    }
+  }
+
+  /// The buffer. Ends the use of the packer.
+  std::vector<std::byte> finish() {
+    header_.size_bytes = bytes_.size();
+    std::memcpy(bytes_.data(), &header_, sizeof header_);
+    return std::move(bytes_);
+  }
+
+ private:
+  PackedHeader header_ = {};
+  std::vector<std::byte> bytes_;
+};
+
+}  // namespace glint::api
