@@ -4,15 +4,18 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <memory>
 #include <random>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "glint.h"
+#include "glint/api/ndf_models.h"
 #include "glint/formats/asset_writer.h"
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
@@ -22,18 +25,31 @@ namespace glint::test {
 inline constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 inline constexpr int kSize = 64;
 
-/// Files of every kind, with their maps.
+// Small assets of the kinds that models answer. A kind that has none does not compile.
+
+inline void writeSample(std::type_identity<NormalMap>, const std::string& path) {
+  formats::writeAsset(path, sampleNormals(kSize, kSize).map, sampleProvenance());
+}
+inline void writeSample(std::type_identity<NdfPyramid>, const std::string& path) {
+  formats::writeAsset(path, samplePyramid(kSize, BlockPrecision::f16).pyramid, sampleProvenance());
+}
+inline void writeSample(std::type_identity<NdfCp>, const std::string& path) {
+  formats::writeAsset(path, sampleNdfCp(kSize, CompressionMethod::cp, CoefficientType::i8).ndf, sampleProvenance());
+}
+inline void writeSample(std::type_identity<BinMap>, const std::string& path) {
+  formats::writeAsset(path, sampleBinMap(kSize, kSize).map, sampleProvenance());
+}
+inline void writeSample(std::type_identity<HistogramSat>, const std::string& path) {
+  formats::writeAsset(path, sampleHistograms(kSize, kSize).sat, sampleProvenance());
+}
+
+/// Files of every kind that a model answers, and of some others.
 class Assets {
  public:
   Assets() {
-    const auto normals = sampleNormals(kSize, kSize);
-    formats::writeAsset(path("normals"), normals.map, sampleProvenance());
-    const auto pyramid = samplePyramid(kSize, BlockPrecision::f16);
-    formats::writeAsset(path("ndf-pyramid"), pyramid.pyramid, sampleProvenance());
-    const auto compressed = sampleNdfCp(kSize, CompressionMethod::cp, CoefficientType::i8);
-    formats::writeAsset(path("ndf-cp"), compressed.ndf, sampleProvenance());
-    formats::writeAsset(path("bin-map"), sampleBinMap(kSize, kSize).map, sampleProvenance());
-    formats::writeAsset(path("histogram-sat"), sampleHistograms(kSize, kSize).sat, sampleProvenance());
+    api::NdfModels::forEach([&]<class Model>(std::type_identity<Model>) {
+      writeSample(std::type_identity<api::AssetOf<Model>>{}, path(std::string(api::NdfTraits<Model>::kKind)));
+    });
     formats::writeAsset(path("heights"), sampleHeights(kSize, kSize).map, sampleProvenance());
     formats::writeAsset(path("displacement"), sampleDisplacement(kSize, true).displacement, sampleProvenance());
   }
@@ -59,7 +75,12 @@ inline Handle openHandle(const std::string& kind, const glint_open_options* opti
   return Handle(ndf);
 }
 
-inline constexpr const char* kKinds[] = {"normals", "ndf-pyramid", "ndf-cp", "bin-map", "histogram-sat"};
+template <class... Models>
+constexpr std::array<const char*, sizeof...(Models)> kindsOf(api::NdfModelList<Models...>) {
+  return {api::NdfTraits<Models>::kKind.data()...};
+}
+/// The kinds that models answer.
+inline constexpr auto kKinds = kindsOf(api::NdfModels{});
 
 /// Random queries of every size, with a few that are degenerate.
 struct Queries {
