@@ -16,13 +16,13 @@
 #include <list>
 #include <random>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
+#include "glint/api/any_ndf.h"
 #include "glint/api/batch.h"
 #include "glint/formats/asset_reader.h"
-#include "glint/query/cp_ndf.h"
-#include "glint/query/pyramid_ndf.h"
 
 namespace {
 
@@ -288,6 +288,27 @@ void addOpenBenchmark(const std::string& path, const std::string& name) {
   })->Unit(benchmark::kMillisecond);
 }
 
+/// The model that answers round footprints, which all queries have.
+template <class Model>
+const auto& roundModel(const Model& model) {
+  if constexpr (requires { model.round(); })
+    return model.round();
+  else
+    return model;
+}
+
+/// Deviations of the narrowest and the widest footprint that are asked, texels: those of the levels, where there are any.
+template <class Model>
+std::pair<float, float> footprintSizes(const Model& model) {
+  constexpr float kNarrowest = 2, kWidest = 128;
+  if constexpr (requires { model.round().shape(); }) {
+    const PyramidShape& shape = model.round().shape();
+    return {finestSigma(shape), kFootprintPerStride * shape.levels[shape.level_count - 1].stride};
+  } else {
+    return {kNarrowest, kWidest};
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -299,25 +320,18 @@ int main(int argc, char** argv) {
   try {
     const formats::Asset normals = formats::Asset::open(argv[1]);
     // Lists: benchmarks keep references to their elements.
-    std::list<formats::Asset> assets;
-    std::list<std::variant<PyramidNdf, CpNdf>> models;
+    std::list<api::OpenedNdf> assets;
     std::list<std::vector<Query>> queries;
     for (int k = 2; k < argc; ++k) {
       const std::string path = argv[k], name = std::filesystem::path(path).filename().string();
       addOpenBenchmark(path, name);
-      const formats::Asset& asset = assets.emplace_back(formats::Asset::open(path));
-      if (asset.kind() == "ndf-cp")
-        models.emplace_back(CpNdf(asset.get<NdfCp>()));
-      else
-        models.emplace_back(PyramidNdf(asset.get<NdfPyramid>()));
       std::visit(
           [&](const auto& model) {
-            const PyramidShape& shape = model.shape();
-            const float finest = finestSigma(shape),
-                        coarsest = kFootprintPerStride * shape.levels[shape.level_count - 1].stride;
-            addModelBenchmarks(name, model, queries.emplace_back(randomQueries(normals.get<NormalMap>(), finest, coarsest)));
+            const auto [finest, coarsest] = footprintSizes(model);
+            addModelBenchmarks(name, roundModel(model),
+                               queries.emplace_back(randomQueries(normals.get<NormalMap>(), finest, coarsest)));
           },
-          models.back());
+          assets.emplace_back(api::OpenedNdf::open(path)).model());
     }
     addQueryBenchmarks("density", "ggx", queries.front(), plainDensity);
     addQueryBenchmarks("sample", "ggx", queries.front(), plainSample);
