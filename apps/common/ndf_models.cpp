@@ -5,43 +5,16 @@
 #include <algorithm>
 
 #include "common/files.h"
+#include "glint/api/alternatives.h"
 #include "glint/bake/common/reference_image.h"
 
 namespace glint::apps {
 
-NdfAsset::NdfAsset(Tool& tool) : tool_(tool) {
-  tool.option("ASSET", path_, "asset of kind normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat or displacement").required();
-  const std::vector<std::string> normals = {"normals"}, pyramids = {"ndf-pyramid", "ndf-cp"}, histograms = {"histogram-sat"};
-  useOnly(pyramids, "--normals",
-          tool.option("--normals", normals_path_,
-                      "asset of kind normals that the pyramid was made from, for footprints below its finest level"));
-  useOnly(pyramids, "--parts",
-          tool.option("--parts", options_.footprint_parts,
-                      "most round footprints that stand for a stretched one; 1: one of the same mean square size (kinds "
-                      "ndf-pyramid and ndf-cp)")
-              .range(1, IsotropicParts::kMost));
-  useOnly(normals, "--surface",
-          tool.choice("--surface", options_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
-                      "how normals behave between texels (kind normals)"));
-  useOnly(normals, "--boundary",
-          tool.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
-                      "beyond the border of the map (kind normals)"));
-  useOnly(
-      {"normals", "histogram-sat"}, "--sigma-r",
-      tool.option("--sigma-r", options_.sigma_r, "intrinsic roughness, disk units (kind normals; histogram-sat with --light)")
-          .range(1e-4, 0.25));
-  useOnly({"bin-map"}, "--alpha",
-          tool.option("--alpha", options_.alpha, "Beckmann roughness, in the range of the asset (kind bin-map)")
-              .range(1e-4, 1)
-              .defaultText("the smallest of the asset"));
-  useOnly(histograms, "--gaussian-boxes",
-          tool.choice("--gaussian-boxes", options_.gaussian_boxes, {{"1", GaussianBoxes::one}, {"3", GaussianBoxes::three}},
-                      "boxes that stand for a Gaussian footprint (kind histogram-sat)"));
-  useOnly(
-      histograms, "--slant-tolerance",
-      tool.option("--slant-tolerance", options_.slant_tolerance,
-                  "share of a footprint with slanted sides that may be misplaced; 0: exact, and slower (kind histogram-sat)")
-          .range(0, 1));
+NdfAsset::NdfAsset(Tool& tool, const AskedAssets& asked) : tool_(tool), asked_(asked) {
+  tool.option("ASSET", path_, "asset of kind " + api::alternatives(asked.kinds)).required();
+  if (asks({"ndf-pyramid", "ndf-cp"})) addPyramidOptions();
+  addNormalsOptions();
+  addBinOptions();
   tool.addCheck([this] {
     checkRegular(path_);
     tool_.addInput(path_);
@@ -51,11 +24,72 @@ NdfAsset::NdfAsset(Tool& tool) : tool_(tool) {
   });
 }
 
-void NdfAsset::useOnly(std::vector<std::string> kinds, const std::string& name, const Option& option) {
-  kind_options_.push_back({std::move(kinds), name, &option});
+void NdfAsset::addPyramidOptions() {
+  useOnly({"ndf-pyramid", "ndf-cp"}, "--normals",
+          tool_.option("--normals", normals_path_,
+                       "asset of kind normals that the pyramid was made from, for footprints below its finest level"));
+  useOnly({"ndf-pyramid", "ndf-cp"}, "--parts",
+          tool_
+              .option("--parts", options_.footprint_parts,
+                      "most round footprints that stand for a stretched one; 1: one of the same mean square size (kinds "
+                      "ndf-pyramid and ndf-cp)")
+              .range(1, IsotropicParts::kMost));
+}
+
+void NdfAsset::addNormalsOptions() {
+  if (asked_.smooth_surfaces)
+    useOnly({"normals"}, "--surface",
+            tool_.choice("--surface", options_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
+                         "how normals behave between texels (kind normals)"));
+  useOnly({"normals"}, "--boundary",
+          tool_.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
+                       "beyond the border of the map (kind normals)"));
+  useOnly({"normals", "histogram-sat"}, "--sigma-r",
+          tool_
+              .option("--sigma-r", options_.sigma_r,
+                      "intrinsic roughness, disk units (kind normals; the light of kind histogram-sat)")
+              .range(1e-4, 0.25));
+}
+
+void NdfAsset::addBinOptions() {
+  if (asks({"bin-map"}))
+    useOnly({"bin-map"}, "--alpha",
+            tool_.option("--alpha", options_.alpha, "Beckmann roughness, in the range of the asset (kind bin-map)")
+                .range(1e-4, 1)
+                .defaultText("the smallest of the asset"));
+  if (!asks({"histogram-sat"})) return;
+  useOnly({"histogram-sat"}, "--gaussian-boxes",
+          tool_.choice("--gaussian-boxes", options_.gaussian_boxes, {{"1", GaussianBoxes::one}, {"3", GaussianBoxes::three}},
+                       "boxes that stand for a Gaussian footprint (kind histogram-sat)"));
+  useOnly(
+      {"histogram-sat"}, "--slant-tolerance",
+      tool_
+          .option("--slant-tolerance", options_.slant_tolerance,
+                  "share of a footprint with slanted sides that may be misplaced; 0: exact, and slower (kind histogram-sat)")
+          .range(0, 1));
+}
+
+bool NdfAsset::asks(std::initializer_list<std::string_view> kinds) const {
+  return std::find_first_of(asked_.kinds.begin(), asked_.kinds.end(), kinds.begin(), kinds.end()) != asked_.kinds.end();
+}
+
+void NdfAsset::useOnly(std::initializer_list<std::string_view> kinds, const std::string& name, const Option& option) {
+  kind_options_.push_back({kinds, name, &option});
+}
+
+void NdfAsset::refuseOtherKinds() const {
+  const std::string kind(formats::Asset::open(path_).kind());
+  if (kind == "displacement")
+    throw Error(
+        ErrorCode::unsupported, "format.kind", path_, "", "is of kind displacement, which holds no distribution of normals",
+        "ask for the light that it reflects: glint-query reflectance " + path_ + " --uv U V --sigma S --wi X Y Z --wo X Y Z");
+  if (api::answersNdf(kind) && !asks({kind}))
+    throw Error(ErrorCode::unsupported, "format.kind", path_, "", "is of kind " + kind + ", which is not asked this",
+                "pass an asset of kind " + api::alternatives(asked_.kinds));
 }
 
 void NdfAsset::open(const formats::OpenOptions& checks) {
+  refuseOtherKinds();
   options_.normals = normals_path_;
   options_.checks = checks;
   opened_ = api::OpenedNdf::open(path_, options_);

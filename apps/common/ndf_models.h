@@ -1,7 +1,9 @@
 #pragma once
 
+#include <initializer_list>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/footprint_rules.h"
@@ -12,17 +14,24 @@ namespace glint::apps {
 
 using api::AnyNdf;
 
+/// The assets that a command asks.
+struct AskedAssets {
+  std::vector<std::string_view> kinds = api::ndfKinds();
+  bool smooth_surfaces = true;  ///< whether normals may be asked as a smooth surface
+};
+
 /// Mix-in: the asset that a tool asks, and the options that say how. Normals are answered by Reference with --surface,
 /// --sigma-r and --boundary; pyramids and compressed ones by their own parameters, and by Reference below level 0 where
-/// --normals is given; bin maps by their own, at any size.
+/// --normals is given; bin maps by their own, at any size. Options of kinds that are not asked are not declared.
 class NdfAsset {
  public:
-  explicit NdfAsset(Tool& tool);
+  explicit NdfAsset(Tool& tool, const AskedAssets& asked = {});
 
   /// Opens the asset, and warns of options that are for other kinds. Call once, in the work; the model lives as long as this
   /// object.
   /// @param checks  of the asset and of --normals, beyond those that opening always makes
-  /// @throws Error invalid_input if --normals is not the map that the asset was made from
+  /// @throws Error invalid_input if --normals is not the map that the asset was made from; unsupported if the asset is of a
+  ///               kind that is not asked
   void open(const formats::OpenOptions& checks = {});
   const std::string& path() const { return path_; }
   const AnyNdf& model() const { return opened_->model(); }
@@ -45,13 +54,19 @@ class NdfAsset {
  private:
   /// An option that only some kinds of assets use.
   struct KindOption {
-    std::vector<std::string> kinds;
+    std::vector<std::string_view> kinds;
     std::string name;
     const Option* option;
   };
-  void useOnly(std::vector<std::string> kinds, const std::string& name, const Option& option);
+  void addNormalsOptions();
+  void addPyramidOptions();
+  void addBinOptions();
+  bool asks(std::initializer_list<std::string_view> kinds) const;
+  void useOnly(std::initializer_list<std::string_view> kinds, const std::string& name, const Option& option);
+  void refuseOtherKinds() const;
 
   Tool& tool_;
+  AskedAssets asked_;
   std::vector<KindOption> kind_options_;
   std::string path_;
   std::string normals_path_;

@@ -197,6 +197,7 @@ struct Tool::State {
   std::vector<std::pair<std::string, std::function<json()>>> recorders;  // one for each option, same order
   std::vector<std::function<void()>> checks;
   std::vector<std::function<void()>> late_checks;
+  std::vector<std::pair<std::string, std::vector<std::string>>> elsewhere;  // lines of other commands, and their options
   std::vector<std::string> inputs;
   std::vector<std::string> outputs;
   json result = json::object();
@@ -313,6 +314,9 @@ Option& Tool::choiceOf(const std::string& name, const std::vector<std::string>& 
 }
 
 CLI::App& Tool::parser() { return state_->app; }
+void Tool::pointTo(const std::string& line, const std::vector<std::string>& options) {
+  state_->elsewhere.emplace_back(line, options);
+}
 void Tool::usesSeed() { state_->uses_seed = true; }
 void Tool::addCheck(std::function<void()> check) { state_->checks.push_back(std::move(check)); }
 void Tool::addLateCheck(std::function<void()> check) { state_->late_checks.push_back(std::move(check)); }
@@ -386,6 +390,26 @@ formats::Provenance Tool::provenance() const {
   return provenance;
 }
 
+void Tool::refuseUnknownOptions() const {
+  const CLI::App& app = state_->app;
+  std::vector<std::string> unknown;
+  for (const std::string& word : app.remaining())
+    if (word.size() >= 2 && word[0] == '-') unknown.push_back(word.substr(0, word.find('=')));
+  if (unknown.empty()) return;
+  for (const auto& [line, options] : state_->elsewhere) {
+    const auto moved = std::find_first_of(unknown.begin(), unknown.end(), options.begin(), options.end());
+    if (moved != unknown.end())
+      throw Error(ErrorCode::usage, "cli.unknown_option", "", "", "unknown option " + *moved,
+                  "it is an option of another command: " + line);
+  }
+  std::vector<std::string> known;
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& long_name : option->get_lnames()) known.push_back("--" + long_name);
+  const std::string near = nearestName(unknown.front(), known);
+  throw Error(ErrorCode::usage, "cli.unknown_option", "", "", "unknown option " + unknown.front(),
+              (near.empty() ? "" : "did you mean " + near + "? ") + "see " + name() + " --help");
+}
+
 bool Tool::parse(int argc, char** argv) {
   CLI::App& app = state_->app;
   try {
@@ -406,17 +430,7 @@ bool Tool::parse(int argc, char** argv) {
     throw Error(ErrorCode::io, "cli.config", "", "", error.what(), "check the name given to --config");
   } catch (const CLI::ParseError& error) {
     // A misspelt name is the cause of most other complaints ("--output is required"), so it is reported first.
-    std::vector<std::string> known;
-    for (const CLI::Option* option : app.get_options()) {
-      for (const std::string& long_name : option->get_lnames()) known.push_back("--" + long_name);
-    }
-    for (const std::string& word : app.remaining()) {
-      if (word.size() < 2 || word[0] != '-') continue;
-      const std::string unknown = word.substr(0, word.find('='));
-      const std::string near = nearestName(unknown, known);
-      throw Error(ErrorCode::usage, "cli.unknown_option", "", "", "unknown option " + unknown,
-                  (near.empty() ? "" : "did you mean " + near + "? ") + "see " + name() + " --help");
-    }
+    refuseUnknownOptions();
     throw Error(ErrorCode::usage, "cli.usage", "", "", error.what(), "see " + name() + " --help");
   }
 }

@@ -105,6 +105,10 @@ class Tool {
   /// The parser, for what the functions above do not cover. Options declared here are not in the `command` record.
   CLI::App& parser();
 
+  /// Names options that belong to another command of the program. Who gives one of them here is pointed to that command.
+  /// @param line  how the other command is called
+  void pointTo(const std::string& line, const std::vector<std::string>& options);
+
   /// Declares that the result depends on --seed: `command` records it. Call before run().
   void usesSeed();
 
@@ -169,6 +173,8 @@ class Tool {
   void addStandardOptions();
   /// @return false when --help or --version was answered
   bool parse(int argc, char** argv);
+  /// Throws Error usage if words were left over that look like options.
+  void refuseUnknownOptions() const;
   int work(const std::function<void()>& work);
   int fail(const Error& error);
   void printFailure(const Error& error) const;

@@ -4,15 +4,32 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <optional>
+#include <stdexcept>
+#include <string_view>
 #include <type_traits>
 
 #include "common/files.h"
+#include "glint-query/command_forms.h"
+#include "glint-query/directions.h"
 #include "glint/bake/sh/lobes.h"
 #include "glint/formats/asset_reader.h"
 
 namespace glint::apps {
 namespace {
+
+/// Whether a model lists the normals of a footprint, as texels or as bins.
+template <class Model>
+constexpr bool kListsNormals = std::is_same_v<Model, Reference> || requires(const Model& model) {
+  model.binNormal(0);
+};
+
+std::vector<std::string_view> kindsThatListNormals() {
+  std::vector<std::string_view> kinds;
+  api::NdfModels::forEach([&]<class Model>(std::type_identity<Model>) {
+    if (kListsNormals<Model>) kinds.push_back(api::NdfTraits<Model>::kKind);
+  });
+  return kinds;
+}
 
 /// The texels of a footprint as a histogram of one bin each: exact, and as slow as their number.
 class TexelHistogram {
@@ -46,46 +63,44 @@ ShLightIntegral integrate(const ShLight& light, std::span<const float> zonal, fl
 
 }  // namespace
 
-LightCommand::LightCommand(Tool& tool) : tool_(tool) {
-  tool.section("Light (kinds normals and histogram-sat)");
-  const Option& light = tool.option(
-      "--light", path_, "ask for the light that the footprint reflects: table of kind sh-light, in the frame of the surface");
-  tool.option("--lobes", lobes_path_, "--light: asset of kind sh-lobes whose roughness is taken instead of --sigma-r")
-      .needs(light);
-  tool.option("--order", options_.order, "--light: highest band that is summed")
-      .range(0, kMaxShOrder)
-      .defaultText("the table's")
-      .needs(light);
+LightCommand::LightCommand(Tool& tool)
+    : tool_(tool), asset_(tool, {.kinds = kindsThatListNormals(), .smooth_surfaces = false}), footprint_(tool) {
+  footprint_.centreOption().required();
+  tool.option("--light", path_, "light: table of kind sh-light, in the frame of the surface").required();
+  tool.option("--wo", wo_, "outgoing direction X Y Z, z out of the surface").count(3).required();
+  tool.option("--lobes", lobes_path_, "asset of kind sh-lobes whose roughness is taken instead of --sigma-r");
+  tool.option("--order", options_.order, "highest band that is summed").range(0, kMaxShOrder).defaultText("the table's");
   tool.choice("--window", options_.window, {{"none", ShWindow::none}, {"lanczos", ShWindow::lanczos}, {"hann", ShWindow::hann}},
-              "--light: weights of the bands: none is sharpest, the others ring less around bright light");
-  tool.option("--tolerance", options_.tolerance, "--light: leave out bands that change less than this share of the mean light")
-      .range(0, 1)
-      .needs(light);
-  const Option& fresnel = tool.option("--fresnel", fresnel_, "--light: reflectance R G B at the angle of --wo")
-                              .count(3)
-                              .range(0, 1)
-                              .defaultText("1 1 1")
-                              .needs(light);
-  const Option& ior = tool.option("--ior", ior_, "--light: instead of --fresnel, refractive index of a dielectric")
-                          .range(1e-3, 1e3)
-                          .defaultText("none")
-                          .needs(light)
-                          .excludes(fresnel);
-  Option& eta = tool.option("--eta", eta_, "--light: instead of --fresnel, refractive index R G B of a metal; needs --k")
-                    .count(3)
-                    .range(0, 1e3)
-                    .needs(light)
-                    .excludes(fresnel)
-                    .excludes(ior);
-  eta.needs(tool.option("--k", k_, "--light: extinction R G B of a metal").count(3).range(0, 1e3).needs(eta));
-  const Option& shadowing =
-      tool.option("--shadowing", shadowing_, "--light: G of --wo and its mirror direction").range(0, 1).needs(light);
-  tool.flag("--smith", smith_, "--light: instead of --shadowing, G by the slopes of the map").needs(light).excludes(shadowing);
+              "weights of the bands: none is sharpest, the others ring less around bright light");
+  tool.option("--tolerance", options_.tolerance, "leave out bands that change less than this share of the mean light")
+      .range(0, 1);
+  addReflectance();
+  for (const CommandForm& form : {kDistributionForm, kReflectanceForm}) tool.pointTo(form.line, form.options);
   tool.addCheck([this] { check(); });
 }
 
+void LightCommand::addReflectance() {
+  const Option& fresnel =
+      tool_.option("--fresnel", fresnel_, "reflectance R G B at the angle of --wo").count(3).range(0, 1).defaultText("1 1 1");
+  const Option& ior = tool_.option("--ior", ior_, "instead of --fresnel, refractive index of a dielectric")
+                          .range(1e-3, 1e3)
+                          .defaultText("none")
+                          .excludes(fresnel);
+  Option& eta = tool_.option("--eta", eta_, "instead of --fresnel, refractive index R G B of a metal; needs --k")
+                    .count(3)
+                    .range(0, 1e3)
+                    .excludes(fresnel)
+                    .excludes(ior);
+  eta.needs(tool_.option("--k", k_, "extinction R G B of a metal").count(3).range(0, 1e3).needs(eta));
+  const Option& shadowing = tool_.option("--shadowing", shadowing_, "G of --wo and its mirror direction").range(0, 1);
+  tool_.flag("--smith", smith_, "instead of --shadowing, G by the slopes of the map").excludes(shadowing);
+}
+
 void LightCommand::check() const {
-  if (!asked()) return;
+  footprint_.check();
+  if (!(wo_[2] > 0))
+    throw Error(ErrorCode::usage, "query.arguments", "", "--wo", "the outgoing direction is not above the surface",
+                "give X Y Z with Z > 0");
   checkRegular(path_);
   tool_.addInput(path_);
   if (lobes_path_.empty()) return;
@@ -93,22 +108,52 @@ void LightCommand::check() const {
   tool_.addInput(lobes_path_);
 }
 
-LightCommand::Lobe LightCommand::lobe(const NdfAsset& asset, int order) const {
+void LightCommand::run() {
+  asset_.open({.verify_hashes = true, .check_values = true});
+  if (const auto fault = asset_.unanswerable(footprint_.footprint()))
+    throw Error(ErrorCode::usage, "query.footprint", asset_.path(), "", fault->what, fault->remedy);
+  const formats::Asset light_asset = formats::Asset::openForBuilding(path_);
+  const ShLight& light = light_asset.get<ShLight>();
+  const Lobe facets = lobe(light.order);
+  const Vec3 wo = directionOf(wo_, "--wo");
+  report(integral(light, facets, wo), transfer(facets.sigma_r, wo));
+}
+
+LightCommand::Lobe LightCommand::lobe(int order) const {
   if (!lobes_path_.empty()) {
     const formats::Asset lobes = formats::Asset::openForBuilding(lobes_path_);
     return {{lobes.get<ShLobes>().zonal.begin(), lobes.get<ShLobes>().zonal.end()}, lobes.get<ShLobes>().sigma_r};
   }
-  const std::vector<double> f = bake::zonalLobe(asset.facetRoughness(), order);
-  return {{f.begin(), f.end()}, asset.facetRoughness()};
+  const std::vector<double> f = bake::zonalLobe(asset_.facetRoughness(), order);
+  return {{f.begin(), f.end()}, asset_.facetRoughness()};
 }
 
-Rgb LightCommand::transfer(const NdfAsset& asset, float sigma_r, Vec3 wo) const {
+ShLightIntegral LightCommand::integral(const ShLight& light, const Lobe& lobe, Vec3 wo) const {
+  const Footprint footprint = footprint_.footprint();
+  const auto ask = [&](const auto& histogram) {
+    return light.order <= kShFloatOrder
+               ? integrate<float>(light, lobe.zonal, lobe.sigma_r, histogram, footprint, wo, options_)
+               : integrate<double>(light, lobe.zonal, lobe.sigma_r, histogram, footprint, wo, options_);
+  };
+  return std::visit(
+      [&]<class Model>(const Model& model) -> ShLightIntegral {
+        if constexpr (std::is_same_v<Model, Reference>)
+          return ask(TexelHistogram(model, footprint));
+        else if constexpr (kListsNormals<Model>)
+          return ask(model);
+        else
+          throw std::logic_error("a model that lists no normals was opened");
+      },
+      asset_.model());
+}
+
+Rgb LightCommand::transfer(float sigma_r, Vec3 wo) const {
   const Rgb given = {fresnel_[0], fresnel_[1], fresnel_[2]};
   Fresnel fresnel = Fresnel::mirror();
   if (ior_ > 0) fresnel = Fresnel::dielectric(ior_);
   if (!eta_.empty()) fresnel = Fresnel::conductor({eta_[0], eta_[1], eta_[2]}, {k_[0], k_[1], k_[2]});
   if (!smith_) return transferFactor(1, shadowing_, wo.z) * (given * fresnel.reflectance(wo.z));
-  return given * transferFactor(fresnel, SmithMasking(asset.slopes(), sigma_r), wo);
+  return given * transferFactor(fresnel, SmithMasking(asset_.slopes(), sigma_r), wo);
 }
 
 void LightCommand::report(const ShLightIntegral& integral, Rgb transfer) {
@@ -122,33 +167,6 @@ void LightCommand::report(const ShLightIntegral& integral, Rgb transfer) {
                    {"signed_light_integral", integral.signed_value},
                    {"clamped", integral.clamped},
                    {"order", integral.order}});
-}
-
-void LightCommand::run(const NdfAsset& asset, const Footprint& footprint, Vec3 wo) {
-  if (asset.info().surface != Surface::flat)
-    throw Error(ErrorCode::unsupported, "query.light", "", "--surface", "light is summed over facets, not over smooth surfaces",
-                "leave out --surface smooth");
-  const formats::Asset light_asset = formats::Asset::openForBuilding(path_);
-  const ShLight& light = light_asset.get<ShLight>();
-  const Lobe lobe = this->lobe(asset, light.order);
-  const auto ask = [&](const auto& histogram) {
-    return light.order <= kShFloatOrder
-               ? integrate<float>(light, lobe.zonal, lobe.sigma_r, histogram, footprint, wo, options_)
-               : integrate<double>(light, lobe.zonal, lobe.sigma_r, histogram, footprint, wo, options_);
-  };
-  const ShLightIntegral integral = std::visit(
-      [&](const auto& m) -> ShLightIntegral {
-        using Model = std::decay_t<decltype(m)>;
-        if constexpr (std::is_same_v<Model, Reference>)
-          return ask(TexelHistogram(m, footprint));
-        else if constexpr (requires { m.binNormal(0); })
-          return ask(m);
-        else
-          throw Error(ErrorCode::unsupported, "query.light", "", "",
-                      "this kind of asset cannot list the normals of a footprint", "ask the normals, or a histogram of them");
-      },
-      asset.model());
-  report(integral, transfer(asset, lobe.sigma_r, wo));
 }
 
 }  // namespace glint::apps

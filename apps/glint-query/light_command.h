@@ -5,23 +5,20 @@
 
 #include "common/ndf_models.h"
 #include "common/tool.h"
+#include "glint-query/footprint_options.h"
 #include "glint/query/light/sh_light_query.h"
 #include "glint/query/light/sh_transfer.h"
 
 namespace glint::apps {
 
-/// Mix-in: light that a footprint reflects, from a table of glint-shlobes (--light and what belongs to it).
+/// `glint-query light ASSET`: light that a footprint reflects, by a table of glint-shlobes.
 class LightCommand {
  public:
   explicit LightCommand(Tool& tool);
 
-  /// Whether --light was given.
-  bool asked() const { return !path_.empty(); }
-
   /// Integrates the light against the asset's normals and prints the result. Facets are as rough as the asset says, or --lobes.
-  /// @param wo  outgoing direction, unit vector above the surface
-  /// @throws Error unsupported if the model cannot list the normals of a footprint, or they are not facets
-  void run(const NdfAsset& asset, const Footprint& footprint, Vec3 wo);
+  /// @throws Error unsupported if the model cannot list the normals of a footprint
+  void run();
 
  private:
   /// The roughness lobe of the facets.
@@ -31,14 +28,18 @@ class LightCommand {
   };
 
   void check() const;
-  Lobe lobe(const NdfAsset& asset, int order) const;
+  void addReflectance();
+  Lobe lobe(int order) const;
+  ShLightIntegral integral(const ShLight& light, const Lobe& lobe, Vec3 wo) const;
   /// F G / (4 cos) towards wo.
-  Rgb transfer(const NdfAsset& asset, float sigma_r, Vec3 wo) const;
+  Rgb transfer(float sigma_r, Vec3 wo) const;
   void report(const ShLightIntegral& integral, Rgb transfer);
 
   Tool& tool_;
+  NdfAsset asset_;
+  FootprintOptions footprint_;
   std::string path_, lobes_path_;
-  std::vector<float> fresnel_ = {1, 1, 1}, eta_, k_;
+  std::vector<float> wo_, fresnel_ = {1, 1, 1}, eta_, k_;
   float shadowing_ = 1, ior_ = 0;
   bool smith_ = false;
   ShLightOptions options_;

@@ -1,25 +1,53 @@
-#include "common/ndf_models.h"
+#include "common/commands.h"
 #include "common/tool.h"
 #include "glint-query/distribution_command.h"
-#include "glint/formats/asset_reader.h"
+#include "glint-query/light_command.h"
+#include "glint-query/reflectance_command.h"
 
 using namespace glint;
 
-int main(int argc, char** argv) {
-  apps::Tool tool(
+namespace {
+
+/// One line of the command line: a tool with the options of a sort of questions.
+template <class Command>
+int ask(const apps::ToolInfo& info, int argc, char** argv) {
+  apps::Tool tool(info);
+  Command command(tool);
+  return tool.run(argc, argv, [&] { command.run(); });
+}
+
+int askDistribution(int argc, char** argv) {
+  return ask<apps::DistributionCommand>(
       {"glint-query",
        "Asks an asset how the normals inside a footprint are distributed: the density towards a half vector, its mean over "
-       "a range of them, or a picture of the whole distribution; or how much light a displacement reflects.",
-       "glint-query flakes.pyramid.glint --uv 0.3 0.7 --sigma 20 --half 0.1 -0.05"});
-  apps::NdfAsset asset(tool);
-  apps::DistributionCommand command(tool);
+       "a range of them, or a picture of the whole distribution.",
+       "glint-query flakes.pyramid.glint --uv 0.3 0.7 --sigma 20 --half 0.1 -0.05",
+       "Other questions are commands of their own, each with a help of its own:\n"
+       "  glint-query light ASSET ...        light that a footprint reflects, by a table of glint-shlobes\n"
+       "  glint-query reflectance ASSET ...  light that a displacement of glint-displace reflects"},
+      argc, argv);
+}
 
-  return tool.run(argc, argv, [&] {
-    constexpr formats::OpenOptions checks = {.verify_hashes = true, .check_values = true};
-    // An asset of another kind is opened, and checked, with its own options.
-    const bool displacement = formats::Asset::open(asset.path()).kind() == "displacement";
-    if (displacement) return command.run(formats::Asset::open(asset.path(), checks).get<Displacement>());
-    asset.open(checks);
-    command.run(asset);
-  });
+int askLight(int argc, char** argv) {
+  return ask<apps::LightCommand>(
+      {"glint-query light",
+       "Asks how much light a footprint reflects of a whole environment: the normals inside it, and a table of the light "
+       "that glint-shlobes --light makes.",
+       "glint-query light flakes.sat.glint --light studio.glint --uv 0.3 0.7 --sigma 20 --wo 0 0 1"},
+      argc, argv);
+}
+
+int askReflectance(int argc, char** argv) {
+  return ask<apps::ReflectanceCommand>(
+      {"glint-query reflectance",
+       "Asks how much light a displacement reflects from one direction to another, or how the normals of its lobes are "
+       "distributed.",
+       "glint-query reflectance rock.displaced.glint --uv 0.3 0.7 --sigma 8 --wi 0.5 0 1 --wo -0.2 0.1 1"},
+      argc, argv);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return apps::runCommand(argc, argv, {{"light", askLight}, {"reflectance", askReflectance}}, askDistribution);
 }

@@ -24,6 +24,14 @@ std::vector<float> answerAll(const AnyNdf& model, std::span<const Query> queries
   return answers;
 }
 
+void setResult(Tool& tool, nlohmann::json result, std::optional<double> nanoseconds) {
+  if (nanoseconds) {
+    result["nanoseconds"] = *nanoseconds;
+    tool.print(fmt::format("{:.1f} ns per query\n", *nanoseconds));
+  }
+  tool.setResult(result);
+}
+
 std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int resolution, const bake::ProgressFn& progress) {
   std::vector<float> image(static_cast<std::size_t>(resolution) * resolution);
   const float pixel = 2.0f / static_cast<float>(resolution);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "common/ndf_models.h"
+#include "common/tool.h"
 #include "glint-query/csv_table.h"
 #include "glint/model/footprint.h"
 
@@ -44,6 +46,16 @@ double medianNanoseconds(int repeats, const Ask& ask) {
   static_cast<void>(sink);
   std::nth_element(times.begin(), times.begin() + kRuns / 2, times.end());
   return times[kRuns / 2];
+}
+
+/// Sets the result of one query, and prints the time that it took, where there is one.
+void setResult(Tool& tool, nlohmann::json result, std::optional<double> nanoseconds);
+
+/// Sets the result of one query. With repeats, measures the time of the query, prints it and adds it to the result.
+/// @param ask  asks once
+template <class Ask>
+void reportTimed(Tool& tool, const nlohmann::json& result, int repeats, const Ask& ask) {
+  setResult(tool, result, repeats > 0 ? std::optional(medianNanoseconds(repeats, ask)) : std::nullopt);
 }
 
 /// Pixel means of the density over [-1, 1]^2, [resolution][resolution], bottom row first.

@@ -9,11 +9,18 @@
 #include <optional>
 
 #include "common/footprint_rules.h"
+#include "glint-query/command_forms.h"
+#include "glint-query/directions.h"
 #include "glint-query/queries.h"
 #include "glint/bake/common/counter_random.h"
+#include "glint/formats/asset_reader.h"
 
 namespace glint::apps {
 namespace {
+
+[[noreturn]] void usage(const std::string& what, const std::string& remedy) {
+  throw Error(ErrorCode::usage, "query.arguments", "", "", what, remedy);
+}
 
 constexpr std::array kLevel = {"level"};
 constexpr std::array kLight = {"wix", "wiy", "wiz"};
@@ -39,14 +46,6 @@ std::optional<FootprintFault> levelFault(const Displacement& asset, int level) {
   return FootprintFault{fmt::format("the asset has no level {}", level), fmt::format("give 0 to {}", asset.level_count - 1)};
 }
 
-std::optional<Vec3> unitVector(Vec3 given) {
-  const float length = std::sqrt(dot(given, given));
-  if (!(length > 0 && std::isfinite(length))) return {};
-  return 1 / length * given;
-}
-
-constexpr const char* kDirectionRemedy = "give X Y Z, z out of the surface";
-
 /// A direction in columns of a table.
 Vec3 directionOf(const CsvTable& table, std::size_t row, const std::array<const char*, 3>& columns) {
   const auto [x, y, z] = table.numbers(columns, row);
@@ -69,68 +68,105 @@ DisplacedPoint pointOf(const DisplacedBrdf& brdf, const CsvTable& table, std::si
 
 }  // namespace
 
-Vec3 directionOf(const std::vector<float>& xyz, const char* option) {
-  if (const auto unit = unitVector({xyz[0], xyz[1], xyz[2]})) return *unit;
-  throw Error(ErrorCode::usage, "query.arguments", "", option, "is no direction", kDirectionRemedy);
+DisplacedPointOptions::DisplacedPointOptions(Tool& tool) {
+  uv_option_ = &tool.option("--uv", uv_, "centre of the footprint, texture space").count(2);
+  sigma_option_ =
+      &tool.option("--sigma", sigma_, "footprint: deviation of an isotropic Gaussian, texels; it chooses the levels")
+           .range(kLeastSigma, kMostSigma);
+  level_option_ = &tool.option("--level", level_, "level of detail instead of a footprint, 0 is the finest")
+                       .range(0, kMaxDisplacementLevels - 1)
+                       .excludes(*sigma_option_);
 }
 
-ReflectanceCommand::ReflectanceCommand(Tool& tool) : tool_(tool) {
-  tool.section("Reflectance (kind displacement)");
-  wi_option_ =
-      &tool.option(
-               "--wi", wi_,
-               "displacement: ask for the light reflected from this direction X Y Z to --wo, BRDF times cosine, z out of the "
-               "surface")
-           .count(3);
-  level_option_ = &tool.option("--level", level_, "displacement: level of detail instead of a footprint, 0 is the finest")
-                       .range(0, kMaxDisplacementLevels - 1);
-  variant_option_ = &tool.choice(
-      "--variant", variant_,
-      {{"full", DisplacedVariant::full}, {"lobes", DisplacedVariant::lobes}, {"single", DisplacedVariant::single}},
-      "displacement: all of the model, its lobes without shadowing and interreflections, or one Beckmann lobe with Smith's "
-      "shadowing");
+void DisplacedPointOptions::checkSize() const {
+  if (!sigma_option_->given() && !level_option_->given())
+    usage("neither a footprint nor a level was given", "add --sigma S or --level L");
 }
 
-DisplacedPoint ReflectanceCommand::point(const Displacement& asset, Vec2 uv, float sigma) const {
-  if (!level_option_->given()) return {uv, DisplacedBrdf(asset).levelsFor(diameterOf(sigma))};
-  if (const auto fault = levelFault(asset, level_))
+DisplacedPoint DisplacedPointOptions::point(const DisplacedBrdf& brdf) const {
+  const Vec2 uv = {uv_[0], uv_[1]};
+  if (!level_option_->given()) return {uv, brdf.levelsFor(diameterOf(sigma_))};
+  if (const auto fault = levelFault(brdf.asset(), level_))
     throw Error(ErrorCode::usage, "query.level", "", "--level", fault->what, fault->remedy);
   return {uv, {level_, level_, 0}};
 }
 
-void ReflectanceCommand::reflect(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int repeats) const {
-  const Vec3 wi = directionOf(wi_, "--wi");
+ReflectanceCommand::ReflectanceCommand(Tool& tool)
+    : tool_(tool),
+      asset_(tool, "asset of kind displacement", "ASSET"),
+      point_(tool),
+      wi_option_(&tool.option("--wi", wi_,
+                              "ask for the light reflected from this direction X Y Z to --wo, BRDF times cosine, z out of the "
+                              "surface")
+                      .count(3)),
+      wo_option_(&tool.option("--wo", wo_, "outgoing direction X Y Z, z out of the surface").count(3)),
+      half_option_(
+          &tool.option("--half", half_, "ask for the density of the lobes' normals towards a half vector HX HY").count(2)),
+      picture_(tool),
+      table_(tool, "answer a table of queries; its header names u,v; sigma or level; wix,wiy,wiz,wox,woy,woz or hx,hy",
+             "draw directions of light for --wo: a table of wix,wiy,wiz,pdf") {
+  tool.choice(
+      "--variant", variant_,
+      {{"full", DisplacedVariant::full}, {"lobes", DisplacedVariant::lobes}, {"single", DisplacedVariant::single}},
+      "all of the model, its lobes without shadowing and interreflections, or one Beckmann lobe with Smith's shadowing");
+  tool.option("--repeat", repeat_, "time the query: nanoseconds, median of 15 runs of N / 15").range(1, 1000000000);
+  wi_option_->needs(*wo_option_).excludes(*half_option_);
+  table_.samplesOption().needs(*wo_option_);
+  for (Option* one : {&point_.centreOption(), wi_option_, wo_option_, half_option_, &picture_.option()})
+    table_.csvOption().excludes(*one);
+  tool.usesSeed();
+  for (const CommandForm& form : {kLightForm, kDistributionForm}) tool.pointTo(form.line, form.options);
+  tool.addCheck([this] { check(); });
+}
+
+void ReflectanceCommand::check() const {
+  if (table_.csvGiven()) return;
+  if (!point_.given()) usage("no point was given", "add --uv U V, or --csv TABLE");
+  point_.checkSize();
+  if (!wi_option_->given() && !half_option_->given() && !picture_.given() && table_.samples() == 0)
+    usage("nothing was asked", "add --wi and --wo, or --half, --samples or --image");
+}
+
+void ReflectanceCommand::run() {
+  const formats::Asset opened = formats::Asset::openForBuilding(asset_.path());
+  if (opened.kind() != "displacement")
+    throw Error(ErrorCode::unsupported, "format.kind", asset_.path(), "",
+                "is of kind " + std::string(opened.kind()) + ", which holds no displacement",
+                "pass an asset of glint-displace, or ask for the light by " + kLightForm.line);
+  const DisplacedBrdf brdf(opened.get<Displacement>());
+  if (table_.csvGiven()) return table_.write(table(brdf));
+  const DisplacedPoint at = point_.point(brdf);
+  if (picture_.given()) picture_.write(picture_.size(256), lobeImage(brdf, at, picture_.size(256)));
+  if (table_.samples() > 0) table_.write(samples(brdf, at));
+  if (wi_option_->given()) reflect(brdf, at);
+  if (half_option_->given()) density(brdf, at);
+}
+
+void ReflectanceCommand::reflect(const DisplacedBrdf& brdf, const DisplacedPoint& at) const {
+  const Vec3 wi = directionOf(wi_, "--wi"), wo = directionOf(wo_, "--wo");
   const std::vector<float> value = channelsOf(brdf, brdf.reflected(at.levels, at.uv, wi, wo, variant_));
-  nlohmann::json result = {{"reflected", value},
-                           {"pdf", brdf.pdf(at.levels, at.uv, wi, wo)},
-                           {"levels", {at.levels.first, at.levels.second}},
-                           {"level_weight", at.levels.weight}};
   std::string text;
   for (const float channel : value) text += fmt::format("{}{:.9g}", text.empty() ? "" : " ", channel);
   tool_.print(text + "\n");
-  if (repeats > 0) {
-    const double ns = medianNanoseconds(repeats, [&] { return brdf.reflected(at.levels, at.uv, wi, wo, variant_).g; });
-    result["nanoseconds"] = ns;
-    tool_.print(fmt::format("{:.1f} ns per query\n", ns));
-  }
-  tool_.setResult(result);
+  reportTimed(tool_,
+              {{"reflected", value},
+               {"pdf", brdf.pdf(at.levels, at.uv, wi, wo)},
+               {"levels", {at.levels.first, at.levels.second}},
+               {"level_weight", at.levels.weight}},
+              repeat_, [&] { return brdf.reflected(at.levels, at.uv, wi, wo, variant_).g; });
 }
 
-void ReflectanceCommand::density(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec2 half, int repeats) const {
+void ReflectanceCommand::density(const DisplacedBrdf& brdf, const DisplacedPoint& at) const {
+  const Vec2 half = {half_[0], half_[1]};
   const float value = blendedDensity(brdf, at, half);
-  nlohmann::json result = {{"density", value}};
   tool_.print(fmt::format("{:.9g}\n", value));
-  if (repeats > 0) {
-    const double ns = medianNanoseconds(repeats, [&] { return blendedDensity(brdf, at, half); });
-    result["nanoseconds"] = ns;
-    tool_.print(fmt::format("{:.1f} ns per query\n", ns));
-  }
-  tool_.setResult(result);
+  reportTimed(tool_, {{"density", value}}, repeat_, [&] { return blendedDensity(brdf, at, half); });
 }
 
-std::string ReflectanceCommand::samples(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int count) const {
+std::string ReflectanceCommand::samples(const DisplacedBrdf& brdf, const DisplacedPoint& at) const {
+  const Vec3 wo = directionOf(wo_, "--wo");
   std::string text = "wix,wiy,wiz,pdf\n";
-  for (int k = 0; k < count; ++k) {
+  for (int k = 0; k < table_.samples(); ++k) {
     const DirectionSample s =
         brdf.sample(at.levels, at.uv, wo, bake::randomPair(tool_.seed(), 0, static_cast<std::uint64_t>(k)));
     text += fmt::format("{:.9g},{:.9g},{:.9g},{:.9g}\n", s.direction.x, s.direction.y, s.direction.z, s.pdf);
@@ -138,11 +174,11 @@ std::string ReflectanceCommand::samples(const DisplacedBrdf& brdf, const Displac
   return text;
 }
 
-std::string ReflectanceCommand::table(const DisplacedBrdf& brdf, const std::string& path) const {
-  const CsvTable table = CsvTable::read(path);
+std::string ReflectanceCommand::table(const DisplacedBrdf& brdf) const {
+  const CsvTable table = CsvTable::read(table_.csv());
   const bool reflects = table.has(kLight) && table.has(kView);
   if (!table.has(kCentre) || table.has(kSigma) == table.has(kLevel) || reflects == table.has(kHalf))
-    throw Error(ErrorCode::invalid_input, "csv.columns", path, "header",
+    throw Error(ErrorCode::invalid_input, "csv.columns", table.path(), "header",
                 "the columns " + table.header() + " do not make one query of a displacement",
                 "name u,v; sigma or level; wix,wiy,wiz,wox,woy,woz or hx,hy");
   std::vector<std::string> names = {reflects ? "reflected" : "density"};

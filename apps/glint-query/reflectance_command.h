@@ -1,10 +1,11 @@
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "common/files.h"
 #include "common/tool.h"
+#include "glint-query/output_options.h"
 #include "glint/query/brdf/displaced_brdf.h"
 
 namespace glint::apps {
@@ -15,47 +16,62 @@ struct DisplacedPoint {
   LevelBlend levels;
 };
 
-/// Mix-in: what only displacement assets answer: the light that they reflect from --wi to --wo.
+/// Mix-in: the point that is asked, as --uv and one of --sigma and --level.
+class DisplacedPointOptions {
+ public:
+  explicit DisplacedPointOptions(Tool& tool);
+
+  /// --uv, for its constraints.
+  Option& centreOption() { return *uv_option_; }
+  bool given() const { return uv_option_->given(); }
+  /// Checks that there is a footprint or a level. @throws Error usage
+  void checkSize() const;
+
+  /// @throws Error usage if the asset has no such level
+  DisplacedPoint point(const DisplacedBrdf& brdf) const;
+
+ private:
+  std::vector<float> uv_;
+  float sigma_ = 0;
+  int level_ = 0;
+  Option *uv_option_, *sigma_option_, *level_option_;
+};
+
+/// `glint-query reflectance ASSET`: how a displacement reflects light, and how its normals are distributed.
 class ReflectanceCommand {
  public:
   explicit ReflectanceCommand(Tool& tool);
+  void run();
 
-  /// Whether one of --wi, --level and --variant was given.
-  bool asked() const { return wi_option_->given() || level_option_->given() || variant_option_->given(); }
-  bool lightGiven() const { return wi_option_->given(); }
-  bool levelGiven() const { return level_option_->given(); }
+ private:
+  void check() const;
 
-  /// @param sigma  deviation of the footprint, texels; taken where there is no --level
-  /// @throws Error usage if the asset has no such level
-  DisplacedPoint point(const Displacement& asset, Vec2 uv, float sigma) const;
+  /// Prints the light reflected from --wi to --wo, BRDF times cosine; and with --repeat the time of it.
+  void reflect(const DisplacedBrdf& brdf, const DisplacedPoint& at) const;
 
-  /// Prints the light reflected from --wi to --wo, BRDF times cosine; and with `repeats` the time of it.
-  void reflect(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int repeats) const;
+  /// Prints the density of the lobes' normals towards --half; and with --repeat the time of it.
+  void density(const DisplacedBrdf& brdf, const DisplacedPoint& at) const;
 
-  /// Prints the density of the lobes' normals towards a half vector; and with `repeats` the time of it.
-  void density(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec2 half, int repeats) const;
-
-  /// Light directions drawn for a view, as a table with the columns wix, wiy, wiz and pdf.
-  std::string samples(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec3 wo, int count) const;
+  /// Light directions drawn for --wo, as a table with the columns wix, wiy, wiz and pdf.
+  std::string samples(const DisplacedBrdf& brdf, const DisplacedPoint& at) const;
 
   /// A table with the columns u, v; sigma or level; wix, wiy, wiz, wox, woy, woz (answered by reflected, or reflected_r, _g,
   /// _b) or hx, hy (answered by density). @throws Error invalid_input that names the row and the column
-  std::string table(const DisplacedBrdf& brdf, const std::string& path) const;
+  std::string table(const DisplacedBrdf& brdf) const;
 
- private:
   Tool& tool_;
-  std::vector<float> wi_;
-  int level_ = 0;
+  InputFile asset_;
+  DisplacedPointOptions point_;
+  std::vector<float> wi_, wo_, half_;
   DisplacedVariant variant_ = DisplacedVariant::full;
-  Option *wi_option_, *level_option_, *variant_option_;
+  Option *wi_option_, *wo_option_, *half_option_;
+  PictureOptions picture_;
+  TableOptions table_;
+  int repeat_ = 0;
 };
 
 /// Densities of the lobes' normals at the pixels of [-1, 1]^2, [size][size], bottom row first. Lobes narrower than a pixel are
 /// widened to it.
 std::vector<float> lobeImage(const DisplacedBrdf& brdf, const DisplacedPoint& at, int size);
-
-/// A direction of any length above 0 as a unit vector.
-/// @throws Error usage if it has none
-Vec3 directionOf(const std::vector<float>& xyz, const char* option);
 
 }  // namespace glint::apps

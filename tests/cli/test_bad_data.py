@@ -130,7 +130,7 @@ def test_queries_of_displacements_with_bad_values_are_refused(glint, assets, dat
     place = ["--uv", ".05", ".05", "--level", "0"]
     light = ["--wi", ".3", ".1", ".9", "--wo", "-.2", ".1", ".9"]
     for question in [light, ["--image", "out.exr"]]:
-        process = glint("query", bad, *place, *question)
+        process = glint("query", "reflectance", bad, *place, *question)
         assert process.returncode == 3 and process.stdout == ""
 
 

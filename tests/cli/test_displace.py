@@ -145,7 +145,7 @@ def test_colours_of_the_base_follow_the_normals(glint, two_colours):
     assert info["result"]["properties"]["channels"] == 3 if "properties" in info["result"] else "rgb of each lobe" in json.dumps(info)
 
     def reflected(x):
-        run = glint("query", "d.glint", "--uv", 0.3, 0.6, "--level", 0, "--wi", x, 0, 1, "--wo", x, 0, 1, "--json")
+        run = glint("query", "reflectance", "d.glint", "--uv", 0.3, 0.6, "--level", 0, "--wi", x, 0, 1, "--wo", x, 0, 1, "--json")
         assert run.returncode == 0, run.stderr
         return json.loads(run.stdout)["result"]["reflected"]
 
@@ -219,7 +219,7 @@ def displaced(glint, heights):
 
 
 def reflected(glint, *arguments):
-    process = glint("query", "d.glint", *arguments, "--json")
+    process = glint("query", "reflectance", "d.glint", *arguments, "--json")
     assert process.returncode == 0, process.stderr
     return json.loads(process.stdout)["result"]
 
@@ -229,14 +229,14 @@ LIGHT = ["--wi", 0.3, 0.1, 1, "--wo", -0.4, 0, 1]
 
 
 def test_query_reflects_light(glint, displaced):
-    process = glint("query", displaced, *POINT, "--level", 0, *LIGHT)
+    process = glint("query", "reflectance", displaced, *POINT, "--level", 0, *LIGHT)
     assert process.returncode == 0, process.stderr
     values = {variant: reflected(glint, *POINT, "--level", 0, *LIGHT, "--variant", variant)["reflected"][0] for variant in ("full", "lobes", "single")}
     assert float(process.stdout) == pytest.approx(values["full"], rel=1e-6)
     assert len(set(values.values())) == 3 and min(values.values()) > 0
     # Directions of any length are the same.
     assert reflected(glint, *POINT, "--level", 0, "--wi", 0.6, 0.2, 2, "--wo", -4, 0, 10)["reflected"][0] == pytest.approx(values["full"], rel=1e-5)
-    assert "ns per query" in glint("query", displaced, *POINT, "--level", 0, *LIGHT, "--repeat", 300).stdout
+    assert "ns per query" in glint("query", "reflectance", displaced, *POINT, "--level", 0, *LIGHT, "--repeat", 300).stdout
 
 
 def test_query_blends_levels_by_the_footprint(glint, displaced):
@@ -248,14 +248,14 @@ def test_query_blends_levels_by_the_footprint(glint, displaced):
 
 def test_query_tables_and_samples_of_a_displacement(glint, displaced):
     (glint.folder / "q.csv").write_text("u,v,level,wix,wiy,wiz,wox,woy,woz,name\n0.3,0.7,0,0.3,0.1,1,-0.4,0,1,a\n0.3,0.7,1,0.3,0.1,1,-0.4,0,1,b\n")
-    process = glint("query", displaced, "--csv", "q.csv", "-o", "-")
+    process = glint("query", "reflectance", displaced, "--csv", "q.csv", "-o", "-")
     assert process.returncode == 0, process.stderr
     rows = process.stdout.splitlines()
     assert rows[0].endswith("name,reflected")
     for level in (0, 1):
         assert float(rows[1 + level].split(",")[-1]) == pytest.approx(reflected(glint, *POINT, "--level", level, *LIGHT)["reflected"][0], rel=1e-6)
     for footprint in (["--level", 0], ["--sigma", 2]):  # one level, and between two
-        process = glint("query", displaced, *POINT, *footprint, "--wo", -0.4, 0, 1, "--samples", 50, "-o", "-")
+        process = glint("query", "reflectance", displaced, *POINT, *footprint, "--wo", -0.4, 0, 1, "--samples", 50, "-o", "-")
         table = numpy.array([[float(field) for field in row.split(",")] for row in process.stdout.splitlines()[1:]])
         drawn = table[table[:, 3] > 0]
         assert len(drawn) > 30
@@ -269,30 +269,35 @@ def test_query_normals_of_a_displacement_integrate_to_one(glint, displaced):
     centres = (numpy.arange(n) + 0.5) * 2 / n - 1
     grid = [(x, y) for x in centres for y in centres]
     (glint.folder / "h.csv").write_text("u,v,level,hx,hy\n" + "".join(f"0.3,0.7,1,{x},{y}\n" for x, y in grid))
-    process = glint("query", displaced, "--csv", "h.csv", "-o", "-")
+    process = glint("query", "reflectance", displaced, "--csv", "h.csv", "-o", "-")
     assert process.returncode == 0, process.stderr
     densities = [float(row.split(",")[-1]) for row in process.stdout.splitlines()[1:]]
     assert sum(densities) * (2 / n) ** 2 == pytest.approx(1, abs=0.05)  # 24 x 24 points of broad lobes
-    assert glint("query", displaced, *POINT, "--level", 1, "--half", *grid[40]).stdout.strip() == f"{densities[40]:.9g}"
-    assert glint("query", displaced, *POINT, "--level", 1, "--image", "lobes.png", "--image-size", 64).returncode == 0
+    assert glint("query", "reflectance", displaced, *POINT, "--level", 1, "--half", *grid[40]).stdout.strip() == f"{densities[40]:.9g}"
+    assert glint("query", "reflectance", displaced, *POINT, "--level", 1, "--image", "lobes.png", "--image-size", 64).returncode == 0
     assert (glint.folder / "lobes.png").stat().st_size > 500
 
 
 @pytest.mark.parametrize(
     "arguments, message",
     [
-        ([*POINT, "--box", 1, 0, 0, 1, *LIGHT], "--sigma S or --level L"),
-        ([*POINT, "--level", 0, "--sigma", 3, *LIGHT], "twice"),
+        ([*POINT, *LIGHT], "--sigma S or --level L"),
+        ([*POINT, "--box", 1, 0, 0, 1, *LIGHT], "unknown option --box"),
+        ([*POINT, "--level", 0, "--sigma", 3, *LIGHT], "excludes"),
         ([*POINT, "--level", 2, *LIGHT], "no level 2"),
-        ([*POINT, "--level", 0, "--wi", 0, 0, 1], "--wo X Y Z"),
+        ([*POINT, "--level", 0, "--wi", 0, 0, 1], "--wi requires --wo"),
+        ([*POINT, "--level", 0, "--samples", 3, "-o", "s.csv"], "--samples requires --wo"),
         ([*POINT, "--level", 0, "--wi", 0, 0, 0, "--wo", 0, 0, 1], "no direction"),
-        ([*POINT, "--level", 0, "--range", 0, 0, 0.1, 0.1], "--half"),
-        ([*POINT, "--level", 0, "--half", 0, 0, *LIGHT], "both"),
+        ([*POINT, "--level", 0], "nothing was asked"),
+        ([*POINT, "--level", 0, "--range", 0, 0, 0.1, 0.1], "glint-query ASSET --uv U V"),
+        ([*POINT, "--level", 0, "--light", "l.glint"], "glint-query light ASSET"),
+        ([*POINT, "--level", 0, "--half", 0, 0, *LIGHT], "excludes"),
         (["--level", 0, *LIGHT], "--uv"),
+        (["--csv", "q.csv", "-o", "a.csv", *POINT], "excludes"),
     ],
 )
 def test_questions_that_a_displacement_cannot_answer(glint, displaced, arguments, message):
-    process = glint("query", displaced, *arguments)
+    process = glint("query", "reflectance", displaced, *arguments)
     assert process.returncode == 1, process.stderr
     assert message in process.stderr
 
@@ -300,8 +305,25 @@ def test_questions_that_a_displacement_cannot_answer(glint, displaced, arguments
 def test_light_is_not_asked_of_distributions(glint):
     glint("synth", "flakes", "--size", "32", "-o", "n.png")
     glint("ingest", "n.png", "-o", "n.glint")
-    process = glint("query", "n.glint", *POINT, "--sigma", 3, *LIGHT)
-    assert process.returncode == 1 and "glint-displace" in process.stderr
+    process = glint("query", "reflectance", "n.glint", *POINT, "--sigma", 3, *LIGHT)
+    assert process.returncode == 5
+    assert "kind normals" in process.stderr and "glint-displace" in process.stderr and "glint-query light" in process.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments, code",
+    [
+        (["--level", 0, *LIGHT], 1),
+        (["--sigma", 3, *LIGHT], 1),
+        (["--level", 0, "--half", 0, 0], 1),
+        (["--sigma", 3, "--half", 0, 0], 5),
+        (["--sigma", 3, "--image", "a.png"], 5),
+    ],
+)
+def test_questions_without_the_command_are_shown_how_to_ask(glint, displaced, arguments, code):
+    process = glint("query", displaced, *POINT, *arguments)
+    assert process.returncode == code
+    assert "glint-query reflectance" in process.stderr and "--wi X Y Z --wo X Y Z" in process.stderr
 
 
 def test_factors_that_do_not_divide_the_map_name_the_nearest_that_do(glint, heights):

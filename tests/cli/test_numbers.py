@@ -36,9 +36,9 @@ def assets(tmp_path_factory):
     return {kind: folder / f"{kind}.glint" for kind in (*KINDS, "displaced")}
 
 
-def ask_table(glint, asset, text):
+def ask_table(glint, asset, text, *command):
     (glint.folder / "q.csv").write_text(text)
-    return glint("query", asset, "--csv", "q.csv", "-o", "-")
+    return glint("query", *command, asset, "--csv", "q.csv", "-o", "-")
 
 
 def test_a_number_with_zeros_in_front_is_decimal(glint):
@@ -135,7 +135,7 @@ def test_cells_that_are_no_numbers_are_refused_by_row_and_column(glint, assets, 
                                    "u,v,level,hx,hy\n.5,.5,1,0,0\n.5,.5,2,0,0\n",
                                    "u,v,level,wix,wiy,wiz,wox,woy,woz\n.5,.5,0,0,0,1,0,0,1\n.5,.5,0,0,0,0,0,0,1\n"])
 def test_rows_that_ask_a_displacement_are_checked_like_options(glint, assets, table):
-    process = ask_table(glint, assets["displaced"], table)
+    process = ask_table(glint, assets["displaced"], table, "reflectance")
     assert process.returncode == 3, process.stdout
     assert "q.csv: row 2: " in process.stderr
 

@@ -10,6 +10,7 @@ from conftest import BIN
 
 APPS = pathlib.Path(__file__).parents[2] / "apps"
 TOOLS = sorted(path.parent.name.removeprefix("glint-") for path in APPS.glob("glint-*/main.cpp"))
+COMMANDS = [*TOOLS, "query light", "query reflectance"]  # programs, and their commands
 SHARED = ["--threads", "--seed", "--json", "--progress", "--quiet", "--force", "--depfile", "--config", "--version", "--help"]
 
 
@@ -17,9 +18,15 @@ def test_there_are_tools():
     assert {"ingest", "synth"} <= set(TOOLS)
 
 
-@pytest.mark.parametrize("tool", TOOLS)
-def test_help_lists_shared_flags_and_an_example(glint, tool):
-    process = glint(tool, "--help")
+@pytest.fixture
+def run(glint):
+    """Runs a program or a command: run("query light", ...)."""
+    return lambda tool, *arguments: glint(*tool.split(), *arguments)
+
+
+@pytest.mark.parametrize("tool", COMMANDS)
+def test_help_lists_shared_flags_and_an_example(run, tool):
+    process = run(tool, "--help")
     assert process.returncode == 0
     assert process.stderr == ""
     for flag in SHARED:
@@ -29,31 +36,31 @@ def test_help_lists_shared_flags_and_an_example(glint, tool):
 
 def test_help_says_in_words_what_an_option_takes(glint):
     text = glint("query", "--help").stdout
-    assert "--uv FLOAT FLOAT " in text
+    assert "--uv FLOAT FLOAT (not with --csv)" in text
     assert "--sigma FLOAT (1e-06 to 1e+09, not with --box, --cov)" in text  # it has no default that could be meant
     assert "--sigma-r FLOAT (0.0001 to 0.25, default 0.005)" in text
     assert "--depfile FILE " in text
     assert text.index("--uv") < text.index("--threads"), "the tool's own options come first"
 
 
-@pytest.mark.parametrize("tool", TOOLS)
-def test_version_names_the_tool(glint, tool):
-    process = glint(tool, "--version")
+@pytest.mark.parametrize("tool", COMMANDS)
+def test_version_names_the_tool(run, tool):
+    process = run(tool, "--version")
     assert process.returncode == 0
     assert process.stdout.startswith(f"glint-{tool} ")
 
 
-@pytest.mark.parametrize("tool", TOOLS)
-def test_unknown_option_is_a_usage_error_with_a_suggestion(glint, tool):
-    process = glint(tool, "--thread", "2")
+@pytest.mark.parametrize("tool", COMMANDS)
+def test_unknown_option_is_a_usage_error_with_a_suggestion(run, tool):
+    process = run(tool, "--thread", "2")
     assert process.returncode == 1
     assert process.stdout == ""
     assert process.stderr.startswith(f"glint-{tool}: error: unknown option --thread; did you mean --threads?")
 
 
-@pytest.mark.parametrize("tool", TOOLS)
-def test_usage_error_is_json_too(glint, tool):
-    process = glint(tool, "--nonsense-option", "--json")
+@pytest.mark.parametrize("tool", COMMANDS)
+def test_usage_error_is_json_too(run, tool):
+    process = run(tool, "--nonsense-option", "--json")
     assert process.returncode == 1
     assert json.loads(process.stdout)["error"]["code"] == "usage"
 
@@ -105,3 +112,31 @@ def test_examples_in_help_parse(glint):
         example = glint(tool, "--help").stdout.split("Example:\n  ")[1].splitlines()[0]
         process = glint(tool, *shlex.split(example)[1:])
         assert process.returncode == 0, process.stderr
+
+
+def test_commands_are_in_the_help_of_their_program(glint):
+    text = glint("query", "--help").stdout
+    for command in ("light", "reflectance"):
+        assert f"glint-query {command} ASSET" in text
+
+
+def test_shared_flags_work_behind_a_command(glint):
+    """--config, --json, --threads, --seed, --depfile and --progress of `glint-query reflectance`, and its example."""
+    glint("synth", "isotropic", "--size", "64", "--height", "-o", "h.exr")
+    assert glint("ingest", "h.exr", "--kind", "height", "--to", "heights", "-o", "h.glint").returncode == 0
+    assert glint("displace", "h.glint", "-o", "rock.displaced.glint", "--factors", "4,8", "--quiet").returncode == 0
+    command = ["query", "reflectance"]
+    example = shlex.split(glint(*command, "--help").stdout.split("Example:\n  ")[1].splitlines()[0])
+    process = glint(*command, *example[2:], "--threads", "1", "--progress", "none", "--json")
+    assert process.returncode == 0, process.stderr
+    document = json.loads(process.stdout)
+    assert document["tool"] == "glint-query reflectance" and document["result"]["reflected"]
+    (glint.folder / "ask.toml").write_text("uv = [0.3, 0.7]\nsigma = 8\nwi = [0.5, 0, 1]\nwo = [-0.2, 0.1, 1]\n")
+    asked = glint(*command, "rock.displaced.glint", "--config", "ask.toml", "--json")
+    assert json.loads(asked.stdout)["result"] == document["result"]
+    sampled = ["rock.displaced.glint", "--uv", "0.3", "0.7", "--level", "0", "--wo", "0", "0", "1", "--samples", "4", "-o", "s.csv"]
+    assert glint(*command, *sampled, "--seed", "3", "--depfile", "s.d").returncode == 0
+    first = (glint.folder / "s.csv").read_text()
+    assert (glint.folder / "s.d").read_text().startswith("s.csv:") and "rock.displaced.glint" in (glint.folder / "s.d").read_text()
+    assert glint(*command, *sampled, "--seed", "4").returncode == 0
+    assert (glint.folder / "s.csv").read_text() != first

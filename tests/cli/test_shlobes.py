@@ -1,4 +1,4 @@
-"""glint-shlobes, and glint-query --light, as a pipeline runs them."""
+"""glint-shlobes and glint-query light, as a pipeline runs them."""
 
 import json
 import math
@@ -52,7 +52,7 @@ def test_same_bytes_with_any_number_of_threads(glint, folder):
 
 
 def ask(glint, *arguments):
-    process = glint("query", *arguments, "--json")
+    process = glint("query", "light", *arguments, "--json")
     assert process.returncode == 0, process.stderr
     return json.loads(process.stdout)["result"]
 
@@ -150,9 +150,9 @@ def test_optics_of_the_surface(glint, folder):
     assert 0.5 / (4 * 0.6) < smith[0] < 0.999 / (4 * 0.6)
     # The map's slopes are the same, stored or taken from the texels.
     assert ask(glint, "n.glint", *common, *slanted, "--smith")["transfer"] == pytest.approx(smith, rel=1e-5)
-    assert glint("query", "s.glint", *common, *up, "--eta", 1, 1, 1).returncode == 1
-    assert glint("query", "s.glint", *common, *up, "--ior", 1.5, "--fresnel", 1, 1, 1).returncode == 1
-    assert glint("query", "s.glint", *common, *up, "--smith", "--shadowing", 0.5).returncode == 1
+    assert glint("query", "light", "s.glint", *common, *up, "--eta", 1, 1, 1).returncode == 1
+    assert glint("query", "light", "s.glint", *common, *up, "--ior", 1.5, "--fresnel", 1, 1, 1).returncode == 1
+    assert glint("query", "light", "s.glint", *common, *up, "--smith", "--shadowing", 0.5).returncode == 1
 
 
 def test_light_comes_from_where_the_image_says(glint, folder):
@@ -180,7 +180,7 @@ def test_clamped_light_says_so(glint, folder):
     glint("shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 20, "--grid", "9x16")
     clamped = 0
     for tilt in np.linspace(0.2, 1.2, 8):
-        process = glint("query", "flat.glint", "--uv", 0.5, 0.5, "--sigma", 2, "--light", "light.glint", "--wo", math.sin(tilt), 0, math.cos(tilt), "--json")
+        process = glint("query", "light", "flat.glint", "--uv", 0.5, 0.5, "--sigma", 2, "--light", "light.glint", "--wo", math.sin(tilt), 0, math.cos(tilt), "--json")
         document = json.loads(process.stdout)
         result = document["result"]
         assert result["clamped"] == ("clamped" in process.stderr)
@@ -349,9 +349,16 @@ def test_light_of_other_models_and_kinds_is_refused(glint, folder):
     glint("pyramid", "flakes.glint", "-o", "pyramid.glint")
     glint("shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 4, "--grid", "3x4")
     asked = ["--uv", 0.5, 0.5, "--sigma", 20, "--light", "light.glint", "--wo", 0, 0, 1]
-    assert glint("query", "flakes.glint", *asked).returncode == 0
-    assert glint("query", "flakes.glint", *asked, "--surface", "smooth").returncode == 5
-    assert glint("query", "pyramid.glint", *asked).returncode == 5
-    assert glint("query", "flakes.glint", *asked[:-5], "flakes.glint", "--wo", 0, 0, 1).returncode == 5
-    assert glint("query", "flakes.glint", *asked[:-1], -1).returncode == 1
-    assert glint("query", "flakes.glint", *asked[:-4]).returncode == 1
+    assert glint("query", "light", "flakes.glint", *asked).returncode == 0
+    assert glint("query", "light", "flakes.glint", *asked, "--surface", "smooth").returncode == 1
+    refused = glint("query", "light", "pyramid.glint", *asked)
+    assert refused.returncode == 5 and "normals or histogram-sat" in refused.stderr
+    assert glint("query", "light", "flakes.glint", *asked[:-5], "flakes.glint", "--wo", 0, 0, 1).returncode == 5
+    assert glint("query", "light", "flakes.glint", *asked[:-1], -1).returncode == 1
+    assert glint("query", "light", "flakes.glint", *asked[:-4]).returncode == 1
+    assert "glint-query ASSET --uv" in glint("query", "light", "flakes.glint", *asked, "--half", 0, 0).stderr
+    # The command is a word of its own: without it, options of light are shown where they belong.
+    for command in (["flakes.glint", *asked], ["flakes.glint", *asked[:5], "--wo", 0, 0, 1], ["--json", "light", "flakes.glint", *asked]):
+        process = glint("query", *command)
+        assert process.returncode == 1
+        assert "glint-query light ASSET --light TABLE" in process.stderr

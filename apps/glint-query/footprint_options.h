@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/tool.h"
+#include "glint/model/footprint.h"
+
+namespace glint::apps {
+
+/// Mix-in: the footprint that is asked, as --uv and one of --sigma, --cov and --box.
+class FootprintOptions {
+ public:
+  explicit FootprintOptions(Tool& tool);
+
+  /// --uv, for its constraints.
+  Option& centreOption() { return *uv_option_; }
+  bool given() const { return uv_option_->given(); }
+
+  /// Checks that the footprint has a size, and that it can be asked for.
+  /// @throws Error usage
+  void check() const;
+
+  Footprint footprint() const;
+
+ private:
+  std::vector<float> uv_, covariance_, box_;
+  float sigma_ = 0;
+  Option *uv_option_, *sigma_option_, *covariance_option_, *box_option_;
+};
+
+}  // namespace glint::apps
