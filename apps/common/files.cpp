@@ -7,12 +7,12 @@
 #include <CLI/App.hpp>
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <string_view>
 
+#include "common/answer_columns.h"
 #include "glint/formats/atomic_file.h"
 #include "glint/formats/descriptor.h"
 
@@ -209,25 +209,6 @@ std::vector<std::byte> readFile(const std::string& path) {
 
 void writeTextFile(const std::string& path, const std::string& text) {
   formats::writeFile(path, std::as_bytes(std::span(text)));
-}
-
-bool isAnswerHeader(std::string_view line) {
-  std::vector<std::string> columns(1);
-  for (const char c : line) {
-    if (c == ',') {
-      columns.emplace_back();
-    } else if (c != ' ' && c != '\t' && c != '\r' && c != '"') {
-      columns.back() += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    }
-  }
-  if (columns.front().starts_with("\xef\xbb\xbf")) columns.front().erase(0, 3);  // a byte-order mark
-  const auto has = [&](const char* name) { return std::find(columns.begin(), columns.end(), name) != columns.end(); };
-  using Names = std::vector<std::string>;
-  if (columns == Names{"hx", "hy", "pdf"} || columns == Names{"wix", "wiy", "wiz", "pdf"}) return true;
-  // Answers come behind the queries.
-  static const Names kAnswers = {"density", "mean", "reflected", "reflected_b"};
-  const bool answered = std::find(kAnswers.begin(), kAnswers.end(), columns.back()) != kAnswers.end();
-  return answered && has("u") && has("v") && (has("hx") || has("x0") || has("wix"));
 }
 
 bool isDepfile(std::string_view text) {

@@ -64,9 +64,6 @@ class OutputFile {
 /// @throws Error io
 void writeTextFile(const std::string& path, const std::string& text);
 
-/// Whether the first line of a file is the header of a table that glint-query writes: samples, or queries with their answers.
-bool isAnswerHeader(std::string_view line);
-
 /// Whether a text looks as makeDepfile() writes it.
 bool isDepfile(std::string_view text);
 

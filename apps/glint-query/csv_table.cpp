@@ -5,6 +5,7 @@
 
 #include <memory>
 
+#include "common/answer_columns.h"
 #include "common/files.h"
 #include "common/numbers.h"
 
@@ -17,14 +18,6 @@ std::span<const std::byte> withoutByteOrderMark(std::span<const std::byte> bytes
   constexpr std::array kMark = {std::byte{0xEF}, std::byte{0xBB}, std::byte{0xBF}};
   const bool marked = bytes.size() >= kMark.size() && std::equal(kMark.begin(), kMark.end(), bytes.begin());
   return marked ? bytes.subspan(kMark.size()) : bytes;
-}
-
-/// The name of a column as it is looked up: in small letters, without the blanks around it.
-std::string keyOf(const std::string& name) {
-  std::string key(trimBlanks(name));
-  for (char& c : key)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return key;
 }
 
 Rows parseCsv(const std::string& path) {
@@ -71,7 +64,7 @@ CsvTable CsvTable::read(const std::string& path) {
   CsvTable table;
   table.path_ = path;
   table.rows_ = parseCsv(path);
-  for (const std::string& name : table.rows_.front()) table.keys_.push_back(keyOf(name));
+  for (const std::string& name : table.rows_.front()) table.keys_.push_back(columnKey(name));
   for (std::size_t r = 1; r < table.rows_.size(); ++r) {
     if (table.rows_[r].size() == table.rows_.front().size()) continue;
     table.fail("csv.row", r - 1,

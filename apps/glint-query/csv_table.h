@@ -9,11 +9,6 @@
 
 namespace glint::apps {
 
-/// Columns that tables of queries share, whatever the kind of the asset.
-inline constexpr std::array kCentre = {"u", "v"};
-inline constexpr std::array kSigma = {"sigma"};
-inline constexpr std::array kHalf = {"hx", "hy"};
-
 /// A CSV table (RFC 4180) whose header names columns of numbers; further columns are kept as they are. A byte-order mark is
 /// skipped. Names of columns are found whatever their case and the blanks around them, and numbers are read by parseNumber.
 class CsvTable {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/answer_columns.h"
 #include "glint/bake/common/counter_random.h"
 
 namespace glint::apps {
@@ -69,7 +70,7 @@ std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& 
 }
 
 std::string sampleTable(std::span<const HalfVectorSample> samples) {
-  std::string text = "hx,hy,pdf\n";
+  std::string text = std::string(kHalfVectorSamples) + "\n";
   for (const HalfVectorSample& s : samples) text += fmt::format("{:.9g},{:.9g},{:.9g}\n", s.h.x, s.h.y, s.pdf);
   return text;
 }

@@ -1,14 +1,9 @@
-#include <array>
-
+#include "common/answer_columns.h"
 #include "common/footprint_rules.h"
 #include "glint-query/queries.h"
 
 namespace glint::apps {
 namespace {
-
-constexpr std::array kCovariance = {"sxx", "sxy", "syy"};
-constexpr std::array kBox = {"ax", "ay", "bx", "by"};
-constexpr std::array kRange = {"x0", "y0", "x1", "y1"};
 
 void requireColumns(const CsvTable& columns) {
   const int sizes = columns.has(kSigma) + columns.has(kCovariance) + columns.has(kBox);
@@ -58,7 +53,7 @@ QueryTable QueryTable::read(const std::string& path) {
 }
 
 std::string QueryTable::withAnswers(std::span<const float> answers) const {
-  const std::string name = !queries_.empty() && queries_.front().range ? "mean" : "density";
+  const std::string name = !queries_.empty() && queries_.front().range ? kMean : kDensity;
   return table_.withColumns({&name, 1}, answers);
 }
 

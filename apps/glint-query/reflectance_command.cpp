@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "common/answer_columns.h"
 #include "common/footprint_rules.h"
 #include "glint-query/command_forms.h"
 #include "glint-query/directions.h"
@@ -21,10 +22,6 @@ namespace {
 [[noreturn]] void usage(const std::string& what, const std::string& remedy) {
   throw Error(ErrorCode::usage, "query.arguments", "", "", what, remedy);
 }
-
-constexpr std::array kLevel = {"level"};
-constexpr std::array kLight = {"wix", "wiy", "wiz"};
-constexpr std::array kView = {"wox", "woy", "woz"};
 
 /// Side of the box with the second moments of a Gaussian.
 float diameterOf(float sigma) { return std::sqrt(12.0f) * sigma; }
@@ -165,7 +162,7 @@ void ReflectanceCommand::density(const DisplacedBrdf& brdf, const DisplacedPoint
 
 std::string ReflectanceCommand::samples(const DisplacedBrdf& brdf, const DisplacedPoint& at) const {
   const Vec3 wo = directionOf(wo_, "--wo");
-  std::string text = "wix,wiy,wiz,pdf\n";
+  std::string text = std::string(kLightSamples) + "\n";
   for (int k = 0; k < table_.samples(); ++k) {
     const DirectionSample s =
         brdf.sample(at.levels, at.uv, wo, bake::randomPair(tool_.seed(), 0, static_cast<std::uint64_t>(k)));
@@ -181,8 +178,8 @@ std::string ReflectanceCommand::table(const DisplacedBrdf& brdf) const {
     throw Error(ErrorCode::invalid_input, "csv.columns", table.path(), "header",
                 "the columns " + table.header() + " do not make one query of a displacement",
                 "name u,v; sigma or level; wix,wiy,wiz,wox,woy,woz or hx,hy");
-  std::vector<std::string> names = {reflects ? "reflected" : "density"};
-  if (reflects && brdf.asset().channels == 3) names = {"reflected_r", "reflected_g", "reflected_b"};
+  std::vector<std::string> names = {reflects ? kReflected : kDensity};
+  if (reflects && brdf.asset().channels == 3) names.assign(kReflectedRgb.begin(), kReflectedRgb.end());
   std::vector<float> answers;
   for (std::size_t row = 0; row < table.count(); ++row) {
     const DisplacedPoint at = pointOf(brdf, table, row);

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "common/answer_columns.h"
 #include "common/files.h"
 #include "common/suggest.h"
 #include "common/tool.h"
