@@ -7,19 +7,18 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
-#include <cmath>
 #include <deque>
 #include <filesystem>
 #include <map>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 #include <stdexcept>
 #include <system_error>
 
 #include "common/files.h"
-#include "common/numbers.h"
+#include "common/help_formatter.h"
+#include "common/number_checks.h"
 #include "common/progress_reporter.h"
 #include "common/signals.h"
 #include "common/standard_streams.h"
@@ -70,29 +69,6 @@ struct ElementOf<std::vector<T>> {
   using Type = T;
 };
 
-/// Reads numbers strictly, and hands them on as CLI11 reads them right: its own reading takes "010" for eight, and wraps "-1".
-template <class T>
-CLI::Validator strictNumber() {
-  return {[](std::string& text) {
-            T value = 0;
-            std::string complaint = parseNumber(text, value);
-            if (complaint.empty()) text = fmt::format("{}", value);
-            return complaint;
-          },
-          "", "number"};
-}
-
-/// Numbers outside [low, high] are refused.
-CLI::Validator numberRange(double low, double high) {
-  const std::string range = fmt::format("{:g} to {:g}", low, high);
-  return {[low, high, range](std::string& text) {
-            double number = 0;
-            if (std::string complaint = parseNumber(text, number); !complaint.empty()) return complaint;
-            return number >= low && number <= high ? std::string() : text + " is not in the range " + range;
-          },
-          range, "range"};
-}
-
 const char* codeName(ErrorCode code) {
   switch (code) {
     case ErrorCode::usage:
@@ -111,33 +87,6 @@ const char* codeName(ErrorCode code) {
   return "failed";
 }
 
-/// Help texts that say in words what an option takes: `--wo FLOAT FLOAT FLOAT (needs --light)`.
-class HelpFormatter : public CLI::Formatter {
- public:
-  std::string make_option_opts(const CLI::Option* option) const override {
-    const std::string type = option->get_type_name();  // "FLOAT:0 to 1": with what its checks say
-    const std::size_t colon = std::min(type.find(':'), type.size());
-    std::string text;
-    for (int k = 0; k < std::clamp(option->get_expected_min(), 1, 8) && colon > 0; ++k) text += " " + type.substr(0, colon);
-    std::vector<std::string> notes;
-    if (colon < type.size()) notes.push_back(type.substr(colon + 1));
-    if (option->get_required())
-      notes.push_back("required");
-    else if (!option->get_default_str().empty())
-      notes.push_back("default " + option->get_default_str());
-    if (!option->get_needs().empty()) notes.push_back("needs " + names(option->get_needs()));
-    if (!option->get_excludes().empty()) notes.push_back("not with " + names(option->get_excludes()));
-    return notes.empty() ? text : fmt::format("{} ({})", text, fmt::join(notes, ", "));
-  }
-
- private:
-  static std::string names(const std::set<CLI::Option*>& options) {
-    std::set<std::string> sorted;  // the set's own order is that of addresses
-    for (const CLI::Option* option : options) sorted.insert(option->get_name());
-    return fmt::format("{}", fmt::join(sorted, ", "));
-  }
-};
-
 /// Assets name their inputs in UTF-8, without control characters.
 void requireText(const std::string& path, const std::string& name) {
   if (escapedText(name) == name) return;
@@ -149,45 +98,6 @@ void requireText(const std::string& path, const std::string& name) {
 std::string dump(const json& document) { return document.dump(2, ' ', false, json::error_handler_t::replace); }
 
 }  // namespace
-
-Option& Option::required() {
-  option_->required();
-  return *this;
-}
-
-Option& Option::range(double low, double high) {
-  option_->check(numberRange(low, high));
-  double number = 0;
-  if (parseNumber(option_->get_default_str(), number).empty() && !(number >= low && number <= high)) option_->default_str("");
-  return *this;
-}
-
-Option& Option::count(int values) {
-  option_->expected(values);
-  return *this;
-}
-
-Option& Option::excludes(const Option& other) {
-  option_->excludes(other.option_);
-  return *this;
-}
-
-Option& Option::needs(const Option& other) {
-  option_->needs(other.option_);
-  return *this;
-}
-
-Option& Option::unrecorded() {
-  recorded_ = false;
-  return *this;
-}
-
-Option& Option::defaultText(const std::string& text) {
-  option_->default_str(text);
-  return *this;
-}
-
-bool Option::given() const { return option_->count() > 0; }
 
 struct Tool::State {
   ToolInfo info;

@@ -9,13 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "common/option.h"
 #include "glint/bake/common/progress.h"
 #include "glint/formats/provenance.h"
 #include "glint/model/error.h"
 
 namespace CLI {
 class App;
-class Option;
 }  // namespace CLI
 
 namespace glint::apps {
@@ -28,29 +28,6 @@ struct ToolInfo {
   std::string summary;     ///< one or two sentences: what it reads and what it makes
   std::string example;     ///< one command line that works, shown at the end of the help text
   std::string notes = {};  ///< what options have no room for, such as the form of a file; shown before the example
-};
-
-/// A declared option, for the constraints that are checked while the command line is parsed.
-class Option {
- public:
-  Option& required();
-  /// Numbers outside [low, high] are a usage error. Applies to each element of a list.
-  Option& range(double low, double high);
-  /// A list of exactly so many values, given as `a b c` or `a,b,c`.
-  Option& count(int values);
-  Option& excludes(const Option& other);
-  Option& needs(const Option& other);
-  /// Leaves the option out of the `command` record: it does not change the result.
-  Option& unrecorded();
-  /// Shown in the help text instead of the value, for defaults that depend on other options.
-  Option& defaultText(const std::string& text);
-  /// Whether the command line or the configuration file set it. Valid after parsing.
-  bool given() const;
-
- private:
-  friend class Tool;
-  CLI::Option* option_ = nullptr;
-  bool recorded_ = true;
 };
 
 /// A command-line program: declares the flags that every tool shares, parses, runs the work, and exits.
