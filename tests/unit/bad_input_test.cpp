@@ -6,17 +6,19 @@
 #include <limits>
 #include <random>
 #include <string>
+#include <variant>
 #include <vector>
 
+#include "glint/api/any_ndf.h"
 #include "glint/query/anisotropic_ndf.h"
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/brdf/displaced_brdf.h"
 #include "glint/query/brdf/microfacet_brdf.h"
 #include "glint/query/cp_ndf.h"
-#include "glint/query/histogram_ndf.h"
 #include "glint/query/light/environment.h"
 #include "glint/query/pyramid_ndf.h"
 #include "glint/query/reference.h"
+#include "support/c_api.h"
 #include "support/sample_assets.h"
 
 namespace glint {
@@ -27,7 +29,8 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kLargest = std::numeric_limits<float>::max();
 constexpr int kSize = 32;
 
-/// Calls visitor(model, name) for every model of the NDF, with and without the texels.
+/// Calls visitor(model, name) for every model of the NDF: variants of some models, with and without the texels, and the model of
+/// every kind of asset.
 template <class Visitor>
 void forEachModel(Visitor&& visitor) {
   const auto map = test::sampleNormals(kSize, kSize);
@@ -48,10 +51,10 @@ void forEachModel(Visitor&& visitor) {
     visitor(CpNdf(compressed.ndf), "CpNdf");
     visitor(CpNdf(compressed.ndf, map.map), "CpNdf with texels");
   }
-  const auto bins = test::sampleBinMap(kSize, kSize);
-  visitor(BinMapNdf(bins.map), "BinMapNdf");
-  const auto histograms = test::sampleHistograms(kSize, kSize);
-  visitor(HistogramNdf(histograms.sat), "HistogramNdf");
+  for (const char* kind : test::kKinds) {
+    const auto opened = api::OpenedNdf::open(test::assets().path(kind));
+    std::visit([&](const auto& model) { visitor(model, kind); }, opened.model());
+  }
 }
 
 /// Calls visitor(footprint, what).
