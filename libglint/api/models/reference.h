@@ -28,8 +28,9 @@ struct NdfTraits<Reference> {
     return info;
   }
 
-  /// Sums over all texels, row by row.
+  /// What the map says, or sums over all texels, row by row.
   static MapSlopes slopes(const NormalMap& map) {
+    if (map.slopes) return *map.slopes;
     const auto width = static_cast<std::size_t>(map.width);
     SlopeSums sums;
     for (std::size_t j = 0; j < static_cast<std::size_t>(map.height); ++j)
