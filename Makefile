@@ -30,7 +30,7 @@ bench: build  ## time whole commands and queries on 2K^2 maps; writes build/benc
 	@$(PYTHON) tests/bench/bench.py --bin build/bin --out build/bench
 
 .PHONY: bench-report
-bench-report: bench  ## the same, and write docs/BENCHMARKS.md and its charts
+bench-report: bench  ## the same, and write docs/BENCHMARKS.md, its charts and docs/benchmarks.csv
 	@$(PYTHON) tests/bench/report.py build/bench/results.json --docs docs
 
 # Asks for Doxygen and graphviz here only: nothing else needs them.
