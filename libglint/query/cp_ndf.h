@@ -4,7 +4,7 @@
 #include "glint/model/ndf_cp.h"
 #include "glint/query/detail/common/sampling.h"
 #include "glint/query/detail/compressed/avx2_reader.h"
-#include "glint/query/detail/compressed/cluster_slices.h"
+#include "glint/query/detail/compressed/cluster_reader.h"
 #include "glint/query/detail/compressed/spots.h"
 #include "glint/query/detail/pyramid/block_mass.h"
 #include "glint/query/detail/pyramid/block_rows.h"

@@ -12,7 +12,7 @@
 
 #include "glint/math/bits.h"
 #include "glint/math/float4.h"
-#include "glint/query/detail/compressed/cluster_slices.h"
+#include "glint/query/detail/compressed/column_layout.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
 
 namespace glint {
