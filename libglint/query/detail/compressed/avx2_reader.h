@@ -57,6 +57,9 @@ class Avx2Reader : public ClusterReader<Basis, Coefficient> {
   GLINT_AVX2 Float16 rowPixels(const NdfCluster& cluster, const float* weights, int y) const {
     return this->basisOf(cluster).rowPixels(weights, y, Avx2Prefixes::Weigh());
   }
+  GLINT_AVX2 void block(const NdfCluster& cluster, const float* weights, float* pixels) const {
+    this->basisOf(cluster).block(weights, pixels, Avx2Prefixes::Weigh());
+  }
 };
 
 }  // namespace glint

@@ -114,7 +114,7 @@ class ClusterReader {
   }
   /// All pixels of a slice, [16][16], negative pixels taken as 0.
   GLINT_HD void block(const NdfCluster& cluster, const float* weights, float* pixels) const {
-    basisOf(cluster).block(weights, pixels);
+    basisOf(cluster).block(weights, pixels, WeighPrefixes());
   }
 
  protected:

@@ -76,7 +76,8 @@ struct CpBasis : ClusterArrays {
   }
 
   /// All pixels of a slice, [16][16], negative pixels taken as 0; O(256 rank).
-  GLINT_DEVICE_CALL GLINT_HD void block(const float* weights, float* pixels) const {
+  template <class Weigh>
+  GLINT_DEVICE_CALL GLINT_HD void block(const float* weights, float* pixels, Weigh /*weigh*/) const {
     float x_values[kMaxColumns * kBlockSize], y_values[kMaxColumns * kBlockSize];
     const int count = columns();
     valuesOfAxis(alongX(), count, x_values);

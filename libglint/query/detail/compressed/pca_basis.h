@@ -69,12 +69,13 @@ struct PcaBasis : ClusterArrays {
 
   /// All pixels of a slice, [16][16], negative pixels taken as 0; O(256 columns). Weighs the prefix sums of all columns first,
   /// and takes differences once.
-  GLINT_DEVICE_CALL GLINT_HD void block(const float* weights, float* pixels) const {
+  template <class Weigh>
+  GLINT_DEVICE_CALL GLINT_HD void block(const float* weights, float* pixels, Weigh weigh) const {
     const int count = columns();
     const T* row = prefix();
     Float16 above = {{Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()}};
     for (int y = 0; y < kBlockSize; ++y, row += kBlockSize * count) {
-      const Float16 here = WeighPrefixes()(row, count, count, weights, Stored()).differences();
+      const Float16 here = weigh(row, count, count, weights, Stored()).differences();
       (here - above).positive().store(pixels + y * kBlockSize);
       above = here;
     }

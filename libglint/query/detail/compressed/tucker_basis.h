@@ -68,7 +68,8 @@ struct TuckerBasis : ClusterArrays {
   }
 
   /// All pixels of a slice, [16][16], negative pixels taken as 0; O(16 rank_x (16 + rank_y)).
-  GLINT_DEVICE_CALL GLINT_HD void block(const float* weights, float* pixels) const {
+  template <class Weigh>
+  GLINT_DEVICE_CALL GLINT_HD void block(const float* weights, float* pixels, Weigh /*weigh*/) const {
     float x_values[kBlockPixels], y_values[kBlockPixels], in_rows[kBlockPixels];
     valuesOfAxis(alongX(), rankX(), x_values);
     valuesOfAxis(alongY(), rankY(), y_values);
