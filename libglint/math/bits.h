@@ -17,14 +17,15 @@ inline GLINT_HD int setBits(std::uint64_t bits) {
 #endif
 }
 
-/// What a bit of a word of a mask stands for: whether it is set, and how many are set below it. Nothing branches on it.
+/// One bit of a mask: whether it is set, and the number of set bits below it. Computed without branches, which processors could
+/// not predict.
 struct BitRank {
   GLINT_HD BitRank(std::uint64_t word, unsigned bit) {
     const std::uint64_t up_to = word << (~bit & 63u);
     kept = static_cast<std::uint64_t>(static_cast<std::int64_t>(up_to) >> 63);
     below = static_cast<std::uint64_t>(setBits(up_to)) + kept;
   }
-  std::uint64_t kept;   ///< all bits if it is set, else 0
+  std::uint64_t kept;   ///< all ones if the bit is set, else 0
   std::uint64_t below;  ///< the number of set bits below it
 };
 

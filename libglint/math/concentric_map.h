@@ -21,7 +21,7 @@ inline GLINT_HD Vec3 concentricDirection(Vec2 square) {
   return {sine * std::cos(angle), sine * std::sin(angle), 1 - r * r};
 }
 
-/// The point of [-1, 1]^2 of a direction; inverse of concentricDirection. Directions below the horizon are put on the border.
+/// The point of [-1, 1]^2 of a direction: inverse of concentricDirection. Directions below the horizon are put on the border.
 inline GLINT_HD Vec2 concentricSquare(Vec3 direction) {
   constexpr float kQuarterPi = 0.785398163397448310f;
   const float r = std::sqrt(std::clamp(1 - direction.z, 0.0f, 1.0f));
@@ -38,7 +38,7 @@ inline GLINT_HD Vec3 gridDirection(int index, int n) {
       {(static_cast<float>(index % n) + 0.5f) * scale - 1, (static_cast<float>(index / n) + 0.5f) * scale - 1});
 }
 
-/// Where a direction lies between the centres of the grid: four cells and their bilinear weights, clamped at the border.
+/// The four cells whose centres surround a direction, and their bilinear weights. Clamped at the border of the grid.
 struct GridPlace {
   int cell[4];
   float weight[4];

@@ -19,11 +19,11 @@
 
 namespace glint {
 
-/// Signed numbers of four bits in the halves of a byte.
+/// The two numbers of four bits with sign that a byte holds.
 inline GLINT_HD std::int8_t lowHalf(std::int8_t byte) { return static_cast<std::int8_t>(((byte & 15) ^ 8) - 8); }
 inline GLINT_HD std::int8_t highHalf(std::int8_t byte) { return static_cast<std::int8_t>(byte >> 4); }
 
-/// a - b, rounded once. Integers that are too far apart, as only a broken file has them, wrap.
+/// a - b, rounded once. Integers wrap where the difference does not fit 32 bits, as only a broken file has them.
 inline GLINT_HD float differenceOf(float a, float b) { return a - b; }
 inline GLINT_HD float differenceOf(std::int32_t a, std::int32_t b) {
   return static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b)));
@@ -31,8 +31,8 @@ inline GLINT_HD float differenceOf(std::int32_t a, std::int32_t b) {
 inline GLINT_HD float differenceOf(std::int16_t a, std::int16_t b) { return differenceOf(std::int32_t{a}, std::int32_t{b}); }
 
 #ifdef GLINT_SSE
-/// SSE2, and SSE4.1 where the program is compiled for it: with the same results, and in the same registers, so that parts of a
-/// program that are compiled for other processors can call one another.
+/// Operations that SSE4.1 has and SSE2 lacks. Both versions return the same bits and pass arguments in the same registers. So
+/// sources that are compiled for different processors can call one another.
 namespace sse {
 #ifdef __SSE4_1__
 inline __m128i integersOf8(__m128i bytes) { return _mm_cvtepi8_epi32(bytes); }
@@ -54,18 +54,18 @@ inline __m128 where(__m128 mask, __m128 yes, __m128 no) { return _mm_or_ps(_mm_a
 inline __m128 floorOf(__m128 v) {
   const __m128 sign = _mm_set1_ps(-0.0f), whole = _mm_cvtepi32_ps(_mm_cvttps_epi32(v));
   const __m128 below = _mm_sub_ps(whole, _mm_and_ps(_mm_cmplt_ps(v, whole), _mm_set1_ps(1)));
-  // From 2^23 on all numbers are whole; and what is none stays so.
+  // Numbers from 2^23 on are whole already. They, infinities and NaN are returned unchanged.
   const __m128 has_fraction = _mm_cmplt_ps(_mm_andnot_ps(sign, v), _mm_set1_ps(0x1p23f));
   return where(has_fraction, _mm_or_ps(below, _mm_and_ps(v, sign)), v);
 }
 #endif
-/// Four numbers of 16 bits, in the lower half.
+/// Four numbers of 16 bits, in the lower 64 bits.
 inline __m128i loadFour(const void* p) { return _mm_loadl_epi64(static_cast<const __m128i*>(p)); }
 }  // namespace sse
 #endif
 
-/// Four floats side by side. Each operation gives the same bits on every processor. Of a product and a sum together that holds where
-/// the compiler does not fuse them (-ffp-contract=off): it may do so on processors that can, and then rounds once.
+/// Four floats side by side: lanes 0 to 3. Each operation returns the same bits on every processor. A sum of products does so
+/// only with -ffp-contract=off: otherwise the compiler may fuse a product and a sum into one operation that rounds once.
 struct Float4 {
 #ifdef GLINT_SSE
   __m128 v;
@@ -87,14 +87,14 @@ struct Float4 {
   static Float4 load(const std::int8_t* p) { return {_mm_cvtepi32_ps(bytes(p))}; }
   static Float4 load(const std::int16_t* p) { return {_mm_cvtepi32_ps(sse::integersOf16(sse::loadFour(p)))}; }
   static Float4 load(const std::int32_t* p) { return {_mm_cvtepi32_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))}; }
-  /// Half-precision numbers.
+  /// Loads half-precision numbers; infinities and NaN as in halfToFloat.
   static Float4 load(const std::uint16_t* p) {
     const __m128i halves = sse::loadFour(p), signs = _mm_and_si128(halves, _mm_set1_epi16(-0x8000));
     const __m128i finite = _mm_min_epi16(_mm_andnot_si128(signs, halves), _mm_set1_epi16(kLargestHalf));
     const __m128i magnitude = _mm_unpacklo_epi16(finite, _mm_setzero_si128());
     const __m128i sign = _mm_unpacklo_epi16(_mm_setzero_si128(), signs);
     const __m128i normal = _mm_add_epi32(_mm_slli_epi32(magnitude, 13), _mm_set1_epi32(112 << 23));
-    // As integers: arithmetic on subnormal floats takes a hundred cycles.
+    // Subnormal numbers are converted as integers: arithmetic on subnormal floats takes a hundred cycles.
     const __m128 subnormal = _mm_mul_ps(_mm_cvtepi32_ps(magnitude), _mm_set1_ps(0x1p-24f));
     const __m128 is_subnormal = _mm_castsi128_ps(_mm_cmplt_epi32(magnitude, _mm_set1_epi32(0x400)));
     return {_mm_or_ps(sse::where(is_subnormal, subnormal, _mm_castsi128_ps(normal)), _mm_castsi128_ps(sign))};
@@ -111,7 +111,7 @@ struct Float4 {
   static Float4 difference(const float* a, const float* b, int mask) {
     return {_mm_sub_ps(_mm_loadu_ps(a), _mm_and_ps(_mm_loadu_ps(b), _mm_castsi128_ps(_mm_set1_epi32(mask))))};
   }
-  /// positiveHalfToFloat: fewer steps, as there is no sign.
+  /// Loads half-precision numbers as positiveHalfToFloat does. Takes fewer steps than `load`, which keeps signs.
   static Float4 loadPositive(const std::uint16_t* p) {
     return positiveHalves(_mm_unpacklo_epi16(sse::loadFour(p), _mm_setzero_si128()));
   }
@@ -120,21 +120,21 @@ struct Float4 {
     bits = _mm_insert_epi16(_mm_insert_epi16(bits, b, 2), c, 4);
     return positiveHalves(_mm_insert_epi16(bits, d, 6));
   }
-  /// Masses of blocks whose codes (block_mass.h) are the bytes of `codes`, the first of them lowest.
+  /// Masses of four blocks. `codes` holds one code (query/detail/pyramid/block_mass.h) per byte, lowest byte first.
   static Float4 ofMassCodes(std::uint32_t codes) {
     const __m128i zero = _mm_setzero_si128();
     const __m128i pairs = _mm_unpacklo_epi8(_mm_cvtsi32_si128(static_cast<int>(codes)), zero);
     return positiveHalves(_mm_slli_epi32(_mm_unpacklo_epi16(pairs, zero), 6));
   }
-  /// @param halves  in the low 16 bits of lanes
+  /// @param halves  half-precision numbers in the low 16 bits of each lane
   static Float4 positiveHalves(__m128i halves) {
     const __m128i bits = _mm_min_epi16(_mm_max_epi16(halves, _mm_setzero_si128()), _mm_set1_epi32(kLargestHalf));
-    // Right for normal numbers. A subnormal f 2^-14 comes out as 2^-15 (1 + f): less than twice that minus 2^-14 only if it is
-    // normal.
+    // `normal` is right for normal numbers n, and 2 n - 2^-14 is at least n for them. A subnormal number f 2^-14 comes out as
+    // n = 2^-15 (1 + f), for which 2 n - 2^-14 is the right value and less than n.
     const __m128 normal = _mm_castsi128_ps(_mm_add_epi32(_mm_slli_epi32(bits, 13), _mm_set1_epi32(112 << 23)));
     return {_mm_min_ps(normal, _mm_sub_ps(_mm_add_ps(normal, normal), _mm_set1_ps(0x1p-14f)))};
   }
-  /// Signed numbers of four bits, from the low and the high halves of four bytes.
+  /// lowHalf and highHalf of four bytes.
   static Float4 loadLow(const std::int8_t* p) { return {_mm_cvtepi32_ps(_mm_srai_epi32(_mm_slli_epi32(bytes(p), 28), 28))}; }
   static Float4 loadHigh(const std::int8_t* p) { return {_mm_cvtepi32_ps(_mm_srai_epi32(bytes(p), 4))}; }
   void store(float* p) const { _mm_storeu_ps(p, v); }
@@ -151,12 +151,12 @@ struct Float4 {
                                           _mm_set1_epi32(static_cast<std::int32_t>(number)));
     return {_mm_and_ps(_mm_castsi128_ps(equal), yes.v)};
   }
-  /// Lanes 0 and 1, 2 and 3 of two, in turn.
+  /// Lanes of `a` and `b` in turn: a0 b0 a1 b1 (low), a2 b2 a3 b3 (high).
   friend Float4 interleaveLow(Float4 a, Float4 b) { return {_mm_unpacklo_ps(a.v, b.v)}; }
   friend Float4 interleaveHigh(Float4 a, Float4 b) { return {_mm_unpackhi_ps(a.v, b.v)}; }
   Float4 lanes0101() const { return {_mm_movelh_ps(v, v)}; }
   Float4 lanes2233() const { return {_mm_unpackhi_ps(v, v)}; }
-  /// out[k] = row[k] * columns + column[k], of whole numbers >= 0.
+  /// out[k] = row[k] * columns + column[k]. Lanes hold whole numbers >= 0.
   friend void storeIndices(Float4 row, std::int32_t columns, Float4 column, std::uint32_t* out) {
     const __m128i before = sse::productOf(_mm_cvttps_epi32(row.v), _mm_set1_epi32(columns));
     _mm_storeu_si128(reinterpret_cast<__m128i*>(out), _mm_add_epi32(before, _mm_cvttps_epi32(column.v)));
@@ -171,17 +171,17 @@ struct Float4 {
   Float4 positive() const { return {_mm_max_ps(v, _mm_setzero_ps())}; }
   /// Bit k: lane k is at most `bound`.
   unsigned notAbove(float bound) const { return static_cast<unsigned>(_mm_movemask_ps(_mm_cmple_ps(v, _mm_set1_ps(bound)))); }
-  /// 0, 1 + 0, (2 + 1) + 0, (3 + 2) + (1 + 0).
+  /// Lane k: sum of lanes 0 to k, added in the order v0, v1 + v0, (v2 + v1) + v0, (v3 + v2) + (v1 + v0).
   Float4 runningSums() const {
     const __m128 pairs = _mm_add_ps(v, _mm_castsi128_ps(_mm_slli_si128(_mm_castps_si128(v), 4)));
     return {_mm_add_ps(pairs, _mm_castsi128_ps(_mm_slli_si128(_mm_castps_si128(pairs), 8)))};
   }
-  /// The last lane in all.
+  /// Lane 3 in all lanes.
   Float4 last() const { return {_mm_shuffle_ps(v, v, 0xff)}; }
   float lastLane() const { return _mm_cvtss_f32(last().v); }
-  /// Lanes one further, behind the last one of `before`.
+  /// Lane 3 of `before`, then lanes 0 to 2 of this.
   Float4 shiftedBehind(Float4 before) const { return {_mm_shuffle_ps(_mm_shuffle_ps(before.v, v, 0x0f), v, 0x98)}; }
-  /// (0 + 2) + (1 + 3).
+  /// Sum of the lanes, added in the order (v0 + v2) + (v1 + v3).
   float sum() const {
     const __m128 pairs = _mm_add_ps(v, _mm_movehl_ps(v, v));
     return _mm_cvtss_f32(_mm_add_ss(pairs, _mm_shuffle_ps(pairs, pairs, 1)));
@@ -198,7 +198,7 @@ struct Float4 {
   static GLINT_HD Float4 load(const T* p) {
     return {{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]), static_cast<float>(p[3])}};
   }
-  /// Half-precision numbers.
+  /// Loads half-precision numbers; infinities and NaN as in halfToFloat.
   static GLINT_HD Float4 load(const std::uint16_t* p) {
     return {{halfToFloat(p[0]), halfToFloat(p[1]), halfToFloat(p[2]), halfToFloat(p[3])}};
   }
@@ -213,12 +213,12 @@ struct Float4 {
   static GLINT_HD Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
     return {{positiveHalfToFloat(a), positiveHalfToFloat(b), positiveHalfToFloat(c), positiveHalfToFloat(d)}};
   }
-  /// Masses of blocks whose codes (block_mass.h) are the bytes of `codes`, the first of them lowest.
+  /// Masses of four blocks. `codes` holds one code (query/detail/pyramid/block_mass.h) per byte, lowest byte first.
   static GLINT_HD Float4 ofMassCodes(std::uint32_t codes) {
     const auto half = [&](int k) { return static_cast<std::uint16_t>((codes >> (8 * k) & 255u) << 6); };
     return ofPositive(half(0), half(1), half(2), half(3));
   }
-  /// Signed numbers of four bits, from the low and the high halves of four bytes.
+  /// lowHalf and highHalf of four bytes.
   static GLINT_HD Float4 loadLow(const std::int8_t* p) {
     const std::int8_t low[4] = {lowHalf(p[0]), lowHalf(p[1]), lowHalf(p[2]), lowHalf(p[3])};
     return load(low);
@@ -255,12 +255,12 @@ struct Float4 {
     for (int k = 0; k < 4; ++k) a.v[k] = a.v[k] < b.v[k] ? a.v[k] : b.v[k];
     return a;
   }
-  /// Lanes 0 and 1, 2 and 3 of two, in turn.
+  /// Lanes of `a` and `b` in turn: a0 b0 a1 b1 (low), a2 b2 a3 b3 (high).
   friend GLINT_HD Float4 interleaveLow(Float4 a, Float4 b) { return {{a.v[0], b.v[0], a.v[1], b.v[1]}}; }
   friend GLINT_HD Float4 interleaveHigh(Float4 a, Float4 b) { return {{a.v[2], b.v[2], a.v[3], b.v[3]}}; }
   GLINT_HD Float4 lanes0101() const { return {{v[0], v[1], v[0], v[1]}}; }
   GLINT_HD Float4 lanes2233() const { return {{v[2], v[2], v[3], v[3]}}; }
-  /// out[k] = row[k] * columns + column[k], of whole numbers >= 0.
+  /// out[k] = row[k] * columns + column[k]. Lanes hold whole numbers >= 0.
   friend GLINT_HD void storeIndices(Float4 row, std::int32_t columns, Float4 column, std::uint32_t* out) {
     for (int k = 0; k < 4; ++k)
       out[k] =
@@ -283,22 +283,22 @@ struct Float4 {
     for (int k = 0; k < 4; ++k) bits |= (v[k] <= bound ? 1u : 0u) << k;
     return bits;
   }
-  /// 0, 1 + 0, (2 + 1) + 0, (3 + 2) + (1 + 0).
+  /// Lane k: sum of lanes 0 to k, added in the order v0, v1 + v0, (v2 + v1) + v0, (v3 + v2) + (v1 + v0).
   GLINT_HD Float4 runningSums() const {
     const float pair = v[1] + v[0];
     return {{v[0], pair, (v[2] + v[1]) + v[0], (v[3] + v[2]) + pair}};
   }
-  /// The last lane in all.
+  /// Lane 3 in all lanes.
   GLINT_HD Float4 last() const { return {{v[3], v[3], v[3], v[3]}}; }
   GLINT_HD float lastLane() const { return v[3]; }
-  /// Lanes one further, behind the last one of `before`.
+  /// Lane 3 of `before`, then lanes 0 to 2 of this.
   GLINT_HD Float4 shiftedBehind(Float4 before) const { return {{before.v[3], v[0], v[1], v[2]}}; }
-  /// (0 + 2) + (1 + 3).
+  /// Sum of the lanes, added in the order (v0 + v2) + (v1 + v3).
   GLINT_HD float sum() const { return (v[0] + v[2]) + (v[1] + v[3]); }
 #endif
 };
 
-/// Sums of four vectors, each over its lanes.
+/// The sums of the lanes of `a`, `b`, `c` and `d`: same bits as sum() of each.
 inline GLINT_HD Float4 sumsOf(Float4 a, Float4 b, Float4 c, Float4 d) {
 #ifdef GLINT_SSE
   const Float4 ab = {_mm_add_ps(_mm_unpacklo_ps(a.v, b.v), _mm_unpackhi_ps(a.v, b.v))};
@@ -309,7 +309,7 @@ inline GLINT_HD Float4 sumsOf(Float4 a, Float4 b, Float4 c, Float4 d) {
 #endif
 }
 
-/// Sixteen floats: a row or a column of a block, or sums of its rows.
+/// Sixteen floats, one for each pixel of a row or a column of a block.
 struct Float16 {
   Float4 v[4];
 
@@ -323,14 +323,14 @@ struct Float16 {
     return {{a.v[0] - b.v[0], a.v[1] - b.v[1], a.v[2] - b.v[2], a.v[3] - b.v[3]}};
   }
   GLINT_HD Float16 positive() const { return {{v[0].positive(), v[1].positive(), v[2].positive(), v[3].positive()}}; }
-  /// Lane k: sum of lanes 0 to k. In an order that does not depend on the processor.
+  /// Lane k: sum of lanes 0 to k. Adds in an order that does not depend on the processor.
   GLINT_HD Float16 runningSums() const {
     Float16 sums;
     Float4 before = Float4::zero();
     for (int k = 0; k < 4; ++k) before = (sums.v[k] = before + v[k].runningSums()).last();
     return sums;
   }
-  /// Lane k without lane k - 1.
+  /// Lane k minus lane k - 1; lane 0 stays.
   GLINT_HD Float16 differences() const {
     Float16 out;
     Float4 before = Float4::zero();

@@ -20,16 +20,16 @@ inline GLINT_HD float fresnelDielectric(float cosine, float eta) {
   const float parallel = (eta * c - inside) / (eta * c + inside);
   const float perpendicular = (c - eta * inside) / (c + eta * inside);
   const float reflected = 0.5f * (parallel * parallel + perpendicular * perpendicular);
-  return reflected >= 0 ? reflected : 1.0f;  // an index without end: all is reflected
+  return reflected >= 0 ? reflected : 1.0f;  // NaN comes from an infinite index, which reflects everything
 }
 
 /// Share of unpolarised light that a smooth conductor of refractive index eta + i k (relative to the outside) reflects.
 /// @param cosine  as for a dielectric
-/// @return in [0, 1]; with k = 0 and eta >= 1 that of a dielectric
+/// @return in [0, 1]; with k = 0 and eta >= 1 the share that a dielectric reflects
 inline GLINT_HD float fresnelConductor(float cosine, float eta, float k) {
   const float c = cosine > 0 ? std::min(cosine, 1.0f) : 0.0f;
   const float c2 = c * c, s2 = 1 - c2;
-  // a + i b is the complex index times the cosine inside; real arithmetic, since std::complex is no device code.
+  // a + i b is the complex index times the cosine inside. Real arithmetic, since device code has no std::complex.
   const float difference = eta * eta - k * k - s2;
   const float a2_plus_b2 = std::sqrt(difference * difference + 4 * eta * eta * k * k);
   const float a = std::sqrt(std::max(0.0f, 0.5f * (a2_plus_b2 + difference)));
@@ -37,17 +37,17 @@ inline GLINT_HD float fresnelConductor(float cosine, float eta, float k) {
   const float steep = s2 * s2, mixed = 2 * a * c * s2;
   const float parallel = perpendicular * (c2 * a2_plus_b2 + steep - mixed) / (c2 * a2_plus_b2 + steep + mixed);
   const float reflected = 0.5f * (perpendicular + parallel);
-  return reflected >= 0 ? std::min(reflected, 1.0f) : 1.0f;  // 0/0 at an index of exactly 0, where all is reflected
+  return reflected >= 0 ? std::min(reflected, 1.0f) : 1.0f;  // NaN is 0/0 at an index of exactly 0, which reflects everything
 }
 
-/// What the facets of a surface are made of.
+/// The material of facets: the share of light that they reflect.
 class Fresnel {
  public:
   /// Facets that reflect everything: for furnace tests, and for reflectance applied elsewhere.
   static GLINT_HD constexpr Fresnel mirror() { return {}; }
   /// @param eta, k  real and imaginary part of the refractive index of each channel, relative to the outside
   static GLINT_HD constexpr Fresnel conductor(Rgb eta, Rgb k) { return {Kind::conductor, eta, k}; }
-  /// Reflection only; what is refracted is lost.
+  /// Reflection only: refracted light is lost.
   static GLINT_HD constexpr Fresnel dielectric(float eta) { return {Kind::dielectric, Rgb::grey(eta), {}}; }
 
   /// Reflectance towards `cosine`, each channel in [0, 1].

@@ -11,7 +11,7 @@ namespace glint {
 inline constexpr float kPi = 3.14159265358979324f;
 inline constexpr float kInvSqrt2 = 0.70710678118654752f;
 
-/// A facet's lobe is cut off this many standard deviations away: exp(-5.5^2 / 2) = 2.7e-7 of its peak.
+/// Lobes of facets end at this many standard deviations, where they are exp(-5.5^2 / 2) = 2.7e-7 of their peak.
 inline constexpr float kLobeReach = 5.5f;
 
 /// Mass of a normal distribution of mean `mean` and deviation `sigma` in [low, high].
@@ -54,7 +54,7 @@ inline GLINT_HD float lobeMass(const Box2& box, Vec2 normal, float sigma) {
   return gaussianMass(box.low.x, box.high.x, normal.x, sigma) * gaussianMass(box.low.y, box.high.y, normal.y, sigma);
 }
 
-/// Whether the lobe of any normal within `reach` of `box` can matter: false means that it is farther away on some axis.
+/// Whether the lobe around a normal can reach `box`: false where the normal is farther than `reach` from it along an axis.
 inline GLINT_HD bool near(const Box2& box, Vec2 low, Vec2 high, float reach) {
   return low.x <= box.high.x + reach && high.x >= box.low.x - reach && low.y <= box.high.y + reach &&
          high.y >= box.low.y - reach;

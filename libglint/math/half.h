@@ -21,14 +21,14 @@ inline GLINT_HD float halfToFloat(std::uint16_t half) {
   return half & 0x8000u ? -value : value;
 }
 
-/// The same with infinities and NaNs as they are: a check must see them, a query must not.
+/// halfToFloat that keeps infinities and NaNs, for checks of files. Queries use halfToFloat, so that answers are finite.
 inline GLINT_HD float ieeeHalfToFloat(std::uint16_t half) {
   if ((half & 0x7c00u) != 0x7c00u) return halfToFloat(half);
   if (half & 0x3ffu) return std::numeric_limits<float>::quiet_NaN();
   return half & 0x8000u ? -std::numeric_limits<float>::infinity() : std::numeric_limits<float>::infinity();
 }
 
-/// The same for what cannot be negative: negative numbers, which a file may have, become 0.
+/// halfToFloat of a number that cannot be negative, such as a density: negative numbers, which a file may have, become 0.
 inline GLINT_HD float positiveHalfToFloat(std::uint16_t half) { return half & 0x8000u ? 0.0f : halfToFloat(half); }
 
 /// Nearest half-precision number, ties to even; magnitudes above 65504 become 65504.

@@ -13,18 +13,18 @@ namespace glint {
 //
 // since dhx dhy = h.z dw(h), and dw(wi) = 4 (wo . h) dw(h).
 
-/// Directions closer to the horizon count as below it: no light is seen along them. Keeps 1 / cosine finite.
+/// Directions with a cosine below this count as below the horizon and reflect no light. Keeps 1 / cosine finite.
 inline constexpr float kHorizon = 1e-6f;
 
-/// Whether a vector is not longer than a unit vector is after rounding. False for NaN.
+/// Whether a vector is at most as long as a rounded unit vector. False for NaN.
 inline GLINT_HD bool isDirection(Vec3 w) { return dot(w, w) < 1.001f; }
-/// Whether a direction can be asked for: one above the horizon.
+/// Whether a direction is above the horizon, so that a BRDF can be asked for it.
 inline GLINT_HD bool aboveHorizon(Vec3 w) { return w.z > kHorizon && isDirection(w); }
 
 /// The normal of a facet between two directions.
 struct HalfVector {
-  Vec2 disk;          ///< its projection on the disk
-  float cosine = 0;   ///< h.z: 0 if there is none
+  Vec2 disk;          ///< projection of the normal on the disk
+  float cosine = 0;   ///< h.z; 0 if there is no such normal
   float towards = 0;  ///< wo . h = wi . h
 };
 
@@ -49,10 +49,10 @@ inline GLINT_HD Vec3 reflected(Vec3 wo, const HalfVector& h) {
   return {twice * h.disk.x - wo.x, twice * h.disk.y - wo.y, twice * h.cosine - wo.z};
 }
 
-/// Density of h per unit projected area to density of the wi that it reflects into, per unit solid angle.
+/// Factor from the density of h per unit projected area to the density of wi per unit solid angle, wi being wo mirrored at h.
 inline GLINT_HD float projectedToIncident(float density, const HalfVector& h) { return density * h.cosine / (4 * h.towards); }
 
-/// Density of wi per unit solid angle to density of its half vector per unit projected area.
+/// Factor from the density of wi per unit solid angle to the density of its half vector per unit projected area.
 inline GLINT_HD float incidentToProjected(float density, const HalfVector& h) { return density * (4 * h.towards) / h.cosine; }
 
 }  // namespace glint

@@ -18,14 +18,13 @@ struct SphericalGaussian {
   Rgb amplitude;          ///< radiance along the axis
 };
 
-/// A view of lobes that light a scene together. The lobes must outlive it.
+/// A view of the lobes that light a scene together. The lobes must outlive the view.
 struct SphericalGaussians {
   const SphericalGaussian* lobes = nullptr;
   std::size_t count = 0;
 };
 
-/// Lobes whose sharpness or axis is no use (not finite, sharpness not in (0, 1e10), axis not a unit vector to 1e-3) give no
-/// light.
+/// Whether a lobe is valid: finite, sharpness in (0, 1e10), axis a unit vector to 1e-3. Other lobes give no light.
 inline GLINT_HD bool isUsable(const SphericalGaussian& g) {
   const float length2 = dot(g.axis, g.axis);
   return g.sharpness > 0 && g.sharpness < 1e10f && length2 > 0.998f && length2 < 1.002f;
@@ -56,13 +55,12 @@ inline GLINT_HD float compactSupport(float amplitude, float sharpness, float eps
   return cosine == cosine ? std::acos(std::clamp(cosine, -1.0f, 1.0f)) : 0.0f;
 }
 
-/// Side of the square of the disk that Deng 2022 average over for a lobe, disk units: Eq. 9, halved as they do. Q / 2 of 256
-/// pixels that span 2 disk units, so 2 theta / pi.
+/// Side of the square of the disk over which Deng 2022 average for a lobe, disk units. Their Eq. 9 gives Q, and they use Q / 2
+/// of 256 pixels that span 2 disk units: 2 theta / pi.
 inline GLINT_HD float supportSide(float support_angle) { return 2 * support_angle / kPi; }
 
-/// The direction at a point of the plane that the sphere is unrolled to around the axis, keeping areas (Lambert):
-/// |p| = 2 sin(angle / 2). On it a spherical Gaussian is a normal distribution of deviation 1 / sqrt(lambda), exactly, cut off
-/// at |p| = 2.
+/// The direction at a point p of Lambert's equal-area map of the sphere around an axis: |p| = 2 sin(angle / 2). On this map a
+/// spherical Gaussian is exactly a normal distribution of deviation 1 / sqrt(lambda), cut off at |p| = 2.
 inline GLINT_HD Vec3 directionAt(const SphericalGaussian& g, const Tangents& frame, Vec2 p) {
   const float r2 = std::min(dot(p, p), 4.0f), scale = std::sqrt(1 - 0.25f * r2);
   return (scale * p.x) * frame.s + (scale * p.y) * frame.t + (1 - 0.5f * r2) * g.axis;

@@ -6,7 +6,7 @@
 
 namespace glint {
 
-/// Two unit vectors that make a right-handed frame with a third (Duff et al. 2017).
+/// Two unit vectors that form a right-handed frame with a given unit vector (Duff et al. 2017).
 struct Tangents {
   Vec3 s, t;
 };

@@ -7,11 +7,11 @@ namespace glint {
 /// The largest number below 1.
 inline constexpr float kBelowOne = 0x1.fffffep-1f;
 
-/// What can only be positive, for an answer: the numbers of a file are not checked when it is opened, so sums of them may be
-/// infinite, negative, or no number. These become 0.
+/// A sum as an answer that cannot be negative: infinities, negative numbers and NaN become 0. Opening a file does not check its
+/// numbers, so sums of them may be any of these.
 inline GLINT_HD float finitePositive(float x) { return x > 0 && x <= 0x1.fffffep127f ? x : 0.0f; }
 
-/// A point or vector of the plane: texture space, or the unit disk that holds normals and half vectors.
+/// A point or vector of texture space, or of the unit disk of normals and half vectors.
 struct Vec2 {
   float x = 0;
   float y = 0;
