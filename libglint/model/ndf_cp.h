@@ -17,10 +17,10 @@ enum class CompressionMethod : std::uint8_t {
 /// Storage of coefficients. Bases are always prefix sums of integers (or of floats with f32), so range queries are exact.
 enum class CoefficientType : std::uint8_t { i8, f16, f32 };
 
-/// One cluster: the slices (blocks of NDF images) that share an angular block and a region.
+/// One cluster: the slices of one place in one region. A slice is the part of an image inside one angular block.
 ///
-/// Columns are stored widest first: the last `narrow_columns` have coefficients of 4 bits. A cluster with slices and without
-/// columns is one of spots.
+/// A column is one basis image and its coefficients. Columns with wide coefficients come first; the last `narrow_columns` have
+/// coefficients of 4 bits. A cluster that has slices and no columns stores spots.
 struct NdfCluster {
   std::uint64_t first_coefficient = 0;  ///< offset into `coefficients`, elements
   std::uint32_t first_basis = 0;        ///< offset into `basis`, elements
@@ -35,52 +35,53 @@ struct NdfCluster {
 };
 static_assert(sizeof(NdfCluster) == 32);
 
-/// A facet's image in a slice: a Gaussian of variance sigma_r^2 around a point, and how much of it there is.
+/// The blurred image of a facet in a slice: a Gaussian of variance sigma_r^2 around a point, times a weight.
 struct NdfSpot {
-  std::uint8_t x = 0;        ///< centre, eighths of a pixel right of 3 pixels left of the block
-  std::uint8_t y = 0;        ///< the same upwards
-  std::uint16_t weight = 0;  ///< times the scale of the cluster: sum of its pixels
+  std::uint8_t x = 0;        ///< centre, in eighths of a pixel from 3 pixels left of the block
+  std::uint8_t y = 0;        ///< centre, in eighths of a pixel from 3 pixels below the block
+  std::uint16_t weight = 0;  ///< sum of the spot's pixels over the scale of the cluster
 };
 static_assert(sizeof(NdfSpot) == 4);
 
-/// Steps of a spot's place in a pixel.
+/// Positions of a spot's centre in one pixel, along an axis.
 inline constexpr int kSpotSteps = 8;
-/// Pixels between a block and the farthest centre of a spot in it.
+/// Distance in pixels of the farthest centre outside the block.
 inline constexpr int kSpotReach = 3;
-/// Largest place of a spot along an axis.
+/// Largest NdfSpot::x and y.
 inline constexpr int kLastSpotPlace = (kBlockSize + 2 * kSpotReach) * kSpotSteps;
-/// Elements of NdfCp::spot_sums: distances of an edge of pixels from a centre, -(16 + 3) to 16 + 3 pixels.
+/// Elements of NdfCp::spot_sums: one for each distance of a pixel edge from a centre, -(16 + 3) to 16 + 3 pixels.
 inline constexpr int kSpotSums = 2 * (kBlockSize + kSpotReach) * kSpotSteps + 1;
 
-// A cluster of n slices of spots has, from its first coefficient on (a multiple of 4):
+// A cluster of n slices of spots has these arrays from its first coefficient on, whose offset is a multiple of 4:
 //
 //   u32 before[ceil(n / 16)]  spots of the slices before slice 16 k
 //   u8 counts[n]              spots of each slice
-//   u8 rests[n]               codes of block_mass.h: what is left of each slice, even over the block
+//   u8 rests[n]               mass of each slice that is in no spot, spread evenly over the block; codes of block_mass.h
 //   u8 zeros[]                up to a multiple of 4 bytes
-//   NdfSpot spots[]           of all slices in turn
+//   NdfSpot spots[]           spots of all slices in turn
 //
-// and two scales: of the weights, and of the rests (then a density).
+// It has two scales: one for the weights, and one that turns rests into densities.
 
 /// Slices between two entries of `before`.
 inline constexpr int kSpotGroup = 16;
-/// Bytes from the first coefficient of a cluster of spots to `counts` and to `spots`; `rests` is n bytes after `counts`.
+/// Bytes from the first coefficient of a cluster of spots to `counts`. `rests` begins n bytes after `counts`.
 GLINT_HD constexpr std::uint64_t spotCountsOffset(std::uint32_t slices) {
   return std::uint64_t{4} * ((slices + kSpotGroup - 1) / kSpotGroup);
 }
+/// Bytes from the first coefficient of a cluster of spots to `spots`.
 GLINT_HD constexpr std::uint64_t firstSpotOffset(std::uint32_t slices) {
   return spotCountsOffset(slices) + (std::uint64_t{2} * slices + 3) / 4 * 4;
 }
 
-/// Of a block without slices in any image.
+/// Value in NdfCp::block_places for blocks that are empty in all images.
 inline constexpr std::uint16_t kNoBlockPlace = 0xffff;
 
 /// A compressed pyramid of NDF images (asset kind `ndf-cp`).
 ///
-/// Every image belongs to a region and has a slot in it; a region holds images of like places or levels. Blocks that occur in
-/// any
-/// image are numbered: that is their place. Cluster (region, place) lists the slots where the block is occupied as a bit mask;
-/// the slice of a slot is the number of set bits below it, found from `mask_ranks` (running counts) and one popcount.
+/// Every image belongs to a region, a group of images of nearby positions or levels, and has a slot (its number in the region).
+/// Blocks that are occupied in any image are numbered: the number is the place of the block. Cluster (region, place) has a bit
+/// mask of the slots whose image occupies the block. The slice of a slot is the number of set bits below the slot's bit: the
+/// running count in `mask_ranks` plus one popcount.
 struct NdfCp {
   PyramidShape shape;
   CompressionMethod method = CompressionMethod::cp;
@@ -92,14 +93,15 @@ struct NdfCp {
   std::span<const std::uint16_t> image_regions;  ///< [images]
   std::span<const std::uint16_t> image_slots;    ///< [images]
   std::span<const float> image_scales;           ///< [images]: factor that makes the image integrate to 1
-  std::span<const float> density_scales;         ///< [images]: the same, negative pixels taken as 0; 0 if nothing is positive
-  std::span<const std::uint16_t> block_places;   ///< [blocksPerImage]: place of a block, or kNoBlockPlace
-  std::span<const std::uint16_t> place_blocks;   ///< [places]: block of a place, rising
-  std::span<const NdfCluster> clusters;          ///< [regions][places]
-  std::span<const std::uint64_t> masks;          ///< of each cluster: a word for every 64 slots of its region
-  std::span<const std::uint32_t> mask_ranks;     ///< same shape as masks: set bits of the cluster before this word
+  std::span<const float> density_scales;  ///< [images]: the factor if negative pixels count as 0; 0 if no pixel is positive
+  std::span<const std::uint16_t> block_places;  ///< [blocksPerImage]: place of a block, or kNoBlockPlace
+  std::span<const std::uint16_t> place_blocks;  ///< [places]: block of a place, rising
+  std::span<const NdfCluster> clusters;         ///< [regions][places]
+  std::span<const std::uint64_t> masks;         ///< of each cluster: a word for every 64 slots of its region
+  std::span<const std::uint32_t> mask_ranks;    ///< same shape as masks: set bits of the cluster before this word
 
-  /// What sampling chooses a block of an image by: the blocks that have a slice, and at least their shares of the image.
+  // Sampling chooses a block of an image by the next three arrays: which blocks have a slice, and an upper bound of each
+  // block's share of the image.
   std::span<const std::uint64_t> block_masks;  ///< [images][placeWords()]; bit k: the block of place k has a slice
   std::span<const std::uint32_t> first_block;  ///< [images + 1]: running count of these bits
   std::span<const std::uint8_t> block_masses;  ///< [slices], by image and place: codes of block_mass.h, rounded up
@@ -109,15 +111,14 @@ struct NdfCp {
   /// Elements are f32 if coefficient_type is f32; else i16 for cp and tucker (of 12-bit integers), i32 for pca.
   const void* basis = nullptr;
   std::uint64_t basis_count = 0;
-  /// Of each cluster [slices][rowElements()]. i8: wide columns, then narrow ones: byte j holds column j of them in its low
-  /// half and
-  /// column j + ceil(narrow / 2) in its high half. Ends with kRowPadding zeros, so that rows can be read in groups of four.
-  /// A cluster of spots is laid out as above.
+  /// Coefficients of each cluster, [slices][rowElements()]. A row has the wide columns first. With i8, bytes of two narrow
+  /// columns each follow: byte j has narrow column j in its low half and narrow column j + ceil(narrow_columns / 2) in its high
+  /// half. kRowPadding zeros end the array, so that rows can be read in groups of four. For clusters of spots see NdfSpot.
   const void* coefficients = nullptr;
   std::uint64_t coefficient_count = 0;
-  std::span<const float> scales;  ///< [columns] of each cluster: density = sum of scale * basis * coefficient; two for spots
-  std::span<const std::uint8_t> core;  ///< tucker: as `scales`: a + 16 b of each column
-  std::span<const float> spot_sums;  ///< [kSpotSums]: integral of a spot's profile up to an edge of pixels; none without spots
+  std::span<const float> scales;       ///< [columns] of each cluster: density = sum of scale * basis * coefficient
+  std::span<const std::uint8_t> core;  ///< tucker, indexed like `scales`: a + 16 b of each column
+  std::span<const float> spot_sums;    ///< [kSpotSums]: integral of a spot's profile up to a pixel edge; empty without spots
 
   GLINT_HD constexpr int placeWords() const { return (places + 63) / 64; }
 };

@@ -15,15 +15,15 @@ namespace glint {
 
 /// The NDF from a compressed pyramid: tensor rank (CP), Tucker-2 or PCA (Deng 2022, sections 4.2 to 4.4).
 ///
-/// Chooses images as PyramidNdf does. Pixels are sums of products of few factors, and so are sums over boxes of pixels, from
-/// prefix sums (Eq. 6 and 7). Where few facets make up the slices, they are sums of few spots and an even rest instead.
+/// Chooses images as PyramidNdf does. A pixel is a sum of products of few factors. The sum over a box of pixels has the same
+/// form, with factors from prefix sums (Eq. 6 and 7). Slices of few facets are stored as a few spots and an even rest instead.
 ///
-/// The density of an image is what the approximation leaves above zero, scaled to integrate to 1, and constant over a pixel.
-/// The mean is a difference of prefix sums, so it counts what lies below zero, is scaled to integrate to 1 with that, and only
-/// the result is clamped: it is the exact average of `signedDensity`, and of `density` where nothing is negative. Thread-safe,
-/// allocates nothing; the arrays must outlive it.
+/// Approximated pixels can be negative. `density` takes negative pixels as 0, scales the image so that it then integrates to 1,
+/// and is constant over a pixel. `mean` is a difference of prefix sums, which include negative pixels: it is the exact average of
+/// `signedDensity`, clamped at the end. So it is the exact average of `density` only where no pixel is negative.
+/// Thread-safe, allocates nothing; the arrays must outlive it.
 class CpNdf {
-  static constexpr int kMostBlocks = 64 * 64;  // of 1024^2 pixels, the largest image
+  static constexpr int kMostBlocks = 64 * 64;  // blocks of the largest image, 1024^2 pixels
 
  public:
   GLINT_HD explicit CpNdf(const NdfCp& ndf) : ndf_(ndf), chooser_(ndf.shape) {}
@@ -51,18 +51,18 @@ class CpNdf {
     });
   }
 
-  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly
-  /// inside, as the density is constant there: exactly in proportion to the density, which is the pdf.
+  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value, and a point evenly in
+  /// the pixel. The result is exactly in proportion to the density, which is the pdf.
   ///
-  /// Stored masses are rounded up by at most a sixteenth: with the difference's share another block is drawn, from the digits
-  /// of `xi` that are left (one in forty on average). O(16 columns), and O(256 columns) with that share and with the share of
-  /// pixels next to negative ones.
+  /// Stored masses are rounded up, by at most a sixteenth. Where `xi` falls into the excess, another block is drawn with the
+  /// digits of `xi` that are left: one time in forty on average. O(16 columns). O(256 columns) where `xi` falls into the excess
+  /// or into mass that negative pixels of the same row hide.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const;
 
   /// Average over a box of half vectors, >= 0, 0 if the box is empty; O(columns) for each block that the box covers.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const { return finitePositive(signedMean(p, range)); }
 
-  /// Density with what the approximation leaves below zero. Not checked: infinite, or no number, if numbers of the file are.
+  /// Density that keeps negative pixels. Infinite or NaN where numbers of the file are.
   GLINT_HD float signedDensity(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     if (fromTexels(p)) return below_.density(p, h);
@@ -90,9 +90,9 @@ class CpNdf {
  private:
   static constexpr std::size_t kNone = ~std::size_t{0};
 
-  /// A slice of a cluster. cluster: kNone when the image has nothing in the block.
+  /// A slice and its cluster.
   struct SlicePlace {
-    std::size_t cluster = kNone;
+    std::size_t cluster = kNone;  ///< kNone: the image has no slice in the block
     std::uint64_t slice = 0;
   };
 
@@ -100,7 +100,8 @@ class CpNdf {
     return std::size_t{ndf_.first_image[slice.level]} + slice.image;
   }
 
-  /// @param block_place  as in NdfCp
+  /// Finds the slice of an image in a block.
+  /// @param block_place  place of the block (NdfCp)
   GLINT_HD SlicePlace findSlice(std::size_t image, int block_place) const {
     const std::size_t at =
         static_cast<std::size_t>(ndf_.image_regions.data()[image]) * static_cast<std::size_t>(ndf_.places) + block_place;
@@ -111,17 +112,18 @@ class CpNdf {
     return {at, ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(setBits(mask & (bit - 1)))};
   }
 
-  /// Negative values of a slice: kept, or taken as 0.
+  /// Keeps negative values of a slice.
   struct Signed {
     GLINT_HD float operator()(float value) const { return value; }
     GLINT_HD Float4 operator()(Float4 values) const { return values; }
   };
+  /// Takes negative values of a slice as 0.
   struct Positive {
     GLINT_HD float operator()(float value) const { return std::max(0.0f, value); }
     GLINT_HD Float4 operator()(Float4 values) const { return values.positive(); }
   };
 
-  /// What is asked of a block: one pixel, or the sum over a box of pixels.
+  /// Asks a block for one pixel.
   template <class Reader>
   struct PixelOf {
     Reader reader;
@@ -144,6 +146,7 @@ class CpNdf {
       return spotsAt(profile, list, place.x, place.y);
     }
   };
+  /// Asks a block for the sum over a box of pixels.
   template <class Reader>
   struct BoxOf {
     Reader reader;
@@ -162,15 +165,16 @@ class CpNdf {
     GLINT_HD float spots(const SpotProfile& profile, const SpotList& list) const { return spotsIn(profile, list, box); }
   };
 
-  /// Where the slices of the chosen images are. Weights include the scales of images, and are 0 where an image has no slice, or
-  /// where no more images are chosen.
+  /// Slices of the chosen images in one block. Weights include the scales of images. A weight is 0 where the image has no
+  /// slice, and beyond the number of chosen images.
   struct SlicePlaces {
     std::uint32_t clusters[PyramidSlices::kMost];
     std::uint32_t slices[PyramidSlices::kMost];
     float weights[PyramidSlices::kMost] = {};
   };
 
-  /// Nothing branches on what is stored: that cannot be predicted.
+  /// Finds the slices of the chosen images in a block. Has no branch on whether an image has a slice: processors cannot predict
+  /// it.
   GLINT_HD SlicePlaces findSlices(const PyramidSlices& chosen, int block, const float* scales) const {
     SlicePlaces out;
     const unsigned block_place = ndf_.block_places.data()[block];
@@ -191,8 +195,8 @@ class CpNdf {
     return out;
   }
 
-  /// Weighted sum over the chosen images. What it reads is asked for together before it is read.
-  /// @param scales  of images
+  /// Weighted sum over the chosen images. Prefetches all slices first, so that their cache misses overlap.
+  /// @param scales  factors of images, [images]
   /// @param ask     PixelOf or BoxOf
   /// @param part    Signed or Positive
   template <class Ask, class Part>
@@ -203,7 +207,7 @@ class CpNdf {
     return sumSlices(places, ask, part);
   }
 
-  /// Weighted sum over slices. Those of the same cluster, as those of neighbours mostly are, share its projection.
+  /// Weighted sum over slices. Slices of the same cluster share one projection; neighbouring images mostly are in one cluster.
   template <class Ask, class Part>
   GLINT_HD float sumSlices(const SlicePlaces& places, const Ask& ask, Part part) const {
 #ifdef GLINT_AVX2
@@ -250,7 +254,7 @@ class CpNdf {
           sum += places.weights[first] * part(ask.reader.dot(projection, layout, rows(places.slices[first])));
           continue;
         }
-        // Lanes of other clusters repeat one of this, and weigh nothing.
+        // Four slices are read at once. Lanes of other clusters repeat a slice of this cluster, with weight 0.
         const auto lane = [&](int k) { return rows(places.slices[lanes >> k & 1 ? step + k : first]); };
         sum += (shares(step) * part(ask.reader.dots(projection, layout, {lane(0), lane(1), lane(2), lane(3)}))).sum();
       }
@@ -260,7 +264,8 @@ class CpNdf {
 
   static GLINT_HD unsigned lanesAbove0(Float4 weights) { return ~weights.notAbove(0) & 15u; }
 
-  /// Weighted sum over the slices `here` of a cluster of spots.
+  /// Weighted sum over slices of a cluster of spots.
+  /// @param here  bit k: slice k of `places` is in the cluster
   template <class Ask, class Part>
   GLINT_HD float addSpots(const NdfCluster& cluster, const SlicePlaces& places, unsigned here, const Ask& ask,
                           Part part) const {
@@ -273,7 +278,7 @@ class CpNdf {
     return sum;
   }
 
-  /// A sample on its way: chooseImage, chooseBlock, findBlockSlice and choosePixel make it, in this order.
+  /// A sample that is being drawn: chooseImage, chooseBlock, findBlockSlice and choosePixel fill it in this order.
   struct Draw;
   GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const;
   GLINT_HD void chooseBlock(Draw& draw) const;
@@ -281,7 +286,7 @@ class CpNdf {
   template <class Reader>
   GLINT_HD void choosePixel(const Reader& reader, Draw& draw) const;
 
-  /// Sums of the rows of a slice and single rows of pixels: of columns, or of spots.
+  /// Sums of the rows of a slice and single rows of its pixels, for clusters of columns and for clusters of spots.
   template <class Reader>
   class SliceRows {
    public:
@@ -293,14 +298,14 @@ class CpNdf {
         reader.sliceWeights(cluster_, reader.row(cluster_, at.slice), weights_);
     }
 
-    /// What is surely in each row: less by what lies below zero there.
+    /// A lower bound of the mass of each row: its sum with negative pixels included.
     GLINT_HD Float16 leastSums() const {
       return cluster_.columns == 0 ? spotRowSums(profile_, spots_) : reader_.rowSums(cluster_, weights_).positive();
     }
-    /// What is in each row besides. Decodes all pixels.
+    /// The mass of each row beyond `least`, with negative pixels taken as 0. Decodes all pixels.
     GLINT_HD Float16 addedSums(const Float16& least) const {
       float pixels[kBlockPixels];
-      if (cluster_.columns == 0)  // nothing is below zero
+      if (cluster_.columns == 0)  // no pixel of spots is negative
         std::fill(pixels, pixels + kBlockPixels, 0.0f);
       else
         reader_.block(cluster_, weights_, pixels);
@@ -321,11 +326,12 @@ class CpNdf {
 
   /// Chooses a pixel of the chosen block in proportion to its value: its row with xi.y, its column with xi.x.
   ///
-  /// Sums of whole rows are cheap, but count what lies below zero: where they are positive, the row has at least that. So a
-  /// number below their total chooses a row by them. One above it chooses by what else the rows have, which takes all pixels,
-  /// or falls into what the stored mass is too large by.
-  /// @param last_try  whether no other block can be drawn: one in a million; then rows are chosen by their sums alone
-  /// @return false: another block is to be drawn with what is left of xi
+  /// The stored mass of the block has three parts, and xi.y falls into one of them:
+  ///  1. Lower bounds of the rows (leastSums). They are cheap, and choose the row.
+  ///  2. The rest of the rows' mass, which negative pixels hide (addedSums). Chooses the row after decoding all pixels.
+  ///  3. The excess from rounding the stored mass up. No pixel is chosen.
+  /// @param last_try  whether this is the last block that is tried (one in a million); then lower bounds alone choose the row
+  /// @return false in case 3: the caller draws another block with the digits of xi that are left
   template <class Reader>
   GLINT_DEVICE_CALL GLINT_HD bool choosePixelOfBlock(const Reader& reader, bool last_try, Draw& draw) const;
   template <class Reader>
@@ -338,11 +344,11 @@ class CpNdf {
 
 struct CpNdf::Draw {
   Vec2 xi;
-  float total = 0;  ///< weights of the images that have any density
+  float total = 0;  ///< sum of the weights of images that have any density
   bool possible = false;
   std::size_t image = 0;
   int block = 0, block_place = 0;
-  float mass = 0;  ///< of the block, as stored: at least its share of the image
+  float mass = 0;  ///< stored mass of the block: at least its share of the image
   SlicePlace slice;
   PixelPlace place = {0, -1, -1};  ///< x = -1: nothing can be drawn
 };
@@ -351,7 +357,7 @@ inline GLINT_HD CpNdf::Draw CpNdf::chooseImage(const PyramidSlices& chosen, Vec2
   Draw draw;
   draw.xi = clampUnit(xi);
   float weights[PyramidSlices::kMost];
-  for (int k = 0; k < chosen.count; ++k) {  // images of which nothing was kept have no density
+  for (int k = 0; k < chosen.count; ++k) {  // images without a positive pixel have no density
     weights[k] = ndf_.density_scales.data()[imageOf(chosen[k])] > 0 ? chosen.weights[k] : 0.0f;
     draw.total += weights[k];
   }
@@ -364,7 +370,7 @@ inline GLINT_HD CpNdf::Draw CpNdf::chooseImage(const PyramidSlices& chosen, Vec2
   return draw;
 }
 
-/// In proportion to its stored mass, with xi.y.
+/// Chooses a block in proportion to its stored mass, with xi.y.
 inline GLINT_HD void CpNdf::chooseBlock(Draw& draw) const {
   if (!draw.possible) return;
   const std::uint32_t* first = ndf_.first_block.data() + draw.image;
@@ -387,7 +393,7 @@ inline GLINT_HD void CpNdf::findBlockSlice(Draw& draw) const {
 template <class Reader>
 GLINT_HD bool CpNdf::choosePixelOfBlock(const Reader& reader, bool last_try, Draw& draw) const {
   const auto resolution = static_cast<float>(shape().resolution);
-  float mass = draw.mass * 0.25f * resolution * resolution / ndf_.density_scales.data()[draw.image];  // in pixels
+  float mass = draw.mass * 0.25f * resolution * resolution / ndf_.density_scales.data()[draw.image];  // sum of pixels
   const SliceRows<Reader> rows(ndf_, reader, draw.slice);
   Float16 sums = rows.leastSums();
   float total = sums.sum(), reached = draw.xi.y * (last_try ? total : mass);
@@ -423,7 +429,7 @@ GLINT_HD void CpNdf::choosePixelBy(const Reader& reader, Draw& draw) const {
   }
 }
 
-// Behind the class: clang instantiates the templates that it calls only once it has read them.
+// Defined after the templates that it calls, because clang instantiates only templates that it has read.
 inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) const {
   if (fromTexels(p)) return below_.sample(p, clampUnit(xi));
   const PyramidSlices chosen = chooser_.choose(p);
@@ -432,7 +438,7 @@ inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) cons
   findBlockSlice(draw);
   if (!draw.possible) return {};
   return withReader(ndf_, [&]<class Reader>(const Reader& reader) -> HalfVectorSample {
-    // What the pdf reads is on its way while the pixel is chosen.
+    // Prefetches the slices that the pdf needs; they arrive while the pixel is chosen.
     const int block = draw.block;
     SlicePlaces places = findSlices(chosen, block, ndf_.density_scales.data());
     for (int k = 0; k < PyramidSlices::kMost; ++k)

@@ -14,16 +14,18 @@ namespace glint {
 struct SpotList {
   const NdfSpot* spots;
   int count;
-  float scale;  ///< of weights
-  float rest;   ///< density of what is no spot
+  float scale;  ///< factor of NdfSpot::weight
+  float rest;   ///< even density of the mass that is in no spot
 };
 
+/// Sum of the eight bytes of a word.
 inline GLINT_HD std::uint32_t sumOfBytes(std::uint64_t bytes) {
   constexpr std::uint64_t kEven = 0x00ff00ff00ff00ffu;
   const std::uint64_t pairs = (bytes & kEven) + (bytes >> 8 & kEven);
   return static_cast<std::uint32_t>(pairs * 0x0001000100010001u >> 48);
 }
 
+/// Finds the spots of a slice: the group of kSpotGroup slices has a running count, and the counts before the slice are summed.
 inline GLINT_HD SpotList spotsOf(const NdfCp& ndf, const NdfCluster& cluster, std::uint64_t slice) {
   const auto* first = static_cast<const std::uint8_t*>(ndf.coefficients) + cluster.first_coefficient;
   const std::uint8_t* counts = first + spotCountsOffset(cluster.slice_count);
@@ -31,7 +33,7 @@ inline GLINT_HD SpotList spotsOf(const NdfCp& ndf, const NdfCluster& cluster, st
   const int inside = static_cast<int>(slice % kSpotGroup);
   std::uint32_t before;
   std::memcpy(&before, first + 4 * group, sizeof before);
-  std::uint64_t low, high;  // what is read beyond the counts is masked
+  std::uint64_t low, high;  // counts of 16 slices; the masks below drop the slice itself and all bytes after it
   std::memcpy(&low, counts + group * kSpotGroup, sizeof low);
   std::memcpy(&high, counts + group * kSpotGroup + 8, sizeof high);
   low &= inside >= 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << 8 * inside) - 1;
@@ -42,7 +44,7 @@ inline GLINT_HD SpotList spotsOf(const NdfCp& ndf, const NdfCluster& cluster, st
           scales[1] * blockMass(counts[cluster.slice_count + slice])};
 }
 
-/// Profiles of spots: shares of a spot along one axis.
+/// The profile of a spot along one axis: shares of its weight, by position of its centre (`place`: NdfSpot::x or y).
 class SpotProfile {
  public:
   GLINT_HD explicit SpotProfile(const NdfCp& ndf) : sums_(ndf.spot_sums.data()) {}
