@@ -21,7 +21,8 @@ struct CompactCounts {
   GLINT_HD std::uint64_t operator[](std::size_t k) const { return bases.data()[k >> shift] + offsets.data()[k]; }
 };
 
-/// How a texel is packed in 32 bits, from the lowest: column, row, and place along x and y.
+/// Layout of a texel in 32 bits. Fields from the lowest bit on: column, row, and the position of the normal in its block
+/// along x and along y (the place).
 struct TexelCode {
   int column_bits = 0;
   int row_bits = 0;
@@ -43,8 +44,8 @@ struct TexelCode {
   }
 };
 
-/// Column and row in the map and place in the bin, as precise as a texel's bin keeps it at best. Maps whose columns and rows
-/// need more than kMaxPositionBits together have no code: place_bits is -1.
+/// The layout with column and row in the whole map. The bits that remain are the largest precision of places. Maps whose
+/// columns and rows need more than kMaxPositionBits together have no code: place_bits is -1.
 GLINT_HD constexpr TexelCode texelCode(int width, int height) {
   const auto bits = [](int size) {
     int count = 0;
@@ -66,7 +67,7 @@ struct CellGrid {
   int columns = 1;
 };
 
-/// The grid of 2^cell_bits cells over a map: cells as square as powers of two allow.
+/// The grid of 2^cell_bits cells over a map. Cells are as square as powers of two allow.
 /// @param cell_bits  at most column_bits + row_bits
 GLINT_HD constexpr CellGrid cellGrid(const TexelCode& code, int cell_bits) {
   int across = (cell_bits + code.column_bits - code.row_bits + 1) / 2;
@@ -77,9 +78,9 @@ GLINT_HD constexpr CellGrid cellGrid(const TexelCode& code, int cell_bits) {
   return {code.column_bits - across, code.row_bits - (cell_bits - across), 1 << across};
 }
 
-/// Code of the texels of a block of 2^side_bits x 2^side_bits bins with 2^cell_bits cells: column and row in the cell, place in
-/// the block. A place in a bin takes place_bits - side_bits bits along each axis, as many as `map`, the map's texelCode, has if
-/// there is room for them; fewer than 0 if there is none for the bin.
+/// Layout of the texels of a block of 2^side_bits x 2^side_bits bins with 2^cell_bits cells: column and row in the cell, place
+/// in the block. place_bits - side_bits bits of a place tell normals of one bin apart: as many as the texelCode of the map has,
+/// if they fit. The difference is negative if not even the number of the bin fits.
 GLINT_HD constexpr TexelCode blockCode(const TexelCode& map, int side_bits, int cell_bits) {
   const CellGrid grid = cellGrid(map, cell_bits);
   const int left = (32 - grid.column_shift - grid.row_shift) / 2 - side_bits;
@@ -88,15 +89,15 @@ GLINT_HD constexpr TexelCode blockCode(const TexelCode& map, int side_bits, int 
 
 /// The texels of a normal map, listed by the directions of their normals (Atanasov 2021, section 5.4).
 ///
-/// The square [-1, 1]^2 has bins_per_axis^2 bins. They are listed by block: squares of 2^s x 2^s neighbouring bins, larger
-/// where few normals are. A block's texels lie in a grid of cells over the map, a power of two of them (see `cellGrid`), and
-/// its list is sorted by cell, row by row. Small footprints meet one or two cells of each block, and few blocks have bins near
-/// a half vector.
+/// The square [-1, 1]^2 has bins_per_axis^2 bins. A block is a square of 2^s x 2^s neighbouring bins, larger where few normals
+/// are, with a list of the texels whose normals lie in it. Each block divides the map into a grid of 2^cell_bits cells
+/// (`cellGrid`), and its list is sorted by cell, row by row. So a query reads little: few blocks have bins near a half vector,
+/// and a small footprint meets one or two cells of each.
 ///
-/// Blocks are the leaves of quadtrees: tiles of 2^tile_bits x 2^tile_bits bins, row by row, each with the node of its number as
-/// root. The four children of a node are those with lower and higher columns and lower and higher rows, in the order (low,
-/// low), (high, low), (low, high), (high, high). The *key* of a bin counts bins in the order of the quadtrees: 4^tile_bits of
-/// each tile.
+/// Blocks are the leaves of quadtrees. Each tile of 2^tile_bits x 2^tile_bits bins has a quadtree; tiles are numbered row by
+/// row, and node number t is the root of tile t. The four children of a node are in the order (low column, low row), (high,
+/// low), (low, high), (high, high). The *key* of a bin is its number in the order of the quadtrees; each tile has 4^tile_bits
+/// keys.
 struct BinMap {
   int width = 0;        ///< texels
   int height = 0;       ///< texels
@@ -120,7 +121,8 @@ struct BinMap {
   CompactCounts cell_starts;              ///< [cells + 1]: place in `texels` of each cell, of all blocks in order
   std::span<const std::uint32_t> texels;  ///< [height * width]: blockCode
 
-  /// Bins are also grouped in at most kMaxClasses classes of consecutive keys, for the way from a texel to its block.
+  /// Finding the block of a texel: bins are grouped in at most kMaxClasses classes of consecutive keys, and each texel stores
+  /// its class.
   static constexpr int kClassBits = 12;
   static constexpr int kMaxClasses = 1 << kClassBits;
   std::span<const std::uint32_t> class_keys;     ///< [classes + 1]: first key of each class; then keyCount()

@@ -14,31 +14,31 @@
 
 namespace glint {
 
-/// A facet, or several that are answered as one.
+/// A facet, or the facets of a block answered as one.
 struct BinFacet {
   double weight = 0;  ///< share of the footprint
   Vec2 normal;
-  Covariance spread;  ///< of the normals that it stands for, squared disk units; 0 for a single texel
+  Covariance spread;  ///< covariance of the normals of the facets, squared disk units; 0 for a single texel
 };
 
 /// The NDF from an inverse bin map (Atanasov 2021): exact shares of the footprint for every texel near the half vector.
 ///
-/// Each texel in reach counts with its own normal, kept to a fraction of a bin (see blockCode). A block that holds more than a
-/// few hundred texels of the footprint, and is no wider than the lobe allows, counts as one Gaussian with the mean and
-/// covariance of its normals inside the footprint; between kFewTexels and kManyTexels the two are blended, so
-/// that the density is continuous in footprint and half vector. Lobes are those of FacetLobe.
+/// Each texel in reach has a lobe (FacetLobe) around its own normal, which is stored to a fraction of a bin (blockCode). Where
+/// a block has more than kManyTexels texels in the footprint, and is no wider than the lobe allows, one Gaussian replaces them,
+/// with the mean and covariance of their normals. Between kFewTexels and kManyTexels both answers are blended, so that the
+/// density is continuous in footprint and half vector.
 ///
-/// Boxes are answered exactly, Gaussians by the box of the same second moments: see TexelCover, also for boxes without area and
-/// boxes larger than the map. Thread-safe, allocates nothing; the arrays must outlive it.
+/// Boxes are answered exactly, Gaussians by the box of the same second moments. TexelCover also says how boxes without area and
+/// boxes larger than the map are answered. Thread-safe, allocates nothing; the arrays must outlive it.
 class BinMapNdf {
  public:
-  /// Blocks with fewer texels than this in the footprint are summed texel by texel, those with more than kManyTexels at once.
+  /// Blocks with fewer texels in the footprint are summed texel by texel, blocks with more than kManyTexels as one Gaussian.
   static constexpr double kFewTexels = 256;
   static constexpr double kManyTexels = 512;
-  /// A block's Gaussian is wider than a facet's lobe: bins this far from the half vector are asked, in deviations.
+  /// Distance, in deviations of a facet's lobe, up to which bins are asked. The Gaussian of a block is wider than the lobe.
   static constexpr float kBinReach = 5.5f;
 
-  /// Of the smallest roughness that the map is made for.
+  /// The NDF of the smallest roughness that the map is made for.
   GLINT_HD explicit BinMapNdf(const BinMap& map) : BinMapNdf(map, map.alpha_min) {}
   /// @param alpha  Beckmann roughness of the facets, alpha_min to alpha_max of the map
   GLINT_HD BinMapNdf(const BinMap& map, float alpha) : blocks_(map), sigma_(alpha * kInvSqrt2), wider_(alpha / map.alpha) {
@@ -67,8 +67,9 @@ class BinMapNdf {
     return finitePositive(static_cast<float>(sum / range.area()));
   }
 
-  /// A half vector with the density of the footprint (Atanasov 2021, section 5.3 and Eq. 18): a point of the footprint, the
-  /// normal of its texel, and a point of its lobe. The leading digits of xi choose the point, the others the lobe.
+  /// Draws a half vector (Atanasov 2021, section 5.3 and Eq. 18): a point of the footprint, then a point of the lobe around the
+  /// normal of the texel there. The leading digits of xi choose the point of the footprint, the other digits the point of the
+  /// lobe.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     Vec2 normal;
     if (!sampleNormal(p, xi, normal)) return {};
@@ -77,8 +78,8 @@ class BinMapNdf {
     return drawnAt(h, density(p, h));
   }
 
-  /// The normal of the texel at a point of the footprint, even over it. Uses up the leading digits of xi and leaves the others,
-  /// even in [0, 1)^2.
+  /// The normal of the texel at a point drawn evenly from the footprint. Uses up the leading digits of xi; the digits that are
+  /// left are again uniform in [0, 1)^2.
   GLINT_HD bool sampleNormal(const Footprint& p, Vec2& xi, Vec2& normal) const {
     xi = clampUnit(xi);
     const TexelCover cover(p, map().width, map().height);
@@ -107,8 +108,8 @@ class BinMapNdf {
     return window.weights(areas, 1 / cover.area());
   }
 
-  /// Visits what of a footprint has normals in reach of a box of half vectors: visitor(BinFacet). Weights are shares of the
-  /// footprint; those of normals out of reach are missing.
+  /// Calls visitor(BinFacet) for the facets of a footprint whose normals are in reach of a box of half vectors. Weights are
+  /// shares of the footprint; they sum to less than 1 where other normals are out of reach.
   template <class Visitor>
   GLINT_HD void forEachFacet(const Footprint& p, const Box2& support, Visitor&& visitor) const {
     const TexelCover cover(p, map().width, map().height);
@@ -126,13 +127,13 @@ class BinMapNdf {
 
  private:
   static constexpr float kStrata = 4096;
-  /// Blocks count as one facet for lobes that are not much narrower than those that bins as wide as the block are made for.
+  /// Blocks count as one facet unless the lobe is much narrower than the lobe for which bins as wide as the block are made.
   static constexpr double kNarrowestMerged = 0.9;
 
   /// A box of half vectors, and how far from it a normal counts.
   struct BinReach {
     GLINT_HD BinReach(const Box2& box, float distance) : support(box), radius(distance) {}
-    /// Whether some of a square is in reach.
+    /// Whether a part of a square is in reach.
     GLINT_HD bool meets(Vec2 low, float side) const {
       const float dx = std::max({low.x - support.high.x, support.low.x - low.x - side, 0.0f});
       const float dy = std::max({low.y - support.high.y, support.low.y - low.y - side, 0.0f});
@@ -144,7 +145,7 @@ class BinMapNdf {
 
   static GLINT_HD float fraction(float x) { return x - std::floor(x); }
 
-  /// Row or column of bins at a coordinate, those outside the square moved to its border.
+  /// Row or column of bins at a coordinate; coordinates outside the square are moved to its border.
   GLINT_HD int binAt(float x) const {
     const auto last = static_cast<float>(map().bins_per_axis - 1);
     return static_cast<int>(std::clamp((x + 1) * 0.5f * static_cast<float>(map().bins_per_axis), 0.0f, last));
@@ -156,15 +157,16 @@ class BinMapNdf {
             binAt(box.high.y + reach.radius) + 1};
   }
 
-  /// Texels of a footprint's bounding box: more than an int may hold.
+  /// Number of texels in a footprint's bounding box. An int could overflow.
   static GLINT_HD double boxTexels(const TexelCover& cover) { return 1.0 * cover.columns() * cover.rows(); }
 
-  /// Texels of one row of a footprint's bounding box: (x, y) in its coordinates is (column, row) of the map.
+  /// Texels in one row of a footprint's bounding box. The first has coordinates (x, y) of the footprint and is texel
+  /// (column, row) of the map.
   struct TexelRow {
     int x, y, column, row, count;
   };
 
-  /// Calls visitor(TexelRow) for all texels of a footprint's bounding box, at most kMostAtOnce together.
+  /// Calls visitor(TexelRow) for all texels of a footprint's bounding box, at most kMostAtOnce texels in a call.
   template <class Visitor>
   GLINT_HD void forEachTexelRow(const TexelCover& cover, Visitor&& visitor) const {
     for (int y = 0, j = cover.originY(); y < cover.rows(); ++y, j = j + 1 < map().height ? j + 1 : 0) {
@@ -177,7 +179,7 @@ class BinMapNdf {
     }
   }
 
-  /// Asks for the classes of a small footprint, whose rows are far apart in memory.
+  /// Asks the memory for the classes of a small footprint: its rows are far apart in memory.
   GLINT_HD void prefetchClasses(const TexelCover& cover) const {
     constexpr int kMostRows = 40;
     if (cover.rows() > kMostRows) return;
@@ -207,7 +209,7 @@ class BinMapNdf {
     });
   }
 
-  /// For footprints of few texels, which none of the blocks would be merged for: looks up every texel.
+  /// Looks up every texel. For footprints of so few texels that no block counts as one facet.
   template <class Visitor>
   GLINT_HD void forEachFacetByTexel(const TexelCover& cover, const BinReach& reach, Visitor& visitor) const {
     prefetchClasses(cover);
@@ -223,7 +225,7 @@ class BinMapNdf {
     });
   }
 
-  /// Whether looking up every texel of the footprint is cheaper than reading lists. Nanoseconds, about.
+  /// Whether looking up every texel of the footprint is cheaper than reading lists. Costs are nanoseconds, roughly.
   GLINT_HD bool shorterByTexel(const TexelCover& cover, const WindowBlocks& near) const {
     constexpr double kTexelCost = 1, kRowCost = 20, kTurnedCost = 6, kFindCost = 180;
     constexpr double kFirstCost = 250, kBlockCost = 50, kListCost = 0.3, kCellRowCost = 45;
@@ -236,7 +238,7 @@ class BinMapNdf {
       texels += size;
       found += size * (near.blocks[k].side_bits > 0 ? kFindCost : cover.aligned() ? 0 : kTurnedCost);
     }
-    // Lists are read up to a cell around the border; a cell holds 1 to 2 leaves.
+    // Reading lists also reads the texels of a cell around the border; a cell has one to two times leaf_size texels.
     const double all = static_cast<double>(map().texels.size());
     const double cell = std::sqrt(all * 1.5 * map().leaf_size * near.count / std::max(texels, 1.0));
     const double border = 2 * (cover.columns() + cover.rows()) * cell + 2 * cell * cell;
@@ -249,7 +251,7 @@ class BinMapNdf {
   /// Slots for texels in no bin of the window, and from kShared on for texels of a block of several bins.
   static constexpr std::uint8_t kNoSlot = BinWindow::kSlots, kShared = kNoSlot + 1;
 
-  /// Looks at the class of every texel, which is the number of its block.
+  /// Looks at the class of every texel. Used where each class is one block, so that the class is the number of the block.
   GLINT_HD void addByTexel(const TexelCover& cover, const BinWindow& window, const WindowBlocks& near, double* areas) const {
     prefetchClasses(cover);
     std::uint8_t slots[BinMap::kMaxClasses];
@@ -290,10 +292,10 @@ class BinMapNdf {
     return inside ? dy * BinWindow::kSide + dx : int{kNoSlot};
   }
 
-  /// For boxes along the axes each texel is counted, without branches, in the slot of its class.
+  /// Footprints with sides along the axes: counts each texel, without branches, in the slot of its class.
   GLINT_HD void addAlignedTexels(const TexelCover& cover, const std::uint8_t* slots, double* areas) const {
-    // Counts of four texels in turn, since an increment waits for the last one of the same slot; flushed where a row's height
-    // changes.
+    // Four texels count in four arrays, so that an increment need not wait for the previous increment of its slot. Counts are
+    // added to the areas where the covered height of rows changes.
     std::uint32_t counts[4][kNoSlot + 1] = {};
     const BoxSides sides(cover);
     int last_y = 0;
@@ -326,7 +328,7 @@ class BinMapNdf {
     flush(sides.row(last_y));
   }
 
-  /// Everything is asked for before it is read: the processor then waits for all blocks together, not for one after the other.
+  /// Reads the lists of the window's blocks. Prefetches all of them first, so that their cache misses overlap.
   GLINT_FLATTEN GLINT_HD void addByBlock(const TexelCover& cover, const BinWindow& window, const WindowBlocks& near,
                                          double* areas) const {
     CellRows rows;
@@ -343,7 +345,7 @@ class BinMapNdf {
     return {-1 + static_cast<float>(block.column) * bin_size_, -1 + static_cast<float>(block.row) * bin_size_};
   }
 
-  /// Side of the square of normals that a place stands for.
+  /// Side of the square of normals that share one place of a code.
   GLINT_HD float placeSize(const BinBlock& block, const TexelCode& code) const {
     return bin_size_ / static_cast<float>(1 << (code.place_bits - block.side_bits));
   }
@@ -353,8 +355,8 @@ class BinMapNdf {
                                                          static_cast<float>(code.placeY(texel)) + 0.5f};
   }
 
-  /// How far a block counts as one facet. Lobes that are wider than the block needs want fewer texels in it for the same error;
-  /// footprints of few texels merge nothing, as when they are looked up texel by texel.
+  /// Weight, 0 to 1, with which a block counts as one facet. The wider lobes are against the block, the fewer texels are needed
+  /// for the same error. Is 0 in footprints of few texels, so that the answer equals looking up texel by texel.
   GLINT_HD double mergedShare(const TexelCover& cover, const BinBlock& block) const {
     const double wider = double{wider_} / block.side();
     if (wider < kNarrowestMerged) return 0;
@@ -376,7 +378,7 @@ class BinMapNdf {
     return moments;
   }
 
-  /// The texels of a block that are in a footprint as one facet, weighted by their area.
+  /// One facet for the texels of a block that are in the footprint; its weight is their covered area.
   GLINT_DEVICE_CALL GLINT_HD BinFacet blockFacet(const TexelCover& cover, const BinBlock& block, CellRows& rows) const {
     const TexelCode code = blocks_.code(block);
     PlaceMomentSum sum(map().texels.data(), cover, code, blocks_.begin(block), blocks_.end(block), momentsOf(block, code));
@@ -394,7 +396,7 @@ class BinMapNdf {
             {static_cast<float>(squared * xx), static_cast<float>(squared * xy), static_cast<float>(squared * yy)}};
   }
 
-  /// Passes on the texels of a block, in reach and in the footprint, as facets.
+  /// A visitor of runs that makes one facet of each texel that is in reach and in the footprint.
   template <class Visitor>
   class EachTexel {
    public:
@@ -442,10 +444,10 @@ class BinMapNdf {
     TexelCode code_;
     double scale_;
     Visitor& visitor_;
-    IndexRange columns_, rows_;  ///< places in reach
+    IndexRange columns_, rows_;  ///< range of places whose normals are in reach
   };
 
-  /// Passes on the facets of one block.
+  /// Calls visitor(BinFacet) for the facets of one block.
   template <class Visitor>
   GLINT_HD void visitBlock(const TexelCover& cover, const BinBlock& block, const BinReach& reach, CellRows& rows,
                            Visitor& visitor) const {
@@ -466,7 +468,7 @@ class BinMapNdf {
     return FacetLobe::density({squared + f.spread.xx, f.spread.xy, squared + f.spread.yy}, h - f.normal);
   }
 
-  /// Mass of a facet's lobe in a box, as of a whole Gaussian: within 1e-4 of that of the lobe.
+  /// Mass of a facet in a box. Takes the lobe for a Gaussian that does not end, which is right to 1e-4.
   GLINT_HD double mass(const BinFacet& f, const Box2& box) const {
     return gaussianMass(box.low.x, box.high.x, f.normal.x, std::sqrt(sigma_ * sigma_ + f.spread.xx)) *
            gaussianMass(box.low.y, box.high.y, f.normal.y, std::sqrt(sigma_ * sigma_ + f.spread.yy));
@@ -487,7 +489,7 @@ class BinMapNdf {
 
   BinBlocks blocks_;
   float sigma_ = 0;
-  float wider_ = 1;  ///< than the lobe that the bins are made for
+  float wider_ = 1;  ///< deviation of the lobe over the deviation that the bins are made for
   float bin_size_ = 0;
   bool block_classes_ = false;  ///< whether the class of a texel is the number of its block
 };

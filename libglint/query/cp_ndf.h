@@ -16,11 +16,11 @@ namespace glint {
 /// The NDF from a compressed pyramid: tensor rank (CP), Tucker-2 or PCA (Deng 2022, sections 4.2 to 4.4).
 ///
 /// Chooses images as PyramidNdf does. A pixel is a sum of products of few factors. The sum over a box of pixels has the same
-/// form, with factors from prefix sums (Eq. 6 and 7). Slices of few facets are stored as a few spots and an even rest instead.
+/// form, with factors from prefix sums (Eq. 6 and 7). Slices of few facets are stored as spots and an even rest instead.
 ///
 /// Approximated pixels can be negative. `density` takes negative pixels as 0, scales the image so that it then integrates to 1,
-/// and is constant over a pixel. `mean` is a difference of prefix sums, which include negative pixels: it is the exact average of
-/// `signedDensity`, clamped at the end. So it is the exact average of `density` only where no pixel is negative.
+/// and is constant over a pixel. `mean` is a difference of prefix sums, which include negative pixels: it is the exact average
+/// of `signedDensity`, clamped at the end. So it is the exact average of `density` only where no pixel is negative.
 /// Thread-safe, allocates nothing; the arrays must outlive it.
 class CpNdf {
   static constexpr int kMostBlocks = 64 * 64;  // blocks of the largest image, 1024^2 pixels

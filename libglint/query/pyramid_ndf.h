@@ -12,8 +12,8 @@ namespace glint {
 /// The NDF from a pyramid of images: exact (pixel means) at the centres of its levels, trilinear between them.
 ///
 /// Footprints are answered as isotropic Gaussians of the same mean square size. With the normals at hand, those below level 0
-/// are answered by Reference; without, level 0 answers. Footprints that are large beside the map tend to its mean (SliceChooser).
-/// The density is constant over a pixel. Thread-safe, allocates nothing; the arrays must outlive it.
+/// are answered by Reference; without, level 0 answers. Footprints that are large beside the map tend to its mean
+/// (SliceChooser). The density is constant over a pixel. Thread-safe, allocates nothing; the arrays must outlive it.
 class PyramidNdf {
  public:
   GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid) : reader_(pyramid), chooser_(pyramid.shape) {}

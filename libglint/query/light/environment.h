@@ -67,9 +67,9 @@ GLINT_HD Rgb supportRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const Spher
 /// section 5.4, with one cell and LobeRange::support).
 ///
 /// The lobe is cut into cells x cells; more follow a wide lobe's shape, and the horizon, more closely. The error is that of the
-/// footprint's NDF varying within a box and of the boxes' alignment. With the default cells and a Beckmann NDF it is 2 % for lobes
-/// of sharpness 30 and more and 7 % from 3 on (tests/unit/environment_test.cpp); a lobe of sharpness 1, half the sky, comes out up
-/// to half as bright again at grazing wo. NDFs of few facets err more: sample wide lobes where that matters.
+/// footprint's NDF varying within a box and of the boxes' alignment. With the default cells and a Beckmann NDF it is 2 % for
+/// lobes of sharpness 30 and more and 7 % from 3 on (tests/unit/environment_test.cpp); a lobe of sharpness 1, half the sky,
+/// comes out up to half as bright again at grazing wo. NDFs of few facets err more: sample wide lobes where that matters.
 /// @param cells  1 to kMostLobeCells; LobeRange::support has one
 /// @return 0 for wo below the horizon and for lobes that are not usable (isUsable)
 template <NdfModel M>

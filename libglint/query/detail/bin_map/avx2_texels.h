@@ -10,9 +10,9 @@
 
 namespace glint {
 
-/// Reads lists eight texels at a time, with the results of SingleTexels: to the bit where no product and sum are fused.
+/// Reads lists eight texels at a time. Results have the same bits as SingleTexels, unless the compiler fuses products and sums.
 struct Avx2Texels {
-  /// PartRange, in all lanes.
+  /// PartRange for eight texels.
   struct Part {
     GLINT_AVX2 explicit Part(const PartRange& r)
         : mask(all(r.mask)),
@@ -34,7 +34,7 @@ struct Avx2Texels {
     __m256 at_low, at_high;
   };
 
-  /// TexelParts.
+  /// TexelParts for eight texels.
   struct Parts {
     GLINT_AVX2 explicit Parts(const TexelParts& parts) : columns(parts.columns), rows(parts.rows) {}
     template <unsigned kCut>
@@ -97,7 +97,7 @@ struct Avx2Texels {
   }
 
  private:
-  /// SlotFields, in all lanes.
+  /// SlotFields for eight texels.
   struct Slots {
     struct Places {
       __m256i slots, inside;
@@ -120,7 +120,7 @@ struct Avx2Texels {
     __m256i mask, first_x, first_y;
   };
 
-  /// PlaceMoments, in lanes.
+  /// PlaceMoments, eight sums each.
   struct Moments {
     GLINT_AVX2 explicit Moments(const PlaceFields& f)
         : shift_x(_mm_cvtsi32_si128(f.shift_x)),
@@ -150,7 +150,7 @@ struct Avx2Texels {
     return _mm_cvtss_f32(_mm_add_ss(two, _mm_shuffle_ps(two, two, 1)));
   }
 
-  /// For each set of lanes their numbers, one after the other, in a byte each.
+  /// For each set of lanes (a mask of 8 bits): the numbers of the lanes in rising order, one per byte.
   static constexpr std::array<std::uint64_t, 256> kLanesOf = [] {
     std::array<std::uint64_t, 256> table{};
     for (unsigned set = 0; set < 256; ++set)
@@ -168,7 +168,7 @@ struct Avx2Texels {
   }
 
   GLINT_AVX2 static __m256i all(std::uint32_t x) { return _mm256_set1_epi32(static_cast<int>(x)); }
-  /// In lanes: a <= most, as numbers without sign.
+  /// In each lane: all ones if a <= most, compared as unsigned numbers.
   GLINT_AVX2 static __m256i notAbove(__m256i a, __m256i most) { return _mm256_cmpeq_epi32(_mm256_min_epu32(a, most), a); }
   GLINT_AVX2 static __m256i firstLanes(int count) {
     return _mm256_cmpgt_epi32(_mm256_set1_epi32(count), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));

@@ -11,7 +11,7 @@
 
 namespace glint {
 
-/// Columns and rows [.._begin, .._end) of bins.
+/// A rectangle of bins: columns and rows from `begin` to before `end`.
 struct BinRect {
   int column_begin = 0, column_end = 0, row_begin = 0, row_end = 0;
 
@@ -20,52 +20,53 @@ struct BinRect {
   }
 };
 
-/// A square of 2^side_bits x 2^side_bits bins with a list of its own.
+/// A block: a square of 2^side_bits x 2^side_bits bins with a list of its texels.
 struct BinBlock {
-  int column, row;  ///< of its first bin
+  int column, row;  ///< lowest column and row of its bins
   int side_bits;
-  int cell_bits;             ///< 2^cell_bits cells
-  std::uint32_t first_cell;  ///< of all cells
-  std::uint32_t number;      ///< among blocks
+  int cell_bits;             ///< the list is divided into 2^cell_bits cells
+  std::uint32_t first_cell;  ///< number of its first cell among the cells of all blocks
+  std::uint32_t number;      ///< number of the block
 
   GLINT_HD int side() const { return 1 << side_bits; }
 };
 
-/// A texel found in its list.
+/// A texel and the block whose list has it.
 struct BinTexel {
   BinBlock block;
-  std::uint32_t code = 0;  ///< blockCode
+  std::uint32_t code = 0;  ///< packed as blockCode says
 };
 
-/// Texels [begin, end) of a block's list that a footprint may meet in part. Column and row of their codes count from (x, y) in
-/// coordinates of the footprint (TexelCover).
+/// Consecutive texels of a block's list, from number `begin` to before `end`. The footprint may cover some of them only in
+/// part, or not at all. Column and row of a code, plus (x, y), are coordinates of the footprint (TexelCover).
 struct TexelRun {
   std::uint64_t begin, end;
   int x, y;
-  bool cut_x,
-      cut_y;  ///< whether sides may cut it along u, and along v; where not, the coordinate does not matter
+  bool cut_x, cut_y;  ///< whether the footprint may begin or end inside the cells, along u and along v; else x, y is unused
 };
 
-/// Cells [first, end) of one row of a block that a footprint meets. Those of [whole, whole_end) are covered completely, or
-/// along u only if `cut_y`.
+/// Cells of one row of a block's grid that a footprint meets: from `first` to before `end`. Cells from `whole` to before
+/// `whole_end` are covered along their whole width; along their height only if not `cut_y`.
 struct CellRow {
   std::uint32_t first, whole, whole_end, end;
-  int x, y;  ///< of cell `first`
+  int x, y;  ///< coordinates of cell `first` in the footprint
   bool cut_y;
 };
 
-/// The cell rows of one footprint, kept for some numbers of cells: neighbouring blocks have alike ones.
+/// A cache of the cell rows of one footprint. Rows depend only on the number of cells of a block, which neighbouring blocks
+/// often share.
 struct CellRows {
   static constexpr int kMost = 32;
   struct Grid {
     int cell_bits = -1;
-    int count = 0;  ///< may be more than are kept
+    int count = 0;  ///< rows that the footprint meets; if more than kMost, `rows` is incomplete
     CellRow rows[kMost];
   };
   Grid grids[4];
 };
 
-/// Finds blocks, their texels and what of them a footprint covers. Allocates nothing; the map's arrays must outlive it.
+/// Finds the blocks of some bins, and the texels of a block that a footprint covers. Allocates nothing; the map's arrays must
+/// outlive it.
 class BinBlocks {
  public:
   GLINT_HD explicit BinBlocks(const BinMap& map)
@@ -75,18 +76,18 @@ class BinBlocks {
   GLINT_HD std::uint32_t texel(std::uint64_t k) const { return map_.texels.data()[k]; }
   /// How the texels of a block are packed.
   GLINT_HD TexelCode code(const BinBlock& block) const { return blockCode(code_, block.side_bits, block.cell_bits); }
-  /// Places of the first texel of a block and behind its last.
+  /// The list of a block: `texel` numbers from begin(block) to before end(block).
   GLINT_HD std::uint64_t begin(const BinBlock& block) const { return map_.cell_starts[block.first_cell]; }
   GLINT_HD std::uint64_t end(const BinBlock& block) const {
     return map_.cell_starts[block.first_cell + (std::uint64_t{1} << block.cell_bits)];
   }
 
-  /// Asks for the tiles of some bins.
+  /// Asks the memory for the tiles of some bins.
   GLINT_HD void prefetchTiles(const BinRect& bins) const {
     forEachTile(bins, [&](int column, int row) { prefetch(node(tileOf(column, row))); });
   }
 
-  /// Calls visitor(BinBlock) for the blocks that some bins are in.
+  /// Calls visitor(BinBlock) for the blocks that contain some bins.
   template <class Visitor>
   GLINT_HD void forEachBlock(const BinRect& bins, Visitor&& visitor) const {
     forEachTile(bins, [&](int column, int row) {
@@ -95,18 +96,18 @@ class BinBlocks {
     });
   }
 
-  /// Splits the part of a block's list that may be in a footprint into runs: visitor.partial(TexelRun) where texels have to be
-  /// looked at, and visitor.whole(begin, end) where all are covered completely. A texel of a footprint larger than the map is
-  /// met once for every period. O(cells along the border).
-  /// @param kept  what was found for other blocks and the same footprint
+  /// Splits the part of a block's list that a footprint can meet into runs. Calls visitor.whole(begin, end) for texels that are
+  /// covered completely, and visitor.partial(TexelRun) for texels that the visitor must look at one by one. Under a footprint
+  /// larger than the map, a texel is in one run for every period that covers it. O(cells along the border).
+  /// @param kept  cache for this footprint, shared between blocks
   template <class Visitor>
   GLINT_HD void forEachRun(const TexelCover& cover, const BinBlock& block, CellRows& kept, Visitor&& visitor) const {
     forEachPiece(cover, block, kept, [&](const Piece& piece) { visitPiece(block.first_cell, piece, visitor); });
   }
 
-  /// The same for several blocks, cell by cell: runs of the same cell follow one another. Calls visitor.select(block) before
-  /// what may be a run of it.
-  /// @param blocks  of any type that has a BinBlock `block`
+  /// Splits the lists of several blocks into runs, cell by cell: runs of the same cell follow one another. Calls
+  /// visitor.select(block) before runs of that block.
+  /// @param blocks  elements have a member BinBlock `block`
   /// @param count   at most 31
   template <class Block, class Visitor>
   GLINT_HD void forEachRun(const TexelCover& cover, const Block* blocks, int count, CellRows& kept, Visitor&& visitor) const {
@@ -129,7 +130,7 @@ class BinBlocks {
     }
   }
 
-  /// Asks for the cells of a block that a small footprint will need.
+  /// Asks the memory for the cells of a block that a small footprint will need.
   GLINT_HD void prefetchCells(const TexelCover& cover, const BinBlock& block, CellRows& kept) const {
     const CellRows::Grid& grid = cellRows(cover, block, kept);
     for (int k = 0; k < std::min(grid.count, 4); ++k) {
@@ -139,7 +140,7 @@ class BinBlocks {
     }
   }
 
-  /// Looks for the texel (column, row) of a class, among its bins in `bins`.
+  /// Looks for the texel (column, row) in the blocks of a class that have bins in `bins`.
   GLINT_HD bool find(std::uint32_t texel_class, std::uint32_t column, std::uint32_t row, const BinRect& bins,
                      BinTexel& found) const {
     const std::uint64_t end = map_.class_keys.data()[texel_class + 1];
@@ -166,12 +167,12 @@ class BinBlocks {
     return true;
   }
 
-  /// Key of the first bin of a tile; of the first of the next if `past`.
+  /// Key of the first bin of a tile; if `past`, of the first bin of the next tile.
   GLINT_HD std::uint32_t tileKey(int bin_column, int bin_row, bool past) const {
     return (tileOf(bin_column >> map_.tile_bits, bin_row >> map_.tile_bits) + (past ? 1 : 0)) << 2 * map_.tile_bits;
   }
 
-  /// The class of a bin's key. O(log classes).
+  /// The class that has a key; O(log classes).
   GLINT_HD std::uint32_t classOf(std::uint32_t key) const {
     std::uint32_t low = 0, count = static_cast<std::uint32_t>(map_.classCount());
     while (count > 1) {  // the class is in [low, low + count)
@@ -185,10 +186,11 @@ class BinBlocks {
   /// Most texels that `texelsOfClasses` answers at once.
   static constexpr int kMostAtOnce = 60;
 
-  /// Bit k: the class of texel index + k is in [first, last], for 0 <= k < count <= kMostAtOnce, all of one row of the map.
+  /// Bit k, for k < count: whether the class of texel index + k is in [first, last].
+  /// @param count  at most kMostAtOnce; all texels are in one row of the map
   GLINT_HD std::uint64_t texelsOfClasses(std::uint64_t index, int count, std::uint32_t first, std::uint32_t last) const {
-    // Four texels at a time, each in 16 bits of a word: additions carry into the highest of these for c >= first, and for c >
-    // last.
+    // Takes four texels at a time, each in 16 bits of a word. The first sum below sets the highest of the 16 bits where the
+    // class is >= first, the second sum where the class is > last.
     constexpr std::uint64_t kOnes = 0x0001000100010001, kHighest = kOnes << 15;
     const std::uint64_t below = (0x8000 - first) * kOnes, above = (0x7fff - last) * kOnes;
     const int head = static_cast<int>(index % 4), end = head + count;
@@ -198,20 +200,22 @@ class BinBlocks {
       const std::uint64_t lanes = fourClasses(begin + static_cast<std::uint64_t>(k));
       const std::uint64_t in = (lanes + below) & ~(lanes + above) & kHighest;
       if (in == 0) continue;
-      constexpr std::uint64_t kGather = 1ull << 48 | 1ull << 33 | 1ull << 18 | 1ull << 3;  // the four bits to bits 48 to 51
+      constexpr std::uint64_t kGather =
+          1ull << 48 | 1ull << 33 | 1ull << 18 | 1ull << 3;  // moves the four bits to bits 48 to 51
       bits |= ((in >> 15) * kGather >> 48 & 15) << k;
     }
     return bits >> head & ((std::uint64_t{1} << count) - 1);
   }
 
-  /// Visits the classes of texels index + k, 0 <= k < count, of one row of the map: one(k, class) or four(k, and four classes).
+  /// Visits the classes of `count` texels of one row of the map, from `index` on: calls one(k, class of index + k), or
+  /// four(k, classes of index + k to index + k + 3).
   template <class One, class Four>
   GLINT_HD void forEachClass(std::uint64_t index, int count, One&& one, Four&& four) const {
     constexpr std::uint64_t kMask = BinMap::kMaxClasses - 1;
     int k = 0;
     for (; k < count && (index + static_cast<std::uint64_t>(k)) % 4 != 0; ++k)
       one(k, texelClass(index + static_cast<std::uint64_t>(k)));
-    // Four texels fill three words.
+    // The classes of four texels fill three words.
     const std::uint16_t* words = map_.texel_classes.data() + (index + static_cast<std::uint64_t>(k)) / 4 * 3;
     for (; k + 4 <= count; k += 4, words += 3) {
       const std::uint64_t packed = words[0] | std::uint64_t{words[1]} << 16 | std::uint64_t{words[2]} << 32;
@@ -247,7 +251,7 @@ class BinBlocks {
       for (int column = bins.column_begin >> bits; column <= (bins.column_end - 1) >> bits; ++column) visitor(column, row);
   }
 
-  /// Makes a block of a node, if it is one.
+  /// Fills a block from its node; false if the node is no block.
   static GLINT_HD bool isBlock(const std::uint32_t* node, BinBlock& block) {
     const std::uint32_t kind = node[0] & ((1u << BinMap::kKindBits) - 1);
     if (kind == BinMap::kEmpty) return false;
@@ -259,14 +263,14 @@ class BinBlocks {
   static GLINT_HD bool isSplit(const std::uint32_t* node) {
     return (node[0] & ((1u << BinMap::kKindBits) - 1)) == BinMap::kSplit;
   }
-  /// The place of a node's child.
+  /// Turns the square of a node into the square of its child.
   static GLINT_HD void descend(BinBlock& block, std::uint32_t quadrant) {
     --block.side_bits;
     block.column += static_cast<int>(quadrant & 1) << block.side_bits;
     block.row += static_cast<int>(quadrant >> 1) << block.side_bits;
   }
 
-  /// Visits the blocks of a tile, not by recursion: GPUs cannot tell how deep a stack that takes.
+  /// Visits the blocks of a tile. Not recursive: compilers for GPUs could not bound the stack.
   template <class Visitor>
   GLINT_HD void visitTile(std::uint32_t tile, const BinBlock& place, const BinRect& bins, Visitor& visitor) const {
     struct Pending {
@@ -283,7 +287,7 @@ class BinBlocks {
         if (isBlock(here, next.block)) visitor(next.block);
         continue;
       }
-      for (std::uint32_t quadrant = 4; quadrant-- > 0;) {  // the first one is the next
+      for (std::uint32_t quadrant = 4; quadrant-- > 0;) {  // pushed last, quadrant 0 is taken next
         BinBlock child = next.block;
         descend(child, quadrant);
         if (bins.meets(child.column, child.row, child.side())) pending[count++] = {here[1] + quadrant, child};
@@ -291,7 +295,7 @@ class BinBlocks {
     }
   }
 
-  /// The block of a key, or where it would be: false if no normals are there.
+  /// Finds the leaf that has a key: false if it has no normals, and then `block` is only its square.
   GLINT_HD bool blockAt(std::uint64_t key, BinBlock& block) const {
     const auto tile = static_cast<std::uint32_t>(key >> 2 * map_.tile_bits), across = static_cast<std::uint32_t>(tiles_);
     block.column = static_cast<int>(tile % across) << map_.tile_bits, block.row = static_cast<int>(tile / across)
@@ -308,7 +312,7 @@ class BinBlocks {
 
   static constexpr std::uint64_t kNowhere = ~std::uint64_t{0};
 
-  /// Place in [from, to) of the texel with some position in its cell.
+  /// Number in [from, to) of the texel that has a column and row; kNowhere if there is none.
   GLINT_HD std::uint64_t findCode(std::uint64_t from, std::uint64_t to, const TexelCode& code, std::uint32_t column,
                                   std::uint32_t row) const {
     constexpr std::uint64_t kRun = 16;
@@ -325,7 +329,8 @@ class BinBlocks {
     return kNowhere;
   }
 
-  /// Classes of texels index to index + 3, a multiple of four, in 16 bits each; 0 beyond the map.
+  /// Classes of texels index to index + 3 in 16 bits each; 0 beyond the map.
+  /// @param index  a multiple of four
   GLINT_HD std::uint64_t fourClasses(std::uint64_t index) const {
     constexpr int kBits = BinMap::kClassBits;
     constexpr std::uint64_t kMask = BinMap::kMaxClasses - 1;
@@ -337,12 +342,13 @@ class BinBlocks {
            (packed & kMask << 3 * kBits) << 12;
   }
 
-  /// Columns and rows [.._begin, .._end) of the map, seen in one period.
+  /// The part of the map that a footprint's bounding box covers in one period. Offsets lead from coordinates of the footprint
+  /// to columns and rows of the map.
   struct Window {
     int offset_x, offset_y, column_begin, column_end, row_begin, row_end;
   };
 
-  /// The cell rows of a block.
+  /// The cell rows of a block, from the cache or added to it.
   GLINT_HD const CellRows::Grid& cellRows(const TexelCover& cover, const BinBlock& block, CellRows& kept) const {
     CellRows::Grid& grid = kept.grids[block.cell_bits % 4];
     if (grid.cell_bits == block.cell_bits) return grid;
@@ -358,7 +364,7 @@ class BinBlocks {
   template <class Visitor>
   GLINT_HD void forEachWindow(const TexelCover& cover, Visitor&& visitor) const {
     for (int y = 0; y < cover.originY() + cover.rows(); y += map_.height) {
-      // Slanted footprints miss most periods of their bounding box.
+      // A slanted footprint misses most periods of its bounding box: its columns in these rows tell which.
       CoverSpan outer, inner;
       cover.spans(std::max(y - cover.originY(), 0), y + map_.height - cover.originY(), outer, inner);
       const int first = floorTo(outer.low, cover.columns()) + cover.originX(), last = floorTo(outer.high, cover.columns());
@@ -382,7 +388,7 @@ class BinBlocks {
         const int last = std::min(w.column_end, floorTo(outer.high, cover.columns()) + 1 + w.offset_x) - 1;
         if (outer.low > outer.high || begin > last) continue;
         const int c0 = begin >> grid.column_shift, c1 = (last >> grid.column_shift) + 1;
-        // Whole cells [i0, i1): both sides rounded inwards.
+        // Cells i0 to before i1 are covered along their width: both ends are rounded inwards.
         int i0 = c1, i1 = c1;
         const bool cut_y = inner.low > inner.high;
         if (cut_y && cover.aligned()) inner = outer;
@@ -399,14 +405,14 @@ class BinBlocks {
     });
   }
 
-  /// Cells [from, to) of a row that are read together.
+  /// Cells of a row that are read as one run: from `from` to before `to`.
   struct Piece {
     std::uint32_t from, to;
     int x, y;
     bool cut_x, cut_y;
   };
 
-  /// The pieces of a block's cells that a footprint meets.
+  /// Visits the pieces of a block's grid that a footprint meets.
   template <class Visitor>
   GLINT_HD void forEachPiece(const TexelCover& cover, const BinBlock& block, CellRows& kept, Visitor&& visitor) const {
     const CellGrid shape = cellGrid(code_, block.cell_bits);
@@ -440,7 +446,7 @@ class BinBlocks {
       visitor.whole(begin, end);
   }
 
-  /// Rounds down what is known to be near [0, limit].
+  /// Rounds down; numbers outside [-1, limit + 1] are clamped to it first.
   static GLINT_HD int floorTo(double x, int limit) { return static_cast<int>(std::floor(std::clamp(x, -1.0, limit + 1.0))); }
 
   BinMap map_;

@@ -10,7 +10,8 @@
 
 namespace glint {
 
-/// Weights of the bins around a half vector: the share of a footprint whose normals are in each (Atanasov 2021, section 5.2).
+/// Weights of the bins around a half vector: the share of the footprint whose normals are in the bin (Atanasov 2021, section
+/// 5.2).
 struct BinWeights {
   static constexpr int kMost = 21;  ///< 5 x 5 without the corners
 
@@ -49,7 +50,7 @@ struct BinWindow {
     return result;
   }
 
-  int column, row;  ///< of the first bin; bins beyond the square are left out: only a broken file has texels there
+  int column, row;  ///< of slot 0; bins outside the square of half vectors are left out, since no valid file has texels there
   int across;
   BinRect bins;
 };
@@ -60,7 +61,7 @@ struct WindowBlocks {
   BinBlock blocks[BinWindow::kSlots];
 };
 
-/// A block and where it lies in a window.
+/// A block and its position in a window.
 struct WindowBlock {
   WindowBlock() = default;
   GLINT_HD WindowBlock(const BinBlock& b, const TexelCode& c, const BinWindow& window)
@@ -73,11 +74,12 @@ struct WindowBlock {
 
   BinBlock block;
   TexelCode code;
-  int slot;  ///< of the first bin; may be outside
+  int slot;  ///< slot of the block's first bin; may be outside the window
   SlotFields fields;
 };
 
-/// What of its border texels a box along the axes covers.
+/// Covered parts of the columns and rows of a footprint's bounding box, for footprints with sides along the axes: less than 1
+/// for the first and the last column and row.
 struct BoxSides {
   GLINT_HD explicit BoxSides(const TexelCover& cover)
       : last_x(cover.columns() - 1),
@@ -92,7 +94,8 @@ struct BoxSides {
   GLINT_HD RangeEnds columns() const { return {static_cast<float>(left), static_cast<float>(right)}; }
   GLINT_HD RangeEnds rows() const { return {static_cast<float>(lower), static_cast<float>(upper)}; }
 
-  /// Covered area of a texel in the bounding box, of a run that is cut along kCut.
+  /// Covered area of a texel of a run.
+  /// @tparam kCut  fields along which the run may be cut (withCut)
   template <unsigned kCut>
   GLINT_HD double texelArea(const TexelCover& cover, const TexelRun& run, const TexelCode& code, std::uint32_t texel) const {
     const int x = static_cast<int>(code.column(texel)) + run.x, y = static_cast<int>(code.row(texel)) + run.y;
@@ -105,13 +108,13 @@ struct BoxSides {
   double left, right, lower, upper;
 };
 
-/// Columns and rows of a run that are in the footprint's bounding box.
+/// Ranges of the column and row fields of a run that are inside the footprint's bounding box.
 inline GLINT_HD IndexRange columnsIn(const TexelCover& cover, const TexelRun& run) {
   return {-run.x, cover.columns() - 1 - run.x};
 }
 inline GLINT_HD IndexRange rowsIn(const TexelCover& cover, const TexelRun& run) { return {-run.y, cover.rows() - 1 - run.y}; }
 
-/// Calls visitor(c), where c() is the fields of TexelFilter along which a run is cut.
+/// Calls visitor(c), where c() is a constant: the fields of TexelFilter along which the footprint may cut the run.
 template <class Visitor>
 GLINT_HD void withCut(const TexelRun& run, Visitor&& visitor) {
   constexpr unsigned kColumn = TexelFilter::kColumn, kRow = TexelFilter::kRow;
@@ -125,15 +128,15 @@ GLINT_HD void withCut(const TexelRun& run, Visitor&& visitor) {
     visitor(std::integral_constant<unsigned, 0>());
 }
 
-/// Adds up the areas of runs (BinBlocks::forEachRun) by bin. Several are asked for before they are read: the processor then
-/// waits for all of them together.
+/// Adds up the covered areas of runs (BinBlocks::forEachRun) by bin. Prefetches up to kMost runs before it reads them, so that
+/// their cache misses overlap.
 class WindowSum {
  public:
-  /// @param texels  of all lists
-  /// @param areas  of the window's slots
+  /// @param texels  the lists of all blocks, one after the other
+  /// @param areas   sums by slot of the window; results are added
   GLINT_HD WindowSum(const std::uint32_t* texels, const TexelCover& cover, double* areas)
       : cover_(cover), sides_(cover), texels_(texels), areas_(areas) {}
-  /// The block that the next run is of; kept until `finish`.
+  /// Sets the block of the next runs. `block` must stay alive until `finish`.
   GLINT_HD void select(const WindowBlock& block) { block_ = &block; }
   GLINT_HD void whole(std::uint64_t begin, std::uint64_t end) {
     if (block_->isBin())
@@ -148,7 +151,7 @@ class WindowSum {
     items_[count_++] = {run, block_};
     if (count_ == kMost) flush();
   }
-  /// To be called when all runs are in.
+  /// Completes the sums: call once, after the last run.
   GLINT_HD void finish() {
     flush();
     sums_.addTo(areas_);
@@ -197,7 +200,7 @@ class WindowSum {
       sums_.addBins<Texels, kCut>(texels, count, parts, item.block->fields);
   }
 
-  /// Whether the texels of two runs count the same.
+  /// Whether equal codes of two runs have equal weights, so that one TexelParts serves both.
   static GLINT_HD bool countAlike(const Item& a, const Item& b) {
     return a.run.x == b.run.x && a.run.y == b.run.y && a.run.cut_x == b.run.cut_x && a.run.cut_y == b.run.cut_y &&
            a.block->code.column_bits == b.block->code.column_bits && a.block->code.row_bits == b.block->code.row_bits;
@@ -209,7 +212,7 @@ class WindowSum {
             {code.column_bits, code.row_bits, rowsIn(cover_, item.run), sides_.rows()}};
   }
 
-  /// A footprint with sides along no axis.
+  /// Adds a run where the sides of the footprint are not along the axes.
   GLINT_DEVICE_CALL GLINT_HD void addTurned(const Item& item) {
     constexpr unsigned kPosition = TexelFilter::kPosition;
     const TexelFilter near(item.block->code, columnsIn(cover_, item.run), rowsIn(cover_, item.run), {}, {});

@@ -8,7 +8,8 @@
 
 namespace glint {
 
-/// The lobe of a facet: a Gaussian less its value at kReach deviations, where it ends, scaled to integrate to 1.
+/// The lobe of a facet: a Gaussian minus its value at kReach deviations, so that it ends there without a step, scaled to
+/// integrate to 1.
 struct FacetLobe {
   static constexpr float kReach = 5;  ///< deviations
 

@@ -9,13 +9,14 @@
 
 namespace glint {
 
-/// Adds up weights, places and products of places over the runs of one block (BinBlocks::forEachRun).
+/// Adds up PlaceMoments over the runs of one block (BinBlocks::forEachRun).
 ///
-/// Runs of whole cells that follow one another in the list are read as one, and not at all where they are the whole block.
+/// Whole runs that follow one another in the list are joined. Where they make up the whole list, the stored sums of the block
+/// are used and no texel is read.
 class PlaceMomentSum {
  public:
-  /// @param texels  of all lists
-  /// @param all     sums over all texels of the block
+  /// @param texels  the lists of all blocks, one after the other
+  /// @param all     moments of all texels of the block
   GLINT_HD PlaceMomentSum(const std::uint32_t* texels, const TexelCover& cover, const TexelCode& code, std::uint64_t begin,
                           std::uint64_t end, const PlaceMoments& all)
       : cover_(cover), sides_(cover), texels_(texels), code_(code), fields_(code), begin_(begin), end_(end), all_(all) {}
@@ -35,7 +36,7 @@ class PlaceMomentSum {
         add<cut()>(run);
     });
   }
-  /// To be called when all runs are in.
+  /// Completes the sums: call once, after the last run.
   GLINT_HD const PlaceMoments& finish() {
     flush();
     return sums_;
@@ -67,14 +68,14 @@ class PlaceMomentSum {
 #endif
   template <class Texels, unsigned kCut>
   GLINT_HD void addBy(const TexelRun& run, const TexelParts& of_run) {
-    constexpr std::uint64_t kMostSummed = 512;  // as floats
+    constexpr std::uint64_t kMostSummed = 512;  // texels that are summed in float; more lose digits
     const typename Texels::Parts parts(of_run);
     for (std::uint64_t k = run.begin; k < run.end; k += kMostSummed)
       sums_.add(
           1, Texels::template moments<kCut>(texels_ + k, static_cast<int>(std::min(run.end - k, kMostSummed)), parts, fields_));
   }
 
-  /// A footprint with sides along no axis.
+  /// Adds a run where the sides of the footprint are not along the axes.
   GLINT_DEVICE_CALL GLINT_HD void addTurned(const TexelRun& run) {
     constexpr unsigned kPosition = TexelFilter::kPosition;
     const TexelFilter near(code_, columnsIn(cover_, run), rowsIn(cover_, run), {}, {});
@@ -89,9 +90,9 @@ class PlaceMomentSum {
   const std::uint32_t* texels_;
   TexelCode code_;
   PlaceFields fields_;
-  std::uint64_t begin_, end_;  ///< of the block
+  std::uint64_t begin_, end_;  ///< the list of the block
   PlaceMoments all_, sums_;
-  std::uint64_t whole_begin_ = 0, whole_end_ = 0;  ///< not yet added
+  std::uint64_t whole_begin_ = 0, whole_end_ = 0;  ///< whole runs, joined, that are not added yet
 };
 
 }  // namespace glint

@@ -7,24 +7,24 @@
 
 namespace glint {
 
-/// Adds up what texels count, by slots of a window. `Texels` is SingleTexels or Avx2Texels, with the same results.
+/// Adds up the weights of texels by slot of a window. `Texels` is SingleTexels or Avx2Texels; both have the same results.
 class SlotSums {
  public:
   static constexpr int kSlots = SlotFields::kNone;
 
   GLINT_HD void add(int slot, double amount) { sums_[0][slot] += amount; }
 
-  /// Texels of one bin.
+  /// Adds a list whose texels are all in one bin.
   template <class Texels, unsigned kCut>
   GLINT_HD void addBin(const std::uint32_t* texels, std::uint64_t count, const typename Texels::Parts& parts, int slot) {
-    constexpr std::uint64_t kMostSummed = 256;  // as floats
+    constexpr std::uint64_t kMostSummed = 256;  // texels that are summed in float; more lose digits
     double total = 0;
     for (std::uint64_t k = 0; k < count; k += kMostSummed)
       total += double{Texels::template sum<kCut>(texels + k, static_cast<int>(std::min(count - k, kMostSummed)), parts)};
     add(slot, total);
   }
 
-  /// Texels of several bins.
+  /// Adds a list whose texels are in several bins.
   template <class Texels, unsigned kCut>
   GLINT_HD void addBins(const std::uint32_t* texels, std::uint64_t count, const typename Texels::Parts& parts,
                         const SlotFields& fields) {
@@ -36,7 +36,7 @@ class SlotSums {
     }
   }
 
-  /// To be called once, when everything is added.
+  /// Adds the sums to `areas`: call once, at the end.
   GLINT_HD void addTo(double* areas) {
     addFound();
     for (int k = 0; k < kSlots; ++k) areas[k] += (sums_[0][k] + sums_[2][k]) + (sums_[1][k] + sums_[3][k]);
@@ -51,7 +51,7 @@ class SlotSums {
     found_.count = 0;
   }
 
-  double sums_[4][kSlots] = {};  ///< several, since an addition waits for the last one of its slot
+  double sums_[4][kSlots] = {};  ///< four rows, so that an addition need not wait for the previous addition to its slot
   FoundTexels found_;
 };
 

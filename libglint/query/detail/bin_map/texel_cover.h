@@ -45,14 +45,14 @@ struct CoverSpan {
   double high = 0;
 };
 
-/// A parallelogram on the periodic plane of a map, made ready for exact overlaps with texels.
+/// A parallelogram on the periodic plane of a map, prepared for exact overlaps with texels.
 ///
-/// Its coordinates count texels from the corner (originX, originY) of the map, the texel where its bounding box begins. Texel
-/// (i, j) of the map lies at (i - originX + m width, j - originY + n height) for all integers m, n.
+/// Coordinates of the footprint count texels from the corner of its bounding box, which is texel (originX, originY) of the map.
+/// Texel (i, j) of the map has the coordinates (i - originX + m width, j - originY + n height) for all integers m and n.
 ///
-/// Boxes are what they say, very long ones shortened by `shortenedBox`. Gaussians become the parallelogram with the same
-/// second moments along their principal axes, or that of `woundBox` where they are longer than the map; boxes without area or
-/// finite size become the Gaussian of their moments first (as in FootprintWeights).
+/// A box footprint is its own parallelogram; `shortenedBox` shortens very long boxes. A Gaussian becomes the parallelogram
+/// along its principal axes with the same second moments, or the parallelogram of `woundBox` where it is longer than the map. A
+/// box without area or of infinite size becomes the Gaussian of its moments first (as in FootprintWeights).
 class TexelCover {
  public:
   GLINT_DEVICE_CALL GLINT_HD TexelCover(const Footprint& p, int width, int height) : width_(width), height_(height) {
@@ -87,7 +87,7 @@ class TexelCover {
   GLINT_HD int rows() const { return rows_count_; }
   /// Whether no texel is seen twice: the bounding box is not larger than the map.
   GLINT_HD bool fits() const { return columns_ <= width_ && rows_count_ <= height_; }
-  /// Whether the sides are parallel to the axes. Then only `low` and `high` matter.
+  /// Whether the sides are parallel to the axes. Then `low` and `high` alone describe the parallelogram.
   GLINT_HD bool aligned() const { return aligned_; }
   /// Area, texels^2: the sum of `texel` over the endless plane.
   GLINT_HD double area() const { return area_; }
@@ -120,12 +120,12 @@ class TexelCover {
     return whole ? 1 : areaInFrame(rows_, offsets);
   }
 
-  /// For the rows between y0 < y1: `outer` holds every point of the parallelogram there; every point between them and inside
-  /// `inner` is of the parallelogram.
+  /// Bounds of the parallelogram between rows y0 < y1. Every point of the parallelogram between the rows is inside `outer`.
+  /// Every point between the rows and inside `inner` is in the parallelogram.
   GLINT_DEVICE_CALL GLINT_HD void spans(double y0, double y1, CoverSpan& outer, CoverSpan& inner) const {
     outer = inner = {low_[0], high_[0]};
     for (int k = 0; k < 2; ++k) {
-      if (reach_[k] == 0) {  // a condition on y alone
+      if (reach_[k] == 0) {  // this pair of sides bounds y alone
         const double s0 = rows_[k][1] * (centre_[1] - y0), s1 = rows_[k][1] * (centre_[1] - y1);
         if (std::fabs(s0) > 1 || std::fabs(s1) > 1) inner = {1, 0};
         if ((s0 > 1 && s1 > 1) || (s0 < -1 && s1 < -1)) outer = {1, 0};
@@ -166,7 +166,7 @@ class TexelCover {
   double low_[2] = {}, high_[2] = {}, centre_[2] = {};
   double rows_[2][2] = {};
   double half_texel_[2] = {};
-  double reach_[2] = {}, slant_[2] = {};  // of each pair of sides along u: half width, and shift for a step along -v
+  double reach_[2] = {}, slant_[2] = {};  // of each pair of sides along u: half width, and shift for a step of -1 along v
 };
 
 }  // namespace glint

@@ -13,13 +13,14 @@ struct IndexRange {
   int low = 0, high = 0;
 };
 
-/// Finds the texels of a list whose columns, rows and places are in ranges: eight at a time where the processor can.
+/// Finds the texels of a list whose fields (columns, rows and positions of normals in the block) are in given ranges. Tests
+/// eight texels at a time where the processor has AVX2.
 class TexelFilter {
  public:
   static constexpr int kMostAtOnce = 64;
 
-  /// @param columns, rows  in the cell
-  /// @param places_x, places_y  in the block
+  /// @param columns, rows       columns and rows in the cell
+  /// @param places_x, places_y  positions of normals in the block
   GLINT_HD TexelFilter(const TexelCode& code, IndexRange columns, IndexRange rows, IndexRange places_x, IndexRange places_y) {
     const int position_bits = code.column_bits + code.row_bits;
     set(fields_[0], 0, code.column_bits, columns);
@@ -28,10 +29,11 @@ class TexelFilter {
     set(fields_[3], position_bits + code.place_bits, code.place_bits, places_y);
   }
 
-  /// Fields of a code, to be joined by |.
+  /// Fields of a code: sets of them are joined by |.
   static constexpr unsigned kColumn = 1, kRow = 2, kPosition = kColumn | kRow, kPlace = 12;
 
-  /// Bit k: texel k of `count`, at most kMostAtOnce, has the fields kFields in range.
+  /// Bit k, for k < count: whether texel k has the fields kFields in range.
+  /// @param count  at most kMostAtOnce
   template <unsigned kFields>
   GLINT_HD std::uint64_t matches(const std::uint32_t* texels, int count) const {
 #ifdef GLINT_AVX2
@@ -63,7 +65,7 @@ class TexelFilter {
     field = {bits == 0 ? 0 : shift, (1u << bits) - 1, range.low, range.high};
   }
 
-  /// Negative differences have the highest bit.
+  /// Tests ranges by subtraction: a field is out of range if one of its two differences is negative and so has the highest bit.
   template <unsigned kFields>
   GLINT_HD std::uint64_t one(std::uint32_t texel) const {
     int outside = 0;
@@ -81,7 +83,7 @@ class TexelFilter {
     std::uint64_t bits = 0;
     int k = 0;
     for (; k + 8 <= count; k += 8) bits |= eight<kFields>(texels + k) << k;
-    // The last eight again: bits that are already there do not change.
+    // The last group of eight overlaps the group before it: bits that are set already do not change.
     return k < count ? bits | eight<kFields>(texels + count - 8) << (count - 8) : bits;
   }
 

@@ -8,14 +8,15 @@
 
 namespace glint {
 
-/// What texels count whose field is at the ends of a range; those between count as 1.
+/// Weights of texels in the first and the last column (or row) of a range. Texels between have weight 1. A footprint covers its
+/// first and last column only in part.
 struct RangeEnds {
-  float low = 1, high = 1;  ///< the same where the range is one number
+  float low = 1, high = 1;  ///< equal where the range has one column (or row)
 };
 
-/// What texels count by one field of their codes. Numbers stay in the place of the field.
+/// Weights of texels by one field of their codes, column or row. Fields are compared without shifting them down.
 struct PartRange {
-  /// @param shift, bits  of the field; shift below 32
+  /// @param shift, bits  position and width of the field; shift < 32
   GLINT_HD PartRange(int shift, int bits, IndexRange range, RangeEnds ends) : at(ends) {
     const int largest = static_cast<int>((1u << bits) - 1);
     const int first = std::max(range.low, 0), last = std::min(range.high, largest);
@@ -33,14 +34,14 @@ struct PartRange {
     return value == low ? at.low : value == high ? at.high : 1;
   }
 
-  static constexpr std::uint32_t kNever = ~std::uint32_t{0};  ///< no field fills a code
+  static constexpr std::uint32_t kNever = ~std::uint32_t{0};  ///< equal to no field, since no field has all bits of a code
   std::uint32_t mask;
-  std::uint32_t begin = kNever, span = 0;     ///< those that count
-  std::uint32_t low = kNever, high = kNever;  ///< the ends, if texels can have them
+  std::uint32_t begin = kNever, span = 0;     ///< the range: fields from begin to begin + span have a weight above 0
+  std::uint32_t low = kNever, high = kNever;  ///< ends of the range; kNever where the cell does not contain them
   RangeEnds at;
 };
 
-/// What texels count by column and row.
+/// Weights of texels by column and row: the covered area under a footprint with sides along the axes.
 struct TexelParts {
   /// @tparam kCut  the fields of TexelFilter that matter
   template <unsigned kCut>
@@ -53,7 +54,8 @@ struct TexelParts {
   PartRange columns, rows;
 };
 
-/// The slot that a texel of a block of several bins has in a window of kSide x kSide bins.
+/// Computes the slot of a texel in a window of kSide x kSide bins. The block of the texel may have several bins, so the code
+/// tells the bin.
 struct SlotFields {
   static constexpr std::uint32_t kSide = 5, kNone = kSide * kSide;
 
@@ -62,12 +64,12 @@ struct SlotFields {
     return x < kSide && y < kSide ? y * kSide + x : kNone;
   }
 
-  int shift_x, shift_y;            ///< of the bin in a code
-  std::uint32_t mask;              ///< bins of the block along each axis, less 1
+  int shift_x, shift_y;            ///< position of the bin's column and row in a code
+  std::uint32_t mask;              ///< bins of the block along each axis, minus 1
   std::uint32_t first_x, first_y;  ///< the window's column and row of the block's first bin; modulo 2^32
 };
 
-/// Texels that are in a window: their slots, and what they count.
+/// Texels in a window: their slots and weights.
 struct FoundTexels {
   static constexpr int kMost = 256;
   int count = 0;
@@ -75,18 +77,19 @@ struct FoundTexels {
   float parts[kMost + 8];
 };
 
-/// Sums over texels: of weights, and of weights times places and their products. Places count from the middle of the block.
+/// Sums over the texels of a block: weights, and weights times the first and second powers of (x, y). (x, y) is the position of
+/// the normal from the middle of the block, in units of the place fields.
 struct PlaceMoments {
   double weight = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
 
-  /// Adds `times` other sums.
+  /// Adds other sums, multiplied by `times`.
   GLINT_HD void add(double times, const PlaceMoments& other) {
     weight += times * other.weight, x += times * other.x, y += times * other.y;
     xx += times * other.xx, xy += times * other.xy, yy += times * other.yy;
   }
 };
 
-/// Where the places of a block's texels are in their codes.
+/// Reads the positions of normals in their block from codes.
 struct PlaceFields {
   GLINT_HD explicit PlaceFields(const TexelCode& code)
       : shift_x(std::min(code.column_bits + code.row_bits, 31)),
@@ -98,14 +101,14 @@ struct PlaceFields {
 
   int shift_x, shift_y;
   std::uint32_t mask;
-  float middle;  ///< of the block, in places
+  float middle;  ///< middle of the block, in units of the field
 };
 
-/// Reads lists one texel after the other.
+/// Reads lists one texel after the other. Avx2Texels does the same eight at a time.
 struct SingleTexels {
   using Parts = TexelParts;
 
-  /// Appends those of `count` texels that are in the window. There must be room for all.
+  /// Appends the texels of a list that are in the window. `found` must have room for all `count`.
   template <unsigned kCut>
   static GLINT_HD void find(const std::uint32_t* texels, int count, const Parts& parts, const SlotFields& fields,
                             FoundTexels& found) {
@@ -117,7 +120,7 @@ struct SingleTexels {
     }
   }
 
-  /// What all of them count, in eight sums: those of texels 8 k + i.
+  /// Sum of the weights of a list. Adds in eight sums, texel k to sum k % 8, as vectors of eight do.
   template <unsigned kCut>
   static GLINT_HD float sum(const std::uint32_t* texels, int count, const Parts& parts) {
     float sums[8] = {};
@@ -125,7 +128,7 @@ struct SingleTexels {
     return total(sums);
   }
 
-  /// Their moments, in eight sums like `sum`.
+  /// Moments of a list, added in eight sums like `sum`.
   template <unsigned kCut>
   static GLINT_HD PlaceMoments moments(const std::uint32_t* texels, int count, const Parts& parts, const PlaceFields& fields) {
     float sums[6][8] = {};

@@ -10,8 +10,8 @@
 
 namespace glint {
 
-/// ClusterReader with vectors of eight. Each function that it replaces reads the same elements as the function of ClusterReader,
-/// and returns the same bits unless the compiler fuses products and sums.
+/// ClusterReader with vectors of eight. Each function that it replaces reads the same elements as the function of
+/// ClusterReader, and returns the same bits unless the compiler fuses products and sums.
 template <class Basis, class Coefficient>
 class Avx2Reader : public ClusterReader<Basis, Coefficient> {
   using Base = ClusterReader<Basis, Coefficient>;

@@ -207,7 +207,8 @@ class SliceChooser {
   /// What levelOf's x grows by for each variance of level 0 beyond the last level.
   GLINT_HD float farDecay() const {
     constexpr float kTwoPiSquared = 19.739208802178716f;
-    // A step in the middle of a map that ends keeps 1 / (sigma^2 / W^2 + 0.047) of its height, to a tenth from sigma = W / 5 on.
+    // A step in the middle of a map that ends keeps 1 / (sigma^2 / W^2 + 0.047) of its height, to a tenth from sigma = W / 5
+    // on.
     constexpr float kClampedOffset = 0.047f;
     const float longest = std::max(largest_u_, largest_v_) * per_finest_variance_;
     return wraps_ ? kTwoPiSquared / longest : 1 / (largest_ratio_ + kClampedOffset * longest);
