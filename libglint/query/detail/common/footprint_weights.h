@@ -9,7 +9,7 @@
 
 namespace glint {
 
-/// Footprints thinner than this are widened to it: texel centres sample a narrower Gaussian too coarsely to hold any weight.
+/// Gaussians are widened to this deviation. Narrower ones could fall between texel centres and have no weight at all.
 inline constexpr float kMinSigmaTexels = 0.25f;
 /// Boxes thinner than this (texels) are answered as Gaussians.
 inline constexpr float kMinBoxThickness = 1e-3f;
@@ -22,22 +22,23 @@ inline GLINT_HD int wrapIndex(int i, int n) {
   return r < 0 ? r + n : r;
 }
 
-/// Brings a coordinate of a footprint's centre into [0, 1); what is not finite becomes 0.
+/// Wraps a coordinate of a footprint's centre into [0, 1); numbers that are not finite become 0.
 inline GLINT_HD float wrapUnit(float u) {
   const float wrapped = u - std::floor(u);
-  return wrapped >= 0 ? std::min(wrapped, float{kBelowOne}) : 0.0f;  // close below 0 it is rounded to 1
+  return wrapped >= 0 ? std::min(wrapped, float{kBelowOne}) : 0.0f;  // numbers just below 0 are rounded to 1
 }
 
-/// A covariance of positive definite form, texels^2. Double: in float that of a long footprint would lose its width.
+/// A positive definite covariance, texels^2. In double, because in float a long footprint would lose its width.
 struct UsableCovariance {
   double xx, xy, yy;
-  /// At least that of the narrowest footprint as long: differences of large numbers have no digits for it.
+  /// The determinant, at least that of the narrowest footprint of the same length: the difference of products may have no
+  /// digits left.
   GLINT_HD double determinant() const {
     return std::max(xx * yy - xy * xy, double{kMinSigmaTexels} * kMinSigmaTexels * 0.5 * (xx + yy));
   }
 };
 
-/// Principal axes of a covariance, as long as its deviations, texels.
+/// Principal axes of a covariance; their lengths are its deviations, texels.
 inline GLINT_HD AxisPair deviationsOf(const UsableCovariance& c) {
   if (c.xy == 0) return {{std::sqrt(c.xx), 0}, {0, std::sqrt(c.yy)}};
   const double mean = 0.5 * (c.xx + c.yy), half = 0.5 * (c.xx - c.yy), split = std::sqrt(half * half + c.xy * c.xy);
@@ -46,7 +47,7 @@ inline GLINT_HD AxisPair deviationsOf(const UsableCovariance& c) {
   return {{longer * cosine, longer * sine}, {-shorter * sine, shorter * cosine}};
 }
 
-/// A covariance of positive definite form: widened to kMinSigmaTexels; what is not finite becomes the narrowest.
+/// Makes a covariance positive definite: widens it to kMinSigmaTexels; one that is not finite becomes the narrowest.
 inline GLINT_HD UsableCovariance positiveCovariance(double xx, double xy, double yy) {
   constexpr double kLowest = kMinSigmaTexels * kMinSigmaTexels;
   if (!(std::isfinite(xx) && std::isfinite(xy) && std::isfinite(yy))) return {kLowest, 0, kLowest};
@@ -59,8 +60,9 @@ inline GLINT_HD UsableCovariance positiveCovariance(double xx, double xy, double
 
 inline GLINT_HD UsableCovariance positiveCovariance(const Covariance& c) { return positiveCovariance(c.xx, c.xy, c.yy); }
 
-/// `positiveCovariance`, shortened on a periodic map where a footprint is longer than the map: along the way on which it winds
-/// round it, to one turn of deviation (PeriodFrame). It sees the map as evenly as before, to 5e-9; direction and width stay.
+/// `positiveCovariance`, and on a periodic map shortened where the footprint is longer than the map: along the line on which it
+/// winds round the map, to a deviation of one turn (PeriodFrame). Direction and width stay. The footprint weighs the map as
+/// evenly as before, to 5e-9.
 GLINT_DEVICE_CALL inline GLINT_HD UsableCovariance usableCovariance(Covariance covariance, int width, int height) {
   const UsableCovariance c = positiveCovariance(covariance);
   const double w = width, h = height;
@@ -69,7 +71,7 @@ GLINT_DEVICE_CALL inline GLINT_HD UsableCovariance usableCovariance(Covariance c
   const PeriodFrame frame(sigma);
   if (frame.across_variance >= PeriodFrame::kEven) return {w * w, 0, h * h};
   if (frame.turns_variance < PeriodFrame::kEven) return c;
-  // A turn along the way, and what the footprint is across it.
+  // One turn along the line, and the part of the footprint across it.
   const double wide = std::hypot(PeriodFrame::dot(frame.across, sigma.a), PeriodFrame::dot(frame.across, sigma.b));
   double s[2], t[2];
   frame.vector(wide, 0, s);
@@ -104,8 +106,8 @@ struct SmallPolygon {
   }
 };
 
-/// The part of a convex polygon that lies in the square [-1, 1]^2. `points` holds `count` <= 4 corners. These and the result
-/// count from `origin`: so polygons keep their area that are tiny and far from the middle of the square.
+/// The part of a convex polygon that lies in the square [-1, 1]^2. `points` holds `count` <= 4 corners. Corners of the input
+/// and of the result are relative to `origin`, so that tiny polygons far from the middle of the square keep their area.
 inline GLINT_HD SmallPolygon clipToUnitBox(const Vec2* points, int count, Vec2 origin = {}) {
   SmallPolygon polygon;
   polygon.count = count;
@@ -130,15 +132,15 @@ inline GLINT_HD SmallPolygon clipToUnitBox(const Vec2* points, int count, Vec2 o
   return polygon;
 }
 
-/// A footprint made ready for sums over texels.
+/// A footprint prepared for sums over texels.
 ///
 /// Texel (i, j) of the endless plane is the square [i, i+1] x [j, j+1]; the cell (i, j) of a smooth surface is the square
 /// between the centres of texels (i, j) and (i+1, j+1), halved along its diagonal. A Gaussian weighs texels at their centres
 /// and triangles at their centroids; a box weighs both by the covered area. Weights are relative: divide by their sum.
 ///
-/// Sizes are made usable first, so that every footprint has an answer: see `usableCovariance` for Gaussians and `shortenedBox`
-/// for boxes; boxes without area or finite size are answered as the Gaussian of the same moments. Where the map does not go on
-/// beyond its border (Boundary::clamp), nothing is shortened.
+/// Every footprint has an answer, because sizes are made usable first: see `usableCovariance` for Gaussians and `shortenedBox`
+/// for boxes. Boxes without area or of infinite size are answered as the Gaussian of the same moments. With Boundary::clamp
+/// nothing is shortened.
 class FootprintWeights {
  public:
   GLINT_HD FootprintWeights(const Footprint& p, int width, int height, Boundary boundary = Boundary::wrap) {
@@ -159,7 +161,7 @@ class FootprintWeights {
   };
   /// Columns of the texels that can have weight in rows [row, end_row).
   GLINT_HD Columns columnsIn(int row, int end_row) const {
-    // A row and a column more on both sides, for the triangles of a cell.
+    // One row and one column more on each side, because triangles of a cell reach into the next texel.
     const double low = row - 1 - centre_y_, high = end_row + 1 - centre_y_;
     double left = -kFarTexels, right = kFarTexels;
     for (int k = 0; k < (is_box_ ? 2 : 1); ++k) {
@@ -193,8 +195,8 @@ class FootprintWeights {
   GLINT_HD bool isBox() const { return is_box_; }
   GLINT_HD Vec2 centre() const { return {static_cast<float>(centre_x_), static_cast<float>(centre_y_)}; }
 
-  /// A Gaussian along one line of texel space, y = const: where it peaks, its deviation, and the integral over the line
-  /// relative to that over the line through the centre.
+  /// A Gaussian along one line y = const of texel space: position of its peak, its deviation, and its integral over the line
+  /// relative to the integral over the line through the centre.
   struct Line {
     float mean, sigma, share;
   };
@@ -203,7 +205,8 @@ class FootprintWeights {
     return {static_cast<float>(centre_x_ + slant_[0] * dy), 1 / std::sqrt(across_), std::exp(-0.5f * along_ * dy * dy)};
   }
 
-  /// The parallelogram of a box, or its part inside a rectangle of texel space, in the frame where it is [-1, 1]^2.
+  /// The parallelogram of a box, or its part inside a rectangle of texel space. Corners are in the frame where the
+  /// parallelogram is [-1, 1]^2.
   GLINT_HD SmallPolygon localShape(const Box2* clip) const {
     const Vec2 whole[4] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
     if (!clip) return clipToUnitBox(whole, 4);
@@ -212,20 +215,20 @@ class FootprintWeights {
                              corner(clip->high.x, clip->high.y), corner(clip->low.x, clip->high.y)};
     return clipToUnitBox(corners, 4);
   }
-  /// Back from that frame to texel space: x and y.
+  /// Position in texel space (x and y) of a point of the frame where the parallelogram is [-1, 1]^2.
   GLINT_HD void fromLocal(Vec2 s, double& x, double& y) const {
     const double det = row_x_[0] * row_y_[1] - row_x_[1] * row_y_[0];
     x = centre_x_ + (row_y_[1] * s.x - row_x_[1] * s.y) / det;
     y = centre_y_ + (row_x_[0] * s.y - row_y_[0] * s.x) / det;
   }
 
-  /// Whether the sum of all texel weights has a closed form, that of `closedFormTotal`, to float precision.
+  /// Whether closedFormTotal equals the sum of all texel weights to float precision.
   GLINT_HD bool hasClosedFormTotal() const { return is_box_ || min_sigma_ >= 1; }
-  /// Sum of `texel`, as of `triangle`, over the endless plane.
+  /// Sum of `texel` over the endless plane, which is also the sum of `triangle`.
   GLINT_HD double closedFormTotal() const { return is_box_ ? 4 * scale_ : 2 * 3.14159265358979 * root_determinant_; }
 
  private:
-  /// Beyond all texels that are summed.
+  /// A coordinate beyond all texels that are summed.
   static constexpr double kFarTexels = 1 << 30;
 
   GLINT_HD bool setBox(const Footprint& p, int width, int height, Boundary boundary) {
@@ -272,29 +275,29 @@ class FootprintWeights {
     const auto x = static_cast<float>(dx - slant_[0] * dy), y = static_cast<float>(dy);
     return std::exp(-0.5f * (across_ * x * x + along_ * y * y));
   }
-  /// Into the frame where the parallelogram is [-1, 1]^2.
+  /// Position in the frame where the parallelogram is [-1, 1]^2.
   GLINT_HD Vec2 local(double dx, double dy) const {
     return {static_cast<float>(row_x_[0] * dx + row_x_[1] * dy), static_cast<float>(row_y_[0] * dx + row_y_[1] * dy)};
   }
-  /// Steps of a texel in that frame.
+  /// Steps in that frame for one texel along x and along y.
   GLINT_HD Vec2 columnStep() const { return {static_cast<float>(row_x_[0]), static_cast<float>(row_y_[0])}; }
   GLINT_HD Vec2 rowStep() const { return {static_cast<float>(row_x_[1]), static_cast<float>(row_y_[1])}; }
-  /// Area in texels of a polygon of that frame.
+  /// Area, in texels, of a polygon that is given in that frame.
   GLINT_HD float areaOf(const SmallPolygon& polygon) const {
     return static_cast<float>(scale_ * (0.5 * std::fabs(polygon.twiceSignedArea())));
   }
 
   double centre_x_ = 0, centre_y_ = 0;
   bool is_box_ = false;
-  // A Gaussian: exp(-(across (x - slant y)^2 + along y^2) / 2). Nothing cancels that is long and thin.
+  // A Gaussian is exp(-(across (x - slant y)^2 + along y^2) / 2). In this form no digits cancel for long thin Gaussians.
   float across_ = 0, along_ = 0;
-  float root_determinant_ = 0;  ///< of the covariance
+  float root_determinant_ = 0;  ///< square root of the determinant of the covariance
   float min_sigma_ = 0;
-  // Where lines y = const can meet the footprint: within a half width of slant * y, for each pair of sides of a box.
+  // Lines y = const can meet the footprint within a half width of slant * y, for each pair of sides of a box.
   double slant_[2] = {}, half_width_[2] = {};
   double row_x_[2] = {}, row_y_[2] = {};
-  Vec2 half_texel_;   ///< of its bounding box in the frame of the parallelogram
-  double scale_ = 0;  ///< area in texels of a unit of that frame
+  Vec2 half_texel_;   ///< half size of a texel's bounding box in the frame of the parallelogram
+  double scale_ = 0;  ///< area, in texels, of a unit square of that frame
 };
 
 }  // namespace glint

@@ -15,27 +15,27 @@ struct AxisPair {
   GLINT_HD AxisPair scaled(double x, double y) const { return {{x * a[0], y * a[1]}, {x * b[0], y * b[1]}}; }
 };
 
-/// std::round, which device code does not have everywhere; halves go up.
+/// std::round for device code, which does not have it everywhere. Rounds halves up.
 inline GLINT_HD double nearestInteger(double x) { return std::floor(x + 0.5); }
 
-/// The periods of a map in which a footprint is least long.
+/// A pair of periods of a map, chosen so that a footprint is short when it is measured in them.
 ///
-/// A long footprint winds round the map. What it sees depends on the waves exp(2 pi i k . x), k whole, that it does not average
-/// out: those with fronts along its way. All of them are multiples of one wave once the footprint winds round often enough, and
-/// then it sees the closed line across that wave's normal evenly: so it can be shortened along this line to whole turns,
-/// whatever its direction, and keeps its width and its drift across the line.
+/// A long footprint winds round a periodic map. Its answer depends only on the waves exp(2 pi i k . x), k whole, that it does
+/// not average out: waves whose fronts run along the footprint. If the footprint winds round often enough, all such waves are
+/// multiples of one wave, and the footprint covers the closed line along the front of that wave evenly. So it can be shortened
+/// along this line to whole turns, whatever its direction. Its width and its drift across the line stay.
 struct PeriodFrame {
-  /// Waves shorter than 1 / kFinest of the map are taken for averaged out where longer ones are.
+  /// Waves shorter than 1 / kFinest of the map count as averaged out where longer waves are.
   static constexpr double kFinest = 64;
-  /// Variance of a Gaussian along a wave that it averages out; half of it may be of waves above kFinest.
+  /// Variance along a wave from which on a Gaussian averages it out. Half of it may be variance of waves above kFinest.
   static constexpr double kEven = 2;
 
-  double across[2], along[2];                ///< the wave, and one that counts turns
-  double across_period[2], along_period[2];  ///< periods: a step of 1 by one wave and of 0 by the other
-  double across_variance = 0;                ///< of the footprint by the wave `across`, those of waves above kFinest included
-  double turns_variance = 0;                 ///< of its turns at each place across
+  double across[2], along[2];                ///< the wave that is not averaged out, and a wave that counts turns
+  double across_period[2], along_period[2];  ///< periods: each is a step of 1 of its own wave and of 0 of the other
+  double across_variance = 0;                ///< variance along the wave `across`, plus variance of waves above kFinest
+  double turns_variance = 0;                 ///< variance of its turns, for each position across
 
-  /// Shortest wave by the variance of a footprint (Gauss's reduction of a quadratic form).
+  /// Finds the wave along which a footprint has the least variance (Gauss's reduction of a quadratic form).
   /// @param sigma  in units of the map's sides: the footprint's covariance is a a^T + b b^T
   GLINT_HD explicit PeriodFrame(const AxisPair& sigma) {
     const auto variance = [&](const double(&k)[2], const double(&q)[2]) {
@@ -43,7 +43,7 @@ struct PeriodFrame {
     };
     double k[2] = {1, 0}, q[2] = {0, 1};
     if (variance(q, q) < variance(k, k)) swapWaves(k, q);
-    constexpr int kMostSteps = 100;  // each one but the last halves a variance
+    constexpr int kMostSteps = 100;  // each step but the last halves a variance
     for (int step = 0; step < kMostSteps; ++step) {
       const double times = nearestInteger(variance(k, q) / variance(k, k));
       q[0] -= times * k[0], q[1] -= times * k[1];
@@ -52,7 +52,7 @@ struct PeriodFrame {
     }
     across_variance = variance(k, k);
     turns_variance = variance(q, q) - variance(k, q) * variance(k, q) / across_variance;
-    // Any wave counts turns that has no part of the other: the shortest one.
+    // Every wave that makes a basis with the first counts turns. Takes the shortest.
     const double rest = nearestInteger(dot(k, q) / dot(k, k));
     for (int i = 0; i < 2; ++i) across[i] = k[i], along[i] = q[i] - rest * k[i];
     const double turn = across[0] * along[1] - across[1] * along[0];  // 1 or -1
@@ -61,7 +61,7 @@ struct PeriodFrame {
   }
 
   static GLINT_HD double dot(const double (&p)[2], const double (&q)[2]) { return p[0] * q[0] + p[1] * q[1]; }
-  /// s steps across and t turns.
+  /// The vector of s steps across and t turns.
   GLINT_HD void vector(double s, double t, double (&result)[2]) const {
     for (int i = 0; i < 2; ++i) result[i] = s * across_period[i] + t * along_period[i];
   }
@@ -75,18 +75,18 @@ struct PeriodFrame {
   }
 };
 
-/// Half axes of a parallelogram of some covariance, which stands for a Gaussian: with the axes it is given, or, as soon as it
-/// winds round the map, with two sides along its way, and then of one turn at most. A Gaussian that long sees the map evenly
-/// along its way, and so does one whole turn. Between half a turn and a whole one the parallelogram turns from the one position
-/// to the other, so that it changes smoothly with the covariance.
+/// Half axes of a parallelogram that stands for a Gaussian of the same covariance. A Gaussian that does not wind round the map
+/// keeps the given axes. A longer one gets two sides along the line on which it winds, of one turn at most: a Gaussian that
+/// long covers the line evenly, and so does one whole turn. Between half a turn and a whole turn the parallelogram rotates from
+/// one position to the other, so that it changes smoothly with the covariance.
 /// @param texels  the covariance is a a^T + b b^T
 GLINT_DEVICE_CALL inline GLINT_HD AxisPair woundBox(const AxisPair& texels, int width, int height) {
-  constexpr double kTurn = 1.0 / 12, kRoot = 1.7320508075688772;  // variance of an even turn; deviations of half of one
+  constexpr double kTurn = 1.0 / 12, kRoot = 1.7320508075688772;  // variance of one even turn; half its length in deviations
   const double w = width, h = height;
   const AxisPair sigma = texels.scaled(1 / w, 1 / h);
   const double u = sigma.a[0] * sigma.a[0] + sigma.b[0] * sigma.b[0], v = sigma.a[1] * sigma.a[1] + sigma.b[1] * sigma.b[1];
   if (4 * std::max(u, v) <= kTurn) return texels.scaled(kRoot, kRoot);
-  // Deviations of the coordinate across, and of turns where it is known.
+  // Deviation of the coordinate across, and deviation of turns at a fixed coordinate across.
   const PeriodFrame frame(sigma);
   const double across[2] = {PeriodFrame::dot(frame.across, sigma.a), PeriodFrame::dot(frame.across, sigma.b)};
   const double along[2] = {PeriodFrame::dot(frame.along, sigma.a), PeriodFrame::dot(frame.along, sigma.b)};
@@ -98,7 +98,7 @@ GLINT_DEVICE_CALL inline GLINT_HD AxisPair woundBox(const AxisPair& texels, int 
     frame.vector(0, 0.5, half.b);
     return half.scaled(w, h);
   }
-  // How much each of the two shortest waves decides, which take the place of one another.
+  // Weights of the two shortest waves: where one replaces the other as the shortest, the result must not jump.
   const double slope = PeriodFrame::dot(across, along) / (wide * wide), rest = (slope - nearestInteger(slope)) * wide;
   const auto pull = [&](double deviation) {
     const double t = std::clamp(2 * deviation / turn - 1, 0.0, 1.0), smooth = t * t * (3 - 2 * t);
@@ -106,7 +106,8 @@ GLINT_DEVICE_CALL inline GLINT_HD AxisPair woundBox(const AxisPair& texels, int 
   };
   const double first = pull(turns), second = pull(wide * turns / std::hypot(rest, turns));
   if (first == 0 && second == 0) return texels.scaled(kRoot, kRoot);
-  // In coordinates where the covariance is 1, parallelograms are squares: a mean of angles that are the same after a quarter.
+  // In coordinates where the covariance is the identity, parallelograms are squares, which repeat after a quarter turn. So
+  // angles are averaged modulo a quarter turn.
   const double given = 4 * std::atan2((along[0] - slope * across[0]) / turns, across[0] / wide);
   const double other = -4 * std::atan2(rest, turns);
   const double angle =
@@ -119,34 +120,35 @@ GLINT_DEVICE_CALL inline GLINT_HD AxisPair woundBox(const AxisPair& texels, int 
   return half.scaled(w, h);
 }
 
-/// Boxes of up to so many texels, but at least kFewestBoxMaps times the map, are answered as they are where they reach no
-/// further than kMostBoxPeriods along u and v from their centre.
+/// Boxes up to this number of texels, or up to kFewestBoxMaps times the map if that is more, are answered without shortening if
+/// they reach at most kMostBoxPeriods along u and v from their centre.
 inline constexpr double kMostBoxTexels = 1 << 22, kFewestBoxMaps = 16, kMostBoxMaps = 256, kMostBoxPeriods = 256;
 
-/// Half axes, texels, of a box on a periodic map: those given, or where it is longer than can be summed, shortened along the
-/// way on which it winds round the map, to whole turns. Direction, width and drift stay. What it sees changes by less than 3 %
-/// of the footprint, about the last of its turns (tests/unit/long_footprints_test.cpp).
+/// Half axes, texels, of a box on a periodic map. A box too long to be summed is shortened to whole turns along the line on
+/// which it winds round the map; direction, width and drift stay. Its weights change by less than 3 % of the footprint, about
+/// its last turn (tests/unit/long_footprints_test.cpp).
 GLINT_DEVICE_CALL inline GLINT_HD AxisPair shortenedBox(const AxisPair& texels, int width, int height) {
   const double w = width, h = height;
   const double maps = std::clamp(kMostBoxTexels / (w * h), double{kFewestBoxMaps}, double{kMostBoxMaps});
   AxisPair half = texels.scaled(1 / w, 1 / h);
   const double reach_u = std::fabs(half.a[0]) + std::fabs(half.b[0]), reach_v = std::fabs(half.a[1]) + std::fabs(half.b[1]);
   if (std::max(reach_u, reach_v) <= kMostBoxPeriods && 4 * std::fabs(half.cross()) <= maps) return texels;
-  // Directions are not known to so many digits that more turns would matter.
+  // More turns would need more digits of the direction than there are.
   constexpr double kLongest = 1e9;
   for (double* axis : {half.a, half.b}) {
     const double scale = std::min(1.0, kLongest / std::max(std::hypot(axis[0], axis[1]), 1.0));
     axis[0] *= scale, axis[1] *= scale;
   }
-  const double root = std::sqrt(1.0 / 3);  // the covariance of a box
+  const double root = std::sqrt(1.0 / 3);  // deviation of a box of half width 1
   const PeriodFrame frame(half.scaled(root, root));
-  constexpr double kFourTurns = 16;  // of deviation along every wave: even to some percent
+  constexpr double kFourTurns =
+      16;  // variance from which on a box averages a wave out to some percent: four turns of deviation
   if (frame.across_variance >= kFourTurns) return {{0.5 * w, 0}, {0, 0.5 * h}};
-  // Across, both axes as they are. The shorter one there gets all turns: where the other one is wide, it averages out the waves
-  // that drift and turns together do not.
+  // Both axes keep their extent across. The axis that is shorter across gets all turns: the other, if wide, averages out the
+  // waves that drift and turns together would leave.
   const double by_a = PeriodFrame::dot(frame.across, half.a), by_b = PeriodFrame::dot(frame.across, half.b);
   const bool a_wider = std::fabs(by_a) >= std::fabs(by_b);
-  constexpr double kThinnest = 1e-9;  // of what is left of axes that are longer than kLongest
+  constexpr double kThinnest = 1e-9;  // least width across, where axes longer than kLongest were scaled down
   const double wide = std::max(std::fabs(a_wider ? by_a : by_b), kThinnest), narrow = a_wider ? by_b : by_a;
   const double period = std::hypot(frame.along_period[0], frame.along_period[1]);
   const double turns = std::min({maps / (2 * wide), 2 * kMostBoxPeriods / period, std::sqrt(12 * frame.turns_variance)});

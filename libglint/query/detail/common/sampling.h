@@ -10,13 +10,13 @@
 
 namespace glint {
 
-/// Brings a random number into [0, 1); what is not a number becomes 0.
+/// Clamps a random number to [0, 1); NaN becomes 0.
 inline GLINT_HD float clampUnit(float xi) { return xi > 0 ? std::min(xi, float{kBelowOne}) : 0.0f; }
 inline GLINT_HD Vec2 clampUnit(Vec2 xi) { return {clampUnit(xi.x), clampUnit(xi.y)}; }
 
-/// Chooses one of `count` things in proportion to weight(k) >= 0, which sum to `total`, and leaves in `xi` how far into the
-/// share of the chosen one it fell: again uniform in [0, 1), so that one number serves a chain of choices and stratified
-/// numbers stay so.
+/// Chooses one of `count` things in proportion to weight(k) >= 0, which sum to `total`. Sets `xi` to its position inside the
+/// share of the chosen thing: this is again uniform in [0, 1), so that one number serves several choices, and stratified
+/// numbers stay stratified.
 /// @return index, or -1 if no weight is positive
 template <class Weight>
 GLINT_HD int chooseIndex(int count, float total, Weight&& weight, float& xi) {
@@ -35,18 +35,18 @@ GLINT_HD int chooseIndex(int count, float total, Weight&& weight, float& xi) {
   return chosen;
 }
 
-/// The one of 16 things at which the sum of their weights passes `reached`. Nothing branches on the weights, which cannot be
-/// predicted.
+/// Chooses the thing of 16 at which the running sum of weights passes `reached`. Has no branch on the weights, which processors
+/// could not predict.
 /// @param sums  runningSums of the weights
-/// @param xi    set to how far into its share
+/// @param xi    set to the position of `reached` inside the share of the chosen thing
 /// @return index, or -1 if no weight is positive
 inline GLINT_HD int chooseAt(const Float16& weights, const Float16& sums, float reached, float& xi) {
-  float before[17], each[16];  // before[k]: of the first k
+  float before[17], each[16];  // before[k]: sum of the first k weights
   before[0] = 0;
   sums.store(before + 1);
   weights.store(each);
   const int k = lowestBit(~std::uint64_t{sums.notAbove(reached)});
-  // Sums are rounded, so that the last one may be passed, or something without weight be met.
+  // Sums are rounded: `reached` may pass the last sum, or fall on a thing without weight.
   if (k == 16 || !(each[k] > 0)) {
     xi = clampUnit(reached / before[16]);
     return chooseIndex(
@@ -66,12 +66,12 @@ inline GLINT_HD int chooseOf16(const Float16& weights, float& xi) {
 }
 
 /// chooseIndex among many things.
-/// @tparam kMost   most of them
-/// @param weights  count(): of things; group(g): Float16 of the weights of things 16 g to 16 g + 15, 0 beyond the end;
+/// @tparam kMost   upper bound of weights.count()
+/// @param weights  count(): number of things; group(g): Float16 of the weights of things 16 g to 16 g + 15, 0 beyond the end;
 ///                 sumGroups(sums): writes the sums of all groups
 template <int kMost, class Weights>
 GLINT_HD int chooseOfMany(const Weights& weights, float& xi) {
-  float before[(kMost + 15) / 16 + 1];  // before[g]: of groups before group g
+  float before[(kMost + 15) / 16 + 1];  // before[g]: sum of the groups before group g
   before[0] = 0;
   const int groups = (weights.count() + 15) / 16;
   if (groups == 0) return -1;

@@ -9,7 +9,7 @@
 
 namespace glint {
 
-/// What of a map decides which texels a footprint weighs.
+/// The properties of a map on which the weights of texels depend.
 struct TexelGrid {
   int width, height;
   Surface surface;
@@ -18,12 +18,12 @@ struct TexelGrid {
 
 /// A texel of the endless plane, or one of the two triangles of the cell that starts there.
 struct TexelChoice {
-  bool found = false;  ///< false: the footprint sees nothing
+  bool found = false;  ///< false: no texel has a weight
   int i = 0, j = 0, half = 0;
 };
 
-/// The digits of u below about 2^-bits as a number in [0, 1): uniform, and nearly independent of the leading ones. The factor
-/// is no power of two, so that regular grids of u spread too.
+/// The digits of u below about 2^-bits as a number in [0, 1): uniform, and nearly independent of the leading digits. The factor
+/// is no power of two, so that u on a regular grid give spread results too.
 inline GLINT_HD float lowerDigits(float u, int bits) {
   const double scaled = static_cast<double>(u) * 1.2360679774997896 * static_cast<double>(1 << bits);
   return clampUnit(static_cast<float>(scaled - std::floor(scaled)));
@@ -31,12 +31,13 @@ inline GLINT_HD float lowerDigits(float u, int bits) {
 
 /// Chooses among the weights of a footprint, texel by texel or triangle by triangle, exactly in proportion.
 ///
-/// Gaussians: a row by its sum, then a column in it. On a plane that goes on for ever, sums of rows at least a texel wide have
-/// a closed form (to 5e-9: Poisson's formula); others are added up. Boxes: the texel under an even point of the parallelogram.
+/// For a Gaussian, chooses a row by its sum and a column in the row. On a periodic map the sum of a row has a closed form where
+/// the Gaussian is at least a texel wide (to 5e-9, Poisson's formula); other rows are added up. For a box, draws a point evenly
+/// from the parallelogram and takes the texel under it.
 class TexelChooser {
  public:
   GLINT_HD TexelChooser(const FootprintWeights& weights, const TexelGrid& grid) : weights_(weights), grid_(grid) {
-    const int lost = smooth() ? 1 : 0;  // cells of the last row and column reach over the border
+    const int lost = smooth() ? 1 : 0;  // the last row and column of a smooth clamped map begin no cell
     if (grid.boundary == Boundary::wrap) {
       columns_ = {weights.column_begin, weights.column_end};
       rows_ = {weights.row_begin, weights.row_end};
@@ -58,7 +59,7 @@ class TexelChooser {
     return smooth() ? weights_.triangle(i, j, half) : weights_.texel(i, j);
   }
 
-  /// Where the weights of row (j, half) lie: texel centres, or the centroids of its triangles.
+  /// Positions at which row (j, half) is weighed: texel centres, or centroids of triangles.
   GLINT_HD Vec2 offset(int half) const {
     if (!smooth()) return {0.5f, 0.5f};
     constexpr float kThird = 1.0f / 3;
@@ -83,7 +84,7 @@ class TexelChooser {
     return sum;
   }
 
-  /// An index in [begin, end) in proportion to weight(k), like chooseIndex but adding in double.
+  /// Chooses an index in [begin, end) in proportion to weight(k), like chooseIndex, with sums in double.
   template <class Weight>
   static GLINT_HD bool choose(Range range, Weight&& weight, float& xi, int& chosen) {
     double total = 0;
@@ -129,7 +130,7 @@ class TexelChooser {
     texel.found = true;
     texel.i = static_cast<int>(std::floor(x));
     texel.j = static_cast<int>(std::floor(y));
-    if (grid_.boundary == Boundary::clamp) {  // rounding can leave the map
+    if (grid_.boundary == Boundary::clamp) {  // rounding can move the texel out of the map
       texel.i = std::clamp(texel.i, columns_.begin, columns_.end - 1);
       texel.j = std::clamp(texel.j, rows_.begin, rows_.end - 1);
     }
@@ -138,7 +139,7 @@ class TexelChooser {
     return texel;
   }
 
-  /// An even point of a convex polygon: a whole square by its coordinates, any other shape by its fan of triangles.
+  /// Draws a point evenly from a convex polygon: from its coordinates for the whole square, else from its fan of triangles.
   static GLINT_HD Vec2 pointIn(const SmallPolygon& shape, Vec2 xi) {
     if (shape.count == 4 && std::fabs(shape.twiceSignedArea()) >= 8) return {2 * xi.x - 1, 2 * xi.y - 1};
     const auto triangle = [&](int k) {

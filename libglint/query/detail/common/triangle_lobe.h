@@ -7,8 +7,8 @@
 
 namespace glint {
 
-/// Average over a triangle of the disk of the Gaussian lobe around h: the density of a facet whose normals fill the triangle
-/// evenly. Works for triangles of any shape, down to a segment or a point.
+/// Density towards h of a facet whose normals fill a triangle of the disk evenly: the average over the triangle of the Gaussian
+/// lobe around h. Works for triangles of any shape, also for a segment or a point.
 ///
 /// Along the longest edge the integral is an error function; across it, Gauss-Legendre panels no longer than one deviation.
 inline GLINT_HD float triangleDensity(Vec2 n0, Vec2 n1, Vec2 n2, Vec2 h, float sigma) {
@@ -37,7 +37,7 @@ inline GLINT_HD float triangleDensity(Vec2 n0, Vec2 n1, Vec2 n2, Vec2 h, float s
     return 0;
   }
   const float motion = (s_high - s_low) * std::max({std::fabs(y1 - y0), std::fabs(a1 - a0), std::fabs(a1 - b0)});
-  if (!(motion >= 0)) return 0;  // what is asked, or a normal of a file, is no number
+  if (!(motion >= 0)) return 0;  // NaN in the question, or in a normal of a file
   const int panels = std::max(static_cast<int>(std::min(std::ceil(motion), 256.0f)), 1);
   constexpr float kNode[3] = {-0.7745966692414834f, 0, 0.7745966692414834f};
   constexpr float kWeight[3] = {5.0f / 18, 8.0f / 18, 5.0f / 18};
@@ -56,7 +56,7 @@ inline GLINT_HD float triangleDensity(Vec2 n0, Vec2 n1, Vec2 n2, Vec2 h, float s
       sum += kWeight[q] * (1 - s) * mean_along * std::exp(-0.5f * y * y);
     }
   }
-  const float normalisation = 0.5f * std::sqrt(2 / kPi);  // of the Gaussian across
+  const float normalisation = 0.5f * std::sqrt(2 / kPi);  // factor of the Gaussian across the edge
   return 2 * (s_high - s_low) / static_cast<float>(panels) * sum * normalisation * inverse_sigma * inverse_sigma;
 }
 
@@ -64,9 +64,9 @@ inline GLINT_HD float triangleDensity(Vec2 n0, Vec2 n1, Vec2 n2, Vec2 h, float s
 ///
 /// Halves the longest edge until pieces are about a deviation long, then applies a rule of degree 5; pieces that lie deep
 /// inside or far outside the box need no halving.
-/// @return 0 for a triangle that does not fit into the square [-1, 1]^2, as only a broken file has it
+/// @return 0 for a triangle that does not fit into the square [-1, 1]^2; only a broken file has one
 inline GLINT_HD float triangleMass(Vec2 n0, Vec2 n1, Vec2 n2, const Box2& box, float sigma) {
-  constexpr float kDiagonal2 = 8.1f;  // of the square, and some rounding
+  constexpr float kDiagonal2 = 8.1f;  // squared diagonal of the square, plus rounding
   const Vec2 edges[3] = {n1 - n0, n2 - n1, n0 - n2};
   for (const Vec2 e : edges)
     if (!(dot(e, e) <= kDiagonal2)) return 0;

@@ -7,23 +7,23 @@
 
 namespace glint {
 
-// Blocks of pixels of half precision, [16][16], all >= 0.
+// Operations on blocks of half-precision pixels, [16][16], all >= 0, with vectors of eight.
 
 GLINT_AVX2 inline __m256 loadPixelsAvx2(const std::uint16_t* p) {
   return positiveFloatsOf(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
 }
 
-/// Adds `part` times a row of pixels to its left and its right half.
+/// Adds `part` times a row of pixels: eight pixels to `left`, eight to `right`.
 GLINT_AVX2 inline void addRow(const std::uint16_t* row, float part, __m256& left, __m256& right) {
   left = _mm256_add_ps(left, _mm256_mul_ps(_mm256_set1_ps(part), loadPixelsAvx2(row)));
   right = _mm256_add_ps(right, _mm256_mul_ps(_mm256_set1_ps(part), loadPixelsAvx2(row + kBlockSize / 2)));
 }
 
-/// Weighted sum of the pixels of some blocks by how much of their columns and rows is covered, to the bit that of
+/// Weighted sum of the pixels of some blocks. Each pixel counts by the covered parts of its column and row. Same bits as
 /// BlockCover::sumByFour.
 /// @param blocks, weights     [count]
-/// @param columns, rows       [16]; columns that are not covered are 0
-/// @param first_row, end_row  rows that are covered
+/// @param columns, rows       [16]: covered parts; 0 for columns that are not covered
+/// @param first_row, end_row  covered rows: from first_row to before end_row
 GLINT_AVX2 inline float sumCoveredPixels(const std::uint16_t* const* blocks, const float* weights, int count,
                                          const float* columns, const float* rows, int first_row, int end_row) {
   __m256 left = _mm256_setzero_ps(), right = left;
@@ -45,7 +45,7 @@ GLINT_AVX2 inline float sumCoveredPixels(const std::uint16_t* const* blocks, con
   return ((lowFour(left) + highFour(left)) + (lowFour(right) + highFour(right))).sum();
 }
 
-/// sumRows, to the bit.
+/// Sum of each row: same bits as sumRows.
 GLINT_AVX2 inline Float16 sumRowsAvx2(const std::uint16_t* pixels) {
   Float4 rows[kBlockSize];
   for (int y = 0; y < kBlockSize; ++y) {

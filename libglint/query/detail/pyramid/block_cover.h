@@ -13,7 +13,7 @@
 
 namespace glint {
 
-/// How much of each row and column of a block a box covers.
+/// Covered parts of the rows and columns of a block under a box of pixels.
 class BlockCover {
  public:
   GLINT_HD void set(const BlockBox& box) {
@@ -41,14 +41,14 @@ class BlockCover {
 #endif
     return sumByFour(blocks, weights, count);
   }
-  /// The same without vectors of eight.
+  /// `sum` with vectors of four.
   template <class Pixel>
   GLINT_HD float sumByFour(const Pixel* const* blocks, const float* weights, int count) const {
     Float4 sums[kBlockSize / 4] = {Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()};
     for (int x = first_column; x < end_column; x += 4) {
       Float4 sum = Float4::zero();
       for (int k = 0; k < count; ++k) {
-        // Two sums, since an addition waits for the one before it.
+        // Two sums, so that an addition need not wait for the previous one.
         Float4 even = Float4::zero(), odd = Float4::zero();
         const auto row = [&](int y) { return Float4::all(rows[y]) * loadPixels(blocks[k] + y * kBlockSize + x); };
         int y = first_row;

@@ -11,8 +11,8 @@
 
 namespace glint {
 
-/// Masses of blocks in one byte: bits 6 to 13 of a half-precision number, which is 0 to 1.9375 with four bits of mantissa.
-/// All are whole multiples of 2^-18, so that sums up to 64 are exact.
+/// Decodes the mass of a block from one byte: bits 6 to 13 of a half-precision number. Masses are 0 to 1.9375 with four bits of
+/// mantissa. All are multiples of 2^-18, so that float sums up to 64 are exact.
 inline GLINT_HD float blockMass(std::uint8_t code) { return halfToFloat(static_cast<std::uint16_t>(code << 6)); }
 
 /// The smallest code whose mass is not below `mass` (at most 1.9375).
@@ -33,7 +33,7 @@ class BlockMasses {
   GLINT_HD int count() const { return count_; }
   GLINT_HD float operator[](int k) const { return blockMass(codes_[k]); }
 
-  /// Masses 16 g to 16 g + 15; 0 where there are fewer.
+  /// Masses 16 g to 16 g + 15; 0 beyond the last mass.
   GLINT_HD Float16 group(int g) const {
 #ifdef GLINT_AVX2
     if (hasAvx2()) return groupAvx2(g);
@@ -55,10 +55,10 @@ class BlockMasses {
  private:
   static constexpr int kGroup = 16;
 
-  /// Whether all bytes of a group may be read, those behind the last code included.
+  /// Whether all 16 bytes of a group may be read, including bytes after the last code.
   GLINT_HD bool isReadable(int g) const { return readable_ >= static_cast<std::size_t>(kGroup * (g + 1)); }
 
-  /// Codes of a group, 0 behind the last.
+  /// Codes of a group; 0 after the last code.
   struct Codes {
     std::uint32_t fours[kGroup / 4];
   };

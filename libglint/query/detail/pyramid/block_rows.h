@@ -19,7 +19,7 @@ GLINT_HD Float16 rowOf(const Pixel* pixels, int y) {
   return {{loadPixels(row), loadPixels(row + 4), loadPixels(row + 8), loadPixels(row + 12)}};
 }
 
-/// Sums of the rows of a block.
+/// The sum of each row of a block.
 template <class Pixel>
 GLINT_HD Float16 sumRows(const Pixel* pixels) {
   const auto four = [&](int y) {
@@ -32,8 +32,8 @@ GLINT_HD Float16 sumRows(const Pixel* pixels) {
 }
 static_assert(kBlockSize == 16);
 
-/// The half vector at position `xi` of a pixel. Kept 2^-23 resolution from the pixel's border, so that rounding does not take
-/// it into a neighbour.
+/// The half vector at position `xi` of a pixel. Stays 2^-23 resolution inside the pixel's border, so that rounding cannot move
+/// it into a neighbouring pixel.
 inline GLINT_HD Vec2 pointInPixel(const PyramidShape& shape, const PixelPlace& place, Vec2 xi) {
   const float margin = 0x1p-23f * static_cast<float>(shape.resolution);
   const int blocks = shape.blocksPerAxis();

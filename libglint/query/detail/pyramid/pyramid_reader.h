@@ -16,8 +16,8 @@
 
 namespace glint {
 
-/// Reads the images that answer a footprint. Long answers come in steps, each of which asks the memory for what the next one
-/// reads: a batch takes a step for many queries before the next step, so that their cache misses are under way together.
+/// Reads the images that answer a footprint. Long answers are split into steps, and each step prefetches what the next step
+/// reads. A batch does one step for many queries before the next step, so that their cache misses overlap.
 class PyramidReader {
  public:
   GLINT_HD explicit PyramidReader(const NdfPyramid& pyramid) : pyramid_(pyramid), mask_words_(pyramid.shape.maskWords()) {}
@@ -31,19 +31,19 @@ class PyramidReader {
                                                      : addPixelsOf<float>(findPixelsOf<float>(chosen, place));
   }
 
-  /// A sample from an image on its way: chooseImage, findBlocks, chooseBlock and choosePixel make it, in this order. Each
-  /// reads what the one before has asked the memory for, so the cache misses of many samples can be under way together.
+  /// A sample that is being drawn: chooseImage, findBlocks, chooseBlock and choosePixel fill it in this order. Each step reads
+  /// what the previous step prefetched, so that the cache misses of many samples can overlap.
   struct Draw {
     PyramidSlices slices;
     Vec2 xi;
     PyramidSlice chosen = {0, 0, 0};  ///< weight 0: nothing can be drawn
-    std::uint64_t first_block = 0;    ///< of the chosen image
+    std::uint64_t first_block = 0;    ///< number of the chosen image's first stored block
     int block_count = 0;
     std::uint64_t stored = 0;        ///< the chosen block
     PixelPlace place = {0, -1, -1};  ///< x = -1: nothing can be drawn
   };
 
-  /// By the weights of the images, with xi.x.
+  /// Chooses an image in proportion to its weight, with xi.x.
   GLINT_HD Draw chooseImage(const PyramidSlices& chosen, Vec2 xi) const {
     Draw draw;
     draw.slices = chosen;
@@ -57,7 +57,7 @@ class PyramidReader {
     return draw;
   }
 
-  /// The blocks that the image stores, whose means it asks for.
+  /// Finds the stored blocks of the image and prefetches their means.
   GLINT_HD void findBlocks(Draw& draw) const {
     constexpr int kLine = 16;
     const PyramidLevel& level = levelOf(draw.chosen);
@@ -67,7 +67,7 @@ class PyramidReader {
     for (int k = 0; k < draw.block_count; k += kLine) prefetch(level.block_means.data() + draw.first_block + k);
   }
 
-  /// By the means of the blocks, with xi.y.
+  /// Chooses a block in proportion to its mean, with xi.y.
   GLINT_HD void chooseBlock(Draw& draw) const {
     if (!(draw.chosen.weight > 0)) return;
     const PyramidLevel& level = levelOf(draw.chosen);
@@ -80,7 +80,7 @@ class PyramidReader {
     prefetchRows(static_cast<const char*>(level.pixels) + draw.stored * blockBytes(), 0, kBlockSize);
   }
 
-  /// By its value: the row with xi.y, the column with xi.x.
+  /// Chooses a pixel in proportion to its value: the row with xi.y, the column with xi.x.
   GLINT_HD void choosePixel(Draw& draw) const {
     if (!(draw.chosen.weight > 0 && draw.place.block >= 0)) return;
     const PyramidLevel& level = levelOf(draw.chosen);
@@ -93,7 +93,7 @@ class PyramidReader {
                                               : choose(static_cast<const float*>(level.pixels));
   }
 
-  /// Stored blocks in one place of the chosen images.
+  /// The stored blocks of the chosen images that have one number.
   struct StoredBlocks {
     int count;
     float weights[PyramidSlices::kMost];
@@ -101,17 +101,17 @@ class PyramidReader {
     const float* means[PyramidSlices::kMost];
   };
 
-  /// A mean on its way: what it reads is asked for, and not yet read.
+  /// A mean that has been begun: its blocks are prefetched and not read yet.
   struct PendingMean {
     static constexpr int kMost = 4;
-    double sum;  ///< of densities times pixels, so far
+    double sum;  ///< integral so far: densities times numbers of pixels
     int count;
     BlockCover covers[kMost];
     StoredBlocks blocks[kMost];
   };
 
-  /// Begins a mean from chosen images: finds what is stored and asks the memory for it. Ranges of more than
-  /// PendingMean::kMost blocks are summed on the way.
+  /// Begins a mean from chosen images: finds the stored blocks in the range and prefetches them. In ranges of more than
+  /// PendingMean::kMost blocks, blocks are summed already here to make room.
   GLINT_HD void beginMean(const PyramidSlices& chosen, const Box2& range, PendingMean& pending) const {
     pending.sum = 0;
     pending.count = 0;
@@ -127,14 +127,14 @@ class PyramidReader {
     });
   }
 
-  /// The mean that was begun with the same range; 0 if the range is empty.
+  /// Completes a mean that was begun with the same range; 0 if the range is empty.
   GLINT_HD float finishMean(const Box2& range, PendingMean& pending) const {
     addPending(pending);
     const float area = areaInPixels(shape(), range);
     return area > 0 ? finitePositive(static_cast<float>(pending.sum / area)) : 0.0f;
   }
 
-  /// Asks the memory for where chosen images say which blocks they store.
+  /// Prefetches the masks of stored blocks of the chosen images.
   GLINT_HD void prefetchIndex(const PyramidSlices& chosen) const {
     for (int k = 0; k < chosen.count; ++k) {
       prefetch(maskOf(chosen[k]));
@@ -151,10 +151,10 @@ class PyramidReader {
     return levelOf(slice).mask_ranks.data() + std::size_t{slice.image} * mask_words_;
   }
 
-  /// Where a place is in the level of every slice.
+  /// Positions of one pixel in the arrays of the levels, for all slices.
   struct Places {
     const void* pixels[PyramidSlices::kMost];
-    float weights[PyramidSlices::kMost];  ///< 0 where nothing is stored: then the pixel is something else, which can be read
+    float weights[PyramidSlices::kMost];  ///< 0 where the block is not stored: the position is then some other pixel
     int count = 0;
   };
 
@@ -175,8 +175,8 @@ class PyramidReader {
     }
   };
 
-  /// Finds a pixel in every slice and asks the memory for all. Nothing branches on what is stored, since that cannot be
-  /// predicted, so the cache misses of all slices are under way together.
+  /// Finds a pixel in every slice and prefetches it. Has no branch on whether blocks are stored, which processors cannot
+  /// predict: so the cache misses of all slices overlap.
   template <class Pixel>
   GLINT_HD Places findPixelsOf(const PyramidSlices& chosen, const PixelPlace& place) const {
     constexpr std::uint64_t kBlockBytes = kBlockPixels * sizeof(Pixel);
@@ -185,7 +185,7 @@ class PyramidReader {
     places.count = chosen.count;
     for (int step = 0; 4 * step < chosen.count; ++step) {
       const PyramidLevel& level = pyramid_.levels[chosen.levels[step]];
-      // Where nothing is stored a pixel of the first block is read; a level may have none.
+      // Where the block is not stored, a pixel of the level's first block is read instead; a level may have no block at all.
       const void* pixels = level.masks.data();
       if (!level.block_means.empty()) pixels = static_cast<const Pixel*>(level.pixels) + (place.y * kBlockSize + place.x);
       for (int k = 4 * step; k < 4 * step + 4; ++k) {
@@ -213,14 +213,14 @@ class PyramidReader {
     const auto pixel = [&](int j) { return *static_cast<const Pixel*>(places.pixels[k + j]); };
     const Float4 weights = Float4::load(places.weights + k);
     if constexpr (std::is_same_v<Pixel, float>) {
-      // Values of a file are not checked: a slice that does not count must not bring an infinity.
+      // Numbers of a file are not checked: 0 times an infinity from a slice of weight 0 would be NaN.
       return whereLess(Float4::zero(), weights, weights * Float4::of(pixel(0), pixel(1), pixel(2), pixel(3)));
     } else {
       return weights * Float4::ofPositive(pixel(0), pixel(1), pixel(2), pixel(3));
     }
   }
 
-  /// Nothing branches on what is stored, as in findPixelsOf.
+  /// Finds a block in every slice. Like findPixelsOf, has no branch on whether blocks are stored.
   GLINT_HD void findStored(const PyramidSlices& chosen, int block, StoredBlocks& out) const {
     const unsigned word = static_cast<unsigned>(block) / 64, bit = static_cast<unsigned>(block) % 64;
     int count = 0;
@@ -232,7 +232,7 @@ class PyramidReader {
       out.weights[count] = chosen.weights[k];
       out.pixels[count] = static_cast<const char*>(level.pixels) + stored * blockBytes();
       out.means[count] = level.block_means.data() + stored;
-      // Those of weight 0 would cost as much; and values of a file are not checked, so that 0 times one may be no number.
+      // Drops blocks of weight 0: they would cost as much as others, and 0 times an unchecked number of a file may be NaN.
       count += static_cast<int>(rank.kept & 1) & static_cast<int>(chosen.weights[k] > 0);
     }
     out.count = count;
@@ -260,7 +260,7 @@ class PyramidReader {
                                        : covered(static_cast<const float*>(nullptr)));
   }
 
-  /// Sums of the rows of a block.
+  /// The sum of each row of a block.
   template <class Pixel>
   static GLINT_HD Float16 rowSums(const Pixel* block) {
 #ifdef GLINT_AVX2

@@ -19,11 +19,11 @@ struct PyramidSlice {
   float weight;
 };
 
-/// The images that answer a footprint: four neighbours in one level or in each of two: corner k % 4 (x in bit 0, y in bit 1) of
-/// step k / 4. Weights are >= 0 and sum to 1.
+/// The images that answer a footprint: four neighbouring images in one level, or in each of two levels. Slice k is corner k % 4
+/// (x in bit 0, y in bit 1) of level number k / 4. Weights are >= 0 and sum to 1.
 struct PyramidSlices {
   static constexpr int kMost = 8;
-  int levels[2];  ///< of the first four slices and, if there are more, of the others
+  int levels[2];  ///< level of slices 0 to 3, and of slices 4 to 7
   std::uint32_t images[kMost];
   float weights[kMost];
   int count = 0;  ///< 4 or 8
@@ -32,9 +32,9 @@ struct PyramidSlices {
   GLINT_HD PyramidSlice operator[](int k) const { return {level(k), images[k], weights[k]}; }
 };
 
-/// Variance (texels^2) of the isotropic Gaussian with the same mean square size as a footprint, widened to kMinSigmaTexels; a
-/// size that is not finite counts as the smallest. A footprint that is longer than the map along its longer side is first
-/// shortened to the map there.
+/// Variance (texels^2) of the isotropic Gaussian with the same mean square size as a footprint, at least that of
+/// kMinSigmaTexels; a size that is not finite counts as the smallest. A footprint that is longer than the map along its longer
+/// axis is first shortened to the map along that axis.
 /// @param largest_u, largest_v  squares of the map's width and height
 inline GLINT_HD float isotropicVariance(float largest_u, float largest_v, const Covariance& c) {
   constexpr float kLowest = kMinSigmaTexels * kMinSigmaTexels;
@@ -48,21 +48,21 @@ inline GLINT_HD float isotropicVariance(const PyramidShape& shape, const Footpri
   return isotropicVariance(width * width, height * height, p.covariance);
 }
 
-/// Its deviation, texels.
+/// Deviation of that Gaussian, texels.
 inline GLINT_HD float isotropicSigma(const PyramidShape& shape, const Footprint& p) {
   return std::sqrt(isotropicVariance(shape, p));
 }
 
-/// Footprint of level 0, texels. Narrower ones are answered from the texels themselves where these are at hand.
+/// Deviation of the footprints of level 0, texels. Narrower footprints are answered from the texels where these are available.
 inline GLINT_HD float finestSigma(const PyramidShape& shape) { return kFootprintPerStride * shape.levels[0].stride; }
 
-/// Whether a footprint is narrower than those of level 0.
+/// Whether a footprint is narrower than the footprints of level 0.
 inline GLINT_HD bool belowFinest(const PyramidShape& shape, const Footprint& p) {
   return isotropicVariance(shape, p) < finestSigma(shape) * finestSigma(shape);
 }
 
-/// log2 of a positive, finite number, to 2e-7. Plain arithmetic, so that batches and device code choose the same levels to the
-/// bit.
+/// log2 of a positive, finite number, to 2e-7. Uses plain arithmetic, so that batches and device code get the same bits and
+/// choose the same levels.
 inline GLINT_HD float log2Of(float x) {
   constexpr std::uint32_t kSqrtHalf = 0x3f3504f3u;
   std::uint32_t bits;
@@ -77,14 +77,14 @@ inline GLINT_HD float log2Of(float x) {
   return static_cast<float>(exponent) + kTwoOverLn2 * s * series;
 }
 
-/// A level between those of a pyramid.
+/// A position between two levels of a pyramid.
 struct LevelPlace {
-  int first;  ///< the finer of its neighbours
-  float t;    ///< 0 to 1: how far it is to the next; 0 at the last
+  int first;  ///< the finer level
+  float t;    ///< 0 to 1: share of the next level; 0 at the last level
 };
 
-/// The level of a footprint between those of a pyramid.
-/// @param ratio  variance over that of level 0, from 1 to 4^15: a level is where it is 4^level
+/// The position of a footprint between the levels of a pyramid.
+/// @param ratio  variance of the footprint over the variance of level 0, from 1 to 4^15; it is 4^l at level l
 inline GLINT_HD LevelPlace levelPlace(float ratio) {
   constexpr std::uint32_t kOne = 0x3f800000u;
   constexpr int kPowerOf4 = 24;  // the exponent less its lowest bit
@@ -99,14 +99,15 @@ inline GLINT_HD LevelPlace levelPlace(float ratio) {
   return {static_cast<int>(first), t < 1 ? t : 1.0f};
 }
 
-/// Chooses the images of footprints. Holds what follows from the shape, so that a query divides by nothing.
+/// Chooses the images that answer a footprint. The constructor computes everything that depends on the shape alone, so that a
+/// query has no division by it.
 class SliceChooser {
  public:
   /// The centres of one level along x and y, in strides.
   struct LevelCentres {
-    float extent[2];   ///< of the map
+    float extent[2];   ///< width and height of the map
     float last[2];     ///< last column and row
-    float per_gap[2];  ///< 1 / (gap from the last centre round to the first): not 1 when the stride does not divide the map
+    float per_gap[2];  ///< 1 / (gap from the last centre across the border to the first); 1 if the stride divides the map
     std::int32_t columns, unused;
   };
 
@@ -129,8 +130,8 @@ class SliceChooser {
     levels_[shape.level_count] = levels_[shape.level_count - 1];  // with weight 0
   }
 
-  /// Trilinear choice of images: bilinear between centres, linear in log2 of the footprint's size between levels. Footprints
-  /// below the finest level get that level; those above the last one of footprints get it and the mean of the map (`levelOf`).
+  /// Chooses images trilinearly: bilinear between centres, linear in log2 of the footprint's size between levels. Footprints
+  /// below the finest level get the finest level. Footprints above the last level get it and the mean of the map (`levelOf`).
   GLINT_HD PyramidSlices choose(const Footprint& p) const {
     const LevelPlace level = levelOf(isotropicVariance(largest_u_, largest_v_, p.covariance));
     const LevelCentres &finer = levels_[level.first], &coarser = levels_[level.first + 1];
@@ -146,14 +147,14 @@ class SliceChooser {
     return out;
   }
 
-  // What batches choose by, in vectors.
+  // Parts of `choose` for batches, which choose images for several footprints at once in vectors.
 
   /// The level of a footprint of this variance, texels^2.
   ///
-  /// Above the last level of footprints, at sigma_L, the mean of the map takes over as unevenness fades: on a map of length W
-  /// that repeats, a Gaussian footprint keeps exp(-2 pi^2 sigma^2 / W^2) of the slowest wave; on one that ends, the weights
-  /// inside a footprint differ over the map by a part that falls with 1 / sigma^2 in the end (`farDecay`). So the share of
-  /// level L is what sigma keeps over what sigma_L keeps.
+  /// Above the last level L of footprints the answer fades into the mean of the map. How fast follows from the unevenness that
+  /// a footprint of deviation sigma still sees. On a map of length W that repeats, this is exp(-2 pi^2 sigma^2 / W^2), the
+  /// share of the longest wave that a Gaussian keeps. On a map that ends, it falls with 1 / sigma^2 for large sigma
+  /// (`farDecay`). The share of level L is the unevenness at sigma over the unevenness at sigma_L.
   GLINT_HD LevelPlace levelOf(float variance) const {
     const float ratio = variance * per_finest_variance_, coarse = ratio > 1 ? ratio : 1;
     LevelPlace level = levelPlace(coarse < largest_ratio_ ? coarse : largest_ratio_);
@@ -165,19 +166,19 @@ class SliceChooser {
     level.t = beyond > 0 ? 1 - 1 / series : level.t;
     return level;
   }
-  /// @param level  up to the one behind the last
+  /// @param level  0 to level_count, which repeats the last level
   GLINT_HD const LevelCentres& centres(int level) const { return levels_[level]; }
 
  private:
-  /// Neighbouring centres, and the position between them: 0 to 1, and what is left to 1. Lanes: x and y of a level, x and y of
-  /// another.
+  /// Neighbouring centres and the position t between them, 0 to 1; rest = 1 - t. Lanes: x and y of one level, x and y of
+  /// another level.
   struct Neighbours {
     Float4 low, high, t, rest;
   };
 
   GLINT_HD Neighbours neighbours(const LevelCentres& a, const LevelCentres& b, Vec2 centre) const {
     const Float4 zero = Float4::zero(), one = Float4::all(1), below_one = Float4::all(kBelowOne);
-    // In [0, 1), and 0 if it is not finite.
+    // Wraps into [0, 1); numbers that are not finite become 0.
     const Float4 uv = Float4::of(centre.x, centre.y, centre.x, centre.y);
     const Float4 wrapped = minOf((uv - floorOf(uv)).positive(), below_one);
     const Float4 extent = Float4::ofPairs(a.extent, b.extent), last = Float4::ofPairs(a.last, b.last);
@@ -197,14 +198,15 @@ class SliceChooser {
     return {low, high, t, one - t};
   }
 
-  /// Images and weights of the corners of one level. Lanes of places and weights: low and high along x, low and high along y.
+  /// Sets the images and weights of the four corners of one level.
+  /// @param places, parts  centres and their shares; lanes: low and high along x, low and high along y
   static GLINT_HD void setCorners(Float4 places, Float4 parts, std::int32_t columns, float level_weight, std::uint32_t* images,
                                   float* weights) {
     storeIndices(places.lanes2233(), columns, places.lanes0101(), images);
     (Float4::all(level_weight) * parts.lanes0101() * parts.lanes2233()).store(weights);
   }
 
-  /// What levelOf's x grows by for each variance of level 0 beyond the last level.
+  /// Growth of x in levelOf for each unit of variance beyond the last level, in units of the variance of level 0.
   GLINT_HD float farDecay() const {
     constexpr float kTwoPiSquared = 19.739208802178716f;
     // A step in the middle of a map that ends keeps 1 / (sigma^2 / W^2 + 0.047) of its height, to a tenth from sigma = W / 5
@@ -216,7 +218,7 @@ class SliceChooser {
 
   float largest_u_, largest_v_;  // texels^2
   float per_finest_variance_;
-  float largest_ratio_;  // of variances, that of the last level of footprints
+  float largest_ratio_;  // variance of the last level of footprints over the variance of level 0
   float decay_;
   bool wraps_;
   LevelCentres levels_[kMaxPyramidLevels + 1];
@@ -227,7 +229,8 @@ struct BlockBox {
   float x0, y0, x1, y1;
 };
 
-/// The pixel that holds a half vector: its block, and its place there. Valid for |h.x|, |h.y| <= 1.
+/// The pixel that contains a half vector: number of its block, and its column and row in the block. Valid for |h.x|, |h.y| <=
+/// 1.
 struct PixelPlace {
   int block, x, y;
 };
@@ -235,7 +238,7 @@ inline GLINT_HD PixelPlace pixelPlace(const PyramidShape& shape, Vec2 h) {
   const float half = 0.5f * static_cast<float>(shape.resolution);
   const int x = std::min(static_cast<int>((h.x + 1) * half), shape.resolution - 1);
   const int y = std::min(static_cast<int>((h.y + 1) * half), shape.resolution - 1);
-  // Shifts, since neither is negative.
+  // Shifts instead of divisions, since neither is negative.
   static_assert(kBlockSize == 16);
   return {(y >> 4) * (shape.resolution >> 4) + (x >> 4), x & 15, y & 15};
 }
@@ -259,7 +262,7 @@ GLINT_HD void forEachBlock(const PyramidShape& shape, const Box2& range, Visitor
   }
 }
 
-/// Pixels of a range of half vectors: what a sum over pixels is divided by to become a mean. Parts outside the square count.
+/// Area of a range of half vectors in pixels, including parts outside the square. A sum over pixels divided by it is the mean.
 inline GLINT_HD float areaInPixels(const PyramidShape& shape, const Box2& range) {
   const float half = 0.5f * static_cast<float>(shape.resolution);
   return range.area() * half * half;
