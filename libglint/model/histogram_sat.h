@@ -18,14 +18,14 @@ namespace glint {
 /// Four tables count texels of each bin, one row of `rowLength()` counters after the other:
 ///  - `sums`: texels of [0, x) x [0, y) at every `stride` texels, modulo 2^16: exact differences for rectangles of less than
 ///    2^16 texels;
-///  - `coarse_sums`: the same at every `coarse_stride` texels, modulo 2^32;
+///  - `coarse_sums`: texels of [0, x) x [0, y) at every `coarse_stride` texels, modulo 2^32;
 ///  - `row_sums`, `column_sums`: texels of one row (column) before every `line_stride`-th texel, modulo 2^16.
 /// Point a of a table lies at texel min(a * stride, size); the last one is the border. Counters beyond `bin_count` are 0.
 struct HistogramSat {
   static constexpr int kMaxThetaBins = 64;
   static constexpr int kMaxPhiBins = 256;
   static constexpr int kMaxBins = 2048;   ///< theta_bins * phi_bins at most
-  static constexpr int kMaxStride = 128;  ///< of the fine and the coarse table: keeps a cell far below 2^16 texels
+  static constexpr int kMaxStride = 128;  ///< largest stride of `sums` and `coarse_sums`: a cell is far below 2^16 texels
   static constexpr int kMaxLineStride = 4096;
   static constexpr int kTileSize = 8;       ///< texels are stored in tiles, so that columns cost no more than rows
   static constexpr int kRowAlignment = 16;  ///< counters
@@ -53,10 +53,10 @@ struct HistogramSat {
   GLINT_HD constexpr int rowLength() const { return (bin_count + kRowAlignment - 1) / kRowAlignment * kRowAlignment; }
   GLINT_HD constexpr int tileColumns() const { return (width + kTileSize - 1) / kTileSize; }
   GLINT_HD constexpr int tileRows() const { return (height + kTileSize - 1) / kTileSize; }
-  /// Points of a table of that stride along u, v: both borders count.
+  /// Points of a table of this stride along u and along v, points on both borders included.
   GLINT_HD constexpr int pointsX(int table_stride) const { return (width + table_stride - 1) / table_stride + 1; }
   GLINT_HD constexpr int pointsY(int table_stride) const { return (height + table_stride - 1) / table_stride + 1; }
-  /// Place of a texel in `texels`.
+  /// Index of a texel in `texels`.
   GLINT_HD constexpr std::size_t texelIndex(int i, int j) const {
     const std::size_t tile = static_cast<std::size_t>(j / kTileSize) * tileColumns() + i / kTileSize;
     return tile * kTileSize * kTileSize + j % kTileSize * kTileSize + i % kTileSize;

@@ -15,10 +15,10 @@
 
 namespace glint {
 
-/// How many nested boxes stand for a Gaussian footprint.
+/// Number of nested boxes that stand for a Gaussian footprint.
 enum class GaussianBoxes : std::uint8_t {
   one = 1,    ///< the box of the same second moments
-  three = 3,  ///< three boxes of the same second moments in sum, with least squared difference from the Gaussian
+  three = 3,  ///< three boxes that together have the same second moments and the least squared difference from the Gaussian
 };
 
 /// Share of a footprint with slanted sides that HistogramNdf may count in a wrong place, unless it is told otherwise.
@@ -26,14 +26,15 @@ inline constexpr float kSlantTolerance = 0.06f;
 
 /// The NDF from accumulated histograms of normals (Gamboa 2018, section 4.1).
 ///
-/// Texels count by their covered area, the plane is periodic. Boxes along the axes are exact, whatever their size. Boxes at an
-/// angle are made of strips where these misplace no more than a given share of the footprint, which bounds the total variation
-/// from the exact histogram; small or thin ones, and all with a tolerance of 0, are exact. Gaussian footprints are answered as
-/// the parallelogram of the same covariance, or three of them. Inside a bin of directions the density is even over the bin's
-/// area of the disk: the histogram knows no more. Bins are some ten degrees wide, far wider than the intrinsic roughness, so
-/// there is no further blur, and the density integrates to 1 over the disk.
-/// Cost: a few texels for each texel along the border of an axis-aligned box (and none beyond some hundreds), four rows of
-/// counters; at an angle that for some 1 / tolerance strips, and exactly O(stride * border).
+/// Texels count by their covered area; the plane is periodic.
+///  - Boxes along the axes are exact at any size.
+///  - Boxes at an angle are cut into strips that misplace at most a given share of the footprint. The share bounds the total
+///    variation from the exact histogram. Small or thin boxes are exact, and all boxes with a tolerance of 0.
+///  - A Gaussian is answered as the parallelogram of the same covariance, or as three of them.
+/// The density is constant over the area of a bin on the disk. Bins are some ten degrees wide, far wider than the intrinsic
+/// roughness, so there is no further blur, and the density integrates to 1 over the disk.
+/// Cost of an axis-aligned box: four rows of counters, and a few texels for each texel along a border of up to some hundred
+/// texels. Cost at an angle: the same for each of about 1 / tolerance strips, or O(stride * border) for an exact answer.
 /// Thread-safe, allocates nothing; the arrays must outlive it.
 class HistogramNdf {
  public:
@@ -44,7 +45,7 @@ class HistogramNdf {
 
   GLINT_HD const HistogramSat& sat() const { return sat_; }
   GLINT_HD const SphericalBins& bins() const { return bins_; }
-  /// Bins that occur in the map.
+  /// Number of bins that occur in the map.
   GLINT_HD int binCount() const { return sat_.bin_count; }
   /// Mean normal of the texels of a bin over the whole map: the direction that stands for it.
   GLINT_HD Vec2 binNormal(int bin) const { return sat_.bin_normals.data()[bin]; }
@@ -122,7 +123,7 @@ class HistogramNdf {
   }
 
  private:
-  /// Counts of all bins, times a factor. Returns their sum: the area that was counted, texels^2.
+  /// Sums the texels of all bins. Returns the total: the area that was counted, texels^2.
   GLINT_HD double histogram(const Footprint& p, BinCounts& counts) const {
     AllBins sum(sat_, counts);
     const double area = addFootprint(p, sum);
@@ -130,27 +131,27 @@ class HistogramNdf {
     return area;
   }
 
-  /// Place of a bin among those that occur, or -1.
+  /// Number of a bin among the bins that occur, or -1.
   GLINT_HD int binOf(int id) const {
     const std::uint16_t* ids = sat_.bin_ids.data();
     const std::uint16_t* found = std::lower_bound(ids, ids + sat_.bin_count, id);
     return found != ids + sat_.bin_count && *found == id ? static_cast<int>(found - ids) : -1;
   }
 
-  /// Adds the texels of a footprint. Returns the area that they cover together.
+  /// Adds the texels of a footprint. Returns the area that was added.
   template <class Sum>
   GLINT_HD double addFootprint(const Footprint& p, Sum& sum) const {
     if (p.kind == Footprint::Kind::box) {
       const double area = addBox(p, sum);
       if (area > 0) return area;
     }
-    // The parallelogram of the same covariance, two of its sides upright: Cholesky's factor.
+    // The parallelogram of the same covariance with two upright sides, from Cholesky's factor.
     const UsableCovariance c = positiveCovariance(p.covariance);
     const double across = std::sqrt(c.xx);
     const AxisPair sigma = {{across, c.xy / across}, {0, std::sqrt(c.determinant()) / across}};
     if (gaussian_ == GaussianBoxes::one) return addParallelogram(p.centre, woundBox(sigma, sat_.width, sat_.height), 1, sum);
-    // Nested boxes for a Gaussian: sizes relative to the box of its covariance, and shares. Fitted: least squared difference
-    // under sum of shares 1, sum of shares * scales^2 1.
+    // Three nested boxes for a Gaussian: sizes relative to the box of its covariance, and shares. They have the least squared
+    // difference from the Gaussian for which the shares, and the shares times scales^2, sum to 1.
     constexpr double scales[3] = {0.508447702070, 0.812387977981, 1.239504002977};
     constexpr double shares[3] = {0.179460940730, 0.350350560935, 0.470188498334};
     double total = 0;
@@ -161,21 +162,21 @@ class HistogramNdf {
     return total;
   }
 
-  /// Adds a box as it is. Returns its area; 0 if it cannot be answered, as where it has none or no finite size.
+  /// Adds a box. Returns its area, or 0 if the box has no area or no finite size.
   template <class Sum>
   GLINT_HD double addBox(const Footprint& p, Sum& sum) const {
     AxisPair half = halfAxes(p);
     if (!hasArea(half)) return 0;
     const bool aligned = (half.a[1] == 0 && half.b[0] == 0) || (half.a[0] == 0 && half.b[1] == 0);
     if (!aligned) return addParallelogram(p.centre, shortenedBox(half, sat_.width, sat_.height), 1, sum);
-    // Where it is a hundred periods long, the rest makes no difference that is worth its cost.
+    // Longer boxes are cut at kMostPeriods: more periods would change the histogram too little for their cost.
     const double most[2] = {kMostPeriods * sat_.width, kMostPeriods * sat_.height};
     for (double* axis : {half.a, half.b})
       for (int k = 0; k < 2; ++k) axis[k] = std::clamp(axis[k], -most[k], most[k]);
     return addParallelogram(p.centre, half, 1, sum);
   }
 
-  /// Returns the area that it adds, times the weight.
+  /// Adds a parallelogram. Returns its area times the weight.
   template <class Sum>
   GLINT_DEVICE_CALL GLINT_HD double addParallelogram(Vec2 centre_uv, const AxisPair& half, double weight, Sum& sum) const {
     const double ax = half.a[0], ay = half.a[1], bx = half.b[0], by = half.b[1];
@@ -192,7 +193,7 @@ class HistogramNdf {
     return weight * 4 * std::fabs(ax * by - ay * bx);
   }
 
-  /// Longest half axis in periods of the map: sums of areas stay below 2^63.
+  /// Longest half axis, in periods of the map, for which sums of areas stay below 2^63.
   static constexpr double kMostPeriods = 64;
 
   HistogramSat sat_;

@@ -9,22 +9,22 @@
 
 namespace glint {
 
-/// Covered areas of single texels are summed as integers of this many to a texel: exact for whole texels, and faster to add to
-/// memory than floating point.
+/// Units of covered area in one texel. Areas are summed as integers of this unit: exact for whole texels, and faster to add to
+/// memory than floating-point numbers.
 inline constexpr double kAreaUnits = 4294967296.0;
 
-/// Room for the sums of every bin.
+/// Memory for the sums of all bins.
 struct BinCounts {
-  /// Sums of texels are kept in four rows side by side, so that runs of texels of one bin need not wait for each addition.
+  /// Areas are kept in four rows, so that consecutive texels of one bin need not wait for each other's addition.
   static constexpr int kLanes = 4;
   static constexpr int kLaneStride =
-      HistogramSat::kMaxBins + 24;        ///< not a multiple of 4 KiB, which processors take for a clash
-  double totals[HistogramSat::kMaxBins];  ///< texels of each bin, once finished; >= 0
+      HistogramSat::kMaxBins + 24;        ///< not a multiple of 4 KiB: processors take such addresses for the same one
+  double totals[HistogramSat::kMaxBins];  ///< area of each bin after finish(), texels; >= 0
   std::uint32_t whole[HistogramSat::kMaxBins];
-  std::int64_t areas[kLanes * kLaneStride];  ///< kAreaUnits
+  std::int64_t areas[kLanes * kLaneStride];  ///< in 1 / kAreaUnits of a texel
 };
 
-/// Sums the texels of every bin. Exact for whole texels, up to 2^53.
+/// Sums the covered area of every bin. Exact for whole texels, up to 2^53.
 class AllBins {
  public:
   GLINT_HD AllBins(const HistogramSat& sat, BinCounts& counts)
@@ -43,7 +43,7 @@ class AllBins {
   /// @param area  from `areaUnits`
   GLINT_HD void addTexel(int bin, int lane, std::int64_t area) { areas_[lane * BinCounts::kLaneStride + bin] += area; }
 
-  /// Adds weight * (a - b - c + d), all modulo the counters' type.
+  /// Adds weight * (a - b - c + d) for every bin. Counters are subtracted modulo their type.
   template <class Counter>
   GLINT_HD void addCorners(const Counter* a, const Counter* b, const Counter* c, const Counter* d, double weight) {
     if constexpr (sizeof(Counter) == sizeof(std::uint16_t))
@@ -51,7 +51,7 @@ class AllBins {
     for (int k = 0; k < stride_; ++k)
       totals_[k] += weight * static_cast<double>(static_cast<Counter>(a[k] - b[k] - c[k] + d[k]));
   }
-  /// Adds weight times what lies between an outer and an inner rectangle, modulo 2^16. Corners as in addCorners.
+  /// Adds weight times the counts of the frame between an outer and an inner rectangle, modulo 2^16. Corners as in addCorners.
   GLINT_HD void addFrame(const std::uint16_t* const (&outer)[4], const std::uint16_t* const (&inner)[4], double weight) {
     const std::uint16_t *a = outer[0], *b = outer[1], *c = outer[2], *d = outer[3];
     const std::uint16_t *e = inner[0], *f = inner[1], *g = inner[2], *h = inner[3];
@@ -69,7 +69,7 @@ class AllBins {
     for (int k = 0; k < count_; ++k) totals_[k] += weight * static_cast<double>(bin_totals_[k]);
   }
 
-  /// Adds up the parts: call once, at the end.
+  /// Completes `totals`: call once, at the end.
   GLINT_HD void finish() {
     for (int k = 0; k < stride_; ++k) {
       constexpr int kLane = BinCounts::kLaneStride;
@@ -80,10 +80,10 @@ class AllBins {
   }
 
  private:
-  /// So many differences of 16 bits fit a sum of 32.
+  /// Number of differences of 16 bits whose sum fits 32 bits.
   static constexpr int kMostDifferences = 65536;
 
-  /// Adds difference(bin) of 16 bits: eight bins at a time, in vectors.
+  /// Adds difference(bin), 16 bits, for every bin. Compilers vectorise the loop by eight.
   template <class Difference>
   GLINT_HD void addWhole(Difference difference) {
     if (differences_ == kMostDifferences) {
@@ -92,7 +92,7 @@ class AllBins {
       differences_ = 0;
     }
     ++differences_;
-    // In local variables, which the sums cannot overwrite.
+    // Local copies: the compiler knows that writing sums cannot change them.
     std::uint32_t* sums = whole_;
     const int count = stride_;
     for (int k = 0; k < count; ++k) sums[k] += difference(k);
@@ -139,17 +139,18 @@ class OneBin {
 
 /// Adds rectangles of texels to a sum over bins. Each texel counts by its covered area.
 ///
-/// A rectangle is moved to the nearest points of the fine table on all sides, and the strips between are added or taken off
-/// texel by texel, long ones from the sums along their rows and columns. Rectangles of several times 2^16 texels take their
-/// middle from the coarse table, whose counters are modulo 2^32, and the frame around it from the fine one: at once, or in
-/// pieces, below 2^16 texels.
+/// Each side of a rectangle is moved to the nearest point of the fine table (HistogramSat::sums), which counts the new
+/// rectangle with one difference of four points. The strips between old and new sides are then added or subtracted: texel by
+/// texel, or where they are long from row_sums and column_sums. The counters of the fine table are modulo 2^16. So rectangles
+/// of several times 2^16 texels take their middle from the coarse table, whose counters are modulo 2^32, and only the frame
+/// around the middle from the fine table, in pieces of less than 2^16 texels.
 template <class Sum>
 class RectangleSums {
  public:
   GLINT_HD RectangleSums(const HistogramSat& sat, Sum& sum) : sat_(sat), sum_(sum) {}
 
-  /// Rectangle [x0, x1] x [y0, y1] of the endless plane, texels; any finite size, counted in whole periods where it is larger
-  /// than the map.
+  /// Adds the rectangle [x0, x1] x [y0, y1] of the endless plane, in texels. Any finite size: where it is larger than the map,
+  /// whole periods are counted at once.
   GLINT_HD void add(double x0, double x1, double y0, double y1, double weight) {
     forEachPiece(y0, y1, sat_.height, [&](double b0, double b1, double times_y) {
       forEachPiece(x0, x1, sat_.width,
@@ -157,7 +158,7 @@ class RectangleSums {
     });
   }
 
-  /// Starts to fetch what `add` needs, where the rectangle does not cross a border of the map.
+  /// Prefetches the counters that `add` needs, if the rectangle does not cross a border of the map.
   GLINT_HD void prefetchWithin(double x0, double x1, double y0, double y1) const {
     const double x = std::floor(x0 / sat_.width) * sat_.width, y = std::floor(y0 / sat_.height) * sat_.height;
     if (x0 < x1 && x1 - x <= sat_.width && y1 - y <= sat_.height) prefetchInside(x0 - x, x1 - x, y0 - y, y1 - y);
@@ -166,7 +167,7 @@ class RectangleSums {
   /// Row of the map that row j of the endless plane repeats.
   GLINT_HD int rowOf(int j) const { return wrapIndex(j, sat_.height); }
 
-  /// Texels [from, to) of a row of the map, along the endless plane.
+  /// Adds the texels from `from` to before `to` of a row of the endless plane.
   GLINT_DEVICE_CALL GLINT_HD void addRow(int row, int from, int to, double weight) {
     if (to - from > kDifferenceCost) {
       return forEachPiece(from, to, sat_.width, [&](double a, double b, double times) {
@@ -180,7 +181,7 @@ class RectangleSums {
     }
   }
 
-  /// Texels [from, to) of a row of the map, along the endless plane, with weight(texel).
+  /// Adds the texels from `from` to before `to` of a row of the endless plane, each times weight(texel).
   template <class Weight>
   GLINT_HD void addTexels(int row, int from, int to, Weight&& weight) {
     constexpr int kSize = HistogramSat::kTileSize;
@@ -191,7 +192,7 @@ class RectangleSums {
     }
   }
 
-  /// Nearest point along u of a table of that stride, in texels of the endless plane.
+  /// Position of the nearest point along u of a table with this stride, in texels of the endless plane.
   GLINT_HD double nearestPointX(double x, int stride) const {
     const double period = std::floor(x / sat_.width) * sat_.width;
     return period + texelOf(nearest(x - period, stride, sat_.width), stride, sat_.width);
@@ -201,26 +202,28 @@ class RectangleSums {
   struct Slab {
     int begin, end;
   };
-  /// The slab around row j. Its height is a multiple of the fine table's stride.
+  /// The slab that contains row j.
+  /// @param span  height of slabs: a multiple of the stride of the fine table
   GLINT_HD Slab slabOf(int j, int span) const {
     const int row = wrapIndex(j, sat_.height), begin = row / span * span;
     return {j - row + begin, j - row + std::min(begin + span, sat_.height)};
   }
 
  private:
-  /// Rectangles of so few texels are summed texel by texel.
+  /// Rectangles of fewer texels are summed texel by texel.
   static constexpr double kFewTexels = 96;
-  /// What a difference of two points of row_sums costs, in texels.
+  /// Cost of a difference of two points of row_sums, as a number of texels that cost as much.
   static constexpr int kDifferenceCost = 96;
   static constexpr std::int64_t kFineLimit = 65536;
-  /// Rectangles of less than so many times kFineLimit are added in pieces. With more, their shorter side times the largest
-  /// stride could exceed kFineLimit.
+  /// Rectangles of less than this many times kFineLimit are added in pieces. In larger rectangles the shorter side times the
+  /// largest stride could exceed kFineLimit, and pieces would not fit.
   static constexpr int kMostPieces = 3;
   static constexpr int kCacheLine = 32;  // counters
 
   static GLINT_HD std::int64_t areaUnits(double area) { return static_cast<std::int64_t>(area * kAreaUnits); }
 
-  /// Splits [low, high] into whole periods and at most two parts of one: visitor(begin, end, times), 0 <= begin < end <= size.
+  /// Splits [low, high] into whole periods and at most two parts of a period. Calls visitor(begin, end, times) with
+  /// 0 <= begin < end <= size.
   template <class Visitor>
   static GLINT_HD void forEachPiece(double low, double high, int size, Visitor&& visitor) {
     const double length = high - low, periods = std::floor(length / size);
@@ -233,14 +236,14 @@ class RectangleSums {
   static GLINT_HD int texelOf(int point, int stride, int size) {
     return static_cast<int>(std::min<std::int64_t>(std::int64_t{point} * stride, size));
   }
-  /// Point of a table that lies nearest to x, 0 <= x <= size.
+  /// The point of a table that is nearest to x, 0 <= x <= size.
   static GLINT_HD int nearest(double x, int stride, int size) {
     const int low = static_cast<int>(x) / stride, last = (size + stride - 1) / stride;
     if (low >= last) return last;
     return x - texelOf(low, stride, size) <= texelOf(low + 1, stride, size) - x ? low : low + 1;
   }
 
-  /// The rectangle of points of the fine table that lies nearest to a rectangle of the map.
+  /// A rectangle whose corners are points of the fine table: the nearest to a rectangle of the map.
   struct Points {
     int a0, a1, b0, b1;
   };
@@ -249,7 +252,7 @@ class RectangleSums {
             nearest(y1, sat_.stride, sat_.height)};
   }
 
-  /// A rectangle of the map itself.
+  /// Adds a rectangle that lies inside the map.
   GLINT_DEVICE_CALL GLINT_HD void addInside(double x0, double x1, double y0, double y1, double weight) {
     if ((std::ceil(x1) - std::floor(x0)) * (std::ceil(y1) - std::floor(y0)) <= kFewTexels) {
       return forEachCovered(y0, y1, [&](int j, double covered) { addLine<false>(j, x0, x1, weight * covered); });
@@ -265,13 +268,13 @@ class RectangleSums {
     addPoints(a0, a1, b0, b1, weight);
   }
 
-  /// visitor(texel, covered part) for the texels between low and high.
+  /// Calls visitor(texel, covered part) for the texels between low and high.
   template <class Visitor>
   static GLINT_HD void forEachCovered(double low, double high, Visitor&& visitor) {
     for (int k = static_cast<int>(low); k < high; ++k) visitor(k, std::min(high, k + 1.0) - std::max(low, double(k)));
   }
 
-  /// The columns (or rows) from `from` to `to`, cut at [low, high]; taken off if `from` lies behind `to`.
+  /// Adds the columns (or rows) from `from` to `to`, cut at [low, high]. Subtracts them if `from` > `to`.
   template <bool kColumns>
   GLINT_HD void addStrip(double from, double to, double low, double high, double weight) {
     if (!(high > low)) return;
@@ -280,7 +283,7 @@ class RectangleSums {
                    [&](int line, double covered) { addLine<kColumns>(line, low, high, sign * covered); });
   }
 
-  /// One column (or row) from low to high, the texels at the ends by their covered part.
+  /// Adds one column (or row) from low to high. Texels at the ends count by their covered part.
   template <bool kColumn>
   GLINT_DEVICE_CALL GLINT_HD void addLine(int line, double low, double high, double weight) {
     const int first = static_cast<int>(std::ceil(low)), last = static_cast<int>(high);
@@ -290,7 +293,7 @@ class RectangleSums {
     if (last < high) addRunTexels<kColumn>(line, last, last + 1, weight * (high - last));
   }
 
-  /// Whole texels [from, to) of a column (or row).
+  /// Adds whole texels from `from` to before `to` of a column (or row).
   template <bool kColumn>
   GLINT_DEVICE_CALL GLINT_HD void addRun(int line, int from, int to, double weight) {
     const int stride = sat_.line_stride, size = kColumn ? sat_.height : sat_.width;
@@ -327,7 +330,8 @@ class RectangleSums {
     for (; k < to; ++k) sum_.addTexel(tile[k % kSize * kStep], k & 3, area);
   }
 
-  /// The largest rectangle of the coarse table inside one of the fine table, in points of both; empty if c0 >= c1 or d0 >= d1.
+  /// The largest rectangle of the coarse table inside a rectangle of the fine table, in points of either table; empty if
+  /// c0 >= c1 or d0 >= d1.
   struct Inner {
     int c0, c1, d0, d1;
     int a0, a1, b0, b1;
@@ -345,13 +349,13 @@ class RectangleSums {
     return inner;
   }
 
-  /// The rectangle between points (a0, b0) and (a1, b1) of the fine table.
+  /// Adds the rectangle between points (a0, b0) and (a1, b1) of the fine table.
   GLINT_DEVICE_CALL GLINT_HD void addPoints(int a0, int a1, int b0, int b1, double weight) {
     if (a0 >= a1 || b0 >= b1) return;
     const std::int64_t all = texels(a0, a1, b0, b1);
     if (all < kMostPieces * kFineLimit) return addPieces(a0, a1, b0, b1, weight);
     if (a0 == 0 && b0 == 0 && a1 == sat_.pointsX(sat_.stride) - 1 && b1 == sat_.pointsY(sat_.stride) - 1)
-      return sum_.addMap(weight);  // may be all of 2^32 texels
+      return sum_.addMap(weight);  // the whole map may have 2^32 texels, which a counter cannot hold
     const Inner inner = innerOf(a0, a1, b0, b1);
     if (inner.c0 >= inner.c1 || inner.d0 >= inner.d1) return addPieces(a0, a1, b0, b1, weight);
     sum_.addCorners(coarsePoint(inner.c1, inner.d1), coarsePoint(inner.c0, inner.d1), coarsePoint(inner.c1, inner.d0),
@@ -370,7 +374,7 @@ class RectangleSums {
     addPieces(inner.a0, inner.a1, inner.b1, b1, weight);
   }
 
-  /// A rectangle whose shorter side times the stride is below kFineLimit, in pieces that the fine table can tell.
+  /// Adds a rectangle whose shorter side times the stride is below kFineLimit, in pieces of less than 2^16 texels.
   GLINT_HD void addPieces(int a0, int a1, int b0, int b1, double weight) {
     if (a0 >= a1 || b0 >= b1) return;
     const bool along_a = a1 - a0 >= b1 - b0;
@@ -404,7 +408,7 @@ class RectangleSums {
     return point(sat_.coarse_sums.data(), sat_.pointsX(sat_.coarse_stride), c, d);
   }
 
-  /// Starts to fetch what a rectangle of the map needs.
+  /// Prefetches the counters that a rectangle of the map needs.
   GLINT_HD void prefetchInside(double x0, double x1, double y0, double y1) const {
     const auto [a0, a1, b0, b1] = nearestPoints(x0, x1, y0, y1);
     const double left = texelOf(a0, sat_.stride, sat_.width), right = texelOf(a1, sat_.stride, sat_.width);
@@ -415,7 +419,7 @@ class RectangleSums {
     prefetchPoints(a0, a1, b0, b1);
   }
 
-  /// Starts to fetch the corners of the fine table.
+  /// Prefetches the corners in the fine table.
   GLINT_HD void prefetchPoints(int a0, int a1, int b0, int b1) const {
     if (a0 >= a1 || b0 >= b1) return;
     prefetchCorners(a0, a1, b0, b1);
@@ -428,7 +432,7 @@ class RectangleSums {
       for (int k = 0; k < sat_.rowLength(); k += kCacheLine) prefetch(row + k);
   }
 
-  /// Starts to fetch the texels of a short strip: column (or row) `line` from low to high.
+  /// Prefetches the texels of a short strip: column (or row) `line` from low to high.
   template <bool kColumn>
   GLINT_HD void prefetchLine(double line, double low, double high) const {
     if (high - low > 2 * sat_.line_stride) return;

@@ -8,19 +8,19 @@
 
 namespace glint {
 
-/// How a parallelogram is cut into strips: see ParallelogramStrips.
+/// The plan by which ParallelogramStrips cuts a parallelogram into strips.
 struct StripPlan {
-  int rows = 0;          ///< height of the strips, texels; 0: no strips are that good
-  int snap = 0;          ///< stride of the table to whose points their ends are moved, texels; 0: they stay where they are
-  double misplaced = 0;  ///< largest share of the parallelogram that they may count in a wrong place
+  int rows = 0;          ///< height of the strips, texels; 0: no strips are good enough
+  int snap = 0;          ///< ends of strips are moved to points of the table with this stride, texels; 0: they are not moved
+  double misplaced = 0;  ///< largest share of the parallelogram that strips may count in a wrong place
 };
 
-/// Strips of one height, the highest that misplace no more than a share of a parallelogram.
+/// Plans strips of one height: the highest strips that misplace at most a given share of a parallelogram.
 ///
-/// In a strip of height h, a side that runs over r texels along u and its mean enclose an area of 8/27 r h at most (r h / 4
-/// where it has no corner): over all strips, 32/27 h (|ax| + |bx|). Half of that is misplaced, since what is too much here
-/// lacks there. Moving the ends to points `snap` apart moves an area of 1/2 snap * height on each side, which counts twice
-/// since shares are taken of an area that has changed.
+/// A strip replaces each slanted side by its mean position. In a strip of height h, a side that runs over r texels along u and
+/// its mean enclose an area of at most 8/27 r h (r h / 4 without a corner). Over all strips this is 32/27 h (|ax| + |bx|). Half
+/// of it is misplaced: each texel too much is one texel missing elsewhere. Moving the ends to points `snap` apart moves an area
+/// of 1/2 snap * height on each side. This counts twice, because shares are then relative to a changed area.
 /// @param ax, ay, bx, by  half axes, texels
 GLINT_HD inline StripPlan planStrips(const HistogramSat& sat, double ax, double ay, double bx, double by, double tolerance) {
   const double area = 4 * std::fabs(ax * by - ay * bx), height = 2 * (std::fabs(ay) + std::fabs(by));
@@ -35,9 +35,9 @@ GLINT_HD inline StripPlan planStrips(const HistogramSat& sat, double ax, double 
   return {};
 }
 
-/// Adds a parallelogram of texels to a sum over bins as strips, rectangles between rows of the fine table: each begins and ends
-/// where the parallelogram does on average over the strip. So a strip has the right area, and steps take the place of slanted
-/// sides.
+/// Adds a parallelogram of texels to a sum over bins as strips: rectangles between rows of the fine table. Each strip begins
+/// and ends at the mean position of the parallelogram's sides in these rows. So slanted sides become steps, and each strip has
+/// the right area.
 ///
 /// Strips end at the same rows of the map wherever the parallelogram lies, so that results change smoothly as it moves.
 /// O(height / plan.rows) rectangles; without plan.snap, O(height * stride) texels as well.
@@ -50,7 +50,7 @@ class ParallelogramStrips {
   /// @return area that was added, texels^2
   GLINT_HD double add(const ParallelogramEdges& edges, double weight) {
     double area = 0;
-    // Strips wait in a ring while their counters are fetched.
+    // A ring of strips: each waits there while the memory fetches its counters.
     Strip waiting[kAhead];
     int count = 0;
     const auto addWaiting = [&](int k) {
@@ -84,7 +84,7 @@ class ParallelogramStrips {
     return {sum_.nearestPointX(left, plan_.snap), sum_.nearestPointX(right, plan_.snap), y, end};
   }
 
-  /// Mean over the rows from low to high of where the parallelogram begins (sign 1) or ends (sign -1).
+  /// Mean, over the rows from low to high, of the position where the parallelogram begins (sign 1) or ends (sign -1).
   static GLINT_HD double meanX(const ParallelogramEdges& edges, double sign, double low, double high) {
     double sum = 0;
     for (const ParallelogramEdges::Edge& edge : edges) {

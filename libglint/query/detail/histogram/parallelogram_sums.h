@@ -12,7 +12,7 @@ class ParallelogramEdges {
  public:
   struct Edge {
     double x, low, high;  ///< x at the low end
-    double slope, sign;   ///< sign: what it adds to the area on its right
+    double slope, sign;   ///< sign: 1 or -1, added to the area on the right of the edge
   };
 
   /// @param x, y    centre
@@ -50,10 +50,11 @@ class ParallelogramEdges {
 
 /// Adds a parallelogram of texels to a sum over bins, each texel by its covered area: exact, whatever the angle.
 ///
-/// A row of texels sees the area on the right of the edges that go down less that on the right of those that go up. The texels
-/// that an edge crosses get their part of that area in closed form; the rest of a row is a run of whole texels. Runs of the
-/// rows between two points of the fine table are cut to points as well, so that they make a rectangle, and the texels left over
-/// at their ends are added or taken off. O(length of the edges * stride) texels and O(height / stride) rectangles.
+/// In each row the parallelogram is the area on the right of its descending edges minus the area on the right of its ascending
+/// edges. Texels that an edge crosses get their part of the area in closed form. The other texels of a row form a run of whole
+/// texels. The runs of the rows in one slab (between two rows of the fine table) are cut to columns of the fine table, so that
+/// together they are one rectangle. Texels left over at the ends of runs are added or subtracted.
+/// O(length of the edges * stride) texels and O(height / stride) rectangles.
 template <class Sum>
 class ParallelogramSums {
  public:
@@ -79,7 +80,8 @@ class ParallelogramSums {
     int row, begin, end;
   };
 
-  /// Adds the texels of row j that edges cross, and what lies between them: as a run for later where it is whole.
+  /// Adds the texels of row j that edges cross. Texels between edges are kept as a run if they are wholly covered, and else
+  /// added.
   GLINT_DEVICE_CALL GLINT_HD void addEdges(const ParallelogramEdges& edges, int j) {
     const int row = sum_.rowOf(j);
     int ends[4], count = 0;
@@ -102,8 +104,8 @@ class ParallelogramSums {
     addShares(row, ends, shares, count);
   }
 
-  /// Texels of a row that an edge crosses between columns left and right. Returns the first texel that lies wholly on its
-  /// right.
+  /// Adds the texels of a row that an edge crosses, between columns left and right. Returns the first texel that lies wholly on
+  /// the right of the edge.
   GLINT_HD int addEdge(int row, double left, double right, double share) {
     const int first = static_cast<int>(std::floor(left)), last = std::max(static_cast<int>(std::ceil(right)), first);
     if (last - first == 1) {
@@ -119,10 +121,10 @@ class ParallelogramSums {
   /// Integral of clamp(t, 0, 1).
   static GLINT_HD double coveredBefore(double t) { return t <= 0 ? 0 : t < 1 ? 0.5 * t * t : t - 0.5; }
 
-  /// What edges add to the texels on their right, which ends where all have been passed.
+  /// Adds the texels between the ends of edges, where earlier edges contribute a constant share.
   GLINT_HD void addShares(int row, const int* ends, const double* shares, int count) {
     for (int k = 0; k < count; ++k) {
-      // Between each end and the next one in order, the shares of all edges that end before.
+      // Texels between one end and the next, in order, get the shares of all edges that ended before.
       int next = ends[k];
       double total = 0;
       bool last = true, first_of_equals = true;
@@ -138,7 +140,7 @@ class ParallelogramSums {
     }
   }
 
-  /// The runs of the rows of one slab: as a rectangle where all rows have one, cut to points of the fine table.
+  /// Adds the runs of the rows of one slab. If every row has a run, they become a rectangle between points of the fine table.
   GLINT_HD void addRuns(const Slab& slab) {
     if (run_count_ < slab.end - slab.begin) {
       for (int k = 0; k < run_count_; ++k) sum_.addRow(runs_[k].row, runs_[k].begin, runs_[k].end, weight_);
@@ -169,13 +171,13 @@ class ParallelogramSums {
       sum_.addRow(row, to, from, -weight);
   }
 
-  /// Adds the rectangle of slabs seen so far.
+  /// Adds the rectangle of the slabs so far.
   GLINT_HD void flush() {
     if (left_ < right_ && begin_ < end_) sum_.add(left_, right_, begin_, end_, weight_);
     begin_ = end_ = 0;
   }
 
-  /// Higher slabs leave more texels at their ends, lower ones make more rectangles.
+  /// The height of slabs. Higher slabs leave more texels at the ends of runs, lower slabs make more rectangles.
   static constexpr int kSlabTexels = 16;
 
   RectangleSums<Sum> sum_;

@@ -21,7 +21,7 @@ inline GLINT_HD double triangleInDisk(double px, double py, double qx, double qy
   const double root = std::sqrt(discriminant);
   const double t0 = std::clamp((-b - root) / a, 0.0, 1.0), t1 = std::clamp((-b + root) / a, 0.0, 1.0);
   if (t0 >= t1) return sector(px, py, qx, qy);
-  // The edge is inside from t0 to t1: sectors before and after, a triangle between.
+  // The edge is inside the circle from t0 to t1: the area is a triangle there, and sectors before and after.
   const double sx = px + t0 * dx, sy = py + t0 * dy, ex = px + t1 * dx, ey = py + t1 * dy;
   double area = 0.5 * (sx * ey - sy * ex);
   if (t0 > 0) area += sector(px, py, sx, sy);
@@ -38,7 +38,7 @@ struct DiskPolygon {
     return {{box.low.x, box.high.x, box.high.x, box.low.x}, {box.low.y, box.low.y, box.high.y, box.high.y}, 4};
   }
 
-  /// Keeps what lies on the left of the line from the origin along (dx, dy).
+  /// Cuts the polygon: keeps the part on the left of the line from the origin along (dx, dy).
   GLINT_HD void clip(double dx, double dy) {
     DiskPolygon kept;
     for (int k = 0; k < count; ++k) {
@@ -96,7 +96,7 @@ class SphericalBins {
     return ring * sectors_ + std::min(static_cast<int>(turn * static_cast<float>(sectors_)), sectors_ - 1);
   }
 
-  /// Area on the disk.
+  /// Area of a bin on the disk.
   GLINT_HD double area(int bin) const {
     const double inner = radii_[bin / sectors_], outer = radii_[bin / sectors_ + 1];
     return kPiDouble / sectors_ * (outer * outer - inner * inner);
@@ -124,7 +124,7 @@ class SphericalBins {
   /// Point of a bin, uniform over its area for uniform `xi` in [0, 1)^2: xi.x turns, xi.y goes outwards.
   GLINT_HD Vec2 point(int bin, Vec2 xi) const {
     const Vec2 h = place(bin, xi);
-    // Rounding may carry a point on the border into the next bin: pull it in by less than it was rounded.
+    // Rounding may move a point on the border into the next bin: the point is then moved a little towards the middle of its bin.
     return find(h) == bin ? h : place(bin, {0.5f + 0.9999f * (xi.x - 0.5f), 0.5f + 0.9999f * (xi.y - 0.5f)});
   }
 
