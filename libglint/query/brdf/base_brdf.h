@@ -15,7 +15,7 @@ inline GLINT_HD float conductorFresnel(float cosine, float eta, float k) {
   return eta == 1 && k == 0 ? 1.0f : fresnelConductor(cosine, eta, k);
 }
 
-/// GGX distribution of normals around an axis; c is the cosine to it. Per unit projected area on the plane across the axis.
+/// GGX distribution of normals around an axis, per unit area on the plane across the axis; c is the cosine to the axis.
 inline GLINT_HD float ggxDensity(float c, float alpha) {
   const float a2 = alpha * alpha;
   const float t = (1 - c * c) + a2 * c * c;

@@ -31,10 +31,10 @@ namespace glint {
 /// Thread-safe, allocates nothing.
 class BinMapBrdf {
  public:
-  /// Masked by the slopes of the whole map, which the bin map holds.
+  /// Takes the masking from the slopes of the whole map, which the bin map stores.
   GLINT_HD BinMapBrdf(const BinMapNdf& ndf, const Footprint& footprint, const Fresnel& fresnel)
       : BinMapBrdf(ndf, footprint, SmithMasking(ndf.map().slopes, 0), fresnel) {}
-  /// @param masking  of the map without roughness: facets mask by themselves
+  /// @param masking  masking by the map without roughness, since each facet adds its own
   GLINT_HD BinMapBrdf(const BinMapNdf& ndf, const Footprint& footprint, const SmithMasking& masking, const Fresnel& fresnel)
       : ndf_(ndf), footprint_(footprint), masking_(masking), fresnel_(fresnel) {}
 
@@ -56,7 +56,7 @@ class BinMapBrdf {
     return static_cast<float>(sums(wi, wo, h).drawn / (4 * double{h.towards}));
   }
 
-  /// `evaluate` and `pdf` together, at the cost of one.
+  /// `evaluate` and `pdf` together, at the cost of one of them.
   GLINT_HD BrdfValue evaluateWithPdf(Vec3 wi, Vec3 wo) const {
     if (!(aboveHorizon(wi) && aboveHorizon(wo))) return {};
     const HalfVector h = halfVectorOf(wi, wo);
@@ -64,8 +64,8 @@ class BinMapBrdf {
     return {response(wi, wo, h, s), static_cast<float>(s.drawn / (4 * double{h.towards}))};
   }
 
-  /// Draws wi (Atanasov 2021, section 5.3): a point of the footprint, a Beckmann microfacet of its texel, wo mirrored at that.
-  /// The leading digits of xi choose the point, the others the microfacet.
+  /// Draws wi (Atanasov 2021, section 5.3): a point of the footprint, a Beckmann microfacet of the texel there, and wo mirrored
+  /// at the microfacet. The leading digits of xi choose the point, the other digits the microfacet.
   ///
   /// pdf and weight are 0 for microfacets that are turned away from wo and for reflections below the horizon. Weights are at
   /// most 1 / (A(wo) t.z (h . t)) for the steepest facet t near h, A the projected area of SmithMasking.
@@ -89,12 +89,12 @@ class BinMapBrdf {
  private:
   /// t.z of facets is at least this: codes of normals next to the rim of the disk may lie beyond it.
   static constexpr float kSteepest = 1e-3f;
-  /// Deviation of the normals of a bin over the cosine to a direction, from where on kGrazingPoints along each axis stand for
-  /// it.
+  /// Deviation of the normals of a bin over the cosine to a direction, above which kGrazingPoints facets along each axis
+  /// replace the bin.
   static constexpr float kGrazingSpread = 0.2f;
   static constexpr int kGrazingPoints = 6;
 
-  /// Axes of a facet: up its slope's azimuth, across it, and its normal.
+  /// The frame of a facet: along the azimuth of its slope, across the azimuth, and its normal.
   struct Frame {
     GLINT_HD explicit Frame(Vec2 n) {
       const float length = std::sqrt(dot(n, n)), r = std::min(length, float{kRim});
@@ -113,8 +113,8 @@ class BinMapBrdf {
 
   /// Sums over the facets of a footprint towards one half vector.
   struct Sums {
-    double reflected = 0;  ///< of share D G / t.z
-    double drawn = 0;      ///< of share D (h . t): density per unit solid angle of h
+    double reflected = 0;  ///< sum of share D G / t.z
+    double drawn = 0;      ///< sum of share D (h . t): density per unit solid angle of h
   };
 
   GLINT_HD Rgb response(Vec3 wi, Vec3 wo, const HalfVector& h, const Sums& s) const {
@@ -128,9 +128,9 @@ class BinMapBrdf {
     return sums;
   }
 
-  /// A facet that stands for many becomes a grid of facets, evenly weighted, of the same mean and covariance: masking and the
-  /// frame are not linear in a bin. Where directions graze it some of its normals are turned away from them, which takes more
-  /// points.
+  /// Replaces a facet that stands for many by a grid of facets with equal weights and the same mean and covariance, because
+  /// masking and frame are not linear in the normal. Where a direction grazes the facet, some of its normals are turned away
+  /// from the direction, and the grid needs more points.
   GLINT_HD void add(const BinFacet& f, Vec3 wi, Vec3 wo, Vec3 h, Sums& sums) const {
     if (f.spread.xx == 0 && f.spread.yy == 0) {
       addFacet(f.weight, f.normal, wi, wo, h, sums);

@@ -18,7 +18,7 @@
 
 namespace glint {
 
-/// What of the prefiltered model is evaluated.
+/// The parts of the prefiltered model that are evaluated.
 enum class DisplacedVariant : std::uint8_t {
   full,    ///< T S f'_low
   lobes,   ///< f'_low alone: no shadowing, no interreflections
@@ -32,7 +32,7 @@ struct LevelBlend {
   float weight = 0;
 };
 
-/// A direction drawn for a shading point.
+/// A direction drawn at a shading point.
 struct DirectionSample {
   Vec3 direction;
   float pdf = 0;  ///< per solid angle; 0 if nothing was drawn
@@ -41,9 +41,9 @@ struct DirectionSample {
 /// The prefiltered BRDF of a downsampled displacement map (Wu 2019, Eq. 11 and 18), in the map's tangent frame.
 ///
 /// f'_low(wi, wo) = n_z / (cos(wi) cos(wo)) * integral of f cos(n', wi) cos(n', wo) D(n') over the normals n' of the cell, with
-/// the cosines in front those of the facet n of the downsampled surface. Unlike Eq. 5 it counts the area that normals show to
-/// wo: so it is reciprocal, and with one normal it is the base itself. Renderers use it on the downsampled surface, with their
-/// own visibility; that of smaller scale is in S. Where the asset has no colours, all channels are the same.
+/// the cosines in front taken at the facet n of the downsampled surface. Unlike Eq. 5 it counts the area that normals show to
+/// wo: so it is reciprocal, and with one normal it equals the base BRDF. Renderers use it on the downsampled surface, with
+/// their own visibility; visibility at smaller scale is in S. Where the asset has no colours, all channels are the same.
 ///
 /// Directions are unit vectors away from the surface. Those that are longer or not finite, behind the facet or within kHorizon
 /// of its plane get 0. Coordinates are periodic; those that are not finite count as 0.
@@ -67,7 +67,8 @@ class DisplacedBrdf {
     return {first, second, std::clamp(place, 0.0f, 1.0f)};
   }
 
-  /// The levels around a place between them: 1.25 is three parts of level 1 and one of level 2. Clamped; NaN counts as 0.
+  /// The two levels around a fractional level: 1.25 is three parts of level 1 and one part of level 2. Clamped; NaN counts as
+  /// 0.
   GLINT_HD LevelBlend levelsAt(float level) const {
     const float place = level > 0 ? std::min(level, static_cast<float>(asset_.level_count - 1)) : 0.0f;
     const int first = static_cast<int>(place);
@@ -75,7 +76,7 @@ class DisplacedBrdf {
     return {first, weight > 0 ? first + 1 : first, weight};
   }
 
-  /// Normal of the downsampled surface: of one of the two triangles of the cell.
+  /// Normal of the downsampled surface: the normal of one of the two triangles of the cell.
   GLINT_HD Vec3 normal(int level, Vec2 uv) const {
     const DisplacementLevel& l = asset_.levels[level];
     const Place p = place(l, uv);
@@ -86,7 +87,7 @@ class DisplacedBrdf {
     const bool lower = p.x + p.y < 1;
     const float sx = scale * (lower ? h10 - h00 : h11 - h01), sy = scale * (lower ? h01 - h00 : h11 - h10);
     const float square = 1 + sx * sx + sy * sy;
-    // Heights of a file are not checked: where they are no numbers, or too large, the surface is flat.
+    // Heights of a file are not checked: where they are NaN or too large, the surface counts as flat.
     if (!(square <= std::numeric_limits<float>::max())) return {0, 0, 1};
     const float z = 1 / std::sqrt(square);
     return {-sx * z, -sy * z, z};
@@ -106,7 +107,7 @@ class DisplacedBrdf {
                                                             : reflected);
   }
 
-  /// Light reflected from wi to wo, BRDF times cosine, blended between levels. Each level has its own facet.
+  /// Light reflected from wi to wo (BRDF times cosine), blended between levels. Each level uses the facet of its own surface.
   GLINT_HD Rgb reflected(const LevelBlend& blend, Vec2 uv, Vec3 wi, Vec3 wo,
                          DisplacedVariant variant = DisplacedVariant::full) const {
     const auto at = [&](int level) {
@@ -117,7 +118,7 @@ class DisplacedBrdf {
     return blend.weight > 0 ? (1 - blend.weight) * first + blend.weight * at(blend.second) : first;
   }
 
-  /// Draws wi at a blend of levels: at one of them, taken by its weight. The pdf is that of the blend.
+  /// Draws wi at a blend of levels: chooses one level by its weight. The pdf is the pdf of the blend.
   GLINT_HD DirectionSample sample(const LevelBlend& blend, Vec2 uv, Vec3 wo, Vec2 xi) const {
     if (!(blend.weight > 0)) return sample(blend.first, uv, wo, xi);
     const bool second = xi.x < blend.weight;
@@ -183,8 +184,8 @@ class DisplacedBrdf {
   }
 
   /// Density of the original's normals towards a half vector, by the lobes of a cell: per unit projected area. Its integral
-  /// over the disk is 1 but for what lobes have below the horizon; 0 outside the disk.
-  /// @param least_variance  lobes are widened to at least this variance, radians^2: for pixels that are wider than they
+  /// over the disk is 1 minus the share of lobes below the horizon; 0 outside the disk.
+  /// @param least_variance  lobes are widened to at least this variance, radians^2: for pixels that are wider than lobes
   GLINT_HD float normalDensity(int level, Vec2 uv, Vec2 h, float least_variance = 0) const {
     const float z2 = 1 - dot(h, h);
     if (z2 <= 0) return 0;
@@ -236,7 +237,7 @@ class DisplacedBrdf {
     return color(sum, 0);
   }
 
-  /// Integral of f cos(wi) cos(wo) D over the normals of a cell: f'_low without the facet's terms.
+  /// Integral of f cos(wi) cos(wo) D over the normals of a cell: f'_low without the terms of the downsampled facet.
   GLINT_HD Rgb timesCosines(const DisplacementLevel& l, std::size_t cell, Vec3 wi, Vec3 wo) const {
     const std::size_t first = cell * static_cast<std::size_t>(asset_.lobe_count);
     const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
@@ -263,7 +264,7 @@ class DisplacedBrdf {
   }
 
  private:
-  /// A cell and the place in it.
+  /// A cell and a position in it, (x, y) in [0, 1]^2.
   struct Place {
     int i, j;
     float x, y;
@@ -299,7 +300,7 @@ class DisplacedBrdf {
     return l.lobe_alphas.empty() ? asset_.base.alpha : l.lobe_alphas[lobe];
   }
 
-  /// How often `sample` takes a lobe, relative to the others of its cell.
+  /// Relative frequency with which `sample` chooses a lobe of a cell.
   GLINT_HD float lobeShare(const DisplacementLevel& l, std::size_t lobe) const {
     const Rgb c = lobeColor(l, lobe);
     return l.lobes[lobe].amplitude * (c.r + c.g + c.b);
@@ -318,8 +319,8 @@ class DisplacedBrdf {
     return sine * std::cos(angle) * frame.s + sine * std::sin(angle) * frame.t + cosine * axis;
   }
 
-  /// The same integral for one Beckmann lobe with the cell's slope moments and mean base, shadowed by its own Smith term (Dupuy
-  /// et al. 2013).
+  /// Integral of f cos(wi) cos(wo) D for one Beckmann lobe with the cell's slope moments and mean base, shadowed by its own
+  /// Smith term (Dupuy et al. 2013).
   GLINT_HD Rgb singleLobe(const DisplacementLevel& l, std::size_t cell, Vec3 wi, Vec3 wo) const {
     if (wi.z <= 0 || wo.z <= 0) return {};
     const std::size_t first = cell * static_cast<std::size_t>(asset_.lobe_count);
@@ -334,7 +335,7 @@ class DisplacedBrdf {
     return singleLobe(l.slopes[cell], width / area, wi, wo) / area * color;
   }
 
-  /// @param width  square of the base's alpha
+  /// @param width  squared alpha of the base
   GLINT_HD float singleLobe(const MapSlopes& m, float width, Vec3 wi, Vec3 wo) const {
     const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
     const float widening = diffuse ? 1e-8f : 0.5f * width;
@@ -352,7 +353,7 @@ class DisplacedBrdf {
       const float density = std::exp(-0.5f * exponent) * 0.5f * kInversePi / (std::sqrt(determinant) * h2 * h2);
       return 0.25f * conductorFresnel(0.5f * length, asset_.base.eta, asset_.base.k) * density * shadowing;
     }
-    // Gauss and Hermite's five points along each principal direction of the slopes, by the Cholesky factor.
+    // Gauss-Hermite quadrature of the slopes: five points along each column of the Cholesky factor.
     constexpr float kNode[5] = {-2.85697001387f, -1.35562617997f, 0, 1.35562617997f, 2.85697001387f};
     constexpr float kWeight[5] = {0.0112574113f, 0.2220759220f, 0.5333333333f, 0.2220759220f, 0.0112574113f};
     const float l11 = std::sqrt(std::max(0.0f, xx)), l21 = xy / l11, l22 = std::sqrt(std::max(0.0f, yy - l21 * l21));

@@ -10,7 +10,7 @@ namespace glint {
 /// A direction drawn by a BRDF.
 struct BrdfSample {
   Vec3 wi;
-  Rgb weight;     ///< f wi.z / pdf; 0 where pdf is
+  Rgb weight;     ///< f wi.z / pdf; 0 where pdf is 0
   float pdf = 0;  ///< per unit solid angle; 0 if the sample is not a direction above the horizon
 };
 
@@ -33,13 +33,14 @@ struct BrdfValue {
 /// exceed 1, as a tilted facet does. What bounces between facets is lost, so white facets give less than 1.
 ///
 /// Half vectors that D spills outside the unit disk are no directions: they are never evaluated, and a sample of them has pdf
-/// and weight 0. So the pdf integrates to less than 1: by those, and by facets that reflect below the horizon.
+/// and weight 0. So the pdf integrates to less than 1: samples outside the disk and facets that reflect below the horizon are
+/// missing.
 ///
 /// Holds a pointer to the model, which must outlive it. Thread-safe, allocates nothing.
 template <NdfModel M>
 class MicrofacetBrdf {
  public:
-  /// Most of the samples that are drawn evenly over the hemisphere instead of from D; see `sample`.
+  /// Largest share of samples that are drawn evenly from the hemisphere instead of from D; see `sample`.
   static constexpr float kUniformShare = 0.125f;
 
   /// @param footprint  any; the model says which it answers exactly
@@ -77,7 +78,7 @@ class MicrofacetBrdf {
     return valueOf(wi, wo, h, model_->density(footprint_, h.disk));
   }
 
-  /// The same where the density towards h is known.
+  /// `evaluate` and `pdf` from a density towards h that is known already.
   /// @param wi, wo  above the horizon
   GLINT_HD BrdfValue valueOf(Vec3 wi, Vec3 wo, const HalfVector& h, float density) const {
     return {density * response(wi, wo, h), mixed(density, h, wo)};
@@ -97,13 +98,13 @@ class MicrofacetBrdf {
     return sampleOf(wo, model_->sample(footprint_, modelPoint(wo, xi)));
   }
 
-  /// What `sample` asks the model for where xi.x >= uniformShare(wo).
+  /// The random numbers with which `sample` asks the model, where xi.x >= uniformShare(wo).
   static GLINT_HD Vec2 modelPoint(Vec3 wo, Vec2 xi) {
     const float share = uniformShare(wo);
     return {std::min((xi.x - share) / (1 - share), float{kBelowOne}), xi.y};
   }
 
-  /// What `sample` makes of the half vector that the model has drawn at modelPoint.
+  /// The sample for a half vector that the model has drawn at modelPoint.
   /// @param wo  above the horizon
   GLINT_HD BrdfSample sampleOf(Vec3 wo, const HalfVectorSample& drawn) const {
     const HalfVector h = halfVectorAt(drawn.h, wo);
@@ -113,7 +114,8 @@ class MicrofacetBrdf {
     return weighted(wi, wo, h, drawn.pdf);
   }
 
-  /// Share of samples that are drawn evenly from the hemisphere: 0 at normal incidence, where the weight needs none.
+  /// Share of samples that are drawn evenly from the hemisphere. Is 0 at normal incidence, where weights are bounded without
+  /// it.
   static GLINT_HD float uniformShare(Vec3 wo) { return kUniformShare * std::max(0.0f, 1 - wo.z * wo.z); }
 
  private:

@@ -17,7 +17,7 @@ struct SlopeSums {
 
   /// Mean and covariance of `count` slopes. A map that is flat to float precision counts as flat.
   GLINT_HD MapSlopes moments(double count) const {
-    constexpr double kRoundingVariance = 1e-13;  // that rounded normals alone can have
+    constexpr double kRoundingVariance = 1e-13;  // variance that rounding of normals alone can cause
     const double mean_p = p / count, mean_q = q / count;
     const auto variance = [&](double v) { return v > kRoundingVariance ? v : 0; };
     const double xx = variance(pp / count - mean_p * mean_p), yy = variance(qq / count - mean_q * mean_q);
@@ -27,7 +27,7 @@ struct SlopeSums {
   }
 };
 
-/// Sums over some normals, in lanes that compilers vectorise.
+/// Sums over the slopes of some normals, in lanes that compilers vectorise.
 inline GLINT_HD SlopeSums slopeSums(const Vec2* normals, std::size_t count) {
   constexpr std::size_t kLanes = 8;
   double sums[5][kLanes] = {};

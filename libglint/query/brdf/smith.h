@@ -12,14 +12,13 @@ namespace glint {
 /// any anisotropy).
 ///
 /// Everything follows from the area that facets turn towards a direction w, projected along it, for each unit of the surface:
-/// A(w) = E[max(0, w . (-p, -q, 1))] over slopes (p, q). It is that of a normal variable and finite down to the horizon:
+/// A(w) = E[max(0, w . (-p, -q, 1))] over slopes (p, q). The product is a normal variable, and A is finite down to the horizon:
 /// G1 = w.z / A, Lambda = A / w.z - 1. Where facets lean away so far that A < w.z (only with a mean slope that is not 0) A
 /// counts as w.z, so that nothing is made brighter than unshadowed. Directions are unit vectors with w.z > 0.
 class SmithMasking {
  public:
   /// @param slopes   of the map: api::OpenedNdf::slopes of any asset, or PyramidShape::slopes
-  /// @param sigma_r  intrinsic roughness of its facets; their blur adds sigma_r^2 to both variances, exact for facets that are
-  ///                 level
+  /// @param sigma_r  intrinsic roughness of the facets: adds sigma_r^2 to both variances, which is exact for level facets
   GLINT_HD SmithMasking(const MapSlopes& slopes, float sigma_r) : mean_(slopes.mean), covariance_(slopes.covariance) {
     covariance_.xx += sigma_r * sigma_r;
     covariance_.yy += sigma_r * sigma_r;
@@ -41,8 +40,8 @@ class SmithMasking {
   /// Share of the facets facing w that w sees, in (0, 1].
   GLINT_HD float g1(Vec3 w) const { return w.z / projectedArea(w); }
 
-  /// Share that both directions see, with heights correlated: 1 / (1 + Lambda(i) + Lambda(o)) (Heitz 2014, Eq. 99). At most the
-  /// smaller G1.
+  /// Share of facets that both directions see, with heights correlated: 1 / (1 + Lambda(i) + Lambda(o)) (Heitz 2014, Eq. 99).
+  /// At most the smaller G1.
   GLINT_HD float g2(Vec3 wi, Vec3 wo) const { return 4 * wi.z * wo.z * visibility(wi, wo); }
 
   /// g2 / (4 wi.z wo.z), without a division by a cosine.

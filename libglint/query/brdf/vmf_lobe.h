@@ -28,7 +28,8 @@ inline GLINT_HD float vmfDensity(float cosine, float kappa) {
   return 0.5f * kInversePi * kappa / (1 - std::exp(-2 * kappa)) * std::exp(kappa * (cosine - 1));
 }
 
-/// How the normals of a lobe face one direction, taking cosines to be normally distributed: all that the diffuse term needs.
+/// Moments of the cosines between the normals of a lobe and one direction, which the diffuse term needs. Cosines are taken to
+/// be normally distributed.
 struct LobeFacing {
   float cosine = 0;   ///< dot(mu, w)
   float lit = 0;      ///< mean of max(0, dot(n, w))
@@ -61,7 +62,7 @@ inline GLINT_HD LobeFacing lobeFacing(const LobeMoments& moments, Vec3 centre, V
 }
 
 /// Mean over the normals of a lobe of max(0, dot(n, wi)) max(0, dot(n, wo)), to first order in the correlation of the two
-/// cosines: exact when all normals face both directions. May fall slightly below 0 where hardly any do.
+/// cosines: exact when all normals face both directions. May be slightly below 0 where hardly any normal faces both.
 inline GLINT_HD float lobeCosines(const LobeMoments& moments, const LobeFacing& i, const LobeFacing& o, float cosine_io) {
   const float covariance = moments.spread * cosine_io + moments.bias * i.cosine * o.cosine;
   return i.lit * o.lit + covariance * i.visible * o.visible;
@@ -76,7 +77,7 @@ inline GLINT_HD float spreadRoughness(float alpha, float kappa) { return std::sq
 inline GLINT_HD float ggxLobe(float alpha, Vec3 centre, float kappa, Vec3 wi, Vec3 wo, Vec3 half) {
   const float a2 = alpha * alpha;
   const float width = a2 + 2 / std::max(kappa, 1.0f);
-  const float share = a2 / width;  // of the facet's own roughness in the width
+  const float share = a2 / width;  // share of the facet's own roughness in the width
   const Vec3 sum = share * centre + (1 - share) * half;
   const float scale = 1 / std::sqrt(std::max(1e-12f, dot(sum, sum)));
   const float ci = std::max(0.0f, scale * dot(sum, wi)), co = std::max(0.0f, scale * dot(sum, wo));
