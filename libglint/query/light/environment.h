@@ -7,7 +7,7 @@
 
 namespace glint {
 
-/// How the range of half vectors of a lobe is found.
+/// Methods to find the range of half vectors of a lobe.
 enum class LobeRange : std::uint8_t {
   moments,  ///< the box that has the second moments of the lobe's half vectors seen from wo
   support,  ///< a square of side 2 theta / pi around the axis's half vector (Deng 2022, Eq. 8 and 9)
@@ -15,17 +15,17 @@ enum class LobeRange : std::uint8_t {
 
 /// Most cells along each axis of a lobe.
 inline constexpr int kMostLobeCells = 8;
-/// Cells of a lobe that answer best for their cost: 9 means.
+/// Cells along each axis with the best accuracy for the cost, which is 9 means.
 inline constexpr int kLobeCells = 3;
 
-/// Half the extent of a lobe that is cut into n cells, in deviations: with it the cells, each evenly filled with its share of
-/// the lobe, have the variance of the lobe.
+/// Half the extent, in deviations, of a lobe that is cut into n x n cells. Chosen so that the cells, each filled evenly with
+/// its share of the lobe, together have the variance of the lobe.
 inline GLINT_HD float lobeExtent(int cells) {
   constexpr float kExtents[kMostLobeCells] = {1.732f, 1.732f, 1.994f, 2.181f, 2.326f, 2.444f, 2.542f, 2.626f};
   return kExtents[std::clamp(cells, 1, int{kMostLobeCells}) - 1];
 }
 
-/// Mean density over a range of half vectors; ranges too small for that are points.
+/// Mean density over a range of half vectors. Very small ranges are answered as points.
 template <NdfModel M>
 GLINT_HD float meanAround(const MicrofacetBrdf<M>& brdf, Vec2 h, float side_x, float side_y) {
   constexpr float kSmallestSide = 1e-3f;  // a third of a pixel at 512^2; differences of prefix sums lose digits below
@@ -34,9 +34,10 @@ GLINT_HD float meanAround(const MicrofacetBrdf<M>& brdf, Vec2 h, float side_x, f
   return brdf.model().mean(brdf.footprint(), Box2{h - half, h + half});
 }
 
-/// Radiance towards wo of one lobe's cell: everything but D is taken at its centre, D is averaged over its half vectors.
+/// Radiance towards wo of one cell of a lobe. D is averaged over the half vectors of the cell; all other terms are taken at the
+/// centre of the cell.
 /// @param centre, side  of the square cell, on the plane of directionAt
-/// @return for a lobe of integral 1 all inside the cell
+/// @return radiance of a lobe of integral 1 that lies in the cell
 template <NdfModel M>
 GLINT_HD Rgb cellRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const SphericalGaussian& light, const Tangents& frame,
                           Vec2 centre, float side) {
@@ -53,7 +54,7 @@ GLINT_HD Rgb cellRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const Spherica
   return density * wi.z * brdf.response(wi, wo, h);
 }
 
-/// The radiance towards wo by the paper's square range around the axis's half vector.
+/// Radiance towards wo with the paper's range: a square around the half vector of the lobe's axis.
 template <NdfModel M>
 GLINT_HD Rgb supportRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const SphericalGaussian& light) {
   if (!aboveHorizon(light.axis)) return {};
@@ -96,7 +97,7 @@ GLINT_HD Rgb prefilteredRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const S
   return flux * sum;
 }
 
-/// The same for all lobes.
+/// Radiance from all lobes.
 template <NdfModel M>
 GLINT_HD Rgb prefilteredRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const SphericalGaussians& lights,
                                  int cells = kLobeCells) {
@@ -108,12 +109,12 @@ GLINT_HD Rgb prefilteredRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const S
 /// A direction drawn towards the lights.
 struct LightSample {
   Vec3 wi;
-  Rgb radiance;   ///< of all lobes along wi
+  Rgb radiance;   ///< radiance of all lobes along wi
   float pdf = 0;  ///< per unit solid angle; 0 if there is no light
 };
 
-/// Importance sampling of a list of lobes for one BRDF and wo: first a lobe by what it contributes to the radiance towards wo,
-/// then a direction in it.
+/// Importance sampling of a list of lobes for one BRDF and wo. Chooses a lobe by its contribution to the radiance towards wo,
+/// then draws a direction from the lobe.
 ///
 /// A lobe's contribution is its prefiltered radiance with one cell; kFluxShare of the samples choose by flux alone, so that
 /// every lobe that gives light can be chosen. Directions may lie below the horizon: there the BRDF is 0. Colours count by their
@@ -122,7 +123,7 @@ class LightSampler {
  public:
   static constexpr float kFluxShare = 0.1f;
 
-  /// Asks for each lobe's contribution: one mean for each lobe.
+  /// Computes the contributions of all lobes, at the cost of one mean for each lobe.
   /// @param shares  room for lights.count numbers, filled here with the probability of each lobe; must outlive the sampler
   template <NdfModel M>
   GLINT_HD LightSampler(const MicrofacetBrdf<M>& brdf, Vec3 wo, const SphericalGaussians& lights, float* shares)
@@ -151,7 +152,7 @@ class LightSampler {
     for (std::size_t k = 0; k < lights_.count; ++k) {
       if (!(shares_[k] > 0)) continue;
       if (chosen != lights_.count) left -= shares_[chosen];
-      chosen = k;  // the last one with light takes what rounding leaves
+      chosen = k;  // if rounding leaves a rest, the last lobe with light gets it
       if (left < shares_[k]) break;
     }
     if (chosen == lights_.count) return {};

@@ -59,7 +59,7 @@ class ShRecurrence {
   const T* diagonal_ = nullptr;
 };
 
-/// Directions that `ShAccumulator` takes at a time.
+/// Number of directions that `ShAccumulator` sums at a time.
 inline constexpr int kShBatch = 4;
 
 /// Sums weighted spherical harmonics of directions: out[shIndex(l, m)] = sum over d of weight_d y_l^m(d).
@@ -131,9 +131,9 @@ class ShAccumulator {
     const T* ab = recurrence_.ab(l);
     T* cosines_out = out_ + shIndex(l, 0);
     T* sines_out = cosines_out + l;  // of m = 0, which is not stored: from m = 1 on
-    // The band before is in the array that the parity of l does not name; this band replaces the one before that.
+    // Two arrays hold bands l - 1 and l - 2, by the parity of the band. Band l replaces band l - 2.
     for (int d = 0; d < kShBatch; ++d) {
-      // z = sign (1 - gap): near the poles the rounding of z alone would turn a band by l^2 times that.
+      // z = sign (1 - gap): near the poles, a rounding error of z would change a band by l^2 times the error.
       const T sign = static_cast<T>(sign_[d]), gap = static_cast<T>(sign_[d] * gap_[d]);
       T* current = array(l & 1, d);
       const T* before = array(~l & 1, d);

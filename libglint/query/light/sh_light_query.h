@@ -24,23 +24,24 @@ struct ShadingFrame {
   GLINT_HD Vec3 toWorld(Vec3 v) const { return v.x * tangent + v.y * bitangent + v.z * normal; }
 };
 
-/// What a light integral may leave out.
+/// Options that trade the accuracy of a light integral for speed.
 struct ShLightOptions {
-  int order = kMaxShOrder;           ///< highest band; no more than light and lobes have
+  int order = kMaxShOrder;           ///< highest band; limited to the bands of light and lobes
   ShWindow window = ShWindow::none;  ///< weight of the bands up to `order`
-  /// Bands are left out from the lowest on whose rest cannot change the result by more than this times the mean of the light
-  /// over all half vectors: the effective band limit of light and NDF together (Gamboa 2018, section 4.2).
+  /// The sum ends where all later bands together cannot change the result by more than this times the mean of the light over
+  /// all half vectors: the effective band limit of light and NDF together (Gamboa 2018, section 4.2).
   float tolerance = 0;
   bool nearest =
       false;  ///< take the nearest outgoing direction of the table; else blend the four around it, at four times the cost
 };
 
-/// A light integral. Series that are cut off can fall below zero near dark light: `value` is then 0, and says so.
+/// A light integral. A series that is cut off can be negative where the light is dark: `value` is then 0, and `clamped` is
+/// true.
 struct ShLightIntegral {
   float value[3] = {0, 0, 0};         ///< R, G, B, >= 0, finite
-  float signed_value[3] = {0, 0, 0};  ///< what the series gives
+  float signed_value[3] = {0, 0, 0};  ///< value of the series
   bool clamped = false;               ///< some signed_value is negative
-  int order = 0;                      ///< band that the sum ended with
+  int order = 0;                      ///< last band of the sum
 };
 
 /// The integral over all light of L(wi) D(h) dwi for a histogram of normals, in one evaluation without noise (Gamboa 2018, Eq.
@@ -229,7 +230,7 @@ class ShLightQuery {
   static GLINT_HD float decode(std::uint16_t value) { return halfToFloat(value); }
   template <class Stored>
   static GLINT_HD double dotProduct(const Stored* stored, const T* ndf, std::size_t n) {
-    // Four partial sums, so that the compiler can use vectors without reordering.
+    // Four partial sums, so that the compiler can use vectors without changing the order of additions.
     T partial[4] = {0, 0, 0, 0};
     std::size_t k = 0;
     for (; k + 4 <= n; k += 4)

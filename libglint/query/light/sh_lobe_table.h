@@ -12,10 +12,10 @@
 
 namespace glint {
 
-/// Turned roughness lobes from a table (Gamboa 2018, section 6.2): blends the four directions of the grid around the one that
-/// is asked. Blending blurs what is finer than the grid: bands from about rows on are lost between grid points, so the grid has
-/// to be four times as fine as the lobe is wide. Evaluating harmonics (ShAccumulator) is exact, and faster once the table does
-/// not fit a cache.
+/// Turned roughness lobes from a table (Gamboa 2018, section 6.2). Blends the lobes of the four nearest directions of the grid.
+/// Blending blurs detail that is finer than the grid: bands above about the number of rows are lost between grid points. So the
+/// grid must be four times as fine as the lobe is wide. Evaluating harmonics (ShAccumulator) is exact, and faster if the table
+/// does not fit a cache.
 class ShLobeTable {
  public:
   GLINT_HD explicit ShLobeTable(const ShLobes& lobes) : lobes_(lobes) {}

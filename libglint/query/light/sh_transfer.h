@@ -8,8 +8,9 @@
 
 namespace glint {
 
-/// What Fresnel and masking make of a light integral: F G / (4 cos(wo)), with both taken in the mirror direction at the
-/// surface's normal instead of under the integral (Gamboa 2018, Eq. 14). Radiance = transferFactor * ShLightIntegral::value.
+/// The factor by which Fresnel and masking scale a light integral: F G / (4 cos(wo)). F and G are taken in the mirror direction
+/// at the surface's normal, and not under the integral (Gamboa 2018, Eq. 14). Radiance = transferFactor *
+/// ShLightIntegral::value.
 /// @param fresnel      reflectance at the angle of wo, in [0, 1]
 /// @param shadowing    G of wo and its mirror direction, in [0, 1]
 /// @param wo_dot_normal  cosine of the outgoing direction; the result is 0 at and below the surface
@@ -17,8 +18,8 @@ GLINT_HD inline float transferFactor(float fresnel, float shadowing, float wo_do
   return wo_dot_normal > 0 ? fresnel * shadowing / (4 * wo_dot_normal) : 0.0f;
 }
 
-/// The same from what a surface is made of and how rough its map is: Fresnel at the angle of wo, G of wo and its mirror
-/// direction with heights correlated. All that a renderer needs for a pixel that sees `footprint` of an asset of kind
+/// transferFactor from the material and the masking of a surface: Fresnel at the angle of wo, G of wo and its mirror direction
+/// with heights correlated. This is the complete code of a renderer for a pixel that sees `footprint` of an asset of kind
 /// histogram-sat:
 ///
 ///   const HistogramNdf ndf(asset.get<HistogramSat>());

@@ -8,12 +8,12 @@
 
 namespace glint {
 
-/// How bands are weighted before a series of spherical harmonics is cut off. Cutting alone makes bright spots ring: dark and
+/// Weights of bands in a series of spherical harmonics that is cut off. Without weights, bright spots ring: they have dark and
 /// even negative rings around them.
 enum class ShWindow : std::uint8_t {
   none,     ///< all bands alike: sharpest, rings most
   lanczos,  ///< sinc(l / (order + 1)): blurs a spot by about a quarter, rings a tenth of `none`
-  hann,     ///< (1 + cos(pi l / (order + 1))) / 2: blurs it by about half, rings least
+  hann,     ///< (1 + cos(pi l / (order + 1))) / 2: blurs a spot by about half, rings least
 };
 
 /// Weight of band l of a series that ends with band `order`; 1 at l = 0.
