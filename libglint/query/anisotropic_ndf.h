@@ -10,7 +10,7 @@
 
 namespace glint {
 
-/// A Gaussian footprint as a sum of isotropic ones of equal size along its long axis. Weights are > 0 and sum to 1.
+/// A Gaussian footprint as a sum of isotropic Gaussians of equal size along its long axis. Weights are > 0 and sum to 1.
 struct IsotropicParts {
   static constexpr int kMost = 32;
   Footprint footprints[kMost];
@@ -18,18 +18,19 @@ struct IsotropicParts {
   int count = 0;
 };
 
-/// Most that neighbouring parts are apart, in deviations of a part: their sum ripples by 1 %. More only where kMost is too few.
+/// Largest gap between neighbouring parts, in deviations of a part: their sum then ripples by 1 %. Gaps are larger only where
+/// kMost parts are too few.
 inline constexpr float kPartGap = 2;
 /// Parts lie out to this many deviations of the footprint.
 inline constexpr float kPartReach = 2.2f;
 /// Aspect up to which IsotropicParts::kMost parts are enough: sqrt(1 + (kMost kPartGap / (2 kPartReach))^2).
 inline constexpr float kMostAspect = 14.58f;
-/// How much wider parts become where they are too few: a share of the square of the gap beyond kPartGap. Gaps miss texels,
-/// width adds others; this leaves the least squared error on a map of unrelated texels, to a tenth
-/// (tests/unit/anisotropic_test.cpp).
+/// Widening of parts where they are too few, as a share of the square of the gap beyond kPartGap. Gaps miss texels of the
+/// footprint, and wider parts see texels outside it. This share has the least squared error on a map of unrelated texels, to a
+/// tenth (tests/unit/anisotropic_test.cpp).
 inline constexpr float kPartWidening = 0.055f;
 
-/// A footprint is round if its variance along it is larger than the variance of its parts by less than this share.
+/// A footprint is round if its variance along its long axis exceeds the variance of its parts by less than this share.
 inline constexpr float kRoundLength = 0.05f;
 
 /// Deviations along the axes of a covariance, and the direction of the longer one.
@@ -45,11 +46,11 @@ inline GLINT_HD PrincipalAxes principalAxes(const UsableCovariance& c) {
           {std::cos(angle), std::sin(angle)}};
 }
 
-/// Parts of a footprint that winds round the map, even along the period that it follows: `count` is 0 where it is shorter than
-/// that. As wide as the footprint is across, or wider where `most` are too few.
+/// Parts of a footprint that winds round the map: spread evenly along the period that the footprint follows. `count` is 0 if
+/// the footprint is shorter. Parts are as wide as the footprint is across, or wider where `most` parts are too few.
 GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p, int width, int height, float narrowest_sigma,
                                                              int most) {
-  constexpr double kTurns = 0.5;  // variance of turns that is even to 5e-5
+  constexpr double kTurns = 0.5;  // variance of turns from which on the footprint is even along them, to 5e-5
   const double w = width, h = height;
   const UsableCovariance c = usableCovariance(p.covariance, width, height);
   IsotropicParts parts;
@@ -81,8 +82,8 @@ GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p,
   return parts;
 }
 
-/// Parts of a footprint on a map that ends: those near the map, weighed by how much of them lies over it. Parts beyond the
-/// border are answered at the border.
+/// Parts of a footprint on a map that ends (Boundary::clamp): only parts near the map, weighed by their share over the map.
+/// Parts beyond the border are answered at the border.
 GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOverMap(const Footprint& p, int width, int height, float narrowest_sigma,
                                                               int most) {
   const PrincipalAxes axes = principalAxes(positiveCovariance(p.covariance));
@@ -126,16 +127,16 @@ GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOverMap(const Footprint& p
   return parts;
 }
 
-/// Splits a footprint along its long axis so that the first and second moments of the parts together are its own.
+/// Splits a footprint along its long axis. The parts together have the first and second moments of the footprint.
 ///
-/// The size is made usable first (usableCovariance); footprints that wind round the map are `partsOfTurn`. Other parts have the
-/// short deviation, or `narrowest_sigma` where that is larger, and neighbours are at most kPartGap deviations apart. Above an
-/// aspect of kMostAspect the parts are too few: they are wider and further apart, so that the footprint keeps its length,
-/// exactly in its second moment, and grows in width (kPartWidening). Boxes are split as the Gaussian of the same moments.
-/// @param narrowest_sigma  texels; what the model that is asked cannot tell apart, e.g. finestSigma(shape) of a pyramid without
-///                         normals
-/// @param most             of the parts, 2 to IsotropicParts::kMost; kMostAspect is less with fewer
-/// @param boundary         clamp: the parts are those of partsOverMap
+/// The size is made usable first (usableCovariance). Footprints that wind round the map are split by `partsOfTurn`. Other parts
+/// have the short deviation of the footprint, or `narrowest_sigma` if that is larger, and neighbours are at most kPartGap
+/// deviations apart. Above an aspect of kMostAspect there are too few parts: they are wider and further apart, so that the
+/// footprint keeps its length exactly and grows in width (kPartWidening). Boxes are split as the Gaussian of the same moments.
+/// @param narrowest_sigma  texels; the model answers smaller footprints alike, e.g. finestSigma(shape) for a pyramid
+///                         without normals
+/// @param most             largest number of parts, 2 to IsotropicParts::kMost; fewer parts lower kMostAspect
+/// @param boundary         with clamp, partsOverMap makes the parts
 /// @return 1 part for round footprints, else 2 or more
 inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int height, float narrowest_sigma = 0,
                                               int most = IsotropicParts::kMost, Boundary boundary = Boundary::wrap) {
@@ -175,16 +176,16 @@ inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int
   return parts;
 }
 
-/// Answers stretched footprints from a model that knows only round ones (PyramidNdf, CpNdf): each as the sum of up to 32 round
-/// ones along its long axis, at that many times the cost. Round footprints are asked of the model as they are.
+/// Answers stretched footprints from a model that knows only round footprints (PyramidNdf, CpNdf): as the sum of up to 32 round
+/// footprints along the long axis, at that many times the cost. Round footprints are passed to the model unchanged.
 ///
 /// Thread-safe, allocates nothing; the arrays of the model must outlive it.
 template <NdfModel M>
 class AnisotropicNdf {
  public:
-  /// @param width, height    of the map, texels
+  /// @param width, height    size of the map, texels
   /// @param narrowest_sigma  as for isotropicParts
-  /// @param most_parts       that a footprint is split into, clamped to 1 to IsotropicParts::kMost; 1: none is split
+  /// @param most_parts       largest number of parts of a footprint, clamped to 1 to IsotropicParts::kMost; 1: no splitting
   /// @param boundary         of the map
   GLINT_HD AnisotropicNdf(const M& model, int width, int height, float narrowest_sigma = 0,
                           int most_parts = IsotropicParts::kMost, Boundary boundary = Boundary::wrap)
@@ -194,7 +195,7 @@ class AnisotropicNdf {
         narrowest_sigma_(narrowest_sigma),
         most_parts_(std::clamp(most_parts, 1, int{IsotropicParts::kMost})),
         boundary_(boundary) {}
-  /// For a model of a pyramid: without normals, parts are no narrower than its level 0.
+  /// For a model of a pyramid. If the model has no normals, parts are at least as wide as footprints of level 0.
   GLINT_HD AnisotropicNdf(const M& model, int most_parts = IsotropicParts::kMost) requires requires {
     model.shape();
   } : AnisotropicNdf(model, model.shape().width, model.shape().height, model.hasNormals() ? 0 : finestSigma(model.shape()),
@@ -203,7 +204,7 @@ class AnisotropicNdf {
 
   /// The model of round footprints.
   GLINT_HD const M& round() const { return model_; }
-  /// Whether a footprint is asked of the model as it is.
+  /// Whether a footprint is passed to the model unchanged.
   GLINT_HD bool isWhole(const Footprint& p) const {
     return most_parts_ == 1 || (p.covariance.xx == p.covariance.yy && p.covariance.xy == 0);
   }
@@ -224,7 +225,7 @@ class AnisotropicNdf {
     return summed(parts(p), [&](const Footprint& part) { return model_.mean(part, range); });
   }
 
-  /// Draws one of the parts by its weight, and from it. The pdf is the density of all parts.
+  /// Chooses a part by its weight and draws from it. The pdf is the density of all parts.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     if (isWhole(p)) return model_.sample(p, xi);
     const IsotropicParts all = parts(p);

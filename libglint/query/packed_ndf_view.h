@@ -7,16 +7,16 @@
 
 namespace glint {
 
-/// Makes the models of a packed buffer. Trusts the header beyond magic and version: it must come from glint::api::pack. A host
-/// that has the whole buffer makes the view with glint::api::viewPacked, which says what is wrong.
+/// Makes the models of a packed buffer. Checks only magic and version, so the header must come from glint::api::pack. A host
+/// that has the whole buffer should use glint::api::viewPacked instead, which checks it and reports errors.
 ///
-/// Header and arrays are given apart, because the processor that makes the model need not be the one that asks it: a host reads
-/// its own copy of the header, and gives the address of the buffer on the device. On the device both are the buffer.
+/// Header and arrays are two arguments, because one processor may make the model and another ask it: a host then reads its own
+/// copy of the header, and passes the address of the buffer on the device. On the device both are the address of the buffer.
 /// @see glint/model/packed_ndf.h for the layout
 class PackedNdfView {
  public:
   /// @param header  first bytes of the buffer, readable here
-  /// @param base    the buffer as those who ask will see it; aligned to 16 bytes
+  /// @param base    address of the buffer for the processor that asks the model; aligned to 16 bytes
   GLINT_HD PackedNdfView(const PackedHeader& header, const void* base)
       : header_(header), base_(static_cast<const unsigned char*>(base)) {}
   GLINT_HD explicit PackedNdfView(const void* buffer) : PackedNdfView(*static_cast<const PackedHeader*>(buffer), buffer) {}

@@ -11,9 +11,9 @@ namespace glint {
 
 /// The NDF from a pyramid of images: exact (pixel means) at the centres of its levels, trilinear between them.
 ///
-/// Footprints are answered as isotropic Gaussians of the same mean square size. With the normals at hand, those below level 0
-/// are answered by Reference; without, level 0 answers. Footprints that are large beside the map tend to its mean
-/// (SliceChooser). The density is constant over a pixel. Thread-safe, allocates nothing; the arrays must outlive it.
+/// Footprints are answered as isotropic Gaussians of the same mean square size. Reference answers footprints below level 0 if
+/// the normals are given; else level 0 does. Answers of footprints larger than the map tend to its mean (SliceChooser). The
+/// density is constant over a pixel. Thread-safe, allocates nothing; the arrays must outlive it.
 class PyramidNdf {
  public:
   GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid) : reader_(pyramid), chooser_(pyramid.shape) {}
@@ -37,9 +37,9 @@ class PyramidNdf {
     return reader_.pixelDensity(chooser_.choose(p), pixelPlace(shape(), h));
   }
 
-  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value and a point evenly
-  /// inside, as the density is constant there. The pdf is the density, which integrates to what the images do: 1 within 1e-3 by
-  /// the format, 1e-5 as they are built. O(stored blocks of one image + 256).
+  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value, and a point evenly in
+  /// the pixel. The pdf is the density, whose integral is that of the images: 1 within 1e-3 in every valid file, within 1e-5 as
+  /// glint-pyramid builds them. O(stored blocks of one image + 256).
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     if (fromTexels(p)) return below_.sample(p, clampUnit(xi));
     PyramidReader::Draw draw = reader_.chooseImage(chooser_.choose(p), xi);
@@ -51,8 +51,8 @@ class PyramidNdf {
     return drawnAt(pointInPixel(shape(), draw.place, draw.xi), reader_.pixelDensity(draw.slices, draw.place));
   }
 
-  /// Average density over a box of half vectors, 0 if it is empty. O(1) for each block that the box covers: whole blocks have
-  /// their mean stored, others sum at most 256 pixels.
+  /// Average density over a box of half vectors, 0 if the box is empty. O(1) for each block that the box covers: the means of
+  /// whole blocks are stored, and a block that is covered in part sums at most 256 pixels.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     if (fromTexels(p)) return below_.mean(p, range);
     PyramidReader::PendingMean pending;

@@ -7,8 +7,7 @@
 
 namespace glint {
 
-/// Deviation of the pixel filter that `footprintFromDifferentials` assumes, in pixels: that of renderers' usual Gaussian
-/// filter.
+/// Deviation of the pixel filter that `footprintFromDifferentials` assumes, in pixels: the usual Gaussian filter of renderers.
 inline constexpr float kPixelFilterSigma = 0.5f;
 /// Half axes are cut to this length (texels), so that their squares are finite.
 inline constexpr float kLongestAxis = 1e15f;
@@ -21,10 +20,9 @@ inline GLINT_HD Vec2 finiteAxis(Vec2 a) {
 
 /// The Gaussian footprint of a pixel from a renderer's ray differentials.
 ///
-/// Its covariance is filter_sigma^2 (a a^T + b b^T), where a and b are the texels that neighbouring pixels along x and y are
-/// apart: the image of a round pixel filter in texture space. What is not a number counts as 0, infinite lengths as
-/// kLongestAxis, and a footprint without extent is answered as the narrowest: every input gives a footprint that every model
-/// answers.
+/// Its covariance is filter_sigma^2 (a a^T + b b^T), where a and b are the steps in texels from a pixel to its neighbour along
+/// x and along y: the image of a round pixel filter in texture space. NaN counts as 0, infinite lengths as kLongestAxis, and a
+/// footprint without extent as the narrowest. So every input gives a footprint that every model answers.
 /// @param uv             centre; the texture is periodic
 /// @param duvdx, duvdy   change of uv from one pixel to the next
 /// @param width, height  of the map, texels
@@ -36,36 +34,36 @@ inline GLINT_HD Footprint footprintFromDifferentials(Vec2 uv, Vec2 duvdx, Vec2 d
   return Footprint::gaussian(uv, {a.x * a.x + b.x * b.x, a.x * a.y + b.x * b.y, a.y * a.y + b.y * b.y});
 }
 
-/// Change of uv for a step on the surface, by least squares: what a renderer needs that has dp/du and dp/dv only.
+/// Change of uv for a step on the surface, by least squares: for renderers that have only dp/du and dp/dv.
 /// @param dpdu, dpdv  derivatives of the position, any units
 /// @param step        on the tangent plane, e.g. dp/dx of a ray differential, same units
 /// @return 0 where dpdu and dpdv are parallel, 0 or not finite
 inline GLINT_HD Vec2 uvDifferential(Vec3 dpdu, Vec3 dpdv, Vec3 step) {
   const float uu = dot(dpdu, dpdu), uv = dot(dpdu, dpdv), vv = dot(dpdv, dpdv);
   const float determinant = uu * vv - uv * uv;
-  constexpr float kParallel = 1e-6f;  // sine^2 of the angle between them that floats still tell from 0
+  constexpr float kParallel = 1e-6f;  // squared sine of the smallest angle between dpdu and dpdv that floats distinguish from 0
   if (!(determinant > kParallel * uu * vv)) return {};
   const float su = dot(dpdu, step), sv = dot(dpdv, step);
   const Vec2 d = {(vv * su - uv * sv) / determinant, (uu * sv - uv * su) / determinant};
   return std::isfinite(d.x) && std::isfinite(d.y) ? d : Vec2{};
 }
 
-/// A path's beam as it widens: what indirect bounces need, where there are no ray differentials (Deng 2022, section 5.3).
-/// Deviations of a Gaussian beam; the filter of a pixel gives the first.
+/// The width of a path as a Gaussian beam, for indirect bounces, which have no ray differentials (Deng 2022, section 5.3). The
+/// filter of a pixel gives the first beam.
 struct RayCone {
-  float width = 0;   ///< at the last hit, across the ray, scene units
-  float spread = 0;  ///< of directions, radians
+  float width = 0;   ///< deviation across the ray at the last hit, scene units
+  float spread = 0;  ///< deviation of directions, radians
 };
 
-/// The beam after a distance: both causes add as variances.
+/// The beam after a distance: variances from width and from spread add.
 inline GLINT_HD RayCone propagated(RayCone cone, float distance) {
   const float widening = cone.spread * distance;
   return {std::sqrt(cone.width * cone.width + widening * widening), cone.spread};
 }
 
-/// The beam after it was reflected by facets whose slopes deviate by `slope_sigma` per axis: directions deviate by twice the
-/// angle. With alpha of a GGX or Beckmann lobe slope_sigma is alpha / sqrt(2); with a map's slopes and sigma_r, sqrt(mean
-/// variance + sigma_r^2). The spread is at most that of the whole hemisphere.
+/// The beam after reflection by facets whose slopes have the deviation `slope_sigma` per axis: directions deviate by twice the
+/// angle. For a GGX or Beckmann lobe slope_sigma is alpha / sqrt(2). For a map it is sqrt(mean variance of its slopes +
+/// sigma_r^2). The spread is at most that of the whole hemisphere.
 inline GLINT_HD RayCone bounced(RayCone cone, float slope_sigma) {
   constexpr float kHemisphere = 0.75f;  // radians: RMS angle per axis of a hemisphere seen evenly by projected area
   const float turned = 2 * std::atan(slope_sigma);

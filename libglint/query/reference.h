@@ -16,16 +16,17 @@ namespace glint {
 /// The ground truth: the NDF summed over the texels (Deng 2022, Eq. 2, with normalised footprint weights).
 ///
 /// Exact for Gaussian and box footprints, flat and smooth surfaces. `Search::exhaustive` visits every texel of the footprint:
-/// O(footprint area). `Search::pruned` descends the map's min-max pyramid of normals and skips blocks whose normals are out of
-/// the lobe's reach (kLobeReach): the same to 3e-7 of a lobe's peak, and sublinear; it needs `map.bounds`.
+/// O(footprint area). `Search::pruned` descends the map's min-max pyramid of normals and skips squares of texels whose normals
+/// are out of the lobe's reach (kLobeReach). Its answers differ by at most 3e-7 of a lobe's peak, and its cost is sublinear; it
+/// needs `map.bounds`.
 /// With Boundary::clamp a footprint sees only texels of the map. A smooth surface then ends at the outermost texel centres:
-/// footprints whose centre lies beyond them, in the outer half texel, are moved there, so that none misses it.
+/// footprints whose centre lies beyond, in the outer half texel, are moved to the end of the surface, so that each sees some.
 /// Thread-safe, allocates nothing; the map must outlive it.
 class Reference {
  public:
   enum class Search { exhaustive, pruned };
 
-  /// Has no map; may only be asked `hasMap`.
+  /// A reference without a map: only `hasMap` may be called.
   Reference() = default;
   GLINT_HD Reference(const NormalMap& map, float sigma_r, Surface surface = Surface::flat, Boundary boundary = Boundary::wrap,
                      Search search = Search::exhaustive)
@@ -50,11 +51,11 @@ class Reference {
     return finitePositive(static_cast<float>(average(p, BoxLobe{box, sigma_r_}) / range.area()));
   }
 
-  /// Draws a texel (or triangle) by its weight in the footprint, a normal of it and the lobe's blur around that. The pdf is the
-  /// density; where the blur leaves [-1, 1]^2, nothing is drawn.
+  /// Draws a texel (or triangle) by its weight in the footprint, one of its normals, and a point of the lobe around the normal.
+  /// The pdf is the density. Nothing is drawn where the point leaves [-1, 1]^2.
   ///
   /// O(rows + columns) of the footprint for Gaussians (O(area) if they are rotated and the boundary is clamped), O(1) for
-  /// boxes, and the density. A choice uses up leading digits of `xi` and the next one those below, so 24 bits are enough for
+  /// boxes, plus the cost of a density. Each choice uses up the leading digits of `xi` that are left; 24 bits are enough for
   /// one sample.
   GLINT_DEVICE_CALL GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     xi = clampUnit(xi);
@@ -65,7 +66,7 @@ class Reference {
     if (surface_ == Surface::smooth) {
       const Vec2 side = texel.half == 0 ? normal(texel.i + 1, texel.j) : normal(texel.i, texel.j + 1);
       const Vec2 far = normal(texel.i + 1, texel.j + 1);
-      const float r = std::sqrt(xi.y);  // even in the triangle
+      const float r = std::sqrt(xi.y);  // makes the point uniform in the triangle
       n = (1 - r) * n + (r * (1 - xi.x)) * side + (r * xi.x) * far;
       xi = {lowerDigits(xi.x, 7), lowerDigits(xi.y, 7)};
     }
@@ -204,7 +205,7 @@ class Reference {
     });
   }
 
-  /// Visits the texels of a window whose block bounds come near the lobe.
+  /// Visits the texels of a window, except squares of texels whose bounds of normals are out of the lobe's reach.
   template <class Leaf>
   GLINT_HD void descend(const FootprintWeights& weights, const Window& w, const Box2& support, float reach, Leaf&& leaf) const {
     struct Node {
@@ -228,7 +229,7 @@ class Reference {
           const int shift = node.level;  // children cover 2^shift texels
           if ((i << shift) >= w.column_end || ((i + 1) << shift) <= w.column_begin) continue;
           if ((j << shift) >= w.row_end || ((j + 1) << shift) <= w.row_begin) continue;
-          if (shift > 0) {  // slanted footprints miss blocks of their bounding box
+          if (shift > 0) {  // a slanted footprint misses parts of its bounding box
             const auto columns = weights.columnsIn(w.offset_y + (j << shift), w.offset_y + ((j + 1) << shift));
             if (w.offset_x + (i << shift) >= columns.end || w.offset_x + ((i + 1) << shift) <= columns.begin) continue;
           }
@@ -246,7 +247,7 @@ class Reference {
     return value - (remainder < 0 ? remainder + step : remainder);
   }
   GLINT_HD Vec2 normal(int i, int j) const { return map_.at(wrapIndex(i, map_.width), wrapIndex(j, map_.height)); }
-  /// Cells of the last row and column reach over the border, so they exist only on the endless plane.
+  /// Cells in the last row and column reach over the border: they exist only with Boundary::wrap.
   GLINT_HD bool hasCell(int i, int j) const {
     return boundary_ == Boundary::wrap || (i + 1 < map_.width && j + 1 < map_.height);
   }

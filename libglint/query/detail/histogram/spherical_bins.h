@@ -124,7 +124,7 @@ class SphericalBins {
   /// Point of a bin, uniform over its area for uniform `xi` in [0, 1)^2: xi.x turns, xi.y goes outwards.
   GLINT_HD Vec2 point(int bin, Vec2 xi) const {
     const Vec2 h = place(bin, xi);
-    // Rounding may move a point on the border into the next bin: the point is then moved a little towards the middle of its bin.
+    // Rounding may move a point on the border into the next bin. The point is then drawn a little nearer the bin's middle.
     return find(h) == bin ? h : place(bin, {0.5f + 0.9999f * (xi.x - 0.5f), 0.5f + 0.9999f * (xi.y - 0.5f)});
   }
 
