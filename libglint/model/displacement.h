@@ -47,27 +47,27 @@ struct DisplacementLevel {
   int factor = 0;           ///< texels of the original along a side of a cell
   int columns = 0;          ///< width / factor
   int rows = 0;             ///< height / factor
-  int spatial_columns = 0;  ///< of T: at most `columns`
+  int spatial_columns = 0;  ///< columns of T, at most `columns`
   int spatial_rows = 0;
 
   std::span<const float> heights;        ///< [rows][columns] of the vertices, texels of the original
   std::span<const VmfLobe> lobes;        ///< [rows][columns][lobe_count], largest amplitude first
   std::span<const float> lobe_colors;    ///< [rows][columns][lobe_count][channels], factors of the base; empty: all 1
-  std::span<const float> lobe_alphas;    ///< [rows][columns][lobe_count], ggx roughness; empty: that of the base
+  std::span<const float> lobe_alphas;    ///< [rows][columns][lobe_count], ggx roughness; empty: alpha of the base
   std::span<const MapSlopes> slopes;     ///< [rows][columns], for the single-lobe variant
   std::span<const float> fit_errors;     ///< [rows][columns]: relative error of the lobes, both sides blurred by 8 degrees
   std::span<const float> spatial_scale;  ///< T [spatial_rows][spatial_columns][channels], mean 1 over the cells
   std::span<const std::uint16_t> angular_scale;  ///< S [][channels], half precision: pair i <= o is at o (o + 1) / 2 + i
 
-  // How far the factorisation and its assumptions hold (below 75 degrees; of colours the worst channel or the mean of them).
-  float rank1_residual = 0;        ///< |R - T S| / |R| of the scaling function R before it was factorised
-  float rank1_energy = 1;          ///< share of the largest singular value's square: what the best factorisation keeps
-  float interreflected_share = 0;  ///< of the reflected light
-  float distant_share = 0;         ///< of the reflected light: over hops longer than a cell, which T and S cannot place
+  // Errors of the factorisation and its assumptions, for directions below 75 degrees; worst channel or mean of channels.
+  float rank1_residual = 0;  ///< |R - T S| / |R| of the scaling function R before it was factorised
+  float rank1_energy = 1;    ///< share of the largest squared singular value: the energy that the best factorisation keeps
+  float interreflected_share = 0;  ///< share of interreflection in the reflected light
+  float distant_share = 0;         ///< share that comes over hops longer than a cell, which T and S cannot represent
 };
 
-/// A displacement map downsampled to several levels of detail, with what keeps its appearance (asset kind `displacement`,
-/// Wu 2019): f_low(x, wi, wo) = T(x) S(wi, wo) f'_low(x, wi, wo).
+/// A displacement map downsampled to several levels of detail, with scaling functions that keep its appearance (asset kind
+/// `displacement`, Wu 2019): f_low(x, wi, wo) = T(x) S(wi, wo) f'_low(x, wi, wo).
 struct Displacement {
   int width = 0;   ///< of the original, texels
   int height = 0;  ///< of the original, texels

@@ -10,18 +10,18 @@
 
 namespace glint {
 
-/// What went wrong, in the classes that a caller or a pipeline treats differently. Values are the exit codes of the tools.
+/// Classes of errors that a caller or a pipeline treats differently. Values are the exit codes of the tools.
 enum class ErrorCode : std::uint8_t {
   usage = 1,          ///< an argument is missing, unknown or out of range
   io = 2,             ///< a file cannot be opened, read or written
-  invalid_input = 3,  ///< a file was read, but what it holds cannot be used
+  invalid_input = 3,  ///< a file was read, but its contents cannot be used
   failed = 4,         ///< the work itself failed (memory, no convergence)
-  unsupported = 5,    ///< valid, but newer or other than this version handles
+  unsupported = 5,    ///< valid, but this version cannot handle it
   differs = 7,        ///< a comparison found a difference
 };
 
-/// The one exception of the libraries: what happened, where, and what to do about it. Its text is one line of at most some
-/// hundred characters of UTF-8, whatever bytes a file's name or another library's message brings in.
+/// The only exception of the libraries: says the error, its place, and what the user can do. Its text is one line of at most
+/// some hundred characters of UTF-8, whatever bytes a file's name or another library's message brings in.
 class Error : public std::runtime_error {
  public:
   /// @param rule    stable id of the broken rule, e.g. "normals.finite"; empty if there is none

@@ -27,7 +27,7 @@ struct Footprint {
   Vec2 axis_a;
   Vec2 axis_b;
 
-  /// Isotropic Gaussian of standard deviation `sigma_texels`. Deviations above 1e15 are answered like it, as the largest.
+  /// Isotropic Gaussian of standard deviation `sigma_texels`. Deviations above 1e15 count as 1e15.
   static GLINT_HD constexpr Footprint isotropic(Vec2 centre_uv, float sigma_texels) {
     constexpr float kLargest = 1e15f;  // its square is finite
     const bool large = sigma_texels > kLargest && sigma_texels <= 0x1.fffffep127f;
@@ -57,7 +57,7 @@ struct Footprint {
   }
 
  private:
-  /// (a0 a1 + b0 b1) / 3, at most 1e30: enormous boxes are still large, not undefined.
+  /// (a0 a1 + b0 b1) / 3, clamped to 1e30 so that enormous boxes have a finite covariance.
   static GLINT_HD constexpr float secondMoment(float a0, float a1, float b0, float b1) {
     const double moment = (double{a0} * a1 + double{b0} * b1) / 3;
     return static_cast<float>(moment > 1e30 ? 1e30 : moment < -1e30 ? -1e30 : moment);

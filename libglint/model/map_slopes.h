@@ -5,7 +5,7 @@
 
 namespace glint {
 
-/// Mean and covariance of the slopes (dz/dx, dz/dy) = (-nx/nz, -ny/nz) of a map's texels: what shadowing needs to know of it.
+/// Mean and covariance of the slopes (dz/dx, dz/dy) = (-nx/nz, -ny/nz) of a map's texels, from which masking follows.
 struct MapSlopes {
   Vec2 mean;
   Covariance covariance;  ///< of slopes, dimensionless

@@ -18,7 +18,7 @@ inline constexpr int kMaxPyramidLevels = 16;
 /// Most 64-bit words that an image's mask of blocks can have: images of 1024^2.
 inline constexpr int kMostMaskWords = 64;
 
-/// Where the footprints of one level lie: centres ((i + 0.5) stride, (j + 0.5) stride) in texels.
+/// The grid of footprints of one level: centres ((i + 0.5) stride, (j + 0.5) stride) in texels.
 struct PyramidGrid {
   float stride = 0;  ///< texels
   int columns = 0;   ///< ceil(width / stride); 1 in the mean of the map
@@ -27,7 +27,7 @@ struct PyramidGrid {
   GLINT_HD constexpr std::size_t imageCount() const { return static_cast<std::size_t>(columns) * rows; }
 };
 
-/// What all pyramids of NDF images share, compressed or not (section 4.1 of Deng 2022).
+/// Sizes and parameters of a pyramid of NDF images, compressed or not (Deng 2022, section 4.1).
 struct PyramidShape {
   int width = 0;       ///< of the normal map, texels
   int height = 0;      ///< of the normal map, texels
@@ -39,7 +39,7 @@ struct PyramidShape {
   PyramidGrid levels[kMaxPyramidLevels];
   MapSlopes slopes;  ///< of the normal map's texels, without sigma_r
 
-  /// Whether the last level is the mean of the whole map, in one image, for footprints that are larger than all others.
+  /// Whether the last level is one image of the whole map, for footprints that are larger than all other levels.
   GLINT_HD constexpr bool endsInMean() const { return level_count > 1 && levels[level_count - 1].imageCount() == 1; }
   /// Levels of Gaussian footprints: all levels but the mean.
   GLINT_HD constexpr int footprintLevels() const { return level_count - (endsInMean() ? 1 : 0); }
@@ -54,10 +54,11 @@ inline constexpr float kFootprintPerStride = 0.4330127018922193f;
 
 enum class BlockPrecision : std::uint8_t { f16, f32 };
 
-/// The NDF images of one level. Only blocks that hold something are stored.
+/// The NDF images of one level. Only blocks with a density above 0 are stored.
 struct PyramidLevel {
   std::span<const std::uint64_t> masks;  ///< [rows][columns][maskWords]; bit b: block b = by * blocksPerAxis + bx is stored
-  /// [rows][columns][maskWords], and one more: stored blocks of the level before those of this word; the last is their number.
+  /// [rows][columns][maskWords], plus one element: number of stored blocks of the level before this word; the last element is
+  /// the number of all stored blocks.
   std::span<const std::uint32_t> mask_ranks;
   std::span<const float> block_means;  ///< [blocks]: mean density of each stored block
   const void* pixels = nullptr;        ///< [blocks][16][16] of f16 or f32: density (pixel means) / value_scale

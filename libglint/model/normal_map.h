@@ -10,13 +10,13 @@
 
 namespace glint {
 
-/// How normals behave between texel centres.
+/// Interpolation of normals between texel centres.
 enum class Surface : std::uint8_t {
   flat,    ///< each texel is a facet: a point of the disk
   smooth,  ///< linear over the two triangles of every cell of four texel centres
 };
 
-/// What lies beyond the border of a map.
+/// Continuation of a map beyond its border.
 enum class Boundary : std::uint8_t { wrap, clamp };
 
 /// Smallest box of the disk that holds the normals of a block of texels. Stored as four floats in this order.
@@ -31,8 +31,8 @@ static_assert(sizeof(NormalBounds) == 16);
 /// One level of the min-max pyramid of a normal map.
 ///
 /// With b = 2^(k+1) texels, node (i, j) of `bounds[k]` bounds the texels [i b, (i+1) b] x [j b, (j+1) b], both ends included
-/// (wrapped): its block and one more row and column, so that it also bounds the triangles of a smooth surface that start there.
-/// columns = ceil(width / b), rows = ceil(height / b).
+/// (wrapped). The extra row and column are there so that the node also bounds the triangles of a smooth surface that start in
+/// it. columns = ceil(width / b), rows = ceil(height / b).
 struct NormalBoundsLevel {
   int columns = 0;
   int rows = 0;

@@ -9,16 +9,15 @@
 
 namespace glint {
 
-// One linear buffer that holds all that the queries of one model read, so that a GPU (or another process) has it after one
-// copy. Nothing in it is an address: places are offsets from its first byte, so it may be copied anywhere that is aligned to 16
-// bytes.
+// One linear buffer with all data that the queries of one model read, so that one copy brings a model to a GPU or to another
+// process. The buffer has no addresses, only offsets from its first byte: a copy works at any address aligned to 16 bytes.
 //
 //   0                      PackedHeader, 1920 bytes
 //   1920                   the arrays of the model, each at a multiple of 64 bytes, in the order of the header
 //   header.size_bytes      end
 //
-// glint::api::pack makes it, glint/query/packed_ndf_view.h makes models of it. All is little-endian. It is made from an asset
-// in memory and lives no longer than the program: it is no file format, and its version changes with the layout.
+// glint::api::pack writes a buffer, and PackedNdfView (glint/query/packed_ndf_view.h) makes models from it. All numbers are
+// little-endian. A buffer is made from an asset in memory and is no file format: its version changes with every layout.
 
 /// An array of a packed buffer. An array that the model does not have has count 0.
 struct PackedArray {
@@ -27,7 +26,7 @@ struct PackedArray {
 };
 static_assert(sizeof(PackedArray) == 16);
 
-/// As PyramidGrid, with the index of the level's first image (kind compressed).
+/// PyramidGrid, and the index of the level's first image (kind compressed).
 struct PackedGrid {
   float stride;
   std::int32_t columns;
@@ -36,16 +35,16 @@ struct PackedGrid {
 };
 static_assert(sizeof(PackedGrid) == 16);
 
-/// `unknown`: never written; what a buffer of another version, or no buffer at all, holds.
+/// `unknown` is never written. It is the kind of a buffer of another version.
 enum class PackedKind : std::uint32_t { normals = 0, pyramid = 1, compressed = 2, unknown = 0xffffffff };
 
 inline constexpr std::uint32_t kPackedMagic = 0x6e6c6721;  // "!gln"
 inline constexpr std::uint32_t kPackedVersion = 3;
 inline constexpr std::size_t kPackedAlignment = 64;
-/// Arrays of a level of a pyramid, and of a compressed one: as many as PackedHeader::arrays has places for.
+/// Numbers of arrays of a level of a pyramid, and of a compressed pyramid. PackedHeader::arrays has room for either.
 inline constexpr int kPackedArrays = 4 * kMaxPyramidLevels;
 
-/// What a packed buffer starts with.
+/// The first bytes of a packed buffer.
 struct PackedHeader {
   std::uint32_t magic;                                       //   0
   std::uint32_t version;                                     //   4

@@ -15,7 +15,7 @@ inline constexpr int kMaxShOrder = 1000;
 GLINT_HD constexpr std::size_t shCount(int order) {
   return (static_cast<std::size_t>(order) + 1) * (static_cast<std::size_t>(order) + 1);
 }
-/// Place of the coefficient of y_l^m: band by band, in each first the cosines m = 0 .. l, then the sines m = -1 .. -l.
+/// Index of the coefficient of y_l^m. Bands follow one another; a band has the cosines m = 0 .. l, then the sines m = -1 .. -l.
 GLINT_HD constexpr std::size_t shIndex(int l, int m) {
   return static_cast<std::size_t>(l) * static_cast<std::size_t>(l) + static_cast<std::size_t>(m >= 0 ? m : l - m);
 }

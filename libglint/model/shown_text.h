@@ -24,7 +24,7 @@ inline std::size_t shownCharacterBytes(std::string_view text, std::size_t at) {
 }
 
 /// The text in one line of UTF-8: control characters, and bytes that are no UTF-8, become \n, \t or \x1b.
-/// @param most  the rest is left out as soon as the result has so many bytes
+/// @param most  the text ends as soon as the result has this number of bytes
 inline std::string escapedText(std::string_view text, std::size_t most = std::string_view::npos) {
   std::string shown;
   for (std::size_t k = 0; k < text.size() && shown.size() <= most;) {
@@ -48,7 +48,7 @@ inline std::size_t characterStart(std::string_view text, std::size_t at) {
   return at;
 }
 
-/// The text in one line of at most `most` bytes (>= 8): what is longer ends in "...".
+/// The text in one line of at most `most` bytes (>= 8): longer text is cut and ends in "...".
 inline std::string shownText(std::string_view text, std::size_t most) {
   std::string shown = escapedText(text, most);
   if (shown.size() <= most) return shown;
@@ -56,7 +56,7 @@ inline std::string shownText(std::string_view text, std::size_t most) {
   return shown + "...";
 }
 
-/// The same of a path: what is longer starts with "...", because its end tells files apart.
+/// A path in one line of at most `most` bytes: a longer path is cut and starts with "...", because its end tells files apart.
 inline std::string shownPath(std::string_view path, std::size_t most) {
   const std::string shown = escapedText(path);
   if (shown.size() <= most) return shown;
