@@ -7,9 +7,10 @@
 #include "glint/model/histogram_sat.h"
 #include "glint/query/detail/common/footprint_weights.h"
 #include "glint/query/detail/common/sampling.h"
-#include "glint/query/detail/histogram/histogram_sums.h"
+#include "glint/query/detail/histogram/bin_counts.h"
 #include "glint/query/detail/histogram/parallelogram_strips.h"
 #include "glint/query/detail/histogram/parallelogram_sums.h"
+#include "glint/query/detail/histogram/rectangle_sums.h"
 #include "glint/query/detail/histogram/spherical_bins.h"
 #include "glint/query/ndf_model.h"
 

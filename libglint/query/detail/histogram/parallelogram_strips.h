@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "glint/query/detail/histogram/histogram_sums.h"
 #include "glint/query/detail/histogram/parallelogram_sums.h"
+#include "glint/query/detail/histogram/rectangle_sums.h"
 
 namespace glint {
 

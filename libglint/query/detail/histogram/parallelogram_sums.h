@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "glint/query/detail/histogram/histogram_sums.h"
+#include "glint/query/detail/histogram/rectangle_sums.h"
 
 namespace glint {
 
