@@ -5,6 +5,7 @@
 #include "glint/query/detail/common/sampling.h"
 #include "glint/query/detail/compressed/avx2_reader.h"
 #include "glint/query/detail/compressed/cluster_reader.h"
+#include "glint/query/detail/compressed/slice_places.h"
 #include "glint/query/detail/compressed/spots.h"
 #include "glint/query/detail/pyramid/block_mass.h"
 #include "glint/query/detail/pyramid/block_rows.h"
@@ -88,28 +89,8 @@ class CpNdf {
   }
 
  private:
-  static constexpr std::size_t kNone = ~std::size_t{0};
-
-  /// A slice and its cluster.
-  struct SlicePlace {
-    std::size_t cluster = kNone;  ///< kNone: the image has no slice in the block
-    std::uint64_t slice = 0;
-  };
-
   GLINT_HD std::size_t imageOf(const PyramidSlice& slice) const {
     return std::size_t{ndf_.first_image[slice.level]} + slice.image;
-  }
-
-  /// Finds the slice of an image in a block.
-  /// @param block_place  place of the block (NdfCp)
-  GLINT_HD SlicePlace findSlice(std::size_t image, int block_place) const {
-    const std::size_t at =
-        static_cast<std::size_t>(ndf_.image_regions.data()[image]) * static_cast<std::size_t>(ndf_.places) + block_place;
-    const int slot = ndf_.image_slots.data()[image];
-    const std::size_t word = ndf_.clusters.data()[at].first_word + static_cast<std::size_t>(slot / 64);
-    const std::uint64_t mask = ndf_.masks.data()[word], bit = std::uint64_t{1} << (slot % 64);
-    if (!(mask & bit)) return {};
-    return {at, ndf_.mask_ranks.data()[word] + static_cast<std::uint64_t>(setBits(mask & (bit - 1)))};
   }
 
   /// Keeps negative values of a slice.
@@ -165,43 +146,13 @@ class CpNdf {
     GLINT_HD float spots(const SpotProfile& profile, const SpotList& list) const { return spotsIn(profile, list, box); }
   };
 
-  /// Slices of the chosen images in one block. Weights include the scales of images. A weight is 0 where the image has no
-  /// slice, and beyond the number of chosen images.
-  struct SlicePlaces {
-    std::uint32_t clusters[PyramidSlices::kMost];
-    std::uint32_t slices[PyramidSlices::kMost];
-    float weights[PyramidSlices::kMost] = {};
-  };
-
-  /// Finds the slices of the chosen images in a block. Has no branch on whether an image has a slice: processors cannot predict
-  /// it.
-  GLINT_HD SlicePlaces findSlices(const PyramidSlices& chosen, int block, const float* scales) const {
-    SlicePlaces out;
-    const unsigned block_place = ndf_.block_places.data()[block];
-    if (block_place == kNoBlockPlace) return out;
-    const auto block_places = static_cast<unsigned>(ndf_.places);
-    for (int step = 0; 4 * step < chosen.count; ++step) {
-      const std::uint32_t first = ndf_.first_image[chosen.levels[step]];
-      for (int k = 4 * step; k < 4 * step + 4; ++k) {
-        const std::size_t image = first + chosen.images[k];
-        const unsigned slot = ndf_.image_slots.data()[image];
-        out.clusters[k] = ndf_.image_regions.data()[image] * block_places + block_place;
-        const std::size_t word = ndf_.clusters.data()[out.clusters[k]].first_word + slot / 64;
-        const BitRank rank(ndf_.masks.data()[word], slot % 64);
-        out.slices[k] = static_cast<std::uint32_t>(ndf_.mask_ranks.data()[word] + rank.below);
-        out.weights[k] = keepIf(rank.kept, chosen.weights[k] * scales[image]);
-      }
-    }
-    return out;
-  }
-
   /// Weighted sum over the chosen images. Prefetches all slices first, so that their cache misses overlap.
   /// @param scales  factors of images, [images]
   /// @param ask     PixelOf or BoxOf
   /// @param part    Signed or Positive
   template <class Ask, class Part>
   GLINT_HD float sumSlices(const PyramidSlices& chosen, int block, const float* scales, const Ask& ask, Part part) const {
-    const SlicePlaces places = findSlices(chosen, block, scales);
+    const SlicePlaces places = findSlices(ndf_, chosen, block, scales);
     for (int k = 0; k < PyramidSlices::kMost; ++k)
       if (places.weights[k] > 0) ask.prefetch(ndf_.clusters.data()[places.clusters[k]], places.slices[k]);
     return sumSlices(places, ask, part);
@@ -386,8 +337,8 @@ inline GLINT_HD void CpNdf::chooseBlock(Draw& draw) const {
 
 inline GLINT_HD void CpNdf::findBlockSlice(Draw& draw) const {
   if (!draw.possible) return;
-  draw.slice = findSlice(draw.image, draw.block_place);
-  draw.possible = draw.slice.cluster != kNone;
+  draw.slice = findSlice(ndf_, draw.image, draw.block_place);
+  draw.possible = draw.slice.found();
 }
 
 template <class Reader>
@@ -440,12 +391,12 @@ inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) cons
   return withReader(ndf_, [&]<class Reader>(const Reader& reader) -> HalfVectorSample {
     // Prefetches the slices that the pdf needs; they arrive while the pixel is chosen.
     const int block = draw.block;
-    SlicePlaces places = findSlices(chosen, block, ndf_.density_scales.data());
+    SlicePlaces places = findSlices(ndf_, chosen, block, ndf_.density_scales.data());
     for (int k = 0; k < PyramidSlices::kMost; ++k)
       if (places.weights[k] > 0) prefetch(reader.row(ndf_.clusters.data()[places.clusters[k]], places.slices[k]));
     choosePixel(reader, draw);
     if (draw.place.x < 0) return {};
-    if (draw.block != block) places = findSlices(chosen, draw.block, ndf_.density_scales.data());
+    if (draw.block != block) places = findSlices(ndf_, chosen, draw.block, ndf_.density_scales.data());
     const float density = sumSlices(places, PixelOf<Reader>{reader, draw.place}, Positive{});
     return drawnAt(pointInPixel(shape(), draw.place, draw.xi), finitePositive(density / draw.total));
   });
