@@ -12,8 +12,8 @@ namespace {
 
 void requireSameMap(const formats::Asset& asset, const std::filesystem::path& path, const NdfInfo& info, const NormalMap& map,
                     const std::filesystem::path& normals_path) {
-  // A pyramid names its map as an input; what was compressed from a pyramid names it as an input of that. Files that name no
-  // such input can be compared by size only.
+  // A pyramid names its map as an input. A compressed pyramid names the map as an input of the pyramid. Where a file names no map,
+  // only the sizes can be compared.
   const bool pyramid = asset.kind() == "ndf-pyramid";
   std::vector<formats::InputRecord> maps;
   for (const formats::InputRecord& input : asset.info().provenance.inputs)

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kSlices = PyramidSlices::kMost;
 
-/// Where the slices of a chunk are stored. Nothing branches on what is stored: that cannot be predicted.
+/// Places where the slices of a chunk are stored. No branch depends on a stored value, because processors cannot predict one.
 class PyramidChunk {
  public:
   explicit PyramidChunk(const NdfPyramid& pyramid)
@@ -22,7 +22,7 @@ class PyramidChunk {
     for (int l = 0; l < pyramid.shape.level_count; ++l) {
       const PyramidLevel& level = pyramid.levels[l];
       levels_[l] = {level.masks.data(), level.mask_ranks.data(), static_cast<const char*>(level.pixels)};
-      // Slices without a pixel read the first one of their level; a level may have none.
+      // A slice without a pixel reads the first pixel of its level. A level without pixels has one of 0.
       if (level.block_means.empty()) levels_[l].pixels = reinterpret_cast<const char*>(&kZero);
     }
   }
@@ -38,7 +38,7 @@ class PyramidChunk {
     }
   }
 
-  /// Finds every pixel, and gives slices that have none weight 0.
+  /// Finds the pixel of every slice. A slice without a pixel gets weight 0.
   void findPixels(SliceChunk& chunk) {
     for (int k = 0; k < kChunk; ++k) {
       const unsigned word = static_cast<unsigned>(chunk.blocks[k]) / 64, bit = static_cast<unsigned>(chunk.blocks[k]) % 64;
@@ -57,7 +57,7 @@ class PyramidChunk {
     }
   }
 
-  /// As PyramidNdf adds up: the corners of a level first.
+  /// Adds up in the order of PyramidNdf: the corners of a level first.
   void addUp(const SliceChunk& chunk, float* sums) const {
     for (int step = 0; step < 2; ++step) {
       alignas(64) float products[4][kChunk];
@@ -87,7 +87,7 @@ class PyramidChunk {
 
   static void weighFloats(const float* weights, const char* const* places, float* products) {
     for (int k = 0; k < kChunk; ++k) {
-      // Values of a file are not checked: a slice that does not count must not bring an infinity.
+      // Values of a file are not checked: a slice of weight 0 must not add an infinity.
       const float value = weights[k] * *reinterpret_cast<const float*>(places[k]);
       products[k] = weights[k] > 0 ? value : 0.0f;
     }
@@ -106,8 +106,8 @@ GLINT_API_MULTIVERSION void addUpPixels(const PyramidChunk& places, const SliceC
   places.addUp(chunk, sums);
 }
 
-/// The steps of a chunk of densities: `begin` asks the memory for the index, `find` reads it and asks for the values, `finish`
-/// adds these up.
+/// The steps of a chunk of densities. `begin` prefetches the index, `find` reads the index and prefetches the pixels, `finish`
+/// adds the pixels up.
 struct PyramidSteps {
   explicit PyramidSteps(const PyramidNdf& model) : places(model.pyramid()), scale(model.pyramid().value_scale) {}
   void begin(SliceChunk& chunk) { places.prefetchMasks(chunk); }
@@ -120,14 +120,13 @@ struct PyramidSteps {
   float scale;
 };
 
-/// Chunks go through their steps one behind the other, so that what a step asks the memory for has the time of another chunk's
-/// to come.
+/// Three chunks are in flight, one step apart. While the memory fetches what one chunk needs next, the other two are computed.
 void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints,
                     const HalfVectorArrays& halves, float* out) {
   const SliceChooser chooser(model.shape());
   struct Stage {
     explicit Stage(const PyramidNdf& m) : steps(m) {}
-    SliceChunk chunk;  // every step fills what the next reads: not worth clearing
+    SliceChunk chunk;  // not cleared: every step fills the members that the next step reads
     PyramidSteps steps;
   };
   Stage stages[3] = {Stage(model), Stage(model), Stage(model)};
@@ -156,7 +155,7 @@ void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintA
   }
 }
 
-/// Models that have no way of their own are asked one by one.
+/// Models without an overload above are asked one query at a time.
 template <class Model>
 void modelDensities(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                     float* out) {
@@ -174,7 +173,7 @@ void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArray
     selectChunk(model.shape(), chooser, footprints, {ranges.x0, ranges.y0}, first, lanes, chunk);
     for (int k = 0; k < lanes; ++k) reader.prefetchIndex(chunk.slices(k));
     const auto fromTexels = [&](int k) { return model.hasNormals() && chunk.below[k] != 0; };
-    // A mean is long work next to its cache misses, and reads many lines: only the next one's are asked ahead.
+    // A mean takes long beside its cache misses, and reads many lines: only the next mean is prefetched.
     const auto begin = [&](int k) {
       if (fromTexels(k)) return;
       reader.beginMean(chunk.slices(k), ranges[first + static_cast<std::size_t>(k)], pending[k % 2]);
@@ -235,7 +234,7 @@ void modelSamples(const Model& model, std::size_t count, const FootprintArrays& 
   for (std::size_t k = 0; k < count; ++k) out.set(k, model.sample(footprints[k], xi[k]));
 }
 
-/// Whether no footprint of a batch is split into parts.
+/// Whether every footprint of a batch is asked as it is, not as several parts.
 bool allWhole(const AnisotropicNdf<PyramidNdf>& model, std::size_t count, const FootprintArrays& footprints) {
   if (footprints.sigma.data != nullptr) return true;
   for (std::size_t k = 0; k < count; ++k)
@@ -243,7 +242,8 @@ bool allWhole(const AnisotropicNdf<PyramidNdf>& model, std::size_t count, const 
   return true;
 }
 
-/// Calls ask(model) with the model inside, or with that of round footprints where these are all: it has batches of its own.
+/// Calls ask(model) with the model that answers a batch. A pyramid answers a batch of round footprints by its own model of round
+/// footprints, which answers many queries at once. Every other batch goes to the model as it is.
 template <class Ask>
 void askModel(const AnyNdf& any, std::size_t count, const FootprintArrays& footprints, Ask&& ask) {
   const auto* pyramid = std::get_if<AnisotropicNdf<PyramidNdf>>(&any);

@@ -20,8 +20,8 @@ struct StridedFloats {
   }
 };
 
-/// Footprints as a structure of arrays: centres, and one of the three ways to give a size. Where several are given, the first
-/// of them counts.
+/// Footprints as a structure of arrays: centres, and one of the three ways to give a size. Where several ways are given, the
+/// first counts.
 struct FootprintArrays {
   StridedFloats u, v;            ///< centres, uv; required
   StridedFloats sigma;           ///< isotropic Gaussians: deviation, texels
@@ -59,12 +59,12 @@ struct SampleArrays {
   }
 };
 
-/// out[k] = density of query k, for k < count. The same values as asking one by one, but for 1e-6 of each where products and
-/// sums are fused or in another order, and the same rules for what is degenerate.
+/// out[k] = density of query k, for k < count. Each value is that of a single query to 1e-6 of itself: products and sums may be
+/// fused or in another order. Degenerate queries follow the rules of single queries.
 ///
-/// Pyramids have the cache misses of many queries in flight where all footprints of the batch are round; one that is split into
-/// parts has all asked one by one. A query of any other kind has enough work or misses of its own to overlap, and gains nothing
-/// but the call.
+/// Pyramids overlap the cache misses of many queries if all footprints of the batch are round. If one footprint is split into
+/// parts, all queries are asked one by one. Other kinds gain only the cost of the calls: each of their queries has enough work
+/// to hide its own misses.
 /// @note thread-safe, allocates nothing; split a batch over threads as you like
 void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                float* out);
@@ -72,7 +72,7 @@ void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& fo
 /// out[k] = mean density over the box of query k.
 void means(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges, float* out);
 
-/// Draws the half vector of query k from its footprint's density, with xi[k] in [0, 1)^2.
+/// Draws the half vector of query k from the density of its footprint, with xi[k] in [0, 1)^2.
 void samples(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
              const SampleArrays& out);
 

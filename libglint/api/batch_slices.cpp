@@ -10,7 +10,7 @@
 namespace glint::api {
 namespace {
 
-/// Queries in registers' order. Loops over lanes have no branches, so that compilers turn them into vectors.
+/// Queries as a structure of arrays. Loops over lanes have no branches, so that compilers turn them into vectors.
 struct Lanes {
   alignas(64) float u[kChunk], v[kChunk], xx[kChunk], xy[kChunk], yy[kChunk], hx[kChunk], hy[kChunk];
   alignas(64) float t[kChunk];
@@ -31,7 +31,7 @@ void load(const FootprintArrays& footprints, const HalfVectorArrays& halves, std
   }
 }
 
-/// As isotropicVariance, belowFinest, and the choice of levels in SliceChooser.
+/// Computes isotropicVariance, belowFinest and the levels of SliceChooser for every lane.
 GLINT_API_MULTIVERSION void chooseLevels(const PyramidShape& shape, const SliceChooser& chooser, Lanes& lanes,
                                          SliceChunk& chunk) {
   constexpr float kLowest = kMinSigmaTexels * kMinSigmaTexels;
@@ -51,17 +51,18 @@ GLINT_API_MULTIVERSION void chooseLevels(const PyramidShape& shape, const SliceC
   }
 }
 
-/// One level of every lane along one axis, looked up first: loads by index and arithmetic in one loop do not become vectors.
+/// The level of every lane along one axis. It is looked up before the arithmetic: compilers make no vectors of a loop that does
+/// both.
 struct AxisLevels {
   alignas(64) float extent[kChunk], last[kChunk], per_gap[kChunk];
 };
 
-/// Neighbouring centres along one axis, in floats: counts and indices are far below 2^24.
+/// Neighbouring centres along one axis. Floats hold them exactly: counts and indices are far below 2^24.
 struct Neighbours {
   alignas(64) float low[kChunk], high[kChunk], t[kChunk];
 };
 
-/// As SliceChooser, along one axis.
+/// Finds the neighbours that SliceChooser finds, along one axis.
 template <bool kWrap>
 inline void findNeighbours(const float* __restrict coordinates, const AxisLevels& axis, Neighbours& __restrict out) {
   for (int k = 0; k < kChunk; ++k) {
@@ -130,7 +131,8 @@ GLINT_API_MULTIVERSION void chooseClamped(const SliceChooser& chooser, const Lan
   chooseImages<false>(chooser, lanes, chunk);
 }
 
-/// As insideSquare and pixelPlace; lanes outside get a pixel that can be read.
+/// Computes insideSquare and pixelPlace for every lane. A lane outside the square gets the pixel in the middle, which can be
+/// read.
 GLINT_API_MULTIVERSION void choosePixels(const PyramidShape& shape, const Lanes& lanes, SliceChunk& chunk) {
   const float half = 0.5f * static_cast<float>(shape.resolution);
   const int last = shape.resolution - 1, blocks = shape.blocksPerAxis();

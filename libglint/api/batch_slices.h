@@ -12,11 +12,11 @@ namespace glint::api {
 /// Queries that a batch works on at once: enough to keep many cache misses in flight, few enough to stay in the nearest cache.
 inline constexpr int kChunk = 32;
 
-/// The images that answer a chunk of queries, as SliceChooser chooses them, and the pixels that are asked. Lane k is a query;
-/// lanes beyond the last query repeat harmless ones.
+/// The images that answer a chunk of queries, as SliceChooser chooses them, and the pixels that are read. Lane k is a query;
+/// lanes beyond the last query repeat it.
 struct SliceChunk {
   /// Slice j of a query: corner j % 4 (x in bit 0, y in bit 1) of level first + j / 4.
-  alignas(64) float weights[8][kChunk];  ///< 0: the slice does not count, and its image is one that can be read
+  alignas(64) float weights[8][kChunk];  ///< 0: the slice does not count, but its image can be read
   alignas(64) std::uint32_t images[8][kChunk];
   alignas(64) std::int32_t levels[2][kChunk];
   alignas(64) std::int32_t blocks[kChunk];

@@ -91,7 +91,7 @@ constexpr std::size_t kFirstOptionsSize = offsetof(glint_open_options, verify_ha
 static_assert(offsetof(glint_open_options, footprint_parts) + sizeof(int32_t) == sizeof(glint_open_options),
               "padding at the end would be read as a member by a later library");
 
-/// @return null if the options can be used, else what is wrong
+/// @return null if the options can be used, else the fault
 const char* takeOptions(const glint_open_options* from, glint_open_options& to) {
   to = GLINT_OPEN_OPTIONS_INIT;
   if (from == nullptr) return nullptr;
@@ -128,7 +128,7 @@ glint_footprint given(const Footprint& gaussian) {
   return {GLINT_FOOTPRINT_GAUSSIAN, gaussian.centre.x, gaussian.centre.y, {c.xx, c.xy, c.yy, 0}};
 }
 
-/// What is wrong with the arguments that all batches have; null if nothing.
+/// The fault of the arguments that all batches have; null if there is none.
 const char* faultOf(const glint_ndf* ndf, const glint_footprints* footprints, const float* out) {
   if (ndf == nullptr) return "ndf is null";
   if (footprints == nullptr) return "footprints is null";

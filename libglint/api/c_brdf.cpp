@@ -26,7 +26,7 @@ static_assert(offsetof(glint_brdf_options, k) + 3 * sizeof(float) == sizeof(glin
 
 bool inRange(float value, float least) { return value >= least && value <= kMostIndex; }
 
-/// @return null if the options can be used, else what is wrong
+/// @return null if the options can be used, else the fault
 const char* takeOptions(const glint_brdf_options* from, glint_brdf_options& to) {
   to = GLINT_BRDF_OPTIONS_INIT;
   if (from == nullptr) return nullptr;
@@ -52,7 +52,7 @@ Fresnel fresnelOf(const glint_brdf_options& o) {
   return Fresnel::mirror();
 }
 
-/// ask(brdf) with the BRDF of a footprint.
+/// Calls ask(brdf) with the BRDF of a footprint.
 template <class Ask>
 auto atFootprint(const glint_brdf& b, const Footprint& footprint, Ask&& ask) {
   const api::AnyNdf& model = b.ndf->opened.model();
@@ -60,7 +60,7 @@ auto atFootprint(const glint_brdf& b, const Footprint& footprint, Ask&& ask) {
   return std::visit([&](const auto& m) { return ask(MicrofacetBrdf(m, footprint, b.masking, b.fresnel)); }, model);
 }
 
-/// Where a batch of values goes; null: not wanted.
+/// The arrays of a batch of values; null: not wanted.
 struct Values {
   float* f;
   float* pdf;
@@ -71,7 +71,7 @@ struct Values {
   }
 };
 
-/// Queries of a batch, from the first of a part on.
+/// The queries of a batch from `first` on.
 api::StridedFloats from(api::StridedFloats a, std::size_t first) {
   if (a.data == nullptr) return a;
   const char* start = reinterpret_cast<const char*>(a.data) + static_cast<std::ptrdiff_t>(first) * a.stride_bytes;
@@ -82,10 +82,11 @@ api::FootprintArrays from(const api::FootprintArrays& p, std::size_t first) {
           from(p.yy, first), from(p.ax, first), from(p.ay, first),    from(p.bx, first), from(p.by, first)};
 }
 
-/// Queries that are answered at once, from arrays on the stack.
+/// Most queries of a batch that has its arrays on the stack.
 constexpr std::size_t kPart = 256;
 
-/// Values with D from the batch of densities, whose cache misses overlap; part by part, so that nothing is allocated.
+/// Evaluates with D from batches of densities, whose cache misses overlap. Batches have kPart queries, so that their arrays are on
+/// the stack.
 void evaluateByDensities(const glint_brdf& b, std::size_t count, const api::FootprintArrays& footprints,
                          const DirectionArrays& wi, const DirectionArrays& wo, const Values& out) {
   std::array<HalfVector, kPart> halves;
@@ -109,7 +110,7 @@ void evaluateByDensities(const glint_brdf& b, std::size_t count, const api::Foot
   }
 }
 
-/// Where a batch of samples goes.
+/// The arrays of a batch of samples.
 struct Samples {
   float* wi;
   float* weights;
@@ -122,7 +123,8 @@ struct Samples {
   }
 };
 
-/// Samples whose half vectors come from the batch of samples; those that are drawn evenly, and none, ask it in vain.
+/// Samples with half vectors from batches of samples. A direction that is drawn evenly, or not at all, does not use its half
+/// vector.
 void sampleByHalfVectors(const glint_brdf& b, std::size_t count, const api::FootprintArrays& footprints,
                          const DirectionArrays& wo, const api::HalfVectorArrays& xi, const Samples& out) {
   using Brdf = MicrofacetBrdf<Reference>;  // any model has the same share
@@ -150,7 +152,7 @@ void sampleByHalfVectors(const glint_brdf& b, std::size_t count, const api::Foot
   }
 }
 
-/// What is wrong with the arguments that both batches have; null if nothing.
+/// The fault of the arguments that both batches have; null if there is none.
 const char* faultOf(const glint_brdf* brdf, const glint_footprints* footprints, const glint_directions* wo) {
   if (brdf == nullptr) return "brdf is null";
   if (footprints == nullptr) return "footprints is null";
@@ -171,7 +173,7 @@ glint_status glint_brdf_create(const glint_ndf* ndf, const glint_brdf_options* o
       throw Error(ErrorCode::unsupported, "api.facets", "", "glint_brdf_options.facets",
                   "Beckmann facets are the texels of a bin-map, and this is of kind " + ndf->kind,
                   "open an asset of kind bin-map, or take GLINT_FACETS_OF_DISTRIBUTION");
-    // Beckmann facets mask themselves; where they are in D, their roughness is one of the slopes that mask.
+    // Beckmann facets mask themselves, so the roughness is no part of the map's masking. In D, the roughness adds to the slopes.
     const float sigma_r = beckmann ? 0 : ndf->opened.info().sigma_r;
     *brdf = new glint_brdf{ndf, fresnelOf(given), SmithMasking(ndf->opened.slopes(), sigma_r), beckmann};
   });

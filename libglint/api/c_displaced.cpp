@@ -54,7 +54,7 @@ struct PointArrays {
   api::StridedFloats level, u, v;
 };
 
-/// What is wrong with the arguments that both batches have; null if nothing.
+/// The fault of the arguments that both batches have; null if there is none.
 const char* faultOf(const glint_displaced* displaced, const glint_displaced_points* points, const glint_directions* wo) {
   if (displaced == nullptr) return "displaced is null";
   if (points == nullptr || points->level.data == nullptr || points->u.data == nullptr || points->v.data == nullptr)

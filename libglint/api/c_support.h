@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to libglint/api. What the sources of the C interface share.
+// Private to libglint/api. Functions that the sources of the C interface share.
 
 #include <algorithm>
 #include <cstddef>
@@ -27,7 +27,7 @@ glint_status fail(glint_status status, const char* message, const char* rule = "
 
 /// Fails for an argument.
 /// @param where  function or struct
-/// @param what   is wrong with it
+/// @param what   the fault
 glint_status usage(const char* where, const char* what);
 
 /// An argument that must not be null.
@@ -36,7 +36,7 @@ struct Argument {
   const char* name;
 };
 
-/// Fails for the first of these arguments that is null, by its name. One of them must be.
+/// Fails for the first argument that is null, and names it. At least one must be null.
 glint_status nullArgument(const char* where, std::initializer_list<Argument> arguments);
 
 /// Runs work that may throw.
@@ -56,14 +56,14 @@ glint_status guarded(Work&& work) noexcept {
   }
 }
 
-/// More than any struct will ever have: a larger struct_size is no size, and would be read beyond the caller's memory.
+/// No struct will ever be larger. A larger struct_size is a mistake, and would be read beyond the caller's memory.
 inline constexpr std::size_t kMostStructSize = GLINT_MOST_STRUCT_SIZE;
 inline constexpr const char* kWrongStructSize = "struct_size is not the size of the struct";
 
-/// Takes a struct of options of an older or newer header: members that the caller does not have stay as they are, those that
+/// Takes a struct of options of an older or newer header. Members that the caller does not have stay as they are; members that
 /// this library does not have must be 0.
-/// @param first_size  of the struct in its first version; no caller's is smaller
-/// @return null if the options can be used, else what is wrong
+/// @param first_size  size of the struct in its first version: no caller has a smaller one
+/// @return null if the options can be used, else the fault
 template <class Options>
 const char* takeSized(const Options& from, std::size_t first_size, Options& to) {
   if (from.struct_size < first_size || from.struct_size > kMostStructSize) return kWrongStructSize;
@@ -74,7 +74,7 @@ const char* takeSized(const Options& from, std::size_t first_size, Options& to) 
   return unknown ? "has members that this version of the library does not know" : nullptr;
 }
 
-/// Fills as much of a struct of answers as its caller has.
+/// Fills the members of a struct of answers that the caller has.
 /// @return whether struct_size is one that a caller can have
 template <class Info>
 bool giveSized(Info all, Info* info) {
@@ -91,7 +91,7 @@ inline Footprint footprintOf(const glint_footprint& p) {
 
 inline StridedFloats arrayOf(const glint_floats& a) { return {a.data, a.stride}; }
 
-/// @return null if the footprints are complete, else what is missing
+/// @return null if the footprints are complete, else the fault
 const char* missingIn(const glint_footprints& p);
 FootprintArrays arraysOf(const glint_footprints& p);
 
