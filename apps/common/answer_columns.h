@@ -26,7 +26,7 @@ inline constexpr std::array kReflectedRgb = {"reflected_r", "reflected_g", "refl
 inline constexpr const char* kHalfVectorSamples = "hx,hy,pdf";
 inline constexpr const char* kLightSamples = "wix,wiy,wiz,pdf";
 
-/// The name of a column as it is looked up: in small letters, without the blanks around it.
+/// The name by which a column is found: in small letters, without the blanks around it.
 std::string columnKey(std::string_view name);
 
 /// Whether the first line of a file is the header of a table that glint-query writes: samples, or queries with their answers.

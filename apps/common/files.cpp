@@ -75,7 +75,7 @@ bool isImage(std::string_view start) {
 
 /// Whether the first bytes of a file show that it is an earlier result of the same kind.
 bool mayReplace(const std::string& path, OutputFormat format) {
-  constexpr std::size_t kHeadBytes = 1 << 20;  // root attributes come first, and are shorter
+  constexpr std::size_t kHeadBytes = 1 << 20;  // more than the root attributes, which come first
   const std::string head = headOf(path, kHeadBytes);
   if (head.empty()) return true;
   switch (format) {
@@ -105,7 +105,7 @@ bool isSameFile(const std::string& a, const std::string& b) {
 void checkReplaceable(const std::string& path, const fs::path& target, OutputFormat format) {
   struct stat existing {};
   if (::stat(target.c_str(), &existing) != 0) throwIo("output.regular", path, systemError());
-  // Root may write whatever the mode says, but the owner has said no.
+  // A mode of 0444 is a decision of the owner, which holds for root too.
   constexpr mode_t kAnyWrite = S_IWUSR | S_IWGRP | S_IWOTH;
   if ((existing.st_mode & kAnyWrite) == 0 || ::access(target.c_str(), W_OK) != 0)
     throwIo("output.read_only", path, "exists and is read-only", "name another file, or replace it with --force");
@@ -115,7 +115,7 @@ void checkReplaceable(const std::string& path, const fs::path& target, OutputFor
   }
 }
 
-/// Checks that an output is no other file of this run. A stream may be several of them.
+/// Checks that no other file of this run has the name of an output. Several outputs may be one stream.
 void checkApart(const Tool& tool, const std::string& path, std::size_t others) {
   if (formats::findOutput(path).kind == formats::OutputTarget::Kind::stream) return;
   const std::vector<std::string> inputs = tool.readPaths();
@@ -137,7 +137,7 @@ void checkApart(const Tool& tool, const std::string& path, std::size_t others) {
               "rename the file or leave out --depfile");
 }
 
-/// What Make has no way to write. Of a backslash before a sign that needs one, Make and ninja read different names.
+/// Refuses names that Make cannot express. After a backslash before a sign that is escaped, Make and ninja read different names.
 void checkNameForMake(const std::string& name) {
   for (const auto& [sign, what] : {std::pair{'\n', "a line break"}, std::pair{'\r', "a line break"}, std::pair{'\t', "a tab"},
                                    std::pair{';', "';'"}, std::pair{'|', "'|'"}, std::pair{'=', "'='"}})
@@ -148,15 +148,15 @@ void checkNameForMake(const std::string& name) {
   if (name.ends_with(')') && name.find('(') != std::string::npos) refuseInDepfile(name, "parentheses at its end");
 }
 
-/// A name as Make reads it: `\ `, `\#` and `\:` are signs of the name, `$$` is one `$`, and a `~` in front is no home. ninja reads the
-/// same names. The signs & ' * ? < > " ` and ^ end a name for ninja up to 1.11, and nothing can be done about it. Make takes * ? and [
-/// for themselves where no other name fits them: escaped, they would not name what is not there any more.
+/// Escapes a name for Make: blank, `#` and `:` get a backslash, `$` is doubled, and a `~` in front becomes `./~`. ninja reads the
+/// same names. ninja up to 1.11 ends a name at & ' * ? < > " ` and ^, and knows no escape for them. The signs * ? and [ stay as
+/// they are: Make takes them literally if no file matches, and an escaped sign would not match a file that was deleted.
 std::string escapeForMake(const std::string& name) {
   checkNameForMake(name);
   std::string escaped = name.starts_with('~') ? "./" : "";
   for (std::size_t k = 0; k < name.size(); ++k) {
     const char c = name[k];
-    if (c == ' ') {  // backslashes before a blank count double
+    if (c == ' ') {  // Make halves the backslashes before a blank
       for (std::size_t b = k; b > 0 && name[b - 1] == '\\'; --b) escaped += '\\';
     }
     if (c == ' ' || c == '#' || c == ':') escaped += '\\';
@@ -166,7 +166,7 @@ std::string escapeForMake(const std::string& name) {
   return escaped;
 }
 
-/// `%` makes a pattern of a target, but is a sign like others among the prerequisites.
+/// Escapes a target. `%` makes a pattern of a target; in a prerequisite it is an ordinary sign.
 std::string escapeTarget(const std::string& name) {
   std::string escaped;
   for (const char c : escapeForMake(name)) escaped += c == '%' ? std::string("\\%") : std::string(1, c);
@@ -231,7 +231,8 @@ std::string makeDepfile(const std::vector<std::string>& targets, const std::vect
   text += ":";
   for (const std::string& prerequisite : prerequisites) text += " \\\n  " + escapeForMake(prerequisite);
   text += "\n";
-  // ninja takes a target with `\%` for an output that nobody declared. Where the rule has such a target anyway, it is for Make.
+  // ninja refuses a target with `\%` as an output that nobody declared. So prerequisites with `%` have rules only if an output has
+  // a `%` itself: such a depfile is for Make.
   const auto holdsPercent = [](const std::string& name) { return name.find('%') != std::string::npos; };
   const bool for_make = std::any_of(targets.begin(), targets.end(), holdsPercent);
   for (const std::string& prerequisite : prerequisites)

@@ -31,7 +31,7 @@ class InputFiles {
   std::vector<std::string> paths_;
 };
 
-/// What an output holds, which decides what it may replace.
+/// The content of an output. It decides which files the output may replace.
 enum class OutputFormat : unsigned char {
   asset,    ///< .glint
   image,    ///< any image format
@@ -39,12 +39,13 @@ enum class OutputFormat : unsigned char {
   depfile,  ///< rule for Make
 };
 
-/// Checks the name of an output before the work starts, and once all inputs and outputs are known that it is none of them.
+/// Checks an output before the work starts. Checks again, when all inputs and outputs are known, that no other file of the run
+/// has its name.
 ///
-/// Its folder must exist and be writable; symbolic links are followed. Devices and pipes are written to; folders, disks and
-/// sockets are refused. Without --force a file is replaced only if it can be written (a mode of 0444 says no, to root too), is
-/// no input, and holds an earlier result: an asset replaces an asset; an image an image of a known format; a table a table with
-/// the columns of answers or samples; a depfile a depfile. An empty file may always be replaced.
+/// The folder must exist and be writable; symbolic links are followed. Devices and pipes are written to; folders, disks and
+/// sockets are refused. Without --force an output replaces a file only if the file can be written (a mode of 0444 holds for root
+/// too), is no input, and holds an earlier result of the same format: an asset, an image of a known format, a table with the
+/// columns of answers or samples, a depfile. An empty file may always be replaced.
 /// @throws Error io, usage
 void checkOutput(Tool& tool, const std::string& path, OutputFormat format);
 
@@ -53,7 +54,7 @@ class OutputFile {
  public:
   OutputFile(Tool& tool, OutputFormat format, const std::string& help, const std::string& name = "-o,--output");
   const std::string& path() const { return path_; }
-  /// For writeAsset: what may be replaced was decided by the check before the work.
+  /// Options for writeAsset. It may replace any file, because the check before the work has decided.
   formats::WriteOptions writeOptions() const { return {.overwrite = true}; }
 
  private:
@@ -64,7 +65,7 @@ class OutputFile {
 /// @throws Error io
 void writeTextFile(const std::string& path, const std::string& text);
 
-/// Whether a text looks as makeDepfile() writes it.
+/// Whether a text has the form that makeDepfile() writes.
 bool isDepfile(std::string_view text);
 
 /// Reads a whole file.

@@ -20,7 +20,7 @@ double largestDeviation(const Covariance& c) {
 }
 
 std::optional<FootprintFault> covarianceFault(const Covariance& c) {
-  constexpr double kRounding = 1e-5;  // of a line that has no width
+  constexpr double kRounding = 1e-5;  // of the determinant of a line, which is 0
   const double xx = c.xx, xy = c.xy, yy = c.yy;
   const std::string values = fmt::format("{:g} {:g} {:g}", xx, xy, yy);
   if (!(xx >= 0 && yy >= 0 && xy * xy <= (1 + kRounding) * xx * yy))

@@ -9,7 +9,7 @@ namespace glint::apps {
 namespace {
 
 std::string names(const std::set<CLI::Option*>& options) {
-  std::set<std::string> sorted;  // the set's own order is that of addresses
+  std::set<std::string> sorted;  // `options` is in the order of addresses
   for (const CLI::Option* option : options) sorted.insert(option->get_name());
   return fmt::format("{}", fmt::join(sorted, ", "));
 }
@@ -17,7 +17,7 @@ std::string names(const std::set<CLI::Option*>& options) {
 }  // namespace
 
 std::string HelpFormatter::make_option_opts(const CLI::Option* option) const {
-  const std::string type = option->get_type_name();  // "FLOAT:0 to 1": with what its checks say
+  const std::string type = option->get_type_name();  // "FLOAT:0 to 1": the type, and the texts of its checks
   const std::size_t colon = std::min(type.find(':'), type.size());
   std::string text;
   for (int k = 0; k < std::clamp(option->get_expected_min(), 1, 8) && colon > 0; ++k) text += " " + type.substr(0, colon);

@@ -6,7 +6,7 @@
 
 namespace glint::apps {
 
-/// Help texts that say in words what an option takes: `--wo FLOAT FLOAT FLOAT (needs --light)`.
+/// Help texts that name the values and the constraints of an option in words: `--wi FLOAT FLOAT FLOAT (needs --wo)`.
 class HelpFormatter : public CLI::Formatter {
  public:
   std::string make_option_opts(const CLI::Option* option) const override;

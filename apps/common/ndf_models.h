@@ -20,16 +20,14 @@ struct AskedAssets {
   bool smooth_surfaces = true;  ///< whether normals may be asked as a smooth surface
 };
 
-/// Mix-in: the asset that a tool asks, and the options that say how. Normals are answered by Reference with --surface,
-/// --sigma-r and --boundary; pyramids and compressed ones by their own parameters, and by Reference below level 0 where
-/// --normals is given; bin maps by their own, at any size. Options of kinds that are not asked are not declared.
+/// Mix-in: the asset that a tool asks, and the options of the kinds that it asks. Reference answers normals, with --surface,
+/// --sigma-r and --boundary. With --normals, Reference also answers footprints below level 0 of a pyramid.
 class NdfAsset {
  public:
   explicit NdfAsset(Tool& tool, const AskedAssets& asked = {});
 
-  /// Opens the asset, and warns of options that are for other kinds. Call once, in the work; the model lives as long as this
-  /// object.
-  /// @param checks  of the asset and of --normals, beyond those that opening always makes
+  /// Opens the asset, and warns of options for other kinds. Call once, in the work; the model lives as long as this object.
+  /// @param checks  further checks of the asset and of --normals
   /// @throws Error invalid_input if --normals is not the map that the asset was made from; unsupported if the asset is of a
   ///               kind that is not asked
   void open(const formats::OpenOptions& checks = {});

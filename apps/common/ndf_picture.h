@@ -9,8 +9,8 @@ namespace glint::apps {
 /// Throws Error usage unless the name ends in .exr or .png.
 void checkPictureName(const std::string& path);
 
-/// Writes an NDF image. As .exr: the densities, one float channel. As .png: colours (inferno) of log(1 + density), from 0 to
-/// the image's largest value, so that sparse glints and broad lobes are both seen.
+/// Writes an NDF image. An .exr holds the densities, one float channel. A .png holds colours (inferno) of log(1 + density), from
+/// 0 to the largest value of the image: the logarithm shows both sparse glints and broad lobes.
 /// @param densities  [size][size], bottom row first
 void writeNdfPicture(const std::string& path, int size, std::span<const float> densities);
 

@@ -9,7 +9,8 @@
 
 namespace glint::apps {
 
-/// Reads numbers strictly, and hands them on as CLI11 reads them right: its own reading takes "010" for eight, and wraps "-1".
+/// Reads numbers by parseNumber, and hands them to CLI11 in a form that it reads correctly. CLI11 alone takes "010" for eight,
+/// and wraps "-1".
 template <class T>
 CLI::Validator strictNumber() {
   return {[](std::string& text) {
@@ -21,7 +22,7 @@ CLI::Validator strictNumber() {
           "", "number"};
 }
 
-/// Numbers outside [low, high] are refused.
+/// Refuses numbers outside [low, high].
 inline CLI::Validator numberRange(double low, double high) {
   const std::string range = fmt::format("{:g} to {:g}", low, high);
   return {[low, high, range](std::string& text) {

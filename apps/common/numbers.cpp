@@ -28,7 +28,7 @@ std::string outOfRange(std::string_view text) {
     return fmt::format("'{}' is out of the range of numbers", text);
 }
 
-/// As readAll; a float too small for its type becomes the nearest one, which is 0 or close to it.
+/// Reads as readAll. A float too small for its type becomes the nearest float.
 std::errc readNearest(std::string_view digits, float& value) {
   const std::errc error = readAll(digits, value);
   double wide = 0;

@@ -5,14 +5,14 @@
 
 namespace glint::apps {
 
-/// Reads a text as one decimal number, the only way in which options, configuration files, lists and tables are read.
+/// Reads a text as one decimal number. Options, configuration files, lists and tables are all read by this function.
 ///
-/// All of the text must be the number, but for blanks around it. It may begin with one sign, + or -. Zeros in front mean
-/// nothing: "010" is ten. Floating point may have a point and an exponent. Other bases ("0x10") and numbers that are not finite
-/// are refused, and so are those that T cannot hold; a float too small for its type becomes the nearest one.
+/// The whole text must be the number; blanks around it are allowed. It may begin with one sign, + or -. Zeros in front mean
+/// nothing: "010" is ten. Floating point may have a point and an exponent. Refused are other bases ("0x10"), numbers that are not
+/// finite, and numbers that T cannot hold. A float too small for its type becomes the nearest float.
 ///
 /// T: int, std::uint64_t, float or double.
-/// @return what is wrong with the text, such as "'x' is not a number", and then `value` is as before; empty if nothing is
+/// @return the fault, such as "'x' is not a number", and then `value` is as before; empty if there is none
 template <class T>
 std::string parseNumber(std::string_view text, T& value);
 

@@ -14,13 +14,13 @@ class Option {
   Option& required();
   /// Numbers outside [low, high] are a usage error. Applies to each element of a list.
   Option& range(double low, double high);
-  /// A list of exactly so many values, given as `a b c` or `a,b,c`.
+  /// Makes the option a list of exactly `values` values, given as `a b c` or `a,b,c`.
   Option& count(int values);
   Option& excludes(const Option& other);
   Option& needs(const Option& other);
-  /// Leaves the option out of the `command` record: it does not change the result.
+  /// Leaves the option out of the `command` record, because it does not change the result.
   Option& unrecorded();
-  /// Shown in the help text instead of the value, for defaults that depend on other options.
+  /// Sets a text that the help shows instead of the default value, for defaults that depend on other options.
   Option& defaultText(const std::string& text);
   /// Whether the command line or the configuration file set it. Valid after parsing.
   bool given() const;

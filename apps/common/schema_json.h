@@ -5,7 +5,7 @@
 
 namespace glint::apps {
 
-/// The table of formats/schema.h as JSON, keys in the order of the table.
+/// The table of formats/schema.h as JSON. Keys are in the order of the table.
 nlohmann::ordered_json schemaJson();
 
 /// The contents of formats/schema.json.

@@ -5,11 +5,11 @@
 
 namespace glint::apps {
 
-/// What signals do while a tool runs; the old ways come back at the end of the scope.
+/// Handles signals while a tool runs. The end of the scope restores the earlier handlers.
 ///
-/// INT, TERM, HUP and QUIT remove the temporary files and then end the process as they would have (a shell sees 128 + n),
-/// unless they were ignored before (nohup). XFSZ and PIPE are ignored: the call that meets the limit or the broken pipe fails
-/// and says so.
+/// INT, TERM, HUP and QUIT remove the temporary files, then end the process in the usual way (a shell sees 128 + n). A signal that
+/// was ignored before stays ignored (nohup). XFSZ and PIPE are ignored: the call that meets the limit or the broken pipe fails
+/// instead, with a message.
 class SignalScope {
  public:
   SignalScope();

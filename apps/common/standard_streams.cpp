@@ -22,7 +22,7 @@ namespace {
 }  // namespace
 
 void openStandardStreams() {
-  // Descriptors are taken in order, so each opened here gets the number that is missing; it is opened for the wrong direction.
+  // open() takes the lowest free number, which is that of the missing stream. Opened for the wrong direction, it cannot be used.
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (::fcntl(stream, F_GETFD) >= 0 || errno != EBADF) continue;
     if (::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY) < 0) return;
@@ -30,7 +30,7 @@ void openStandardStreams() {
 }
 
 void writeStdout(const std::string& text) {
-  // What is written before a failure is lost with the stream's buffer, so the first failure counts.
+  // A failure loses the text in the stream's buffer, so the first failure counts.
   if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) throwStdout(errno);
 }
 

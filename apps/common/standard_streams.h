@@ -4,13 +4,13 @@
 
 namespace glint::apps {
 
-/// Opens something that nobody can use in place of stdin, stdout and stderr where these are closed, so that no file that is
-/// opened later takes their numbers. Writing to them still fails.
+/// Opens placeholders for those of stdin, stdout and stderr that are closed, so that no file that is opened later takes their
+/// numbers. Writing to a placeholder fails.
 void openStandardStreams();
 
 /// Writes a text to stdout.
-/// @throws Error io if it cannot be written. When the reader of a pipe has gone, ends the process by SIGPIPE as other filters
-///         do, if SIGPIPE ended it when it began
+/// @throws Error io if it cannot be written. If the reader of a pipe has gone, ends the process by SIGPIPE as other filters do,
+///         unless SIGPIPE was ignored when the process began
 void writeStdout(const std::string& text);
 
 /// Flushes stdout; throws as writeStdout does.

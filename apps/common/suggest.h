@@ -6,8 +6,8 @@
 
 namespace glint::apps {
 
-/// The candidate that a misspelt word was probably meant to be: the one with the smallest edit distance, if that is at most a
-/// third of the word (and at least 1). Empty when none is near.
+/// The candidate with the smallest edit distance from a misspelt word. Empty if the distance is above a third of the word's
+/// length, and above 1.
 std::string nearestName(std::string_view word, const std::vector<std::string>& candidates);
 
 }  // namespace glint::apps

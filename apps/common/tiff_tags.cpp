@@ -16,7 +16,7 @@ constexpr std::uint64_t kLongestText = 256;
 /// A chain of more directories than this is damaged or a loop.
 constexpr int kMostDirectories = 4096;
 
-/// Reads bytes at an offset; false if there are not so many.
+/// Reads bytes at an offset; false if the file ends before.
 using ReadBytes = std::function<bool(std::uint64_t offset, std::span<std::byte> bytes)>;
 
 /// One tag of a directory.
@@ -26,7 +26,7 @@ struct Tag {
   std::uint64_t value_at = 0;  ///< where its value is, or the offset of its value
 };
 
-/// Finds tags in files of the classic form of TIFF and of BigTIFF, whose offsets have 8 bytes.
+/// Finds tags in files of classic TIFF and of BigTIFF. Offsets of BigTIFF have 8 bytes.
 class TiffReader {
  public:
   explicit TiffReader(ReadBytes read) : read_(std::move(read)) {}

@@ -323,7 +323,7 @@ void Tool::refuseUnknownOptions() const {
 bool Tool::parse(int argc, char** argv) {
   CLI::App& app = state_->app;
   try {
-    // "-.5" would be taken for an option.
+    // CLI11 takes "-.5" for an option.
     std::vector<std::string> words(argv + 1, argv + argc);
     for (std::string& word : words)
       if (word.size() > 2 && word.starts_with("-.") && std::isdigit(static_cast<unsigned char>(word[2]))) word.insert(1, "0");
@@ -401,7 +401,7 @@ void Tool::printFailure(const Error& error) const {
     writeStdout(dump(document) + "\n");
     flushStdout();
   } catch (const Error&) {
-    // The exit code tells of the first error.
+    // The exit code is that of the first error.
   }
 }
 
@@ -409,9 +409,9 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   openStandardStreams();
   const SignalScope signals;
   try {
-    // Parsing stops at the first error, which may come before --json is seen.
+    // Parsing stops at the first error, possibly before it reads --json.
     for (int i = 1; i < argc; ++i) state_->json_result |= std::string(argv[i]) == "--json";
-    addStandardOptions();  // last, so that the help begins with what is the tool's own
+    addStandardOptions();  // last, so that the help begins with the tool's own options
     if (parse(argc, argv)) return work(body);
     flushStdout();
     return 0;

@@ -22,12 +22,12 @@ namespace glint::apps {
 
 class ProgressReporter;
 
-/// What `--help` says about a tool.
+/// The texts of a tool's `--help`.
 struct ToolInfo {
   std::string name;        ///< "glint-pyramid"
   std::string summary;     ///< one or two sentences: what it reads and what it makes
   std::string example;     ///< one command line that works, shown at the end of the help text
-  std::string notes = {};  ///< what options have no room for, such as the form of a file; shown before the example
+  std::string notes = {};  ///< a longer explanation, such as the form of a file; shown before the example
 };
 
 /// A command-line program: declares the flags that every tool shares, parses, runs the work, and exits.
@@ -40,8 +40,8 @@ struct ToolInfo {
 /// on failure {..., "status": "error", "error": {"code", "rule", "path", "object", "message", "remedy"}}. The message for
 /// people is on stderr in both cases: one line, whatever goes wrong.
 ///
-/// While it runs, signals that end the process remove temporary files first (signals.h). A stdout that cannot be written is an
-/// error (io); a stderr that cannot be written is none.
+/// Signals that end the process remove temporary files first (signals.h). A failure to write stdout is an error (io); a failure
+/// to write stderr is ignored.
 class Tool {
  public:
   explicit Tool(ToolInfo info);
@@ -49,12 +49,12 @@ class Tool {
   Tool(const Tool&) = delete;
   Tool& operator=(const Tool&) = delete;
 
-  /// Heads the options declared next, in the help text; kOptions at first.
+  /// Sets the heading of the options that are declared next, in the help text. The first heading is kOptions.
   void section(const std::string& title);
   static constexpr const char* kOptions = "Options";
 
-  /// Declares an option or, when `name` has no dash, a positional argument. `value` holds the default, which the help shows
-  /// unless it is empty or out of range, as that of an option is which does nothing until it is given.
+  /// Declares an option or, when `name` has no dash, a positional argument. `value` holds the default, and the help shows it. The
+  /// help does not show a default that is empty or out of the option's range: such a default means "not given".
   /// T: int, std::uint64_t, float, double, std::string, or std::vector of int, float or std::string (given as a,b,c).
   /// Numbers are read by parseNumber (numbers.h): those that are not finite, or that T cannot hold, are a usage error.
   template <class T>
@@ -99,14 +99,14 @@ class Tool {
   /// @return exit code: 0 ok, or the value of the ErrorCode
   int run(int argc, char** argv, const std::function<void()>& work);
 
-  // What the work may use.
+  // For the work.
 
   const std::string& name() const;
   bool quiet() const;
   bool verbose() const;
   bool wantsJson() const;
   bool force() const;
-  /// Value of --threads; all the processor's when it was not given. oneTBB is limited to it already.
+  /// Value of --threads, or the number of the processor's threads. oneTBB is already limited to it.
   int threads() const;
   /// Value of --seed.
   /// @throws std::logic_error if usesSeed() was not called: the record of the run would lack the seed
@@ -137,8 +137,8 @@ class Tool {
   std::string generator() const;
   /// JSON object of every recorded parameter, defaults included, keys sorted.
   std::string commandJson() const;
-  /// What an asset records about this run: generator, command, and name (without folder, so that outputs do not depend on where
-  /// a build runs) and hash of every input. Reads the inputs.
+  /// The record of this run in an asset: generator, command, and the name and hash of every input. Names are without folders, so
+  /// that outputs do not depend on where a build runs. Reads the inputs.
   /// @throws Error io if an input cannot be read
   formats::Provenance provenance() const;
 

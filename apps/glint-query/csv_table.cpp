@@ -26,7 +26,7 @@ Rows parseCsv(const std::string& path) {
   csv_parser parser;
   if (csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI) != 0) throw std::bad_alloc();
   const std::unique_ptr<csv_parser, void (*)(csv_parser*)> guard(&parser, csv_free);
-  csv_set_space_func(&parser, [](unsigned char) { return 0; });  // keeps fields as they are
+  csv_set_space_func(&parser, [](unsigned char) { return 0; });  // no sign is a blank: fields keep theirs
   struct State {
     Rows rows;
     std::vector<std::string> row;

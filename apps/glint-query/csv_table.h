@@ -9,8 +9,8 @@
 
 namespace glint::apps {
 
-/// A CSV table (RFC 4180) whose header names columns of numbers; further columns are kept as they are. A byte-order mark is
-/// skipped. Names of columns are found whatever their case and the blanks around them, and numbers are read by parseNumber.
+/// A CSV table (RFC 4180) whose header names columns of numbers. Further columns are kept as they are. A byte-order mark is
+/// skipped. Names of columns match in any case and with blanks around them; parseNumber reads the numbers.
 class CsvTable {
  public:
   /// @throws Error io; invalid_input that names the row
@@ -39,7 +39,7 @@ class CsvTable {
 
   /// The names of the columns, for messages.
   std::string header() const;
-  /// What is wrong with a row, 0 being the first below the header.
+  /// Throws Error invalid_input that names a row, 0 being the first below the header.
   [[noreturn]] void fail(const std::string& rule, std::size_t row, const std::string& what, const std::string& remedy) const;
 
   /// The table with more columns.
@@ -53,7 +53,7 @@ class CsvTable {
 
   std::string path_;
   std::vector<std::vector<std::string>> rows_;  // the header first
-  std::vector<std::string> keys_;               // the header in small letters, without blanks
+  std::vector<std::string> keys_;               // columnKey of each name of the header
 };
 
 }  // namespace glint::apps

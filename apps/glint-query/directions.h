@@ -8,7 +8,7 @@
 
 namespace glint::apps {
 
-/// What a direction looks like, for messages.
+/// The form of a direction, for messages.
 inline constexpr const char* kDirectionRemedy = "give X Y Z, z out of the surface";
 
 /// A direction of any length above 0 as a unit vector; nothing if it has none.

@@ -31,7 +31,7 @@ std::vector<std::string_view> kindsThatListNormals() {
   return kinds;
 }
 
-/// The texels of a footprint as a histogram of one bin each: exact, and as slow as their number.
+/// The texels of a footprint as a histogram with a bin for each texel: exact, O(texels of the footprint).
 class TexelHistogram {
  public:
   TexelHistogram(const Reference& reference, const Footprint& footprint) {

@@ -16,7 +16,8 @@ class LightCommand {
  public:
   explicit LightCommand(Tool& tool);
 
-  /// Integrates the light against the asset's normals and prints the result. Facets are as rough as the asset says, or --lobes.
+  /// Integrates the light against the asset's normals and prints the result. The roughness of the facets is that of --lobes, or
+  /// else of the asset.
   /// @throws Error unsupported if the model cannot list the normals of a footprint
   void run();
 
@@ -31,7 +32,7 @@ class LightCommand {
   void addReflectance();
   Lobe lobe(int order) const;
   ShLightIntegral integral(const ShLight& light, const Lobe& lobe, Vec3 wo) const;
-  /// F G / (4 cos) towards wo.
+  /// The factor F G / (4 cos) towards wo.
   Rgb transfer(float sigma_r, Vec3 wo) const;
   void report(const ShLightIntegral& integral, Rgb transfer);
 

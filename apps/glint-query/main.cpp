@@ -8,7 +8,7 @@ using namespace glint;
 
 namespace {
 
-/// One line of the command line: a tool with the options of a sort of questions.
+/// Runs one command: a tool with the options of one sort of questions.
 template <class Command>
 int ask(const apps::ToolInfo& info, int argc, char** argv) {
   apps::Tool tool(info);

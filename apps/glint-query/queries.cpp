@@ -59,7 +59,7 @@ std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& 
     const std::size_t begin = rowBegin(row), end = rowBegin(row + 1);
     for (std::size_t k = begin; k < end; ++k) {
       const Vec2 jitter = bake::randomPair(seed, 0, k);
-      // Rows are as high as they have cells.
+      // The height of a row is in proportion to its number of cells.
       const double x = (static_cast<double>(k - begin) + jitter.x) / static_cast<double>(end - begin);
       const double y = (static_cast<double>(begin) + jitter.y * static_cast<double>(end - begin)) / count;
       const Vec2 xi = {static_cast<float>(x), static_cast<float>(y)};

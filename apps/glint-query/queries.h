@@ -16,7 +16,7 @@
 
 namespace glint::apps {
 
-/// What is asked at a footprint: the density towards a half vector, or its mean over a box of half vectors.
+/// A question at a footprint: the density towards a half vector, or its mean over a box of half vectors.
 struct Query {
   Footprint footprint;
   std::optional<Vec2> half;
@@ -33,7 +33,7 @@ std::vector<float> answerAll(const AnyNdf& model, std::span<const Query> queries
 /// @param ask  asks once
 template <class Ask>
 double medianNanoseconds(int repeats, const Ask& ask) {
-  // Runs of several queries, so that reading the clock does not count.
+  // Each run asks several times, so that the time of reading the clock is negligible.
   constexpr int kRuns = 15;
   const int per_run = std::max(1, repeats / kRuns);
   std::vector<double> times;
@@ -65,7 +65,7 @@ std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int
 /// Further columns are kept.
 class QueryTable {
  public:
-  /// @throws Error io; invalid_input that names the row, for what an option would refuse too
+  /// @throws Error io; invalid_input that names the row, by the rules of the options
   static QueryTable read(const std::string& path);
 
   const std::vector<Query>& queries() const { return queries_; }
@@ -80,8 +80,8 @@ class QueryTable {
   std::vector<Query> queries_;
 };
 
-/// Half vectors drawn from the distribution inside a footprint, from stratified random numbers: the unit square is split in
-/// `count` cells of equal area, each with one number that depends only on the seed and the cell.
+/// Draws half vectors from the distribution inside a footprint. The random numbers are stratified: the unit square has `count`
+/// cells of equal area, and each has one pair of numbers, which depends only on the seed and the cell.
 std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& footprint, int count, std::uint64_t seed);
 
 /// Samples as a CSV table with the columns hx, hy and pdf.

@@ -32,25 +32,25 @@ float blendedDensity(const DisplacedBrdf& brdf, const DisplacedPoint& at, Vec2 h
   return first + at.levels.weight * (brdf.normalDensity(at.levels.second, at.uv, half, least_variance) - first);
 }
 
-/// The channels of an asset.
+/// The channels of a colour that the asset has.
 std::vector<float> channelsOf(const DisplacedBrdf& brdf, Rgb color) {
   return brdf.asset().channels == 1 ? std::vector<float>{color.r} : std::vector<float>{color.r, color.g, color.b};
 }
 
-/// What is wrong with a level of detail; nothing if the asset has it.
+/// The fault of a level of detail; nothing if the asset has the level.
 std::optional<FootprintFault> levelFault(const Displacement& asset, int level) {
   if (level >= 0 && level < asset.level_count) return {};
   return FootprintFault{fmt::format("the asset has no level {}", level), fmt::format("give 0 to {}", asset.level_count - 1)};
 }
 
-/// A direction in columns of a table.
+/// The direction in three columns of a row.
 Vec3 directionOf(const CsvTable& table, std::size_t row, const std::array<const char*, 3>& columns) {
   const auto [x, y, z] = table.numbers(columns, row);
   if (const auto unit = unitVector({x, y, z})) return *unit;
   table.fail("csv.direction", row, fmt::format("{} is no direction", fmt::join(columns, ",")), kDirectionRemedy);
 }
 
-/// Where a row asks.
+/// The point that a row asks.
 DisplacedPoint pointOf(const DisplacedBrdf& brdf, const CsvTable& table, std::size_t row) {
   const auto [u, v] = table.numbers(kCentre, row);
   if (table.has(kSigma)) {

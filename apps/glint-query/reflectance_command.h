@@ -10,7 +10,7 @@
 
 namespace glint::apps {
 
-/// Where a displacement asset is asked: a point, and the levels that a footprint or --level chooses.
+/// A point of a displacement, and the levels that a footprint or --level chooses there.
 struct DisplacedPoint {
   Vec2 uv;
   LevelBlend levels;
@@ -46,10 +46,10 @@ class ReflectanceCommand {
  private:
   void check() const;
 
-  /// Prints the light reflected from --wi to --wo, BRDF times cosine; and with --repeat the time of it.
+  /// Prints the light reflected from --wi to --wo, BRDF times cosine; with --repeat also the time of the query.
   void reflect(const DisplacedBrdf& brdf, const DisplacedPoint& at) const;
 
-  /// Prints the density of the lobes' normals towards --half; and with --repeat the time of it.
+  /// Prints the density of the lobes' normals towards --half; with --repeat also the time of the query.
   void density(const DisplacedBrdf& brdf, const DisplacedPoint& at) const;
 
   /// Light directions drawn for --wo, as a table with the columns wix, wiy, wiz and pdf.
