@@ -1,8 +1,18 @@
 #pragma once
 
-/// Compiles a function twice, for AVX2 with FMA and for the baseline; the loader chooses a version for the processor. For
-/// kernels of plain loops, of which the compiler makes vectors. With sanitizers there is the baseline only, since the functions
-/// that choose a version run before a sanitizer is ready.
+// Builders have SIMD of the best instruction set of the machine in two ways.
+//
+// Highway is for kernels with explicit vectors: sums, conversions and shuffles, such as effective_kernels.cpp. Against vectors
+// of the compiler (vector_size) it takes .84 of the time for matrix products and .99 for the GGX quadrature, with the same
+// bits.
+//
+// GLINT_MULTIVERSION is for plain loops, of which the compiler makes the same vectors either way. Most of these loops call the
+// scalar functions of the query headers, which readers share; Highway would need each formula a second time. It is also for the
+// splat of flat_scatter.cpp, which builds a vector of four from four different scalars: with Highway that goes through memory
+// and takes 1.2 to 1.35 of the time.
+
+/// Compiles a function twice, for AVX2 with FMA and for the baseline; the loader chooses a version for the processor. With
+/// sanitizers there is the baseline only, since the functions that choose a version run before a sanitizer is ready.
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define GLINT_MULTIVERSION __attribute__((target_clones("arch=x86-64-v3", "default")))
 #else
