@@ -53,9 +53,8 @@ std::vector<AttributeInfo> describe(const Attributes& attributes, const KindSche
     const auto found = attributes.find(attribute.name);
     if (found == attributes.end()) continue;
     const AttributeValue& value = found->second;
-    list.push_back({std::string(attribute.name), std::string(name(value.type)), value.scalar,
-                    attribute.count == "level_count", value.numbers, value.texts, std::string(attribute.units),
-                    std::string(attribute.long_name)});
+    list.push_back({std::string(attribute.name), std::string(name(value.type)), value.scalar, attribute.count == "level_count",
+                    value.numbers, value.texts, std::string(attribute.units), std::string(attribute.long_name)});
   }
   return list;
 }
