@@ -104,8 +104,9 @@ TEST(NdfModels, OfTilesAreOneModelThatOpensEachTileByItsTraits) {
   const auto normals = test::sampleNormals(test::kSize, test::kSize);
   const auto bins = test::sampleBinMap(test::kSize, test::kSize);
   const ToyPlaneAsset asset = {normals.map, bins.map};
-  const api::NdfModelList<Reference, ToyPlane>::Any any =
-      api::NdfTraits<ToyPlane>::open({asset, api::NdfOptions{.sigma_r = 0.05f}});
+  api::NdfOptions options;
+  options.sigma_r = 0.05f;
+  const api::NdfModelList<Reference, ToyPlane>::Any any = api::NdfTraits<ToyPlane>::open({asset, options});
   const auto ask = [&](float u) {
     const Footprint p = Footprint::isotropic({u, 0.5f}, 9);
     return std::visit([&](const auto& model) { return model.density(p, {0.1f, 0}); }, any);
