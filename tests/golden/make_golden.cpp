@@ -3,6 +3,7 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <string>
 
 #include "support/sample_assets.h"
 
@@ -15,7 +16,7 @@ int main(int argc, char** argv) {
   try {
     const std::filesystem::path folder = argv[1];
     for (const test::SampleAsset& sample : test::sampleAssets())
-      writeAsset(folder / (sample.name + ".glint"), sample.asset, test::sampleProvenance());
+      writeAsset(folder / (std::string(sample.name) + ".glint"), sample.make().asset, test::sampleProvenance());
   } catch (const Error& error) {
     std::fprintf(stderr, "glint-make-golden: error: %s\n", error.what());
     return static_cast<int>(error.code());

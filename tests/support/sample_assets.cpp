@@ -780,30 +780,42 @@ SampleShLight sampleShLight() {
   return s;
 }
 
+namespace {
+
+/// An asset that is a member of its sample.
+template <class Sample, class Model>
+OwnedAsset owned(Sample sample, Model Sample::*member) {
+  const auto memory = std::make_shared<const Sample>(std::move(sample));
+  return {(*memory).*member, memory};
+}
+
+template <CompressionMethod kMethod, CoefficientType kType, SampleForm kForm = SampleForm::wide>
+OwnedAsset ownedNdfCp() {
+  return owned(sampleNdfCp(64, kMethod, kType, kForm), &SampleNdfCp::ndf);
+}
+
+}  // namespace
+
 std::vector<SampleAsset> sampleAssets() {
-  std::vector<SampleAsset> samples;
-  const auto add = [&](std::string name, auto sample, auto member) {
-    const auto memory = std::make_shared<const decltype(sample)>(std::move(sample));
-    samples.push_back({std::move(name), (*memory).*member, memory});
-  };
   using enum CompressionMethod;
   using enum CoefficientType;
-  add("bin-map", sampleBinMap(64, 48), &SampleBinMap::map);
-  add("displacement", sampleDisplacement(64), &SampleDisplacement::displacement);
-  add("displacement-rgb", sampleDisplacement(64, true), &SampleDisplacement::displacement);
-  add("heights", sampleHeights(64, 48), &SampleHeights::map);
-  add("histogram-sat", sampleHistograms(22, 19), &SampleHistograms::sat);
-  add("ndf-cp-cp-i8", sampleNdfCp(64, cp, i8), &SampleNdfCp::ndf);
-  add("ndf-cp-tucker-f16", sampleNdfCp(64, tucker, f16), &SampleNdfCp::ndf);
-  add("ndf-cp-pca-i8", sampleNdfCp(64, pca, i8), &SampleNdfCp::ndf);
-  add("ndf-cp-narrow-i8", sampleNdfCp(64, tucker, i8, SampleForm::narrow), &SampleNdfCp::ndf);
-  add("ndf-cp-spots-i8", sampleNdfCp(64, tucker, i8, SampleForm::spots), &SampleNdfCp::ndf);
-  add("ndf-cp-cp-f32", sampleNdfCp(64, cp, f32), &SampleNdfCp::ndf);
-  add("ndf-pyramid", samplePyramid(64, BlockPrecision::f16), &SamplePyramid::pyramid);
-  add("normals", sampleNormals(64, 48), &SampleNormals::map);
-  add("sh-light", sampleShLight(), &SampleShLight::light);
-  add("sh-lobes", sampleShLobes(), &SampleShLobes::lobes);
-  return samples;
+  return {
+      {"bin-map", [] { return owned(sampleBinMap(64, 48), &SampleBinMap::map); }},
+      {"displacement", [] { return owned(sampleDisplacement(64), &SampleDisplacement::displacement); }},
+      {"displacement-rgb", [] { return owned(sampleDisplacement(64, true), &SampleDisplacement::displacement); }},
+      {"heights", [] { return owned(sampleHeights(64, 48), &SampleHeights::map); }},
+      {"histogram-sat", [] { return owned(sampleHistograms(22, 19), &SampleHistograms::sat); }},
+      {"ndf-cp-cp-i8", ownedNdfCp<cp, i8>},
+      {"ndf-cp-tucker-f16", ownedNdfCp<tucker, f16>},
+      {"ndf-cp-pca-i8", ownedNdfCp<pca, i8>},
+      {"ndf-cp-narrow-i8", ownedNdfCp<tucker, i8, SampleForm::narrow>},
+      {"ndf-cp-spots-i8", ownedNdfCp<tucker, i8, SampleForm::spots>},
+      {"ndf-cp-cp-f32", ownedNdfCp<cp, f32>},
+      {"ndf-pyramid", [] { return owned(samplePyramid(64, BlockPrecision::f16), &SamplePyramid::pyramid); }},
+      {"normals", [] { return owned(sampleNormals(64, 48), &SampleNormals::map); }},
+      {"sh-light", [] { return owned(sampleShLight(), &SampleShLight::light); }},
+      {"sh-lobes", [] { return owned(sampleShLobes(), &SampleShLobes::lobes); }},
+  };
 }
 
 formats::Provenance sampleProvenance() {

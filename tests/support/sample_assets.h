@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <memory>
 #include <ostream>
-#include <string>
 #include <vector>
 
 #include "glint/formats/asset_writer.h"
@@ -135,10 +134,15 @@ SampleShLobes sampleShLobes();
 SampleShLight sampleShLight();
 
 /// An asset of any kind and the memory behind it.
-struct SampleAsset {
-  std::string name;  ///< of its golden file, without the extension
+struct OwnedAsset {
   formats::AnyAsset asset;
   std::shared_ptr<const void> memory;
+};
+
+/// One of the samples below, made when it is asked for.
+struct SampleAsset {
+  const char* name;  ///< of its golden file, without the extension
+  OwnedAsset (*make)();
 };
 
 /// How tests name a sample.
