@@ -21,9 +21,16 @@ def damaged(path, name, change):
     return copy
 
 
-def with_flipped_last_byte(data):
-    data[-1] ^= 1
-    return data
+def with_flipped_normal(glint, path):
+    """A copy of an asset of normals with a bit of its last number flipped."""
+    datasets = json.loads(glint("info", path, "--json").stdout)["result"]["datasets"]
+    last = next(dataset["offset"] + dataset["bytes"] - 1 for dataset in datasets if dataset["path"] == "/normals")
+
+    def flip(data):
+        data[last] ^= 1
+        return data
+
+    return damaged(path, "bad.glint", flip)
 
 
 def test_validate_is_silent_on_valid_files(glint, normals):
@@ -32,7 +39,7 @@ def test_validate_is_silent_on_valid_files(glint, normals):
 
 
 def test_validate_names_the_rule_of_a_changed_byte(glint, normals):
-    bad = damaged(normals, "bad.glint", with_flipped_last_byte)
+    bad = with_flipped_normal(glint, normals)
     process = glint("validate", normals, bad)
     assert process.returncode == 3
     assert "[dataset.hash]" in process.stdout and "bad.glint" in process.stdout

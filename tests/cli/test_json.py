@@ -52,19 +52,19 @@ MAKE = [
 ]
 QUERY = "query {asset}.glint --uv .3 .6 --sigma 4 {asked}"
 ASKED = [
-    *(QUERY.format(asset=asset, asked="--half 0 .1") for asset in ("normals", "pyramid", "cp", "bins", "sat", "displaced")),
-    *(QUERY.format(asset=asset, asked="--half .1 0 --repeat 15") for asset in ("pyramid", "displaced")),
-    *(QUERY.format(asset=asset, asked="--image ndf.png --image-size 16") for asset in ("tucker", "displaced")),
+    *(QUERY.format(asset=asset, asked="--half 0 .1") for asset in ("normals", "pyramid", "cp", "bins", "sat", "reflectance displaced")),
+    *(QUERY.format(asset=asset, asked="--half .1 0 --repeat 15") for asset in ("pyramid", "reflectance displaced")),
+    *(QUERY.format(asset=asset, asked="--image ndf.png --image-size 16") for asset in ("tucker", "reflectance displaced")),
     *(QUERY.format(asset=asset, asked="--range -1 -1 1 1 --repeat 15") for asset in ("normals", "sat")),
     "query normals.glint --uv .3 .6 --box 3 0 0 2 --range -1 -1 1 1",
     "query pyramid.glint --uv .3 .6 --cov 16 0 20 --half 0 0",
     QUERY.format(asset="cp", asked="--samples 3 -o samples.csv"),
     "query pyramid.glint --csv half.csv -o answers.csv",
-    *(QUERY.format(asset=asset, asked="--light light.glint --wo .1 0 1") for asset in ("normals", "sat")),
-    "query displaced.glint --uv .3 .6 --level 1 --wi .5 0 1 --wo -.2 0 1",
-    "query colored.glint --uv .3 .6 --sigma 3 --wi .5 0 1 --wo -.2 0 1 --repeat 15",
-    "query displaced.glint --uv .3 .6 --level 0 --wo 0 0 1 --samples 3 -o samples.csv",
-    "query displaced.glint --csv displaced.csv -o answers.csv",
+    *(QUERY.format(asset=asset, asked="--light light.glint --wo .1 0 1") for asset in ("light normals", "light sat")),
+    "query reflectance displaced.glint --uv .3 .6 --level 1 --wi .5 0 1 --wo -.2 0 1",
+    "query reflectance colored.glint --uv .3 .6 --sigma 3 --wi .5 0 1 --wo -.2 0 1 --repeat 15",
+    "query reflectance displaced.glint --uv .3 .6 --level 0 --wo 0 0 1 --samples 3 -o samples.csv",
+    "query reflectance displaced.glint --csv displaced.csv -o answers.csv",
 ]
 FOUND = [*(f"info {asset}.glint" for asset in ASSETS), "validate normals.glint pyramid.glint"]
 REFUSED = [
