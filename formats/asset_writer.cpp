@@ -51,7 +51,7 @@ void writeAttribute(hid_t object, const std::string& name, const AttributeValue&
   }
   const hdf5::Handle attribute(H5Acreate2(object, name.c_str(), types[value.type], space, H5P_DEFAULT, H5P_DEFAULT),
                                "cannot be written", place, io);
-  // HDF5 converts; every schema type is exact in a double.
+  // Numbers are kept as doubles, which hold every type of the schema exactly; HDF5 converts them.
   if (count > 0) hdf5::check(H5Awrite(attribute, H5T_NATIVE_DOUBLE, value.numbers.data()), "cannot be written", place, io);
 }
 
@@ -71,7 +71,7 @@ Attributes commonValues(std::string_view kind, const Provenance& provenance) {
           {"inputs", {ElementType::text, false, {}, std::move(inputs)}}};
 }
 
-/// Writes everything but the datasets' bytes and finds where those go.
+/// Writes everything but the bytes of the datasets, and finds the places of these bytes in the file.
 ///
 /// HDF5 only reserves the space: the bytes are then written with plain calls, at the speed of the disk and with its errors.
 class MetadataWriter {
@@ -103,7 +103,7 @@ class MetadataWriter {
  private:
   static constexpr ErrorCode kIo = ErrorCode::io;
 
-  /// Access that starts every object of `alignment` bytes or more at a multiple of it.
+  /// Access to a file in which every object of `alignment` bytes or more starts at a multiple of `alignment`.
   static hdf5::Handle access(hsize_t alignment) {
     hdf5::Handle properties(H5Pcreate(H5P_FILE_ACCESS), "cannot create properties", {}, kIo);
     hdf5::check(H5Pset_fapl_sec2(properties), "cannot set properties", {}, kIo);

@@ -95,7 +95,7 @@ bool lock(int file) {
   return ::fcntl(file, F_OFD_SETLK, &whole) == 0;
 }
 
-/// Removes what killed writers of the same target have left.
+/// Removes the temporary files that killed writers of the same target have left.
 void removeStale(const fs::path& folder, const std::string& prefix) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
@@ -170,7 +170,7 @@ void AtomicFile::create(const fs::path& folder) {
       if (error != EEXIST || attempt >= kMostAttempts) throwUnwritable(name_, "cannot be created", error);
       continue;
     }
-    // Where there are no locks, nobody removes what is not locked. Another writer may have done so before this lock.
+    // Another writer may have removed the new file before it was locked. Where locks do not work, no writer removes any.
     struct stat status {};
     if (!lock(file_) || ::fstat(file_, &status) != 0 || status.st_nlink > 0) return;
     ::close(file_);

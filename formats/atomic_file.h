@@ -19,18 +19,18 @@ struct OutputTarget {
   int descriptor = -1;         ///< of this process, if the name is one of /dev/fd; -1 otherwise
 };
 
-/// Follows symbolic links, of which the last may lead to a file that is still to be made.
+/// Follows symbolic links. The last link may lead to a file that does not exist yet.
 /// @throws Error io  a folder, socket or disk; links in a circle; a name that is too long
 OutputTarget findOutput(const std::filesystem::path& name);
 
 /// The one way in which files are made: whole or not at all.
 ///
 /// The bytes go to a file under a unique hidden name in the target's folder, which publish() flushes to the disk and renames.
-/// It has the permissions, and where allowed the owner, of the file that it replaces. A symbolic link stays: what it leads to
-/// is replaced. Devices and pipes are written to in one go at the end, from a temporary file elsewhere.
+/// It has the permissions, and where allowed the owner, of the file that it replaces. A symbolic link stays: the file at
+/// its end is replaced. Devices and pipes are written to in one go at the end, from a temporary file elsewhere.
 ///
-/// The temporary file is locked as long as its writer lives: what killed writers of the same target have left is not, and is
-/// removed by the next one. The lock is one of the open file description, so that HDF5, which may lock the same file by flock,
+/// The temporary file is locked as long as its writer lives. Temporary files of killed writers are not locked: the next writer of
+/// the same target removes them. The lock belongs to the open file description, so HDF5, which may lock the same file by flock,
 /// does not meet it.
 class AtomicFile {
  public:

@@ -138,7 +138,7 @@ void readMembers(Cursor& cursor, unsigned version, std::uint64_t flags, Datatype
   }
 }
 
-/// Reads a datatype. Where it is one that no schema uses, the rest of it is left unread.
+/// Reads a datatype. The rest of a datatype that no schema uses is left unread.
 Datatype readDatatype(Cursor& cursor, bool member) {
   enum : unsigned { fixed = 0, floating = 1, text = 3, reference = 7, compound = 6, variable = 9, last = 10 };
   const auto head = static_cast<unsigned>(cursor.number(1));

@@ -6,7 +6,7 @@
 
 namespace glint::formats {
 
-/// Adds a file to those that removeTemporaryFiles() removes, whether it exists yet or not.
+/// Makes removeTemporaryFiles() remove a file. The file need not exist yet.
 /// @return its slot; -1 if all slots are taken or the path is too long: the file is then left to the next writer
 int registerTemporary(const std::filesystem::path& path);
 

@@ -36,7 +36,7 @@ struct ValidateOptions {
   bool data = true;    ///< check values (finite, in the disk, integrals); reads the whole file
 };
 
-/// Checks a file against every rule of rules(). Never throws for what is in the file: that is what findings are for.
+/// Checks a file against every rule of rules(). Contents of the file never make it throw: they become findings.
 /// Safe on untrusted input, as long as nobody changes the file meanwhile.
 ValidationReport validateAsset(const std::filesystem::path& path, const ValidateOptions& options = {});
 

@@ -13,7 +13,7 @@ namespace glint::apps {
 struct StoredImage {
   Image image;
   int orientation = 1;  ///< 1 to 8, as in Exif
-  /// The display window; its first column and row (from the top) are relative to those of the pixels.
+  /// The display window. Its first column and row (from the top) count from the first column and row of the pixels.
   struct {
     std::int64_t column = 0, row = 0, width = 0, height = 0;
   } display;

@@ -25,7 +25,7 @@ struct Image {
   std::optional<double> no_data;  ///< number in the file that pixels without data hold, if the file names one
   std::vector<std::string> parts;   ///< names of all images of the file, empty where they have none
   int part = 0;                     ///< the one that was read
-  std::vector<std::string> layers;  ///< names of the layers of this part; that of channels without a layer is empty
+  std::vector<std::string> layers;  ///< names of the layers of this part; channels without a layer have the empty name
   std::string layer;                ///< the one that was read
   std::vector<std::string> notes;   ///< what a reader of the file may not expect: clauses
   /// [height][width][channels]. Unsigned integers of up to 8 and 16 bits keep their codes (full range 255 and 65535);

@@ -67,7 +67,7 @@ int channelOfLetter(const Image& image, char letter) {
   return -1;
 }
 
-/// A pixel value between 0 and 1 if it is that of an integer.
+/// A pixel value, between 0 and 1 if the file stores integers.
 template <class T>
 float valueOf(T code) {
   if constexpr (std::is_floating_point_v<T>) return code;

@@ -14,8 +14,8 @@ void cropToDisplay(StoredImage& stored, const std::string& path);
 /// Turns and mirrors the pixels as the orientation says.
 void orient(StoredImage& stored);
 
-/// Keeps the channels of one layer: those whose names start with it and a point.
-/// @param layer  empty: that of the first channel
+/// Keeps the channels of one layer: their names start with the layer's name and a point.
+/// @param layer  name; empty: the layer of the first channel
 /// @throws Error invalid_input if there is no such layer
 void selectLayer(Image& image, const std::string& layer, const std::string& path);
 

@@ -111,7 +111,7 @@ Image IngestOptions::read(Tool& tool, const std::string& path) const {
 
 bake::PixelArray pixelArray(const Image& image) {
   bake::PixelArray array{image.width, image.height, image.channels, {}, image.code_scale};
-  // Integers with a sign are floats here, and so are those that were divided by alpha.
+  // Integers with a sign are read as floats, and so are integers that were divided by alpha.
   const bool floats = std::holds_alternative<std::vector<float>>(image.pixels);
   if (floats && !image.floating) array.step = static_cast<float>(1 / image.code_scale);
   std::visit([&](const auto& pixels) { array.pixels = std::span(pixels); }, image.pixels);

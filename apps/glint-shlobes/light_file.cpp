@@ -18,7 +18,7 @@ using nlohmann::json;
 /// Radiance that is multiplied by alpha is what arrives.
 const ImageChoice kRadiance = {.alpha = ImageChoice::Alpha::ignore};
 
-/// Linear RGB of an image, of which integers are sRGB; grey images have the same in all three.
+/// Linear RGB of an image. Integers are taken as sRGB. Grey images have the same value in red, green and blue.
 std::vector<float> linearRgb(const Image& image, const std::string& path) {
   if (image.channels == 2)
     throw Error(ErrorCode::invalid_input, "light.channels", path, "", "has 2 channels",
@@ -33,7 +33,7 @@ std::vector<float> linearRgb(const Image& image, const std::string& path) {
   return rgb;
 }
 
-/// One light of the JSON, whose members are taken one after the other; what is left is unknown.
+/// One light of the JSON. Members are taken out one after the other; members that are left in the end are unknown.
 class LightReader {
  public:
   LightReader(const json& light, std::size_t index, const std::string& path, Tool& tool)

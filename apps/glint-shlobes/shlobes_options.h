@@ -38,7 +38,7 @@ class ShLobesOptions {
 
 nlohmann::json lobesJson(const ShLobes& lobes);
 nlohmann::json lightJson(const ShLight& light);
-/// For people: one line from what the functions above give.
+/// The result of a function above for people, in one line.
 std::string tableText(const nlohmann::json& table);
 
 }  // namespace glint::apps

@@ -33,7 +33,7 @@ class TreeWalk {
     next_node_ = across_ * across_;
   }
 
-  /// Calls visitor(BlockOfNode) for each block. Returns false at what is out of order.
+  /// Calls visitor(BlockOfNode) for each block. Returns false at the first node that is out of order.
   template <class Visitor>
   bool walk(Visitor&& visitor) {
     if (next_node_ > nodeCount()) return false;

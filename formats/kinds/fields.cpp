@@ -77,7 +77,7 @@ void PackFields::add(std::string_view path, ElementType type, const void* values
                      std::string_view units, std::string_view long_name) {
   PackedArray array{
       levelPath(path, static_cast<int>(scope_.level)), type, {}, values, count * sizeBytes(type), units, long_name};
-  // A size that no name gives is what the elements leave for it.
+  // A size that no name gives follows from the number of elements.
   std::uint64_t known = 1;
   for (const std::string_view dim : dims) known *= evaluateSize(dim, scope_).value_or(1);
   for (const std::string_view dim : dims) {
