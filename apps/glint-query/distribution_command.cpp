@@ -6,16 +6,9 @@
 
 #include "common/footprint_rules.h"
 #include "glint-query/command_forms.h"
+#include "glint-query/usage.h"
 
 namespace glint::apps {
-namespace {
-
-[[noreturn]] void usage(const std::string& what, const std::string& remedy) {
-  throw Error(ErrorCode::usage, "query.arguments", "", "", what, remedy);
-}
-
-}  // namespace
-
 HalfVectorOptions::HalfVectorOptions(Tool& tool) {
   half_option_ = &tool.option("--half", half_, "ask for the density towards a half vector HX HY").count(2);
   range_option_ = &tool.option("--range", range_, "ask for the mean density over a box X0 Y0 X1 Y1 of half vectors").count(4);
@@ -25,7 +18,7 @@ HalfVectorOptions::HalfVectorOptions(Tool& tool) {
 
 void HalfVectorOptions::check() const {
   if (!range_option_->given()) return;
-  if (const auto fault = rangeFault(*query({}).range)) usage("--range " + fault->what, fault->remedy);
+  if (const auto fault = rangeFault(*query({}).range)) throwUsage("--range " + fault->what, fault->remedy);
 }
 
 Query HalfVectorOptions::query(const Footprint& footprint) const {
@@ -58,10 +51,10 @@ DistributionCommand::DistributionCommand(Tool& tool)
 
 void DistributionCommand::check() const {
   if (table_.csvGiven()) return;
-  if (!footprint_.given()) usage("no footprint was given", "add --uv U V, or --csv TABLE");
+  if (!footprint_.given()) throwUsage("no footprint was given", "add --uv U V, or --csv TABLE");
   footprint_.check();
   if (!picture_.given() && !halves_.given() && table_.samples() == 0)
-    usage("nothing was asked", "add --half, --range, --samples or --image");
+    throwUsage("nothing was asked", "add --half, --range, --samples or --image");
 }
 
 void DistributionCommand::run() {

@@ -4,16 +4,9 @@
 
 #include "common/files.h"
 #include "common/ndf_picture.h"
+#include "glint-query/usage.h"
 
 namespace glint::apps {
-namespace {
-
-[[noreturn]] void usage(const std::string& what, const std::string& remedy) {
-  throw Error(ErrorCode::usage, "query.arguments", "", "", what, remedy);
-}
-
-}  // namespace
-
 TableOptions::TableOptions(Tool& tool, const std::string& csv_help, const std::string& samples_help) : tool_(tool) {
   csv_option_ = &tool.option("--csv", csv_, csv_help);
   samples_option_ = &tool.option("--samples", samples_, samples_help).range(1, 100000000);
@@ -25,12 +18,12 @@ TableOptions::TableOptions(Tool& tool, const std::string& csv_help, const std::s
 void TableOptions::check() const {
   const bool makes_table = csvGiven() || samples_ > 0;
   if (makes_table && !output_option_->given())
-    usage(csvGiven() ? "--csv needs a place for the answers" : "--samples needs a place for them",
-          "add -o OUT.csv, or -o - for stdout");
-  if (!makes_table && output_option_->given()) usage("-o is for tables", "add --csv or --samples, or leave it out");
+    throwUsage(csvGiven() ? "--csv needs a place for the answers" : "--samples needs a place for them",
+               "add -o OUT.csv, or -o - for stdout");
+  if (!makes_table && output_option_->given()) throwUsage("-o is for tables", "add --csv or --samples, or leave it out");
   if (!makes_table) return;
   if (output_ == "-" && tool_.wantsJson())
-    usage("--json and -o - both write to stdout", "name a file with -o, or leave out --json");
+    throwUsage("--json and -o - both write to stdout", "name a file with -o, or leave out --json");
   if (output_ != "-") {
     checkOutput(tool_, output_, OutputFormat::table);
     tool_.addOutput(output_);

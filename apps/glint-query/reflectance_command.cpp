@@ -13,15 +13,12 @@
 #include "glint-query/command_forms.h"
 #include "glint-query/directions.h"
 #include "glint-query/queries.h"
+#include "glint-query/usage.h"
 #include "glint/bake/common/counter_random.h"
 #include "glint/formats/asset_reader.h"
 
 namespace glint::apps {
 namespace {
-
-[[noreturn]] void usage(const std::string& what, const std::string& remedy) {
-  throw Error(ErrorCode::usage, "query.arguments", "", "", what, remedy);
-}
 
 /// Side of the box with the second moments of a Gaussian.
 float diameterOf(float sigma) { return std::sqrt(12.0f) * sigma; }
@@ -77,7 +74,7 @@ DisplacedPointOptions::DisplacedPointOptions(Tool& tool) {
 
 void DisplacedPointOptions::checkSize() const {
   if (!sigma_option_->given() && !level_option_->given())
-    usage("neither a footprint nor a level was given", "add --sigma S or --level L");
+    throwUsage("neither a footprint nor a level was given", "add --sigma S or --level L");
 }
 
 DisplacedPoint DisplacedPointOptions::point(const DisplacedBrdf& brdf) const {
@@ -118,10 +115,10 @@ ReflectanceCommand::ReflectanceCommand(Tool& tool)
 
 void ReflectanceCommand::check() const {
   if (table_.csvGiven()) return;
-  if (!point_.given()) usage("no point was given", "add --uv U V, or --csv TABLE");
+  if (!point_.given()) throwUsage("no point was given", "add --uv U V, or --csv TABLE");
   point_.checkSize();
   if (!wi_option_->given() && !half_option_->given() && !picture_.given() && table_.samples() == 0)
-    usage("nothing was asked", "add --wi and --wo, or --half, --samples or --image");
+    throwUsage("nothing was asked", "add --wi and --wo, or --half, --samples or --image");
 }
 
 void ReflectanceCommand::run() {
