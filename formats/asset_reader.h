@@ -73,7 +73,7 @@ class Asset {
 
   /// Opens an asset to make something of all that it holds: builders trust their inputs, so hashes and values are checked, too.
   /// @throws Error  as open(); invalid_input also for values, naming the first texel that is wrong
-  /// @note O(file): 0.1 to 0.3 s for an asset of a map of 2048^2 texels, of any kind
+  /// @note O(file)
   static Asset openForBuilding(const std::filesystem::path& path) { return open(path, {true, true}); }
 
   Asset(Asset&&) noexcept;

@@ -100,9 +100,11 @@ void PackFields::add(std::string_view path, ElementType type, const void* values
 
 int ReadFields::indexIn(std::string_view values, std::string_view value) { return indexOf(value, values); }
 
-const AttributeValue* ReadFields::find(std::string_view name) const {
+const AttributeValue* ReadFields::find(std::string_view name) {
   const auto found = file_.attributes.find(name);
-  return found == file_.attributes.end() ? nullptr : &found->second;
+  if (found != file_.attributes.end()) return &found->second;
+  missing_ = true;
+  return nullptr;
 }
 
 const DatasetRecord* ReadFields::findArray(std::string_view path) const {

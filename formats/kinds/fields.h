@@ -222,7 +222,6 @@ class ReadFields {
   void reals(std::string_view name, std::string_view, std::initializer_list<float*> values, Range, std::string_view,
              std::string_view, int = 0) {
     const AttributeValue* found = find(name);
-    missing_ |= found == nullptr;
     if (found == nullptr) return;
     auto number = found->numbers.begin();
     for (float* value : values) *value = static_cast<float>(*number++);
@@ -275,7 +274,8 @@ class ReadFields {
 
  private:
   static int indexIn(std::string_view values, std::string_view value);
-  const AttributeValue* find(std::string_view name) const;
+  /// Value of an attribute; nullptr, noted in missing_, if the file does not have it.
+  const AttributeValue* find(std::string_view name);
   const DatasetRecord* findArray(std::string_view path) const;
 
   const FileStructure& file_;

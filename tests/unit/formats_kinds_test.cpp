@@ -111,6 +111,20 @@ TEST(Kinds, NameEachAttributeAndArrayOnce) {
   }
 }
 
+TEST(Kinds, OptionalValuesNeedAllOfTheirAttributes) {
+  const test::TempFolder folder;
+  auto sample = test::sampleNormals(64, 48);
+  sample.map.slopes = MapSlopes{{0.5f, 0.25f}, {1, 0, 1}};
+  writeAsset(folder / "a.glint", sample.map, test::sampleProvenance());
+  Findings findings(folder / "a.glint");
+  FileStructure file = readStructure(folder / "a.glint", findings);
+  const auto slopes = [&] { return std::get<NormalMap>(formats::kindOf<NormalMap>().read(file)).slopes; };
+  ASSERT_TRUE(slopes());
+  EXPECT_EQ(slopes()->mean.x, 0.5f);
+  file.attributes.erase("slope_covariance");
+  EXPECT_FALSE(slopes());
+}
+
 TEST_P(EveryKind, IsWrittenAsItsGoldenFile) {
   const fs::path golden = fs::path(GLINT_SOURCE_DIR) / "tests/golden/v1.0" / (std::string(GetParam().name) + ".glint");
   EXPECT_EQ(bytesOf(path_), bytesOf(golden)) << golden;

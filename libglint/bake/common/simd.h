@@ -2,14 +2,11 @@
 
 // Builders have SIMD of the best instruction set of the machine in two ways, with one exception.
 //
-// Highway is for kernels with explicit vectors: sums, conversions and shuffles, such as effective_kernels.cpp. Against vectors
-// of the compiler (vector_size) it takes .84 of the time for matrix products and .99 for the GGX quadrature, with the same
-// bits.
+// Highway is for kernels with explicit vectors: sums, conversions and shuffles, such as effective_kernels.cpp.
 //
 // GLINT_MULTIVERSION is for plain loops, of which the compiler makes vectors. Some of these loops call scalar functions of the
 // query headers, which readers share: explicit vectors would need each formula a second time. It is also for the splat of
-// flat_scatter.cpp, which builds a vector of four from four different scalars: with Highway that goes through memory and takes
-// 1.2 to 1.35 of the time.
+// flat_scatter.cpp, which builds a vector of four from four different scalars: with Highway these go through memory.
 //
 // One kernel has intrinsics: the conversion to halves of pyramid.cpp. On processors without an instruction for it, Highway 1.0
 // truncates, and results would differ from the rounded halves of all other processors.
