@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 namespace glint::apps {
 namespace {
@@ -13,6 +14,10 @@ std::string format(const char* pattern, Values... values) {
   return line;
 }
 
+const char* typeName(CoefficientType type) {
+  return type == CoefficientType::i8 ? "i8" : type == CoefficientType::f16 ? "f16" : "f32";
+}
+
 }  // namespace
 
 CompressOptions::CompressOptions(Tool& tool) {
@@ -20,15 +25,20 @@ CompressOptions::CompressOptions(Tool& tool) {
               {{"cp", CompressionMethod::cp}, {"tucker", CompressionMethod::tucker}, {"pca", CompressionMethod::pca}},
               "decomposition of the blocks: canonical polyadic, Tucker-2 or principal components");
   const Option& rank = tool.option("--rank", values_.rank, "columns of every cluster").range(1, 256);
-  tool.option("--tolerance", values_.tolerance,
-              "instead of --rank: relative error of all images together (tucker: also of level 0, of level 1 and of the "
-              "coarser ones); columns and bits of every cluster are chosen to meet it in the fewest bytes")
+  tool.option(
+          "--tolerance", values_.tolerance,
+          "instead of --rank: largest error, in the metric below; columns and bits of every cluster are chosen to meet it in "
+          "the fewest bytes")
       .range(1e-6, 0.99)
       .excludes(rank)
       .defaultText("none");
-  tool.choice("--quantize", values_.coefficient_type,
-              {{"f32", CoefficientType::f32}, {"f16", CoefficientType::f16}, {"i8", CoefficientType::i8}},
-              "type of the coefficients");
+  tool.choice("--metric", values_.metric, {{"seen", bake::ErrorMetric::seen}, {"l2", bake::ErrorMetric::l2}},
+              "error to make small: what a person sees towards each half vector, in every level; or the relative error of all "
+              "images together, in which peaks hide dim light");
+  tool.choice(
+      "--quantize", values_.coefficient_type,
+      {{"auto", std::nullopt}, {"f32", CoefficientType::f32}, {"f16", CoefficientType::f16}, {"i8", CoefficientType::i8}},
+      "type of the coefficients; auto: i8, and more bits where a tolerance needs them");
   tool.choice("--spots", values_.spots, {{"auto", true}, {"off", false}},
               "with --tolerance, tucker or pca, and i8: store slices of few facets as spots where that costs less");
   tool.option("--regions", values_.regions, "regions of the map along each axis")
@@ -41,12 +51,14 @@ CompressOptions::CompressOptions(Tool& tool) {
 
 nlohmann::json compressionJson(const bake::CompressionReport& report) {
   const auto level = [](const bake::CompressionLevelReport& l) {
-    return nlohmann::json{{"slices", l.slices}, {"rel_l2", l.rel_l2}};
+    return nlohmann::json{
+        {"slices", l.slices}, {"rel_l2", l.rel_l2}, {"seen", l.seen.seen}, {"seen_worst", l.seen.worst}, {"bias", l.seen.bias}};
   };
   nlohmann::json levels = nlohmann::json::array();
   for (const auto& l : report.levels) levels.push_back(level(l));
   return {{"total", level(report.total)},
           {"levels", levels},
+          {"coefficient_type", typeName(report.coefficient_type)},
           {"basis_bytes", report.basis_bytes},
           {"coefficient_bytes", report.coefficient_bytes},
           {"index_bytes", report.index_bytes},
@@ -60,12 +72,15 @@ nlohmann::json compressionJson(const bake::CompressionReport& report) {
 }
 
 std::string compressionText(const bake::CompressionReport& report) {
-  std::string text =
-      format("%.2f MB, 1 : %.1f of the pyramid as stored, 1 : %.1f of dense images; relative error %.4f\n",
-             static_cast<double>(report.total_bytes) / 1e6, report.ratio_to_stored, report.ratio_to_dense, report.total.rel_l2);
-  for (std::size_t l = 0; l < report.levels.size(); ++l)
-    text += format("level %zu: %llu slices, relative error %.4f\n", l, static_cast<unsigned long long>(report.levels[l].slices),
-                   report.levels[l].rel_l2);
+  std::string text = format("%.2f MB, 1 : %.1f of the pyramid as stored, 1 : %.1f of dense images; coefficients of type %s\n",
+                            static_cast<double>(report.total_bytes) / 1e6, report.ratio_to_stored, report.ratio_to_dense,
+                            typeName(report.coefficient_type));
+  const auto errors = [](const bake::CompressionLevelReport& l) {
+    return format("%llu slices, seen error %.4f (worst direction %.3f, bias %.4f), relative error %.4f\n",
+                  static_cast<unsigned long long>(l.slices), l.seen.seen, l.seen.worst, l.seen.bias, l.rel_l2);
+  };
+  text += "all levels: " + errors(report.total);
+  for (std::size_t l = 0; l < report.levels.size(); ++l) text += format("level %zu: ", l) + errors(report.levels[l]);
   return text;
 }
 

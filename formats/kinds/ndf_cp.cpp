@@ -13,11 +13,6 @@ namespace {
 
 constexpr double kIntegralTolerance = 1e-3;
 
-ElementType basisType(const NdfCp& ndf) {
-  if (ndf.coefficient_type == CoefficientType::f32) return ElementType::f32;
-  return ndf.method == CompressionMethod::pca ? ElementType::i32 : ElementType::i16;
-}
-
 ElementType coefficientElement(CoefficientType type) {
   switch (type) {
     case CoefficientType::i8:
@@ -33,8 +28,6 @@ double element(ElementType type, const void* data, std::uint64_t index) {
   switch (type) {
     case ElementType::i8:
       return static_cast<const std::int8_t*>(data)[index];
-    case ElementType::i16:
-      return static_cast<const std::int16_t*>(data)[index];
     case ElementType::i32:
       return static_cast<const std::int32_t*>(data)[index];
     case ElementType::f16:
@@ -193,7 +186,7 @@ std::vector<std::size_t> firstSlots(const NdfCp& ndf) {
 
 /// Basis images of a cluster with their scales, [columns][256].
 std::vector<float> basisImages(const NdfCp& ndf, const NdfCluster& cluster) {
-  const auto at = [&](std::uint64_t index) { return element(basisType(ndf), ndf.basis, cluster.first_basis + index); };
+  const auto at = [&](std::uint64_t index) { return element(ElementType::i32, ndf.basis, cluster.first_basis + index); };
   const bool tucker = ndf.method == CompressionMethod::tucker;
   const std::uint64_t columns = cluster.columns, rx = tucker ? cluster.rank_x : columns, ry = tucker ? cluster.rank_y : columns;
   const auto along = [&](std::uint64_t first, std::uint64_t rank, std::uint64_t k, int t) {
@@ -401,8 +394,7 @@ void describeClusters(auto& fields, auto& ndf) {
   fields.array("clusters", ndf.clusters, {"regions", "places"}, "1", "place and size of each cluster's factors");
   fields.array("masks", ndf.masks, {"word_count"}, "1", "bit b of word w of a cluster: slot 64 w + b has a slice in it");
   fields.array("mask_ranks", ndf.mask_ranks, {"word_count"}, "1", "set bits of the cluster before this word");
-  fields.data("basis", ndf.basis, ndf.basis_count,
-              {{"coefficient_type=f32", f32}, {"method=cp|tucker", i16}, {"method=pca", i32}}, {"basis_count"}, "1",
+  fields.data("basis", ndf.basis, ndf.basis_count, {{"", i32}}, {"basis_count"}, "1",
               "inclusive prefix sums of each cluster's basis, columns fastest");
   fields.data("coefficients", ndf.coefficients, ndf.coefficient_count,
               {{"coefficient_type=i8", i8}, {"coefficient_type=f16", f16}, {"coefficient_type=f32", f32}},
@@ -436,7 +428,7 @@ struct KindDescription<NdfCp> {
             errorRule("compressed.block_masks", "block_masks name the slices of the clusters"),
             errorRule("compressed.block_masses", "block_masses are the shares of the slices, rounded up"),
             errorRule("compressed.scales", "scales are finite"),
-            errorRule("compressed.factors", "bases and coefficients are finite"),
+            errorRule("compressed.factors", "coefficients are finite, and sums of spots between 0 and 1"),
             warningRule("compressed.integral", "every image integrates to 1 within 1e-3")};
   }
 
@@ -491,11 +483,6 @@ struct KindDescription<NdfCp> {
       checkAll(
           ndf.coefficient_count, [&](std::uint64_t k) { return std::isfinite(element(type, ndf.coefficients, k)); },
           "compressed.factors", "/coefficients", "not finite", findings);
-    }
-    if (basisType(ndf) == ElementType::f32) {
-      checkAll(
-          ndf.basis_count, [&](std::uint64_t k) { return std::isfinite(element(ElementType::f32, ndf.basis, k)); },
-          "compressed.factors", "/basis", "not finite", findings);
     }
     checkAll(
         ndf.spot_sums.size(), [&](std::uint64_t k) { return ndf.spot_sums[k] >= 0 && ndf.spot_sums[k] <= 1; },

@@ -14,7 +14,7 @@ enum class CompressionMethod : std::uint8_t {
   pca,     ///< B_k: any 16x16 images, orthonormal
 };
 
-/// Storage of coefficients. Bases are always prefix sums of integers (or of floats with f32), so range queries are exact.
+/// Storage of coefficients. Bases are always prefix sums of integers, so range queries are exact.
 enum class CoefficientType : std::uint8_t { i8, f16, f32 };
 
 /// One cluster: the slices of one place in one region. A slice is the part of an image inside one angular block.
@@ -108,7 +108,7 @@ struct NdfCp {
 
   /// Prefix sums along each block axis, inclusive, columns fastest.
   /// cp: X[16][K] then Y[16][K]; tucker: U[16][rank_x] then V[16][rank_y]; pca: [16][16][K], summed over both axes.
-  /// Elements are f32 if coefficient_type is f32; else i16 for cp and tucker (of 12-bit integers), i32 for pca.
+  /// Elements are i32, sums of integers of at most 2^20.
   const void* basis = nullptr;
   std::uint64_t basis_count = 0;
   /// Coefficients of each cluster, [slices][rowElements()]. A row has the wide columns first. With i8, bytes of two narrow
@@ -122,6 +122,9 @@ struct NdfCp {
 
   GLINT_HD constexpr int placeWords() const { return (places + 63) / 64; }
 };
+
+/// Bytes of an element of NdfCp::basis.
+inline constexpr int kBasisElementBytes = 4;
 
 /// Elements after the last row of NdfCp::coefficients.
 inline constexpr int kRowPadding = 16;

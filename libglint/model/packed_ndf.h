@@ -91,8 +91,5 @@ GLINT_HD constexpr int pixelBytes(BlockPrecision precision) { return precision =
 GLINT_HD constexpr int coefficientBytes(CoefficientType type) {
   return type == CoefficientType::i8 ? 1 : type == CoefficientType::f16 ? 2 : 4;
 }
-GLINT_HD constexpr int basisBytes(CompressionMethod method, CoefficientType type) {
-  return type == CoefficientType::f32 || method == CompressionMethod::pca ? 4 : 2;
-}
 
 }  // namespace glint

@@ -1,7 +1,9 @@
 """glint-compress as a pipeline runs it."""
 
 import json
+import math
 import pathlib
+import random
 
 import pytest
 
@@ -10,16 +12,52 @@ SAMPLES = pathlib.Path(__file__).parents[2] / "data-samples"
 
 @pytest.mark.parametrize("tolerance", [0.05, 0.025, 0.012])
 @pytest.mark.parametrize("sample", ["scratches_256", "brushed_256"])
-def test_every_level_meets_a_tolerance(glint, sample, tolerance):
+def test_every_level_meets_a_tolerance_of_the_relative_error(glint, sample, tolerance):
     glint("ingest", SAMPLES / f"{sample}.png", "-o", "map.glint")
     glint("pyramid", "map.glint", "-o", "map.pyramid.glint")
-    process = glint("compress", "map.pyramid.glint", "-o", "map.cp.glint", "--method", "tucker", "--tolerance", tolerance, "--json")
+    process = glint("compress", "map.pyramid.glint", "-o", "map.cp.glint", "--method", "tucker", "--tolerance", tolerance, "--metric", "l2", "--json")
     assert process.returncode == 0, process.stderr
     result = json.loads(process.stdout)["result"]
-    assert 0.98 * tolerance <= result["total"]["rel_l2"] <= tolerance
+    assert 0.97 * tolerance <= result["total"]["rel_l2"] <= tolerance
     *own, third, mean = result["levels"]
     assert len(own) == 2, "each is a group of its own"
     for level in own:
         assert level["rel_l2"] <= tolerance
     # The third level shares a group with the mean of the map, whose single image is easier.
     assert mean["rel_l2"] <= third["rel_l2"] <= 1.1 * tolerance
+
+
+@pytest.mark.parametrize("method", ["tucker", "pca"])
+@pytest.mark.parametrize("sample", ["scratches_256", "brushed_256"])
+def test_every_level_meets_a_tolerance_of_the_seen_error(glint, sample, method):
+    glint("ingest", SAMPLES / f"{sample}.png", "-o", "map.glint")
+    glint("pyramid", "map.glint", "-o", "map.pyramid.glint")
+    process = glint("compress", "map.pyramid.glint", "-o", "map.cp.glint", "--method", method, "--tolerance", "0.1", "--json")
+    assert process.returncode == 0, process.stderr
+    result = json.loads(process.stdout)["result"]
+    assert 0.09 <= result["total"]["seen"] <= 0.1
+    for level in result["levels"]:
+        assert level["seen"] <= 0.1
+
+
+def test_dim_light_of_scratches_is_kept(glint):
+    """1,500 random places, half vectors on the circle |h| = .2: light that is dim beside the peak. It was lost at --tolerance 0.1."""
+    glint("synth", "scratches", "--size", "1024", "--seed", "3", "-o", "s.png")
+    glint("ingest", "s.png", "-o", "s.glint")
+    glint("pyramid", "s.glint", "-o", "p.glint")
+    glint("compress", "p.glint", "-o", "c.glint", "--method", "tucker", "--tolerance", "0.1")
+    rng = random.Random(1)
+    rows = ["u,v,sigma,hx,hy"]
+    for _ in range(1500):
+        angle = rng.uniform(0, 2 * math.pi)
+        rows.append(f"{rng.random()},{rng.random()},28,{0.2 * math.cos(angle)},{0.2 * math.sin(angle)}")
+    (glint.folder / "rows.csv").write_text("\n".join(rows) + "\n")
+    answers = []
+    for asset in ("p.glint", "c.glint"):
+        process = glint("query", asset, "--csv", "rows.csv", "-o", f"{asset}.csv")
+        assert process.returncode == 0, process.stderr
+        answers.append([float(line.split(",")[-1]) for line in (glint.folder / f"{asset}.csv").read_text().splitlines()[1:]])
+    exact, compressed = answers
+    error = math.sqrt(sum((a - b) ** 2 for a, b in zip(exact, compressed)) / sum(a * a for a in exact))
+    assert error <= 0.1
+    assert sum(compressed) == pytest.approx(sum(exact), rel=0.1)

@@ -126,7 +126,6 @@ void forEachSpoiledModel(float bad, std::uint16_t bad_half, Visitor&& visitor) {
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     for (const auto type : {CoefficientType::i8, CoefficientType::f16, CoefficientType::f32}) {
       auto compressed = test::sampleNdfCp(kSize, method, type);
-      spoil(compressed.basis_f32, bad);
       spoil(compressed.coefficients_f32, bad);
       spoil(compressed.coefficients_f16, bad_half);
       visitor(CpNdf(compressed.ndf), "CpNdf");

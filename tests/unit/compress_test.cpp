@@ -7,7 +7,10 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <random>
+#include <vector>
 
+#include "glint/bake/common/seen_error.h"
 #include "glint/model/error.h"
 #include "unit/compress_fixture.h"
 #include "unit/compress_reference.h"
@@ -40,6 +43,7 @@ CompressionOptions options(CompressionMethod method, CoefficientType type = Coef
   o.coefficient_type = type;
   o.rank = rank;
   o.regions = regions;
+  o.metric = ErrorMetric::l2;
   return o;
 }
 
@@ -161,6 +165,94 @@ TEST(Compress, MeetsAToleranceAndIsNotFarBelowIt) {
   }
 }
 
+/// Seen error of each level of decoded data, by the slow decoder. Negative pixels count as 0, and images integrate to 1.
+std::vector<SeenSummary> seenErrors(const NdfPyramid& pyramid, const NdfCp& compressed) {
+  std::vector<SeenSummary> result;
+  for (int l = 0; l < pyramid.shape.level_count; ++l) {
+    SeenError error(pyramid.shape.resolution);
+    for (std::size_t i = 0; i < pyramid.shape.levels[l].imageCount(); ++i) {
+      const auto expected = test::storedImage(pyramid, l, i);
+      const auto decoded = test::decodeImage(compressed, compressed.first_image[l] + static_cast<std::uint32_t>(i));
+      std::vector<float> truth(expected.begin(), expected.end()), shown(decoded.size());
+      double sum = 0;
+      for (const double pixel : decoded) sum += std::max(0.0, pixel) * 4 / static_cast<double>(decoded.size());
+      for (std::size_t p = 0; p < decoded.size(); ++p) shown[p] = static_cast<float>(std::max(0.0, decoded[p]) / sum);
+      error.add(shown.data(), truth.data());
+    }
+    result.push_back(error.summary());
+  }
+  return result;
+}
+
+TEST(Compress, MeetsAToleranceOfTheSeenErrorInEveryLevel) {
+  constexpr double kTightness = 0.9;  // of the level that is nearest to the tolerance
+  PyramidShape shape = test::makeShape(128, 64, 16, 3);
+  shape.sigma_r = 0.03f;  // about a pixel
+  const TestPyramid noise = test::makePyramid(test::isotropicNoise(128, 0.2f, 1), shape),
+                    flakes = test::makePyramid(test::flakes(128, 5, 24, 2), shape);
+  for (const auto method : kMethods) {
+    for (const TestPyramid* pyramid : {&noise, &flakes}) {
+      auto o = options(method);
+      o.coefficient_type.reset();
+      o.metric = ErrorMetric::seen;
+      // The rank of cp ends at 64; and blocks of a few facets reach from 10,000 to nothing within a pixel.
+      o.tolerance = method == CompressionMethod::cp ? 0.4 : pyramid == &noise ? 0.1 : 0.3;
+      CompressionReport report;
+      const auto data = compressPyramid(pyramid->view(), o, &report);
+      const std::vector<SeenSummary> seen = seenErrors(pyramid->view(), data.view());
+      double most = 0;
+      for (std::size_t l = 0; l < seen.size(); ++l) {
+        EXPECT_LE(seen[l].seen, o.tolerance * 1.01) << "level " << l;
+        // The report counts errors of cells that are not lit, too.
+        EXPECT_GE(report.levels[l].seen.seen, seen[l].seen - 0.01 * o.tolerance);
+        EXPECT_LE(report.levels[l].seen.seen, seen[l].seen + 0.1 * o.tolerance);
+        // The report leaves out cells that only the decoded images light.
+        EXPECT_LE(report.levels[l].seen.worst, 1.02 * seen[l].worst + 1e-3);
+        EXPECT_LE(report.levels[l].seen.bias, 1.02 * seen[l].bias + 1e-3);
+        if (pyramid == &noise) EXPECT_NEAR(report.levels[l].seen.bias, seen[l].bias, 0.02 * seen[l].bias + 1e-3);
+        most = std::max(most, seen[l].seen);
+      }
+      EXPECT_GE(most, kTightness * o.tolerance);
+    }
+  }
+}
+
+TEST(Compress, KeepsDimLightThatARelativeErrorLoses) {
+  // A bright peak beside dim lobes, which differ from place to place.
+  PyramidShape shape = test::makeShape(128, 64, 16, 1);
+  shape.sigma_r = 0.02f;
+  TestPyramid pyramid;
+  pyramid.shape = shape;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> place(-0.4f, 0.4f);
+  for (int image = 0; image < 64; ++image) {
+    std::vector<float> pixels(64 * 64, 0.0f);
+    test::addLobe(pixels, 64, {0, 0}, 0.02f, 0.98f);
+    for (int k = 0; k < 4; ++k) test::addLobe(pixels, 64, {place(random), place(random)}, 0.06f, 0.005f);
+    pyramid.addImage(0, pixels);
+  }
+  auto o = options(CompressionMethod::tucker, CoefficientType::i8, 16, 1);
+  o.tolerance = 0.1;
+  const auto by_l2 = seenErrors(pyramid.view(), compressPyramid(pyramid.view(), o).view());
+  o.metric = ErrorMetric::seen;
+  const auto by_seen = seenErrors(pyramid.view(), compressPyramid(pyramid.view(), o).view());
+  EXPECT_GT(by_l2[0].seen, 0.8);
+  EXPECT_LE(by_seen[0].seen, 0.101);
+}
+
+TEST(Compress, TakesMoreBitsWhereAToleranceNeedsThem) {
+  CompressionOptions o;
+  o.metric = ErrorMetric::l2;
+  o.tolerance = 3e-4;
+  CompressionReport report;
+  compressPyramid(noise().view(), o, &report);
+  EXPECT_NE(report.coefficient_type, CoefficientType::i8);
+  EXPECT_LE(report.total.rel_l2, o.tolerance);
+  o.tolerance = 0.1;
+  compressPyramid(noise().view(), o, &report);
+  EXPECT_EQ(report.coefficient_type, CoefficientType::i8);
+}
+
 TEST(Compress, StoresTheErrorOfFixedRanksInAThirdOfTheBytes) {
   auto fixed = options(CompressionMethod::cp, CoefficientType::i8, 16, 8);
   CompressionReport cp;
@@ -273,7 +365,6 @@ TEST(Compress, ExactlyKeepsAnImageThatNeverChanges) {
       CompressionReport report;
       const auto data = compressPyramid(pyramid.view(), options(method, CoefficientType::i8, 16, 1), &report);
       EXPECT_EQ(data.clusters[0].columns, 1);
-      // The ramp 1..16 in integers up to 2047.
       EXPECT_LT(report.total.rel_l2, 1e-3);
     }
   }
@@ -347,7 +438,9 @@ TEST(Compress, PutsImagesInTheRegionOfTheirLevelAndCentre) {
   }
 }
 
-TEST(Compress, StoresIntegersOfTwelveBits) {
+TEST(Compress, StoresIntegersUpTo2To20) {
+  constexpr double kPeak = 1 << 20;
+
   for (const auto method : kMethods) {
     const auto data = compressPyramid(noise().view(), options(method));
     const NdfCp c = data.view();
@@ -358,7 +451,7 @@ TEST(Compress, StoresIntegersOfTwelveBits) {
         double largest = 0;
         for (int y = 0; y < kBlockSize; ++y)
           for (int x = 0; x < kBlockSize; ++x) largest = std::max(largest, std::abs(test::basisValue(c, cluster, k, x, y)));
-        EXPECT_EQ(largest, method == CompressionMethod::cp ? 2047.0 * 2047.0 : 2047.0);
+        EXPECT_EQ(largest, method == CompressionMethod::cp ? kPeak * kPeak : kPeak);
       }
     }
     EXPECT_EQ(checked > 0, method != CompressionMethod::tucker);

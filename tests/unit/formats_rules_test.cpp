@@ -616,9 +616,6 @@ std::vector<Fixture> dataFixtures() {
           [](const Patch& patch) { patch.change<float>("scales", 3, [](float& scale) { scale = kNan; }); }, true),
       patched(
           "compressed.factors", Base::compressed_f32,
-          [](const Patch& patch) { patch.change<float>("basis", 3, [](float& sum) { sum = kNan; }); }, true),
-      patched(
-          "compressed.factors", Base::compressed_f32,
           [](const Patch& patch) { patch.change<float>("coefficients", 3, [](float& c) { c = INFINITY; }); }, true),
       patched(
           "compressed.integral", Base::compressed,

@@ -70,6 +70,7 @@ const NdfCpData& compressedToTolerance(CompressionMethod method) {
     bake::CompressionOptions o;
     o.method = method;
     o.tolerance = 0.2;
+    o.metric = bake::ErrorMetric::l2;
     built[method] = bake::compressPyramid(pyramid().view(), o);
     int narrow = 0;
     for (const NdfCluster& cluster : built[method].clusters) narrow += cluster.narrow_columns;
@@ -89,6 +90,7 @@ const NdfCpData& ndfCpSpots() {
     p.levels = 3;
     bake::CompressionOptions o;
     o.tolerance = 0.3;
+    o.metric = bake::ErrorMetric::l2;
     bake::CompressionReport report;
     auto made = bake::compressPyramid(bake::buildPyramid(flakes.map(), p).view(), o, &report);
     EXPECT_GT(report.spot_slices, 0u);

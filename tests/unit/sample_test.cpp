@@ -318,6 +318,7 @@ TEST(Sample, OfSpotsAndNarrowColumnsFollowsTheDensity) {
   for (const auto& c : cases()) {
     bake::CompressionOptions o;
     o.tolerance = 0.3;
+    o.metric = bake::ErrorMetric::l2;
     bake::CompressionReport report;
     const NdfCpData data = bake::compressPyramid(c->pyramid.view(), o, &report);
     if (c->name == "flakes") {

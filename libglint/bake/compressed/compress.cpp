@@ -12,6 +12,7 @@
 #include <type_traits>
 
 #include "glint/bake/compressed/encode.h"
+#include "glint/bake/compressed/error_weights.h"
 #include "glint/bake/compressed/model.h"
 #include "glint/bake/compressed/ranks.h"
 #include "glint/bake/compressed/slices.h"
@@ -59,37 +60,70 @@ void checkRegions(const NdfPyramid& pyramid, int regions) {
                 fmt::format("give --regions of at most {}", most));
 }
 
+/// How an attempt to meet a tolerance stores coefficients and scales blocks (ErrorWeights).
+struct Attempt {
+  CoefficientType type;
+  double scale_range;
+};
+
+/// Attempts in turn, from few bytes to many. The wide range is best for most maps; the narrow range loses less to rounding.
+std::vector<Attempt> attemptsOf(const CompressionOptions& options) {
+  constexpr double kWide = 1e6, kNarrow = 1e3;
+  const CoefficientType first = options.coefficient_type.value_or(CoefficientType::i8);
+  if (!(options.tolerance > 0)) return {{first, kWide}};
+  std::vector<Attempt> attempts = {{first, kWide}, {first, kNarrow}};
+  if (!options.coefficient_type)
+    attempts.insert(attempts.end(), {{CoefficientType::f16, kNarrow}, {CoefficientType::f32, kNarrow}});
+  return attempts;
+}
+
 /// One run of compressPyramid(): its steps, and the data that they pass on.
 class Compressor {
  public:
-  Compressor(const NdfPyramid& pyramid, const CompressionOptions& options, const ProgressFn& progress)
+  Compressor(const NdfPyramid& pyramid, const CompressionOptions& options, const Attempt& attempt, const ProgressFn& progress)
       : pyramid_(pyramid),
         options_(options),
+        type_(attempt.type),
         index_(pyramid, regions(options), levelGroups(options)),
+        weights_(index_, options.metric, attempt.scale_range),
         groups_(index_.levelGroupCount()),
-        progress_(progress, 3 * index_.clusterCount()),
+        progress_(progress, 2 * index_.clusterCount()),
         statistics_(index_.clusterCount()),
+        bases_(index_.clusterCount()),
         encoded_(index_.clusterCount()),
         selection_(index_.clusterCount(), -1),
-        encoded_gains_(index_.clusterCount(), 0.0),
         image_scales_(index_.imageCount(), 1.0f),
-        density_scales_(index_.imageCount(), 0.0f) {}
+        density_scales_(index_.imageCount(), 1.0f) {}
 
-  NdfCpData run(CompressionReport* report) {
+  /// Chooses the sizes of all clusters and encodes them.
+  /// @return whether the tolerance is met
+  bool compress() {
     // Measure the clusters, and how much energy and how many slices each group of levels has.
-    forEachCluster([&](std::size_t c) { statistics_[c] = measureCluster(index_, c); });
+    forEachCluster([&](std::size_t c) { statistics_[c] = measureCluster(index_, weights_, c); });
     for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
       groupOf(c).energy += statistics_[c].energy;
       groupOf(c).slices += static_cast<std::uint64_t>(index_.sliceCount(c));
-      energy_ += statistics_[c].energy;
     }
     // Decompose all clusters, choose their sizes, and encode them.
     decompose();
-    if (options_.tolerance > 0) {
-      meetTolerance();
-    } else {
-      encode(std::vector<int>(index_.clusterCount(), 0));
-    }
+    if (options_.tolerance > 0) return meetTolerance();
+    // The first pass finds the scales of images, and the second measures errors with them.
+    for (int pass = 0; pass < 2; ++pass) encode(std::vector<int>(index_.clusterCount(), 0));
+    return true;
+  }
+
+  /// @throw Error failed, which names the smallest tolerance that can be met
+  [[noreturn]] void rejectTolerance() const {
+    double least = 0;
+    for (std::size_t g = 0; g < groups_.size(); ++g) least = std::max(least, groupError(g));
+    throw Error(ErrorCode::failed, "compress.tolerance", "", "",
+                fmt::format("the tolerance {} cannot be reached with this method and type of coefficient; the least error is "
+                            "{:.4g}",
+                            options_.tolerance, least),
+                "ask for a larger tolerance, or for coefficients of more bits");
+  }
+
+  NdfCpData result(CompressionReport* report) {
     NdfCpData data = pack();
     if (report) *report = makeReport(data);
     return data;
@@ -100,13 +134,22 @@ class Compressor {
   struct LevelGroup {
     double energy = 0;
     std::uint64_t slices = 0;
-    double gain_per_byte = 0;  ///< squared error that a byte must remove to be worth storing
+    double gain_per_byte = 0;  ///< weighted squared error that a byte must remove to be worth storing
   };
 
   std::size_t clustersPerGroup() const { return index_.clusterCount() / groups_.size(); }
   LevelGroup& groupOf(std::size_t cluster) { return groups_[cluster / clustersPerGroup()]; }
-  /// Squared error that a group may have.
-  double budget(const LevelGroup& group) const { return options_.tolerance * options_.tolerance * group.energy; }
+  int firstLevel(std::size_t group) const { return static_cast<int>(group); }
+  int endLevel(std::size_t group) const {
+    return group + 1 < groups_.size() ? static_cast<int>(group) + 1 : index_.levelCount();
+  }
+
+  /// Weighted squared error that a group may have.
+  double budget(const LevelGroup& group) const {
+    const auto g = static_cast<std::size_t>(&group - groups_.data());
+    const double whole = options_.metric == ErrorMetric::seen ? endLevel(g) - firstLevel(g) : group.energy;
+    return options_.tolerance * options_.tolerance * whole;
+  }
 
   static int regions(const CompressionOptions& options) {
     if (options.regions > 0) return options.regions;
@@ -114,8 +157,11 @@ class Compressor {
   }
 
   // The finest levels differ most from other levels and have most of the slices. Bases of tucker are small, so level groups can
-  // have bases of their own.
-  static int levelGroups(const CompressionOptions& options) { return options.method == CompressionMethod::tucker ? 3 : 1; }
+  // have bases of their own. A tolerance for the seen error holds in every level, and coarse levels need finer coefficients.
+  static int levelGroups(const CompressionOptions& options) {
+    if (options.tolerance > 0 && options.metric == ErrorMetric::seen) return 4;
+    return options.method == CompressionMethod::tucker ? 3 : 1;
+  }
 
   template <class Work>
   void forEachCluster(Work work) {
@@ -135,23 +181,29 @@ class Compressor {
       const LevelGroup& group = groupOf(c);
       const double share =
           static_cast<double>(index_.sliceCount(c)) / static_cast<double>(std::max<std::uint64_t>(1, group.slices));
-      models[c].emplace(index_, c, statistics_[c], options_, 0.0025 * budget(group) * share);
+      models[c].emplace(index_, weights_, c, statistics_[c], options_, type_,
+                        0.0025 * budget(group) * share * weights_.evenness(c));
     });
     models_.reserve(models.size());
     for (auto& model : models) models_.push_back(std::move(*model));
   }
 
-  /// Encodes every cluster whose choice changed, or whose group's gain per byte changed, and scales the images.
+  /// Encodes every cluster, and scales the images.
   void encode(const std::vector<int>& selection) {
-    forEachCluster([&](std::size_t c) {
-      const double gain_per_byte = groupOf(c).gain_per_byte;
-      if (selection[c] == selection_[c] && gain_per_byte == encoded_gains_[c]) return;
-      encoded_gains_[c] = gain_per_byte;
-      encoded_[c] = encodeCluster(index_, c, statistics_[c], models_[c].basis(selection[c]), options_.method,
-                                  options_.coefficient_type, pyramid_.value_scale, gain_per_byte);
-    });
+    progress_.grow(index_.clusterCount());
+    forEachCluster([&](std::size_t c) { encodeOne(c, selection[c]); });
     selection_ = selection;
     scaleImages();
+    measureLevels();
+  }
+
+  void encodeOne(std::size_t c, int choice) {
+    const bool keeps_bases = options_.method == CompressionMethod::cp;  // another decomposition would cost most of the time
+    std::optional<ClusterBasis>& kept = bases_[c];
+    if (choice != selection_[c] || !kept) kept = models_[c].basis(choice);
+    encoded_[c] = encodeCluster(index_, weights_, c, statistics_[c], *kept, options_.method, type_, groupOf(c).gain_per_byte,
+                                density_scales_);
+    if (!keeps_bases) kept.reset();
   }
 
   /// Finds the scale with which each image integrates to 1.
@@ -161,8 +213,8 @@ class Compressor {
     for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
       for (int s = 0; s < index_.sliceCount(c); ++s) {
         const std::uint32_t image = index_.image(index_.firstSlice(c) + s);
-        sums[image] += static_cast<double>(encoded_[c].slices[s].sum) * statistics_[c].peak;
-        positive[image] += static_cast<double>(encoded_[c].slices[s].positive) * statistics_[c].peak;
+        sums[image] += static_cast<double>(encoded_[c].errors.slices[s].sum) * statistics_[c].peak;
+        positive[image] += static_cast<double>(encoded_[c].errors.slices[s].positive) * statistics_[c].peak;
       }
     }
     const double pixel = 2.0 / pyramid_.shape.resolution;
@@ -177,25 +229,73 @@ class Compressor {
     }
   }
 
-  /// Squared error of a slice as a reader decodes it: with the scale of its image.
-  double sliceError(std::size_t cluster, int slice) const {
-    // slice - scale decoded = (slice - decoded) + (1 - scale) decoded
-    const SliceError& e = encoded_[cluster].slices[slice];
-    const double rest = 1.0 - image_scales_[index_.image(index_.firstSlice(cluster) + slice)];
-    const double peak = statistics_[cluster].peak;
-    return std::max(0.0, e.error + 2 * rest * e.cross + rest * rest * e.power) * peak * peak;
+  /// Errors of one level.
+  struct LevelErrors {
+    double error = 0;   ///< sum over pixels of (D' - D)^2, stored units
+    double energy = 0;  ///< sum over pixels of D^2, stored units
+    SeenSummary seen;   ///< of densities
+  };
+
+  /// Measures the errors of all levels, with the scales of images.
+  void measureLevels() {
+    level_errors_.assign(index_.levelCount(), {});
+    std::vector<double> seen2(index_.levelCount(), 0.0);
+    for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
+      const double peak2 = static_cast<double>(statistics_[c].peak) * statistics_[c].peak;
+      for (int s = 0; s < index_.sliceCount(c); ++s) {
+        const SliceError& e = encoded_[c].errors.slices[s];
+        const std::uint32_t image = index_.image(index_.firstSlice(c) + s);
+        const int level = index_.level(image);
+        level_errors_[level].error += e.plain.at(image_scales_[image]) * peak2;
+        level_errors_[level].energy += e.plain.at(0) * peak2;
+        seen2[level] += e.seen.at(density_scales_[image] / e.seen_scale) * peak2;
+      }
+    }
+    for (int level = 0; level < index_.levelCount(); ++level) {
+      measureCells(level);
+      if (options_.metric == ErrorMetric::seen) level_errors_[level].seen.seen = std::sqrt(seen2[level]);
+    }
   }
 
-  /// Squared error of the clusters of a group.
-  double groupError(std::size_t group) const {
-    double sum = 0;
-    for (std::size_t c = group * clustersPerGroup(); c < (group + 1) * clustersPerGroup(); ++c)
-      for (int s = 0; s < index_.sliceCount(c); ++s) sum += sliceError(c, s);
-    return sum;
+  /// Measures the bias and the worst error of the cells of a level; with ErrorMetric::l2 the seen error, too.
+  void measureCells(int level) {
+    const auto blocks = static_cast<std::size_t>(index_.blockCount());
+    const int cells = weights_.cellCount();
+    const double pixels = static_cast<double>(index_.levelImages(level)) * weights_.cellPixels() * weights_.cellPixels();
+    SeenSummary& seen = level_errors_[level].seen;
+    double squares = 0, lit = 0;
+    for (std::size_t block = 0; block < blocks; ++block) {
+      for (int k = 0; k < cells; ++k) {
+        const CellDensity& truth = weights_.cells(level, block)[k];
+        if (!truth.lit) continue;
+        double sum = 0, error = 0;
+        for (std::size_t c = block; c < index_.clusterCount(); c += blocks) {
+          sum += encoded_[c].errors.cell_sums[static_cast<std::size_t>(level) * cells + k];
+          error += encoded_[c].errors.cell_errors[static_cast<std::size_t>(level) * cells + k];
+        }
+        const double e2 = error / pixels / truth.seenSquare();
+        ++lit;
+        squares += e2;
+        seen.worst = std::max(seen.worst, std::sqrt(e2));
+        seen.bias = std::max(seen.bias, std::abs(sum / pixels - truth.mean) / truth.seenMean());
+      }
+    }
+    seen.seen = lit > 0 ? std::sqrt(squares / lit) : 0;
+  }
+
+  /// Error of a group that its budget bounds.
+  double measuredError(std::size_t group) const {
+    double sum = 0, most = 0;
+    for (int level = firstLevel(group); level < endLevel(group); ++level) {
+      sum += level_errors_[level].error;
+      most = std::max(most, level_errors_[level].seen.seen);
+    }
+    return options_.metric == ErrorMetric::seen ? (endLevel(group) - firstLevel(group)) * most * most : sum;
   }
 
   /// Searches the smallest choices of all clusters with which every group meets the tolerance, and encodes them.
-  void meetTolerance() {
+  /// @return whether every group meets the tolerance
+  bool meetTolerance() {
     std::vector<ToleranceSearch> searches;
     for (std::size_t g = 0; g < groups_.size(); ++g) {
       std::vector<std::span<const SizeChoice>> clusters;
@@ -209,26 +309,23 @@ class Compressor {
         selection.insert(selection.end(), searches[g].selection().begin(), searches[g].selection().end());
         if (options_.method != CompressionMethod::cp) groups_[g].gain_per_byte = searches[g].gainPerByte();
       }
-      progress_.grow(index_.clusterCount());
       encode(selection);
     };
     for (bool searching = true; searching;) {
       encodeChosen();
       searching = false;
-      for (std::size_t g = 0; g < groups_.size(); ++g) searching |= searches[g].next(groupError(g));
+      for (std::size_t g = 0; g < groups_.size(); ++g) searching |= searches[g].next(measuredError(g));
     }
     encodeChosen();
-    for (std::size_t g = 0; g < groups_.size(); ++g) requireMet(g);
+    bool met = true;
+    for (std::size_t g = 0; g < groups_.size(); ++g) met &= measuredError(g) <= budget(groups_[g]);
+    return met;
   }
 
-  void requireMet(std::size_t group) const {
-    const double error = groupError(group);
-    if (error <= budget(groups_[group])) return;
-    throw Error(ErrorCode::failed, "compress.tolerance", "", "",
-                "the tolerance " + fmt::format("{}", options_.tolerance) +
-                    " cannot be reached with this method and type of coefficient; the least error is " +
-                    fmt::format("{:.4g}", std::sqrt(error / groups_[group].energy)),
-                "ask for a larger tolerance, or for coefficients of more bits");
+  /// Error of a group that the tolerance bounds.
+  double groupError(std::size_t group) const {
+    const double bound = budget(groups_[group]);
+    return bound > 0 ? options_.tolerance * std::sqrt(measuredError(group) / bound) : 0;
   }
 
   /// Puts the encoded clusters into the arrays of NdfCp.
@@ -236,18 +333,17 @@ class Compressor {
     NdfCpData data;
     index_.describe(data);
     data.header.method = options_.method;
-    data.header.coefficient_type = options_.coefficient_type;
+    data.header.coefficient_type = type_;
     data.image_scales = image_scales_;
     data.density_scales = density_scales_;
     numberBlocks(data);
     const std::size_t blocks = pyramid_.shape.blocksPerImage();
     for (int region = 0; region < index_.regionCount(); ++region)
       for (const std::uint16_t block : data.place_blocks) packCluster(region, region * blocks + block, data);
-    data.coefficients.resize(data.coefficients.size() +
-                             static_cast<std::size_t>(kRowPadding) * coefficientElementBytes(options_.coefficient_type));
+    data.coefficients.resize(data.coefficients.size() + static_cast<std::size_t>(kRowPadding) * coefficientElementBytes(type_));
     packBlockMasses(data);
     if (std::any_of(encoded_.begin(), encoded_.end(), [](const EncodedCluster& e) { return e.spots > 0; }))
-      data.spot_sums = SpotFinder(index_.sigmaPixels()).sums();
+      data.spot_sums = spotSums(index_.sigmaPixels());
     return data;
   }
 
@@ -268,12 +364,11 @@ class Compressor {
   /// Appends one cluster: its record, factors and mask.
   void packCluster(int region, std::size_t c, NdfCpData& data) {
     const EncodedCluster& e = encoded_[c];
-    const int coefficient_bytes = coefficientElementBytes(options_.coefficient_type);
+    const int coefficient_bytes = coefficientElementBytes(type_);
     // A reader loads 32-bit numbers of spots, so they begin at a multiple of four bytes.
     if (e.spots > 0) data.coefficients.resize((data.coefficients.size() + 3) / 4 * 4);
     NdfCluster cluster;
-    cluster.first_basis =
-        static_cast<std::uint32_t>(data.basis.size() / basisElementBytes(options_.method, options_.coefficient_type));
+    cluster.first_basis = static_cast<std::uint32_t>(data.basis.size() / kBasisElementBytes);
     cluster.first_coefficient = data.coefficients.size() / coefficient_bytes;
     cluster.first_scale = static_cast<std::uint32_t>(data.scales.size());
     cluster.first_word = static_cast<std::uint32_t>(data.masks.size());
@@ -315,7 +410,7 @@ class Compressor {
       for (const std::uint32_t s : encoded_[c].kept) {
         const std::size_t image = index_.image(index_.firstSlice(c) + s);
         masses[image * places + data.block_places[c % blocks]] =
-            static_cast<float>(unit * encoded_[c].slices[s].positive * density_scales_[image]) * kRounding;
+            static_cast<float>(unit * encoded_[c].errors.slices[s].positive * density_scales_[image]) * kRounding;
       }
     }
     data.block_masks.assign(images * words, 0);
@@ -332,7 +427,8 @@ class Compressor {
 
   CompressionReport makeReport(const NdfCpData& data) const {
     CompressionReport report;
-    measureLevels(data, report);
+    report.coefficient_type = type_;
+    reportLevels(report);
     measureBytes(data, report);
     report.unscaled_images = unscaled_images_;
     for (const EncodedCluster& e : encoded_) {
@@ -348,29 +444,19 @@ class Compressor {
     return report;
   }
 
-  void measureLevels(const NdfCpData& data, CompressionReport& report) const {
-    const int levels = pyramid_.shape.level_count;
-    const std::uint32_t* first = data.header.first_image;
-    std::vector<double> errors(levels, 0.0);
-    std::vector<double> energies(levels, 0.0);
-    report.levels.resize(levels);
-    for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
-      const double peak = statistics_[c].peak;
-      for (int s = 0; s < index_.sliceCount(c); ++s) {
-        const std::uint32_t image = index_.image(index_.firstSlice(c) + s);
-        const auto level = std::upper_bound(first, first + levels, image) - first - 1;
-        const SliceError& e = encoded_[c].slices[s];
-        ++report.levels[level].slices;
-        errors[level] += sliceError(c, s);
-        energies[level] += (static_cast<double>(e.error) + 2.0 * e.cross + e.power) * peak * peak;
-      }
+  void reportLevels(CompressionReport& report) const {
+    double error = 0, energy = 0;
+    for (const LevelErrors& e : level_errors_) {
+      report.levels.push_back({0, e.energy > 0 ? std::sqrt(e.error / e.energy) : 0, e.seen});
+      error += e.error;
+      energy += e.energy;
+      SeenSummary& most = report.total.seen;
+      most = {std::max(most.seen, e.seen.seen), std::max(most.worst, e.seen.worst), std::max(most.bias, e.seen.bias)};
     }
-    double error = 0;
-    for (int l = 0; l < levels; ++l) {
-      report.levels[l].rel_l2 = energies[l] > 0 ? std::sqrt(errors[l] / energies[l]) : 0;
-      error += errors[l];
-    }
-    report.total = {index_.totalSlices(), energy_ > 0 ? std::sqrt(error / energy_) : 0};
+    for (std::uint64_t slice = 0; slice < index_.totalSlices(); ++slice)
+      ++report.levels[index_.level(index_.image(slice))].slices;
+    report.total.slices = index_.totalSlices();
+    report.total.rel_l2 = energy > 0 ? std::sqrt(error / energy) : 0;
   }
 
   void measureBytes(const NdfCpData& data, CompressionReport& report) const {
@@ -398,15 +484,17 @@ class Compressor {
 
   const NdfPyramid& pyramid_;
   const CompressionOptions& options_;
+  CoefficientType type_;
   SliceIndex index_;
+  ErrorWeights weights_;
   std::vector<LevelGroup> groups_;
   ProgressCounter progress_;
   std::vector<ClusterStatistics> statistics_;
-  double energy_ = 0;
   std::vector<ClusterModel> models_;
+  std::vector<std::optional<ClusterBasis>> bases_;  // [clusters], cp: the bases of selection_
   std::vector<EncodedCluster> encoded_;
+  std::vector<LevelErrors> level_errors_;
   std::vector<int> selection_;
-  std::vector<double> encoded_gains_;  // [clusters]: gain_per_byte with which the cluster was encoded
   std::vector<float> image_scales_;
   std::vector<float> density_scales_;
   std::uint64_t unscaled_images_ = 0;
@@ -429,18 +517,13 @@ NdfCp NdfCpData::view() const {
   v.masks = masks;
   v.mask_ranks = mask_ranks;
   v.basis = basis.data();
-  v.basis_count = basis.size() / basisElementBytes(header.method, header.coefficient_type);
+  v.basis_count = basis.size() / kBasisElementBytes;
   v.coefficients = coefficients.data();
   v.coefficient_count = coefficients.size() / coefficientElementBytes(header.coefficient_type);
   v.scales = scales;
   v.core = core;
   v.spot_sums = spot_sums;
   return v;
-}
-
-int basisElementBytes(CompressionMethod method, CoefficientType type) {
-  if (type == CoefficientType::f32) return sizeof(float);
-  return method == CompressionMethod::pca ? sizeof(std::int32_t) : sizeof(std::int16_t);
 }
 
 int coefficientElementBytes(CoefficientType type) {
@@ -451,7 +534,12 @@ NdfCpData compressPyramid(const NdfPyramid& pyramid, const CompressionOptions& o
                           const ProgressFn& progress) {
   checkOptions(options);
   checkRegions(pyramid, options.regions);
-  return Compressor(pyramid, options, progress).run(report);
+  const std::vector<Attempt> attempts = attemptsOf(options);
+  for (std::size_t k = 0;; ++k) {
+    Compressor compressor(pyramid, options, attempts[k], progress);
+    if (compressor.compress()) return compressor.result(report);
+    if (k + 1 == attempts.size()) compressor.rejectTolerance();
+  }
 }
 
 }  // namespace glint::bake

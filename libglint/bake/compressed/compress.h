@@ -2,13 +2,21 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "glint/bake/common/progress.h"
+#include "glint/bake/common/seen_error.h"
 #include "glint/model/ndf_cp.h"
 #include "glint/model/ndf_pyramid.h"
 
 namespace glint::bake {
+
+/// The error that compressPyramid() makes small.
+enum class ErrorMetric : std::uint8_t {
+  seen,  ///< the seen error (SeenError) of each level
+  l2,    ///< the relative error of all images together, ||D' - D|| / ||D||. Peaks hide all other densities
+};
 
 /// How compressPyramid() compresses.
 struct CompressionOptions {
@@ -17,19 +25,27 @@ struct CompressionOptions {
   /// Columns of every cluster, 1..256. A cluster that is exact with fewer columns has fewer. Not used with a tolerance.
   int rank = 16;
 
-  /// If > 0: chooses the columns of every cluster, and with i8 the bits of their coefficients (8 or 4; cp: 8). The relative
-  /// error of all images together, ||D' - D|| / ||D||, is then at most this, and the bytes are as few as possible. With tucker,
-  /// the errors of level 0, of level 1, and of all coarser levels together are each at most this. One bound for all levels
-  /// would leave the error to levels in which a byte removes least of it, such as the coarse levels of flakes. Below 1.
+  /// If > 0: chooses the columns of every cluster, and with i8 the bits of their coefficients (8 or 4; cp: 8), so that the error
+  /// of the metric is at most this in as few bytes as possible. Below 1.
+  ///
+  /// With ErrorMetric::seen, the seen error of every level is at most this. The bias is reported and not bounded: it is large
+  /// towards half vectors that few places reflect to, where the error of columns is a haze (its negative part is cut).
+  /// With ErrorMetric::l2 the error of all images together is at most this; with tucker, the errors of level 0, of level 1, and
+  /// of all coarser levels together each are. One bound for all levels would leave the error to levels in which a byte removes
+  /// least of it, such as the coarse levels of flakes.
   double tolerance = 0;
+
+  ErrorMetric metric = ErrorMetric::seen;
 
   /// Stores the slices of a cluster as spots where spots take fewer bytes. Needs a tolerance, tucker or pca, and i8.
   bool spots = true;
 
-  CoefficientType coefficient_type = CoefficientType::i8;
+  /// Without a value: i8; where a tolerance cannot be met with i8, f16; where it cannot be met with f16, f32.
+  std::optional<CoefficientType> coefficient_type;
 
   /// Regions along each axis of the map, 1..255. 0: the default of the method, 8 for cp (Deng 2022, section 4.2) and 1
-  /// otherwise. With tucker, level 0 and level 1 have regions of their own, and all coarser levels share theirs.
+  /// otherwise. With tucker, level 0 and level 1 have regions of their own, and all coarser levels share theirs. With a
+  /// tolerance for the seen error, level 2 has regions of its own, too, whatever the method.
   int regions = 0;
 
   double min_improvement = 1e-4;  ///< cp: the search ends when a sweep improves the relative error of a cluster by less, >= 0
@@ -40,10 +56,14 @@ struct CompressionOptions {
 struct CompressionLevelReport {
   std::uint64_t slices = 0;  ///< blocks that the pyramid stores
   double rel_l2 = 0;  ///< ||D' - D|| / ||D|| over the pixels of these slices, D' as a reader decodes it; 0 for an empty level
+  /// Seen error of the densities, over all images of the level and the cells that they light; of all levels: the largest. Errors
+  /// of cells that only the decoded images light count in `seen.seen` and not in the others.
+  SeenSummary seen;
 };
 
 /// Errors and bytes that compressPyramid() reached. Bytes are sizes of arrays, without the overhead of a file.
 struct CompressionReport {
+  CoefficientType coefficient_type = CoefficientType::i8;
   std::vector<CompressionLevelReport> levels;
   CompressionLevelReport total;
   std::uint64_t basis_bytes = 0;
@@ -85,9 +105,6 @@ class NdfCpData {
   /// @return spans over the arrays; valid while this object lives and is not changed
   NdfCp view() const;
 };
-
-/// @return bytes of one element of NdfCp::basis
-int basisElementBytes(CompressionMethod method, CoefficientType type);
 
 /// @return bytes of one element of NdfCp::coefficients
 int coefficientElementBytes(CoefficientType type);

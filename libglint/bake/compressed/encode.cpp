@@ -5,22 +5,22 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 
 #include "glint/bake/compressed/kernels.h"
 #include "glint/bake/compressed/quantize.h"
+#include "glint/math/float4.h"
 #include "glint/query/detail/pyramid/block_mass.h"
 
 namespace glint::bake {
 namespace {
 
-// Largest integer of a quantised basis. 12 bits with the sign, so that the prefix sums of 16 integers fit 16 bits.
-constexpr float kBasisPeak = 2047;
+// Largest integer of a quantised basis: sums of 16 integers are exact in floats, and sums of 256 fit 32 bits. A block can hold
+// densities that differ by a factor of 10,000, and the smallest need some digits, too.
+constexpr float kBasisPeak = 0x1p20f;
 
 // Ridge of the least squares for coefficients, relative to the mean square norm of a basis image. Without it, nearly parallel
 // columns of cp would get large coefficients of opposite signs, whose quantisation costs more accuracy than the ridge does.
 constexpr double kCpRidge = 1e-3;
-constexpr double kOrthogonalRidge = 1e-9;
 
 template <class T>
 void append(std::vector<std::byte>& bytes, T value) {
@@ -31,67 +31,62 @@ void append(std::vector<std::byte>& bytes, T value) {
 
 /// Quantised functions of a basis: along one axis, or images.
 struct QuantizedFactor {
-  std::vector<float> values;  // [rows][columns]: integers, or for f32 numbers up to 1
+  std::vector<float> values;  // [rows][columns]: integers
   std::vector<float> scales;  // [columns]: value = scale * stored
 };
 
-/// Scales each column so that its largest magnitude is kBasisPeak and rounds it to integers, or for f32 scales it to 1.
-QuantizedFactor quantizeFactor(const std::vector<float>& factor, int rows, int columns, bool integers) {
+/// Scales each column so that its largest magnitude is kBasisPeak and rounds it to integers.
+QuantizedFactor quantizeFactor(const std::vector<float>& factor, int rows, int columns) {
   QuantizedFactor result{factor, std::vector<float>(columns, 0.0f)};
   for (int k = 0; k < columns; ++k) {
     float peak = 0;
     for (int i = 0; i < rows; ++i) peak = std::max(peak, std::abs(factor[i * columns + k]));
     if (!(peak > 0)) continue;
-    const float scale = integers ? peak / kBasisPeak : peak;
+    const float scale = peak / kBasisPeak;
     result.scales[k] = scale;
     for (int i = 0; i < rows; ++i) {
-      const float value = factor[i * columns + k] / scale;
-      result.values[i * columns + k] = integers ? std::round(value) : value;
+      result.values[i * columns + k] = std::round(factor[i * columns + k] / scale);
     }
   }
   return result;
 }
 
-/// Writes the prefix sums of [16][columns] along the first axis as elements of type T, and replaces the values by the
+/// Writes the prefix sums of [16][columns] along the first axis and replaces the values by the
 /// differences of these sums, as a reader decodes them.
-template <class T>
 void writePrefixSums(std::vector<float>& values, int columns, std::vector<std::byte>& bytes) {
   std::vector<double> sums(columns, 0.0);
-  std::vector<float> before(columns, 0.0f);
+  std::vector<std::int32_t> before(columns, 0);
   for (int i = 0; i < kBlockSize; ++i) {
     for (int k = 0; k < columns; ++k) {
       sums[k] += values[i * columns + k];
-      const T stored = static_cast<T>(sums[k]);
+      const auto stored = static_cast<std::int32_t>(sums[k]);
       append(bytes, stored);
-      values[i * columns + k] = static_cast<float>(stored) - before[k];
-      before[k] = static_cast<float>(stored);
+      values[i * columns + k] = differenceOf(stored, before[k]);
+      before[k] = stored;
     }
   }
 }
 
 /// Writes the sums of images [16][16][columns] over the pixels below and left of each pixel, and replaces the values by the
 /// differences of these sums, as a reader decodes them.
-template <class T>
 void writeAreaSums(std::vector<float>& values, int columns, std::vector<std::byte>& bytes) {
   std::vector<double> above(static_cast<std::size_t>(kBlockSize) * columns, 0.0);
-  std::vector<float> stored_above(static_cast<std::size_t>(kBlockSize) * columns, 0.0f);
+  std::vector<std::int32_t> stored_above(static_cast<std::size_t>(kBlockSize) * columns, 0);
   for (int y = 0; y < kBlockSize; ++y) {
     std::vector<double> row(columns, 0.0);
-    std::vector<float> left(columns, 0.0f);
-    std::vector<float> diagonal(columns, 0.0f);
+    std::vector<std::int32_t> left(columns, 0);
+    std::vector<std::int32_t> diagonal(columns, 0);
     for (int x = 0; x < kBlockSize; ++x) {
       for (int k = 0; k < columns; ++k) {
         float& value = values[(y * kBlockSize + x) * columns + k];
         const int i = x * columns + k;
         row[k] += value;
         above[i] += row[k];
-        const T stored = static_cast<T>(above[i]);
+        const auto stored = static_cast<std::int32_t>(above[i]);
         append(bytes, stored);
-        const float sum = static_cast<float>(stored);
-        value = (sum - left[k]) - (stored_above[i] - diagonal[k]);
+        value = differenceOf(stored, left[k]) - differenceOf(stored_above[i], diagonal[k]);
         diagonal[k] = stored_above[i];
-        left[k] = sum;
-        stored_above[i] = sum;
+        left[k] = stored_above[i] = stored;
       }
     }
   }
@@ -101,7 +96,7 @@ void writeAreaSums(std::vector<float>& values, int columns, std::vector<std::byt
 struct DecodedBasis {
   int columns = 0;
   int stride = 0;             // columns with padding
-  std::vector<float> images;  // [columns][256]
+  std::vector<float> images;  // [columns][256], in the scaled domain
   std::vector<float> dual;    // [256][stride]: coefficients = slice * dual
   std::vector<float> scales;  // [columns]: value of a stored 1
 };
@@ -116,40 +111,45 @@ void appendProduct(const QuantizedFactor& x, int rank_x, int a, const QuantizedF
 }
 
 /// Computes dual = images^T (images images^T + ridge)^-1: regularised least squares for the coefficients of any slice.
-void solveDual(DecodedBasis& basis, double ridge) {
+void solveDual(DecodedBasis& basis) {
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   const Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> images(
       basis.images.data(), basis.columns, kBlockPixels);
   const Matrix rows = images.cast<double>();
   Matrix gram = rows * rows.transpose();
   // The second term keeps a basis of zeros solvable.
-  gram.diagonal().array() += ridge * gram.trace() / basis.columns + 1e-30;
+  gram.diagonal().array() += kCpRidge * gram.trace() / basis.columns + 1e-30;
   const Matrix solved = gram.llt().solve(rows);
-  basis.stride = paddedColumns(basis.columns);
-  basis.dual.assign(static_cast<std::size_t>(kBlockPixels) * basis.stride, 0.0f);
   for (int k = 0; k < basis.columns; ++k)
     for (int p = 0; p < kBlockPixels; ++p) basis.dual[p * basis.stride + k] = static_cast<float>(solved(k, p));
 }
 
+/// The same for orthogonal images: each divided by its power.
+void transposeOrthogonal(DecodedBasis& basis) {
+  for (int k = 0; k < basis.columns; ++k) {
+    const float* image = basis.images.data() + static_cast<std::size_t>(k) * kBlockPixels;
+    double power = 1e-30;
+    for (int p = 0; p < kBlockPixels; ++p) power += static_cast<double>(image[p]) * image[p];
+    for (int p = 0; p < kBlockPixels; ++p) basis.dual[p * basis.stride + k] = static_cast<float>(image[p] / power);
+  }
+}
+
 /// Quantises the basis, writes it to `bytes`, and decodes it again.
-DecodedBasis encodeBasis(const ClusterBasis& basis, CompressionMethod method, CoefficientType type,
+DecodedBasis encodeBasis(const ClusterBasis& basis, const BlockScale& scale, CompressionMethod method,
                          std::vector<std::byte>& bytes) {
-  const bool integers = type != CoefficientType::f32;
   DecodedBasis out;
   if (method == CompressionMethod::pca) {
-    QuantizedFactor images = quantizeFactor(basis.x, kBlockPixels, basis.rank_x, integers);
-    integers ? writeAreaSums<std::int32_t>(images.values, basis.rank_x, bytes)
-             : writeAreaSums<float>(images.values, basis.rank_x, bytes);
+    QuantizedFactor images = quantizeFactor(basis.x, kBlockPixels, basis.rank_x);
+    writeAreaSums(images.values, basis.rank_x, bytes);
     out.scales = images.scales;
     for (int k = 0; k < basis.rank_x; ++k)
       for (int p = 0; p < kBlockPixels; ++p) out.images.push_back(images.scales[k] * images.values[p * basis.rank_x + k]);
   } else {
     const int rank_y = basis.rank_y;
-    QuantizedFactor x = quantizeFactor(basis.x, kBlockSize, basis.rank_x, integers);
-    QuantizedFactor y = quantizeFactor(basis.y, kBlockSize, rank_y, integers);
-    integers ? writePrefixSums<std::int16_t>(x.values, basis.rank_x, bytes)
-             : writePrefixSums<float>(x.values, basis.rank_x, bytes);
-    integers ? writePrefixSums<std::int16_t>(y.values, rank_y, bytes) : writePrefixSums<float>(y.values, rank_y, bytes);
+    QuantizedFactor x = quantizeFactor(basis.x, kBlockSize, basis.rank_x);
+    QuantizedFactor y = quantizeFactor(basis.y, kBlockSize, rank_y);
+    writePrefixSums(x.values, basis.rank_x, bytes);
+    writePrefixSums(y.values, rank_y, bytes);
     for (const ClusterColumn& column : basis.columns) {
       const bool tucker = method == CompressionMethod::tucker;
       appendProduct(x, basis.rank_x, tucker ? column.index % kBlockSize : column.index, y, rank_y,
@@ -157,18 +157,24 @@ DecodedBasis encodeBasis(const ClusterBasis& basis, CompressionMethod method, Co
     }
   }
   out.columns = static_cast<int>(out.scales.size());
-  solveDual(out, method == CompressionMethod::cp ? kCpRidge : kOrthogonalRidge);
+  std::vector<float> factors(kBlockPixels);
+  scale.factors(1, factors.data());
+  for (std::size_t k = 0; k < out.images.size(); ++k) out.images[k] *= factors[k % kBlockPixels];
+  out.stride = paddedColumns(out.columns);
+  out.dual.assign(static_cast<std::size_t>(kBlockPixels) * out.stride, 0.0f);
+  method == CompressionMethod::cp ? solveDual(out) : transposeOrthogonal(out);
   return out;
 }
 
 /// Solves the coefficients of all slices, [slices][stride].
-std::vector<float> solveCoefficients(const SliceIndex& index, std::size_t cluster, float peak, const DecodedBasis& basis) {
+std::vector<float> solveCoefficients(const SliceIndex& index, std::size_t cluster, const float* factors,
+                                     const DecodedBasis& basis) {
   const int count = index.sliceCount(cluster);
   std::vector<float> coefficients(static_cast<std::size_t>(count) * basis.stride);
   std::vector<float> panel(static_cast<std::size_t>(std::min(count, kPanelSlices)) * kSliceStride, 0.0f);
   for (int first = 0; first < count; first += kPanelSlices) {
     const int slices = std::min(kPanelSlices, count - first);
-    index.load(cluster, first, slices, 1 / peak, panel.data());
+    index.load(cluster, first, slices, factors, panel.data());
     multiply({panel.data(), kSliceStride, 1}, basis.dual.data(), basis.stride,
              coefficients.data() + static_cast<std::size_t>(first) * basis.stride, basis.stride, slices, basis.stride,
              kBlockPixels);
@@ -236,47 +242,27 @@ std::vector<float> quantizeCoefficients(std::vector<float>& coefficients, int co
   return scales;
 }
 
-/// Compares a slice with its decoded form.
-SliceError compare(const float* slice, const float* decoded) {
-  SliceError r;
-  for (int p = 0; p < kBlockPixels; ++p) {
-    const float d = decoded[p];
-    const float e = slice[p] - d;
-    r.error += e * e;
-    r.cross += e * d;
-    r.power += d * d;
-    r.sum += d;
-    r.positive += std::max(0.0f, d);
-  }
-  return r;
-}
-
 /// Decodes every slice and compares it with the original. A basis without columns decodes to zeros.
-std::vector<SliceError> measureSlices(const SliceIndex& index, std::size_t cluster, float peak, const DecodedBasis& basis,
-                                      const std::vector<float>& coefficients) {
+void measureSlices(const SliceIndex& index, std::size_t cluster, const float* factors, const DecodedBasis& basis,
+                   const std::vector<float>& coefficients, SliceComparer& comparer) {
   const int count = index.sliceCount(cluster);
-  std::vector<SliceError> result(count);
   const std::size_t panel_size = static_cast<std::size_t>(std::min(count, kPanelSlices)) * kSliceStride;
   std::vector<float> panel(panel_size, 0.0f);
   std::vector<float> decoded(panel_size, 0.0f);
   for (int first = 0; first < count; first += kPanelSlices) {
     const int slices = std::min(kPanelSlices, count - first);
-    index.load(cluster, first, slices, 1 / peak, panel.data());
+    index.load(cluster, first, slices, factors, panel.data());
     multiply({coefficients.data() + static_cast<std::size_t>(first) * basis.stride, basis.stride, 1}, basis.images.data(),
              kBlockPixels, decoded.data(), kSliceStride, slices, kBlockPixels, basis.columns);
-    for (int s = 0; s < slices; ++s) {
-      result[first + s] = compare(panel.data() + s * kSliceStride, decoded.data() + s * kSliceStride);
-    }
+    for (int s = 0; s < slices; ++s) comparer.add(panel.data() + s * kSliceStride, decoded.data() + s * kSliceStride);
   }
-  return result;
 }
 
-/// Density of the rest of a slice, >= 0: the mass that its spots leave, spread evenly over the block.
+/// Density of the rest of a slice, >= 0: the even density that is nearest to what its spots leave.
 float restOf(const float* slice, const SliceSpots& spots, const SpotFinder& finder) {
-  float sum = 0;
-  for (int p = 0; p < kBlockPixels; ++p) sum += slice[p];
-  for (const Spot& spot : spots) sum -= spot.weight * finder.share(spot);
-  return std::max(0.0f, sum / kBlockPixels);
+  float match = finder.evenMatch(slice);
+  for (const Spot& spot : spots) match -= spot.weight * finder.evenShare(spot);
+  return std::max(0.0f, match / finder.evenPower());
 }
 
 /// The code (see blockMassCode) whose mass is nearest.
@@ -286,15 +272,14 @@ std::uint8_t nearestMassCode(float mass) {
 }
 
 /// Quantises a cluster of spots, writes it as ndf_cp.h says, and compares its decoded slices with the originals.
-void encodeSpots(const SliceIndex& index, std::size_t cluster, float peak, const std::vector<SliceSpots>& spots,
-                 EncodedCluster& out) {
+void encodeSpots(const SliceIndex& index, std::size_t cluster, const float* factors, const SpotFinder& finder,
+                 const std::vector<SliceSpots>& spots, EncodedCluster& out, SliceComparer& comparer) {
   // Find the largest weight and rest of all slices, which give the scales.
-  const SpotFinder finder(index.sigmaPixels());
   const auto all = static_cast<std::uint32_t>(spots.size());
   std::vector<float> slice(kSliceStride), decoded(kBlockPixels), rests;
   float most_weight = 0, most_rest = 0;
   for (std::uint32_t s = 0; s < all; ++s) {
-    index.load(cluster, static_cast<int>(s), 1, 1 / peak, slice.data());
+    index.load(cluster, static_cast<int>(s), 1, factors, slice.data());
     rests.push_back(restOf(slice.data(), spots[s], finder));
     most_rest = std::max(most_rest, rests.back());
     for (const Spot& spot : spots[s]) most_weight = std::max(most_weight, spot.weight);
@@ -318,33 +303,36 @@ void encodeSpots(const SliceIndex& index, std::size_t cluster, float peak, const
   }
   // Write the spots, and decode every slice as a reader does.
   for (std::uint32_t s = 0; s < all; ++s) {
-    index.load(cluster, static_cast<int>(s), 1, 1 / peak, slice.data());
-    std::fill(decoded.begin(), decoded.end(), most_rest * blockMass(codes[s]));
+    index.load(cluster, static_cast<int>(s), 1, factors, slice.data());
+    finder.setEven(most_rest * blockMass(codes[s]), decoded.data());
     for (const Spot& spot : spots[s]) {
       const float weight = std::clamp(std::round(spot.weight / out.scales[0]), 0.0f, 65535.0f);
       append(out.coefficients, NdfSpot{spot.x, spot.y, static_cast<std::uint16_t>(weight)});
       finder.add(spot.x, spot.y, out.scales[0] * weight, decoded.data());
     }
-    out.slices.push_back(compare(slice.data(), decoded.data()));
+    comparer.add(slice.data(), decoded.data());
   }
 }
 
-/// Slices that are worth storing: they hold at least the energy `least`, or more than a 256th of the mass of their image.
-std::vector<std::uint32_t> worthyRows(const SliceIndex& index, std::size_t cluster, float peak, float unit, double least) {
+/// Slices that are worth storing: they hold at least the weighted energy `least`, or more than a 256th of the mass of their
+/// image.
+std::vector<std::uint32_t> worthyRows(const SliceIndex& index, const ErrorWeights& weights, std::size_t cluster,
+                                      const ClusterStatistics& statistics, double least) {
   constexpr double kMostOfImage = 1.0 / 256;
-  const double pixel_area = 1.0 / index.pixelsPerArea();
+  const double pixel_area = 1.0 / index.pixelsPerArea(), peak = statistics.peak;
   std::vector<std::uint32_t> kept;
   std::vector<float> slice(kSliceStride);
   for (int s = 0; s < index.sliceCount(cluster); ++s) {
-    double energy = 0, sum = 0;
+    double energy = 0, sum = 0, weight = 1;
     if (least > 0) {
-      index.load(cluster, s, 1, 1 / peak, slice.data());
+      weight = weights.slice(cluster, index.level(index.image(index.firstSlice(cluster) + s)));
+      index.load(cluster, s, 1, statistics.factors.data(), slice.data());
       for (int p = 0; p < kBlockPixels; ++p) {
         energy += static_cast<double>(slice[p]) * slice[p];
-        sum += slice[p];
+        sum += slice[p] / statistics.factors[p];
       }
     }
-    if (energy * peak * peak >= least || sum * peak * unit * pixel_area > kMostOfImage)
+    if (weight * energy * peak * peak >= least || sum * index.unit() * pixel_area > kMostOfImage)
       kept.push_back(static_cast<std::uint32_t>(s));
   }
   return kept;
@@ -368,20 +356,25 @@ void spreadRows(const std::vector<std::uint32_t>& kept, int count, int stride, s
 
 }  // namespace
 
-EncodedCluster encodeCluster(const SliceIndex& index, std::size_t cluster, const ClusterStatistics& statistics,
-                             const ClusterBasis& basis, CompressionMethod method, CoefficientType type, float unit,
-                             double per_byte) {
+EncodedCluster encodeCluster(const SliceIndex& index, const ErrorWeights& weights, std::size_t cluster,
+                             const ClusterStatistics& statistics, const ClusterBasis& basis, CompressionMethod method,
+                             CoefficientType type, double per_byte, std::span<const float> density_scales) {
   // Spots, and clusters of nothing, have no columns.
   EncodedCluster out;
   const int count = index.sliceCount(cluster);
+  const float* factors = statistics.factors.data();
+  SliceComparer comparer(index, weights, cluster, statistics, density_scales);
   if (!basis.spots.empty()) {
-    encodeSpots(index, cluster, statistics.peak, basis.spots, out);
+    const SpotFinder finder(index.sigmaPixels(), weights.scale(cluster));
+    encodeSpots(index, cluster, factors, finder, basis.spots, out, comparer);
+    out.errors = comparer.take();
     if (method == CompressionMethod::tucker) out.core.resize(out.scales.size());
-    for (float& scale : out.scales) scale *= statistics.peak * unit;
+    for (float& scale : out.scales) scale *= statistics.peak * index.unit();
     return out;
   }
   if (basis.columns.empty()) {
-    out.slices = measureSlices(index, cluster, std::max(statistics.peak, std::numeric_limits<float>::min()), {}, {});
+    measureSlices(index, cluster, factors, {}, {}, comparer);
+    out.errors = comparer.take();
     return out;
   }
   // Quantise the basis, and solve the coefficients of every slice for it.
@@ -393,19 +386,20 @@ EncodedCluster encodeCluster(const SliceIndex& index, std::size_t cluster, const
   }
   if (type == CoefficientType::i8)
     for (const ClusterColumn& column : basis.columns) out.narrow_columns += column.bits == 4;
-  const DecodedBasis decoded = encodeBasis(basis, method, type, out.basis);
-  std::vector<float> coefficients = solveCoefficients(index, cluster, statistics.peak, decoded);
+  const DecodedBasis decoded = encodeBasis(basis, weights.scale(cluster), method, out.basis);
+  std::vector<float> coefficients = solveCoefficients(index, cluster, factors, decoded);
   // Leave out slices that are not worth their bytes, and quantise the coefficients of all others.
   const double row_bytes =
       type == CoefficientType::i8 ? out.columns - 0.5 * out.narrow_columns : 1.0 * out.columns * coefficientElementBytes(type);
-  out.kept = worthyRows(index, cluster, statistics.peak, unit, (row_bytes + 1) * per_byte);
+  out.kept = worthyRows(index, weights, cluster, statistics, (row_bytes + 1) * per_byte);
   keepRows(out.kept, decoded.stride, coefficients);
   out.scales = quantizeCoefficients(coefficients, static_cast<int>(out.kept.size()), decoded.stride, basis.columns, type,
                                     out.coefficients);
-  for (int k = 0; k < decoded.columns; ++k) out.scales[k] *= decoded.scales[k] * statistics.peak * unit;
+  for (int k = 0; k < decoded.columns; ++k) out.scales[k] *= decoded.scales[k] * statistics.peak * index.unit();
   // Measure the error as a reader sees it.
   spreadRows(out.kept, count, decoded.stride, coefficients);
-  out.slices = measureSlices(index, cluster, statistics.peak, decoded, coefficients);
+  measureSlices(index, cluster, factors, decoded, coefficients, comparer);
+  out.errors = comparer.take();
   return out;
 }
 

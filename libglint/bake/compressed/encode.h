@@ -2,21 +2,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
+#include "glint/bake/compressed/error_weights.h"
 #include "glint/bake/compressed/model.h"
+#include "glint/bake/compressed/slice_errors.h"
 
 namespace glint::bake {
-
-/// Sums over the pixels of a slice and of its decoded form, in units of the peak of the cluster. From these follows the error
-/// under any scale of the image.
-struct SliceError {
-  float error = 0;     ///< sum of (slice - decoded)^2
-  float cross = 0;     ///< sum of (slice - decoded) decoded
-  float power = 0;     ///< sum of decoded^2
-  float sum = 0;       ///< sum of decoded
-  float positive = 0;  ///< sum of decoded where it is positive
-};
 
 /// A cluster, encoded as NdfCp stores it.
 struct EncodedCluster {
@@ -30,16 +23,16 @@ struct EncodedCluster {
   std::vector<std::uint8_t> core;
   std::vector<std::uint32_t> kept;  ///< numbers of the slices that are stored, ascending; other slices decode to 0
   std::uint64_t spots = 0;
-  std::vector<SliceError> slices;  ///< of all slices
+  ClusterErrors errors;
 };
 
 /// Quantises the basis of a cluster, solves the coefficients of every slice for the quantised basis by least squares, and
 /// quantises the coefficients. A basis of spots is quantised spot by spot.
-/// @param unit      density of one stored unit (NdfPyramid::value_scale)
-/// @param per_byte  energy (squared stored units) that a slice must hold for each byte of its coefficients to be stored. A
-///                  slice with a large part of its image's mass is always stored. Not used for spots
-EncodedCluster encodeCluster(const SliceIndex& index, std::size_t cluster, const ClusterStatistics& statistics,
-                             const ClusterBasis& basis, CompressionMethod method, CoefficientType type, float unit,
-                             double per_byte);
+/// @param per_byte        weighted energy that a slice must hold for each byte of its coefficients to be stored. A slice with a
+///                        large part of its image's mass is always stored. Not used for spots
+/// @param density_scales  [images]: factors of the densities that errors are measured with (NdfCp::density_scales)
+EncodedCluster encodeCluster(const SliceIndex& index, const ErrorWeights& weights, std::size_t cluster,
+                             const ClusterStatistics& statistics, const ClusterBasis& basis, CompressionMethod method,
+                             CoefficientType type, double per_byte, std::span<const float> density_scales);
 
 }  // namespace glint::bake

@@ -41,29 +41,6 @@ constexpr double kSpotSliceBytes = 2.25;
 // Bytes of any slice besides its coefficients: its block mass.
 constexpr double kSliceBytes = 1;
 
-/// Loads the slices of a cluster, divided by its peak, a panel at a time, and calls visit(panel, number of slices).
-template <class Visit>
-void forEachPanel(const SliceIndex& index, std::size_t cluster, float peak, Visit visit) {
-  const int count = index.sliceCount(cluster);
-  std::vector<float> panel(static_cast<std::size_t>(std::min(count, kPanelSlices)) * kSliceStride, 0.0f);
-  for (int first = 0; first < count; first += kPanelSlices) {
-    const int slices = std::min(kPanelSlices, count - first);
-    index.load(cluster, first, slices, 1 / peak, panel.data());
-    visit(panel.data(), slices);
-  }
-}
-
-/// Gram matrix of the pixels: the sum over slices of slice slice^T, [256][256]. 131 kflop for each slice.
-std::vector<float> gramMatrix(const SliceIndex& index, std::size_t cluster, float peak) {
-  std::vector<float> gram(static_cast<std::size_t>(kBlockPixels) * kBlockPixels, 0.0f);
-  forEachPanel(index, cluster, peak, [&](const float* panel, int slices) {
-    addGram(panel, kSliceStride, slices, kBlockPixels, gram.data(), kBlockPixels);
-  });
-  for (int i = 0; i < kBlockPixels; ++i)
-    for (int j = i + 1; j < kBlockPixels; ++j) gram[i * kBlockPixels + j] = gram[j * kBlockPixels + i];
-  return gram;
-}
-
 /// Principal components of slices.
 struct Components {
   std::vector<float> images;    // [K][256], orthonormal
@@ -112,11 +89,14 @@ Components componentsOfSlices(const float* panel, int slices) {
 
 }  // namespace
 
-ClusterStatistics measureCluster(const SliceIndex& index, std::size_t cluster) {
+ClusterStatistics measureCluster(const SliceIndex& index, const ErrorWeights& weights, std::size_t cluster) {
   ClusterStatistics statistics;
+  statistics.factors.resize(kBlockPixels);
+  weights.scale(cluster).factors(1, statistics.factors.data());
   float slice[kSliceStride];
   for (int s = 0; s < index.sliceCount(cluster); ++s) {
-    index.load(cluster, s, 1, 1, slice);
+    const std::uint32_t image = index.image(index.firstSlice(cluster) + s);
+    index.load(cluster, s, 1, statistics.factors.data(), slice);
     // In double, squares of the largest floats do not overflow, so a sum that is not finite shows a value that is not.
     double energy = 0;
     float peak = 0;
@@ -125,39 +105,71 @@ ClusterStatistics measureCluster(const SliceIndex& index, std::size_t cluster) {
       peak = std::max(peak, std::abs(slice[p]));
     }
     if (!std::isfinite(energy))
-      throw Error(ErrorCode::invalid_input, "pyramid.finite", "",
-                  "image " + std::to_string(index.image(index.firstSlice(cluster) + s)), "a density is not finite",
+      throw Error(ErrorCode::invalid_input, "pyramid.finite", "", "image " + std::to_string(image), "a density is not finite",
                   "build the pyramid again with glint-pyramid");
-    statistics.energy += energy;
+    statistics.energy += energy * weights.slice(cluster, index.level(image));
     statistics.peak = std::max(statistics.peak, peak);
   }
+  if (statistics.peak >= kSmallestPeak) weights.scale(cluster).factors(statistics.peak, statistics.factors.data());
   return statistics;
 }
 
-ClusterModel::ClusterModel(const SliceIndex& index, std::size_t cluster, const ClusterStatistics& statistics,
-                           const CompressionOptions& options, double negligible)
+ClusterModel::ClusterModel(const SliceIndex& index, const ErrorWeights& weights, std::size_t cluster,
+                           const ClusterStatistics& statistics, const CompressionOptions& options, CoefficientType type,
+                           double negligible)
     : method_(options.method),
-      type_(options.coefficient_type),
+      type_(type),
       cluster_(cluster),
       slice_count_(index.sliceCount(cluster)),
       peak_(statistics.peak),
       energy_(0),
       index_(&index),
+      statistics_(&statistics),
+      scale_(weights.scale(cluster)),
       min_improvement_(options.min_improvement),
       max_iterations_(options.max_iterations) {
   if (slice_count_ == 0 || peak_ < kSmallestPeak) {
     choices_.push_back({false, 0, statistics.energy, 0});
     return;
   }
+  for (int s = 0; s < slice_count_; ++s)
+    slice_weights_.push_back(weights.slice(cluster, index.level(index.image(index.firstSlice(cluster) + s))));
   const double square = static_cast<double>(peak_) * peak_;
   energy_ = statistics.energy / square;
   if (options.tolerance > 0) choices_.push_back({false, 0, statistics.energy, 0});
-  if (method_ == CompressionMethod::tucker) decomposeTucker(index, options, negligible / square);
-  if (method_ == CompressionMethod::pca) decomposePca(index, options, negligible / square);
-  if (method_ == CompressionMethod::cp) boundCpRanks(index, options, negligible / square);
+  if (method_ == CompressionMethod::tucker) decomposeTucker(options, negligible / square);
+  if (method_ == CompressionMethod::pca) decomposePca(options, negligible / square);
+  if (method_ == CompressionMethod::cp) boundCpRanks(options, negligible / square);
   if (options.tolerance > 0 && options.spots && type_ == CoefficientType::i8 && method_ != CompressionMethod::cp)
-    addSpots(index, negligible / square);
+    addSpots(negligible / square);
   if (options.tolerance > 0) keepHull();
+}
+
+/// Loads the slices a panel at a time, and calls visit(panel, number of slices).
+/// @param weighted  whether each slice is multiplied by the square root of its weight
+template <class Visit>
+void ClusterModel::forEachPanel(bool weighted, Visit visit) const {
+  std::vector<float> panel(static_cast<std::size_t>(std::min(slice_count_, kPanelSlices)) * kSliceStride, 0.0f);
+  for (int first = 0; first < slice_count_; first += kPanelSlices) {
+    const int slices = std::min(kPanelSlices, slice_count_ - first);
+    index_->load(cluster_, first, slices, statistics_->factors.data(), panel.data());
+    for (int s = 0; weighted && s < slices; ++s) {
+      const float root = std::sqrt(slice_weights_[first + s]);
+      for (int p = 0; p < kBlockPixels; ++p) panel[static_cast<std::size_t>(s) * kSliceStride + p] *= root;
+    }
+    visit(panel.data(), slices);
+  }
+}
+
+/// Gram matrix of the pixels: the weighted sum over slices of slice slice^T, [256][256]. 131 kflop for each slice.
+std::vector<float> ClusterModel::gramMatrix() const {
+  std::vector<float> gram(static_cast<std::size_t>(kBlockPixels) * kBlockPixels, 0.0f);
+  forEachPanel(true, [&](const float* panel, int slices) {
+    addGram(panel, kSliceStride, slices, kBlockPixels, gram.data(), kBlockPixels);
+  });
+  for (int i = 0; i < kBlockPixels; ++i)
+    for (int j = i + 1; j < kBlockPixels; ++j) gram[i * kBlockPixels + j] = gram[j * kBlockPixels + i];
+  return gram;
 }
 
 /// Adds the steps of one column: from nothing to narrow coefficients, and from narrow to wide; or straight to wide coefficients
@@ -167,12 +179,12 @@ void ClusterModel::addColumnSteps(int column, const float* coefficients, double 
   const double first_bytes = basis_bytes + sizeof(float);
   if (type_ != CoefficientType::i8) {
     double energy = 0;
-    for (int s = 0; s < slice_count_; ++s) energy += static_cast<double>(coefficients[s]) * coefficients[s];
+    for (int s = 0; s < slice_count_; ++s) energy += static_cast<double>(slice_weights_[s]) * coefficients[s] * coefficients[s];
     steps_.push_back({column, 8, energy, first_bytes + static_cast<double>(slice_count_) * coefficientElementBytes(type_)});
     return;
   }
   const double half = 0.5 * slice_count_;
-  const ColumnErrors errors = roundingErrors(coefficients, slice_count_);
+  const ColumnErrors errors = roundingErrors(coefficients, slice_weights_.data(), slice_count_);
   const Step narrow{column, 4, errors.energy - errors.narrow, first_bytes + half};
   const Step wide{column, 8, errors.narrow - errors.wide, half};
   if (narrow.gain * wide.bytes > wide.gain * narrow.bytes) {
@@ -215,10 +227,10 @@ std::vector<ClusterColumn> ClusterModel::columnsAfter(int steps) const {
 }
 
 /// Adds choices of spots, unless a few slices show that columns take fewer bytes.
-void ClusterModel::addSpots(const SliceIndex& index, double negligible) {
-  const float sigma = index.sigmaPixels();
+void ClusterModel::addSpots(double negligible) {
+  const float sigma = index_->sigmaPixels();
   if (!SpotFinder::suits(sigma)) return;
-  const SpotFinder finder(sigma);
+  const SpotFinder finder(sigma, scale_);
   const auto least = static_cast<float>(kLeastGain * negligible / slice_count_);
   std::vector<float> slice(kSliceStride);
   const auto energyOf = [&] {
@@ -231,10 +243,11 @@ void ClusterModel::addSpots(const SliceIndex& index, double negligible) {
   std::size_t count = 0;
   int probes = 0;
   for (int s = 0; s < slice_count_; s += std::max(1, slice_count_ / kProbes), ++probes) {
-    index.load(cluster_, s, 1, 1 / peak_, slice.data());
-    probed += energyOf();
-    count += finder.find(slice.data(), kMostSpots, least).size();
-    left += energyOf();
+    const float weight = slice_weights_[s];
+    index_->load(cluster_, s, 1, statistics_->factors.data(), slice.data());
+    probed += weight * energyOf();
+    count += finder.find(slice.data(), kMostSpots, least / weight).size();
+    left += weight * energyOf();
   }
   const double share = probed > 0 ? left / probed : 1;
   const double spot_bytes = static_cast<double>(sizeof(NdfSpot)) * static_cast<double>(count) / probes * slice_count_;
@@ -244,15 +257,15 @@ void ClusterModel::addSpots(const SliceIndex& index, double negligible) {
   // Search all slices.
   std::vector<float> sums(slice_count_, 0.0f);
   for (int s = 0; s < slice_count_; ++s) {
-    index.load(cluster_, s, 1, 1 / peak_, slice.data());
-    sums[s] = std::accumulate(slice.begin(), slice.begin() + kBlockPixels, 0.0f);
-    spots_.push_back(finder.find(slice.data(), kMostSpots, least));
+    index_->load(cluster_, s, 1, statistics_->factors.data(), slice.data());
+    sums[s] = finder.evenMatch(slice.data());
+    spots_.push_back(finder.find(slice.data(), kMostSpots, least / slice_weights_[s]));
   }
   addSpotChoices(finder, std::move(sums));
 }
 
 /// Adds choices with the spots of all slices that gain most, from few spots to all.
-/// @param rests  sum of the pixels of each slice
+/// @param rests  SpotFinder::evenMatch of each slice
 void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<float> rests) {
   struct Candidate {
     float gain;
@@ -261,22 +274,26 @@ void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<float> r
   };
   std::vector<Candidate> candidates;
   for (int s = 0; s < slice_count_; ++s)
-    for (const Spot& spot : spots_[s]) candidates.push_back({spot.gain, spot.weight * finder.share(spot), s});
+    for (const Spot& spot : spots_[s])
+      candidates.push_back({spot.gain * slice_weights_[s], spot.weight * finder.evenShare(spot), s});
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
   for (const Candidate& c : candidates) spot_gains_.push_back(c.gain);
-  // Spread evenly over the block, a rest lowers the squared error by the square of its sum over 256.
-  const auto evened = [](float sum) { return sum > 0 ? static_cast<double>(sum) * sum / kBlockPixels : 0.0; };
+  // An even rest lowers the squared error of its slice by the square of the match over the power of an even density.
+  const auto evened = [&](int slice) {
+    const float match = rests[slice];
+    return match > 0 ? slice_weights_[slice] * (static_cast<double>(match) * match / finder.evenPower()) : 0.0;
+  };
   double error = energy_;
-  for (const float sum : rests) error -= evened(sum);
+  for (int s = 0; s < slice_count_; ++s) error -= evened(s);
   constexpr std::size_t kChoices = 64;
   const std::size_t stride = candidates.size() / kChoices + 1;
   const double slice_bytes = (kSpotSliceBytes + kSliceBytes) * slice_count_ + 2 * sizeof(float);
   for (std::size_t k = 0; k < candidates.size(); ++k) {
-    float& rest = rests[candidates[k].slice];
-    error += evened(rest) - candidates[k].gain;
-    rest -= candidates[k].share;
-    error -= evened(rest);
+    const int slice = candidates[k].slice;
+    error += evened(slice) - candidates[k].gain;
+    rests[slice] -= candidates[k].share;
+    error -= evened(slice);
     // A choice is known by its smallest gain, so spots of equal gain are in it together.
     const bool last = k + 1 == candidates.size();
     if ((k % stride == stride - 1 || last) && (last || candidates[k + 1].gain < candidates[k].gain))
@@ -302,17 +319,17 @@ void ClusterModel::keepHull() {
   choices_ = std::move(hull);
 }
 
-TuckerAxes ClusterModel::analyseAxes(const SliceIndex& index) const {
+TuckerAxes ClusterModel::analyseAxes() const {
   TuckerAnalysis analysis;
-  forEachPanel(index, cluster_, peak_, [&](const float* panel, int slices) { analysis.addMoments(panel, slices); });
+  forEachPanel(true, [&](const float* panel, int slices) { analysis.addMoments(panel, slices); });
   analysis.solveAxes();
-  forEachPanel(index, cluster_, peak_, [&](const float* panel, int slices) { analysis.addEnergies(panel, slices); });
+  forEachPanel(true, [&](const float* panel, int slices) { analysis.addEnergies(panel, slices); });
   return analysis.axes();
 }
 
 /// Projects the slices on orthonormal images.
 /// @return coefficients, [images][slices]
-std::vector<float> ClusterModel::project(const SliceIndex& index, const std::vector<float>& images, int count) const {
+std::vector<float> ClusterModel::project(const std::vector<float>& images, int count) const {
   const int stride = paddedColumns(count);
   std::vector<float> transposed(static_cast<std::size_t>(kBlockPixels) * stride, 0.0f);
   for (int k = 0; k < count; ++k)
@@ -320,7 +337,7 @@ std::vector<float> ClusterModel::project(const SliceIndex& index, const std::vec
   std::vector<float> result(static_cast<std::size_t>(count) * slice_count_);
   std::vector<float> products(static_cast<std::size_t>(kPanelSlices) * stride);
   int first = 0;
-  forEachPanel(index, cluster_, peak_, [&](const float* panel, int slices) {
+  forEachPanel(false, [&](const float* panel, int slices) {
     multiply({panel, kSliceStride, 1}, transposed.data(), stride, products.data(), stride, slices, stride, kBlockPixels);
     for (int s = 0; s < slices; ++s)
       for (int k = 0; k < count; ++k) result[static_cast<std::size_t>(k) * slice_count_ + first + s] = products[s * stride + k];
@@ -330,8 +347,8 @@ std::vector<float> ClusterModel::project(const SliceIndex& index, const std::vec
 }
 
 /// Tucker-2: columns are pairs of axes, and gain the energy of their entries of the core.
-void ClusterModel::decomposeTucker(const SliceIndex& index, const CompressionOptions& options, double negligible) {
-  axes_ = analyseAxes(index);
+void ClusterModel::decomposeTucker(const CompressionOptions& options, double negligible) {
+  axes_ = analyseAxes();
   std::vector<int> pairs(kBlockPixels);
   std::iota(pairs.begin(), pairs.end(), 0);
   const auto energy = [&](int pair) { return axes_.energy[pair % kBlockSize][pair / kBlockSize]; };
@@ -353,22 +370,21 @@ void ClusterModel::decomposeTucker(const SliceIndex& index, const CompressionOpt
     for (int p = 0; p < kBlockPixels; ++p)
       images[k * kBlockPixels + p] = axes_.u[p % kBlockSize * kBlockSize + pairs[k] % kBlockSize] *
                                      axes_.v[p / kBlockSize * kBlockSize + pairs[k] / kBlockSize];
-  const std::vector<float> coefficients = project(index, images, count);
+  const std::vector<float> coefficients = project(images, count);
   // Bytes of a column: an entry of the core, and the mean cost of a new function along an axis.
-  constexpr double kBasisBytes = 1 + 8;
+  constexpr double kBasisBytes = 1 + 16;
   for (int k = 0; k < count; ++k)
     addColumnSteps(pairs[k], coefficients.data() + static_cast<std::size_t>(k) * slice_count_, kBasisBytes);
   addStepChoices(energy_);
 }
 
 /// Principal components of the slices: columns are images, and gain their eigenvalues.
-void ClusterModel::decomposePca(const SliceIndex& index, const CompressionOptions& options, double negligible) {
+void ClusterModel::decomposePca(const CompressionOptions& options, double negligible) {
   Components components;
   if (slice_count_ < kBlockPixels)
-    forEachPanel(index, cluster_, peak_,
-                 [&](const float* panel, int slices) { components = componentsOfSlices(panel, slices); });
+    forEachPanel(true, [&](const float* panel, int slices) { components = componentsOfSlices(panel, slices); });
   else
-    components = componentsOfGram(gramMatrix(index, cluster_, peak_));
+    components = componentsOfGram(gramMatrix());
   const int available = static_cast<int>(components.energies.size());
   const int most = options.tolerance > 0 ? available : std::min(available, options.rank);
   double error = energy_;
@@ -381,8 +397,8 @@ void ClusterModel::decomposePca(const SliceIndex& index, const CompressionOption
     choices_.push_back({false, rank, std::max(0.0, error) * peak_ * peak_, 0});
     return;
   }
-  const std::vector<float> coefficients = project(index, components_, rank);
-  const double basis_bytes = static_cast<double>(kBlockPixels) * basisElementBytes(method_, type_);
+  const std::vector<float> coefficients = project(components_, rank);
+  const double basis_bytes = static_cast<double>(kBlockPixels) * kBasisElementBytes;
   for (int k = 0; k < rank; ++k)
     addColumnSteps(k, coefficients.data() + static_cast<std::size_t>(k) * slice_count_, basis_bytes);
   addStepChoices(energy_);
@@ -391,11 +407,11 @@ void ClusterModel::decomposePca(const SliceIndex& index, const CompressionOption
 /// Bounds the error of cp at each rank, without decomposing. A decomposition starts from a column for each of the largest
 /// entries of the core, so it ends with less error than theirs: by about the same factor in all clusters, so that the bounds
 /// serve to compare clusters.
-void ClusterModel::boundCpRanks(const SliceIndex& index, const CompressionOptions& options, double negligible) {
-  axes_ = analyseAxes(index);
+void ClusterModel::boundCpRanks(const CompressionOptions& options, double negligible) {
+  axes_ = analyseAxes();
   std::vector<double> energies(axes_.energy[0], axes_.energy[0] + kBlockPixels);
   std::sort(energies.begin(), energies.end(), std::greater<>());
-  const std::uint64_t column_bytes = 2ull * kBlockSize * basisElementBytes(method_, type_) + sizeof(float) +
+  const std::uint64_t column_bytes = 2ull * kBlockSize * kBasisElementBytes + sizeof(float) +
                                      static_cast<std::uint64_t>(slice_count_) * coefficientElementBytes(type_);
   const bool one = !(options.tolerance > 0);
   const int most = one ? options.rank : kMostCpRank;
@@ -416,24 +432,40 @@ CpFactors ClusterModel::decompose(int rank) const {
   tensor.energy = energy_;
   std::vector<float> data;
   if (slice_count_ > CpTensor::kMostSlices) {
-    data = gramMatrix(*index_, cluster_, peak_);
+    data = gramMatrix();
     tensor.gram = data.data();
   } else {
-    data.resize(static_cast<std::size_t>(slice_count_) * kSliceStride);
-    index_->load(cluster_, 0, slice_count_, 1 / peak_, data.data());
+    forEachPanel(true, [&](const float* panel, int slices) {
+      data.insert(data.end(), panel, panel + static_cast<std::ptrdiff_t>(slices) * kSliceStride);
+    });
     tensor.slices = data.data();
   }
   return decomposeCp(tensor, axes_, {rank, min_improvement_, max_iterations_});
 }
 
 ClusterBasis ClusterModel::basis(int choice) const {
-  const SizeChoice& c = choices_[choice];
+  ClusterBasis basis = scaledBasis(choices_[choice]);
+  if (basis.columns.empty()) return basis;
+  // The basis was found in the scaled domain.
+  const bool images = method_ == CompressionMethod::pca;
+  for (std::size_t k = 0; k < basis.x.size(); ++k) {
+    const std::size_t pixel = k / basis.rank_x;
+    basis.x[k] /= images ? scale_.x[pixel % kBlockSize] * scale_.y[pixel / kBlockSize] : scale_.x[pixel];
+  }
+  for (std::size_t k = 0; k < basis.y.size(); ++k) basis.y[k] /= scale_.y[k / basis.rank_y];
+  return basis;
+}
+
+/// Basis of a choice in the scaled domain.
+ClusterBasis ClusterModel::scaledBasis(const SizeChoice& c) const {
   ClusterBasis basis;
   if (c.count == 0) return basis;
   if (c.spots) {
     const float least = spot_gains_[c.count - 1];
-    for (const SliceSpots& found : spots_) {
-      const auto end = std::find_if(found.begin(), found.end(), [&](const Spot& spot) { return spot.gain < least; });
+    for (int s = 0; s < slice_count_; ++s) {
+      const SliceSpots& found = spots_[s];
+      const auto end =
+          std::find_if(found.begin(), found.end(), [&](const Spot& spot) { return spot.gain * slice_weights_[s] < least; });
       basis.spots.emplace_back(found.begin(), end);
     }
     return basis;

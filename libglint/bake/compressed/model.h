@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "glint/bake/compressed/cp.h"
+#include "glint/bake/compressed/error_weights.h"
 #include "glint/bake/compressed/slices.h"
 #include "glint/bake/compressed/spots.h"
 
@@ -13,7 +14,7 @@ namespace glint::bake {
 struct SizeChoice {
   bool spots = false;       ///< whether the cluster has spots instead of columns
   int count = 0;            ///< number of spots, or of steps of columns (cp: rank)
-  double error = 0;         ///< squared error, stored units (cp: an upper bound)
+  double error = 0;         ///< weighted squared error (ErrorWeights; cp: an upper bound)
   std::uint64_t bytes = 0;  ///< bytes of bases, coefficients, scales and block masses
 };
 
@@ -33,25 +34,27 @@ struct ClusterBasis {
   std::vector<SliceSpots> spots;       ///< [slices]; empty where the cluster has columns
 };
 
-/// Size and scale of a cluster.
+/// Size of the slices of a cluster, in the domain that its BlockScale scales.
 struct ClusterStatistics {
-  float peak = 0;     ///< largest magnitude, stored units
-  double energy = 0;  ///< sum of squares, stored units
+  float peak = 0;              ///< largest magnitude of a scaled pixel, stored units
+  double energy = 0;           ///< weighted sum of the squares of scaled pixels, stored units
+  std::vector<float> factors;  ///< [256]: what SliceIndex::load() multiplies by: the scale, over the peak
 };
 
 /// Measures a cluster.
 /// @throw Error invalid_input if a value is not finite
-ClusterStatistics measureCluster(const SliceIndex& index, std::size_t cluster);
+ClusterStatistics measureCluster(const SliceIndex& index, const ErrorWeights& weights, std::size_t cluster);
 
 /// A decomposed cluster: the sizes that are worth choosing, and the basis of each.
 class ClusterModel {
  public:
-  /// @param index       must outlive the model
+  /// @param index       must outlive the model, as `weights` and `statistics`
   /// @param options     a tolerance of 0 gives one choice, `options.rank`. Any other tolerance gives the choices on the lower
   ///                    convex hull of (bytes, error), the first of which stores nothing
-  /// @param negligible  with a tolerance: squared error, in stored units, below which no more columns are looked for
-  ClusterModel(const SliceIndex& index, std::size_t cluster, const ClusterStatistics& statistics,
-               const CompressionOptions& options, double negligible);
+  /// @param type        of the coefficients
+  /// @param negligible  with a tolerance: weighted squared error below which no more columns are looked for
+  ClusterModel(const SliceIndex& index, const ErrorWeights& weights, std::size_t cluster, const ClusterStatistics& statistics,
+               const CompressionOptions& options, CoefficientType type, double negligible);
 
   /// Choices from few bytes to many; at least one.
   const std::vector<SizeChoice>& choices() const { return choices_; }
@@ -71,15 +74,19 @@ class ClusterModel {
 
   void addColumnSteps(int column, const float* coefficients, double basis_bytes);
   void addStepChoices(double error);
-  void addSpots(const SliceIndex& index, double negligible);
+  void addSpots(double negligible);
   void addSpotChoices(const SpotFinder& finder, std::vector<float> rests);
-  std::vector<float> project(const SliceIndex& index, const std::vector<float>& images, int count) const;
+  std::vector<float> project(const std::vector<float>& images, int count) const;
   void keepHull();
-  void decomposeTucker(const SliceIndex& index, const CompressionOptions& options, double negligible);
-  void decomposePca(const SliceIndex& index, const CompressionOptions& options, double negligible);
-  void boundCpRanks(const SliceIndex& index, const CompressionOptions& options, double negligible);
+  void decomposeTucker(const CompressionOptions& options, double negligible);
+  void decomposePca(const CompressionOptions& options, double negligible);
+  void boundCpRanks(const CompressionOptions& options, double negligible);
   CpFactors decompose(int rank) const;
-  TuckerAxes analyseAxes(const SliceIndex& index) const;
+  ClusterBasis scaledBasis(const SizeChoice& choice) const;
+  TuckerAxes analyseAxes() const;
+  std::vector<float> gramMatrix() const;
+  template <class Visit>
+  void forEachPanel(bool weighted, Visit visit) const;
   std::vector<ClusterColumn> columnsAfter(int steps) const;
 
   CompressionMethod method_;
@@ -89,6 +96,9 @@ class ClusterModel {
   float peak_;
   double energy_;  // energy of the slices, in units of peak_^2
   const SliceIndex* index_;
+  const ClusterStatistics* statistics_;
+  BlockScale scale_;
+  std::vector<float> slice_weights_;  // [slices]: weights of their squared errors
   double min_improvement_;
   int max_iterations_;
   std::vector<SizeChoice> choices_;

@@ -17,8 +17,8 @@ float largest(const float* coefficients, int count, int stride) {
   return peak;
 }
 
-/// Squared error of 4-bit coefficients with this step.
-double errorOfStep(const float* coefficients, int count, int stride, float step) {
+/// Squared error of coefficients of integers up to `most` with this step.
+double errorOfStep(const float* coefficients, int count, int stride, float step, float most) {
   const float inverse = 1 / step;
   double error = 0;
   // Float sums over runs of 256 terms are exact to 1e-5; double sums over the runs lose nothing.
@@ -26,7 +26,7 @@ double errorOfStep(const float* coefficients, int count, int stride, float step)
     float sum = 0;
     for (int s = first; s < std::min(count, first + 256); ++s) {
       const float value = coefficients[static_cast<std::ptrdiff_t>(s) * stride];
-      const float cut = std::min(kNarrowPeak, std::max(-kNarrowPeak, value * inverse));
+      const float cut = std::min(most, std::max(-most, value * inverse));
       // Adding and subtracting 1.5 * 2^23 rounds magnitudes below 2^22 to integers, without a call.
       const float rounded = (cut + 0x1.8p23f) - 0x1.8p23f;
       const float e = value - rounded * step;
@@ -48,7 +48,7 @@ NarrowStep bestNarrowStep(const float* coefficients, int count, int stride) {
   for (const float cut : kCuts) {
     const float step = peak * cut / kNarrowPeak;
     if (!std::isnormal(step) || !std::isfinite(1 / step)) break;
-    const double error = errorOfStep(coefficients, count, stride, step);
+    const double error = errorOfStep(coefficients, count, stride, step, kNarrowPeak);
     // The error falls and then rises as the step shrinks: the first rise ends the search.
     if (best.step > 0 && error >= best.error) break;
     best = {step, error};
@@ -58,14 +58,20 @@ NarrowStep bestNarrowStep(const float* coefficients, int count, int stride) {
 
 }  // namespace
 
-ColumnErrors roundingErrors(const float* coefficients, int count) {
+ColumnErrors roundingErrors(const float* coefficients, const float* weights, int count) {
   ColumnErrors errors;
-  for (int s = 0; s < count; ++s) errors.energy += static_cast<double>(coefficients[s]) * coefficients[s];
+  double all_weights = 0;
+  for (int s = 0; s < count; ++s) {
+    errors.energy += static_cast<double>(weights[s]) * coefficients[s] * coefficients[s];
+    all_weights += weights[s];
+  }
   const NarrowStep narrow = bestNarrowStep(coefficients, count, 1);
-  errors.narrow = narrow.step > 0 ? std::min(narrow.error, errors.energy) : errors.energy;
-  const double wide_step = largest(coefficients, count, 1) / kWidePeak;
-  // Rounding errors are uniform over a step, so their mean square is step^2 / 12.
-  errors.wide = std::min(errors.narrow, count * wide_step * wide_step / 12);
+  // Rounding errors of all slices are alike, so each counts the mean of the weights.
+  errors.narrow = narrow.step > 0 ? std::min(narrow.error * all_weights / count, errors.energy) : errors.energy;
+  const float step = largest(coefficients, count, 1) / kWidePeak;
+  const bool usable = std::isnormal(step) && std::isfinite(1 / step);
+  const double wide = usable ? errorOfStep(coefficients, count, 1, step, kWidePeak) * all_weights / count : errors.energy;
+  errors.wide = std::min(errors.narrow, wide);
   return errors;
 }
 

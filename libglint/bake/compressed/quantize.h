@@ -15,7 +15,8 @@ struct ColumnErrors {
 
 /// Errors of a column when its coefficients are rounded to the best steps.
 /// @param coefficients  [count]
-ColumnErrors roundingErrors(const float* coefficients, int count);
+/// @param weights       [count]: weights of squared errors
+ColumnErrors roundingErrors(const float* coefficients, const float* weights, int count);
 
 /// Step of 4-bit coefficients with the smallest error. Where most coefficients are small, a small step that cuts large
 /// coefficients off is better than a step that reaches them.

@@ -118,13 +118,16 @@ void SliceIndex::assignSlices() {
   });
 }
 
-void SliceIndex::load(std::size_t cluster, int first, int count, float factor, float* out) const {
+int SliceIndex::level(std::uint32_t image) const {
+  return static_cast<int>(std::upper_bound(first_image_.begin(), first_image_.end(), image) - first_image_.begin()) - 1;
+}
+
+void SliceIndex::load(std::size_t cluster, int first, int count, const float* factors, float* out) const {
   for (int s = 0; s < count; ++s, out += kSliceStride) {
     const std::uint64_t slice = first_slices_[cluster] + first + s;
-    const auto level = std::upper_bound(first_image_.begin(), first_image_.end(), images_[slice]) - first_image_.begin() - 1;
-    loadStoredBlock(pyramid_, pyramid_.levels[level], blocks_[slice], out);
-    if (factor != 1)
-      for (int p = 0; p < kBlockPixels; ++p) out[p] *= factor;
+    loadStoredBlock(pyramid_, pyramid_.levels[level(images_[slice])], blocks_[slice], out);
+    if (factors != nullptr)
+      for (int p = 0; p < kBlockPixels; ++p) out[p] *= factors[p];
   }
 }
 

@@ -16,8 +16,8 @@ inline constexpr int kPanelSlices = 256;
 
 /// Tells which slices of a pyramid each cluster has, in the order of ndf_cp.h.
 ///
-/// load() multiplies by a factor: callers divide densities by the peak of the cluster, so that floats neither overflow nor
-/// underflow.
+/// load() multiplies each pixel by a factor: callers scale densities by what an error there counts, and divide by the peak of the
+/// cluster, so that floats neither overflow nor underflow.
 class SliceIndex {
  public:
   /// @param regions       regions along each axis, 1..255
@@ -47,9 +47,22 @@ class SliceIndex {
   /// @return image that has a slice; images are numbered over all levels
   std::uint32_t image(std::uint64_t slice) const { return images_[slice]; }
 
-  /// Converts slices first..first+count-1 of a cluster to floats, multiplied by `factor`.
-  /// @param out  [count][kSliceStride]; the padding is not written
-  void load(std::size_t cluster, int first, int count, float factor, float* out) const;
+  int levelCount() const { return pyramid_.shape.level_count; }
+  /// @return level of an image; images are numbered over all levels
+  int level(std::uint32_t image) const;
+  /// @return number of images of a level
+  std::uint32_t levelImages(int level) const { return first_image_[level + 1] - first_image_[level]; }
+  /// @return number of angular blocks of an image
+  int blockCount() const { return pyramid_.shape.blocksPerImage(); }
+  /// @return density of one stored unit
+  float unit() const { return pyramid_.value_scale; }
+  /// @return pixels of an image along each axis
+  int resolution() const { return pyramid_.shape.resolution; }
+
+  /// Converts slices first..first+count-1 of a cluster to floats.
+  /// @param factors  [256]: what each pixel is multiplied by; null: 1
+  /// @param out      [count][kSliceStride]; the padding is not written
+  void load(std::size_t cluster, int first, int count, const float* factors, float* out) const;
 
   /// Fills the shape, regions and slots of `data`.
   void describe(NdfCpData& data) const;

@@ -12,38 +12,74 @@ namespace {
 // A spot whose profile inside the block has a norm below this lies mostly in the neighbouring block, which stores it.
 constexpr float kLeastNorm = 0.05f;
 
+float powerOf(const float* scale) {
+  float sum = 0;
+  for (int k = 0; k < kBlockSize; ++k) sum += scale[k] * scale[k];
+  return sum;
+}
+
 }  // namespace
 
-SpotFinder::SpotFinder(float sigma_pixels) : sums_(kSpotSums), reach_(static_cast<int>(std::ceil(3 * sigma_pixels)) + 1) {
+std::vector<float> spotSums(float sigma_pixels) {
+  std::vector<float> sums(kSpotSums);
   for (int k = 0; k < kSpotSums; ++k) {
     const double pixels = static_cast<double>(k - kSpotSums / 2) / kSpotSteps;
-    sums_[k] = static_cast<float>(0.5 * std::erfc(-pixels / (sigma_pixels * std::sqrt(2.0))));
+    sums[k] = static_cast<float>(0.5 * std::erfc(-pixels / (sigma_pixels * std::sqrt(2.0))));
   }
+  return sums;
+}
+
+SpotFinder::Axis::Axis(const std::vector<float>& sums, const float* scale) {
   for (int place = 0; place <= kLastSpotPlace; ++place) {
-    float power = 0, share = 0;
+    float power = 0, power_inside = 0, match = 0;
     for (int p = 0; p < kBlockSize; ++p) {
-      const float* edge = sums_.data() + kSpotSteps * p + kLastSpotPlace - place;
-      profiles_.push_back(edge[kSpotSteps] - edge[0]);
-      power += profiles_.back() * profiles_.back();
-      share += profiles_.back();
+      const float* edge = sums.data() + kSpotSteps * p + kLastSpotPlace - place;
+      const float mass = edge[kSpotSteps] - edge[0], scaled = mass * scale[p];
+      profiles.push_back(scaled);
+      power += scaled * scaled;
+      power_inside += mass * mass;
+      match += scaled * scale[p];
     }
-    shares_.push_back(share);
-    norms_.push_back(std::sqrt(power));
+    norms.push_back(std::sqrt(power));
+    inside.push_back(std::sqrt(power_inside));
+    even.push_back(match);
   }
+}
+
+SpotFinder::SpotFinder(float sigma_pixels, const BlockScale& scale)
+    : scale_(scale),
+      x_(spotSums(sigma_pixels), scale.x),
+      y_(spotSums(sigma_pixels), scale.y),
+      even_power_(powerOf(scale.x) * powerOf(scale.y)),
+      reach_(static_cast<int>(std::ceil(3 * sigma_pixels)) + 1) {}
+
+float SpotFinder::evenMatch(const float* slice) const {
+  float sum = 0;
+  for (int j = 0; j < kBlockSize; ++j) {
+    float row = 0;
+    for (int i = 0; i < kBlockSize; ++i) row += scale_.x[i] * slice[j * kBlockSize + i];
+    sum += scale_.y[j] * row;
+  }
+  return sum;
+}
+
+void SpotFinder::setEven(float density, float* pixels) const {
+  for (int j = 0; j < kBlockSize; ++j)
+    for (int i = 0; i < kBlockSize; ++i) pixels[j * kBlockSize + i] = density * scale_.x[i] * scale_.y[j];
 }
 
 /// Dot product of the slice with the spot at a position, over the norm of the spot.
 float SpotFinder::match(const float* slice, int x, int y) const {
-  const float norm = norms_[x] * norms_[y];
-  if (norm < kLeastNorm) return 0;
+  if (x_.inside[x] * y_.inside[y] < kLeastNorm) return 0;
+  const float norm = x_.norms[x] * y_.norms[y];
   const int px = x / kSpotSteps - kSpotReach, py = y / kSpotSteps - kSpotReach;
   const int x0 = std::max(0, px - reach_), x1 = std::min(kBlockSize, px + reach_ + 1);
   const int y0 = std::max(0, py - reach_), y1 = std::min(kBlockSize, py + reach_ + 1);
   float sum = 0;
   for (int j = y0; j < y1; ++j) {
     float row = 0;
-    for (int i = x0; i < x1; ++i) row += profile(x)[i] * slice[j * kBlockSize + i];
-    sum += profile(y)[j] * row;
+    for (int i = x0; i < x1; ++i) row += x_.profile(x)[i] * slice[j * kBlockSize + i];
+    sum += y_.profile(y)[j] * row;
   }
   return sum / norm;
 }
@@ -69,9 +105,9 @@ void SpotFinder::refine(const float* slice, int& x, int& y, float& best) const {
 
 void SpotFinder::add(int x, int y, float weight, float* pixels) const {
   for (int j = 0; j < kBlockSize; ++j) {
-    const float row = weight * profile(y)[j];
+    const float row = weight * y_.profile(y)[j];
     if (row == 0) continue;
-    for (int i = 0; i < kBlockSize; ++i) pixels[j * kBlockSize + i] += row * profile(x)[i];
+    for (int i = 0; i < kBlockSize; ++i) pixels[j * kBlockSize + i] += row * x_.profile(x)[i];
   }
 }
 
@@ -86,7 +122,7 @@ SliceSpots SpotFinder::find(float* slice, int most, float least) const {
     refine(slice, x, y, best);
     const float gain = std::min(best * best, spots.empty() ? best * best : spots.back().gain);
     if (!(best > 0) || gain < least) break;
-    const float weight = best / (norms_[x] * norms_[y]);
+    const float weight = best / (x_.norms[x] * y_.norms[y]);
     add(x, y, -weight, slice);
     spots.push_back({static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), weight, gain});
   }

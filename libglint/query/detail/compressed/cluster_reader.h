@@ -151,22 +151,20 @@ class ClusterReader {
 };
 
 /// Calls visitor(ClusterReader) for a method and a type of coefficients.
-/// @tparam Sum       stored type of prefix sums of cp and tucker
-/// @tparam ImageSum  stored type of prefix sums of pca
-template <class Sum, class ImageSum, class Coefficient, class Visitor>
+/// @tparam Sum  stored type of prefix sums
+template <class Sum, class Coefficient, class Visitor>
 GLINT_HD auto withReaderOf(const NdfCp& ndf, Visitor& visitor) {
   if (ndf.method == CompressionMethod::cp) return visitor(ClusterReader<CpBasis<Sum>, Coefficient>(ndf));
   if (ndf.method == CompressionMethod::tucker) return visitor(ClusterReader<TuckerBasis<Sum>, Coefficient>(ndf));
-  return visitor(ClusterReader<PcaBasis<ImageSum>, Coefficient>(ndf));
+  return visitor(ClusterReader<PcaBasis<Sum>, Coefficient>(ndf));
 }
 
 /// Calls visitor(ClusterReader) for the method and the types of a compressed pyramid.
 template <class Visitor>
 GLINT_HD auto withReader(const NdfCp& ndf, Visitor&& visitor) {
-  if (ndf.coefficient_type == CoefficientType::f32) return withReaderOf<float, float, float>(ndf, visitor);
-  if (ndf.coefficient_type == CoefficientType::f16)
-    return withReaderOf<std::int16_t, std::int32_t, std::uint16_t>(ndf, visitor);
-  return withReaderOf<std::int16_t, std::int32_t, std::int8_t>(ndf, visitor);
+  if (ndf.coefficient_type == CoefficientType::f32) return withReaderOf<std::int32_t, float>(ndf, visitor);
+  if (ndf.coefficient_type == CoefficientType::f16) return withReaderOf<std::int32_t, std::uint16_t>(ndf, visitor);
+  return withReaderOf<std::int32_t, std::int8_t>(ndf, visitor);
 }
 
 }  // namespace glint
