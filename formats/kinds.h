@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string_view>
 #include <variant>
 
 #include "glint/model/bin_map.h"
@@ -12,8 +13,30 @@
 
 namespace glint::formats {
 
-/// The struct of any kind of asset: the one list of kinds, in the order of their names. To add a kind, add its struct here and
-/// describe the kind in a file of formats/kinds/.
+/// The struct of any kind of asset: the one list of kinds, in the order of their names. To add a kind, add its struct and its
+/// name here, and describe the kind in a file of formats/kinds/.
 using AnyAsset = std::variant<BinMap, Displacement, HeightMap, HistogramSat, NdfCp, NdfPyramid, NormalMap, ShLight, ShLobes>;
+
+/// Name of the kind whose assets are of struct `Model`, as files and messages have it, e.g. "bin-map".
+template <class Model>
+inline constexpr std::string_view kKindName = {};
+template <>
+inline constexpr std::string_view kKindName<BinMap> = "bin-map";
+template <>
+inline constexpr std::string_view kKindName<Displacement> = "displacement";
+template <>
+inline constexpr std::string_view kKindName<HeightMap> = "heights";
+template <>
+inline constexpr std::string_view kKindName<HistogramSat> = "histogram-sat";
+template <>
+inline constexpr std::string_view kKindName<NdfCp> = "ndf-cp";
+template <>
+inline constexpr std::string_view kKindName<NdfPyramid> = "ndf-pyramid";
+template <>
+inline constexpr std::string_view kKindName<NormalMap> = "normals";
+template <>
+inline constexpr std::string_view kKindName<ShLight> = "sh-light";
+template <>
+inline constexpr std::string_view kKindName<ShLobes> = "sh-lobes";
 
 }  // namespace glint::formats

@@ -159,7 +159,6 @@ bool momentsHold(std::span<const std::uint16_t> moments) {
 
 template <>
 struct KindDescription<BinMap> {
-  static constexpr std::string_view kName = "bin-map";
   static constexpr std::string_view kTitle = "Inverse bin map";
 
   static std::vector<Rule> indexRules() {

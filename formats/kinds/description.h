@@ -10,7 +10,7 @@ namespace glint::formats {
 /// The description of the kind whose assets are of struct `Model`. Each file of kinds/ specialises it and ends with
 /// `template const Kind& kindOf<Model>();`. A description has
 ///
-///   static constexpr std::string_view kName, kTitle;         // of the kind; one line for people
+///   static constexpr std::string_view kTitle;                // of the kind, one line for people
 ///   static std::vector<Rule> indexRules(), valueRules();     // rules of this kind alone
 ///   static void describe(auto& fields, auto& model);         // every attribute, then derived sizes, then every array, once
 ///   static void checkIndex(const Model&, Findings&);         // everything that a query follows
@@ -26,7 +26,8 @@ template <class Model>
 Kind makeKind() {
   using Description = KindDescription<Model>;
   Kind kind;
-  kind.schema.name = Description::kName;
+  static_assert(!kKindName<Model>.empty(), "formats/kinds.h gives each kind a name");
+  kind.schema.name = kKindName<Model>;
   kind.schema.title = Description::kTitle;
   const Model empty{};
   SchemaFields schema_fields(kind.schema);
@@ -34,7 +35,7 @@ Kind makeKind() {
   kind.index_rules = Description::indexRules();
   kind.value_rules = Description::valueRules();
   kind.pack = [](const AnyAsset& asset) {
-    PackFields fields(Description::kName);
+    PackFields fields(kKindName<Model>);
     Description::describe(fields, std::get<Model>(asset));
     return std::move(fields.packed());
   };

@@ -66,7 +66,6 @@ void describeLevel(auto& fields, auto& level) {
 
 template <>
 struct KindDescription<Displacement> {
-  static constexpr std::string_view kName = "displacement";
   static constexpr std::string_view kTitle = "Downsampled displacement map that keeps its appearance";
 
   static std::vector<Rule> indexRules() {

@@ -8,7 +8,6 @@ namespace glint::formats {
 
 template <>
 struct KindDescription<HeightMap> {
-  static constexpr std::string_view kName = "heights";
   static constexpr std::string_view kTitle = "Height field";
 
   static std::vector<Rule> indexRules() { return {}; }

@@ -92,7 +92,6 @@ bool totalsCount(const HistogramSat& sat) {
 
 template <>
 struct KindDescription<HistogramSat> {
-  static constexpr std::string_view kName = "histogram-sat";
   static constexpr std::string_view kTitle = "Accumulated histograms of normals";
 
   static std::vector<Rule> indexRules() {

@@ -408,7 +408,6 @@ void describeClusters(auto& fields, auto& ndf) {
 
 template <>
 struct KindDescription<NdfCp> {
-  static constexpr std::string_view kName = "ndf-cp";
   static constexpr std::string_view kTitle = "Compressed pyramid of NDF images";
 
   static std::vector<Rule> indexRules() {

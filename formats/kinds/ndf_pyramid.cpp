@@ -66,7 +66,6 @@ std::vector<double> checkBlocks(const NdfPyramid& pyramid, int l, Findings& find
 
 template <>
 struct KindDescription<NdfPyramid> {
-  static constexpr std::string_view kName = "ndf-pyramid";
   static constexpr std::string_view kTitle = "Pyramid of NDF images";
 
   static std::vector<Rule> indexRules() {

@@ -82,7 +82,6 @@ void checkStoredSlopes(const NormalMap& map, Findings& findings) {
 
 template <>
 struct KindDescription<NormalMap> {
-  static constexpr std::string_view kName = "normals";
   static constexpr std::string_view kTitle = "Normal map";
 
   static std::vector<Rule> indexRules() {

@@ -8,7 +8,6 @@ namespace glint::formats {
 
 template <>
 struct KindDescription<ShLight> {
-  static constexpr std::string_view kName = "sh-light";
   static constexpr std::string_view kTitle = "Light for half vectors in spherical harmonics";
 
   static std::vector<Rule> indexRules() { return {}; }

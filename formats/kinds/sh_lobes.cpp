@@ -7,7 +7,6 @@ namespace glint::formats {
 
 template <>
 struct KindDescription<ShLobes> {
-  static constexpr std::string_view kName = "sh-lobes";
   static constexpr std::string_view kTitle = "Turned roughness lobes in spherical harmonics";
 
   static std::vector<Rule> indexRules() { return {}; }

@@ -11,11 +11,12 @@ import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
 
-# The line: the struct of the kind joins the list. What comes before and after it is today's.
+# The line: the struct of the kind joins the list, with its name. What comes before and after it is today's.
 LIST = "formats/kinds.h"
 LIST_EDITS = {
     '#include "glint/model/sh.h"\n': '#include "glint/model/sh.h"\n#include "glint/model/toy.h"\n',
-    "ShLobes>;": "ShLobes, Toy>;",
+    "NormalMap, ShLight, ShLobes>;": "NormalMap, ShLight, ShLobes, Toy>;",
+    'kKindName<ShLobes> = "sh-lobes";\n': 'kKindName<ShLobes> = "sh-lobes";\ntemplate <>\ninline constexpr std::string_view kKindName<Toy> = "toy";\n',
 }
 
 # The file, and the struct that it describes.
@@ -38,7 +39,6 @@ namespace glint::formats {
 
 template <>
 struct KindDescription<Toy> {
-  static constexpr std::string_view kName = "toy";
   static constexpr std::string_view kTitle = "Toy";
   static std::vector<Rule> indexRules() { return {}; }
   static std::vector<Rule> valueRules() { return {errorRule("toy.finite", "values are finite")}; }

@@ -10,7 +10,7 @@ namespace glint::api {
 template <>
 struct NdfTraits<BinMapNdf> {
   using Asset = BinMap;
-  static constexpr std::string_view kKind = "bin-map";
+  static constexpr std::string_view kKind = formats::kKindName<Asset>;
 
   static BinMapNdf open(const NdfSource<BinMap>& source) { return {source.asset, askedAlpha(source)}; }
 

@@ -8,7 +8,7 @@ namespace glint::api {
 template <>
 struct NdfTraits<AnisotropicNdf<CpNdf>> {
   using Asset = NdfCp;
-  static constexpr std::string_view kKind = "ndf-cp";
+  static constexpr std::string_view kKind = formats::kKindName<Asset>;
 
   static AnisotropicNdf<CpNdf> open(const NdfSource<NdfCp>& source) { return openLevels<CpNdf>(source); }
   static NdfInfo info(const NdfSource<NdfCp>& source) { return levelsInfo(source.asset.shape); }

@@ -8,7 +8,7 @@ namespace glint::api {
 template <>
 struct NdfTraits<HistogramNdf> {
   using Asset = HistogramSat;
-  static constexpr std::string_view kKind = "histogram-sat";
+  static constexpr std::string_view kKind = formats::kKindName<Asset>;
 
   static HistogramNdf open(const NdfSource<HistogramSat>& source) {
     return HistogramNdf(source.asset, source.options.gaussian_boxes, source.options.slant_tolerance);

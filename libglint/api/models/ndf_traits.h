@@ -7,6 +7,7 @@
 #include "glint/api/ndf_info.h"
 #include "glint/api/ndf_options.h"
 #include "glint/api/packer.h"
+#include "glint/formats/kinds.h"
 #include "glint/model/normal_map.h"
 #include "glint/query/ndf_model.h"
 
@@ -25,7 +26,7 @@ struct NdfSource {
 /// of its own, beside this one. DescribedNdf lists the members:
 ///
 ///   Asset           struct of the kind that the model answers, e.g. BinMap
-///   kKind           name of the kind, e.g. "bin-map"
+///   kKind           name of the kind, formats::kKindName<Asset>
 ///   open(source)    makes the model. Throws Error (usage) for options that the asset cannot answer
 ///   info(source)    properties of the model that open(source) makes
 ///   slopes(asset)   moments of the map's slopes, for SmithMasking

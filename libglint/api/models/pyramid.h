@@ -8,7 +8,7 @@ namespace glint::api {
 template <>
 struct NdfTraits<AnisotropicNdf<PyramidNdf>> {
   using Asset = NdfPyramid;
-  static constexpr std::string_view kKind = "ndf-pyramid";
+  static constexpr std::string_view kKind = formats::kKindName<Asset>;
 
   static AnisotropicNdf<PyramidNdf> open(const NdfSource<NdfPyramid>& source) { return openLevels<PyramidNdf>(source); }
   static NdfInfo info(const NdfSource<NdfPyramid>& source) { return levelsInfo(source.asset.shape); }

@@ -9,7 +9,7 @@ namespace glint::api {
 template <>
 struct NdfTraits<Reference> {
   using Asset = NormalMap;
-  static constexpr std::string_view kKind = "normals";
+  static constexpr std::string_view kKind = formats::kKindName<Asset>;
 
   static Reference open(const NdfSource<NormalMap>& source) {
     const NdfOptions& options = source.options;
