@@ -4,6 +4,7 @@
 #include "glint/formats/kinds/description.h"
 #include "glint/formats/kinds/shared_fields.h"
 #include "glint/formats/kinds/texel_tally.h"
+#include "glint/model/slope_sums.h"
 
 namespace glint::formats {
 namespace {
@@ -47,20 +48,6 @@ void checkBounds(const NormalMap& map, Findings& findings) {
     }
     report(loose, "normals.bounds", "/" + levelPath("bounds/level_{l}", k), "nodes do not hold what they cover", findings);
   }
-}
-
-/// Moments of the slopes of normals inside the disk, by plain sums.
-MapSlopes slopesOf(const NormalMap& map) {
-  double p = 0, q = 0, pp = 0, pq = 0, qq = 0;
-  for (const Vec2 n : map.normals) {
-    const double z = std::sqrt(std::max(1e-12, 1 - double{n.x} * n.x - double{n.y} * n.y)), x = -n.x / z, y = -n.y / z;
-    p += x, q += y, pp += x * x, pq += x * y, qq += y * y;
-  }
-  const auto count = static_cast<double>(map.normals.size());
-  p /= count, q /= count;
-  return {
-      {static_cast<float>(p), static_cast<float>(q)},
-      {static_cast<float>(pp / count - p * p), static_cast<float>(pq / count - p * q), static_cast<float>(qq / count - q * q)}};
 }
 
 /// Compares the stored slopes with the normals'.

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "glint/api/models/ndf_traits.h"
-#include "glint/query/brdf/slope_sums.h"
+#include "glint/model/slope_sums.h"
 #include "glint/query/reference.h"
 
 namespace glint::api {
@@ -28,15 +28,8 @@ struct NdfTraits<Reference> {
     return info;
   }
 
-  /// What the map says, or sums over all texels, row by row.
-  static MapSlopes slopes(const NormalMap& map) {
-    if (map.slopes) return *map.slopes;
-    const auto width = static_cast<std::size_t>(map.width);
-    SlopeSums sums;
-    for (std::size_t j = 0; j < static_cast<std::size_t>(map.height); ++j)
-      sums.add(slopeSums(map.normals.data() + j * width, width));
-    return sums.moments(static_cast<double>(map.width) * map.height);
-  }
+  /// Slopes that the map holds; where it holds none, sums over all texels.
+  static MapSlopes slopes(const NormalMap& map) { return map.slopes ? *map.slopes : slopesOf(map); }
 
   static constexpr bool kPacks = true;
   static void pack(const NdfSource<NormalMap>& source, Packer& packer) {

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "glint/bake/common/simd.h"
-#include "glint/query/brdf/slope_sums.h"
+#include "glint/model/slope_sums.h"
 
 namespace glint::bake {
 namespace {

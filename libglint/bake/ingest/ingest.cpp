@@ -14,7 +14,7 @@
 #include "glint/bake/ingest/checks.h"
 #include "glint/bake/ingest/pixel_codes.h"
 #include "glint/model/error.h"
-#include "glint/query/brdf/slope_sums.h"
+#include "glint/model/slope_sums.h"
 
 namespace glint::bake {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "glint/math/vec.h"
 #include "glint/model/map_slopes.h"
+#include "glint/model/normal_map.h"
 
 namespace glint {
 
@@ -47,6 +48,15 @@ inline GLINT_HD SlopeSums slopeSums(const Vec2* normals, std::size_t count) {
   SlopeSums total;
   for (std::size_t k = 0; k < kLanes; ++k) total.add({sums[0][k], sums[1][k], sums[2][k], sums[3][k], sums[4][k]});
   return total;
+}
+
+/// Moments of the slopes of a map's normals, from sums over rows that are added in order.
+inline MapSlopes slopesOf(const NormalMap& map) {
+  const auto width = static_cast<std::size_t>(map.width);
+  SlopeSums total;
+  for (std::size_t j = 0; j < static_cast<std::size_t>(map.height); ++j)
+    total.add(slopeSums(map.normals.data() + j * width, width));
+  return total.moments(static_cast<double>(map.width) * map.height);
 }
 
 }  // namespace glint
