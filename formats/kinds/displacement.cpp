@@ -2,21 +2,10 @@
 
 #include "glint/formats/kinds/description.h"
 #include "glint/formats/kinds/shared_fields.h"
+#include "glint/formats/kinds/tally.h"
 
 namespace glint::formats {
 namespace {
-
-/// Adds a finding if some of `count` elements are bad.
-template <class Bad>
-void report(Findings& findings, const char* rule, int level, const char* dataset, std::size_t count, const char* what,
-            Bad bad) {
-  std::size_t number = 0, first = 0;
-  for (std::size_t k = 0; k < count; ++k)
-    if (bad(k) && number++ == 0) first = k;
-  if (number == 0) return;
-  findings.add(rule, "/" + levelPath("level_{l}/", level) + dataset,
-               std::to_string(number) + " " + what + " (first is element " + std::to_string(first) + ")");
-}
 
 void describeBase(auto& fields, auto& base) {
   fields.choice("base", base.kind, "diffuse|ggx", "reflectance of a facet of the original surface");
@@ -60,6 +49,38 @@ void describeLevel(auto& fields, auto& level) {
                {"level_spatial_rows[l]", "level_spatial_columns[l]", "channels"}, "1", "T: factors of each patch");
   fields.halves("level_{l}/angular_scale", level.angular_scale, {"angular_pairs", "channels"}, "1",
                 "S: factors of each pair of directions i <= o at o (o + 1) / 2 + i");
+}
+
+bool isProper(const VmfLobe& lobe) {
+  return dot(lobe.mu, lobe.mu) <= 1 && lobe.kappa >= 0 && lobe.kappa <= kMaxKappa && lobe.amplitude >= 0 &&
+         std::isfinite(lobe.amplitude);
+}
+
+bool isFinite(const MapSlopes& m) {
+  return std::isfinite(m.mean.x + m.mean.y + m.covariance.xx + m.covariance.xy + m.covariance.yy);
+}
+
+void checkLevel(const DisplacementLevel& level, int l, Findings& findings) {
+  const auto check = [&](std::string_view rule, const char* dataset, const auto& values, const Subject& subject,
+                         const char* what, auto holds) {
+    reportUnless(
+        values.size(), [&](std::size_t k) { return holds(values[k]); }, rule, "/" + levelPath("level_{l}/", l) + dataset,
+        subject, what, findings);
+  };
+  const auto finite = [](float x) { return std::isfinite(x); };
+  const Subject factors = {"factor is", "factors are"};
+  check("displacement.heights", "heights", level.heights, {"height is", "heights are"}, "not finite", finite);
+  check("displacement.lobes", "lobes", level.lobes, {"lobe is", "lobes are"}, "out of range", isProper);
+  check("displacement.bases", "lobe_colors", level.lobe_colors, {"colour is", "colours are"}, "out of range",
+        [](float x) { return x >= 0 && x <= 1; });
+  check("displacement.bases", "lobe_alphas", level.lobe_alphas, {"alpha is", "alphas are"}, "out of range",
+        [](float x) { return x > 0 && x <= 1; });
+  check("displacement.moments", "slopes", level.slopes, {"cell has", "cells have"}, "moments that are not finite", isFinite);
+  check("displacement.moments", "fit_errors", level.fit_errors, {"error is", "errors are"}, "not finite", finite);
+  check("displacement.scales", "spatial_scale", level.spatial_scale, factors, "negative or not finite",
+        [](float x) { return std::isfinite(x) && x >= 0; });
+  check("displacement.scales", "angular_scale", level.angular_scale, factors, "negative or not finite",
+        [](std::uint16_t half) { return (half & 0x7c00) != 0x7c00 && (half & 0x8000) == 0; });
 }
 
 }  // namespace
@@ -120,33 +141,7 @@ struct KindDescription<Displacement> {
   }
 
   static void checkValues(const Displacement& displacement, Findings& findings) {
-    for (int l = 0; l < displacement.level_count; ++l) {
-      const DisplacementLevel& level = displacement.levels[l];
-      report(findings, "displacement.heights", l, "heights", level.heights.size(), "heights are not finite",
-             [&](std::size_t k) { return !std::isfinite(level.heights[k]); });
-      report(findings, "displacement.lobes", l, "lobes", level.lobes.size(), "lobes are out of range", [&](std::size_t k) {
-        const VmfLobe& lobe = level.lobes[k];
-        return !(dot(lobe.mu, lobe.mu) <= 1 && lobe.kappa >= 0 && lobe.kappa <= kMaxKappa && lobe.amplitude >= 0 &&
-                 std::isfinite(lobe.amplitude));
-      });
-      report(findings, "displacement.bases", l, "lobe_colors", level.lobe_colors.size(), "colours are out of range",
-             [&](std::size_t k) { return !(level.lobe_colors[k] >= 0 && level.lobe_colors[k] <= 1); });
-      report(findings, "displacement.bases", l, "lobe_alphas", level.lobe_alphas.size(), "alphas are out of range",
-             [&](std::size_t k) { return !(level.lobe_alphas[k] > 0 && level.lobe_alphas[k] <= 1); });
-      report(findings, "displacement.moments", l, "slopes", level.slopes.size(), "cells have moments that are not finite",
-             [&](std::size_t k) {
-               const MapSlopes& m = level.slopes[k];
-               return !std::isfinite(m.mean.x + m.mean.y + m.covariance.xx + m.covariance.xy + m.covariance.yy);
-             });
-      report(findings, "displacement.moments", l, "fit_errors", level.fit_errors.size(), "errors are not finite",
-             [&](std::size_t k) { return !std::isfinite(level.fit_errors[k]); });
-      report(findings, "displacement.scales", l, "spatial_scale", level.spatial_scale.size(),
-             "factors are negative or not finite",
-             [&](std::size_t k) { return !(std::isfinite(level.spatial_scale[k]) && level.spatial_scale[k] >= 0); });
-      report(
-          findings, "displacement.scales", l, "angular_scale", level.angular_scale.size(), "factors are negative or not finite",
-          [&](std::size_t k) { return (level.angular_scale[k] & 0x7c00) == 0x7c00 || (level.angular_scale[k] & 0x8000) != 0; });
-    }
+    for (int l = 0; l < displacement.level_count; ++l) checkLevel(displacement.levels[l], l, findings);
   }
 };
 

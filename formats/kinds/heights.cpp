@@ -2,7 +2,7 @@
 
 #include "glint/formats/kinds/description.h"
 #include "glint/formats/kinds/shared_fields.h"
-#include "glint/formats/kinds/texel_tally.h"
+#include "glint/formats/kinds/tally.h"
 
 namespace glint::formats {
 
@@ -26,7 +26,7 @@ struct KindDescription<HeightMap> {
     TexelTally infinite(map.width, map.height);
     for (std::size_t k = 0; k < map.heights.size(); ++k)
       if (!std::isfinite(map.heights[k])) infinite.add(k);
-    report(infinite, "heights.finite", "/heights", "texels are not finite", findings);
+    report(infinite, "heights.finite", "/heights", {"texel is", "texels are"}, "not finite", findings);
   }
 };
 

@@ -5,6 +5,7 @@
 
 #include "glint/formats/kinds/description.h"
 #include "glint/formats/kinds/shared_fields.h"
+#include "glint/formats/kinds/tally.h"
 #include "glint/formats/number_text.h"
 #include "glint/math/half.h"
 
@@ -339,30 +340,14 @@ void checkDensities(const NdfCp& ndf, Findings& findings) {
   }
   if (bad_integrals > 0)
     findings.add("compressed.integral", "/image_scales",
-                 std::to_string(bad_integrals) + " images do not integrate to 1 (worst " + numberText(worst) + ")");
+                 counted(bad_integrals, {"image does", "images do"}) + " not integrate to 1 (worst " + numberText(worst) + ")");
   if (bad_images > 0)
     findings.add("compressed.density_scales", "/density_scales",
-                 std::to_string(bad_images) + " images do not integrate to 1 without their negative parts");
+                 counted(bad_images, {"image does", "images do"}) + " not integrate to 1 without negative parts");
   if (bad_masses > 0)
     findings.add("compressed.block_masses", "/block_masses",
-                 std::to_string(bad_masses) + " masses are not the slices' shares of their images, rounded up");
+                 counted(bad_masses, {"mass is", "masses are"}) + " not a slice's share of its image, rounded up");
 }
-
-template <class Condition>
-void checkAll(std::uint64_t count, Condition holds, std::string_view rule, const char* object, const char* what,
-              Findings& findings) {
-  std::uint64_t bad = 0;
-  std::uint64_t first = 0;
-  for (std::uint64_t k = 0; k < count; ++k) {
-    if (!holds(k) && bad++ == 0) first = k;
-  }
-  if (bad > 0)
-    findings.add(rule, object, std::to_string(bad) + " values are " + what + " (first at " + std::to_string(first) + ")");
-}
-
-}  // namespace
-
-namespace {
 
 /// Numbers the images of all levels.
 void describeImages(auto& fields, auto& ndf) {
@@ -471,21 +456,22 @@ struct KindDescription<NdfCp> {
   }
 
   static void checkValues(const NdfCp& ndf, Findings& findings) {
-    checkAll(
-        ndf.image_scales.size(), [&](std::uint64_t k) { return std::isfinite(ndf.image_scales[k]) && ndf.image_scales[k] > 0; },
-        "compressed.image_scales", "/image_scales", "not finite and positive", findings);
-    checkAll(
-        ndf.scales.size(), [&](std::uint64_t k) { return std::isfinite(ndf.scales[k]); }, "compressed.scales", "/scales",
+    const Subject values = {"value is", "values are"};
+    reportUnless(
+        ndf.image_scales.size(), [&](std::size_t k) { return std::isfinite(ndf.image_scales[k]) && ndf.image_scales[k] > 0; },
+        "compressed.image_scales", "/image_scales", values, "not finite and positive", findings);
+    reportUnless(
+        ndf.scales.size(), [&](std::size_t k) { return std::isfinite(ndf.scales[k]); }, "compressed.scales", "/scales", values,
         "not finite", findings);
     if (ndf.coefficient_type != CoefficientType::i8) {
       const ElementType type = coefficientElement(ndf.coefficient_type);
-      checkAll(
-          ndf.coefficient_count, [&](std::uint64_t k) { return std::isfinite(element(type, ndf.coefficients, k)); },
-          "compressed.factors", "/coefficients", "not finite", findings);
+      reportUnless(
+          ndf.coefficient_count, [&](std::size_t k) { return std::isfinite(element(type, ndf.coefficients, k)); },
+          "compressed.factors", "/coefficients", values, "not finite", findings);
     }
-    checkAll(
-        ndf.spot_sums.size(), [&](std::uint64_t k) { return ndf.spot_sums[k] >= 0 && ndf.spot_sums[k] <= 1; },
-        "compressed.factors", "/spot_sums", "not between 0 and 1", findings);
+    reportUnless(
+        ndf.spot_sums.size(), [&](std::size_t k) { return ndf.spot_sums[k] >= 0 && ndf.spot_sums[k] <= 1; },
+        "compressed.factors", "/spot_sums", values, "not between 0 and 1", findings);
     checkDensities(ndf, findings);
   }
 };

@@ -4,9 +4,9 @@
 
 #include "glint/formats/kinds/description.h"
 #include "glint/formats/kinds/shared_fields.h"
+#include "glint/formats/kinds/tally.h"
 #include "glint/formats/number_text.h"
 #include "glint/math/half.h"
-#include "glint/model/texel_name.h"
 
 namespace glint::formats {
 namespace {
@@ -23,42 +23,34 @@ float pixel(const NdfPyramid& pyramid, const PyramidLevel& level, std::size_t in
                                                   : static_cast<const float*>(level.pixels)[index];
 }
 
-/// "the image at column 3, row 7 from the top" that a stored block of a level belongs to.
+/// "in the image at column 3, row 7 from the top": place of a stored block of a level.
 std::string imageOf(const NdfPyramid& pyramid, int l, std::size_t block) {
   const std::span<const std::uint32_t> ranks = pyramid.levels[l].mask_ranks;
   const auto word = static_cast<std::size_t>(std::upper_bound(ranks.begin(), ranks.end(), block) - ranks.begin()) - 1;
   const PyramidGrid& grid = pyramid.shape.levels[l];
-  return "the image at " + texelName(grid.columns, grid.rows, word / static_cast<std::size_t>(pyramid.shape.maskWords()));
+  return "in the image at " + texelName(grid.columns, grid.rows, word / static_cast<std::size_t>(pyramid.shape.maskWords()));
 }
 
 /// Checks the pixels of one level against its means. Returns the sum of the pixels of each block.
 std::vector<double> checkBlocks(const NdfPyramid& pyramid, int l, Findings& findings) {
   const PyramidLevel& level = pyramid.levels[l];
   std::vector<double> sums(level.block_means.size());
-  std::size_t bad_pixels = 0;
-  std::size_t bad_means = 0;
-  std::size_t first_pixel = 0;
-  std::size_t first_mean = 0;
+  Tally bad_pixels, bad_means;  // by block
   for (std::size_t b = 0; b < sums.size(); ++b) {
     for (std::size_t k = b * kBlockPixels; k < (b + 1) * kBlockPixels; ++k) {
       const float value = pixel(pyramid, level, k);
-      if (!(std::isfinite(value) && value >= 0) && bad_pixels++ == 0) first_pixel = b;
+      if (!(std::isfinite(value) && value >= 0)) bad_pixels.add(b);
       sums[b] += value;
     }
     const double mean = sums[b] * pyramid.value_scale / kBlockPixels;
     const double tolerance = kMeanTolerance * std::abs(mean) + kMeanFloor * pyramid.value_scale;
-    if (!(std::abs(mean - level.block_means[b]) <= tolerance) && bad_means++ == 0) first_mean = b;
+    if (!(std::abs(mean - level.block_means[b]) <= tolerance)) bad_means.add(b);
   }
-  if (bad_pixels > 0) {
-    findings.add(
-        "pyramid.pixels", levelObject(l, "pixels"),
-        std::to_string(bad_pixels) + " pixels are negative or not finite (first in " + imageOf(pyramid, l, first_pixel) + ")");
-  }
-  if (bad_means > 0) {
-    findings.add(
-        "pyramid.block_means", levelObject(l, "block_means"),
-        std::to_string(bad_means) + " means differ from the pixels' (first in " + imageOf(pyramid, l, first_mean) + ")");
-  }
+  const auto image = [&](std::size_t block) { return imageOf(pyramid, l, block); };
+  report(bad_pixels, "pyramid.pixels", levelObject(l, "pixels"), {"pixel is", "pixels are"}, "negative or not finite", findings,
+         image);
+  report(bad_means, "pyramid.block_means", levelObject(l, "block_means"), {"mean differs", "means differ"}, "from the pixels'",
+         findings, image);
   return sums;
 }
 
@@ -139,7 +131,7 @@ struct KindDescription<NdfPyramid> {
       }
       if (bad > 0) {
         findings.add("pyramid.integral", levelObject(l, "pixels"),
-                     std::to_string(bad) + " images do not integrate to 1 (worst " + numberText(worst) + ")");
+                     counted(bad, {"image does", "images do"}) + " not integrate to 1 (worst " + numberText(worst) + ")");
       }
     }
   }

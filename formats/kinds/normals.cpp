@@ -3,7 +3,7 @@
 
 #include "glint/formats/kinds/description.h"
 #include "glint/formats/kinds/shared_fields.h"
-#include "glint/formats/kinds/texel_tally.h"
+#include "glint/formats/kinds/tally.h"
 #include "glint/model/slope_sums.h"
 
 namespace glint::formats {
@@ -46,7 +46,8 @@ void checkBounds(const NormalMap& map, Findings& findings) {
         if (!(k == 0 ? holdsTexels(map, node, i, j) : holdsChildren(map.bounds[k - 1], node, i, j))) loose.add(index);
       }
     }
-    report(loose, "normals.bounds", "/" + levelPath("bounds/level_{l}", k), "nodes do not hold what they cover", findings);
+    report(loose, "normals.bounds", "/" + levelPath("bounds/level_{l}", k), {"node does", "nodes do"},
+           "not hold all texels below", findings);
   }
 }
 
@@ -118,8 +119,8 @@ struct KindDescription<NormalMap> {
         outside.add(k);
       }
     }
-    report(infinite, "normals.finite", "/normals", "texels are not finite", findings);
-    report(outside, "normals.disk", "/normals", "normals are not inside the unit disk", findings);
+    report(infinite, "normals.finite", "/normals", {"texel is", "texels are"}, "not finite", findings);
+    report(outside, "normals.disk", "/normals", {"normal is", "normals are"}, "not inside the unit disk", findings);
     checkBounds(map, findings);
     if (map.slopes && infinite.count() == 0 && outside.count() == 0) checkStoredSlopes(map, findings);
   }

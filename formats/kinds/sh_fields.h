@@ -4,9 +4,11 @@
 
 #include <cstddef>
 #include <span>
+#include <string>
 
 #include "glint/formats/findings.h"
 #include "glint/formats/kinds/shared_fields.h"
+#include "glint/formats/kinds/tally.h"
 #include "glint/model/sh.h"
 
 namespace glint::formats {
@@ -29,6 +31,9 @@ void describeCoefficients(auto& fields, std::string_view path, auto& coefficient
   const Types types = {{"precision=f16", ElementType::f16}, {"precision=f32", ElementType::f32}};
   fields.data(path, coefficients, std::uint64_t{count}, types, dims, "1", long_name);
 }
+
+/// "at direction 3", for report().
+inline std::string directionName(std::size_t direction) { return "at direction " + std::to_string(direction); }
 
 void checkGrid(const ShGrid& grid, bool may_be_empty, Findings& findings);
 

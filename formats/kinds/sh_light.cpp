@@ -29,7 +29,7 @@ struct KindDescription<ShLight> {
     checkShNumbers(light.scales, false, "/scales", findings);
     checkShNumbers(light.band_norms, false, "/band_norms", findings);
     const std::size_t count = shCount(light.order), bands = static_cast<std::size_t>(light.order) + 1;
-    std::size_t other = 0, first = 0;
+    Tally other;
     for (std::size_t d = 0; d < light.grid.directionCount(); ++d) {
       double largest = 0;
       for (std::size_t l = 0; l < bands; ++l) largest = std::max(largest, double{light.band_norms[d * bands + l]});
@@ -48,12 +48,10 @@ struct KindDescription<ShLight> {
         // Small bands lose digits to the largest coefficient's scale in half precision.
         holds &= std::fabs(norm - stored) <= kShNormTolerance * stored + 1e-5 * largest;
       }
-      if (!holds && other++ == 0) first = d;
+      if (!holds) other.add(d);
     }
-    if (other > 0)
-      findings.add(
-          "sh.band_norms", "/band_norms",
-          "differs from the coefficients at " + std::to_string(other) + " directions (first " + std::to_string(first) + ")");
+    report(other, "sh.band_norms", "/band_norms", {"direction has", "directions have"}, "other norms than the coefficients",
+           findings, directionName);
   }
 };
 

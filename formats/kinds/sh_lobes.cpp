@@ -30,7 +30,7 @@ struct KindDescription<ShLobes> {
     const std::size_t count = shCount(lobes.order);
     double norm = 0;
     for (const float f : lobes.zonal) norm += double{f} * f;
-    std::size_t other = 0, first = 0;
+    Tally other;
     for (std::size_t d = 0; d < lobes.grid.directionCount(); ++d) {
       double turned = 0;
       for (int l = 0; l <= lobes.order; ++l) turned += std::pow(bandNorm(lobes.coefficients, lobes.precision, d * count, l), 2);
@@ -38,12 +38,10 @@ struct KindDescription<ShLobes> {
         findings.add("sh.finite", "/lobes", "direction " + std::to_string(d) + " has coefficients that are not finite");
         return;
       }
-      if (!(std::fabs(std::sqrt(turned) - std::sqrt(norm)) <= kShNormTolerance * std::sqrt(norm)) && other++ == 0) first = d;
+      if (!(std::fabs(std::sqrt(turned) - std::sqrt(norm)) <= kShNormTolerance * std::sqrt(norm))) other.add(d);
     }
-    if (other > 0)
-      findings.add("sh.zonal", "/lobes",
-                   std::to_string(other) + " lobes have another norm than the one along +z (first at direction " +
-                       std::to_string(first) + ")");
+    report(other, "sh.zonal", "/lobes", {"lobe has", "lobes have"}, "another norm than the one along +z", findings,
+           directionName);
   }
 };
 
