@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/image_formats.h"
+#include "common/name_list.h"
 #include "glint/model/error.h"
 #include "glint/model/shown_text.h"
 
@@ -41,13 +42,9 @@ void checkDeclaredSize(const std::string& path, std::uint64_t pixel_bytes) {
 }
 
 std::string partList(const std::vector<std::string>& names) {
-  constexpr std::size_t kMost = 8, kMostName = 40;
-  std::string list;
-  for (std::size_t k = 0; k < std::min(names.size(), kMost); ++k) {
-    list += (k > 0 ? ", " : "") + std::to_string(k);
-    if (!names[k].empty()) list += " (" + shownText(names[k], kMostName) + ")";
-  }
-  return list + (names.size() > kMost ? ", ..." : "");
+  return nameList(names, [](std::size_t k, const std::string& name) {
+    return std::to_string(k) + (name.empty() ? "" : " (" + name + ")");
+  });
 }
 
 int findPart(const std::string& path, const std::string& part, const std::vector<std::string>& names) {

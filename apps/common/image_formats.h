@@ -53,7 +53,7 @@ void checkDeclaredSize(const std::string& path, std::uint64_t pixel_bytes);
 /// @throws Error invalid_input if there is none
 int findPart(const std::string& path, const std::string& part, const std::vector<std::string>& names);
 
-/// "0 (beauty), 1 (normals)": numbers and names of images, at most eight.
+/// "0 (beauty), 1 (normals)": numbers and names of the first images.
 std::string partList(const std::vector<std::string>& names);
 
 /// Reads a file to its end, so that errors of the system are not taken for damage of the file.

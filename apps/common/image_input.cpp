@@ -2,25 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "common/image_formats.h"
-#include "glint/model/shown_text.h"
+#include "common/name_list.h"
 
 namespace glint::apps {
-namespace {
-
-std::string layerList(const std::vector<std::string>& layers) {
-  constexpr std::size_t kMost = 8, kMostName = 40;
-  std::vector<std::string> names;
-  for (const std::string& layer : layers)
-    names.push_back(layer.empty() ? "the one without a name" : shownText(layer, kMostName));
-  const bool more = names.size() > kMost;
-  if (more) names.resize(kMost);
-  return fmt::format("{}{}", fmt::join(names, ", "), more ? ", ..." : "");
-}
-
-}  // namespace
 
 void ImageOptions::declare(Tool& tool) {
   using Window = ImageChoice::Window;
@@ -48,8 +33,9 @@ Image readInputImage(Tool& tool, const std::string& path, const ImageChoice& cho
                           partList(image.parts), remedy));
   }
   if (image.layers.size() > 1 && choice.layer.empty()) {
+    const auto label = [](std::size_t, const std::string& name) { return name.empty() ? "the one without a name" : name; };
     tool.warn(fmt::format("{}: holds {} layers, of which the first was read: {}; {}", path, image.layers.size(),
-                          layerList(image.layers), remedy));
+                          nameList(image.layers, label), remedy));
   }
   return image;
 }

@@ -4,8 +4,8 @@
 #include <cctype>
 #include <limits>
 
+#include "common/name_list.h"
 #include "glint/model/error.h"
-#include "glint/model/shown_text.h"
 #include "glint/model/texel_name.h"
 
 namespace glint::apps {
@@ -42,11 +42,8 @@ std::string layerOf(const std::string& channel) {
   return point == std::string::npos ? "" : channel.substr(0, point);
 }
 
-std::string joined(const std::vector<std::string>& names) {
-  constexpr std::size_t kMost = 12, kMostName = 40;
-  std::string text;
-  for (std::size_t k = 0; k < std::min(names.size(), kMost); ++k) text += (k > 0 ? ", " : "") + shownText(names[k], kMostName);
-  return text + (names.size() > kMost ? ", ..." : "");
+std::string channelList(const Image& image) {
+  return nameList(image.channel_names, [](std::size_t, const std::string& name) { return name; });
 }
 
 std::string lower(std::string text) {
@@ -165,7 +162,7 @@ void selectLayer(Image& image, const std::string& layer, const std::string& path
     if (layerOf(image.channel_names[static_cast<std::size_t>(c)]) == image.layer) kept.push_back(c);
   if (kept.empty()) {
     throw Error(ErrorCode::invalid_input, "image.layer", path, "", "has no layer \"" + layer + "\"",
-                "its channels are " + joined(image.channel_names));
+                "its channels are " + channelList(image));
   }
   // Each layer of an OpenEXR file may have an alpha of its own.
   const auto alpha = std::find_if(kept.begin(), kept.end(),
@@ -179,7 +176,7 @@ std::vector<int> findChannels(const Image& image, const std::string& channels, c
   const auto add = [&](int channel, const std::string& name) {
     if (channel < 0) {
       throw Error(ErrorCode::invalid_input, "image.channels", path, "", "has no channel \"" + name + "\"",
-                  "its channels are " + joined(image.channel_names) + "; choose among them with --channels");
+                  "its channels are " + channelList(image) + "; choose among them with --channels");
     }
     found.push_back(channel);
   };
