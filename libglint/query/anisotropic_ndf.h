@@ -33,19 +33,6 @@ inline constexpr float kPartWidening = 0.055f;
 /// A footprint is round if its variance along its long axis exceeds the variance of its parts by less than this share.
 inline constexpr float kRoundLength = 0.05f;
 
-/// Deviations along the axes of a covariance, and the direction of the longer one.
-struct PrincipalAxes {
-  float longest = 0, shortest = 0;
-  Vec2 direction;
-};
-inline GLINT_HD PrincipalAxes principalAxes(const UsableCovariance& c) {
-  const double mean = 0.5 * (c.xx + c.yy), half = 0.5 * (c.xx - c.yy), high = mean + std::sqrt(half * half + c.xy * c.xy);
-  const float angle = 0.5f * std::atan2(static_cast<float>(c.xy), static_cast<float>(half));
-  return {static_cast<float>(std::sqrt(high)),
-          static_cast<float>(std::sqrt(c.determinant() / high)),
-          {std::cos(angle), std::sin(angle)}};
-}
-
 /// Parts of a footprint that winds round the map: spread evenly along the period that the footprint follows. `count` is 0 if
 /// the footprint is shorter. Parts are as wide as the footprint is across, or wider where `most` parts are too few.
 GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p, int width, int height, float narrowest_sigma,
@@ -87,11 +74,12 @@ GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p,
 GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOverMap(const Footprint& p, int width, int height, float narrowest_sigma,
                                                               int most) {
   const PrincipalAxes axes = principalAxes(positiveCovariance(p.covariance));
-  const float narrow = std::max(axes.shortest, narrowest_sigma);
-  const float along2 = axes.longest * axes.longest - narrow * narrow;
+  const auto longest = static_cast<float>(axes.longest);
+  const float narrow = std::max(static_cast<float>(axes.shortest), narrowest_sigma);
+  const float along2 = longest * longest - narrow * narrow;
   IsotropicParts parts;
   if (!(along2 > kRoundLength * narrow * narrow)) {
-    parts.footprints[0] = Footprint::isotropic(p.centre, std::max(narrow, axes.longest));
+    parts.footprints[0] = Footprint::isotropic(p.centre, std::max(narrow, longest));
     parts.weights[0] = 1;
     parts.count = 1;
     return parts;
@@ -99,7 +87,7 @@ GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOverMap(const Footprint& p
   // The stretch of the long axis, in texels from the centre, that comes within kPartReach deviations of a part of the map.
   const float along = std::sqrt(along2), size[2] = {static_cast<float>(width), static_cast<float>(height)};
   const float centre[2] = {wrapUnit(p.centre.x) * size[0], wrapUnit(p.centre.y) * size[1]};
-  const float direction[2] = {axes.direction.x, axes.direction.y};
+  const float direction[2] = {static_cast<float>(axes.x), static_cast<float>(axes.y)};
   float low = -kPartReach * along, high = kPartReach * along;
   for (int k = 0; k < 2; ++k) {
     if (direction[k] == 0) continue;
@@ -143,14 +131,15 @@ inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int
   if (boundary == Boundary::clamp) return partsOverMap(p, width, height, narrowest_sigma, most);
   if (const IsotropicParts turn = partsOfTurn(p, width, height, narrowest_sigma, most); turn.count > 0) return turn;
   const PrincipalAxes axes = principalAxes(usableCovariance(p.covariance, width, height));
-  const float narrow = std::max(axes.shortest, narrowest_sigma), narrow2 = narrow * narrow;
+  const auto longest = static_cast<float>(axes.longest);
+  const float narrow = std::max(static_cast<float>(axes.shortest), narrowest_sigma), narrow2 = narrow * narrow;
   const float gap_per_length = 2 * kPartReach / static_cast<float>(most);
-  const float gap2 = gap_per_length * gap_per_length * (axes.longest * axes.longest - narrow2);
+  const float gap2 = gap_per_length * gap_per_length * (longest * longest - narrow2);
   const float sigma = std::sqrt(narrow2 + kPartWidening * std::max(0.0f, gap2 - kPartGap * kPartGap * narrow2));
-  const float along2 = axes.longest * axes.longest - sigma * sigma;
+  const float along2 = longest * longest - sigma * sigma;
   IsotropicParts parts;
   if (!(along2 > kRoundLength * sigma * sigma)) {
-    parts.footprints[0] = Footprint::isotropic(p.centre, std::max(sigma, axes.longest));
+    parts.footprints[0] = Footprint::isotropic(p.centre, std::max(sigma, longest));
     parts.weights[0] = 1;
     parts.count = 1;
     return parts;
@@ -166,7 +155,7 @@ inline GLINT_HD IsotropicParts isotropicParts(const Footprint& p, int width, int
     moment += parts.weights[k] * x * x;
   }
   const float stretch = along * std::sqrt(total / moment);
-  const Vec2 unit = {axes.direction.x / static_cast<float>(width), axes.direction.y / static_cast<float>(height)};
+  const Vec2 unit = {static_cast<float>(axes.x / width), static_cast<float>(axes.y / height)};
   const Vec2 centre = {wrapUnit(p.centre.x), wrapUnit(p.centre.y)};
   for (int k = 0; k < parts.count; ++k) {
     const float x = step * (static_cast<float>(k) - middle);

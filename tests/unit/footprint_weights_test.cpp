@@ -65,7 +65,25 @@ TEST(IsotropicParts, LongGaussiansKeepTheirWidth) {
   const PrincipalAxes axes = principalAxes(usableCovariance({2e6f, 2e6f, 2e6f}, kSize, kSize));
   EXPECT_NEAR(axes.shortest, kMinSigmaTexels, 1e-5f);
   EXPECT_NEAR(axes.longest, 2000, 0.01f);
-  EXPECT_NEAR(axes.direction.x, std::sqrt(0.5f), 1e-6f);
+  EXPECT_NEAR(axes.x, std::sqrt(0.5), 1e-6);
+}
+
+TEST(PrincipalAxes, AreThoseOfTheCovariance) {
+  constexpr double kRounding = 1e-12;  // relative, of doubles
+  for (int k = 0; k < 64; ++k) {
+    const double angle = (k - 32) * 0.05, c = std::cos(angle), s = std::sin(angle), a2 = 900, b2 = 4;
+    const UsableCovariance covariance = {a2 * c * c + b2 * s * s, (a2 - b2) * c * s, a2 * s * s + b2 * c * c};
+    const PrincipalAxes axes = principalAxes(covariance);
+    EXPECT_NEAR(axes.longest, 30, 30 * kRounding) << angle;
+    EXPECT_NEAR(axes.shortest, 2, 900 * kRounding) << angle;
+    EXPECT_NEAR(axes.x * s - axes.y * c, 0, kRounding) << angle;
+    EXPECT_NEAR(std::hypot(axes.x, axes.y), 1, kRounding) << angle;
+    const AxisPair pair = deviationsOf(covariance);
+    EXPECT_NEAR(pair.a[0] * pair.a[1] + pair.b[0] * pair.b[1], covariance.xy, 900 * kRounding) << angle;
+  }
+  const PrincipalAxes along_v = principalAxes({4, 0, 900});
+  EXPECT_EQ(along_v.x, 0);
+  EXPECT_EQ(along_v.y, 1);
 }
 
 TEST(FootprintWeights, CentresCloseBelow0AreAtTheEndOfTheMap) {

@@ -38,13 +38,28 @@ struct UsableCovariance {
   }
 };
 
-/// Principal axes of a covariance; their lengths are its deviations, texels.
+/// Deviations along the principal axes of a covariance, texels, and the unit vector along the longer axis.
+struct PrincipalAxes {
+  double longest, shortest;
+  double x, y;  ///< of the longer axis; x >= 0
+};
+
+/// Decomposition of a covariance. No digits cancel where the axes are nearly along u and v.
+inline GLINT_HD PrincipalAxes principalAxes(const UsableCovariance& c) {
+  const double mean = 0.5 * (c.xx + c.yy), half = 0.5 * (c.xx - c.yy), split = std::sqrt(half * half + c.xy * c.xy);
+  const double high = mean + split, longest = std::sqrt(high), shortest = std::sqrt(c.determinant() / high);
+  if (split == 0) return {longest, shortest, 1, 0};
+  // Cosine and sine of half the angle whose cosine is half / split and whose sine is c.xy / split.
+  const double larger = std::sqrt(0.5 * (1 + std::fabs(half) / split)), smaller = 0.5 * std::fabs(c.xy) / (split * larger);
+  return {longest, shortest, half >= 0 ? larger : smaller, std::copysign(half >= 0 ? smaller : larger, c.xy)};
+}
+
+/// Principal axes as vectors whose lengths are the deviations, texels: the longer one first, or the one along u if both are
+/// along u and v.
 inline GLINT_HD AxisPair deviationsOf(const UsableCovariance& c) {
   if (c.xy == 0) return {{std::sqrt(c.xx), 0}, {0, std::sqrt(c.yy)}};
-  const double mean = 0.5 * (c.xx + c.yy), half = 0.5 * (c.xx - c.yy), split = std::sqrt(half * half + c.xy * c.xy);
-  const double angle = 0.5 * std::atan2(c.xy, half), cosine = std::cos(angle), sine = std::sin(angle);
-  const double longer = std::sqrt(mean + split), shorter = std::sqrt(c.determinant() / (mean + split));
-  return {{longer * cosine, longer * sine}, {-shorter * sine, shorter * cosine}};
+  const PrincipalAxes axes = principalAxes(c);
+  return {{axes.longest * axes.x, axes.longest * axes.y}, {-axes.shortest * axes.y, axes.shortest * axes.x}};
 }
 
 /// Makes a covariance positive definite: widens it to kMinSigmaTexels; one that is not finite becomes the narrowest.
