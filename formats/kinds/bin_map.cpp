@@ -174,7 +174,7 @@ struct KindDescription<BinMap> {
             errorRule("bin_map.moments", "block_moments are those of a distribution inside the block")};
   }
 
-  static void describe(auto& fields, auto& map) {
+  static void describe(Fields auto& fields, auto& map) {
     describeMapSize(fields, map);
     fields.real("alpha", map.alpha, kDiskUnits, "1", "Beckmann roughness that the bins are made for");
     fields.real("alpha_min", map.alpha_min, kDiskUnits, "1", "smallest Beckmann roughness of a facet");

@@ -12,13 +12,12 @@ namespace glint::formats {
 ///
 ///   static constexpr std::string_view kTitle;                // of the kind, one line for people
 ///   static std::vector<Rule> indexRules(), valueRules();     // rules of this kind alone
-///   static void describe(auto& fields, auto& model);         // every attribute, then derived sizes, then every array, once
+///   static void describe(Fields auto& fields, auto& model);  // every attribute, then derived sizes, then every array, once
 ///   static void checkIndex(const Model&, Findings&);         // everything that a query follows
 ///   static void checkValues(const Model&, Findings&);
 ///
-/// describe() calls a function of `fields` for each: integer, real, choice, reals, levelIntegers, levelReals, derived, array,
-/// halves, data; levels() repeats arrays, optional() has attributes that a file may lack. It is called with a model that is constant (to write it, to make the schema) and with
-/// one that is to be filled, and fields.set() changes only the latter.
+/// describe() calls a function of `fields` (the concept Fields) for each. It is called with a model that is constant, to write it
+/// and to make the schema, and with one that is to be filled: fields.set() changes only the latter.
 template <class Model>
 struct KindDescription;
 

@@ -7,7 +7,7 @@
 namespace glint::formats {
 namespace {
 
-void describeBase(auto& fields, auto& base) {
+void describeBase(Fields auto& fields, auto& base) {
   fields.choice("base", base.kind, "diffuse|ggx", "reflectance of a facet of the original surface");
   fields.real("albedo", base.albedo, {0, 1}, "1", "diffuse: albedo; ggx: 1");
   fields.real("alpha", base.alpha, {0, 1}, "1", "ggx: roughness; diffuse: 0");
@@ -15,7 +15,7 @@ void describeBase(auto& fields, auto& base) {
   fields.real("k", base.k, {0, 100}, "1", "ggx: extinction of the conductor; with eta 1 and k 0 it reflects all light");
 }
 
-void describeLevelSizes(auto& fields, auto& d) {
+void describeLevelSizes(Fields auto& fields, auto& d) {
   const auto integers = [&](const char* name, auto member, Range range, const char* units, const char* long_name) {
     fields.levelIntegers(
         name, d.level_count, [&](int l) -> auto& { return d.levels[l].*member; }, range, units, long_name);
@@ -37,7 +37,7 @@ void describeLevelSizes(auto& fields, auto& d) {
   reals("level_distant", &Level::distant_share, {0, 1}, "share of the reflected light that hopped farther than a cell");
 }
 
-void describeLevel(auto& fields, auto& level) {
+void describeLevel(Fields auto& fields, auto& level) {
   fields.array("level_{l}/heights", level.heights, {"level_rows[l]", "level_columns[l]"}, "texel", "height of each vertex");
   fields.array("level_{l}/lobes", level.lobes, {"level_rows[l]", "level_columns[l]", "lobe_count", "4"}, "1",
                "centre (x, y) on the disk, bandwidth and amplitude of each lobe of each cell");
@@ -100,7 +100,7 @@ struct KindDescription<Displacement> {
             errorRule("displacement.moments", "slope moments and fit errors are finite")};
   }
 
-  static void describe(auto& fields, auto& d) {
+  static void describe(Fields auto& fields, auto& d) {
     describeMap(fields, d);
     describeBase(fields, d.base);
     int rgb = d.channels == 3, has_colors = !d.levels[0].lobe_colors.empty(), has_alphas = !d.levels[0].lobe_alphas.empty();

@@ -1,7 +1,7 @@
 #pragma once
 
 // Private to formats/: what is done with each attribute and array of a kind. A description (description.h) names them once, to
-// one of the classes below.
+// one of the classes below, which satisfy the concept Fields.
 
 #include <cstdint>
 #include <initializer_list>
@@ -282,5 +282,34 @@ class ReadFields {
   int level_ = 0;
   bool missing_ = false;
 };
+
+/// Functions that describe() calls for each attribute and array, whichever is done with them. A member of the struct is
+/// constant for classes that only look at it.
+///
+/// Attributes: integer, real, choice, reals (several numbers), levelIntegers and levelReals (a number for each level; get(l) is
+/// the member of level l). optional() describes attributes that a file may lack, all or none. set() stores a value that follows
+/// from others. Sizes: derived. Arrays: array, halves (half precision), data (a bare pointer to elements of one of several
+/// types); levels() repeats them.
+template <class F>
+concept Fields = requires(F& fields, int& integer, float& real, BlockPrecision& choice, std::optional<MapSlopes>& slopes,
+                          std::span<const float>& array, std::span<const std::uint16_t>& halves, const void*& data,
+                          std::uint64_t& count, Range range, std::string_view text, Types types, Dims dims, int since,
+                          int& (*integer_of)(int), float& (*real_of)(int), void (*visit_level)(int),
+                          void (*describe_slopes)(const MapSlopes&)) {
+  fields.integer(text, integer, range, text, text, since);
+  fields.real(text, real, range, text, text, since);
+  fields.choice(text, choice, text, text, since);
+  fields.reals(text, text, {&real, &real}, range, text, text, since);
+  fields.levelIntegers(text, integer, integer_of, range, text, text);
+  fields.levelReals(text, integer, real_of, range, text, text);
+  fields.optional(slopes, describe_slopes);
+  fields.set(integer, integer);
+  fields.derived(text, text, text);
+  fields.array(text, array, dims, text, text, since);
+  fields.halves(text, halves, dims, text, text, since);
+  fields.data(text, data, count, types, dims, text, text, since);
+  fields.levels(text, integer, visit_level);
+};
+static_assert(Fields<SchemaFields> && Fields<PackFields> && Fields<ReadFields>);
 
 }  // namespace glint::formats

@@ -15,7 +15,7 @@ struct KindDescription<HeightMap> {
     return {errorRule("heights.finite", "heights are finite", "make it again with glint-ingest --fix-invalid")};
   }
 
-  static void describe(auto& fields, auto& map) {
+  static void describe(Fields auto& fields, auto& map) {
     describeMap(fields, map);
     fields.array("heights", map.heights, {"height", "width"}, "texel", "height over the base plane, bottom row first");
   }

@@ -105,7 +105,7 @@ struct KindDescription<HistogramSat> {
             errorRule("histogram.sums", "the tables of sums count the texels of each bin")};
   }
 
-  static void describe(auto& fields, auto& sat) {
+  static void describe(Fields auto& fields, auto& sat) {
     describeMapSize(fields, sat);
     fields.integer("theta_bins", sat.theta_bins, {1, HistogramSat::kMaxThetaBins}, "1", "rings of elevation");
     fields.integer("phi_bins", sat.phi_bins, {1, HistogramSat::kMaxPhiBins}, "1", "sectors of azimuth");

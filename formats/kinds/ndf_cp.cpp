@@ -350,7 +350,7 @@ void checkDensities(const NdfCp& ndf, Findings& findings) {
 }
 
 /// Numbers the images of all levels.
-void describeImages(auto& fields, auto& ndf) {
+void describeImages(Fields auto& fields, auto& ndf) {
   std::uint32_t first_image = 0;
   for (int l = 0; l < ndf.shape.level_count; ++l) {
     fields.set(ndf.first_image[l], first_image);
@@ -374,7 +374,7 @@ void describeImages(auto& fields, auto& ndf) {
 }
 
 /// The factors of the clusters.
-void describeClusters(auto& fields, auto& ndf) {
+void describeClusters(Fields auto& fields, auto& ndf) {
   using enum ElementType;
   fields.array("clusters", ndf.clusters, {"regions", "places"}, "1", "place and size of each cluster's factors");
   fields.array("masks", ndf.masks, {"word_count"}, "1", "bit b of word w of a cluster: slot 64 w + b has a slice in it");
@@ -416,7 +416,7 @@ struct KindDescription<NdfCp> {
             warningRule("compressed.integral", "every image integrates to 1 within 1e-3")};
   }
 
-  static void describe(auto& fields, auto& ndf) {
+  static void describe(Fields auto& fields, auto& ndf) {
     describeShape(fields, ndf.shape);
     fields.choice("method", ndf.method, "cp|tucker|pca", "how the basis images of a cluster are made");
     fields.choice("coefficient_type", ndf.coefficient_type, "i8|f16|f32", "type of the stored coefficients");

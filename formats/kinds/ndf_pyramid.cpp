@@ -70,7 +70,7 @@ struct KindDescription<NdfPyramid> {
             warningRule("pyramid.integral", "every image integrates to 1 within 1e-3")};
   }
 
-  static void describe(auto& fields, auto& pyramid) {
+  static void describe(Fields auto& fields, auto& pyramid) {
     describeShape(fields, pyramid.shape);
     fields.choice("precision", pyramid.precision, "f16|f32", "type of the stored pixels");
     fields.real("value_scale", pyramid.value_scale, kPositive, "1", "density = value_scale * stored pixel");

@@ -83,7 +83,7 @@ struct KindDescription<NormalMap> {
             errorRule("normals.slopes", "slope_mean and slope_covariance, where there are any, are those of the normals")};
   }
 
-  static void describe(auto& fields, auto& map) {
+  static void describe(Fields auto& fields, auto& map) {
     describeMap(fields, map);
     fields.optional(map.slopes, [&](auto&& slopes) { describeSlopes(fields, slopes); });
     fields.integer("bounds_level_count", map.bounds_level_count, {0, NormalMap::kMaxBoundsLevels}, "1",

@@ -18,7 +18,7 @@ inline constexpr double kShNormTolerance = 1e-2;
 
 /// Order, grid and precision.
 /// @param smallest_grid  rows and columns that a grid has at least
-void describeSh(auto& fields, auto& asset, double smallest_grid) {
+void describeSh(Fields auto& fields, auto& asset, double smallest_grid) {
   fields.integer("order", asset.order, {0, kMaxShOrder}, "1", "highest band of the spherical harmonics");
   fields.integer("grid_rows", asset.grid.rows, {smallest_grid, 4096}, "1",
                  "polar angles of the grid of directions, both poles included");
@@ -26,7 +26,7 @@ void describeSh(auto& fields, auto& asset, double smallest_grid) {
   fields.choice("precision", asset.precision, "f16|f32", "type of the stored coefficients");
 }
 
-void describeCoefficients(auto& fields, std::string_view path, auto& coefficients, std::uint64_t count, Dims dims,
+void describeCoefficients(Fields auto& fields, std::string_view path, auto& coefficients, std::uint64_t count, Dims dims,
                           std::string_view long_name) {
   const Types types = {{"precision=f16", ElementType::f16}, {"precision=f32", ElementType::f32}};
   fields.data(path, coefficients, std::uint64_t{count}, types, dims, "1", long_name);

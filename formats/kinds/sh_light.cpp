@@ -13,7 +13,7 @@ struct KindDescription<ShLight> {
   static std::vector<Rule> indexRules() { return {}; }
   static std::vector<Rule> valueRules() { return {errorRule("sh.band_norms", "band_norms are the norms of the coefficients")}; }
 
-  static void describe(auto& fields, auto& light) {
+  static void describe(Fields auto& fields, auto& light) {
     describeSh(fields, light, 2);
     fields.array("scales", light.scales, {"grid_rows", "grid_columns"}, "1", "coefficient = scale * stored number");
     fields.array("band_norms", light.band_norms, {"grid_rows", "grid_columns", "order + 1"}, "1",

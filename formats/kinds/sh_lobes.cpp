@@ -14,7 +14,7 @@ struct KindDescription<ShLobes> {
     return {warningRule("sh.zonal", "lobes have the norm of the lobe along +z within 1e-2")};
   }
 
-  static void describe(auto& fields, auto& lobes) {
+  static void describe(Fields auto& fields, auto& lobes) {
     describeSh(fields, lobes, 0);
     fields.real("sigma_r", lobes.sigma_r, kDiskUnits, "1", "intrinsic roughness: standard deviation in disk units");
     fields.array("zonal", lobes.zonal, {"order + 1"}, "1", "coefficients f_l of the lobe along +z");

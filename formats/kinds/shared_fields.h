@@ -20,19 +20,19 @@ inline constexpr Range kPositive = {FLT_MIN, FLT_MAX};
 inline constexpr Range kDiskUnits = {FLT_MIN, 1};  // of roughness
 
 /// width, height and texel_size_um of a map.
-void describeMap(auto& fields, auto& map) {
+void describeMap(Fields auto& fields, auto& map) {
   fields.integer("width", map.width, kMapSize, "texel", "width of the map");
   fields.integer("height", map.height, kMapSize, "texel", "height of the map");
   fields.real("texel_size_um", map.texel_size_um, {0, FLT_MAX}, "um", "width of a texel; 0 when unknown");
 }
 
 /// width and height of the normal map that an asset was made from.
-void describeMapSize(auto& fields, auto& asset) {
+void describeMapSize(Fields auto& fields, auto& asset) {
   fields.integer("width", asset.width, kMapSize, "texel", "width of the normal map");
   fields.integer("height", asset.height, kMapSize, "texel", "height of the normal map");
 }
 
-void describeSlopes(auto& fields, auto& slopes) {
+void describeSlopes(Fields auto& fields, auto& slopes) {
   constexpr double kMaxSlope = 1e6;  // float normals inside the unit disk have slopes up to 4096
   constexpr double kMaxCovariance = kMaxSlope * kMaxSlope;
   fields.reals("slope_mean", "2", {&slopes.mean.x, &slopes.mean.y}, {-kMaxSlope, kMaxSlope}, "1",
@@ -42,7 +42,7 @@ void describeSlopes(auto& fields, auto& slopes) {
 }
 
 /// What all pyramids of NDF images share.
-void describeShape(auto& fields, auto& shape) {
+void describeShape(Fields auto& fields, auto& shape) {
   describeMapSize(fields, shape);
   fields.integer("resolution", shape.resolution, {kBlockSize, 1024}, "pixel",
                  "pixels of an NDF image along each axis; a multiple of 16");

@@ -43,7 +43,7 @@ struct KindDescription<Toy> {
   static std::vector<Rule> indexRules() { return {}; }
   static std::vector<Rule> valueRules() { return {errorRule("toy.finite", "values are finite")}; }
 
-  static void describe(auto& fields, auto& toy) {
+  static void describe(Fields auto& fields, auto& toy) {
     fields.integer("count", toy.count, {0, 1000}, "1", "number of values");
     fields.real("scale", toy.scale, kPositive, "um", "size of a toy");
     fields.array("values", toy.values, {"count"}, "1", "values of the toy");
