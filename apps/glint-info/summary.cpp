@@ -18,7 +18,8 @@ ordered_json valueOf(const formats::AttributeInfo& attribute, std::size_t k) {
   return attribute.numbers[k];
 }
 
-/// Attributes by name. Those with a value for each level are a table of levels, under their names without "level_".
+/// Attributes by name. A covariance is an object of its three elements. Attributes with a value for each level are a table of
+/// levels, under their names without "level_".
 ordered_json propertiesOf(const formats::AssetInfo& info) {
   ordered_json properties = ordered_json::object(), levels = ordered_json::array();
   for (const formats::AttributeInfo& attribute : info.attributes) {
@@ -28,6 +29,9 @@ ordered_json propertiesOf(const formats::AssetInfo& info) {
     } else if (attribute.of_levels) {
       const std::string column = attribute.name.substr(std::string("level_").size());
       for (std::size_t k = 0; k < count; ++k) levels[k][column] = valueOf(attribute, k);
+    } else if (attribute.name.ends_with("_covariance")) {
+      properties[attribute.name] = {
+          {"xx", valueOf(attribute, 0)}, {"xy", valueOf(attribute, 1)}, {"yy", valueOf(attribute, 2)}};
     } else {
       for (std::size_t k = 0; k < count; ++k) properties[attribute.name].push_back(valueOf(attribute, k));
     }
@@ -42,7 +46,7 @@ std::string listed(const ordered_json& dims) {
   return text;
 }
 
-/// A number with the digits that people read, a text without quotes, or a list of those.
+/// A number with the digits that people read, a text without quotes, or a list or an object of such.
 std::string plain(const ordered_json& value) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_number_float()) {
@@ -50,8 +54,12 @@ std::string plain(const ordered_json& value) {
     std::snprintf(digits, sizeof digits, "%.5g", value.get<double>());
     return digits;
   }
-  if (!value.is_array()) return value.dump();
   std::string text;
+  if (value.is_object()) {
+    for (const auto& [key, element] : value.items()) text += (text.empty() ? "" : ", ") + key + " " + plain(element);
+    return text;
+  }
+  if (!value.is_array()) return value.dump();
   for (const auto& element : value) text += (text.empty() ? "" : ", ") + plain(element);
   return text;
 }

@@ -8,7 +8,7 @@
 namespace glint::apps {
 
 /// Version of the JSON that summarize makes: grows when a key changes its meaning or goes away.
-inline constexpr int kSummarySchemaVersion = 2;
+inline constexpr int kSummarySchemaVersion = 3;
 
 /// What an asset is: {"schema_version", "kind", "format_version", "file_bytes", "provenance", "properties", "statistics",
 /// "datasets"}. Properties are the attributes of SPEC.md.

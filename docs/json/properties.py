@@ -26,9 +26,11 @@ def value_schema(attribute):
 
 
 def property_schema(attribute):
-    """The schema of a property: a value, or a list of as many values as the attribute has."""
+    """The schema of a property: a value, a covariance, or a list of as many values as the attribute has."""
     units = "" if attribute["type"] == "text" or attribute["units"] == "1" else f" ({attribute['units']})"
     described = {"description": attribute["long_name"][:1].upper() + attribute["long_name"][1:] + units + "."}
+    if attribute["name"].endswith("_covariance"):
+        return described | {"$ref": "common.schema.json#/$defs/covariance"}
     count = attribute.get("count", "")
     if not count or count == "level_count":
         return described | value_schema(attribute)
