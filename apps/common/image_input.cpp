@@ -8,6 +8,7 @@
 namespace glint::apps {
 
 void ImageOptions::declare(Tool& tool) {
+  choice_.has_options = true;
   using Window = ImageChoice::Window;
   using Alpha = ImageChoice::Alpha;
   tool.option("--subimage", choice_.part, "number, from 0, or name of one of several images in the file (parts, pages)")
@@ -24,7 +25,9 @@ void ImageOptions::declare(Tool& tool) {
               "display: the image as it is shown; data: the pixels that the file stores");
 }
 
-Image readInputImage(Tool& tool, const std::string& path, const ImageChoice& choice, const std::string& remedy) {
+Image readInputImage(Tool& tool, const std::string& path, const ImageChoice& choice) {
+  const char* remedy =
+      choice.has_options ? "choose with --subimage or --layer" : "export the one that is meant to a file of its own";
   Image image = readImage(path, choice);
   for (const std::string& note : image.notes) tool.warn(path + ": " + note);
   // The first image of a PSD is all of its layers together, as it is shown.

@@ -19,8 +19,6 @@ class ImageOptions {
 };
 
 /// Reads an image as readImage does. Warns of other images and layers in the file, and of pixels that were cut off.
-/// @param remedy  how another image or layer is chosen
-Image readInputImage(Tool& tool, const std::string& path, const ImageChoice& choice = {},
-                     const std::string& remedy = "export the one that is meant to a file of its own");
+Image readInputImage(Tool& tool, const std::string& path, const ImageChoice& choice = {});
 
 }  // namespace glint::apps

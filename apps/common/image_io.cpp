@@ -52,7 +52,7 @@ Image readImage(const std::string& path, const ImageChoice& choice) {
   if (png) findPart(path, choice.part, image.parts);
   if (image.format == "jpeg") checkJpegComplete(path);
   if (image.format == "tiff") image.no_data = geoTiffNoData(path, image.part);
-  if (choice.window == ImageChoice::Window::display) cropToDisplay(stored, path);
+  if (choice.window == ImageChoice::Window::display) cropToDisplay(stored, choice, path);
   orient(stored);
   const bool full_names = choice.channels.find('.') != std::string::npos;
   if (!full_names || !choice.layer.empty()) selectLayer(image, choice.layer, path);
@@ -62,7 +62,7 @@ Image readImage(const std::string& path, const ImageChoice& choice) {
   const bool alpha_chosen = std::find(channels.begin(), channels.end(), image.alpha) != channels.end();
   const bool divides =
       choice.alpha == ImageChoice::Alpha::divide || (choice.alpha == ImageChoice::Alpha::automatic && image.associated);
-  if (divides && !alpha_chosen) divideByAlpha(image, choice.transparent_holes, path);
+  if (divides && !alpha_chosen) divideByAlpha(image, choice, path);
   if (!channels.empty()) selectChannels(image, channels);
   return std::move(image);
 }

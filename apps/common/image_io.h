@@ -43,6 +43,7 @@ struct ImageChoice {
   std::string channels = {};  ///< letters such as "rg", or names with commas between them; empty: all of the layer
   Window window = Window::display;  ///< what the file shows, or what it stores
   Alpha alpha = Alpha::automatic;   ///< divide colours by alpha: if the file says that they were multiplied; always; never
+  bool has_options = false;         ///< the tool has the options of ImageOptions, so that errors may point to them
   bool transparent_holes = false;   ///< colours that alpha 0 destroyed become NaN; otherwise they are an error
 };
 

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "common/name_list.h"
+#include "glint/model/counted.h"
 #include "glint/model/error.h"
 #include "glint/model/texel_name.h"
 
@@ -71,25 +72,28 @@ float valueOf(T code) {
   return static_cast<float>(code) / static_cast<float>(std::numeric_limits<T>::max());
 }
 
-[[noreturn]] void throwNotAssociated(const Image& image, std::size_t texel, const std::string& what, const std::string& path) {
+[[noreturn]] void throwNotAssociated(const Image& image, const ImageChoice& choice, std::size_t texel, const std::string& what,
+                                     const std::string& path) {
   throw Error(ErrorCode::invalid_input, "image.alpha", path, texelName(image.width, image.height, texel),
               what + ", although the file says that colours are multiplied by alpha",
-              "export the image without alpha, or read the colours as they are with glint-ingest --alpha ignore");
+              std::string("export the image without alpha") +
+                  (choice.has_options ? ", or read the colours as they are with --alpha ignore" : ""));
 }
 
 /// The colours of all pixels divided by their alpha; NaN where alpha is 0.
 template <class T>
-std::vector<float> divided(const Image& image, const std::vector<T>& pixels, TexelTally& lost, const std::string& path) {
+std::vector<float> divided(const Image& image, const ImageChoice& choice, const std::vector<T>& pixels, TexelTally& lost,
+                           const std::string& path) {
   const auto channels = static_cast<std::size_t>(image.channels), alpha = static_cast<std::size_t>(image.alpha);
   std::vector<float> values(pixels.size());
   for (std::size_t k = 0; k < pixels.size(); k += channels) {
     const float a = valueOf(pixels[k + alpha]);
-    if (!(a >= 0)) throwNotAssociated(image, k / channels, "alpha is no number of 0 or more", path);
+    if (!(a >= 0)) throwNotAssociated(image, choice, k / channels, "alpha is no number of 0 or more", path);
     for (std::size_t c = 0; c < channels; ++c) {
       const float value = valueOf(pixels[k + c]);
-      if (a == 0 && value != 0) throwNotAssociated(image, k / channels, "alpha is 0 and the colour is not", path);
+      if (a == 0 && value != 0) throwNotAssociated(image, choice, k / channels, "alpha is 0 and the colour is not", path);
       if (!std::is_floating_point_v<T> && value > a)
-        throwNotAssociated(image, k / channels, "a colour is larger than alpha", path);
+        throwNotAssociated(image, choice, k / channels, "a colour is larger than alpha", path);
       values[k + c] = c == alpha ? a : a == 0 ? std::numeric_limits<float>::quiet_NaN() : value / a;
     }
     if (a == 0) lost.add(k / channels);
@@ -99,7 +103,7 @@ std::vector<float> divided(const Image& image, const std::vector<T>& pixels, Tex
 
 }  // namespace
 
-void cropToDisplay(StoredImage& stored, const std::string& path) {
+void cropToDisplay(StoredImage& stored, const ImageChoice& choice, const std::string& path) {
   Image& image = stored.image;
   const auto [column, row, width, height] = stored.display;
   if (column == 0 && row == 0 && width == image.width && height == image.height) return;
@@ -114,7 +118,8 @@ void cropToDisplay(StoredImage& stored, const std::string& path) {
                     std::to_string(missing) + " are missing: the file stores " + std::to_string(image.width) + " x " +
                     std::to_string(image.height) + " from column " + std::to_string(-column) + ", row " + std::to_string(-row) +
                     " from the top on",
-                "export the whole image, or take the stored pixels for a map with glint-ingest --window data");
+                std::string("export the whole image") +
+                    (choice.has_options ? ", or take the stored pixels for a map with --window data" : ""));
   }
   image.notes.push_back("its " + std::to_string(image.width) + " x " + std::to_string(image.height) +
                         " pixels reach beyond the display window, of which the " + std::to_string(width) + " x " +
@@ -219,7 +224,7 @@ void selectChannels(Image& image, const std::vector<int>& channels) {
   image.channels = static_cast<int>(channels.size());
 }
 
-void divideByAlpha(Image& image, bool holes, const std::string& path) {
+void divideByAlpha(Image& image, const ImageChoice& choice, const std::string& path) {
   if (image.alpha < 0 || image.channels < 2)
     throw Error(ErrorCode::invalid_input, "image.alpha", path, "", "has no alpha to divide by", "leave out --alpha divide");
   image.associated = false;
@@ -230,16 +235,16 @@ void divideByAlpha(Image& image, bool holes, const std::string& path) {
         const auto channels = static_cast<std::size_t>(image.channels);
         for (std::size_t k = static_cast<std::size_t>(image.alpha); k < pixels.size(); k += channels) {
           if (valueOf(pixels[k]) == 1) continue;
-          values = divided(image, pixels, lost, path);
+          values = divided(image, choice, pixels, lost, path);
           return;
         }
       },
       image.pixels);
-  if (lost.count() > 0 && !holes) {
+  if (lost.count() > 0 && !choice.transparent_holes) {
     throw Error(ErrorCode::invalid_input, "image.transparent", path, "",
-                std::to_string(lost.count()) + " pixels are transparent: alpha 0 left nothing of their colours (first at " +
-                    lost.firstName() + ")",
-                "fill them with glint-ingest --fix-invalid, or export the image without alpha");
+                counted(lost.count(), {"pixel is", "pixels are"}) +
+                    " transparent: alpha 0 left nothing of the colour (first at " + lost.firstName() + ")",
+                std::string(choice.has_options ? "fill them with --fix-invalid, or " : "") + "export the image without alpha");
   }
   if (!values.empty()) image.pixels = std::move(values);
 }

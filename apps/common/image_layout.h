@@ -9,7 +9,7 @@ namespace glint::apps {
 
 /// Cuts the display window out of the pixels. What was cut off is noted.
 /// @throws Error invalid_input if the display window has pixels that are not stored
-void cropToDisplay(StoredImage& stored, const std::string& path);
+void cropToDisplay(StoredImage& stored, const ImageChoice& choice, const std::string& path);
 
 /// Turns and mirrors the pixels as the orientation says.
 void orient(StoredImage& stored);
@@ -28,8 +28,8 @@ std::vector<int> findChannels(const Image& image, const std::string& channels, c
 void selectChannels(Image& image, const std::vector<int>& channels);
 
 /// Divides the other channels by alpha; integers become floats. Where alpha is 1 everywhere nothing changes.
-/// @param holes  colours that alpha 0 destroyed become NaN; otherwise they are an error
-/// @throws Error invalid_input if the colours cannot have been multiplied by alpha
-void divideByAlpha(Image& image, bool holes, const std::string& path);
+/// @throws Error invalid_input if the colours cannot have been multiplied by alpha, or if alpha 0 destroyed colours and these are
+///         not to become NaN (ImageChoice::transparent_holes)
+void divideByAlpha(Image& image, const ImageChoice& choice, const std::string& path);
 
 }  // namespace glint::apps

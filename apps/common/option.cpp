@@ -13,7 +13,7 @@ Option& Option::required() {
 }
 
 Option& Option::range(double low, double high) {
-  option_->check(numberRange(low, high));
+  option_->transform(numberRange(low, high));  // before the check of the type, whose range is wider
   double number = 0;
   if (parseNumber(option_->get_default_str(), number).empty() && !(number >= low && number <= high)) option_->default_str("");
   return *this;

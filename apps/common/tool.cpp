@@ -9,10 +9,12 @@
 #include <cctype>
 #include <deque>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <system_error>
 
@@ -97,6 +99,17 @@ void requireText(const std::string& path, const std::string& name) {
 /// Paths may hold any bytes; JSON must be UTF-8.
 std::string dump(const json& document) { return document.dump(2, ' ', false, json::error_handler_t::replace); }
 
+/// Configuration files of CLI11, which may begin with a byte-order mark of UTF-8.
+struct ConfigFile : CLI::ConfigBase {
+  std::vector<CLI::ConfigItem> from_config(std::istream& file) const override {
+    constexpr std::string_view kMark = "\xef\xbb\xbf";
+    std::string text{std::istreambuf_iterator<char>(file), {}};
+    if (text.starts_with(kMark)) text.erase(0, kMark.size());
+    std::istringstream rest(text);
+    return ConfigBase::from_config(rest);
+  }
+};
+
 }  // namespace
 
 struct Tool::State {
@@ -145,6 +158,7 @@ Tool::Tool(ToolInfo info) : state_(std::make_unique<State>()) {
   app.get_formatter()->column_width(34);
   app.option_defaults()->always_capture_default();
   app.allow_config_extras(CLI::config_extras_mode::error);
+  app.config_formatter(std::make_shared<ConfigFile>());
 }
 
 Tool::~Tool() = default;
@@ -165,7 +179,7 @@ void Tool::addStandardOptions() {
       ->group(group)
       ->type_name("N")
       ->transform(strictNumber<int>())
-      ->check(numberRange(0, kMaxThreads));
+      ->transform(numberRange(0, kMaxThreads));  // the last transform comes first, so that large numbers are told the range
   app.add_option("--seed", s.seed, "seed of every random choice")
       ->group(group)
       ->type_name("N")
@@ -348,7 +362,8 @@ bool Tool::parse(int argc, char** argv) {
 int Tool::work(const std::function<void()>& body) {
   State& s = *state_;
   for (const auto& check : s.checks) check();
-  if (!s.depfile.empty()) {
+  const bool makes_depfile = s.app.get_option("--depfile")->count() > 0;
+  if (makes_depfile) {
     if (s.outputs.empty())
       throw Error(ErrorCode::usage, "cli.depfile", "", "--depfile", "nothing is made that could depend on anything",
                   "ask for an output file, or leave out --depfile");
@@ -358,9 +373,7 @@ int Tool::work(const std::function<void()>& body) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads()));
   body();
   s.reporter.reset();
-  if (!s.depfile.empty()) {
-    writeTextFile(s.depfile, makeDepfile(s.outputs, readPaths()));
-  }
+  if (makes_depfile) writeTextFile(s.depfile, makeDepfile(s.outputs, readPaths()));
   const int code = s.exit_code ? static_cast<int>(*s.exit_code) : 0;
   if (s.json_result) {
     const char* status = s.exit_code ? codeName(*s.exit_code) : "ok";

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/numbers.h"
+#include "glint/model/counted.h"
 
 namespace glint::apps {
 namespace {
@@ -106,7 +107,7 @@ bake::IngestOptions IngestOptions::values(Tool& tool, const std::string& name, c
 Image IngestOptions::read(Tool& tool, const std::string& path) const {
   ImageChoice choice = image_.choice();
   choice.transparent_holes = values_.fix_invalid;
-  return readInputImage(tool, path, choice, "choose with --subimage or --layer");
+  return readInputImage(tool, path, choice);
 }
 
 bake::PixelArray pixelArray(const Image& image) {
@@ -173,25 +174,24 @@ void warnOfSeam(const Warn& warn, Boundary boundary, Vec2 seam) {
 
 void warnAbout(Tool& tool, const std::string& name, const bake::IngestOptions& values, const bake::IngestReport& r) {
   const auto warn = [&](const std::string& text) { tool.warn(name + ": " + text); };
-  const auto replaced = [&](std::size_t count, const std::string& what) {
-    if (count > 0) warn(fmt::format("{} {} and were replaced by their neighbours' mean", count, what));
+  const auto replaced = [&](std::size_t count, const Subject& subject, const std::string& what) {
+    if (count > 0) warn(counted(count, subject) + " " + what + ": replaced by the mean of the neighbours");
   };
-  if (r.no_data > 0) replaced(r.no_data, fmt::format("texels hold no data ({})", *values.no_data));
-  replaced(r.downward, fmt::format("of {} texels point below the surface", r.texels));
-  replaced(r.non_finite, "texels are not finite");
-  if (r.clipped > 0) warn(fmt::format("{} texels on the rim of the disk were moved just inside it", r.clipped));
+  if (r.no_data > 0) replaced(r.no_data, {"texel holds", "texels hold"}, fmt::format("no data ({})", *values.no_data));
+  replaced(r.downward, {"texel points", "texels point"}, fmt::format("below the surface, of {}", r.texels));
+  replaced(r.non_finite, {"texel is", "texels are"}, "not finite");
+  if (r.clipped > 0) warn(counted(r.clipped, {"texel was", "texels were"}) + " on the rim of the disk: moved just inside it");
   if (r.cliffs > 0) {
-    warn(
-        fmt::format("{} texels are at cliffs steeper than 89.9 degrees, to which their normals are moved; check "
-                    "--height-scale and --nodata",
-                    r.cliffs));
+    warn(counted(r.cliffs, {"texel is", "texels are"}) +
+         " at cliffs steeper than 89.9 degrees: normals are moved there; check --height-scale and --nodata");
   }
   if (r.channels == bake::NormalChannels::ag)
     warn("red is constant: x was read from alpha, y from green, and z follows from them");
   if (r.blue_ignored) warn("blue is constant and contradicts red and green: z was taken from them, as with --channels rg");
   if (r.non_unit > 0) {
-    warn(fmt::format("{} of {} vectors were not of unit length (half of all are off by more than {:.3f}) and were normalised",
-                     r.non_unit, r.texels, r.median_length_error));
+    warn(counted(r.non_unit, {"vector was", "vectors were"}) +
+         fmt::format(" not of unit length, of {} (half of all are off by more than {:.3f}): normalised", r.texels,
+                     r.median_length_error));
   }
   warnOfSeam(warn, values.boundary, r.seam);
   if (std::max(std::abs(r.mean_normal.x), std::abs(r.mean_normal.y)) > kSuspiciousMeanTilt) {

@@ -103,7 +103,7 @@ def test_transparent_pixels_are_refused_or_filled(glint):
     alpha = numpy.ones((40, 48, 1))
     alpha[3, 5] = 0
     write(glint.folder / "a.exr", with_alpha(unorm(surface()), alpha))
-    refused(glint, "a.exr", "1 pixels are transparent", "column 5, row 3 from the top", "--fix-invalid")
+    refused(glint, "a.exr", "1 pixel is transparent", "column 5, row 3 from the top", "--fix-invalid")
     ingest(glint, "a.exr", "--fix-invalid")
     assert numpy.isfinite(data(glint)).all()
 
@@ -135,6 +135,16 @@ def test_base_colours_are_divided_by_associated_alpha(glint):
             colours = file["level_00/lobe_colors"][...]
         half_a_code = 0.006  # of the associated value
         assert colours[colours > 0] == pytest.approx(0.604, abs=half_a_code), image
+
+
+def test_remedies_name_options_of_the_tool_that_reads_the_image(glint):
+    assert glint("synth", "leather", "--size", "32", "--height", "-o", "h.exr").returncode == 0
+    assert glint("ingest", "h.exr", "--kind", "height", "--to", "heights", "-o", "h.glint").returncode == 0
+    alpha = numpy.zeros((32, 32, 1))
+    write(glint.folder / "c.exr", with_alpha(numpy.full((32, 32, 3), 0.5, numpy.float32), alpha))
+    process = glint("displace", "h.glint", "-o", "d.glint", "--factor", "32", "--base-color", "c.exr")
+    assert process.returncode == 3
+    assert "export the image without alpha" in process.stderr and "--fix-invalid" not in process.stderr, process.stderr
 
 
 # --- several images in one file

@@ -80,7 +80,7 @@ def test_a_few_texels_that_point_down_are_repaired_and_counted(glint):
     for column in (5, 9, 30, 50):
         pixels[7, column, 2] = 100
     Image.fromarray(pixels).save(glint.folder / "d.png")
-    assert "4 of 4096 texels point below the surface" in ingest(glint, "d.png").stderr
+    assert "4 texels point below the surface, of 4096" in ingest(glint, "d.png").stderr
     (glint.folder / "o.glint").unlink()
     pixels[8, 8, 2] = 100  # one more than one in 1000
     Image.fromarray(pixels).save(glint.folder / "d.png")

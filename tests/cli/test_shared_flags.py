@@ -95,6 +95,24 @@ def test_depfile_without_an_output_is_a_usage_error(glint):
     assert process.returncode == 1
     assert "--depfile" in process.stderr
     assert not (glint.folder / "out.d").exists()
+    process = glint("synth", "flat", "--size", "4", "-o", "a.png", "--depfile", "")
+    assert process.returncode == 1
+    assert "empty" in process.stderr
+
+
+def test_configuration_may_begin_with_a_byte_order_mark(glint):
+    (glint.folder / "run.toml").write_bytes(b"\xef\xbb\xbfsize = 8\n")
+    assert glint("synth", "flat", "-o", "a.png", "--config", "run.toml").returncode == 0
+    assert glint("synth", "flat", "-o", "b.png", "--size", "8").returncode == 0
+    assert (glint.folder / "a.png").read_bytes() == (glint.folder / "b.png").read_bytes()
+
+
+def test_large_numbers_are_told_the_range_of_their_option(glint):
+    for option, range_text in (("--threads", "0 to 1024"), ("--order", "0 to 1000")):
+        tool = ["shlobes", "--sigma-r", "0.1", "-o", "a.glint"] if option == "--order" else ["synth", "flat", "-o", "a.png"]
+        process = glint(*tool, option, "99999999999")
+        assert process.returncode == 1
+        assert range_text in process.stderr and "2147483647" not in process.stderr, process.stderr
 
 
 def test_numbers_may_begin_with_a_point(glint):

@@ -50,7 +50,7 @@ TEST(Orient, ShowsWhatExifMeans) {
 TEST(CropToDisplay, CutsOverscanOffAndNotesIt) {
   StoredImage stored = image(4, 3, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12});
   stored.display = {1, 1, 2, 1};
-  cropToDisplay(stored, "a.exr");
+  cropToDisplay(stored, {}, "a.exr");
   EXPECT_EQ(fromTop(stored), (std::vector<std::uint8_t>{6, 7}));
   EXPECT_EQ(stored.image.notes.size(), 1u);
 }
@@ -59,7 +59,7 @@ TEST(CropToDisplay, CountsMissingPixels) {
   StoredImage stored = image(2, 2, {1, 2, 3, 4});
   stored.display = {-1, 1, 3, 2};  // of its six pixels two are stored
   try {
-    cropToDisplay(stored, "a.exr");
+    cropToDisplay(stored, {}, "a.exr");
     FAIL();
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("4 are missing"), std::string::npos) << error.what();
@@ -77,27 +77,27 @@ Image rgba(std::vector<float> pixels) {
 
 TEST(DivideByAlpha, GivesStraightColours) {
   Image half = rgba({0.25f, 0.1f, 0.5f, 0.5f, 0.2f, 0.3f, 0.4f, 1});
-  divideByAlpha(half, false, "a.exr");
+  divideByAlpha(half, {}, "a.exr");
   EXPECT_EQ(std::get<std::vector<float>>(half.pixels), (std::vector<float>{0.5f, 0.2f, 1, 0.5f, 0.2f, 0.3f, 0.4f, 1}));
 }
 
 TEST(DivideByAlpha, KeepsTheCodesOfOpaqueImages) {
   Image opaque = rgba({});
   opaque.pixels = std::vector<std::uint8_t>{1, 2, 3, 255};
-  divideByAlpha(opaque, false, "a.tif");
+  divideByAlpha(opaque, {}, "a.tif");
   EXPECT_EQ(std::get<std::vector<std::uint8_t>>(opaque.pixels), (std::vector<std::uint8_t>{1, 2, 3, 255}));
 }
 
 TEST(DivideByAlpha, RefusesCodesThatWereNotMultiplied) {
   Image straight = rgba({});
   straight.pixels = std::vector<std::uint8_t>{200, 2, 3, 100};
-  EXPECT_THROW(divideByAlpha(straight, false, "a.tif"), Error);
+  EXPECT_THROW(divideByAlpha(straight, {}, "a.tif"), Error);
 }
 
 TEST(DivideByAlpha, TransparentPixelsAreHolesOnlyWhereWanted) {
   Image empty = rgba({0, 0, 0, 0, 0.2f, 0.3f, 0.4f, 1});
-  EXPECT_THROW(divideByAlpha(empty, false, "a.exr"), Error);
-  divideByAlpha(empty, true, "a.exr");
+  EXPECT_THROW(divideByAlpha(empty, {}, "a.exr"), Error);
+  divideByAlpha(empty, {.transparent_holes = true}, "a.exr");
   EXPECT_TRUE(std::isnan(std::get<std::vector<float>>(empty.pixels)[0]));
 }
 

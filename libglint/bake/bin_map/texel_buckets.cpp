@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "glint/model/counted.h"
 #include "glint/model/error.h"
 #include "glint/model/texel_name.h"
 
@@ -22,7 +23,8 @@ constexpr std::size_t kBuckets = 512;
   for (std::size_t k = 0; k < map.normals.size(); ++k)
     if (!(dot(map.normals[k], map.normals[k]) < 1)) outside.add(k);
   throw Error(ErrorCode::invalid_input, "normals.disk", {}, "/normals",
-              std::to_string(outside.count()) + " normals are not inside the unit disk (first at " + outside.firstName() + ")",
+              counted(outside.count(), {"normal is", "normals are"}) + " not inside the unit disk (first at " +
+                  outside.firstName() + ")",
               "make the map again with glint-ingest, which moves normals on the rim inside");
 }
 

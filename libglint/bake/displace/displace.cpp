@@ -12,6 +12,7 @@
 #include "glint/bake/displace/scaling_function.h"
 #include "glint/bake/displace/vmf_fit.h"
 #include "glint/math/half.h"
+#include "glint/model/counted.h"
 #include "glint/model/error.h"
 #include "glint/model/texel_name.h"
 
@@ -26,19 +27,19 @@ void require(bool holds, const char* parameter, const std::string& range) {
 }
 
 void checkOptions(const DisplaceOptions& o) {
-  require(!o.factors.empty() && o.factors.size() <= kMaxDisplacementLevels, "factors", "a list of 1 to 8 numbers");
+  require(!o.factors.empty() && o.factors.size() <= kMaxDisplacementLevels, "--factors", "a list of 1 to 8 numbers");
   for (std::size_t k = 0; k < o.factors.size(); ++k)
-    require(o.factors[k] >= 2 && (k == 0 || o.factors[k] > o.factors[k - 1]), "factors", "2 or more and ascending");
-  require(o.lobes >= 1 && o.lobes <= kMaxLobes, "lobes", "1 to 6");
-  require(o.angular >= 3 && o.angular <= 25, "angular", "3 to 25");
-  require(o.spatial >= 1 && o.spatial <= 16, "spatial", "1 to 16");
-  require(o.bounces >= 1 && o.bounces <= kAllBounces, "bounces", "1 to 64");
+    require(o.factors[k] >= 2 && (k == 0 || o.factors[k] > o.factors[k - 1]), "--factors", "2 or more and ascending");
+  require(o.lobes >= 1 && o.lobes <= kMaxLobes, "--lobes", "1 to 6");
+  require(o.angular >= 3 && o.angular <= 25, "--angular", "3 to 25");
+  require(o.spatial >= 1 && o.spatial <= 16, "--spatial", "1 to 16");
+  require(o.bounces >= 1 && o.bounces <= kAllBounces, "--bounces", "1 to 64");
   if (o.base.kind == BaseBrdf::Kind::diffuse) {
-    require(o.base.albedo > 0 && o.base.albedo <= 1, "base",
+    require(o.base.albedo > 0 && o.base.albedo <= 1, "--base",
             "an albedo above 0 and at most 1: a base may neither absorb all light nor gain any");
   } else {
-    require(o.base.alpha >= kLeastAlpha && o.base.alpha <= 1, "base", "a roughness of 0.05 to 1");
-    require(o.base.eta > 0 && o.base.eta <= 100 && o.base.k >= 0 && o.base.k <= 100, "base",
+    require(o.base.alpha >= kLeastAlpha && o.base.alpha <= 1, "--base", "a roughness of 0.05 to 1");
+    require(o.base.eta > 0 && o.base.eta <= 100 && o.base.k >= 0 && o.base.k <= 100, "--base",
             "a refractive index above 0 and an extinction of 0 or more, both at most 100");
   }
 }
@@ -54,7 +55,8 @@ void requireTexels(const HeightMap& map, std::size_t count, std::size_t each, co
     if (bad(k)) found.add(k / each);
   if (found.count() == 0) return;
   throw Error(ErrorCode::invalid_input, rule, "", what,
-              std::to_string(found.count()) + " values are not " + range + " (first at " + found.firstName() + ")", remedy);
+              counted(found.count(), {"value is", "values are"}) + " not " + range + " (first at " + found.firstName() + ")",
+              remedy);
 }
 
 void checkTexture(const HeightMap& map, const DisplaceOptions& options) {
@@ -119,9 +121,10 @@ void checkMap(const HeightMap& map, const DisplaceOptions& options) {
     if (dot(slope, slope) > kSteepestSlope * kSteepestSlope) steep.add(f / 2);
   }
   if (steep.count() > 0) {
-    throw Error(ErrorCode::invalid_input, "displace.steep", "", "heights",
-                std::to_string(steep.count()) + " facets are steeper than 80 degrees (first at " + steep.firstName() + ")",
-                "heights are in texels: scale them with glint-ingest --height-scale, or smooth the map");
+    throw Error(
+        ErrorCode::invalid_input, "displace.steep", "", "heights",
+        counted(steep.count(), {"facet is", "facets are"}) + " steeper than 80 degrees (first at " + steep.firstName() + ")",
+        "heights are in texels: scale them with glint-ingest --height-scale, or smooth the map");
   }
 }
 

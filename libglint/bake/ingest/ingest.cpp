@@ -13,6 +13,7 @@
 #include "glint/bake/common/slopes.h"
 #include "glint/bake/ingest/checks.h"
 #include "glint/bake/ingest/pixel_codes.h"
+#include "glint/model/counted.h"
 #include "glint/model/error.h"
 #include "glint/model/slope_sums.h"
 
@@ -240,19 +241,20 @@ std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestOptions& p,
 /// @throws Error invalid_input
 void checkFaults(const PixelArray& image, const IngestOptions& p, bool three, const Faults& faults) {
   if (p.fix_invalid) return;
-  const auto plural = [](std::size_t n) { return n == 1 ? std::string("1 texel is ") : std::to_string(n) + " texels are "; };
+  const Subject texels_are = {"texel is", "texels are"};
   if (faults.non_finite > 0) {
     throw Error(ErrorCode::invalid_input, "map.finite", p.name, texelName(image, faults.first_non_finite),
-                plural(faults.non_finite) + "not finite, this is the first", "repair them with glint-ingest --fix-invalid");
+                counted(faults.non_finite, texels_are) + " not finite, this is the first",
+                "repair them with glint-ingest --fix-invalid");
   }
   const std::size_t texels = static_cast<std::size_t>(image.width) * image.height;
   if (faults.downward * kTexelsPerDownward > texels) {
-    throw Error(ErrorCode::invalid_input, three ? "normals.upward" : "normals.disk", p.name,
-                texelName(image, faults.first_downward),
-                plural(faults.downward) + (three ? "not above the surface (z <= 0)" : "outside the unit disk (x^2 + y^2 > 1)") +
-                    ", this is the first",
-                three ? "export a tangent-space map or set --encoding, or repair them with glint-ingest --fix-invalid"
-                      : "set --encoding, or repair them with glint-ingest --fix-invalid");
+    throw Error(
+        ErrorCode::invalid_input, three ? "normals.upward" : "normals.disk", p.name, texelName(image, faults.first_downward),
+        counted(faults.downward, texels_are) +
+            (three ? " not above the surface (z <= 0)" : " outside the unit disk (x^2 + y^2 > 1)") + ", this is the first",
+        three ? "export a tangent-space map or set --encoding, or repair them with glint-ingest --fix-invalid"
+              : "set --encoding, or repair them with glint-ingest --fix-invalid");
   }
 }
 

@@ -11,6 +11,7 @@
 
 #include "glint/bake/common/fftw_plan.h"
 #include "glint/bake/sh/gauss_legendre.h"
+#include "glint/model/counted.h"
 #include "glint/model/error.h"
 #include "glint/model/sh.h"
 #include "glint/model/texel_name.h"
@@ -150,7 +151,7 @@ void refusePixels(const Environment& e, const std::string& path, const char* rul
   for (std::size_t k = 0; k < e.rgb.size(); k += 3)
     if (bad(e.rgb[k]) || bad(e.rgb[k + 1]) || bad(e.rgb[k + 2])) found.add(k / 3);
   if (found.count() == 0) return;
-  refuse(path, rule, std::to_string(found.count()) + " pixels " + what + " (first at " + found.firstName() + ")",
+  refuse(path, rule, counted(found.count(), {"pixel is", "pixels are"}) + " " + what + " (first at " + found.firstName() + ")",
          "repair the image; radiance is finite and not negative");
 }
 
@@ -179,8 +180,8 @@ void requireUsable(const Environment& e, const std::string& path) {
     refuse(path, "environment.aspect",
            "the environment is " + std::to_string(e.width) + " x " + std::to_string(e.height) + ", not twice as wide as high",
            "convert it to a latitude-longitude image of 2:1");
-  refusePixels(e, path, "environment.finite", "are not finite", [](float v) { return !std::isfinite(v); });
-  refusePixels(e, path, "environment.positive", "are negative", [](float v) { return v < 0; });
+  refusePixels(e, path, "environment.finite", "not finite", [](float v) { return !std::isfinite(v); });
+  refusePixels(e, path, "environment.positive", "negative", [](float v) { return v < 0; });
 }
 
 std::vector<double> projectEnvironment(const Environment& environment, int band_limit) {
