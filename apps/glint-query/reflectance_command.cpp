@@ -128,10 +128,10 @@ void ReflectanceCommand::run() {
                 "is of kind " + std::string(opened.kind()) + ", which holds no displacement",
                 "pass an asset of glint-displace, or ask for the light by " + kLightForm.line);
   const DisplacedBrdf brdf(opened.get<Displacement>());
-  if (table_.csvGiven()) return table_.write(table(brdf));
+  if (table_.csvGiven()) return answerTable(brdf);
   const DisplacedPoint at = point_.point(brdf);
   if (picture_.given()) picture_.write(picture_.size(256), lobeImage(brdf, at, picture_.size(256)));
-  if (table_.samples() > 0) table_.write(samples(brdf, at));
+  if (table_.samples() > 0) writeSamples(brdf, at);
   if (wi_option_->given()) reflect(brdf, at);
   if (half_option_->given()) density(brdf, at);
 }
@@ -157,7 +157,7 @@ void ReflectanceCommand::density(const DisplacedBrdf& brdf, const DisplacedPoint
   reportTimed(tool_, {{"density", value}}, repeat_, [&] { return blendedDensity(brdf, at, half); });
 }
 
-std::string ReflectanceCommand::samples(const DisplacedBrdf& brdf, const DisplacedPoint& at) const {
+void ReflectanceCommand::writeSamples(const DisplacedBrdf& brdf, const DisplacedPoint& at) const {
   const Vec3 wo = directionOf(wo_, "--wo");
   std::string text = std::string(kLightSamples) + "\n";
   for (int k = 0; k < table_.samples(); ++k) {
@@ -165,10 +165,11 @@ std::string ReflectanceCommand::samples(const DisplacedBrdf& brdf, const Displac
         brdf.sample(at.levels, at.uv, wo, bake::randomPair(tool_.seed(), 0, static_cast<std::uint64_t>(k)));
     text += fmt::format("{:.9g},{:.9g},{:.9g},{:.9g}\n", s.direction.x, s.direction.y, s.direction.z, s.pdf);
   }
-  return text;
+  table_.write(text);
+  tool_.setResult({{"samples", table_.samples()}});
 }
 
-std::string ReflectanceCommand::table(const DisplacedBrdf& brdf) const {
+void ReflectanceCommand::answerTable(const DisplacedBrdf& brdf) const {
   const CsvTable table = CsvTable::read(table_.csv());
   const bool reflects = table.has(kLight) && table.has(kView);
   if (!table.has(kCentre) || table.has(kSigma) == table.has(kLevel) || reflects == table.has(kHalf))
@@ -189,7 +190,8 @@ std::string ReflectanceCommand::table(const DisplacedBrdf& brdf) const {
       answers.push_back(blendedDensity(brdf, at, {x, y}));
     }
   }
-  return table.withColumns(names, answers);
+  table_.write(table.withColumns(names, answers));
+  tool_.setResult({{"queries", table.count()}});
 }
 
 std::vector<float> lobeImage(const DisplacedBrdf& brdf, const DisplacedPoint& at, int size) {

@@ -52,12 +52,12 @@ class ReflectanceCommand {
   /// Prints the density of the lobes' normals towards --half; with --repeat also the time of the query.
   void density(const DisplacedBrdf& brdf, const DisplacedPoint& at) const;
 
-  /// Light directions drawn for --wo, as a table with the columns wix, wiy, wiz and pdf.
-  std::string samples(const DisplacedBrdf& brdf, const DisplacedPoint& at) const;
+  /// Writes light directions drawn for --wo, as a table with the columns wix, wiy, wiz and pdf.
+  void writeSamples(const DisplacedBrdf& brdf, const DisplacedPoint& at) const;
 
-  /// A table with the columns u, v; sigma or level; wix, wiy, wiz, wox, woy, woz (answered by reflected, or reflected_r, _g,
+  /// Writes a table with the columns u, v; sigma or level; wix, wiy, wiz, wox, woy, woz (answered by reflected, or reflected_r, _g,
   /// _b) or hx, hy (answered by density). @throws Error invalid_input that names the row and the column
-  std::string table(const DisplacedBrdf& brdf) const;
+  void answerTable(const DisplacedBrdf& brdf) const;
 
   Tool& tool_;
   InputFile asset_;

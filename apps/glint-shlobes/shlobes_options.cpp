@@ -76,22 +76,22 @@ bake::ShLightOptions ShLobesOptions::lightOptions() const {
 }
 
 nlohmann::json lobesJson(const ShLobes& lobes) {
-  const double bytes = static_cast<double>(lobes.grid.directionCount() * shCount(lobes.order));
+  const std::size_t coefficients = lobes.grid.directionCount() * shCount(lobes.order);
   return {{"kind", "sh-lobes"},
           {"order", lobes.order},
           {"grid_rows", lobes.grid.rows},
           {"grid_columns", lobes.grid.columns},
-          {"table_bytes", bytes * (lobes.precision == ShPrecision::f16 ? 2 : 4)},
+          {"table_bytes", coefficients * (lobes.precision == ShPrecision::f16 ? 2 : 4)},
           {"last_band_relative", lobes.zonal.back() / lobes.zonal.front() / std::sqrt(2 * lobes.order + 1.0)}};
 }
 
 nlohmann::json lightJson(const ShLight& light) {
-  const double bytes = static_cast<double>(3 * light.grid.directionCount() * shCount(light.order));
+  const std::size_t coefficients = 3 * light.grid.directionCount() * shCount(light.order);
   return {{"kind", "sh-light"},
           {"order", light.order},
           {"grid_rows", light.grid.rows},
           {"grid_columns", light.grid.columns},
-          {"table_bytes", bytes * (light.precision == ShPrecision::f16 ? 2 : 4)}};
+          {"table_bytes", coefficients * (light.precision == ShPrecision::f16 ? 2 : 4)}};
 }
 
 std::string tableText(const nlohmann::json& table) {

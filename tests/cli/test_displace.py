@@ -79,7 +79,7 @@ def test_warns_of_distant_interreflections(glint):
     [
         (["--factor", "5"], 3, "does not divide 64 x 96"),
         (["--factor", "1"], 1, ""),
-        (["--factors", "16,4"], 1, "ascending"),
+        (["--factors", "16,4"], 1, "--factors: is not 2 or more and ascending"),
         (["--factor", "4", "--factors", "4,8"], 1, ""),
         (["--base", "diffuse:1.5"], 1, "gain"),
         (["--base", "diffuse:0"], 1, "absorb"),
@@ -263,6 +263,10 @@ def test_query_tables_and_samples_of_a_displacement(glint, displaced):
         assert numpy.linalg.norm(drawn[:, :3], axis=1) == pytest.approx(1, abs=1e-4)
         first = reflected(glint, *POINT, *footprint, "--wi", *drawn[0, :3], "--wo", -0.4, 0, 1)
         assert first["pdf"] == pytest.approx(drawn[0, 3], rel=1e-3)
+    told = glint("query", "reflectance", displaced, "--csv", "q.csv", "-o", "a.csv", "--json")
+    assert json.loads(told.stdout)["result"] == {"queries": 2}
+    told = glint("query", "reflectance", displaced, *POINT, "--level", 0, "--wo", 0, 0, 1, "--samples", 7, "-o", "s.csv", "--json")
+    assert json.loads(told.stdout)["result"] == {"samples": 7}
 
 
 def test_query_normals_of_a_displacement_integrate_to_one(glint, displaced):
