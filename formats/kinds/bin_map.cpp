@@ -77,7 +77,7 @@ class TreeWalk {
     next_cell_ += std::uint64_t{1} << block.cell_bits;
     if (next_cell_ >= map_.cell_starts.size()) return false;
     if (map_.cell_starts[block.first_cell] == map_.cell_starts[next_cell_]) return false;
-    if (blockCode(code_, block.side_bits, block.cell_bits).place_bits < block.side_bits) return false;
+    if (blockCode(code_, block.side_bits, block.cell_bits).subbin_bits < block.side_bits) return false;
     return visitor(block);
   }
 
@@ -114,7 +114,7 @@ bool listHolds(const BinMap& map, const BlockOfNode& block, std::vector<bool>& s
   const TexelCode code_of_map = texelCode(map.width, map.height);
   const TexelCode code = blockCode(code_of_map, block.side_bits, block.cell_bits);
   const CellGrid grid = cellGrid(code_of_map, block.cell_bits);
-  const std::uint32_t bin_shift = static_cast<std::uint32_t>(code.place_bits - block.side_bits);
+  const std::uint32_t bin_shift = static_cast<std::uint32_t>(code.subbin_bits - block.side_bits);
   for (std::uint32_t cell = 0; cell < 1u << block.cell_bits; ++cell) {
     const std::uint32_t across = static_cast<std::uint32_t>(grid.columns);
     const std::uint32_t first_column = cell % across << grid.column_shift, first_row = cell / across << grid.row_shift;
@@ -122,14 +122,14 @@ bool listHolds(const BinMap& map, const BlockOfNode& block, std::vector<bool>& s
       const std::uint32_t code_of_texel = map.texels[k];
       const std::uint32_t column = first_column + code.column(code_of_texel), row = first_row + code.row(code_of_texel);
       if (column >= static_cast<std::uint32_t>(map.width) || row >= static_cast<std::uint32_t>(map.height)) return false;
-      const int bin_column = block.column + static_cast<int>(code.placeX(code_of_texel) >> bin_shift);
-      const int bin_row = block.row + static_cast<int>(code.placeY(code_of_texel) >> bin_shift);
+      const int bin_column = block.column + static_cast<int>(code.subbinX(code_of_texel) >> bin_shift);
+      const int bin_row = block.row + static_cast<int>(code.subbinY(code_of_texel) >> bin_shift);
       if (bin_column >= map.bins_per_axis || bin_row >= map.bins_per_axis) return false;
       const std::size_t texel = std::size_t{row} * static_cast<std::size_t>(map.width) + column;
       std::uint64_t key = block.first_key;
       for (int bit = 0; bit < block.side_bits; ++bit) {
-        key += std::uint64_t{code.placeX(code_of_texel) >> (bin_shift + static_cast<std::uint32_t>(bit)) & 1} << 2 * bit;
-        key += std::uint64_t{code.placeY(code_of_texel) >> (bin_shift + static_cast<std::uint32_t>(bit)) & 1} << (2 * bit + 1);
+        key += std::uint64_t{code.subbinX(code_of_texel) >> (bin_shift + static_cast<std::uint32_t>(bit)) & 1} << 2 * bit;
+        key += std::uint64_t{code.subbinY(code_of_texel) >> (bin_shift + static_cast<std::uint32_t>(bit)) & 1} << (2 * bit + 1);
       }
       const std::uint32_t c = classOf(map, texel);
       if (seen[texel] || key < map.class_keys[c] || key >= map.class_keys[c + 1]) return false;
@@ -206,7 +206,7 @@ struct KindDescription<BinMap> {
     if (!(map.alpha_min <= map.alpha && map.alpha <= map.alpha_max))
       findings.add("bin_map.alpha", "/@alpha", "is not between alpha_min and alpha_max");
     checkSlopes(map.slopes, findings);
-    if (texelCode(map.width, map.height).place_bits < 0) {
+    if (texelCode(map.width, map.height).subbin_bits < 0) {
       findings.add("bin_map.size", "/", "has " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels");
       return;
     }

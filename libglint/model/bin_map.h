@@ -21,31 +21,31 @@ struct CompactCounts {
   GLINT_HD std::uint64_t operator[](std::size_t k) const { return bases.data()[k >> shift] + offsets.data()[k]; }
 };
 
-/// Layout of a texel in 32 bits. Fields from the lowest bit on: column, row, and the position of the normal in its block
-/// along x and along y (the place).
+/// Layout of a texel in 32 bits. Fields from the lowest bit on: column, row, and the column and row of the normal's sub-bin
+/// in its block.
 struct TexelCode {
   int column_bits = 0;
   int row_bits = 0;
-  int place_bits = 0;  ///< along each axis
+  int subbin_bits = 0;  ///< along each axis
 
   static constexpr int kMaxPositionBits = 28;
-  static constexpr int kMaxPlaceBits = 8;
+  static constexpr int kMaxSubbinBits = 8;
 
   GLINT_HD constexpr std::uint32_t column(std::uint32_t code) const { return code & ((1u << column_bits) - 1); }
   GLINT_HD constexpr std::uint32_t row(std::uint32_t code) const { return code >> column_bits & ((1u << row_bits) - 1); }
-  GLINT_HD constexpr std::uint32_t placeX(std::uint32_t code) const {
-    return code >> (column_bits + row_bits) & ((1u << place_bits) - 1);
+  GLINT_HD constexpr std::uint32_t subbinX(std::uint32_t code) const {
+    return code >> (column_bits + row_bits) & ((1u << subbin_bits) - 1);
   }
-  GLINT_HD constexpr std::uint32_t placeY(std::uint32_t code) const {
-    return code >> (column_bits + row_bits + place_bits) & ((1u << place_bits) - 1);
+  GLINT_HD constexpr std::uint32_t subbinY(std::uint32_t code) const {
+    return code >> (column_bits + row_bits + subbin_bits) & ((1u << subbin_bits) - 1);
   }
   GLINT_HD constexpr std::uint32_t pack(std::uint32_t column, std::uint32_t row, std::uint32_t x, std::uint32_t y) const {
-    return column | row << column_bits | x << (column_bits + row_bits) | y << (column_bits + row_bits + place_bits);
+    return column | row << column_bits | x << (column_bits + row_bits) | y << (column_bits + row_bits + subbin_bits);
   }
 };
 
-/// The layout with column and row in the whole map. The bits that remain are the largest precision of places. Maps whose
-/// columns and rows need more than kMaxPositionBits together have no code: place_bits is -1.
+/// The layout with column and row in the whole map. The bits that remain are the largest number of bits of sub-bins. Maps whose
+/// columns and rows need more than kMaxPositionBits together have no code: subbin_bits is -1.
 GLINT_HD constexpr TexelCode texelCode(int width, int height) {
   const auto bits = [](int size) {
     int count = 0;
@@ -54,9 +54,9 @@ GLINT_HD constexpr TexelCode texelCode(int width, int height) {
   };
   TexelCode code{bits(width), bits(height), 0};
   const int left = 32 - code.column_bits - code.row_bits;
-  code.place_bits = left < 32 - TexelCode::kMaxPositionBits ? -1
-                    : left / 2 < TexelCode::kMaxPlaceBits   ? left / 2
-                                                            : TexelCode::kMaxPlaceBits;
+  code.subbin_bits = left < 32 - TexelCode::kMaxPositionBits ? -1
+                     : left / 2 < TexelCode::kMaxSubbinBits  ? left / 2
+                                                             : TexelCode::kMaxSubbinBits;
   return code;
 }
 
@@ -78,13 +78,13 @@ GLINT_HD constexpr CellGrid cellGrid(const TexelCode& code, int cell_bits) {
   return {code.column_bits - across, code.row_bits - (cell_bits - across), 1 << across};
 }
 
-/// Layout of the texels of a block of 2^side_bits x 2^side_bits bins with 2^cell_bits cells: column and row in the cell, place
-/// in the block. place_bits - side_bits bits of a place tell normals of one bin apart: as many as the texelCode of the map has,
-/// if they fit. The difference is negative if not even the number of the bin fits.
+/// Layout of the texels of a block of 2^side_bits x 2^side_bits bins with 2^cell_bits cells: column and row in the cell, sub-bin
+/// in the block. A bin has 2^(subbin_bits - side_bits) sub-bins along each axis: as many as the texelCode of the map says, if
+/// they fit. The difference is negative if not even the number of the bin fits.
 GLINT_HD constexpr TexelCode blockCode(const TexelCode& map, int side_bits, int cell_bits) {
   const CellGrid grid = cellGrid(map, cell_bits);
   const int left = (32 - grid.column_shift - grid.row_shift) / 2 - side_bits;
-  return {grid.column_shift, grid.row_shift, side_bits + (left < map.place_bits ? left : map.place_bits)};
+  return {grid.column_shift, grid.row_shift, side_bits + (left < map.subbin_bits ? left : map.subbin_bits)};
 }
 
 /// The texels of a normal map, listed by the directions of their normals (Atanasov 2021, section 5.4).
@@ -118,7 +118,7 @@ struct BinMap {
   /// [blocks][5] of f16: mean (x, y) and covariance (xx, xy, yy) of the block's normals, from its lower left corner, in its
   /// sides
   std::span<const std::uint16_t> block_moments;
-  CompactCounts cell_starts;              ///< [cells + 1]: place in `texels` of each cell, of all blocks in order
+  CompactCounts cell_starts;              ///< [cells + 1]: first of `texels` of each cell, of all blocks in order
   std::span<const std::uint32_t> texels;  ///< [height * width]: blockCode
 
   /// Finding the block of a texel: bins are grouped in at most kMaxClasses classes of consecutive keys, and each texel stores

@@ -8,7 +8,7 @@
 #include "glint/math/half.h"
 #include "glint/query/detail/bin_map/bin_window.h"
 #include "glint/query/detail/bin_map/facet_lobe.h"
-#include "glint/query/detail/bin_map/place_moments.h"
+#include "glint/query/detail/bin_map/subbin_moments.h"
 #include "glint/query/detail/common/sampling.h"
 #include "glint/query/ndf_model.h"
 
@@ -285,9 +285,9 @@ class BinMapNdf {
     std::uint32_t texel = 0;
     if (!blocks_.findIn(block, static_cast<std::uint32_t>(column), static_cast<std::uint32_t>(row), texel)) return kNoSlot;
     const TexelCode code = blocks_.code(block);
-    const int shift = code.place_bits - block.side_bits;
-    const int dx = block.column + static_cast<int>(code.placeX(texel) >> shift) - window.column;
-    const int dy = block.row + static_cast<int>(code.placeY(texel) >> shift) - window.row;
+    const int shift = code.subbin_bits - block.side_bits;
+    const int dx = block.column + static_cast<int>(code.subbinX(texel) >> shift) - window.column;
+    const int dy = block.row + static_cast<int>(code.subbinY(texel) >> shift) - window.row;
     const bool inside = dx >= 0 && dx < BinWindow::kSide && dy >= 0 && dy < BinWindow::kSide;
     return inside ? dy * BinWindow::kSide + dx : int{kNoSlot};
   }
@@ -345,14 +345,14 @@ class BinMapNdf {
     return {-1 + static_cast<float>(block.column) * bin_size_, -1 + static_cast<float>(block.row) * bin_size_};
   }
 
-  /// Side of the square of normals that share one place of a code.
-  GLINT_HD float placeSize(const BinBlock& block, const TexelCode& code) const {
-    return bin_size_ / static_cast<float>(1 << (code.place_bits - block.side_bits));
+  /// Side of a sub-bin.
+  GLINT_HD float subbinSize(const BinBlock& block, const TexelCode& code) const {
+    return bin_size_ / static_cast<float>(1 << (code.subbin_bits - block.side_bits));
   }
 
   GLINT_HD Vec2 normal(const BinBlock& block, const TexelCode& code, std::uint32_t texel) const {
-    return corner(block) + placeSize(block, code) * Vec2{static_cast<float>(code.placeX(texel)) + 0.5f,
-                                                         static_cast<float>(code.placeY(texel)) + 0.5f};
+    return corner(block) + subbinSize(block, code) * Vec2{static_cast<float>(code.subbinX(texel)) + 0.5f,
+                                                          static_cast<float>(code.subbinY(texel)) + 0.5f};
   }
 
   /// Weight, 0 to 1, with which a block counts as one facet. The wider lobes are against the block, the fewer texels are needed
@@ -367,12 +367,12 @@ class BinMapNdf {
   }
 
   /// Sums over all texels of a block.
-  GLINT_HD PlaceMoments momentsOf(const BinBlock& block, const TexelCode& code) const {
+  GLINT_HD SubbinMoments momentsOf(const BinBlock& block, const TexelCode& code) const {
     const std::uint16_t* stored = map().block_moments.data() + 5 * std::size_t{block.number};
-    const double side = 1 << code.place_bits;
+    const double side = 1 << code.subbin_bits;
     const double x = side * (halfToFloat(stored[0]) - 0.5), y = side * (halfToFloat(stored[1]) - 0.5);
     const auto square = [&](int k) { return side * side * halfToFloat(stored[k]); };
-    PlaceMoments moments;
+    SubbinMoments moments;
     moments.add(static_cast<double>(blocks_.end(block) - blocks_.begin(block)),
                 {1, x, y, square(2) + x * x, square(3) + x * y, square(4) + y * y});
     return moments;
@@ -381,11 +381,11 @@ class BinMapNdf {
   /// One facet for the texels of a block that are in the footprint; its weight is their covered area.
   GLINT_DEVICE_CALL GLINT_HD BinFacet blockFacet(const TexelCover& cover, const BinBlock& block, CellRows& rows) const {
     const TexelCode code = blocks_.code(block);
-    PlaceMomentSum sum(map().texels.data(), cover, code, blocks_.begin(block), blocks_.end(block), momentsOf(block, code));
+    SubbinMomentSum sum(map().texels.data(), cover, code, blocks_.begin(block), blocks_.end(block), momentsOf(block, code));
     blocks_.forEachRun(cover, block, rows, sum);
-    const PlaceMoments& sums = sum.finish();
+    const SubbinMoments& sums = sum.finish();
     if (!(sums.weight > 0)) return {};
-    const double size = placeSize(block, code), squared = size * size;
+    const double size = subbinSize(block, code), squared = size * size;
     const double x = sums.x / sums.weight, y = sums.y / sums.weight;
     const double xx = std::max(0.0, sums.xx / sums.weight - x * x), yy = std::max(0.0, sums.yy / sums.weight - y * y);
     const double limit = std::sqrt(xx * yy), xy = std::clamp(sums.xy / sums.weight - x * y, -limit, limit);
@@ -412,8 +412,8 @@ class BinMapNdf {
       const Vec2 low = reach.support.low - Vec2{reach.radius, reach.radius},
                  high = reach.support.high + Vec2{reach.radius, reach.radius};
       const Vec2 corner = ndf.corner(block);
-      columns_ = placesBetween(low.x - corner.x, high.x - corner.x);
-      rows_ = placesBetween(low.y - corner.y, high.y - corner.y);
+      columns_ = subbinsBetween(low.x - corner.x, high.x - corner.x);
+      rows_ = subbinsBetween(low.y - corner.y, high.y - corner.y);
     }
     GLINT_HD void whole(std::uint64_t begin, std::uint64_t end) { partial({begin, end, 0, 0, false, false}); }
     GLINT_DEVICE_CALL GLINT_HD void partial(const TexelRun& run) {
@@ -421,8 +421,8 @@ class BinMapNdf {
     }
 
    private:
-    GLINT_HD IndexRange placesBetween(float begin, float end) const {
-      const float size = ndf_.placeSize(block_, code_), last = static_cast<float>((1 << code_.place_bits) - 1);
+    GLINT_HD IndexRange subbinsBetween(float begin, float end) const {
+      const float size = ndf_.subbinSize(block_, code_), last = static_cast<float>((1 << code_.subbin_bits) - 1);
       return {static_cast<int>(std::clamp(std::floor(begin / size), 0.0f, last)),
               static_cast<int>(std::clamp(std::floor(end / size), 0.0f, last))};
     }
@@ -434,7 +434,7 @@ class BinMapNdf {
         const double weight = sides_.texelArea<kCut>(cover_, run, code_, texel);
         if (weight > 0) visitor_(BinFacet{scale_ * weight, ndf_.normal(block_, code_, texel), {}});
       };
-      near.forEach<kCut | TexelFilter::kPlace>(ndf_.map().texels.data() + run.begin, run.end - run.begin, pass);
+      near.forEach<kCut | TexelFilter::kSubbin>(ndf_.map().texels.data() + run.begin, run.end - run.begin, pass);
     }
 
     const BinMapNdf& ndf_;
@@ -444,7 +444,7 @@ class BinMapNdf {
     TexelCode code_;
     double scale_;
     Visitor& visitor_;
-    IndexRange columns_, rows_;  ///< range of places whose normals are in reach
+    IndexRange columns_, rows_;  ///< range of sub-bins in reach
   };
 
   /// Calls visitor(BinFacet) for the facets of one block.

@@ -577,10 +577,10 @@ void addCompact(std::uint64_t value, int shift, std::vector<std::uint64_t>& base
 
 /// Mean and covariance of places in a block, in its sides.
 void addMoments(const TexelCode& code, const std::vector<std::uint32_t>& texels, std::vector<std::uint16_t>& moments) {
-  const double step = 1.0 / (1 << code.place_bits), n = static_cast<double>(texels.size());
+  const double step = 1.0 / (1 << code.subbin_bits), n = static_cast<double>(texels.size());
   double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
   for (const std::uint32_t t : texels) {
-    const double px = (code.placeX(t) + 0.5) * step, py = (code.placeY(t) + 0.5) * step;
+    const double px = (code.subbinX(t) + 0.5) * step, py = (code.subbinY(t) + 0.5) * step;
     x += px / n, y += py / n, xx += px * px / n, xy += px * py / n, yy += py * py / n;
   }
   for (const double v : {x, y, xx - x * x, xy - x * y, yy - y * y}) moments.push_back(floatToHalf(static_cast<float>(v)));
@@ -605,7 +605,7 @@ void addBlock(const SampleNormals& normals, int width, int bins, int column, int
       const double x = ((normals.normals[t].x + 1.0) * bins / 2 - column) * scale;
       const double y = ((normals.normals[t].y + 1.0) * bins / 2 - row) * scale;
       if (x < 0 || x >= 1 || y < 0 || y >= 1) continue;
-      const auto place = [&](double v) { return static_cast<std::uint32_t>(v * (1 << code.place_bits)); };
+      const auto place = [&](double v) { return static_cast<std::uint32_t>(v * (1 << code.subbin_bits)); };
       list.push_back(code.pack(static_cast<std::uint32_t>(i & ((1 << grid.column_shift) - 1)),
                                static_cast<std::uint32_t>(j & ((1 << grid.row_shift) - 1)), place(x), place(y)));
     }

@@ -18,7 +18,7 @@ namespace {
 struct Steps {
   test::OwnedMap map{200, 128, test::roughSurface(200, 128, 0.2f)};
   TexelCode code = texelCode(200, 128);
-  BinGrid grid = makeBinGrid(binsPerAxis(0.05f), 2, code.place_bits);
+  BinGrid grid = makeBinGrid(binsPerAxis(0.05f), 2, code.subbin_bits);
 };
 
 TEST(BinGrid, KeysNumberAllBinsOnce) {

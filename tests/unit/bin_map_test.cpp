@@ -243,10 +243,10 @@ TEST(BinMap, NormalsOutsideTheDiskAreNamedFromTheTop) {
 }
 
 TEST(BinMap, MapsTooLargeForTheirCodesAreUnsupported) {
-  EXPECT_EQ(texelCode(16384, 16384).place_bits, 2);
-  EXPECT_EQ(texelCode(1 << 20, 256).place_bits, 2);
-  EXPECT_LT(texelCode(16385, 16384).place_bits, 0);
-  EXPECT_LT(texelCode(1 << 20, 1 << 20).place_bits, 0);
+  EXPECT_EQ(texelCode(16384, 16384).subbin_bits, 2);
+  EXPECT_EQ(texelCode(1 << 20, 256).subbin_bits, 2);
+  EXPECT_LT(texelCode(16385, 16384).subbin_bits, 0);
+  EXPECT_LT(texelCode(1 << 20, 1 << 20).subbin_bits, 0);
   const std::vector<Vec2> row(1);
   NormalMap map;
   map.width = 16385;
@@ -434,7 +434,7 @@ TEST(BinMapNdf, OneMapAnswersARangeOfRoughnesses) {
   const test::OwnedMap map(512, 512, test::roughSurface(512, 512, 0.3f));
   const bake::BinMapData data = bake::buildBinMap(map.map(), {low, 8, high});
   EXPECT_EQ(std::tuple(data.alpha_min, data.alpha_max), std::tuple(low, high));
-  EXPECT_FLOAT_EQ(data.alpha, bake::binAlpha(low, high, texelCode(512, 512).place_bits));
+  EXPECT_FLOAT_EQ(data.alpha, bake::binAlpha(low, high, texelCode(512, 512).subbin_bits));
   EXPECT_FLOAT_EQ(BinMapNdf(data.view()).sigma(), low * kInvSqrt2);
   for (const float alpha : {low, 0.02f, 0.08f, high}) {
     const BinMapNdf ndf(data.view(), alpha);

@@ -853,10 +853,10 @@ TEST(FormatRules, TexelsInBinsBeyondTheSquareAreFound) {
   bool moved = false;
   blocks.forEachBlock({last, last + 1, 0, last + 1}, [&](const BinBlock& block) {
     const TexelCode code = blocks.code(block);
-    const int shift = code.place_bits - block.side_bits;
+    const int shift = code.subbin_bits - block.side_bits;
     for (std::uint64_t k = blocks.begin(block); k < blocks.end(block) && !moved && block.column + block.side() > last + 1;
          ++k) {
-      if (block.column + static_cast<int>(code.placeX(blocks.texel(k)) >> shift) != last) continue;
+      if (block.column + static_cast<int>(code.subbinX(blocks.texel(k)) >> shift) != last) continue;
       data.texels[k] += 1u << (code.column_bits + code.row_bits + shift);
       moved = true;
     }

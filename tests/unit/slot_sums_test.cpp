@@ -32,14 +32,14 @@ Case randomCase(std::mt19937& random) {
   Case c;
   c.code = {below(15), below(15), 0};
   const int side_bits = below(4), position_bits = c.code.column_bits + c.code.row_bits;
-  c.code.place_bits = std::min(side_bits + below(3), (32 - position_bits) / 2);
+  c.code.subbin_bits = std::min(side_bits + below(3), (32 - position_bits) / 2);
   c.columns = range(c.code.column_bits);
   c.rows = range(c.code.row_bits);
   // Multiples of 2^-5: sums are exact.
   c.column_ends = {0.03125f * static_cast<float>(below(33)), 0.25f};
   c.row_ends = {0.5f, 0.03125f * static_cast<float>(below(33))};
-  const int shift = std::min(position_bits + c.code.place_bits - std::min(side_bits, c.code.place_bits), 31);
-  c.bins = {shift, std::min(shift + c.code.place_bits, 31), (1u << side_bits) - 1, static_cast<std::uint32_t>(below(10) - 5),
+  const int shift = std::min(position_bits + c.code.subbin_bits - std::min(side_bits, c.code.subbin_bits), 31);
+  c.bins = {shift, std::min(shift + c.code.subbin_bits, 31), (1u << side_bits) - 1, static_cast<std::uint32_t>(below(10) - 5),
             static_cast<std::uint32_t>(below(10) - 5)};
   c.texels.resize(static_cast<std::size_t>(below(10) == 0 ? below(2000) : below(70)));
   for (std::uint32_t& texel : c.texels) texel = static_cast<std::uint32_t>(random());
@@ -101,13 +101,13 @@ void expectAreas() {
   }
 }
 
-/// Moments of all texels' places, field by field.
+/// Moments of all texels' sub-bins, field by field.
 template <unsigned kCut>
-PlaceMoments expectedMoments(const Case& c) {
-  PlaceMoments moments;
-  const double middle = 0.5 * ((1 << c.code.place_bits) - 1);
+SubbinMoments expectedMoments(const Case& c) {
+  SubbinMoments moments;
+  const double middle = 0.5 * ((1 << c.code.subbin_bits) - 1);
   for (const std::uint32_t texel : c.texels) {
-    const double w = partOf<kCut>(c, texel), x = c.code.placeX(texel) - middle, y = c.code.placeY(texel) - middle;
+    const double w = partOf<kCut>(c, texel), x = c.code.subbinX(texel) - middle, y = c.code.subbinY(texel) - middle;
     moments.add(w, {1, x, y, x * x, x * y, y * y});
   }
   return moments;
@@ -118,15 +118,15 @@ void expectMoments() {
   std::mt19937 random(7);
   for (int k = 0; k < 3000 && !testing::Test::HasFailure(); ++k) {
     Case c = randomCase(random);
-    if (c.code.column_bits + c.code.row_bits + 2 * c.code.place_bits > 31) continue;  // shifts of a whole word
-    if (c.texels.size() > 500) c.texels.resize(500);                                  // as many as are summed at once
+    if (c.code.column_bits + c.code.row_bits + 2 * c.code.subbin_bits > 31) continue;  // shifts of a whole word
+    if (c.texels.size() > 500) c.texels.resize(500);                                   // as many as are summed at once
     SCOPED_TRACE(k);
     const typename Texels::Parts parts(c.parts());
     const auto n = static_cast<int>(c.texels.size());
-    const PlaceMoments sums = Texels::template moments<3>(c.texels.data(), n, parts, PlaceFields(c.code));
-    const PlaceMoments expected = expectedMoments<3>(c);
+    const SubbinMoments sums = Texels::template moments<3>(c.texels.data(), n, parts, SubbinFields(c.code));
+    const SubbinMoments expected = expectedMoments<3>(c);
     constexpr double kRounding = 1e-5;  // of float sums
-    const double side = 1 << c.code.place_bits, tolerance = kRounding * expected.weight;
+    const double side = 1 << c.code.subbin_bits, tolerance = kRounding * expected.weight;
     EXPECT_NEAR(sums.weight, expected.weight, tolerance);
     EXPECT_NEAR(sums.x, expected.x, tolerance * side);
     EXPECT_NEAR(sums.y, expected.y, tolerance * side);
@@ -136,7 +136,7 @@ void expectMoments() {
   }
 }
 
-TEST(PlaceMoments, AddUpTexelByTexel) { expectMoments<SingleTexels>(); }
+TEST(SubbinMoments, AddUpTexelByTexel) { expectMoments<SingleTexels>(); }
 
 TEST(SlotSums, AddUpTexelByTexel) { expectAreas<SingleTexels>(); }
 
@@ -146,12 +146,12 @@ TEST(SlotSums, AddUpEightTexelsAtATime) {
   expectAreas<Avx2Texels>();
 }
 
-TEST(PlaceMoments, AddUpEightTexelsAtATime) {
+TEST(SubbinMoments, AddUpEightTexelsAtATime) {
   if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
   expectMoments<Avx2Texels>();
 }
 
-TEST(PlaceMoments, AreTheSameToTheBitByEightAndByOne) {
+TEST(SubbinMoments, AreTheSameToTheBitByEightAndByOne) {
   if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
   std::mt19937 random(8);
   std::uniform_real_distribution<float> end;
@@ -159,9 +159,9 @@ TEST(PlaceMoments, AreTheSameToTheBitByEightAndByOne) {
     Case c = randomCase(random);
     c.column_ends = {end(random), end(random)};
     const auto n = static_cast<int>(std::min<std::size_t>(c.texels.size(), 500));
-    const PlaceFields fields(c.code);
-    const PlaceMoments one = SingleTexels::moments<3>(c.texels.data(), n, c.parts(), fields);
-    const PlaceMoments eight = Avx2Texels::moments<3>(c.texels.data(), n, Avx2Texels::Parts(c.parts()), fields);
+    const SubbinFields fields(c.code);
+    const SubbinMoments one = SingleTexels::moments<3>(c.texels.data(), n, c.parts(), fields);
+    const SubbinMoments eight = Avx2Texels::moments<3>(c.texels.data(), n, Avx2Texels::Parts(c.parts()), fields);
     EXPECT_EQ((std::array{one.weight, one.x, one.y, one.xx, one.xy, one.yy}),
               (std::array{eight.weight, eight.x, eight.y, eight.xx, eight.xy, eight.yy}))
         << k;

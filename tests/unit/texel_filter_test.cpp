@@ -21,8 +21,8 @@ Case randomCase(std::mt19937& random) {
   Case c;
   c.code.column_bits = below(12);
   c.code.row_bits = below(12);
-  c.code.place_bits = 1 + below(std::min(8, (32 - c.code.column_bits - c.code.row_bits) / 2));
-  const int bits[4] = {c.code.column_bits, c.code.row_bits, c.code.place_bits, c.code.place_bits};
+  c.code.subbin_bits = 1 + below(std::min(8, (32 - c.code.column_bits - c.code.row_bits) / 2));
+  const int bits[4] = {c.code.column_bits, c.code.row_bits, c.code.subbin_bits, c.code.subbin_bits};
   for (int k = 0; k < 4; ++k) {
     const int low = below((1 << bits[k]) + 2) - 1;
     c.ranges[k] = {low, low + below(4) * (1 << bits[k]) / 3};
@@ -35,8 +35,8 @@ Case randomCase(std::mt19937& random) {
 int field(const TexelCode& code, int k, std::uint32_t texel) {
   return static_cast<int>(k == 0   ? code.column(texel)
                           : k == 1 ? code.row(texel)
-                          : k == 2 ? code.placeX(texel)
-                                   : code.placeY(texel));
+                          : k == 2 ? code.subbinX(texel)
+                                   : code.subbinY(texel));
 }
 
 template <unsigned kFields>
@@ -62,8 +62,8 @@ TEST(TexelFilter, MatchesAreThoseOfEachFieldInTurn) {
     expectMatches<TexelFilter::kColumn>(c);
     expectMatches<TexelFilter::kRow>(c);
     expectMatches<TexelFilter::kPosition>(c);
-    expectMatches<TexelFilter::kPlace>(c);
-    expectMatches<TexelFilter::kPosition | TexelFilter::kPlace>(c);
+    expectMatches<TexelFilter::kSubbin>(c);
+    expectMatches<TexelFilter::kPosition | TexelFilter::kSubbin>(c);
     if (HasFailure()) FAIL() << "case " << k;
   }
 }

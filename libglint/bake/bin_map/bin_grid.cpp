@@ -13,11 +13,11 @@ std::uint32_t spreadBits(std::uint32_t x) {
 }
 
 /// binNormals without references to structs, which would keep the compiler from making vectors.
-GLINT_MULTIVERSION bool binAll(const Vec2* normals, std::size_t count, int bins, int place_bits, std::uint16_t* columns,
-                               std::uint16_t* rows, std::uint16_t* places) {
+GLINT_MULTIVERSION bool binAll(const Vec2* normals, std::size_t count, int bins, int subbin_bits, std::uint16_t* columns,
+                               std::uint16_t* rows, std::uint16_t* subbins) {
   const float half = 0.5f * static_cast<float>(bins);
-  const auto steps = static_cast<float>(1 << place_bits);
-  const int last = bins - 1, last_step = (1 << place_bits) - 1;
+  const auto steps = static_cast<float>(1 << subbin_bits);
+  const int last = bins - 1, last_step = (1 << subbin_bits) - 1;
   int bad = 0;
   for (std::size_t k = 0; k < count; ++k) {
     const float nx = normals[k].x, ny = normals[k].y;
@@ -28,15 +28,15 @@ GLINT_MULTIVERSION bool binAll(const Vec2* normals, std::size_t count, int bins,
     const int py = std::min(static_cast<int>((y - static_cast<float>(row)) * steps), last_step);
     columns[k] = static_cast<std::uint16_t>(column);
     rows[k] = static_cast<std::uint16_t>(row);
-    places[k] = static_cast<std::uint16_t>(px | py << place_bits);
+    subbins[k] = static_cast<std::uint16_t>(px | py << subbin_bits);
   }
   return bad == 0;
 }
 
 }  // namespace
 
-BinGrid makeBinGrid(int bins_per_axis, int tile_bits, int place_bits) {
-  BinGrid grid{bins_per_axis, tile_bits, place_bits, ((bins_per_axis - 1) >> tile_bits) + 1, 0, {}, {}};
+BinGrid makeBinGrid(int bins_per_axis, int tile_bits, int subbin_bits) {
+  BinGrid grid{bins_per_axis, tile_bits, subbin_bits, ((bins_per_axis - 1) >> tile_bits) + 1, 0, {}, {}};
   grid.key_count = grid.tileCount() * grid.keysPerTile();
   for (int k = 0; k < bins_per_axis; ++k) {
     const auto tile = static_cast<std::uint32_t>(k >> tile_bits);
@@ -48,8 +48,8 @@ BinGrid makeBinGrid(int bins_per_axis, int tile_bits, int place_bits) {
 }
 
 bool binNormals(const Vec2* normals, std::size_t count, const BinGrid& grid, std::uint16_t* columns, std::uint16_t* rows,
-                std::uint16_t* places) {
-  return binAll(normals, count, grid.bins_per_axis, grid.place_bits, columns, rows, places);
+                std::uint16_t* subbins) {
+  return binAll(normals, count, grid.bins_per_axis, grid.subbin_bits, columns, rows, subbins);
 }
 
 }  // namespace glint::bake

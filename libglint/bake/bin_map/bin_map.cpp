@@ -30,7 +30,7 @@ void checkOptions(const NormalMap& map, const BinMapOptions& o) {
     usage("--alpha", "a range that rises to at most 1 and 64 times its beginning");
   if (!(o.leaf_size >= 1 && o.leaf_size <= 1024)) usage("--leaf-size", "1 to 1024 texels");
   if (map.width < 1 || map.height < 1) throw Error(ErrorCode::invalid_input, "normals.size", {}, {}, "the map has no texels");
-  if (texelCode(map.width, map.height).place_bits < 0) {
+  if (texelCode(map.width, map.height).subbin_bits < 0) {
     throw Error(ErrorCode::unsupported, "bin_map.size", {}, {},
                 std::to_string(map.width) + " x " + std::to_string(map.height) + " texels are too many for a bin map",
                 "cut the map to at most 16384 x 16384 texels, or as many in another shape of powers of two");
@@ -55,9 +55,9 @@ int tileBits(int bins_per_axis, std::size_t texels) {
   return std::min(bitsFor(texels / kTexelsOfTile), std::max(kWideTileBits, bitsFor(texels / kFewTexelsOfTile)));
 }
 
-float binAlpha(float alpha_min, float alpha_max, int place_bits) {
-  constexpr int kPlaceBits = 4;
-  const int spare = std::max(std::min(place_bits, kSurePlaceBits) - kPlaceBits, 0);
+float binAlpha(float alpha_min, float alpha_max, int subbin_bits) {
+  constexpr int kSubbinBits = 4;
+  const int spare = std::max(std::min(subbin_bits, kSureSubbinBits) - kSubbinBits, 0);
   const float finest = alpha_min * std::exp2(static_cast<float>(spare));
   return alpha_min == alpha_max ? alpha_min : std::min(std::sqrt(alpha_min * alpha_max), finest);
 }
@@ -117,13 +117,13 @@ BinMapData buildBinMap(const NormalMap& map, const BinMapOptions& options, const
   data.height = map.height;
   data.alpha_min = options.alpha;
   data.alpha_max = options.alpha_max == 0 ? options.alpha : options.alpha_max;
-  data.alpha = binAlpha(data.alpha_min, data.alpha_max, code.place_bits);
+  data.alpha = binAlpha(data.alpha_min, data.alpha_max, code.subbin_bits);
   data.leaf_size = options.leaf_size;
   data.bins_per_axis = binsPerAxis(data.alpha);
   data.tile_bits = tileBits(data.bins_per_axis, map.normals.size());
 
   // Move texels to buckets of neighbouring bins, which fit the cache.
-  const BinGrid grid = makeBinGrid(data.bins_per_axis, data.tile_bits, code.place_bits);
+  const BinGrid grid = makeBinGrid(data.bins_per_axis, data.tile_bits, code.subbin_bits);
   const RunCounts counts = countRuns(map, grid);
   step(1);
   const TexelBuckets buckets = fillBuckets(map, code, grid, counts);

@@ -32,7 +32,7 @@ int tileBits(int bins_per_axis, std::size_t texels);
 
 /// Roughness for which bins are made when queries may ask for any roughness from alpha_min to alpha_max: the geometric mean of
 /// the two, or less where codes have few bits. A code must tell a normal to a sixteenth of a bin that is made for alpha_min.
-float binAlpha(float alpha_min, float alpha_max, int place_bits);
+float binAlpha(float alpha_min, float alpha_max, int subbin_bits);
 
 /// A CompactCounts that owns its arrays.
 struct CompactCountsData {

@@ -12,10 +12,10 @@ namespace {
 /// Most texels of a block of several bins, and of each of its bins. A query may merge all texels of a block into one lobe (see
 /// BinMapNdf), and merging more would cost accuracy.
 constexpr std::uint64_t kMostOfBlock = 4096, kMostOfSharedBin = 512;
-/// Most bits, along each axis, of a place inside a block: half of a code.
-constexpr int kMostBlockPlaceBits = 16;
+/// Most bits, along each axis, of a sub-bin of a block: half of a code.
+constexpr int kMostSubbinBits = 16;
 /// A map with at most this many bits of position (column and row) has few texels. Sums over few texels do not average the
-/// rounding of their places, so codes then keep all bits of places that they have room for.
+/// rounding to sub-bins, so codes then keep as many bits of sub-bins as they have room for.
 constexpr int kFewPositionBits = 8;
 
 /// Number of texels of each bin, by key.
@@ -28,19 +28,19 @@ std::vector<std::uint32_t> countBins(const BinGrid& grid, const TexelBuckets& bu
   return counts;
 }
 
-/// Fewest bits, along each axis, of places inside bins: one less for each bit of position beyond kFewPositionBits.
-int surePlaceBits(const TexelCode& map) {
+/// Fewest bits, along each axis, of sub-bins of a bin: one less for each bit of position beyond kFewPositionBits.
+int sureSubbinBits(const TexelCode& map) {
   const int beyond = std::max(map.column_bits + map.row_bits - kFewPositionBits, 0);
-  return std::min(std::max(TexelCode::kMaxPlaceBits - beyond, kSurePlaceBits), map.place_bits);
+  return std::min(std::max(TexelCode::kMaxSubbinBits - beyond, kSureSubbinBits), map.subbin_bits);
 }
 
-/// Logarithm of the number of cells of a block: of `wanted`, or more where codes would have no room for surePlaceBits. Smaller
-/// cells leave more bits of a code to places.
+/// Logarithm of the number of cells of a block: of `wanted`, or more where codes would have no room for sureSubbinBits. Smaller
+/// cells leave more bits of a code to sub-bins.
 int cellBits(const TexelCode& map, int side_bits, std::uint64_t wanted) {
   const int most = map.column_bits + map.row_bits;
   int bits = std::min(wanted == 0 ? 0 : static_cast<int>(std::bit_width(wanted)) - 1, most);
-  const int sure = side_bits + surePlaceBits(map);
-  while (bits < most && blockCode(map, side_bits, bits).place_bits < sure) ++bits;
+  const int sure = side_bits + sureSubbinBits(map);
+  while (bits < most && blockCode(map, side_bits, bits).subbin_bits < sure) ++bits;
   return bits;
 }
 
@@ -76,7 +76,7 @@ class TileDivider {
   void divide(std::size_t node, std::size_t first_key, int side_bits) {
     const Filling texels = filling(first_key, side_bits);
     if (texels.all == 0) return;
-    const bool is_coarse = side_bits + surePlaceBits(code_) > kMostBlockPlaceBits;
+    const bool is_coarse = side_bits + sureSubbinBits(code_) > kMostSubbinBits;
     if (side_bits > 0 && (texels.all > kMostOfBlock || texels.fullest > kMostOfSharedBin || is_coarse))
       split(node, first_key, side_bits);
     else

@@ -8,8 +8,8 @@
 
 namespace glint::bake {
 
-/// Bits, along each axis, that codes keep of places inside bins: at least this many, where the map leaves room for them.
-inline constexpr int kSurePlaceBits = 5;
+/// Bits, along each axis, that codes keep of sub-bins of a bin: at least this many, where the map leaves room for them.
+inline constexpr int kSureSubbinBits = 5;
 
 /// A block of bins, as it is known before its texels are listed.
 struct BinBlock {

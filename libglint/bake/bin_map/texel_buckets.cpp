@@ -58,7 +58,7 @@ TexelBuckets joinTiles(const BinGrid& grid, const RunCounts& counts, std::size_t
 }
 
 /// For each part of the map, the index in each bucket at which it writes its first texel: after the texels of earlier parts.
-std::vector<std::vector<std::uint64_t>> firstPlaces(const RunCounts& counts, const std::vector<std::uint16_t>& run_buckets,
+std::vector<std::vector<std::uint64_t>> firstTexels(const RunCounts& counts, const std::vector<std::uint16_t>& run_buckets,
                                                     const TexelBuckets& buckets) {
   std::vector<std::vector<std::uint64_t>> cursors(kMapParts, std::vector<std::uint64_t>(buckets.count()));
   for (std::size_t part = 0; part < kMapParts; ++part)
@@ -92,7 +92,7 @@ RunCounts countRuns(const NormalMap& map, const BinGrid& grid) {
 TexelBuckets fillBuckets(const NormalMap& map, const TexelCode& code, const BinGrid& grid, const RunCounts& counts) {
   std::vector<std::uint16_t> run_buckets;
   TexelBuckets buckets = joinTiles(grid, counts, map.normals.size(), run_buckets);
-  std::vector<std::vector<std::uint64_t>> cursors = firstPlaces(counts, run_buckets, buckets);
+  std::vector<std::vector<std::uint64_t>> cursors = firstTexels(counts, run_buckets, buckets);
   buckets.texels = std::make_unique_for_overwrite<BinnedTexel[]>(map.normals.size());
   BinnedTexel* texels = buckets.texels.get();
   const auto width = static_cast<std::uint32_t>(map.width);
@@ -102,7 +102,7 @@ TexelBuckets fillBuckets(const NormalMap& map, const TexelCode& code, const BinG
       auto row = static_cast<std::uint32_t>(chunk.first / width), column = static_cast<std::uint32_t>(chunk.first % width);
       for (std::size_t k = 0; k < chunk.count; ++k) {
         const std::uint32_t key = chunk.keys[k];
-        texels[cursor[run_buckets[key >> counts.shift]]++] = {code.pack(column, row, chunk.places[k], 0), key};
+        texels[cursor[run_buckets[key >> counts.shift]]++] = {code.pack(column, row, chunk.subbins[k], 0), key};
         if (++column == width) column = 0, ++row;
       }
     });

@@ -29,7 +29,7 @@ class BlockPacker {
         grid_(cellGrid(map, block.cell_bits)),
         first_cell_(block.first_cell - first_cell),
         key_mask_((1u << 2 * block.side_bits) - 1),
-        kept_bits_(code_.place_bits - block.side_bits) {}
+        kept_bits_(code_.subbin_bits - block.side_bits) {}
 
   std::uint32_t cell(const BinnedTexel& texel) const {
     return first_cell_ + (map_.row(texel.code) >> grid_.row_shift) * static_cast<std::uint32_t>(grid_.columns) +
@@ -38,11 +38,11 @@ class BlockPacker {
 
   std::uint32_t pack(const BinnedTexel& texel) const {
     const std::uint32_t bin = texel.key & key_mask_;
-    const int dropped = map_.place_bits - kept_bits_;
+    const int dropped = map_.subbin_bits - kept_bits_;
     return code_.pack(map_.column(texel.code) & ((1u << grid_.column_shift) - 1),
                       map_.row(texel.code) & ((1u << grid_.row_shift) - 1),
-                      gatherBits(bin) << kept_bits_ | map_.placeX(texel.code) >> dropped,
-                      gatherBits(bin >> 1) << kept_bits_ | map_.placeY(texel.code) >> dropped);
+                      gatherBits(bin) << kept_bits_ | map_.subbinX(texel.code) >> dropped,
+                      gatherBits(bin >> 1) << kept_bits_ | map_.subbinY(texel.code) >> dropped);
   }
 
  private:
@@ -52,17 +52,17 @@ class BlockPacker {
   int kept_bits_;
 };
 
-/// Stores the mean and the covariance of the places of the texels [begin, end) of a block, as BinMap::block_moments.
+/// Stores the mean and the covariance of the sub-bins of the texels [begin, end) of a block, as BinMap::block_moments.
 void storeMoments(const TexelCode& code, const std::vector<std::uint32_t>& texels, std::uint64_t begin, std::uint64_t end,
                   std::uint16_t* moments) {
   std::uint64_t x = 0, y = 0;
   double xx = 0, xy = 0, yy = 0;
   for (std::uint64_t k = begin; k < end; ++k) {
-    const std::uint64_t px = code.placeX(texels[k]), py = code.placeY(texels[k]);
+    const std::uint64_t px = code.subbinX(texels[k]), py = code.subbinY(texels[k]);
     x += px, y += py;
     xx += static_cast<double>(px * px), xy += static_cast<double>(px * py), yy += static_cast<double>(py * py);
   }
-  const double count = static_cast<double>(end - begin), step = 1.0 / (1 << code.place_bits);
+  const double count = static_cast<double>(end - begin), step = 1.0 / (1 << code.subbin_bits);
   const double mx = static_cast<double>(x) / count, my = static_cast<double>(y) / count;
   const double values[5] = {(mx + 0.5) * step, (my + 0.5) * step, (xx / count - mx * mx) * step * step,
                             (xy / count - mx * my) * step * step, (yy / count - my * my) * step * step};

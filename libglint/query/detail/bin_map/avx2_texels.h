@@ -59,9 +59,9 @@ struct Avx2Texels {
     }
     if (k < count) {
       const __m256i exist = firstLanes(count - k), some = load(texels + k, exist);
-      Slots::Places places = slots.of(some);
-      places.inside = _mm256_and_si256(places.inside, exist);
-      end = append(places, parts.of<kCut>(some), found, end);
+      Slots::Found some_slots = slots.of(some);
+      some_slots.inside = _mm256_and_si256(some_slots.inside, exist);
+      end = append(some_slots, parts.of<kCut>(some), found, end);
     }
     found.count = end;
   }
@@ -81,8 +81,8 @@ struct Avx2Texels {
 
   /// SingleTexels::moments.
   template <unsigned kCut>
-  GLINT_AVX2 static PlaceMoments moments(const std::uint32_t* texels, int count, const Parts& parts,
-                                         const PlaceFields& fields) {
+  GLINT_AVX2 static SubbinMoments moments(const std::uint32_t* texels, int count, const Parts& parts,
+                                          const SubbinFields& fields) {
     Moments sums(fields);
     int k = 0;
     for (; k + 8 <= count; k += 8) {
@@ -99,7 +99,7 @@ struct Avx2Texels {
  private:
   /// SlotFields for eight texels.
   struct Slots {
-    struct Places {
+    struct Found {
       __m256i slots, inside;
     };
     GLINT_AVX2 explicit Slots(const SlotFields& f)
@@ -108,7 +108,7 @@ struct Avx2Texels {
           mask(all(f.mask)),
           first_x(all(f.first_x)),
           first_y(all(f.first_y)) {}
-    GLINT_AVX2 Places of(__m256i texels) const {
+    GLINT_AVX2 Found of(__m256i texels) const {
       const __m256i x = _mm256_add_epi32(_mm256_and_si256(_mm256_srl_epi32(texels, shift_x), mask), first_x);
       const __m256i y = _mm256_add_epi32(_mm256_and_si256(_mm256_srl_epi32(texels, shift_y), mask), first_y);
       const __m256i last = all(SlotFields::kSide - 1);
@@ -120,18 +120,18 @@ struct Avx2Texels {
     __m256i mask, first_x, first_y;
   };
 
-  /// PlaceMoments, eight sums each.
+  /// SubbinMoments, eight sums each.
   struct Moments {
-    GLINT_AVX2 explicit Moments(const PlaceFields& f)
+    GLINT_AVX2 explicit Moments(const SubbinFields& f)
         : shift_x(_mm_cvtsi32_si128(f.shift_x)),
           shift_y(_mm_cvtsi32_si128(f.shift_y)),
           mask(all(static_cast<std::uint32_t>(f.mask))),
           middle(_mm256_set1_ps(f.middle)) {}
-    GLINT_AVX2 __m256 place(__m256i texels, __m128i shift) const {
+    GLINT_AVX2 __m256 position(__m256i texels, __m128i shift) const {
       return _mm256_sub_ps(_mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srl_epi32(texels, shift), mask)), middle);
     }
     GLINT_AVX2 void add(__m256i texels, __m256 weights) {
-      const __m256 px = place(texels, shift_x), py = place(texels, shift_y);
+      const __m256 px = position(texels, shift_x), py = position(texels, shift_y);
       const __m256 wx = _mm256_mul_ps(weights, px), wy = _mm256_mul_ps(weights, py);
       w = _mm256_add_ps(w, weights), x = _mm256_add_ps(x, wx), y = _mm256_add_ps(y, wy);
       xx = _mm256_add_ps(xx, _mm256_mul_ps(wx, px));
@@ -159,10 +159,10 @@ struct Avx2Texels {
     return table;
   }();
 
-  GLINT_AVX2 static int append(const Slots::Places& places, __m256 parts, FoundTexels& found, int end) {
-    const auto set = static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(places.inside)));
+  GLINT_AVX2 static int append(const Slots::Found& eight, __m256 parts, FoundTexels& found, int end) {
+    const auto set = static_cast<unsigned>(_mm256_movemask_ps(_mm256_castsi256_ps(eight.inside)));
     const __m256i lanes = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(static_cast<long long>(kLanesOf[set])));
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(found.slots + end), _mm256_permutevar8x32_epi32(places.slots, lanes));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(found.slots + end), _mm256_permutevar8x32_epi32(eight.slots, lanes));
     _mm256_storeu_ps(found.parts + end, _mm256_permutevar8x32_ps(parts, lanes));
     return end + std::popcount(set);
   }

@@ -270,16 +270,16 @@ class BinBlocks {
     block.row += static_cast<int>(quadrant >> 1) << block.side_bits;
   }
 
-  /// Visits the blocks of a tile. Not recursive: compilers for GPUs could not bound the stack.
+  /// Visits the blocks of a tile, whose bins are those of `square`. Not recursive: compilers for GPUs could not bound the stack.
   template <class Visitor>
-  GLINT_HD void visitTile(std::uint32_t tile, const BinBlock& place, const BinRect& bins, Visitor& visitor) const {
+  GLINT_HD void visitTile(std::uint32_t tile, const BinBlock& square, const BinRect& bins, Visitor& visitor) const {
     struct Pending {
       std::uint32_t node;
       BinBlock block;
     };
     // Each split leaves at most three siblings behind.
     Pending pending[3 * BinMap::kMaxTileBits + 1];
-    pending[0] = {tile, place};
+    pending[0] = {tile, square};
     for (int count = 1; count > 0;) {
       Pending next = pending[--count];
       const std::uint32_t* here = node(next.node);

@@ -66,8 +66,8 @@ struct WindowBlock {
   WindowBlock() = default;
   GLINT_HD WindowBlock(const BinBlock& b, const TexelCode& c, const BinWindow& window)
       : block(b), code(c), slot(window.slotOf(b)) {
-    const int shift = code.column_bits + code.row_bits + code.place_bits - block.side_bits;
-    fields = {shift, std::min(shift + code.place_bits, 31), (1u << block.side_bits) - 1,
+    const int shift = code.column_bits + code.row_bits + code.subbin_bits - block.side_bits;
+    fields = {shift, std::min(shift + code.subbin_bits, 31), (1u << block.side_bits) - 1,
               static_cast<std::uint32_t>(b.column - window.column), static_cast<std::uint32_t>(b.row - window.row)};
   }
   GLINT_HD bool isBin() const { return block.side_bits == 0; }

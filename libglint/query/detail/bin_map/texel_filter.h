@@ -13,24 +13,24 @@ struct IndexRange {
   int low = 0, high = 0;
 };
 
-/// Finds the texels of a list whose fields (columns, rows and positions of normals in the block) are in given ranges. Tests
-/// eight texels at a time where the processor has AVX2.
+/// Finds the texels of a list whose fields (column, row and sub-bin) are in given ranges. Tests eight texels at a time where the
+/// processor has AVX2.
 class TexelFilter {
  public:
   static constexpr int kMostAtOnce = 64;
 
-  /// @param columns, rows       columns and rows in the cell
-  /// @param places_x, places_y  positions of normals in the block
-  GLINT_HD TexelFilter(const TexelCode& code, IndexRange columns, IndexRange rows, IndexRange places_x, IndexRange places_y) {
+  /// @param columns, rows         columns and rows in the cell
+  /// @param subbins_x, subbins_y  columns and rows of sub-bins in the block
+  GLINT_HD TexelFilter(const TexelCode& code, IndexRange columns, IndexRange rows, IndexRange subbins_x, IndexRange subbins_y) {
     const int position_bits = code.column_bits + code.row_bits;
     set(fields_[0], 0, code.column_bits, columns);
     set(fields_[1], code.column_bits, code.row_bits, rows);
-    set(fields_[2], position_bits, code.place_bits, places_x);
-    set(fields_[3], position_bits + code.place_bits, code.place_bits, places_y);
+    set(fields_[2], position_bits, code.subbin_bits, subbins_x);
+    set(fields_[3], position_bits + code.subbin_bits, code.subbin_bits, subbins_y);
   }
 
   /// Fields of a code: sets of them are joined by |.
-  static constexpr unsigned kColumn = 1, kRow = 2, kPosition = kColumn | kRow, kPlace = 12;
+  static constexpr unsigned kColumn = 1, kRow = 2, kPosition = kColumn | kRow, kSubbin = 12;
 
   /// Bit k, for k < count: whether texel k has the fields kFields in range.
   /// @param count  at most kMostAtOnce

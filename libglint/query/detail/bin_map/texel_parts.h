@@ -78,23 +78,23 @@ struct FoundTexels {
 };
 
 /// Sums over the texels of a block: weights, and weights times the first and second powers of (x, y). (x, y) is the position of
-/// the normal from the middle of the block, in units of the place fields.
-struct PlaceMoments {
+/// the normal from the middle of the block, in sub-bins.
+struct SubbinMoments {
   double weight = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
 
   /// Adds other sums, multiplied by `times`.
-  GLINT_HD void add(double times, const PlaceMoments& other) {
+  GLINT_HD void add(double times, const SubbinMoments& other) {
     weight += times * other.weight, x += times * other.x, y += times * other.y;
     xx += times * other.xx, xy += times * other.xy, yy += times * other.yy;
   }
 };
 
 /// Reads the positions of normals in their block from codes.
-struct PlaceFields {
-  GLINT_HD explicit PlaceFields(const TexelCode& code)
+struct SubbinFields {
+  GLINT_HD explicit SubbinFields(const TexelCode& code)
       : shift_x(std::min(code.column_bits + code.row_bits, 31)),
-        shift_y(std::min(code.column_bits + code.row_bits + code.place_bits, 31)),
-        mask((1u << code.place_bits) - 1),
+        shift_y(std::min(code.column_bits + code.row_bits + code.subbin_bits, 31)),
+        mask((1u << code.subbin_bits) - 1),
         middle(0.5f * static_cast<float>(mask)) {}
   GLINT_HD float x(std::uint32_t texel) const { return static_cast<float>(static_cast<int>(texel >> shift_x & mask)) - middle; }
   GLINT_HD float y(std::uint32_t texel) const { return static_cast<float>(static_cast<int>(texel >> shift_y & mask)) - middle; }
@@ -130,7 +130,8 @@ struct SingleTexels {
 
   /// Moments of a list, added in eight sums like `sum`.
   template <unsigned kCut>
-  static GLINT_HD PlaceMoments moments(const std::uint32_t* texels, int count, const Parts& parts, const PlaceFields& fields) {
+  static GLINT_HD SubbinMoments moments(const std::uint32_t* texels, int count, const Parts& parts,
+                                        const SubbinFields& fields) {
     float sums[6][8] = {};
     for (int k = 0; k < count; ++k) {
       const float w = parts.of<kCut>(texels[k]), x = fields.x(texels[k]), y = fields.y(texels[k]), wx = w * x, wy = w * y;

@@ -9,16 +9,16 @@
 
 namespace glint {
 
-/// Adds up PlaceMoments over the runs of one block (BinBlocks::forEachRun).
+/// Adds up SubbinMoments over the runs of one block (BinBlocks::forEachRun).
 ///
 /// Whole runs that follow one another in the list are joined. Where they make up the whole list, the stored sums of the block
 /// are used and no texel is read.
-class PlaceMomentSum {
+class SubbinMomentSum {
  public:
   /// @param texels  the lists of all blocks, one after the other
   /// @param all     moments of all texels of the block
-  GLINT_HD PlaceMomentSum(const std::uint32_t* texels, const TexelCover& cover, const TexelCode& code, std::uint64_t begin,
-                          std::uint64_t end, const PlaceMoments& all)
+  GLINT_HD SubbinMomentSum(const std::uint32_t* texels, const TexelCover& cover, const TexelCode& code, std::uint64_t begin,
+                           std::uint64_t end, const SubbinMoments& all)
       : cover_(cover), sides_(cover), texels_(texels), code_(code), fields_(code), begin_(begin), end_(end), all_(all) {}
 
   GLINT_HD void whole(std::uint64_t begin, std::uint64_t end) {
@@ -37,7 +37,7 @@ class PlaceMomentSum {
     });
   }
   /// Completes the sums: call once, after the last run.
-  GLINT_HD const PlaceMoments& finish() {
+  GLINT_HD const SubbinMoments& finish() {
     flush();
     return sums_;
   }
@@ -89,9 +89,9 @@ class PlaceMomentSum {
   BoxSides sides_;
   const std::uint32_t* texels_;
   TexelCode code_;
-  PlaceFields fields_;
+  SubbinFields fields_;
   std::uint64_t begin_, end_;  ///< the list of the block
-  PlaceMoments all_, sums_;
+  SubbinMoments all_, sums_;
   std::uint64_t whole_begin_ = 0, whole_end_ = 0;  ///< whole runs, joined, that are not added yet
 };
 
