@@ -35,7 +35,7 @@ KEPT_IN = {
     r"^(hdf5|H5\w*)(\.h|\.hpp)$|^highfive/": ["formats"],
     r"^OpenImageIO/|^OpenEXR/|^Imath/|^Imf\w*\.h$": ["apps"],
     r"^CLI/": ["apps"],
-    r"^Eigen/|^fftw3|^hwy/": ["libglint/bake"],
+    r"^Eigen/|^fftw3|^libsharp/|^hwy/": ["libglint/bake"],
     r"^(tbb|oneapi)/": ["libglint/bake", "apps"],
 }
 

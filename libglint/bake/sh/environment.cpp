@@ -1,15 +1,16 @@
 #include "glint/bake/sh/environment.h"
 
+#include <libsharp/sharp.h>
+#include <libsharp/sharp_almhelpers.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstddef>
 #include <memory>
-#include <new>
 #include <numbers>
 
-#include "glint/bake/common/fftw_plan.h"
 #include "glint/bake/sh/gauss_legendre.h"
 #include "glint/model/counted.h"
 #include "glint/model/error.h"
@@ -21,124 +22,66 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-/// Fourier transforms of every row and channel, [3][height][width / 2 + 1]: sums over x of radiance exp(-2 pi i k x / width).
-std::vector<std::complex<double>> rowSpectra(const Environment& environment) {
-  const auto width = static_cast<std::size_t>(environment.width), bins = width / 2 + 1;
-  const auto rows = static_cast<std::size_t>(environment.height);
-  std::vector<std::complex<double>> spectra(3 * rows * bins);
-  const std::unique_ptr<double, FftwFree> line(static_cast<double*>(fftw_malloc(sizeof(double) * width)));
-  const std::unique_ptr<fftw_complex, FftwFree> sums(static_cast<fftw_complex*>(fftw_malloc(sizeof(fftw_complex) * bins)));
-  if (!line || !sums) throw std::bad_alloc();
-  const FftwPlan plan =
-      makeFftwPlan([&](unsigned flags) { return fftw_plan_dft_r2c_1d(environment.width, line.get(), sums.get(), flags); });
-  for (std::size_t c = 0; c < 3; ++c) {
-    for (std::size_t j = 0; j < rows; ++j) {
-      for (std::size_t x = 0; x < width; ++x) line.get()[x] = environment.rgb[(j * width + x) * 3 + c];
-      fftw_execute(plan.get());
-      const auto* from = reinterpret_cast<const std::complex<double>*>(sums.get());
-      std::copy(from, from + bins, spectra.begin() + static_cast<std::ptrdiff_t>((c * rows + j) * bins));
-    }
-  }
-  return spectra;
-}
-
-/// Integral of radiance exp(-i m phi) dphi over the pixels of one row and channel.
-std::complex<double> rowIntegral(const std::complex<double>* spectrum, int width, int m) {
-  const int k = m % width;
-  const std::complex<double> sum = k <= width / 2 ? spectrum[k] : std::conj(spectrum[width - k]);
-  const double half_pixel = kPi / width;
-  const double pixel = m == 0 ? 2 * half_pixel : 2 * std::sin(m * half_pixel) / m;
-  return sum * std::polar(pixel, -m * half_pixel);
-}
-
-/// Quadrature nodes over the polar angle. Each row of pixels has nodes of its own, so that integrals are exact although
-/// radiance jumps between rows.
-struct PolarNodes {
-  std::vector<double> z, sine, weights;
-  std::size_t per_row = 0;
+struct DestroyRings {
+  void operator()(sharp_geom_info* rings) const { sharp_destroy_geom_info(rings); }
 };
+struct DestroyBands {
+  void operator()(sharp_alm_info* bands) const { sharp_destroy_alm_info(bands); }
+};
+using Rings = std::unique_ptr<sharp_geom_info, DestroyRings>;
+using Bands = std::unique_ptr<sharp_alm_info, DestroyBands>;
 
-PolarNodes polarNodes(int height, int band_limit) {
-  PolarNodes nodes;
+/// Quadrature over the polar angle: each row of pixels has rings of its own, all of which read the pixels of the row. So
+/// integrals are exact although radiance jumps between rows.
+Rings makeRings(int width, int height, int band_limit) {
   const double step = kPi / height;
   // The phase of a function of band limit B advances by B * step radians in a row. 0.8 nodes for each radian and 4 more reach
   // double precision.
-  const int n = 4 + static_cast<int>(0.8 * band_limit * step);
-  nodes.per_row = static_cast<std::size_t>(n);
+  const int per_row = 4 + static_cast<int>(0.8 * band_limit * step), count = per_row * height;
+  std::vector<double> angles, weights;
+  std::vector<std::ptrdiff_t> first_pixels;
   for (int j = 0; j < height; ++j) {
-    const GaussLegendre rule = gaussLegendre(n, kPi - (j + 1) * step, kPi - j * step);
-    for (int k = 0; k < n; ++k) {
-      const double theta = rule.nodes[static_cast<std::size_t>(k)];
-      nodes.z.push_back(std::cos(theta));
-      nodes.sine.push_back(std::sin(theta));
-      nodes.weights.push_back(rule.weights[static_cast<std::size_t>(k)] * std::sin(theta));
+    const GaussLegendre rule = gaussLegendre(per_row, kPi - (j + 1) * step, kPi - j * step);
+    for (int k = 0; k < per_row; ++k) {
+      const double angle = rule.nodes[static_cast<std::size_t>(k)];
+      angles.push_back(angle);
+      weights.push_back(rule.weights[static_cast<std::size_t>(k)] * std::sin(angle));
+      first_pixels.push_back(static_cast<std::ptrdiff_t>(j) * width);
     }
   }
-  return nodes;
+  const std::vector<int> pixels(angles.size(), width), strides(angles.size(), 1);
+  const std::vector<double> azimuths(angles.size(), kPi / width);  // of the centres of the first pixels
+  sharp_geom_info* rings = nullptr;
+  sharp_make_geom_info(count, pixels.data(), first_pixels.data(), strides.data(), azimuths.data(), angles.data(),
+                       weights.data(), &rings);
+  return Rings(rings);
 }
 
-/// Computes the coefficients of one m: for each band l, sums over the nodes of P_l^m times the integrals of the rows against
-/// cos(m phi) and sin(m phi), in three channels.
-class OrderProjection {
- public:
-  OrderProjection(const PolarNodes& nodes, int m) : nodes_(nodes), m_(m), before_(nodes.z.size()), current_(nodes.z.size()) {}
+Bands makeBands(int band_limit) {
+  sharp_alm_info* bands = nullptr;
+  sharp_make_triangular_alm_info(band_limit, band_limit, 1, &bands);
+  return Bands(bands);
+}
 
-  /// Multiplies the integrals of the rows by the weights of the nodes.
-  void setRows(const std::vector<std::complex<double>>& spectra, int width, int height) {
-    const std::size_t bins = static_cast<std::size_t>(width) / 2 + 1;
-    for (int c = 0; c < 3; ++c) {
-      auto& real = factors_[2 * c];
-      auto& imaginary = factors_[2 * c + 1];
-      real.resize(nodes_.z.size());
-      imaginary.resize(nodes_.z.size());
-      for (int j = 0; j < height; ++j) {
-        const auto row = rowIntegral(&spectra[(static_cast<std::size_t>(c) * height + j) * bins], width, m_);
-        for (std::size_t k = j * nodes_.per_row; k < (j + 1) * nodes_.per_row; ++k) {
-          real[k] = row.real() * nodes_.weights[k];
-          imaginary[k] = -row.imag() * nodes_.weights[k];
-        }
-      }
-    }
-  }
+/// Complex coefficients, in the order of `bands`, of an environment that is a point at the centre of each pixel.
+/// @param channel  0 to 2: red, green or blue
+std::vector<std::complex<double>> projectCentres(const Environment& environment, int channel, const Rings& rings,
+                                                 const Bands& bands) {
+  std::vector<double> pixels;
+  for (std::size_t k = static_cast<std::size_t>(channel); k < environment.rgb.size(); k += 3)
+    pixels.push_back(double{environment.rgb[k]});
+  std::vector<std::complex<double>> coefficients(static_cast<std::size_t>(sharp_alm_count(bands.get())));
+  void *from = pixels.data(), *to = coefficients.data();
+  // Without OpenMP: oneTBB starts the threads, as many as were asked for.
+  sharp_execute(SHARP_YtW, 0, &to, &from, rings.get(), bands.get(), SHARP_DP | SHARP_NO_OPENMP, nullptr, nullptr);
+  return coefficients;
+}
 
-  /// Computes all bands.
-  void run(int band_limit, std::vector<double>& result) {
-    const std::size_t count = shCount(band_limit);
-    for (std::size_t k = 0; k < nodes_.z.size(); ++k) {
-      double seed = 0.5 / std::sqrt(kPi);
-      for (int m = 1; m <= m_; ++m) seed *= std::sqrt((2.0 * m + 1) / (2.0 * m)) * nodes_.sine[k];
-      current_[k] = m_ > 0 ? seed * std::numbers::sqrt2 : seed;
-    }
-    for (int l = m_;; ++l) {
-      for (int c = 0; c < 3; ++c) {
-        result[static_cast<std::size_t>(c) * count + shIndex(l, m_)] = sum(factors_[2 * c]);
-        if (m_ > 0) result[static_cast<std::size_t>(c) * count + shIndex(l, -m_)] = sum(factors_[2 * c + 1]);
-      }
-      if (l == band_limit) return;
-      step(l + 1);
-    }
-  }
-
- private:
-  double sum(const std::vector<double>& factors) const {
-    double total = 0;
-    for (std::size_t k = 0; k < factors.size(); ++k) total += factors[k] * current_[k];
-    return total;
-  }
-
-  /// Recurrence of the normalised P_l^m over l.
-  void step(int l) {
-    const double ll = static_cast<double>(l) * l, mm = static_cast<double>(m_) * m_, p = l - 1.0;
-    const double a = std::sqrt((4 * ll - 1) / (ll - mm)), b = l > m_ + 1 ? std::sqrt((p * p - mm) / (4 * p * p - 1)) : 0;
-    for (std::size_t k = 0; k < current_.size(); ++k) before_[k] = a * (nodes_.z[k] * current_[k] - b * before_[k]);
-    std::swap(before_, current_);
-  }
-
-  const PolarNodes& nodes_;
-  int m_;
-  std::vector<double> before_, current_;
-  std::vector<double> factors_[6];
-};
+/// Integral of exp(-i m phi) over the width of a pixel whose centre is at phi = 0.
+double pixelIntegral(int m, int width) {
+  const double half_pixel = kPi / width;
+  return m == 0 ? 2 * half_pixel : 2 * std::sin(m * half_pixel) / m;
+}
 
 [[noreturn]] void refuse(const std::string& path, const char* rule, const std::string& what, const std::string& remedy) {
   throw Error(ErrorCode::invalid_input, rule, path, {}, what, remedy);
@@ -186,13 +129,25 @@ void requireUsable(const Environment& e, const std::string& path) {
 
 std::vector<double> projectEnvironment(const Environment& environment, int band_limit) {
   requireUsable(environment);
-  const std::vector<std::complex<double>> spectra = rowSpectra(environment);
-  const PolarNodes nodes = polarNodes(environment.height, band_limit);
-  std::vector<double> result(3 * shCount(band_limit));
-  tbb::parallel_for(0, band_limit + 1, [&](int m) {
-    OrderProjection projection(nodes, m);
-    projection.setRows(spectra, environment.width, environment.height);
-    projection.run(band_limit, result);
+  const Rings rings = makeRings(environment.width, environment.height, band_limit);
+  const Bands bands = makeBands(band_limit);
+  const std::size_t count = shCount(band_limit);
+  std::vector<double> result(3 * count);
+  tbb::parallel_for(0, 3, [&](int channel) {
+    const std::vector<std::complex<double>> complex = projectCentres(environment, channel, rings, bands);
+    double* real = &result[static_cast<std::size_t>(channel) * count];
+    for (int m = 0; m <= band_limit; ++m) {
+      // Real harmonics here have sqrt(2) and no sign (-1)^m.
+      const double factor = (m == 0       ? 1
+                             : m % 2 == 0 ? std::numbers::sqrt2
+                                          : -std::numbers::sqrt2) *
+                            pixelIntegral(m, environment.width);
+      for (int l = m; l <= band_limit; ++l) {
+        const std::complex<double> c = complex[static_cast<std::size_t>(sharp_alm_index(bands.get(), l, m))];
+        real[shIndex(l, m)] = factor * c.real();
+        if (m > 0) real[shIndex(l, -m)] = -factor * c.imag();
+      }
+    }
   });
   return result;
 }

@@ -31,7 +31,8 @@ void requireUsable(const Environment& environment, const std::string& path = {})
 bool hasLightAbove(const Environment& environment);
 
 /// Projects an environment on spherical harmonics up to a band: exact integrals over the pixels, in double precision.
-/// O(height * band_limit^2), and O(width * height log width) for Fourier transforms of rows.
+/// O(height * band_limit^2), and O(width * log width) for the Fourier transform of every node of the quadrature over the polar
+/// angle. At most one thread for each channel.
 /// @return [3][shCount(band_limit)], for red, green and blue
 std::vector<double> projectEnvironment(const Environment& environment, int band_limit);
 
