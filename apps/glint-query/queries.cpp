@@ -12,11 +12,7 @@
 namespace glint::apps {
 
 float answer(const AnyNdf& model, const Query& query) {
-  return std::visit(
-      [&](const auto& m) {
-        return query.range ? m.mean(query.footprint, *query.range) : m.density(query.footprint, *query.half);
-      },
-      model);
+  return query.range ? model.mean(query.footprint, *query.range) : model.density(query.footprint, *query.half);
 }
 
 std::vector<float> answerAll(const AnyNdf& model, std::span<const Query> queries) {
@@ -40,11 +36,7 @@ std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int
   tbb::parallel_for(0, resolution, [&](int y) {
     for (int x = 0; x < resolution; ++x) {
       const Vec2 low = {-1 + static_cast<float>(x) * pixel, -1 + static_cast<float>(y) * pixel};
-      image[static_cast<std::size_t>(y) * resolution + x] = std::visit(
-          [&](const auto& m) {
-            return m.mean(footprint, {low, low + Vec2{pixel, pixel}});
-          },
-          model);
+      image[static_cast<std::size_t>(y) * resolution + x] = model.mean(footprint, {low, low + Vec2{pixel, pixel}});
     }
     counter.advance();
   });
@@ -63,7 +55,7 @@ std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& 
       const double x = (static_cast<double>(k - begin) + jitter.x) / static_cast<double>(end - begin);
       const double y = (static_cast<double>(begin) + jitter.y * static_cast<double>(end - begin)) / count;
       const Vec2 xi = {static_cast<float>(x), static_cast<float>(y)};
-      samples[k] = std::visit([&](const auto& m) { return m.sample(footprint, xi); }, model);
+      samples[k] = model.sample(footprint, xi);
     }
   });
   return samples;

@@ -9,11 +9,13 @@
 #include "glint/api/ndf_models.h"
 #include "glint/api/ndf_options.h"
 #include "glint/formats/asset_reader.h"
+#include "glint/query/brdf/smith.h"
 
 namespace glint::api {
 
-/// Any model of the NDF that an asset can hold, for footprints of any shape.
+/// Any model of the NDF that an asset can hold, for footprints of any shape. A std::variant of them that is a model itself.
 using AnyNdf = NdfModels::Any;
+static_assert(NdfModel<AnyNdf>);
 
 /// Whether assets of a kind answer an NDF.
 bool answersNdf(std::string_view kind);
@@ -40,6 +42,8 @@ class OpenedNdf {
   const NormalMap* normals() const { return normals_ ? &normals_->get<NormalMap>() : nullptr; }
   /// Moments of the map's slopes, for SmithMasking. Kind normals: sums over all texels; other kinds hold them.
   MapSlopes slopes() const;
+  /// Masking of a BRDF by the slopes of the map and the roughness of its facets. Costs as much as `slopes`: keep it.
+  SmithMasking masking() const { return {slopes(), info_.sigma_r}; }
 
   /// What the model was made from, for functions of its traits. Points into this object.
   template <class Model>

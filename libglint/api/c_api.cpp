@@ -189,11 +189,7 @@ glint_footprint glint_footprint_from_differentials(float u, float v, float dudx,
 glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy, float* density) {
   if (ndf == nullptr || footprint == nullptr || density == nullptr)
     return nullArgument("glint_density", {{ndf, "ndf"}, {footprint, "footprint"}, {density, "density"}});
-  *density = std::visit(
-      [&](const auto& model) {
-        return model.density(footprintOf(*footprint), {hx, hy});
-      },
-      ndf->opened.model());
+  *density = ndf->opened.model().density(footprintOf(*footprint), {hx, hy});
   return GLINT_OK;
 }
 
@@ -201,11 +197,7 @@ glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, 
                         float* mean) {
   if (ndf == nullptr || footprint == nullptr || mean == nullptr)
     return nullArgument("glint_mean", {{ndf, "ndf"}, {footprint, "footprint"}, {mean, "mean"}});
-  *mean = std::visit(
-      [&](const auto& model) {
-        return model.mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}});
-      },
-      ndf->opened.model());
+  *mean = ndf->opened.model().mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}});
   return GLINT_OK;
 }
 
@@ -213,11 +205,7 @@ glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint
                           float* pdf) {
   if (ndf == nullptr || footprint == nullptr || hx == nullptr || hy == nullptr || pdf == nullptr)
     return nullArgument("glint_sample", {{ndf, "ndf"}, {footprint, "footprint"}, {hx, "hx"}, {hy, "hy"}, {pdf, "pdf"}});
-  const HalfVectorSample drawn = std::visit(
-      [&](const auto& model) {
-        return model.sample(footprintOf(*footprint), {xi1, xi2});
-      },
-      ndf->opened.model());
+  const HalfVectorSample drawn = ndf->opened.model().sample(footprintOf(*footprint), {xi1, xi2});
   *hx = drawn.h.x;
   *hy = drawn.h.y;
   *pdf = drawn.pdf;

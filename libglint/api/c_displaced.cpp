@@ -135,7 +135,7 @@ glint_status glint_displaced_evaluate_batch(const glint_displaced* displaced, in
   if (!complete(wi)) return usage("glint_displaced_evaluate_batch", "x, y and z of wi must be given");
   if (reflected == nullptr && pdfs == nullptr) return usage("glint_displaced_evaluate_batch", "reflected and pdfs are null");
   const PointArrays at(*points);
-  const DirectionArrays i(*wi), o(*wo);
+  const api::DirectionArrays i = arraysOf(*wi), o = arraysOf(*wo);
   for (std::size_t k = 0; k < count; ++k)
     Point(*displaced, variant, at.level[k], {at.u[k], at.v[k]})
         .evaluate(i[k], o[k], reflected == nullptr ? nullptr : reflected + 3 * k, pdfs == nullptr ? nullptr : pdfs + k);
@@ -151,7 +151,7 @@ glint_status glint_displaced_sample_batch(const glint_displaced* displaced, int3
   if (wi == nullptr || weights == nullptr || pdfs == nullptr)
     return usage("glint_displaced_sample_batch", "wi, weights and pdfs must be given");
   const PointArrays at(*points);
-  const DirectionArrays o(*wo);
+  const api::DirectionArrays o = arraysOf(*wo);
   const api::HalfVectorArrays xi = {arrayOf(xi1), arrayOf(xi2)};
   for (std::size_t k = 0; k < count; ++k)
     Point(*displaced, variant, at.level[k], {at.u[k], at.v[k]}).sample(o[k], xi[k], wi + 3 * k, weights + 3 * k, pdfs + k);

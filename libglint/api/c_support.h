@@ -9,9 +9,10 @@
 #include <new>
 #include <string>
 
+#include "glint.h"
 #include "glint/api/any_ndf.h"
 #include "glint/api/batch.h"
-#include "glint/api/glint.h"
+#include "glint/api/brdf_batch.h"
 #include "glint/math/rgb.h"
 #include "glint/math/vec.h"
 
@@ -99,13 +100,7 @@ inline Vec3 vectorOf(const float w[3]) { return {w[0], w[1], w[2]}; }
 inline void set(float out[3], Vec3 w) { out[0] = w.x, out[1] = w.y, out[2] = w.z; }
 inline void set(float out[3], Rgb c) { out[0] = c.r, out[1] = c.g, out[2] = c.b; }
 
-/// Directions as a structure of arrays.
-struct DirectionArrays {
-  explicit DirectionArrays(const glint_directions& d) : x(arrayOf(d.x)), y(arrayOf(d.y)), z(arrayOf(d.z)) {}
-  Vec3 operator[](std::size_t k) const { return {x[k], y[k], z[k]}; }
-
-  StridedFloats x, y, z;
-};
+inline DirectionArrays arraysOf(const glint_directions& d) { return {arrayOf(d.x), arrayOf(d.y), arrayOf(d.z)}; }
 
 inline bool complete(const glint_directions* d) { return d && d->x.data && d->y.data && d->z.data; }
 

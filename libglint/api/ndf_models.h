@@ -11,11 +11,29 @@
 
 namespace glint::api {
 
+/// One of several models, and a model itself: it answers as the model that it holds, so that it fits wherever a template takes
+/// an NdfModel. Its questions choose the model once each; std::visit chooses it once for many questions.
+template <NdfModel... Models>
+class OneOfNdfs : public std::variant<Models...> {
+ public:
+  using std::variant<Models...>::variant;
+
+  float density(const Footprint& p, Vec2 h) const {
+    return std::visit([&](const auto& model) { return model.density(p, h); }, *this);
+  }
+  float mean(const Footprint& p, const Box2& range) const {
+    return std::visit([&](const auto& model) { return model.mean(p, range); }, *this);
+  }
+  HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+    return std::visit([&](const auto& model) { return model.sample(p, xi); }, *this);
+  }
+};
+
 /// A list of models. A model whose traits lack a member cannot be in it.
 template <DescribedNdf... Models>
 struct NdfModelList {
   /// Any model of the list.
-  using Any = std::variant<Models...>;
+  using Any = OneOfNdfs<Models...>;
 
   /// Calls visit(std::type_identity<Model>{}) for each model.
   template <class Visit>

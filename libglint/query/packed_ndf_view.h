@@ -19,6 +19,7 @@ class PackedNdfView {
   /// @param base    address of the buffer for the processor that asks the model; aligned to 16 bytes
   GLINT_HD PackedNdfView(const PackedHeader& header, const void* base)
       : header_(header), base_(static_cast<const unsigned char*>(base)) {}
+  PackedNdfView(const PackedHeader&& header, const void* base) = delete;
   GLINT_HD explicit PackedNdfView(const void* buffer) : PackedNdfView(*static_cast<const PackedHeader*>(buffer), buffer) {}
 
   /// Whether pack() of this version wrote the header. If not, kind() is unknown and no model may be made.

@@ -3,7 +3,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <variant>
 
 #include "glint/api/any_ndf.h"
 #include "glint/formats/asset_reader.h"
@@ -14,7 +13,7 @@ int main(int argc, char** argv) try {
   const auto opened = glint::api::OpenedNdf::open(argv[1]);
   const auto footprint = glint::Footprint::isotropic({0.3f, 0.7f}, 40);
   const glint::Vec2 half = {0.1f, -0.05f};
-  const float density = std::visit([&](const auto& model) { return model.density(footprint, half); }, opened.model());
+  const float density = opened.model().density(footprint, half);
   const auto asset = glint::formats::Asset::open(argv[1]);
   const float typed = asset.kind() == "ndf-cp" ? glint::CpNdf(asset.get<glint::NdfCp>()).density(footprint, half) : density;
 

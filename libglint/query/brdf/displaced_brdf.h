@@ -48,10 +48,11 @@ struct DirectionSample {
 /// Directions are unit vectors away from the surface. Those that are longer or not finite, behind the facet or within kHorizon
 /// of its plane get 0. Coordinates are periodic; those that are not finite count as 0.
 ///
-/// Thread-safe, allocates nothing.
+/// Refers to the asset, which must outlive it. Thread-safe, allocates nothing.
 class DisplacedBrdf {
  public:
   GLINT_HD explicit DisplacedBrdf(const Displacement& asset) : asset_(asset) {}
+  explicit DisplacedBrdf(const Displacement&& asset) = delete;
 
   GLINT_HD const Displacement& asset() const { return asset_; }
 

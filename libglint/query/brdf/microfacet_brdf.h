@@ -46,6 +46,7 @@ class MicrofacetBrdf {
   /// @param footprint  any; the model says which it answers exactly
   GLINT_HD MicrofacetBrdf(const M& model, const Footprint& footprint, const SmithMasking& masking, const Fresnel& fresnel)
       : model_(&model), footprint_(footprint), masking_(masking), fresnel_(fresnel) {}
+  MicrofacetBrdf(const M&& model, const Footprint&, const SmithMasking&, const Fresnel&) = delete;
 
   GLINT_HD const M& model() const { return *model_; }
   GLINT_HD const Footprint& footprint() const { return footprint_; }

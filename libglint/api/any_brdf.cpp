@@ -1,0 +1,23 @@
+#include "glint/api/any_brdf.h"
+
+#include <string>
+
+namespace glint::api {
+namespace {
+
+SmithMasking maskingOf(const OpenedNdf& opened, BrdfFacets facets) {
+  if (facets == BrdfFacets::distribution) return opened.masking();
+  if (!std::holds_alternative<BinMapNdf>(opened.model()))
+    throw Error(ErrorCode::unsupported, "api.facets", opened.path().string(), "",
+                "Beckmann facets are the texels of a bin-map, and this is of kind " + std::string(opened.asset().kind()),
+                "open an asset of kind bin-map, or take facets of the distribution");
+  // Beckmann facets mask themselves, so the roughness is no part of the map's masking.
+  return {opened.slopes(), 0};
+}
+
+}  // namespace
+
+AnyBrdf::AnyBrdf(const OpenedNdf& opened, const Fresnel& fresnel, BrdfFacets facets)
+    : model_(opened.model()), masking_(maskingOf(opened, facets)), fresnel_(fresnel), facets_(facets) {}
+
+}  // namespace glint::api
