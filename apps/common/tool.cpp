@@ -210,6 +210,7 @@ template Option& Tool::option(const std::string&, double&, const std::string&);
 template Option& Tool::option(const std::string&, std::string&, const std::string&);
 template Option& Tool::option(const std::string&, std::vector<int>&, const std::string&);
 template Option& Tool::option(const std::string&, std::vector<float>&, const std::string&);
+template Option& Tool::option(const std::string&, std::vector<double>&, const std::string&);
 template Option& Tool::option(const std::string&, std::vector<std::string>&, const std::string&);
 
 Option& Tool::flag(const std::string& name, bool& value, const std::string& help) {

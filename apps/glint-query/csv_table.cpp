@@ -89,6 +89,7 @@ T CsvTable::number(const char* column, std::size_t row) const {
   return value;
 }
 template float CsvTable::number(const char*, std::size_t) const;
+template double CsvTable::number(const char*, std::size_t) const;
 template int CsvTable::number(const char*, std::size_t) const;
 
 std::string CsvTable::header() const { return fmt::format("{}", fmt::join(rows_.front(), ",")); }

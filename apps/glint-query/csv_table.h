@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "glint/model/footprint.h"
+
 namespace glint::apps {
 
 /// A CSV table (RFC 4180) whose header names columns of numbers. Further columns are kept as they are. A byte-order mark is
@@ -32,6 +34,11 @@ class CsvTable {
     std::array<float, N> values;
     for (std::size_t k = 0; k < N; ++k) values[k] = number<float>(names[k], row);
     return values;
+  }
+  /// The position of one row, modulo the map. Its numbers are read as doubles.
+  /// @throws as numbers
+  Vec2 position(const std::array<const char*, 2>& names, std::size_t row) const {
+    return wrappedUv(number<double>(names[0], row), number<double>(names[1], row));
   }
   /// A whole number of one row.
   /// @throws as numbers

@@ -25,7 +25,7 @@ void FootprintOptions::check() const {
 }
 
 Footprint FootprintOptions::footprint() const {
-  const Vec2 centre = {uv_[0], uv_[1]};
+  const Vec2 centre = wrappedUv(uv_[0], uv_[1]);
   if (covariance_option_->given()) return Footprint::gaussian(centre, {covariance_[0], covariance_[1], covariance_[2]});
   if (box_option_->given()) return Footprint::box(centre, {box_[0], box_[1]}, {box_[2], box_[3]});
   return Footprint::isotropic(centre, sigma_);

@@ -24,7 +24,8 @@ class FootprintOptions {
   Footprint footprint() const;
 
  private:
-  std::vector<float> uv_, covariance_, box_;
+  std::vector<double> uv_;
+  std::vector<float> covariance_, box_;
   float sigma_ = 0;
   Option *uv_option_, *sigma_option_, *covariance_option_, *box_option_;
 };

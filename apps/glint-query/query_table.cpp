@@ -19,17 +19,17 @@ Query readQuery(const CsvTable& columns, std::size_t row) {
     if (fault) columns.fail("csv.footprint", row, "the footprint " + fault->what, fault->remedy);
   };
   Query query;
-  const auto [u, v] = columns.numbers(kCentre, row);
+  const Vec2 centre = columns.position(kCentre, row);
   if (columns.has(kSigma)) {
     const auto [sigma] = columns.numbers(kSigma, row);
     refuse(sigmaFault(sigma));
-    query.footprint = Footprint::isotropic({u, v}, sigma);
+    query.footprint = Footprint::isotropic(centre, sigma);
   } else if (columns.has(kCovariance)) {
     const auto [xx, xy, yy] = columns.numbers(kCovariance, row);
-    query.footprint = Footprint::gaussian({u, v}, {xx, xy, yy});
+    query.footprint = Footprint::gaussian(centre, {xx, xy, yy});
   } else {
     const auto [ax, ay, bx, by] = columns.numbers(kBox, row);
-    query.footprint = Footprint::box({u, v}, {ax, ay}, {bx, by});
+    query.footprint = Footprint::box(centre, {ax, ay}, {bx, by});
   }
   if (!columns.has(kSigma)) refuse(footprintFault(query.footprint));
   if (columns.has(kHalf)) {

@@ -49,15 +49,15 @@ Vec3 directionOf(const CsvTable& table, std::size_t row, const std::array<const 
 
 /// The point that a row asks.
 DisplacedPoint pointOf(const DisplacedBrdf& brdf, const CsvTable& table, std::size_t row) {
-  const auto [u, v] = table.numbers(kCentre, row);
+  const Vec2 uv = table.position(kCentre, row);
   if (table.has(kSigma)) {
     const auto [sigma] = table.numbers(kSigma, row);
     if (const auto fault = sigmaFault(sigma)) table.fail("csv.footprint", row, "the footprint " + fault->what, fault->remedy);
-    return {{u, v}, brdf.levelsFor(diameterOf(sigma))};
+    return {uv, brdf.levelsFor(diameterOf(sigma))};
   }
   const int level = table.wholeNumber(kLevel[0], row);
   if (const auto fault = levelFault(brdf.asset(), level)) table.fail("query.level", row, fault->what, fault->remedy);
-  return {{u, v}, {level, level, 0}};
+  return {uv, {level, level, 0}};
 }
 
 }  // namespace
@@ -78,7 +78,7 @@ void DisplacedPointOptions::checkSize() const {
 }
 
 DisplacedPoint DisplacedPointOptions::point(const DisplacedBrdf& brdf) const {
-  const Vec2 uv = {uv_[0], uv_[1]};
+  const Vec2 uv = wrappedUv(uv_[0], uv_[1]);
   if (!level_option_->given()) return {uv, brdf.levelsFor(diameterOf(sigma_))};
   if (const auto fault = levelFault(brdf.asset(), level_))
     throw Error(ErrorCode::usage, "query.level", "", "--level", fault->what, fault->remedy);

@@ -31,7 +31,7 @@ class DisplacedPointOptions {
   DisplacedPoint point(const DisplacedBrdf& brdf) const;
 
  private:
-  std::vector<float> uv_;
+  std::vector<double> uv_;
   float sigma_ = 0;
   int level_ = 0;
   Option *uv_option_, *sigma_option_, *level_option_;

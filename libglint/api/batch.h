@@ -20,16 +20,30 @@ struct StridedFloats {
   }
 };
 
+/// Doubles at equal distances, as StridedFloats.
+struct StridedDoubles {
+  const double* data = nullptr;  ///< nullptr: not given
+  std::ptrdiff_t stride_bytes = sizeof(double);
+
+  double operator[](std::size_t k) const {
+    double value;
+    std::memcpy(&value, reinterpret_cast<const char*>(data) + static_cast<std::ptrdiff_t>(k) * stride_bytes, sizeof value);
+    return value;
+  }
+};
+
 /// Footprints as a structure of arrays: centres, and one of the three ways to give a size. Where several ways are given, the
 /// first counts.
 struct FootprintArrays {
-  StridedFloats u, v;            ///< centres, uv; required
+  StridedFloats u, v;            ///< centres, uv; required, or precise_u and precise_v
   StridedFloats sigma;           ///< isotropic Gaussians: deviation, texels
   StridedFloats xx, xy, yy;      ///< Gaussians: covariance, texels^2; xy not given: 0
   StridedFloats ax, ay, bx, by;  ///< boxes: half axes, texels
+  /// Centres as doubles, for positions far out in a tiled texture. Where given, they count instead of u and v.
+  StridedDoubles precise_u = {}, precise_v = {};
 
   Footprint operator[](std::size_t k) const {
-    const Vec2 centre = {u[k], v[k]};
+    const Vec2 centre = precise_u.data ? wrappedUv(precise_u[k], precise_v[k]) : Vec2{u[k], v[k]};
     if (sigma.data) return Footprint::isotropic(centre, sigma[k]);
     if (xx.data) return Footprint::gaussian(centre, {xx[k], xy.data ? xy[k] : 0.0f, yy[k]});
     return Footprint::box(centre, {ax[k], ay[k]}, {bx[k], by[k]});

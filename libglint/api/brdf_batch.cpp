@@ -9,14 +9,21 @@ namespace glint::api {
 namespace {
 
 /// The queries of a batch from `first` on.
-StridedFloats from(StridedFloats a, std::size_t first) {
+template <class Strided>
+Strided from(Strided a, std::size_t first) {
   if (a.data == nullptr) return a;
   const char* start = reinterpret_cast<const char*>(a.data) + static_cast<std::ptrdiff_t>(first) * a.stride_bytes;
-  return {reinterpret_cast<const float*>(start), a.stride_bytes};
+  return {reinterpret_cast<decltype(a.data)>(start), a.stride_bytes};
 }
 FootprintArrays from(const FootprintArrays& p, std::size_t first) {
-  return {from(p.u, first),  from(p.v, first),  from(p.sigma, first), from(p.xx, first), from(p.xy, first),
-          from(p.yy, first), from(p.ax, first), from(p.ay, first),    from(p.bx, first), from(p.by, first)};
+  FootprintArrays rest = p;
+  for (StridedFloats FootprintArrays::*member :
+       {&FootprintArrays::u, &FootprintArrays::v, &FootprintArrays::sigma, &FootprintArrays::xx, &FootprintArrays::xy,
+        &FootprintArrays::yy, &FootprintArrays::ax, &FootprintArrays::ay, &FootprintArrays::bx, &FootprintArrays::by})
+    rest.*member = from(p.*member, first);
+  rest.precise_u = from(p.precise_u, first);
+  rest.precise_v = from(p.precise_v, first);
+  return rest;
 }
 
 /// Most queries of a batch that has its arrays on the stack.

@@ -55,7 +55,8 @@ glint_status nullArgument(const char* where, std::initializer_list<Argument> arg
 }
 
 const char* missingIn(const glint_footprints& p) {
-  if (p.u.data == nullptr || p.v.data == nullptr) return "u and v of the footprints must be given";
+  const bool precise = p.precise_u.data != nullptr && p.precise_v.data != nullptr;
+  if (!precise && (p.u.data == nullptr || p.v.data == nullptr)) return "u and v of the footprints must be given";
   const bool gaussian = p.xx.data != nullptr && p.yy.data != nullptr;
   const bool box = p.ax.data != nullptr && p.ay.data != nullptr && p.bx.data != nullptr && p.by.data != nullptr;
   if (p.sigma.data != nullptr || gaussian || box) return nullptr;
@@ -66,6 +67,10 @@ FootprintArrays arraysOf(const glint_footprints& p) {
   FootprintArrays out;
   out.u = arrayOf(p.u);
   out.v = arrayOf(p.v);
+  if (p.precise_u.data != nullptr && p.precise_v.data != nullptr) {
+    out.precise_u = arrayOf(p.precise_u);
+    out.precise_v = arrayOf(p.precise_v);
+  }
   out.sigma = arrayOf(p.sigma);
   if (p.xx.data != nullptr && p.yy.data != nullptr) {
     out.xx = arrayOf(p.xx);
@@ -123,9 +128,8 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   return options;
 }
 
-glint_footprint given(const Footprint& gaussian) {
-  const Covariance& c = gaussian.covariance;
-  return {GLINT_FOOTPRINT_GAUSSIAN, gaussian.centre.x, gaussian.centre.y, {c.xx, c.xy, c.yy, 0}};
+glint_footprint gaussianAt(double u, double v, const Covariance& c) {
+  return {GLINT_FOOTPRINT_GAUSSIAN, u, v, {c.xx, c.xy, c.yy, 0}};
 }
 
 /// The fault of the arguments that all batches have; null if there is none.
@@ -177,13 +181,13 @@ glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* info) {
   return giveSized(all, info) ? GLINT_OK : usage("glint_ndf_info", kWrongStructSize);
 }
 
-glint_footprint glint_footprint_isotropic(float u, float v, float sigma_texels) {
-  return given(Footprint::isotropic({u, v}, sigma_texels));
+glint_footprint glint_footprint_isotropic(double u, double v, float sigma_texels) {
+  return gaussianAt(u, v, Footprint::isotropic({}, sigma_texels).covariance);
 }
 
-glint_footprint glint_footprint_from_differentials(float u, float v, float dudx, float dvdx, float dudy, float dvdy,
+glint_footprint glint_footprint_from_differentials(double u, double v, float dudx, float dvdx, float dudy, float dvdy,
                                                    int32_t width, int32_t height) {
-  return given(footprintFromDifferentials({u, v}, {dudx, dvdx}, {dudy, dvdy}, width, height));
+  return gaussianAt(u, v, footprintFromDifferentials({}, {dudx, dvdx}, {dudy, dvdy}, width, height).covariance);
 }
 
 glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy, float* density) {

@@ -50,15 +50,30 @@ struct Point {
 
 /// Points as a structure of arrays.
 struct PointArrays {
-  explicit PointArrays(const glint_displaced_points& p) : level(arrayOf(p.level)), u(arrayOf(p.u)), v(arrayOf(p.v)) {}
+  explicit PointArrays(const glint_displaced_points& p)
+      : level(arrayOf(p.level)),
+        u(arrayOf(p.u)),
+        v(arrayOf(p.v)),
+        precise_u(arrayOf(p.precise_u)),
+        precise_v(arrayOf(p.precise_v)) {}
+
+  /// Whether each point has a level and a position.
+  bool complete() const { return level.data != nullptr && (isPrecise() || (u.data != nullptr && v.data != nullptr)); }
+  Vec2 uv(std::size_t k) const {
+    return isPrecise() ? wrappedUv(precise_u[k], precise_v[k]) : wrappedUv(double{u[k]}, double{v[k]});
+  }
+
   api::StridedFloats level, u, v;
+  api::StridedDoubles precise_u, precise_v;
+
+ private:
+  bool isPrecise() const { return precise_u.data != nullptr && precise_v.data != nullptr; }
 };
 
 /// The fault of the arguments that both batches have; null if there is none.
 const char* faultOf(const glint_displaced* displaced, const glint_displaced_points* points, const glint_directions* wo) {
   if (displaced == nullptr) return "displaced is null";
-  if (points == nullptr || points->level.data == nullptr || points->u.data == nullptr || points->v.data == nullptr)
-    return "level, u and v of the points must be given";
+  if (points == nullptr || !PointArrays(*points).complete()) return "level, u and v of the points must be given";
   return complete(wo) ? nullptr : "x, y and z of wo must be given";
 }
 
@@ -109,21 +124,21 @@ glint_status glint_displaced_level(const glint_displaced* displaced, float sigma
   return GLINT_OK;
 }
 
-glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t variant, float level, float u, float v,
+glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t variant, float level, double u, double v,
                                       const float wi[3], const float wo[3], float reflected[3], float* pdf) {
   if (displaced == nullptr || wi == nullptr || wo == nullptr)
     return nullArgument("glint_displaced_evaluate", {{displaced, "displaced"}, {wi, "wi"}, {wo, "wo"}});
   if (reflected == nullptr && pdf == nullptr) return usage("glint_displaced_evaluate", "reflected and pdf are null");
-  Point(*displaced, variant, level, {u, v}).evaluate(vectorOf(wi), vectorOf(wo), reflected, pdf);
+  Point(*displaced, variant, level, wrappedUv(u, v)).evaluate(vectorOf(wi), vectorOf(wo), reflected, pdf);
   return GLINT_OK;
 }
 
-glint_status glint_displaced_sample(const glint_displaced* displaced, int32_t variant, float level, float u, float v,
+glint_status glint_displaced_sample(const glint_displaced* displaced, int32_t variant, float level, double u, double v,
                                     const float wo[3], float xi1, float xi2, float wi[3], float weight[3], float* pdf) {
   if (displaced == nullptr || wo == nullptr || wi == nullptr || weight == nullptr || pdf == nullptr)
     return nullArgument("glint_displaced_sample",
                         {{displaced, "displaced"}, {wo, "wo"}, {wi, "wi"}, {weight, "weight"}, {pdf, "pdf"}});
-  Point(*displaced, variant, level, {u, v}).sample(vectorOf(wo), {xi1, xi2}, wi, weight, pdf);
+  Point(*displaced, variant, level, wrappedUv(u, v)).sample(vectorOf(wo), {xi1, xi2}, wi, weight, pdf);
   return GLINT_OK;
 }
 
@@ -137,7 +152,7 @@ glint_status glint_displaced_evaluate_batch(const glint_displaced* displaced, in
   const PointArrays at(*points);
   const api::DirectionArrays i = arraysOf(*wi), o = arraysOf(*wo);
   for (std::size_t k = 0; k < count; ++k)
-    Point(*displaced, variant, at.level[k], {at.u[k], at.v[k]})
+    Point(*displaced, variant, at.level[k], at.uv(k))
         .evaluate(i[k], o[k], reflected == nullptr ? nullptr : reflected + 3 * k, pdfs == nullptr ? nullptr : pdfs + k);
   return GLINT_OK;
 }
@@ -154,6 +169,6 @@ glint_status glint_displaced_sample_batch(const glint_displaced* displaced, int3
   const api::DirectionArrays o = arraysOf(*wo);
   const api::HalfVectorArrays xi = {arrayOf(xi1), arrayOf(xi2)};
   for (std::size_t k = 0; k < count; ++k)
-    Point(*displaced, variant, at.level[k], {at.u[k], at.v[k]}).sample(o[k], xi[k], wi + 3 * k, weights + 3 * k, pdfs + k);
+    Point(*displaced, variant, at.level[k], at.uv(k)).sample(o[k], xi[k], wi + 3 * k, weights + 3 * k, pdfs + k);
   return GLINT_OK;
 }

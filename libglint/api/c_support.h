@@ -86,11 +86,13 @@ bool giveSized(Info all, Info* info) {
 }
 
 inline Footprint footprintOf(const glint_footprint& p) {
-  if (p.kind == GLINT_FOOTPRINT_BOX) return Footprint::box({p.u, p.v}, {p.m[0], p.m[1]}, {p.m[2], p.m[3]});
-  return Footprint::gaussian({p.u, p.v}, {p.m[0], p.m[1], p.m[2]});
+  const Vec2 centre = wrappedUv(p.u, p.v);
+  if (p.kind == GLINT_FOOTPRINT_BOX) return Footprint::box(centre, {p.m[0], p.m[1]}, {p.m[2], p.m[3]});
+  return Footprint::gaussian(centre, {p.m[0], p.m[1], p.m[2]});
 }
 
 inline StridedFloats arrayOf(const glint_floats& a) { return {a.data, a.stride}; }
+inline StridedDoubles arrayOf(const glint_doubles& a) { return {a.data, a.stride}; }
 
 /// @return null if the footprints are complete, else the fault
 const char* missingIn(const glint_footprints& p);

@@ -3,7 +3,8 @@
  * light.
  *
  * Conventions
- *  - uv: texture space, periodic; any finite uv is valid. v points up.
+ *  - uv: texture space, periodic; any finite uv is valid. v points up. Positions are doubles, because floats lose texels far out
+ *    in a tiled texture; arrays of floats are for positions near the origin.
  *  - Half vectors are points (x, y) of the unit disk in the tangent frame, z = sqrt(1 - x^2 - y^2).
  *  - Densities are per unit projected area, >= 0: the microfacet D whose integral against the cosine is 1.
  *  - Sizes are in texels of the normal map.
@@ -136,18 +137,18 @@ GLINT_API glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* 
 enum { GLINT_FOOTPRINT_GAUSSIAN = 0, GLINT_FOOTPRINT_BOX = 1 };
 typedef struct glint_footprint {
   int32_t kind; /* GLINT_FOOTPRINT_*; other values count as Gaussian */
-  float u, v;   /* centre */
+  double u, v;  /* centre */
   float m[4];   /* Gaussian: covariance xx, xy, yy in texels^2, and unused. Box: a parallelogram's half axes ax, ay, bx, by
                    in texels */
 } glint_footprint;
 
 /* Isotropic Gaussian of deviation sigma, texels. */
-GLINT_API glint_footprint glint_footprint_isotropic(float u, float v, float sigma_texels);
+GLINT_API glint_footprint glint_footprint_isotropic(double u, double v, float sigma_texels);
 
 /* The Gaussian footprint of a pixel, from ray differentials: (dudx, dvdx) and (dudy, dvdy) are the changes of uv from one pixel to
  * the next along x and y. width, height: of the map, texels. The pixel filter is a Gaussian of deviation 0.5 pixels; scale the
  * differentials for another. What is not a number counts as 0. */
-GLINT_API glint_footprint glint_footprint_from_differentials(float u, float v, float dudx, float dvdx, float dudy, float dvdy,
+GLINT_API glint_footprint glint_footprint_from_differentials(double u, double v, float dudx, float dvdx, float dudy, float dvdy,
                                                              int32_t width, int32_t height);
 
 /* Density towards one half vector.
@@ -187,13 +188,20 @@ typedef struct glint_floats {
   ptrdiff_t stride;  /* bytes; may be negative */
 } glint_floats;
 
-/* Footprints of a batch. u, v and one of sigma; xx and yy, with or without xy; ax, ay, bx and by must be given. If several are
- * given, the first of them counts. Zero the struct first. */
+/* Doubles of a batch, as glint_floats. */
+typedef struct glint_doubles {
+  const double* data; /* null: not given */
+  ptrdiff_t stride;   /* bytes; may be negative */
+} glint_doubles;
+
+/* Footprints of a batch. u and v, or precise_u and precise_v, and one of sigma; xx and yy, with or without xy; ax, ay, bx and by
+ * must be given. If several are given, the first of them counts. Zero the struct first. */
 typedef struct glint_footprints {
-  glint_floats u, v;           /* centres */
-  glint_floats sigma;          /* isotropic Gaussians: deviation, texels */
-  glint_floats xx, xy, yy;     /* Gaussians: covariance, texels^2 */
-  glint_floats ax, ay, bx, by; /* boxes: half axes, texels */
+  glint_floats u, v;                  /* centres */
+  glint_floats sigma;                 /* isotropic Gaussians: deviation, texels */
+  glint_floats xx, xy, yy;            /* Gaussians: covariance, texels^2 */
+  glint_floats ax, ay, bx, by;        /* boxes: half axes, texels */
+  glint_doubles precise_u, precise_v; /* centres as doubles: for positions far out. Where given, u and v are not read */
 } glint_footprints;
 
 /* densities[k] = glint_density of query k, k < count, to 1e-6 of its size; densities is contiguous.
@@ -346,21 +354,22 @@ GLINT_API glint_status glint_displaced_level(const glint_displaced* displaced, f
  * pdf: density with which glint_displaced_sample draws wi for this wo, per unit solid angle, behind the facet too. Either may be
  * null. Both are 0 for directions longer than a unit vector, or not finite. Returns GLINT_ERROR_USAGE for null arguments
  * (reflected and pdf: both), else GLINT_OK. */
-GLINT_API glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t variant, float level, float u,
-                                                float v, const float wi[3], const float wo[3], float reflected[3], float* pdf);
+GLINT_API glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t variant, float level, double u,
+                                                double v, const float wi[3], const float wo[3], float reflected[3], float* pdf);
 
 /* Draws wi for a view wo, by the lobes of whichever variant.
  *
  * (xi1, xi2): as for glint_sample. weight: reflected / pdf of each channel. pdf: per unit solid angle; where it is 0 nothing
  * was drawn, and wi and weight are 0. Directions behind the facet are drawn, with weight 0. No argument may be null. Else as
  * for glint_displaced_evaluate. */
-GLINT_API glint_status glint_displaced_sample(const glint_displaced* displaced, int32_t variant, float level, float u, float v,
-                                              const float wo[3], float xi1, float xi2, float wi[3], float weight[3],
+GLINT_API glint_status glint_displaced_sample(const glint_displaced* displaced, int32_t variant, float level, double u,
+                                              double v, const float wo[3], float xi1, float xi2, float wi[3], float weight[3],
                                               float* pdf);
 
-/* Points of a batch; all three must be given. */
+/* Points of a batch: level, and u and v, or precise_u and precise_v. Zero the struct first. */
 typedef struct glint_displaced_points {
   glint_floats level, u, v;
+  glint_doubles precise_u, precise_v; /* as of glint_footprints */
 } glint_displaced_points;
 
 /* reflected[3 k] to reflected[3 k + 2] and pdfs[k] = glint_displaced_evaluate of query k; reflected or pdfs may be null. Else

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "glint/math/vec.h"
@@ -13,9 +14,23 @@ struct Covariance {
   float yy = 0;
 };
 
+/// A position in texture space as the centre of a footprint: (u, v) modulo the map, each in [0, 1). What is not finite becomes 0.
+///
+/// Takes doubles, because far out in a tiled texture floats lose texels: next to 4096 they are half a thousandth of the map apart.
+/// A float between 0 and 1 is exact to 3e-8 of the map.
+inline GLINT_HD Vec2 wrappedUv(double u, double v) {
+  const auto wrapped = [](double x) {
+    const double part = x - std::floor(x);
+    const auto rounded = static_cast<float>(part);
+    return !(part >= 0) ? 0.0f : rounded < 1 ? rounded : float{kBelowOne};
+  };
+  return {wrapped(u), wrapped(v)};
+}
+
 /// The region of texture space that a shading point sees.
 ///
-/// `centre` is a uv; the plane is periodic, so any finite uv is valid. Sizes are in texels:
+/// `centre` is a uv; the plane is periodic, so any finite uv is valid (wrappedUv keeps the digits of one far out). Sizes are in
+/// texels:
 ///  - `gaussian`: weights exp(-d^T C^-1 d / 2), normalised to 1, with C = `covariance`;
 ///  - `box`: the parallelogram centre +- axis_a +- axis_b, texels weighted by their covered area.
 struct Footprint {

@@ -23,7 +23,7 @@ inline GLINT_HD Vec2 finiteAxis(Vec2 a) {
 /// Its covariance is filter_sigma^2 (a a^T + b b^T), where a and b are the steps in texels from a pixel to its neighbour along
 /// x and along y: the image of a round pixel filter in texture space. NaN counts as 0, infinite lengths as kLongestAxis, and a
 /// footprint without extent as the narrowest. So every input gives a footprint that every model answers.
-/// @param uv             centre; the texture is periodic
+/// @param uv             centre; the texture is periodic. wrappedUv makes it of doubles, which positions far out need
 /// @param duvdx, duvdy   change of uv from one pixel to the next
 /// @param width, height  of the map, texels
 /// @param filter_sigma   deviation of the pixel filter, pixels
@@ -71,7 +71,7 @@ inline GLINT_HD RayCone bounced(RayCone cone, float slope_sigma) {
 }
 
 /// The footprint of a beam on a surface.
-/// @param uv              centre
+/// @param uv              centre, see footprintFromDifferentials
 /// @param direction       unit vector of the tangent frame towards the ray's origin: the footprint is stretched along it by
 ///                        1 / z
 /// @param texels_per_unit texels in one scene unit, > 0

@@ -73,7 +73,7 @@ TEST(CApi, QueriesAllocateNothing) {
   const float zero = 0, one = 1;
   const glint_directions up = {{&zero, 0}, {&zero, 0}, {&one, 0}};
   const glint_floats xi = test::contiguous(q.v);
-  const glint_displaced_points points = {xi, xi, xi};
+  const glint_displaced_points points = {xi, xi, xi, {}, {}};
   std::array<float, 3 * kCount> colors, directions, pdfs;
   glint_displaced* displaced = nullptr;
   ASSERT_EQ(glint_displaced_open(test::assets().path("displacement").c_str(), 0, &displaced), GLINT_OK);

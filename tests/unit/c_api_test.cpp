@@ -342,7 +342,7 @@ TEST(CApi, StretchedFootprintsAreAskedAsSeveralRoundOnes) {
     glint_density(several.get(), &given, q.hx[k], q.hy[k], &answer);
     EXPECT_EQ(answer, stretched.density(p, {q.hx[k], q.hy[k]}));
     glint_footprints arrays = {};
-    arrays.u = {&given.u, 0}, arrays.v = {&given.v, 0};
+    arrays.precise_u = {&given.u, 0}, arrays.precise_v = {&given.v, 0};
     arrays.xx = {&given.m[0], 0}, arrays.xy = {&given.m[1], 0}, arrays.yy = {&given.m[2], 0};
     glint_density_batch(several.get(), 1, &arrays, {&q.hx[k], 0}, {&q.hy[k], 0}, &batch);
     EXPECT_EQ(batch, answer);

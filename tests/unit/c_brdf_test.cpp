@@ -357,7 +357,7 @@ TEST(CDisplaced, AnswersAsTheClassDoesAlsoInBatches) {
   const Directions d(kCount, 6);
   std::vector<float> level;
   for (std::size_t k = 0; k < kCount; ++k) level.push_back(k % 19 == 2 ? kNan : 0.01f * static_cast<float>(k) - 0.5f);
-  const glint_displaced_points points = {contiguous(level), contiguous(q.u), contiguous(q.v)};
+  const glint_displaced_points points = {contiguous(level), contiguous(q.u), contiguous(q.v), {}, {}};
   const glint_directions wis = Directions::arrays(d.wi), wos = Directions::arrays(d.wo);
   for (const auto& [variant, id] : {std::pair<DisplacedVariant, int>{DisplacedVariant::full, GLINT_DISPLACED_FULL},
                                     {DisplacedVariant::lobes, GLINT_DISPLACED_LOBES},
@@ -377,10 +377,10 @@ TEST(CDisplaced, AnswersAsTheClassDoesAlsoInBatches) {
     for (std::size_t k = 0; k < kCount; ++k) {
       const Vec3 wi = {d.wi[k][0], d.wi[k][1], d.wi[k][2]}, wo = {d.wo[k][0], d.wo[k][1], d.wo[k][2]};
       const LevelBlend levels = same.levelsAt(level[k]);
-      const Vec2 uv = {q.u[k], q.v[k]};
+      const Vec2 uv = wrappedUv(double{q.u[k]}, double{q.v[k]});
       Triple one{}, direction{}, weight{};
       float pdf = -1;
-      glint_displaced_evaluate(displaced.get(), id, level[k], uv.x, uv.y, d.wi[k].data(), d.wo[k].data(), one.data(), &pdf);
+      glint_displaced_evaluate(displaced.get(), id, level[k], q.u[k], q.v[k], d.wi[k].data(), d.wo[k].data(), one.data(), &pdf);
       EXPECT_EQ(one, tripleOf(same.reflected(levels, uv, wi, wo, variant))) << k;
       EXPECT_EQ(pdf, same.pdf(levels, uv, wi, wo));
       EXPECT_EQ(std::memcmp(&reflected[3 * k], one.data(), sizeof one), 0);
@@ -471,7 +471,7 @@ TEST(CDisplaced, OtherKindsAndMissingArgumentsAreRefused) {
   refused(glint_displaced_get_info(displaced.get(), &info));
   const Queries q(1);
   const Directions d(1, 1);
-  const glint_displaced_points points = {contiguous(q.u), contiguous(q.u), contiguous(q.v)};
+  const glint_displaced_points points = {contiguous(q.u), contiguous(q.u), contiguous(q.v), {}, {}};
   const glint_directions whole = Directions::arrays(d.wo);
   glint_displaced_points incomplete = points;
   incomplete.level.data = nullptr;
