@@ -44,6 +44,18 @@ add_library(glint_warnings INTERFACE)
 target_compile_options(glint_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
   $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)
 
+# Programs in C++ get the flag for C++20 from the targets. CMake refuses such a demand in projects without C++.
+set(GLINT_STANDARD cxx_std_20)
+if(NOT PROJECT_IS_TOP_LEVEL AND NOT GLINT_INCLUDER_HAS_CXX)
+  set(GLINT_STANDARD "")
+endif()
+
+# The runtime of C++, for static libraries in programs that CMake links as C.
+set(GLINT_CXX_RUNTIME stdc++)
+if("c++" IN_LIST CMAKE_CXX_IMPLICIT_LINK_LIBRARIES)
+  set(GLINT_CXX_RUNTIME c++)
+endif()
+
 # glint_add_library(<room> [INTERFACE])  makes target glint_<room> with alias glint::<room>
 function(glint_add_library room)
   cmake_parse_arguments(ARG "INTERFACE" "" "SOURCES" ${ARGN})
@@ -54,10 +66,12 @@ function(glint_add_library room)
     add_library(glint_${room} STATIC ${ARG_SOURCES})
     set(scope PUBLIC)
     target_link_libraries(glint_${room} PRIVATE $<BUILD_INTERFACE:glint_warnings>)
+    target_compile_features(glint_${room} PRIVATE cxx_std_20)
+    target_link_libraries(glint_${room} INTERFACE $<$<LINK_LANGUAGE:C>:${GLINT_CXX_RUNTIME}> $<$<LINK_LANGUAGE:C>:m>)
     set_target_properties(glint_${room} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   endif()
   add_library(glint::${room} ALIAS glint_${room})
-  target_compile_features(glint_${room} ${scope} cxx_std_20)
+  target_compile_features(glint_${room} ${scope} ${GLINT_STANDARD})
   target_include_directories(glint_${room} ${scope}
     $<BUILD_INTERFACE:${GLINT_INCLUDE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   set_target_properties(glint_${room} PROPERTIES EXPORT_NAME ${room} CXX_EXTENSIONS OFF)

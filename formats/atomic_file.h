@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <span>
 
+#include "glint/math/device.h"  // asks for C++20
+
 namespace glint::formats {
 
 /// What the name of an output stands for.

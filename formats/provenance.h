@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "glint/math/device.h"  // asks for C++20
+
 namespace glint::formats {
 
 /// One input of a run.

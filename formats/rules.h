@@ -4,6 +4,7 @@
 #include <span>
 #include <string_view>
 
+#include "glint/math/device.h"  // asks for C++20
 #include "glint/model/error.h"
 
 namespace glint::formats {

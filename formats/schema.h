@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "glint/math/device.h"  // asks for C++20
+
 namespace glint::formats {
 
 /// Version of the file format that this library writes. SPEC.md says what a reader does with other versions.

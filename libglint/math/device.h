@@ -1,5 +1,10 @@
 #pragma once
 
+// Every header of the library includes this one or is C++17: older compilers get one error that says what to do.
+#if (defined(_MSVC_LANG) ? _MSVC_LANG : __cplusplus) < 202002L
+#error "glint needs C++20: compile with -std=c++20 or /std:c++20, with CMake target_compile_features(app PRIVATE cxx_std_20)"
+#endif
+
 /// Marks a function that also compiles as CUDA device code.
 ///
 /// Such functions call constexpr functions of the standard library: clang allows this, nvcc needs --expt-relaxed-constexpr.

@@ -116,9 +116,7 @@ struct Float4 {
     return positiveHalves(_mm_unpacklo_epi16(sse::loadFour(p), _mm_setzero_si128()));
   }
   static Float4 ofPositive(std::uint16_t a, std::uint16_t b, std::uint16_t c, std::uint16_t d) {
-    __m128i bits = _mm_insert_epi16(_mm_setzero_si128(), a, 0);
-    bits = _mm_insert_epi16(_mm_insert_epi16(bits, b, 2), c, 4);
-    return positiveHalves(_mm_insert_epi16(bits, d, 6));
+    return positiveHalves(_mm_setr_epi32(a, b, c, d));
   }
   /// Masses of four blocks. `codes` holds one code (query/detail/pyramid/block_mass.h) per byte, lowest byte first.
   static Float4 ofMassCodes(std::uint32_t codes) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 #include "glint/math/device.h"
 
 namespace glint {
@@ -10,6 +12,11 @@ inline constexpr float kBelowOne = 0x1.fffffep-1f;
 /// A sum as an answer that cannot be negative: infinities, negative numbers and NaN become 0. Opening a file does not check its
 /// numbers, so sums of them may be any of these.
 inline GLINT_HD float finitePositive(float x) { return x > 0 && x <= 0x1.fffffep127f ? x : 0.0f; }
+
+/// Index of element (column, row) in an array whose rows have `columns` elements. None may be negative.
+GLINT_HD constexpr std::size_t rowMajorIndex(int column, int row, int columns) {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(column);
+}
 
 /// A point or vector of texture space, or of the unit disk of normals and half vectors.
 struct Vec2 {

@@ -74,7 +74,7 @@ struct Footprint {
  private:
   /// (a0 a1 + b0 b1) / 3, clamped to 1e30 so that enormous boxes have a finite covariance.
   static GLINT_HD constexpr float secondMoment(float a0, float a1, float b0, float b1) {
-    const double moment = (double{a0} * a1 + double{b0} * b1) / 3;
+    const double moment = (double{a0} * double{a1} + double{b0} * double{b1}) / 3;
     return static_cast<float>(moment > 1e30 ? 1e30 : moment < -1e30 ? -1e30 : moment);
   }
 };

@@ -58,8 +58,8 @@ struct HistogramSat {
   GLINT_HD constexpr int pointsY(int table_stride) const { return (height + table_stride - 1) / table_stride + 1; }
   /// Index of a texel in `texels`.
   GLINT_HD constexpr std::size_t texelIndex(int i, int j) const {
-    const std::size_t tile = static_cast<std::size_t>(j / kTileSize) * tileColumns() + i / kTileSize;
-    return tile * kTileSize * kTileSize + j % kTileSize * kTileSize + i % kTileSize;
+    const std::size_t tile = rowMajorIndex(i / kTileSize, j / kTileSize, tileColumns());
+    return tile * kTileSize * kTileSize + rowMajorIndex(i % kTileSize, j % kTileSize, kTileSize);
   }
 };
 

@@ -24,7 +24,7 @@ struct PyramidGrid {
   int columns = 0;   ///< ceil(width / stride); 1 in the mean of the map
   int rows = 0;      ///< ceil(height / stride); 1 in the mean of the map
 
-  GLINT_HD constexpr std::size_t imageCount() const { return static_cast<std::size_t>(columns) * rows; }
+  GLINT_HD constexpr std::size_t imageCount() const { return rowMajorIndex(0, rows, columns); }
 };
 
 /// Sizes and parameters of a pyramid of NDF images, compressed or not (Deng 2022, section 4.1).

@@ -55,7 +55,7 @@ struct NormalMap {
   int bounds_level_count = 0;
   NormalBoundsLevel bounds[kMaxBoundsLevels];
 
-  GLINT_HD const Vec2& at(int i, int j) const { return normals.data()[static_cast<std::size_t>(j) * width + i]; }
+  GLINT_HD const Vec2& at(int i, int j) const { return normals.data()[rowMajorIndex(i, j, width)]; }
 };
 
 /// A height field, same order as NormalMap. Heights are in texels (height / texel size).

@@ -87,8 +87,8 @@ static_assert(offsetof(PackedHeader, slope_mean) == 832 && offsetof(PackedHeader
 static_assert(sizeof(PackedHeader) == 1920 && sizeof(PackedHeader) % kPackedAlignment == 0);
 
 /// Bytes of an element of the arrays that have no type of their own.
-GLINT_HD constexpr int pixelBytes(BlockPrecision precision) { return precision == BlockPrecision::f16 ? 2 : 4; }
-GLINT_HD constexpr int coefficientBytes(CoefficientType type) {
+GLINT_HD constexpr std::size_t pixelBytes(BlockPrecision precision) { return precision == BlockPrecision::f16 ? 2 : 4; }
+GLINT_HD constexpr std::size_t coefficientBytes(CoefficientType type) {
   return type == CoefficientType::i8 ? 1 : type == CoefficientType::f16 ? 2 : 4;
 }
 

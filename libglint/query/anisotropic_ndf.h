@@ -57,11 +57,11 @@ GLINT_DEVICE_CALL inline GLINT_HD IsotropicParts partsOfTurn(const Footprint& p,
   const double length = std::hypot(w * frame.along_period[0], h * frame.along_period[1]);
   const double across = wide / std::hypot(frame.across[0] / w, frame.across[1] / h);
   const double narrow = std::max(across, double{narrowest_sigma});
-  parts.count = static_cast<int>(std::clamp(std::ceil(length / (kPartGap * narrow)), 2.0, 1.0 * most));
+  parts.count = static_cast<int>(std::clamp(std::ceil(length / (double{kPartGap} * narrow)), 2.0, 1.0 * most));
   const auto part_sigma = static_cast<float>(std::max(narrow, length / (double{kPartGap} * parts.count)));
   for (int k = 0; k < parts.count; ++k) {
     const double turn = (k + 0.5) / parts.count - 0.5;
-    const double u = centre.x + turn * frame.along_period[0], v = centre.y + turn * frame.along_period[1];
+    const double u = double{centre.x} + turn * frame.along_period[0], v = double{centre.y} + turn * frame.along_period[1];
     parts.footprints[k] =
         Footprint::isotropic({static_cast<float>(u - std::floor(u)), static_cast<float>(v - std::floor(v))}, part_sigma);
     parts.weights[k] = 1.0f / static_cast<float>(parts.count);

@@ -64,7 +64,7 @@ class BinMapNdf {
     if (!(box.width() > 0 && box.height() > 0)) return 0;
     double sum = 0;
     forEachFacet(p, box, [&](const BinFacet& f) { sum += f.weight * mass(f, box); });
-    return finitePositive(static_cast<float>(sum / range.area()));
+    return finitePositive(static_cast<float>(sum / double{range.area()}));
   }
 
   /// Draws a half vector (Atanasov 2021, section 5.3 and Eq. 18): a point of the footprint, then a point of the lobe around the
@@ -370,8 +370,8 @@ class BinMapNdf {
   GLINT_HD SubbinMoments momentsOf(const BinBlock& block, const TexelCode& code) const {
     const std::uint16_t* stored = map().block_moments.data() + 5 * std::size_t{block.number};
     const double side = 1 << code.subbin_bits;
-    const double x = side * (halfToFloat(stored[0]) - 0.5), y = side * (halfToFloat(stored[1]) - 0.5);
-    const auto square = [&](int k) { return side * side * halfToFloat(stored[k]); };
+    const double x = side * (double{halfToFloat(stored[0])} - 0.5), y = side * (double{halfToFloat(stored[1])} - 0.5);
+    const auto square = [&](int k) { return side * side * double{halfToFloat(stored[k])}; };
     SubbinMoments moments;
     moments.add(static_cast<double>(blocks_.end(block) - blocks_.begin(block)),
                 {1, x, y, square(2) + x * x, square(3) + x * y, square(4) + y * y});

@@ -98,7 +98,7 @@ class HistogramNdf {
       const int id = sat_.bin_ids.data()[bin];
       mass += counts.totals[bin] * (bins_.areaInside(id, box) / bins_.area(id));
     }
-    return static_cast<float>(mass / (total * range.area()));
+    return static_cast<float>(mass / (total * double{range.area()}));
   }
 
   /// Half vector with probability density `density`, which is its pdf: xi.x chooses the bin and what is left of it the azimuth

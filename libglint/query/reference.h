@@ -48,7 +48,7 @@ class Reference {
   GLINT_DEVICE_CALL GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     const Box2 box = insideSquare(range);
     if (!(box.width() > 0 && box.height() > 0)) return 0;
-    return finitePositive(static_cast<float>(average(p, BoxLobe{box, sigma_r_}) / range.area()));
+    return finitePositive(static_cast<float>(average(p, BoxLobe{box, sigma_r_}) / double{range.area()}));
   }
 
   /// Draws a texel (or triangle) by its weight in the footprint, one of its normals, and a point of the lobe around the normal.
@@ -82,7 +82,7 @@ class Reference {
     forEachCell(weights, [&](int i, int j) {
       const float w = weights.texel(i, j);
       if (w <= 0) return;
-      total += w;
+      total += double{w};
       visitor(w, normal(i, j));
     });
     return total;
@@ -98,7 +98,7 @@ class Reference {
       for (int half = 0; half < 2; ++half) {
         const float w = weights.triangle(i, j, half);
         if (w <= 0) continue;
-        total += w;
+        total += double{w};
         visitor(w, normal(i, j), half == 0 ? normal(i + 1, j) : normal(i, j + 1), normal(i + 1, j + 1));
       }
     });
@@ -137,8 +137,8 @@ class Reference {
     double sum = 0;
     const double total =
         surface_ == Surface::flat
-            ? forEachTexel(p, [&](float w, Vec2 n) { sum += double{w} * lobe.facet(n); })
-            : forEachTriangle(p, [&](float w, Vec2 a, Vec2 b, Vec2 c) { sum += double{w} * lobe.triangle(a, b, c); });
+            ? forEachTexel(p, [&](float w, Vec2 n) { sum += double{w} * double{lobe.facet(n)}; })
+            : forEachTriangle(p, [&](float w, Vec2 a, Vec2 b, Vec2 c) { sum += double{w} * double{lobe.triangle(a, b, c)}; });
     return total > 0 ? sum / total : 0;
   }
 
@@ -151,11 +151,11 @@ class Reference {
     const auto leaf = [&](int i, int j) {  // texel (i, j) of the endless plane
       const Vec2 n = normal(i, j);
       if (surface_ == Surface::flat) {
-        if (near(support, n, n, reach)) sum += double{weights.texel(i, j)} * lobe.facet(n);
+        if (near(support, n, n, reach)) sum += double{weights.texel(i, j)} * double{lobe.facet(n)};
       } else if (hasCell(i, j)) {
         const Vec2 right = normal(i + 1, j), up = normal(i, j + 1), far = normal(i + 1, j + 1);
-        sum += double{weights.triangle(i, j, 0)} * lobe.triangle(n, right, far);
-        sum += double{weights.triangle(i, j, 1)} * lobe.triangle(n, up, far);
+        sum += double{weights.triangle(i, j, 0)} * double{lobe.triangle(n, right, far)};
+        sum += double{weights.triangle(i, j, 1)} * double{lobe.triangle(n, up, far)};
       }
     };
     forEachPeriod(weights, [&](const Window& w) { descend(weights, w, support, reach, leaf); });
@@ -221,7 +221,7 @@ class Reference {
     while (count > 0) {
       const Node node = stack[--count];
       const NormalBoundsLevel& level = map_.bounds[node.level];
-      const NormalBounds& box = level.nodes.data()[static_cast<std::size_t>(node.j) * level.columns + node.i];
+      const NormalBounds& box = level.nodes.data()[rowMajorIndex(node.i, node.j, level.columns)];
       if (!near(support, {box.low_x, box.low_y}, {box.high_x, box.high_y}, reach)) continue;
       for (int dj = 0; dj < 2; ++dj) {
         for (int di = 0; di < 2; ++di) {

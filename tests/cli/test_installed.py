@@ -35,6 +35,14 @@ def instrumented(sanitizer):
     return f"-fsanitize={sanitizer}" in cache("CMAKE_CXX_FLAGS")
 
 
+def run_for_warnings(source, prefix, flags):
+    """Lines of warnings of a source that compiles."""
+    command = ["c++", "-std=c++20", "-Wall", "-Wextra", *flags, "-fsyntax-only", "-I", prefix / "include", source]
+    process = subprocess.run(command, capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
+    return [line for line in process.stderr.splitlines() if "warning:" in line]
+
+
 pytestmark = pytest.mark.skipif(instrumented("thread"), reason="programs with AddressSanitizer cannot link a library for ThreadSanitizer")
 
 
@@ -77,6 +85,12 @@ def test_example_of_the_readme_answers(programs):
     assert re.fullmatch(r"density \S+\nmean over a light \S+\nreflected \S+ \S+ \S+\n", run(programs / "app", GOLDEN / "ndf-cp-cp-i8.glint"))
 
 
+def test_a_project_in_c_alone_links_the_static_library(prefix, tmp_path):
+    run("cmake", "-S", ROOT / "tests/consumer_c", "-B", tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_FLAGS={cache('CMAKE_C_FLAGS')}")
+    run("cmake", "--build", tmp_path)
+    assert "mean over a light" in run(tmp_path / "app", GOLDEN / "ndf-cp-cp-i8.glint")
+
+
 def test_kinds_without_a_distribution_are_refused_by_name(programs):
     process = subprocess.run([programs / "app", GOLDEN / "heights.glint"], capture_output=True, text=True)
     assert process.returncode == 1
@@ -107,11 +121,34 @@ def test_soname_is_the_version_of_the_abi(prefix, library_dir):
     assert f"soname: [libglint.so.{version}]" in run("readelf", "-d", library_dir / "libglint.so")
 
 
+def installed_headers(prefix):
+    headers = [header.relative_to(prefix / "include") for header in sorted((prefix / "include/glint").rglob("*.h"))]
+    assert len(headers) > 15
+    return headers
+
+
+# Conversions that other projects forbid. Headers that a warning of their own is owed to.
+STRICT = ["-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wshadow"]
+NOT_STRICT = ["glint/query/cp_ndf.h", "glint/query/detail/pyramid/pyramid_reader.h", "glint/query/detail/bin_map/texel_cover.h"]
+
+
 def test_installed_headers_compile_alone(prefix, tmp_path):
     """Each by itself, so that none leans on another that is not installed or not included."""
-    headers = sorted((prefix / "include/glint").rglob("*.h"))
-    assert len(headers) > 15
     source = tmp_path / "all.cpp"
-    for header in headers:
-        source.write_text(f'#include "{header.relative_to(prefix / "include")}"\n')
-        run("c++", "-std=c++20", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "-I", prefix / "include", source)
+    for header in installed_headers(prefix):
+        source.write_text(f'#include "{header}"\n')
+        warnings = run_for_warnings(source, prefix, STRICT)
+        assert [line for line in warnings if not any(name in line for name in NOT_STRICT)] == [], header
+
+
+def test_older_standards_get_one_error_that_says_what_to_do(prefix, tmp_path):
+    source = tmp_path / "old.cpp"
+    refused = 0
+    for header in installed_headers(prefix):
+        source.write_text(f'#include "{header}"\n')
+        process = subprocess.run(["c++", "-std=c++17", "-fsyntax-only", "-Wfatal-errors", "-I", prefix / "include", source],
+                                 capture_output=True, text=True)
+        errors = [line for line in process.stderr.splitlines() if "error:" in line]
+        assert not errors or "glint needs C++20" in errors[0], header
+        refused += bool(errors)
+    assert refused > 50

@@ -150,6 +150,12 @@ def test_c_header_is_c_and_needs_only_the_standard_library():
     assert [name for _, name in includes(ROOMS["api"] / "glint.h")] == ["stddef.h", "stdint.h"]
 
 
+def test_c_header_is_included_as_an_installed_package_has_it():
+    files = [p for folder in (ROOT / "libglint", ROOT / "formats", ROOT / "tests", APPS) for p in sources(folder)]
+    names = {name for path in files for _, name in includes(path) if pathlib.PurePath(name).name == "glint.h"}
+    assert names == {"glint.h"}
+
+
 def mains():
     return sorted(APPS.glob("glint-*/main.cpp"))
 

@@ -146,7 +146,7 @@ class BinMapBrdf {
     for (int k = 0; k < points * points; ++k) {
       const float s = step * (static_cast<float>(k % points) - 0.5f * (part - 1));
       const float t = step * (static_cast<float>(k / points) - 0.5f * (part - 1));
-      addFacet(f.weight / (part * part), f.normal + Vec2{s * x, s * along + t * across}, wi, wo, h, sums);
+      addFacet(f.weight / double{part * part}, f.normal + Vec2{s * x, s * along + t * across}, wi, wo, h, sums);
     }
   }
 
@@ -159,10 +159,10 @@ class BinMapBrdf {
     const float lobe = FacetLobe::density(slopes, {local.x / local.z, local.y / local.z});
     if (lobe == 0) return;
     const float cosine2 = local.z * local.z, distribution = lobe / (cosine2 * cosine2);
-    sums.drawn += weight * distribution * local.z;
+    sums.drawn += weight * double{distribution} * double{local.z};
     const Vec3 i = t.local(wi), o = t.local(wo);
     if (!(i.z > 0 && o.z > 0)) return;
-    sums.reflected += weight * distribution * SmithMasking({{0, 0}, slopes}, 0).g2(i, o) / t.normal.z;
+    sums.reflected += weight * double{distribution} * double{SmithMasking({{0, 0}, slopes}, 0).g2(i, o)} / double{t.normal.z};
   }
 
   BinMapNdf ndf_;

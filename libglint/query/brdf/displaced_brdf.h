@@ -82,7 +82,7 @@ class DisplacedBrdf {
     const DisplacementLevel& l = asset_.levels[level];
     const Place p = place(l, uv);
     const int i1 = p.i + 1 == l.columns ? 0 : p.i + 1, j1 = p.j + 1 == l.rows ? 0 : p.j + 1;
-    const auto height = [&](int i, int j) { return l.heights[static_cast<std::size_t>(j) * l.columns + i]; };
+    const auto height = [&](int i, int j) { return l.heights[rowMajorIndex(i, j, l.columns)]; };
     const float h00 = height(p.i, p.j), h10 = height(i1, p.j), h01 = height(p.i, j1), h11 = height(i1, j1);
     const float scale = 1 / static_cast<float>(l.factor);
     const bool lower = p.x + p.y < 1;
@@ -215,9 +215,7 @@ class DisplacedBrdf {
     int i0, i1, j0, j1;
     const float fx = axis(uv.x - 0.5f / static_cast<float>(asset_.width), l.spatial_columns, i0, i1);
     const float fy = axis(uv.y - 0.5f / static_cast<float>(asset_.height), l.spatial_rows, j0, j1);
-    const auto at = [&](int i, int j) {
-      return color(l.spatial_scale.data(), static_cast<std::size_t>(j) * l.spatial_columns + static_cast<std::size_t>(i));
-    };
+    const auto at = [&](int i, int j) { return color(l.spatial_scale.data(), rowMajorIndex(i, j, l.spatial_columns)); };
     return (1 - fy) * ((1 - fx) * at(i0, j0) + fx * at(i1, j0)) + fy * ((1 - fx) * at(i0, j1) + fx * at(i1, j1));
   }
 

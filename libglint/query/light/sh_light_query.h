@@ -213,7 +213,7 @@ class ShLightQuery {
     const std::size_t count = shCount(light_.order);
     const float scale = light_.scales.data()[corner.index] * corner.weight;
     for (int l = 0; l <= order; ++l) {
-      const double factor = scale * zonalFactor(l, zonal_.data()[l]) * windowWeight(window, l, highest);
+      const double factor = double{scale} * zonalFactor(l, zonal_.data()[l]) * double{windowWeight(window, l, highest)};
       const std::size_t first = shIndex(l, 0), n = 2 * static_cast<std::size_t>(l) + 1;
       for (std::size_t c = 0; c < 3; ++c) {
         const std::size_t start = (corner.index * 3 + c) * count + first;

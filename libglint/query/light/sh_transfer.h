@@ -50,10 +50,10 @@ class RatioEstimator {
   /// @param visibility    in [0, 1]
   GLINT_HD void add(const float contribution[3], float visibility) {
     for (int c = 0; c < 3; ++c) {
-      open_[c] += contribution[c];
-      seen_[c] += double{contribution[c]} * visibility;
+      open_[c] += double{contribution[c]};
+      seen_[c] += double{contribution[c]} * double{visibility};
     }
-    visible_ += visibility;
+    visible_ += double{visibility};
     ++count_;
   }
 

@@ -34,7 +34,7 @@ struct UsableCovariance {
   /// The determinant, at least that of the narrowest footprint of the same length: the difference of products may have no
   /// digits left.
   GLINT_HD double determinant() const {
-    return std::max(xx * yy - xy * xy, double{kMinSigmaTexels} * kMinSigmaTexels * 0.5 * (xx + yy));
+    return std::max(xx * yy - xy * xy, double{kMinSigmaTexels} * double{kMinSigmaTexels} * 0.5 * (xx + yy));
   }
 };
 
@@ -216,8 +216,8 @@ class FootprintWeights {
     float mean, sigma, share;
   };
   GLINT_HD Line gaussianLine(float y) const {
-    const auto dy = static_cast<float>(y - centre_y_);
-    return {static_cast<float>(centre_x_ + slant_[0] * dy), 1 / std::sqrt(across_), std::exp(-0.5f * along_ * dy * dy)};
+    const auto dy = static_cast<float>(double{y} - centre_y_);
+    return {static_cast<float>(centre_x_ + slant_[0] * double{dy}), 1 / std::sqrt(across_), std::exp(-0.5f * along_ * dy * dy)};
   }
 
   /// The parallelogram of a box, or its part inside a rectangle of texel space. Corners are in the frame where the
@@ -225,7 +225,7 @@ class FootprintWeights {
   GLINT_HD SmallPolygon localShape(const Box2* clip) const {
     const Vec2 whole[4] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
     if (!clip) return clipToUnitBox(whole, 4);
-    const auto corner = [&](float x, float y) { return local(x - centre_x_, y - centre_y_); };
+    const auto corner = [&](float x, float y) { return local(double{x} - centre_x_, double{y} - centre_y_); };
     const Vec2 corners[4] = {corner(clip->low.x, clip->low.y), corner(clip->high.x, clip->low.y),
                              corner(clip->high.x, clip->high.y), corner(clip->low.x, clip->high.y)};
     return clipToUnitBox(corners, 4);
@@ -233,14 +233,14 @@ class FootprintWeights {
   /// Position in texel space (x and y) of a point of the frame where the parallelogram is [-1, 1]^2.
   GLINT_HD void fromLocal(Vec2 s, double& x, double& y) const {
     const double det = row_x_[0] * row_y_[1] - row_x_[1] * row_y_[0];
-    x = centre_x_ + (row_y_[1] * s.x - row_x_[1] * s.y) / det;
-    y = centre_y_ + (row_x_[0] * s.y - row_y_[0] * s.x) / det;
+    x = centre_x_ + (row_y_[1] * double{s.x} - row_x_[1] * double{s.y}) / det;
+    y = centre_y_ + (row_x_[0] * double{s.y} - row_y_[0] * double{s.x}) / det;
   }
 
   /// Whether closedFormTotal equals the sum of all texel weights to float precision.
   GLINT_HD bool hasClosedFormTotal() const { return is_box_ || min_sigma_ >= 1; }
   /// Sum of `texel` over the endless plane, which is also the sum of `triangle`.
-  GLINT_HD double closedFormTotal() const { return is_box_ ? 4 * scale_ : 2 * 3.14159265358979 * root_determinant_; }
+  GLINT_HD double closedFormTotal() const { return is_box_ ? 4 * scale_ : 2 * 3.14159265358979 * double{root_determinant_}; }
 
  private:
   /// A coordinate beyond all texels that are summed.
@@ -269,12 +269,12 @@ class FootprintWeights {
     const double determinant = c.determinant(), mean = 0.5 * (c.xx + c.yy);
     const double largest = mean + std::sqrt(std::max(0.0, mean * mean - determinant));
     slant_[0] = c.xy / c.yy;
-    half_width_[0] = (kFootprintReach + 1) * std::sqrt(determinant / c.yy);
+    half_width_[0] = double{kFootprintReach + 1} * std::sqrt(determinant / c.yy);
     across_ = static_cast<float>(c.yy / determinant);
     along_ = static_cast<float>(1 / c.yy);
     root_determinant_ = static_cast<float>(std::sqrt(determinant));
     min_sigma_ = static_cast<float>(std::sqrt(determinant / largest));
-    setRange(kFootprintReach * std::sqrt(c.xx), kFootprintReach * std::sqrt(c.yy));
+    setRange(double{kFootprintReach} * std::sqrt(c.xx), double{kFootprintReach} * std::sqrt(c.yy));
   }
 
   GLINT_HD void setRange(double reach_x, double reach_y) {
@@ -299,7 +299,7 @@ class FootprintWeights {
   GLINT_HD Vec2 rowStep() const { return {static_cast<float>(row_x_[1]), static_cast<float>(row_y_[1])}; }
   /// Area, in texels, of a polygon that is given in that frame.
   GLINT_HD float areaOf(const SmallPolygon& polygon) const {
-    return static_cast<float>(scale_ * (0.5 * std::fabs(polygon.twiceSignedArea())));
+    return static_cast<float>(scale_ * (0.5 * double{std::fabs(polygon.twiceSignedArea())}));
   }
 
   double centre_x_ = 0, centre_y_ = 0;

@@ -71,7 +71,7 @@ inline GLINT_HD int chooseOf16(const Float16& weights, float& xi) {
 ///                 sumGroups(sums): writes the sums of all groups
 template <int kMost, class Weights>
 GLINT_HD int chooseOfMany(const Weights& weights, float& xi) {
-  float before[(kMost + 15) / 16 + 1];  // before[g]: sum of the groups before group g
+  float before[std::size_t{(kMost + 15) / 16 + 1}];  // before[g]: sum of the groups before group g
   before[0] = 0;
   const int groups = (weights.count() + 15) / 16;
   if (groups == 0) return -1;

@@ -80,7 +80,7 @@ class TexelChooser {
     if (grid_.boundary == Boundary::wrap && line.sigma >= 1) return line.share;
     const Range range = columnsOf(line, half);
     double sum = 0;
-    for (int i = range.begin; i < range.end; ++i) sum += weight(i, j, half);
+    for (int i = range.begin; i < range.end; ++i) sum += double{weight(i, j, half)};
     return sum;
   }
 
@@ -89,7 +89,7 @@ class TexelChooser {
   static GLINT_HD bool choose(Range range, Weight&& weight, float& xi, int& chosen) {
     double total = 0;
     for (int k = range.begin; k < range.end; ++k) total += weight(k);
-    double rest = xi * total, share = 0;
+    double rest = double{xi} * total, share = 0;
     for (int k = range.begin; k < range.end; ++k) {
       const double w = weight(k);
       if (!(w > 0)) continue;
@@ -125,7 +125,7 @@ class TexelChooser {
     if (shape.count < 3 || !(std::fabs(shape.twiceSignedArea()) > 0)) return {};
     double x = 0, y = 0;
     weights_.fromLocal(pointIn(shape, xi), x, y);
-    x -= border, y -= border;
+    x -= double{border}, y -= double{border};
     TexelChoice texel;
     texel.found = true;
     texel.i = static_cast<int>(std::floor(x));

@@ -21,8 +21,7 @@ struct SlicePlace {
 /// Finds the slice of an image in a block.
 /// @param block_place  place of the block (NdfCp)
 inline GLINT_HD SlicePlace findSlice(const NdfCp& ndf, std::size_t image, int block_place) {
-  const std::size_t at =
-      static_cast<std::size_t>(ndf.image_regions.data()[image]) * static_cast<std::size_t>(ndf.places) + block_place;
+  const std::size_t at = rowMajorIndex(block_place, ndf.image_regions.data()[image], ndf.places);
   const int slot = ndf.image_slots.data()[image];
   const std::size_t word = ndf.clusters.data()[at].first_word + static_cast<std::size_t>(slot / 64);
   const std::uint64_t mask = ndf.masks.data()[word], bit = std::uint64_t{1} << (slot % 64);

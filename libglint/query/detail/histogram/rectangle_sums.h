@@ -176,12 +176,11 @@ class RectangleSums {
     if (first >= last || ends + kDifferenceCost > to - from) return addRunTexels<kColumn>(line, from, to, weight);
     const int points = kColumn ? sat_.pointsY(stride) : sat_.pointsX(stride);
     const std::uint16_t* sums =
-        (kColumn ? sat_.column_sums : sat_.row_sums).data() + static_cast<std::size_t>(line) * points * sat_.rowLength();
+        (kColumn ? sat_.column_sums : sat_.row_sums).data() + rowMajorIndex(0, line, points * sat_.rowLength());
     const int step = static_cast<int>(kFineLimit - 1) / stride;
     for (int k = first; k < last; k += step) {
       const int next = std::min(k + step, last);
-      sum_.addDifference(sums + static_cast<std::size_t>(next) * sat_.rowLength(),
-                         sums + static_cast<std::size_t>(k) * sat_.rowLength(), weight);
+      sum_.addDifference(sums + rowMajorIndex(0, next, sat_.rowLength()), sums + rowMajorIndex(0, k, sat_.rowLength()), weight);
     }
     addRunTexels<kColumn>(line, std::min(from, begin), std::max(from, begin), from < begin ? weight : -weight);
     addRunTexels<kColumn>(line, std::min(to, end), std::max(to, end), end < to ? weight : -weight);
@@ -191,7 +190,7 @@ class RectangleSums {
   GLINT_HD void addRunTexels(int line, int from, int to, double weight) {
     constexpr int kSize = HistogramSat::kTileSize;
     constexpr int kStep = kColumn ? kSize : 1;
-    const std::size_t tile_step = std::size_t{kSize * kSize} * (kColumn ? sat_.tileColumns() : 1);
+    const std::size_t tile_step = rowMajorIndex(0, kSize * kSize, kColumn ? sat_.tileColumns() : 1);
     const std::uint16_t* tile = sat_.texels.data() + (kColumn ? sat_.texelIndex(line, 0) : sat_.texelIndex(0, line)) +
                                 static_cast<std::size_t>(from / kSize) * tile_step;
     const std::int64_t area = areaUnits(weight);
@@ -272,7 +271,7 @@ class RectangleSums {
 
   template <class Counter>
   GLINT_HD const Counter* point(const Counter* table, int points, int a, int b) const {
-    return table + (static_cast<std::size_t>(b) * points + a) * sat_.rowLength();
+    return table + rowMajorIndex(a, b, points) * static_cast<std::size_t>(sat_.rowLength());
   }
   GLINT_HD const std::uint16_t* finePoint(int a, int b) const {
     return point(sat_.sums.data(), sat_.pointsX(sat_.stride), a, b);
