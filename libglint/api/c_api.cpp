@@ -2,9 +2,12 @@
 #include <cstddef>
 #include <cstdio>
 #include <cstring>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "glint/api/c_support.h"
+#include "glint/api/pack.h"
 #include "glint/query/ray_footprint.h"
 
 namespace {
@@ -48,10 +51,25 @@ glint_status usage(const char* where, const char* what) {
   return fail(GLINT_ERROR_USAGE, message, "api.arguments");
 }
 
-glint_status nullArgument(const char* where, std::initializer_list<Argument> arguments) {
-  const auto isNull = [](const Argument& argument) { return argument.pointer == nullptr; };
-  const Argument* first = std::find_if(arguments.begin(), arguments.end(), isNull);
-  return usage(where, (std::string(first->name) + " is null").c_str());
+glint_status badArgument(const char* where, std::initializer_list<Argument> arguments) {
+  const auto isBad = [](const Argument& argument) { return argument.fault() != nullptr; };
+  const Argument* first = std::find_if(arguments.begin(), arguments.end(), isBad);
+  return usage(where, (std::string(first->name) + first->fault()).c_str());
+}
+
+namespace {
+
+template <class Kind>
+const char* handleFault(const Kind* handle, const char* null, const char* closed) {
+  return handle == nullptr ? null : isOpen(handle) ? nullptr : closed;
+}
+
+}  // namespace
+
+const char* faultOf(const glint_ndf* ndf) { return handleFault(ndf, "ndf is null", "ndf is closed, or of another kind"); }
+const char* faultOf(const glint_brdf* brdf) { return handleFault(brdf, "brdf is null", "brdf is closed, or of another kind"); }
+const char* faultOf(const glint_displaced* displaced) {
+  return handleFault(displaced, "displaced is null", "displaced is closed, or of another kind");
 }
 
 const char* missingIn(const glint_footprints& p) {
@@ -134,7 +152,7 @@ glint_footprint gaussianAt(double u, double v, const Covariance& c) {
 
 /// The fault of the arguments that all batches have; null if there is none.
 const char* faultOf(const glint_ndf* ndf, const glint_footprints* footprints, const float* out) {
-  if (ndf == nullptr) return "ndf is null";
+  if (const char* fault = faultOf(ndf)) return fault;
   if (footprints == nullptr) return "footprints is null";
   if (out == nullptr) return "the array of answers is null";
   return missingIn(*footprints);
@@ -155,18 +173,18 @@ glint_status glint_ndf_open(const char* path, const glint_open_options* options,
   return guarded([&] {
     auto opened = api::OpenedNdf::open(path, optionsOf(given));
     std::string kind(opened.asset().kind());
-    *ndf = new glint_ndf{std::move(opened), std::move(kind)};
+    *ndf = new glint_ndf(std::make_shared<NdfBody>(NdfBody{std::move(opened), std::move(kind)}));
   });
 }
 
-void glint_ndf_close(glint_ndf* ndf) { delete ndf; }
+void glint_ndf_close(glint_ndf* ndf) { glint_ndf::close(ndf); }
 
 glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* info) {
-  if (ndf == nullptr) return usage("glint_ndf_get_info", "ndf is null");
+  if (const char* fault = faultOf(ndf)) return usage("glint_ndf_get_info", fault);
   if (info == nullptr) return usage("glint_ndf_get_info", "info is null");
-  const api::NdfInfo& from = ndf->opened.info();
+  const api::NdfInfo& from = ndf->body().opened.info();
   glint_ndf_info all = {};
-  all.kind = ndf->kind.c_str();
+  all.kind = ndf->body().kind.c_str();
   all.width = from.width;
   all.height = from.height;
   all.resolution = from.resolution;
@@ -176,8 +194,8 @@ glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* info) {
   all.coarsest_sigma_texels = from.coarsest_sigma_texels;
   all.surface = static_cast<int32_t>(from.surface);
   all.boundary = static_cast<int32_t>(from.boundary);
-  all.has_normals = ndf->opened.hasNormals() ? 1 : 0;
-  all.file_bytes = ndf->opened.asset().info().file_bytes;
+  all.has_normals = ndf->body().opened.hasNormals() ? 1 : 0;
+  all.file_bytes = ndf->body().opened.asset().info().file_bytes;
   return giveSized(all, info) ? GLINT_OK : usage("glint_ndf_info", kWrongStructSize);
 }
 
@@ -185,31 +203,73 @@ glint_footprint glint_footprint_isotropic(double u, double v, float sigma_texels
   return gaussianAt(u, v, Footprint::isotropic({}, sigma_texels).covariance);
 }
 
+glint_footprint glint_footprint_box(double u, double v, float ax, float ay, float bx, float by) {
+  return {GLINT_FOOTPRINT_BOX, u, v, {ax, ay, bx, by}};
+}
+
 glint_footprint glint_footprint_from_differentials(double u, double v, float dudx, float dvdx, float dudy, float dvdy,
                                                    int32_t width, int32_t height) {
   return gaussianAt(u, v, footprintFromDifferentials({}, {dudx, dvdx}, {dudy, dvdy}, width, height).covariance);
 }
 
+glint_ray_cone glint_ray_cone_propagated(glint_ray_cone cone, float distance) {
+  const RayCone after = propagated({cone.width, cone.spread}, distance);
+  return {after.width, after.spread};
+}
+
+glint_ray_cone glint_ray_cone_bounced(glint_ray_cone cone, float slope_sigma) {
+  const RayCone after = bounced({cone.width, cone.spread}, slope_sigma);
+  return {after.width, after.spread};
+}
+
+glint_footprint glint_footprint_from_cone(glint_ray_cone cone, double u, double v, const float direction[3],
+                                          float texels_per_unit) {
+  const Vec3 towards = direction == nullptr ? Vec3{0, 0, 1} : vectorOf(direction);
+  return gaussianAt(u, v, footprintOfCone({cone.width, cone.spread}, {}, towards, texels_per_unit).covariance);
+}
+
+glint_status glint_ndf_slopes(const glint_ndf* ndf, float mean[2], float covariance[3]) {
+  if (!isOpen(ndf) || mean == nullptr || covariance == nullptr)
+    return badArgument("glint_ndf_slopes", {{ndf, "ndf"}, {mean, "mean"}, {covariance, "covariance"}});
+  const MapSlopes slopes = ndf->body().opened.slopes();
+  mean[0] = slopes.mean.x, mean[1] = slopes.mean.y;
+  covariance[0] = slopes.covariance.xx, covariance[1] = slopes.covariance.xy, covariance[2] = slopes.covariance.yy;
+  return GLINT_OK;
+}
+
+glint_status glint_ndf_pack(const glint_ndf* ndf, void* buffer, size_t capacity, size_t* size) {
+  if (!isOpen(ndf) || size == nullptr) return badArgument("glint_ndf_pack", {{ndf, "ndf"}, {size, "size"}});
+  std::vector<std::byte> packed;
+  const glint_status status = guarded([&] { packed = api::pack(ndf->body().opened); });
+  if (status != GLINT_OK) return status;
+  if (buffer != nullptr) {
+    if (capacity < packed.size()) return usage("glint_ndf_pack", "the buffer is smaller than the packed model");
+    std::memcpy(buffer, packed.data(), packed.size());
+  }
+  *size = packed.size();
+  return GLINT_OK;
+}
+
 glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy, float* density) {
-  if (ndf == nullptr || footprint == nullptr || density == nullptr)
-    return nullArgument("glint_density", {{ndf, "ndf"}, {footprint, "footprint"}, {density, "density"}});
-  *density = ndf->opened.model().density(footprintOf(*footprint), {hx, hy});
+  if (!isOpen(ndf) || footprint == nullptr || density == nullptr)
+    return badArgument("glint_density", {{ndf, "ndf"}, {footprint, "footprint"}, {density, "density"}});
+  *density = ndf->body().opened.model().density(footprintOf(*footprint), {hx, hy});
   return GLINT_OK;
 }
 
 glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, float x0, float y0, float x1, float y1,
                         float* mean) {
-  if (ndf == nullptr || footprint == nullptr || mean == nullptr)
-    return nullArgument("glint_mean", {{ndf, "ndf"}, {footprint, "footprint"}, {mean, "mean"}});
-  *mean = ndf->opened.model().mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}});
+  if (!isOpen(ndf) || footprint == nullptr || mean == nullptr)
+    return badArgument("glint_mean", {{ndf, "ndf"}, {footprint, "footprint"}, {mean, "mean"}});
+  *mean = ndf->body().opened.model().mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}});
   return GLINT_OK;
 }
 
 glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint, float xi1, float xi2, float* hx, float* hy,
                           float* pdf) {
-  if (ndf == nullptr || footprint == nullptr || hx == nullptr || hy == nullptr || pdf == nullptr)
-    return nullArgument("glint_sample", {{ndf, "ndf"}, {footprint, "footprint"}, {hx, "hx"}, {hy, "hy"}, {pdf, "pdf"}});
-  const HalfVectorSample drawn = ndf->opened.model().sample(footprintOf(*footprint), {xi1, xi2});
+  if (!isOpen(ndf) || footprint == nullptr || hx == nullptr || hy == nullptr || pdf == nullptr)
+    return badArgument("glint_sample", {{ndf, "ndf"}, {footprint, "footprint"}, {hx, "hx"}, {hy, "hy"}, {pdf, "pdf"}});
+  const HalfVectorSample drawn = ndf->body().opened.model().sample(footprintOf(*footprint), {xi1, xi2});
   *hx = drawn.h.x;
   *hy = drawn.h.y;
   *pdf = drawn.pdf;
@@ -221,7 +281,7 @@ glint_status glint_density_batch(const glint_ndf* ndf, size_t count, const glint
   if (count == 0) return GLINT_OK;
   if (const char* fault = faultOf(ndf, footprints, densities)) return usage("glint_density_batch", fault);
   if (hx.data == nullptr || hy.data == nullptr) return usage("glint_density_batch", "hx and hy must be given");
-  api::densities(ndf->opened.model(), count, arraysOf(*footprints), {arrayOf(hx), arrayOf(hy)}, densities);
+  api::densities(ndf->body().opened.model(), count, arraysOf(*footprints), {arrayOf(hx), arrayOf(hy)}, densities);
   return GLINT_OK;
 }
 
@@ -231,7 +291,8 @@ glint_status glint_mean_batch(const glint_ndf* ndf, size_t count, const glint_fo
   if (const char* fault = faultOf(ndf, footprints, means)) return usage("glint_mean_batch", fault);
   if (x0.data == nullptr || y0.data == nullptr || x1.data == nullptr || y1.data == nullptr)
     return usage("glint_mean_batch", "x0, y0, x1 and y1 must be given");
-  api::means(ndf->opened.model(), count, arraysOf(*footprints), {arrayOf(x0), arrayOf(y0), arrayOf(x1), arrayOf(y1)}, means);
+  api::means(ndf->body().opened.model(), count, arraysOf(*footprints), {arrayOf(x0), arrayOf(y0), arrayOf(x1), arrayOf(y1)},
+             means);
   return GLINT_OK;
 }
 
@@ -241,6 +302,6 @@ glint_status glint_sample_batch(const glint_ndf* ndf, size_t count, const glint_
   if (const char* fault = faultOf(ndf, footprints, pdfs)) return usage("glint_sample_batch", fault);
   if (xi1.data == nullptr || xi2.data == nullptr) return usage("glint_sample_batch", "xi1 and xi2 must be given");
   if (hx == nullptr || hy == nullptr) return usage("glint_sample_batch", "hx and hy must be given");
-  api::samples(ndf->opened.model(), count, arraysOf(*footprints), {arrayOf(xi1), arrayOf(xi2)}, {hx, hy, pdfs});
+  api::samples(ndf->body().opened.model(), count, arraysOf(*footprints), {arrayOf(xi1), arrayOf(xi2)}, {hx, hy, pdfs});
   return GLINT_OK;
 }

@@ -1,14 +1,20 @@
 #include <cmath>
+#include <memory>
+#include <utility>
 
 #include "glint/api/c_support.h"
 #include "glint/query/brdf/displaced_brdf.h"
 
-struct glint_displaced {
-  explicit glint_displaced(glint::formats::Asset opened) : asset(std::move(opened)), brdf(asset.get<glint::Displacement>()) {}
+namespace glint::api::c {
 
-  glint::formats::Asset asset;
-  glint::DisplacedBrdf brdf;
+struct DisplacedBody {
+  explicit DisplacedBody(formats::Asset opened) : asset(std::move(opened)), brdf(asset.get<Displacement>()) {}
+
+  formats::Asset asset;
+  DisplacedBrdf brdf;
 };
+
+}  // namespace glint::api::c
 
 namespace {
 
@@ -28,7 +34,7 @@ DisplacedVariant variantOf(int32_t variant) {
 /// One point of the coarse surface.
 struct Point {
   Point(const glint_displaced& displaced, int32_t variant_id, float level, Vec2 at)
-      : brdf(displaced.brdf), variant(variantOf(variant_id)), levels(brdf.levelsAt(level)), uv(at) {}
+      : brdf(displaced.body().brdf), variant(variantOf(variant_id)), levels(brdf.levelsAt(level)), uv(at) {}
 
   void evaluate(Vec3 wi, Vec3 wo, float* reflected, float* pdf) const {
     if (reflected != nullptr) set(reflected, brdf.reflected(levels, uv, wi, wo, variant));
@@ -72,7 +78,7 @@ struct PointArrays {
 
 /// The fault of the arguments that both batches have; null if there is none.
 const char* faultOf(const glint_displaced* displaced, const glint_displaced_points* points, const glint_directions* wo) {
-  if (displaced == nullptr) return "displaced is null";
+  if (const char* fault = faultOf(displaced)) return fault;
   if (points == nullptr || !PointArrays(*points).complete()) return "level, u and v of the points must be given";
   return complete(wo) ? nullptr : "x, y and z of wo must be given";
 }
@@ -82,15 +88,17 @@ const char* faultOf(const glint_displaced* displaced, const glint_displaced_poin
 glint_status glint_displaced_open(const char* path, int32_t verify_hashes, glint_displaced** displaced) {
   if (path == nullptr) return usage("glint_displaced_open", "path is null");
   if (displaced == nullptr) return usage("glint_displaced_open", "displaced is null");
-  return guarded([&] { *displaced = new glint_displaced(formats::Asset::open(path, {verify_hashes != 0})); });
+  return guarded([&] {
+    *displaced = new glint_displaced(std::make_shared<DisplacedBody>(formats::Asset::open(path, {verify_hashes != 0})));
+  });
 }
 
-void glint_displaced_close(glint_displaced* displaced) { delete displaced; }
+void glint_displaced_close(glint_displaced* displaced) { glint_displaced::close(displaced); }
 
 glint_status glint_displaced_get_info(const glint_displaced* displaced, glint_displaced_info* info) {
-  if (displaced == nullptr) return usage("glint_displaced_get_info", "displaced is null");
+  if (const char* fault = faultOf(displaced)) return usage("glint_displaced_get_info", fault);
   if (info == nullptr) return usage("glint_displaced_get_info", "info is null");
-  const Displacement& from = displaced->brdf.asset();
+  const Displacement& from = displaced->body().brdf.asset();
   glint_displaced_info all = {};
   all.width = from.width;
   all.height = from.height;
@@ -98,17 +106,17 @@ glint_status glint_displaced_get_info(const glint_displaced* displaced, glint_di
   all.channels = from.channels;
   all.base = static_cast<int32_t>(from.base.kind);
   all.texel_size_um = from.texel_size_um;
-  all.file_bytes = displaced->asset.info().file_bytes;
+  all.file_bytes = displaced->body().asset.info().file_bytes;
   for (int l = 0; l < from.level_count; ++l) all.factors[l] = from.levels[l].factor;
   return giveSized(all, info) ? GLINT_OK : usage("glint_displaced_info", kWrongStructSize);
 }
 
 glint_status glint_displaced_heights(const glint_displaced* displaced, int32_t level, const float** heights, int32_t* columns,
                                      int32_t* rows) {
-  if (displaced == nullptr || heights == nullptr || columns == nullptr || rows == nullptr)
-    return nullArgument("glint_displaced_heights",
-                        {{displaced, "displaced"}, {heights, "heights"}, {columns, "columns"}, {rows, "rows"}});
-  const Displacement& asset = displaced->brdf.asset();
+  if (!isOpen(displaced) || heights == nullptr || columns == nullptr || rows == nullptr)
+    return badArgument("glint_displaced_heights",
+                       {{displaced, "displaced"}, {heights, "heights"}, {columns, "columns"}, {rows, "rows"}});
+  const Displacement& asset = displaced->body().brdf.asset();
   if (level < 0 || level >= asset.level_count) return usage("glint_displaced_heights", "the asset has no such level");
   *heights = asset.levels[level].heights.data();
   *columns = asset.levels[level].columns;
@@ -117,17 +125,17 @@ glint_status glint_displaced_heights(const glint_displaced* displaced, int32_t l
 }
 
 glint_status glint_displaced_level(const glint_displaced* displaced, float sigma_texels, float* level) {
-  if (displaced == nullptr || level == nullptr)
-    return nullArgument("glint_displaced_level", {{displaced, "displaced"}, {level, "level"}});
-  const LevelBlend levels = displaced->brdf.levelsFor(std::sqrt(12.0f) * sigma_texels);
+  if (!isOpen(displaced) || level == nullptr)
+    return badArgument("glint_displaced_level", {{displaced, "displaced"}, {level, "level"}});
+  const LevelBlend levels = displaced->body().brdf.levelsFor(std::sqrt(12.0f) * sigma_texels);
   *level = static_cast<float>(levels.first) + levels.weight;
   return GLINT_OK;
 }
 
 glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t variant, float level, double u, double v,
                                       const float wi[3], const float wo[3], float reflected[3], float* pdf) {
-  if (displaced == nullptr || wi == nullptr || wo == nullptr)
-    return nullArgument("glint_displaced_evaluate", {{displaced, "displaced"}, {wi, "wi"}, {wo, "wo"}});
+  if (!isOpen(displaced) || wi == nullptr || wo == nullptr)
+    return badArgument("glint_displaced_evaluate", {{displaced, "displaced"}, {wi, "wi"}, {wo, "wo"}});
   if (reflected == nullptr && pdf == nullptr) return usage("glint_displaced_evaluate", "reflected and pdf are null");
   Point(*displaced, variant, level, wrappedUv(u, v)).evaluate(vectorOf(wi), vectorOf(wo), reflected, pdf);
   return GLINT_OK;
@@ -135,9 +143,9 @@ glint_status glint_displaced_evaluate(const glint_displaced* displaced, int32_t 
 
 glint_status glint_displaced_sample(const glint_displaced* displaced, int32_t variant, float level, double u, double v,
                                     const float wo[3], float xi1, float xi2, float wi[3], float weight[3], float* pdf) {
-  if (displaced == nullptr || wo == nullptr || wi == nullptr || weight == nullptr || pdf == nullptr)
-    return nullArgument("glint_displaced_sample",
-                        {{displaced, "displaced"}, {wo, "wo"}, {wi, "wi"}, {weight, "weight"}, {pdf, "pdf"}});
+  if (!isOpen(displaced) || wo == nullptr || wi == nullptr || weight == nullptr || pdf == nullptr)
+    return badArgument("glint_displaced_sample",
+                       {{displaced, "displaced"}, {wo, "wo"}, {wi, "wi"}, {weight, "weight"}, {pdf, "pdf"}});
   Point(*displaced, variant, level, wrappedUv(u, v)).sample(vectorOf(wo), {xi1, xi2}, wi, weight, pdf);
   return GLINT_OK;
 }

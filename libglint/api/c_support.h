@@ -13,15 +13,16 @@
 #include "glint/api/any_ndf.h"
 #include "glint/api/batch.h"
 #include "glint/api/brdf_batch.h"
+#include "glint/api/c_handle.h"
 #include "glint/math/rgb.h"
 #include "glint/math/vec.h"
 
-struct glint_ndf {
-  glint::api::OpenedNdf opened;
+namespace glint::api::c {
+
+struct NdfBody {
+  OpenedNdf opened;
   std::string kind;
 };
-
-namespace glint::api::c {
 
 /// Sets the thread's last error. Returns the status.
 glint_status fail(glint_status status, const char* message, const char* rule = "");
@@ -31,14 +32,34 @@ glint_status fail(glint_status status, const char* message, const char* rule = "
 /// @param what   the fault
 glint_status usage(const char* where, const char* what);
 
-/// An argument that must not be null.
+/// Whether a handle that a caller gives can be asked.
+template <class Kind>
+bool isOpen(const Kind* handle) {
+  return Kind::isOpen(handle);
+}
+
+/// An argument that must not be null, and open if it is a handle.
 struct Argument {
+  template <class T>
+  Argument(const T* given, const char* given_name) : pointer(given), name(given_name) {
+    if constexpr (std::is_base_of_v<Shell, T>) closed = given != nullptr && !isOpen(given);
+  }
+
+  /// null if there is none, else what is wrong
+  const char* fault() const { return pointer == nullptr ? " is null" : closed ? " is closed, or of another kind" : nullptr; }
+
   const void* pointer;
   const char* name;
+  bool closed = false;
 };
 
-/// Fails for the first argument that is null, and names it. At least one must be null.
-glint_status nullArgument(const char* where, std::initializer_list<Argument> arguments);
+/// The fault of a handle; null if there is none.
+const char* faultOf(const glint_ndf* ndf);
+const char* faultOf(const glint_brdf* brdf);
+const char* faultOf(const glint_displaced* displaced);
+
+/// Fails for the first argument that is null or closed, and names it. There must be one.
+glint_status badArgument(const char* where, std::initializer_list<Argument> arguments);
 
 /// Runs work that may throw.
 template <class Work>

@@ -15,6 +15,9 @@
  * glint_error_message() then says what, where, and what to do. Queries fail for null arguments only: numbers that are not
  * finite or out of range have defined answers, given with each function. No C++ exception leaves the library.
  *
+ * Closed handles: a function that is given one, or a handle of another kind, returns GLINT_ERROR_USAGE. For that, some 40 bytes
+ * of each handle stay in memory until the program ends.
+ *
  * Threads: handles are immutable; any number of threads may ask one at once. Opening is thread-safe (one file at a time) and
  * uses HDF5 while it lasts: a program with HDF5 code of its own on other threads must keep it apart from that. Queries do not
  * use HDF5, and allocate nothing.
@@ -108,7 +111,8 @@ typedef struct glint_open_options {
  * above. */
 GLINT_API glint_status glint_ndf_open(const char* path, const glint_open_options* options, glint_ndf** ndf);
 
-/* Closes a handle; null is ignored. No thread may be asking it. */
+/* Closes a handle; null and closed handles are ignored. No thread may be asking it. BRDFs of the handle stay usable: the asset
+ * stays open until the last of them is destroyed. */
 GLINT_API void glint_ndf_close(glint_ndf* ndf);
 
 /* What a handle is. Members are added at the end; the library fills those that fit into struct_size. */
@@ -133,6 +137,19 @@ typedef struct glint_ndf_info {
  * above GLINT_MOST_STRUCT_SIZE. */
 GLINT_API glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* info);
 
+/* Moments of the map's slopes (dz/dx, dz/dy), from which masking follows: mean, and covariance xx, xy, yy. For kind normals this
+ * may read all texels. Returns GLINT_ERROR_USAGE for null arguments, else GLINT_OK. */
+GLINT_API glint_status glint_ndf_slopes(const glint_ndf* ndf, float mean[2], float covariance[3]);
+
+/* Packs the model, and the normals that it was opened with, into one buffer without addresses, for a GPU or another process: the
+ * layout of glint/model/packed_ndf.h, which glint/query/packed_ndf_view.h reads.
+ *
+ * buffer: receives the bytes; null to ask for the size only, which costs as much. capacity: bytes of the buffer. size: receives
+ * the bytes of the packed model.
+ * Returns GLINT_ERROR_USAGE for null ndf or size, or a capacity that is too small; UNSUPPORTED for kinds without a packed form,
+ * which the message tells apart. */
+GLINT_API glint_status glint_ndf_pack(const glint_ndf* ndf, void* buffer, size_t capacity, size_t* size);
+
 /* The region of texture space that a shading point sees. */
 enum { GLINT_FOOTPRINT_GAUSSIAN = 0, GLINT_FOOTPRINT_BOX = 1 };
 typedef struct glint_footprint {
@@ -145,11 +162,32 @@ typedef struct glint_footprint {
 /* Isotropic Gaussian of deviation sigma, texels. */
 GLINT_API glint_footprint glint_footprint_isotropic(double u, double v, float sigma_texels);
 
+/* Parallelogram with the half axes a and b, texels. */
+GLINT_API glint_footprint glint_footprint_box(double u, double v, float ax, float ay, float bx, float by);
+
 /* The Gaussian footprint of a pixel, from ray differentials: (dudx, dvdx) and (dudy, dvdy) are the changes of uv from one pixel to
  * the next along x and y. width, height: of the map, texels. The pixel filter is a Gaussian of deviation 0.5 pixels; scale the
  * differentials for another. What is not a number counts as 0. */
 GLINT_API glint_footprint glint_footprint_from_differentials(double u, double v, float dudx, float dvdx, float dudy, float dvdy,
                                                              int32_t width, int32_t height);
+
+/* The width of a path as a Gaussian beam, for bounces, which have no ray differentials. */
+typedef struct glint_ray_cone {
+  float width;  /* deviation across the ray at the last hit, scene units */
+  float spread; /* deviation of directions, radians */
+} glint_ray_cone;
+
+/* The beam after a distance, scene units. */
+GLINT_API glint_ray_cone glint_ray_cone_propagated(glint_ray_cone cone, float distance);
+
+/* The beam after reflection by facets whose slopes have this deviation per axis: alpha / sqrt(2) of a GGX or Beckmann lobe; of a
+ * map, the square root of the mean variance of glint_ndf_slopes plus sigma_r^2. */
+GLINT_API glint_ray_cone glint_ray_cone_bounced(glint_ray_cone cone, float slope_sigma);
+
+/* The footprint of a beam on a surface, stretched along the ray. direction: unit vector of the tangent frame towards the ray's
+ * origin; null: straight above. texels_per_unit: texels in a scene unit, > 0. What is not a number counts as 0. */
+GLINT_API glint_footprint glint_footprint_from_cone(glint_ray_cone cone, double u, double v, const float direction[3],
+                                                    float texels_per_unit);
 
 /* Density towards one half vector.
  *
@@ -249,7 +287,7 @@ typedef struct glint_brdf_options {
 #define GLINT_BRDF_OPTIONS_INIT { sizeof(glint_brdf_options), 0, 0, { 0.0f, 0.0f, 0.0f }, { 0.0f, 0.0f, 0.0f } }
 /* clang-format on */
 
-/* Makes a BRDF of a distribution, which must stay open for as long as the BRDF is used. It is masked by the slopes of the whole
+/* Makes a BRDF of a distribution, whose handle may be closed before that of the BRDF. It is masked by the slopes of the whole
  * map (Smith, heights correlated), which every kind holds but normals: for those this reads all texels once.
  *
  * options: null for the defaults. brdf: receives the handle, not null.
@@ -257,7 +295,7 @@ typedef struct glint_brdf_options {
  * kind than bin-map. */
 GLINT_API glint_status glint_brdf_create(const glint_ndf* ndf, const glint_brdf_options* options, glint_brdf** brdf);
 
-/* Destroys a handle, not the distribution; null is ignored. No thread may be asking it. */
+/* Destroys a handle, not the distribution; null and destroyed handles are ignored. No thread may be asking it. */
 GLINT_API void glint_brdf_destroy(glint_brdf* brdf);
 
 /* The BRDF inside a footprint and the density of its samples.
@@ -295,6 +333,43 @@ GLINT_API glint_status glint_brdf_sample_batch(const glint_brdf* brdf, size_t co
                                                const glint_directions* wo, glint_floats xi1, glint_floats xi2, float* wi,
                                                float* weights, float* pdfs);
 
+/* A lobe of light: radiance amplitude exp(sharpness (w . axis - 1)) from each direction w. An environment or a large lamp is a list
+ * of lobes. Lobes that are not finite, of a sharpness outside (0, 1e10), or without a unit axis give no light. */
+typedef struct glint_spherical_gaussian {
+  float axis[3];      /* unit vector, tangent frame of the shading point */
+  float sharpness;    /* > 0; the deviation is about 1 / sqrt(sharpness) radians */
+  float amplitude[3]; /* radiance along the axis: red, green and blue */
+} glint_spherical_gaussian;
+
+enum { GLINT_MOST_LOBE_CELLS = 8 };
+
+/* Radiance that a surface reflects towards wo from all lobes, without sampling: D is averaged over the half vectors of each lobe
+ * (Deng 2022, section 5.4).
+ *
+ * cells: cells along each axis that a lobe is cut into, 1 to GLINT_MOST_LOBE_CELLS; 0: 3. More follow wide lobes more closely.
+ * radiance: red, green and blue; 0 for wo below the horizon. lobes may be null if count is 0.
+ * Returns GLINT_ERROR_USAGE for null arguments, cells out of range, and a BRDF of Beckmann facets. */
+GLINT_API glint_status glint_lobes_reflected(const glint_brdf* brdf, const glint_footprint* footprint, const float wo[3],
+                                             const glint_spherical_gaussian* lobes, size_t count, int32_t cells,
+                                             float radiance[3]);
+
+/* Prepares sampling of lobes for one BRDF, footprint and wo: shares[k] receives the probability of lobe k, by the light that it
+ * adds towards wo. One mean for each lobe. Returns as glint_lobes_reflected. */
+GLINT_API glint_status glint_lobes_shares(const glint_brdf* brdf, const glint_footprint* footprint, const float wo[3],
+                                          const glint_spherical_gaussian* lobes, size_t count, float* shares);
+
+/* Draws a direction towards the lobes, by the shares that glint_lobes_shares has filled.
+ *
+ * (xi1, xi2): as for glint_sample. radiance: of all lobes along wi. pdf: per unit solid angle; 0 if there is no light. wi may lie
+ * below the horizon. Returns GLINT_ERROR_USAGE for null arguments, else GLINT_OK. */
+GLINT_API glint_status glint_lobes_sample(const glint_spherical_gaussian* lobes, size_t count, const float* shares, float xi1,
+                                          float xi2, float wi[3], float radiance[3], float* pdf);
+
+/* Radiance of all lobes along w, and the density with which glint_lobes_sample draws w, per unit solid angle: to weigh samples of
+ * the BRDF against those of the light. Either may be null; without pdf, shares may be. Returns as glint_lobes_sample. */
+GLINT_API glint_status glint_lobes_evaluate(const glint_spherical_gaussian* lobes, size_t count, const float* shares,
+                                            const float w[3], float radiance[3], float* pdf);
+
 /* A displacement map at several levels of detail, each a coarse surface and the light that it reflects, shadowing and
  * interreflections of all that is finer included (Wu 2019, Eq. 11 and 18). */
 typedef struct glint_displaced glint_displaced;
@@ -310,7 +385,7 @@ enum {
 /* Opens an asset of kind displacement; as glint_ndf_open. verify_hashes: as glint_open_options. */
 GLINT_API glint_status glint_displaced_open(const char* path, int32_t verify_hashes, glint_displaced** displaced);
 
-/* Closes a handle; null is ignored. No thread may be asking it. */
+/* Closes a handle; null and closed handles are ignored. No thread may be asking it. */
 GLINT_API void glint_displaced_close(glint_displaced* displaced);
 
 /* What a handle is. Members are added at the end; the library fills those that fit into struct_size. */

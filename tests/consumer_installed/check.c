@@ -202,6 +202,55 @@ static void check_displaced(const char* path) {
   free(wi), free(wo), free(light), free(pdfs);
 }
 
+static void check_light(const glint_ndf* ndf) {
+  const glint_spherical_gaussian lamps[2] = {{{0, 0, 1}, 50, {1, 2, 3}}, {{0.6f, 0, 0.8f}, 200, {3, 1, 1}}};
+  const glint_footprint p = glint_footprint_from_cone(
+      glint_ray_cone_bounced(glint_ray_cone_propagated((glint_ray_cone){0.1f, 0.01f}, 2), 0.1f), 4096.3, -17.3, NULL, 100);
+  const float wo[3] = {-0.28f, 0, 0.96f};
+  float light[3] = {-1, -1, -1}, wi[3], shares[2], pdf = -1, again = -2, mean[2], covariance[3];
+  glint_brdf* brdf = NULL;
+  check(glint_brdf_create(ndf, NULL, &brdf) == GLINT_OK, "a distribution reflects without options");
+  check(glint_lobes_reflected(brdf, &p, wo, lamps, 2, 0, light) == GLINT_OK && is_light(light), "lobes are reflected");
+  check(glint_lobes_shares(brdf, &p, wo, lamps, 2, shares) == GLINT_OK, "lobes have shares");
+  check(glint_lobes_sample(lamps, 2, shares, 0.3f, 0.6f, wi, light, &pdf) == GLINT_OK && is_light(light) && pdf > 0,
+        "lobes are drawn");
+  check(glint_lobes_evaluate(lamps, 2, shares, wi, NULL, &again) == GLINT_OK && fabsf(again - pdf) <= 1e-5f * pdf,
+        "lobes have a pdf");
+  check(glint_ndf_slopes(ndf, mean, covariance) == GLINT_OK && covariance[0] >= 0 && covariance[2] >= 0, "a map has slopes");
+  glint_brdf_destroy(brdf);
+  check(glint_lobes_reflected(brdf, &p, wo, lamps, 2, 0, light) == GLINT_ERROR_USAGE, "a destroyed BRDF is an error");
+}
+
+static void check_packing(const glint_ndf* ndf) {
+  size_t size = 0;
+  const glint_status status = glint_ndf_pack(ndf, NULL, 0, &size);
+  check(status == GLINT_OK || status == GLINT_ERROR_UNSUPPORTED, "a model packs, or its kind has no packed form");
+  if (status != GLINT_OK) return;
+  void* buffer = malloc(size);
+  check(glint_ndf_pack(ndf, buffer, size - 1, &size) == GLINT_ERROR_USAGE, "a small buffer is an error");
+  check(glint_ndf_pack(ndf, buffer, size, &size) == GLINT_OK, "a buffer of the right size is filled");
+  free(buffer);
+}
+
+/* A handle of its own, because it is asked after it is closed. */
+static void check_closed(const char* path) {
+  glint_ndf* ndf = NULL;
+  glint_brdf* brdf = NULL;
+  const glint_footprint p = glint_footprint_box(0.3, 0.7, 9, 1, -1, 9);
+  const float up[3] = {0, 0, 1};
+  float value = -1, f[3];
+  check(glint_ndf_open(path, NULL, &ndf) == GLINT_OK && glint_brdf_create(ndf, NULL, &brdf) == GLINT_OK,
+        "an asset opens twice");
+  glint_ndf_close(ndf);
+  check(glint_density(ndf, &p, 0, 0, &value) == GLINT_ERROR_USAGE && value == -1, "asking a closed handle is an error");
+  check(strstr(glint_error_message(), "closed") != NULL, "the message says so");
+  check(glint_brdf_evaluate(brdf, &p, up, up, f, NULL) == GLINT_OK, "a BRDF keeps its distribution");
+  glint_ndf_close(ndf);
+  glint_brdf_destroy(brdf);
+  glint_brdf_destroy(brdf);
+  check(glint_brdf_evaluate(brdf, &p, up, up, f, NULL) == GLINT_ERROR_USAGE, "asking a destroyed BRDF is an error");
+}
+
 int main(int argc, char** argv) {
   glint_ndf* ndf = NULL;
   if (argc != 3) return 99;
@@ -220,6 +269,9 @@ int main(int argc, char** argv) {
   check_bad_arguments(ndf);
   check_batches(ndf);
   check_brdf(ndf);
+  check_light(ndf);
+  check_packing(ndf);
+  check_closed(argv[1]);
   check_displaced(argv[2]);
   printf("%s, %d x %d texels, %d levels: %d broken promises\n", info.kind, (int)info.width, (int)info.height,
          (int)info.level_count, broken);

@@ -135,7 +135,7 @@ class LightSampler {
       total_flux += flux(k);
     }
     if (!(total_flux > 0 && total_flux < kLargest)) {
-      lights_.count = 0;
+      for (std::size_t k = 0; k < lights.count; ++k) shares[k] = 0;
       return;
     }
     const bool by_contribution = total > 0 && total < kLargest;
@@ -143,6 +143,9 @@ class LightSampler {
     for (std::size_t k = 0; k < lights.count; ++k)
       shares[k] = flux_share * (flux(k) / total_flux) + (by_contribution ? (1 - kFluxShare) * (shares[k] / total) : 0.0f);
   }
+
+  /// Samples by probabilities that another sampler has filled for the same lobes.
+  GLINT_HD LightSampler(const SphericalGaussians& lights, const float* shares) : lights_(lights), shares_(shares) {}
 
   /// @param xi  in [0, 1)^2
   /// @note O(lobes)
