@@ -10,20 +10,30 @@
 namespace glint::api {
 namespace {
 
-void requireSameMap(const formats::Asset& asset, const std::filesystem::path& path, const NdfInfo& info, const NormalMap& map,
-                    const std::filesystem::path& normals_path) {
-  // A pyramid names its map as an input. A compressed pyramid names the map as an input of the pyramid. Where a file names no map,
-  // only the sizes can be compared.
+/// The inputs that may be the map of an asset. A pyramid names its map as an input. A compressed pyramid names the map as an input
+/// of the pyramid.
+std::vector<formats::InputRecord> mapsOf(const formats::Asset& asset) {
   const bool pyramid = asset.kind() == "ndf-pyramid";
   std::vector<formats::InputRecord> maps;
   for (const formats::InputRecord& input : asset.info().provenance.inputs)
     if (pyramid || formats::isChained(input)) maps.push_back(input);
+  return maps;
+}
+
+/// Where an asset names no map, only the sizes can be compared.
+void requireSameMap(const formats::Asset& asset, const std::filesystem::path& path, const NdfInfo& info, const NormalMap& map,
+                    const std::filesystem::path& normals_path) {
+  const std::vector<formats::InputRecord> maps = mapsOf(asset);
   const std::string hash = maps.empty() ? std::string() : formats::hashFile(normals_path);
   const bool named =
       maps.empty() || std::any_of(maps.begin(), maps.end(), [&](const auto& input) { return input.hash_hex == hash; });
   if (named && map.width == info.width && map.height == info.height) return;
+  std::string remedy = "give the asset that glint-pyramid read";
+  if (!maps.empty())
+    remedy += ", " + maps.front().name.substr(maps.front().name.rfind('/') + 1) + ", as it was then (hash " +
+              maps.front().hash_hex + "), or make the pyramid again from this one";
   throw Error(ErrorCode::invalid_input, "query.normals", normals_path.string(), "",
-              "this is not the map that " + path.string() + " was made from", "give the asset that glint-pyramid read");
+              "this is not the map that " + path.string() + " was made from", remedy);
 }
 
 [[noreturn]] void refuseKind(std::string_view kind, const std::filesystem::path& path) {

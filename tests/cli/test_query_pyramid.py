@@ -259,7 +259,10 @@ def test_below_the_finest_level_needs_the_normals(ask, assets, kind):
 
 def test_normals_of_another_map_are_invalid_input(ask, assets, glint):
     question = ["--uv", "0.3", "0.7", "--sigma", "3", "--half", "0", "0"]
-    assert ask("pyramid", *question, "--normals", assets["other"]).returncode == 3
+    for kind in ("pyramid", "compressed"):  # of the same size: told apart by the hash that the asset names
+        process = ask(kind, *question, "--normals", assets["other"])
+        assert process.returncode == 3
+        assert "is not the map" in process.stderr and "give the asset that glint-pyramid read, normals.glint" in process.stderr
     glint("synth", "isotropic", "--size", "64", "-o", "small.exr")
     glint("ingest", "small.exr", "-o", "small.glint")
     for kind in ("pyramid", "compressed"):
