@@ -9,6 +9,13 @@ namespace glint {
 
 /// Deviation of the pixel filter that `footprintFromDifferentials` assumes, in pixels: the usual Gaussian filter of renderers.
 inline constexpr float kPixelFilterSigma = 0.5f;
+/// Deviation of the pixel filter for one of several jittered samples of a pixel, pixels: 0.5 / sqrt(samples), the part of the pixel
+/// that the sample stands for. The filter that the renderer weighs samples by does the rest. A whole pixel's footprint at every
+/// jittered sample would filter twice.
+/// @param samples  of a pixel, 1 at least
+inline GLINT_HD float sampleFilterSigma(int samples) {
+  return kPixelFilterSigma / std::sqrt(static_cast<float>(std::max(1, samples)));
+}
 /// Half axes are cut to this length (texels), so that their squares are finite.
 inline constexpr float kLongestAxis = 1e15f;
 

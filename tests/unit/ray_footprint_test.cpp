@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <utility>
 
 #include "glint/query/detail/common/footprint_weights.h"
 
@@ -24,6 +26,18 @@ TEST(RayFootprint, OfAPixelIsItsFilterInTexels) {
   EXPECT_NEAR(sheared.covariance.xx, 16, 1e-4f);
   EXPECT_NEAR(sheared.covariance.xy, 8, 1e-4f);
   EXPECT_NEAR(sheared.covariance.yy, 5, 1e-4f);
+}
+
+TEST(RayFootprint, JitterAndFootprintsOfSamplesAddUpToAboutThePixelsFilter) {
+  // Samples that are spread like the filter of a pixel, each with its own footprint: variances add.
+  constexpr float kTexels = 8;  // of a pixel
+  for (const auto& [samples, widened] : {std::pair{1, 1.41421356f}, {4, 1.11803399f}, {16, 1.03077641f}}) {
+    const Footprint p =
+        footprintFromDifferentials({}, {kTexels / 100, 0}, {0, kTexels / 100}, 100, 100, sampleFilterSigma(samples));
+    const float jitter = kPixelFilterSigma * kTexels, whole = std::sqrt(jitter * jitter + p.covariance.xx);
+    EXPECT_NEAR(whole / jitter, widened, 1e-5f) << samples;
+  }
+  EXPECT_EQ(sampleFilterSigma(0), kPixelFilterSigma);
 }
 
 TEST(RayFootprint, BadDifferentialsGiveUsableFootprints) {
