@@ -257,6 +257,20 @@ def test_below_the_finest_level_needs_the_normals(ask, assets, kind):
     assert ask(kind, "--csv", "q.csv", "-o", "a.csv", "--normals", assets["normals"]).returncode == 0
 
 
+@pytest.mark.parametrize("kind", MODELS)
+def test_positions_far_out_are_those_of_the_map(ask, kind):
+    """Next to 4096 floats are an eighth of a texel of this map apart."""
+    near, far = ("0.3", "0.7"), ("4096.3", "-4095.3")
+    ask_at = lambda uv: number(ask(kind, "--uv", *uv, "--sigma", "14", "--half", "0.02", "-0.03"))
+    assert ask_at(near) > 0
+    assert ask_at(far) == pytest.approx(ask_at(near), rel=PRINTED)
+    rows = "".join(f"{u},{v},14,0.02,-0.03\n" for u, v in (near, far))
+    (ask.folder / "q.csv").write_text("u,v,sigma,hx,hy\n" + rows)
+    assert ask(kind, "--csv", "q.csv", "-o", "a.csv").returncode == 0
+    a, b = (float(line.split(",")[-1]) for line in (ask.folder / "a.csv").read_text().splitlines()[1:])
+    assert a == pytest.approx(b, rel=PRINTED)
+
+
 def test_normals_of_another_map_are_invalid_input(ask, assets, glint):
     question = ["--uv", "0.3", "0.7", "--sigma", "3", "--half", "0", "0"]
     for kind in ("pyramid", "compressed"):  # of the same size: told apart by the hash that the asset names
