@@ -33,6 +33,10 @@ bench: build  ## time whole commands and queries on 2K^2 maps; writes build/benc
 bench-report: bench  ## the same, and write docs/BENCHMARKS.md, its charts and docs/benchmarks.csv
 	@$(PYTHON) tests/bench/report.py build/bench/results.json --docs docs
 
+.PHONY: limits
+limits: build  ## draw with every method, compare with brute force; writes docs/LIMITS.md and its pictures
+	@$(PYTHON) tests/render/compare.py --bin build/bin --out build/limits --docs docs
+
 # Asks for Doxygen and graphviz here only: nothing else needs them.
 .PHONY: docs
 docs:  ## the API reference, in build/docs/html; lists public names without a contract
