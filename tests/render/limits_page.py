@@ -1,6 +1,7 @@
 """Writes docs/LIMITS.md and docs/limits.csv from the figures of compare.py."""
 
 import csv
+import textwrap
 from math import radians, tan
 
 from gallery import MODELS, REFERENCES, reference_of
@@ -149,7 +150,7 @@ def failure_section(rows, model):
     """What is seen, and a folded list of the missed targets."""
     over = misses(rows, model=model)
     judged = [row for row in select(rows, model=model) if row["figure"] in TARGETS]
-    text = f"### {model}\n\n{SEEN.get(model, '')}\n\n"
+    text = f"### {model}\n\n{textwrap.fill(SEEN[model], 150)}\n\n"
     if not over:
         return text + f"All {len(judged)} targets are met."
     lines = [f"- {row['figure']}: {shown_value(row['figure'], row['value'])} ({place_of(row)})" for row in over]
