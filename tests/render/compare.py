@@ -110,13 +110,15 @@ class Comparison:
                 self.add(model, "change with size", measures.change(*(picture.radiance[0] for picture in pair)), sigma=sigma, light=light)
 
     def borders(self):
-        """Steps of the error across borders of blocks over steps beside them, of all distances together. Pyramids have blocks."""
+        """Steps of the error across borders of blocks over steps beside them, of all distances together, as a screen shows them: else only
+        the brightest pixels would count. Pyramids have blocks."""
         for model in filter(has_blocks, self.models):
             steps = {light: [] for light in self.lights}
             for distance in self.distances:
                 half = self.pictures[model, distance].half
                 for light, picture, truth in self.pairs(model, distance):
-                    steps[light].append(measures.border_steps(picture - truth, half))
+                    error = measures.shown(picture, self.exposure(light)) - measures.shown(truth, self.exposure(light))
+                    steps[light].append(measures.border_steps(error, half))
             for light, pairs in steps.items():
                 across, near = (np.concatenate(parts) for parts in zip(*pairs))
                 if measures.rms(near) > 0:

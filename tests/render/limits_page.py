@@ -6,7 +6,7 @@ from math import radians, tan
 
 from gallery import MODELS, REFERENCES, reference_of
 
-# Largest values that a good method has. Steps: 1 is the noise beside a border, which pictures of 48^2 pixels tell to a fifth.
+# Largest values that a good method has. Steps: 1 is the noise beside a side of a block, which the sides of five pictures tell to a tenth.
 TARGETS = {"energy": 0.02, "flicker": 1.1, "change with size": 0.03, "steps at borders": 1.2}
 PERCENT = {"energy", "rmse", "change with size"}
 PLACES = ("distance", "light", "sigma")
@@ -44,7 +44,7 @@ of the scene.
 | FLIP | difference that a person sees in turns of the two pictures, 0 to 1 (flip-evaluator, 67 pixels for a degree) | |
 | flicker | RMS of the second difference of three frames, each moved by 1/8 pixel, over that of the Reference's frames | <= 1.1 |
 | change with size | RMS change of a picture for a footprint larger by 1 %, at sizes from .7 to 4 times level 0's | <= 3 %, or 1.1 times the Reference's |
-| steps at borders | RMS steps of the error between pixels on either side of a border of 16-pixel blocks, over those of the pixels beside it | <= 1.2 |
+| steps at borders | RMS steps of the error, as a screen shows it, across a side of a 16-pixel block, over those beside it; steps that agree along a side count more, as lines do | <= 1.2 |
 
 The time is that of one mean over a range on one core; a picture asks one for each strip of the light and pixel. The Reference visits the texels of a
 footprint once for all strips.

