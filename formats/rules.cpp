@@ -63,7 +63,8 @@ constexpr std::array kIndexRules = {
     Rule{"shape.resolution", error, invalid_input, "the image resolution is a multiple of 16", kMakeAgain},
     Rule{"shape.strides", error, invalid_input, "each level's stride is twice the one before", kMakeAgain},
     Rule{"shape.slopes", error, invalid_input, "slope_covariance is a covariance", kMakeAgain},
-    Rule{"shape.grid", error, invalid_input, "a level's grid is ceil(size / stride), or 1 x 1 of the last level", kMakeAgain},
+    Rule{"shape.grid", error, invalid_input, "a level's grid is ceil(size overlap / stride), or 1 x 1 of the last level",
+         kMakeAgain},
     Rule{"sh.grid", error, invalid_input, "a grid is 0 x 0 (lobes only) or has at least 2 rows and 3 columns", kMakeAgain},
 };
 

@@ -9,7 +9,12 @@
 namespace glint::apps {
 
 PyramidOptions::PyramidOptions(Tool& tool) {
-  tool.option("--stride", values_.stride, "texels between the footprints of the finest level").range(2, 65536);
+  tool.option("--stride", values_.stride,
+              "stride of the finest level, texels; its footprints have a deviation of 0.433 strides")
+      .range(2, 65536);
+  tool.option("--overlap", values_.overlap, "footprints in a stride along each axis; 1: the grid of Deng 2022")
+      .range(1, kMostOverlap)
+      .defaultText("sqrt(2)");
   tool.option("--resolution", values_.resolution, "pixels of an NDF image along each axis, a multiple of 16").range(32, 1024);
   tool.option("--sigma-r", values_.sigma_r, "intrinsic roughness: standard deviation of a facet's lobe, disk units");
   tool.choice("--surface", values_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
@@ -48,8 +53,11 @@ nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid) {
          {"occupied", static_cast<double>(blocks) / (static_cast<double>(grid.imageCount()) * pyramid.shape.blocksPerImage())},
          {"size_bytes", level_bytes}});
   }
-  return {
-      {"levels", levels}, {"size_bytes", bytes}, {"resolution", pyramid.shape.resolution}, {"sigma_r", pyramid.shape.sigma_r}};
+  return {{"levels", levels},
+          {"size_bytes", bytes},
+          {"resolution", pyramid.shape.resolution},
+          {"overlap", pyramid.shape.overlap},
+          {"sigma_r", pyramid.shape.sigma_r}};
 }
 
 std::string pyramidText(const bake::NdfPyramidData& pyramid) {

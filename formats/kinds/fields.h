@@ -72,6 +72,12 @@ class SchemaFields {
   void real(std::string_view name, float, Range range, std::string_view units, std::string_view long_name, int since = 0) {
     add({name, ElementType::f32, "", units, long_name, range.minimum, range.maximum, {}, since});
   }
+  /// A number that a file need not have. Files without it have `absent`, and `absent` is not written.
+  void realUnless(float, std::string_view name, float, Range range, std::string_view units, std::string_view long_name) {
+    AttributeSchema attribute = {name, ElementType::f32, "", units, long_name, range.minimum, range.maximum};
+    attribute.required = false;
+    schema_.attributes.push_back(attribute);
+  }
   template <class Enum>
   void choice(std::string_view name, Enum, std::string_view values, std::string_view long_name, int since = 0) {
     add({name, ElementType::text, "", "1", long_name, 0, 0, values, since});
@@ -143,6 +149,10 @@ class PackFields {
 
   void integer(std::string_view name, int value, Range range, std::string_view, std::string_view, int = 0);
   void real(std::string_view name, float value, Range range, std::string_view, std::string_view, int = 0);
+  void realUnless(float absent, std::string_view name, float value, Range range, std::string_view units,
+                  std::string_view long_name) {
+    if (value != absent) real(name, value, range, units, long_name);
+  }
   template <class Enum>
   void choice(std::string_view name, Enum value, std::string_view values, std::string_view, int = 0) {
     text(name, static_cast<int>(value), values);
@@ -214,6 +224,10 @@ class ReadFields {
   }
   void real(std::string_view name, float& value, Range, std::string_view, std::string_view, int = 0) {
     if (const AttributeValue* found = find(name)) value = static_cast<float>(found->numbers[0]);
+  }
+  void realUnless(float absent, std::string_view name, float& value, Range, std::string_view, std::string_view) {
+    const AttributeValue* found = find(name);
+    value = found != nullptr ? static_cast<float>(found->numbers[0]) : absent;
   }
   template <class Enum>
   void choice(std::string_view name, Enum& value, std::string_view values, std::string_view, int = 0) {

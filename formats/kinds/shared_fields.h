@@ -49,12 +49,14 @@ void describeShape(Fields auto& fields, auto& shape) {
   fields.real("sigma_r", shape.sigma_r, kDiskUnits, "1", "intrinsic roughness: standard deviation in disk units");
   fields.choice("surface", shape.surface, "flat|smooth", "normals between texel centres");
   fields.choice("boundary", shape.boundary, "wrap|clamp", "what lies beyond the border of the map");
+  fields.realUnless(1, "overlap", shape.overlap, {1, kMostOverlap}, "1",
+                    "footprints in a stride along each axis; 1 where it is absent");
   fields.integer("level_count", shape.level_count, {1, kMaxPyramidLevels}, "1", "number of levels");
   const auto strides = [&](int l) -> auto& { return shape.levels[l].stride; };
   const auto columns = [&](int l) -> auto& { return shape.levels[l].columns; };
   const auto rows = [&](int l) -> auto& { return shape.levels[l].rows; };
   fields.levelReals("level_strides", shape.level_count, strides, {FLT_MIN, kMaxMapSize}, "texel",
-                    "distance between footprint centres of each level");
+                    "stride of each level, which the size of its footprints follows");
   fields.levelIntegers("level_columns", shape.level_count, columns, kMapSize, "1", "footprints along u of each level");
   fields.levelIntegers("level_rows", shape.level_count, rows, kMapSize, "1", "footprints along v of each level");
   describeSlopes(fields, shape.slopes);

@@ -18,6 +18,8 @@ static_assert(static_cast<int>(Surface::flat) == GLINT_SURFACE_FLAT &&
               static_cast<int>(Surface::smooth) == GLINT_SURFACE_SMOOTH);
 static_assert(static_cast<int>(Boundary::wrap) == GLINT_BOUNDARY_WRAP &&
               static_cast<int>(Boundary::clamp) == GLINT_BOUNDARY_CLAMP);
+static_assert(static_cast<int>(Interpolation::footprint) == GLINT_INTERPOLATION_FOOTPRINT &&
+              static_cast<int>(Interpolation::trilinear) == GLINT_INTERPOLATION_TRILINEAR);
 static_assert(static_cast<int>(ErrorCode::usage) == GLINT_ERROR_USAGE &&
               static_cast<int>(ErrorCode::unsupported) == GLINT_ERROR_UNSUPPORTED);
 
@@ -111,7 +113,7 @@ using namespace glint::api::c;
 constexpr float kLeastSigmaR = 1e-4f, kMostSigmaR = 0.25f;
 /// Size of the options in the first version of the struct.
 constexpr std::size_t kFirstOptionsSize = offsetof(glint_open_options, verify_hashes) + sizeof(int32_t);
-static_assert(offsetof(glint_open_options, footprint_parts) + sizeof(int32_t) == sizeof(glint_open_options),
+static_assert(offsetof(glint_open_options, reserved) + sizeof(int32_t) == sizeof(glint_open_options),
               "padding at the end would be read as a member by a later library");
 
 /// @return null if the options can be used, else the fault
@@ -129,6 +131,9 @@ const char* takeOptions(const glint_open_options* from, glint_open_options& to) 
     return "gaussian_boxes is not 1 or 3; give 0 for 1";
   if (!(to.footprint_parts >= 0 && to.footprint_parts <= IsotropicParts::kMost))
     return "footprint_parts is not in 1 to 32; give 0 for 32";
+  if (to.interpolation != GLINT_INTERPOLATION_FOOTPRINT && to.interpolation != GLINT_INTERPOLATION_TRILINEAR)
+    return "unknown interpolation";
+  if (to.reserved != 0) return "reserved is not 0";
   return nullptr;
 }
 
@@ -142,6 +147,7 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   options.alpha = o.alpha;
   if (o.slant_tolerance != 0) options.slant_tolerance = std::max(0.0f, o.slant_tolerance);
   if (o.footprint_parts != 0) options.footprint_parts = o.footprint_parts;
+  options.interpolation = static_cast<Interpolation>(o.interpolation);
   if (o.gaussian_boxes == 3) options.gaussian_boxes = GaussianBoxes::three;
   return options;
 }
@@ -195,6 +201,7 @@ glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* info) {
   all.surface = static_cast<int32_t>(from.surface);
   all.boundary = static_cast<int32_t>(from.boundary);
   all.has_normals = ndf->body().opened.hasNormals() ? 1 : 0;
+  all.smallest_sigma_texels = from.smallest_sigma_texels;
   all.file_bytes = ndf->body().opened.asset().info().file_bytes;
   return giveSized(all, info) ? GLINT_OK : usage("glint_ndf_info", kWrongStructSize);
 }

@@ -73,6 +73,10 @@ typedef struct glint_ndf glint_ndf;
 
 enum { GLINT_SURFACE_FLAT = 0, GLINT_SURFACE_SMOOTH = 1 };
 enum { GLINT_BOUNDARY_WRAP = 0, GLINT_BOUNDARY_CLAMP = 1 };
+enum {
+  GLINT_INTERPOLATION_FOOTPRINT = 0, /* 16 images, weighed so that together they see the footprint; 32 between levels */
+  GLINT_INTERPOLATION_TRILINEAR = 1  /* 8 images: quicker, and answers a wider footprint */
+};
 
 /* Structs that start with a struct_size may grow: it says which version of the struct the caller has. A size that is smaller
  * than the first version's or above this is no size of a struct, and GLINT_ERROR_USAGE. */
@@ -94,12 +98,15 @@ typedef struct glint_open_options {
   int32_t gaussian_boxes;   /* kind histogram-sat: boxes that stand for a Gaussian footprint, 1 or 3; 0: 1 */
   int32_t footprint_parts;  /* kinds ndf-pyramid and ndf-cp: most round footprints that stand for a stretched one, up to 32,
                                each at the cost of one; 1: one of the same mean square size, whatever the shape; 0: 32 */
+  int32_t interpolation;    /* kinds ndf-pyramid and ndf-cp: GLINT_INTERPOLATION_*, how footprints between the stored ones are
+                               answered */
+  int32_t reserved;         /* 0 */
 } glint_open_options;
 
 #define GLINT_SLANT_EXACT (-1.0f)
 
 /* clang-format off */
-#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f, 0.0f, 0, 0 }
+#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f, 0.0f, 0, 0, 0, 0 }
 /* clang-format on */
 
 /* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat.
@@ -131,6 +138,8 @@ typedef struct glint_ndf_info {
   float coarsest_sigma_texels; /* footprint of the last level, above which answers tend to the mean of the map; 0 where
                                   there are no levels */
   uint64_t file_bytes;         /* size of the asset */
+  float smallest_sigma_texels; /* smallest footprint that is answered as wide as it is asked for, deviation in texels; smaller
+                                  ones are answered up to this wide. 0 where there are no levels, or the normals are given */
 } glint_ndf_info;
 
 /* Fills info. Returns GLINT_ERROR_USAGE for null arguments or a struct_size that does not reach beyond itself or is

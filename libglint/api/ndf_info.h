@@ -26,6 +26,9 @@ struct NdfInfo {
   float finest_sigma_texels = 0;  ///< deviation of the footprints of level 0; 0 where there are no levels
   /// Deviation of the footprints of the last level; larger ones tend to the mean of the map. 0 where there are no levels.
   float coarsest_sigma_texels = 0;
+  /// Deviation of the smallest footprint that is answered as wide as it is asked for; smaller ones are answered up to this wide. 0
+  /// where there are no levels, or the normals are given.
+  float smallest_sigma_texels = 0;
 };
 
 }  // namespace glint::api

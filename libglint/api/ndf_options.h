@@ -6,6 +6,7 @@
 #include "glint/model/normal_map.h"
 #include "glint/query/anisotropic_ndf.h"
 #include "glint/query/histogram_ndf.h"
+#include "glint/query/interpolation.h"
 
 namespace glint::api {
 
@@ -20,7 +21,9 @@ struct NdfOptions {
   float slant_tolerance = kSlantTolerance;      ///< kind histogram-sat: share of a slanted footprint that may be misplaced
   int footprint_parts = IsotropicParts::kMost;  ///< kinds ndf-pyramid and ndf-cp: most round footprints that stand for a
                                                 ///< stretched one; 1: one of the same mean square size
-  formats::OpenOptions checks;                  ///< checks of the asset and of `normals`
+  /// Kinds ndf-pyramid and ndf-cp: how footprints between the stored ones are answered.
+  Interpolation interpolation = Interpolation::footprint;
+  formats::OpenOptions checks;  ///< checks of the asset and of `normals`
 };
 
 }  // namespace glint::api

@@ -45,6 +45,7 @@ class Packer {
     header_.sigma_r = shape.sigma_r;
     header_.surface = static_cast<std::uint32_t>(shape.surface);
     header_.boundary = static_cast<std::uint32_t>(shape.boundary);
+    header_.overlap = shape.overlap;
     header_.level_count = shape.level_count;
     header_.slope_mean[0] = shape.slopes.mean.x;
     header_.slope_mean[1] = shape.slopes.mean.y;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -18,11 +19,14 @@ inline constexpr int kMaxPyramidLevels = 16;
 /// Most 64-bit words that an image's mask of blocks can have: images of 1024^2.
 inline constexpr int kMostMaskWords = 64;
 
-/// The grid of footprints of one level: centres ((i + 0.5) stride, (j + 0.5) stride) in texels.
+/// Most footprints in a stride along each axis.
+inline constexpr float kMostOverlap = 4;
+
+/// The grid of footprints of one level. PyramidShape::centre has their centres.
 struct PyramidGrid {
-  float stride = 0;  ///< texels
-  int columns = 0;   ///< ceil(width / stride); 1 in the mean of the map
-  int rows = 0;      ///< ceil(height / stride); 1 in the mean of the map
+  float stride = 0;  ///< texels; the footprint has a deviation of kFootprintPerStride strides
+  int columns = 0;   ///< ceil(width overlap / stride); 1 in the mean of the map
+  int rows = 0;      ///< ceil(height overlap / stride); 1 in the mean of the map
 
   GLINT_HD constexpr std::size_t imageCount() const { return rowMajorIndex(0, rows, columns); }
 };
@@ -35,6 +39,9 @@ struct PyramidShape {
   float sigma_r = 0;   ///< intrinsic roughness, disk units
   Surface surface = Surface::flat;
   Boundary boundary = Boundary::wrap;
+  /// Footprints in a stride along each axis, 1 to kMostOverlap. With 1, centres are one stride apart, and the gap across the
+  /// border of the map is what is left. With more, centres are spread evenly over the map.
+  float overlap = 1;
   int level_count = 0;
   PyramidGrid levels[kMaxPyramidLevels];
   MapSlopes slopes;  ///< of the normal map's texels, without sigma_r
@@ -43,6 +50,24 @@ struct PyramidShape {
   GLINT_HD constexpr bool endsInMean() const { return level_count > 1 && levels[level_count - 1].imageCount() == 1; }
   /// Levels of Gaussian footprints: all levels but the mean.
   GLINT_HD constexpr int footprintLevels() const { return level_count - (endsInMean() ? 1 : 0); }
+  /// Columns or rows of a level of footprints.
+  /// @param size  width or height of the map, texels
+  GLINT_HD int centresAlong(int size, float stride) const {
+    return static_cast<int>(std::ceil(static_cast<double>(size) * double{overlap} / double{stride}));
+  }
+  /// Distance between neighbouring centres of a level of footprints along u and v, texels.
+  GLINT_HD Vec2 spacing(int level) const {
+    const PyramidGrid& grid = levels[level];
+    if (overlap == 1) return {grid.stride, grid.stride};
+    return {static_cast<float>(width) / static_cast<float>(grid.columns),
+            static_cast<float>(height) / static_cast<float>(grid.rows)};
+  }
+  /// Centre of footprint (i, j) of a level, texels.
+  GLINT_HD Vec2 centre(int level, int i, int j) const {
+    const Vec2 gap = spacing(level);
+    return {(static_cast<float>(i) + 0.5f) * gap.x, (static_cast<float>(j) + 0.5f) * gap.y};
+  }
+
   GLINT_HD constexpr int blocksPerAxis() const { return resolution / kBlockSize; }
   GLINT_HD constexpr int blocksPerImage() const { return blocksPerAxis() * blocksPerAxis(); }
   /// 64-bit words that hold one occupancy bit for each block of an image.

@@ -39,7 +39,7 @@ static_assert(sizeof(PackedGrid) == 16);
 enum class PackedKind : std::uint32_t { normals = 0, pyramid = 1, compressed = 2, unknown = 0xffffffff };
 
 inline constexpr std::uint32_t kPackedMagic = 0x6e6c6721;  // "!gln"
-inline constexpr std::uint32_t kPackedVersion = 3;
+inline constexpr std::uint32_t kPackedVersion = 4;
 inline constexpr std::size_t kPackedAlignment = 64;
 /// Numbers of arrays of a level of a pyramid, and of a compressed pyramid. PackedHeader::arrays has room for either.
 inline constexpr int kPackedArrays = 4 * kMaxPyramidLevels;
@@ -62,7 +62,7 @@ struct PackedHeader {
   float value_scale;                                         //  56  pyramid
   std::int32_t regions;                                      //  60  compressed
   std::int32_t places;                                       //  64
-  std::uint32_t unused;                                      //  68  0
+  float overlap;                                             //  68  0 for normals
   std::int32_t bounds_level_count;                           //  72  of the normals
   float texel_size_um;                                       //  76
   PackedGrid levels[kMaxPyramidLevels];                      //   80

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "glint/math/bits.h"
 #include "glint/model/ndf_cp.h"
 #include "glint/query/detail/common/sampling.h"
@@ -10,7 +12,9 @@
 #include "glint/query/detail/pyramid/block_mass.h"
 #include "glint/query/detail/pyramid/block_rows.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
-#include "glint/query/reference.h"
+#include "glint/query/detail/pyramid/texel_blend.h"
+#include "glint/query/interpolation.h"
+#include "glint/query/ndf_model.h"
 
 namespace glint {
 
@@ -27,29 +31,24 @@ class CpNdf {
   static constexpr int kMostBlocks = 64 * 64;  // blocks of the largest image, 1024^2 pixels
 
  public:
-  GLINT_HD explicit CpNdf(const NdfCp& ndf) : ndf_(ndf), chooser_(ndf.shape) {}
-  GLINT_HD CpNdf(const NdfCp& ndf, const NormalMap& normals)
-      : ndf_(ndf),
-        chooser_(ndf.shape),
-        below_(Reference(normals, ndf.shape.sigma_r, ndf.shape.surface, ndf.shape.boundary, Reference::Search::pruned)) {}
+  GLINT_HD explicit CpNdf(const NdfCp& ndf, Interpolation interpolation = Interpolation::footprint)
+      : ndf_(ndf), chooser_(ndf.shape, interpolation) {}
+  GLINT_HD CpNdf(const NdfCp& ndf, const NormalMap& normals, Interpolation interpolation = Interpolation::footprint)
+      : ndf_(ndf), chooser_(ndf.shape, interpolation), below_(ndf.shape, normals) {}
 
   GLINT_HD const NdfCp& ndfCp() const { return ndf_; }
   /// Whether footprints below level 0 are answered from the texels.
-  GLINT_HD bool hasNormals() const { return below_.hasMap(); }
+  GLINT_HD bool hasNormals() const { return below_.hasNormals(); }
   GLINT_HD const PyramidShape& shape() const { return ndf_.shape; }
-  /// Whether this footprint is answered from the texels.
-  GLINT_HD bool fromTexels(const Footprint& p) const { return hasNormals() && belowFinest(shape(), p); }
+  /// Whether the texels have a share in the answer of this footprint.
+  GLINT_HD bool fromTexels(const Footprint& p) const { return below_.share(p) > 0; }
+  /// As PyramidNdf::smallestSigma.
+  GLINT_HD float smallestSigma() const { return hasNormals() ? 0 : std::sqrt(smallestSeenVariance(shape())); }
 
-  /// Density towards h, >= 0; O(columns) in each of 8 images.
+  /// Density towards h, >= 0; O(columns) in each of 16 or 32 images, or of 8 (Interpolation).
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    if (fromTexels(p)) return below_.density(p, h);
-    const PyramidSlices chosen = chooser_.choose(p);
-    const PixelPlace place = pixelPlace(shape(), h);
-    return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
-      return finitePositive(
-          sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<Reader>{reader, place}, Positive{}));
-    });
+    return below_.density(p, h, [&] { return imageDensity(p, h); });
   }
 
   /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value, and a point evenly in
@@ -58,7 +57,10 @@ class CpNdf {
   /// Stored masses are rounded up, by at most a sixteenth. Where `xi` falls into the excess, another block is drawn with the
   /// digits of `xi` that are left: one time in forty on average. O(16 columns). O(256 columns) where `xi` falls into the excess
   /// or into mass that negative pixels of the same row hide.
-  GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const;
+  GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
+    return below_.sample(
+        p, xi, [&](Vec2 x) { return imageSample(p, x); }, [&](Vec2 h) { return insideSquare(h) ? imageDensity(p, h) : 0.0f; });
+  }
 
   /// Average over a box of half vectors, >= 0, 0 if the box is empty; O(columns) for each block that the box covers.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const { return finitePositive(signedMean(p, range)); }
@@ -66,29 +68,40 @@ class CpNdf {
   /// Density that keeps negative pixels. Infinite or NaN where numbers of the file are.
   GLINT_HD float signedDensity(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    if (fromTexels(p)) return below_.density(p, h);
-    const PyramidSlices chosen = chooser_.choose(p);
-    const PixelPlace place = pixelPlace(shape(), h);
-    return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
-      return sumSlices(chosen, place.block, ndf_.image_scales.data(), PixelOf<Reader>{reader, place}, Signed{});
+    return below_.density(p, h, [&] {
+      const PixelPlace place = pixelPlace(shape(), h);
+      return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
+        return sumSlices(chooser_.choose(p), place.block, ndf_.image_scales.data(), PixelOf<Reader>{reader, place}, Signed{});
+      });
     });
   }
 
   /// Exact average of signedDensity over a box of half vectors, 0 if the box is empty.
   GLINT_HD float signedMean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
-    if (fromTexels(p)) return below_.mean(p, range);
-    const PyramidSlices chosen = chooser_.choose(p);
-    return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
-      double sum = 0;
-      forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
-        sum += double{sumSlices(chosen, block, ndf_.image_scales.data(), BoxOf<Reader>{reader, box}, Signed{})};
+    return below_.mean(p, range, [&] {
+      const PyramidSlices chosen = chooser_.choose(p);
+      return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
+        double sum = 0;
+        forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
+          sum += double{sumSlices(chosen, block, ndf_.image_scales.data(), BoxOf<Reader>{reader, box}, Signed{})};
+        });
+        return static_cast<float>(sum / areaInPixels(shape(), range));
       });
-      return static_cast<float>(sum / areaInPixels(shape(), range));
     });
   }
 
  private:
+  GLINT_HD float imageDensity(const Footprint& p, Vec2 h) const {
+    const PyramidSlices chosen = chooser_.choose(p);
+    const PixelPlace place = pixelPlace(shape(), h);
+    return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
+      return finitePositive(
+          sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<Reader>{reader, place}, Positive{}));
+    });
+  }
+  GLINT_HD HalfVectorSample imageSample(const Footprint& p, Vec2 xi) const;
+
   GLINT_HD std::size_t imageOf(const PyramidSlice& slice) const {
     return std::size_t{ndf_.first_image[slice.level]} + slice.image;
   }
@@ -153,7 +166,7 @@ class CpNdf {
   template <class Ask, class Part>
   GLINT_HD float sumSlices(const PyramidSlices& chosen, int block, const float* scales, const Ask& ask, Part part) const {
     const SlicePlaces places = findSlices(ndf_, chosen, block, scales);
-    for (int k = 0; k < PyramidSlices::kMost; ++k)
+    for (int k = 0; k < places.count; ++k)
       if (places.weights[k] > 0) ask.prefetch(ndf_.clusters.data()[places.clusters[k]], places.slices[k]);
     return sumSlices(places, ask, part);
   }
@@ -175,7 +188,8 @@ class CpNdf {
 
   template <class Ask, class Part>
   GLINT_HD float sumSlicesBy(const SlicePlaces& places, const Ask& ask, Part part) const {
-    unsigned left = lanesAbove0(Float4::load(places.weights)) | lanesAbove0(Float4::load(places.weights + 4)) << 4;
+    unsigned left = 0;
+    for (int k = 0; k < places.count; k += 4) left |= lanesAbove0(Float4::load(places.weights + k)) << k;
     float sum = 0;
     while (left != 0) {
       const int lowest = lowestBit(left);
@@ -187,7 +201,8 @@ class CpNdf {
         continue;
       }
       const auto shares = [&](int step) { return whereEqual(places.clusters + step, at, Float4::load(places.weights + step)); };
-      const unsigned here = lanesAbove0(shares(0)) | lanesAbove0(shares(4)) << 4;
+      unsigned here = 0;
+      for (int k = 0; k < places.count; k += 4) here |= lanesAbove0(shares(k)) << k;
       left &= ~here;
       if (cluster.columns == 0) {
         sum += addSpots(cluster, places, here, ask, part);
@@ -197,7 +212,7 @@ class CpNdf {
       float projection[ColumnLayout::kMost];
       ask.project(cluster, layout, projection);
       const auto rows = ask.reader.rows(cluster, layout);
-      for (int step = 0; step < PyramidSlices::kMost; step += 4) {
+      for (int step = 0; step < places.count; step += 4) {
         const unsigned lanes = here >> step & 15;
         if (lanes == 0) continue;
         const int first = step + lowestBit(lanes);
@@ -290,7 +305,7 @@ class CpNdf {
 
   NdfCp ndf_;
   SliceChooser chooser_;
-  Reference below_;
+  TexelBlend below_;
 };
 
 struct CpNdf::Draw {
@@ -381,8 +396,7 @@ GLINT_HD void CpNdf::choosePixelBy(const Reader& reader, Draw& draw) const {
 }
 
 // Defined after the templates that it calls, because clang instantiates only templates that it has read.
-inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) const {
-  if (fromTexels(p)) return below_.sample(p, clampUnit(xi));
+inline GLINT_HD HalfVectorSample CpNdf::imageSample(const Footprint& p, Vec2 xi) const {
   const PyramidSlices chosen = chooser_.choose(p);
   Draw draw = chooseImage(chosen, xi);
   chooseBlock(draw);
@@ -392,7 +406,7 @@ inline GLINT_HD HalfVectorSample CpNdf::sample(const Footprint& p, Vec2 xi) cons
     // Prefetches the slices that the pdf needs; they arrive while the pixel is chosen.
     const int block = draw.block;
     SlicePlaces places = findSlices(ndf_, chosen, block, ndf_.density_scales.data());
-    for (int k = 0; k < PyramidSlices::kMost; ++k)
+    for (int k = 0; k < places.count; ++k)
       if (places.weights[k] > 0) prefetch(reader.row(ndf_.clusters.data()[places.clusters[k]], places.slices[k]));
     choosePixel(reader, draw);
     if (draw.place.x < 0) return {};

@@ -33,9 +33,13 @@ class PackedNdfView {
                      static_cast<Boundary>(header_.boundary), Reference::Search::pruned);
   }
   /// Kind pyramid, with its normals if they were packed.
-  GLINT_HD PyramidNdf pyramidNdf() const { return hasNormals() ? PyramidNdf(pyramid(), normalMap()) : PyramidNdf(pyramid()); }
+  GLINT_HD PyramidNdf pyramidNdf(Interpolation interpolation = Interpolation::footprint) const {
+    return hasNormals() ? PyramidNdf(pyramid(), normalMap(), interpolation) : PyramidNdf(pyramid(), interpolation);
+  }
   /// Kind compressed, with its normals if they were packed.
-  GLINT_HD CpNdf cpNdf() const { return hasNormals() ? CpNdf(ndfCp(), normalMap()) : CpNdf(ndfCp()); }
+  GLINT_HD CpNdf cpNdf(Interpolation interpolation = Interpolation::footprint) const {
+    return hasNormals() ? CpNdf(ndfCp(), normalMap(), interpolation) : CpNdf(ndfCp(), interpolation);
+  }
 
   GLINT_HD NormalMap normalMap() const {
     NormalMap map;
@@ -107,6 +111,7 @@ class PackedNdfView {
     out.sigma_r = header_.sigma_r;
     out.surface = static_cast<Surface>(header_.surface);
     out.boundary = static_cast<Boundary>(header_.boundary);
+    out.overlap = header_.overlap;
     out.level_count = header_.level_count;
     for (int l = 0; l < header_.level_count; ++l)
       out.levels[l] = {header_.levels[l].stride, header_.levels[l].columns, header_.levels[l].rows};

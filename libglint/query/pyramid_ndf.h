@@ -1,47 +1,75 @@
 #pragma once
 
+#include <cmath>
+
 #include "glint/model/ndf_pyramid.h"
 #include "glint/query/detail/common/sampling.h"
 #include "glint/query/detail/pyramid/block_rows.h"
 #include "glint/query/detail/pyramid/pyramid_reader.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
-#include "glint/query/reference.h"
+#include "glint/query/detail/pyramid/texel_blend.h"
+#include "glint/query/interpolation.h"
+#include "glint/query/ndf_model.h"
 
 namespace glint {
 
-/// The NDF from a pyramid of images: exact (pixel means) at the centres of its levels, trilinear between them.
+/// The NDF from a pyramid of images.
 ///
-/// Footprints are answered as isotropic Gaussians of the same mean square size. Reference answers footprints below level 0 if
-/// the normals are given; else level 0 does. Answers of footprints larger than the map tend to its mean (SliceChooser). The
-/// density is constant over a pixel. Thread-safe, allocates nothing; the arrays must outlive it.
+/// Footprints are answered as isotropic Gaussians of the same mean square size. Between the centres and the sizes of the images
+/// see Interpolation. Reference answers footprints below level 0 if the normals are given, blended with the images up to a fifth
+/// above it (TexelBlend). Without normals level 0 answers them, too wide (smallestSigma). Answers of footprints larger than the
+/// map tend to its mean (SliceChooser). The density is constant over a pixel. Thread-safe, allocates nothing; the arrays must
+/// outlive it.
 class PyramidNdf {
  public:
-  GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid) : reader_(pyramid), chooser_(pyramid.shape) {}
-  GLINT_HD PyramidNdf(const NdfPyramid& pyramid, const NormalMap& normals)
-      : reader_(pyramid),
-        chooser_(pyramid.shape),
-        below_(Reference(normals, pyramid.shape.sigma_r, pyramid.shape.surface, pyramid.shape.boundary,
-                         Reference::Search::pruned)) {}
+  GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid, Interpolation interpolation = Interpolation::footprint)
+      : reader_(pyramid), chooser_(pyramid.shape, interpolation) {}
+  GLINT_HD PyramidNdf(const NdfPyramid& pyramid, const NormalMap& normals,
+                      Interpolation interpolation = Interpolation::footprint)
+      : reader_(pyramid), chooser_(pyramid.shape, interpolation), below_(pyramid.shape, normals) {}
 
   GLINT_HD const NdfPyramid& pyramid() const { return reader_.pyramid(); }
   GLINT_HD const PyramidShape& shape() const { return pyramid().shape; }
+  GLINT_HD const PyramidReader& reader() const { return reader_; }
+  GLINT_HD const SliceChooser& chooser() const { return chooser_; }
   /// Whether footprints below level 0 are answered from the texels.
-  GLINT_HD bool hasNormals() const { return below_.hasMap(); }
-  /// Whether this footprint is answered from the texels.
-  GLINT_HD bool fromTexels(const Footprint& p) const { return hasNormals() && belowFinest(shape(), p); }
+  GLINT_HD bool hasNormals() const { return below_.hasNormals(); }
+  /// Whether the texels have a share in the answer of this footprint.
+  GLINT_HD bool fromTexels(const Footprint& p) const { return below_.share(p) > 0; }
+  /// Deviation of the smallest footprint that is answered as wide as it is asked for, texels; 0 with normals. Smaller ones are
+  /// answered up to this wide.
+  GLINT_HD float smallestSigma() const { return hasNormals() ? 0 : std::sqrt(smallestSeenVariance(shape())); }
 
-  /// Density towards h, >= 0; O(1): one pixel in each of 8 images.
+  /// Density towards h, >= 0; O(1): one pixel in each of 16 or 32 images, or of 8 (Interpolation).
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    if (fromTexels(p)) return below_.density(p, h);
-    return reader_.pixelDensity(chooser_.choose(p), pixelPlace(shape(), h));
+    return below_.density(p, h, [&] { return imageDensity(p, h); });
   }
 
   /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value, and a point evenly in
   /// the pixel. The pdf is the density, whose integral is that of the images: 1 within 1e-3 in every valid file, within 1e-5 as
   /// glint-pyramid builds them. O(stored blocks of one image + 256).
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
-    if (fromTexels(p)) return below_.sample(p, clampUnit(xi));
+    return below_.sample(
+        p, xi, [&](Vec2 x) { return imageSample(p, x); }, [&](Vec2 h) { return insideSquare(h) ? imageDensity(p, h) : 0.0f; });
+  }
+
+  /// Average density over a box of half vectors, 0 if the box is empty. O(1) for each block that the box covers: the means of
+  /// whole blocks are stored, and a block that is covered in part sums at most 256 pixels.
+  GLINT_HD float mean(const Footprint& p, const Box2& range) const {
+    return below_.mean(p, range, [&] {
+      PyramidReader::PendingMean pending;
+      reader_.beginMean(chooser_.choose(p), range, pending);
+      return reader_.finishMean(range, pending);
+    });
+  }
+
+ private:
+  GLINT_HD float imageDensity(const Footprint& p, Vec2 h) const {
+    return reader_.pixelDensity(chooser_.choose(p), pixelPlace(shape(), h));
+  }
+
+  GLINT_HD HalfVectorSample imageSample(const Footprint& p, Vec2 xi) const {
     PyramidReader::Draw draw = reader_.chooseImage(chooser_.choose(p), xi);
     reader_.findBlocks(draw);
     reader_.prefetchIndex(draw.slices);
@@ -51,19 +79,9 @@ class PyramidNdf {
     return drawnAt(pointInPixel(shape(), draw.place, draw.xi), reader_.pixelDensity(draw.slices, draw.place));
   }
 
-  /// Average density over a box of half vectors, 0 if the box is empty. O(1) for each block that the box covers: the means of
-  /// whole blocks are stored, and a block that is covered in part sums at most 256 pixels.
-  GLINT_HD float mean(const Footprint& p, const Box2& range) const {
-    if (fromTexels(p)) return below_.mean(p, range);
-    PyramidReader::PendingMean pending;
-    reader_.beginMean(chooser_.choose(p), range, pending);
-    return reader_.finishMean(range, pending);
-  }
-
- private:
   PyramidReader reader_;
   SliceChooser chooser_;
-  Reference below_;
+  TexelBlend below_;
 };
 
 static_assert(NdfModel<PyramidNdf>);

@@ -430,8 +430,9 @@ TEST(Compress, PutsImagesInTheRegionOfTheirLevelAndCentre) {
     for (int j = 0; j < grid.rows; ++j) {
       for (int i = 0; i < grid.columns; ++i) {
         const std::uint32_t image = c.first_image[l] + j * grid.columns + i;
-        const auto region = [&](int k) { return std::min(2, static_cast<int>((k + 0.5) * grid.stride * 3 / 128)); };
-        EXPECT_EQ(c.image_regions[image], (l * 3 + region(j)) * 3 + region(i));
+        const auto region = [](float centre) { return std::min(2, static_cast<int>(centre * 3 / 128)); };
+        const Vec2 centre = c.shape.centre(l, i, j);
+        EXPECT_EQ(c.image_regions[image], (l * 3 + region(centre.y)) * 3 + region(centre.x));
         EXPECT_EQ(c.image_slots[image], next[c.image_regions[image]]++);
       }
     }

@@ -41,10 +41,9 @@ PyramidOptions withLevels(PyramidOptions o, int levels) {
 
 /// The footprint that image (i, j) of a level holds.
 Footprint footprintOf(const PyramidShape& shape, int level, int i, int j) {
-  const float stride = shape.levels[level].stride;
-  return Footprint::isotropic({(static_cast<float>(i) + 0.5f) * stride / static_cast<float>(shape.width),
-                               (static_cast<float>(j) + 0.5f) * stride / static_cast<float>(shape.height)},
-                              kFootprintPerStride * stride);
+  const Vec2 centre = shape.centre(level, i, j);
+  return Footprint::isotropic({centre.x / static_cast<float>(shape.width), centre.y / static_cast<float>(shape.height)},
+                              kFootprintPerStride * shape.levels[level].stride);
 }
 
 /// Calls visitor(level, i, j) for every image of a pyramid.
@@ -80,7 +79,9 @@ std::vector<float> storedImage(const NdfPyramid& pyramid, int level, int i, int 
 }
 
 TEST(PyramidShape, StridesDoubleWhileTheyAreShorterThanTheMapAndThenComesItsMean) {
-  const PyramidShape shape = pyramidShape(350, 200, options(32, 64, 0.02f));
+  PyramidOptions o = options(32, 64, 0.02f);
+  o.overlap = 1;
+  const PyramidShape shape = pyramidShape(350, 200, o);
   ASSERT_EQ(shape.level_count, 5);
   EXPECT_TRUE(shape.endsInMean());
   EXPECT_EQ(shape.footprintLevels(), 4);
@@ -93,6 +94,26 @@ TEST(PyramidShape, StridesDoubleWhileTheyAreShorterThanTheMapAndThenComesItsMean
   EXPECT_EQ(pyramidShape(8, 8, options(32, 64, 0.02f)).footprintLevels(), 1);
   EXPECT_EQ(pyramidShape(1 << 20, 1, options(2, 64, 0.02f)).level_count, kMaxPyramidLevels);
   EXPECT_THROW(pyramidShape(350, 200, withLevels(options(32, 64, 0.02f), 5)), Error);
+}
+
+TEST(PyramidShape, CentresOfOverlappingFootprintsAreSpreadEvenly) {
+  PyramidOptions o = options(32, 64, 0.02f);
+  o.overlap = 1.5f;
+  const PyramidShape shape = pyramidShape(350, 200, o);
+  ASSERT_EQ(shape.level_count, 5);
+  const PyramidGrid expected[] = {{32, 17, 10}, {64, 9, 5}, {128, 5, 3}, {256, 3, 2}, {512, 1, 1}};
+  for (int l = 0; l < 5; ++l) {
+    const PyramidGrid& grid = shape.levels[l];
+    EXPECT_EQ(grid.stride, expected[l].stride);
+    EXPECT_EQ(grid.columns, expected[l].columns);
+    EXPECT_EQ(grid.rows, expected[l].rows);
+    if (l == shape.footprintLevels()) continue;
+    EXPECT_LE(shape.spacing(l).x, grid.stride / o.overlap);
+    EXPECT_LE(shape.spacing(l).y, grid.stride / o.overlap);
+    const Vec2 first = shape.centre(l, 0, 0), last = shape.centre(l, grid.columns - 1, grid.rows - 1);
+    EXPECT_FLOAT_EQ(350 - last.x, first.x);  // the gap across the border is that of all centres
+    EXPECT_FLOAT_EQ(200 - last.y, first.y);
+  }
 }
 
 TEST(Pyramid, RefusesOptionsOutOfRangeByName) {
@@ -262,9 +283,10 @@ void expectExactCentres(const CentreCase& c, Surface surface) {
   constexpr double kImageError = 0.01;
   const OwnedMap owned(c.width, c.height, test::roughSurface(c.width, c.height, c.alpha, c.correlation));
   for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
-    const NdfPyramidData data =
-        buildPyramid(owned.map(), withLevels(options(c.stride, c.resolution, c.sigma_r, surface, boundary), c.levels));
-    const PyramidNdf model(data.view());
+    PyramidOptions o = withLevels(options(c.stride, c.resolution, c.sigma_r, surface, boundary), c.levels);
+    o.overlap = boundary == Boundary::wrap ? kDefaultOverlap : 1;
+    const NdfPyramidData data = buildPyramid(owned.map(), o);
+    const PyramidNdf model(data.view(), Interpolation::trilinear);  // answers centres by their own image
     for (int l = 0; l < data.shape.footprintLevels(); ++l) {
       const PyramidGrid& grid = data.shape.levels[l];
       for (const auto& [i, j] : {std::pair{0, 0}, {grid.columns - 1, grid.rows / 2}}) {
@@ -313,7 +335,9 @@ TEST(Pyramid, ALevelAgreesWithTheMeanOfItsChildren) {
     const OwnedMap noise(128, 128, test::randomNormals(128, 128, 0.5f, 5)), rough(128, 128, test::roughSurface(128, 128, 0.2f));
     double worst = 0;
     for (const OwnedMap* owned : {&noise, &rough}) {
-      const NdfPyramidData data = buildPyramid(owned->map(), withLevels(options(16, 64, 0.02f, surface), 3));
+      PyramidOptions o = withLevels(options(16, 64, 0.02f, surface), 3);
+      o.overlap = 1;  // every image has four children
+      const NdfPyramidData data = buildPyramid(owned->map(), o);
       for (int l = 0; l < 2; ++l)
         for (int j = 0; j < data.shape.levels[l + 1].rows; ++j)
           for (int i = 0; i < data.shape.levels[l + 1].columns; ++i) worst = std::max(worst, parentToChildren(data, l, i, j));

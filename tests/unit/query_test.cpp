@@ -211,14 +211,15 @@ TEST(CpNdf, SignedMeanOverPixelsIsTheMeanOfSignedPointQueries) {
 
 TEST(CpNdf, EqualsASlowDecoderAtItsCentres) {
   constexpr double kFactorError = 1e-5;  // of the largest value: products of floats
-  forEachCompression([](const CpNdf& model, const NdfCpData& data) {
+  forEachCompression([](const CpNdf&, const NdfCpData& data) {
     const NdfCp view = data.view();
+    const CpNdf model(view, Interpolation::trilinear);
     for (int l = 0; l < view.shape.level_count; ++l) {
       const PyramidGrid& grid = view.shape.levels[l];
       const float sigma = l < view.shape.footprintLevels() ? kFootprintPerStride * grid.stride : 1e6f;  // the mean of the map
       for (const auto& [i, j] : {std::pair{0, 0}, {grid.columns / 2, grid.rows - 1}}) {
-        const Footprint p = Footprint::isotropic(
-            {(static_cast<float>(i) + 0.5f) * grid.stride / 100, (static_cast<float>(j) + 0.5f) * grid.stride / 72}, sigma);
+        const Vec2 centre = view.shape.centre(l, i, j);
+        const Footprint p = Footprint::isotropic({centre.x / 100, centre.y / 72}, sigma);
         const auto expected = test::decodeImage(view, view.first_image[l] + static_cast<std::uint32_t>(j * grid.columns + i));
         const double largest = *std::max_element(expected.begin(), expected.end());
         ASSERT_GT(largest, 1);
@@ -276,10 +277,14 @@ TEST(CpNdf, MeanOverTheWholeSquareIsAQuarter) {
   });
 }
 
+constexpr Interpolation kInterpolations[] = {Interpolation::footprint, Interpolation::trilinear};
+
 /// Weight of every image, as a sparse vector.
-std::map<std::pair<int, std::uint32_t>, double> weightsOf(const PyramidShape& shape, const Footprint& p) {
+std::map<std::pair<int, std::uint32_t>, double> weightsOf(const PyramidShape& shape, const SliceChooser& chooser,
+                                                          const Footprint& p) {
   std::map<std::pair<int, std::uint32_t>, double> weights;
-  const PyramidSlices chosen = SliceChooser(shape).choose(p);
+  const PyramidSlices chosen = chooser.choose(p);
+  EXPECT_LE(chosen.count, PyramidSlices::kMost);
   for (int k = 0; k < chosen.count; ++k) {
     const PyramidSlice s = chosen[k];
     EXPECT_GE(s.weight, 0);
@@ -300,60 +305,76 @@ double distance(const std::map<std::pair<int, std::uint32_t>, double>& a, std::m
 TEST(PyramidSlices, WeightsAreNotNegativeAndSumToOne) {
   RandomQueries random(6);
   for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
-    for (int k = 0; k < 5000; ++k) {
-      double sum = 0;
-      for (const auto& [image, w] : weightsOf(pyramid(boundary).shape, random.footprint(0.1f, 1e4f))) sum += w;
-      ASSERT_NEAR(sum, 1, 1e-6);
+    for (const Interpolation interpolation : kInterpolations) {
+      const PyramidShape& shape = pyramid(boundary).shape;
+      const SliceChooser chooser(shape, interpolation);
+      for (int k = 0; k < 5000; ++k) {
+        double sum = 0;
+        for (const auto& [image, w] : weightsOf(shape, chooser, random.footprint(0.1f, 1e4f))) sum += w;
+        ASSERT_NEAR(sum, 1, 3e-6);
+      }
     }
   }
 }
 
-TEST(PyramidSlices, WeightsAreContinuousInPositionAndSize) {
-  // Bilinear weights change by 2 a gap and axis. The shortest gap between centres of a wrapping level is what is left over when
-  // the stride does not divide the map: at stride 16 it is 4 of 100 texels, at 64 36.
-  constexpr double kShortestGap = 4, kStep = 0.02;  // texels
-  constexpr double kMostPerStep = 2 * kStep / kShortestGap + 1e-4;
+TEST(PyramidSlices, WeightsAreContinuousInPosition) {
+  // Bilinear weights change by 2 a gap and axis, and kernels of four centres by less than 4. The shortest gap is 10 texels.
+  constexpr double kStep = 0.02, kMostPerStep = 4 * kStep / 10;  // texels
   for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
-    const PyramidShape& shape = pyramid(boundary).shape;
-    for (const float sigma : {3.0f, 6.93f, 9.0f, 13.86f, 20.0f, 27.7f, 100.0f}) {
-      for (const bool along_v : {false, true}) {
-        const int extent = along_v ? shape.height : shape.width;
-        const int steps = static_cast<int>(extent / kStep);
-        const auto at = [&](int k) {
-          const auto u = static_cast<float>(static_cast<double>(k % steps) / steps);
-          return weightsOf(shape, Footprint::isotropic(along_v ? Vec2{0.37f, u} : Vec2{u, 0.37f}, sigma));
-        };
-        auto previous = at(0);
-        for (int k = 1; k <= (boundary == Boundary::wrap ? steps : steps - 1); ++k) {  // with wrap, round to where it started
-          auto next = at(k);
-          ASSERT_LT(distance(previous, next), kMostPerStep) << "sigma " << sigma << " step " << k;
-          previous = std::move(next);
+    for (const Interpolation interpolation : kInterpolations) {
+      const PyramidShape& shape = pyramid(boundary).shape;
+      const SliceChooser chooser(shape, interpolation);
+      for (const float sigma : {3.0f, 6.93f, 9.0f, 13.86f, 15.0f, 20.0f, 27.7f, 100.0f}) {
+        for (const bool along_v : {false, true}) {
+          const int steps = static_cast<int>((along_v ? shape.height : shape.width) / kStep);
+          const auto at = [&](int k) {
+            const auto u = static_cast<float>(static_cast<double>(k % steps) / steps);
+            return weightsOf(shape, chooser, Footprint::isotropic(along_v ? Vec2{0.37f, u} : Vec2{u, 0.37f}, sigma));
+          };
+          auto previous = at(0);
+          for (int k = 1; k <= (boundary == Boundary::wrap ? steps : steps - 1); ++k) {  // with wrap, round to where it started
+            auto next = at(k);
+            ASSERT_LT(distance(previous, next), kMostPerStep) << "sigma " << sigma << " step " << k;
+            previous = std::move(next);
+          }
         }
       }
     }
-    auto previous = weightsOf(shape, Footprint::isotropic({0.61f, 0.83f}, 2));
-    // Linear in octaves: 2 for each. Above the last level, at 0.28 of the map, its share is exp(-x) over that at the level, with
-    // x = 2 pi^2 sigma^2 / width^2 >= 1.51: at most 4 ln(2) 1.51 = 4.2 for each.
-    for (float octave = 1; octave < 9; octave += 0.01f) {
-      auto next = weightsOf(shape, Footprint::isotropic({0.61f, 0.83f}, std::exp2(octave)));
-      ASSERT_LT(distance(previous, next), std::exp2(octave) < 27 ? 0.021 : 0.043) << octave;
-      previous = std::move(next);
+  }
+}
+
+TEST(PyramidSlices, WeightsAreContinuousInSize) {
+  // Trilinear weights are linear in octaves: 2 for each. The fade between levels of footprints takes log2(1.15) octaves: 2 / 0.2
+  // for each. Above the last level the share falls at most as exp(-x) over that at the level, with x = 2 pi^2 sigma^2 / width^2:
+  // at most 4 ln(2) x <= 16 for each where the level ends at 0.57 of the map.
+  constexpr float kStep = 0.01f;  // octaves
+  constexpr double kMostTrilinear = 0.045, kMostOfFootprints = 0.16;
+  for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
+    for (const Interpolation interpolation : kInterpolations) {
+      const PyramidShape& shape = pyramid(boundary).shape;
+      const SliceChooser chooser(shape, interpolation);
+      auto previous = weightsOf(shape, chooser, Footprint::isotropic({0.61f, 0.83f}, 2));
+      for (float octave = 1; octave < 9; octave += kStep) {
+        auto next = weightsOf(shape, chooser, Footprint::isotropic({0.61f, 0.83f}, std::exp2(octave)));
+        ASSERT_LT(distance(previous, next), interpolation == Interpolation::trilinear ? kMostTrilinear : kMostOfFootprints)
+            << octave;
+        previous = std::move(next);
+      }
     }
   }
 }
 
-TEST(PyramidSlices, CentresGetTheirOwnImage) {
+TEST(PyramidSlices, CentresGetTheirOwnImageOfTrilinearInterpolation) {
   constexpr double kCentreError = 1e-4;  // a centre as uv is rounded: 1e-5 of the gap between centres
   for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
     const PyramidShape& shape = pyramid(boundary).shape;
+    const SliceChooser chooser(shape, Interpolation::trilinear);
     for (int l = 0; l < shape.footprintLevels(); ++l) {
       const PyramidGrid& grid = shape.levels[l];
       for (int j = 0; j < grid.rows; ++j) {
         for (int i = 0; i < grid.columns; ++i) {
-          const Vec2 uv = {(static_cast<float>(i) + 0.5f) * grid.stride / 100,
-                           (static_cast<float>(j) + 0.5f) * grid.stride / 72};
-          if (boundary == Boundary::clamp && (uv.x >= 1 || uv.y >= 1)) continue;
-          auto weights = weightsOf(shape, Footprint::isotropic(uv, kFootprintPerStride * grid.stride));
+          const Vec2 centre = shape.centre(l, i, j), uv = {centre.x / 100, centre.y / 72};
+          auto weights = weightsOf(shape, chooser, Footprint::isotropic(uv, kFootprintPerStride * grid.stride));
           EXPECT_NEAR((weights[{l, static_cast<std::uint32_t>(j * grid.columns + i)}]), 1, kCentreError)
               << l << ' ' << i << ' ' << j;
         }

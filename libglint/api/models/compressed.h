@@ -11,7 +11,7 @@ struct NdfTraits<AnisotropicNdf<CpNdf>> {
   static constexpr std::string_view kKind = formats::kKindName<Asset>;
 
   static AnisotropicNdf<CpNdf> open(const NdfSource<NdfCp>& source) { return openLevels<CpNdf>(source); }
-  static NdfInfo info(const NdfSource<NdfCp>& source) { return levelsInfo(source.asset.shape); }
+  static NdfInfo info(const NdfSource<NdfCp>& source) { return levelsInfo(source.asset.shape, source.normals != nullptr); }
   static MapSlopes slopes(const NdfCp& ndf) { return ndf.shape.slopes; }
 
   static constexpr bool kPacks = true;

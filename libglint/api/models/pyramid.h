@@ -11,7 +11,7 @@ struct NdfTraits<AnisotropicNdf<PyramidNdf>> {
   static constexpr std::string_view kKind = formats::kKindName<Asset>;
 
   static AnisotropicNdf<PyramidNdf> open(const NdfSource<NdfPyramid>& source) { return openLevels<PyramidNdf>(source); }
-  static NdfInfo info(const NdfSource<NdfPyramid>& source) { return levelsInfo(source.asset.shape); }
+  static NdfInfo info(const NdfSource<NdfPyramid>& source) { return levelsInfo(source.asset.shape, source.normals != nullptr); }
   static MapSlopes slopes(const NdfPyramid& pyramid) { return pyramid.shape.slopes; }
 
   static constexpr bool kPacks = true;

@@ -14,8 +14,9 @@ namespace glint::bake {
 namespace {
 
 /// Region, along one axis, that has the centre of column i of a level (ndf_cp.h).
-int regionOf(int i, float stride, int size, int regions) {
-  return std::min(regions - 1, static_cast<int>(std::floor((2.0 * i + 1) * stride * regions / (2.0 * size))));
+/// @param spacing  distance between neighbouring centres, texels
+int regionOf(int i, float spacing, int size, int regions) {
+  return std::min(regions - 1, static_cast<int>(std::floor((2.0 * i + 1) * spacing * regions / (2.0 * size))));
 }
 
 [[noreturn]] void rejectLevel(int level, const std::string& what) {
@@ -71,10 +72,10 @@ void SliceIndex::assignImages() {
   region_slots_.assign(static_cast<std::size_t>(regions_) * regions_ * level_groups_, 0);
   for (int l = 0; l < shape.level_count; ++l) {
     const PyramidGrid& grid = shape.levels[l];
+    const Vec2 spacing = shape.spacing(l);
     for (int j = 0; j < grid.rows; ++j) {
       for (int i = 0; i < grid.columns; ++i) {
-        const int row = regionOf(j, grid.stride, shape.height, regions_),
-                  column = regionOf(i, grid.stride, shape.width, regions_);
+        const int row = regionOf(j, spacing.y, shape.height, regions_), column = regionOf(i, spacing.x, shape.width, regions_);
         const int region = (std::min(l, level_groups_ - 1) * regions_ + row) * regions_ + column;
         image_regions_.push_back(static_cast<std::uint16_t>(region));
         slots_.push_back(static_cast<std::uint16_t>(region_slots_[region]++));

@@ -38,11 +38,17 @@ double squaredNorm(const std::vector<float>& a) {
   return sum;
 }
 
+/// The centre of a coarser level that is nearest to a centre of a finer level, along one axis.
+int nearestAlong(int finer, float finer_gap, float gap, int count) {
+  return std::min(static_cast<int>((static_cast<float>(finer) + 0.5f) * finer_gap / gap), count - 1);
+}
+
 }  // namespace
 
 double levelDisagreement(const NdfPyramid& pyramid, int level) {
   const PyramidGrid& fine = pyramid.shape.levels[level];
   const PyramidGrid& coarse = pyramid.shape.levels[level + 1];
+  const Vec2 gap = pyramid.shape.spacing(level), coarse_gap = pyramid.shape.spacing(level + 1);
   struct Sums {
     double difference = 0, norm = 0;
   };
@@ -52,8 +58,10 @@ double levelDisagreement(const NdfPyramid& pyramid, int level) {
     std::vector<float> parent, child;
     decodeImage(pyramid, level + 1, image, parent);
     const double norm = squaredNorm(parent);
-    for (int y = 2 * j; y < std::min(2 * j + 2, fine.rows); ++y) {
-      for (int x = 2 * i; x < std::min(2 * i + 2, fine.columns); ++x) {
+    for (int y = 0; y < fine.rows; ++y) {
+      if (nearestAlong(y, gap.y, coarse_gap.y, coarse.rows) != j) continue;
+      for (int x = 0; x < fine.columns; ++x) {
+        if (nearestAlong(x, gap.x, coarse_gap.x, coarse.columns) != i) continue;
         decodeImage(pyramid, level, static_cast<std::size_t>(y) * fine.columns + x, child);
         sums[image].difference += squaredDistance(child, parent);
         sums[image].norm += norm;

@@ -36,6 +36,7 @@ void require(bool ok, const char* option, const std::string& range) {
 
 void checkOptions(const NormalMap& map, const PyramidOptions& o) {
   require(o.stride >= 2 && o.stride <= 65536, "--stride", "2 to 65536 texels");
+  require(o.overlap >= 1 && o.overlap <= kMostOverlap, "--overlap", "1 to 4 footprints in a stride");
   require(o.resolution >= 32 && o.resolution <= 1024 && o.resolution % kBlockSize == 0, "--resolution",
           "a multiple of 16 from 32 to 1024");
   const float pixel = 2.0f / static_cast<float>(o.resolution);
@@ -217,8 +218,7 @@ std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const Pyra
     images[l].resize(grid.imageCount());
     tbb::parallel_for(std::size_t{0}, grid.imageCount(), [&](std::size_t k) {
       Scratch& s = scratch.local();
-      const Vec2 centre = {(static_cast<float>(k % grid.columns) + 0.5f) * grid.stride,
-                           (static_cast<float>(k / grid.columns) + 0.5f) * grid.stride};
+      const Vec2 centre = shape.centre(l, static_cast<int>(k % grid.columns), static_cast<int>(k / grid.columns));
       if (l < shape.footprintLevels())
         scatterFlatFootprint(map, shape.boundary, centre, kFootprintPerStride * grid.stride, s.bins, s.band);
       else
@@ -316,12 +316,12 @@ PyramidShape pyramidShape(int width, int height, const PyramidOptions& o) {
   shape.sigma_r = o.sigma_r;
   shape.surface = o.surface;
   shape.boundary = o.boundary;
+  shape.overlap = o.overlap;
   const auto longest = static_cast<float>(std::max(width, height));
   for (float stride = o.stride; shape.level_count < kMaxFootprintLevels; stride *= 2) {
     if (shape.level_count > 0 && stride >= longest) break;
     if (o.levels > 0 && shape.level_count == o.levels) break;
-    shape.levels[shape.level_count++] = {stride, static_cast<int>(std::ceil(static_cast<float>(width) / stride)),
-                                         static_cast<int>(std::ceil(static_cast<float>(height) / stride))};
+    shape.levels[shape.level_count++] = {stride, shape.centresAlong(width, stride), shape.centresAlong(height, stride)};
   }
   if (shape.level_count < o.levels)
     throw Error(ErrorCode::usage, "option.range", {}, "--levels",

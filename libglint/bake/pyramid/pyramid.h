@@ -8,8 +8,14 @@
 
 namespace glint::bake {
 
+/// sqrt(2): twice the images of an overlap of 1.
+inline constexpr float kDefaultOverlap = 1.41421356f;
+
 struct PyramidOptions {
-  float stride = 32;       ///< texels between the footprints of level 0; >= 2
+  float stride = 32;  ///< of level 0, texels; >= 2. Footprints have a deviation of kFootprintPerStride strides
+  /// Footprints in a stride along each axis, 1 to kMostOverlap. The default is the knee of error against bytes; 1 is the grid of
+  /// Deng 2022.
+  float overlap = kDefaultOverlap;
   int resolution = 256;    ///< pixels of an NDF image along each axis: a multiple of 16 in [32, 1024]
   float sigma_r = 0.005f;  ///< intrinsic roughness, disk units: at least 0.1 pixel of an NDF image, at most 0.25
   Surface surface = Surface::flat;

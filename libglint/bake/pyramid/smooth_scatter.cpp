@@ -122,10 +122,10 @@ class AxisWeights {
   };
 
   /// Weights of Gaussian footprints.
-  AxisWeights(const Axis& axis, int images, float stride) : images_of_(axis.cells), cells_of_(images) {
-    const float sigma = kFootprintPerStride * stride;
+  /// @param spacing  distance between neighbouring centres, texels
+  AxisWeights(const Axis& axis, int images, float spacing, float sigma) : images_of_(axis.cells), cells_of_(images) {
     for (int i = 0; i < images; ++i) {
-      const float centre = (static_cast<float>(i) + 0.5f) * stride;
+      const float centre = (static_cast<float>(i) + 0.5f) * spacing;
       for (const int c : axis.cellsWithin(centre, kPyramidReach * sigma)) add(i, c, axis.weight(c, centre, sigma));
     }
   }
@@ -160,8 +160,8 @@ class Level {
         columns_(shape.levels[level].columns),
         axis_x_(x),
         axis_y_(y),
-        x_(weightsOf(shape, level, x, columns_)),
-        y_(weightsOf(shape, level, y, shape.levels[level].rows)),
+        x_(weightsOf(shape, level, x, columns_, shape.spacing(level).x)),
+        y_(weightsOf(shape, level, y, shape.levels[level].rows, shape.spacing(level).y)),
         sink_(sink),
         image_rows_(shape.levels[level].rows),
         spare_images_(columns_, tiles, 1),
@@ -202,8 +202,9 @@ class Level {
   }
 
  private:
-  static AxisWeights weightsOf(const PyramidShape& shape, int level, const Axis& axis, int images) {
-    return level < shape.footprintLevels() ? AxisWeights(axis, images, shape.levels[level].stride) : AxisWeights::even(axis);
+  static AxisWeights weightsOf(const PyramidShape& shape, int level, const Axis& axis, int images, float spacing) {
+    const float sigma = kFootprintPerStride * shape.levels[level].stride;
+    return level < shape.footprintLevels() ? AxisWeights(axis, images, spacing, sigma) : AxisWeights::even(axis);
   }
 
   int level_;

@@ -29,12 +29,12 @@ inline GLINT_HD SlicePlace findSlice(const NdfCp& ndf, std::size_t image, int bl
   return {at, ndf.mask_ranks.data()[word] + static_cast<std::uint64_t>(setBits(mask & (bit - 1)))};
 }
 
-/// Slices of the chosen images in one block. Weights include the scales of images. A weight is 0 where the image has no
-/// slice, and beyond the number of chosen images.
+/// Slices of the chosen images in one block. Weights include the scales of images. A weight is 0 where the image has no slice.
 struct SlicePlaces {
   std::uint32_t clusters[PyramidSlices::kMost];
   std::uint32_t slices[PyramidSlices::kMost];
-  float weights[PyramidSlices::kMost] = {};
+  float weights[PyramidSlices::kMost];
+  int count = 0;  ///< of the chosen images; 0 if no image has a slice
 };
 
 /// Finds the slices of the chosen images in a block. Has no branch on whether an image has a slice: processors cannot predict
@@ -44,6 +44,7 @@ inline GLINT_HD SlicePlaces findSlices(const NdfCp& ndf, const PyramidSlices& ch
   SlicePlaces out;
   const unsigned block_place = ndf.block_places.data()[block];
   if (block_place == kNoBlockPlace) return out;
+  out.count = chosen.count;
   const auto block_places = static_cast<unsigned>(ndf.places);
   for (int step = 0; 4 * step < chosen.count; ++step) {
     const std::uint32_t first = ndf.first_image[chosen.levels[step]];

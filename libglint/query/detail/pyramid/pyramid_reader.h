@@ -27,8 +27,35 @@ class PyramidReader {
 
   /// Density of a pixel, >= 0; O(1).
   GLINT_HD float pixelDensity(const PyramidSlices& chosen, const PixelPlace& place) const {
-    return pyramid_.precision == BlockPrecision::f16 ? addPixelsOf<std::uint16_t>(findPixelsOf<std::uint16_t>(chosen, place))
-                                                     : addPixelsOf<float>(findPixelsOf<float>(chosen, place));
+    return addPixels(findPixels(chosen, place));
+  }
+
+  /// Positions of one pixel in the arrays of the levels, for all slices.
+  struct Pixels {
+    const void* pixels[PyramidSlices::kMost];
+    float weights[PyramidSlices::kMost];  ///< 0 where the block is not stored: the position is then some other pixel
+    int count = 0;
+  };
+
+  /// Prefetches what findPixels reads.
+  GLINT_HD void prefetchBlock(const PyramidSlices& chosen, int block) const {
+    const std::size_t word = static_cast<unsigned>(block) / 64;
+    for (int k = 0; k < chosen.count; ++k) {
+      prefetch(maskOf(chosen[k]) + word);
+      prefetch(ranksOf(chosen[k]) + word);
+    }
+  }
+
+  /// Finds a pixel in every slice and prefetches it. Has no branch on whether blocks are stored, which processors cannot
+  /// predict: so the cache misses of all slices overlap.
+  GLINT_HD Pixels findPixels(const PyramidSlices& chosen, const PixelPlace& place) const {
+    return pyramid_.precision == BlockPrecision::f16 ? findPixelsOf<std::uint16_t>(chosen, place)
+                                                     : findPixelsOf<float>(chosen, place);
+  }
+
+  /// Density of the pixels that were found, >= 0.
+  GLINT_HD float addPixels(const Pixels& pixels) const {
+    return pyramid_.precision == BlockPrecision::f16 ? addPixelsOf<std::uint16_t>(pixels) : addPixelsOf<float>(pixels);
   }
 
   /// A sample that is being drawn: chooseImage, findBlocks, chooseBlock and choosePixel fill it in this order. Each step reads
@@ -151,13 +178,6 @@ class PyramidReader {
     return levelOf(slice).mask_ranks.data() + std::size_t{slice.image} * mask_words_;
   }
 
-  /// Positions of one pixel in the arrays of the levels, for all slices.
-  struct Places {
-    const void* pixels[PyramidSlices::kMost];
-    float weights[PyramidSlices::kMost];  ///< 0 where the block is not stored: the position is then some other pixel
-    int count = 0;
-  };
-
   /// Means of the blocks of an image, for chooseOfMany.
   struct BlockMeans {
     const float* means;
@@ -175,13 +195,11 @@ class PyramidReader {
     }
   };
 
-  /// Finds a pixel in every slice and prefetches it. Has no branch on whether blocks are stored, which processors cannot
-  /// predict: so the cache misses of all slices overlap.
   template <class Pixel>
-  GLINT_HD Places findPixelsOf(const PyramidSlices& chosen, const PixelPlace& place) const {
+  GLINT_HD Pixels findPixelsOf(const PyramidSlices& chosen, const PixelPlace& place) const {
     constexpr std::uint64_t kBlockBytes = kBlockPixels * sizeof(Pixel);
     const unsigned word = static_cast<unsigned>(place.block) / 64, bit = static_cast<unsigned>(place.block) % 64;
-    Places places;
+    Pixels places;
     places.count = chosen.count;
     for (int step = 0; 4 * step < chosen.count; ++step) {
       const PyramidLevel& level = pyramid_.levels[chosen.levels[step]];
@@ -201,17 +219,17 @@ class PyramidReader {
   }
 
   template <class Pixel>
-  GLINT_HD float addPixelsOf(const Places& places) const {
-    Float4 sum = fourPixels<Pixel>(places, 0);
-    if (places.count > 4) sum = sum + fourPixels<Pixel>(places, 4);
+  GLINT_HD float addPixelsOf(const Pixels& pixels) const {
+    Float4 sum = Float4::zero();
+    for (int k = 0; k < pixels.count; k += 4) sum = sum + fourPixels<Pixel>(pixels, k);
     return finitePositive(pyramid_.value_scale * sum.sum());
   }
 
   /// Weighted pixels of the four slices from k on.
   template <class Pixel>
-  static GLINT_HD Float4 fourPixels(const Places& places, int k) {
-    const auto pixel = [&](int j) { return *static_cast<const Pixel*>(places.pixels[k + j]); };
-    const Float4 weights = Float4::load(places.weights + k);
+  static GLINT_HD Float4 fourPixels(const Pixels& found, int k) {
+    const auto pixel = [&](int j) { return *static_cast<const Pixel*>(found.pixels[k + j]); };
+    const Float4 weights = Float4::load(found.weights + k);
     if constexpr (std::is_same_v<Pixel, float>) {
       // Numbers of a file are not checked: 0 times an infinity from a slice of weight 0 would be NaN.
       return whereLess(Float4::zero(), weights, weights * Float4::of(pixel(0), pixel(1), pixel(2), pixel(3)));

@@ -9,6 +9,8 @@
 #include "glint/model/footprint.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/query/detail/common/footprint_weights.h"
+#include "glint/query/detail/pyramid/footprint_kernel.h"
+#include "glint/query/interpolation.h"
 
 namespace glint {
 
@@ -19,14 +21,15 @@ struct PyramidSlice {
   float weight;
 };
 
-/// The images that answer a footprint: four neighbouring images in one level, or in each of two levels. Slice k is corner k % 4
-/// (x in bit 0, y in bit 1) of level number k / 4. Weights are >= 0 and sum to 1.
+/// The images that answer a footprint, in groups of four of one level. Slice k is in group k / 4. Weights are >= 0 and sum to 1.
+/// With Interpolation::trilinear a group has the four corners around a place, x in bit 0, y in bit 1. Else it has four neighbours
+/// of one row, and a level has up to four groups.
 struct PyramidSlices {
-  static constexpr int kMost = 8;
-  int levels[2];  ///< level of slices 0 to 3, and of slices 4 to 7
+  static constexpr int kMost = 32;
+  int levels[kMost / 4];  ///< of each group
   std::uint32_t images[kMost];
   float weights[kMost];
-  int count = 0;  ///< 4 or 8
+  int count = 0;  ///< a multiple of 4
 
   GLINT_HD int level(int k) const { return levels[k / 4]; }
   GLINT_HD PyramidSlice operator[](int k) const { return {level(k), images[k], weights[k]}; }
@@ -56,11 +59,6 @@ inline GLINT_HD float isotropicSigma(const PyramidShape& shape, const Footprint&
 /// Deviation of the footprints of level 0, texels. Narrower footprints are answered from the texels where these are available.
 inline GLINT_HD float finestSigma(const PyramidShape& shape) { return kFootprintPerStride * shape.levels[0].stride; }
 
-/// Whether a footprint is narrower than the footprints of level 0.
-inline GLINT_HD bool belowFinest(const PyramidShape& shape, const Footprint& p) {
-  return isotropicVariance(shape, p) < finestSigma(shape) * finestSigma(shape);
-}
-
 /// log2 of a positive, finite number, to 2e-7. Uses plain arithmetic, so that batches and device code get the same bits and
 /// choose the same levels.
 inline GLINT_HD float log2Of(float x) {
@@ -83,145 +81,218 @@ struct LevelPlace {
   float t;    ///< 0 to 1: share of the next level; 0 at the last level
 };
 
-/// The position of a footprint between the levels of a pyramid.
-/// @param ratio  variance of the footprint over the variance of level 0, from 1 to 4^15; it is 4^l at level l
-inline GLINT_HD LevelPlace levelPlace(float ratio) {
-  constexpr std::uint32_t kOne = 0x3f800000u;
-  constexpr int kPowerOf4 = 24;  // the exponent less its lowest bit
-  std::uint32_t bits;
-  std::memcpy(&bits, &ratio, sizeof bits);
-  // The level is known without waiting for the logarithm.
-  const std::uint32_t first = (bits - kOne) >> kPowerOf4;
-  bits -= first << kPowerOf4;
-  float rest;  // [1, 4)
-  std::memcpy(&rest, &bits, sizeof rest);
-  const float t = 0.5f * log2Of(rest);
-  return {static_cast<int>(first), t < 1 ? t : 1.0f};
-}
-
 /// Chooses the images that answer a footprint. The constructor computes everything that depends on the shape alone, so that a
 /// query has no division by it.
 class SliceChooser {
  public:
-  /// The centres of one level along x and y, in strides.
-  struct LevelCentres {
-    float extent[2];   ///< width and height of the map
-    float last[2];     ///< last column and row
-    float per_gap[2];  ///< 1 / (gap from the last centre across the border to the first); 1 if the stride divides the map
-    std::int32_t columns, unused;
-  };
-
-  GLINT_HD explicit SliceChooser(const PyramidShape& shape) {
+  GLINT_HD explicit SliceChooser(const PyramidShape& shape, Interpolation interpolation = Interpolation::footprint)
+      : interpolation_(interpolation), wraps_(shape.boundary == Boundary::wrap) {
     const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
     largest_u_ = width * width;
     largest_v_ = height * height;
-    per_finest_variance_ = 1 / (finestSigma(shape) * finestSigma(shape));
-    largest_ratio_ = 1;
-    for (int l = 1; l < shape.footprintLevels(); ++l) largest_ratio_ *= 4;
-    wraps_ = shape.boundary == Boundary::wrap;
+    const bool trilinear = interpolation == Interpolation::trilinear;
+    const float finest = finestSigma(shape), first_ratio = trilinear ? 1 : fadeStart(shape.overlap);
+    per_first_variance_ = 1 / (first_ratio * finest * finest);
+    last_level_ = shape.footprintLevels() - 1;
+    largest_variance_ = (trilinear ? 1 : 1 + kLastPerSquareGap * squareGap(shape.overlap)) * finest * finest;
+    for (int l = 0; l < last_level_; ++l) largest_variance_ *= 4;
+    largest_ratio_ = largest_variance_ * per_first_variance_;
     decay_ = shape.endsInMean() ? farDecay() : 0;
-    for (int l = 0; l < shape.level_count; ++l) {
-      const PyramidGrid& grid = shape.levels[l];
-      const auto last_column = static_cast<float>(grid.columns - 1), last_row = static_cast<float>(grid.rows - 1);
-      // A single column has itself as its neighbour, however little of its stride the map fills.
-      const float across = grid.columns > 1 ? width / grid.stride : 1, up = grid.rows > 1 ? height / grid.stride : 1;
-      levels_[l] = {{across, up}, {last_column, last_row}, {1 / (across - last_column), 1 / (up - last_row)}, grid.columns, 0};
-    }
-    levels_[shape.level_count] = levels_[shape.level_count - 1];  // with weight 0
+    for (int l = 0; l < shape.level_count; ++l) setLevel(shape, l);
   }
 
-  /// Chooses images trilinearly: bilinear between centres, linear in log2 of the footprint's size between levels. Footprints
-  /// below the finest level get the finest level. Footprints above the last level get it and the mean of the map (`levelOf`).
+  /// Chooses images for a footprint; see Interpolation. Footprints below the finest level get the finest level. Footprints above
+  /// the last level get it and the mean of the map (`levelOf`).
   GLINT_HD PyramidSlices choose(const Footprint& p) const {
-    const LevelPlace level = levelOf(isotropicVariance(largest_u_, largest_v_, p.covariance));
-    const LevelCentres &finer = levels_[level.first], &coarser = levels_[level.first + 1];
-    const Neighbours at = neighbours(finer, coarser, p.centre);
+    const float variance = isotropicVariance(largest_u_, largest_v_, p.covariance);
+    const LevelPlace level = levelOf(variance);
     PyramidSlices out;
-    out.levels[0] = level.first;
-    out.levels[1] = level.first + 1;
-    setCorners(interleaveLow(at.low, at.high), interleaveLow(at.rest, at.t), finer.columns, 1 - level.t, out.images,
-               out.weights);
-    setCorners(interleaveHigh(at.low, at.high), interleaveHigh(at.rest, at.t), coarser.columns, level.t, out.images + 4,
-               out.weights + 4);
-    out.count = level.t > 0 ? 8 : 4;
+    if (level.t < 1) addLevel(level.first, 1 - level.t, p.centre, variance, out);
+    if (level.t > 0) addLevel(level.first + 1, level.t, p.centre, variance, out);
     return out;
   }
 
-  // Parts of `choose` for batches, which choose images for several footprints at once in vectors.
+ private:
+  /// The centres of one level. Arrays have an element for x and one for y.
+  struct LevelCentres {
+    float extent[2];          ///< size of the map, in gaps between centres
+    float last[2];            ///< last column and row
+    float per_border_gap[2];  ///< 1 / (gap from the last centre across the border to the first)
+    float per_square_gap[2];  ///< 1 / (square of the gap between centres, texels^2)
+    float variance;           ///< of the footprints, texels^2
+    std::int32_t columns;
+  };
+
+  /// Interpolation::footprint fades from one level to the next where the kernel of the finer level gets too short. The fade ends
+  /// at this ratio of the variance that is asked for to the variance of the finer level, which depends on the gap between centres.
+  static constexpr float kFadeEnd = 2.5f, kFadeEndPerSquareGap = 1.05f;  // gap in deviations of a footprint
+  /// Ratio of the sizes at which the fade ends and begins: as short as changes of 1 % in size allow, which may change a density
+  /// by 3 %.
+  static constexpr float kFadeSizes = 1.16f;
+
+  /// Variance that the last level of footprints adds to that of its images, in squares of the gap: as large as the kernel has
+  /// exactly, since what is left of the slowest wave of the map depends on it.
+  static constexpr float kLastPerSquareGap = 0.7f;
+
+  /// Square of the gap between centres, in deviations of a footprint.
+  static GLINT_HD float squareGap(float overlap) {
+    const float gap = 1 / (kFootprintPerStride * overlap);
+    return gap * gap;
+  }
+  /// The ratio of variances at which the fade begins.
+  static GLINT_HD float fadeStart(float overlap) {
+    return (kFadeEnd + kFadeEndPerSquareGap * squareGap(overlap)) / (kFadeSizes * kFadeSizes);
+  }
+
+  GLINT_HD void setLevel(const PyramidShape& shape, int l) {
+    const PyramidGrid& grid = shape.levels[l];
+    const Vec2 gap = shape.spacing(l);
+    const float sigma = kFootprintPerStride * grid.stride;
+    LevelCentres& to = levels_[l];
+    setAxis(0, grid.columns, static_cast<float>(shape.width) / gap.x, gap.x, to);
+    setAxis(1, grid.rows, static_cast<float>(shape.height) / gap.y, gap.y, to);
+    to.variance = sigma * sigma;
+    to.columns = grid.columns;
+  }
+  static GLINT_HD void setAxis(int axis, int count, float extent, float gap, LevelCentres& to) {
+    to.extent[axis] = count > 1 ? extent : 1;  // a single centre is its own neighbour, however little of its gap the map fills
+    to.last[axis] = static_cast<float>(count - 1);
+    to.per_border_gap[axis] = 1 / (to.extent[axis] - to.last[axis]);
+    to.per_square_gap[axis] = 1 / (gap * gap);
+  }
 
   /// The level of a footprint of this variance, texels^2.
   ///
   /// Above the last level L of footprints the answer fades into the mean of the map. How fast follows from the unevenness that
   /// a footprint of deviation sigma still sees. On a map of length W that repeats, this is exp(-2 pi^2 sigma^2 / W^2), the
   /// share of the longest wave that a Gaussian keeps. On a map that ends, it falls with 1 / sigma^2 for large sigma
-  /// (`farDecay`). The share of level L is the unevenness at sigma over the unevenness at sigma_L.
+  /// (`farDecay`). The share of level L is the unevenness at sigma over the unevenness at the largest size that L answers.
   GLINT_HD LevelPlace levelOf(float variance) const {
-    const float ratio = variance * per_finest_variance_, coarse = ratio > 1 ? ratio : 1;
-    LevelPlace level = levelPlace(coarse < largest_ratio_ ? coarse : largest_ratio_);
+    const float ratio = variance * per_first_variance_, beyond = ratio - largest_ratio_;
+    if (!(beyond > 0)) {
+      const LevelPlace between = levelPlace(ratio > 1 ? ratio : 1, interpolation_);
+      return between.first < last_level_ ? between : LevelPlace{last_level_, 0};
+    }
     constexpr float kLargest = 1e4f;  // its powers are finite
-    const float beyond = coarse - largest_ratio_, exponent = decay_ * beyond, x = exponent < kLargest ? exponent : kLargest;
-    // 1 / exp(x), or 1 / (1 + x), in plain arithmetic: batches and device code have the same bits.
+    const float exponent = decay_ * beyond, x = exponent < kLargest ? exponent : kLargest;
+    // 1 / exp(x), or 1 / (1 + x), in plain arithmetic: device code has the same bits.
     const float wave = wraps_ ? 1.0f : 0.0f;
     const float series = 1 + x * (1 + wave * (x / 2) * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6 * (1 + x / 7))))));
-    level.t = beyond > 0 ? 1 - 1 / series : level.t;
-    return level;
+    return {last_level_, 1 - 1 / series};
   }
-  /// @param level  0 to level_count, which repeats the last level
-  GLINT_HD const LevelCentres& centres(int level) const { return levels_[level]; }
 
- private:
-  /// Neighbouring centres and the position t between them, 0 to 1; rest = 1 - t. Lanes: x and y of one level, x and y of
-  /// another level.
-  struct Neighbours {
-    Float4 low, high, t, rest;
+  /// The position of a footprint between the levels.
+  /// @param ratio  variance of the footprint over the largest variance that level 0 answers alone; 1 to 4^15
+  static GLINT_HD LevelPlace levelPlace(float ratio, Interpolation interpolation) {
+    constexpr std::uint32_t kOne = 0x3f800000u;
+    constexpr int kPowerOf4 = 24;  // the exponent less its lowest bit
+    std::uint32_t bits;
+    std::memcpy(&bits, &ratio, sizeof bits);
+    // The level is known without waiting for the logarithm.
+    const std::uint32_t first = (bits - kOne) >> kPowerOf4;
+    bits -= first << kPowerOf4;
+    float rest;  // [1, 4)
+    std::memcpy(&rest, &bits, sizeof rest);
+    constexpr float kPerFade = 1 / (kFadeSizes * kFadeSizes - 1);
+    const float t = interpolation == Interpolation::trilinear ? 0.5f * log2Of(rest) : kPerFade * (rest - 1);
+    return {static_cast<int>(first), t < 1 ? t : 1.0f};
+  }
+
+  GLINT_HD void addLevel(int level, float share, Vec2 centre, float variance, PyramidSlices& out) const {
+    const LevelCentres& centres = levels_[level];
+    const Position x = positionOn(centres, 0, centre.x), y = positionOn(centres, 1, centre.y);
+    if (interpolation_ == Interpolation::trilinear) return addCorners(level, share, x, y, out);
+    const float lacking = (variance < largest_variance_ ? variance : largest_variance_) - centres.variance;
+    const Neighbours columns = neighbours(centres, 0, x, lacking), rows = neighbours(centres, 1, y, lacking);
+    float row_places[4], row_weights[4];
+    rows.places.store(row_places);
+    (Float4::all(share) * rows.weights).store(row_weights);
+    for (int k = 0; k < 4; ++k)
+      if (row_weights[k] > 0)
+        addGroup(level, Float4::all(row_places[k]), columns.places, Float4::all(row_weights[k]) * columns.weights, out);
+  }
+
+  /// A position on one axis of a level: t after centre number `low`, in gaps.
+  struct Position {
+    float low;  ///< 0 to the last; on a map that ends, -1 before the first centre
+    float t;    ///< 0 to 1
   };
-
-  GLINT_HD Neighbours neighbours(const LevelCentres& a, const LevelCentres& b, Vec2 centre) const {
-    const Float4 zero = Float4::zero(), one = Float4::all(1), below_one = Float4::all(kBelowOne);
-    // Wraps into [0, 1); numbers that are not finite become 0.
-    const Float4 uv = Float4::of(centre.x, centre.y, centre.x, centre.y);
-    const Float4 wrapped = minOf((uv - floorOf(uv)).positive(), below_one);
-    const Float4 extent = Float4::ofPairs(a.extent, b.extent), last = Float4::ofPairs(a.last, b.last);
-    const Float4 at = wrapped * extent - Float4::all(0.5f);
-    Float4 low, high, t;
-    if (wraps_) {
-      const Float4 unrolled = at + whereLess(at, zero, extent);
-      low = minOf(floorOf(unrolled), last);
-      high = whereLess(low, last, low + one);
-      t = minOf((unrolled - low) * whereLess(low, last, one, Float4::ofPairs(a.per_gap, b.per_gap)), one);
-    } else {
-      const Float4 clamped = minOf(at.positive(), last);
-      low = floorOf(clamped);
-      high = minOf(low + one, last);
-      t = clamped - low;
+  GLINT_HD Position positionOn(const LevelCentres& centres, int axis, float coordinate) const {
+    const float turn = coordinate - std::floor(coordinate);
+    const float u = turn >= 0 ? turn < kBelowOne ? turn : float{kBelowOne} : 0.0f;  // numbers that are not finite become 0
+    const float at = u * centres.extent[axis] - 0.5f, last = centres.last[axis];
+    if (!wraps_) {
+      const float low = std::floor(at);  // at most the last: the border is half a gap beyond it
+      return {low < last ? low : last, at - low};
     }
-    return {low, high, t, one - t};
+    const float unrolled = at < 0 ? at + centres.extent[axis] : at, below = std::floor(unrolled);
+    const float low = below < last ? below : last;
+    const float t = (unrolled - low) * (low < last ? 1.0f : centres.per_border_gap[axis]);
+    return {low, t < 1 ? t : 1.0f};
   }
 
-  /// Sets the images and weights of the four corners of one level.
-  /// @param places, parts  centres and their shares; lanes: low and high along x, low and high along y
-  static GLINT_HD void setCorners(Float4 places, Float4 parts, std::int32_t columns, float level_weight, std::uint32_t* images,
-                                  float* weights) {
-    storeIndices(places.lanes2233(), columns, places.lanes0101(), images);
-    (Float4::all(level_weight) * parts.lanes0101() * parts.lanes2233()).store(weights);
+  /// Four neighbouring centres along an axis.
+  struct Neighbours {
+    Float4 places, weights;
+  };
+  /// @param lacking  variance that the images lack, texels^2
+  GLINT_HD Neighbours neighbours(const LevelCentres& centres, int axis, Position at, float lacking) const {
+    const float last = centres.last[axis];
+    if (last == 0) return {Float4::zero(), Float4::of(1, 0, 0, 0)};
+    const Float4 zero = Float4::zero(), lasts = Float4::all(last), one = Float4::all(1);
+    const Float4 weights = FootprintKernel::weights(lacking * centres.per_square_gap[axis], at.t);
+    const Float4 places = Float4::all(at.low) + Float4::of(-1, 0, 1, 2);
+    if (wraps_) {
+      const Float4 count = lasts + one, not_before = places + whereLess(places, zero, count);
+      return {not_before - whereLess(lasts, not_before, count), weights};
+    }
+    // Centres beyond the border of a map that ends count for nothing.
+    const Float4 inside = whereLess(places, zero, zero, whereLess(lasts, places, zero, weights));
+    return {minOf(places.positive(), lasts), inside * Float4::all(1 / inside.sum())};
   }
 
-  /// Growth of x in levelOf for each unit of variance beyond the last level, in units of the variance of level 0.
+  GLINT_HD void addCorners(int level, float share, Position x, Position y, PyramidSlices& out) const {
+    const auto pairOf = [&](Position at, int axis, float(&places)[2], float(&parts)[2]) {
+      const float last = levels_[level].last[axis];
+      places[0] = at.low > 0 ? at.low : 0;
+      places[1] = at.low < last ? at.low + 1 : wraps_ ? 0.0f : last;
+      parts[0] = 1 - at.t, parts[1] = at.t;
+    };
+    float columns[2], rows[2], across[2], up[2];
+    pairOf(x, 0, columns, across);
+    pairOf(y, 1, rows, up);
+    addGroup(
+        level, Float4::of(rows[0], rows[0], rows[1], rows[1]), Float4::of(columns[0], columns[1], columns[0], columns[1]),
+        Float4::all(share) * Float4::of(across[0], across[1], across[0], across[1]) * Float4::of(up[0], up[0], up[1], up[1]),
+        out);
+  }
+
+  GLINT_HD void addGroup(int level, Float4 rows, Float4 columns, Float4 weights, PyramidSlices& out) const {
+    out.levels[out.count / 4] = level;
+    storeIndices(rows, levels_[level].columns, columns, out.images + out.count);
+    weights.store(out.weights + out.count);
+    out.count += 4;
+  }
+
+  /// Growth of x in levelOf for each unit of variance beyond the last level, in units of the variance where level 0 ends.
   GLINT_HD float farDecay() const {
     constexpr float kTwoPiSquared = 19.739208802178716f;
     // A step in the middle of a map that ends keeps 1 / (sigma^2 / W^2 + 0.047) of its height, to a tenth from sigma = W / 5
     // on.
     constexpr float kClampedOffset = 0.047f;
-    const float longest = std::max(largest_u_, largest_v_) * per_finest_variance_;
+    const float longest = std::max(largest_u_, largest_v_) * per_first_variance_;
     return wraps_ ? kTwoPiSquared / longest : 1 / (largest_ratio_ + kClampedOffset * longest);
   }
 
-  float largest_u_, largest_v_;  // texels^2
-  float per_finest_variance_;
-  float largest_ratio_;  // variance of the last level of footprints over the variance of level 0
-  float decay_;
+  Interpolation interpolation_;
   bool wraps_;
-  LevelCentres levels_[kMaxPyramidLevels + 1];
+  float largest_u_, largest_v_;  // texels^2
+  float per_first_variance_;     // 1 / (largest variance that level 0 answers alone)
+  float largest_variance_;       // that the last level of footprints answers alone, texels^2
+  float largest_ratio_;          // largest_variance_ * per_first_variance_
+  float decay_;
+  int last_level_;  // of footprints
+  LevelCentres levels_[kMaxPyramidLevels];
 };
 
 /// A box of pixels within one angular block: [x0, x1] x [y0, y1] in [0, 16]^2.
