@@ -34,6 +34,15 @@ void NdfAsset::addPyramidOptions() {
                       "most round footprints that stand for a stretched one; 1: one of the same mean square size (kinds "
                       "ndf-pyramid and ndf-cp)")
               .range(1, IsotropicParts::kMost));
+  addInterpolation();
+}
+
+void NdfAsset::addInterpolation() {
+  useOnly({"ndf-pyramid", "ndf-cp"}, "--interpolation",
+          tool_.choice("--interpolation", options_.interpolation,
+                       {{"footprint", Interpolation::footprint}, {"trilinear", Interpolation::trilinear}},
+                       "how footprints between the stored ones are answered: by images that together see the footprint, or "
+                       "trilinearly, which is quicker and sees a wider one (kinds ndf-pyramid and ndf-cp)"));
 }
 
 void NdfAsset::addNormalsOptions() {
@@ -103,6 +112,17 @@ std::optional<std::vector<float>> NdfAsset::scatteredImage(const Footprint& foot
   if (!std::holds_alternative<Reference>(model()) || options_.surface != Surface::flat) return std::nullopt;
   return bake::referenceImage(opened_->asset().get<NormalMap>(), options_.sigma_r, options_.surface, options_.boundary,
                               footprint, size);
+}
+
+bool NdfAsset::widens(const Footprint& footprint) const {
+  return std::visit(
+      [&](const auto& m) {
+        if constexpr (requires { m.round().smallestSigma(); })
+          return isotropicSigma(m.round().shape(), footprint) < m.round().smallestSigma();
+        else
+          return false;
+      },
+      model());
 }
 
 std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint) const {

@@ -49,6 +49,9 @@ class NdfAsset {
   /// Why the asset cannot answer for a footprint without --normals; nothing if it can.
   std::optional<FootprintFault> unanswerable(const Footprint& footprint) const;
 
+  /// Whether the asset answers a wider footprint, for want of --normals.
+  bool widens(const Footprint& footprint) const;
+
  private:
   /// An option that only some kinds of assets use.
   struct KindOption {
@@ -56,6 +59,7 @@ class NdfAsset {
     std::string name;
     const Option* option;
   };
+  void addInterpolation();
   void addNormalsOptions();
   void addPyramidOptions();
   void addBinOptions();

@@ -62,18 +62,28 @@ void DistributionCommand::run() {
   if (table_.csvGiven()) return answerTable();
   if (const auto fault = asset_.unanswerable(footprint_.footprint()))
     throw Error(ErrorCode::usage, "query.footprint", asset_.path(), "", fault->what, fault->remedy);
+  if (asset_.widens(footprint_.footprint())) warnOfWidening("the footprint is");
   if (picture_.given()) writePicture();
   if (table_.samples() > 0) writeSamples();
   if (halves_.given()) answerOne();
 }
 
+void DistributionCommand::warnOfWidening(const std::string& which) {
+  tool_.warn(
+      fmt::format("{}: {} answered up to {:.3g} texels wide; add --normals with the asset that the pyramid was made from",
+                  asset_.path(), which, asset_.info().smallest_sigma_texels));
+}
+
 void DistributionCommand::answerTable() {
   const QueryTable table = QueryTable::read(table_.csv());
+  std::size_t widened = 0;
   for (std::size_t row = 0; row < table.queries().size(); ++row) {
     if (const auto fault = asset_.unanswerable(table.queries()[row].footprint))
       throw Error(ErrorCode::usage, "query.footprint", table_.csv(), fmt::format("row {}", row + 1), fault->what,
                   fault->remedy);
+    widened += asset_.widens(table.queries()[row].footprint) ? 1 : 0;
   }
+  if (widened > 0) warnOfWidening(fmt::format("{} footprints are", widened));
   table_.write(table.withAnswers(answerAll(asset_.model(), table.queries())));
   tool_.setResult({{"queries", table.queries().size()}});
 }
@@ -89,7 +99,8 @@ void DistributionCommand::answerOne() {
   const Query q = halves_.query(footprint_.footprint());
   const float value = answer(asset_.model(), q);
   tool_.print(fmt::format("{:.9g}\n", value));
-  reportTimed(tool_, {{q.range ? "mean" : "density", value}}, repeat_, [&] { return answer(asset_.model(), q); });
+  reportTimed(tool_, {{q.range ? "mean" : "density", value}, {"widened", asset_.widens(q.footprint)}}, repeat_,
+              [&] { return answer(asset_.model(), q); });
 }
 
 void DistributionCommand::writePicture() {

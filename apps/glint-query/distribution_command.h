@@ -36,6 +36,8 @@ class DistributionCommand {
 
  private:
   void check() const;
+  /// @param which  footprints that are smaller than the asset can answer as they are, with a verb
+  void warnOfWidening(const std::string& which);
   void answerTable();
   void answerOne();
   void writeSamples();
