@@ -71,10 +71,10 @@ def test_density_and_mean_are_printed_and_in_json(ask, kind):
 
 @pytest.mark.parametrize("kind", MODELS)
 def test_models_agree_on_the_same_question(ask, kind):
-    # At the centre of an image of the finest level the pyramid is exact; compression keeps a few percent of error.
-    question = ["--uv", "0.3125", "0.6875", "--sigma", "13.8564", "--range", "-0.0625", "-0.0625", "0.0625", "0.0625"]
+    # Images that stand for the footprint keep a few percent of error, and so does compression.
+    question = ["--uv", "0.3125", "0.6875", "--sigma", "20", "--range", "-0.0625", "-0.0625", "0.0625", "0.0625"]
     exact = number(ask("normals", *question, "--sigma-r", "0.02"))
-    assert number(ask(kind, *question, *(["--sigma-r", "0.02"] if kind == "normals" else []))) == pytest.approx(exact, rel=0.05)
+    assert number(ask(kind, *question, *(["--sigma-r", "0.02"] if kind == "normals" else []))) == pytest.approx(exact, rel=0.1)
 
 
 @pytest.mark.parametrize("kind", MODELS)
@@ -269,6 +269,25 @@ def test_positions_far_out_are_those_of_the_map(ask, kind):
     assert ask(kind, "--csv", "q.csv", "-o", "a.csv").returncode == 0
     a, b = (float(line.split(",")[-1]) for line in (ask.folder / "a.csv").read_text().splitlines()[1:])
     assert a == pytest.approx(b, rel=PRINTED)
+
+
+@pytest.mark.parametrize("kind", ["pyramid", "compressed"])
+def test_a_footprint_that_is_widened_is_warned_of(ask, assets, kind):
+    question = ["--uv", "0.3", "0.7", "--sigma", "15", "--half", "0.02", "-0.03"]  # level 0 has 13.9 texels
+    assert "add --normals" in ask(kind, *question).stderr
+    assert json.loads(ask(kind, *question, "--json").stdout)["result"]["widened"] is True
+    answered = ask(kind, *question, "--normals", assets["normals"], "--json")
+    assert json.loads(answered.stdout)["result"]["widened"] is False
+    assert answered.stderr == ""
+
+
+@pytest.mark.parametrize("kind", ["pyramid", "compressed"])
+def test_interpolation_is_chosen(ask, kind):
+    question = [*FOOTPRINT, "--half", "0.02", "-0.03", "--interpolation"]
+    footprint, trilinear = number(ask(kind, *question, "footprint")), number(ask(kind, *question, "trilinear"))
+    assert footprint == number(ask(kind, *FOOTPRINT, "--half", "0.02", "-0.03"))
+    assert footprint != trilinear
+    assert footprint == pytest.approx(trilinear, rel=0.5)
 
 
 def test_normals_of_another_map_are_invalid_input(ask, assets, glint):
