@@ -22,7 +22,7 @@ TEST(LevelPlace, IsTheLogarithmToBase4) {
   constexpr double kError = 2e-7;  // that of log2Of
   for (double octaves = 0; octaves <= 30; octaves += 0.001) {
     const auto ratio = static_cast<float>(std::exp2(octaves));
-    const LevelPlace place = levelPlace(ratio);
+    const LevelPlace place = SliceChooser::levelPlace(ratio, Interpolation::trilinear);
     ASSERT_GE(place.t, 0);
     ASSERT_LE(place.t, 1);
     ASSERT_NEAR(place.first + double{place.t}, 0.5 * std::log2(double{ratio}), kError) << ratio;
@@ -32,11 +32,12 @@ TEST(LevelPlace, IsTheLogarithmToBase4) {
 TEST(LevelPlace, PowersOf4AreLevels) {
   for (int level = 0; level < kMaxPyramidLevels; ++level) {
     const float ratio = std::exp2(2.0f * static_cast<float>(level));
-    EXPECT_EQ(levelPlace(ratio).first, level);
-    EXPECT_EQ(levelPlace(ratio).t, 0);
+    EXPECT_EQ(SliceChooser::levelPlace(ratio, Interpolation::trilinear).first, level);
+    EXPECT_EQ(SliceChooser::levelPlace(ratio, Interpolation::trilinear).t, 0);
     if (level == 0) continue;
-    EXPECT_EQ(levelPlace(std::nextafter(ratio, 0.0f)).first, level - 1);  // and t does not exceed 1
-    EXPECT_NEAR(levelPlace(std::nextafter(ratio, 0.0f)).t, 1, 1e-6);
+    EXPECT_EQ(SliceChooser::levelPlace(std::nextafter(ratio, 0.0f), Interpolation::trilinear).first,
+              level - 1);  // and t does not exceed 1
+    EXPECT_NEAR(SliceChooser::levelPlace(std::nextafter(ratio, 0.0f), Interpolation::trilinear).t, 1, 1e-6);
   }
 }
 

@@ -112,6 +112,23 @@ class SliceChooser {
     return out;
   }
 
+  /// The position of a footprint between the levels.
+  /// @param ratio  variance of the footprint over the largest variance that level 0 answers alone; 1 to 4^15
+  static GLINT_HD LevelPlace levelPlace(float ratio, Interpolation interpolation) {
+    constexpr std::uint32_t kOne = 0x3f800000u;
+    constexpr int kPowerOf4 = 24;  // the exponent less its lowest bit
+    std::uint32_t bits;
+    std::memcpy(&bits, &ratio, sizeof bits);
+    // The level is known without waiting for the logarithm.
+    const std::uint32_t first = (bits - kOne) >> kPowerOf4;
+    bits -= first << kPowerOf4;
+    float rest;  // [1, 4)
+    std::memcpy(&rest, &bits, sizeof rest);
+    constexpr float kPerFade = 1 / (kFadeSizes * kFadeSizes - 1);
+    const float t = interpolation == Interpolation::trilinear ? 0.5f * log2Of(rest) : kPerFade * (rest - 1);
+    return {static_cast<int>(first), t < 1 ? t : 1.0f};
+  }
+
  private:
   /// The centres of one level. Arrays have an element for x and one for y.
   struct LevelCentres {
@@ -179,23 +196,6 @@ class SliceChooser {
     const float wave = wraps_ ? 1.0f : 0.0f;
     const float series = 1 + x * (1 + wave * (x / 2) * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6 * (1 + x / 7))))));
     return {last_level_, 1 - 1 / series};
-  }
-
-  /// The position of a footprint between the levels.
-  /// @param ratio  variance of the footprint over the largest variance that level 0 answers alone; 1 to 4^15
-  static GLINT_HD LevelPlace levelPlace(float ratio, Interpolation interpolation) {
-    constexpr std::uint32_t kOne = 0x3f800000u;
-    constexpr int kPowerOf4 = 24;  // the exponent less its lowest bit
-    std::uint32_t bits;
-    std::memcpy(&bits, &ratio, sizeof bits);
-    // The level is known without waiting for the logarithm.
-    const std::uint32_t first = (bits - kOne) >> kPowerOf4;
-    bits -= first << kPowerOf4;
-    float rest;  // [1, 4)
-    std::memcpy(&rest, &bits, sizeof rest);
-    constexpr float kPerFade = 1 / (kFadeSizes * kFadeSizes - 1);
-    const float t = interpolation == Interpolation::trilinear ? 0.5f * log2Of(rest) : kPerFade * (rest - 1);
-    return {static_cast<int>(first), t < 1 ? t : 1.0f};
   }
 
   GLINT_HD void addLevel(int level, float share, Vec2 centre, float variance, PyramidSlices& out) const {
