@@ -1,6 +1,7 @@
 // How far pyramids, compressed or not, are from the Reference:
 //   glint-accuracy NORMALS.glint ASSET.glint... [--samples N]
-// For every footprint-size octave: errors at the model's own centres, and at random footprints between them. JSON on stdout.
+// For every footprint-size octave: errors of the images (at centres, trilinear is the image), and of answers at random places for a size between two levels. JSON on
+// stdout.
 
 #include <tbb/parallel_for.h>
 
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "glint/bake/common/reference_image.h"
+#include "glint/bake/common/seen_error.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"
@@ -21,6 +23,9 @@
 namespace {
 
 using namespace glint;
+
+// Size of random footprints, in deviations of their level.
+constexpr float kRandomSize = 1.3f;
 
 struct Errors {
   double rel_l2 = 0;
@@ -62,21 +67,21 @@ std::vector<Footprint> centresOf(const PyramidShape& shape, int level, int sampl
   for (int k = 0; k < count; ++k) {
     // An odd multiple of the golden ratio visits rows and columns evenly.
     const int image = count == images ? k : static_cast<int>(std::fmod((k + 0.5) * 0.6180339887498949, 1.0) * images);
-    const Vec2 uv = {(static_cast<float>(image % grid.columns) + 0.5f) * grid.stride / static_cast<float>(shape.width),
-                     (static_cast<float>(image / grid.columns) + 0.5f) * grid.stride / static_cast<float>(shape.height)};
+    const Vec2 centre = shape.centre(level, image % grid.columns, image / grid.columns);
+    const Vec2 uv = {centre.x / static_cast<float>(shape.width), centre.y / static_cast<float>(shape.height)};
     footprints.push_back(Footprint::isotropic(uv, kFootprintPerStride * grid.stride));
   }
   return footprints;
 }
 
-/// Anywhere, of any size from this level's to the next one's.
+/// Anywhere, of one size between this level's and the next one's: seen errors are defined over places of one size.
 std::vector<Footprint> randomFootprints(const PyramidShape& shape, int level, int samples) {
   std::mt19937 random(static_cast<unsigned>(level) + 1);
   const auto unit = [&] { return static_cast<float>(random() >> 8) * 0x1p-24f; };
   std::vector<Footprint> footprints;
   for (int k = 0; k < samples; ++k) {
     const float u = unit(), v = unit();
-    footprints.push_back(Footprint::isotropic({u, v}, kFootprintPerStride * shape.levels[level].stride * std::exp2(unit())));
+    footprints.push_back(Footprint::isotropic({u, v}, kRandomSize * kFootprintPerStride * shape.levels[level].stride));
   }
   return footprints;
 }
@@ -94,16 +99,22 @@ class Truth {
   template <NdfModel M>
   nlohmann::ordered_json errorsOf(const M& model) const {
     std::vector<Errors> errors(images_.size());
+    std::vector<std::vector<float>> answers(images_.size());
     tbb::parallel_for(std::size_t{0}, images_.size(), [&](std::size_t k) {
-      errors[k] = compare(imageOf(model, footprints_[k], resolution_), images_[k], resolution_);
+      answers[k] = imageOf(model, footprints_[k], resolution_);
+      errors[k] = compare(answers[k], images_[k], resolution_);
     });
+    bake::SeenError seen_error(resolution_);
+    for (std::size_t k = 0; k < images_.size(); ++k) seen_error.add(answers[k].data(), images_[k].data());
+    const bake::SeenSummary seen = seen_error.summary();
     Errors mean;
     for (const Errors& e : errors) {
       mean.rel_l2 += e.rel_l2 / static_cast<double>(errors.size());
       mean.tv += e.tv / static_cast<double>(errors.size());
       mean.energy += e.energy / static_cast<double>(errors.size());
     }
-    return {{"footprints", errors.size()}, {"rel_l2", mean.rel_l2}, {"tv", mean.tv}, {"energy", mean.energy}};
+    return {{"footprints", errors.size()}, {"rel_l2", mean.rel_l2},    {"tv", mean.tv},    {"energy", mean.energy},
+            {"seen", seen.seen},           {"seen_worst", seen.worst}, {"bias", seen.bias}};
   }
 
  private:
@@ -116,9 +127,9 @@ const PyramidShape& shapeOf(const formats::Asset& asset) {
   return asset.kind() == "ndf-cp" ? asset.get<NdfCp>().shape : asset.get<NdfPyramid>().shape;
 }
 
-nlohmann::ordered_json errorsOf(const Truth& truth, const formats::Asset& asset) {
-  return asset.kind() == "ndf-cp" ? truth.errorsOf(CpNdf(asset.get<NdfCp>()))
-                                  : truth.errorsOf(PyramidNdf(asset.get<NdfPyramid>()));
+nlohmann::ordered_json errorsOf(const Truth& truth, const formats::Asset& asset, Interpolation interpolation) {
+  return asset.kind() == "ndf-cp" ? truth.errorsOf(CpNdf(asset.get<NdfCp>(), interpolation))
+                                  : truth.errorsOf(PyramidNdf(asset.get<NdfPyramid>(), interpolation));
 }
 
 bool sameGrid(const PyramidShape& a, const PyramidShape& b) {
@@ -147,8 +158,8 @@ nlohmann::ordered_json measure(const std::string& normals_path, const std::vecto
     const Truth random(map, shape, randomFootprints(shape, level, level + 1 < shape.level_count ? samples : 0));
     for (std::size_t a = 0; a < assets.size(); ++a) {
       nlohmann::ordered_json entry = {{"sigma_texels", kFootprintPerStride * shape.levels[level].stride},
-                                      {"centres", errorsOf(own, assets[a])}};
-      if (level + 1 < shape.level_count) entry["random"] = errorsOf(random, assets[a]);
+                                      {"centres", errorsOf(own, assets[a], Interpolation::trilinear)}};
+      if (level + 1 < shape.level_count) entry["random"] = errorsOf(random, assets[a], Interpolation::footprint);
       result[a]["levels"].push_back(entry);
     }
   }

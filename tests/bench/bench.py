@@ -190,9 +190,13 @@ class Bench:
             coefficients = next(word for word, least in LEAST_ERROR.items() if error >= least)
             for method in ("tucker", "pca"):
                 reached, bytes_used = self.compress(f"compress, {method} to the error of {kind}, {name}", name, f"{method}-tolerance", "--method",
-                                                    method, "--tolerance", error, "--quantize", coefficients, target=4)
+                                                    method, "--metric", "l2", "--tolerance", error, "--quantize", coefficients, target=4)
                 self.table.add(f"bytes over those of {kind}, {method}, {name}", bytes_used / size, "", target=1 / 3, rel_l2=reached, bytes=bytes_used)
 
+        for name in MAPS:
+            run = self.process(f"compress, tucker to a seen error of 10 %, {name}", "compress", self.path(name, "pyramid"), "-o",
+                               self.path(name, "tucker-seen"), "--tolerance", 0.1)
+            self.table.add(f"bytes at a seen error of 10 %, {name}", run.result["total_bytes"] / MB, "MB")
         self.noise_tensors()
 
     def noise_tensors(self):

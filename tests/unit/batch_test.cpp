@@ -19,7 +19,7 @@ namespace {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr int kSize = 64;
 /// Of the pdf of a footprint whose variance is not finite: it is asked as one part, and rounded once more. All else has the same bits.
-constexpr float kPdfError = 1e-6f;
+constexpr float kPdfError = 5e-6f;
 
 struct Queries {
   std::vector<float> u, v, sigma, hx, hy;

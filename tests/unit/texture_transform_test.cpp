@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
+#include "glint/model/slope_sums.h"
 #include "glint/query/brdf/microfacet_brdf.h"
-#include "glint/query/brdf/slope_sums.h"
 #include "glint/query/reference.h"
 #include "support/directions.h"
 #include "support/test_maps.h"

@@ -66,14 +66,17 @@ struct Attempt {
   double scale_range;
 };
 
-/// Attempts in turn, from few bytes to many. The wide range is best for most maps; the narrow range loses less to rounding.
+/// Attempts in turn, from few bytes to many. A wide range is best for most maps; narrow ranges lose less to rounding.
 std::vector<Attempt> attemptsOf(const CompressionOptions& options) {
-  constexpr double kWide = 1e6, kNarrow = 1e3;
+  constexpr double kWide = 1e6, kNarrow = 1e3, kNarrowest = 100;
   const CoefficientType first = options.coefficient_type.value_or(CoefficientType::i8);
   if (!(options.tolerance > 0)) return {{first, kWide}};
   std::vector<Attempt> attempts = {{first, kWide}, {first, kNarrow}};
   if (!options.coefficient_type)
-    attempts.insert(attempts.end(), {{CoefficientType::f16, kNarrow}, {CoefficientType::f32, kNarrow}});
+    attempts.insert(attempts.end(), {{CoefficientType::f16, kNarrow},
+                                     {CoefficientType::f16, kNarrowest},
+                                     {CoefficientType::f32, kNarrowest},
+                                     {CoefficientType::f32, 1}});
   return attempts;
 }
 
