@@ -282,7 +282,7 @@ def test_bad_pixels_are_refused(glint, folder, change, words):
     write_exr(folder / "env.exr", pixels)
     process = glint("shlobes", "--light", "env.exr", "-o", "x.glint", "--order", 4)
     assert process.returncode == 3
-    assert "env.exr" in process.stderr and "1 pixels" in process.stderr and words in process.stderr
+    assert "env.exr" in process.stderr and "1 pixel " in process.stderr and words in process.stderr
     assert "column 4, row 3 from the top" in process.stderr
     assert not (folder / "x.glint").exists()
 

@@ -137,6 +137,7 @@ NdfCpData compress(const Case& c, CompressionMethod method, CoefficientType type
   o.method = method;
   o.coefficient_type = type;
   o.rank = rank;  // 7 leaves values below zero, and a rest of columns beyond a multiple of four
+  o.metric = bake::ErrorMetric::l2;
   o.regions = 2;
   return bake::compressPyramid(c.pyramid.view(), o);
 }

@@ -51,7 +51,8 @@ inline GLINT_HD PrincipalAxes principalAxes(const UsableCovariance& c) {
   if (split == 0) return {longest, shortest, 1, 0};
   // Cosine and sine of half the angle whose cosine is half / split and whose sine is c.xy / split.
   const double larger = std::sqrt(0.5 * (1 + std::fabs(half) / split)), smaller = 0.5 * std::fabs(c.xy) / (split * larger);
-  return {longest, shortest, half >= 0 ? larger : smaller, std::copysign(half >= 0 ? smaller : larger, c.xy)};
+  const double sine = half >= 0 ? smaller : larger;
+  return {longest, shortest, half >= 0 ? larger : smaller, c.xy < 0 ? -sine : sine};
 }
 
 /// Principal axes as vectors whose lengths are the deviations, texels: the longer one first, or the one along u if both are
