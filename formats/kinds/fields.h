@@ -45,6 +45,8 @@ struct ElementOf<std::uint32_t> : ElementIs<ElementType::u32> {};
 template <>
 struct ElementOf<std::uint64_t> : ElementIs<ElementType::u64> {};
 template <>
+struct ElementOf<std::int32_t> : ElementIs<ElementType::i32> {};
+template <>
 struct ElementOf<float> : ElementIs<ElementType::f32> {};
 template <>
 struct ElementOf<Vec2> : ElementIs<ElementType::f32, 2> {};

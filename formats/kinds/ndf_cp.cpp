@@ -29,8 +29,6 @@ double element(ElementType type, const void* data, std::uint64_t index) {
   switch (type) {
     case ElementType::i8:
       return static_cast<const std::int8_t*>(data)[index];
-    case ElementType::i32:
-      return static_cast<const std::int32_t*>(data)[index];
     case ElementType::f16:
       return ieeeHalfToFloat(static_cast<const std::uint16_t*>(data)[index]);
     default:
@@ -168,7 +166,7 @@ std::string_view checkFactors(const NdfCp& ndf, const NdfCluster& cluster) {
   if (!inside(cluster.first_scale, columns, ndf.scales.size())) return "compressed.ranges";
   if (cluster.columns == 0) return spotsHold(ndf, cluster) ? std::string_view() : "compressed.spots";
   const bool tucker = ndf.method == CompressionMethod::tucker;
-  if (!inside(cluster.first_basis, static_cast<std::uint64_t>(basisElements(ndf.method, cluster)), ndf.basis_count) ||
+  if (!inside(cluster.first_basis, static_cast<std::uint64_t>(basisElements(ndf.method, cluster)), ndf.basis.size()) ||
       !inside(cluster.first_coefficient,
               static_cast<std::uint64_t>(cluster.slice_count) * static_cast<std::uint64_t>(rowElements(cluster)) + kRowPadding,
               ndf.coefficient_count) ||
@@ -187,7 +185,7 @@ std::vector<std::size_t> firstSlots(const NdfCp& ndf) {
 
 /// Basis images of a cluster with their scales, [columns][256].
 std::vector<float> basisImages(const NdfCp& ndf, const NdfCluster& cluster) {
-  const auto at = [&](std::uint64_t index) { return element(ElementType::i32, ndf.basis, cluster.first_basis + index); };
+  const auto at = [&](std::uint64_t index) { return static_cast<double>(ndf.basis[cluster.first_basis + index]); };
   const bool tucker = ndf.method == CompressionMethod::tucker;
   const std::uint64_t columns = cluster.columns, rx = tucker ? cluster.rank_x : columns, ry = tucker ? cluster.rank_y : columns;
   const auto along = [&](std::uint64_t first, std::uint64_t rank, std::uint64_t k, int t) {
@@ -379,8 +377,7 @@ void describeClusters(Fields auto& fields, auto& ndf) {
   fields.array("clusters", ndf.clusters, {"regions", "places"}, "1", "place and size of each cluster's factors");
   fields.array("masks", ndf.masks, {"word_count"}, "1", "bit b of word w of a cluster: slot 64 w + b has a slice in it");
   fields.array("mask_ranks", ndf.mask_ranks, {"word_count"}, "1", "set bits of the cluster before this word");
-  fields.data("basis", ndf.basis, ndf.basis_count, {{"", i32}}, {"basis_count"}, "1",
-              "inclusive prefix sums of each cluster's basis, columns fastest");
+  fields.array("basis", ndf.basis, {"basis_count"}, "1", "inclusive prefix sums of each cluster's basis, columns fastest");
   fields.data("coefficients", ndf.coefficients, ndf.coefficient_count,
               {{"coefficient_type=i8", i8}, {"coefficient_type=f16", f16}, {"coefficient_type=f32", f32}},
               {"coefficient_count"}, "1", "coefficients of each cluster, a row for each slice; or its spots");

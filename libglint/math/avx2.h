@@ -38,9 +38,6 @@ GLINT_AVX2 inline __m256 loadEight(const std::uint16_t* p) {
 GLINT_AVX2 inline __m256i integersOf(const std::int8_t* p) {
   return _mm256_cvtepi8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)));
 }
-GLINT_AVX2 inline __m256i integersOf(const std::int16_t* p) {
-  return _mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)));
-}
 GLINT_AVX2 inline __m256i integersOf(const std::int32_t* p) { return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)); }
 /// p[0] to p[7], integers, as floats.
 template <class Integer>

@@ -23,12 +23,10 @@ namespace glint {
 inline GLINT_HD std::int8_t lowHalf(std::int8_t byte) { return static_cast<std::int8_t>(((byte & 15) ^ 8) - 8); }
 inline GLINT_HD std::int8_t highHalf(std::int8_t byte) { return static_cast<std::int8_t>(byte >> 4); }
 
-/// a - b, rounded once. Integers wrap where the difference does not fit 32 bits, as only a broken file has them.
-inline GLINT_HD float differenceOf(float a, float b) { return a - b; }
+/// a - b, rounded once. Wraps where the difference does not fit 32 bits, as only a broken file has it.
 inline GLINT_HD float differenceOf(std::int32_t a, std::int32_t b) {
   return static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(a) - static_cast<std::uint32_t>(b)));
 }
-inline GLINT_HD float differenceOf(std::int16_t a, std::int16_t b) { return differenceOf(std::int32_t{a}, std::int32_t{b}); }
 
 #ifdef GLINT_SSE
 /// Operations that SSE4.1 has and SSE2 lacks. Both versions return the same bits and pass arguments in the same registers. So
@@ -36,7 +34,6 @@ inline GLINT_HD float differenceOf(std::int16_t a, std::int16_t b) { return diff
 namespace sse {
 #ifdef __SSE4_1__
 inline __m128i integersOf8(__m128i bytes) { return _mm_cvtepi8_epi32(bytes); }
-inline __m128i integersOf16(__m128i shorts) { return _mm_cvtepi16_epi32(shorts); }
 inline __m128i productOf(__m128i a, __m128i b) { return _mm_mullo_epi32(a, b); }
 inline __m128 where(__m128 mask, __m128 yes, __m128 no) { return _mm_blendv_ps(no, yes, mask); }
 inline __m128 floorOf(__m128 v) { return _mm_floor_ps(v); }
@@ -45,7 +42,6 @@ inline __m128i integersOf8(__m128i bytes) {
   const __m128i pairs = _mm_unpacklo_epi8(bytes, bytes);
   return _mm_srai_epi32(_mm_unpacklo_epi16(pairs, pairs), 24);
 }
-inline __m128i integersOf16(__m128i shorts) { return _mm_srai_epi32(_mm_unpacklo_epi16(shorts, shorts), 16); }
 inline __m128i productOf(__m128i a, __m128i b) {
   const __m128i even = _mm_mul_epu32(a, b), odd = _mm_mul_epu32(_mm_srli_epi64(a, 32), _mm_srli_epi64(b, 32));
   return _mm_unpacklo_epi32(_mm_shuffle_epi32(even, 0x08), _mm_shuffle_epi32(odd, 0x08));
@@ -85,7 +81,6 @@ struct Float4 {
     return sse::integersOf8(_mm_cvtsi32_si128(four));
   }
   static Float4 load(const std::int8_t* p) { return {_mm_cvtepi32_ps(bytes(p))}; }
-  static Float4 load(const std::int16_t* p) { return {_mm_cvtepi32_ps(sse::integersOf16(sse::loadFour(p)))}; }
   static Float4 load(const std::int32_t* p) { return {_mm_cvtepi32_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))}; }
   /// Loads half-precision numbers; infinities and NaN as in halfToFloat.
   static Float4 load(const std::uint16_t* p) {
@@ -100,16 +95,9 @@ struct Float4 {
     return {_mm_or_ps(sse::where(is_subnormal, subnormal, _mm_castsi128_ps(normal)), _mm_castsi128_ps(sign))};
   }
   /// differenceOf(a[k], b[k]), or a[k] where `mask` is 0 rather than -1.
-  static Float4 difference(const std::int16_t* a, const std::int16_t* b, int mask) {
-    const auto four = [](const std::int16_t* p) { return sse::integersOf16(sse::loadFour(p)); };
-    return {_mm_cvtepi32_ps(_mm_sub_epi32(four(a), _mm_and_si128(four(b), _mm_set1_epi32(mask))))};
-  }
   static Float4 difference(const std::int32_t* a, const std::int32_t* b, int mask) {
     const auto four = [](const std::int32_t* p) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(p)); };
     return {_mm_cvtepi32_ps(_mm_sub_epi32(four(a), _mm_and_si128(four(b), _mm_set1_epi32(mask))))};
-  }
-  static Float4 difference(const float* a, const float* b, int mask) {
-    return {_mm_sub_ps(_mm_loadu_ps(a), _mm_and_ps(_mm_loadu_ps(b), _mm_castsi128_ps(_mm_set1_epi32(mask))))};
   }
   /// Loads half-precision numbers as positiveHalfToFloat does. Takes fewer steps than `load`, which keeps signs.
   static Float4 loadPositive(const std::uint16_t* p) {
@@ -201,10 +189,9 @@ struct Float4 {
     return {{halfToFloat(p[0]), halfToFloat(p[1]), halfToFloat(p[2]), halfToFloat(p[3])}};
   }
   /// differenceOf(a[k], b[k]), or a[k] where `mask` is 0 rather than -1.
-  template <class T>
-  static GLINT_HD Float4 difference(const T* a, const T* b, int mask) {
+  static GLINT_HD Float4 difference(const std::int32_t* a, const std::int32_t* b, int mask) {
     Float4 out;
-    for (int k = 0; k < 4; ++k) out.v[k] = differenceOf(a[k], mask != 0 ? b[k] : T{0});
+    for (int k = 0; k < 4; ++k) out.v[k] = differenceOf(a[k], mask != 0 ? b[k] : 0);
     return out;
   }
   static GLINT_HD Float4 loadPositive(const std::uint16_t* p) { return ofPositive(p[0], p[1], p[2], p[3]); }

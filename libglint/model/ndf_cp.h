@@ -108,9 +108,8 @@ struct NdfCp {
 
   /// Prefix sums along each block axis, inclusive, columns fastest.
   /// cp: X[16][K] then Y[16][K]; tucker: U[16][rank_x] then V[16][rank_y]; pca: [16][16][K], summed over both axes.
-  /// Elements are i32, sums of integers of at most 2^20.
-  const void* basis = nullptr;
-  std::uint64_t basis_count = 0;
+  /// Sums are of integers of at most 2^20.
+  std::span<const std::int32_t> basis;
   /// Coefficients of each cluster, [slices][rowElements()]. A row has the wide columns first. With i8, bytes of two narrow
   /// columns each follow: byte j has narrow column j in its low half and narrow column j + ceil(narrow_columns / 2) in its high
   /// half. kRowPadding zeros end the array, so that rows can be read in groups of four. For clusters of spots see NdfSpot.
@@ -122,9 +121,6 @@ struct NdfCp {
 
   GLINT_HD constexpr int placeWords() const { return (places + 63) / 64; }
 };
-
-/// Bytes of an element of NdfCp::basis.
-inline constexpr int kBasisElementBytes = 4;
 
 /// Elements after the last row of NdfCp::coefficients.
 inline constexpr int kRowPadding = 16;

@@ -81,8 +81,7 @@ class PackedNdfView {
     out.clusters = array<NdfCluster>(arrays[3]);
     out.masks = array<std::uint64_t>(arrays[4]);
     out.mask_ranks = array<std::uint32_t>(arrays[5]);
-    out.basis = base_ + arrays[6].offset;
-    out.basis_count = arrays[6].count;
+    out.basis = array<std::int32_t>(arrays[6]);
     out.coefficients = base_ + arrays[7].offset;
     out.coefficient_count = arrays[7].count;
     out.scales = array<float>(arrays[8]);

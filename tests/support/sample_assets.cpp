@@ -236,14 +236,14 @@ std::uint64_t coefficientCount(const SampleNdfCp& sample) {
 
 void addBasis(SampleNdfCp& sample) {
   for (const double sum : basisSums(sample.ndf.method)) {
-    sample.basis_i32.push_back(static_cast<std::int32_t>(sum));
+    sample.basis.push_back(static_cast<std::int32_t>(sum));
   }
 }
 
 void addCluster(SampleNdfCp& sample, const std::vector<const Image*>& slots, int block, SampleForm form) {
   NdfCluster cluster;
   if (form == SampleForm::spots) sample.coefficients_i8.resize((sample.coefficients_i8.size() + 3) / 4 * 4);
-  cluster.first_basis = static_cast<std::uint32_t>(sample.basis_i32.size());
+  cluster.first_basis = static_cast<std::uint32_t>(sample.basis.size());
   cluster.first_coefficient = coefficientCount(sample);
   cluster.first_scale = static_cast<std::uint32_t>(sample.scales.size());
   cluster.first_word = static_cast<std::uint32_t>(sample.masks.size());
@@ -295,15 +295,14 @@ void linkSpans(SampleNdfCp& sample) {
   ndf.block_places = sample.block_places;
   ndf.place_blocks = sample.place_blocks;
   ndf.spot_sums = sample.spot_sums;
-  ndf.basis = sample.basis_i32.data();
-  ndf.basis_count = sample.basis_i32.size();
+  ndf.basis = sample.basis;
   ndf.coefficients = !sample.coefficients_i8.empty()    ? static_cast<const void*>(sample.coefficients_i8.data())
                      : !sample.coefficients_f16.empty() ? static_cast<const void*>(sample.coefficients_f16.data())
                                                         : sample.coefficients_f32.data();
   ndf.coefficient_count = coefficientCount(sample);
 }
 
-double basisElement(const NdfCp& ndf, std::uint64_t index) { return static_cast<const std::int32_t*>(ndf.basis)[index]; }
+double basisElement(const NdfCp& ndf, std::uint64_t index) { return ndf.basis[index]; }
 
 double coefficientElement(const NdfCp& ndf, std::uint64_t index) {
   switch (ndf.coefficient_type) {

@@ -62,7 +62,7 @@ struct SampleNdfCp {
   std::vector<NdfCluster> clusters;
   std::vector<std::uint64_t> masks;
   std::vector<std::uint32_t> mask_ranks;
-  std::vector<std::int32_t> basis_i32;
+  std::vector<std::int32_t> basis;
   std::vector<std::int8_t> coefficients_i8;
   std::vector<std::uint16_t> coefficients_f16;
   std::vector<float> coefficients_f32;

@@ -19,7 +19,7 @@ inline double decodeHalf(std::uint16_t bits) {
 }
 
 /// Element of an array that is stored as the first type that applies.
-inline double basisElement(const NdfCp& c, std::uint64_t i) { return static_cast<const std::int32_t*>(c.basis)[i]; }
+inline double basisElement(const NdfCp& c, std::uint64_t i) { return c.basis[i]; }
 
 inline double coefficientElement(const NdfCp& c, std::uint64_t i) {
   if (c.coefficient_type == CoefficientType::f32) return static_cast<const float*>(c.coefficients)[i];

@@ -57,8 +57,7 @@ TEST(BitRank, CountsTheBitsBelow) {
   }
 }
 
-template <class T>
-void expectDifferences(const T (&a)[4], const T (&b)[4]) {
+void expectDifferences(const std::int32_t (&a)[4], const std::int32_t (&b)[4]) {
   for (const bool masked : {false, true}) {
     float lanes[4];
     Float4::difference(a, b, masked ? 0 : -1).store(lanes);
@@ -69,11 +68,7 @@ void expectDifferences(const T (&a)[4], const T (&b)[4]) {
   }
 }
 
-TEST(Float4, DifferencesAreRoundedOnce) {
-  expectDifferences<std::int16_t>({32767, -32768, 5, 0}, {-32768, 32767, 7, -1});
-  expectDifferences<std::int32_t>({1 << 30, 16777217, -5, 0}, {(1 << 30) - 1, 1, 7, -1});
-  expectDifferences<float>({0.5f, -1, 3, 1e30f}, {0.25f, 1, 3, 1});
-}
+TEST(Float4, DifferencesAreRoundedOnce) { expectDifferences({1 << 30, 16777217, -5, 0}, {(1 << 30) - 1, 1, 7, -1}); }
 
 /// Columns whose values are their numbers.
 struct Numbers {

@@ -31,7 +31,7 @@ struct NdfTraits<AnisotropicNdf<CpNdf>> {
     header.arrays[3] = packer.add(ndf.clusters);
     header.arrays[4] = packer.add(ndf.masks);
     header.arrays[5] = packer.add(ndf.mask_ranks);
-    header.arrays[6] = packer.addBytes(ndf.basis, ndf.basis_count, kBasisElementBytes);
+    header.arrays[6] = packer.add(ndf.basis);
     header.arrays[7] = packer.addBytes(ndf.coefficients, ndf.coefficient_count, coefficientBytes(ndf.coefficient_type));
     header.arrays[8] = packer.add(ndf.scales);
     header.arrays[9] = packer.add(ndf.density_scales);

@@ -53,14 +53,14 @@ QuantizedFactor quantizeFactor(const std::vector<float>& factor, int rows, int c
 
 /// Writes the prefix sums of [16][columns] along the first axis and replaces the values by the
 /// differences of these sums, as a reader decodes them.
-void writePrefixSums(std::vector<float>& values, int columns, std::vector<std::byte>& bytes) {
+void writePrefixSums(std::vector<float>& values, int columns, std::vector<std::int32_t>& out) {
   std::vector<double> sums(columns, 0.0);
   std::vector<std::int32_t> before(columns, 0);
   for (int i = 0; i < kBlockSize; ++i) {
     for (int k = 0; k < columns; ++k) {
       sums[k] += values[i * columns + k];
       const auto stored = static_cast<std::int32_t>(sums[k]);
-      append(bytes, stored);
+      out.push_back(stored);
       values[i * columns + k] = differenceOf(stored, before[k]);
       before[k] = stored;
     }
@@ -69,7 +69,7 @@ void writePrefixSums(std::vector<float>& values, int columns, std::vector<std::b
 
 /// Writes the sums of images [16][16][columns] over the pixels below and left of each pixel, and replaces the values by the
 /// differences of these sums, as a reader decodes them.
-void writeAreaSums(std::vector<float>& values, int columns, std::vector<std::byte>& bytes) {
+void writeAreaSums(std::vector<float>& values, int columns, std::vector<std::int32_t>& out) {
   std::vector<double> above(static_cast<std::size_t>(kBlockSize) * columns, 0.0);
   std::vector<std::int32_t> stored_above(static_cast<std::size_t>(kBlockSize) * columns, 0);
   for (int y = 0; y < kBlockSize; ++y) {
@@ -83,7 +83,7 @@ void writeAreaSums(std::vector<float>& values, int columns, std::vector<std::byt
         row[k] += value;
         above[i] += row[k];
         const auto stored = static_cast<std::int32_t>(above[i]);
-        append(bytes, stored);
+        out.push_back(stored);
         value = differenceOf(stored, left[k]) - differenceOf(stored_above[i], diagonal[k]);
         diagonal[k] = stored_above[i];
         left[k] = stored_above[i] = stored;
@@ -134,13 +134,13 @@ void transposeOrthogonal(DecodedBasis& basis) {
   }
 }
 
-/// Quantises the basis, writes it to `bytes`, and decodes it again.
+/// Quantises the basis, appends its prefix sums to `sums`, and decodes it again.
 DecodedBasis encodeBasis(const ClusterBasis& basis, const BlockScale& scale, CompressionMethod method,
-                         std::vector<std::byte>& bytes) {
+                         std::vector<std::int32_t>& sums) {
   DecodedBasis out;
   if (method == CompressionMethod::pca) {
     QuantizedFactor images = quantizeFactor(basis.x, kBlockPixels, basis.rank_x);
-    writeAreaSums(images.values, basis.rank_x, bytes);
+    writeAreaSums(images.values, basis.rank_x, sums);
     out.scales = images.scales;
     for (int k = 0; k < basis.rank_x; ++k)
       for (int p = 0; p < kBlockPixels; ++p) out.images.push_back(images.scales[k] * images.values[p * basis.rank_x + k]);
@@ -148,8 +148,8 @@ DecodedBasis encodeBasis(const ClusterBasis& basis, const BlockScale& scale, Com
     const int rank_y = basis.rank_y;
     QuantizedFactor x = quantizeFactor(basis.x, kBlockSize, basis.rank_x);
     QuantizedFactor y = quantizeFactor(basis.y, kBlockSize, rank_y);
-    writePrefixSums(x.values, basis.rank_x, bytes);
-    writePrefixSums(y.values, rank_y, bytes);
+    writePrefixSums(x.values, basis.rank_x, sums);
+    writePrefixSums(y.values, rank_y, sums);
     for (const ClusterColumn& column : basis.columns) {
       const bool tucker = method == CompressionMethod::tucker;
       appendProduct(x, basis.rank_x, tucker ? column.index % kBlockSize : column.index, y, rank_y,
@@ -325,7 +325,7 @@ std::vector<std::uint32_t> worthyRows(const SliceIndex& index, const ErrorWeight
   for (int s = 0; s < index.sliceCount(cluster); ++s) {
     double energy = 0, sum = 0, weight = 1;
     if (least > 0) {
-      weight = weights.slice(cluster, index.level(index.image(index.firstSlice(cluster) + s)));
+      weight = weights.slice(cluster, index.sliceLevel(cluster, s));
       index.load(cluster, s, 1, statistics.factors.data(), slice.data());
       for (int p = 0; p < kBlockPixels; ++p) {
         energy += static_cast<double>(slice[p]) * slice[p];

@@ -17,7 +17,7 @@ struct EncodedCluster {
   int narrow_columns = 0;
   int rank_x = 0;  ///< tucker only, as rank_y
   int rank_y = 0;
-  std::vector<std::byte> basis;
+  std::vector<std::int32_t> basis;
   std::vector<std::byte> coefficients;  ///< a row for each slice of `kept`, without padding; spots: as ndf_cp.h says
   std::vector<float> scales;
   std::vector<std::uint8_t> core;

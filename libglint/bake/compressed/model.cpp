@@ -95,7 +95,7 @@ ClusterStatistics measureCluster(const SliceIndex& index, const ErrorWeights& we
   weights.scale(cluster).factors(1, statistics.factors.data());
   float slice[kSliceStride];
   for (int s = 0; s < index.sliceCount(cluster); ++s) {
-    const std::uint32_t image = index.image(index.firstSlice(cluster) + s);
+    const std::uint32_t image = index.sliceImage(cluster, s);
     index.load(cluster, s, 1, statistics.factors.data(), slice);
     // In double, squares of the largest floats do not overflow, so a sum that is not finite shows a value that is not.
     double energy = 0;
@@ -132,8 +132,7 @@ ClusterModel::ClusterModel(const SliceIndex& index, const ErrorWeights& weights,
     choices_.push_back({false, 0, statistics.energy, 0});
     return;
   }
-  for (int s = 0; s < slice_count_; ++s)
-    slice_weights_.push_back(weights.slice(cluster, index.level(index.image(index.firstSlice(cluster) + s))));
+  for (int s = 0; s < slice_count_; ++s) slice_weights_.push_back(weights.slice(cluster, index.sliceLevel(cluster, s)));
   const double square = static_cast<double>(peak_) * peak_;
   energy_ = statistics.energy / square;
   if (options.tolerance > 0) choices_.push_back({false, 0, statistics.energy, 0});
@@ -398,7 +397,7 @@ void ClusterModel::decomposePca(const CompressionOptions& options, double neglig
     return;
   }
   const std::vector<float> coefficients = project(components_, rank);
-  const double basis_bytes = static_cast<double>(kBlockPixels) * kBasisElementBytes;
+  const double basis_bytes = static_cast<double>(kBlockPixels) * sizeof(std::int32_t);
   for (int k = 0; k < rank; ++k)
     addColumnSteps(k, coefficients.data() + static_cast<std::size_t>(k) * slice_count_, basis_bytes);
   addStepChoices(energy_);
@@ -411,7 +410,7 @@ void ClusterModel::boundCpRanks(const CompressionOptions& options, double neglig
   axes_ = analyseAxes();
   std::vector<double> energies(axes_.energy[0], axes_.energy[0] + kBlockPixels);
   std::sort(energies.begin(), energies.end(), std::greater<>());
-  const std::uint64_t column_bytes = 2ull * kBlockSize * kBasisElementBytes + sizeof(float) +
+  const std::uint64_t column_bytes = 2ull * kBlockSize * sizeof(std::int32_t) + sizeof(float) +
                                      static_cast<std::uint64_t>(slice_count_) * coefficientElementBytes(type_);
   const bool one = !(options.tolerance > 0);
   const int most = one ? options.rank : kMostCpRank;

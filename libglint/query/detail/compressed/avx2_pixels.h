@@ -14,8 +14,7 @@ namespace glint {
 // Values of columns at one pixel with vectors of eight: avx2Pixel(basis, ...) for the basis of each method, and the function
 // `scaled` that ColumnLayout::arrange then uses. Results are those of basis.pixel to the bit.
 
-template <class T>
-struct Avx2CpPixel : CpBasis<T>::Pixel {
+struct Avx2CpPixel : CpBasis::Pixel {
   GLINT_AVX2 __m256 eight(int k) const {
     return _mm256_mul_ps(Avx2Prefixes::eight(this->x, k), Avx2Prefixes::eight(this->y, k));
   }
@@ -23,22 +22,19 @@ struct Avx2CpPixel : CpBasis<T>::Pixel {
     storeEight(to, _mm256_mul_ps(loadEight(scales + k), eight(k)));
   }
 };
-template <class T>
-GLINT_AVX2 inline void avx2Pixel(const CpBasis<T>& basis, const ColumnLayout& layout, int x, int y, float* projection) {
-  layout.arrange(basis.scales(), Avx2CpPixel<T>{basis.at(x, y)}, projection);
+GLINT_AVX2 inline void avx2Pixel(const CpBasis& basis, const ColumnLayout& layout, int x, int y, float* projection) {
+  layout.arrange(basis.scales(), Avx2CpPixel{basis.at(x, y)}, projection);
 }
 
-template <class T>
-struct Avx2PcaPixel : PcaBasis<T>::Pixel {
+struct Avx2PcaPixel : PcaBasis::Pixel {
   GLINT_AVX2 void scaled(const float* scales, int k, float* to) const {
     const __m256 at = Avx2Prefixes::eight(this->here, k);
     const __m256 value = this->inner ? _mm256_sub_ps(at, Avx2Prefixes::eight(this->below, k)) : at;
     storeEight(to, _mm256_mul_ps(loadEight(scales + k), value));
   }
 };
-template <class T>
-GLINT_AVX2 inline void avx2Pixel(const PcaBasis<T>& basis, const ColumnLayout& layout, int x, int y, float* projection) {
-  layout.arrange(basis.scales(), Avx2PcaPixel<T>{basis.at(x, y)}, projection);
+GLINT_AVX2 inline void avx2Pixel(const PcaBasis& basis, const ColumnLayout& layout, int x, int y, float* projection) {
+  layout.arrange(basis.scales(), Avx2PcaPixel{basis.at(x, y)}, projection);
 }
 
 /// Products of pairs of functions. The values of the 16 functions of each axis stay in two vectors, where the core picks them.
@@ -67,11 +63,10 @@ struct Avx2TuckerPixel {
   const float *x, *y;
   __m256 low_x, high_x, low_y, high_y;
 };
-template <class T>
-GLINT_AVX2 inline void avx2Pixel(const TuckerBasis<T>& basis, const ColumnLayout& layout, int x, int y, float* projection) {
+GLINT_AVX2 inline void avx2Pixel(const TuckerBasis& basis, const ColumnLayout& layout, int x, int y, float* projection) {
   float at_x[kBlockSize] = {}, at_y[kBlockSize] = {};
-  PrefixAxis<T>(basis.alongX(), basis.rankX(), x).store(at_x);
-  PrefixAxis<T>(basis.alongY(), basis.rankY(), y).store(at_y);
+  PrefixAxis(basis.alongX(), basis.rankX(), x).store(at_x);
+  PrefixAxis(basis.alongY(), basis.rankY(), y).store(at_y);
   layout.arrange(basis.scales(), Avx2TuckerPixel{basis.core(), at_x, at_y}, projection);
 }
 

@@ -12,10 +12,7 @@ namespace glint {
 /// and read no further.
 struct Avx2Prefixes {
   /// Columns k to k + 7 at the pixel of an axis.
-  template <class T>
-  GLINT_AVX2 static __m256 eight(const PrefixAxis<T>& axis, int k) {
-    return difference(axis.at + k, axis.before + k, axis.inner);
-  }
+  GLINT_AVX2 static __m256 eight(const PrefixAxis& axis, int k) { return difference(axis.at + k, axis.before + k, axis.inner); }
 
   /// weighPrefixes as a function object. Not inlined: with a copy in each caller, a source takes twice as long to compile.
   struct Weigh {
@@ -28,11 +25,7 @@ struct Avx2Prefixes {
 
  private:
   /// Eight elements as floats: a[k] - b[k], rounded once, or a[k] where `mask` is 0 rather than -1 (Float4::difference).
-  GLINT_AVX2 static __m256 difference(const float* a, const float* b, int mask) {
-    return _mm256_sub_ps(loadEight(a), _mm256_and_ps(loadEight(b), _mm256_castsi256_ps(_mm256_set1_epi32(mask))));
-  }
-  template <class T>
-  GLINT_AVX2 static __m256 difference(const T* a, const T* b, int mask) {
+  GLINT_AVX2 static __m256 difference(const std::int32_t* a, const std::int32_t* b, int mask) {
     return _mm256_cvtepi32_ps(_mm256_sub_epi32(integersOf(a), _mm256_and_si256(integersOf(b), _mm256_set1_epi32(mask))));
   }
 

@@ -27,7 +27,7 @@ class Avx2Reader : public ClusterReader<Basis, Coefficient> {
 
   GLINT_AVX2 float valueAlone(const NdfCluster& cluster, Row c, int x, int y) const {
     if constexpr (Basis::kIsQuickAlone) {
-      const Avx2CpPixel<typename Basis::Element> values{this->basisOf(cluster).at(x, y)};
+      const Avx2CpPixel values{this->basisOf(cluster).at(x, y)};
       const float* scales = this->scalesOf(cluster);
       Float4 sum = Float4::zero();
       int k = 0;

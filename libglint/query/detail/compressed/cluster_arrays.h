@@ -14,11 +14,8 @@ struct ClusterArrays {
   const NdfCluster& cluster;
 
   GLINT_HD int columns() const { return cluster.columns; }
-  /// First prefix sum, stored as T.
-  template <class T>
-  GLINT_HD const T* basis() const {
-    return static_cast<const T*>(ndf.basis) + cluster.first_basis;
-  }
+  /// First prefix sum.
+  GLINT_HD const std::int32_t* basis() const { return ndf.basis.data() + cluster.first_basis; }
   /// First coefficient, stored as T.
   template <class T>
   GLINT_HD const T* coefficients() const {

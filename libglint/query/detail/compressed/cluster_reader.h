@@ -151,20 +151,19 @@ class ClusterReader {
 };
 
 /// Calls visitor(ClusterReader) for a method and a type of coefficients.
-/// @tparam Sum  stored type of prefix sums
-template <class Sum, class Coefficient, class Visitor>
+template <class Coefficient, class Visitor>
 GLINT_HD auto withReaderOf(const NdfCp& ndf, Visitor& visitor) {
-  if (ndf.method == CompressionMethod::cp) return visitor(ClusterReader<CpBasis<Sum>, Coefficient>(ndf));
-  if (ndf.method == CompressionMethod::tucker) return visitor(ClusterReader<TuckerBasis<Sum>, Coefficient>(ndf));
-  return visitor(ClusterReader<PcaBasis<Sum>, Coefficient>(ndf));
+  if (ndf.method == CompressionMethod::cp) return visitor(ClusterReader<CpBasis, Coefficient>(ndf));
+  if (ndf.method == CompressionMethod::tucker) return visitor(ClusterReader<TuckerBasis, Coefficient>(ndf));
+  return visitor(ClusterReader<PcaBasis, Coefficient>(ndf));
 }
 
 /// Calls visitor(ClusterReader) for the method and the types of a compressed pyramid.
 template <class Visitor>
 GLINT_HD auto withReader(const NdfCp& ndf, Visitor&& visitor) {
-  if (ndf.coefficient_type == CoefficientType::f32) return withReaderOf<std::int32_t, float>(ndf, visitor);
-  if (ndf.coefficient_type == CoefficientType::f16) return withReaderOf<std::int32_t, std::uint16_t>(ndf, visitor);
-  return withReaderOf<std::int32_t, std::int8_t>(ndf, visitor);
+  if (ndf.coefficient_type == CoefficientType::f32) return withReaderOf<float>(ndf, visitor);
+  if (ndf.coefficient_type == CoefficientType::f16) return withReaderOf<std::uint16_t>(ndf, visitor);
+  return withReaderOf<std::int8_t>(ndf, visitor);
 }
 
 }  // namespace glint

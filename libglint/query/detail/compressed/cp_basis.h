@@ -13,11 +13,8 @@
 namespace glint {
 
 /// Basis of a cluster of method cp: column k is X_k(x) Y_k(y) (Deng 2022, Eq. 5).
-/// @tparam T  stored type of prefix sums
-template <class T>
 struct CpBasis : ClusterArrays {
-  using Element = T;
-  using Axis = PrefixAxis<T>;
+  using Axis = PrefixAxis;
   /// Whether one pixel of one slice costs no more by itself than with a projection that other slices share.
   static constexpr bool kIsQuickAlone = true;
   /// Whether coefficients form a matrix.
@@ -49,8 +46,8 @@ struct CpBasis : ClusterArrays {
   /// Asks the memory for the columns at one pixel.
   GLINT_HD void prefetchPixel(int x, int y) const {
     const auto count = static_cast<std::uint64_t>(columns());
-    prefetch(basis<T>() + static_cast<unsigned>(x) * count);
-    prefetch(basis<T>() + static_cast<unsigned>(kBlockSize + y) * count);
+    prefetch(basis() + static_cast<unsigned>(x) * count);
+    prefetch(basis() + static_cast<unsigned>(kBlockSize + y) * count);
   }
 
   /// Sum of each row of a slice, negative pixels included; O(16 rank).
@@ -59,7 +56,7 @@ struct CpBasis : ClusterArrays {
   template <class Weigh>
   GLINT_DEVICE_CALL GLINT_HD Float16 rowSums(const float* weights, Weigh weigh) const {
     const int count = columns();
-    const T* sums_of_x = alongX() + (kBlockSize - 1) * count;
+    const std::int32_t* sums_of_x = alongX() + (kBlockSize - 1) * count;
     float in_rows[kMaxColumns];  // weights of the functions of y
     for (int k = 0; k < count; ++k) in_rows[k] = weights[k] * static_cast<float>(sums_of_x[k]);
     return weigh(alongY(), count, count, in_rows, Stored()).differences();
@@ -91,8 +88,8 @@ struct CpBasis : ClusterArrays {
     combineRows(x_values, in_rows, count, pixels);
   }
 
-  GLINT_HD const T* alongX() const { return basis<T>(); }                           ///< prefix sums of X, [16][columns]
-  GLINT_HD const T* alongY() const { return basis<T>() + kBlockSize * columns(); }  ///< prefix sums of Y, [16][columns]
+  GLINT_HD const std::int32_t* alongX() const { return basis(); }                           ///< prefix sums of X, [16][columns]
+  GLINT_HD const std::int32_t* alongY() const { return basis() + kBlockSize * columns(); }  ///< prefix sums of Y, [16][columns]
 };
 
 }  // namespace glint

@@ -12,10 +12,8 @@
 namespace glint {
 
 /// Basis of a cluster of method pca: each column is an image of 16x16 pixels, stored as prefix sums over both axes.
-/// @tparam T  stored type of prefix sums
-template <class T>
 struct PcaBasis : ClusterArrays {
-  using Axis = PrefixAxis<T>;
+  using Axis = PrefixAxis;
   static constexpr bool kIsQuickAlone = false;
   static constexpr bool kHasCore = false;
 
@@ -42,7 +40,7 @@ struct PcaBasis : ClusterArrays {
     const int count = columns();
     float sums[kMaxColumns];
     std::fill(sums, sums + count, 0.0f);
-    forEachPrefix(b, [&](const T* sums_before, float weight) {
+    forEachPrefix(b, [&](const std::int32_t* sums_before, float weight) {
       for (int k = 0; k < count; ++k) sums[k] += weight * static_cast<float>(sums_before[k]);
     });
     layout.arrange(scales(), ColumnValues{sums}, projection);
@@ -61,7 +59,7 @@ struct PcaBasis : ClusterArrays {
   template <class Weigh>
   GLINT_DEVICE_CALL GLINT_HD Float16 rowPixels(const float* weights, int y, Weigh weigh) const {
     const int count = columns(), row_elements = kBlockSize * count;
-    const T* row = prefix() + y * row_elements;
+    const std::int32_t* row = prefix() + y * row_elements;
     const Float16 sums =
         y > 0 ? weigh(row, count, count, weights, LessAbove{row_elements}) : weigh(row, count, count, weights, Stored());
     return sums.differences().positive();
@@ -72,7 +70,7 @@ struct PcaBasis : ClusterArrays {
   template <class Weigh>
   GLINT_DEVICE_CALL GLINT_HD void block(const float* weights, float* pixels, Weigh weigh) const {
     const int count = columns();
-    const T* row = prefix();
+    const std::int32_t* row = prefix();
     Float16 above = {{Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()}};
     for (int y = 0; y < kBlockSize; ++y, row += kBlockSize * count) {
       const Float16 here = weigh(row, count, count, weights, Stored()).differences();
@@ -81,7 +79,7 @@ struct PcaBasis : ClusterArrays {
     }
   }
 
-  GLINT_HD const T* prefix() const { return basis<T>(); }  ///< prefix sums over x and y, [16][16][columns]
+  GLINT_HD const std::int32_t* prefix() const { return basis(); }  ///< prefix sums over x and y, [16][16][columns]
 
  private:
   /// Calls visitor(prefix sums [columns], weight) for the prefix sums that add up to the sum over a box. Each of the four

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 
 #include "glint/math/float4.h"
 #include "glint/model/ndf_pyramid.h"
@@ -8,11 +9,10 @@
 namespace glint {
 
 /// Values of columns at one pixel of a block axis: differences of two rows of inclusive prefix sums [16][count].
-template <class Element>
 struct PrefixAxis {
-  GLINT_HD PrefixAxis(const Element* prefix, int columns, int pixel)
+  GLINT_HD PrefixAxis(const std::int32_t* prefix, int columns, int pixel)
       : inner(pixel > 0 ? -1 : 0), count(columns), at(prefix + pixel * columns), before(at - (columns & inner)) {}
-  GLINT_HD float one(int k) const { return differenceOf(at[k], inner != 0 ? before[k] : Element{0}); }
+  GLINT_HD float one(int k) const { return differenceOf(at[k], inner != 0 ? before[k] : 0); }
   GLINT_HD Float4 four(int k) const { return Float4::difference(at + k, before + k, inner); }
   /// Writes the values of all columns.
   GLINT_HD void store(float* values) const {
@@ -27,21 +27,20 @@ struct PrefixAxis {
 
   int inner;  ///< -1, or 0 at pixel 0, which has no row before it
   int count;
-  const Element *at, *before;
+  const std::int32_t *at, *before;
 };
 
 /// sums[k] = sum of column k over the positions from `low` to `high` of one block axis. Pixels at the ends count by the part
 /// that is covered.
 /// @param prefix  inclusive prefix sums [16][columns]
-template <class Element>
-GLINT_HD void sumAlongAxis(const Element* prefix, int columns, float low, float high, float* sums) {
+inline GLINT_HD void sumAlongAxis(const std::int32_t* prefix, int columns, float low, float high, float* sums) {
   const int l = std::min(static_cast<int>(low), kBlockSize - 1), h = std::min(static_cast<int>(high), kBlockSize - 1);
   const float fl = low - static_cast<float>(l), fh = high - static_cast<float>(h);
   // The sum up to a position inside a pixel is (1 - f) * prefix before the pixel + f * prefix after it.
-  const Element* l0 = l > 0 ? prefix + (l - 1) * columns : nullptr;
-  const Element* h0 = h > 0 ? prefix + (h - 1) * columns : nullptr;
-  const Element* l1 = prefix + l * columns;
-  const Element* h1 = prefix + h * columns;
+  const std::int32_t* l0 = l > 0 ? prefix + (l - 1) * columns : nullptr;
+  const std::int32_t* h0 = h > 0 ? prefix + (h - 1) * columns : nullptr;
+  const std::int32_t* l1 = prefix + l * columns;
+  const std::int32_t* h1 = prefix + h * columns;
   for (int k = 0; k < columns; ++k) {
     const float before = (l0 ? (1 - fl) * static_cast<float>(l0[k]) : 0.0f) + (fl > 0 ? fl * static_cast<float>(l1[k]) : 0.0f);
     const float after = (h0 ? (1 - fh) * static_cast<float>(h0[k]) : 0.0f) + fh * static_cast<float>(h1[k]);
@@ -51,8 +50,7 @@ GLINT_HD void sumAlongAxis(const Element* prefix, int columns, float low, float 
 
 /// values[k][t] = column k at pixel t of a block axis.
 /// @param prefix  inclusive prefix sums [16][columns]
-template <class Element>
-GLINT_HD void valuesOfAxis(const Element* prefix, int columns, float* values) {
+inline GLINT_HD void valuesOfAxis(const std::int32_t* prefix, int columns, float* values) {
   for (int k = 0; k < columns; ++k) {
     float before = 0;
     for (int t = 0; t < kBlockSize; ++t) {

@@ -13,10 +13,8 @@
 namespace glint {
 
 /// Basis of a cluster of method tucker: column k is U_a(x) V_b(y), where core[k] = a + 16 b.
-/// @tparam T  stored type of prefix sums
-template <class T>
 struct TuckerBasis : ClusterArrays {
-  using Axis = PrefixAxis<T>;
+  using Axis = PrefixAxis;
   static constexpr bool kIsQuickAlone = false;
   static constexpr bool kHasCore = true;
 
@@ -86,8 +84,8 @@ struct TuckerBasis : ClusterArrays {
 
   GLINT_HD int rankX() const { return cluster.rank_x; }
   GLINT_HD int rankY() const { return cluster.rank_y; }
-  GLINT_HD const T* alongX() const { return basis<T>(); }                         ///< prefix sums of U, [16][rankX()]
-  GLINT_HD const T* alongY() const { return basis<T>() + kBlockSize * rankX(); }  ///< prefix sums of V, [16][rankY()]
+  GLINT_HD const std::int32_t* alongX() const { return basis(); }                         ///< prefix sums of U, [16][rankX()]
+  GLINT_HD const std::int32_t* alongY() const { return basis() + kBlockSize * rankX(); }  ///< prefix sums of V, [16][rankY()]
 
  private:
   /// Products of pairs of functions, for ColumnLayout::arrange.
