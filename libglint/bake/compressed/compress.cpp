@@ -66,37 +66,41 @@ struct Attempt {
   double scale_range;
 };
 
-/// Attempts in turn, from few bytes to many. A wide range is best for most maps; narrow ranges lose less to rounding.
+/// Attempts in turn, from few bytes to many. A wide range is best for most maps; narrow ranges lose less to rounding. Blocks are
+/// scaled for the seen error alone.
 std::vector<Attempt> attemptsOf(const CompressionOptions& options) {
   constexpr double kWide = 1e6, kNarrow = 1e3, kNarrowest = 100;
-  const CoefficientType first = options.coefficient_type.value_or(CoefficientType::i8);
-  if (!(options.tolerance > 0)) return {{first, kWide}};
-  std::vector<Attempt> attempts = {{first, kWide}, {first, kNarrow}};
-  if (!options.coefficient_type)
-    attempts.insert(attempts.end(), {{CoefficientType::f16, kNarrow},
-                                     {CoefficientType::f16, kNarrowest},
-                                     {CoefficientType::f32, kNarrowest},
-                                     {CoefficientType::f32, 1}});
+  const bool scales = options.metric == ErrorMetric::seen;
+  std::vector<Attempt> attempts = {{options.coefficient_type.value_or(CoefficientType::i8), kWide}};
+  if (!(options.tolerance > 0)) return attempts;
+  if (scales) attempts.push_back({attempts[0].type, kNarrow});
+  if (options.coefficient_type) return attempts;
+  attempts.push_back({CoefficientType::f16, kNarrow});
+  if (scales) attempts.push_back({CoefficientType::f16, kNarrowest});
+  attempts.push_back({CoefficientType::f32, kNarrowest});
+  if (scales) attempts.push_back({CoefficientType::f32, 1});
   return attempts;
 }
 
 /// One run of compressPyramid(): its steps, and the data that they pass on.
 class Compressor {
  public:
-  Compressor(const NdfPyramid& pyramid, const CompressionOptions& options, const Attempt& attempt, const ProgressFn& progress)
+  Compressor(const NdfPyramid& pyramid, const CompressionOptions& options, const Attempt& attempt, ProgressCounter& progress)
       : pyramid_(pyramid),
         options_(options),
         type_(attempt.type),
         index_(pyramid, regions(options), levelGroups(options)),
         weights_(index_, options.metric, attempt.scale_range),
         groups_(index_.levelGroupCount()),
-        progress_(progress, 2 * index_.clusterCount()),
+        progress_(progress),
         statistics_(index_.clusterCount()),
         bases_(index_.clusterCount()),
         encoded_(index_.clusterCount()),
         selection_(index_.clusterCount(), -1),
         image_scales_(index_.imageCount(), 1.0f),
-        density_scales_(index_.imageCount(), 1.0f) {}
+        density_scales_(index_.imageCount(), 1.0f) {
+    progress_.grow(2 * index_.clusterCount());
+  }
 
   /// Chooses the sizes of all clusters and encodes them.
   /// @return whether the tolerance is met
@@ -119,11 +123,13 @@ class Compressor {
   [[noreturn]] void rejectTolerance() const {
     double least = 0;
     for (std::size_t g = 0; g < groups_.size(); ++g) least = std::max(least, groupError(g));
+    // A little more than what was measured, since the error is printed with few digits.
+    constexpr double kMore = 1.001;
+    const std::string type = options_.coefficient_type ? "; other types of coefficients (--quantize auto) may reach less" : "";
     throw Error(ErrorCode::failed, "compress.tolerance", "", "",
-                fmt::format("the tolerance {} cannot be reached with this method and type of coefficient; the least error is "
-                            "{:.4g}",
-                            options_.tolerance, least),
-                "ask for a larger tolerance, or for coefficients of more bits");
+                fmt::format("the tolerance {} cannot be reached with this method", options_.tolerance) +
+                    (type.empty() ? "" : " and type of coefficient"),
+                fmt::format("ask for at least {:.4g}{}", kMore * least, type));
   }
 
   NdfCpData result(CompressionReport* report) {
@@ -148,9 +154,8 @@ class Compressor {
   }
 
   /// Weighted squared error that a group may have.
-  double budget(const LevelGroup& group) const {
-    const auto g = static_cast<std::size_t>(&group - groups_.data());
-    const double whole = options_.metric == ErrorMetric::seen ? endLevel(g) - firstLevel(g) : group.energy;
+  double budget(std::size_t group) const {
+    const double whole = options_.metric == ErrorMetric::seen ? endLevel(group) - firstLevel(group) : groups_[group].energy;
     return options_.tolerance * options_.tolerance * whole;
   }
 
@@ -181,11 +186,10 @@ class Compressor {
     std::vector<std::optional<ClusterModel>> models(index_.clusterCount());
     forEachCluster([&](std::size_t c) {
       // With this error in every cluster, the sum is 1/400 of the budget: more columns are not worth their memory.
-      const LevelGroup& group = groupOf(c);
       const double share =
-          static_cast<double>(index_.sliceCount(c)) / static_cast<double>(std::max<std::uint64_t>(1, group.slices));
+          static_cast<double>(index_.sliceCount(c)) / static_cast<double>(std::max<std::uint64_t>(1, groupOf(c).slices));
       models[c].emplace(index_, weights_, c, statistics_[c], options_, type_,
-                        0.0025 * budget(group) * share * weights_.evenness(c));
+                        0.0025 * budget(c / clustersPerGroup()) * share * weights_.evenness(c));
     });
     models_.reserve(models.size());
     for (auto& model : models) models_.push_back(std::move(*model));
@@ -215,7 +219,7 @@ class Compressor {
     std::vector<double> positive(index_.imageCount(), 0.0);
     for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
       for (int s = 0; s < index_.sliceCount(c); ++s) {
-        const std::uint32_t image = index_.image(index_.firstSlice(c) + s);
+        const std::uint32_t image = index_.sliceImage(c, s);
         sums[image] += static_cast<double>(encoded_[c].errors.slices[s].sum) * statistics_[c].peak;
         positive[image] += static_cast<double>(encoded_[c].errors.slices[s].positive) * statistics_[c].peak;
       }
@@ -247,7 +251,7 @@ class Compressor {
       const double peak2 = static_cast<double>(statistics_[c].peak) * statistics_[c].peak;
       for (int s = 0; s < index_.sliceCount(c); ++s) {
         const SliceError& e = encoded_[c].errors.slices[s];
-        const std::uint32_t image = index_.image(index_.firstSlice(c) + s);
+        const std::uint32_t image = index_.sliceImage(c, s);
         const int level = index_.level(image);
         level_errors_[level].error += e.plain.at(image_scales_[image]) * peak2;
         level_errors_[level].energy += e.plain.at(0) * peak2;
@@ -304,7 +308,7 @@ class Compressor {
       std::vector<std::span<const SizeChoice>> clusters;
       for (const ClusterModel& model : std::span(models_).subspan(g * clustersPerGroup(), clustersPerGroup()))
         clusters.emplace_back(model.choices());
-      searches.emplace_back(std::move(clusters), budget(groups_[g]));
+      searches.emplace_back(std::move(clusters), budget(g));
     }
     const auto encodeChosen = [&] {
       std::vector<int> selection;
@@ -321,13 +325,13 @@ class Compressor {
     }
     encodeChosen();
     bool met = true;
-    for (std::size_t g = 0; g < groups_.size(); ++g) met &= measuredError(g) <= budget(groups_[g]);
+    for (std::size_t g = 0; g < groups_.size(); ++g) met &= measuredError(g) <= budget(g);
     return met;
   }
 
   /// Error of a group that the tolerance bounds.
   double groupError(std::size_t group) const {
-    const double bound = budget(groups_[group]);
+    const double bound = budget(group);
     return bound > 0 ? options_.tolerance * std::sqrt(measuredError(group) / bound) : 0;
   }
 
@@ -371,7 +375,7 @@ class Compressor {
     // A reader loads 32-bit numbers of spots, so they begin at a multiple of four bytes.
     if (e.spots > 0) data.coefficients.resize((data.coefficients.size() + 3) / 4 * 4);
     NdfCluster cluster;
-    cluster.first_basis = static_cast<std::uint32_t>(data.basis.size() / kBasisElementBytes);
+    cluster.first_basis = static_cast<std::uint32_t>(data.basis.size());
     cluster.first_coefficient = data.coefficients.size() / coefficient_bytes;
     cluster.first_scale = static_cast<std::uint32_t>(data.scales.size());
     cluster.first_word = static_cast<std::uint32_t>(data.masks.size());
@@ -389,7 +393,7 @@ class Compressor {
     // Mark the images of the region that have a slice in this cluster, and count them word by word.
     data.masks.resize(data.masks.size() + (index_.slotCount(region) + 63) / 64, 0);
     for (const std::uint32_t s : e.kept) {
-      const std::uint16_t slot = index_.slot(index_.image(index_.firstSlice(c) + s));
+      const std::uint16_t slot = index_.slot(index_.sliceImage(c, s));
       data.masks[cluster.first_word + slot / 64] |= std::uint64_t{1} << (slot % 64);
     }
     std::uint32_t count = 0;
@@ -411,7 +415,7 @@ class Compressor {
     for (std::size_t c = 0; c < index_.clusterCount(); ++c) {
       const double unit = pixel * pixel * pyramid_.value_scale * statistics_[c].peak;
       for (const std::uint32_t s : encoded_[c].kept) {
-        const std::size_t image = index_.image(index_.firstSlice(c) + s);
+        const std::size_t image = index_.sliceImage(c, s);
         masses[image * places + data.block_places[c % blocks]] =
             static_cast<float>(unit * encoded_[c].errors.slices[s].positive * density_scales_[image]) * kRounding;
       }
@@ -491,7 +495,7 @@ class Compressor {
   SliceIndex index_;
   ErrorWeights weights_;
   std::vector<LevelGroup> groups_;
-  ProgressCounter progress_;
+  ProgressCounter& progress_;
   std::vector<ClusterStatistics> statistics_;
   std::vector<ClusterModel> models_;
   std::vector<std::optional<ClusterBasis>> bases_;  // [clusters], cp: the bases of selection_
@@ -519,8 +523,7 @@ NdfCp NdfCpData::view() const {
   v.clusters = clusters;
   v.masks = masks;
   v.mask_ranks = mask_ranks;
-  v.basis = basis.data();
-  v.basis_count = basis.size() / kBasisElementBytes;
+  v.basis = basis;
   v.coefficients = coefficients.data();
   v.coefficient_count = coefficients.size() / coefficientElementBytes(header.coefficient_type);
   v.scales = scales;
@@ -538,8 +541,9 @@ NdfCpData compressPyramid(const NdfPyramid& pyramid, const CompressionOptions& o
   checkOptions(options);
   checkRegions(pyramid, options.regions);
   const std::vector<Attempt> attempts = attemptsOf(options);
+  ProgressCounter counter(progress, 0);
   for (std::size_t k = 0;; ++k) {
-    Compressor compressor(pyramid, options, attempts[k], progress);
+    Compressor compressor(pyramid, options, attempts[k], counter);
     if (compressor.compress()) return compressor.result(report);
     if (k + 1 == attempts.size()) compressor.rejectTolerance();
   }

@@ -96,7 +96,7 @@ class NdfCpData {
   std::vector<NdfCluster> clusters;
   std::vector<std::uint64_t> masks;
   std::vector<std::uint32_t> mask_ranks;
-  std::vector<std::byte> basis;         ///< of the element type of NdfCp::basis
+  std::vector<std::int32_t> basis;
   std::vector<std::byte> coefficients;  ///< of the element type of NdfCp::coefficients
   std::vector<float> scales;
   std::vector<std::uint8_t> core;

@@ -59,17 +59,16 @@ ErrorWeights::ErrorWeights(const SliceIndex& index, ErrorMetric metric, double s
 
 /// Sums the densities of every cell over the places of each level.
 void ErrorWeights::measureCells() {
-  const int side = kBlockSize / cell_pixels_;
   tbb::parallel_for(std::size_t{0}, blocks_, [&](std::size_t block) {
     std::vector<float> slice(kSliceStride);
     for (std::size_t cluster = block; cluster < index_.clusterCount(); cluster += blocks_) {
       for (int s = 0; s < index_.sliceCount(cluster); ++s) {
         index_.load(cluster, s, 1, nullptr, slice.data());
-        const int level = index_.level(index_.image(index_.firstSlice(cluster) + s));
+        const int level = index_.sliceLevel(cluster, s);
         CellDensity* cells = cells_.data() + (static_cast<std::size_t>(level) * blocks_ + block) * cellCount();
         for (int p = 0; p < kBlockPixels; ++p) {
           const double d = static_cast<double>(slice[p]) * index_.unit();
-          CellDensity& cell = cells[p / kBlockSize / cell_pixels_ * side + p % kBlockSize / cell_pixels_];
+          CellDensity& cell = cells[cellOf(p)];
           cell.mean += d;
           cell.mean_square += d * d;
           cell.lit |= d > kDarkestSeen;
@@ -102,7 +101,7 @@ void ErrorWeights::chooseScale(std::size_t cluster) {
   std::fill_n(scale.y, kBlockSize, 1.0f);
   if (metric_ == ErrorMetric::l2 || index_.sliceCount(cluster) == 0) return;
   std::vector<char> occurs(levels_, 0);
-  for (int s = 0; s < index_.sliceCount(cluster); ++s) occurs[index_.level(index_.image(index_.firstSlice(cluster) + s))] = 1;
+  for (int s = 0; s < index_.sliceCount(cluster); ++s) occurs[index_.sliceLevel(cluster, s)] = 1;
   // The mean square of each cell, averaged over the levels.
   const int side = kBlockSize / cell_pixels_, count = cellCount();
   const std::size_t block = cluster % blocks_;
@@ -128,7 +127,7 @@ void ErrorWeights::chooseScale(std::size_t cluster) {
     pixels(cluster, level, exact);
     double sum = 0, lit = 0, most = 0;
     for (int p = 0; p < kBlockPixels; ++p) {
-      const CellDensity& cell = cells(level, block)[p / kBlockSize / cell_pixels_ * side + p % kBlockSize / cell_pixels_];
+      const CellDensity& cell = cells(level, block)[cellOf(p)];
       sum += cell.lit ? exact[p] : 0;
       lit += cell.lit;
       most = std::max(most, cell.lit ? double{exact[p]} : 0.0);
@@ -139,15 +138,12 @@ void ErrorWeights::chooseScale(std::size_t cluster) {
 }
 
 void ErrorWeights::pixels(std::size_t cluster, int level, float* out) const {
-  const int side = kBlockSize / cell_pixels_;
   const CellDensity* densities = cells(level, cluster % blocks_);
   const BlockScale& scale = scales_[cluster];
   const double unit2 = metric_ == ErrorMetric::seen ? static_cast<double>(index_.unit()) * index_.unit() : 1;
   for (int p = 0; p < kBlockPixels; ++p) {
-    const int x = p % kBlockSize, y = p / kBlockSize;
-    const double s = static_cast<double>(scale.x[x]) * scale.y[y];
-    const CellDensity& cell = densities[y / cell_pixels_ * side + x / cell_pixels_];
-    out[p] = static_cast<float>(cellWeight(level, cell) * unit2 / (s * s));
+    const double s = static_cast<double>(scale.x[p % kBlockSize]) * scale.y[p / kBlockSize];
+    out[p] = static_cast<float>(cellWeight(level, densities[cellOf(p)]) * unit2 / (s * s));
   }
 }
 

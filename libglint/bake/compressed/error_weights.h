@@ -58,6 +58,11 @@ class ErrorWeights {
   int cellPixels() const { return cell_pixels_; }
   /// @return cells of a block
   int cellCount() const { return kBlockPixels / (cell_pixels_ * cell_pixels_); }
+  /// @return cell that has a pixel of a block
+  int cellOf(int pixel) const {
+    const int side = kBlockSize / cell_pixels_;
+    return pixel / kBlockSize / cell_pixels_ * side + pixel % kBlockSize / cell_pixels_;
+  }
   /// @return densities of the cells of a block, [cells]
   const CellDensity* cells(int level, std::size_t block) const {
     return cells_.data() + (static_cast<std::size_t>(level) * blocks_ + block) * cellCount();

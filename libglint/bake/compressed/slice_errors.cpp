@@ -52,7 +52,7 @@ const float* SliceComparer::pixelWeights(int level) {
 }
 
 void SliceComparer::add(const float* slice, const float* decoded) {
-  const std::uint32_t image = index_.image(index_.firstSlice(cluster_) + errors_.slices.size());
+  const std::uint32_t image = index_.sliceImage(cluster_, static_cast<int>(errors_.slices.size()));
   const int level = index_.level(image), cell_pixels = weights_.cellPixels(), side = kBlockSize / cell_pixels;
   // Scales far from 1 belong to images that lost most of their mass. Large scales would cost ScaledError its precision.
   const float density_scale = std::clamp(density_scales_[image], 0.5f, 2.0f), *pixel_weights = pixelWeights(level);

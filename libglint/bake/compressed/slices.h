@@ -43,9 +43,14 @@ class SliceIndex {
   /// @return number of slices of a cluster
   int sliceCount(std::size_t cluster) const { return static_cast<int>(first_slices_[cluster + 1] - first_slices_[cluster]); }
   std::uint64_t totalSlices() const { return first_slices_.back(); }
-  std::uint64_t firstSlice(std::size_t cluster) const { return first_slices_[cluster]; }
   /// @return image that has a slice; images are numbered over all levels
   std::uint32_t image(std::uint64_t slice) const { return images_[slice]; }
+  /// @return image that has slice number `slice` of a cluster
+  std::uint32_t sliceImage(std::size_t cluster, int slice) const {
+    return images_[first_slices_[cluster] + static_cast<std::uint64_t>(slice)];
+  }
+  /// @return level of that image
+  int sliceLevel(std::size_t cluster, int slice) const { return level(sliceImage(cluster, slice)); }
 
   int levelCount() const { return pyramid_.shape.level_count; }
   /// @return level of an image; images are numbered over all levels
