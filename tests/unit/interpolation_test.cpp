@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "glint/bake/common/reference_image.h"
+#include "glint/bake/common/seen_error.h"
 #include "glint/bake/compressed/compress.h"
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/cp_ndf.h"
@@ -135,11 +136,11 @@ TEST(Interpolation, OfTheGridOfOneStrideErrsByLessThanHalfOfTheTrilinear) {
 }
 
 TEST(Interpolation, IsContinuousInSize) {
-  // The footprint that is asked for changes by sqrt(2) % itself. The target is 0.03; 32 places leave some noise.
-  for (const auto& [overlap, most] : {std::pair{1.0f, 0.036}, {bake::kDefaultOverlap, 0.037}}) {
+  constexpr double kMost = 0.03;  // the footprint that is asked for changes by sqrt(2) % itself
+  for (const float overlap : {1.0f, bake::kDefaultOverlap}) {
     const SeenFootprints footprints(overlap);
     for (float size = 0.5f; size < 6; size *= 1.025f)
-      ASSERT_LT(footprints.step(size * footprints.finest()), most) << overlap << ' ' << size;
+      ASSERT_LT(footprints.step(size * footprints.finest()), kMost) << overlap << ' ' << size;
   }
 }
 
@@ -160,55 +161,21 @@ TEST(Interpolation, IsContinuousInPlaceWhereTheWindowMovesOn) {
   }
 }
 
-/// Seen error of images of many places: relative to the root mean square towards each cell of half vectors, root mean square over
-/// the lit cells.
-class SeenSum {
- public:
-  static constexpr int kResolution = 256, kCells = 64;
-
-  void add(const std::vector<float>& image, const std::vector<float>& truth) {
-    for (std::size_t k = 0; k < truth.size(); ++k) {
-      Cell& cell = cells_[(k / kResolution * kCells / kResolution) * kCells + k % kResolution * kCells / kResolution];
-      cell.error += std::pow(image[k] - truth[k], 2);
-      cell.truth += std::pow(truth[k], 2);
-      cell.lit = cell.lit || std::max(image[k], truth[k]) > kDarkest;
-    }
-    pixels_ += double{kResolution} * kResolution / (kCells * kCells);
-  }
-  double seen() const {
-    double sum = 0;
-    int lit = 0;
-    for (const Cell& cell : cells_) {
-      if (!cell.lit) continue;
-      sum += cell.error / std::max(cell.truth, kDarkest * kDarkest * pixels_);
-      ++lit;
-    }
-    return std::sqrt(sum / lit);
-  }
-
- private:
-  static constexpr double kDarkest = 1e-3;
-  struct Cell {
-    double error = 0, truth = 0;
-    bool lit = false;
-  };
-  std::vector<Cell> cells_ = std::vector<Cell>(kCells * kCells);
-  double pixels_ = 0;
-};
-
 /// Seen error of a model at random places.
 template <class Model>
 double seenError(const Model& model, const NormalMap& map, float sigma) {
-  constexpr int kPlaces = 32;
+  constexpr int kPlaces = 32, kResolution = 256;
   std::mt19937 random(5);
   std::uniform_real_distribution<float> unit(0, 1);
-  SeenSum sum;
+  bake::SeenError error(kResolution);
   for (int k = 0; k < kPlaces; ++k) {
     const Footprint p = Footprint::isotropic({unit(random), unit(random)}, sigma);
-    sum.add(test::imageOf(model, p, SeenSum::kResolution),
-            bake::referenceImage(map, model.shape().sigma_r, Surface::flat, Boundary::wrap, p, SeenSum::kResolution));
+    const std::vector<float> image = test::imageOf(model, p, kResolution),
+                             truth = bake::referenceImage(map, model.shape().sigma_r, Surface::flat, Boundary::wrap, p,
+                                                          kResolution);
+    error.add(image.data(), truth.data());
   }
-  return sum.seen();
+  return error.summary().seen;
 }
 
 struct SynthCase {

@@ -238,7 +238,7 @@ TEST(CpNdf, EqualsASlowDecoderAtItsCentres) {
 }
 
 TEST(CpNdf, AFullRankBasisReproducesThePyramid) {
-  // 64 columns of a block's 256 pixels hold almost all of it; quantised bases have 12 bits and more.
+  // 64 columns of a block's 256 pixels hold almost all of it; quantised bases have 20 bits.
   constexpr double kBasisError = 0.02;
   bake::CompressionOptions o;
   o.method = CompressionMethod::pca;
@@ -344,7 +344,7 @@ TEST(PyramidSlices, WeightsAreContinuousInPosition) {
 }
 
 TEST(PyramidSlices, WeightsAreContinuousInSize) {
-  // Trilinear weights are linear in octaves: 2 for each. The fade between levels of footprints takes log2(1.15) octaves: 2 / 0.2
+  // Trilinear weights are linear in octaves: 2 for each. The fade between levels of footprints takes log2(1.23) octaves: 2 / 0.3
   // for each. Above the last level the share falls at most as exp(-x) over that at the level, with x = 2 pi^2 sigma^2 / width^2:
   // at most 4 ln(2) x <= 16 for each where the level ends at 0.57 of the map.
   constexpr float kStep = 0.01f;  // octaves

@@ -144,8 +144,8 @@ class SliceChooser {
   /// at this ratio of the variance that is asked for to the variance of the finer level, which depends on the gap between centres.
   static constexpr float kFadeEnd = 2.5f, kFadeEndPerSquareGap = 1.05f;  // gap in deviations of a footprint
   /// Ratio of the sizes at which the fade ends and begins: as short as changes of 1 % in size allow, which may change a density
-  /// by 3 %.
-  static constexpr float kFadeSizes = 1.16f;
+  /// by 3 % (Interpolation.IsContinuousInSize measures it).
+  static constexpr float kFadeSizes = 1.23f;
 
   /// Variance that the last level of footprints adds to that of its images, in squares of the gap: as large as the kernel has
   /// exactly, since what is left of the slowest wave of the map depends on it.
