@@ -86,7 +86,7 @@ class CpNdf {
         forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
           sum += double{sumSlices(chosen, block, ndf_.image_scales.data(), BoxOf<Reader>{reader, box}, Signed{})};
         });
-        return static_cast<float>(sum / areaInPixels(shape(), range));
+        return static_cast<float>(sum / double{areaInPixels(shape(), range)});
       });
     });
   }

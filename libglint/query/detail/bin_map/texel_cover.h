@@ -67,8 +67,8 @@ class TexelCover {
     rows_[1][0] = -axes[0][1] / det, rows_[1][1] = axes[0][0] / det;
     aligned_ = (axes[0][1] == 0 && axes[1][0] == 0) || (axes[0][0] == 0 && axes[1][1] == 0);
     const double reach[2] = {std::fabs(axes[0][0]) + std::fabs(axes[1][0]), std::fabs(axes[0][1]) + std::fabs(axes[1][1])};
-    bound(wrapUnit(p.centre.x) * double{1} * width, reach[0], width, origin_x_, columns_, low_[0], high_[0]);
-    bound(wrapUnit(p.centre.y) * double{1} * height, reach[1], height, origin_y_, rows_count_, low_[1], high_[1]);
+    bound(double{wrapUnit(p.centre.x)} * width, reach[0], width, origin_x_, columns_, low_[0], high_[0]);
+    bound(double{wrapUnit(p.centre.y)} * height, reach[1], height, origin_y_, rows_count_, low_[1], high_[1]);
     centre_[0] = 0.5 * (low_[0] + high_[0]);
     centre_[1] = 0.5 * (low_[1] + high_[1]);
     for (int k = 0; k < 2; ++k) {

@@ -20,7 +20,8 @@ namespace glint {
 /// reads. A batch does one step for many queries before the next step, so that their cache misses overlap.
 class PyramidReader {
  public:
-  GLINT_HD explicit PyramidReader(const NdfPyramid& pyramid) : pyramid_(pyramid), mask_words_(pyramid.shape.maskWords()) {}
+  GLINT_HD explicit PyramidReader(const NdfPyramid& pyramid)
+      : pyramid_(pyramid), mask_words_(static_cast<std::size_t>(pyramid.shape.maskWords())) {}
 
   GLINT_HD const NdfPyramid& pyramid() const { return pyramid_; }
   GLINT_HD const PyramidShape& shape() const { return pyramid_.shape; }
@@ -158,7 +159,7 @@ class PyramidReader {
   GLINT_HD float finishMean(const Box2& range, PendingMean& pending) const {
     addPending(pending);
     const float area = areaInPixels(shape(), range);
-    return area > 0 ? finitePositive(static_cast<float>(pending.sum / area)) : 0.0f;
+    return area > 0 ? finitePositive(static_cast<float>(pending.sum / double{area})) : 0.0f;
   }
 
   /// Prefetches the masks of stored blocks of the chosen images.
