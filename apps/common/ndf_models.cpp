@@ -43,6 +43,10 @@ void NdfAsset::addInterpolation() {
                        {{"footprint", Interpolation::footprint}, {"trilinear", Interpolation::trilinear}},
                        "how footprints between the stored ones are answered: by images that together see the footprint, or "
                        "trilinearly, which is quicker and sees a wider one (kinds ndf-pyramid and ndf-cp)"));
+  useOnly({"ndf-pyramid", "ndf-cp"}, "--pixels",
+          tool_.choice("--pixels", options_.pixels, {{"smooth", Pixels::smooth}, {"constant", Pixels::constant}},
+                       "how densities run between half vectors of one pixel of an image: continuously, or constant, which is "
+                       "quicker and shows borders of pixels under small lights (kinds ndf-pyramid and ndf-cp)"));
 }
 
 void NdfAsset::addNormalsOptions() {

@@ -21,8 +21,17 @@ class PyramidChunk {
     places_[k] = inside_[k] ? pixelPlace(model.shape(), h) : PixelPlace{0, 0, 0};
     model.reader().prefetchBlock(slices_[k], places_[k].block);
   }
-  void findPixels(int k, const PyramidNdf& model) { pixels_[k] = model.reader().findPixels(slices_[k], places_[k]); }
-  float density(int k, const PyramidNdf& model) const { return inside_[k] ? model.reader().addPixels(pixels_[k]) : 0.0f; }
+  void findPixels(int k, const PyramidNdf& model) {
+    if (model.pixels() == Pixels::constant)
+      pixels_[k] = model.reader().findPixels(slices_[k], places_[k]);
+    else
+      model.reader().findWindow(slices_[k], places_[k], windows_[k]);
+  }
+  float density(int k, const PyramidNdf& model, Vec2 h) const {
+    if (!inside_[k]) return 0;
+    if (model.pixels() == Pixels::constant) return model.reader().addPixels(pixels_[k]);
+    return splineDensity(model.shape(), model.reader().addWindow(slices_[k], places_[k], windows_[k]), h);
+  }
   /// Whether the texels have a share in the answer: then the model is asked for the query alone.
   bool fromTexels(int k) const { return from_texels_[k]; }
 
@@ -30,7 +39,8 @@ class PyramidChunk {
   bool inside_[kChunk], from_texels_[kChunk];
   PyramidSlices slices_[kChunk];
   PixelPlace places_[kChunk];
-  PyramidReader::Pixels pixels_[kChunk];
+  PyramidReader::FoundPixels pixels_[kChunk];    // of models with constant pixels
+  PyramidReader::StoredBlocks windows_[kChunk];  // of models with smooth pixels
 };
 
 /// Three chunks are in flight, one step apart. While the memory fetches what one chunk needs next, the other two are computed.
@@ -52,7 +62,7 @@ void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintA
     const PyramidChunk& ready = stages[(step - 2) % 3];
     for (int k = 0; k < lanesOf(step - 2); ++k) {
       const std::size_t at = queryOf(step - 2, k);
-      out[at] = ready.fromTexels(k) ? model.density(footprints[at], halves[at]) : ready.density(k, model);
+      out[at] = ready.fromTexels(k) ? model.density(footprints[at], halves[at]) : ready.density(k, model, halves[at]);
     }
   }
 }
@@ -96,7 +106,8 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
                   const SampleArrays& out) {
   const PyramidReader& reader = model.reader();
   PyramidReader::Draw draws[kChunk];
-  PyramidReader::Pixels pixels[kChunk];
+  PyramidReader::FoundPixels pixels[kChunk];
+  PyramidReader::StoredBlocks windows[kChunk];
   for (std::size_t first = 0; first < count; first += kChunk) {
     const int lanes = static_cast<int>(std::min(count - first, std::size_t{kChunk}));
     for (int k = 0; k < lanes; ++k) {
@@ -110,7 +121,11 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
     for (int k = 0; k < lanes; ++k) reader.chooseBlock(draws[k]);
     for (int k = 0; k < lanes; ++k) {
       reader.choosePixel(draws[k]);
-      if (draws[k].place.x >= 0) pixels[k] = reader.findPixels(draws[k].slices, draws[k].place);
+      if (draws[k].place.x < 0) continue;
+      if (model.pixels() == Pixels::constant)
+        pixels[k] = reader.findPixels(draws[k].slices, draws[k].place);
+      else
+        reader.findWindow(draws[k].slices, draws[k].place, windows[k]);
     }
     for (int k = 0; k < lanes; ++k) {
       const std::size_t at = first + static_cast<std::size_t>(k);
@@ -118,8 +133,11 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
         out.set(at, model.sample(footprints[at], xi[at]));
       else if (draws[k].place.x < 0)
         out.set(at, {});
-      else
+      else if (model.pixels() == Pixels::constant)
         out.set(at, drawnAt(pointInPixel(model.shape(), draws[k].place, draws[k].xi), reader.addPixels(pixels[k])));
+      else
+        out.set(at, splineSample(model.shape(), draws[k].place, reader.addWindow(draws[k].slices, draws[k].place, windows[k]),
+                                 draws[k].xi));
     }
   }
 }

@@ -20,6 +20,8 @@ static_assert(static_cast<int>(Boundary::wrap) == GLINT_BOUNDARY_WRAP &&
               static_cast<int>(Boundary::clamp) == GLINT_BOUNDARY_CLAMP);
 static_assert(static_cast<int>(Interpolation::footprint) == GLINT_INTERPOLATION_FOOTPRINT &&
               static_cast<int>(Interpolation::trilinear) == GLINT_INTERPOLATION_TRILINEAR);
+static_assert(static_cast<int>(Pixels::smooth) == GLINT_PIXELS_SMOOTH &&
+              static_cast<int>(Pixels::constant) == GLINT_PIXELS_CONSTANT);
 static_assert(static_cast<int>(ErrorCode::usage) == GLINT_ERROR_USAGE &&
               static_cast<int>(ErrorCode::unsupported) == GLINT_ERROR_UNSUPPORTED);
 
@@ -113,7 +115,7 @@ using namespace glint::api::c;
 constexpr float kLeastSigmaR = 1e-4f, kMostSigmaR = 0.25f;
 /// Size of the options in the first version of the struct.
 constexpr std::size_t kFirstOptionsSize = offsetof(glint_open_options, verify_hashes) + sizeof(int32_t);
-static_assert(offsetof(glint_open_options, reserved) + sizeof(int32_t) == sizeof(glint_open_options),
+static_assert(offsetof(glint_open_options, pixels) + sizeof(int32_t) == sizeof(glint_open_options),
               "padding at the end would be read as a member by a later library");
 
 /// @return null if the options can be used, else the fault
@@ -133,7 +135,7 @@ const char* takeOptions(const glint_open_options* from, glint_open_options& to) 
     return "footprint_parts is not in 1 to 32; give 0 for 32";
   if (to.interpolation != GLINT_INTERPOLATION_FOOTPRINT && to.interpolation != GLINT_INTERPOLATION_TRILINEAR)
     return "unknown interpolation";
-  if (to.reserved != 0) return "reserved is not 0";
+  if (to.pixels != GLINT_PIXELS_SMOOTH && to.pixels != GLINT_PIXELS_CONSTANT) return "unknown pixels";
   return nullptr;
 }
 
@@ -148,6 +150,7 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   if (o.slant_tolerance != 0) options.slant_tolerance = std::max(0.0f, o.slant_tolerance);
   if (o.footprint_parts != 0) options.footprint_parts = o.footprint_parts;
   options.interpolation = static_cast<Interpolation>(o.interpolation);
+  options.pixels = static_cast<Pixels>(o.pixels);
   if (o.gaussian_boxes == 3) options.gaussian_boxes = GaussianBoxes::three;
   return options;
 }

@@ -77,6 +77,10 @@ enum {
   GLINT_INTERPOLATION_FOOTPRINT = 0, /* 16 images, weighed so that together they see the footprint; 32 between levels */
   GLINT_INTERPOLATION_TRILINEAR = 1  /* 8 images: quicker, and answers a wider footprint */
 };
+enum {
+  GLINT_PIXELS_SMOOTH = 0,  /* continuous, of the same mean in every pixel */
+  GLINT_PIXELS_CONSTANT = 1 /* quicker, but small lights show the borders of pixels */
+};
 
 /* Structs that start with a struct_size may grow: it says which version of the struct the caller has. A size that is smaller
  * than the first version's or above this is no size of a struct, and GLINT_ERROR_USAGE. */
@@ -100,7 +104,8 @@ typedef struct glint_open_options {
                                each at the cost of one; 1: one of the same mean square size, whatever the shape; 0: 32 */
   int32_t interpolation;    /* kinds ndf-pyramid and ndf-cp: GLINT_INTERPOLATION_*, how footprints between the stored ones are
                                answered */
-  int32_t reserved;         /* 0 */
+  int32_t pixels;           /* kinds ndf-pyramid and ndf-cp: GLINT_PIXELS_*, how densities run between half vectors of one pixel
+                               of an image */
 } glint_open_options;
 
 #define GLINT_SLANT_EXACT (-1.0f)

@@ -23,6 +23,8 @@ struct NdfOptions {
                                                 ///< stretched one; 1: one of the same mean square size
   /// Kinds ndf-pyramid and ndf-cp: how footprints between the stored ones are answered.
   Interpolation interpolation = Interpolation::footprint;
+  /// Kinds ndf-pyramid and ndf-cp: how densities run between half vectors of one pixel.
+  Pixels pixels = Pixels::smooth;
   formats::OpenOptions checks;  ///< checks of the asset and of `normals`
 };
 

@@ -208,6 +208,13 @@ class AnisotropicNdf {
     return summed(parts(p), [&](const Footprint& part) { return model_.density(part, h); });
   }
 
+  /// Average density over the pixel of the model's images that holds h.
+  GLINT_HD float pixelMean(const Footprint& p, Vec2 h) const requires requires(const M& m) { m.pixelMean(p, h); }
+  {
+    if (isWhole(p)) return model_.pixelMean(p, h);
+    return summed(parts(p), [&](const Footprint& part) { return model_.pixelMean(part, h); });
+  }
+
   /// Average density over a box of half vectors.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     if (isWhole(p)) return model_.mean(p, range);

@@ -11,6 +11,7 @@
 #include "glint/query/detail/compressed/spots.h"
 #include "glint/query/detail/pyramid/block_mass.h"
 #include "glint/query/detail/pyramid/block_rows.h"
+#include "glint/query/detail/pyramid/pixel_spline.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
 #include "glint/query/detail/pyramid/texel_blend.h"
 #include "glint/query/interpolation.h"
@@ -23,18 +24,21 @@ namespace glint {
 /// Chooses images as PyramidNdf does. A pixel is a sum of products of few factors. The sum over a box of pixels has the same
 /// form, with factors from prefix sums (Eq. 6 and 7). Slices of few facets are stored as spots and an even rest instead.
 ///
-/// Approximated pixels can be negative. `density` takes negative pixels as 0, scales the image so that it then integrates to 1,
-/// and is constant over a pixel. `mean` is a difference of prefix sums, which include negative pixels: it is the exact average
-/// of `signedDensity`, clamped at the end. So it is the exact average of `density` only where no pixel is negative.
+/// Approximated pixels can be negative. `density` takes negative pixels as 0, and scales the image so that it then integrates to
+/// 1; between the half vectors of a pixel see Pixels. `mean` is a difference of prefix sums, which include negative pixels: it is the exact average
+/// of `signedDensity`, clamped at the end. So over whole pixels it is the exact average of `density` only where no pixel is
+/// negative.
 /// Thread-safe, allocates nothing; the arrays must outlive it.
 class CpNdf {
   static constexpr int kMostBlocks = 64 * 64;  // blocks of the largest image, 1024^2 pixels
 
  public:
-  GLINT_HD explicit CpNdf(const NdfCp& ndf, Interpolation interpolation = Interpolation::footprint)
-      : ndf_(ndf), chooser_(ndf.shape, interpolation) {}
-  GLINT_HD CpNdf(const NdfCp& ndf, const NormalMap& normals, Interpolation interpolation = Interpolation::footprint)
-      : ndf_(ndf), chooser_(ndf.shape, interpolation), below_(ndf.shape, normals) {}
+  GLINT_HD explicit CpNdf(const NdfCp& ndf, Interpolation interpolation = Interpolation::footprint,
+                          Pixels pixels = Pixels::smooth)
+      : ndf_(ndf), chooser_(ndf.shape, interpolation), pixels_(pixels) {}
+  GLINT_HD CpNdf(const NdfCp& ndf, const NormalMap& normals, Interpolation interpolation = Interpolation::footprint,
+                 Pixels pixels = Pixels::smooth)
+      : ndf_(ndf), chooser_(ndf.shape, interpolation), pixels_(pixels), below_(ndf.shape, normals) {}
 
   GLINT_HD const NdfCp& ndfCp() const { return ndf_; }
   /// Whether footprints below level 0 are answered from the texels.
@@ -45,14 +49,23 @@ class CpNdf {
   /// As PyramidNdf::smallestSigma.
   GLINT_HD float smallestSigma() const { return hasNormals() ? 0 : std::sqrt(smallestSeenVariance(shape())); }
 
-  /// Density towards h, >= 0; O(columns) in each of 16 or 32 images, or of 8 (Interpolation).
+  GLINT_HD Pixels pixels() const { return pixels_; }
+
+  /// Density towards h, >= 0; O(columns) for nine pixels, or one (Pixels), in each of 16 or 32 images, or of 8 (Interpolation).
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     return below_.density(p, h, [&] { return imageDensity(p, h); });
   }
 
-  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value, and a point evenly in
-  /// the pixel. The result is exactly in proportion to the density, which is the pdf.
+  /// Average of the density over the pixel of the images that holds h, >= 0; O(columns) in each image.
+  GLINT_HD float pixelMean(const Footprint& p, Vec2 h) const {
+    if (!insideSquare(h)) return 0;
+    const PixelPlace place = pixelPlace(shape(), h);
+    return below_.mean(p, boxOfPixel(shape(), place), [&] { return imageMean(chooser_.choose(p), place); });
+  }
+
+  /// Draws an image by its weight, a block by its mass (Deng 2022, section 5.2), a pixel by its value, and a point in the pixel
+  /// by its density. The result is exactly in proportion to the density, which is the pdf.
   ///
   /// Stored masses are rounded up, by at most a sixteenth. Where `xi` falls into the excess, another block is drawn with the
   /// digits of `xi` that are left: one time in forty on average. O(16 columns). O(256 columns) where `xi` falls into the excess
@@ -65,7 +78,7 @@ class CpNdf {
   /// Average over a box of half vectors, >= 0, 0 if the box is empty; O(columns) for each block that the box covers.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const { return finitePositive(signedMean(p, range)); }
 
-  /// Density that keeps negative pixels. Infinite or NaN where numbers of the file are.
+  /// Density that keeps negative pixels and is constant over a pixel. Infinite or NaN where numbers of the file are.
   GLINT_HD float signedDensity(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     return below_.density(p, h, [&] {
@@ -95,6 +108,11 @@ class CpNdf {
   GLINT_HD float imageDensity(const Footprint& p, Vec2 h) const {
     const PyramidSlices chosen = chooser_.choose(p);
     const PixelPlace place = pixelPlace(shape(), h);
+    if (pixels_ == Pixels::constant) return imageMean(chosen, place);
+    return withReader(ndf_, [&](const auto& reader) { return splineDensity(shape(), window(reader, chosen, place), h); });
+  }
+  /// Mean density of a pixel, >= 0.
+  GLINT_HD float imageMean(const PyramidSlices& chosen, const PixelPlace& place) const {
     return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
       return finitePositive(
           sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<Reader>{reader, place}, Positive{}));
@@ -228,6 +246,93 @@ class CpNdf {
     return sum;
   }
 
+  /// Mean densities of a pixel and of its neighbours, >= 0.
+  template <class Reader>
+  GLINT_HD PixelWindow window(const Reader& reader, const PyramidSlices& chosen, const PixelPlace& place) const {
+    WindowRows window;
+    forEachBlockOfWindow(shape(), place, [&](int block, int x, int y) {
+      const SlicePlaces places = findSlices(ndf_, chosen, block, ndf_.density_scales.data());
+      prefetchRows(reader, places);
+      addWindow(reader, places, x, y, window);
+    });
+    return window.pixels();
+  }
+  template <class Reader>
+  GLINT_HD void prefetchRows(const Reader& reader, const SlicePlaces& places) const {
+    for (int k = 0; k < places.count; ++k)
+      if (places.weights[k] > 0) prefetch(reader.row(ndf_.clusters.data()[places.clusters[k]], places.slices[k]));
+  }
+
+  /// Adds the part of a window that lies in a block. Negative pixels of a slice count as 0.
+  /// @param x, y  column and row of the window's first pixel in the block, -2 to 15
+  template <class Reader>
+  GLINT_HD void addWindow(const Reader& reader, const SlicePlaces& places, int x, int y, WindowRows& window) const {
+#ifdef GLINT_AVX2
+    if (hasAvx2()) return addWindowAvx2(reader, places, x, y, window);
+#endif
+    addWindowBy(reader, places, x, y, window);
+  }
+#ifdef GLINT_AVX2
+  template <class Reader>
+  GLINT_AVX2 GLINT_FLATTEN void addWindowAvx2(const Reader& reader, const SlicePlaces& places, int x, int y,
+                                              WindowRows& window) const {
+    addWindowBy(typename Reader::Avx2(reader), places, x, y, window);
+  }
+#endif
+
+  template <class Reader>
+  GLINT_HD void addWindowBy(const Reader& reader, const SlicePlaces& places, int x, int y, WindowRows& window) const {
+    unsigned left = 0;
+    for (int k = 0; k < places.count; k += 4) left |= lanesAbove0(Float4::load(places.weights + k)) << k;
+    while (left != 0) {
+      const std::uint32_t at = places.clusters[lowestBit(left)];
+      unsigned here = 0;
+      for (int k = 0; k < places.count; k += 4)
+        here |= lanesAbove0(whereEqual(places.clusters + k, at, Float4::load(places.weights + k))) << k;
+      left &= ~here;
+      const NdfCluster& cluster = ndf_.clusters.data()[at];
+      cluster.columns == 0 ? addWindowOfSpots(cluster, places, here, x, y, window)
+                           : addWindowOfColumns(reader, cluster, places, here, x, y, window);
+    }
+  }
+
+  /// @param here  bit k: slice k of `places` is in the cluster
+  template <class Reader>
+  GLINT_HD void addWindowOfColumns(const Reader& reader, const NdfCluster& cluster, const SlicePlaces& places, unsigned here,
+                                   int x, int y, WindowRows& window) const {
+    constexpr int kRows = ColumnWindows::kRows;
+    ColumnWindows columns;
+    reader.window(cluster, x, y, columns);
+    for (; here != 0; here &= here - 1) {
+      const int slice = lowestBit(here);
+      float scaled[kMaxColumns];
+      reader.scaledCoefficients(cluster, reader.row(cluster, places.slices[slice]), scaled);
+      // Two sums of each row, so that an addition need not wait for the previous one.
+      Float4 even[kRows], odd[kRows];
+      for (int row = 0; row < kRows; ++row) even[row] = odd[row] = Float4::zero();
+      int k = 0;
+      for (; k + 2 <= cluster.columns; k += 2) {
+        for (int row = 0; row < kRows; ++row) {
+          even[row] = even[row] + Float4::all(scaled[k]) * columns.row(k, row);
+          odd[row] = odd[row] + Float4::all(scaled[k + 1]) * columns.row(k + 1, row);
+        }
+      }
+      if (k < cluster.columns)
+        for (int row = 0; row < kRows; ++row) even[row] = even[row] + Float4::all(scaled[k]) * columns.row(k, row);
+      for (int row = 0; row < kRows; ++row)
+        window.rows[row] = window.rows[row] + Float4::all(places.weights[slice]) * (even[row] + odd[row]).positive();
+    }
+  }
+
+  GLINT_HD void addWindowOfSpots(const NdfCluster& cluster, const SlicePlaces& places, unsigned here, int x, int y,
+                                 WindowRows& window) const {
+    const SpotProfile profile(ndf_);
+    for (; here != 0; here &= here - 1) {
+      const int slice = lowestBit(here);
+      addSpotWindow(profile, spotsOf(ndf_, cluster, places.slices[slice]), x, y, places.weights[slice], window);
+    }
+  }
+
   static GLINT_HD unsigned lanesAbove0(Float4 weights) { return ~weights.notAbove(0) & 15u; }
 
   /// Weighted sum over slices of a cluster of spots.
@@ -305,6 +410,7 @@ class CpNdf {
 
   NdfCp ndf_;
   SliceChooser chooser_;
+  Pixels pixels_;
   TexelBlend below_;
 };
 
@@ -404,15 +510,14 @@ inline GLINT_HD HalfVectorSample CpNdf::imageSample(const Footprint& p, Vec2 xi)
   if (!draw.possible) return {};
   return withReader(ndf_, [&]<class Reader>(const Reader& reader) -> HalfVectorSample {
     // Prefetches the slices that the pdf needs; they arrive while the pixel is chosen.
-    const int block = draw.block;
-    SlicePlaces places = findSlices(ndf_, chosen, block, ndf_.density_scales.data());
-    for (int k = 0; k < places.count; ++k)
-      if (places.weights[k] > 0) prefetch(reader.row(ndf_.clusters.data()[places.clusters[k]], places.slices[k]));
+    prefetchRows(reader, findSlices(ndf_, chosen, draw.block, ndf_.density_scales.data()));
     choosePixel(reader, draw);
     if (draw.place.x < 0) return {};
-    if (draw.block != block) places = findSlices(ndf_, chosen, draw.block, ndf_.density_scales.data());
-    const float density = sumSlices(places, PixelOf<Reader>{reader, draw.place}, Positive{});
-    return drawnAt(pointInPixel(shape(), draw.place, draw.xi), finitePositive(density / draw.total));
+    if (pixels_ == Pixels::constant)
+      return drawnAt(pointInPixel(shape(), draw.place, draw.xi), finitePositive(imageMean(chosen, draw.place) / draw.total));
+    PixelWindow pixels = window(reader, chosen, draw.place);
+    pixels *= 1 / draw.total;
+    return splineSample(shape(), draw.place, pixels, draw.xi);
   });
 }
 

@@ -33,12 +33,13 @@ class PackedNdfView {
                      static_cast<Boundary>(header_.boundary), Reference::Search::pruned);
   }
   /// Kind pyramid, with its normals if they were packed.
-  GLINT_HD PyramidNdf pyramidNdf(Interpolation interpolation = Interpolation::footprint) const {
-    return hasNormals() ? PyramidNdf(pyramid(), normalMap(), interpolation) : PyramidNdf(pyramid(), interpolation);
+  GLINT_HD PyramidNdf pyramidNdf(Interpolation interpolation = Interpolation::footprint, Pixels pixels = Pixels::smooth) const {
+    return hasNormals() ? PyramidNdf(pyramid(), normalMap(), interpolation, pixels)
+                        : PyramidNdf(pyramid(), interpolation, pixels);
   }
   /// Kind compressed, with its normals if they were packed.
-  GLINT_HD CpNdf cpNdf(Interpolation interpolation = Interpolation::footprint) const {
-    return hasNormals() ? CpNdf(ndfCp(), normalMap(), interpolation) : CpNdf(ndfCp(), interpolation);
+  GLINT_HD CpNdf cpNdf(Interpolation interpolation = Interpolation::footprint, Pixels pixels = Pixels::smooth) const {
+    return hasNormals() ? CpNdf(ndfCp(), normalMap(), interpolation, pixels) : CpNdf(ndfCp(), interpolation, pixels);
   }
 
   GLINT_HD NormalMap normalMap() const {

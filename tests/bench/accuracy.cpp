@@ -47,14 +47,14 @@ Errors compare(const std::vector<float>& image, const std::vector<float>& truth,
   return {std::sqrt(difference2 / truth2), 0.5 * absolute * area, sum * area - 1};
 }
 
-/// The density is constant over a pixel in both models, so their value at its centre is its mean.
+/// Means of the density over pixels.
 template <NdfModel M>
 std::vector<float> imageOf(const M& model, const Footprint& footprint, int resolution) {
   std::vector<float> image;
   image.reserve(static_cast<std::size_t>(resolution) * resolution);
   const auto centre = [&](int k) { return -1 + (static_cast<float>(k) + 0.5f) * 2 / static_cast<float>(resolution); };
   for (int y = 0; y < resolution; ++y)
-    for (int x = 0; x < resolution; ++x) image.push_back(model.density(footprint, {centre(x), centre(y)}));
+    for (int x = 0; x < resolution; ++x) image.push_back(model.pixelMean(footprint, {centre(x), centre(y)}));
   return image;
 }
 

@@ -290,6 +290,16 @@ def test_interpolation_is_chosen(ask, kind):
     assert footprint == pytest.approx(trilinear, rel=0.5)
 
 
+@pytest.mark.parametrize("kind", ["pyramid", "compressed"])
+def test_pixels_are_smooth_or_constant(ask, kind):
+    def density(x, *pixels):
+        return number(ask(kind, *FOOTPRINT, "--half", str(x), "-0.03", *pixels))
+
+    left, right = 0.0157, 0.0233  # both in pixel 130 of 256
+    assert density(left, "--pixels", "constant") == density(right, "--pixels", "constant")
+    assert density(left, "--pixels", "smooth") == density(left) != density(right)
+
+
 def test_normals_of_another_map_are_invalid_input(ask, assets, glint):
     question = ["--uv", "0.3", "0.7", "--sigma", "3", "--half", "0", "0"]
     for kind in ("pyramid", "compressed"):  # of the same size: told apart by the hash that the asset names

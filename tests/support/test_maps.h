@@ -125,11 +125,11 @@ inline Vec2 pixelCentre(std::size_t k, int resolution) {
           -1 + (static_cast<float>(k / static_cast<std::size_t>(resolution)) + 0.5f) * pixel};
 }
 
-/// The whole NDF image of a model whose densities are constant over pixels.
+/// The whole NDF image of a pyramid or a compressed pyramid: means of the density over pixels.
 template <class Model>
 std::vector<float> imageOf(const Model& model, const Footprint& p, int resolution) {
   std::vector<float> image(static_cast<std::size_t>(resolution) * resolution);
-  for (std::size_t k = 0; k < image.size(); ++k) image[k] = model.density(p, pixelCentre(k, resolution));
+  for (std::size_t k = 0; k < image.size(); ++k) image[k] = model.pixelMean(p, pixelCentre(k, resolution));
   return image;
 }
 

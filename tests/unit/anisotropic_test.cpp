@@ -231,7 +231,7 @@ TEST(AnisotropicNdf, MeanOverPixelsIsTheMeanOfPointQueries) {
   double sum = 0;
   for (int y = 0; y < 6; ++y)
     for (int x = 0; x < 9; ++x)
-      sum += ndf.density(p, {-0.125f + (static_cast<float>(x) + 0.5f) * pixel, (static_cast<float>(y) + 0.5f) * pixel});
+      sum += ndf.pixelMean(p, {-0.125f + (static_cast<float>(x) + 0.5f) * pixel, (static_cast<float>(y) + 0.5f) * pixel});
   EXPECT_NEAR(ndf.mean(p, {{-0.125f, 0}, {-0.125f + 9 * pixel, 6 * pixel}}), sum / 54, 1e-4 * sum / 54);
   EXPECT_NEAR(ndf.mean(p, {{-1, -1}, {1, 1}}), 0.25, 1e-3);
 }

@@ -162,7 +162,7 @@ TEST(PyramidNdf, MeanOverPixelsIsTheMeanOfPointQueries) {
     for (int k = 0; k < 200; ++k) {
       const Footprint p = random.footprint();
       const auto pixels = random.pixels();
-      const auto [mean, magnitude] = meanOfPoints(pixels, [&](Vec2 h) { return model.density(p, h); });
+      const auto [mean, magnitude] = meanOfPoints(pixels, [&](Vec2 h) { return model.pixelMean(p, h); });
       EXPECT_NEAR(model.mean(p, boxOf(pixels)), mean, kSumError * magnitude);
     }
   }
@@ -181,7 +181,8 @@ TEST(PyramidNdf, PartsOfPixelsCountByTheirArea) {
       for (int i = 0; i < 3; ++i) {
         const double wx = i == 0 ? 1 - a : i == 1 ? 1 : a, wy = j == 0 ? 1 - b : j == 1 ? 1 : b;
         expected += wx * wy *
-                    model.density(p, {toHalfVector(x + i) + 1.0f / kResolution, toHalfVector(y + j) + 1.0f / kResolution}) / 4;
+                    model.pixelMean(p, {toHalfVector(x + i) + 1.0f / kResolution, toHalfVector(y + j) + 1.0f / kResolution}) /
+                    4;
       }
     const Vec2 low = {toHalfVector(x) + static_cast<float>(a) * 2 / kResolution,
                       toHalfVector(y) + static_cast<float>(b) * 2 / kResolution};
@@ -209,11 +210,24 @@ TEST(CpNdf, SignedMeanOverPixelsIsTheMeanOfSignedPointQueries) {
   });
 }
 
+/// Positive pixels around a pixel of an image.
+PixelWindow windowOf(const std::vector<double>& image, double scale, int x, int y) {
+  PixelWindow window;
+  for (int j = 0; j < PixelWindow::kSize; ++j)
+    for (int i = 0; i < PixelWindow::kSize; ++i) {
+      const int column = x + i - 1, row = y + j - 1;
+      if (column < 0 || column >= kResolution || row < 0 || row >= kResolution) continue;
+      window.pixels[j][i] =
+          static_cast<float>(scale * std::max(0.0, image[static_cast<std::size_t>(row * kResolution + column)]));
+    }
+  return window;
+}
+
 TEST(CpNdf, EqualsASlowDecoderAtItsCentres) {
   constexpr double kFactorError = 1e-5;  // of the largest value: products of floats
   forEachCompression([](const CpNdf&, const NdfCpData& data) {
     const NdfCp view = data.view();
-    const CpNdf model(view, Interpolation::trilinear);
+    const CpNdf model(view, Interpolation::trilinear), constant(view, Interpolation::trilinear, Pixels::constant);
     for (int l = 0; l < view.shape.level_count; ++l) {
       const PyramidGrid& grid = view.shape.levels[l];
       const float sigma = l < view.shape.footprintLevels() ? kFootprintPerStride * grid.stride : 1e6f;  // the mean of the map
@@ -230,7 +244,16 @@ TEST(CpNdf, EqualsASlowDecoderAtItsCentres) {
           const Vec2 h = test::pixelCentre(k, kResolution);
           ASSERT_NEAR(model.signedDensity(p, h), expected[k], 10 * kFactorError * largest)
               << l << ' ' << i << ' ' << j << " pixel " << k;
-          ASSERT_NEAR(model.density(p, h), std::max(0.0, expected[k]) * density_scale, 10 * kFactorError * largest);
+          ASSERT_NEAR(model.pixelMean(p, h), std::max(0.0, expected[k]) * density_scale, 10 * kFactorError * largest);
+          ASSERT_NEAR(constant.density(p, h), std::max(0.0, expected[k]) * density_scale, 10 * kFactorError * largest);
+        }
+        RandomQueries random(6);
+        for (int k = 0; k < 200; ++k) {
+          const int x = random.below(kResolution), y = random.below(kResolution);
+          const Vec2 t = {random.unit(), random.unit()},
+                     h = {toHalfVector(x) + t.x * 2 / kResolution, toHalfVector(y) + t.y * 2 / kResolution};
+          const PixelSpline spline(windowOf(expected, density_scale, x, y));
+          ASSERT_NEAR(model.density(p, h), spline.density(t), 1e-4 * largest) << x << ' ' << y;
         }
       }
     }

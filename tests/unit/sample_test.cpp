@@ -178,11 +178,11 @@ Histogram expectedOf(int samples, Mass&& mass) {
   return expected;
 }
 
-/// For models whose density is constant over a pixel.
+/// For models of pyramids.
 template <class Model>
 Histogram expectedOfPixels(const Model& model, const Footprint& p, int samples) {
   return expectedOf(samples, [&](std::size_t k) {
-    return model.density(p, test::pixelCentre(k, kResolution)) * 4.0 / (kResolution * kResolution);
+    return model.pixelMean(p, test::pixelCentre(k, kResolution)) * 4.0 / (kResolution * kResolution);
   });
 }
 

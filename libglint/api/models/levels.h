@@ -15,7 +15,9 @@ namespace glint::api {
 template <class Round, class Asset>
 AnisotropicNdf<Round> openLevels(const NdfSource<Asset>& source) {
   const Interpolation between = source.options.interpolation;
-  const Round round = source.normals != nullptr ? Round(source.asset, *source.normals, between) : Round(source.asset, between);
+  const Pixels pixels = source.options.pixels;
+  const Round round =
+      source.normals != nullptr ? Round(source.asset, *source.normals, between, pixels) : Round(source.asset, between, pixels);
   return {round, source.options.footprint_parts};
 }
 

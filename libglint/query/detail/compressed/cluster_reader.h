@@ -54,6 +54,12 @@ class ClusterReader {
     basisOf(cluster).pixel(layout, x, y, projection);
   }
 
+  /// Writes the values of columns, without scales, at the pixels of a window.
+  /// @param x, y  column and row of its first pixel in the block, -2 to 15
+  GLINT_HD void window(const NdfCluster& cluster, int x, int y, ColumnWindows& windows) const {
+    basisOf(cluster).window(x, y, windows);
+  }
+
   /// Writes the projection of a box: sums of scaled columns over the part of the block.
   GLINT_HD void box(const NdfCluster& cluster, const ColumnLayout& layout, const BlockBox& b, float* projection) const {
     basisOf(cluster).box(layout, b, projection);

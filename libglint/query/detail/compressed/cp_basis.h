@@ -33,6 +33,14 @@ struct CpBasis : ClusterArrays {
     layout.arrange(scales(), at(x, y), projection);
   }
 
+  /// Writes the values of all columns at the pixels of a window.
+  /// @param x, y  column and row of its first pixel, -2 to 15
+  GLINT_HD void window(int x, int y, ColumnWindows& windows) const {
+    const AxisWindow<kMaxColumns> at_x(alongX(), columns(), x), at_y(alongY(), columns(), y);
+    for (int k = 0; k < columns(); ++k)
+      for (int row = 0; row < ColumnWindows::kRows; ++row) windows.setRow(k, row, at_x.lanes(k) * Float4::all(at_y.at[row][k]));
+  }
+
   /// Writes the projection of a box: sums of columns over the part of the block (Deng 2022, Eq. 6 and 7).
   GLINT_DEVICE_CALL GLINT_HD void box(const ColumnLayout& layout, const BlockBox& b, float* projection) const {
     float in_x[kMaxColumns], in_y[kMaxColumns];

@@ -35,6 +35,22 @@ struct PcaBasis : ClusterArrays {
     layout.arrange(scales(), at(x, y), projection);
   }
 
+  /// Writes the values of all columns at the pixels of a window.
+  /// @param x, y  column and row of its first pixel, -2 to 15
+  GLINT_HD void window(int x, int y, ColumnWindows& windows) const {
+    const int count = columns();
+    const auto sumsOfRow = [&](int row) { return AxisWindow<kMaxColumns>(prefix() + row * kBlockSize * count, count, x); };
+    for (int row = 0; row < ColumnWindows::kRows; ++row) {
+      const int at = y + row;
+      if (at < 0 || at >= kBlockSize) {
+        for (int k = 0; k < count; ++k) windows.setRow(k, row, Float4::zero());
+        continue;
+      }
+      const AxisWindow<kMaxColumns> here = sumsOfRow(at), below = sumsOfRow(std::max(at - 1, 0));
+      for (int k = 0; k < count; ++k) windows.setRow(k, row, at > 0 ? here.lanes(k) - below.lanes(k) : here.lanes(k));
+    }
+  }
+
   /// Writes the projection of a box: sums of columns over the part of the block.
   GLINT_DEVICE_CALL GLINT_HD void box(const ColumnLayout& layout, const BlockBox& b, float* projection) const {
     const int count = columns();

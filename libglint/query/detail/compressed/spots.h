@@ -6,6 +6,7 @@
 
 #include "glint/model/ndf_cp.h"
 #include "glint/query/detail/pyramid/block_mass.h"
+#include "glint/query/detail/pyramid/pixel_spline.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
 
 namespace glint {
@@ -80,6 +81,33 @@ inline GLINT_HD float spotsAt(const SpotProfile& profile, const SpotList& list, 
     sum += static_cast<float>(spot.weight) * profile.pixel(x, spot.x) * profile.pixel(y, spot.y);
   }
   return list.scale * sum + list.rest;
+}
+
+/// Adds `weight` times the pixels of a window that lie in the block.
+/// @param x, y  column and row of the window's first pixel in the block, -2 to 15
+inline GLINT_HD void addSpotWindow(const SpotProfile& profile, const SpotList& list, int x, int y, float weight,
+                                   WindowRows& window) {
+  const auto inside = [](int pixel) { return pixel >= 0 && pixel < kBlockSize; };
+  const auto shares = [&](int first, int place, float(&at)[PixelWindow::kSize]) {
+    for (int t = 0; t < PixelWindow::kSize; ++t) at[t] = inside(first + t) ? profile.pixel(first + t, place) : 0.0f;
+  };
+  const auto add = [&](const float(&at_x)[PixelWindow::kSize], const float(&at_y)[PixelWindow::kSize], float factor) {
+    const Float4 lanes = Float4::of(at_x[0], at_x[1], at_x[2], 0);
+    for (int row = 0; row < PixelWindow::kSize; ++row)
+      window.rows[row] = window.rows[row] + Float4::all(factor * at_y[row]) * lanes;
+  };
+  float at_x[PixelWindow::kSize], at_y[PixelWindow::kSize];
+  for (int k = 0; k < list.count; ++k) {
+    const NdfSpot spot = list.spots[k];
+    shares(x, spot.x, at_x);
+    shares(y, spot.y, at_y);
+    add(at_x, at_y, weight * list.scale * static_cast<float>(spot.weight));
+  }
+  for (int t = 0; t < PixelWindow::kSize; ++t) {
+    at_x[t] = inside(x + t) ? 1.0f : 0.0f;
+    at_y[t] = inside(y + t) ? 1.0f : 0.0f;
+  }
+  add(at_x, at_y, weight * list.rest);
 }
 
 /// Sum over a box of pixels.

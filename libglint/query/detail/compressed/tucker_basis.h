@@ -26,6 +26,18 @@ struct TuckerBasis : ClusterArrays {
     arrangePairs(layout, at_x, at_y, projection);
   }
 
+  /// Writes the values of all columns at the pixels of a window.
+  /// @param x, y  column and row of its first pixel, -2 to 15
+  GLINT_HD void window(int x, int y, ColumnWindows& windows) const {
+    const AxisWindow<kBlockSize> at_x(alongX(), rankX(), x), at_y(alongY(), rankY(), y);
+    Float4 lanes[kBlockSize];
+    for (int a = 0; a < rankX(); ++a) lanes[a] = at_x.lanes(a);
+    const std::uint8_t* pairs = core();
+    for (int k = 0; k < columns(); ++k)
+      for (int row = 0; row < ColumnWindows::kRows; ++row)
+        windows.setRow(k, row, lanes[pairs[k] % kBlockSize] * Float4::all(at_y.at[row][pairs[k] / kBlockSize]));
+  }
+
   /// Writes the projection of a box: sums of columns over the part of the block.
   GLINT_DEVICE_CALL GLINT_HD void box(const ColumnLayout& layout, const BlockBox& b, float* projection) const {
     float in_x[kBlockSize] = {}, in_y[kBlockSize];

@@ -45,4 +45,13 @@ inline GLINT_HD Vec2 pointInPixel(const PyramidShape& shape, const PixelPlace& p
           coordinate(place.block / blocks * kBlockSize + place.y, xi.y)};
 }
 
+/// The half vectors of a pixel.
+inline GLINT_HD Box2 boxOfPixel(const PyramidShape& shape, const PixelPlace& place) {
+  const int blocks = shape.blocksPerAxis();
+  const float size = 2 / static_cast<float>(shape.resolution);
+  const auto begin = [&](int pixel) { return static_cast<float>(pixel - shape.resolution / 2) * size; };
+  const Vec2 low = {begin(place.block % blocks * kBlockSize + place.x), begin(place.block / blocks * kBlockSize + place.y)};
+  return {low, low + Vec2{size, size}};
+}
+
 }  // namespace glint

@@ -12,6 +12,7 @@
 #include "glint/query/detail/pyramid/avx2_blocks.h"
 #include "glint/query/detail/pyramid/block_cover.h"
 #include "glint/query/detail/pyramid/block_rows.h"
+#include "glint/query/detail/pyramid/pixel_spline.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
 
 namespace glint {
@@ -26,13 +27,13 @@ class PyramidReader {
   GLINT_HD const NdfPyramid& pyramid() const { return pyramid_; }
   GLINT_HD const PyramidShape& shape() const { return pyramid_.shape; }
 
-  /// Density of a pixel, >= 0; O(1).
-  GLINT_HD float pixelDensity(const PyramidSlices& chosen, const PixelPlace& place) const {
+  /// Mean density of a pixel, >= 0; O(1).
+  GLINT_HD float pixelMean(const PyramidSlices& chosen, const PixelPlace& place) const {
     return addPixels(findPixels(chosen, place));
   }
 
   /// Positions of one pixel in the arrays of the levels, for all slices.
-  struct Pixels {
+  struct FoundPixels {
     const void* pixels[PyramidSlices::kMost];
     float weights[PyramidSlices::kMost];  ///< 0 where the block is not stored: the position is then some other pixel
     int count = 0;
@@ -49,14 +50,50 @@ class PyramidReader {
 
   /// Finds a pixel in every slice and prefetches it. Has no branch on whether blocks are stored, which processors cannot
   /// predict: so the cache misses of all slices overlap.
-  GLINT_HD Pixels findPixels(const PyramidSlices& chosen, const PixelPlace& place) const {
+  GLINT_HD FoundPixels findPixels(const PyramidSlices& chosen, const PixelPlace& place) const {
     return pyramid_.precision == BlockPrecision::f16 ? findPixelsOf<std::uint16_t>(chosen, place)
                                                      : findPixelsOf<float>(chosen, place);
   }
 
-  /// Density of the pixels that were found, >= 0.
-  GLINT_HD float addPixels(const Pixels& pixels) const {
+  /// Mean density of the pixels that were found, >= 0.
+  GLINT_HD float addPixels(const FoundPixels& pixels) const {
     return pyramid_.precision == BlockPrecision::f16 ? addPixelsOf<std::uint16_t>(pixels) : addPixelsOf<float>(pixels);
+  }
+
+  /// The stored blocks of the chosen images that have one number.
+  struct StoredBlocks {
+    int count;
+    float weights[PyramidSlices::kMost];
+    const void* pixels[PyramidSlices::kMost];
+    const float* means[PyramidSlices::kMost];
+  };
+
+  /// Finds the block of a pixel in every slice, and prefetches the pixel and its neighbours in the block.
+  GLINT_HD void findWindow(const PyramidSlices& chosen, const PixelPlace& place, StoredBlocks& out) const {
+    findStored(chosen, place.block, out);
+    const int first = std::max(place.y - 1, 0), end = std::min(place.y + 2, int{kBlockSize});
+    for (int k = 0; k < out.count; ++k) prefetchRows(out.pixels[k], first, end);
+  }
+
+  /// Mean densities of a pixel and of its neighbours, >= 0.
+  /// @param found  from findWindow
+  GLINT_HD PixelWindow addWindow(const PyramidSlices& chosen, const PixelPlace& place, const StoredBlocks& found) const {
+    PixelWindow window;
+    forEachBlockOfWindow(shape(), place, [&](int block, int x, int y) {
+      if (block == place.block) return addBlock(found, x, y, window);
+      StoredBlocks neighbour;
+      findStored(chosen, block, neighbour);
+      addBlock(neighbour, x, y, window);
+    });
+    window *= pyramid_.value_scale;
+    return window;
+  }
+
+  /// findWindow and addWindow in one.
+  GLINT_HD PixelWindow window(const PyramidSlices& chosen, const PixelPlace& place) const {
+    StoredBlocks found;
+    findWindow(chosen, place, found);
+    return addWindow(chosen, place, found);
   }
 
   /// A sample that is being drawn: chooseImage, findBlocks, chooseBlock and choosePixel fill it in this order. Each step reads
@@ -120,14 +157,6 @@ class PyramidReader {
     pyramid_.precision == BlockPrecision::f16 ? choose(static_cast<const std::uint16_t*>(level.pixels))
                                               : choose(static_cast<const float*>(level.pixels));
   }
-
-  /// The stored blocks of the chosen images that have one number.
-  struct StoredBlocks {
-    int count;
-    float weights[PyramidSlices::kMost];
-    const void* pixels[PyramidSlices::kMost];
-    const float* means[PyramidSlices::kMost];
-  };
 
   /// A mean that has been begun: its blocks are prefetched and not read yet.
   struct PendingMean {
@@ -197,10 +226,10 @@ class PyramidReader {
   };
 
   template <class Pixel>
-  GLINT_HD Pixels findPixelsOf(const PyramidSlices& chosen, const PixelPlace& place) const {
+  GLINT_HD FoundPixels findPixelsOf(const PyramidSlices& chosen, const PixelPlace& place) const {
     constexpr std::uint64_t kBlockBytes = kBlockPixels * sizeof(Pixel);
     const unsigned word = static_cast<unsigned>(place.block) / 64, bit = static_cast<unsigned>(place.block) % 64;
-    Pixels places;
+    FoundPixels places;
     places.count = chosen.count;
     for (int step = 0; 4 * step < chosen.count; ++step) {
       const PyramidLevel& level = pyramid_.levels[chosen.levels[step]];
@@ -220,15 +249,41 @@ class PyramidReader {
   }
 
   template <class Pixel>
-  GLINT_HD float addPixelsOf(const Pixels& pixels) const {
+  GLINT_HD float addPixelsOf(const FoundPixels& pixels) const {
     Float4 sum = Float4::zero();
     for (int k = 0; k < pixels.count; k += 4) sum = sum + fourPixels<Pixel>(pixels, k);
     return finitePositive(pyramid_.value_scale * sum.sum());
   }
 
+  /// Adds the part of a window that lies in a block.
+  /// @param x, y  column and row of the window's first pixel in the block, -2 to 15
+  GLINT_HD void addBlock(const StoredBlocks& blocks, int x, int y, PixelWindow& window) const {
+    pyramid_.precision == BlockPrecision::f16 ? addBlockOf<std::uint16_t>(blocks, x, y, window)
+                                              : addBlockOf<float>(blocks, x, y, window);
+  }
+
+  template <class Pixel>
+  GLINT_HD void addBlockOf(const StoredBlocks& blocks, int x, int y, PixelWindow& window) const {
+    constexpr int kSize = PixelWindow::kSize, kLanes = 4;
+    const int first = std::clamp(x, 0, kBlockSize - kLanes);  // of the columns that are read
+    const int low = std::max(y, 0), high = std::min(y + kSize, int{kBlockSize});
+    Float4 sums[kSize] = {Float4::zero(), Float4::zero(), Float4::zero()};
+    for (int k = 0; k < blocks.count; ++k) {
+      const Pixel* pixels = static_cast<const Pixel*>(blocks.pixels[k]) + first;
+      const Float4 weight = Float4::all(blocks.weights[k]);
+      for (int row = low; row < high; ++row) sums[row - y] = sums[row - y] + weight * loadPixels(pixels + row * kBlockSize);
+    }
+    for (int row = low; row < high; ++row) {
+      float lanes[kLanes];
+      sums[row - y].store(lanes);
+      for (int column = std::max(x, 0); column < std::min(x + kSize, int{kBlockSize}); ++column)
+        window.pixels[row - y][column - x] += lanes[column - first];
+    }
+  }
+
   /// Weighted pixels of the four slices from k on.
   template <class Pixel>
-  static GLINT_HD Float4 fourPixels(const Pixels& found, int k) {
+  static GLINT_HD Float4 fourPixels(const FoundPixels& found, int k) {
     const auto pixel = [&](int j) { return *static_cast<const Pixel*>(found.pixels[k + j]); };
     const Float4 weights = Float4::load(found.weights + k);
     if constexpr (std::is_same_v<Pixel, float>) {

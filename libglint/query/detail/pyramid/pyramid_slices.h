@@ -313,6 +313,15 @@ inline GLINT_HD PixelPlace pixelPlace(const PyramidShape& shape, Vec2 h) {
   static_assert(kBlockSize == 16);
   return {(y >> 4) * (shape.resolution >> 4) + (x >> 4), x & 15, y & 15};
 }
+/// The position of a half vector inside its pixel, in [0, 1]^2. Valid for |h.x|, |h.y| <= 1.
+inline GLINT_HD Vec2 positionInPixel(const PyramidShape& shape, Vec2 h) {
+  const float half = 0.5f * static_cast<float>(shape.resolution);
+  const auto position = [&](float coordinate) {
+    const float x = (coordinate + 1) * half;
+    return x - static_cast<float>(std::min(static_cast<int>(x), shape.resolution - 1));
+  };
+  return {position(h.x), position(h.y)};
+}
 
 /// Splits a range of half vectors at the borders of angular blocks: visitor(block, BlockBox). Nothing outside [-1, 1]^2.
 template <class Visitor>
