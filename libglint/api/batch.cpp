@@ -90,7 +90,8 @@ void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArray
     }
     // A mean takes long beside its cache misses, and reads many lines: only the next mean is prefetched.
     const auto begin = [&](int k) {
-      if (!from_texels[k]) reader.beginMean(slices[k], ranges[first + static_cast<std::size_t>(k)], pending[k % 2]);
+      if (!from_texels[k])
+        reader.beginMean(slices[k], ranges[first + static_cast<std::size_t>(k)], model.pixels(), pending[k % 2]);
     };
     begin(0);
     for (int k = 0; k < lanes; ++k) {

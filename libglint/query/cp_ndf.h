@@ -25,9 +25,8 @@ namespace glint {
 /// form, with factors from prefix sums (Eq. 6 and 7). Slices of few facets are stored as spots and an even rest instead.
 ///
 /// Approximated pixels can be negative. `density` takes negative pixels as 0, and scales the image so that it then integrates to
-/// 1; between the half vectors of a pixel see Pixels. `mean` is a difference of prefix sums, which include negative pixels: it is the exact average
-/// of `signedDensity`, clamped at the end. So over whole pixels it is the exact average of `density` only where no pixel is
-/// negative.
+/// 1; between the half vectors of a pixel see Pixels. `mean` is a difference of prefix sums, which include negative pixels: over
+/// whole pixels it is the exact average of `signedDensity`, clamped at the end, and that of `density` where no pixel is negative.
 /// Thread-safe, allocates nothing; the arrays must outlive it.
 class CpNdf {
   static constexpr int kMostBlocks = 64 * 64;  // blocks of the largest image, 1024^2 pixels
@@ -89,14 +88,15 @@ class CpNdf {
     });
   }
 
-  /// Exact average of signedDensity over a box of half vectors, 0 if the box is empty.
+  /// Average of signedDensity over a box of half vectors, 0 if the box is empty: exact over whole pixels. Edges that cut pixels
+  /// see BoxEdge.
   GLINT_HD float signedMean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
     return below_.mean(p, range, [&] {
       const PyramidSlices chosen = chooser_.choose(p);
       return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
         double sum = 0;
-        forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
+        forEachBlock(shape(), range, pixels_, [&](int block, const BlockBox& box) {
           sum += double{sumSlices(chosen, block, ndf_.image_scales.data(), BoxOf<Reader>{reader, box}, Signed{})};
         });
         return static_cast<float>(sum / double{areaInPixels(shape(), range)});

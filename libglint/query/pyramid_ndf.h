@@ -63,12 +63,13 @@ class PyramidNdf {
         p, xi, [&](Vec2 x) { return imageSample(p, x); }, [&](Vec2 h) { return insideSquare(h) ? imageDensity(p, h) : 0.0f; });
   }
 
-  /// Average density over a box of half vectors, 0 if the box is empty. O(1) for each block that the box covers: the means of
-  /// whole blocks are stored, and a block that is covered in part sums at most 256 pixels.
+  /// Average density over a box of half vectors, >= 0, 0 if the box is empty: exact over whole pixels. Edges that cut pixels
+  /// see BoxEdge. O(1) for each block that the box covers: the means of whole blocks are stored, and a block that is covered in
+  /// part sums at most 256 pixels.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     return below_.mean(p, range, [&] {
       PyramidReader::PendingMean pending;
-      reader_.beginMean(chooser_.choose(p), range, pending);
+      reader_.beginMean(chooser_.choose(p), range, pixels_, pending);
       return reader_.finishMean(range, pending);
     });
   }

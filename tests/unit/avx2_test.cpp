@@ -150,7 +150,9 @@ TEST(Avx2Blocks, SumCoveredPixels) {
     const Blocks blocks(random);
     const float x = 16 * unit(random), y = 16 * unit(random);
     BlockCover cover;
-    cover.set({x, y, x + (16 - x) * unit(random), y + (16 - y) * unit(random)});
+    const Pixels kind = random() % 2 ? Pixels::smooth : Pixels::constant;
+    const auto edge = [&](float position) { return BoxEdge(position, kind); };
+    cover.set({edge(x), edge(x + (16 - x) * unit(random)), edge(y), edge(y + (16 - y) * unit(random))});
     const std::uint16_t* halves[8];
     const float* floats[8];
     float weights[8];

@@ -168,8 +168,8 @@ TEST(PyramidNdf, MeanOverPixelsIsTheMeanOfPointQueries) {
   }
 }
 
-TEST(PyramidNdf, PartsOfPixelsCountByTheirArea) {
-  const PyramidNdf model(pyramid().view());
+TEST(PyramidNdf, PartsOfConstantPixelsCountByTheirArea) {
+  const PyramidNdf model(pyramid().view(), Interpolation::footprint, Pixels::constant);
   RandomQueries random(2);
   for (int k = 0; k < 100; ++k) {
     const Footprint p = random.footprint();

@@ -98,21 +98,13 @@ struct PcaBasis : ClusterArrays {
   GLINT_HD const std::int32_t* prefix() const { return basis(); }  ///< prefix sums over x and y, [16][16][columns]
 
  private:
-  /// Calls visitor(prefix sums [columns], weight) for the prefix sums that add up to the sum over a box. Each of the four
-  /// corners of the box is interpolated bilinearly between the nearest prefix sums.
+  /// Calls visitor(prefix sums [columns], weight) for the prefix sums that add up to the sum over a box.
   template <class Visitor>
   GLINT_HD void forEachPrefix(const BlockBox& box, Visitor&& visitor) const {
-    const int count = columns();
-    for (int end = 0; end < 4; ++end) {
-      const float x = end & 1 ? box.x0 : box.x1, y = end & 2 ? box.y0 : box.y1, sign = end == 0 || end == 3 ? 1.0f : -1.0f;
-      const int px = std::min(static_cast<int>(x), kBlockSize - 1), py = std::min(static_cast<int>(y), kBlockSize - 1);
-      const float fx = x - static_cast<float>(px), fy = y - static_cast<float>(py);
-      for (int corner = 0; corner < 4; ++corner) {
-        const int cx = px - 1 + (corner & 1), cy = py - 1 + (corner >> 1);
-        const float weight = sign * (corner & 1 ? fx : 1 - fx) * (corner & 2 ? fy : 1 - fy);
-        if (weight != 0 && cx >= 0 && cy >= 0) visitor(prefix() + (cy * kBlockSize + cx) * count, weight);
-      }
-    }
+    const WeightedPrefixes across(box.x0, box.x1), up(box.y0, box.y1);
+    for (int j = 0; j < up.count; ++j)
+      for (int i = 0; i < across.count; ++i)
+        visitor(prefix() + (up.pixels[j] * kBlockSize + across.pixels[i]) * columns(), up.parts[j] * across.parts[i]);
   }
 };
 

@@ -5,6 +5,7 @@
 
 #include "glint/math/float4.h"
 #include "glint/model/ndf_pyramid.h"
+#include "glint/query/detail/pyramid/box_edge.h"
 
 namespace glint {
 
@@ -30,21 +31,34 @@ struct PrefixAxis {
   const std::int32_t *at, *before;
 };
 
-/// sums[k] = sum of column k over the positions from `low` to `high` of one block axis. Pixels at the ends count by the part
-/// that is covered.
+/// The prefix sums of one block axis whose weighted sum is the sum between two edges. Sums up to pixel 0 are 0 and are left out.
+struct WeightedPrefixes {
+  GLINT_HD WeightedPrefixes(const BoxEdge& low, const BoxEdge& high) {
+    for (int k = 0; k < BoxEdge::kTaps; ++k) {
+      add(high.pixels[k], high.parts[k]);
+      add(low.pixels[k], -low.parts[k]);
+    }
+  }
+  GLINT_HD void add(int below, float part) {
+    if (below == 0 || part == 0) return;
+    pixels[count] = below - 1;
+    parts[count++] = part;
+  }
+
+  int count = 0;
+  int pixels[2 * BoxEdge::kTaps];  ///< the last pixel of each sum
+  float parts[2 * BoxEdge::kTaps];
+};
+
+/// sums[k] = sum of column k between two edges on one block axis.
 /// @param prefix  inclusive prefix sums [16][columns]
-inline GLINT_HD void sumAlongAxis(const std::int32_t* prefix, int columns, float low, float high, float* sums) {
-  const int l = std::min(static_cast<int>(low), kBlockSize - 1), h = std::min(static_cast<int>(high), kBlockSize - 1);
-  const float fl = low - static_cast<float>(l), fh = high - static_cast<float>(h);
-  // The sum up to a position inside a pixel is (1 - f) * prefix before the pixel + f * prefix after it.
-  const std::int32_t* l0 = l > 0 ? prefix + (l - 1) * columns : nullptr;
-  const std::int32_t* h0 = h > 0 ? prefix + (h - 1) * columns : nullptr;
-  const std::int32_t* l1 = prefix + l * columns;
-  const std::int32_t* h1 = prefix + h * columns;
-  for (int k = 0; k < columns; ++k) {
-    const float before = (l0 ? (1 - fl) * static_cast<float>(l0[k]) : 0.0f) + (fl > 0 ? fl * static_cast<float>(l1[k]) : 0.0f);
-    const float after = (h0 ? (1 - fh) * static_cast<float>(h0[k]) : 0.0f) + fh * static_cast<float>(h1[k]);
-    sums[k] = after - before;
+inline GLINT_HD void sumAlongAxis(const std::int32_t* prefix, int columns, const BoxEdge& low, const BoxEdge& high,
+                                  float* sums) {
+  const WeightedPrefixes terms(low, high);
+  std::fill(sums, sums + columns, 0.0f);
+  for (int t = 0; t < terms.count; ++t) {
+    const std::int32_t* row = prefix + terms.pixels[t] * columns;
+    for (int k = 0; k < columns; ++k) sums[k] += terms.parts[t] * static_cast<float>(row[k]);
   }
 }
 

@@ -60,11 +60,9 @@ class SpotProfile {
     const float* at = edge(0, place);
     return at[kSpotSteps * kBlockSize] - at[0];
   }
-  /// Share that lies before position `x` in [0, 16], which may cut a pixel.
-  GLINT_HD float before(float x, int place) const {
-    const int p = std::min(static_cast<int>(x), kBlockSize - 1);
-    const float* at = edge(p, place);
-    return at[0] + (x - static_cast<float>(p)) * (at[kSpotSteps] - at[0]);
+  /// Share that lies between two edges.
+  GLINT_HD float between(const BoxEdge& low, const BoxEdge& high, int place) const {
+    return sumBetween(low, high, [&](int p) { return edge(p, place)[0]; });
   }
 
  private:
@@ -115,10 +113,10 @@ inline GLINT_HD float spotsIn(const SpotProfile& profile, const SpotList& list, 
   float sum = 0;
   for (int k = 0; k < list.count; ++k) {
     const NdfSpot spot = list.spots[k];
-    sum += static_cast<float>(spot.weight) * (profile.before(box.x1, spot.x) - profile.before(box.x0, spot.x)) *
-           (profile.before(box.y1, spot.y) - profile.before(box.y0, spot.y));
+    sum += static_cast<float>(spot.weight) * profile.between(box.x0, box.x1, spot.x) * profile.between(box.y0, box.y1, spot.y);
   }
-  return list.scale * sum + list.rest * (box.x1 - box.x0) * (box.y1 - box.y0);
+  const auto pixels = [](int p) { return static_cast<float>(p); };
+  return list.scale * sum + list.rest * sumBetween(box.x0, box.x1, pixels) * sumBetween(box.y0, box.y1, pixels);
 }
 
 /// Sum of each row of a slice.

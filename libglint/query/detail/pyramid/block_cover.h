@@ -13,23 +13,16 @@
 
 namespace glint {
 
-/// Covered parts of the rows and columns of a block under a box of pixels.
+/// How much the rows and columns of a block count in a box.
 class BlockCover {
  public:
   GLINT_HD void set(const BlockBox& box) {
-    constexpr float kFull = kBlockSize;
-    whole_ = box.x0 <= 0 && box.y0 <= 0 && box.x1 >= kFull && box.y1 >= kFull;
-    for (int k = 0; k < kBlockSize; ++k) {
-      columns[k] = covered(box.x0, box.x1, k);
-      rows[k] = covered(box.y0, box.y1, k);
-    }
-    first_row = static_cast<int>(box.y0);
-    end_row = std::min(static_cast<int>(std::ceil(box.y1)), int{kBlockSize});
-    first_column = static_cast<int>(box.x0) / 4 * 4;
-    end_column = std::min(static_cast<int>(std::ceil(box.x1)), int{kBlockSize});
+    const bool whole_rows = setWeights(box.y0, box.y1, rows, first_row, end_row);
+    whole_ = setWeights(box.x0, box.x1, columns, first_column, end_column) && whole_rows;
+    first_column = first_column / 4 * 4;
   }
   int first_row, end_row, first_column, end_column;  ///< the first column is a multiple of 4
-  float columns[kBlockSize], rows[kBlockSize];       ///< covered parts, 0 to 1
+  float columns[kBlockSize], rows[kBlockSize];       ///< weights: 1 inside, 0 outside, other numbers near edges
   GLINT_HD bool isWhole() const { return whole_; }
 
   /// Weighted sum of the covered pixels of some blocks.
@@ -62,8 +55,21 @@ class BlockCover {
   }
 
  private:
-  static GLINT_HD float covered(float low, float high, int k) {
-    return std::max(0.0f, std::min(high, static_cast<float>(k + 1)) - std::max(low, static_cast<float>(k)));
+  /// Writes the weights of the pixels along an axis, and where the first and the last are that are not 0.
+  /// @return whether all weights are 1
+  static GLINT_HD bool setWeights(const BoxEdge& low, const BoxEdge& high, float (&weights)[kBlockSize], int& first, int& end) {
+    // In a box inside one pixel, either edge may be the one that depends on the pixel before or after.
+    first = std::min(low.firstAbove(), high.firstAbove());
+    end = std::max(low.endBelow(), high.endBelow());
+    float steps[kBlockSize + 1] = {};  // steps[k]: weight of pixel k - 1 less that of pixel k
+    for (int tap = 0; tap < BoxEdge::kTaps; ++tap) {
+      steps[high.pixels[tap]] += high.parts[tap];
+      steps[low.pixels[tap]] -= low.parts[tap];
+    }
+    for (float& weight : weights) weight = 0;
+    float weight = 0;
+    for (int k = kBlockSize - 1; k >= first; --k) weights[k] = weight += steps[k + 1];
+    return first == 0 && end == kBlockSize && low.isWhole() && high.isWhole();
   }
   bool whole_;
 };

@@ -169,11 +169,12 @@ class PyramidReader {
 
   /// Begins a mean from chosen images: finds the stored blocks in the range and prefetches them. In ranges of more than
   /// PendingMean::kMost blocks, blocks are summed already here to make room.
-  GLINT_HD void beginMean(const PyramidSlices& chosen, const Box2& range, PendingMean& pending) const {
+  /// @param pixels  how the density runs in pixels that edges of the range cut
+  GLINT_HD void beginMean(const PyramidSlices& chosen, const Box2& range, Pixels pixels, PendingMean& pending) const {
     pending.sum = 0;
     pending.count = 0;
     if (!(range.width() > 0 && range.height() > 0)) return;
-    forEachBlock(shape(), range, [&](int block, const BlockBox& box) {
+    forEachBlock(shape(), range, pixels, [&](int block, const BlockBox& box) {
       if (pending.count == PendingMean::kMost) addPending(pending);
       BlockCover& cover = pending.covers[pending.count];
       StoredBlocks& stored = pending.blocks[pending.count++];

@@ -9,6 +9,7 @@
 #include "glint/model/footprint.h"
 #include "glint/model/ndf_pyramid.h"
 #include "glint/query/detail/common/footprint_weights.h"
+#include "glint/query/detail/pyramid/box_edge.h"
 #include "glint/query/detail/pyramid/footprint_kernel.h"
 #include "glint/query/interpolation.h"
 
@@ -295,11 +296,6 @@ class SliceChooser {
   LevelCentres levels_[kMaxPyramidLevels];
 };
 
-/// A box of pixels within one angular block: [x0, x1] x [y0, y1] in [0, 16]^2.
-struct BlockBox {
-  float x0, y0, x1, y1;
-};
-
 /// The pixel that contains a half vector: number of its block, and its column and row in the block. Valid for |h.x|, |h.y| <=
 /// 1.
 struct PixelPlace {
@@ -323,21 +319,36 @@ inline GLINT_HD Vec2 positionInPixel(const PyramidShape& shape, Vec2 h) {
   return {position(h.x), position(h.y)};
 }
 
-/// Splits a range of half vectors at the borders of angular blocks: visitor(block, BlockBox). Nothing outside [-1, 1]^2.
+/// Splits a range of half vectors at the borders of angular blocks: visitor(block, BlockBox). Nothing outside [-1, 1]^2. Blocks
+/// beside the range are visited where an edge depends on their pixels.
 template <class Visitor>
-GLINT_HD void forEachBlock(const PyramidShape& shape, const Box2& range, Visitor&& visitor) {
+GLINT_HD void forEachBlock(const PyramidShape& shape, const Box2& range, Pixels pixels, Visitor&& visitor) {
   const float half = 0.5f * static_cast<float>(shape.resolution);
   const auto pixel = [&](float h) { return std::clamp((h + 1) * half, 0.0f, 2 * half); };
   const float x0 = pixel(range.low.x), x1 = pixel(range.high.x), y0 = pixel(range.low.y), y1 = pixel(range.high.y);
   if (!(x0 < x1 && y0 < y1)) return;
-  const int blocks = shape.blocksPerAxis();
-  const auto last = [&](float end) { return std::min(static_cast<int>(std::ceil(end / kBlockSize)), blocks); };
-  for (int by = static_cast<int>(y0) / kBlockSize; by < last(y1); ++by) {
-    for (int bx = static_cast<int>(x0) / kBlockSize; bx < last(x1); ++bx) {
-      const auto ox = static_cast<float>(bx * kBlockSize), oy = static_cast<float>(by * kBlockSize);
+  const int blocks = shape.blocksPerAxis(), reach = pixels == Pixels::smooth ? 1 : 0;
+  // An edge that cuts a pixel depends on this pixel and on `reach` pixels on either side.
+  const auto first = [&](float begin, float end) {
+    const auto lowest = [&](float edge) {
+      const float cut = std::floor(edge);
+      return edge > cut ? static_cast<int>(cut) - reach : static_cast<int>(cut);
+    };
+    return std::max(std::min(lowest(begin), lowest(end)), 0) / kBlockSize;
+  };
+  const auto last = [&](float begin, float end) {
+    const auto highest = [&](float edge) {
+      const float cut = std::ceil(edge);
+      return static_cast<int>(cut) - 1 + (edge < cut ? reach : 0);
+    };
+    return std::min(std::max(highest(begin), highest(end)) / kBlockSize, blocks - 1);
+  };
+  for (int by = first(y0, y1); by <= last(y0, y1); ++by) {
+    const auto oy = static_cast<float>(by * kBlockSize);
+    for (int bx = first(x0, x1); bx <= last(x0, x1); ++bx) {
+      const auto ox = static_cast<float>(bx * kBlockSize);
       visitor(by * blocks + bx,
-              BlockBox{std::max(x0 - ox, 0.0f), std::max(y0 - oy, 0.0f), std::min(x1 - ox, static_cast<float>(kBlockSize)),
-                       std::min(y1 - oy, static_cast<float>(kBlockSize))});
+              BlockBox{BoxEdge(x0 - ox, pixels), BoxEdge(x1 - ox, pixels), BoxEdge(y0 - oy, pixels), BoxEdge(y1 - oy, pixels)});
     }
   }
 }
