@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "common/numbers.h"
@@ -15,7 +17,9 @@ PyramidOptions::PyramidOptions(Tool& tool) {
   tool.option("--overlap", values_.overlap, "footprints in a stride along each axis; 1: the grid of Deng 2022")
       .range(1, kMostOverlap)
       .defaultText("sqrt(2)");
-  tool.option("--resolution", values_.resolution, "pixels of an NDF image along each axis, a multiple of 16").range(32, 1024);
+  tool.option("--resolution", resolution_,
+              "pixels of an NDF image along each axis, a multiple of 16 from 32 to 1024; auto: so many that sigma_r is 1.5 "
+              "pixels, where densities between the half vectors of a pixel err by 4 % (256 at the default sigma_r: 19 %)");
   tool.option("--sigma-r", values_.sigma_r, "intrinsic roughness: standard deviation of a facet's lobe, disk units");
   tool.choice("--surface", values_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
               "each texel is a facet (flat), or normals are interpolated between texels (smooth)");
@@ -27,12 +31,32 @@ PyramidOptions::PyramidOptions(Tool& tool) {
               "of stored pixels");
 }
 
+namespace {
+
+/// Pixels of sigma_r from which on densities within a pixel err by 4 % (docs/METHODS.md).
+constexpr float kResolvedPixels = 1.5f;
+
+float pixelsOf(float sigma_r, int resolution) { return 0.5f * sigma_r * static_cast<float>(resolution); }
+
+/// The smallest resolution at which sigma_r has kResolvedPixels, within the limits.
+int resolutionFor(float sigma_r) {
+  constexpr float kLeast = 32, kMost = 1024;
+  const float pixels = 2 * kResolvedPixels / sigma_r;
+  return static_cast<int>(std::ceil(std::clamp(pixels, kLeast, kMost) / kBlockSize)) * kBlockSize;
+}
+
+}  // namespace
+
 bake::PyramidOptions PyramidOptions::values() const {
   bake::PyramidOptions options = values_;
-  if (levels_ == "auto") return options;
-  if (!parseNumber(levels_, options.levels).empty() || options.levels < 1)
-    throw Error(ErrorCode::usage, "option.range", {}, "--levels", "'" + levels_ + "' is not a number of levels",
-                "give auto, or 1 or more");
+  const auto readUnlessAuto = [](const std::string& text, const char* name, const char* what, const char* remedy, int& value) {
+    if (text == "auto") return;
+    if (!parseNumber(text, value).empty() || value < 1)
+      throw Error(ErrorCode::usage, "option.range", {}, name, "'" + text + "' is not a number of " + what, remedy);
+  };
+  readUnlessAuto(levels_, "--levels", "levels", "give auto, or 1 or more", options.levels);
+  if (options.sigma_r > 0) options.resolution = resolutionFor(options.sigma_r);
+  readUnlessAuto(resolution_, "--resolution", "pixels", "give auto, or a multiple of 16 from 32 to 1024", options.resolution);
   return options;
 }
 
@@ -57,7 +81,8 @@ nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid) {
           {"size_bytes", bytes},
           {"resolution", pyramid.shape.resolution},
           {"overlap", pyramid.shape.overlap},
-          {"sigma_r", pyramid.shape.sigma_r}};
+          {"sigma_r", pyramid.shape.sigma_r},
+          {"sigma_r_pixels", pixelsOf(pyramid.shape.sigma_r, pyramid.shape.resolution)}};
 }
 
 std::string pyramidText(const bake::NdfPyramidData& pyramid) {
@@ -72,7 +97,11 @@ std::string pyramidText(const bake::NdfPyramidData& pyramid) {
                         level["rows"].get<int>(), level["blocks"].get<std::size_t>(), 100 * level["occupied"].get<double>(),
                         1e-6 * level["size_bytes"].get<double>());
   }
-  return text + fmt::format("total {:.2f} MB\n", 1e-6 * json["size_bytes"].get<double>());
+  text += fmt::format("total {:.2f} MB\n", 1e-6 * json["size_bytes"].get<double>());
+  const float pixels = pixelsOf(pyramid.shape.sigma_r, pyramid.shape.resolution);
+  if (pixels < kResolvedPixels)
+    text += fmt::format("sigma_r is {:.2g} pixels of an image; for small lights give --resolution auto\n", pixels);
+  return text;
 }
 
 }  // namespace glint::apps

@@ -13,12 +13,12 @@ class PyramidOptions {
  public:
   explicit PyramidOptions(Tool& tool);
 
-  /// Valid after parsing. @throws Error usage if --levels is neither `auto` nor a number
+  /// Valid after parsing. @throws Error usage if --levels or --resolution is neither `auto` nor a number
   bake::PyramidOptions values() const;
 
  private:
   bake::PyramidOptions values_;
-  std::string levels_ = "auto";
+  std::string levels_ = "auto", resolution_ = "256";
 };
 
 /// Levels with their images, stored blocks and bytes.

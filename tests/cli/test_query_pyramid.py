@@ -295,7 +295,7 @@ def test_pixels_are_smooth_or_constant(ask, kind):
     def density(x, *pixels):
         return number(ask(kind, *FOOTPRINT, "--half", str(x), "-0.03", *pixels))
 
-    left, right = 0.0157, 0.0233  # both in pixel 130 of 256
+    left, right = 0.0157, 0.0233  # both in one of 64 pixels
     assert density(left, "--pixels", "constant") == density(right, "--pixels", "constant")
     assert density(left, "--pixels", "smooth") == density(left) != density(right)
 
@@ -348,6 +348,7 @@ def test_questions_that_make_no_sense_are_usage_errors(ask, arguments):
         ["--stride", "1e9"],
         ["--resolution", "40"],
         ["--resolution", "16"],
+        ["--resolution", "many"],
         ["--sigma-r", "0"],
         ["--sigma-r", "0.5"],
         ["--surface", "rough"],
@@ -403,6 +404,16 @@ def test_json_of_a_pyramid_lists_its_levels(glint, assets):
     assert [level["columns"] * level["rows"] for level in result["levels"]] == [144, 36, 9, 1]
     assert [level["is_mean"] for level in result["levels"]] == [False, False, False, True]
     assert result["size_bytes"] == sum(level["size_bytes"] for level in result["levels"])
+
+
+def test_resolution_is_chosen_by_sigma_r(glint, assets):
+    for sigma_r, resolution in (("0.02", 160), ("0.2", 32), ("0.001", 1024)):  # sigma_r has 1.5 pixels or a little more, within the limits
+        options = ["--resolution", "auto", "--sigma-r", sigma_r, "--levels", "1", "--stride", "128", "--json", "--force"]
+        result = json.loads(glint("pyramid", assets["normals"], "-o", "p.glint", *options).stdout)["result"]
+        assert result["resolution"] == resolution
+        assert result["sigma_r_pixels"] == pytest.approx(float(sigma_r) * resolution / 2)
+    told = glint("pyramid", assets["normals"], "-o", "p.glint", "--force", "--verbose", "--levels", "1")
+    assert "give --resolution auto" in told.stdout + told.stderr
 
 
 def test_pyramid_and_compressed_files_are_valid(glint, assets):
