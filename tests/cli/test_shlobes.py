@@ -259,6 +259,14 @@ def test_a_black_environment_is_warned_of(glint, folder):
     assert process.returncode == 0 and "no light comes from above" in process.stderr
 
 
+@pytest.mark.parametrize(("text", "words"), [('{"lights": [{"radius": 1e400}]}', "1e400"), ('{"lights": [{"radius": NaN}]}', "line 1, column 24")])
+def test_files_of_lights_that_are_no_json_say_where(glint, folder, text, words):
+    (folder / "bad.json").write_text(text)
+    process = glint("shlobes", "--light", "bad.json", "-o", "x.glint")
+    assert process.returncode == 3
+    assert "is no JSON" in process.stderr and words in process.stderr and "finite numbers only" in process.stderr
+
+
 @pytest.mark.parametrize("name", BAD_LIGHTS)
 def test_bad_area_lights_are_refused(glint, folder, name):
     (folder / "bad.json").write_text(BAD_LIGHTS[name])
