@@ -209,7 +209,9 @@ TEST(Compress, MeetsAToleranceOfTheSeenErrorInEveryLevel) {
         // The report leaves out cells that only the decoded images light.
         EXPECT_LE(report.levels[l].seen.worst, 1.02 * seen[l].worst + 1e-3);
         EXPECT_LE(report.levels[l].seen.bias, 1.02 * seen[l].bias + 1e-3);
-        if (pyramid == &noise) EXPECT_NEAR(report.levels[l].seen.bias, seen[l].bias, 0.02 * seen[l].bias + 1e-3);
+        if (pyramid == &noise) {
+          EXPECT_NEAR(report.levels[l].seen.bias, seen[l].bias, 0.02 * seen[l].bias + 1e-3);
+        }
         most = std::max(most, seen[l].seen);
       }
       EXPECT_GE(most, kTightness * o.tolerance);
@@ -238,6 +240,59 @@ TEST(Compress, KeepsDimLightThatARelativeErrorLoses) {
   const auto by_seen = seenErrors(pyramid.view(), compressPyramid(pyramid.view(), o).view());
   EXPECT_GT(by_l2[0].seen, 0.8);
   EXPECT_LE(by_seen[0].seen, 0.101);
+}
+
+/// Root mean square of the steps of an error between neighbouring pixels of a row, relative to the light of their half vectors:
+/// across the border of two blocks, and inside of blocks.
+struct ErrorSteps {
+  double at_borders, inside;
+};
+ErrorSteps errorSteps(const NdfPyramid& pyramid, const NdfCp& compressed) {
+  const int n = pyramid.shape.resolution;
+  const auto images = pyramid.shape.levels[0].imageCount();
+  std::vector<double> light(static_cast<std::size_t>(n) * n);
+  std::vector<std::vector<double>> errors;
+  for (std::size_t i = 0; i < images; ++i) {
+    const auto truth = test::storedImage(pyramid, 0, i);
+    auto error = test::decodeImage(compressed, static_cast<std::uint32_t>(i));
+    for (std::size_t p = 0; p < truth.size(); ++p) {
+      error[p] = std::max(0.0, error[p]) - truth[p];
+      light[p] += truth[p] * truth[p] / static_cast<double>(images);
+    }
+    errors.push_back(std::move(error));
+  }
+  double sums[2] = {}, counts[2] = {};
+  for (int y = 0; y < n; ++y) {
+    for (int x = 0; x + 1 < n; ++x) {
+      const auto p = static_cast<std::size_t>(y * n + x);
+      const double scale = std::sqrt(0.5 * (light[p] + light[p + 1]));
+      if (scale < kDarkestSeen) continue;
+      const int inside = (x + 1) % kBlockSize != 0;
+      for (const auto& error : errors) sums[inside] += std::pow((error[p + 1] - error[p]) / scale, 2);
+      counts[inside] += static_cast<double>(images);
+    }
+  }
+  return {std::sqrt(sums[0] / counts[0]), std::sqrt(sums[1] / counts[1])};
+}
+
+TEST(Compress, ErrsAcrossBordersOfBlocksAsIndependentErrorsDo) {
+  // Blocks are compressed apart, so errors on both sides of a border are independent, and steps there are sqrt(2) times the
+  // error. Inside of blocks errors of neighbours resemble each other, and steps are smaller.
+  PyramidShape shape = test::makeShape(128, 64, 16, 1);
+  shape.sigma_r = 0.03f;
+  const TestPyramid pyramid = test::makePyramid(test::isotropicNoise(128, 0.2f, 1), shape);
+  for (const auto method : kMethods) {
+    auto o = options(method);
+    o.metric = ErrorMetric::seen;
+    o.tolerance = method == CompressionMethod::cp ? 0.4 : 0.1;
+    o.coefficient_type.reset();
+    const auto data = compressPyramid(pyramid.view(), o);
+    const ErrorSteps steps = errorSteps(pyramid.view(), data.view());
+    std::printf("method %d: steps of the error %.3f at borders, %.3f inside of blocks\n", static_cast<int>(method),
+                steps.at_borders, steps.inside);
+    EXPECT_LT(steps.at_borders, 1.1 * std::sqrt(2.0) * o.tolerance);
+    EXPECT_LT(steps.at_borders, 1.8 * steps.inside);
+  }
 }
 
 TEST(Compress, TakesMoreBitsWhereAToleranceNeedsThem) {

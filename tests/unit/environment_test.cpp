@@ -189,6 +189,33 @@ TEST(Environment, PrefilteredRadianceIsNearTheConvergedIntegral) {
   }
 }
 
+TEST(PrefilteredRadiance, ErrsMoreOnNdfsOfFewFacets) {
+  const test::OwnedMap map(256, 256, test::synthesised(bake::SynthKind::flakes, 256, 256, 0.2f));
+  bake::PyramidOptions options;
+  options.levels = 2;
+  const bake::NdfPyramidData pyramid = bake::buildPyramid(map.map(), options);
+  const PyramidNdf model(pyramid.view());
+  Random random(4);
+  for (const float sharpness : {100.0f, 1000.0f}) {
+    ErrorNorm few, most;
+    for (int k = 0; k < 12; ++k) {
+      const MicrofacetBrdf brdf(model, Footprint::isotropic(random.pair(), 20 + 20 * random.unit()),
+                                SmithMasking(pyramid.shape.slopes, pyramid.shape.sigma_r), Fresnel::mirror());
+      const Vec3 wo = random.above(0.3);
+      const Vec3 axis = reflected(wo, halfVectorAt({0.3f * random.unit() - 0.15f, 0.3f * random.unit() - 0.15f}, wo));
+      if (axis.z < 0.1f) continue;
+      const SphericalGaussian light = {axis, sharpness, Rgb::grey(1)};
+      const double exact = convergedRadiance(brdf, wo, light);
+      few.add(prefilteredRadiance(brdf, wo, light).r, exact);
+      most.add(prefilteredRadiance(brdf, wo, light, kMostLobeCells).r, exact);
+    }
+    std::printf("flakes, sharpness %g: error %.3f with %d cells, %.3f with %d\n", double{sharpness}, few.relative(), kLobeCells,
+                most.relative(), kMostLobeCells);
+    EXPECT_LT(few.relative(), 0.1);
+    EXPECT_LT(most.relative(), 0.04);
+  }
+}
+
 TEST(Environment, CompressedModelsAreAsNear) {
   const CpNdf model(roughMap().compressed.view());
   EXPECT_LT(prefilterErrors(model, 100, 6)[2], 0.03);
