@@ -68,11 +68,13 @@ each half.
 # Reasons of what is seen; the numbers are in the lists below them.
 NEAR = "Near pictures come from the texels: they are right, and slow."
 SEEN = {
-    "pyramid": "Between the centres of its images a pyramid blends those around, so the footprint of its answer is wider than the pixel: sparkles of maps with few "
-               f"facets are softer and dimmer, most at sizes next to level 0. Where footprints hand over from texels to level 0, the picture steps. {NEAR}",
-    "tucker": "It errs as the pyramid does, and by its tolerance. Half vectors that reflect little light beside the peak may lose all of it.",
+    "pyramid": "The lobe of a facet is narrower than a pixel of the images (.64 pixels at the default --resolution), and the small light is as wide as one pixel. "
+               "So where a footprint holds few facets or thin lines of directions, far scratches and brushed metal above all, pictures under the small light are "
+               f"softer and lose a few percent of the light: glint-pyramid --resolution auto has pixels that are small enough. {NEAR}",
+    "tucker": "It errs as the pyramid does, and by its tolerance, which holds for each half vector on average over places and not for each place. On flakes under the "
+              "small light, the dark between far sparkles is lit by a haze: even over a block of the images, and more in one block than in the next.",
     "cp": "It errs as the pyramid does, and by its rank. Negative parts of low rank are cut, which leaves light where there should be none.",
-    "pca": "It errs as the pyramid does, and by its tolerance. Half vectors that reflect little light beside the peak may lose all of it.",
+    "pca": "It errs as tucker does.",
     "bin map": "Its pictures are those of brute force over boxes. Boxes have hard edges, so sparkles appear and vanish at once as the picture moves, more than under "
                "Gaussians.",
     "histograms": "Directions are known to ten degrees: sparkles are spread over a bin, and edges of bins show on smooth surfaces under small lights. Take them for "

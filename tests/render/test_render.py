@@ -87,20 +87,20 @@ def test_flicker_is_relative_to_the_reference():
 
 # Largest values on the flakes of this test where a target is missed, or where there is none. docs/LIMITS.md says why.
 ENERGY_OF_HISTOGRAMS = 0.6  # sparkles are spread over bins of ten degrees
-HAND_OVER_OF_PYRAMIDS = 0.65  # from texels to level 0
-STEPS_OF_FEW_SIDES = 1.5  # two pictures have some 30 sides of blocks, which tell noise to a fifth
-RMSE = {"pyramid": 0.45, "tucker": 0.45, "bin map": 0.01, "histograms": 1.1}
+ENERGY_OF_TUCKER = 0.025  # a haze, and light that is cut
+STEPS_OF_FEW_SIDES = {"pyramid": 1.3, "tucker": 1.7}  # two pictures have some 30 sides of blocks, which tell noise to a fifth
+RMSE = {"pyramid": 0.18, "tucker": 0.23, "bin map": 0.01, "histograms": 1.1}
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_pictures_have_the_light_of_the_reference(figures, model):
-    bound = ENERGY_OF_HISTOGRAMS if model == "histograms" else TARGETS["energy"]
-    assert np.abs(figures(model, "energy")).max() < bound
+    bounds = {"histograms": ENERGY_OF_HISTOGRAMS, "tucker": ENERGY_OF_TUCKER}
+    assert np.abs(figures(model, "energy")).max() < bounds.get(model, TARGETS["energy"])
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_pictures_differ_little_from_those_of_the_reference(figures, model):
-    assert figures(model, "rmse").max() < RMSE[model]
+    assert figures(model, "rmse").max() < RMSE[model], figures(model, "rmse")
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -111,10 +111,9 @@ def test_pictures_flicker_no_more_than_those_of_the_reference(figures, model):
 @pytest.mark.parametrize("model", MODELS)
 def test_pictures_change_little_with_the_size_of_footprints(figures, model):
     of_reference = 1.1 * figures(reference_of(model), "change with size")
-    bounds = np.maximum(of_reference, HAND_OVER_OF_PYRAMIDS if has_blocks(model) else TARGETS["change with size"])
-    assert np.all(figures(model, "change with size") < bounds)
+    assert np.all(figures(model, "change with size") < np.maximum(of_reference, TARGETS["change with size"]))
 
 
 @pytest.mark.parametrize("model", filter(has_blocks, MODELS))
 def test_borders_of_blocks_are_not_seen(figures, model):
-    assert figures(model, "steps at borders").max() < STEPS_OF_FEW_SIDES
+    assert figures(model, "steps at borders").max() < STEPS_OF_FEW_SIDES[model]
