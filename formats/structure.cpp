@@ -89,7 +89,7 @@ herr_t collectAttribute(hid_t, const char* name, const H5A_info_t*, void* data) 
   return 0;
 }
 
-double toDouble(ElementType type, const std::byte* at) {
+double numberAt(ElementType type, const std::byte* at) {
   switch (type) {
     case ElementType::i8:
       return load<std::int8_t>(at);
@@ -275,7 +275,7 @@ class StructureReader {
         value.texts.emplace_back(chars, ::strnlen(chars, element_bytes));
         if (!isPlainText(value.texts.back())) throwBroken("text.utf8", place, "is no plain text");
       } else {
-        value.numbers.push_back(toDouble(value.type, at));
+        value.numbers.push_back(numberAt(value.type, at));
       }
     }
     attributes.emplace(name, std::move(value));

@@ -59,7 +59,7 @@ class NdfAsset {
     std::string name;
     const Option* option;
   };
-  void addInterpolation();
+  void addImageOptions();
   void addNormalsOptions();
   void addPyramidOptions();
   void addBinOptions();

@@ -4,8 +4,8 @@
 
 namespace glint::apps {
 
-/// Opens placeholders for those of stdin, stdout and stderr that are closed, so that no file that is opened later takes their
-/// numbers. Writing to a placeholder fails.
+/// Opens /dev/null, for the wrong direction, in place of those of stdin, stdout and stderr that are closed: no file that is opened
+/// later takes their numbers, and using such a stream fails.
 void openStandardStreams();
 
 /// Writes a text to stdout.

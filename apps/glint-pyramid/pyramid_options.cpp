@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "common/numbers.h"
@@ -31,31 +29,15 @@ PyramidOptions::PyramidOptions(Tool& tool) {
               "of stored pixels");
 }
 
-namespace {
-
-/// Pixels of sigma_r from which on densities within a pixel err by 4 % (docs/METHODS.md).
-constexpr float kResolvedPixels = 1.5f;
-
-float pixelsOf(float sigma_r, int resolution) { return 0.5f * sigma_r * static_cast<float>(resolution); }
-
-/// The smallest resolution at which sigma_r has kResolvedPixels, within the limits.
-int resolutionFor(float sigma_r) {
-  constexpr float kLeast = 32, kMost = 1024;
-  const float pixels = 2 * kResolvedPixels / sigma_r;
-  return static_cast<int>(std::ceil(std::clamp(pixels, kLeast, kMost) / kBlockSize)) * kBlockSize;
-}
-
-}  // namespace
-
 bake::PyramidOptions PyramidOptions::values() const {
   bake::PyramidOptions options = values_;
+  if (resolution_ == "auto" && options.sigma_r > 0) options.resolution = bake::resolutionFor(options.sigma_r);
   const auto readUnlessAuto = [](const std::string& text, const char* name, const char* what, const char* remedy, int& value) {
     if (text == "auto") return;
     if (!parseNumber(text, value).empty() || value < 1)
       throw Error(ErrorCode::usage, "option.range", {}, name, "'" + text + "' is not a number of " + what, remedy);
   };
   readUnlessAuto(levels_, "--levels", "levels", "give auto, or 1 or more", options.levels);
-  if (options.sigma_r > 0) options.resolution = resolutionFor(options.sigma_r);
   readUnlessAuto(resolution_, "--resolution", "pixels", "give auto, or a multiple of 16 from 32 to 1024", options.resolution);
   return options;
 }
@@ -82,7 +64,7 @@ nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid) {
           {"resolution", pyramid.shape.resolution},
           {"overlap", pyramid.shape.overlap},
           {"sigma_r", pyramid.shape.sigma_r},
-          {"sigma_r_pixels", pixelsOf(pyramid.shape.sigma_r, pyramid.shape.resolution)}};
+          {"sigma_r_pixels", 0.5f * pyramid.shape.sigma_r * static_cast<float>(pyramid.shape.resolution)}};
 }
 
 std::string pyramidText(const bake::NdfPyramidData& pyramid) {
@@ -98,9 +80,9 @@ std::string pyramidText(const bake::NdfPyramidData& pyramid) {
                         1e-6 * level["size_bytes"].get<double>());
   }
   text += fmt::format("total {:.2f} MB\n", 1e-6 * json["size_bytes"].get<double>());
-  const float pixels = pixelsOf(pyramid.shape.sigma_r, pyramid.shape.resolution);
-  if (pixels < kResolvedPixels)
-    text += fmt::format("sigma_r is {:.2g} pixels of an image; for small lights give --resolution auto\n", pixels);
+  if (pyramid.shape.resolution < bake::resolutionFor(pyramid.shape.sigma_r))
+    text += fmt::format("sigma_r is {:.2g} pixels of an image; for small lights give --resolution auto\n",
+                        json["sigma_r_pixels"].get<double>());
   return text;
 }
 

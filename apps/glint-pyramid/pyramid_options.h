@@ -18,7 +18,7 @@ class PyramidOptions {
 
  private:
   bake::PyramidOptions values_;
-  std::string levels_ = "auto", resolution_ = "256";
+  std::string levels_ = "auto", resolution_ = std::to_string(values_.resolution);
 };
 
 /// Levels with their images, stored blocks and bytes.

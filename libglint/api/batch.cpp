@@ -21,17 +21,8 @@ class PyramidChunk {
     places_[k] = inside_[k] ? pixelPlace(model.shape(), h) : PixelPlace{0, 0, 0};
     model.reader().prefetchBlock(slices_[k], places_[k].block);
   }
-  void findPixels(int k, const PyramidNdf& model) {
-    if (model.pixels() == Pixels::constant)
-      pixels_[k] = model.reader().findPixels(slices_[k], places_[k]);
-    else
-      model.reader().findWindow(slices_[k], places_[k], windows_[k]);
-  }
-  float density(int k, const PyramidNdf& model, Vec2 h) const {
-    if (!inside_[k]) return 0;
-    if (model.pixels() == Pixels::constant) return model.reader().addPixels(pixels_[k]);
-    return splineDensity(model.shape(), model.reader().addWindow(slices_[k], places_[k], windows_[k]), h);
-  }
+  void findPixels(int k, const PyramidNdf& model) { pixels_[k] = model.reader().findPixels(slices_[k], places_[k]); }
+  float density(int k, const PyramidNdf& model) const { return inside_[k] ? model.reader().addPixels(pixels_[k]) : 0.0f; }
   /// Whether the texels have a share in the answer: then the model is asked for the query alone.
   bool fromTexels(int k) const { return from_texels_[k]; }
 
@@ -39,13 +30,21 @@ class PyramidChunk {
   bool inside_[kChunk], from_texels_[kChunk];
   PyramidSlices slices_[kChunk];
   PixelPlace places_[kChunk];
-  PyramidReader::FoundPixels pixels_[kChunk];    // of models with constant pixels
-  PyramidReader::StoredBlocks windows_[kChunk];  // of models with smooth pixels
+  PyramidReader::FoundPixels pixels_[kChunk];
 };
 
+/// Models without an overload below are asked one query at a time.
+template <class Model>
+void modelDensities(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
+                    float* out) {
+  for (std::size_t k = 0; k < count; ++k) out[k] = model.density(footprints[k], halves[k]);
+}
+
 /// Three chunks are in flight, one step apart. While the memory fetches what one chunk needs next, the other two are computed.
+/// Smooth pixels are asked one query at a time: each reads so many pixels that its own misses overlap.
 void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints,
                     const HalfVectorArrays& halves, float* out) {
+  if (model.pixels() == Pixels::smooth) return modelDensities<PyramidNdf>(model, count, footprints, halves, out);
   PyramidChunk stages[3];
   const std::size_t chunks = (count + kChunk - 1) / kChunk;
   const auto lanesOf = [&](std::size_t k) { return static_cast<int>(std::min(count - k * kChunk, std::size_t{kChunk})); };
@@ -62,16 +61,9 @@ void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintA
     const PyramidChunk& ready = stages[(step - 2) % 3];
     for (int k = 0; k < lanesOf(step - 2); ++k) {
       const std::size_t at = queryOf(step - 2, k);
-      out[at] = ready.fromTexels(k) ? model.density(footprints[at], halves[at]) : ready.density(k, model, halves[at]);
+      out[at] = ready.fromTexels(k) ? model.density(footprints[at], halves[at]) : ready.density(k, model);
     }
   }
-}
-
-/// Models without an overload above are asked one query at a time.
-template <class Model>
-void modelDensities(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
-                    float* out) {
-  for (std::size_t k = 0; k < count; ++k) out[k] = model.density(footprints[k], halves[k]);
 }
 
 void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
@@ -102,13 +94,19 @@ void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArray
   }
 }
 
-/// Every loop is a step of all samples, and prefetches what the next loop reads.
+template <class Model>
+void modelSamples(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
+                  const SampleArrays& out) {
+  for (std::size_t k = 0; k < count; ++k) out.set(k, model.sample(footprints[k], xi[k]));
+}
+
+/// Every loop is a step of all samples, and prefetches what the next loop reads. Smooth pixels: as for densities.
 void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
                   const SampleArrays& out) {
+  if (model.pixels() == Pixels::smooth) return modelSamples<PyramidNdf>(model, count, footprints, xi, out);
   const PyramidReader& reader = model.reader();
   PyramidReader::Draw draws[kChunk];
   PyramidReader::FoundPixels pixels[kChunk];
-  PyramidReader::StoredBlocks windows[kChunk];
   for (std::size_t first = 0; first < count; first += kChunk) {
     const int lanes = static_cast<int>(std::min(count - first, std::size_t{kChunk}));
     for (int k = 0; k < lanes; ++k) {
@@ -122,11 +120,7 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
     for (int k = 0; k < lanes; ++k) reader.chooseBlock(draws[k]);
     for (int k = 0; k < lanes; ++k) {
       reader.choosePixel(draws[k]);
-      if (draws[k].place.x < 0) continue;
-      if (model.pixels() == Pixels::constant)
-        pixels[k] = reader.findPixels(draws[k].slices, draws[k].place);
-      else
-        reader.findWindow(draws[k].slices, draws[k].place, windows[k]);
+      if (draws[k].place.x >= 0) pixels[k] = reader.findPixels(draws[k].slices, draws[k].place);
     }
     for (int k = 0; k < lanes; ++k) {
       const std::size_t at = first + static_cast<std::size_t>(k);
@@ -134,11 +128,8 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
         out.set(at, model.sample(footprints[at], xi[at]));
       else if (draws[k].place.x < 0)
         out.set(at, {});
-      else if (model.pixels() == Pixels::constant)
-        out.set(at, drawnAt(pointInPixel(model.shape(), draws[k].place, draws[k].xi), reader.addPixels(pixels[k])));
       else
-        out.set(at, splineSample(model.shape(), draws[k].place, reader.addWindow(draws[k].slices, draws[k].place, windows[k]),
-                                 draws[k].xi));
+        out.set(at, drawnAt(pointInPixel(model.shape(), draws[k].place, draws[k].xi), reader.addPixels(pixels[k])));
     }
   }
 }
@@ -147,12 +138,6 @@ template <class Model>
 void modelMeans(const Model& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
                 float* out) {
   for (std::size_t k = 0; k < count; ++k) out[k] = model.mean(footprints[k], ranges[k]);
-}
-
-template <class Model>
-void modelSamples(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
-                  const SampleArrays& out) {
-  for (std::size_t k = 0; k < count; ++k) out.set(k, model.sample(footprints[k], xi[k]));
 }
 
 /// Whether every footprint of a batch is asked as it is, not as several parts.

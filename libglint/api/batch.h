@@ -76,9 +76,9 @@ struct SampleArrays {
 /// out[k] = density of query k, for k < count. Each value is that of a single query to 1e-6 of itself: products and sums may be
 /// fused or in another order. Degenerate queries follow the rules of single queries.
 ///
-/// Pyramids overlap the cache misses of many queries if all footprints of the batch are round. If one footprint is split into
-/// parts, all queries are asked one by one. Other kinds gain only the cost of the calls: each of their queries has enough work
-/// to hide its own misses.
+/// Pyramids with constant pixels overlap the cache misses of many queries if all footprints of the batch are round. If one
+/// footprint is split into parts, all queries are asked one by one. All else gains only the cost of the calls: each query has
+/// enough work to hide its own misses.
 /// @note thread-safe, allocates nothing; split a batch over threads as you like
 void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                float* out);

@@ -206,8 +206,7 @@ class CpNdf {
 
   template <class Ask, class Part>
   GLINT_HD float sumSlicesBy(const SlicePlaces& places, const Ask& ask, Part part) const {
-    unsigned left = 0;
-    for (int k = 0; k < places.count; k += 4) left |= lanesAbove0(Float4::load(places.weights + k)) << k;
+    unsigned left = counted(places);
     float sum = 0;
     while (left != 0) {
       const int lowest = lowestBit(left);
@@ -219,8 +218,7 @@ class CpNdf {
         continue;
       }
       const auto shares = [&](int step) { return whereEqual(places.clusters + step, at, Float4::load(places.weights + step)); };
-      unsigned here = 0;
-      for (int k = 0; k < places.count; k += 4) here |= lanesAbove0(shares(k)) << k;
+      const unsigned here = countedIn(places, at);
       left &= ~here;
       if (cluster.columns == 0) {
         sum += addSpots(cluster, places, here, ask, part);
@@ -282,13 +280,10 @@ class CpNdf {
 
   template <class Reader>
   GLINT_HD void addWindowBy(const Reader& reader, const SlicePlaces& places, int x, int y, WindowRows& window) const {
-    unsigned left = 0;
-    for (int k = 0; k < places.count; k += 4) left |= lanesAbove0(Float4::load(places.weights + k)) << k;
+    unsigned left = counted(places);
     while (left != 0) {
       const std::uint32_t at = places.clusters[lowestBit(left)];
-      unsigned here = 0;
-      for (int k = 0; k < places.count; k += 4)
-        here |= lanesAbove0(whereEqual(places.clusters + k, at, Float4::load(places.weights + k))) << k;
+      const unsigned here = countedIn(places, at);
       left &= ~here;
       const NdfCluster& cluster = ndf_.clusters.data()[at];
       cluster.columns == 0 ? addWindowOfSpots(cluster, places, here, x, y, window)
@@ -333,6 +328,19 @@ class CpNdf {
     }
   }
 
+  /// Bit k: slice k has a weight.
+  static GLINT_HD unsigned counted(const SlicePlaces& places) {
+    unsigned bits = 0;
+    for (int k = 0; k < places.count; k += 4) bits |= lanesAbove0(Float4::load(places.weights + k)) << k;
+    return bits;
+  }
+  /// Bit k: slice k has a weight and is in a cluster.
+  static GLINT_HD unsigned countedIn(const SlicePlaces& places, std::uint32_t cluster) {
+    unsigned bits = 0;
+    for (int k = 0; k < places.count; k += 4)
+      bits |= lanesAbove0(whereEqual(places.clusters + k, cluster, Float4::load(places.weights + k))) << k;
+    return bits;
+  }
   static GLINT_HD unsigned lanesAbove0(Float4 weights) { return ~weights.notAbove(0) & 15u; }
 
   /// Weighted sum over slices of a cluster of spots.

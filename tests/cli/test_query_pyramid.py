@@ -412,8 +412,9 @@ def test_resolution_is_chosen_by_sigma_r(glint, assets):
         result = json.loads(glint("pyramid", assets["normals"], "-o", "p.glint", *options).stdout)["result"]
         assert result["resolution"] == resolution
         assert result["sigma_r_pixels"] == pytest.approx(float(sigma_r) * resolution / 2)
-    told = glint("pyramid", assets["normals"], "-o", "p.glint", "--force", "--verbose", "--levels", "1")
-    assert "give --resolution auto" in told.stdout + told.stderr
+    for options, told in (([], True), (["--resolution", "auto", "--sigma-r", "0.001", "--stride", "128"], False)):  # as fine as it gets
+        process = glint("pyramid", assets["normals"], "-o", "p.glint", "--force", "--verbose", "--levels", "1", *options)
+        assert ("give --resolution auto" in process.stdout + process.stderr) == told
 
 
 def test_pyramid_and_compressed_files_are_valid(glint, assets):

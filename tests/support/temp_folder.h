@@ -11,7 +11,8 @@ namespace glint::test {
 class TempFolder {
  public:
   TempFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "glint-test-XXXXXX").string();
+    std::string name =
+        (std::filesystem::temp_directory_path() / "glint-test-").string() + std::string(6, 'X');  // for mkdtemp to fill
     path_ = ::mkdtemp(name.data());
   }
   ~TempFolder() {

@@ -100,7 +100,8 @@ TEST(Batch, DensitiesOfPyramidsAreThoseOfSingleQueries) {
     for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
       auto sample = test::samplePyramid(kSize, precision);
       sample.pyramid.shape.boundary = boundary;
-      expectBatchesEqualSingleQueries(PyramidNdf(sample.pyramid));
+      for (const Pixels pixels : {Pixels::smooth, Pixels::constant})
+        expectBatchesEqualSingleQueries(PyramidNdf(sample.pyramid, Interpolation::footprint, pixels));
     }
   }
 }
@@ -165,7 +166,8 @@ TEST(Batch, WhatEmptyClustersSayIsNotFollowed) {
 TEST(Batch, FootprintsBelowTheFinestLevelAreAnsweredFromTheTexels) {
   const auto map = test::sampleNormals(kSize, kSize);
   const auto pyramid = test::samplePyramid(kSize, BlockPrecision::f16);
-  expectBatchesEqualSingleQueries(PyramidNdf(pyramid.pyramid, map.map), 60);
+  for (const Pixels pixels : {Pixels::smooth, Pixels::constant})
+    expectBatchesEqualSingleQueries(PyramidNdf(pyramid.pyramid, map.map, Interpolation::footprint, pixels), 60);
   const auto compressed = test::sampleNdfCp(kSize, CompressionMethod::cp, CoefficientType::i8);
   expectBatchesEqualSingleQueries(CpNdf(compressed.ndf, map.map), 60);
 }

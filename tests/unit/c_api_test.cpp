@@ -273,6 +273,32 @@ TEST(CApi, ErrorsNameTheArgumentThatIsNull) {
   EXPECT_EQ(message(glint_displaced_level(nullptr, 1, &a)), "glint_displaced_level: displaced is null");
 }
 
+TEST(CApi, PixelsAreSmoothOrConstant) {
+  const glint_footprint p = glint_footprint_isotropic(0.1f, 0.9f, 20);
+  for (const char* kind : {"ndf-pyramid", "ndf-cp"}) {
+    glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+    const Handle smooth = openHandle(kind, &options);
+    options.pixels = GLINT_PIXELS_CONSTANT;
+    const Handle constant = openHandle(kind, &options);
+    glint_ndf_info info = {};
+    info.struct_size = sizeof info;
+    ASSERT_EQ(glint_ndf_get_info(constant.get(), &info), GLINT_OK);
+    const float pixel = 2.0f / static_cast<float>(info.resolution);
+    float low[2], high[2];  // towards both ends of a pixel, of smooth and of constant pixels
+    for (const auto& [ndf, k] : {std::pair{smooth.get(), 0}, {constant.get(), 1}}) {
+      ASSERT_EQ(glint_density(ndf, &p, 0.1f * pixel, 0.5f * pixel, &low[k]), GLINT_OK);
+      ASSERT_EQ(glint_density(ndf, &p, 0.9f * pixel, 0.5f * pixel, &high[k]), GLINT_OK);
+    }
+    EXPECT_NE(low[0], high[0]) << kind;
+    EXPECT_EQ(low[1], high[1]) << kind;
+    EXPECT_GT(low[1], 0) << kind;
+    options.pixels = 2;
+    glint_ndf* refused = nullptr;
+    EXPECT_EQ(glint_ndf_open(assets().path(kind).c_str(), &options, &refused), GLINT_ERROR_USAGE);
+    EXPECT_STREQ(glint_error_message(), "glint_open_options: unknown pixels");
+  }
+}
+
 TEST(CApi, OptionsReachTheModel) {
   glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
   options.sigma_r = 0.1f;

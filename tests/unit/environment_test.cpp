@@ -198,7 +198,7 @@ TEST(PrefilteredRadiance, ErrsMoreOnNdfsOfFewFacets) {
   Random random(4);
   for (const float sharpness : {100.0f, 1000.0f}) {
     ErrorNorm few, most;
-    for (int k = 0; k < 12; ++k) {
+    for (int k = 0; k < 24; ++k) {
       const MicrofacetBrdf brdf(model, Footprint::isotropic(random.pair(), 20 + 20 * random.unit()),
                                 SmithMasking(pyramid.shape.slopes, pyramid.shape.sigma_r), Fresnel::mirror());
       const Vec3 wo = random.above(0.3);
@@ -212,7 +212,8 @@ TEST(PrefilteredRadiance, ErrsMoreOnNdfsOfFewFacets) {
     std::printf("flakes, sharpness %g: error %.3f with %d cells, %.3f with %d\n", double{sharpness}, few.relative(), kLobeCells,
                 most.relative(), kMostLobeCells);
     EXPECT_LT(few.relative(), 0.1);
-    EXPECT_LT(most.relative(), 0.04);
+    EXPECT_GT(few.relative(), 0.04);  // or the default cells would serve such maps, too
+    EXPECT_LT(most.relative(), 0.025);
   }
 }
 

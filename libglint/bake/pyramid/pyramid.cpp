@@ -37,8 +37,8 @@ void require(bool ok, const char* option, const std::string& range) {
 void checkOptions(const NormalMap& map, const PyramidOptions& o) {
   require(o.stride >= 2 && o.stride <= 65536, "--stride", "2 to 65536 texels");
   require(o.overlap >= 1 && o.overlap <= kMostOverlap, "--overlap", "1 to 4 footprints in a stride");
-  require(o.resolution >= 32 && o.resolution <= 1024 && o.resolution % kBlockSize == 0, "--resolution",
-          "a multiple of 16 from 32 to 1024");
+  require(o.resolution >= kLeastResolution && o.resolution <= kMostResolution && o.resolution % kBlockSize == 0, "--resolution",
+          "auto, or a multiple of 16 from 32 to 1024");
   const float pixel = 2.0f / static_cast<float>(o.resolution);
   require(o.sigma_r >= 0.1f * pixel && o.sigma_r <= 0.25f, "--sigma-r",
           fmt::format("{:.4g}", 0.1f * pixel) + " (a tenth of a pixel; raise --resolution for less) to 0.25");
@@ -329,6 +329,12 @@ PyramidShape pyramidShape(int width, int height, const PyramidOptions& o) {
                 "give at most " + std::to_string(shape.level_count) + ", or auto");
   appendMean(shape);
   return shape;
+}
+
+int resolutionFor(float sigma_r) {
+  constexpr float kResolvedPixels = 1.5f;
+  const float pixels = std::clamp(2 * kResolvedPixels / sigma_r, float{kLeastResolution}, float{kMostResolution});
+  return static_cast<int>(std::ceil(pixels / kBlockSize)) * kBlockSize;
 }
 
 NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options, const ProgressFn& progress) {

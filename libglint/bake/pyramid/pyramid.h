@@ -11,12 +11,15 @@ namespace glint::bake {
 /// sqrt(2): twice the images of an overlap of 1.
 inline constexpr float kDefaultOverlap = 1.41421356f;
 
+/// Pixels of an NDF image along each axis.
+inline constexpr int kLeastResolution = 32, kMostResolution = 1024;
+
 struct PyramidOptions {
   float stride = 32;  ///< of level 0, texels; >= 2. Footprints have a deviation of kFootprintPerStride strides
   /// Footprints in a stride along each axis, 1 to kMostOverlap. The default is the knee of error against bytes; 1 is the grid of
   /// Deng 2022.
   float overlap = kDefaultOverlap;
-  int resolution = 256;    ///< pixels of an NDF image along each axis: a multiple of 16 in [32, 1024]
+  int resolution = 256;    ///< pixels of an NDF image along each axis: a multiple of 16 in [kLeastResolution, kMostResolution]
   float sigma_r = 0.005f;  ///< intrinsic roughness, disk units: at least 0.1 pixel of an NDF image, at most 0.25
   Surface surface = Surface::flat;
   Boundary boundary = Boundary::wrap;
@@ -25,6 +28,10 @@ struct PyramidOptions {
   int levels = 0;
   BlockPrecision precision = BlockPrecision::f16;
 };
+
+/// The smallest resolution, within the limits, at which sigma_r has 1.5 pixels: densities within a pixel then err by 4 % (PixelSpline).
+/// @param sigma_r  intrinsic roughness, disk units, > 0
+int resolutionFor(float sigma_r);
 
 /// With automatic levels, the coarsest level of footprints is dropped while its `levelDisagreement` with the next finer level
 /// is less than this.

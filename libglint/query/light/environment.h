@@ -71,9 +71,9 @@ GLINT_HD Rgb supportRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const Spher
 /// footprint's NDF varying within a box and of the boxes' alignment. With the default cells and a Beckmann NDF it is 2 % for
 /// lobes of sharpness 30 and more and 7 % from 3 on (tests/unit/environment_test.cpp); a lobe of sharpness 1, half the sky,
 /// comes out up to half as bright again at grazing wo.
-/// NDFs of few facets err more, because the lobe is even inside each cell: with 3 / 8 cells the root mean square error is 5 / 2 %
-/// on metallic flakes and 18 / 6 % on scratches, for lobes of sharpness 30 to 3000, and a single view of scratches can be off by
-/// a factor (tests/unit/environment_test.cpp has a bound for flakes). Give more cells there, or sample the lobe.
+/// NDFs of few facets err more, because the lobe is even inside each cell: on metallic flakes and for lobes of sharpness 100 to
+/// 1000 the root mean square error is 6 to 10 % with the default cells, and 2 % with kMostLobeCells (same test). The relative
+/// error of a view that reflects little of the light can be far larger. Give more cells there, or sample the lobe.
 /// @param cells  1 to kMostLobeCells; LobeRange::support has one
 /// @return 0 for wo below the horizon and for lobes that are not usable (isUsable)
 template <NdfModel M>

@@ -5,6 +5,7 @@
 #include "glint/model/ndf_cp.h"
 #include "glint/query/detail/compressed/cluster_arrays.h"
 #include "glint/query/detail/compressed/column_layout.h"
+#include "glint/query/detail/compressed/column_windows.h"
 #include "glint/query/detail/compressed/prefix_axis.h"
 #include "glint/query/detail/compressed/prefix_weights.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"

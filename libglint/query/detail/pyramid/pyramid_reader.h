@@ -68,32 +68,18 @@ class PyramidReader {
     const float* means[PyramidSlices::kMost];
   };
 
-  /// Finds the block of a pixel in every slice, and prefetches the pixel and its neighbours in the block.
-  GLINT_HD void findWindow(const PyramidSlices& chosen, const PixelPlace& place, StoredBlocks& out) const {
-    findStored(chosen, place.block, out);
-    const int first = std::max(place.y - 1, 0), end = std::min(place.y + 2, int{kBlockSize});
-    for (int k = 0; k < out.count; ++k) prefetchRows(out.pixels[k], first, end);
-  }
-
-  /// Mean densities of a pixel and of its neighbours, >= 0.
-  /// @param found  from findWindow
-  GLINT_HD PixelWindow addWindow(const PyramidSlices& chosen, const PixelPlace& place, const StoredBlocks& found) const {
+  /// Mean densities of a pixel and of its neighbours, >= 0; O(1).
+  GLINT_HD PixelWindow window(const PyramidSlices& chosen, const PixelPlace& place) const {
     PixelWindow window;
     forEachBlockOfWindow(shape(), place, [&](int block, int x, int y) {
-      if (block == place.block) return addBlock(found, x, y, window);
-      StoredBlocks neighbour;
-      findStored(chosen, block, neighbour);
-      addBlock(neighbour, x, y, window);
+      StoredBlocks found;
+      findStored(chosen, block, found);
+      const int first = std::max(y, 0), end = std::min(y + PixelWindow::kSize, int{kBlockSize});
+      for (int k = 0; k < found.count; ++k) prefetchRows(found.pixels[k], first, end);
+      addBlock(found, x, y, window);
     });
     window *= pyramid_.value_scale;
     return window;
-  }
-
-  /// findWindow and addWindow in one.
-  GLINT_HD PixelWindow window(const PyramidSlices& chosen, const PixelPlace& place) const {
-    StoredBlocks found;
-    findWindow(chosen, place, found);
-    return addWindow(chosen, place, found);
   }
 
   /// A sample that is being drawn: chooseImage, findBlocks, chooseBlock and choosePixel fill it in this order. Each step reads
