@@ -19,6 +19,13 @@ struct StoredImage {
   } display;
 };
 
+/// A level of a texture with levels: its pixels, bottom row first.
+struct MipLevel {
+  int width = 0;
+  int height = 0;
+  std::vector<float> pixels;  ///< [height][width][channels]
+};
+
 /// The formats of OpenImageIO, in a shared object of their own: programs and inputs that do not need that library must not wait
 /// until it and the hundreds that it links to are loaded.
 struct ImageFormats {
@@ -28,6 +35,9 @@ struct ImageFormats {
   /// The bytes of an image file. @throws Error usage, unsupported
   std::vector<unsigned char> (*encode)(const std::string& path, int width, int height, int channels,
                                        std::span<const float> pixels, PixelFormat format);
+  /// The bytes of an OpenEXR texture in tiles, with all levels. @param levels  each half as large as the one before, rounded down
+  std::vector<unsigned char> (*encodeTexture)(const std::string& path, std::span<const std::string> channels,
+                                              std::span<const MipLevel> levels, PixelFormat format, bool periodic);
   bool (*isWritableName)(const std::string& path);
   /// The colours of the map "inferno" for values of 0..1. @param grey  [size][size] @return [size][size][3]
   std::vector<float> (*infernoColours)(int size, std::span<const float> grey);

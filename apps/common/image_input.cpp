@@ -4,6 +4,7 @@
 
 #include "common/image_formats.h"
 #include "common/name_list.h"
+#include "glint/model/texel_name.h"
 
 namespace glint::apps {
 
@@ -41,6 +42,30 @@ Image readInputImage(Tool& tool, const std::string& path, const ImageChoice& cho
                           nameList(image.layers, label), remedy));
   }
   return image;
+}
+
+void requireSize(const std::string& path, const Image& image, int width, int height) {
+  if (image.width == width && image.height == height) return;
+  throw Error(ErrorCode::invalid_input, "image.size", path, "",
+              fmt::format("the image has {} x {} pixels, the map {} x {} texels", image.width, image.height, width, height),
+              "resample it to the size of the map");
+}
+
+void requireUnitRange(const std::string& path, const std::vector<float>& values, int channels, int width, int height,
+                      const std::string& reason) {
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (values[k] >= 0 && values[k] <= 1) continue;
+    throw Error(ErrorCode::invalid_input, "image.range", path, texelName(width, height, k / static_cast<std::size_t>(channels)),
+                fmt::format("the value {} is not in 0..1", values[k]), "scale the image to 0..1: " + reason);
+  }
+}
+
+std::vector<float> readUnitChannel(Tool& tool, const std::string& path, int width, int height, const std::string& reason) {
+  const Image image = readInputImage(tool, path);
+  requireSize(path, image, width, height);
+  std::vector<float> values = channelsOf(image, 1);
+  requireUnitRange(path, values, 1, width, height, reason);
+  return values;
 }
 
 }  // namespace glint::apps

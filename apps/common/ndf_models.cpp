@@ -28,16 +28,16 @@ void NdfAsset::addPyramidOptions() {
   useOnly({"ndf-pyramid", "ndf-cp"}, "--normals",
           tool_.option("--normals", normals_path_,
                        "asset of kind normals that the pyramid was made from, for footprints below its finest level"));
-  useOnly({"ndf-pyramid", "ndf-cp"}, "--parts",
+  useOnly({"ndf-pyramid", "ndf-cp", "slope-moments"}, "--parts",
           tool_
               .option("--parts", options_.footprint_parts,
                       "most round footprints that stand for a stretched one; 1: one of the same mean square size (kinds "
-                      "ndf-pyramid and ndf-cp)")
+                      "ndf-pyramid, ndf-cp and slope-moments)")
               .range(1, IsotropicParts::kMost));
-  addInterpolation();
+  addImageOptions();
 }
 
-void NdfAsset::addInterpolation() {
+void NdfAsset::addImageOptions() {
   useOnly({"ndf-pyramid", "ndf-cp"}, "--interpolation",
           tool_.choice("--interpolation", options_.interpolation,
                        {{"footprint", Interpolation::footprint}, {"trilinear", Interpolation::trilinear}},
@@ -57,10 +57,10 @@ void NdfAsset::addNormalsOptions() {
   useOnly({"normals"}, "--boundary",
           tool_.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
                        "beyond the border of the map (kind normals)"));
-  useOnly({"normals", "histogram-sat"}, "--sigma-r",
+  useOnly({"normals", "histogram-sat", "slope-moments"}, "--sigma-r",
           tool_
               .option("--sigma-r", options_.sigma_r,
-                      "intrinsic roughness, disk units (kind normals; the light of kind histogram-sat)")
+                      "intrinsic roughness, disk units (kinds normals and slope-moments; the light of kind histogram-sat)")
               .range(1e-4, 0.25));
 }
 

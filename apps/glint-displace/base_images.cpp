@@ -1,31 +1,12 @@
 #include "glint-displace/base_images.h"
 
-#include <fmt/format.h>
-
 #include "common/files.h"
 #include "common/image_input.h"
-#include "glint/model/texel_name.h"
 
 namespace glint::apps {
 namespace {
 
-void requireUnitRange(const std::string& path, const std::vector<float>& values, int channels, int width, int height) {
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    if (values[k] >= 0 && values[k] <= 1) continue;
-    throw Error(ErrorCode::invalid_input, "displace.texture", path,
-                texelName(width, height, k / static_cast<std::size_t>(channels)),
-                fmt::format("the value {} is not in 0..1", values[k]), "scale the image to 0..1: a surface cannot gain light");
-  }
-}
-
-/// Reads an image of the size of the heights.
-Image readOfSize(Tool& tool, const std::string& path, int width, int height) {
-  Image image = readInputImage(tool, path);
-  if (image.width == width && image.height == height) return image;
-  throw Error(ErrorCode::invalid_input, "displace.texture", path, "",
-              fmt::format("the image has {} x {} pixels, the heights {} x {} texels", image.width, image.height, width, height),
-              "resample it to the size of the heights");
-}
+constexpr const char* kNoGain = "a surface cannot gain light";
 
 }  // namespace
 
@@ -53,15 +34,13 @@ BaseImages::BaseImages(Tool& tool) : tool_(tool) {
 
 bake::BaseTexture BaseImages::read(int width, int height) const {
   bake::BaseTexture texture;
-  if (!roughness_path_.empty()) {
-    texture.roughness = channelsOf(readOfSize(tool_, roughness_path_, width, height), 1);
-    requireUnitRange(roughness_path_, texture.roughness, 1, width, height);
-  }
+  if (!roughness_path_.empty()) texture.roughness = readUnitChannel(tool_, roughness_path_, width, height, kNoGain);
   if (color_path_.empty()) return texture;
-  const Image image = readOfSize(tool_, color_path_, width, height);
+  const Image image = readInputImage(tool_, color_path_);
+  requireSize(color_path_, image, width, height);
   texture.channels = image.channels >= 3 ? 3 : 1;
   texture.colors = channelsOf(image, texture.channels);
-  requireUnitRange(color_path_, texture.colors, texture.channels, width, height);
+  requireUnitRange(color_path_, texture.colors, texture.channels, width, height, kNoGain);
   if (color_space_ == ColorSpace::srgb || (color_space_ == ColorSpace::automatic && !image.floating))
     for (float& value : texture.colors) value = linearFromSrgb(value);
   bool grey = true;

@@ -108,6 +108,18 @@ ordered_json statisticsOf(const HistogramSat& sat, const formats::AssetInfo& inf
           {"bytes_per_texel", static_cast<double>(bytes) / texels}};
 }
 
+/// Roughness of a lobe at each level: root mean square of the deviations of slopes under a texel.
+ordered_json statisticsOf(const SlopeMoments& moments, const formats::AssetInfo& info) {
+  ordered_json spreads = ordered_json::array();
+  for (int l = 0; l < moments.level_count; ++l) {
+    double sum = 0;
+    for (const MapSlopes& s : moments.levels[l].texels) sum += 0.5 * (double{s.covariance.xx} + double{s.covariance.yy});
+    spreads.push_back(std::sqrt(sum / static_cast<double>(moments.levels[l].texels.size())));
+  }
+  const double texels = static_cast<double>(moments.width) * moments.height;
+  return {{"slope_deviations", std::move(spreads)}, {"bytes_per_texel", static_cast<double>(datasetBytes(info)) / texels}};
+}
+
 ordered_json statisticsOf(const ShLobes& lobes, const formats::AssetInfo&) {
   return {{"coefficients", shCount(lobes.order)}, {"mean", lobes.zonal[0]}, {"last_band", lobes.zonal.back()}};
 }

@@ -206,6 +206,41 @@ std::vector<unsigned char> encodeImage(const std::string& path, int width, int h
   return encode<float>(path, spec, pixels);
 }
 
+std::vector<unsigned char> encodeTexture(const std::string& path, std::span<const std::string> channels,
+                                         std::span<const MipLevel> levels, PixelFormat format, bool periodic) {
+  constexpr int kTile = 64;
+  const auto output = OIIO::ImageOutput::create(path);
+  if (!output || !output->supports("ioproxy") || !output->supports("mipmap")) {
+    (void)OIIO::geterror();
+    throw Error(ErrorCode::usage, "image.format", path, "", "this image format holds no levels", "name the output .exr");
+  }
+  std::vector<unsigned char> bytes;
+  OIIO::Filesystem::IOVecOutput memory(bytes);
+  output->set_ioproxy(&memory);
+  bool complete = true;
+  for (std::size_t l = 0; complete && l < levels.size(); ++l) {
+    const MipLevel& level = levels[l];
+    OIIO::ImageSpec spec(level.width, level.height, static_cast<int>(channels.size()), fileType(format));
+    spec.channelnames.assign(channels.begin(), channels.end());
+    spec.tile_width = spec.tile_height = kTile;
+    spec.attribute("compression", "zip");
+    spec.attribute("DateTime", "");
+    spec.attribute("textureformat", "Plain Texture");
+    spec.attribute("wrapmodes", periodic ? "periodic,periodic" : "clamp,clamp");
+    spec.attribute("openexr:roundingmode", 0);  // down
+    const std::size_t row = static_cast<std::size_t>(level.width) * channels.size();
+    const float* last_row = level.pixels.data() + row * static_cast<std::size_t>(level.height - 1);
+    complete = output->open(path, spec, l == 0 ? OIIO::ImageOutput::Create : OIIO::ImageOutput::AppendMIPLevel) &&
+               output->write_image(OIIO::TypeDesc::FLOAT, last_row, OIIO::AutoStride,
+                                   -static_cast<OIIO::stride_t>(row * sizeof(float)));
+  }
+  if (!complete || !output->close()) {
+    throw Error(ErrorCode::failed, "image.format", path, "", "the texture cannot be written: " + trimmed(output->geterror()),
+                "name the output .exr");
+  }
+  return bytes;
+}
+
 bool isWritableName(const std::string& path) {
   const auto output = OIIO::ImageOutput::create(path);
   if (!output) (void)OIIO::geterror();  // an error nobody fetches is printed at exit
@@ -228,4 +263,5 @@ std::vector<float> infernoColours(int size, std::span<const float> grey) {
 /// What imageFormats() looks up.
 extern "C" const glint::apps::ImageFormats glint_image_formats;
 const glint::apps::ImageFormats glint_image_formats = {glint::apps::readImageFile, glint::apps::encodeImage,
-                                                       glint::apps::isWritableName, glint::apps::infernoColours};
+                                                       glint::apps::encodeTexture, glint::apps::isWritableName,
+                                                       glint::apps::infernoColours};

@@ -92,7 +92,7 @@ typedef struct glint_open_options {
   size_t struct_size;       /* sizeof(glint_open_options) */
   const char* normals_path; /* asset of kind normals that the pyramid was made from: it answers footprints below level 0,
                                which the nearest level answers without it. Null: none */
-  float sigma_r;            /* kind normals: intrinsic roughness, disk units, 1e-4 to 0.25; 0: 0.005 */
+  float sigma_r;            /* kinds normals and slope-moments: intrinsic roughness, disk units, 1e-4 to 0.25; 0: 0.005 */
   int32_t surface;          /* kind normals: GLINT_SURFACE_* */
   int32_t boundary;         /* kind normals: GLINT_BOUNDARY_* */
   int32_t verify_hashes;    /* not 0: compare datasets with their hashes, and bytes between objects with 0; reads all */
@@ -100,8 +100,9 @@ typedef struct glint_open_options {
   float slant_tolerance;    /* kind histogram-sat: share of a footprint with slanted sides that may be counted in a wrong
                                place, up to 1; 0: 0.06; GLINT_SLANT_EXACT: none, and slower */
   int32_t gaussian_boxes;   /* kind histogram-sat: boxes that stand for a Gaussian footprint, 1 or 3; 0: 1 */
-  int32_t footprint_parts;  /* kinds ndf-pyramid and ndf-cp: most round footprints that stand for a stretched one, up to 32,
-                               each at the cost of one; 1: one of the same mean square size, whatever the shape; 0: 32 */
+  int32_t footprint_parts;  /* kinds ndf-pyramid, ndf-cp and slope-moments: most round footprints that stand for a stretched
+                               one, up to 32, each at the cost of one; 1: one of the same mean square size, whatever the
+                               shape; 0: 32 */
   int32_t interpolation;    /* kinds ndf-pyramid and ndf-cp: GLINT_INTERPOLATION_*, how footprints between the stored ones are
                                answered */
   int32_t pixels;           /* kinds ndf-pyramid and ndf-cp: GLINT_PIXELS_*, how densities run between half vectors of one pixel
@@ -114,7 +115,8 @@ typedef struct glint_open_options {
 #define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f, 0.0f, 0, 0, 0, 0 }
 /* clang-format on */
 
-/* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat.
+/* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat,
+ * slope-moments.
  *
  * The file is checked, then mapped; what queries read is not copied. Safe on untrusted files. A file must not be changed in
  * place while it is open (the tools never do: they replace files).

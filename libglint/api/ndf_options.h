@@ -15,12 +15,13 @@ struct NdfOptions {
   std::filesystem::path normals;       ///< asset that the pyramid was made from, for footprints below level 0; empty: none
   Surface surface = Surface::flat;     ///< kind normals: how they behave between texels
   Boundary boundary = Boundary::wrap;  ///< kind normals: beyond the border of the map
-  float sigma_r = 0.005f;              ///< kind normals: intrinsic roughness, disk units
+  float sigma_r = 0.005f;              ///< kinds normals and slope-moments: intrinsic roughness, disk units
   float alpha = 0;                     ///< kind bin-map: Beckmann roughness, in the range of the asset; 0: the smallest
   GaussianBoxes gaussian_boxes = GaussianBoxes::one;  ///< kind histogram-sat: boxes that stand for a Gaussian footprint
-  float slant_tolerance = kSlantTolerance;      ///< kind histogram-sat: share of a slanted footprint that may be misplaced
-  int footprint_parts = IsotropicParts::kMost;  ///< kinds ndf-pyramid and ndf-cp: most round footprints that stand for a
-                                                ///< stretched one; 1: one of the same mean square size
+  float slant_tolerance = kSlantTolerance;  ///< kind histogram-sat: share of a slanted footprint that may be misplaced
+  int footprint_parts =
+      IsotropicParts::kMost;  ///< kinds ndf-pyramid, ndf-cp and slope-moments: most round footprints that stand
+                              ///< for a stretched one; 1: one of the same mean square size
   /// Kinds ndf-pyramid and ndf-cp: how footprints between the stored ones are answered.
   Interpolation interpolation = Interpolation::footprint;
   /// Kinds ndf-pyramid and ndf-cp: how densities run between half vectors of one pixel.

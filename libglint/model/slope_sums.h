@@ -10,6 +10,9 @@
 
 namespace glint {
 
+/// Slopes (-nx/nz, -ny/nz) of a normal inside the unit disk; finite also on the rim.
+inline GLINT_HD Vec2 slopeOf(Vec2 normal) { return -1 / std::sqrt(std::max(1e-12f, 1 - dot(normal, normal))) * normal; }
+
 /// Sums over the slopes (p, q) of normals, from which the moments of a map follow.
 struct SlopeSums {
   double p = 0, q = 0, pp = 0, pq = 0, qq = 0;

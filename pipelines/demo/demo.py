@@ -23,8 +23,9 @@ IMAGES_PER_REGION = 8
 PICTURE_LEVELS = (0, 1, 3)
 # Columns of the picture of all models -> kind in the file's name, in groups that answer the same footprint exactly. Bin maps and histograms
 # know boxes; they are asked for the box that has the second moments of the Gaussian.
-GAUSSIAN_MODELS = {"Reference, Gaussian": "", "pyramid": "pyramid", "cp, rank 16": "cp", "tucker, 10 %": "tucker10", "pca, rank 16": "pca"}
+GAUSSIAN_MODELS = {"Reference, Gaussian": "", "pyramid": "pyramid", "cp, rank 16": "cp", "tucker, 10 %": "tucker10", "pca, rank 16": "pca", "moments": "moments"}
 BOX_MODELS = {"Reference, box": "", "bin map": "binmap", "histograms": "sat"}
+ASKED_SIGMA_R = {"", "moments"}  # kinds that have no roughness of their own
 NOT_DRAWN = {"flakes_256"}  # flakes_1k is
 
 
@@ -84,6 +85,7 @@ class Chain:
         self.compress("tucker10", "tucker, seen error 10 %", "--method", "tucker", "--tolerance", 0.1)
         self.make("bin map", "binmap", "--alpha", self.sigma_r * 2**0.5)
         self.make("histograms", "sat")
+        self.make("moments", "moments")
         if kind:
             heights = self.path("heights")
             self.tools.run("ingest", self.image, "-o", heights, *kind, "--to", "heights", *self.ingest_flags)
@@ -129,7 +131,7 @@ class Chain:
     def ndf(self, kind, footprint):
         """NDF image of one asset, top row first, by glint-query."""
         path = self.folder / "query.exr"
-        sigma_r = [] if kind else ["--sigma-r", self.sigma_r]
+        sigma_r = ["--sigma-r", self.sigma_r] if kind in ASKED_SIGMA_R else []
         self.tools.run("query", self.path(kind), *footprint.options(), "--image", path, *sigma_r)
         # Not ImageBuf: it remembers files by name.
         image = oiio.ImageInput.open(str(path))
@@ -140,7 +142,7 @@ class Chain:
 
     def nanoseconds(self, kind, footprint, half):
         """Time of a density query."""
-        sigma_r = [] if kind else ["--sigma-r", self.sigma_r]
+        sigma_r = ["--sigma-r", self.sigma_r] if kind in ASKED_SIGMA_R else []
         run = self.tools.run("query", self.path(kind), *footprint.options(), "--half", *half, "--repeat", 3000, *sigma_r)
         return run.result["nanoseconds"]
 

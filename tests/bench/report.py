@@ -63,6 +63,8 @@ METHODS = [
      [("build, 2K maps", r"bin map, build, .* 2K.*"), ("bytes, 2K maps", r"bin map, bytes, .* 2K.*"),
       *((f"weights of {side}^2 texels", rf"bin map, weights, .*, {side}\^2") for side in (4, 64, 1024)),
       ("median error", r"bin map, median error, .*"), ("energy", r"bin map, energy, .*")]),
+    ("Moments", r"moments: .*|queries: .* moments\b.*", "Moments of slopes, by glint-moments: one lobe for each footprint. What pictures of them lack is in [LIMITS](LIMITS.md).",
+     [("build", r"moments, \S+"), ("bytes", r"bytes of moments, .*"), *query_lines("moments")[:-2]]),
     ("Histograms", r"histograms: .*", "Accumulated histograms of 9 x 32 directions, by glint-sat.",
      [*((f"{what}, stride {stride}", rf"{figure}, stride {stride}, .*") for stride in (4, 16)
         for what, figure in (("build", "histograms"), ("bytes", "bytes of histograms"), ("histogram of 64^2 texels", r"histogram of 64\^2"),

@@ -63,12 +63,13 @@ TEXEL = (SIZE - 1 - 7) * SIZE + 3
     [
         ("pyramid", ["-o", "out.glint"]),
         ("sat", ["-o", "out.glint"]),
+        ("moments", ["-o", "out.glint"]),
         ("binmap", ["-o", "out.glint", "--alpha", "0.02"]),
         ("query", ["--uv", ".5", ".5", "--sigma", "9", "--image", "out.exr"]),
         ("query", ["--uv", ".5", ".5", "--sigma", "9", "--samples", "10", "-o", "out.csv"]),
         ("query", ["--uv", ".5", ".5", "--sigma", "9", "--surface", "smooth", "--image", "out.exr"]),
     ],
-    ids=["pyramid", "sat", "binmap", "image", "samples", "smooth-image"],
+    ids=["pyramid", "sat", "moments", "binmap", "image", "samples", "smooth-image"],
 )
 def test_normals_that_are_none_are_named_by_their_texel(glint, assets, tool, arguments, value):
     bad = with_value(assets, "normals.glint", "normals", 2 * TEXEL, value)
@@ -93,10 +94,11 @@ def test_one_query_of_normals_that_are_none_is_refused(glint, assets, value):
 @pytest.mark.parametrize("value", [math.nan, math.inf], ids=["nan", "infinite"])
 def test_heights_that_are_none_are_named_by_their_texel(glint, assets, value):
     bad = with_value(assets, "heights.glint", "heights", TEXEL, value)
-    process = glint("displace", bad, "-o", "out.glint", "--factor", "16", "--base", "diffuse:0.8")
-    assert process.returncode == 3
-    assert "column 3, row 7 from the top" in process.stderr
-    assert not (assets / "out.glint").exists()
+    for tool, *flags in [("displace", "--factor", "16", "--base", "diffuse:0.8"), ("moments",)]:
+        process = glint(tool, bad, "-o", "out.glint", *flags)
+        assert process.returncode == 3
+        assert "column 3, row 7 from the top" in process.stderr
+        assert not (assets / "out.glint").exists()
 
 
 def test_pyramids_with_bad_means_are_not_compressed(glint, assets):

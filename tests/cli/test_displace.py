@@ -185,7 +185,7 @@ def test_roughness_of_the_base_is_that_of_the_image(glint, heights):
 @pytest.mark.parametrize(
     "shape, value, options, message",
     [
-        ((64, 64, 3), 0.5, [], "64 x 64 pixels, the heights 64 x 96"),
+        ((64, 64, 3), 0.5, [], "64 x 64 pixels, the map 64 x 96"),
         ((96, 64, 3), 1.5, [], "not in 0..1"),
         ((96, 64, 3), -0.1, [], "not in 0..1"),
         ((96, 64, 3), float("nan"), [], "not in 0..1"),

@@ -4,6 +4,7 @@
 #include "glint/query/brdf/displaced_brdf.h"
 #include "glint/query/light/environment.h"
 #include "glint/query/histogram_ndf.h"
+#include "glint/query/moments_ndf.h"
 #include "glint/query/ray_footprint.h"
 #include "glint/query/light/sh_light_query.h"
 #include "glint/query/light/sh_transfer.h"
@@ -12,6 +13,8 @@ namespace glint::device {
 
 template __global__ void answer<HistogramNdf>(HistogramNdf, const Footprint*, const Vec2*, float, int, float*, float*);
 template __global__ void draw<HistogramNdf>(HistogramNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
+template __global__ void answer<MomentsNdf>(MomentsNdf, const Footprint*, const Vec2*, float, int, float*, float*);
+template __global__ void draw<MomentsNdf>(MomentsNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 
 /// A shading point of a distribution: its footprint from ray differentials, its BRDF, and lights.
 __global__ void shade(const PyramidNdf ndf, const SmithMasking masking, const SphericalGaussians lights, const Vec2* uv,

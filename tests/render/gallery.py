@@ -40,6 +40,7 @@ MODELS = {
     "pca": Model("compress", ("--method", "pca", "--tolerance", 0.1), "pyramid", True),
     "bin map": Model("binmap", filter="box"),
     "histograms": Model("sat", filter="box"),
+    "moments": Model("moments"),
 }
 
 

@@ -70,7 +70,7 @@ NEAR = "Near pictures come from the texels: they are right, and slow."
 SEEN = {
     "pyramid": "The lobe of a facet is narrower than a pixel of the images (.64 pixels at the default --resolution), and the small light is as wide as one pixel. "
                "So where a footprint holds few facets or thin lines of directions, far scratches and brushed metal above all, pictures under the small light are "
-               f"softer and lose a few percent of the light: glint-pyramid --resolution auto has pixels that are small enough. {NEAR}",
+               f"softer and lose a few percent of the light: glint-pyramid --resolution auto makes the pixels smaller than the lobe. {NEAR}",
     "tucker": "It errs as the pyramid does, and by its tolerance, which holds for each half vector on average over places and not for each place. On flakes under the "
               "small light, the dark between far sparkles is lit by a haze: even over a block of the images, and more in one block than in the next.",
     "cp": "It errs as the pyramid does, and by its rank. Negative parts of low rank are cut, which leaves light where there should be none.",
@@ -79,6 +79,8 @@ SEEN = {
                "Gaussians.",
     "histograms": "Directions are known to ten degrees: sparkles are spread over a bin, and edges of bins show on smooth surfaces under small lights. Take them for "
                   "environments, not for lamps.",
+    "moments": "One smooth lobe for each pixel: no sparkle, whatever the light. It has the light of the map on average, and the right look where a pixel holds so many "
+               "facets that nothing sparkles; lobes of grooves and threads run together.",
 }
 
 

@@ -730,6 +730,28 @@ SampleHistograms sampleHistograms(int width, int height) {
   return sample;
 }
 
+SampleSlopeMoments sampleSlopeMoments(int width, int height) {
+  SampleSlopeMoments sample;
+  SlopeMoments& moments = sample.moments;
+  moments.width = width, moments.height = height, moments.finest_level = 1;
+  // Means along u in even steps around 0. Coarser texels hold the mixture of two.
+  int columns = width / 2, rows = height / 2;
+  float step = 0.5f / static_cast<float>(columns), variance = 1.0f / 64;
+  for (;; columns = std::max(1, columns / 2), rows = std::max(1, rows / 2)) {
+    std::vector<MapSlopes>& texels = sample.texels.emplace_back();
+    for (int j = 0; j < rows; ++j)
+      for (int i = 0; i < columns; ++i)
+        texels.push_back(
+            {{step * (static_cast<float>(i) - 0.5f * static_cast<float>(columns - 1)), 0.25f}, {variance, 0, 1.0f / 32}});
+    moments.levels[moments.level_count++] = {columns, rows, {}};
+    if (columns * rows == 1) break;
+    if (columns > 1) variance += 0.25f * step * step, step *= 2;
+  }
+  for (int l = 0; l < moments.level_count; ++l) moments.levels[l].texels = sample.texels[static_cast<std::size_t>(l)];
+  moments.slopes = sample.texels.back()[0];
+  return sample;
+}
+
 SampleShLobes sampleShLobes() {
   SampleShLobes s;
   s.zonal = {0.28f, 0.4f};
@@ -802,6 +824,7 @@ std::vector<SampleAsset> sampleAssets() {
       {"normals", [] { return owned(sampleNormals(64, 48), &SampleNormals::map); }},
       {"sh-light", [] { return owned(sampleShLight(), &SampleShLight::light); }},
       {"sh-lobes", [] { return owned(sampleShLobes(), &SampleShLobes::lobes); }},
+      {"slope-moments", [] { return owned(sampleSlopeMoments(9, 4), &SampleSlopeMoments::moments); }},
   };
 }
 

@@ -97,6 +97,11 @@ struct SampleHistograms {
   HistogramSat sat;
 };
 
+struct SampleSlopeMoments {
+  std::vector<std::vector<MapSlopes>> texels;
+  SlopeMoments moments;
+};
+
 struct SampleShLobes {
   std::vector<float> zonal;
   std::vector<float> coefficients;
@@ -126,6 +131,8 @@ SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type
 SampleBinMap sampleBinMap(int width, int height);
 /// Histograms of sampleNormals(width, height) over 12 x 8 bins; strides 4, 8 and 16 texels.
 SampleHistograms sampleHistograms(int width, int height);
+/// Level 1 and up of a chain, whose slopes are simple fractions. Half the width and half the height, rounded down, are powers of two.
+SampleSlopeMoments sampleSlopeMoments(int width, int height);
 /// A lobe of order 1 with the zonal coefficients 0.28 and 0.4, on a grid of 3 x 4 directions.
 SampleShLobes sampleShLobes();
 /// Constant light of radiance 1, 2 and 3 in red, green and blue, order 2, on a grid of 3 x 4 directions.

@@ -3,7 +3,6 @@
 #endif
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <hdf5.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +16,7 @@
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 #include "glint/formats/findings.h"
+#include "glint/formats/hdf5_handle.h"
 #include "glint/formats/kinds/kind.h"
 #include "glint/formats/validate.h"
 #include "glint/query/detail/bin_map/bin_blocks.h"
@@ -39,14 +39,15 @@ enum class Base {
   spots,
   bin_map,
   histograms,
+  moments,
   sh_lobes,
   sh_light,
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,        Base::heights,  Base::pyramid,      Base::compressed,
-                           Base::compressed_f32, Base::spots,    Base::bin_map,      Base::histograms,
-                           Base::sh_lobes,       Base::sh_light, Base::displacement, Base::displacement_rgb};
+constexpr Base kBases[] = {Base::normals,  Base::heights,      Base::pyramid,         Base::compressed, Base::compressed_f32,
+                           Base::spots,    Base::bin_map,      Base::histograms,      Base::moments,    Base::sh_lobes,
+                           Base::sh_light, Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -72,6 +73,8 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleBinMap(64, 48).map, provenance);
     case Base::histograms:
       return writeAsset(path, test::sampleHistograms(22, 19).sat, provenance);
+    case Base::moments:
+      return writeAsset(path, test::sampleSlopeMoments(9, 4).moments, provenance);
     case Base::sh_lobes:
       return writeAsset(path, test::sampleShLobes().lobes, provenance);
     case Base::sh_light:
@@ -666,6 +669,22 @@ std::vector<Fixture> histogramFixtures() {
   };
 }
 
+std::vector<Fixture> momentsFixtures() {
+  const auto changed = [](const char* rule, const char* level, std::size_t index, float value) {
+    return patched(
+        rule, Base::moments,
+        [=](const Patch& patch) { patch.change<float>(level, index, [=](float& number) { number = value; }); }, true);
+  };
+  return {
+      patched("moments.levels", Base::moments, [](const Patch& patch) { patch.setInteger("width", 8 << 1); }),
+      patched("moments.levels", Base::moments, [](const Patch& patch) { patch.setInteger("finest_level", 0); }),
+      changed("moments.finite", "level_00/moments", 7, kNan),
+      changed("moments.covariance", "level_01/moments", 2, -0.1f),
+      changed("moments.covariance", "level_00/moments", 8, 0.4f),
+      changed("moments.top", "level_02/moments", 0, 0.1f),
+  };
+}
+
 std::vector<Fixture> binMapFixtures() {
   const auto changed = [](const char* rule, const char* path, std::size_t index, auto edit, bool opens = false) {
     using T = std::remove_cvref_t<decltype(edit(0))>;
@@ -738,9 +757,9 @@ std::vector<Fixture> shFixtures() {
 
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
-  for (auto list :
-       {fileFixtures(), linkFixtures(), attributeFixtures(), storageFixtures(), datasetFixtures(), pyramidFixtures(),
-        ndfCpFixtures(), dataFixtures(), histogramFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
+  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), storageFixtures(), datasetFixtures(),
+                    pyramidFixtures(), ndfCpFixtures(), dataFixtures(), histogramFixtures(), momentsFixtures(),
+                    binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
@@ -915,7 +934,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 15u);
+  EXPECT_EQ(count, 16u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -944,6 +963,9 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_FLOAT_EQ(sat.bin_normals[9].x, 0.0831450075f);
   EXPECT_EQ(sat.sums[(4 * 7 + 5) * 32 + 9], 1);
   EXPECT_EQ(sat.slopes.covariance.xy, 0.03125f);
+  const Asset moments = Asset::open(folder / "slope-moments.glint");
+  EXPECT_EQ(moments.get<SlopeMoments>().levels[0].texels[5].mean.x, -0.0625f);
+  EXPECT_EQ(moments.get<SlopeMoments>().levels[2].texels[0].covariance.xx, 0.03515625f);
   EXPECT_EQ(static_cast<const float*>(Asset::open(folder / "sh-lobes.glint").get<ShLobes>().coefficients)[5 * 4 + 3], 0.4f);
   EXPECT_EQ(Asset::open(folder / "sh-light.glint").get<ShLight>().band_norms[7], 12.2799206f);
   struct Recorded {

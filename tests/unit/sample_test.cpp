@@ -12,10 +12,12 @@
 #include "glint/bake/common/counter_random.h"
 #include "glint/bake/compressed/compress.h"
 #include "glint/bake/histogram/histogram_sat.h"
+#include "glint/bake/moments/slope_moments.h"
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/histogram_ndf.h"
+#include "glint/query/moments_ndf.h"
 #include "glint/query/pyramid_ndf.h"
 #include "support/test_maps.h"
 
@@ -214,7 +216,12 @@ void expectSamplesFollowThePixels(const Model& model, const std::string& name, i
 }
 
 TEST(Sample, OfPyramidsFollowsTheDensity) {
-  for (const auto& c : cases()) expectSamplesFollowThePixels(PyramidNdf(c->pyramid.view()), "pyramid " + c->name, 20000);
+  for (const auto& c : cases()) {
+    const NdfPyramid pyramid = c->pyramid.view();
+    expectSamplesFollowThePixels(PyramidNdf(pyramid), "pyramid " + c->name, 20000);
+    expectSamplesFollowThePixels(PyramidNdf(pyramid, Interpolation::footprint, Pixels::constant),
+                                 "pyramid of constant pixels " + c->name, 20000);
+  }
 }
 
 /// What the pixels of slices are like: choosing rows by sums that include negative pixels is right only where there are none.
@@ -325,7 +332,10 @@ TEST(Sample, OfSpotsAndNarrowColumnsFollowsTheDensity) {
     if (c->name == "flakes") {
       EXPECT_GT(report.spot_slices, 0u);
     }
-    expectSamplesFollowThePixels(CpNdf(data.view()), "tolerance " + c->name, 20000);
+    const NdfCp ndf = data.view();
+    expectSamplesFollowThePixels(CpNdf(ndf), "tolerance " + c->name, 20000);
+    expectSamplesFollowThePixels(CpNdf(ndf, Interpolation::footprint, Pixels::constant),
+                                 "tolerance, constant pixels " + c->name, 20000);
   }
 }
 
@@ -396,6 +406,14 @@ TEST(Sample, OfHistogramsFollowsTheMean) {
   for (const auto& c : cases()) {
     const bake::HistogramSatData data = bake::buildHistogramSat(c->map.map(), {.theta_bins = 9, .phi_bins = 32, .stride = 4});
     expectSamplesFollowTheMean(HistogramNdf(data.view()), "histogram " + c->name, mixedFootprints(4), 10000, kRounding);
+  }
+}
+
+TEST(Sample, OfMomentsFollowsTheMean) {
+  constexpr float kRounding = 1e-5f;
+  for (const auto& c : cases()) {
+    const bake::SlopeMomentsData data = bake::buildSlopeMoments(c->map.map(), {});
+    expectSamplesFollowTheMean(MomentsNdf(data.view(), kSigmaR), "moments " + c->name, mixedFootprints(4), 10000, kRounding);
   }
 }
 

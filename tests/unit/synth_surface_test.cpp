@@ -123,7 +123,7 @@ TEST(Synth, PatternsReachTheSlopeAskedFor) {
     SynthOptions p = sized(kind, 256, 192);
     p.alpha = 0;
     p.slope = 0.8f;
-    EXPECT_NEAR(slopeMoments(256, 192, synthHeights(p)).steepest, 0.8f, 1e-4f) << static_cast<int>(kind);
+    EXPECT_NEAR(slopeVariances(256, 192, synthHeights(p)).steepest, 0.8f, 1e-4f) << static_cast<int>(kind);
   }
 }
 

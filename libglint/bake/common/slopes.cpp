@@ -80,6 +80,24 @@ std::vector<Vec2> normalsFromHeights(int width, int height, std::span<const floa
   return normals;
 }
 
+void rowSlopes(int width, int height, std::span<const float> heights, int j, Boundary boundary, Gradient gradient,
+               std::span<Vec2> slopes) {
+  if (gradient == Gradient::central) {
+    visitSlopes(width, height, heights, j, boundary, [&](int i, Vec2 slope) { slopes[static_cast<std::size_t>(i)] = slope; });
+    return;
+  }
+  const Neighbours y(j, height, boundary);
+  const auto row = [&](int k) { return heights.data() + static_cast<std::size_t>(k) * width; };
+  const float *below = row(y.before), *here = row(j), *above = row(y.after);
+  for (int i = 0; i < width; ++i) {
+    const Neighbours x(i, width, boundary);
+    const auto across = [&](const float* line) { return line[x.after] - line[x.before]; };
+    const auto along = [&](int k) { return above[k] - below[k]; };
+    slopes[static_cast<std::size_t>(i)] = {0.125f * (across(below) + 2 * across(here) + across(above)),
+                                           0.125f * (along(x.before) + 2 * along(i) + along(x.after))};
+  }
+}
+
 Vec2 seamRoughness(int width, int height, std::span<const float> heights) {
   const auto columns = static_cast<std::size_t>(width), rows = static_cast<std::size_t>(height);
   const auto square = [&](std::size_t a, std::size_t b) {
@@ -103,18 +121,18 @@ Vec2 seamRoughness(int width, int height, std::span<const float> heights) {
   return {ratio(between_columns), ratio(between_rows)};
 }
 
-SlopeMoments slopeMoments(int width, int height, std::span<const float> heights) {
-  std::vector<SlopeMoments> rows(static_cast<std::size_t>(height));
+SlopeVariances slopeVariances(int width, int height, std::span<const float> heights) {
+  std::vector<SlopeVariances> rows(static_cast<std::size_t>(height));
   tbb::parallel_for(0, height, [&](int j) {
-    SlopeMoments& sum = rows[static_cast<std::size_t>(j)];
+    SlopeVariances& sum = rows[static_cast<std::size_t>(j)];
     visitSlopes(width, height, heights, j, Boundary::wrap, [&](int, Vec2 slope) {
       sum.variance_x += slope.x * slope.x;
       sum.variance_y += slope.y * slope.y;
       sum.steepest = std::max(sum.steepest, std::sqrt(dot(slope, slope)));
     });
   });
-  SlopeMoments total;
-  for (const SlopeMoments& row : rows) {  // in order of rows, so that the sum does not depend on threads
+  SlopeVariances total;
+  for (const SlopeVariances& row : rows) {  // in order of rows, so that the sum does not depend on threads
     total.variance_x += row.variance_x;
     total.variance_y += row.variance_y;
     total.steepest = std::max(total.steepest, row.steepest);

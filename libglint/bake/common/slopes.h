@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -26,18 +27,31 @@ Vec2 normalFromSlopes(float dh_dx, float dh_dy);
 std::vector<Vec2> normalsFromHeights(int width, int height, std::span<const float> heights, Boundary boundary = Boundary::wrap,
                                      std::size_t* cliffs = nullptr);
 
+/// How slopes of a height field are computed from the heights around a texel.
+enum class Gradient : std::uint8_t {
+  central,  ///< central differences, as normalsFromHeights
+  sobel,    ///< mean of central differences of three rows (columns) with weights 1, 2, 1: smoother, and less steep
+};
+
+/// Computes the slopes (dh/dx, dh/dy) of row j of a height field. Heights beyond the border are wrapped, or under `clamp` those of
+/// the border; central differences are one-sided there.
+/// @param heights  [height][width], texels, bottom row first
+/// @param slopes   [width]
+void rowSlopes(int width, int height, std::span<const float> heights, int j, Boundary boundary, Gradient gradient,
+               std::span<Vec2> slopes);
+
 /// Measures whether a height map tiles. x: root mean square of the height steps from the last column to the first, over the
 /// largest root mean square of the steps between two neighbouring columns inside. y: the same for rows. About 1 or less if the
 /// map tiles; 0 with fewer than three columns (rows).
 Vec2 seamRoughness(int width, int height, std::span<const float> heights);
 
 /// Moments of the slopes of a periodic height field, by the central differences of normalsFromHeights.
-struct SlopeMoments {
+struct SlopeVariances {
   double variance_x = 0;  ///< mean of (dh/dx)^2; the mean slope of a periodic field is 0
   double variance_y = 0;
   float steepest = 0;  ///< largest length of (dh/dx, dh/dy)
 };
-SlopeMoments slopeMoments(int width, int height, std::span<const float> heights);
+SlopeVariances slopeVariances(int width, int height, std::span<const float> heights);
 
 /// Mean and covariance of the slopes of all texels of a map: as the map says, or computed. Does not depend on the number of
 /// threads.

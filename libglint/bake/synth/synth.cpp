@@ -58,7 +58,7 @@ void scale(std::vector<float>& heights, double factor) {
 std::vector<float> scaledNoise(const SynthOptions& p) {
   const bool brushed = p.kind == SynthKind::brushed;
   std::vector<float> heights = noiseHeights(p, brushed ? p.streak_texels : p.correlation_texels, p.correlation_texels);
-  const SlopeMoments moments = slopeMoments(p.width, p.height, heights);
+  const SlopeVariances moments = slopeVariances(p.width, p.height, heights);
   const double variance = brushed ? moments.variance_y : 0.5 * (moments.variance_x + moments.variance_y);
   scale(heights, variance > 0 ? p.alpha / std::sqrt(2 * variance) : 0);
   return heights;
@@ -120,7 +120,7 @@ std::vector<float> synthHeights(const SynthOptions& p) {
   }
   if (p.kind == SynthKind::isotropic || p.kind == SynthKind::brushed) return scaledNoise(p);
   std::vector<float> heights = pattern(p);
-  const float steepest = slopeMoments(p.width, p.height, heights).steepest;
+  const float steepest = slopeVariances(p.width, p.height, heights).steepest;
   scale(heights, steepest > 0 ? p.slope / steepest : 0);
   if (p.alpha > 0 && p.kind != SynthKind::flat) {
     const std::vector<float> noise = scaledNoise(p);
