@@ -42,6 +42,7 @@ void declare(CLI::App& app, Arguments& a) {
   app.add_option("--shift-x", o.shift.x, "shift of the picture, pixels");
   app.add_option("--shift-y", o.shift.y, "shift of the picture, pixels");
   app.add_option("--filter", o.filter, "gaussian or box")->transform(CLI::CheckedTransformer(filters));
+  app.add_flag("--curvature", o.curvature, "widen half vectors by the turning of the surface under a pixel");
   app.add_option("--sigma", o.sigma, "deviation of every footprint, texels; 0: from ray differentials")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--threads", a.threads, "most threads; 0: all");

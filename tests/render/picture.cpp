@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "glint/query/brdf/microfacet_brdf.h"
+#include "glint/query/curved_ndf.h"
 #include "glint/query/ray_footprint.h"
 
 namespace render {
@@ -100,8 +101,9 @@ class Integrator {
     const glint::Covariance& c = footprint.covariance;
     result.sigma = std::sqrt(std::sqrt(std::max(0.0f, c.xx * c.yy - c.xy * c.xy)));
     if (!glint::aboveHorizon(wo) || !glint::aboveHorizon(axis)) return result;
-    result.half = glint::halfVectorOf(axis, wo).disk;
-    result.radiance = reflected(footprint, axis, wo);
+    const glint::HalfVector h = glint::halfVectorOf(axis, wo);
+    result.half = h.disk;
+    result.radiance = reflected(footprint, spreadOf(ray, *hit, frame, h), axis, wo);
     return result;
   }
 
@@ -127,12 +129,25 @@ class Integrator {
     return Footprint::box(hit.uv, {u * dx.x, v * dx.y}, {u * dy.x, v * dy.y});
   }
 
-  std::array<float, kMostLights> reflected(const Footprint& footprint, Vec3 axis, Vec3 wo) const {
+  /// Half widths of the box of half vectors of the pixel.
+  Vec2 spreadOf(const Ray& ray, const Hit& hit, const Frame& frame, const glint::HalfVector& h) const {
+    if (!options_.curvature) return {};
+    const auto turn = [&](Vec3 step) {
+      const Vec3 dn = frame.local(hit.curvature * stepOnSurface(ray, hit, step));
+      return glint::halfVectorDifferential(h, dn, frame.local(-1.0f * step));
+    };
+    return glint::halfVectorSpread(turn(ray.dx), turn(ray.dy), filter_sigma_);
+  }
+
+  std::array<float, kMostLights> reflected(const Footprint& footprint, Vec2 spread, Vec3 axis, Vec3 wo) const {
     const glint::MicrofacetBrdf<M> brdf(model_, footprint, masking_, glint::Fresnel::mirror());
     std::array<LightPart, kMostParts> parts;
     std::size_t count = 0;
     for (const DiskLight& light : lights_) count += light.parts(axis, wo, std::span(parts).subspan(count));
-    const Means means = meansOver(model_, sigma_r_, footprint, std::span(parts).first(count));
+    const auto asked = std::span(parts).first(count);
+    const bool curved = spread.x > 0 || spread.y > 0;
+    const Means means = curved ? meansOver(glint::CurvedNdf<M>(model_, spread), sigma_r_, footprint, asked)
+                               : meansOver(model_, sigma_r_, footprint, asked);
     std::array<float, kMostLights> radiance{};
     std::size_t next = 0;
     for (std::size_t l = 0; l < lights_.size(); ++l) {

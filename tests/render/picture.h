@@ -22,7 +22,8 @@ struct Options {
   int samples = 1;                     ///< of a pixel, along each axis
   Vec2 shift;                          ///< of the picture, pixels
   Filter filter = Filter::gaussian;
-  float sigma = 0;  ///< deviation of every footprint, texels; 0: footprints from ray differentials
+  bool curvature = false;  ///< widen half vectors by the turning of the surface under a pixel
+  float sigma = 0;         ///< deviation of every footprint, texels; 0: footprints from ray differentials
 };
 
 /// Pixels, top row first.

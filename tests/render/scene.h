@@ -24,7 +24,8 @@ struct Hit {
   float distance = 0;  ///< along the ray
   Vec3 position, normal;
   Vec2 uv;
-  Vec3 dpdu, dpdv;  ///< change of the position with uv
+  Vec3 dpdu, dpdv;      ///< change of the position with uv
+  float curvature = 0;  ///< turn of the normal for a step on the surface, radians for each unit
 };
 
 /// A ray, and the change of its unit direction from one pixel to the next.
@@ -68,7 +69,7 @@ struct Sphere {
     const float latitude = std::asin(n.x), longitude = std::atan2(n.y, n.z);
     const Vec3 dpdu = {std::cos(latitude), -n.x * std::sin(longitude), -n.x * std::cos(longitude)};
     const Vec3 dpdv = {0, n.z, -n.y};
-    return Hit{distance, centre + radius * n, n, {radius * latitude, radius * longitude}, dpdu, dpdv};
+    return Hit{distance, centre + radius * n, n, {radius * latitude, radius * longitude}, dpdu, dpdv, 1 / radius};
   }
 };
 
