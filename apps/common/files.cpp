@@ -87,6 +87,10 @@ bool mayReplace(const std::string& path, OutputFormat format) {
       return isAnswerHeader(std::string_view(head).substr(0, head.find('\n')));
     case OutputFormat::depfile:
       return isDepfile(head);
+    case OutputFormat::results:
+      return head.starts_with("{\"schema\":\"glint-bench results"sv);
+    case OutputFormat::page:
+      return head.starts_with("<!doctype html>"sv) && head.find("content=\"glint-bench\"") != std::string::npos;
   }
   return false;
 }

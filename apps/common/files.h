@@ -37,6 +37,8 @@ enum class OutputFormat : unsigned char {
   image,    ///< any image format
   table,    ///< CSV with answers
   depfile,  ///< rule for Make
+  results,  ///< JSON of glint-bench
+  page,     ///< HTML of glint-bench
 };
 
 /// Checks an output before the work starts. Checks again, when all inputs and outputs are known, that no other file of the run

@@ -27,12 +27,13 @@ std::vector<std::string_view> namesOf(bake::LobeConvention convention) {
   return names;
 }
 
-void writeLean(const std::string& path, const SlopeMoments& moments) {
+void writeLean(const std::string& path, const SlopeMoments& moments, const std::vector<std::vector<float>>& heights) {
   static const std::array<std::string, 6> kChannels = {"b0_h", "b1_dhds", "b2_dhdt", "b3_dhds2", "b4_dhdt2", "b5_dh2dsdt"};
   std::vector<MipLevel> levels;
   for (int l = 0; l < moments.level_count; ++l) {
     const SlopeMomentsLevel& level = moments.levels[l];
-    levels.push_back({level.columns, level.rows, bake::leanChannels(level.texels)});
+    const std::span<const float> of_level = heights.empty() ? std::span<const float>() : heights[static_cast<std::size_t>(l)];
+    levels.push_back({level.columns, level.rows, bake::leanChannels(level.texels, of_level)});
   }
   const auto bytes =
       imageFormats().encodeTexture(path, kChannels, levels, PixelFormat::f32, moments.boundary == Boundary::wrap);
@@ -80,8 +81,9 @@ void TextureOutput::check(Tool& tool, int levels) const {
   }
 }
 
-std::size_t TextureOutput::write(const SlopeMoments& lean, const SlopeMoments& lobes) const {
-  writeLean((fs::path(folder_) / kLeanName).string(), lean);
+std::size_t TextureOutput::write(const SlopeMoments& lean, const std::vector<std::vector<float>>& heights,
+                                 const SlopeMoments& lobes) const {
+  writeLean((fs::path(folder_) / kLeanName).string(), lean, heights);
   std::size_t limited = 0;
   for (int l = 0; l < lobes.level_count; ++l) {
     const SlopeMomentsLevel& level = lobes.levels[l];
@@ -116,7 +118,9 @@ std::vector<bake::LobeError> writeTextures(Tool& tool, const TextureOutput& text
   const bake::SlopeMomentsData lobes = momentsOf(asset, options, tool.progress("textures"));
   options.facet_variances = {};
   const bake::SlopeMomentsData lean = momentsOf(asset, options);
-  const std::size_t limited = textures.write(lean.view(), lobes.view());
+  std::vector<std::vector<float>> heights;
+  if (asset.kind() == "heights") heights = bake::meanHeights(asset.get<HeightMap>());
+  const std::size_t limited = textures.write(lean.view(), heights, lobes.view());
   if (limited > 0)
     tool.warn(counted(limited, {"texel is", "texels are"}) + " rougher than 1, all levels together: written as 1");
   return errorsOf(tool, asset, lean.view(), alpha);

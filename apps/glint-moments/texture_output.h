@@ -24,10 +24,11 @@ class TextureOutput {
   void check(Tool& tool, int levels) const;
 
   /// Writes lean.exr, and the textures of every level as files NAME_LL.png.
-  /// @param lean   moments of all levels, without the roughness of the material
-  /// @param lobes  moments of all levels, with it
+  /// @param lean     moments of all levels, without the roughness of the material
+  /// @param heights  of all levels, or empty
+  /// @param lobes    moments of all levels, with the roughness
   /// @return number of texels of which a roughness was above 1, all levels together
-  std::size_t write(const SlopeMoments& lean, const SlopeMoments& lobes) const;
+  std::size_t write(const SlopeMoments& lean, const std::vector<std::vector<float>>& heights, const SlopeMoments& lobes) const;
 
  private:
   std::string fileOf(std::string_view texture, int level) const;

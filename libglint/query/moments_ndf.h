@@ -28,15 +28,17 @@ class MomentsNdf {
   /// @param sigma_r     intrinsic roughness of the facets, disk units
   /// @param most_parts  largest number of round footprints that stand for a stretched one, 1 to IsotropicParts::kMost
   GLINT_HD explicit MomentsNdf(const SlopeMoments& moments, float sigma_r, int most_parts = IsotropicParts::kMost)
-      : moments_(moments), sigma_r_(sigma_r), most_parts_(std::clamp(most_parts, 1, int{IsotropicParts::kMost})) {}
+      : moments_(moments), sigma_r_(sigma_r), most_parts_(std::clamp(most_parts, 1, int{IsotropicParts::kMost})) {
+    for (int l = 0; l < moments_.level_count; ++l) variances_[l] = varianceOf(l);
+  }
 
   GLINT_HD const SlopeMoments& slopeMoments() const { return moments_; }
   GLINT_HD float roughness() const { return sigma_r_; }
 
   /// Deviation, texels, with which footprints smaller than those of the finest level are answered.
-  GLINT_HD float smallestSigma() const { return std::sqrt(variance(0)); }
+  GLINT_HD float smallestSigma() const { return std::sqrt(variances_[0]); }
   /// Deviation, texels, from which on footprints are answered by the moments of the whole map.
-  GLINT_HD float largestSigma() const { return std::sqrt(variance(moments_.level_count - 1)); }
+  GLINT_HD float largestSigma() const { return std::sqrt(variances_[moments_.level_count - 1]); }
 
   /// Mean and covariance of the slopes under a footprint, without the intrinsic roughness.
   GLINT_HD MapSlopes slopes(const Footprint& p) const {
@@ -44,11 +46,13 @@ class MomentsNdf {
     const Covariance& c = p.covariance;
     if (most_parts_ == 1 || (c.xx == c.yy && c.xy == 0)) return roundSlopes(centre, 0.5f * (c.xx + c.yy));
     const IsotropicParts parts = isotropicParts(p, moments_.width, moments_.height, 0, most_parts_, moments_.boundary);
-    MomentMixture mixture;
-    for (int k = 0; k < parts.count; ++k) {
-      const Footprint& part = parts.footprints[k];
-      mixture.add(parts.weights[k], roundSlopes({wrapUnit(part.centre.x), wrapUnit(part.centre.y)}, part.covariance.xx));
-    }
+    const auto slopesOf = [&](const Footprint& part) {
+      return roundSlopes({wrapUnit(part.centre.x), wrapUnit(part.centre.y)}, part.covariance.xx);
+    };
+    const MapSlopes first = slopesOf(parts.footprints[0]);
+    MomentMixture mixture(first.mean);
+    mixture.add(parts.weights[0], first);
+    for (int k = 1; k < parts.count; ++k) mixture.add(parts.weights[k], slopesOf(parts.footprints[k]));
     return mixture.moments();
   }
 
@@ -83,7 +87,7 @@ class MomentsNdf {
 
   /// Variance along an axis of a level's answers, texels^2: 1/12 of a cell's square for the extent of its texels and 1/4 for the
   /// spline, wherever the point lies. An axis with one texel only does not count.
-  GLINT_HD float variance(int level) const {
+  GLINT_HD float varianceOf(int level) const {
     const float w = cellWidth(level), h = cellHeight(level);
     const bool one_column = moments_.levels[level].columns == 1, one_row = moments_.levels[level].rows == 1;
     if (one_column != one_row) return (one_column ? h * h : w * w) / 3;
@@ -103,14 +107,22 @@ class MomentsNdf {
     if (index[2] >= count) index[2] = clamp ? count - 1 : 0, weight[2] = clamp ? 0.0f : weight[2];
   }
 
-  GLINT_HD void add(int level, Vec2 uv, float weight, MomentMixture& mixture) const {
-    const SlopeMomentsLevel& grid = moments_.levels[level];
+  GLINT_HD Place placeAt(int level, Vec2 uv) const {
     Place place;
-    placeAlong(uv.x, grid.columns, place.column, place.weight_x);
-    placeAlong(uv.y, grid.rows, place.row, place.weight_y);
+    placeAlong(uv.x, moments_.levels[level].columns, place.column, place.weight_x);
+    placeAlong(uv.y, moments_.levels[level].rows, place.row, place.weight_y);
+    return place;
+  }
+
+  GLINT_HD const MapSlopes* row(int level, int j) const {
+    const SlopeMomentsLevel& grid = moments_.levels[level];
+    return grid.texels.data() + rowMajorIndex(0, j, grid.columns);
+  }
+
+  GLINT_HD void add(int level, const Place& place, float weight, MomentMixture& mixture) const {
     for (int j = 0; j < 3; ++j) {
-      const MapSlopes* row = grid.texels.data() + rowMajorIndex(0, place.row[j], grid.columns);
-      for (int i = 0; i < 3; ++i) mixture.add(weight * place.weight_x[i] * place.weight_y[j], row[place.column[i]]);
+      const MapSlopes* texels = row(level, place.row[j]);
+      for (int i = 0; i < 3; ++i) mixture.add(weight * place.weight_x[i] * place.weight_y[j], texels[place.column[i]]);
     }
   }
 
@@ -121,16 +133,18 @@ class MomentsNdf {
     // A cell of level l of the full chain is 2^l to 2^(l+1) texels wide.
     int level = std::clamp(static_cast<int>(0.5f * std::log2(std::clamp(3 * wanted, 1.0f, 1e30f))) - 1 - moments_.finest_level,
                            0, last);
-    while (level < last && variance(level + 1) <= wanted) ++level;
-    const float below = variance(level), above = variance(std::min(level + 1, last));
+    while (level < last && variances_[level + 1] <= wanted) ++level;
+    const float below = variances_[level], above = variances_[std::min(level + 1, last)];
     const float t = above > below ? std::clamp((wanted - below) / (above - below), 0.0f, 1.0f) : 0.0f;
-    MomentMixture mixture;
-    add(level, uv, 1 - t, mixture);
-    if (t > 0) add(level + 1, uv, t, mixture);
+    const Place place = placeAt(level, uv);
+    MomentMixture mixture(row(level, place.row[1])[place.column[1]].mean);
+    add(level, place, 1 - t, mixture);
+    if (t > 0) add(level + 1, placeAt(level + 1, uv), t, mixture);
     return mixture.moments();
   }
 
   SlopeMoments moments_;
+  float variances_[SlopeMoments::kMaxLevels];  ///< of levels, texels^2
   float sigma_r_;
   int most_parts_;
 };

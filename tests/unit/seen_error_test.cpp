@@ -109,5 +109,41 @@ TEST(SeenError, IsTheDefinitionOnRandomImages) {
   EXPECT_NEAR(error.summary().bias, bias, 1e-9);
 }
 
+/// Each place lights one cell of many. Eight places alone do not tell that other places light the same cells.
+TEST(SeenError, RelatesToTheLightOfAllPlacesThatAreKnown) {
+  constexpr int kSide = 64, kPlaces = 400;
+  constexpr float kTooBright = 1.1f;
+  std::vector<std::vector<float>> truths;
+  for (int k = 0; k < kPlaces; ++k) {
+    std::vector<float> image(kSide * kSide);
+    image[static_cast<std::size_t>(k * 37 % 40)] = 5;
+    truths.push_back(image);
+  }
+  SeenError all(kSide), few(kSide), alone(kSide);
+  for (int k = 0; k < kPlaces; ++k) {
+    std::vector<float> image = truths[static_cast<std::size_t>(k)];
+    for (float& d : image) d *= kTooBright;
+    const float* truth = truths[static_cast<std::size_t>(k)].data();
+    all.add(image.data(), truth);
+    if (k < 80) {
+      few.add(image.data(), truth);
+    } else {
+      few.addTruth(truth);
+    }
+  }
+  EXPECT_NEAR(all.summary().seen, 0.1, 1e-5);
+  EXPECT_NEAR(few.summary().seen, 0.1, 0.005);
+  EXPECT_NEAR(few.summary().bias, 0.1, 0.005);
+  // A model that puts the light of a place elsewhere: against its own place alone the error is that of light where there is none.
+  std::vector<float> wrong(kSide * kSide);
+  wrong[3] = 5;
+  SeenError known(kSide);
+  alone.add(wrong.data(), truths[0].data());
+  known.add(wrong.data(), truths[0].data());
+  for (int k = 1; k < kPlaces; ++k) known.addTruth(truths[static_cast<std::size_t>(k)].data());
+  EXPECT_GT(alone.summary().worst, 1000);
+  EXPECT_LT(known.summary().worst, 10);
+}
+
 }  // namespace
 }  // namespace glint::bake

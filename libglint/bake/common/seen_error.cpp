@@ -22,6 +22,7 @@ SeenError::SeenError(int resolution)
 
 void SeenError::add(const float* image, const float* truth) {
   ++places_;
+  ++truth_places_;
   for (int y = 0; y < resolution_; ++y) {
     for (int x = 0; x < resolution_; ++x) {
       const std::size_t at = static_cast<std::size_t>(y) * resolution_ + x;
@@ -36,10 +37,23 @@ void SeenError::add(const float* image, const float* truth) {
   }
 }
 
+void SeenError::addTruth(const float* truth) {
+  ++truth_places_;
+  for (int y = 0; y < resolution_; ++y) {
+    for (int x = 0; x < resolution_; ++x) {
+      const double t = truth[static_cast<std::size_t>(y) * resolution_ + x];
+      Cell& cell = sums_[static_cast<std::size_t>(y / cell_pixels_) * cells_ + x / cell_pixels_];
+      cell.truth2 += t * t;
+      cell.truth += t;
+      cell.lit |= t > kDarkestSeen;
+    }
+  }
+}
+
 double SeenError::errorOf(const Cell& cell) const {
-  if (!cell.lit) return 0;
-  const double count = places_ * cell_pixels_ * cell_pixels_;
-  return std::sqrt(cell.error2 / count) / std::max(std::sqrt(cell.truth2 / count), kDarkestSeen);
+  if (!cell.lit || places_ == 0) return 0;
+  const double area = cell_pixels_ * cell_pixels_;
+  return std::sqrt(cell.error2 / (places_ * area)) / std::max(std::sqrt(cell.truth2 / (truth_places_ * area)), kDarkestSeen);
 }
 
 SeenSummary SeenError::summary() const {
@@ -47,11 +61,13 @@ SeenSummary SeenError::summary() const {
   double squares = 0, lit = 0;
   for (const Cell& cell : sums_) {
     if (!cell.lit) continue;
-    const double count = places_ * cell_pixels_ * cell_pixels_, e = errorOf(cell);
+    const double area = cell_pixels_ * cell_pixels_, e = errorOf(cell);
     ++lit;
     squares += e * e;
     result.worst = std::max(result.worst, e);
-    result.bias = std::max(result.bias, std::abs(cell.difference / count) / std::max(cell.truth / count, kDarkestSeen));
+    if (places_ == 0) continue;
+    const double truth = std::max(cell.truth / (truth_places_ * area), kDarkestSeen);
+    result.bias = std::max(result.bias, std::abs(cell.difference / (places_ * area)) / truth);
   }
   if (lit > 0) result.seen = std::sqrt(squares / lit);
   return result;

@@ -36,6 +36,10 @@ class SeenError {
   /// @param image, truth  [resolution][resolution] densities of the model and of the truth
   void add(const float* image, const float* truth);
 
+  /// Adds the truth of a place where the model was not asked. Errors then relate to the light of more places: on a map with few
+  /// facets, few places do not tell how much light a half vector has.
+  void addTruth(const float* truth);
+
   /// @return errors over all places so far; zeros without any
   SeenSummary summary() const;
 
@@ -52,7 +56,7 @@ class SeenError {
   double errorOf(const Cell& cell) const;
 
   int resolution_, cell_pixels_, cells_;
-  double places_ = 0;
+  double places_ = 0, truth_places_ = 0;
   std::vector<Cell> sums_;  // [cells][cells]
 };
 

@@ -84,15 +84,16 @@ std::vector<LobeTexture> lobeTextures(std::span<const MapSlopes> texels, LobeCon
   return textures;
 }
 
-std::vector<float> leanChannels(std::span<const MapSlopes> texels) {
-  return texture("lean", 6, texels,
-                 [](const MapSlopes& s, float* pixel) {
-                   const Vec2 m = s.mean;
-                   const Covariance& c = s.covariance;
-                   const float values[6] = {0, m.x, -m.y, c.xx + m.x * m.x, c.yy + m.y * m.y, -(c.xy + m.x * m.y)};
-                   std::copy(std::begin(values), std::end(values), pixel);
-                 })
-      .pixels;
+std::vector<float> leanChannels(std::span<const MapSlopes> texels, std::span<const float> heights) {
+  std::vector<float> pixels(6 * texels.size());
+  tbb::parallel_for(std::size_t{0}, texels.size(), [&](std::size_t k) {
+    const Vec2 m = texels[k].mean;
+    const Covariance& c = texels[k].covariance;
+    const float values[6] = {
+        heights.empty() ? 0 : heights[k], m.x, -m.y, c.xx + m.x * m.x, c.yy + m.y * m.y, -(c.xy + m.x * m.y)};
+    std::copy(std::begin(values), std::end(values), pixels.data() + 6 * k);
+  });
+  return pixels;
 }
 
 }  // namespace glint::bake

@@ -41,8 +41,9 @@ struct LobeTexture {
 std::vector<LobeTexture> lobeTextures(std::span<const MapSlopes> texels, LobeConvention convention);
 
 /// Moments as LEAN mapping filters them, six channels as `maketx --bumpslopes` has them, for a map whose rows are counted downwards:
-/// height, dh/ds, dh/dt, (dh/ds)^2, (dh/dt)^2, dh/ds dh/dt, in units of texels. The height is 0: it is not filtered here.
+/// height, dh/ds, dh/dt, (dh/ds)^2, (dh/dt)^2, dh/ds dh/dt, in units of texels.
+/// @param heights  of the texels; empty: the map has none, and heights are 0
 /// @return [rows][columns][6], bottom row first
-std::vector<float> leanChannels(std::span<const MapSlopes> texels);
+std::vector<float> leanChannels(std::span<const MapSlopes> texels, std::span<const float> heights);
 
 }  // namespace glint::bake

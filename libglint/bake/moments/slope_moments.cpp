@@ -43,7 +43,7 @@ void averageRows(const Cover& rows, const Texel* const (&row)[Cover::kMost], con
                  MapSlopes* out) {
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const Cover& cover = columns[i];
-    MomentMixture mixture;
+    MomentMixture mixture(asMoments(row[0][cover.first]).mean);
     for (int b = 0; b < rows.count; ++b)
       for (int a = 0; a < cover.count; ++a) mixture.add(rows.shares[b] * cover.shares[a], asMoments(row[b][cover.first + a]));
     out[i] = mixture.moments();
@@ -138,6 +138,30 @@ SlopeMomentsData build(int width, int height, const SlopeMomentsOptions& options
 }
 
 }  // namespace
+
+std::vector<std::vector<float>> meanHeights(const HeightMap& map) {
+  std::vector<std::vector<float>> levels = {{map.heights.begin(), map.heights.end()}};
+  for (int l = 1, width = map.width, height = map.height; l < SlopeMoments::chainLength(map.width, map.height); ++l) {
+    const std::vector<float>& before = levels.back();
+    const int columns = SlopeMoments::chainSize(width, 1), rows = SlopeMoments::chainSize(height, 1);
+    const std::vector<Cover> across = coversOf(width, columns), along = coversOf(height, rows);
+    std::vector<float> level(rowMajorIndex(0, rows, columns));
+    tbb::parallel_for(0, rows, [&](int j) {
+      const Cover& y = along[static_cast<std::size_t>(j)];
+      for (int i = 0; i < columns; ++i) {
+        const Cover& x = across[static_cast<std::size_t>(i)];
+        float sum = 0;
+        for (int b = 0; b < y.count; ++b)
+          for (int a = 0; a < x.count; ++a)
+            sum += y.shares[b] * x.shares[a] * before[rowMajorIndex(x.first + a, y.first + b, width)];
+        level[rowMajorIndex(i, j, columns)] = sum;
+      }
+    });
+    levels.push_back(std::move(level));
+    width = columns, height = rows;
+  }
+  return levels;
+}
 
 SlopeMoments SlopeMomentsData::view() const {
   SlopeMoments moments = shape;

@@ -41,4 +41,7 @@ SlopeMomentsData buildSlopeMoments(const NormalMap& map, const SlopeMomentsOptio
 /// @throws Error (invalid_input) if a height is not finite, or slopes are too steep for a float's square
 SlopeMomentsData buildSlopeMoments(const HeightMap& map, const SlopeMomentsOptions& options, const ProgressFn& progress = {});
 
+/// Mean heights under the texels of every level of a full chain, averaged as the moments are.
+std::vector<std::vector<float>> meanHeights(const HeightMap& map);
+
 }  // namespace glint::bake

@@ -9,20 +9,23 @@ namespace glint {
 
 /// Mean and covariance of a mixture of distributions of slopes, from the moments of each.
 ///
-/// Sums are of slopes relative to the first mean. So a narrow distribution far from level keeps the digits of its covariance.
+/// Sums are of slopes relative to an origin that is near them. So a narrow distribution far from level keeps the digits of its
+/// covariance.
 class MomentMixture {
  public:
+  /// @param origin  a slope near those that are added, such as the first mean
+  GLINT_HD explicit MomentMixture(Vec2 origin) : origin_(origin) {}
+
   /// Adds a distribution. @param weight  >= 0, not normalised
   GLINT_HD void add(float weight, const MapSlopes& slopes) {
-    if (!(weight > 0)) return;
-    if (weight_ == 0) origin_ = slopes.mean;
-    const Vec2 m = slopes.mean - origin_;
-    const Covariance& c = slopes.covariance;
+    const float x = slopes.mean.x - origin_.x, y = slopes.mean.y - origin_.y;
+    const float wx = weight * x, wy = weight * y;
     weight_ += weight;
-    mean_ = mean_ + weight * m;
-    square_.xx += weight * (c.xx + m.x * m.x);
-    square_.xy += weight * (c.xy + m.x * m.y);
-    square_.yy += weight * (c.yy + m.y * m.y);
+    mean_.x += wx;
+    mean_.y += wy;
+    square_.xx += weight * slopes.covariance.xx + wx * x;
+    square_.xy += weight * slopes.covariance.xy + wx * y;
+    square_.yy += weight * slopes.covariance.yy + wy * y;
   }
 
   /// Moments of all that was added; zeros if nothing was.

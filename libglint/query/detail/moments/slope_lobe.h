@@ -117,22 +117,38 @@ class SlopeLobe {
     return count;
   }
 
+  /// Gauss-Legendre points on [-1, 1], and their weights.
+  struct Rule {
+    int count;
+    float node[5], weight[5];
+  };
+
+  /// The rule for a panel of this length, in units of the longest.
+  static GLINT_HD Rule ruleFor(float length) {
+    if (length < 0.1f) return {2, {-0.5773502691896258f, 0.5773502691896258f}, {1, 1}};
+    if (length < 0.5f) {
+      return {
+          3, {-0.7745966692414834f, 0, 0.7745966692414834f}, {0.5555555555555556f, 0.8888888888888889f, 0.5555555555555556f}};
+    }
+    return {5,
+            {-0.9061798459386640f, -0.5384693101056831f, 0, 0.5384693101056831f, 0.9061798459386640f},
+            {0.2369268850561891f, 0.4786286704993665f, 0.5688888888888889f, 0.4786286704993665f, 0.2369268850561891f}};
+  }
+
   GLINT_HD double integral(const Box2& box, float low, float high) const {
     if (!(high > low)) return 0;
-    constexpr float kNode[5] = {-0.9061798459386640f, -0.5384693101056831f, 0, 0.5384693101056831f, 0.9061798459386640f};
-    constexpr float kWeight[5] = {0.2369268850561891f, 0.4786286704993665f, 0.5688888888888889f, 0.4786286704993665f,
-                                  0.2369268850561891f};
     // Where the lobe is narrow along a diagonal, intervals of p move past it within a short way along q.
     const float turn = std::fabs(x_by_y_) * sigma_y_;
-    const float width = kPanel * sigma_y_ * std::min(1.0f, sigma_x_given_y_ / std::max(turn, 1e-20f));
-    const int panels = static_cast<int>(std::clamp(std::ceil((high - low) / width), 1.0f, static_cast<float>(kMostPanels)));
+    const float longest = kPanel * sigma_y_ * std::min(1.0f, sigma_x_given_y_ / std::max(turn, 1e-20f));
+    const int panels = static_cast<int>(std::clamp(std::ceil((high - low) / longest), 1.0f, static_cast<float>(kMostPanels)));
     const float half = 0.5f * (high - low) / static_cast<float>(panels);
+    const Rule rule = ruleFor(2 * half / longest);
     double sum = 0;
     for (int k = 0; k < panels; ++k) {
       const float middle = low + half * static_cast<float>(2 * k + 1);
-      for (int n = 0; n < 5; ++n) {
-        const float q = middle + half * kNode[n], z = (q - mean_.y) / sigma_y_;
-        sum += double{kWeight[n] * std::exp(-0.5f * z * z) * shareAt(box, q)};
+      for (int n = 0; n < rule.count; ++n) {
+        const float q = middle + half * rule.node[n], z = (q - mean_.y) / sigma_y_;
+        sum += double{rule.weight[n] * std::exp(-0.5f * z * z) * shareAt(box, q)};
       }
     }
     constexpr double kNormalisation = 0.39894228040143268;

@@ -1,0 +1,222 @@
+#include "glint-bench/bench_run.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <list>
+
+#include "glint-bench/bench_errors.h"
+#include "glint-bench/bench_times.h"
+#include "glint-bench/candidates.h"
+#include "glint-bench/child_process.h"
+#include "glint-bench/rounded_image.h"
+#include "glint/formats/hash.h"
+
+namespace glint::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+/// One map: its asset, and the questions that every method is asked.
+class BenchMap {
+ public:
+  BenchMap(const std::string& path, const BenchSettings& settings, std::uint64_t seed)
+      : path_(path), asset_(formats::Asset::openForBuilding(path)), hash_(formats::hashFile(path)) {
+    if (asset_.kind() != "normals") {
+      throw Error(ErrorCode::unsupported, "format.kind", path, "", "is of kind " + std::string(asset_.kind()) + ", not normals",
+                  "give the asset that glint-ingest made");
+    }
+    constexpr int kQueries = 1 << 14, kOfSize = 1 << 12, kTruthsOfPlace = 4;
+    sets_ = benchFootprints(map(), seed, settings.places, kTruthsOfPlace * settings.places);
+    const std::vector<float> sizes = roundSizes(sets_);
+    queries_ = benchQueries(map(), seed, kQueries, sizes);
+    for (const float sigma : sizes) sized_queries_.push_back({sigma, benchQueries(map(), seed + 1, kOfSize, {sigma})});
+  }
+
+  const std::string& path() const { return path_; }
+  const std::string& hash() const { return hash_; }
+  std::string name() const { return fs::path(path_).stem().string(); }
+  const NormalMap& map() const { return asset_.get<NormalMap>(); }
+  const std::vector<BenchQuery>& queries() const { return queries_; }
+  const std::vector<SizedQueries>& sizedQueries() const { return sized_queries_; }
+
+  /// The exact images, which are computed on the first call.
+  const std::list<SetTruth>& truths() {
+    if (truths_.empty())
+      for (const FootprintSet& set : sets_) truths_.emplace_back(map(), set);
+    return truths_;
+  }
+
+  /// {name, hash, width, height, truth}: with an image of each size of round footprints.
+  Json json() {
+    Json images = Json::array();
+    for (const SetTruth& truth : truths())
+      if (truth.set().shape == FootprintShape::round)
+        images.push_back({{"sigma_texels", truth.set().sigma_texels}, {"image", roundedImage(truth.firstImage())}});
+    return {{"name", name()}, {"hash", hash_}, {"width", map().width}, {"height", map().height}, {"truth", std::move(images)}};
+  }
+
+ private:
+  std::string path_;
+  formats::Asset asset_;
+  std::string hash_;
+  std::vector<FootprintSet> sets_;
+  std::vector<BenchQuery> queries_;  ///< of all sizes
+  std::vector<SizedQueries> sized_queries_;
+  std::list<SetTruth> truths_;
+};
+
+/// Measures the candidates of one map.
+class MapBench {
+ public:
+  MapBench(Tool& tool, const BenchSettings& settings, BenchMap& map) : tool_(tool), settings_(settings), map_(map) {}
+
+  /// A cell: {map, name, method, setting, command, status, ...}. What fails is in its message.
+  Json measure(const Candidate& candidate) {
+    Json cell = {{"map", map_.hash()},           {"name", candidate.name()},          {"method", candidate.method},
+                 {"setting", candidate.setting}, {"command", commandText(candidate)}, {"status", "failed"}};
+    try {
+      cell["prepare"] = prepare(candidate);
+      ask(candidate, cell);
+      cell["status"] = "ok";
+    } catch (const Error& error) {
+      cell["message"] = error.what();
+    }
+    return cell;
+  }
+
+ private:
+  std::string assetOf(const Candidate& candidate) const {
+    if (candidate.tool.empty()) return map_.path();
+    std::string name = map_.hash().substr(0, 8) + "-" + candidate.name() + ".glint";
+    std::replace_if(
+        name.begin(), name.end(), [](char c) { return c == ' ' || c == ',' || c == '/'; }, '_');
+    return (fs::path(settings_.assets) / name).string();
+  }
+
+  const Candidate* sourceOf(const Candidate& candidate) const {
+    for (const Candidate& other : all_)
+      if (other.name() == candidate.source) return &other;
+    return nullptr;
+  }
+
+  std::vector<std::string> words(const Candidate& candidate) const {
+    const Candidate* source = sourceOf(candidate);
+    std::vector<std::string> list = {candidate.tool, source ? assetOf(*source) : map_.path(), "-o", assetOf(candidate)};
+    list.insert(list.end(), candidate.flags.begin(), candidate.flags.end());
+    return list;
+  }
+
+  /// A command line that a person can type, with short names of files.
+  std::string commandText(const Candidate& candidate) const {
+    if (candidate.tool.empty()) return "glint-query " + fs::path(map_.path()).filename().string();
+    const auto file = [&](const std::string& method) { return map_.name() + "." + method + ".glint"; };
+    std::string text = candidate.tool + " " +
+                       (candidate.source.empty() ? fs::path(map_.path()).filename().string() : file("pyramid")) + " -o ";
+    std::string method = candidate.method;
+    std::replace(method.begin(), method.end(), ' ', '-');
+    text += file(method);
+    for (const std::string& flag : candidate.flags) text += " " + flag;
+    return text;
+  }
+
+  /// Makes the asset, and where it is missing the one that it is made from.
+  /// @return {wall_s, cpu_s, peak_bytes, total_s}; the last with the time of the source
+  Json prepare(const Candidate& candidate) {
+    if (candidate.tool.empty()) return {{"wall_s", 0.0}, {"cpu_s", 0.0}, {"peak_bytes", 0}, {"total_s", 0.0}};
+    double source_s = 0;
+    if (const Candidate* source = sourceOf(candidate)) {
+      if (!times_.contains(source->name())) prepare(*source);
+      source_s = times_.at(source->name());
+    }
+    std::vector<std::string> command = words(candidate);
+    for (const char* word : {"--force", "--quiet", "--threads"}) command.emplace_back(word);
+    command.push_back(std::to_string(tool_.threads()));
+    const ChildRun run = runProgram(command);
+    if (run.exit_code != 0)
+      throw Error(ErrorCode::failed, "bench.candidate", "", "", fmt::format("exit code {}: {}", run.exit_code, run.message));
+    times_[candidate.name()] = source_s + run.wall_s;
+    return {{"wall_s", run.wall_s}, {"cpu_s", run.cpu_s}, {"peak_bytes", run.peak_bytes}, {"total_s", source_s + run.wall_s}};
+  }
+
+  void ask(const Candidate& candidate, Json& cell) {
+    api::NdfOptions options;
+    options.sigma_r = kBenchSigmaR;
+    if (candidate.takes_normals) options.normals = map_.path();
+    const api::OpenedNdf ndf = api::OpenedNdf::open(assetOf(candidate), options);
+    cell["file_bytes"] = ndf.asset().info().file_bytes;
+    cell["times"] = Json(benchTimes(ndf, map_.queries(), map_.sizedQueries(), settings_.longest_run_s));
+    cell["errors"] = Json::array();
+    cell["images"] = Json::array();
+    if (candidate.tool.empty()) return;  // it is the truth
+    for (const SetTruth& truth : map_.truths()) {
+      std::vector<float> first;
+      cell["errors"].push_back(Json(truth.errorsOf(ndf, settings_.budget_s, first)));
+      if (truth.set().shape == FootprintShape::round)
+        cell["images"].push_back({{"sigma_texels", truth.set().sigma_texels}, {"image", roundedImage(first)}});
+    }
+  }
+
+  Tool& tool_;
+  const BenchSettings& settings_;
+  BenchMap& map_;
+  std::vector<Candidate> all_ = benchCandidates(false);
+  std::map<std::string, double> times_;  ///< of assets of this run, from the map, by the names of their candidates
+};
+
+bool isWanted(const BenchSettings& settings, const Candidate& candidate) {
+  return settings.only.empty() ||
+         std::find(settings.only.begin(), settings.only.end(), candidate.method) != settings.only.end();
+}
+
+}  // namespace
+
+AssetFolder::AssetFolder(const std::string& path, bool remove) : path_(path), remove_(remove) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error || !fs::is_directory(path, error)) {
+    throw Error(ErrorCode::io, "output.folder", path, "", "the folder for the assets cannot be made: " + error.message(),
+                "name another one with --assets");
+  }
+  if (!remove) return;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
+    const std::string extension = entry.path().extension().string();
+    if (extension == ".glint" || extension == ".tmp") continue;  // of an earlier bench that was stopped
+    throw Error(ErrorCode::usage, "output.ours", path, "",
+                "exists and would be removed, but holds " + entry.path().filename().string() + ", which is no asset",
+                "name a folder with --assets");
+  }
+}
+
+AssetFolder::~AssetFolder() {
+  std::error_code ignored;
+  if (remove_) fs::remove_all(path_, ignored);
+}
+
+void runBench(Tool& tool, const BenchSettings& settings, BenchResults& results) {
+  std::vector<Candidate> candidates = benchCandidates(settings.quick);
+  std::erase_if(candidates, [&](const Candidate& c) { return !isWanted(settings, c); });
+  const bake::ProgressFn progress = tool.progress("cells");
+  const std::size_t total = settings.maps.size() * candidates.size();
+  std::size_t done = 0;
+  for (const std::string& path : settings.maps) {
+    BenchMap map(path, settings, tool.seed());
+    MapBench bench(tool, settings, map);
+    if (!results.hasMap(map.hash())) {
+      results.addMap(map.json());
+      results.setPlainLobe(Json(plainLobeTime(map.queries())));
+    }
+    for (const Candidate& candidate : candidates) {
+      if (!results.has(map.hash(), candidate.name())) {
+        results.add(bench.measure(candidate));
+        results.write(settings.output);
+      }
+      if (progress) progress(++done, total);
+    }
+  }
+  results.write(settings.output);
+}
+
+}  // namespace glint::apps

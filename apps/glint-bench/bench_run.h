@@ -1,0 +1,42 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/tool.h"
+#include "glint-bench/bench_results.h"
+
+namespace glint::apps {
+
+/// How to measure.
+struct BenchSettings {
+  std::vector<std::string> maps;  ///< assets of kind normals
+  std::vector<std::string> only;  ///< methods; empty: all
+  bool quick = false;
+  int places = 12;              ///< footprints of a set
+  double budget_s = 1.5;        ///< for the errors of a set
+  double longest_run_s = 0.05;  ///< of one of the five runs of a time
+  std::string assets;           ///< folder for the assets
+  std::string output;           ///< file of the results, which is written after every cell
+};
+
+/// The folder for the assets of a bench, which is made if it is missing.
+class AssetFolder {
+ public:
+  /// @param remove  remove the folder, with all that it holds, at the end of the scope; then it must be new, or one that an earlier
+  ///                bench left
+  /// @throws Error io
+  AssetFolder(const std::string& path, bool remove);
+  AssetFolder(const AssetFolder&) = delete;
+  AssetFolder& operator=(const AssetFolder&) = delete;
+  ~AssetFolder();
+
+ private:
+  std::string path_;
+  bool remove_;
+};
+
+/// Measures every cell that the results do not have.
+void runBench(Tool& tool, const BenchSettings& settings, BenchResults& results);
+
+}  // namespace glint::apps

@@ -1,0 +1,98 @@
+#include "glint-bench/child_process.h"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+
+#include "glint/model/error.h"
+
+extern char** environ;
+
+namespace glint::apps {
+namespace {
+
+/// The two ends of a pipe, closed at the end of the scope.
+struct Pipe {
+  int read = -1, write = -1;
+  Pipe() {
+    std::array<int, 2> ends{};
+    if (::pipe2(ends.data(), O_CLOEXEC) != 0)
+      throw Error(ErrorCode::failed, "bench.process", "", "", std::string("no pipe can be made: ") + std::strerror(errno));
+    read = ends[0], write = ends[1];
+  }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+  ~Pipe() {
+    closeWrite();
+    ::close(read);
+  }
+  void closeWrite() {
+    if (write >= 0) ::close(write);
+    write = -1;
+  }
+};
+
+/// Reads to the end; keeps the last line.
+std::string lastLine(int file) {
+  std::string text;
+  std::array<char, 4096> piece{};
+  for (;;) {
+    const ssize_t count = ::read(file, piece.data(), piece.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) break;
+    text.append(piece.data(), static_cast<std::size_t>(count));
+    constexpr std::size_t kMost = 1 << 16;
+    if (text.size() > kMost) text.erase(0, text.size() - kMost);
+  }
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  const std::size_t line = text.rfind('\n');
+  return line == std::string::npos ? text : text.substr(line + 1);
+}
+
+double seconds(const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); }
+
+}  // namespace
+
+ChildRun runProgram(const std::vector<std::string>& words) {
+  const std::string folder = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
+  const std::string program = folder + "/" + words.front();
+  std::vector<char*> argv;
+  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.push_back(nullptr);
+  Pipe errors;
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, errors.write, STDERR_FILENO);
+  const auto start = std::chrono::steady_clock::now();
+  pid_t child = 0;
+  const int failure = ::posix_spawn(&child, program.c_str(), &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (failure != 0) {
+    throw Error(ErrorCode::failed, "bench.process", program, "", std::string("cannot be started: ") + std::strerror(failure),
+                "install the whole package: programs of one folder call each other");
+  }
+  errors.closeWrite();
+  ChildRun run;
+  run.message = lastLine(errors.read);
+  int status = 0;
+  rusage usage{};
+  while (::wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
+  }
+  run.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  run.exit_code = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+  run.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+  run.peak_bytes = std::int64_t{usage.ru_maxrss} * 1024;
+  return run;
+}
+
+}  // namespace glint::apps

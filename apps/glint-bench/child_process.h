@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace glint::apps {
+
+/// A program that ran to its end.
+struct ChildRun {
+  int exit_code = 0;  ///< as a shell has it: 128 + n after signal n
+  double wall_s = 0;
+  double cpu_s = 0;
+  std::int64_t peak_bytes = 0;  ///< largest resident memory
+  std::string message;          ///< last line that it wrote to stderr
+};
+
+/// Runs a program of this package, with nothing on stdin and stdout, and waits for it.
+/// @param words  name of the program, without folder, and its arguments
+/// @throws Error failed if the program cannot be started
+ChildRun runProgram(const std::vector<std::string>& words);
+
+}  // namespace glint::apps

@@ -1,0 +1,290 @@
+"use strict";
+// The page of glint-bench. `results` is the document that glint-bench writes.
+const results = JSON.parse(document.getElementById("results").textContent);
+const element = (id) => document.getElementById(id);
+const state = { map: 0, shape: "round", size: null, metric: "seen", candidate: null, view: "method" };
+
+const METRICS = {
+  seen: "seen error", seen_worst: "seen error, worst half vector", bias: "bias, worst half vector", rel_l2: "relative L2 distance",
+  tv: "total variation", energy: "energy too much or too little",
+};
+const WITHIN = [0.01, 0.05, 0.1, 0.2];
+const SMALLEST = 1e-3, LARGEST = 10; // errors beyond are drawn there: a log axis has no 0, and beyond 1000 % nothing is right
+const inChart = (error) => Math.min(LARGEST, Math.max(SMALLEST, error));
+const PIXELS = 64; // of an image along each axis
+
+// Cells and figures
+
+const theMap = () => results.maps[state.map];
+const cells = () => results.cells.filter((cell) => cell.map === theMap().hash);
+const measured = () => cells().filter((cell) => cell.status === "ok");
+const isTruth = (cell) => cell.errors.length === 0;
+const setOf = (cell, shape, size) => cell.errors.find((set) => set.shape === shape && set.sigma_texels === size);
+const errorOf = (cell, metric, shape, size) => {
+  const set = setOf(cell, shape, size);
+  return set ? Math.abs(set[metric]) : null;
+};
+/** Nanoseconds of a density of round footprints of a size. */
+const timeAt = (cell, size) => cell.times.density.sizes.find((time) => time.sigma_texels === size)?.ns ?? cell.times.density.cold.ns;
+const COSTS = {
+  time: { of: (cell) => timeAt(cell, state.size), label: "ns a density" },
+  bytes: { of: (cell) => cell.file_bytes, label: "bytes" },
+  prepare: { of: (cell) => cell.prepare.total_s, label: "seconds to prepare" },
+};
+const sizesOf = (shape) => [...new Set(measured().flatMap((cell) => cell.errors.filter((set) => set.shape === shape).map((set) => set.sigma_texels)))].sort((a, b) => a - b);
+
+// Words
+
+const percent = (x) => (x == null ? "" : x > LARGEST ? "> 1000 %" : x < 0.0005 ? "< 0.1 %" : `${(100 * x).toPrecision(x < 0.1 ? 2 : 3)} %`);
+const bytesText = (x) => (x >= 1e6 ? `${(x / 1e6).toPrecision(3)} MB` : `${(x / 1e3).toPrecision(3)} kB`);
+const secondsText = (x) => `${x.toPrecision(3)} s`;
+const nsText = (x) => (x >= 1e6 ? `${(x / 1e6).toPrecision(3)} ms` : x >= 1e3 ? `${(x / 1e3).toPrecision(3)} µs` : `${x.toPrecision(3)} ns`);
+
+function node(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+}
+
+function fill(select, options, chosen) {
+  select.replaceChildren(...options.map(([value, text]) => {
+    const option = node("option", { value }, text);
+    option.selected = String(value) === String(chosen);
+    return option;
+  }));
+}
+
+// Charts
+
+/** Points that no other point beats in cost and in error, by cost. */
+function paretoFront(points) {
+  let least = Infinity;
+  return [...points].sort((a, b) => a.cost - b.cost || a.shown - b.shown).filter((point) => {
+    const better = point.shown < least;
+    if (better) least = point.shown;
+    return better;
+  });
+}
+
+const methodColors = () => ({ domain: [...new Set(results.cells.map((cell) => cell.method))], scheme: "tableau10" });
+const chartWidth = () => Math.min(620, element("charts").clientWidth);
+const errorAxis = () => ({ type: "log", domain: [SMALLEST, LARGEST], label: `↓ ${METRICS[state.metric]}`, tickFormat: (x) => (x >= 0.01 ? `${+(100 * x).toPrecision(2)} %` : `${+(100 * x).toPrecision(1)} %`), grid: true });
+
+function drawCost(id) {
+  const { of, label } = COSTS[id];
+  const points = measured().filter((cell) => !isTruth(cell)).map((cell) => ({ cell, cost: of(cell), error: errorOf(cell, state.metric, state.shape, state.size) }))
+    .filter((point) => point.error != null && point.cost > 0).map((point) => ({ ...point, shown: inChart(point.error) }));
+  const truth = measured().filter((cell) => isTruth(cell) && of(cell) > 0);
+  const asked = (point) => (setOf(point.cell, state.shape, state.size).as_asked ? "" : "\nanswers a footprint of the same second moments");
+  const chart = Plot.plot({
+    width: chartWidth(), height: 340, marginLeft: 56, marginRight: 20, marginBottom: 42,
+    style: { background: "transparent", fontSize: "12px" },
+    color: methodColors(),
+    x: { type: "log", label: `← ${label}`, grid: true, tickFormat: "~s", nice: true },
+    y: errorAxis(),
+    marks: [
+      Plot.ruleX(truth, { x: of, stroke: "currentColor", strokeDasharray: "3,3", strokeOpacity: 0.6 }),
+      Plot.text(truth, { x: of, frameAnchor: "top-right", text: () => "brute force", rotate: -90, dx: -8, dy: 4, textAnchor: "end", fillOpacity: 0.7 }),
+      Plot.line(paretoFront(points), { x: "cost", y: "shown", stroke: "currentColor", strokeOpacity: 0.35, strokeWidth: 1.5 }),
+      Plot.dot(points, { x: "cost", y: "shown", fill: (point) => point.cell.method, r: 5, stroke: "var(--paper)" }),
+      Plot.text(points, { x: "cost", y: "shown", text: (point) => point.cell.setting, dy: -10, fontSize: 10, fillOpacity: 0.75 }),
+      Plot.tip(points, Plot.pointer({ x: "cost", y: "shown", fill: "var(--paper)",
+        title: (point) => `${point.cell.name}\n${percent(point.error)} · ${nsText(COSTS.time.of(point.cell))} · ${bytesText(point.cell.file_bytes)} · ${secondsText(point.cell.prepare.total_s)}\n${point.cell.command}${asked(point)}` })),
+    ],
+  });
+  element(id).replaceChildren(Plot.legend({ color: methodColors(), style: { background: "transparent" } }), chart);
+}
+
+function drawSizes() {
+  const points = measured().flatMap((cell) => cell.errors.filter((set) => set.shape === state.shape)
+    .map((set) => ({ cell, size: set.sigma_texels, error: Math.abs(set[state.metric]), shown: inChart(Math.abs(set[state.metric])) })));
+  const chart = Plot.plot({
+    width: chartWidth(), height: 340, marginLeft: 56, marginRight: 20, marginBottom: 42,
+    style: { background: "transparent", fontSize: "12px" },
+    color: methodColors(),
+    x: { type: "log", base: 2, label: "deviation of the footprint, texels →", tickFormat: "d", grid: true },
+    y: errorAxis(),
+    marks: [
+      Plot.line(points, { x: "size", y: "shown", z: (point) => point.cell.name, stroke: (point) => point.cell.method }),
+      Plot.dot(points, { x: "size", y: "shown", fill: (point) => point.cell.method, r: 3 }),
+      Plot.tip(points, Plot.pointer({ x: "size", y: "shown", fill: "var(--paper)", title: (point) => `${point.cell.name}\n${percent(point.error)} at ${point.size} texels` })),
+    ],
+  });
+  element("sizes").replaceChildren(Plot.legend({ color: methodColors(), style: { background: "transparent" } }), chart);
+}
+
+/** A chart as an SVG document of its own, with colours instead of the page's variables. */
+function svgText(id) {
+  const copy = element(id).querySelector("figure > svg, :scope > svg:last-of-type").cloneNode(true);
+  copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
+  copy.style.background = "white";
+  copy.style.color = "#24211b";
+  return new XMLSerializer().serializeToString(copy).replaceAll("var(--paper)", "white");
+}
+
+function save(name, blob) {
+  const link = node("a", { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+function savePng(id) {
+  const picture = new Image();
+  picture.onload = () => {
+    const canvas = node("canvas", { width: 2 * picture.width, height: 2 * picture.height });
+    const context = canvas.getContext("2d");
+    context.scale(2, 2);
+    context.drawImage(picture, 0, 0);
+    canvas.toBlob((blob) => save(`${id}.png`, blob));
+  };
+  picture.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svgText(id))}`;
+}
+
+// Tables
+
+function drawCheapest() {
+  const head = node("tr", {}, node("th", {}, "footprint"), ...WITHIN.map((most) => node("th", {}, `within ${100 * most} %`)));
+  const rows = sizesOf("round").map((size) => {
+    const row = node("tr", size === state.size ? { class: "chosen" } : {}, node("th", {}, `${size} texels`));
+    for (const most of WITHIN) {
+      const able = measured().filter((cell) => isTruth(cell) || errorOf(cell, "seen", "round", size) <= most);
+      // One that is no more than a tenth quicker than a simpler one, which comes before it, counts as equal.
+      const best = able.reduce((least, cell) => (least == null || timeAt(cell, size) < 0.9 * timeAt(least, size) ? cell : least), null);
+      row.append(node("td", {}, best ? `${best.name}, ${nsText(timeAt(best, size))}, ${bytesText(best.file_bytes)}` : "none"));
+    }
+    return row;
+  });
+  element("cheapest").replaceChildren(head, ...rows);
+}
+
+function drawFigures() {
+  const columns = ["method", "prepare", "memory", "file", "density", "warm", "in a batch", "mean", "sample", `${METRICS[state.metric]}`, "command"];
+  const head = node("tr", {}, ...columns.map((text, k) => node("th", k > 0 && k < 10 ? { class: "number" } : {}, text)));
+  const rows = cells().map((cell) => {
+    if (cell.status !== "ok") return node("tr", {}, node("th", {}, cell.name), node("td", { colspan: 10 }, cell.message || cell.status));
+    const t = cell.times;
+    const figures = [secondsText(cell.prepare.total_s), bytesText(cell.prepare.peak_bytes), bytesText(cell.file_bytes), nsText(t.density.cold.ns), nsText(t.density.warm.ns),
+      nsText(t.density.batch.ns), nsText(t.mean.cold.ns), nsText(t.sample.cold.ns), isTruth(cell) ? "the truth" : percent(errorOf(cell, state.metric, state.shape, state.size))];
+    return node("tr", {}, node("th", {}, cell.name), ...figures.map((text) => node("td", { class: "number" }, text)), node("td", {}, node("code", {}, cell.command)));
+  });
+  element("figures").replaceChildren(head, ...rows);
+}
+
+// Images
+
+const truthImage = () => theMap().truth.find((image) => image.sigma_texels === state.size)?.image;
+const methodImage = (cell) => cell.images.find((image) => image.sigma_texels === state.size)?.image;
+const toSrgb = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
+
+/** Draws densities, bottom row first, or their difference from the truth. */
+function paint(canvas, image, truth, view, exposure, zoom) {
+  const context = canvas.getContext("2d");
+  const pixels = Math.max(2, Math.round(PIXELS / zoom));
+  const first = (PIXELS - pixels) >> 1;
+  const data = new ImageData(pixels, pixels);
+  const white = d3.max(truth) / 2 ** exposure;
+  for (let j = 0; j < pixels; ++j) {
+    for (let i = 0; i < pixels; ++i) {
+      const from = (PIXELS - 1 - first - j) * PIXELS + first + i, to = 4 * (j * pixels + i);
+      let color;
+      if (view === "error") {
+        const e = (image[from] - truth[from]) / white, bright = toSrgb(Math.min(1, Math.abs(e)));
+        color = e > 0 ? [bright, 0.6 * bright, 0.1 * bright] : [0.15 * bright, 0.5 * bright, bright];
+      } else {
+        const value = toSrgb(Math.min(1, (view === "truth" ? truth[from] : image[from]) / white));
+        color = [value, value, value];
+      }
+      data.data.set([...color.map((c) => Math.round(255 * c)), 255], to);
+    }
+  }
+  const small = new OffscreenCanvas(pixels, pixels);
+  small.getContext("2d").putImageData(data, 0, 0);
+  context.imageSmoothingEnabled = false;
+  context.clearRect(0, 0, canvas.width, canvas.height);
+  context.drawImage(small, 0, 0, canvas.width, canvas.height);
+}
+
+const drawn = () => measured().filter((cell) => !isTruth(cell));
+const chosenCell = () => drawn().find((cell) => cell.name === state.candidate) || drawn()[0];
+
+function drawPicture(view = state.view) {
+  const cell = chosenCell(), truth = truthImage();
+  if (!cell || !truth) return;
+  paint(element("picture"), methodImage(cell), truth, view, Number(element("exposure").value), Number(element("zoom").value));
+  const set = setOf(cell, "round", state.size);
+  element("caption").textContent = `${view === "truth" ? "Truth" : cell.name}: footprint of ${state.size} texels; seen error ${percent(set.seen)}, ` +
+    `relative L2 ${percent(set.rel_l2)} over ${set.places} places.`;
+}
+
+function drawStrip() {
+  const truth = truthImage();
+  element("strip").replaceChildren(...drawn().map((cell) => {
+    const canvas = node("canvas", { width: 64, height: 64 });
+    if (truth) paint(canvas, methodImage(cell), truth, "method", Number(element("exposure").value), Number(element("zoom").value));
+    const button = node("button", { "aria-pressed": String(cell === chosenCell()) }, canvas, cell.name);
+    button.addEventListener("click", () => { state.candidate = cell.name; drawImages(); });
+    return button;
+  }));
+}
+
+function drawImages() {
+  fill(element("candidate"), drawn().map((cell) => [cell.name, cell.name]), chosenCell()?.name);
+  drawPicture();
+  drawStrip();
+}
+
+// The page
+
+function chooseSize() {
+  const sizes = sizesOf(state.shape);
+  if (!sizes.includes(state.size)) state.size = sizes[sizes.length >> 1] ?? null;
+  fill(element("size"), sizes.map((size) => [size, `${size} texels`]), state.size);
+}
+
+function draw() {
+  chooseSize();
+  for (const id of Object.keys(COSTS)) drawCost(id);
+  drawSizes();
+  drawCheapest();
+  drawFigures();
+  drawImages();
+}
+
+function start() {
+  const { machine } = results;
+  element("about").textContent = `${results.cells.length} measurements of ${results.maps.length} map${results.maps.length > 1 ? "s" : ""}, by ${results.generator}. ` +
+    "Errors are against brute force over all texels.";
+  element("machine").textContent = `${machine.processor}, ${machine.cores} cores, ${machine.system}; a plain microfacet lobe takes ${nsText(results.plain_lobe?.ns ?? NaN)} here. ` +
+    `Seed ${results.seed}, ${results.places} places for each error. Densities are asked anywhere on the map, so that most miss the caches.`;
+  fill(element("map"), results.maps.map((map, k) => [k, `${map.name} (${map.width} x ${map.height})`]), 0);
+  fill(element("shape"), [["round", "round"], ["stretched", "stretched, 8 to 1"], ["box", "square, turned"]], state.shape);
+  fill(element("metric"), Object.entries(METRICS), state.metric);
+  const on = (id, event, act) => element(id).addEventListener(event, (e) => act(e.target.value));
+  on("map", "change", (value) => { state.map = Number(value); draw(); });
+  on("shape", "change", (value) => { state.shape = value; draw(); });
+  on("size", "change", (value) => { state.size = Number(value); draw(); });
+  on("metric", "change", (value) => { state.metric = value; draw(); });
+  on("candidate", "change", (value) => { state.candidate = value; drawImages(); });
+  on("exposure", "input", drawImages);
+  on("zoom", "input", drawImages);
+  for (const radio of document.querySelectorAll("input[name=view]"))
+    radio.addEventListener("change", () => { state.view = radio.value; drawPicture(); });
+  const picture = element("picture");
+  picture.addEventListener("pointerdown", () => drawPicture("truth"));
+  for (const event of ["pointerup", "pointerleave"]) picture.addEventListener(event, () => drawPicture());
+  document.addEventListener("keydown", (event) => {
+    if (event.target.matches("select, input[type=range]")) return;
+    const view = { 1: "truth", 2: "method", 3: "error" }[event.key], zoom = { "+": 1, "-": -1 }[event.key];
+    if (view) document.querySelector(`input[name=view][value=${view}]`).click();
+    if (zoom) { element("zoom").value = Number(element("zoom").value) + zoom; drawImages(); }
+  });
+  for (const button of document.querySelectorAll("[data-save]"))
+    button.addEventListener("click", () => save(`${button.dataset.save}.svg`, new Blob([svgText(button.dataset.save)], { type: "image/svg+xml" })));
+  for (const button of document.querySelectorAll("[data-save-png]")) button.addEventListener("click", () => savePng(button.dataset.savePng));
+  let width = chartWidth();
+  addEventListener("resize", () => { if (chartWidth() !== width) { width = chartWidth(); draw(); } });
+  draw();
+}
+
+start();

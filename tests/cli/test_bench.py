@@ -1,0 +1,206 @@
+"""glint-bench: its results, going on after a stop, and its page in a browser without a window."""
+
+import json
+import pathlib
+import re
+import shutil
+import subprocess
+import time
+
+import jsonschema
+import pytest
+from conftest import BIN
+
+ROOT = pathlib.Path(__file__).parents[2]
+SCHEMA = json.loads((ROOT / "docs/json/files/bench-results.schema.json").read_text())
+SIZE = 64
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """A folder with a map, results of all methods, and their page."""
+    folder = tmp_path_factory.mktemp("bench")
+    for command in (f"synth flakes --size {SIZE} --flake-size 4 -o map.exr", "ingest map.exr -o map.glint", "bench map.glint -o results.json --quick",
+                    "bench --report results.json -o report.html"):
+        tool, *words = command.split()
+        process = subprocess.run([BIN / f"glint-{tool}", *words], cwd=folder, capture_output=True, text=True, timeout=250)
+        assert process.returncode == 0, process.stderr
+        if command.startswith("bench map"):
+            (folder / "printed.txt").write_text(process.stdout)
+    return folder
+
+
+@pytest.fixture
+def results(measured):
+    return json.loads((measured / "results.json").read_text())
+
+
+@pytest.fixture
+def copied(glint, measured):
+    for name in ("map.glint", "results.json"):
+        shutil.copy(measured / name, glint.folder)
+    return glint.folder
+
+
+def test_results_are_as_described(results):
+    jsonschema.Draft202012Validator(SCHEMA).validate(results)
+    assert [cell["name"] for cell in results["cells"] if cell["status"] != "ok"] == []
+    assert {cell["method"] for cell in results["cells"]} == {"brute force", "moments", "bin map", "histograms", "pyramid", "tucker"}
+
+
+def test_errors_are_those_of_the_methods(results):
+    errors = {cell["method"]: {set_["sigma_texels"]: set_ for set_ in cell["errors"] if set_["shape"] == "round"} for cell in results["cells"]}
+    widest = SIZE / 8
+    assert errors["brute force"] == {}
+    assert errors["pyramid"][widest]["rel_l2"] < 0.1 < errors["moments"][widest]["rel_l2"]
+    assert errors["pyramid"][widest]["seen"] <= errors["tucker"][widest]["seen"] + 0.02
+    # A bin map is asked for Gaussians and answers boxes, and is right where it is asked for boxes.
+    bins = {set_["shape"]: set_ for cell in results["cells"] if cell["method"] == "bin map" for set_ in cell["errors"]}
+    assert bins["box"]["as_asked"] and not bins["round"]["as_asked"]
+    assert bins["box"]["rel_l2"] < 0.05 < bins["round"]["rel_l2"]
+
+
+def test_images_are_of_the_footprints(results):
+    truth = results["maps"][0]["truth"]
+    for cell in results["cells"]:
+        for mine, right in zip(cell["images"], truth):
+            assert mine["sigma_texels"] == right["sigma_texels"]
+            assert sum(mine["image"]) * 4 / 64**2 == pytest.approx(1, abs=0.03)
+
+
+def test_summary_names_the_quickest_method(measured):
+    text = (measured / "printed.txt").read_text()
+    assert re.search(r"pyramid, stride 32 +[\d.]+ s +[\d.]+ MB +[\d.]+ to +[\d.]+ us", text)
+    assert "The quickest within" in text and re.search(r"8 texels .*(pyramid|brute force)", text)
+    assert not list(measured.glob("*.assets"))
+
+
+def test_cells_that_are_there_are_not_measured_again(glint, copied):
+    document = json.loads((copied / "results.json").read_text())
+    kept = document["cells"][:3]
+    (copied / "results.json").write_text(json.dumps(document | {"cells": kept}, separators=(",", ":")))
+    process = glint("bench", "map.glint", "-o", "results.json", "--quick", "--only", "moments,histograms,bin map")
+    assert process.returncode == 0, process.stderr
+    after = json.loads((copied / "results.json").read_text())["cells"]
+    assert after[:3] == kept and [cell["method"] for cell in after[3:]] == ["histograms"]
+
+
+def test_a_stopped_run_leaves_whole_results(glint, copied):
+    (copied / "results.json").unlink()
+    process = subprocess.Popen([BIN / "glint-bench", "map.glint", "-o", "results.json", "--quick"], cwd=copied, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    for _ in range(1000):
+        time.sleep(0.02)
+        if (copied / "results.json").exists():
+            break
+    process.terminate()
+    process.wait(timeout=30)
+    document = json.loads((copied / "results.json").read_text())
+    jsonschema.Draft202012Validator(SCHEMA).validate(document)
+    process = glint("bench", "map.glint", "-o", "results.json", "--quick", "--only", "moments")
+    assert process.returncode == 0, process.stderr
+
+
+def test_a_method_that_fails_says_so_and_the_rest_goes_on(glint, copied):
+    """A map of one texel is too small for nothing but what it shows: its cells are there, failed or not."""
+    for command in ("synth flat --size 8 -o one.exr", "ingest one.exr -o one.glint --allow-constant"):
+        assert glint(*command.split()).returncode == 0
+    process = glint("bench", "one.glint", "-o", "one.json", "--quick")
+    assert process.returncode == 0, process.stderr
+    document = json.loads((copied / "one.json").read_text())
+    jsonschema.Draft202012Validator(SCHEMA).validate(document)
+    assert len(document["cells"]) == 6
+
+
+def refused(glint, code, *words):
+    process = glint("bench", *words)
+    assert process.returncode == code, process.stderr
+    return process.stderr
+
+
+def test_bad_input_is_named(glint, copied):
+    before = (copied / "results.json").read_bytes()
+    assert "nothing to measure" in refused(glint, 1, "-o", "x.json")
+    assert "exclude" in refused(glint, 1, "map.glint", "--report", "results.json", "-o", "x.html")
+    assert "no method" in refused(glint, 1, "map.glint", "-o", "x.json", "--only", "magic")
+    assert "seed" in refused(glint, 1, "map.glint", "-o", "results.json", "--quick", "--seed", "9")
+    assert "places" in refused(glint, 1, "map.glint", "-o", "results.json", "--quick", "--places", "9")
+    (copied / "half.json").write_bytes(before[: len(before) // 2])
+    assert "not whole" in refused(glint, 3, "map.glint", "-o", "half.json", "--quick")
+    assert "not whole" in refused(glint, 3, "--report", "half.json", "-o", "x.html")
+    (copied / "other.json").write_text('{"schema":"glint-bench results 0"}')
+    assert "not of the form" in refused(glint, 3, "--report", "other.json", "-o", "x.html")
+    (copied / "lacking.json").write_text('{"schema":"glint-bench results 1","cells":[7]}')
+    assert "lacks" in refused(glint, 3, "--report", "lacking.json", "-o", "x.html")
+    (copied / "mine.json").write_text('{"mine": 1}')
+    assert "--force" in refused(glint, 1, "map.glint", "-o", "mine.json", "--quick")
+    glint("synth", "flat", "--height", "--size", "16", "-o", "h.exr")
+    glint("ingest", "h.exr", "--kind", "height", "--to", "heights", "--allow-constant", "-o", "h.glint")
+    assert "heights" in refused(glint, 5, "h.glint", "-o", "x.json", "--quick")
+    assert (copied / "results.json").read_bytes() == before
+    assert not (copied / "x.json").exists() and not (copied / "x.html").exists()
+
+
+def test_other_files_beside_the_results_are_not_removed(glint, copied):
+    (copied / "x.json.assets").mkdir()
+    (copied / "x.json.assets/notes.txt").write_text("mine")
+    assert "notes.txt" in refused(glint, 1, "map.glint", "-o", "x.json", "--quick")
+    assert (copied / "x.json.assets/notes.txt").read_text() == "mine"
+
+
+# The page, in Chromium where it is installed
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+ACT = """<script>
+const shown = {};
+const note = (name) => { shown[name] = [...document.querySelectorAll("#time > svg, #bytes > svg, #prepare > svg, #sizes > svg")].map((svg) => svg.querySelectorAll("circle").length); };
+const change = (id, value) => { const select = document.getElementById(id); select.value = value; select.dispatchEvent(new Event("change")); };
+const picture = () => document.getElementById("picture").toDataURL();
+setTimeout(() => {
+  note("round");
+  const method = picture();
+  document.querySelector("input[name=view][value=truth]").click();
+  const truth = picture();
+  document.querySelector("input[name=view][value=error]").click();
+  const error = picture();
+  shown.pictures = new Set([method, truth, error]).size;
+  change("shape", "box");
+  change("metric", "tv");
+  note("box");
+  shown.cheapest = document.querySelectorAll("#cheapest tr").length;
+  shown.figures = document.querySelectorAll("#figures tr").length;
+  shown.strip = document.querySelectorAll("#strip canvas").length;
+  shown.wide = document.documentElement.scrollWidth <= innerWidth;
+  document.body.dataset.shown = JSON.stringify(shown);
+}, 300);
+</script>"""
+
+
+def browse(folder, page, width, *flags):
+    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--enable-logging=stderr", f"--window-size={width},1400",
+               "--virtual-time-budget=4000", f"--user-data-dir={folder / 'profile'}", *flags, f"file://{page}"]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+@pytest.mark.parametrize("width", [1280, 500])
+def test_the_page_draws_and_its_choices_work(measured, tmp_path, width):
+    page = tmp_path / "page.html"
+    page.write_text((measured / "report.html").read_text().replace("</body>", ACT + "</body>"))
+    process = browse(tmp_path, page, width, "--dump-dom")
+    assert "Uncaught" not in process.stderr and ":CONSOLE" not in process.stderr, process.stderr
+    found = re.search(r'data-shown="([^"]*)"', process.stdout)
+    assert found, process.stderr[-2000:]
+    shown = json.loads(found.group(1).replace("&quot;", '"'))
+    methods = 5  # all but brute force
+    assert shown["round"][:3] == [methods] * 3 and shown["round"][3] >= 2 * methods
+    assert shown["box"][:3] == [methods] * 3
+    assert shown["pictures"] == 3
+    assert shown["figures"] == 1 + methods + 1 and shown["strip"] == methods and shown["cheapest"] >= 3
+    assert shown["wide"], "the page is wider than the window"
+
+
+def test_the_page_asks_no_network(measured):
+    page = (measured / "report.html").read_text()
+    assert not re.findall(r'<(?:script|link|img|iframe)[^>]+(?:src|href)=', page)
+    assert "fetch(" not in (ROOT / "apps/glint-bench/page/report.js").read_text()
+    assert "Permission to use, copy, modify" in page  # the licences of the libraries inside
