@@ -119,23 +119,6 @@ void checkReplaceable(const std::string& path, const fs::path& target, OutputFor
   }
 }
 
-/// Checks that no other file of this run has the name of an output. Several outputs may be one stream.
-void checkApart(const Tool& tool, const std::string& path, std::size_t others) {
-  if (formats::findOutput(path).kind == formats::OutputTarget::Kind::stream) return;
-  const std::vector<std::string> inputs = tool.readPaths();
-  const bool is_input =
-      std::any_of(inputs.begin(), inputs.end(), [&](const std::string& input) { return isSameFile(path, input); });
-  if (is_input && !tool.force()) {
-    throw Error(ErrorCode::usage, "output.not_input", path, "", "the output is one of the inputs",
-                "name another file, or replace the input with --force");
-  }
-  for (std::size_t k = 0; k < others; ++k) {
-    if (isSameFile(path, tool.outputPaths()[k]))
-      throw Error(ErrorCode::usage, "output.apart", path, "", "two outputs have this name",
-                  "name another file for one of them");
-  }
-}
-
 [[noreturn]] void refuseInDepfile(const std::string& name, const std::string& what) {
   throw Error(ErrorCode::usage, "depfile.name", name, "", "a name with " + what + " cannot stand in a depfile",
               "rename the file or leave out --depfile");
@@ -257,6 +240,22 @@ void checkReadable(const std::string& path) {
   if (::stat(path.c_str(), &info) != 0) throwIo("input.exists", path, systemError(), "check the name of the input");
   if (S_ISDIR(info.st_mode)) throwIo("input.regular", path, "is a folder", "name a file in it");
   if (::access(path.c_str(), R_OK) != 0) throwIo("file.readable", path, systemError(), "check its permissions");
+}
+
+void checkApart(const Tool& tool, const std::string& path, std::size_t others) {
+  if (formats::findOutput(path).kind == formats::OutputTarget::Kind::stream) return;
+  const std::vector<std::string> inputs = tool.readPaths();
+  const bool is_input =
+      std::any_of(inputs.begin(), inputs.end(), [&](const std::string& input) { return isSameFile(path, input); });
+  if (is_input && !tool.force()) {
+    throw Error(ErrorCode::usage, "output.not_input", path, "", "the output is one of the inputs",
+                "name another file, or replace the input with --force");
+  }
+  for (std::size_t k = 0; k < others; ++k) {
+    if (isSameFile(path, tool.outputPaths()[k]))
+      throw Error(ErrorCode::usage, "output.apart", path, "", "two outputs have this name",
+                  "name another file for one of them");
+  }
 }
 
 void checkOutput(Tool& tool, const std::string& path, OutputFormat format) {

@@ -51,6 +51,12 @@ enum class OutputFormat : unsigned char {
 /// @throws Error io, usage
 void checkOutput(Tool& tool, const std::string& path, OutputFormat format);
 
+/// Checks that an output is no other output of the run so far, and no input unless --force is given. For outputs whose names are
+/// known only when the work has begun; checkOutput() does so for the others.
+/// @param others  outputs of tool.outputPaths() to compare with, from the first on
+/// @throws Error usage
+void checkApart(const Tool& tool, const std::string& path, std::size_t others);
+
 /// Mix-in: `-o OUTPUT` (required), written atomically and checked by checkOutput().
 class OutputFile {
  public:

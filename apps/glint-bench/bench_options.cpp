@@ -5,6 +5,7 @@
 
 #include "glint-bench/candidates.h"
 #include "glint/api/alternatives.h"
+#include "glint/formats/atomic_file.h"
 
 namespace glint::apps {
 namespace {
@@ -25,7 +26,7 @@ BenchOptions::BenchOptions(Tool& tool) : tool_(tool) {
   tool.option("--only", settings_.only, "methods to measure: " + methodList()).defaultText("all");
   tool.flag("--quick", settings_.quick, "one setting of each method, fewer places");
   places_option_ = &tool.option("--places", settings_.places, "footprints of each size and shape, for errors")
-                        .range(1, 1000)
+                        .range(1, 100)
                         .defaultText("12, with --quick 4");
   assets_option_ = &tool.option("--assets", settings_.assets, "folder in which the assets stay")
                         .defaultText("none: they are removed")
@@ -63,6 +64,10 @@ void BenchOptions::check() {
     if (!places_option_->given()) settings_.places = 4;
   }
   checkOutput(tool_, settings_.output, OutputFormat::results);
+  if (formats::findOutput(settings_.output).kind == formats::OutputTarget::Kind::stream) {
+    throw Error(ErrorCode::usage, "output.regular", settings_.output, "",
+                "is no file, and results are read and written many times", "name a file");
+  }
   tool_.addOutput(settings_.output);
   if (!assets_option_->given()) settings_.assets = settings_.output + ".assets";
 }

@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 #include <sys/utsname.h>
 
-#include <array>
+#include <algorithm>
 #include <fstream>
 #include <limits>
 #include <thread>
+#include <utility>
 
 #include "common/files.h"
+#include "glint-bench/candidates.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
@@ -37,31 +39,51 @@ Json machine() {
   throw Error(ErrorCode::invalid_input, "bench.results", path, "", what, "name another file, or start again with --force");
 }
 
+/// Reads all that the rest of the program reads of a measurement.
+/// @throws nlohmann::json::exception if it is not there
+void readMeasurement(const Json& m) {
+  for (const char* name : {"map", "name", "method", "setting", "command", "status"}) m.at(name).get<std::string>();
+  if (m.at("status") != "ok") return;
+  m.at("prepare").at("total_s").get<double>();
+  m.at("file_bytes").get<double>();
+  for (const Json& time : m.at("times").at("density").at("sizes")) {
+    time.at("sigma_texels").get<double>();
+    time.at("ns").get<double>();
+  }
+  for (const Json& set : m.at("errors")) {
+    set.at("shape").get<std::string>();
+    set.at("sigma_texels").get<double>();
+    set.at("seen").get<double>();
+  }
+}
+
 /// Whether a document has the members that the rest reads.
 bool isWhole(const Json& document) {
-  if (!document.is_object()) return false;
-  for (const char* name : {"generator", "machine", "seed", "places", "maps", "cells"})
-    if (!document.contains(name)) return false;
-  const auto named = [](const Json& list, std::initializer_list<const char*> names) {
-    if (!list.is_array()) return false;
-    for (const Json& item : list)
-      for (const char* name : names)
-        if (!item.is_object() || !item.contains(name) || !item[name].is_string()) return false;
+  try {
+    for (const char* name : {"generator", "machine", "seed", "places", "quick"}) (void)document.at(name);
+    for (const Json& map : document.at("maps")) {
+      for (const char* name : {"name", "hash"}) map.at(name).get<std::string>();
+      for (const char* name : {"width", "height"}) map.at(name).get<int>();
+      for (const Json& truth : map.at("truth")) truth.at("sigma_texels").get<double>();
+    }
+    for (const Json& measurement : document.at("measurements")) readMeasurement(measurement);
     return true;
-  };
-  return named(document["maps"], {"name", "hash"}) && named(document["cells"], {"map", "name", "method", "status"});
+  } catch (const Json::exception&) {
+    return false;
+  }
 }
 
 }  // namespace
 
-BenchResults::BenchResults(const std::string& generator, std::uint64_t seed, int places)
+BenchResults::BenchResults(const std::string& generator, std::uint64_t seed, int places, bool quick)
     : document_({{"schema", kSchema},
                  {"generator", generator},
                  {"machine", machine()},
                  {"seed", seed},
                  {"places", places},
+                 {"quick", quick},
                  {"maps", Json::array()},
-                 {"cells", Json::array()}}) {}
+                 {"measurements", Json::array()}}) {}
 
 BenchResults BenchResults::read(const std::string& path, const BenchResults* same) {
   const std::vector<std::byte> bytes = readFile(path);
@@ -73,7 +95,7 @@ BenchResults BenchResults::read(const std::string& path, const BenchResults* sam
     refuse(path, std::string("is not of the form \"") + kSchema + "\"");
   if (!isWhole(results.document_)) refuse(path, "lacks a part of a bench's results");
   if (same == nullptr) return results;
-  for (const char* name : {"generator", "machine", "seed", "places"}) {
+  for (const char* name : {"generator", "machine", "seed", "places", "quick"}) {
     if (results.document_[name] == same->document_[name]) continue;
     throw Error(ErrorCode::usage, "bench.results", path, "",
                 std::string("holds results of another ") + (std::string(name) == "generator" ? "version" : name) +
@@ -83,21 +105,26 @@ BenchResults BenchResults::read(const std::string& path, const BenchResults* sam
   return results;
 }
 
-const Json* BenchResults::find(const std::string& map_hash, const std::string& name) const {
-  for (const Json& cell : document_["cells"])
-    if (cell["map"] == map_hash && cell["name"] == name) return &cell;
-  return nullptr;
+bool BenchResults::has(const std::string& map_hash, const std::string& name) const {
+  const Json& all = document_["measurements"];
+  return std::any_of(all.begin(), all.end(), [&](const Json& measurement) {
+    return measurement["map"] == map_hash && measurement["name"] == name && measurement["status"] == "ok";
+  });
 }
 
-bool BenchResults::has(const std::string& map_hash, const std::string& name) const { return find(map_hash, name) != nullptr; }
-
-void BenchResults::add(Json cell) {
-  for (Json& other : document_["cells"]) {
-    if (other["map"] != cell["map"] || other["name"] != cell["name"]) continue;
-    other = std::move(cell);
-    return;
-  }
-  document_["cells"].push_back(std::move(cell));
+void BenchResults::add(Json measurement) {
+  Json& all = document_["measurements"];
+  std::erase_if(all.get_ref<Json::array_t&>(),
+                [&](const Json& other) { return other["map"] == measurement["map"] && other["name"] == measurement["name"]; });
+  all.push_back(std::move(measurement));
+  const std::vector<Candidate> candidates = benchCandidates(false);
+  const auto place = [&](const Json& m) {
+    const std::string name = m["name"];
+    const auto found = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& c) { return c.name() == name; });
+    return std::pair(m["map"].get<std::string>(), found - candidates.begin());
+  };
+  auto& list = all.get_ref<Json::array_t&>();
+  std::stable_sort(list.begin(), list.end(), [&](const Json& a, const Json& b) { return place(a) < place(b); });
 }
 
 bool BenchResults::hasMap(const std::string& hash) const {
@@ -110,21 +137,24 @@ void BenchResults::addMap(Json map) {
   if (!hasMap(map["hash"])) document_["maps"].push_back(std::move(map));
 }
 
-void BenchResults::write(const std::string& path) const { writeTextFile(path, document_.dump() + "\n"); }
+void BenchResults::write(const std::string& path) const {
+  // Names of files and messages may be no UTF-8.
+  writeTextFile(path, document_.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+}
 
 namespace {
 
-/// Cells of one map that were measured.
-std::vector<const Json*> measuredCells(const Json& document, const Json& map) {
-  std::vector<const Json*> cells;
-  for (const Json& cell : document["cells"])
-    if (cell["map"] == map["hash"] && cell["status"] == "ok") cells.push_back(&cell);
-  return cells;
+/// Measurements of one map that did not fail.
+std::vector<const Json*> finishedMeasurements(const Json& document, const Json& map) {
+  std::vector<const Json*> measurements;
+  for (const Json& measurement : document["measurements"])
+    if (measurement["map"] == map["hash"] && measurement["status"] == "ok") measurements.push_back(&measurement);
+  return measurements;
 }
 
 /// Nanoseconds of a density of round footprints of a size; infinite if it was not measured.
-double densityTime(const Json& cell, double sigma) {
-  for (const Json& time : cell["times"]["density"]["sizes"])
+double densityTime(const Json& measurement, double sigma) {
+  for (const Json& time : measurement["times"]["density"]["sizes"])
     if (time["sigma_texels"].get<double>() == sigma) return time["ns"].get<double>();
   return std::numeric_limits<double>::infinity();
 }
@@ -132,41 +162,42 @@ double densityTime(const Json& cell, double sigma) {
 std::string percentText(double error) { return error > 10 ? "> 1000" : fmt::format("{:.1f}", 100 * error); }
 
 /// Seen error of round footprints of a size; below 0 if there is none.
-double seenAt(const Json& cell, double sigma) {
-  for (const Json& set : cell["errors"])
+double seenAt(const Json& measurement, double sigma) {
+  for (const Json& set : measurement["errors"])
     if (set["shape"] == "round" && set["sigma_texels"].get<double>() == sigma) return set["seen"].get<double>();
   return -1;
 }
 
-std::string cellLine(const Json& cell) {
+std::string measurementLine(const Json& measurement) {
   double low = 1e30, high = -1;
-  for (const Json& set : cell["errors"]) {
+  for (const Json& set : measurement["errors"]) {
     if (set["shape"] != "round") continue;
     low = std::min(low, set["seen"].get<double>());
     high = std::max(high, set["seen"].get<double>());
   }
   const std::string seen = high < 0 ? "the truth" : percentText(low) + " to " + percentText(high) + " %";
   double quickest = std::numeric_limits<double>::infinity(), slowest = 0;
-  for (const Json& time : cell["times"]["density"]["sizes"]) {
+  for (const Json& time : measurement["times"]["density"]["sizes"]) {
     quickest = std::min(quickest, time["ns"].get<double>());
     slowest = std::max(slowest, time["ns"].get<double>());
   }
-  return fmt::format("  {:<34} {:>8.2f} s {:>9.2f} MB {:>8.2f} to {:>9.2f} us   {}\n", cell["name"].get<std::string>(),
-                     cell["prepare"]["total_s"].get<double>(), 1e-6 * cell["file_bytes"].get<double>(), 1e-3 * quickest,
-                     1e-3 * slowest, seen);
+  return fmt::format("  {:<34} {:>8.2f} s {:>9.2f} MB {:>8.2f} to {:>9.2f} us   {}\n", measurement["name"].get<std::string>(),
+                     measurement["prepare"]["total_s"].get<double>(), 1e-6 * measurement["file_bytes"].get<double>(),
+                     1e-3 * quickest, 1e-3 * slowest, seen);
 }
 
 /// The quickest method within each of some errors, for one size of footprints. One that is no more than a tenth quicker than a
 /// simpler one counts as equal.
-std::string cheapestLine(const std::vector<const Json*>& cells, double sigma) {
+std::string cheapestLine(const std::vector<const Json*>& measurements, double sigma) {
   constexpr double kClearly = 0.9;
   std::string line = fmt::format("  {:>5.0f} texels ", sigma);
   for (const double most : {0.01, 0.05, 0.1, 0.2}) {
     const Json* best = nullptr;
-    for (const Json* cell : cells) {
-      const double seen = seenAt(*cell, sigma);
-      const bool within = cell->at("errors").empty() || (seen >= 0 && seen <= most);
-      if (within && (best == nullptr || densityTime(*cell, sigma) < kClearly * densityTime(*best, sigma))) best = cell;
+    for (const Json* measurement : measurements) {
+      const double seen = seenAt(*measurement, sigma);
+      const bool within = measurement->at("errors").empty() || (seen >= 0 && seen <= most);
+      if (within && (best == nullptr || densityTime(*measurement, sigma) < kClearly * densityTime(*best, sigma)))
+        best = measurement;
     }
     line += fmt::format(" {:>25}", best == nullptr ? "none" : best->at("name").get<std::string>());
   }
@@ -178,16 +209,16 @@ std::string cheapestLine(const std::vector<const Json*>& cells, double sigma) {
 std::string benchText(const Json& document) {
   std::string text;
   for (const Json& map : document["maps"]) {
-    const std::vector<const Json*> cells = measuredCells(document, map);
+    const std::vector<const Json*> measurements = finishedMeasurements(document, map);
     text += fmt::format("{}{}, {} x {} texels: time to prepare, file, density and seen error of round footprints\n",
                         text.empty() ? "" : "\n", map["name"].get<std::string>(), map["width"].get<int>(),
                         map["height"].get<int>());
-    for (const Json* cell : cells) text += cellLine(*cell);
-    for (const Json& cell : document["cells"])
-      if (cell["map"] == map["hash"] && cell["status"] != "ok")
-        text += fmt::format("  {:<34} {}\n", cell["name"].get<std::string>(), cell.value("message", "failed"));
+    for (const Json* measurement : measurements) text += measurementLine(*measurement);
+    for (const Json& measurement : document["measurements"])
+      if (measurement["map"] == map["hash"] && measurement["status"] != "ok")
+        text += fmt::format("  {:<34} {}\n", measurement["name"].get<std::string>(), measurement.value("message", "failed"));
     text += fmt::format("The quickest within {:>16} {:>25} {:>25} {:>25}\n", "1 %", "5 %", "10 %", "20 %");
-    for (const Json& truth : map["truth"]) text += cheapestLine(cells, truth["sigma_texels"].get<double>());
+    for (const Json& truth : map["truth"]) text += cheapestLine(measurements, truth["sigma_texels"].get<double>());
   }
   return text;
 }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <list>
+#include <map>
+#include <string_view>
 
 #include "glint-bench/bench_errors.h"
 #include "glint-bench/bench_times.h"
@@ -19,15 +21,19 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
+/// Checks that an asset can be measured, so that one that cannot does not end a bench when others were measured for minutes.
+void checkKind(const std::string& path) {
+  const formats::Asset asset = formats::Asset::open(path);
+  if (asset.kind() == "normals") return;
+  throw Error(ErrorCode::unsupported, "format.kind", path, "", "is of kind " + std::string(asset.kind()) + ", not normals",
+              "give the asset that glint-ingest made");
+}
+
 /// One map: its asset, and the questions that every method is asked.
 class BenchMap {
  public:
   BenchMap(const std::string& path, const BenchSettings& settings, std::uint64_t seed)
       : path_(path), asset_(formats::Asset::openForBuilding(path)), hash_(formats::hashFile(path)) {
-    if (asset_.kind() != "normals") {
-      throw Error(ErrorCode::unsupported, "format.kind", path, "", "is of kind " + std::string(asset_.kind()) + ", not normals",
-                  "give the asset that glint-ingest made");
-    }
     constexpr int kQueries = 1 << 14, kOfSize = 1 << 12, kTruthsOfPlace = 4;
     sets_ = benchFootprints(map(), seed, settings.places, kTruthsOfPlace * settings.places);
     const std::vector<float> sizes = roundSizes(sets_);
@@ -73,18 +79,19 @@ class MapBench {
  public:
   MapBench(Tool& tool, const BenchSettings& settings, BenchMap& map) : tool_(tool), settings_(settings), map_(map) {}
 
-  /// A cell: {map, name, method, setting, command, status, ...}. What fails is in its message.
+  /// A measurement: {map, name, method, setting, command, status, ...}. What fails is in its message.
   Json measure(const Candidate& candidate) {
-    Json cell = {{"map", map_.hash()},           {"name", candidate.name()},          {"method", candidate.method},
-                 {"setting", candidate.setting}, {"command", commandText(candidate)}, {"status", "failed"}};
+    Json measurement = {{"map", map_.hash()},           {"name", candidate.name()},          {"method", candidate.method},
+                        {"setting", candidate.setting}, {"command", commandText(candidate)}, {"status", "failed"}};
     try {
-      cell["prepare"] = prepare(candidate);
-      ask(candidate, cell);
-      cell["status"] = "ok";
-    } catch (const Error& error) {
-      cell["message"] = error.what();
+      Json figures = {{"prepare", prepare(candidate)}};
+      ask(candidate, figures);
+      measurement["status"] = "ok";
+      measurement.update(figures);
+    } catch (const std::exception& error) {
+      measurement["message"] = error.what();
     }
-    return cell;
+    return measurement;
   }
 
  private:
@@ -122,40 +129,56 @@ class MapBench {
     return text;
   }
 
+  /// Time that the asset takes from which another is made; makes it where this run has not done so.
+  double sourceTime(const Candidate& candidate) {
+    const Candidate* source = sourceOf(candidate);
+    if (source == nullptr) return 0;
+    if (!times_.contains(source->name()) && !failures_.contains(source->name())) {
+      try {
+        prepare(*source);
+      } catch (const Error& error) {
+        failures_[source->name()] = error.what();
+      }
+    }
+    if (const auto failure = failures_.find(source->name()); failure != failures_.end())
+      throw Error(ErrorCode::failed, "bench.candidate", "", "",
+                  source->name() + ", which it is made from, failed: " + failure->second);
+    return times_.at(source->name());
+  }
+
   /// Makes the asset, and where it is missing the one that it is made from.
   /// @return {wall_s, cpu_s, peak_bytes, total_s}; the last with the time of the source
   Json prepare(const Candidate& candidate) {
     if (candidate.tool.empty()) return {{"wall_s", 0.0}, {"cpu_s", 0.0}, {"peak_bytes", 0}, {"total_s", 0.0}};
-    double source_s = 0;
-    if (const Candidate* source = sourceOf(candidate)) {
-      if (!times_.contains(source->name())) prepare(*source);
-      source_s = times_.at(source->name());
-    }
+    const double source_s = sourceTime(candidate);
     std::vector<std::string> command = words(candidate);
     for (const char* word : {"--force", "--quiet", "--threads"}) command.emplace_back(word);
     command.push_back(std::to_string(tool_.threads()));
     const ChildRun run = runProgram(command);
-    if (run.exit_code != 0)
-      throw Error(ErrorCode::failed, "bench.candidate", "", "", fmt::format("exit code {}: {}", run.exit_code, run.message));
+    if (run.exit_code != 0) {
+      const std::string message = fmt::format("exit code {}: {}", run.exit_code, run.message);
+      failures_[candidate.name()] = message;
+      throw Error(ErrorCode::failed, "bench.candidate", "", "", message);
+    }
     times_[candidate.name()] = source_s + run.wall_s;
     return {{"wall_s", run.wall_s}, {"cpu_s", run.cpu_s}, {"peak_bytes", run.peak_bytes}, {"total_s", source_s + run.wall_s}};
   }
 
-  void ask(const Candidate& candidate, Json& cell) {
+  void ask(const Candidate& candidate, Json& measurement) {
     api::NdfOptions options;
     options.sigma_r = kBenchSigmaR;
     if (candidate.takes_normals) options.normals = map_.path();
     const api::OpenedNdf ndf = api::OpenedNdf::open(assetOf(candidate), options);
-    cell["file_bytes"] = ndf.asset().info().file_bytes;
-    cell["times"] = Json(benchTimes(ndf, map_.queries(), map_.sizedQueries(), settings_.longest_run_s));
-    cell["errors"] = Json::array();
-    cell["images"] = Json::array();
+    measurement["file_bytes"] = ndf.asset().info().file_bytes;
+    measurement["times"] = Json(benchTimes(ndf, map_.queries(), map_.sizedQueries(), settings_.longest_run_s));
+    measurement["errors"] = Json::array();
+    measurement["images"] = Json::array();
     if (candidate.tool.empty()) return;  // it is the truth
     for (const SetTruth& truth : map_.truths()) {
       std::vector<float> first;
-      cell["errors"].push_back(Json(truth.errorsOf(ndf, settings_.budget_s, first)));
+      measurement["errors"].push_back(Json(truth.errorsOf(ndf, settings_.budget_s, first)));
       if (truth.set().shape == FootprintShape::round)
-        cell["images"].push_back({{"sigma_texels", truth.set().sigma_texels}, {"image", roundedImage(first)}});
+        measurement["images"].push_back({{"sigma_texels", truth.set().sigma_texels}, {"image", roundedImage(first)}});
     }
   }
 
@@ -163,12 +186,36 @@ class MapBench {
   const BenchSettings& settings_;
   BenchMap& map_;
   std::vector<Candidate> all_ = benchCandidates(false);
-  std::map<std::string, double> times_;  ///< of assets of this run, from the map, by the names of their candidates
+  std::map<std::string, std::string> failures_;  ///< messages, by the names of candidates
+  std::map<std::string, double> times_;          ///< of assets of this run, from the map, by the names of their candidates
 };
 
 bool isWanted(const BenchSettings& settings, const Candidate& candidate) {
   return settings.only.empty() ||
          std::find(settings.only.begin(), settings.only.end(), candidate.method) != settings.only.end();
+}
+
+}  // namespace
+
+namespace {
+
+/// The beginning of the names of a map's assets.
+std::string prefixOf(const std::string& map_hash) { return map_hash.substr(0, 8) + "-"; }
+
+/// Whether a file has a name that a bench gives, or one under which a program that was stopped was writing it.
+bool isOurs(const fs::directory_entry& entry) {
+  std::string name = entry.path().filename().string();
+  if (name.starts_with('.') && name.ends_with(".tmp")) name.erase(0, 1);
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  const bool named = name.find_first_not_of(kDigits) == 8 && name[8] == '-' && name.find(".glint") != std::string::npos;
+  return named && entry.is_regular_file();
+}
+
+void removeOurs(const std::string& folder, const std::string& part_of_name) {
+  std::error_code ignored;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
+    if (isOurs(entry) && entry.path().filename().string().find(part_of_name) != std::string::npos)
+      fs::remove(entry.path(), ignored);
 }
 
 }  // namespace
@@ -182,23 +229,29 @@ AssetFolder::AssetFolder(const std::string& path, bool remove) : path_(path), re
   }
   if (!remove) return;
   for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
-    const std::string extension = entry.path().extension().string();
-    if (extension == ".glint" || extension == ".tmp") continue;  // of an earlier bench that was stopped
+    if (isOurs(entry)) continue;
     throw Error(ErrorCode::usage, "output.ours", path, "",
-                "exists and would be removed, but holds " + entry.path().filename().string() + ", which is no asset",
+                "exists and would be removed, but holds " + entry.path().filename().string() + ", which is not of a bench",
                 "name a folder with --assets");
   }
 }
 
 AssetFolder::~AssetFolder() {
+  if (!remove_) return;
+  removeOurs(path_, "");
   std::error_code ignored;
-  if (remove_) fs::remove_all(path_, ignored);
+  fs::remove(path_, ignored);
 }
 
-void runBench(Tool& tool, const BenchSettings& settings, BenchResults& results) {
+void AssetFolder::finish(const std::string& map_hash) const {
+  if (remove_) removeOurs(path_, prefixOf(map_hash));
+}
+
+void runBench(Tool& tool, const BenchSettings& settings, const AssetFolder& folder, BenchResults& results) {
   std::vector<Candidate> candidates = benchCandidates(settings.quick);
   std::erase_if(candidates, [&](const Candidate& c) { return !isWanted(settings, c); });
-  const bake::ProgressFn progress = tool.progress("cells");
+  for (const std::string& path : settings.maps) checkKind(path);
+  const bake::ProgressFn progress = tool.progress("measurements");
   const std::size_t total = settings.maps.size() * candidates.size();
   std::size_t done = 0;
   for (const std::string& path : settings.maps) {
@@ -215,6 +268,7 @@ void runBench(Tool& tool, const BenchSettings& settings, BenchResults& results) 
       }
       if (progress) progress(++done, total);
     }
+    folder.finish(map.hash());
   }
   results.write(settings.output);
 }

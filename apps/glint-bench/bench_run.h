@@ -17,26 +17,29 @@ struct BenchSettings {
   double budget_s = 1.5;        ///< for the errors of a set
   double longest_run_s = 0.05;  ///< of one of the five runs of a time
   std::string assets;           ///< folder for the assets
-  std::string output;           ///< file of the results, which is written after every cell
+  std::string output;           ///< file of the results, which is written after every measurement
 };
 
 /// The folder for the assets of a bench, which is made if it is missing.
 class AssetFolder {
  public:
-  /// @param remove  remove the folder, with all that it holds, at the end of the scope; then it must be new, or one that an earlier
-  ///                bench left
+  /// @param remove  remove the folder and its assets at the end of the scope; then it must be new, or hold only what an earlier bench
+  ///                left
   /// @throws Error io
   AssetFolder(const std::string& path, bool remove);
   AssetFolder(const AssetFolder&) = delete;
   AssetFolder& operator=(const AssetFolder&) = delete;
   ~AssetFolder();
 
+  /// Removes the assets of a map, if the folder is to be removed.
+  void finish(const std::string& map_hash) const;
+
  private:
   std::string path_;
   bool remove_;
 };
 
-/// Measures every cell that the results do not have.
-void runBench(Tool& tool, const BenchSettings& settings, BenchResults& results);
+/// Measures every measurement that the results do not have.
+void runBench(Tool& tool, const BenchSettings& settings, const AssetFolder& folder, BenchResults& results);
 
 }  // namespace glint::apps

@@ -1,16 +1,20 @@
 #include "glint-bench/child_process.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <spawn.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 
 #include "glint/model/error.h"
 
@@ -40,11 +44,25 @@ struct Pipe {
   }
 };
 
-/// Reads to the end; keeps the last line.
-std::string lastLine(int file) {
+/// Largest resident memory of a process so far, bytes; 0 if the system does not say. Not ru_maxrss: Linux passes that of this
+/// process on to its children.
+std::int64_t peakOf(pid_t process) {
+  std::ifstream status("/proc/" + std::to_string(process) + "/status");
+  for (std::string line; std::getline(status, line);)
+    if (line.starts_with("VmHWM:")) return 1024 * std::strtoll(line.c_str() + 6, nullptr, 10);
+  return 0;
+}
+
+/// Reads what a process writes to a pipe, to the end. Looks at its memory now and then.
+/// @return the last line
+std::string watch(pid_t process, int file, std::int64_t& peak_bytes) {
+  constexpr int kBetweenLooks_ms = 4;
   std::string text;
   std::array<char, 4096> piece{};
   for (;;) {
+    peak_bytes = std::max(peak_bytes, peakOf(process));
+    pollfd ready = {file, POLLIN, 0};
+    if (::poll(&ready, 1, kBetweenLooks_ms) <= 0) continue;
     const ssize_t count = ::read(file, piece.data(), piece.size());
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) break;
@@ -83,15 +101,17 @@ ChildRun runProgram(const std::vector<std::string>& words) {
   }
   errors.closeWrite();
   ChildRun run;
-  run.message = lastLine(errors.read);
+  run.message = watch(child, errors.read, run.peak_bytes);
   int status = 0;
   rusage usage{};
-  while (::wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
+  while (::wait4(child, &status, 0, &usage) < 0) {
+    if (errno != EINTR)
+      throw Error(ErrorCode::failed, "bench.process", program, "",
+                  std::string("cannot be waited for: ") + std::strerror(errno));
   }
   run.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   run.exit_code = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
   run.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
-  run.peak_bytes = std::int64_t{usage.ru_maxrss} * 1024;
   return run;
 }
 

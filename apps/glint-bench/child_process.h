@@ -11,7 +11,7 @@ struct ChildRun {
   int exit_code = 0;  ///< as a shell has it: 128 + n after signal n
   double wall_s = 0;
   double cpu_s = 0;
-  std::int64_t peak_bytes = 0;  ///< largest resident memory
+  std::int64_t peak_bytes = 0;  ///< largest resident memory, as often as one looks: every few milliseconds
   std::string message;          ///< last line that it wrote to stderr
 };
 

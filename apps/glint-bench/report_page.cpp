@@ -25,7 +25,7 @@ std::string_view text(const char* begin, const char* end) { return {begin, stati
 
 /// JSON as it may stand inside an element of a page: no tag can begin in it.
 std::string forPage(const nlohmann::ordered_json& document) {
-  std::string json = document.dump();
+  std::string json = document.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   for (std::size_t at = json.find('<'); at != std::string::npos; at = json.find('<', at)) json.replace(at, 1, "\\u003c");
   return json;
 }

@@ -71,12 +71,7 @@ void TextureOutput::check(Tool& tool, int levels) const {
     for (int l = 0; l < levels; ++l) files.push_back(fileOf(name, l));
   for (const std::string& file : files) {
     checkOutput(tool, file, OutputFormat::image);
-    for (const std::string& input : tool.readPaths()) {
-      std::error_code missing;
-      if (!fs::equivalent(file, input, missing)) continue;
-      throw Error(ErrorCode::usage, "output.input", file, "", "is an input of this run, and a texture would replace it",
-                  "name another folder with --textures");
-    }
+    checkApart(tool, file, tool.outputPaths().size());
     tool.addOutput(file);
   }
 }
@@ -87,7 +82,7 @@ std::size_t TextureOutput::write(const SlopeMoments& lean, const std::vector<std
   std::size_t limited = 0;
   for (int l = 0; l < lobes.level_count; ++l) {
     const SlopeMomentsLevel& level = lobes.levels[l];
-    for (const MapSlopes& s : level.texels) limited += bake::ggxLobe(s.covariance).limited ? 1 : 0;
+    for (const MapSlopes& s : level.texels) limited += bake::isLimited(s.covariance, convention_) ? 1 : 0;
     for (const bake::LobeTexture& texture : bake::lobeTextures(level.texels, convention_))
       writeImage(fileOf(texture.name, l), level.columns, level.rows, texture.channels, texture.pixels,
                  bits_ == 16 ? PixelFormat::u16 : PixelFormat::u8);
@@ -97,14 +92,26 @@ std::size_t TextureOutput::write(const SlopeMoments& lean, const std::vector<std
 
 namespace {
 
+/// Normals of a height field, by the gradient that its moments have.
+std::vector<Vec2> normalsOf(const HeightMap& map, const bake::SlopeMomentsOptions& options) {
+  std::vector<Vec2> normals;
+  std::vector<Vec2> slopes(static_cast<std::size_t>(map.width));
+  for (int j = 0; j < map.height; ++j) {
+    bake::rowSlopes(map.width, map.height, map.heights, j, options.boundary, options.gradient, slopes);
+    for (const Vec2 slope : slopes) normals.push_back(bake::normalFromSlopes(slope.x, slope.y));
+  }
+  return normals;
+}
+
 /// Errors of the lobes of a map, whose normals follow from heights where it has none.
-std::vector<bake::LobeError> errorsOf(Tool& tool, const formats::Asset& asset, const SlopeMoments& moments, float alpha) {
+std::vector<bake::LobeError> errorsOf(Tool& tool, const formats::Asset& asset, const SlopeMoments& moments,
+                                      const bake::SlopeMomentsOptions& options, float alpha) {
   const auto errors = [&](const NormalMap& map) {
     return bake::lobeErrors(map, moments, alpha / std::numbers::sqrt2_v<float>, tool.progress("errors"));
   };
   if (asset.kind() == "normals") return errors(asset.get<NormalMap>());
   const HeightMap& heights = asset.get<HeightMap>();
-  const std::vector<Vec2> normals = bake::normalsFromHeights(heights.width, heights.height, heights.heights, moments.boundary);
+  const std::vector<Vec2> normals = normalsOf(heights, options);
   NormalMap map;
   map.width = heights.width, map.height = heights.height, map.normals = normals;
   return errors(map);
@@ -123,7 +130,7 @@ std::vector<bake::LobeError> writeTextures(Tool& tool, const TextureOutput& text
   const std::size_t limited = textures.write(lean.view(), heights, lobes.view());
   if (limited > 0)
     tool.warn(counted(limited, {"texel is", "texels are"}) + " rougher than 1, all levels together: written as 1");
-  return errorsOf(tool, asset, lean.view(), alpha);
+  return errorsOf(tool, asset, lean.view(), options, alpha);
 }
 
 nlohmann::json errorsJson(const std::vector<bake::LobeError>& errors) {

@@ -20,7 +20,7 @@ class TextureOutput {
   bool wanted() const { return !folder_.empty(); }
 
   /// Checks the names of all files of a chain of so many levels, before the work.
-  /// @throws Error io, usage as checkOutput; usage if a file is an input of the run
+  /// @throws Error io, usage as checkOutput and checkApart
   void check(Tool& tool, int levels) const;
 
   /// Writes lean.exr, and the textures of every level as files NAME_LL.png.
@@ -40,7 +40,7 @@ class TextureOutput {
 
 /// Writes the textures of a map, and measures by how much their lobes differ from the map.
 /// @param options  how the moments of the asset were built
-/// @param alpha    of the material, mean over the map
+/// @param alpha    of the material, root mean square over the map
 /// @return errors of all levels
 std::vector<bake::LobeError> writeTextures(Tool& tool, const TextureOutput& textures, const formats::Asset& asset,
                                            bake::SlopeMomentsOptions options, float alpha);

@@ -9,10 +9,13 @@ namespace {
 
 std::string levelObject(int l) { return "/" + levelPath("level_{l}/moments", l); }
 
-bool isFinite(const MapSlopes& s) {
+/// Whether moments are those of slopes that a normal map can have: finite, and of the range of slope_mean and slope_covariance.
+bool areUsable(const MapSlopes& s) {
+  constexpr float kMostSlope = 1e6f, kMostCovariance = 1e12f;
   const Covariance& c = s.covariance;
-  return std::isfinite(s.mean.x) && std::isfinite(s.mean.y) && std::isfinite(c.xx) && std::isfinite(c.xy) &&
-         std::isfinite(c.yy);
+  const auto within = [](float x, float most) { return std::abs(x) <= most; };
+  return within(s.mean.x, kMostSlope) && within(s.mean.y, kMostSlope) && within(c.xx, kMostCovariance) &&
+         within(c.xy, kMostCovariance) && within(c.yy, kMostCovariance);
 }
 
 /// Whether a matrix has no negative eigenvalue, but for rounding.
@@ -31,7 +34,7 @@ struct KindDescription<SlopeMoments> {
     return {errorRule("moments.levels", "levels have the sizes of a chain that ends with one texel")};
   }
   static std::vector<Rule> valueRules() {
-    return {errorRule("moments.finite", "moments are finite"),
+    return {errorRule("moments.finite", "moments are finite: means within 1e6, covariances within 1e12"),
             errorRule("moments.covariance", "covariances are positive semi-definite"),
             errorRule("moments.top", "the last level holds slope_mean and slope_covariance")};
   }
@@ -56,35 +59,39 @@ struct KindDescription<SlopeMoments> {
 
   static void checkIndex(const SlopeMoments& moments, Findings& findings) {
     checkSlopes(moments.slopes, findings);
+    const int length = SlopeMoments::chainLength(moments.width, moments.height);
+    if (moments.finest_level + moments.level_count != length) {
+      findings.add(
+          "moments.levels", "/@level_count",
+          "is not that of a chain: levels " + std::to_string(moments.finest_level) + " to " + std::to_string(length - 1));
+      return;
+    }
     for (int l = 0; l < moments.level_count; ++l) {
       const SlopeMomentsLevel& level = moments.levels[l];
-      const int in_chain = moments.finest_level + l;
-      const int columns = SlopeMoments::chainSize(moments.width, in_chain);
-      const int rows = SlopeMoments::chainSize(moments.height, in_chain);
+      const int columns = SlopeMoments::chainSize(moments.width, moments.finest_level + l);
+      const int rows = SlopeMoments::chainSize(moments.height, moments.finest_level + l);
       if (level.columns == columns && level.rows == rows) continue;
       findings.add("moments.levels", "/@level_columns",
                    "level " + std::to_string(l) + " has " + std::to_string(level.columns) + " x " + std::to_string(level.rows) +
                        " texels, not " + std::to_string(columns) + " x " + std::to_string(rows));
       return;
     }
-    const SlopeMomentsLevel& last = moments.levels[moments.level_count - 1];
-    if (last.columns * last.rows != 1)
-      findings.add("moments.levels", "/@level_count", "is too small: the last level is not one texel");
   }
 
   static void checkValues(const SlopeMoments& moments, Findings& findings) {
     for (int l = 0; l < moments.level_count; ++l) {
       const SlopeMomentsLevel& level = moments.levels[l];
-      TexelTally infinite(level.columns, level.rows);
+      TexelTally unusable(level.columns, level.rows);
       TexelTally impossible(level.columns, level.rows);
       for (std::size_t k = 0; k < level.texels.size(); ++k) {
-        if (!isFinite(level.texels[k])) {
-          infinite.add(k);
+        if (!areUsable(level.texels[k])) {
+          unusable.add(k);
         } else if (!isCovariance(level.texels[k].covariance)) {
           impossible.add(k);
         }
       }
-      report(infinite, "moments.finite", levelObject(l), {"texel is", "texels are"}, "not finite", findings);
+      report(unusable, "moments.finite", levelObject(l), {"texel is", "texels are"}, "not within the range of moments",
+             findings);
       report(impossible, "moments.covariance", levelObject(l), {"texel has", "texels have"}, "a covariance that is none",
              findings);
     }

@@ -35,8 +35,8 @@ inline GLINT_HD Vec2 halfVectorSpread(Vec2 dhdx, Vec2 dhdy, float filter_sigma) 
 /// surface spreads over the pixel. Without it, highlights of narrow lobes alias where a pixel covers more of a curve than the lobe is
 /// wide.
 ///
-/// Half vectors fill a box evenly, so that a density is a mean of the model, at the cost of one. Places in
-/// the pixel and half vectors count as independent.
+/// Half vectors fill a box evenly. So a density is one mean of the model, and costs as much. Places in the pixel and half vectors
+/// count as independent.
 /// Holds a pointer to the model, which must outlive it. Thread-safe, allocates nothing.
 template <NdfModel M>
 class CurvedNdf {

@@ -128,11 +128,11 @@ class MomentsNdf {
 
   /// Slopes under a round footprint: of the two levels whose variances enclose that of the footprint, mixed to have its variance.
   /// @param uv  in [0, 1)^2
-  GLINT_HD MapSlopes roundSlopes(Vec2 uv, float wanted) const {
+  GLINT_HD MapSlopes roundSlopes(Vec2 uv, float asked) const {
+    const float wanted = asked > 0 ? std::min(asked, 1e30f) : 0.0f;
     const int last = moments_.level_count - 1;
     // A cell of level l of the full chain is 2^l to 2^(l+1) texels wide.
-    int level = std::clamp(static_cast<int>(0.5f * std::log2(std::clamp(3 * wanted, 1.0f, 1e30f))) - 1 - moments_.finest_level,
-                           0, last);
+    int level = std::clamp(static_cast<int>(0.5f * std::log2(std::max(3 * wanted, 1.0f))) - 1 - moments_.finest_level, 0, last);
     while (level < last && variances_[level + 1] <= wanted) ++level;
     const float below = variances_[level], above = variances_[std::min(level + 1, last)];
     const float t = above > below ? std::clamp((wanted - below) / (above - below), 0.0f, 1.0f) : 0.0f;

@@ -44,26 +44,26 @@ def copied(glint, measured):
 
 def test_results_are_as_described(results):
     jsonschema.Draft202012Validator(SCHEMA).validate(results)
-    assert [cell["name"] for cell in results["cells"] if cell["status"] != "ok"] == []
-    assert {cell["method"] for cell in results["cells"]} == {"brute force", "moments", "bin map", "histograms", "pyramid", "tucker"}
+    assert [measurement["name"] for measurement in results["measurements"] if measurement["status"] != "ok"] == []
+    assert {measurement["method"] for measurement in results["measurements"]} == {"brute force", "moments", "bin map", "histograms", "pyramid", "tucker"}
 
 
 def test_errors_are_those_of_the_methods(results):
-    errors = {cell["method"]: {set_["sigma_texels"]: set_ for set_ in cell["errors"] if set_["shape"] == "round"} for cell in results["cells"]}
+    errors = {measurement["method"]: {set_["sigma_texels"]: set_ for set_ in measurement["errors"] if set_["shape"] == "round"} for measurement in results["measurements"]}
     widest = SIZE / 8
     assert errors["brute force"] == {}
     assert errors["pyramid"][widest]["rel_l2"] < 0.1 < errors["moments"][widest]["rel_l2"]
     assert errors["pyramid"][widest]["seen"] <= errors["tucker"][widest]["seen"] + 0.02
     # A bin map is asked for Gaussians and answers boxes, and is right where it is asked for boxes.
-    bins = {set_["shape"]: set_ for cell in results["cells"] if cell["method"] == "bin map" for set_ in cell["errors"]}
+    bins = {set_["shape"]: set_ for measurement in results["measurements"] if measurement["method"] == "bin map" for set_ in measurement["errors"]}
     assert bins["box"]["as_asked"] and not bins["round"]["as_asked"]
     assert bins["box"]["rel_l2"] < 0.05 < bins["round"]["rel_l2"]
 
 
 def test_images_are_of_the_footprints(results):
     truth = results["maps"][0]["truth"]
-    for cell in results["cells"]:
-        for mine, right in zip(cell["images"], truth):
+    for measurement in results["measurements"]:
+        for mine, right in zip(measurement["images"], truth):
             assert mine["sigma_texels"] == right["sigma_texels"]
             assert sum(mine["image"]) * 4 / 64**2 == pytest.approx(1, abs=0.03)
 
@@ -75,14 +75,14 @@ def test_summary_names_the_quickest_method(measured):
     assert not list(measured.glob("*.assets"))
 
 
-def test_cells_that_are_there_are_not_measured_again(glint, copied):
+def test_measurements_that_are_there_are_not_measured_again(glint, copied):
     document = json.loads((copied / "results.json").read_text())
-    kept = document["cells"][:3]
-    (copied / "results.json").write_text(json.dumps(document | {"cells": kept}, separators=(",", ":")))
+    kept = document["measurements"][:3]
+    (copied / "results.json").write_text(json.dumps(document | {"measurements": kept}, separators=(",", ":")))
     process = glint("bench", "map.glint", "-o", "results.json", "--quick", "--only", "moments,histograms,bin map")
     assert process.returncode == 0, process.stderr
-    after = json.loads((copied / "results.json").read_text())["cells"]
-    assert after[:3] == kept and [cell["method"] for cell in after[3:]] == ["histograms"]
+    after = json.loads((copied / "results.json").read_text())["measurements"]
+    assert after[:3] == kept and [measurement["method"] for measurement in after[3:]] == ["histograms"]
 
 
 def test_a_stopped_run_leaves_whole_results(glint, copied):
@@ -101,14 +101,14 @@ def test_a_stopped_run_leaves_whole_results(glint, copied):
 
 
 def test_a_method_that_fails_says_so_and_the_rest_goes_on(glint, copied):
-    """A map of one texel is too small for nothing but what it shows: its cells are there, failed or not."""
+    """A map of one texel is too small for nothing but what it shows: its measurements are there, failed or not."""
     for command in ("synth flat --size 8 -o one.exr", "ingest one.exr -o one.glint --allow-constant"):
         assert glint(*command.split()).returncode == 0
     process = glint("bench", "one.glint", "-o", "one.json", "--quick")
     assert process.returncode == 0, process.stderr
     document = json.loads((copied / "one.json").read_text())
     jsonschema.Draft202012Validator(SCHEMA).validate(document)
-    assert len(document["cells"]) == 6
+    assert len(document["measurements"]) == 6
 
 
 def refused(glint, code, *words):
@@ -124,12 +124,14 @@ def test_bad_input_is_named(glint, copied):
     assert "no method" in refused(glint, 1, "map.glint", "-o", "x.json", "--only", "magic")
     assert "seed" in refused(glint, 1, "map.glint", "-o", "results.json", "--quick", "--seed", "9")
     assert "places" in refused(glint, 1, "map.glint", "-o", "results.json", "--quick", "--places", "9")
+    assert "quick" in refused(glint, 1, "map.glint", "-o", "results.json", "--places", "4")
+    assert "no file" in refused(glint, 1, "map.glint", "-o", "/dev/null", "--quick")
     (copied / "half.json").write_bytes(before[: len(before) // 2])
     assert "not whole" in refused(glint, 3, "map.glint", "-o", "half.json", "--quick")
     assert "not whole" in refused(glint, 3, "--report", "half.json", "-o", "x.html")
     (copied / "other.json").write_text('{"schema":"glint-bench results 0"}')
     assert "not of the form" in refused(glint, 3, "--report", "other.json", "-o", "x.html")
-    (copied / "lacking.json").write_text('{"schema":"glint-bench results 1","cells":[7]}')
+    (copied / "lacking.json").write_text('{"schema":"glint-bench results 1","measurements":[7]}')
     assert "lacks" in refused(glint, 3, "--report", "lacking.json", "-o", "x.html")
     (copied / "mine.json").write_text('{"mine": 1}')
     assert "--force" in refused(glint, 1, "map.glint", "-o", "mine.json", "--quick")

@@ -258,5 +258,7 @@ def test_textures_do_not_replace_the_roughness_that_they_are_made_of(glint, norm
     write(glint.folder / "r.exr", np.full((SIZE, SIZE), 0.5))
     subprocess.run(["oiiotool", "r.exr", "-d", "uint8", "-o", "t/roughness_00.png"], cwd=glint.folder, check=True)
     before = (glint.folder / "t/roughness_00.png").read_bytes()
-    assert "input" in refused(glint, 1, "n.glint", "-o", "m.glint", "--force", "--roughness", "t/roughness_00.png", "--textures", "t")
+    assert "input" in refused(glint, 1, "n.glint", "-o", "m.glint", "--roughness", "t/roughness_00.png", "--textures", "t")
     assert (glint.folder / "t/roughness_00.png").read_bytes() == before
+    assert "two outputs" in refused(glint, 1, "n.glint", "-o", "t/lean.exr", "--textures", "t")
+    assert not (glint.folder / "t/lean.exr").exists()

@@ -79,8 +79,9 @@ SEEN = {
                "Gaussians.",
     "histograms": "Directions are known to ten degrees: sparkles are spread over a bin, and edges of bins show on smooth surfaces under small lights. Take them for "
                   "environments, not for lamps.",
-    "moments": "One smooth lobe for each pixel: no sparkle, whatever the light. It has the light of the map on average, and the right look where a pixel holds so many "
-               "facets that nothing sparkles; lobes of grooves and threads run together.",
+    "moments": "One smooth lobe for each pixel: no sparkle, whatever the light. It is right where slopes are about normally distributed and a pixel holds so many "
+               "facets that nothing sparkles, as the noise seen from afar. Elsewhere the lobe lights directions that have no facets, and lobes of grooves and threads run "
+               "together.",
 }
 
 

@@ -678,7 +678,9 @@ std::vector<Fixture> momentsFixtures() {
   return {
       patched("moments.levels", Base::moments, [](const Patch& patch) { patch.setInteger("width", 8 << 1); }),
       patched("moments.levels", Base::moments, [](const Patch& patch) { patch.setInteger("finest_level", 0); }),
+      patched("moments.levels", Base::moments, [](const Patch& patch) { patch.setInteger("finest_level", 20); }),
       changed("moments.finite", "level_00/moments", 7, kNan),
+      changed("moments.finite", "level_00/moments", 5, 3e6f),
       changed("moments.covariance", "level_01/moments", 2, -0.1f),
       changed("moments.covariance", "level_00/moments", 8, 0.4f),
       changed("moments.top", "level_02/moments", 0, 0.1f),

@@ -13,32 +13,37 @@ const SMALLEST = 1e-3, LARGEST = 10; // errors beyond are drawn there: a log axi
 const inChart = (error) => Math.min(LARGEST, Math.max(SMALLEST, error));
 const PIXELS = 64; // of an image along each axis
 
-// Cells and figures
+// Measurements and figures
 
 const theMap = () => results.maps[state.map];
-const cells = () => results.cells.filter((cell) => cell.map === theMap().hash);
-const measured = () => cells().filter((cell) => cell.status === "ok");
-const isTruth = (cell) => cell.errors.length === 0;
-const setOf = (cell, shape, size) => cell.errors.find((set) => set.shape === shape && set.sigma_texels === size);
-const errorOf = (cell, metric, shape, size) => {
-  const set = setOf(cell, shape, size);
-  return set ? Math.abs(set[metric]) : null;
+const measurements = () => results.measurements.filter((measurement) => measurement.map === theMap().hash);
+const measured = () => measurements().filter((measurement) => measurement.status === "ok");
+const isTruth = (measurement) => measurement.errors.length === 0;
+const setOf = (measurement, shape, size) => measurement.errors.find((set) => set.shape === shape && set.sigma_texels === size);
+const errorOf = (measurement, metric, shape, size) => {
+  const error = setOf(measurement, shape, size)?.[metric];
+  return error == null ? null : Math.abs(error);
 };
 /** Nanoseconds of a density of round footprints of a size. */
-const timeAt = (cell, size) => cell.times.density.sizes.find((time) => time.sigma_texels === size)?.ns ?? cell.times.density.cold.ns;
+const timeAt = (measurement, size) => measurement.times.density.sizes.find((time) => time.sigma_texels === size)?.ns ?? measurement.times.density.cold.ns;
 const COSTS = {
-  time: { of: (cell) => timeAt(cell, state.size), label: "ns a density" },
-  bytes: { of: (cell) => cell.file_bytes, label: "bytes" },
-  prepare: { of: (cell) => cell.prepare.total_s, label: "seconds to prepare" },
+  time: { of: (measurement) => timeAt(measurement, state.size), label: "ns a density" },
+  bytes: { of: (measurement) => measurement.file_bytes, label: "bytes" },
+  prepare: { of: (measurement) => measurement.prepare.total_s, label: "seconds to prepare" },
 };
-const sizesOf = (shape) => [...new Set(measured().flatMap((cell) => cell.errors.filter((set) => set.shape === shape).map((set) => set.sigma_texels)))].sort((a, b) => a - b);
+const sizesOf = (shape) => shape === "round" ? theMap().truth.map((image) => image.sigma_texels) : [...new Set(measured().flatMap((measurement) => measurement.errors.filter((set) => set.shape === shape).map((set) => set.sigma_texels)))].sort((a, b) => a - b);
 
 // Words
 
 const percent = (x) => (x == null ? "" : x > LARGEST ? "> 1000 %" : x < 0.0005 ? "< 0.1 %" : `${(100 * x).toPrecision(x < 0.1 ? 2 : 3)} %`);
-const bytesText = (x) => (x >= 1e6 ? `${(x / 1e6).toPrecision(3)} MB` : `${(x / 1e3).toPrecision(3)} kB`);
-const secondsText = (x) => `${x.toPrecision(3)} s`;
-const nsText = (x) => (x >= 1e6 ? `${(x / 1e6).toPrecision(3)} ms` : x >= 1e3 ? `${(x / 1e3).toPrecision(3)} µs` : `${x.toPrecision(3)} ns`);
+/** Three digits, without an exponent, in the largest of some units that gives at least 1: [[1e6, "MB"], [1e3, "kB"]]. */
+function inUnits(x, units) {
+  const [scale, unit] = units.find(([scale]) => x >= 0.9995 * scale) ?? units.at(-1);
+  return `${Number((x / scale).toPrecision(3))} ${unit}`;
+}
+const bytesText = (x) => inUnits(x, [[1e9, "GB"], [1e6, "MB"], [1e3, "kB"]]);
+const secondsText = (x) => inUnits(x, [[60, "min"], [1, "s"]]);
+const nsText = (x) => inUnits(x, [[1e9, "s"], [1e6, "ms"], [1e3, "µs"], [1, "ns"]]);
 
 function node(name, attributes = {}, ...children) {
   const made = document.createElement(name);
@@ -67,16 +72,16 @@ function paretoFront(points) {
   });
 }
 
-const methodColors = () => ({ domain: [...new Set(results.cells.map((cell) => cell.method))], scheme: "tableau10" });
+const methodColors = () => ({ domain: [...new Set(results.measurements.map((measurement) => measurement.method))], scheme: "tableau10" });
 const chartWidth = () => Math.min(620, element("charts").clientWidth);
 const errorAxis = () => ({ type: "log", domain: [SMALLEST, LARGEST], label: `↓ ${METRICS[state.metric]}`, tickFormat: (x) => (x >= 0.01 ? `${+(100 * x).toPrecision(2)} %` : `${+(100 * x).toPrecision(1)} %`), grid: true });
 
 function drawCost(id) {
   const { of, label } = COSTS[id];
-  const points = measured().filter((cell) => !isTruth(cell)).map((cell) => ({ cell, cost: of(cell), error: errorOf(cell, state.metric, state.shape, state.size) }))
+  const points = measured().filter((measurement) => !isTruth(measurement)).map((measurement) => ({ measurement, cost: of(measurement), error: errorOf(measurement, state.metric, state.shape, state.size) }))
     .filter((point) => point.error != null && point.cost > 0).map((point) => ({ ...point, shown: inChart(point.error) }));
-  const truth = measured().filter((cell) => isTruth(cell) && of(cell) > 0);
-  const asked = (point) => (setOf(point.cell, state.shape, state.size).as_asked ? "" : "\nanswers a footprint of the same second moments");
+  const truth = measured().filter((measurement) => isTruth(measurement) && of(measurement) > 0);
+  const asked = (point) => (setOf(point.measurement, state.shape, state.size).as_asked ? "" : "\nanswers a footprint of the same second moments");
   const chart = Plot.plot({
     width: chartWidth(), height: 340, marginLeft: 56, marginRight: 20, marginBottom: 42,
     style: { background: "transparent", fontSize: "12px" },
@@ -87,18 +92,18 @@ function drawCost(id) {
       Plot.ruleX(truth, { x: of, stroke: "currentColor", strokeDasharray: "3,3", strokeOpacity: 0.6 }),
       Plot.text(truth, { x: of, frameAnchor: "top-right", text: () => "brute force", rotate: -90, dx: -8, dy: 4, textAnchor: "end", fillOpacity: 0.7 }),
       Plot.line(paretoFront(points), { x: "cost", y: "shown", stroke: "currentColor", strokeOpacity: 0.35, strokeWidth: 1.5 }),
-      Plot.dot(points, { x: "cost", y: "shown", fill: (point) => point.cell.method, r: 5, stroke: "var(--paper)" }),
-      Plot.text(points, { x: "cost", y: "shown", text: (point) => point.cell.setting, dy: -10, fontSize: 10, fillOpacity: 0.75 }),
+      Plot.dot(points, { x: "cost", y: "shown", fill: (point) => point.measurement.method, r: 5, stroke: "var(--paper)" }),
+      Plot.text(points, { x: "cost", y: "shown", text: (point) => point.measurement.setting, dy: -10, fontSize: 10, fillOpacity: 0.75 }),
       Plot.tip(points, Plot.pointer({ x: "cost", y: "shown", fill: "var(--paper)",
-        title: (point) => `${point.cell.name}\n${percent(point.error)} · ${nsText(COSTS.time.of(point.cell))} · ${bytesText(point.cell.file_bytes)} · ${secondsText(point.cell.prepare.total_s)}\n${point.cell.command}${asked(point)}` })),
+        title: (point) => `${point.measurement.name}\n${percent(point.error)} · ${nsText(COSTS.time.of(point.measurement))} · ${bytesText(point.measurement.file_bytes)} · ${secondsText(point.measurement.prepare.total_s)}\n${point.measurement.command}${asked(point)}` })),
     ],
   });
   element(id).replaceChildren(Plot.legend({ color: methodColors(), style: { background: "transparent" } }), chart);
 }
 
 function drawSizes() {
-  const points = measured().flatMap((cell) => cell.errors.filter((set) => set.shape === state.shape)
-    .map((set) => ({ cell, size: set.sigma_texels, error: Math.abs(set[state.metric]), shown: inChart(Math.abs(set[state.metric])) })));
+  const points = measured().flatMap((measurement) => measurement.errors.filter((set) => set.shape === state.shape && set[state.metric] != null)
+    .map((set) => ({ measurement, size: set.sigma_texels, error: Math.abs(set[state.metric]), shown: inChart(Math.abs(set[state.metric])) })));
   const chart = Plot.plot({
     width: chartWidth(), height: 340, marginLeft: 56, marginRight: 20, marginBottom: 42,
     style: { background: "transparent", fontSize: "12px" },
@@ -106,9 +111,9 @@ function drawSizes() {
     x: { type: "log", base: 2, label: "deviation of the footprint, texels →", tickFormat: "d", grid: true },
     y: errorAxis(),
     marks: [
-      Plot.line(points, { x: "size", y: "shown", z: (point) => point.cell.name, stroke: (point) => point.cell.method }),
-      Plot.dot(points, { x: "size", y: "shown", fill: (point) => point.cell.method, r: 3 }),
-      Plot.tip(points, Plot.pointer({ x: "size", y: "shown", fill: "var(--paper)", title: (point) => `${point.cell.name}\n${percent(point.error)} at ${point.size} texels` })),
+      Plot.line(points, { x: "size", y: "shown", z: (point) => point.measurement.name, stroke: (point) => point.measurement.method }),
+      Plot.dot(points, { x: "size", y: "shown", fill: (point) => point.measurement.method, r: 3 }),
+      Plot.tip(points, Plot.pointer({ x: "size", y: "shown", fill: "var(--paper)", title: (point) => `${point.measurement.name}\n${percent(point.error)} at ${point.size} texels` })),
     ],
   });
   element("sizes").replaceChildren(Plot.legend({ color: methodColors(), style: { background: "transparent" } }), chart);
@@ -148,10 +153,10 @@ function drawCheapest() {
   const rows = sizesOf("round").map((size) => {
     const row = node("tr", size === state.size ? { class: "chosen" } : {}, node("th", {}, `${size} texels`));
     for (const most of WITHIN) {
-      const able = measured().filter((cell) => isTruth(cell) || errorOf(cell, "seen", "round", size) <= most);
+      const able = measured().filter((measurement) => isTruth(measurement) || (errorOf(measurement, "seen", "round", size) ?? Infinity) <= most);
       // One that is no more than a tenth quicker than a simpler one, which comes before it, counts as equal.
-      const best = able.reduce((least, cell) => (least == null || timeAt(cell, size) < 0.9 * timeAt(least, size) ? cell : least), null);
-      row.append(node("td", {}, best ? `${best.name}, ${nsText(timeAt(best, size))}, ${bytesText(best.file_bytes)}` : "none"));
+      const best = able.reduce((least, measurement) => (least == null || timeAt(measurement, size) < 0.9 * timeAt(least, size) ? measurement : least), null);
+      row.append(best ? node("td", {}, best.name, node("br"), node("small", {}, `${nsText(timeAt(best, size))}, ${bytesText(best.file_bytes)}`)) : node("td", {}, "none"));
     }
     return row;
   });
@@ -161,12 +166,12 @@ function drawCheapest() {
 function drawFigures() {
   const columns = ["method", "prepare", "memory", "file", "density", "warm", "in a batch", "mean", "sample", `${METRICS[state.metric]}`, "command"];
   const head = node("tr", {}, ...columns.map((text, k) => node("th", k > 0 && k < 10 ? { class: "number" } : {}, text)));
-  const rows = cells().map((cell) => {
-    if (cell.status !== "ok") return node("tr", {}, node("th", {}, cell.name), node("td", { colspan: 10 }, cell.message || cell.status));
-    const t = cell.times;
-    const figures = [secondsText(cell.prepare.total_s), bytesText(cell.prepare.peak_bytes), bytesText(cell.file_bytes), nsText(t.density.cold.ns), nsText(t.density.warm.ns),
-      nsText(t.density.batch.ns), nsText(t.mean.cold.ns), nsText(t.sample.cold.ns), isTruth(cell) ? "the truth" : percent(errorOf(cell, state.metric, state.shape, state.size))];
-    return node("tr", {}, node("th", {}, cell.name), ...figures.map((text) => node("td", { class: "number" }, text)), node("td", {}, node("code", {}, cell.command)));
+  const rows = measurements().map((measurement) => {
+    if (measurement.status !== "ok") return node("tr", {}, node("th", {}, measurement.name), node("td", { colspan: 10 }, measurement.message || measurement.status));
+    const t = measurement.times;
+    const figures = [secondsText(measurement.prepare.total_s), bytesText(measurement.prepare.peak_bytes), bytesText(measurement.file_bytes), nsText(t.density.cold.ns), nsText(t.density.warm.ns),
+      nsText(t.density.batch.ns), nsText(t.mean.cold.ns), nsText(t.sample.cold.ns), isTruth(measurement) ? "the truth" : percent(errorOf(measurement, state.metric, state.shape, state.size))];
+    return node("tr", {}, node("th", {}, measurement.name), ...figures.map((text) => node("td", { class: "number" }, text)), node("td", {}, node("code", {}, measurement.command)));
   });
   element("figures").replaceChildren(head, ...rows);
 }
@@ -174,7 +179,7 @@ function drawFigures() {
 // Images
 
 const truthImage = () => theMap().truth.find((image) => image.sigma_texels === state.size)?.image;
-const methodImage = (cell) => cell.images.find((image) => image.sigma_texels === state.size)?.image;
+const methodImage = (measurement) => measurement.images.find((image) => image.sigma_texels === state.size)?.image;
 const toSrgb = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
 
 /** Draws densities, bottom row first, or their difference from the truth. */
@@ -205,31 +210,37 @@ function paint(canvas, image, truth, view, exposure, zoom) {
   context.drawImage(small, 0, 0, canvas.width, canvas.height);
 }
 
-const drawn = () => measured().filter((cell) => !isTruth(cell));
-const chosenCell = () => drawn().find((cell) => cell.name === state.candidate) || drawn()[0];
+const drawn = () => measured().filter((measurement) => !isTruth(measurement));
+const chosenMeasurement = () => drawn().find((measurement) => measurement.name === state.candidate) || drawn()[0];
 
 function drawPicture(view = state.view) {
-  const cell = chosenCell(), truth = truthImage();
-  if (!cell || !truth) return;
-  paint(element("picture"), methodImage(cell), truth, view, Number(element("exposure").value), Number(element("zoom").value));
-  const set = setOf(cell, "round", state.size);
-  element("caption").textContent = `${view === "truth" ? "Truth" : cell.name}: footprint of ${state.size} texels; seen error ${percent(set.seen)}, ` +
+  const measurement = chosenMeasurement(), truth = truthImage();
+  const image = measurement && methodImage(measurement);
+  if (!image || !truth) {
+    element("picture").getContext("2d").clearRect(0, 0, element("picture").width, element("picture").height);
+    element("caption").textContent = "Nothing was measured here.";
+    return;
+  }
+  paint(element("picture"), image, truth, view, Number(element("exposure").value), Number(element("zoom").value));
+  const set = setOf(measurement, "round", state.size);
+  element("caption").textContent = `${view === "truth" ? "Truth" : measurement.name}: footprint of ${state.size} texels; seen error ${percent(set.seen)}, ` +
     `relative L2 ${percent(set.rel_l2)} over ${set.places} places.`;
 }
 
 function drawStrip() {
   const truth = truthImage();
-  element("strip").replaceChildren(...drawn().map((cell) => {
+  element("strip").replaceChildren(...drawn().map((measurement) => {
     const canvas = node("canvas", { width: 64, height: 64 });
-    if (truth) paint(canvas, methodImage(cell), truth, "method", Number(element("exposure").value), Number(element("zoom").value));
-    const button = node("button", { "aria-pressed": String(cell === chosenCell()) }, canvas, cell.name);
-    button.addEventListener("click", () => { state.candidate = cell.name; drawImages(); });
+    const image = methodImage(measurement);
+    if (truth && image) paint(canvas, image, truth, "method", Number(element("exposure").value), Number(element("zoom").value));
+    const button = node("button", { "aria-pressed": String(measurement === chosenMeasurement()) }, canvas, measurement.name);
+    button.addEventListener("click", () => { state.candidate = measurement.name; drawImages(); });
     return button;
   }));
 }
 
 function drawImages() {
-  fill(element("candidate"), drawn().map((cell) => [cell.name, cell.name]), chosenCell()?.name);
+  fill(element("candidate"), drawn().map((measurement) => [measurement.name, measurement.name]), chosenMeasurement()?.name);
   drawPicture();
   drawStrip();
 }
@@ -252,8 +263,12 @@ function draw() {
 }
 
 function start() {
+  if (results.maps.length === 0) {
+    element("about").textContent = "The results hold no map.";
+    return;
+  }
   const { machine } = results;
-  element("about").textContent = `${results.cells.length} measurements of ${results.maps.length} map${results.maps.length > 1 ? "s" : ""}, by ${results.generator}. ` +
+  element("about").textContent = `${results.measurements.length} measurements of ${results.maps.length} map${results.maps.length > 1 ? "s" : ""}, by ${results.generator}. ` +
     "Errors are against brute force over all texels.";
   element("machine").textContent = `${machine.processor}, ${machine.cores} cores, ${machine.system}; a plain microfacet lobe takes ${nsText(results.plain_lobe?.ns ?? NaN)} here. ` +
     `Seed ${results.seed}, ${results.places} places for each error. Densities are asked anywhere on the map, so that most miss the caches.`;
@@ -274,7 +289,7 @@ function start() {
   picture.addEventListener("pointerdown", () => drawPicture("truth"));
   for (const event of ["pointerup", "pointerleave"]) picture.addEventListener(event, () => drawPicture());
   document.addEventListener("keydown", (event) => {
-    if (event.target.matches("select, input[type=range]")) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("select, input[type=range]")) return;
     const view = { 1: "truth", 2: "method", 3: "error" }[event.key], zoom = { "+": 1, "-": -1 }[event.key];
     if (view) document.querySelector(`input[name=view][value=${view}]`).click();
     if (zoom) { element("zoom").value = Number(element("zoom").value) + zoom; drawImages(); }

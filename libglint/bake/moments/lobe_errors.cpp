@@ -60,8 +60,11 @@ std::vector<LobeError> lobeErrors(const NormalMap& map, const SlopeMoments& mome
     double variation = 0;
     for (std::size_t k = 0; k < count; ++k) {
       // The golden ratio of the texels, so that neighbouring ones are in different rows and columns.
-      const auto texel = static_cast<std::size_t>(std::fmod((static_cast<double>(k) + 0.5) * 0.61803398874989485, 1.0) *
-                                                  static_cast<double>(level.texels.size()));
+      const std::size_t texel =
+          count == level.texels.size()
+              ? k
+              : static_cast<std::size_t>(std::fmod((static_cast<double>(k) + 0.5) * 0.61803398874989485, 1.0) *
+                                         static_cast<double>(level.texels.size()));
       const std::vector<float> truth =
           referenceImage(map, sigma, Surface::flat, moments.boundary, areaOf(moments, level, texel), kResolution);
       const std::vector<float> image = imageOf(SlopeLobe(level.texels[texel], sigma));

@@ -40,8 +40,13 @@ GgxLobe ggxLobe(const Covariance& slopes) {
   lobe.alpha_along = alpha(mean + split);
   lobe.alpha_across = alpha(mean - split);
   lobe.along = {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle))};
-  lobe.limited = 2 * (mean + split) > 1;
   return lobe;
+}
+
+bool isLimited(const Covariance& slopes, LobeConvention convention) {
+  const double mean = 0.5 * (double{slopes.xx} + double{slopes.yy}), half = 0.5 * (double{slopes.xx} - double{slopes.yy});
+  const double split = convention == LobeConvention::isotropic ? 0 : std::hypot(half, double{slopes.xy});
+  return 2 * (mean + split) > 1;
 }
 
 std::vector<LobeTexture> lobeTextures(std::span<const MapSlopes> texels, LobeConvention convention) {

@@ -25,9 +25,10 @@ struct GgxLobe {
   float alpha_along = 0;   ///< the larger alpha, at most 1
   float alpha_across = 0;  ///< the smaller alpha
   Vec2 along;              ///< unit vector of the larger alpha; x >= 0
-  bool limited = false;    ///< whether an alpha was above 1
 };
 GgxLobe ggxLobe(const Covariance& slopes);
+/// Whether an alpha that the textures of a convention hold is above 1, so that they hold 1.
+bool isLimited(const Covariance& slopes, LobeConvention convention);
 
 /// Pixels of one texture of one level, bottom row first, each in [0, 1].
 struct LobeTexture {

@@ -15,7 +15,7 @@ namespace {
 
 /// The texels of the level before, along one axis, that a texel covers: `count` of them from `first` on, and their shares.
 struct Cover {
-  static constexpr int kMost = 4;  // a texel is less than 3 texels of the level before wide
+  static constexpr int kMost = 4;  // a texel is at most 3 texels of the level before wide, and begins anywhere
   int first = 0, count = 0;
   float shares[kMost] = {};
 };
@@ -184,7 +184,7 @@ SlopeMomentsData buildSlopeMoments(const NormalMap& map, const SlopeMomentsOptio
 }
 
 SlopeMomentsData buildSlopeMoments(const HeightMap& map, const SlopeMomentsOptions& options, const ProgressFn& progress) {
-  constexpr float kSteepest = 1e15f;  // its square is a float
+  constexpr float kSteepest = 1e6f;  // as files may hold
   std::atomic<bool> steep = false;
   const auto row_slopes = [&](int j, std::span<Vec2> slopes) {
     rowSlopes(map.width, map.height, map.heights, j, options.boundary, options.gradient, slopes);
@@ -193,7 +193,7 @@ SlopeMomentsData buildSlopeMoments(const HeightMap& map, const SlopeMomentsOptio
   };
   SlopeMomentsData data = build(map.width, map.height, options, row_slopes, progress);
   if (steep) {
-    throw Error(ErrorCode::invalid_input, "heights.steep", {}, "/heights", "are not finite, or have slopes above 1e15",
+    throw Error(ErrorCode::invalid_input, "heights.steep", {}, "/heights", "are not finite, or have slopes above 1e6",
                 "make the heights again with glint-ingest --height-scale");
   }
   return data;

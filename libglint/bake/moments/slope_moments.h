@@ -38,7 +38,7 @@ class SlopeMomentsData {
 /// threads.
 SlopeMomentsData buildSlopeMoments(const NormalMap& map, const SlopeMomentsOptions& options, const ProgressFn& progress = {});
 /// The same of a height field. Slopes are not limited, as normals are.
-/// @throws Error (invalid_input) if a height is not finite, or slopes are too steep for a float's square
+/// @throws Error (invalid_input) if a height is not finite, or a slope is above 1e6
 SlopeMomentsData buildSlopeMoments(const HeightMap& map, const SlopeMomentsOptions& options, const ProgressFn& progress = {});
 
 /// Mean heights under the texels of every level of a full chain, averaged as the moments are.

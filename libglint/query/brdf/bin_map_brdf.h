@@ -21,7 +21,7 @@ namespace glint {
 /// Other than the paper:
 ///  - its Eq. 3 weighs texels by their share of the surface, and leaves out 1 / t.z. A share is of area seen from above, and a
 ///    facet is 1 / t.z times larger. Without the factor steep maps lose energy (a map tilted by 60 degrees half of it).
-///  - its Eq. 18 leaves out h . t, which makes the pdf integrate to less than 1; here the pdf is that of `sample`.
+///  - its Eq. 18 leaves out h . t, which makes the pdf integrate to more than 1; here the pdf is that of `sample`.
 ///  - G and Gx see both directions with heights correlated, 1 / (1 + Lambda(i) + Lambda(o)), as everywhere in this library.
 ///  - bins count texel by texel with their own normals, and only many at once as one lobe: see BinMapNdf.
 ///
