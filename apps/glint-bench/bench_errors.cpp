@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/ndf_image.h"
+#include "glint/bake/common/image_errors.h"
 #include "glint/bake/common/reference_image.h"
 #include "glint/bake/common/seen_error.h"
 
@@ -13,43 +15,6 @@ namespace glint::apps {
 namespace {
 
 constexpr int kResolution = SetTruth::kResolution;
-
-/// Means of a model over the pixels of an image. Rows are shared by all threads.
-std::vector<float> imageOf(const api::AnyNdf& any, const Footprint& footprint) {
-  constexpr float kPixel = 2.0f / kResolution;
-  std::vector<float> image(rowMajorIndex(0, kResolution, kResolution));
-  std::visit(
-      [&](const auto& model) {
-        tbb::parallel_for(0, kResolution, [&](int j) {
-          for (int i = 0; i < kResolution; ++i) {
-            const Vec2 low = {kPixel * static_cast<float>(i) - 1, kPixel * static_cast<float>(j) - 1};
-            image[rowMajorIndex(i, j, kResolution)] = model.mean(footprint, {low, low + Vec2{kPixel, kPixel}});
-          }
-        });
-      },
-      any);
-  return image;
-}
-
-/// Sums over the images of a set: relative L2 distance, total variation, and energy.
-struct ImageSums {
-  double rel_l2 = 0, tv = 0, energy = 0;
-
-  void add(const std::vector<float>& image, const std::vector<float>& truth) {
-    double difference2 = 0, truth2 = 0, absolute = 0, sum = 0;
-    for (std::size_t k = 0; k < image.size(); ++k) {
-      const double d = double{image[k]} - double{truth[k]};
-      difference2 += d * d;
-      truth2 += double{truth[k]} * double{truth[k]};
-      absolute += std::abs(d);
-      sum += double{image[k]};
-    }
-    constexpr double kPixelArea = 4.0 / (kResolution * kResolution);
-    rel_l2 += std::sqrt(difference2 / truth2);
-    tv += 0.5 * kPixelArea * absolute;
-    energy += kPixelArea * sum - 1;
-  }
-};
 
 bool answersAsAsked(const api::FootprintShapes& shapes, FootprintShape shape) {
   return shape == FootprintShape::box ? shapes.boxes : shapes.gaussians;
@@ -67,12 +32,13 @@ nlohmann::json SetTruth::errorsOf(const api::OpenedNdf& ndf, double budget_s, st
   using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
   bake::SeenError seen(kResolution);
-  ImageSums sums;
+  bake::ImageErrors sums;
   std::size_t places = 0;
   while (places < set_->places) {
-    std::vector<float> image = imageOf(ndf.model(), set_->footprints[places]);
+    std::vector<float> image = ndfImage(ndf.model(), set_->footprints[places], kResolution);
     seen.add(image.data(), images_[places].data());
-    sums.add(image, images_[places]);
+    const bake::ImageErrors errors = bake::imageErrors(image, images_[places], kResolution);
+    sums.rel_l2 += errors.rel_l2, sums.tv += errors.tv, sums.energy += errors.energy;
     if (places == 0) first = std::move(image);
     ++places;
     if (std::chrono::duration<double>(Clock::now() - start).count() > budget_s) break;

@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <list>
 #include <map>
-#include <string_view>
 
 #include "glint-bench/bench_errors.h"
 #include "glint-bench/bench_times.h"
@@ -77,7 +76,8 @@ class BenchMap {
 /// Measures the candidates of one map.
 class MapBench {
  public:
-  MapBench(Tool& tool, const BenchSettings& settings, BenchMap& map) : tool_(tool), settings_(settings), map_(map) {}
+  MapBench(Tool& tool, const BenchSettings& settings, const AssetFolder& folder, BenchMap& map)
+      : tool_(tool), settings_(settings), folder_(folder), map_(map) {}
 
   /// A measurement: {map, name, method, setting, command, status, ...}. What fails is in its message.
   Json measure(const Candidate& candidate) {
@@ -96,11 +96,7 @@ class MapBench {
 
  private:
   std::string assetOf(const Candidate& candidate) const {
-    if (candidate.tool.empty()) return map_.path();
-    std::string name = map_.hash().substr(0, 8) + "-" + candidate.name() + ".glint";
-    std::replace_if(
-        name.begin(), name.end(), [](char c) { return c == ' ' || c == ',' || c == '/'; }, '_');
-    return (fs::path(settings_.assets) / name).string();
+    return candidate.tool.empty() ? map_.path() : folder_.fileOf(map_.hash(), candidate.name());
   }
 
   const Candidate* sourceOf(const Candidate& candidate) const {
@@ -184,6 +180,7 @@ class MapBench {
 
   Tool& tool_;
   const BenchSettings& settings_;
+  const AssetFolder& folder_;
   BenchMap& map_;
   std::vector<Candidate> all_ = benchCandidates(false);
   std::map<std::string, std::string> failures_;  ///< messages, by the names of candidates
@@ -197,56 +194,6 @@ bool isWanted(const BenchSettings& settings, const Candidate& candidate) {
 
 }  // namespace
 
-namespace {
-
-/// The beginning of the names of a map's assets.
-std::string prefixOf(const std::string& map_hash) { return map_hash.substr(0, 8) + "-"; }
-
-/// Whether a file has a name that a bench gives, or one under which a program that was stopped was writing it.
-bool isOurs(const fs::directory_entry& entry) {
-  std::string name = entry.path().filename().string();
-  if (name.starts_with('.') && name.ends_with(".tmp")) name.erase(0, 1);
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  const bool named = name.find_first_not_of(kDigits) == 8 && name[8] == '-' && name.find(".glint") != std::string::npos;
-  return named && entry.is_regular_file();
-}
-
-void removeOurs(const std::string& folder, const std::string& part_of_name) {
-  std::error_code ignored;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ignored))
-    if (isOurs(entry) && entry.path().filename().string().find(part_of_name) != std::string::npos)
-      fs::remove(entry.path(), ignored);
-}
-
-}  // namespace
-
-AssetFolder::AssetFolder(const std::string& path, bool remove) : path_(path), remove_(remove) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error || !fs::is_directory(path, error)) {
-    throw Error(ErrorCode::io, "output.folder", path, "", "the folder for the assets cannot be made: " + error.message(),
-                "name another one with --assets");
-  }
-  if (!remove) return;
-  for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
-    if (isOurs(entry)) continue;
-    throw Error(ErrorCode::usage, "output.ours", path, "",
-                "exists and would be removed, but holds " + entry.path().filename().string() + ", which is not of a bench",
-                "name a folder with --assets");
-  }
-}
-
-AssetFolder::~AssetFolder() {
-  if (!remove_) return;
-  removeOurs(path_, "");
-  std::error_code ignored;
-  fs::remove(path_, ignored);
-}
-
-void AssetFolder::finish(const std::string& map_hash) const {
-  if (remove_) removeOurs(path_, prefixOf(map_hash));
-}
-
 void runBench(Tool& tool, const BenchSettings& settings, const AssetFolder& folder, BenchResults& results) {
   std::vector<Candidate> candidates = benchCandidates(settings.quick);
   std::erase_if(candidates, [&](const Candidate& c) { return !isWanted(settings, c); });
@@ -256,7 +203,7 @@ void runBench(Tool& tool, const BenchSettings& settings, const AssetFolder& fold
   std::size_t done = 0;
   for (const std::string& path : settings.maps) {
     BenchMap map(path, settings, tool.seed());
-    MapBench bench(tool, settings, map);
+    MapBench bench(tool, settings, folder, map);
     if (!results.hasMap(map.hash())) {
       results.addMap(map.json());
       results.setPlainLobe(Json(plainLobeTime(map.queries())));

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "common/tool.h"
+#include "glint-bench/asset_folder.h"
 #include "glint-bench/bench_results.h"
 
 namespace glint::apps {
@@ -20,26 +21,7 @@ struct BenchSettings {
   std::string output;           ///< file of the results, which is written after every measurement
 };
 
-/// The folder for the assets of a bench, which is made if it is missing.
-class AssetFolder {
- public:
-  /// @param remove  remove the folder and its assets at the end of the scope; then it must be new, or hold only what an earlier bench
-  ///                left
-  /// @throws Error io
-  AssetFolder(const std::string& path, bool remove);
-  AssetFolder(const AssetFolder&) = delete;
-  AssetFolder& operator=(const AssetFolder&) = delete;
-  ~AssetFolder();
-
-  /// Removes the assets of a map, if the folder is to be removed.
-  void finish(const std::string& map_hash) const;
-
- private:
-  std::string path_;
-  bool remove_;
-};
-
-/// Measures every measurement that the results do not have.
+/// Makes every measurement that the results do not have.
 void runBench(Tool& tool, const BenchSettings& settings, const AssetFolder& folder, BenchResults& results);
 
 }  // namespace glint::apps

@@ -92,17 +92,6 @@ std::size_t TextureOutput::write(const SlopeMoments& lean, const std::vector<std
 
 namespace {
 
-/// Normals of a height field, by the gradient that its moments have.
-std::vector<Vec2> normalsOf(const HeightMap& map, const bake::SlopeMomentsOptions& options) {
-  std::vector<Vec2> normals;
-  std::vector<Vec2> slopes(static_cast<std::size_t>(map.width));
-  for (int j = 0; j < map.height; ++j) {
-    bake::rowSlopes(map.width, map.height, map.heights, j, options.boundary, options.gradient, slopes);
-    for (const Vec2 slope : slopes) normals.push_back(bake::normalFromSlopes(slope.x, slope.y));
-  }
-  return normals;
-}
-
 /// Errors of the lobes of a map, whose normals follow from heights where it has none.
 std::vector<bake::LobeError> errorsOf(Tool& tool, const formats::Asset& asset, const SlopeMoments& moments,
                                       const bake::SlopeMomentsOptions& options, float alpha) {
@@ -111,7 +100,8 @@ std::vector<bake::LobeError> errorsOf(Tool& tool, const formats::Asset& asset, c
   };
   if (asset.kind() == "normals") return errors(asset.get<NormalMap>());
   const HeightMap& heights = asset.get<HeightMap>();
-  const std::vector<Vec2> normals = normalsOf(heights, options);
+  const std::vector<Vec2> normals =
+      bake::normalsFromHeights(heights.width, heights.height, heights.heights, options.boundary, nullptr, options.gradient);
   NormalMap map;
   map.width = heights.width, map.height = heights.height, map.normals = normals;
   return errors(map);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/footprint_rules.h"
+#include "common/ndf_image.h"
 #include "glint-query/command_forms.h"
 #include "glint-query/usage.h"
 

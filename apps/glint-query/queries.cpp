@@ -29,20 +29,6 @@ void setResult(Tool& tool, nlohmann::json result, std::optional<double> nanoseco
   tool.setResult(result);
 }
 
-std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int resolution, const bake::ProgressFn& progress) {
-  std::vector<float> image(static_cast<std::size_t>(resolution) * resolution);
-  const float pixel = 2.0f / static_cast<float>(resolution);
-  bake::ProgressCounter counter(progress, static_cast<std::size_t>(resolution));
-  tbb::parallel_for(0, resolution, [&](int y) {
-    for (int x = 0; x < resolution; ++x) {
-      const Vec2 low = {-1 + static_cast<float>(x) * pixel, -1 + static_cast<float>(y) * pixel};
-      image[static_cast<std::size_t>(y) * resolution + x] = model.mean(footprint, {low, low + Vec2{pixel, pixel}});
-    }
-    counter.advance();
-  });
-  return image;
-}
-
 std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& footprint, int count, std::uint64_t seed) {
   std::vector<HalfVectorSample> samples(static_cast<std::size_t>(count));
   const int rows = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(count))));

@@ -58,9 +58,6 @@ void reportTimed(Tool& tool, const nlohmann::json& result, int repeats, const As
   setResult(tool, result, repeats > 0 ? std::optional(medianNanoseconds(repeats, ask)) : std::nullopt);
 }
 
-/// Pixel means of the density over [-1, 1]^2, [resolution][resolution], bottom row first.
-std::vector<float> ndfImage(const AnyNdf& model, const Footprint& footprint, int resolution, const bake::ProgressFn& progress);
-
 /// A table of queries: the header names columns u, v; sigma or sxx, sxy, syy or ax, ay, bx, by; hx, hy or x0, y0, x1, y1.
 /// Further columns are kept.
 class QueryTable {

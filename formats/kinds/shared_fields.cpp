@@ -4,11 +4,13 @@
 
 namespace glint::formats {
 
-void checkSlopes(const MapSlopes& slopes, Findings& findings) {
+bool isCovariance(const Covariance& c) {
   constexpr double kRounding = 1e-6;  // of three floats
-  const Covariance& c = slopes.covariance;
-  const double square = double{c.xy} * c.xy;
-  if (c.xx >= 0 && c.yy >= 0 && square <= (1 + kRounding) * c.xx * c.yy) return;
+  return c.xx >= 0 && c.yy >= 0 && double{c.xy} * c.xy <= (1 + kRounding) * c.xx * c.yy;
+}
+
+void checkSlopes(const MapSlopes& slopes, Findings& findings) {
+  if (isCovariance(slopes.covariance)) return;
   findings.add("shape.slopes", "/@slope_covariance",
                "is not a covariance: a variance is negative, or the covariance too large");
 }

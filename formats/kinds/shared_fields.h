@@ -62,6 +62,8 @@ void describeShape(Fields auto& fields, auto& shape) {
   describeSlopes(fields, shape.slopes);
 }
 
+/// Whether a matrix is a covariance: no eigenvalue below 0, but for the rounding of floats.
+bool isCovariance(const Covariance& c);
 void checkSlopes(const MapSlopes& slopes, Findings& findings);
 void checkShape(const PyramidShape& shape, Findings& findings);
 

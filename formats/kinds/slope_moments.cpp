@@ -18,12 +18,6 @@ bool areUsable(const MapSlopes& s) {
          within(c.xy, kMostCovariance) && within(c.yy, kMostCovariance);
 }
 
-/// Whether a matrix has no negative eigenvalue, but for rounding.
-bool isCovariance(const Covariance& c) {
-  constexpr double kRounding = 1e-5;  // of sums of floats
-  return c.xx >= 0 && c.yy >= 0 && double{c.xy} * c.xy <= (1 + kRounding) * c.xx * c.yy;
-}
-
 }  // namespace
 
 template <>

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "glint/bake/common/image_errors.h"
 #include "glint/bake/common/reference_image.h"
 #include "glint/bake/common/seen_error.h"
 #include "glint/formats/asset_reader.h"
@@ -26,26 +27,6 @@ using namespace glint;
 
 // Size of random footprints, in deviations of their level.
 constexpr float kRandomSize = 1.3f;
-
-struct Errors {
-  double rel_l2 = 0;
-  double tv = 0;
-  double energy = 0;
-};
-
-/// Definitions of DESIGN: taken on pixel means; pixels have the area (2 / resolution)^2.
-Errors compare(const std::vector<float>& image, const std::vector<float>& truth, int resolution) {
-  double difference2 = 0, truth2 = 0, absolute = 0, sum = 0;
-  for (std::size_t k = 0; k < image.size(); ++k) {
-    const double d = double{image[k]} - truth[k];
-    difference2 += d * d;
-    truth2 += double{truth[k]} * truth[k];
-    absolute += std::fabs(d);
-    sum += image[k];
-  }
-  const double area = 4.0 / (double(resolution) * resolution);
-  return {std::sqrt(difference2 / truth2), 0.5 * absolute * area, sum * area - 1};
-}
 
 /// Means of the density over pixels.
 template <NdfModel M>
@@ -98,17 +79,17 @@ class Truth {
 
   template <NdfModel M>
   nlohmann::ordered_json errorsOf(const M& model) const {
-    std::vector<Errors> errors(images_.size());
+    std::vector<bake::ImageErrors> errors(images_.size());
     std::vector<std::vector<float>> answers(images_.size());
     tbb::parallel_for(std::size_t{0}, images_.size(), [&](std::size_t k) {
       answers[k] = imageOf(model, footprints_[k], resolution_);
-      errors[k] = compare(answers[k], images_[k], resolution_);
+      errors[k] = bake::imageErrors(answers[k], images_[k], resolution_);
     });
     bake::SeenError seen_error(resolution_);
     for (std::size_t k = 0; k < images_.size(); ++k) seen_error.add(answers[k].data(), images_[k].data());
     const bake::SeenSummary seen = seen_error.summary();
-    Errors mean;
-    for (const Errors& e : errors) {
+    bake::ImageErrors mean;
+    for (const bake::ImageErrors& e : errors) {
       mean.rel_l2 += e.rel_l2 / static_cast<double>(errors.size());
       mean.tv += e.tv / static_cast<double>(errors.size());
       mean.energy += e.energy / static_cast<double>(errors.size());

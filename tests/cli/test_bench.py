@@ -100,15 +100,28 @@ def test_a_stopped_run_leaves_whole_results(glint, copied):
     assert process.returncode == 0, process.stderr
 
 
-def test_a_method_that_fails_says_so_and_the_rest_goes_on(glint, copied):
-    """A map of one texel is too small for nothing but what it shows: its measurements are there, failed or not."""
-    for command in ("synth flat --size 8 -o one.exr", "ingest one.exr -o one.glint --allow-constant"):
-        assert glint(*command.split()).returncode == 0
-    process = glint("bench", "one.glint", "-o", "one.json", "--quick")
+def test_a_method_that_fails_says_so_and_the_rest_goes_on(copied):
+    """An installation without glint-sat, and whose glint-pyramid always fails."""
+    programs = copied / "bin"
+    programs.mkdir()
+    shutil.copy(BIN / "glint-bench", programs)  # programs are looked for beside the file itself, behind links
+    for tool in ("moments", "binmap", "compress"):
+        (programs / f"glint-{tool}").symlink_to(BIN / f"glint-{tool}")
+    (programs / "glint-pyramid").write_text("#!/bin/sh\necho no memory left >&2\nexit 4\n")
+    (programs / "glint-pyramid").chmod(0o755)
+    process = subprocess.run([programs / "glint-bench", "map.glint", "-o", "some.json", "--quick"], cwd=copied, capture_output=True, text=True, timeout=120)
     assert process.returncode == 0, process.stderr
-    document = json.loads((copied / "one.json").read_text())
+    document = json.loads((copied / "some.json").read_text())
     jsonschema.Draft202012Validator(SCHEMA).validate(document)
-    assert len(document["measurements"]) == 6
+    messages = {m["method"]: m.get("message") for m in document["measurements"]}
+    assert [method for method, message in messages.items() if message is None] == ["brute force", "moments", "bin map"]
+    assert "cannot be started" in messages["histograms"] and "exit code 4: no memory left" in messages["pyramid"]
+    assert "pyramid, stride 32, which it is made from, failed" in messages["tucker"]
+    assert "no memory left" in process.stdout
+    # Where the programs are there, what failed is measured after all.
+    process = subprocess.run([BIN / "glint-bench", "map.glint", "-o", "some.json", "--quick"], cwd=copied, capture_output=True, text=True, timeout=120)
+    assert process.returncode == 0, process.stderr
+    assert {m["status"] for m in json.loads((copied / "some.json").read_text())["measurements"]} == {"ok"}
 
 
 def refused(glint, code, *words):

@@ -76,7 +76,7 @@ def test_a_curved_pixel_sees_what_many_samples_of_it_see(tools, tmp_path):
     truth = draw(0, "--samples", 32)
     plain, curved = (np.array([draw(shift, *options) for shift in shifts]) / truth for options in ([], ["--curvature"]))
     print(f"light of one sample over that of many: {plain.min():.2f} to {plain.max():.2f}, with curvature {curved.min():.2f} to {curved.max():.2f}")
-    assert plain.max() - plain.min() > 1  # so that the test can fail
+    assert plain.min() < 0.1 and plain.max() > 20  # so that the test can fail
     assert abs(curved - 1).max() < 0.2
 
 

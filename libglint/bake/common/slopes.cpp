@@ -26,9 +26,11 @@ struct Neighbours {
   }
 };
 
-/// Calls visit(i, slopes) for each texel of row j.
+/// Calls visit(i, slopes) for each texel of row j. Heights are scaled before their differences, which would overflow between
+/// heights of 3e38 and -3e38.
 template <class Visit>
-void visitSlopes(int width, int height, std::span<const float> heights, int j, Boundary boundary, const Visit& visit) {
+void visitSlopes(int width, int height, std::span<const float> heights, int j, Boundary boundary, Gradient gradient,
+                 const Visit& visit) {
   const auto row = [&](int y) { return heights.data() + static_cast<std::size_t>(y) * width; };
   const Neighbours y(j, height, boundary);
   const float* here = row(j);
@@ -36,8 +38,13 @@ void visitSlopes(int width, int height, std::span<const float> heights, int j, B
   const float* above = row(y.after);
   for (int i = 0; i < width; ++i) {
     const Neighbours x(i, width, boundary);
-    // Scale heights before their difference, which would overflow between heights of 3e38 and -3e38.
-    visit(i, Vec2{x.scale * here[x.after] - x.scale * here[x.before], y.scale * above[i] - y.scale * below[i]});
+    if (gradient == Gradient::central) {
+      visit(i, Vec2{x.scale * here[x.after] - x.scale * here[x.before], y.scale * above[i] - y.scale * below[i]});
+      continue;
+    }
+    const auto across = [&](const float* line) { return 0.125f * line[x.after] - 0.125f * line[x.before]; };
+    const auto along = [&](int k) { return 0.125f * above[k] - 0.125f * below[k]; };
+    visit(i, Vec2{across(below) + 2 * across(here) + across(above), along(x.before) + 2 * along(i) + along(x.after)});
   }
 }
 
@@ -64,13 +71,13 @@ Vec2 normalFromSlopes(float dh_dx, float dh_dy) {
 }
 
 std::vector<Vec2> normalsFromHeights(int width, int height, std::span<const float> heights, Boundary boundary,
-                                     std::size_t* cliffs) {
+                                     std::size_t* cliffs, Gradient gradient) {
   std::vector<Vec2> normals(heights.size());
   std::vector<std::size_t> row_cliffs(static_cast<std::size_t>(height));
   tbb::parallel_for(0, height, [&](int j) {
     Vec2* line = normals.data() + static_cast<std::size_t>(j) * width;
     std::size_t steep = 0;
-    visitSlopes(width, height, heights, j, boundary, [&](int i, Vec2 slope) {
+    visitSlopes(width, height, heights, j, boundary, gradient, [&](int i, Vec2 slope) {
       line[i] = normalFromSlopes(slope.x, slope.y);
       steep += isCliff(slope) ? 1 : 0;
     });
@@ -82,20 +89,8 @@ std::vector<Vec2> normalsFromHeights(int width, int height, std::span<const floa
 
 void rowSlopes(int width, int height, std::span<const float> heights, int j, Boundary boundary, Gradient gradient,
                std::span<Vec2> slopes) {
-  if (gradient == Gradient::central) {
-    visitSlopes(width, height, heights, j, boundary, [&](int i, Vec2 slope) { slopes[static_cast<std::size_t>(i)] = slope; });
-    return;
-  }
-  const Neighbours y(j, height, boundary);
-  const auto row = [&](int k) { return heights.data() + static_cast<std::size_t>(k) * width; };
-  const float *below = row(y.before), *here = row(j), *above = row(y.after);
-  for (int i = 0; i < width; ++i) {
-    const Neighbours x(i, width, boundary);
-    const auto across = [&](const float* line) { return line[x.after] - line[x.before]; };
-    const auto along = [&](int k) { return above[k] - below[k]; };
-    slopes[static_cast<std::size_t>(i)] = {0.125f * (across(below) + 2 * across(here) + across(above)),
-                                           0.125f * (along(x.before) + 2 * along(i) + along(x.after))};
-  }
+  visitSlopes(width, height, heights, j, boundary, gradient,
+              [&](int i, Vec2 slope) { slopes[static_cast<std::size_t>(i)] = slope; });
 }
 
 Vec2 seamRoughness(int width, int height, std::span<const float> heights) {
@@ -125,7 +120,7 @@ SlopeVariances slopeVariances(int width, int height, std::span<const float> heig
   std::vector<SlopeVariances> rows(static_cast<std::size_t>(height));
   tbb::parallel_for(0, height, [&](int j) {
     SlopeVariances& sum = rows[static_cast<std::size_t>(j)];
-    visitSlopes(width, height, heights, j, Boundary::wrap, [&](int, Vec2 slope) {
+    visitSlopes(width, height, heights, j, Boundary::wrap, Gradient::central, [&](int, Vec2 slope) {
       sum.variance_x += slope.x * slope.x;
       sum.variance_y += slope.y * slope.y;
       sum.steepest = std::max(sum.steepest, std::sqrt(dot(slope, slope)));

@@ -18,20 +18,20 @@ inline constexpr float kRimRadius = 0.9999985f;
 /// kRimRadius long.
 Vec2 normalFromSlopes(float dh_dx, float dh_dy);
 
-/// Computes the normals of a height field. Slopes are central differences, (h[i+1] - h[i-1]) / 2: the exact slopes of a
+/// How slopes of a height field are computed from the heights around a texel.
+enum class Gradient : std::uint8_t {
+  central,  ///< central differences
+  sobel,    ///< mean of central differences of three rows (columns) with weights 1, 2, 1: smoother, and less steep
+};
+
+/// Computes the normals of a height field. By default slopes are central differences, (h[i+1] - h[i-1]) / 2: the exact slopes of a
 /// parabola through three heights, and the scheme of other tools that turn heights into normals. At the border, differences
 /// wrap around the map, or under `clamp` are one-sided (h[1] - h[0]).
 /// @param heights  [height][width], texels, bottom row first
 /// @param cliffs   if not null, gets the number of normals that were moved to kRimRadius
 /// @return [height][width]; NaN where a neighbouring height is not finite
 std::vector<Vec2> normalsFromHeights(int width, int height, std::span<const float> heights, Boundary boundary = Boundary::wrap,
-                                     std::size_t* cliffs = nullptr);
-
-/// How slopes of a height field are computed from the heights around a texel.
-enum class Gradient : std::uint8_t {
-  central,  ///< central differences, as normalsFromHeights
-  sobel,    ///< mean of central differences of three rows (columns) with weights 1, 2, 1: smoother, and less steep
-};
+                                     std::size_t* cliffs = nullptr, Gradient gradient = Gradient::central);
 
 /// Computes the slopes (dh/dx, dh/dy) of row j of a height field. Heights beyond the border are wrapped, or under `clamp` those of
 /// the border; central differences are one-sided there.

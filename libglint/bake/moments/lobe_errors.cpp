@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "glint/bake/common/image_errors.h"
 #include "glint/bake/common/reference_image.h"
 #include "glint/bake/common/seen_error.h"
 #include "glint/query/detail/moments/slope_lobe.h"
@@ -39,13 +40,6 @@ std::vector<float> imageOf(const SlopeLobe& lobe) {
   return image;
 }
 
-/// Half the integral of |a - b| over the image.
-double totalVariation(const std::vector<float>& a, const std::vector<float>& b) {
-  double sum = 0;
-  for (std::size_t k = 0; k < a.size(); ++k) sum += std::abs(double{a[k]} - double{b[k]});
-  return 0.5 * sum * 4 / (kResolution * kResolution);
-}
-
 }  // namespace
 
 std::vector<LobeError> lobeErrors(const NormalMap& map, const SlopeMoments& moments, float sigma_r,
@@ -69,7 +63,7 @@ std::vector<LobeError> lobeErrors(const NormalMap& map, const SlopeMoments& mome
           referenceImage(map, sigma, Surface::flat, moments.boundary, areaOf(moments, level, texel), kResolution);
       const std::vector<float> image = imageOf(SlopeLobe(level.texels[texel], sigma));
       seen.add(image.data(), truth.data());
-      variation += totalVariation(image, truth);
+      variation += imageErrors(image, truth, kResolution).tv;
     }
     errors.push_back({variation / static_cast<double>(count), seen.summary().seen});
     counter.advance();
