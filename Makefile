@@ -37,6 +37,12 @@ bench-report: bench  ## the same, and write docs/BENCHMARKS.md, its charts and d
 limits: build  ## draw with every method, compare with brute force; writes docs/LIMITS.md and its pictures
 	@$(PYTHON) tests/render/compare.py --bin build/bin --out build/limits --docs docs
 
+.PHONY: stability
+stability: build  ## test every method where it fails; writes docs/stability.json, its chart and its section of docs/LIMITS.md
+	@mkdir -p build/stability
+	@build/bin/glint-bench --stability -o build/stability/results.json --force
+	@$(PYTHON) tests/stability/write_docs.py build/stability/results.json --docs docs
+
 # Asks for Doxygen and graphviz here only: nothing else needs them.
 .PHONY: docs
 docs:  ## the API reference, in build/docs/html; lists public names without a contract

@@ -8,13 +8,17 @@
 
 namespace glint::apps {
 
-/// The options of glint-bench: maps to measure, or results to show.
+/// The options of glint-bench: maps to measure, tests of stability or a paper's figures to make, or results to show.
 class BenchOptions {
  public:
   explicit BenchOptions(Tool& tool);
 
   /// The results to show as a page; empty: measure.
   const std::string& report() const { return report_; }
+  /// Whether to run the tests of stability, which make their own maps.
+  bool stability() const { return stability_; }
+  /// The paper whose tables and plots to repeat; empty: none.
+  const std::string& preset() const { return preset_; }
   const std::string& output() const { return settings_.output; }
 
   /// How to measure; valid after parsing.
@@ -25,10 +29,14 @@ class BenchOptions {
 
  private:
   void check();
+  void checkAction() const;
+  void checkNames() const;
 
   Tool& tool_;
   BenchSettings settings_;
   std::string report_;
+  bool stability_ = false;
+  std::string preset_;
   const Option* assets_option_ = nullptr;
   const Option* places_option_ = nullptr;
 };

@@ -1,39 +1,20 @@
 #include "glint-bench/bench_results.h"
 
 #include <fmt/format.h>
-#include <sys/utsname.h>
 
 #include <algorithm>
-#include <fstream>
 #include <limits>
-#include <thread>
 #include <utility>
 
 #include "common/files.h"
 #include "glint-bench/candidates.h"
+#include "glint-bench/machine.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-std::string processorName() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);) {
-    const std::size_t colon = line.find(": ");
-    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return "unknown";
-}
-
-Json machine() {
-  utsname system{};
-  ::uname(&system);
-  return {{"processor", processorName()},
-          {"cores", std::thread::hardware_concurrency()},
-          {"system", std::string(system.sysname) + " " + system.release + " " + system.machine}};
-}
 
 [[noreturn]] void refuse(const std::string& path, const std::string& what) {
   throw Error(ErrorCode::invalid_input, "bench.results", path, "", what, "name another file, or start again with --force");
@@ -78,7 +59,7 @@ bool isWhole(const Json& document) {
 BenchResults::BenchResults(const std::string& generator, std::uint64_t seed, int places, bool quick)
     : document_({{"schema", kSchema},
                  {"generator", generator},
-                 {"machine", machine()},
+                 {"machine", machineJson()},
                  {"seed", seed},
                  {"places", places},
                  {"quick", quick},

@@ -16,6 +16,10 @@ GLINT_EMBED(plot, "plot.umd.min.js");
 GLINT_EMBED(style, "report.css");
 GLINT_EMBED(script, "report.js");
 GLINT_EMBED(body, "report.html");
+GLINT_EMBED(stability_script, "stability.js");
+GLINT_EMBED(stability_body, "stability.html");
+GLINT_EMBED(preset_script, "preset.js");
+GLINT_EMBED(preset_body, "preset.html");
 GLINT_EMBED(licences, "LICENSES.txt");
 
 namespace glint::apps {
@@ -30,27 +34,43 @@ std::string forPage(const nlohmann::ordered_json& document) {
   return json;
 }
 
-}  // namespace
-
-void writeReportPage(const nlohmann::ordered_json& document, const std::string& path) {
+/// Writes a page of this body, which this script fills from the document.
+void writePage(const nlohmann::ordered_json& document, std::string_view body, std::string_view script,
+               const std::string& path) {
   std::string page =
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"generator\" "
       "content=\"glint-bench\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>glint-bench</title>\n<style>\n";
   page += text(glint_page_style, glint_page_style_end);
   page += "</style>\n</head>\n<body>\n";
-  page += text(glint_page_body, glint_page_body_end);
+  page += body;
   page += "<script type=\"application/json\" id=\"results\">" + forPage(document) + "</script>\n";
   page += "<!-- The libraries inside this page:\n\n";
   page += text(glint_page_licences, glint_page_licences_end);
   page += "-->\n";
-  for (const std::string_view script : {text(glint_page_d3, glint_page_d3_end), text(glint_page_plot, glint_page_plot_end),
-                                        text(glint_page_script, glint_page_script_end)}) {
+  for (const std::string_view part :
+       {text(glint_page_d3, glint_page_d3_end), text(glint_page_plot, glint_page_plot_end), script}) {
     page += "<script>\n";
-    page += script;
+    page += part;
     page += "\n</script>\n";
   }
   writeTextFile(path, page + "</body>\n</html>\n");
+}
+
+}  // namespace
+
+void writeReportPage(const nlohmann::ordered_json& document, ResultForm form, const std::string& path) {
+  switch (form) {
+    case ResultForm::measurements:
+      return writePage(document, text(glint_page_body, glint_page_body_end), text(glint_page_script, glint_page_script_end),
+                       path);
+    case ResultForm::stability:
+      return writePage(document, text(glint_page_stability_body, glint_page_stability_body_end),
+                       text(glint_page_stability_script, glint_page_stability_script_end), path);
+    case ResultForm::preset:
+      return writePage(document, text(glint_page_preset_body, glint_page_preset_body_end),
+                       text(glint_page_preset_script, glint_page_preset_script_end), path);
+  }
 }
 
 }  // namespace glint::apps

@@ -12,7 +12,8 @@ import pytest
 from conftest import BIN
 
 ROOT = pathlib.Path(__file__).parents[2]
-SCHEMA = json.loads((ROOT / "docs/json/files/bench-results.schema.json").read_text())
+SCHEMAS = ROOT / "docs/json/files"
+SCHEMA = json.loads((SCHEMAS / "bench-results.schema.json").read_text())
 SIZE = 64
 
 
@@ -134,6 +135,15 @@ def test_bad_input_is_named(glint, copied):
     before = (copied / "results.json").read_bytes()
     assert "nothing to measure" in refused(glint, 1, "-o", "x.json")
     assert "exclude" in refused(glint, 1, "map.glint", "--report", "results.json", "-o", "x.html")
+    assert "exclude" in refused(glint, 1, "map.glint", "--stability", "-o", "x.json")
+    assert "exclude" in refused(glint, 1, "--preset", "deng2022", "--stability", "-o", "x.json")
+    assert "no test" in refused(glint, 1, "--stability", "--only", "tucker", "-o", "x.json")
+    assert "no preset" in refused(glint, 1, "--preset", "newton1704", "-o", "x.json")
+    assert "as a whole" in refused(glint, 1, "--preset", "deng2022", "--only", "cp", "-o", "x.json")
+    assert "places" in refused(glint, 1, "--stability", "--places", "3", "-o", "x.json")
+    for form in ("stability", "preset"):
+        (copied / "some.json").write_text(json.dumps({"schema": f"glint-bench {form} 1", "tests": [{}], "rows": [{}]}))
+        assert "lacks a part" in refused(glint, 3, "--report", "some.json", "-o", "x.html")
     assert "no method" in refused(glint, 1, "map.glint", "-o", "x.json", "--only", "magic")
     assert "seed" in refused(glint, 1, "map.glint", "-o", "results.json", "--quick", "--seed", "9")
     assert "places" in refused(glint, 1, "map.glint", "-o", "results.json", "--quick", "--places", "9")
@@ -160,6 +170,22 @@ def test_other_files_beside_the_results_are_not_removed(glint, copied):
     (copied / "x.json.assets/notes.txt").write_text("mine")
     assert "notes.txt" in refused(glint, 1, "map.glint", "-o", "x.json", "--quick")
     assert (copied / "x.json.assets/notes.txt").read_text() == "mine"
+
+
+# Tests of stability are run by tests/stability; here are their page and the presets.
+
+def test_a_preset_has_figures_beside_those_of_the_paper(glint):
+    process = glint("bench", "--preset", "atanasov2021", "--quick", "-o", "paper.json")
+    assert process.returncode == 0, process.stderr
+    document = json.loads((glint.folder / "paper.json").read_text())
+    jsonschema.Draft202012Validator(json.loads((SCHEMAS / "preset-results.schema.json").read_text())).validate(document)
+    rows = document["rows"]
+    assert not [row for row in rows if "failed" in row.get("note", "")]
+    bins = {row["subject"]: row for row in rows if row["figure"] == "bins along an axis"}
+    assert len(bins) == 4 and all(row["ours"] == row["paper"] for row in bins.values())  # Eq. 16 of the paper
+    assert all(row["ours"] == pytest.approx(1, abs=0.03) for row in rows if row["figure"] == "integral of D" and "0.25" not in row["subject"])
+    assert "x1 " in process.stdout and "Table 4" in process.stdout
+    assert not list(glint.folder.glob("*.assets"))
 
 
 # The page, in Chromium where it is installed
@@ -212,6 +238,45 @@ def test_the_page_draws_and_its_choices_work(measured, tmp_path, width):
     assert shown["pictures"] == 3
     assert shown["figures"] == 1 + methods + 1 and shown["strip"] == methods and shown["cheapest"] >= 3
     assert shown["wide"], "the page is wider than the window"
+
+
+PAGE_ACT = """<script>
+setTimeout(() => {
+  const shown = { circles: document.querySelectorAll("figure > svg circle, figure div > svg circle").length, rows: document.querySelectorAll("tr").length };
+  const series = document.getElementById("series");
+  if (series) { series.value = series.options[1].value; series.dispatchEvent(new Event("change")); }
+  shown.chosen = document.querySelectorAll("figure > svg circle, figure div > svg circle").length;
+  shown.wide = document.documentElement.scrollWidth <= innerWidth;
+  document.body.dataset.shown = JSON.stringify(shown);
+}, 300);
+</script>"""
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+@pytest.mark.parametrize("width", [1280, 500])
+@pytest.mark.parametrize("form", ["stability", "preset"])
+def test_the_other_pages_draw(glint, tmp_path, form, width):
+    if form == "stability":
+        results = ROOT / "docs/stability.json"
+    else:
+        results = tmp_path / "paper.json"
+        row = {"source": "Table 2", "subject": "flakes <b>", "figure": "bytes", "unit": "MB"}
+        results.write_text(json.dumps({"schema": "glint-bench preset 1", "generator": "glint-bench", "machine": {"processor": "p", "cores": 2, "system": "s"}, "seed": 1,
+                                       "quick": True, "preset": "deng2022", "paper": "Deng et al. 2022",
+                                       "rows": [row | {"paper": 2, "ours": 1}, row | {"ours": 3}, row | {"note": "not repeated </script>"}]}))
+    process = glint("bench", "--report", str(results), "-o", str(tmp_path / "some.html"))
+    assert process.returncode == 0, process.stderr
+    page = tmp_path / "page.html"
+    page.write_text((tmp_path / "some.html").read_text().replace("</body>", PAGE_ACT + "</body>"))
+    process = browse(tmp_path, page, width, "--dump-dom")
+    assert "Uncaught" not in process.stderr and ":CONSOLE" not in process.stderr, process.stderr
+    shown = json.loads(re.search(r'data-shown="([^"]*)"', process.stdout).group(1).replace("&quot;", '"'))
+    assert shown["wide"], "the page is wider than the window"
+    if form == "preset":
+        assert shown["circles"] == 1 and shown["rows"] == 4
+    else:
+        tests = json.loads(results.read_text())["tests"]
+        assert shown["circles"] == sum("value" in point for test in tests for point in test["points"]) > shown["chosen"] > 0
 
 
 def test_the_page_asks_no_network(measured):

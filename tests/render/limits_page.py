@@ -1,9 +1,14 @@
 """Writes docs/LIMITS.md and docs/limits.csv from the figures of compare.py."""
 
 import csv
+import json
+import pathlib
+import sys
 import textwrap
 from math import radians, tan
 
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "stability"))
+from limits_section import with_section
 from gallery import MODELS, REFERENCES, reference_of
 
 # Largest values that a good method has. Steps: 1 is the noise beside a side of a block, which the sides of five pictures tell to a tenth.
@@ -185,6 +190,9 @@ def write(results, docs):
         overview=overview_table(rows, models, lights), reference_change=reference_change(rows),
         failures="\n\n".join(failure_section(rows, model) for model in models),
         maps="\n\n".join(map_section(rows, name, models, distances, lights) for name in names))
+    stability = docs / "stability.json"
+    if stability.exists():
+        text = with_section(text, json.loads(stability.read_text()))
     (docs / "LIMITS.md").write_text(text, encoding="utf-8")
     with open(docs / "limits.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, ["map", "model", "figure", "value", *PLACES], lineterminator="\n")
