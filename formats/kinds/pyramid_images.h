@@ -1,0 +1,35 @@
+#pragma once
+
+// Private to formats/: the NDF images of a pyramid, which several kinds have. Their rules are those of kind ndf-pyramid.
+
+#include "glint/formats/kinds/shared_fields.h"
+#include "glint/model/ndf_pyramid.h"
+
+namespace glint::formats {
+
+/// The images of every level. Comes after describeShape, and after all attributes of a kind.
+void describeImages(Fields auto& fields, auto& pyramid) {
+  fields.choice("precision", pyramid.precision, "f16|f32", "type of the stored pixels");
+  fields.real("value_scale", pyramid.value_scale, kPositive, "1", "density = value_scale * stored pixel");
+  fields.derived("mask_words", "ceil_div(resolution * resolution, 16384)", "64-bit words of occupancy bits of an image");
+  fields.levels("level_count", pyramid.shape.level_count, [&](int l) {
+    auto& level = pyramid.levels[l];
+    fields.array("level_{l}/masks", level.masks, {"level_rows[l]", "level_columns[l]", "mask_words"}, "1",
+                 "bit b of word w: block 64 w + b of the image is stored");
+    fields.array("level_{l}/mask_ranks", level.mask_ranks, {"level_rows[l] * level_columns[l] * mask_words + 1"}, "1",
+                 "stored blocks of the level before those of this word; the last value is their total");
+    fields.array("level_{l}/block_means", level.block_means, {"stored_blocks"}, "1", "mean density of each stored block");
+    // The pixels are a bare pointer: the running count is the only witness of how many there are.
+    const std::uint64_t blocks = level.mask_ranks.empty() ? 0 : level.mask_ranks.back();
+    fields.data("level_{l}/pixels", level.pixels, blocks * kBlockPixels,
+                {{"precision=f16", ElementType::f16}, {"precision=f32", ElementType::f32}}, {"stored_blocks", "16", "16"}, "1",
+                "mean density of each pixel of each stored block, divided by value_scale");
+  });
+}
+
+/// Checks what a query follows: masks and ranks.
+void checkImageIndex(const NdfPyramid& pyramid, Findings& findings);
+/// Checks pixels, means of blocks and integrals.
+void checkImageValues(const NdfPyramid& pyramid, Findings& findings);
+
+}  // namespace glint::formats
