@@ -8,6 +8,7 @@
 #include "common/ndf_image.h"
 #include "glint-query/command_forms.h"
 #include "glint-query/usage.h"
+#include "glint/api/plane_position.h"
 
 namespace glint::apps {
 HalfVectorOptions::HalfVectorOptions(Tool& tool) {
@@ -90,14 +91,15 @@ void DistributionCommand::answerTable() {
 }
 
 void DistributionCommand::writeSamples() {
-  const std::vector<HalfVectorSample> samples =
-      drawSamples(asset_.model(), footprint_.footprint(), table_.samples(), tool_.seed());
+  const std::vector<HalfVectorSample> samples = drawSamples(api::movedTo(asset_.model(), footprint_.u(), footprint_.v()),
+                                                            footprint_.footprint(), table_.samples(), tool_.seed());
   table_.write(sampleTable(samples));
   tool_.setResult({{"samples", samples.size()}});
 }
 
 void DistributionCommand::answerOne() {
-  const Query q = halves_.query(footprint_.footprint());
+  Query q = halves_.query(footprint_.footprint());
+  q.u = footprint_.u(), q.v = footprint_.v();
   const float value = answer(asset_.model(), q);
   tool_.print(fmt::format("{:.9g}\n", value));
   reportTimed(tool_, {{q.range ? "mean" : "density", value}, {"widened", asset_.widens(q.footprint)}}, repeat_,
@@ -107,7 +109,9 @@ void DistributionCommand::answerOne() {
 void DistributionCommand::writePicture() {
   const int size = picture_.size(asset_.resolution());
   auto densities = asset_.scatteredImage(footprint_.footprint(), size);
-  if (!densities) densities = ndfImage(asset_.model(), footprint_.footprint(), size, tool_.progress("rows"));
+  if (!densities)
+    densities = ndfImage(api::movedTo(asset_.model(), footprint_.u(), footprint_.v()), footprint_.footprint(), size,
+                         tool_.progress("rows"));
   picture_.write(size, *densities);
 }
 

@@ -8,6 +8,7 @@
 
 #include "glint/api/c_support.h"
 #include "glint/api/pack.h"
+#include "glint/api/plane_position.h"
 #include "glint/query/ray_footprint.h"
 
 namespace {
@@ -263,7 +264,9 @@ glint_status glint_ndf_pack(const glint_ndf* ndf, void* buffer, size_t capacity,
 glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy, float* density) {
   if (!isOpen(ndf) || footprint == nullptr || density == nullptr)
     return badArgument("glint_density", {{ndf, "ndf"}, {footprint, "footprint"}, {density, "density"}});
-  *density = ndf->body().opened.model().density(footprintOf(*footprint), {hx, hy});
+  *density = api::askAt(ndf->body().opened.model(), footprint->u, footprint->v, [&](const auto& model) {
+    return model.density(footprintOf(*footprint), {hx, hy});
+  });
   return GLINT_OK;
 }
 
@@ -271,7 +274,9 @@ glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, 
                         float* mean) {
   if (!isOpen(ndf) || footprint == nullptr || mean == nullptr)
     return badArgument("glint_mean", {{ndf, "ndf"}, {footprint, "footprint"}, {mean, "mean"}});
-  *mean = ndf->body().opened.model().mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}});
+  *mean = api::askAt(ndf->body().opened.model(), footprint->u, footprint->v, [&](const auto& model) {
+    return model.mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}});
+  });
   return GLINT_OK;
 }
 
@@ -279,7 +284,9 @@ glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint
                           float* pdf) {
   if (!isOpen(ndf) || footprint == nullptr || hx == nullptr || hy == nullptr || pdf == nullptr)
     return badArgument("glint_sample", {{ndf, "ndf"}, {footprint, "footprint"}, {hx, "hx"}, {hy, "hy"}, {pdf, "pdf"}});
-  const HalfVectorSample drawn = ndf->body().opened.model().sample(footprintOf(*footprint), {xi1, xi2});
+  const HalfVectorSample drawn = api::askAt(ndf->body().opened.model(), footprint->u, footprint->v, [&](const auto& model) {
+    return model.sample(footprintOf(*footprint), {xi1, xi2});
+  });
   *hx = drawn.h.x;
   *hy = drawn.h.y;
   *pdf = drawn.pdf;

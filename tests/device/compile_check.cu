@@ -6,6 +6,7 @@
 #include "glint/query/histogram_ndf.h"
 #include "glint/query/moments_ndf.h"
 #include "glint/query/ray_footprint.h"
+#include "glint/query/tiny_example_ndf.h"
 #include "glint/query/light/sh_light_query.h"
 #include "glint/query/light/sh_transfer.h"
 
@@ -15,6 +16,8 @@ template __global__ void answer<HistogramNdf>(HistogramNdf, const Footprint*, co
 template __global__ void draw<HistogramNdf>(HistogramNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 template __global__ void answer<MomentsNdf>(MomentsNdf, const Footprint*, const Vec2*, float, int, float*, float*);
 template __global__ void draw<MomentsNdf>(MomentsNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
+template __global__ void answer<TinyExampleNdf>(TinyExampleNdf, const Footprint*, const Vec2*, float, int, float*, float*);
+template __global__ void draw<TinyExampleNdf>(TinyExampleNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 
 /// A shading point of a distribution: its footprint from ray differentials, its BRDF, and lights.
 __global__ void shade(const PyramidNdf ndf, const SmithMasking masking, const SphericalGaussians lights, const Vec2* uv,

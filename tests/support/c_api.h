@@ -46,6 +46,10 @@ inline void writeSample(std::type_identity<SlopeMoments>, const std::string& pat
   formats::writeAsset(path, sampleSlopeMoments(kSize, kSize).moments, sampleProvenance());
 }
 
+inline void writeSample(std::type_identity<TinyExample>, const std::string& path) {
+  formats::writeAsset(path, sampleTinyExample(kSize, TinyMode::tiled).example, sampleProvenance());
+}
+
 /// Files of every kind that a model answers, and of some others.
 class Assets {
  public:

@@ -481,6 +481,35 @@ SampleDisplacement sampleDisplacement(int size, bool colored) {
   return sample;
 }
 
+namespace {
+
+/// Stores the occupied blocks of the images of a level.
+void addLevel(SamplePyramid& sample, int l, const std::vector<Image>& images) {
+  NdfPyramid& pyramid = sample.pyramid;
+  SamplePyramid::Level& level = sample.levels[static_cast<std::size_t>(l)];
+  for (const Image& image : images) {
+    level.mask_ranks.push_back(static_cast<std::uint32_t>(level.block_means.size()));  // one word: at most 64 blocks
+    level.masks.push_back(0);
+    for (int block = 0; block < pyramid.shape.blocksPerImage(); ++block) {
+      const double mean = blockMean(image, block);
+      if (mean == 0) continue;
+      level.masks.back() |= std::uint64_t{1} << block;
+      level.block_means.push_back(static_cast<float>(mean));
+      for (int k = 0; k < kBlockPixels; ++k) {
+        const double stored = blockPixel(image, block, k % kBlockSize, k / kBlockSize) / pyramid.value_scale;
+        level.halves.push_back(floatToHalf(static_cast<float>(stored)));
+        level.floats.push_back(static_cast<float>(stored));
+      }
+    }
+  }
+  level.mask_ranks.push_back(static_cast<std::uint32_t>(level.block_means.size()));
+  const void* pixels =
+      pyramid.precision == BlockPrecision::f16 ? static_cast<const void*>(level.halves.data()) : level.floats.data();
+  pyramid.levels[l] = {level.masks, level.mask_ranks, level.block_means, pixels};
+}
+
+}  // namespace
+
 SamplePyramid samplePyramid(int size, BlockPrecision precision) {
   SamplePyramid sample;
   const SampleNormals normals = sampleNormals(size, size, false);
@@ -489,27 +518,52 @@ SamplePyramid samplePyramid(int size, BlockPrecision precision) {
   pyramid.precision = precision;
   pyramid.value_scale = 4;
   sample.levels.resize(static_cast<std::size_t>(pyramid.shape.level_count));
-  for (int l = 0; l < pyramid.shape.level_count; ++l) {
-    SamplePyramid::Level& level = sample.levels[static_cast<std::size_t>(l)];
-    for (const Image& image : levelImages(normals.map, pyramid.shape.levels[l])) {
-      level.mask_ranks.push_back(static_cast<std::uint32_t>(level.block_means.size()));  // one word: at most 64 blocks
-      level.masks.push_back(0);
-      for (int block = 0; block < pyramid.shape.blocksPerImage(); ++block) {
-        const double mean = blockMean(image, block);
-        if (mean == 0) continue;
-        level.masks.back() |= std::uint64_t{1} << block;
-        level.block_means.push_back(static_cast<float>(mean));
-        for (int k = 0; k < kBlockPixels; ++k) {
-          const double stored = blockPixel(image, block, k % kBlockSize, k / kBlockSize) / pyramid.value_scale;
-          level.halves.push_back(floatToHalf(static_cast<float>(stored)));
-          level.floats.push_back(static_cast<float>(stored));
-        }
+  for (int l = 0; l < pyramid.shape.level_count; ++l) addLevel(sample, l, levelImages(normals.map, pyramid.shape.levels[l]));
+  return sample;
+}
+
+SampleTinyExample sampleTinyExample(int size, TinyMode mode) {
+  SampleTinyExample sample;
+  sample.normals = sampleNormals(size, size, false).normals;
+  TinyExample& tiny = sample.example;
+  tiny.mode = mode;
+  tiny.background_sigma_r = 0.125f;
+  if (mode == TinyMode::scattered) {
+    tiny.transforms = {
+        .scale = {0.5f, 1.5f}, .stretch = {1, 1.25f}, .shear = {-0.25f, 0}, .rotation_rad = {0, 6.25f}, .mirror = 0.5f};
+    tiny.density = 1.5f;
+    tiny.overlap = TinyOverlap::nearest;
+    tiny.seed = 7;
+  }
+  PyramidShape& shape = sample.images.pyramid.shape;
+  shape = sampleShape(size);
+  shape.level_count = 0;
+  const int levels = mode == TinyMode::scattered ? 1 : 0;
+  for (int side = 2; side <= size << levels; side *= 2)
+    shape.levels[shape.level_count++] = {static_cast<float>(side), std::max(1, size / side), std::max(1, size / side)};
+  sample.images.pyramid.value_scale = 4;
+  sample.images.levels.resize(static_cast<std::size_t>(shape.level_count));
+  const double pixel_area = 4.0 / (kResolution * kResolution);
+  for (int l = 0; l < shape.level_count; ++l) {
+    // Each texel fills the pixel of its normal: no lobe, but images that integrate to 1.
+    const int columns = shape.levels[l].columns, side = size / columns;
+    std::vector<Image> images(static_cast<std::size_t>(columns) * static_cast<std::size_t>(columns));
+    for (Image& image : images) image.assign(static_cast<std::size_t>(kResolution) * kResolution, 0);
+    for (int j = 0; j < size; ++j) {
+      for (int i = 0; i < size; ++i) {
+        const Vec2 n =
+            sample.normals[static_cast<std::size_t>(j) * static_cast<std::size_t>(size) + static_cast<std::size_t>(i)];
+        const auto pixel = [](float x) {
+          return std::clamp(static_cast<int>((x + 1) * 0.5f * kResolution), 0, kResolution - 1);
+        };
+        images[static_cast<std::size_t>(j / side * columns + i / side)]
+              [static_cast<std::size_t>(pixel(n.y) * kResolution + pixel(n.x))] += 1 / (pixel_area * side * side);
       }
     }
-    level.mask_ranks.push_back(static_cast<std::uint32_t>(level.block_means.size()));
-    const void* pixels = precision == BlockPrecision::f16 ? static_cast<const void*>(level.halves.data()) : level.floats.data();
-    pyramid.levels[l] = {level.masks, level.mask_ranks, level.block_means, pixels};
+    addLevel(sample.images, l, images);
   }
+  tiny.images = sample.images.pyramid;
+  tiny.normals = sample.normals;
   return sample;
 }
 
@@ -825,6 +879,8 @@ std::vector<SampleAsset> sampleAssets() {
       {"sh-light", [] { return owned(sampleShLight(), &SampleShLight::light); }},
       {"sh-lobes", [] { return owned(sampleShLobes(), &SampleShLobes::lobes); }},
       {"slope-moments", [] { return owned(sampleSlopeMoments(9, 4), &SampleSlopeMoments::moments); }},
+      {"tiny-example-scattered", [] { return owned(sampleTinyExample(8, TinyMode::scattered), &SampleTinyExample::example); }},
+      {"tiny-example-tiled", [] { return owned(sampleTinyExample(8, TinyMode::tiled), &SampleTinyExample::example); }},
   };
 }
 

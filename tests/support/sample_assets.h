@@ -102,6 +102,12 @@ struct SampleSlopeMoments {
   SlopeMoments moments;
 };
 
+struct SampleTinyExample {
+  SamplePyramid images;
+  std::vector<Vec2> normals;
+  TinyExample example;
+};
+
 struct SampleShLobes {
   std::vector<float> zonal;
   std::vector<float> coefficients;
@@ -133,6 +139,9 @@ SampleBinMap sampleBinMap(int width, int height);
 SampleHistograms sampleHistograms(int width, int height);
 /// Level 1 and up of a chain, whose slopes are simple fractions. Half the width and half the height, rounded down, are powers of two.
 SampleSlopeMoments sampleSlopeMoments(int width, int height);
+/// An example of the normals of sampleNormals. Its images have a pixel for each texel.
+/// @param size  a power of two
+SampleTinyExample sampleTinyExample(int size, TinyMode mode);
 /// A lobe of order 1 with the zonal coefficients 0.28 and 0.4, on a grid of 3 x 4 directions.
 SampleShLobes sampleShLobes();
 /// Constant light of radiance 1, 2 and 3 in red, green and blue, order 2, on a grid of 3 x 4 directions.

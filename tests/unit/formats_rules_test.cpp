@@ -40,14 +40,16 @@ enum class Base {
   bin_map,
   histograms,
   moments,
+  tiny_scattered,
+  tiny_tiled,
   sh_lobes,
   sh_light,
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,  Base::heights,      Base::pyramid,         Base::compressed, Base::compressed_f32,
-                           Base::spots,    Base::bin_map,      Base::histograms,      Base::moments,    Base::sh_lobes,
-                           Base::sh_light, Base::displacement, Base::displacement_rgb};
+constexpr Base kBases[] = {Base::normals,    Base::heights,  Base::pyramid,    Base::compressed,   Base::compressed_f32,
+                           Base::spots,      Base::bin_map,  Base::histograms, Base::moments,      Base::tiny_scattered,
+                           Base::tiny_tiled, Base::sh_lobes, Base::sh_light,   Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -75,6 +77,10 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleHistograms(22, 19).sat, provenance);
     case Base::moments:
       return writeAsset(path, test::sampleSlopeMoments(9, 4).moments, provenance);
+    case Base::tiny_scattered:
+      return writeAsset(path, test::sampleTinyExample(8, TinyMode::scattered).example, provenance);
+    case Base::tiny_tiled:
+      return writeAsset(path, test::sampleTinyExample(8, TinyMode::tiled).example, provenance);
     case Base::sh_lobes:
       return writeAsset(path, test::sampleShLobes().lobes, provenance);
     case Base::sh_light:
@@ -687,6 +693,33 @@ std::vector<Fixture> momentsFixtures() {
   };
 }
 
+std::vector<Fixture> tinyFixtures() {
+  const auto reals = [](const char* attribute, std::vector<float> values) {
+    return
+        [=](const Patch& patch) { patch.set("/", attribute, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, values.data(), values.size()); };
+  };
+  return {
+      patched("tiny.size", Base::tiny_tiled, [](const Patch& patch) { patch.setInteger("width", 12); }),
+      patched("tiny.size", Base::tiny_tiled,
+              [](const Patch& patch) {
+                patch.setInteger("width", 4);
+                patch.setInteger("height", 4);
+              }),
+      patched("tiny.levels", Base::tiny_tiled, [](const Patch& patch) { patch.setText("mode", "scattered"); }),
+      patched("tiny.levels", Base::tiny_scattered, [](const Patch& patch) { patch.setText("mode", "tiled"); }),
+      patched("tiny.matrix", Base::tiny_tiled, reals("matrix", {1, 2, 2, 4})),
+      patched("tiny.transforms", Base::tiny_scattered, reals("scale", {2, 1})),
+      patched("tiny.reach", Base::tiny_scattered, reals("shear", {-6, 0})),
+      patched("tiny.reach", Base::tiny_scattered, [](const Patch& patch) { patch.setReal("density", 8); }),
+      patched(
+          "tiny.normals", Base::tiny_scattered,
+          [](const Patch& patch) { patch.change<float>("normals", 3, [](float& x) { x = 1.5f; }); }, true),
+      patched(
+          "tiny.normals", Base::tiny_tiled,
+          [](const Patch& patch) { patch.change<float>("normals", 8, [](float& x) { x = kNan; }); }, true),
+  };
+}
+
 std::vector<Fixture> binMapFixtures() {
   const auto changed = [](const char* rule, const char* path, std::size_t index, auto edit, bool opens = false) {
     using T = std::remove_cvref_t<decltype(edit(0))>;
@@ -760,7 +793,7 @@ std::vector<Fixture> shFixtures() {
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
   for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), storageFixtures(), datasetFixtures(),
-                    pyramidFixtures(), ndfCpFixtures(), dataFixtures(), histogramFixtures(), momentsFixtures(),
+                    pyramidFixtures(), ndfCpFixtures(), dataFixtures(), histogramFixtures(), momentsFixtures(), tinyFixtures(),
                     binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
@@ -936,7 +969,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 16u);
+  EXPECT_EQ(count, 18u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -965,6 +998,10 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_FLOAT_EQ(sat.bin_normals[9].x, 0.0831450075f);
   EXPECT_EQ(sat.sums[(4 * 7 + 5) * 32 + 9], 1);
   EXPECT_EQ(sat.slopes.covariance.xy, 0.03125f);
+  const Asset tiny = Asset::open(folder / "tiny-example-scattered.glint");
+  EXPECT_EQ(tiny.get<TinyExample>().transforms.shear.low, -0.25f);
+  EXPECT_EQ(tiny.get<TinyExample>().images.shape.levels[3].stride, 16);
+  EXPECT_EQ(tiny.get<TinyExample>().overlap, TinyOverlap::nearest);
   const Asset moments = Asset::open(folder / "slope-moments.glint");
   EXPECT_EQ(moments.get<SlopeMoments>().levels[0].texels[5].mean.x, -0.0625f);
   EXPECT_EQ(moments.get<SlopeMoments>().levels[2].texels[0].covariance.xx, 0.03515625f);
