@@ -21,7 +21,7 @@ SCHEMAS = {path.name.removesuffix(".schema.json"): json.loads(path.read_text()) 
 
 LIGHTS = {"lights": [{"type": "sphere", "centre": [1, 0, 3], "radius": 0.5, "radiance": [3, 2, 1]}]}
 QUERIES = {"half.csv": "u,v,sigma,hx,hy\n.3,.3,4,0,0\n.1,.2,5,.1,0\n", "displaced.csv": "u,v,level,hx,hy\n.3,.3,0,0,0\n"}
-ASSETS = ("normals", "smooth", "heights", "flat", "damaged", "pyramid", "cp", "tucker", "pca", "bins", "range", "sat", "moments", "lobes", "zonal", "light",
+ASSETS = ("normals", "smooth", "heights", "flat", "damaged", "pyramid", "cp", "tucker", "pca", "bins", "range", "sat", "moments", "wang", "lobes", "zonal", "light",
           "displaced", "rough", "colored")
 
 # Commands in the order that they run: each may read what the commands before it wrote.
@@ -44,6 +44,8 @@ MAKE = [
     "sat normals.glint -o sat.glint --bins 6x20",
     "moments normals.glint -o moments.glint",
     "moments heights.glint -o m.glint --finest 0 --roughness .3 --textures . --lobe gltf",
+    "wang normals.glint -o wang.glint --size 16",
+    "wang wang.glint --explicit 20 10 -o part.glint",
     "shlobes -o lobes.glint --sigma-r .1 --order 6 --grid 5x8 --precision f32",
     "shlobes -o zonal.glint --sigma-r .1 --order 6 --grid none",
     "shlobes --light lights.json -o light.glint --order 6 --grid 5x8",

@@ -102,6 +102,11 @@ struct SampleSlopeMoments {
   SlopeMoments moments;
 };
 
+struct SampleWangTiles {
+  std::vector<Vec2> normals;
+  WangTiles tiles;
+};
+
 struct SampleShLobes {
   std::vector<float> zonal;
   std::vector<float> coefficients;
@@ -133,6 +138,8 @@ SampleBinMap sampleBinMap(int width, int height);
 SampleHistograms sampleHistograms(int width, int height);
 /// Level 1 and up of a chain, whose slopes are simple fractions. Half the width and half the height, rounded down, are powers of two.
 SampleSlopeMoments sampleSlopeMoments(int width, int height);
+/// Sixteen tiles of 16 x 16 texels, two colours. Normals are the same in all tiles of the same colours on a side, and simple fractions.
+SampleWangTiles sampleWangTiles(WangScheme scheme = WangScheme::corner);
 /// A lobe of order 1 with the zonal coefficients 0.28 and 0.4, on a grid of 3 x 4 directions.
 SampleShLobes sampleShLobes();
 /// Constant light of radiance 1, 2 and 3 in red, green and blue, order 2, on a grid of 3 x 4 directions.

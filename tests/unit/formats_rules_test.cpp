@@ -40,14 +40,15 @@ enum class Base {
   bin_map,
   histograms,
   moments,
+  wang_tiles,
   sh_lobes,
   sh_light,
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,  Base::heights,      Base::pyramid,         Base::compressed, Base::compressed_f32,
-                           Base::spots,    Base::bin_map,      Base::histograms,      Base::moments,    Base::sh_lobes,
-                           Base::sh_light, Base::displacement, Base::displacement_rgb};
+constexpr Base kBases[] = {Base::normals,  Base::heights,  Base::pyramid,      Base::compressed,      Base::compressed_f32,
+                           Base::spots,    Base::bin_map,  Base::histograms,   Base::moments,         Base::wang_tiles,
+                           Base::sh_lobes, Base::sh_light, Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -75,6 +76,8 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleHistograms(22, 19).sat, provenance);
     case Base::moments:
       return writeAsset(path, test::sampleSlopeMoments(9, 4).moments, provenance);
+    case Base::wang_tiles:
+      return writeAsset(path, test::sampleWangTiles().tiles, provenance);
     case Base::sh_lobes:
       return writeAsset(path, test::sampleShLobes().lobes, provenance);
     case Base::sh_light:
@@ -687,6 +690,30 @@ std::vector<Fixture> momentsFixtures() {
   };
 }
 
+std::vector<Fixture> wangFixtures() {
+  const auto changed = [](const char* rule, std::size_t number, float value) {
+    return patched(
+        rule, Base::wang_tiles,
+        [=](const Patch& patch) { patch.change<float>("normals", number, [=](float& x) { x = value; }); }, true);
+  };
+  const std::size_t row = 2 * WangTiles::kLeastSize, tile = row * WangTiles::kLeastSize;
+  return {
+      patched("wang.set", Base::wang_tiles,
+              [](const Patch& patch) {
+                patch.setInteger("colors_h", 3);
+                patch.setInteger("colors_v", 3);
+              }),
+      patched("wang.corners", Base::wang_tiles, [](const Patch& patch) { patch.setInteger("colors_v", 4); }),
+      changed("wang.disk", 3 * tile + 5, kNan),
+      changed("wang.disk", 2 * row + 7, 1.25f),
+      changed("wang.sides", 5 * tile + 6, 0.3125f),              // south
+      changed("wang.sides", 16 * tile - row + 6, 0.3125f),       // north
+      changed("wang.sides", 9 * tile + 4 * row, 0.3125f),        // west
+      changed("wang.sides", 2 * tile + 5 * row - 1, 0.3125f),    // east
+      changed("wang.slopes", 2 * tile + 4 * row + 10, 0.96875f)  // inside
+  };
+}
+
 std::vector<Fixture> binMapFixtures() {
   const auto changed = [](const char* rule, const char* path, std::size_t index, auto edit, bool opens = false) {
     using T = std::remove_cvref_t<decltype(edit(0))>;
@@ -760,7 +787,7 @@ std::vector<Fixture> shFixtures() {
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
   for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), storageFixtures(), datasetFixtures(),
-                    pyramidFixtures(), ndfCpFixtures(), dataFixtures(), histogramFixtures(), momentsFixtures(),
+                    pyramidFixtures(), ndfCpFixtures(), dataFixtures(), histogramFixtures(), momentsFixtures(), wangFixtures(),
                     binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
@@ -936,7 +963,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 16u);
+  EXPECT_EQ(count, 17u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -968,6 +995,9 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   const Asset moments = Asset::open(folder / "slope-moments.glint");
   EXPECT_EQ(moments.get<SlopeMoments>().levels[0].texels[5].mean.x, -0.0625f);
   EXPECT_EQ(moments.get<SlopeMoments>().levels[2].texels[0].covariance.xx, 0.03515625f);
+  const Asset wang = Asset::open(folder / "wang-tiles.glint");
+  EXPECT_EQ(wang.get<WangTiles>().at(9, 3, 2).x, -0.25f);
+  EXPECT_EQ(wang.get<WangTiles>().plane_seed, 7);
   EXPECT_EQ(static_cast<const float*>(Asset::open(folder / "sh-lobes.glint").get<ShLobes>().coefficients)[5 * 4 + 3], 0.4f);
   EXPECT_EQ(Asset::open(folder / "sh-light.glint").get<ShLight>().band_norms[7], 12.2799206f);
   struct Recorded {
