@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <optional>
 #include <string>
 #include <utility>
@@ -23,7 +24,7 @@ namespace glint::bake {
 namespace {
 
 constexpr int kLeastMap = 16;  // texels along an axis of a map that blocks can be cut from
-constexpr int kBorderCandidates = 16;
+constexpr int kBorderCandidates = 32;
 constexpr int kInteriorCandidates = 96;
 constexpr int kShortlist = 6;  // of the interiors that fit best; the normals of the set choose among them
 
@@ -111,6 +112,7 @@ class TileMaker {
 
  private:
   std::vector<Patch> borderPatches() const;
+  NormalCells usedCells(const Patch& patch) const;
   std::array<int, 2> interiorGrid() const;
   PatchPlace interiorCandidate(int tile, int candidate, const std::array<int, 2>& grid) const;
   double ringMisfit(const Patch& border, PatchPlace place) const;
@@ -140,7 +142,7 @@ std::vector<Patch> TileMaker::borderPatches() const {
     for (int candidate = 0; candidate < kBorderCandidates; ++candidate) {
       const auto index = static_cast<std::uint64_t>(k * kBorderCandidates + candidate);
       Patch patch = source_.cut(randomPlace(source_, width, height, seed_, WangStream::borders, index), width, height);
-      NormalCells cells = cellsOf(patch.normals);
+      const NormalCells cells = usedCells(patch);
       patches.push_back(std::move(patch));
       const double misfit = TileBorders::misfit(shape_, overlap_, patches);
       const double score = chosen.totalVariation(input_, &cells) + (spread_ > 0 ? misfit / spread_ : 0);
@@ -151,6 +153,17 @@ std::vector<Patch> TileMaker::borderPatches() const {
     chosen.add(best_cells);
   }
   return patches;
+}
+
+/// The normals of a patch of a border that tiles show: of a corner's patch the arms of the cross around the vertex.
+NormalCells TileMaker::usedCells(const Patch& patch) const {
+  if (shape_.scheme == WangScheme::edge) return cellsOf(patch.normals);
+  NormalCells cells;
+  const int middle = patch.width / 2;
+  for (int y = 0; y < patch.height; ++y)
+    for (int x = 0; x < patch.width; ++x)
+      if (std::min(std::abs(2 * x + 1 - 2 * middle), std::abs(2 * y + 1 - 2 * middle)) < overlap_) cells.add(patch.at(x, y));
+  return cells;
 }
 
 /// Columns and rows of a grid over the map, a cell for each tile, so that the insides of the tiles cover the map evenly.
