@@ -69,6 +69,7 @@ ASKED = [
     "query reflectance displaced.glint --uv .3 .6 --level 1 --wi .5 0 1 --wo -.2 0 1",
     "query reflectance colored.glint --uv .3 .6 --sigma 3 --wi .5 0 1 --wo -.2 0 1 --repeat 15",
     "query reflectance displaced.glint --uv .3 .6 --level 0 --wo 0 0 1 --samples 3 -o samples.csv",
+    "query plane wang.glint --texel 1e12 -3.5 --sigma 4 --half 0 .1",
     "query reflectance displaced.glint --csv displaced.csv -o answers.csv",
 ]
 FOUND = [*(f"info {asset}.glint" for asset in ASSETS), "validate normals.glint pyramid.glint"]

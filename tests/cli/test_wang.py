@@ -179,3 +179,44 @@ def test_damaged_sides_and_texels_are_found(glint, normals):
         process = glint("validate", "bad.glint")
         assert process.returncode == 3 and rule in process.stdout + process.stderr
         assert glint("wang", "bad.glint", "--explicit", 20, 20, "-o", "part.glint").returncode == 3
+
+
+@pytest.mark.parametrize("size", ["--sigma 3", "--cov 30 -12 9", "--box 9 2 -3 6", "--sigma 20"])
+@pytest.mark.parametrize("surface", ["flat", "smooth"])
+def test_the_plane_answers_as_a_map_of_it_does(glint, normals, size, surface):
+    run(glint, "wang n.glint -o w.glint --size 24 --seed 3")
+    half = 2 * 150
+    for x, y in ((12.25, 7.5), (24 * 5 + 0.5, -24 * 2 - 0.25), (FAR + 8.75, -FAR - 0.5)):
+        left, low = int(np.floor(x)) - half, int(np.floor(y)) - half
+        run(glint, f"wang w.glint --explicit {2 * half} {2 * half} --origin {left} {low} -o part.glint --force")
+        at = f"--uv {(x - left) / (2 * half)} {(y - low) / (2 * half)} {size} --surface {surface} --sigma-r .05"
+        for asked in ("--half .1 -.05", "--range -.2 -.1 .1 .3"):
+            expected = float(glint("query", "part.glint", *at.split(), *asked.split(), "--boundary", "clamp").stdout)
+            process = glint("query", "plane", "w.glint", "--texel", x, y, *size.split(), "--surface", surface, "--sigma-r", ".05", *asked.split())
+            assert float(process.stdout) == pytest.approx(expected, rel=1e-3), process.stderr
+
+
+def test_pictures_of_the_plane(glint, normals):
+    run(glint, "wang n.glint -o w.glint --size 24", "query plane w.glint --texel 5 5 --sigma 4 --image ndf.exr --image-size 32 --sigma-r .05")
+    assert (glint.folder / "ndf.exr").exists()
+
+
+PLANE = "query plane w.glint --texel 3 4"
+BAD_QUERIES = {
+    f"{PLANE} --half 0 0": (1, "no size"),
+    f"{PLANE} --sigma 3": (1, "nothing was asked"),
+    f"{PLANE} --cov 1 5 1 --half 0 0": (1, "--cov"),
+    "query plane w.glint --texel 1e300 0 --sigma 3 --half 0 0": (1, "--texel"),
+    "query plane w.glint --sigma 3 --half 0 0": (1, "--texel"),
+    "query plane n.glint --texel 0 0 --sigma 3 --half 0 0": (5, "wang-tiles"),
+    "query w.glint --uv .5 .5 --sigma 3 --half 0 0": (5, "glint-query plane"),
+    "query w.glint --texel 5 5 --sigma 3 --half 0 0": (1, "glint-query plane"),
+}
+
+
+@pytest.mark.parametrize("command", BAD_QUERIES)
+def test_questions_that_cannot_be_are_refused(glint, normals, command):
+    run(glint, "wang n.glint -o w.glint --size 24")
+    process = glint(*command.split())
+    code, text = BAD_QUERIES[command]
+    assert process.returncode == code and text in process.stderr and process.stdout == ""
