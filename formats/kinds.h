@@ -12,13 +12,14 @@
 #include "glint/model/sh.h"
 #include "glint/model/slope_moments.h"
 #include "glint/model/tiny_example.h"
+#include "glint/model/wang_tiles.h"
 
 namespace glint::formats {
 
 /// The struct of any kind of asset: the one list of kinds, in the order of their names. To add a kind, add its struct and its
 /// name here, and describe the kind in a file of formats/kinds/.
 using AnyAsset = std::variant<BinMap, Displacement, HeightMap, HistogramSat, NdfCp, NdfPyramid, NormalMap, ShLight, ShLobes,
-                              SlopeMoments, TinyExample>;
+                              SlopeMoments, TinyExample, WangTiles>;
 
 /// Name of the kind whose assets are of struct `Model`, as files and messages have it, e.g. "bin-map".
 template <class Model>
@@ -45,5 +46,7 @@ template <>
 inline constexpr std::string_view kKindName<SlopeMoments> = "slope-moments";
 template <>
 inline constexpr std::string_view kKindName<TinyExample> = "tiny-example";
+template <>
+inline constexpr std::string_view kKindName<WangTiles> = "wang-tiles";
 
 }  // namespace glint::formats

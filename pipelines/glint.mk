@@ -8,7 +8,7 @@
 #   all: $(GLINT_OUT)/flakes.cp.glint $(GLINT_OUT)/dunes.pca.glint
 #
 #   image (png, exr, tif, jpg, ...)  ->  NAME.glint  ->  NAME.pyramid.glint  ->  NAME.cp.glint | NAME.tucker.glint | NAME.pca.glint
-#                                                    ->  NAME.binmap.glint | NAME.sat.glint | NAME.moments.glint | NAME.tiny.glint
+#                                                    ->  NAME.binmap.glint | NAME.sat.glint | NAME.moments.glint | NAME.tiny.glint | NAME.wang.glint
 #   image of heights                     ->  NAME.heights.glint  ->  NAME.displaced.glint
 #   environment (exr, hdr) or lights (json)  ->  NAME.light.glint
 #   no file, but GLINT_LOBES_FLAGS_NAME := --sigma-r 0.01  ->  NAME.lobes.glint
@@ -41,6 +41,7 @@ GLINT_BINMAP_FLAGS ?=
 GLINT_SAT_FLAGS ?=
 GLINT_MOMENTS_FLAGS ?=
 GLINT_TINY_FLAGS ?= --cut 32
+GLINT_WANG_FLAGS ?=
 GLINT_HEIGHTS_FLAGS ?=
 GLINT_DISPLACE_FLAGS ?= --factor 16
 GLINT_LIGHT_FLAGS ?=
@@ -97,6 +98,7 @@ $(eval $(call glint_normals_rule,binmap,GLINT_BINMAP_FLAGS))
 $(eval $(call glint_normals_rule,sat,GLINT_SAT_FLAGS))
 $(eval $(call glint_normals_rule,moments,GLINT_MOMENTS_FLAGS))
 $(eval $(call glint_normals_rule,tiny,GLINT_TINY_FLAGS))
+$(eval $(call glint_normals_rule,wang,GLINT_WANG_FLAGS))
 $(eval $(call glint_compress_rule,cp,GLINT_CP_FLAGS))
 $(eval $(call glint_compress_rule,tucker,GLINT_TUCKER_FLAGS))
 $(eval $(call glint_compress_rule,pca,GLINT_PCA_FLAGS))

@@ -96,6 +96,10 @@ void NdfAsset::refuseOtherKinds() const {
     throw Error(
         ErrorCode::unsupported, "format.kind", path_, "", "is of kind displacement, which holds no distribution of normals",
         "ask for the light that it reflects: glint-query reflectance " + path_ + " --uv U V --sigma S --wi X Y Z --wo X Y Z");
+  if (kind == "wang-tiles")
+    throw Error(ErrorCode::unsupported, "format.kind", path_, "", "is of kind wang-tiles, a plane without end",
+                "ask for a point of it, glint-query plane " + path_ +
+                    " --texel X Y --sigma S --half HX HY, or make a map of a part of it with glint-wang --explicit");
   if (api::answersNdf(kind) && !asks({kind}))
     throw Error(ErrorCode::unsupported, "format.kind", path_, "", "is of kind " + kind + ", which is not asked this",
                 "pass an asset of kind " + api::alternatives(asked_.kinds));

@@ -46,7 +46,7 @@ DistributionCommand::DistributionCommand(Tool& tool)
       .excludes(halves_.rangeOption())
       .excludes(picture_.option());
   tool.usesSeed();
-  for (const CommandForm& form : {kLightForm, kReflectanceForm}) tool.pointTo(form.line, form.options);
+  for (const CommandForm& form : {kLightForm, kReflectanceForm, kPlaneForm}) tool.pointTo(form.line, form.options);
   tool.pointTo(kLightForm.line + ", or " + kReflectanceForm.line, {"--wo"});
   tool.addCheck([this] { check(); });
 }

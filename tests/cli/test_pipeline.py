@@ -15,8 +15,9 @@ GLINT_MAPS := maps
 GLINT_OUT := assets
 GLINT_PYRAMID_FLAGS := --resolution 64 --sigma-r 0.02
 GLINT_INGEST_FLAGS_dunes := --kind height
+GLINT_WANG_FLAGS := --size 64
 GLINT_DISPLACE_FLAGS := --factors 16,64 --angular 5
-all: $(foreach method,cp tucker pca binmap sat moments tiny,assets/flakes.$(method).glint) assets/dunes.pca.glint assets/dunes.displaced.glint
+all: $(foreach method,cp tucker pca binmap sat moments tiny wang,assets/flakes.$(method).glint) assets/dunes.pca.glint assets/dunes.displaced.glint
 include {root}/pipelines/glint.mk
 """
 
@@ -50,10 +51,10 @@ def later(path):
 
 def test_images_become_assets_and_only_changes_are_made_again(project):
     first = tools(project("-j2"))
-    assert first == ["glint-binmap"] + ["glint-compress"] * 4 + ["glint-displace"] + ["glint-ingest"] * 3 + ["glint-moments"] + ["glint-pyramid"] * 2 + ["glint-sat", "glint-tiny"]
+    assert first == ["glint-binmap"] + ["glint-compress"] * 4 + ["glint-displace"] + ["glint-ingest"] * 3 + ["glint-moments"] + ["glint-pyramid"] * 2 + ["glint-sat", "glint-tiny", "glint-wang"]
     made = {p.name for p in (project.folder / "assets").glob("*.glint")}
     assert made == {f"{n}.glint" for n in ("flakes", "flakes.pyramid", "flakes.cp", "flakes.tucker", "flakes.pca", "flakes.binmap",
-                                                 "flakes.sat", "flakes.moments", "flakes.tiny", "dunes", "dunes.pyramid", "dunes.pca", "dunes.heights", "dunes.displaced")}
+                                                 "flakes.sat", "flakes.moments", "flakes.tiny", "flakes.wang", "dunes", "dunes.pyramid", "dunes.pca", "dunes.heights", "dunes.displaced")}
     assert subprocess.run([BIN / "glint-validate", *(project.folder / "assets").glob("*.glint")]).returncode == 0
 
     assert tools(project("-j2")) == []

@@ -2,19 +2,22 @@
 #include "device/kernels.h"
 #include "glint/query/anisotropic_ndf.h"
 #include "glint/query/brdf/displaced_brdf.h"
-#include "glint/query/light/environment.h"
 #include "glint/query/histogram_ndf.h"
+#include "glint/query/light/environment.h"
+#include "glint/query/light/sh_light_query.h"
+#include "glint/query/light/sh_transfer.h"
 #include "glint/query/moments_ndf.h"
 #include "glint/query/ray_footprint.h"
 #include "glint/query/tiny_example_ndf.h"
-#include "glint/query/light/sh_light_query.h"
-#include "glint/query/light/sh_transfer.h"
+#include "glint/query/wang_reference.h"
 
 namespace glint::device {
 
 template __global__ void answer<HistogramNdf>(HistogramNdf, const Footprint*, const Vec2*, float, int, float*, float*);
 template __global__ void draw<HistogramNdf>(HistogramNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 template __global__ void answer<MomentsNdf>(MomentsNdf, const Footprint*, const Vec2*, float, int, float*, float*);
+template __global__ void answer<WangReference>(WangReference, const Footprint*, const Vec2*, float, int, float*, float*);
+template __global__ void draw<WangReference>(WangReference, const Footprint*, const Vec2*, int, HalfVectorSample*);
 template __global__ void draw<MomentsNdf>(MomentsNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 template __global__ void answer<TinyExampleNdf>(TinyExampleNdf, const Footprint*, const Vec2*, float, int, float*, float*);
 template __global__ void draw<TinyExampleNdf>(TinyExampleNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);

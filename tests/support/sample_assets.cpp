@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "glint/model/slope_sums.h"
+
 namespace glint::test {
 namespace {
 
@@ -806,6 +808,32 @@ SampleSlopeMoments sampleSlopeMoments(int width, int height) {
   return sample;
 }
 
+SampleWangTiles sampleWangTiles(WangScheme scheme) {
+  SampleWangTiles sample;
+  WangTiles& tiles = sample.tiles;
+  tiles.size = WangTiles::kLeastSize, tiles.scheme = scheme;
+  tiles.colors_h = tiles.colors_v = 2, tiles.tile_count = 16;
+  tiles.plane_seed = 7, tiles.texel_size_um = 2;
+  tiles.seam_cost = 1.5f, tiles.ndf_tv = 0.125f, tiles.repetition = 0.25f;
+  const int last = tiles.size - 1;
+  for (int t = 0; t < tiles.tile_count; ++t) {
+    const WangColors colors = tiles.colorsOfTile(t);
+    for (int j = 0; j <= last; ++j)
+      for (int i = 0; i <= last; ++i) {
+        // Scheme corner: the colour of the nearest corner. Scheme edge: that of the nearest edge.
+        const bool east = 2 * i > last, north = 2 * j > last;
+        const int to_u = east ? last - i : i, to_v = north ? last - j : j;
+        const std::size_t corner = (north ? 2u : 0u) + (east ? 1u : 0u);
+        const std::size_t side = to_v <= to_u ? (north ? 1u : 0u) : (east ? 3u : 2u);
+        const int color = colors[scheme == WangScheme::corner ? corner : side];
+        sample.normals.push_back({color == 0 ? 0.25f : -0.25f, static_cast<float>((i + 3 * j) % 5 - 2) / 8});
+      }
+  }
+  tiles.normals = sample.normals;
+  tiles.slopes = slopeSums(sample.normals.data(), sample.normals.size()).moments(static_cast<double>(sample.normals.size()));
+  return sample;
+}
+
 SampleShLobes sampleShLobes() {
   SampleShLobes s;
   s.zonal = {0.28f, 0.4f};
@@ -881,6 +909,7 @@ std::vector<SampleAsset> sampleAssets() {
       {"slope-moments", [] { return owned(sampleSlopeMoments(9, 4), &SampleSlopeMoments::moments); }},
       {"tiny-example-scattered", [] { return owned(sampleTinyExample(8, TinyMode::scattered), &SampleTinyExample::example); }},
       {"tiny-example-tiled", [] { return owned(sampleTinyExample(8, TinyMode::tiled), &SampleTinyExample::example); }},
+      {"wang-tiles", [] { return owned(sampleWangTiles(), &SampleWangTiles::tiles); }},
   };
 }
 

@@ -108,6 +108,11 @@ struct SampleTinyExample {
   TinyExample example;
 };
 
+struct SampleWangTiles {
+  std::vector<Vec2> normals;
+  WangTiles tiles;
+};
+
 struct SampleShLobes {
   std::vector<float> zonal;
   std::vector<float> coefficients;
@@ -142,6 +147,8 @@ SampleSlopeMoments sampleSlopeMoments(int width, int height);
 /// An example of the normals of sampleNormals. Its images have a pixel for each texel.
 /// @param size  a power of two
 SampleTinyExample sampleTinyExample(int size, TinyMode mode);
+/// Sixteen tiles of 16 x 16 texels, two colours. Normals are the same in all tiles of the same colours on a side, and simple fractions.
+SampleWangTiles sampleWangTiles(WangScheme scheme = WangScheme::corner);
 /// A lobe of order 1 with the zonal coefficients 0.28 and 0.4, on a grid of 3 x 4 directions.
 SampleShLobes sampleShLobes();
 /// Constant light of radiance 1, 2 and 3 in red, green and blue, order 2, on a grid of 3 x 4 directions.
