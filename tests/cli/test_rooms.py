@@ -25,9 +25,9 @@ MAY_USE = {
 # The folders inside the rooms, and which of them each may include besides itself. A method has the same name in every room.
 FOLDERS = {
     "bake": {"common": set(), "ingest": {"common"}, "synth": {"common"}, "pyramid": {"common"}, "compressed": {"common"},
-             "bin_map": {"common"}, "histogram": {"common"}, "moments": {"common"}, "sh": {"common"}, "displace": {"common"}},
+             "bin_map": {"common"}, "histogram": {"common"}, "moments": {"common"}, "sh": {"common"}, "displace": {"common"}, "wave": {"common", "pyramid"}},
     "query/detail": {"common": set(), "pyramid": {"common"}, "compressed": {"common", "pyramid"}, "bin_map": {"common"},
-                     "histogram": {"common"}, "moments": {"common"}},
+                     "histogram": {"common"}, "moments": {"common"}, "wave": {"common", "pyramid"}},
 }
 
 # Headers of others that are kept in few places: pattern -> folders, relative to the root.
