@@ -64,6 +64,8 @@ ordered_json statisticsOf(const NdfPyramid& pyramid, const formats::AssetInfo&) 
           {"levels", std::move(levels)}};
 }
 
+ordered_json statisticsOf(const WavePyramid& wave, const formats::AssetInfo& info) { return statisticsOf(wave.grey, info); }
+
 ordered_json statisticsOf(const NdfCp& ndf, const formats::AssetInfo& info) {
   std::map<int, std::uint64_t> ranks;
   std::uint64_t slices = 0, spot_slices = 0;

@@ -100,14 +100,31 @@ void DistributionCommand::writeSamples() {
 void DistributionCommand::answerOne() {
   Query q = halves_.query(footprint_.footprint());
   q.u = footprint_.u(), q.v = footprint_.v();
+  if (q.half && std::holds_alternative<AnisotropicNdf<WaveNdf>>(asset_.model())) return answerColour(q);
   const float value = answer(asset_.model(), q);
   tool_.print(fmt::format("{:.9g}\n", value));
   reportTimed(tool_, {{q.range ? "mean" : "density", value}, {"widened", asset_.widens(q.footprint)}}, repeat_,
               [&] { return answer(asset_.model(), q); });
 }
 
+void DistributionCommand::answerColour(const Query& q) {
+  const auto& wave = std::get<AnisotropicNdf<WaveNdf>>(asset_.model());
+  const auto ask = [&] { return wave.densityRgb(q.footprint, *q.half); };
+  const Rgb rgb = ask();
+  std::vector<float> spectrum(static_cast<std::size_t>(wave.round().channels()));
+  wave.densitySpectrum(q.footprint, *q.half, spectrum.data());
+  tool_.print(fmt::format("{:.9g} {:.9g} {:.9g}\n", rgb.r, rgb.g, rgb.b));
+  reportTimed(tool_,
+              {{"density", answer(asset_.model(), q)},
+               {"rgb", {rgb.r, rgb.g, rgb.b}},
+               {"channels", spectrum},
+               {"widened", asset_.widens(q.footprint)}},
+              repeat_, [&] { return ask().g; });
+}
+
 void DistributionCommand::writePicture() {
   const int size = picture_.size(asset_.resolution());
+  if (const auto colours = asset_.colourImage(footprint_.footprint(), size)) return picture_.writeColours(size, *colours);
   auto densities = asset_.scatteredImage(footprint_.footprint(), size);
   if (!densities)
     densities = ndfImage(api::movedTo(asset_.model(), footprint_.u(), footprint_.v()), footprint_.footprint(), size,

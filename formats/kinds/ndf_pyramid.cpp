@@ -1,6 +1,5 @@
 #include "glint/formats/kinds/description.h"
-#include "glint/formats/kinds/pyramid_images.h"
-#include "glint/formats/kinds/shared_fields.h"
+#include "glint/formats/kinds/pyramid_fields.h"
 
 namespace glint::formats {
 
@@ -19,16 +18,13 @@ struct KindDescription<NdfPyramid> {
   }
 
   static void describe(Fields auto& fields, auto& pyramid) {
-    describeShape(fields, pyramid.shape);
-    describeImages(fields, pyramid);
+    describePyramidAttributes(fields, pyramid);
+    describePyramidLevels(fields, pyramid, [](int, std::uint64_t) {});
   }
 
-  static void checkIndex(const NdfPyramid& pyramid, Findings& findings) {
-    checkShape(pyramid.shape, findings);
-    checkImageIndex(pyramid, findings);
-  }
+  static void checkIndex(const NdfPyramid& pyramid, Findings& findings) { checkPyramidIndex(pyramid, findings); }
 
-  static void checkValues(const NdfPyramid& pyramid, Findings& findings) { checkImageValues(pyramid, findings); }
+  static void checkValues(const NdfPyramid& pyramid, Findings& findings) { checkPyramidValues(pyramid, findings); }
 };
 
 template const Kind& kindOf<NdfPyramid>();

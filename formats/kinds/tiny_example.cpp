@@ -1,8 +1,7 @@
 #include <cmath>
 
 #include "glint/formats/kinds/description.h"
-#include "glint/formats/kinds/pyramid_images.h"
-#include "glint/formats/kinds/shared_fields.h"
+#include "glint/formats/kinds/pyramid_fields.h"
 #include "glint/formats/kinds/tally.h"
 #include "glint/formats/number_text.h"
 #include "glint/math/bits.h"
@@ -55,7 +54,8 @@ struct KindDescription<TinyExample> {
                 "scattered: examples in a cell on average");
     fields.real("background_sigma_r", tiny.background_sigma_r, kDiskUnits, "1", "scattered: roughness between examples");
     fields.integer("seed", tiny.seed, {0, 2147483647}, "1", "scattered: seed of the noise that places examples");
-    describeImages(fields, tiny.images);
+    describePixels(fields, tiny.images);
+    describePyramidLevels(fields, tiny.images, [](int, std::uint64_t) {});
     fields.array("normals", tiny.normals, {"texels", "2"}, "1",
                  "normals of the example, row by row from the lowest; tiled: turned into the plane");
   }
@@ -71,9 +71,8 @@ struct KindDescription<TinyExample> {
     }
     if (tiny.normals.size() != static_cast<std::size_t>(shape.width) * static_cast<std::size_t>(shape.width))
       findings.add("tiny.size", "/normals", "has " + std::to_string(tiny.normals.size()) + " normals, not one for each texel");
-    checkShape(shape, findings);
+    checkPyramidIndex(tiny.images, findings);
     checkLevels(tiny, levels + (tiny.mode == TinyMode::scattered ? 1 : 0), findings);
-    checkImageIndex(tiny.images, findings);
     const double xx = tiny.matrix[0], xy = tiny.matrix[1], yx = tiny.matrix[2], yy = tiny.matrix[3];
     constexpr double kLeastDeterminant = 1e-6;
     if (!(std::abs(xx * yy - xy * yx) >= kLeastDeterminant)) findings.add("tiny.matrix", "/@matrix", "is singular");
@@ -81,7 +80,7 @@ struct KindDescription<TinyExample> {
   }
 
   static void checkValues(const TinyExample& tiny, Findings& findings) {
-    checkImageValues(tiny.images, findings);
+    checkPyramidValues(tiny.images, findings);
     reportUnless(
         tiny.normals.size(), [&](std::size_t k) { return dot(tiny.normals[k], tiny.normals[k]) <= 1; }, "tiny.normals",
         "/normals", {"normal is", "normals are"}, "outside the unit disk or not finite", findings);

@@ -148,8 +148,10 @@ glint_status askMicrofacets(const char* where, const glint_brdf* brdf, const gli
   const api::AnyBrdf& any = brdf->body().brdf;
   if (any.facets() == api::BrdfFacets::beckmann)
     return usage(where, "Beckmann facets have no averages over half vectors; make the BRDF with GLINT_FACETS_OF_DISTRIBUTION");
+  if (any.facets() == api::BrdfFacets::waves)
+    return usage(where, "colours of a wave-pyramid have no averages over half vectors; take glint_brdf_evaluate and _sample");
   any.at(footprintFor(any, footprint), [&](const auto& b) {
-    if constexpr (!std::is_same_v<std::remove_cvref_t<decltype(b)>, BinMapBrdf>) ask(b);
+    if constexpr (requires { b.valueOf(Vec3{}, Vec3{}, HalfVector{}, 0.0f); }) ask(b);
   });
   return GLINT_OK;
 }

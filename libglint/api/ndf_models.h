@@ -10,6 +10,7 @@
 #include "glint/api/models/pyramid.h"
 #include "glint/api/models/reference.h"
 #include "glint/api/models/tiny.h"
+#include "glint/api/models/wave.h"
 
 namespace glint::api {
 
@@ -51,6 +52,6 @@ struct NdfModelList {
 /// that tiles may have, and visits the variant once in each question, after it has chosen the tile. Its traits open a tile by
 /// the traits of the tile's model.
 using NdfModels = NdfModelList<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, BinMapNdf, HistogramNdf,
-                               MomentsNdf, TinyExampleNdf>;
+                               MomentsNdf, TinyExampleNdf, AnisotropicNdf<WaveNdf>>;
 
 }  // namespace glint::api

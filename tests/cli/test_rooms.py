@@ -26,9 +26,9 @@ MAY_USE = {
 FOLDERS = {
     "bake": {"common": set(), "ingest": {"common"}, "synth": {"common"}, "pyramid": {"common"}, "compressed": {"common"},
              "bin_map": {"common"}, "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"}, "sh": {"common"}, "displace": {"common"},
-             "wang": {"common"}},
+             "wang": {"common"}, "wave": {"common", "pyramid"}},
     "query/detail": {"common": set(), "pyramid": {"common"}, "compressed": {"common", "pyramid"}, "bin_map": {"common"},
-                     "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"}},
+                     "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"}, "wave": {"common", "pyramid"}},
 }
 
 # Headers of others that are kept in few places: pattern -> folders, relative to the root.

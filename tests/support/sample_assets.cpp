@@ -569,6 +569,39 @@ SampleTinyExample sampleTinyExample(int size, TinyMode mode) {
   return sample;
 }
 
+SampleWavePyramid sampleWavePyramid(int size, WaveChannels meaning, BlockPrecision precision) {
+  SampleWavePyramid sample;
+  sample.grey = samplePyramid(size, precision);
+  WavePyramid& wave = sample.wave;
+  wave.grey = sample.grey.pyramid;
+  wave.meaning = meaning;
+  const std::vector<float> shares =
+      meaning == WaveChannels::xyz ? std::vector{1.25f, 1.0f, 0.75f} : std::vector{0.5f, 0.75f, 1.0f, 1.25f, 1.5f};
+  wave.channels = static_cast<int>(shares.size());
+  wave.texel_size_um = 1;
+  wave.coherence_um = 8;
+  for (int k = 0; k < wave.channels; ++k) {
+    sample.wavelengths_um.push_back(0.4f + 0.0625f * static_cast<float>(k));
+    const float even = 1 / static_cast<float>(wave.channels), lean = k == 0 ? 0.5f : k == 1 ? -0.5f : 0.0f;
+    sample.channel_rgb.push_back({even + lean, even, even - lean});
+  }
+  wave.wavelengths_um = sample.wavelengths_um;
+  wave.channel_rgb = sample.channel_rgb;
+  for (std::size_t l = 0; l < sample.grey.levels.size(); ++l) {
+    std::vector<std::uint16_t>& halves = sample.halves.emplace_back();
+    std::vector<float>& floats = sample.floats.emplace_back();
+    const std::vector<float>& grey = sample.grey.levels[l].floats;
+    for (std::size_t row = 0; row < grey.size(); row += kBlockSize)
+      for (const float share : shares)
+        for (std::size_t k = row; k < row + kBlockSize; ++k) {
+          floats.push_back(share * grey[k]);
+          halves.push_back(floatToHalf(share * grey[k]));
+        }
+    wave.pixels[l] = precision == BlockPrecision::f16 ? static_cast<const void*>(halves.data()) : floats.data();
+  }
+  return sample;
+}
+
 SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type, SampleForm form) {
   SampleNdfCp sample;
   const SampleNormals normals = sampleNormals(size, size, false);
@@ -910,6 +943,8 @@ std::vector<SampleAsset> sampleAssets() {
       {"tiny-example-scattered", [] { return owned(sampleTinyExample(8, TinyMode::scattered), &SampleTinyExample::example); }},
       {"tiny-example-tiled", [] { return owned(sampleTinyExample(8, TinyMode::tiled), &SampleTinyExample::example); }},
       {"wang-tiles", [] { return owned(sampleWangTiles(), &SampleWangTiles::tiles); }},
+      {"wave-pyramid",
+       [] { return owned(sampleWavePyramid(64, WaveChannels::xyz, BlockPrecision::f16), &SampleWavePyramid::wave); }},
   };
 }
 

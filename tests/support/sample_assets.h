@@ -51,6 +51,15 @@ struct SamplePyramid {
   NdfPyramid pyramid;
 };
 
+struct SampleWavePyramid {
+  SamplePyramid grey;
+  std::vector<float> wavelengths_um;
+  std::vector<Rgb> channel_rgb;
+  std::vector<std::vector<std::uint16_t>> halves;  ///< of each level
+  std::vector<std::vector<float>> floats;
+  WavePyramid wave;
+};
+
 struct SampleNdfCp {
   std::vector<std::uint16_t> image_regions;
   std::vector<std::uint16_t> image_slots;
@@ -142,6 +151,8 @@ SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type
 SampleBinMap sampleBinMap(int width, int height);
 /// Histograms of sampleNormals(width, height) over 12 x 8 bins; strides 4, 8 and 16 texels.
 SampleHistograms sampleHistograms(int width, int height);
+/// samplePyramid with channels: channel c is brighter than the mean by the same share at every pixel.
+SampleWavePyramid sampleWavePyramid(int size, WaveChannels meaning, BlockPrecision precision);
 /// Level 1 and up of a chain, whose slopes are simple fractions. Half the width and half the height, rounded down, are powers of two.
 SampleSlopeMoments sampleSlopeMoments(int width, int height);
 /// An example of the normals of sampleNormals. Its images have a pixel for each texel.

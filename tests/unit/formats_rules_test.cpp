@@ -43,15 +43,16 @@ enum class Base {
   tiny_scattered,
   tiny_tiled,
   wang_tiles,
+  wave,
   sh_lobes,
   sh_light,
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,        Base::heights,        Base::pyramid,      Base::compressed,
-                           Base::compressed_f32, Base::spots,          Base::bin_map,      Base::histograms,
-                           Base::moments,        Base::tiny_scattered, Base::tiny_tiled,   Base::wang_tiles,
-                           Base::sh_lobes,       Base::sh_light,       Base::displacement, Base::displacement_rgb};
+constexpr Base kBases[] = {Base::normals,      Base::heights,         Base::pyramid,    Base::compressed, Base::compressed_f32,
+                           Base::spots,        Base::bin_map,         Base::histograms, Base::moments,    Base::tiny_scattered,
+                           Base::tiny_tiled,   Base::wang_tiles,      Base::wave,       Base::sh_lobes,   Base::sh_light,
+                           Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -85,6 +86,8 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleTinyExample(8, TinyMode::tiled).example, provenance);
     case Base::wang_tiles:
       return writeAsset(path, test::sampleWangTiles().tiles, provenance);
+    case Base::wave:
+      return writeAsset(path, test::sampleWavePyramid(64, WaveChannels::spectral, BlockPrecision::f16).wave, provenance);
     case Base::sh_lobes:
       return writeAsset(path, test::sampleShLobes().lobes, provenance);
     case Base::sh_light:
@@ -679,6 +682,33 @@ std::vector<Fixture> histogramFixtures() {
   };
 }
 
+std::vector<Fixture> waveFixtures() {
+  const auto changed = [](const char* rule, const char* array, std::size_t index, float value) {
+    return patched(rule, Base::wave,
+                   [=](const Patch& patch) { patch.change<float>(array, index, [=](float& number) { number = value; }); });
+  };
+  const auto changedHalf = [](const char* rule, std::size_t index, std::uint16_t value) {
+    return patched(
+        rule, Base::wave,
+        [=](const Patch& patch) {
+          patch.change<std::uint16_t>("level_00/channel_pixels", index, [=](std::uint16_t& half) { half = value; });
+        },
+        true);
+  };
+  constexpr std::uint16_t kHalfNan = 0x7e00, kHalfOfMinus1 = 0xbc00, kHalfOf9 = 0x4880;
+  return {
+      patched("wave.channels", Base::wave, [](const Patch& patch) { patch.setText("channel_meaning", "xyz"); }),
+      changed("wave.wavelengths", "wavelengths_um", 1, 0.7f),
+      changed("wave.wavelengths", "wavelengths_um", 0, 0),
+      changed("wave.wavelengths", "wavelengths_um", 4, kNan),
+      changed("wave.colours", "channel_rgb", 3, 0.5f),
+      changed("wave.colours", "channel_rgb", 3, kNan),
+      changedHalf("wave.pixels", 7, kHalfNan),
+      changedHalf("wave.pixels", 7, kHalfOfMinus1),
+      changedHalf("wave.grey", 7, kHalfOf9),
+  };
+}
+
 std::vector<Fixture> momentsFixtures() {
   const auto changed = [](const char* rule, const char* level, std::size_t index, float value) {
     return patched(
@@ -822,7 +852,7 @@ std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
   for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), storageFixtures(), datasetFixtures(),
                     pyramidFixtures(), ndfCpFixtures(), dataFixtures(), histogramFixtures(), momentsFixtures(), tinyFixtures(),
-                    wangFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
+                    wangFixtures(), waveFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
@@ -997,8 +1027,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 18u);
-  EXPECT_EQ(count, 17u);
+  EXPECT_EQ(count, 20u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -1037,6 +1066,10 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   const Asset wang = Asset::open(folder / "wang-tiles.glint");
   EXPECT_EQ(wang.get<WangTiles>().at(9, 3, 2).x, -0.25f);
   EXPECT_EQ(wang.get<WangTiles>().plane_seed, 7);
+  const Asset wave_asset = Asset::open(folder / "wave-pyramid.glint");
+  const WavePyramid& wave = wave_asset.get<WavePyramid>();
+  EXPECT_EQ(wave.channel_rgb[1], (Rgb{1 / 3.0f - 0.5f, 1 / 3.0f, 1 / 3.0f + 0.5f}));
+  EXPECT_EQ(wave.wavelengths_um[2], 0.4f + 0.125f);
   EXPECT_EQ(static_cast<const float*>(Asset::open(folder / "sh-lobes.glint").get<ShLobes>().coefficients)[5 * 4 + 3], 0.4f);
   EXPECT_EQ(Asset::open(folder / "sh-light.glint").get<ShLight>().band_norms[7], 12.2799206f);
   struct Recorded {

@@ -1,10 +1,8 @@
-#include "glint/formats/kinds/pyramid_images.h"
+#include "glint/formats/kinds/pyramid_fields.h"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <string>
-#include <vector>
 
 #include "glint/formats/kinds/tally.h"
 #include "glint/formats/number_text.h"
@@ -20,19 +18,6 @@ constexpr double kMeanFloor = 0x1p-24;
 
 std::string levelObject(int l, const char* dataset) { return "/" + levelPath("level_{l}/", l) + dataset; }
 
-float pixel(const NdfPyramid& pyramid, const PyramidLevel& level, std::size_t index) {
-  return pyramid.precision == BlockPrecision::f16 ? ieeeHalfToFloat(static_cast<const std::uint16_t*>(level.pixels)[index])
-                                                  : static_cast<const float*>(level.pixels)[index];
-}
-
-/// "in the image at column 3, row 7 from the top": place of a stored block of a level.
-std::string imageOf(const NdfPyramid& pyramid, int l, std::size_t block) {
-  const std::span<const std::uint32_t> ranks = pyramid.levels[l].mask_ranks;
-  const auto word = static_cast<std::size_t>(std::upper_bound(ranks.begin(), ranks.end(), block) - ranks.begin()) - 1;
-  const PyramidGrid& grid = pyramid.shape.levels[l];
-  return "in the image at " + texelName(grid.columns, grid.rows, word / static_cast<std::size_t>(pyramid.shape.maskWords()));
-}
-
 /// Checks the pixels of one level against its means. Returns the sum of the pixels of each block.
 std::vector<double> checkBlocks(const NdfPyramid& pyramid, int l, Findings& findings) {
   const PyramidLevel& level = pyramid.levels[l];
@@ -40,7 +25,7 @@ std::vector<double> checkBlocks(const NdfPyramid& pyramid, int l, Findings& find
   Tally bad_pixels, bad_means;  // by block
   for (std::size_t b = 0; b < sums.size(); ++b) {
     for (std::size_t k = b * kBlockPixels; k < (b + 1) * kBlockPixels; ++k) {
-      const float value = pixel(pyramid, level, k);
+      const float value = storedPixel(level.pixels, pyramid.precision, k);
       if (!(std::isfinite(value) && value >= 0)) bad_pixels.add(b);
       sums[b] += value;
     }
@@ -58,7 +43,20 @@ std::vector<double> checkBlocks(const NdfPyramid& pyramid, int l, Findings& find
 
 }  // namespace
 
-void checkImageIndex(const NdfPyramid& pyramid, Findings& findings) {
+float storedPixel(const void* pixels, BlockPrecision precision, std::size_t index) {
+  return precision == BlockPrecision::f16 ? ieeeHalfToFloat(static_cast<const std::uint16_t*>(pixels)[index])
+                                          : static_cast<const float*>(pixels)[index];
+}
+
+std::string imageOf(const NdfPyramid& pyramid, int l, std::size_t block) {
+  const std::span<const std::uint32_t> ranks = pyramid.levels[l].mask_ranks;
+  const auto word = static_cast<std::size_t>(std::upper_bound(ranks.begin(), ranks.end(), block) - ranks.begin()) - 1;
+  const PyramidGrid& grid = pyramid.shape.levels[l];
+  return "in the image at " + texelName(grid.columns, grid.rows, word / static_cast<std::size_t>(pyramid.shape.maskWords()));
+}
+
+void checkPyramidIndex(const NdfPyramid& pyramid, Findings& findings) {
+  checkShape(pyramid.shape, findings);
   const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
   const int tail_bits = pyramid.shape.blocksPerImage() % 64;
   const std::uint64_t beyond = tail_bits == 0 ? 0 : ~std::uint64_t{0} << tail_bits;
@@ -80,7 +78,7 @@ void checkImageIndex(const NdfPyramid& pyramid, Findings& findings) {
   }
 }
 
-void checkImageValues(const NdfPyramid& pyramid, Findings& findings) {
+void checkPyramidValues(const NdfPyramid& pyramid, Findings& findings) {
   const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
   const double pixel_area = 4.0 / (static_cast<double>(pyramid.shape.resolution) * pyramid.shape.resolution);
   for (int l = 0; l < pyramid.shape.level_count; ++l) {

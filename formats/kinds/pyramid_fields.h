@@ -1,16 +1,25 @@
 #pragma once
 
-// Private to formats/: the NDF images of a pyramid, which several kinds have. Their rules are those of kind ndf-pyramid.
+// Private to formats/: what kinds of uncompressed NDF images share.
 
 #include "glint/formats/kinds/shared_fields.h"
-#include "glint/model/ndf_pyramid.h"
 
 namespace glint::formats {
 
-/// The images of every level. Comes after describeShape, and after all attributes of a kind.
-void describeImages(Fields auto& fields, auto& pyramid) {
+/// Attributes of pixels: their type and scale.
+void describePixels(Fields auto& fields, auto& pyramid) {
   fields.choice("precision", pyramid.precision, "f16|f32", "type of the stored pixels");
   fields.real("value_scale", pyramid.value_scale, kPositive, "1", "density = value_scale * stored pixel");
+}
+
+/// Attributes: shape, and those of pixels.
+void describePyramidAttributes(Fields auto& fields, auto& pyramid) {
+  describeShape(fields, pyramid.shape);
+  describePixels(fields, pyramid);
+}
+
+/// Arrays of all levels: blocks and pixels, and what describe_more(l, blocks) adds, `blocks` being the number of stored blocks.
+void describePyramidLevels(Fields auto& fields, auto& pyramid, auto describe_more) {
   fields.derived("mask_words", "ceil_div(resolution * resolution, 16384)", "64-bit words of occupancy bits of an image");
   fields.levels("level_count", pyramid.shape.level_count, [&](int l) {
     auto& level = pyramid.levels[l];
@@ -24,12 +33,19 @@ void describeImages(Fields auto& fields, auto& pyramid) {
     fields.data("level_{l}/pixels", level.pixels, blocks * kBlockPixels,
                 {{"precision=f16", ElementType::f16}, {"precision=f32", ElementType::f32}}, {"stored_blocks", "16", "16"}, "1",
                 "mean density of each pixel of each stored block, divided by value_scale");
+    describe_more(l, blocks);
   });
 }
 
-/// Checks what a query follows: masks and ranks.
-void checkImageIndex(const NdfPyramid& pyramid, Findings& findings);
-/// Checks pixels, means of blocks and integrals.
-void checkImageValues(const NdfPyramid& pyramid, Findings& findings);
+/// Density of a stored pixel, divided by value_scale.
+float storedPixel(const void* pixels, BlockPrecision precision, std::size_t index);
+
+/// "in the image at column 3, row 7 from the top": place of a stored block of a level.
+std::string imageOf(const NdfPyramid& pyramid, int l, std::size_t block);
+
+/// Rules pyramid.masks and pyramid.mask_ranks, and those of shapes.
+void checkPyramidIndex(const NdfPyramid& pyramid, Findings& findings);
+/// Rules pyramid.pixels, pyramid.block_means and pyramid.integral.
+void checkPyramidValues(const NdfPyramid& pyramid, Findings& findings);
 
 }  // namespace glint::formats
