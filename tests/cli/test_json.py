@@ -46,7 +46,7 @@ MAKE = [
     "moments heights.glint -o m.glint --finest 0 --roughness .3 --textures . --lobe gltf",
     "synth grating --size 64 --height --texel-size-um 1 --depth-um .2 -o g.exr",
     "ingest g.exr --kind height --to heights --height-scale-um 1 --texel-size-um 1 -o grating.glint",
-    "pyramid grating.glint -o wave.glint --optics wave --coherence-um 4 --wavelengths 3 --resolution 64 --stride 16",
+    "pyramid grating.glint -o wave.glint --optics wave --coherence-um 4 --wavelengths 3 --resolution 64 --stride 8",
     "shlobes -o lobes.glint --sigma-r .1 --order 6 --grid 5x8 --precision f32",
     "shlobes -o zonal.glint --sigma-r .1 --order 6 --grid none",
     "shlobes --light lights.json -o light.glint --order 6 --grid 5x8",
