@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "glint/api/any_ndf.h"
 
 namespace glint::api {
@@ -17,10 +19,12 @@ inline int channelCount(const AnyNdf& model) {
       model, [](const auto& wave) { return wave.round().channels(); }, [] { return 1; });
 }
 
-/// Density in linear sRGB towards psi (WaveNdf::densityRgb). Models without colours: their density, grey.
+/// Density in linear sRGB towards psi (WaveNdf::densityRgb). Models without colours: their density, grey. Finite: colours that the
+/// numbers of a file overflow are 0.
 inline Rgb densityRgb(const AnyNdf& model, const Footprint& p, Vec2 psi) {
-  return askWave(
+  const Rgb rgb = askWave(
       model, [&](const auto& wave) { return wave.densityRgb(p, psi); }, [&] { return Rgb::grey(model.density(p, psi)); });
+  return std::isfinite(rgb.r) && std::isfinite(rgb.g) && std::isfinite(rgb.b) ? rgb : Rgb{};
 }
 
 /// Density of each channel towards psi (WaveNdf::densitySpectrum). Models without channels: their density.

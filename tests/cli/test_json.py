@@ -51,7 +51,7 @@ MAKE = [
     "wang wang.glint --explicit 20 10 -o part.glint",
     "synth grating --size 64 --height --texel-size-um 1 --depth-um .2 -o g.exr",
     "ingest g.exr --kind height --to heights --height-scale-um 1 --texel-size-um 1 -o grating.glint",
-    "pyramid grating.glint -o wave.glint --optics wave --coherence-um 4 --wavelengths 3 --resolution 64 --stride 16",
+    "pyramid grating.glint -o wave.glint --optics wave --coherence-um 4 --wavelengths 3 --resolution 64 --stride 8",
     "shlobes -o lobes.glint --sigma-r .1 --order 6 --grid 5x8 --precision f32",
     "shlobes -o zonal.glint --sigma-r .1 --order 6 --grid none",
     "shlobes --light lights.json -o light.glint --order 6 --grid 5x8",

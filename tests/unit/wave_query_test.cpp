@@ -178,6 +178,26 @@ TEST(WaveBrdf, SamplesAverageToTheReflectedLight) {
   EXPECT_GT(integral.g, 0.5f);
 }
 
+TEST(WaveNdf, IsFiniteForAllNumbersThatAFileMayHave) {
+  test::SampleWavePyramid spoiled = test::sampleWavePyramid(kSize, WaveChannels::xyz, BlockPrecision::f32);
+  std::mt19937 random(7);
+  const float numbers[] = {NAN, INFINITY, -INFINITY, 3e38f, -3e38f};
+  for (auto& level : spoiled.floats)
+    for (float& value : level)
+      if (random() % 4 == 0) value = numbers[random() % std::size(numbers)];
+  const api::AnyNdf model = AnisotropicNdf<WaveNdf>(WaveNdf(spoiled.wave));
+  const WaveBrdf brdf = mirrorBrdf(std::get<AnisotropicNdf<WaveNdf>>(model).round(), Footprint::isotropic({0.5f, 0.5f}, 9));
+  for (const Question& q : someQuestions()) {
+    const Rgb rgb = api::densityRgb(model, q.footprint, q.psi);
+    EXPECT_TRUE(std::isfinite(rgb.r) && std::isfinite(rgb.g) && std::isfinite(rgb.b));
+    float spectrum[3];
+    api::densitySpectrum(model, q.footprint, q.psi, spectrum);
+    for (const float density : spectrum) EXPECT_TRUE(std::isfinite(density) && density >= 0);
+    const Rgb f = brdf.evaluate(directionOf(q.psi.x, q.psi.y), {0, 0, 1});
+    EXPECT_TRUE(std::isfinite(f.r) && std::isfinite(f.g) && std::isfinite(f.b));
+  }
+}
+
 class WaveAsset : public ::testing::Test {
  protected:
   WaveAsset() : path_(folder_.path() / "wave.glint") {
