@@ -8,8 +8,8 @@
 #   all: $(GLINT_OUT)/flakes.cp.glint $(GLINT_OUT)/dunes.pca.glint
 #
 #   image (png, exr, tif, jpg, ...)  ->  NAME.glint  ->  NAME.pyramid.glint  ->  NAME.cp.glint | NAME.tucker.glint | NAME.pca.glint
-#                                                    ->  NAME.binmap.glint | NAME.sat.glint | NAME.moments.glint
-#   image of heights                     ->  NAME.heights.glint  ->  NAME.displaced.glint
+#                                                    ->  NAME.binmap.glint | NAME.sat.glint | NAME.moments.glint | NAME.tiny.glint | NAME.wang.glint
+#   image of heights                     ->  NAME.heights.glint  ->  NAME.displaced.glint | NAME.wave.glint
 #   environment (exr, hdr) or lights (json)  ->  NAME.light.glint
 #   no file, but GLINT_LOBES_FLAGS_NAME := --sigma-r 0.01  ->  NAME.lobes.glint
 #
@@ -40,8 +40,11 @@ GLINT_PCA_FLAGS ?= --rank 16
 GLINT_BINMAP_FLAGS ?=
 GLINT_SAT_FLAGS ?=
 GLINT_MOMENTS_FLAGS ?=
+GLINT_TINY_FLAGS ?= --cut 32
+GLINT_WANG_FLAGS ?=
 GLINT_HEIGHTS_FLAGS ?=
 GLINT_DISPLACE_FLAGS ?= --factor 16
+GLINT_WAVE_FLAGS ?=
 GLINT_LIGHT_FLAGS ?=
 GLINT_LOBES_FLAGS ?=
 
@@ -95,11 +98,16 @@ $(eval $(call glint_normals_rule,pyramid,GLINT_PYRAMID_FLAGS))
 $(eval $(call glint_normals_rule,binmap,GLINT_BINMAP_FLAGS))
 $(eval $(call glint_normals_rule,sat,GLINT_SAT_FLAGS))
 $(eval $(call glint_normals_rule,moments,GLINT_MOMENTS_FLAGS))
+$(eval $(call glint_normals_rule,tiny,GLINT_TINY_FLAGS))
+$(eval $(call glint_normals_rule,wang,GLINT_WANG_FLAGS))
 $(eval $(call glint_compress_rule,cp,GLINT_CP_FLAGS))
 $(eval $(call glint_compress_rule,tucker,GLINT_TUCKER_FLAGS))
 $(eval $(call glint_compress_rule,pca,GLINT_PCA_FLAGS))
 $(foreach type,$(GLINT_IMAGES),$(eval $(call glint_ingest_rule,$(type)))$(eval $(call glint_heights_rule,$(type))))
 $(foreach type,$(GLINT_LIGHTS),$(eval $(call glint_light_rule,$(type))))
+
+$(GLINT_OUT)/%.wave.glint: $(GLINT_OUT)/%.heights.glint $(GLINT_SETTINGS)
+	$(call glint_tool,glint-pyramid) $(call glint_quote,$<) $(glint_out) --optics wave $(call glint_flags,GLINT_WAVE_FLAGS)
 
 $(GLINT_OUT)/%.displaced.glint: $(GLINT_OUT)/%.heights.glint $(GLINT_SETTINGS)
 	$(call glint_tool,glint-displace) $(call glint_quote,$<) $(glint_out) $(call glint_flags,GLINT_DISPLACE_FLAGS)

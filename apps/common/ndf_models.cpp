@@ -1,6 +1,7 @@
 #include "common/ndf_models.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 
@@ -12,7 +13,7 @@ namespace glint::apps {
 
 NdfAsset::NdfAsset(Tool& tool, const AskedAssets& asked) : tool_(tool), asked_(asked) {
   tool.option("ASSET", path_, "asset of kind " + api::alternatives(asked.kinds)).required();
-  if (asks({"ndf-pyramid", "ndf-cp"})) addPyramidOptions();
+  if (asks({"ndf-pyramid", "ndf-cp", "wave-pyramid"})) addPyramidOptions();
   addNormalsOptions();
   addBinOptions();
   tool.addCheck([this] {
@@ -28,25 +29,25 @@ void NdfAsset::addPyramidOptions() {
   useOnly({"ndf-pyramid", "ndf-cp"}, "--normals",
           tool_.option("--normals", normals_path_,
                        "asset of kind normals that the pyramid was made from, for footprints below its finest level"));
-  useOnly({"ndf-pyramid", "ndf-cp", "slope-moments"}, "--parts",
+  useOnly({"ndf-pyramid", "ndf-cp", "slope-moments", "wave-pyramid"}, "--parts",
           tool_
               .option("--parts", options_.footprint_parts,
                       "most round footprints that stand for a stretched one; 1: one of the same mean square size (kinds "
-                      "ndf-pyramid, ndf-cp and slope-moments)")
+                      "ndf-pyramid, ndf-cp, slope-moments and wave-pyramid)")
               .range(1, IsotropicParts::kMost));
   addImageOptions();
 }
 
 void NdfAsset::addImageOptions() {
-  useOnly({"ndf-pyramid", "ndf-cp"}, "--interpolation",
+  useOnly({"ndf-pyramid", "ndf-cp", "wave-pyramid"}, "--interpolation",
           tool_.choice("--interpolation", options_.interpolation,
                        {{"footprint", Interpolation::footprint}, {"trilinear", Interpolation::trilinear}},
                        "how footprints between the stored ones are answered: by images that together see the footprint, or "
-                       "trilinearly, which is quicker and sees a wider one (kinds ndf-pyramid and ndf-cp)"));
-  useOnly({"ndf-pyramid", "ndf-cp"}, "--pixels",
+                       "trilinearly, which is quicker and sees a wider one (kinds ndf-pyramid, ndf-cp and wave-pyramid)"));
+  useOnly({"ndf-pyramid", "ndf-cp", "wave-pyramid"}, "--pixels",
           tool_.choice("--pixels", options_.pixels, {{"smooth", Pixels::smooth}, {"constant", Pixels::constant}},
                        "how densities run between half vectors of one pixel of an image: continuously, or constant, which is "
-                       "quicker and shows borders of pixels under small lights (kinds ndf-pyramid and ndf-cp)"));
+                       "quicker and shows borders of pixels under small lights (kinds ndf-pyramid, ndf-cp and wave-pyramid)"));
 }
 
 void NdfAsset::addNormalsOptions() {
@@ -96,6 +97,10 @@ void NdfAsset::refuseOtherKinds() const {
     throw Error(
         ErrorCode::unsupported, "format.kind", path_, "", "is of kind displacement, which holds no distribution of normals",
         "ask for the light that it reflects: glint-query reflectance " + path_ + " --uv U V --sigma S --wi X Y Z --wo X Y Z");
+  if (kind == "wang-tiles")
+    throw Error(ErrorCode::unsupported, "format.kind", path_, "", "is of kind wang-tiles, a plane without end",
+                "ask for a point of it, glint-query plane " + path_ +
+                    " --texel X Y --sigma S --half HX HY, or make a map of a part of it with glint-wang --explicit");
   if (api::answersNdf(kind) && !asks({kind}))
     throw Error(ErrorCode::unsupported, "format.kind", path_, "", "is of kind " + kind + ", which is not asked this",
                 "pass an asset of kind " + api::alternatives(asked_.kinds));
@@ -118,6 +123,30 @@ std::optional<std::vector<float>> NdfAsset::scatteredImage(const Footprint& foot
                               footprint, size);
 }
 
+std::optional<std::vector<float>> NdfAsset::colourImage(const Footprint& footprint, int size) const {
+  const auto* asked = std::get_if<AnisotropicNdf<WaveNdf>>(&model());
+  if (asked == nullptr) return std::nullopt;
+  const AnisotropicNdf<WaveNdf> constant(WaveNdf(asked->round().wavePyramid(), options_.interpolation, Pixels::constant),
+                                         options_.footprint_parts);
+  // Points of a pixel along each axis: one where the pixels are those of the images.
+  const int points = size == info().resolution ? 1 : 4;
+  const float step = 2 / static_cast<float>(size * points);
+  std::vector<float> image(static_cast<std::size_t>(size) * static_cast<std::size_t>(size) * 3);
+  tbb::parallel_for(0, size, [&](int y) {
+    for (int x = 0; x < size; ++x) {
+      Rgb sum;
+      for (int k = 0; k < points * points; ++k) {
+        const float column = static_cast<float>(x * points + k % points), row = static_cast<float>(y * points + k / points);
+        sum = sum + constant.densityRgb(footprint, {(column + 0.5f) * step - 1, (row + 0.5f) * step - 1});
+      }
+      const Rgb mean = 1 / static_cast<float>(points * points) * sum;
+      float* pixel = &image[3 * rowMajorIndex(x, y, size)];
+      pixel[0] = mean.r, pixel[1] = mean.g, pixel[2] = mean.b;
+    }
+  });
+  return image;
+}
+
 bool NdfAsset::widens(const Footprint& footprint) const {
   return std::visit(
       [&](const auto& m) {
@@ -138,7 +167,9 @@ std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint)
           if (sigma >= finest * 0.999f) return {};
           return FootprintFault{
               fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
-              "add --normals with the asset that the pyramid was made from"};
+              opened_->asset().kind() == "wave-pyramid"
+                  ? "make the pyramid again with a smaller --stride: without their neighbours texels do not diffract"
+                  : "add --normals with the asset that the pyramid was made from"};
         } else {
           return {};
         }

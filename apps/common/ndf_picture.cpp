@@ -25,6 +25,20 @@ std::vector<float> ndfColours(int size, std::span<const float> densities, float 
   return imageFormats().infernoColours(size, grey);
 }
 
+void writeColourPicture(const std::string& path, int size, std::span<const float> rgb) {
+  checkPictureName(path);
+  if (std::filesystem::path(path).extension() == ".exr") return writeImage(path, size, size, 3, rgb, PixelFormat::f32);
+  const float largest = *std::max_element(rgb.begin(), rgb.end());
+  const float scale = largest > 0 ? 1 / std::log1p(largest) : 0;
+  std::vector<float> shown(rgb.size());
+  for (std::size_t k = 0; k < rgb.size(); k += 3) {
+    const float brightest = std::max({rgb[k], rgb[k + 1], rgb[k + 2], 0.0f});
+    const float factor = brightest > 0 ? scale * std::log1p(brightest) / brightest : 0;
+    for (std::size_t c = k; c < k + 3; ++c) shown[c] = factor * std::max(rgb[c], 0.0f);
+  }
+  writeImage(path, size, size, 3, shown, PixelFormat::u8);
+}
+
 void writeNdfPicture(const std::string& path, int size, std::span<const float> densities) {
   checkPictureName(path);
   if (std::filesystem::path(path).extension() == ".exr") return writeImage(path, size, size, 1, densities, PixelFormat::f32);

@@ -14,6 +14,11 @@ void checkPictureName(const std::string& path);
 /// @param densities  [size][size], bottom row first
 void writeNdfPicture(const std::string& path, int size, std::span<const float> densities);
 
+/// Writes an NDF image in colour. An .exr holds red, green and blue, which may be below 0. A .png holds the hue of each pixel, cut at
+/// 0, and the logarithm of its brightest channel as writeNdfPicture does.
+/// @param rgb  [size][size][3], linear sRGB, bottom row first
+void writeColourPicture(const std::string& path, int size, std::span<const float> rgb);
+
 /// The colours of writeNdfPicture.
 /// @param largest  density that gets the brightest colour
 /// @return [size][size][3] in 0..1

@@ -64,6 +64,8 @@ ordered_json statisticsOf(const NdfPyramid& pyramid, const formats::AssetInfo&) 
           {"levels", std::move(levels)}};
 }
 
+ordered_json statisticsOf(const WavePyramid& wave, const formats::AssetInfo& info) { return statisticsOf(wave.grey, info); }
+
 ordered_json statisticsOf(const NdfCp& ndf, const formats::AssetInfo& info) {
   std::map<int, std::uint64_t> ranks;
   std::uint64_t slices = 0, spot_slices = 0;
@@ -118,6 +120,19 @@ ordered_json statisticsOf(const SlopeMoments& moments, const formats::AssetInfo&
   }
   const double texels = static_cast<double>(moments.width) * moments.height;
   return {{"slope_deviations", std::move(spreads)}, {"bytes_per_texel", static_cast<double>(datasetBytes(info)) / texels}};
+}
+
+ordered_json statisticsOf(const TinyExample& tiny, const formats::AssetInfo& info) {
+  std::uint64_t images = 0, blocks = 0;
+  for (int l = 0; l < tiny.images.shape.level_count; ++l) {
+    images += tiny.images.shape.levels[l].imageCount();
+    blocks += tiny.images.levels[l].block_means.size();
+  }
+  const double places = static_cast<double>(images) * tiny.images.shape.blocksPerImage();
+  return {{"images", images},
+          {"blocks", blocks},
+          {"occupied_share", static_cast<double>(blocks) / places},
+          {"size_bytes", datasetBytes(info)}};
 }
 
 ordered_json statisticsOf(const ShLobes& lobes, const formats::AssetInfo&) {

@@ -3,6 +3,7 @@
 #include "common/files.h"
 #include "common/tool.h"
 #include "glint-pyramid/pyramid_options.h"
+#include "glint-pyramid/wave_options.h"
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
@@ -13,15 +14,18 @@ int main(int argc, char** argv) {
   apps::Tool tool(
       {"glint-pyramid",
        "Computes the NDF images of a normal map for footprints of every size and position: the level of detail of its "
-       "glints, ready to be queried or compressed.",
+       "glints, ready to be queried or compressed. With --optics wave it takes heights, and computes their diffraction.",
        "glint-pyramid flakes.glint -o flakes.pyramid.glint --stride 32 --sigma-r 0.005"});
-  const apps::InputFile input(tool, "asset of kind normals, from glint-ingest", "NORMALS");
-  const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind ndf-pyramid");
-  apps::PyramidOptions options(tool);
+  const apps::InputFile input(tool, "asset of kind normals, or with --optics wave of kind heights, from glint-ingest",
+                              "NORMALS");
+  const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind ndf-pyramid or wave-pyramid");
+  const apps::PyramidOptions options(tool);
+  const apps::WaveOptions wave(tool, options);
 
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = formats::Asset::openForBuilding(input.path());
     const formats::Provenance provenance = tool.provenance();
+    if (wave.optics() == apps::Optics::wave) return apps::makeWavePyramid(tool, asset, input, wave, provenance, output);
     const bake::NdfPyramidData pyramid = bake::buildPyramid(asset.get<NormalMap>(), options.values(), tool.progress("images"));
     formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
     tool.setResult(apps::pyramidJson(pyramid));

@@ -18,15 +18,23 @@ PyramidOptions::PyramidOptions(Tool& tool) {
   tool.option("--resolution", resolution_,
               "pixels of an NDF image along each axis, a multiple of 16 from 32 to 1024; auto: so many that sigma_r is 1.5 "
               "pixels, where densities between the half vectors of a pixel err by 4 % (256 at the default sigma_r: 19 %)");
-  tool.option("--sigma-r", values_.sigma_r, "intrinsic roughness: standard deviation of a facet's lobe, disk units");
-  tool.choice("--surface", values_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
-              "each texel is a facet (flat), or normals are interpolated between texels (smooth)");
-  tool.choice("--boundary", values_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
-              "whether the map repeats or ends at its border");
+  const Option& sigma_r =
+      tool.option("--sigma-r", values_.sigma_r, "intrinsic roughness: standard deviation of a facet's lobe, disk units");
+  const Option& surface = tool.choice("--surface", values_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
+                                      "each texel is a facet (flat), or normals are interpolated between texels (smooth)");
+  const Option& boundary = tool.choice("--boundary", values_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
+                                       "whether the map repeats or ends at its border");
   tool.option("--levels", levels_,
               "number of levels besides the mean of the map; auto: until levels agree to 1 % or the stride reaches the map");
   tool.choice("--precision", values_.precision, {{"half", BlockPrecision::f16}, {"float", BlockPrecision::f32}},
               "of stored pixels");
+  geometric_ = {{"--sigma-r", &sigma_r}, {"--surface", &surface}, {"--boundary", &boundary}};
+}
+
+std::string PyramidOptions::geometricOption() const {
+  for (const auto& [name, option] : geometric_)
+    if (option->given()) return name;
+  return {};
 }
 
 bake::PyramidOptions PyramidOptions::values() const {

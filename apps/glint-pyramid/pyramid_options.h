@@ -2,6 +2,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "common/tool.h"
 #include "glint/bake/pyramid/pyramid.h"
@@ -15,10 +17,15 @@ class PyramidOptions {
 
   /// Valid after parsing. @throws Error usage if --levels or --resolution is neither `auto` nor a number
   bake::PyramidOptions values() const;
+  /// Whether the resolution is to follow from the roughness.
+  bool autoResolution() const { return resolution_ == "auto"; }
+  /// The first of the options that was given and that only geometric optics has; empty: none.
+  std::string geometricOption() const;
 
  private:
   bake::PyramidOptions values_;
   std::string levels_ = "auto", resolution_ = std::to_string(values_.resolution);
+  std::vector<std::pair<std::string, const Option*>> geometric_;
 };
 
 /// Levels with their images, stored blocks and bytes.

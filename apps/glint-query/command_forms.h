@@ -20,5 +20,6 @@ inline const CommandForm kLightForm = {"glint-query light ASSET --light TABLE --
                                         "--eta", "--k", "--shadowing", "--smith"}};
 inline const CommandForm kReflectanceForm = {"glint-query reflectance ASSET --uv U V --sigma S --wi X Y Z --wo X Y Z",
                                              {"--wi", "--level", "--variant"}};
+inline const CommandForm kPlaneForm = {"glint-query plane ASSET --texel X Y --sigma S --half HX HY", {"--texel"}};
 
 }  // namespace glint::apps

@@ -40,6 +40,11 @@ class CsvTable {
   Vec2 position(const std::array<const char*, 2>& names, std::size_t row) const {
     return wrappedUv(number<double>(names[0], row), number<double>(names[1], row));
   }
+  /// The position as it stands in the row.
+  /// @throws as numbers
+  std::array<double, 2> wholePosition(const std::array<const char*, 2>& names, std::size_t row) const {
+    return {number<double>(names[0], row), number<double>(names[1], row)};
+  }
   /// A whole number of one row.
   /// @throws as numbers
   int wholeNumber(const char* column, std::size_t row) const { return number<int>(column, row); }

@@ -8,6 +8,7 @@
 #include "common/ndf_image.h"
 #include "glint-query/command_forms.h"
 #include "glint-query/usage.h"
+#include "glint/api/plane_position.h"
 
 namespace glint::apps {
 HalfVectorOptions::HalfVectorOptions(Tool& tool) {
@@ -45,7 +46,7 @@ DistributionCommand::DistributionCommand(Tool& tool)
       .excludes(halves_.rangeOption())
       .excludes(picture_.option());
   tool.usesSeed();
-  for (const CommandForm& form : {kLightForm, kReflectanceForm}) tool.pointTo(form.line, form.options);
+  for (const CommandForm& form : {kLightForm, kReflectanceForm, kPlaneForm}) tool.pointTo(form.line, form.options);
   tool.pointTo(kLightForm.line + ", or " + kReflectanceForm.line, {"--wo"});
   tool.addCheck([this] { check(); });
 }
@@ -90,24 +91,44 @@ void DistributionCommand::answerTable() {
 }
 
 void DistributionCommand::writeSamples() {
-  const std::vector<HalfVectorSample> samples =
-      drawSamples(asset_.model(), footprint_.footprint(), table_.samples(), tool_.seed());
+  const std::vector<HalfVectorSample> samples = drawSamples(api::movedTo(asset_.model(), footprint_.u(), footprint_.v()),
+                                                            footprint_.footprint(), table_.samples(), tool_.seed());
   table_.write(sampleTable(samples));
   tool_.setResult({{"samples", samples.size()}});
 }
 
 void DistributionCommand::answerOne() {
-  const Query q = halves_.query(footprint_.footprint());
+  Query q = halves_.query(footprint_.footprint());
+  q.u = footprint_.u(), q.v = footprint_.v();
+  if (q.half && std::holds_alternative<AnisotropicNdf<WaveNdf>>(asset_.model())) return answerColour(q);
   const float value = answer(asset_.model(), q);
   tool_.print(fmt::format("{:.9g}\n", value));
   reportTimed(tool_, {{q.range ? "mean" : "density", value}, {"widened", asset_.widens(q.footprint)}}, repeat_,
               [&] { return answer(asset_.model(), q); });
 }
 
+void DistributionCommand::answerColour(const Query& q) {
+  const auto& wave = std::get<AnisotropicNdf<WaveNdf>>(asset_.model());
+  const auto ask = [&] { return wave.densityRgb(q.footprint, *q.half); };
+  const Rgb rgb = ask();
+  std::vector<float> spectrum(static_cast<std::size_t>(wave.round().channels()));
+  wave.densitySpectrum(q.footprint, *q.half, spectrum.data());
+  tool_.print(fmt::format("{:.9g} {:.9g} {:.9g}\n", rgb.r, rgb.g, rgb.b));
+  reportTimed(tool_,
+              {{"density", answer(asset_.model(), q)},
+               {"rgb", {rgb.r, rgb.g, rgb.b}},
+               {"channels", spectrum},
+               {"widened", asset_.widens(q.footprint)}},
+              repeat_, [&] { return ask().g; });
+}
+
 void DistributionCommand::writePicture() {
   const int size = picture_.size(asset_.resolution());
+  if (const auto colours = asset_.colourImage(footprint_.footprint(), size)) return picture_.writeColours(size, *colours);
   auto densities = asset_.scatteredImage(footprint_.footprint(), size);
-  if (!densities) densities = ndfImage(asset_.model(), footprint_.footprint(), size, tool_.progress("rows"));
+  if (!densities)
+    densities = ndfImage(api::movedTo(asset_.model(), footprint_.u(), footprint_.v()), footprint_.footprint(), size,
+                         tool_.progress("rows"));
   picture_.write(size, *densities);
 }
 

@@ -40,6 +40,8 @@ class DistributionCommand {
   void warnOfWidening(const std::string& which);
   void answerTable();
   void answerOne();
+  /// The colour of a wave-pyramid towards psi.
+  void answerColour(const Query& query);
   void writeSamples();
   void writePicture();
 

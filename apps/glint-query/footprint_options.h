@@ -22,6 +22,9 @@ class FootprintOptions {
   void check() const;
 
   Footprint footprint() const;
+  /// Its centre as it was given: on a plane without end the whole part counts.
+  double u() const { return uv_[0]; }
+  double v() const { return uv_[1]; }
 
  private:
   std::vector<double> uv_;

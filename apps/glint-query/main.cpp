@@ -2,12 +2,12 @@
 #include "common/tool.h"
 #include "glint-query/distribution_command.h"
 #include "glint-query/light_command.h"
+#include "glint-query/plane_command.h"
 #include "glint-query/reflectance_command.h"
 
 using namespace glint;
 
 namespace {
-
 /// Runs one command: a tool with the options of one sort of questions.
 template <class Command>
 int ask(const apps::ToolInfo& info, int argc, char** argv) {
@@ -24,7 +24,8 @@ int askDistribution(int argc, char** argv) {
        "glint-query flakes.pyramid.glint --uv 0.3 0.7 --sigma 20 --half 0.1 -0.05",
        "Other questions are commands of their own, each with a help of its own:\n"
        "  glint-query light ASSET ...        light that a footprint reflects, by a table of glint-shlobes\n"
-       "  glint-query reflectance ASSET ...  light that a displacement of glint-displace reflects"},
+       "  glint-query reflectance ASSET ...  light that a displacement of glint-displace reflects\n"
+       "  glint-query plane ASSET ...        an endless plane of tiles of glint-wang"},
       argc, argv);
 }
 
@@ -40,14 +41,19 @@ int askLight(int argc, char** argv) {
 int askReflectance(int argc, char** argv) {
   return ask<apps::ReflectanceCommand>(
       {"glint-query reflectance",
-       "Asks how much light a displacement reflects from one direction to another, or how the normals of its lobes are "
-       "distributed.",
+       "Asks how much light a displacement reflects between directions, or how the normals of its lobes are distributed.",
        "glint-query reflectance rock.displaced.glint --uv 0.3 0.7 --sigma 8 --wi 0.5 0 1 --wo -0.2 0.1 1"},
       argc, argv);
 }
 
+int askPlane(int argc, char** argv) {
+  return ask<apps::PlaneCommand>({"glint-query plane", "Asks an endless plane of Wang tiles how normals are distributed.",
+                                  "glint-query plane flakes.wang.glint --texel 1e12 0.5 --sigma 8 --half 0.1 -0.05"},
+                                 argc, argv);
+}
 }  // namespace
 
 int main(int argc, char** argv) {
-  return apps::runCommand(argc, argv, {{"light", askLight}, {"reflectance", askReflectance}}, askDistribution);
+  return apps::runCommand(argc, argv, {{"light", askLight}, {"reflectance", askReflectance}, {"plane", askPlane}},
+                          askDistribution);
 }

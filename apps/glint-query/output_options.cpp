@@ -41,7 +41,8 @@ void TableOptions::write(const std::string& text) const {
 }
 
 PictureOptions::PictureOptions(Tool& tool) : tool_(tool) {
-  option_ = &tool.option("--image", path_, "write the NDF image: densities as .exr, colours as .png");
+  option_ = &tool.option("--image", path_,
+                         "write the NDF image: densities (kind wave-pyramid: linear sRGB) as .exr, colours as .png");
   tool.option("--image-size", size_, "pixels of the image along each axis")
       .range(1, 4096)
       .defaultText("the asset's own, or 256");
@@ -57,6 +58,11 @@ void PictureOptions::check() const {
 
 void PictureOptions::write(int size, std::span<const float> densities) const {
   writeNdfPicture(path_, size, densities);
+  tool_.setResult({{"image", path_}, {"image_size", size}});
+}
+
+void PictureOptions::writeColours(int size, std::span<const float> rgb) const {
+  writeColourPicture(path_, size, rgb);
   tool_.setResult({{"image", path_}, {"image_size", size}});
 }
 

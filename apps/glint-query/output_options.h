@@ -47,6 +47,8 @@ class PictureOptions {
   /// Writes the picture, and sets it as the result of the tool.
   /// @param densities  [size][size], bottom row first
   void write(int size, std::span<const float> densities) const;
+  /// The same in colour. @param rgb  [size][size][3]
+  void writeColours(int size, std::span<const float> rgb) const;
 
  private:
   void check() const;

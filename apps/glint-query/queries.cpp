@@ -7,12 +7,15 @@
 #include <cmath>
 
 #include "common/answer_columns.h"
+#include "glint/api/plane_position.h"
 #include "glint/bake/common/counter_random.h"
 
 namespace glint::apps {
 
 float answer(const AnyNdf& model, const Query& query) {
-  return query.range ? model.mean(query.footprint, *query.range) : model.density(query.footprint, *query.half);
+  return api::askAt(model, query.u, query.v, [&](const auto& m) {
+    return query.range ? m.mean(query.footprint, *query.range) : m.density(query.footprint, *query.half);
+  });
 }
 
 std::vector<float> answerAll(const AnyNdf& model, std::span<const Query> queries) {

@@ -19,6 +19,7 @@ namespace glint::apps {
 /// A question at a footprint: the density towards a half vector, or its mean over a box of half vectors.
 struct Query {
   Footprint footprint;
+  double u = 0, v = 0;  ///< centre of the footprint, in maps; on a plane without end the whole part counts
   std::optional<Vec2> half;
   std::optional<Box2> range;
 };

@@ -20,6 +20,8 @@ Query readQuery(const CsvTable& columns, std::size_t row) {
   };
   Query query;
   const Vec2 centre = columns.position(kCentre, row);
+  const auto [u, v] = columns.wholePosition(kCentre, row);
+  query.u = u, query.v = v;
   if (columns.has(kSigma)) {
     const auto [sigma] = columns.numbers(kSigma, row);
     refuse(sigmaFault(sigma));

@@ -13,13 +13,13 @@ int main(int argc, char** argv) {
   apps::Tool tool(
       {"glint-synth",
        "Makes a tileable procedural normal map or height field, as an image (.exr, .png, ...). Normals are encoded 0..1 "
-       "with green up (OpenGL); heights are in texels.",
+       "with green up (OpenGL); heights are in texels or micrometres.",
        "glint-synth flakes -o flakes.exr --size 1024 --alpha 0.2 --flake-size 6 --seed 7"});
   apps::SynthOptions options(tool);
   const apps::OutputFile output(tool, apps::OutputFormat::image, "image; the extension gives the format");
   bool heights = false;
   int bits = 0;
-  tool.flag("--height", heights, "write heights in texels instead of normals");
+  tool.flag("--height", heights, "write heights, in texels or (--texel-size-um) micrometres, instead of normals");
   const apps::Option& bits_option = tool.option("--bits", bits, "of a channel: 8 or 16 (png), 16 or 32 (exr)")
                                         .range(8, 32)
                                         .defaultText("8 for png, 32 for exr");
@@ -32,7 +32,10 @@ int main(int argc, char** argv) {
     const bake::SynthOptions& p = options.values(tool);
     const apps::PixelFormat format = apps::pixelFormat(output.path(), bits);
     if (heights) {
-      apps::writeImage(output.path(), p.width, p.height, 1, bake::synthHeights(p), format);
+      std::vector<float> values = bake::synthHeights(p);
+      if (options.texelSize() > 0)
+        for (float& value : values) value *= options.texelSize();
+      apps::writeImage(output.path(), p.width, p.height, 1, values, format);
     } else {
       apps::writeImage(output.path(), p.width, p.height, 3, apps::encodeNormals(bake::synthNormals(p)), format);
     }

@@ -29,7 +29,8 @@ SynthOptions::SynthOptions(Tool& tool) {
                {"leather", SynthKind::leather},
                {"weave", SynthKind::weave},
                {"sawtooth", SynthKind::sawtooth},
-               {"flat", SynthKind::flat}},
+               {"flat", SynthKind::flat},
+               {"grating", SynthKind::grating}},
               "the surface to make")
       .required();
   tool.option("--size", size_, "N or NxM texels");
@@ -38,10 +39,19 @@ SynthOptions::SynthOptions(Tool& tool) {
   correlation_ = &tool.option("--correlation", p.correlation_texels, "correlation length of the noise, texels").range(0, 65536);
   streak_ = &tool.option("--streak", p.streak_texels, "length of the streaks of brushed, texels").range(0, 65536);
   feature_ = &tool.option("--flake-size,--feature-size", p.feature_texels,
-                          "size of a flake, pebble, thread or tooth, or width of a scratch, texels")
+                          "size of a flake, pebble, thread or tooth, period of a grating, or width of a scratch, texels")
                   .range(1, 65536);
   density_ = &tool.option("--density", p.density, "scratches in 64x64 texels").range(1e-3, 64);
-  slope_ = &tool.option("--slope", p.slope, "steepest slope of scratches, leather, weave, sawtooth").range(0, 10);
+  slope_ = &tool.option("--slope", p.slope, "steepest slope of scratches, leather, weave, sawtooth, grating").range(0, 10);
+  tool.choice("--profile", p.profile, {{"sine", bake::GratingProfile::sine}, {"blazed", bake::GratingProfile::blazed}},
+              "shape of the grooves of a grating");
+  texel_size_ = &tool.option("--texel-size-um", texel_size_um_,
+                             "size of a texel in micrometres: --height then writes micrometres instead of texels")
+                     .range(1e-6, 1e9);
+  depth_ =
+      &tool.option("--depth-um", depth_um_, "from the lowest to the highest point, micrometres, instead of --slope and --alpha")
+           .range(1e-6, 1e9)
+           .needs(*texel_size_);
   for (Option* option : {alpha_, correlation_, feature_, slope_}) option->defaultText(per_kind);
   tool.usesSeed();
 }
@@ -58,6 +68,11 @@ const bake::SynthOptions& SynthOptions::values(Tool& tool) {
   if (!slope_->given()) p.slope = defaults.slope;
   parseSize(size_, p.width, p.height);
   p.seed = tool.seed();
+  if (depth_->given()) {
+    if (p.kind == SynthKind::flakes)
+      throw Error(ErrorCode::usage, "cli.usage", "", "--depth-um", "flakes have no common height field", "take another kind");
+    p.depth_texels = depth_um_ / texel_size_um_;
+  }
   return p;
 }
 

@@ -16,9 +16,13 @@ class SynthOptions {
   /// @throws Error usage for a malformed size
   const bake::SynthOptions& values(Tool& tool);
 
+  /// Size of a texel, um; 0 if it was not given. Valid after parsing.
+  float texelSize() const { return texel_size_->given() ? texel_size_um_ : 0; }
+
  private:
   bake::SynthOptions values_;
   std::string size_ = "512";
+  float texel_size_um_ = 0, depth_um_ = 0;
   Option* alpha_;
   Option* gamma_;
   Option* correlation_;
@@ -26,6 +30,8 @@ class SynthOptions {
   Option* feature_;
   Option* density_;
   Option* slope_;
+  Option* texel_size_;
+  Option* depth_;
 };
 
 }  // namespace glint::apps

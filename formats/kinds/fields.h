@@ -19,6 +19,7 @@
 #include "glint/model/displacement.h"
 #include "glint/model/ndf_cp.h"
 #include "glint/model/normal_map.h"
+#include "glint/model/wave_pyramid.h"
 
 namespace glint::formats {
 
@@ -56,6 +57,8 @@ template <>
 struct ElementOf<VmfLobe> : ElementIs<ElementType::f32, 4> {};
 template <>
 struct ElementOf<MapSlopes> : ElementIs<ElementType::f32, 5> {};
+template <>
+struct ElementOf<Rgb> : ElementIs<ElementType::f32, 3> {};
 template <>
 struct ElementOf<NdfCluster> : ElementIs<ElementType::ndf_cluster> {};
 

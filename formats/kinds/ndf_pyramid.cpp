@@ -1,60 +1,7 @@
-#include <algorithm>
-#include <bit>
-#include <cmath>
-
 #include "glint/formats/kinds/description.h"
-#include "glint/formats/kinds/shared_fields.h"
-#include "glint/formats/kinds/tally.h"
-#include "glint/formats/number_text.h"
-#include "glint/math/half.h"
+#include "glint/formats/kinds/pyramid_fields.h"
 
 namespace glint::formats {
-namespace {
-
-constexpr double kIntegralTolerance = 1e-3;
-/// block_means may be taken before pixels are rounded to half precision (2^-11 relative each, 2^-25 near zero).
-constexpr double kMeanTolerance = 1e-3;
-constexpr double kMeanFloor = 0x1p-24;
-
-std::string levelObject(int l, const char* dataset) { return "/" + levelPath("level_{l}/", l) + dataset; }
-
-float pixel(const NdfPyramid& pyramid, const PyramidLevel& level, std::size_t index) {
-  return pyramid.precision == BlockPrecision::f16 ? ieeeHalfToFloat(static_cast<const std::uint16_t*>(level.pixels)[index])
-                                                  : static_cast<const float*>(level.pixels)[index];
-}
-
-/// "in the image at column 3, row 7 from the top": place of a stored block of a level.
-std::string imageOf(const NdfPyramid& pyramid, int l, std::size_t block) {
-  const std::span<const std::uint32_t> ranks = pyramid.levels[l].mask_ranks;
-  const auto word = static_cast<std::size_t>(std::upper_bound(ranks.begin(), ranks.end(), block) - ranks.begin()) - 1;
-  const PyramidGrid& grid = pyramid.shape.levels[l];
-  return "in the image at " + texelName(grid.columns, grid.rows, word / static_cast<std::size_t>(pyramid.shape.maskWords()));
-}
-
-/// Checks the pixels of one level against its means. Returns the sum of the pixels of each block.
-std::vector<double> checkBlocks(const NdfPyramid& pyramid, int l, Findings& findings) {
-  const PyramidLevel& level = pyramid.levels[l];
-  std::vector<double> sums(level.block_means.size());
-  Tally bad_pixels, bad_means;  // by block
-  for (std::size_t b = 0; b < sums.size(); ++b) {
-    for (std::size_t k = b * kBlockPixels; k < (b + 1) * kBlockPixels; ++k) {
-      const float value = pixel(pyramid, level, k);
-      if (!(std::isfinite(value) && value >= 0)) bad_pixels.add(b);
-      sums[b] += value;
-    }
-    const double mean = sums[b] * pyramid.value_scale / kBlockPixels;
-    const double tolerance = kMeanTolerance * std::abs(mean) + kMeanFloor * pyramid.value_scale;
-    if (!(std::abs(mean - level.block_means[b]) <= tolerance)) bad_means.add(b);
-  }
-  const auto image = [&](std::size_t block) { return imageOf(pyramid, l, block); };
-  report(bad_pixels, "pyramid.pixels", levelObject(l, "pixels"), {"pixel is", "pixels are"}, "negative or not finite", findings,
-         image);
-  report(bad_means, "pyramid.block_means", levelObject(l, "block_means"), {"mean differs", "means differ"}, "from the pixels'",
-         findings, image);
-  return sums;
-}
-
-}  // namespace
 
 template <>
 struct KindDescription<NdfPyramid> {
@@ -71,70 +18,13 @@ struct KindDescription<NdfPyramid> {
   }
 
   static void describe(Fields auto& fields, auto& pyramid) {
-    describeShape(fields, pyramid.shape);
-    fields.choice("precision", pyramid.precision, "f16|f32", "type of the stored pixels");
-    fields.real("value_scale", pyramid.value_scale, kPositive, "1", "density = value_scale * stored pixel");
-    fields.derived("mask_words", "ceil_div(resolution * resolution, 16384)", "64-bit words of occupancy bits of an image");
-    fields.levels("level_count", pyramid.shape.level_count, [&](int l) {
-      auto& level = pyramid.levels[l];
-      fields.array("level_{l}/masks", level.masks, {"level_rows[l]", "level_columns[l]", "mask_words"}, "1",
-                   "bit b of word w: block 64 w + b of the image is stored");
-      fields.array("level_{l}/mask_ranks", level.mask_ranks, {"level_rows[l] * level_columns[l] * mask_words + 1"}, "1",
-                   "stored blocks of the level before those of this word; the last value is their total");
-      fields.array("level_{l}/block_means", level.block_means, {"stored_blocks"}, "1", "mean density of each stored block");
-      // The pixels are a bare pointer: the running count is the only witness of how many there are.
-      const std::uint64_t blocks = level.mask_ranks.empty() ? 0 : level.mask_ranks.back();
-      fields.data("level_{l}/pixels", level.pixels, blocks * kBlockPixels,
-                  {{"precision=f16", ElementType::f16}, {"precision=f32", ElementType::f32}}, {"stored_blocks", "16", "16"},
-                  "1", "mean density of each pixel of each stored block, divided by value_scale");
-    });
+    describePyramidAttributes(fields, pyramid);
+    describePyramidLevels(fields, pyramid, [](int, std::uint64_t) {});
   }
 
-  static void checkIndex(const NdfPyramid& pyramid, Findings& findings) {
-    checkShape(pyramid.shape, findings);
-    const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
-    const int tail_bits = pyramid.shape.blocksPerImage() % 64;
-    const std::uint64_t beyond = tail_bits == 0 ? 0 : ~std::uint64_t{0} << tail_bits;
-    for (int l = 0; l < pyramid.shape.level_count; ++l) {
-      const PyramidLevel& level = pyramid.levels[l];
-      std::uint64_t count = 0;
-      std::uint64_t stray = 0;
-      bool counts_hold = true;
-      for (std::size_t word = 0; word < level.masks.size(); ++word) {
-        counts_hold &= level.mask_ranks[word] == count;
-        count += static_cast<std::uint64_t>(std::popcount(level.masks[word]));
-        if ((word + 1) % words == 0) stray |= level.masks[word] & beyond;
-      }
-      counts_hold &= level.mask_ranks.back() == count && count == level.block_means.size();
-      if (stray != 0) findings.add("pyramid.masks", levelObject(l, "masks"), "has bits beyond the blocks of an image");
-      if (!counts_hold) {
-        findings.add("pyramid.mask_ranks", levelObject(l, "mask_ranks"), "is not the running count of the bits in masks");
-      }
-    }
-  }
+  static void checkIndex(const NdfPyramid& pyramid, Findings& findings) { checkPyramidIndex(pyramid, findings); }
 
-  static void checkValues(const NdfPyramid& pyramid, Findings& findings) {
-    const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
-    const double pixel_area = 4.0 / (static_cast<double>(pyramid.shape.resolution) * pyramid.shape.resolution);
-    for (int l = 0; l < pyramid.shape.level_count; ++l) {
-      const PyramidLevel& level = pyramid.levels[l];
-      const std::vector<double> sums = checkBlocks(pyramid, l, findings);
-      std::size_t bad = 0;
-      double worst = 1;
-      for (std::size_t first = 0; first + words < level.mask_ranks.size(); first += words) {
-        double integral = 0;
-        for (std::uint32_t b = level.mask_ranks[first]; b < level.mask_ranks[first + words]; ++b) integral += sums[b];
-        integral *= pyramid.value_scale * pixel_area;
-        if (std::abs(integral - 1) <= kIntegralTolerance) continue;
-        ++bad;
-        if (!(std::abs(integral - 1) <= std::abs(worst - 1))) worst = integral;
-      }
-      if (bad > 0) {
-        findings.add("pyramid.integral", levelObject(l, "pixels"),
-                     counted(bad, {"image does", "images do"}) + " not integrate to 1 (worst " + numberText(worst) + ")");
-      }
-    }
-  }
+  static void checkValues(const NdfPyramid& pyramid, Findings& findings) { checkPyramidValues(pyramid, findings); }
 };
 
 template const Kind& kindOf<NdfPyramid>();

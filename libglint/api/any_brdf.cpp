@@ -5,8 +5,19 @@
 namespace glint::api {
 namespace {
 
+bool isWave(const OpenedNdf& opened) { return std::holds_alternative<AnisotropicNdf<WaveNdf>>(opened.model()); }
+
+/// Distributions of psi are asked by WaveBrdf, whatever is asked for.
+BrdfFacets usedFacets(const OpenedNdf& opened, BrdfFacets facets) {
+  return facets == BrdfFacets::distribution && isWave(opened) ? BrdfFacets::waves : facets;
+}
+
 SmithMasking maskingOf(const OpenedNdf& opened, BrdfFacets facets) {
-  if (facets == BrdfFacets::distribution) return opened.masking();
+  if (facets == BrdfFacets::waves && !isWave(opened))
+    throw Error(ErrorCode::unsupported, "api.facets", opened.path().string(), "",
+                "waves are answered by a wave-pyramid, and this is of kind " + std::string(opened.asset().kind()),
+                "open an asset of kind wave-pyramid, or take facets of the distribution");
+  if (facets != BrdfFacets::beckmann) return opened.masking();
   if (!std::holds_alternative<BinMapNdf>(opened.model()))
     throw Error(ErrorCode::unsupported, "api.facets", opened.path().string(), "",
                 "Beckmann facets are the texels of a bin-map, and this is of kind " + std::string(opened.asset().kind()),
@@ -18,6 +29,6 @@ SmithMasking maskingOf(const OpenedNdf& opened, BrdfFacets facets) {
 }  // namespace
 
 AnyBrdf::AnyBrdf(const OpenedNdf& opened, const Fresnel& fresnel, BrdfFacets facets)
-    : model_(opened.model()), masking_(maskingOf(opened, facets)), fresnel_(fresnel), facets_(facets) {}
+    : model_(opened.model()), masking_(maskingOf(opened, facets)), fresnel_(fresnel), facets_(usedFacets(opened, facets)) {}
 
 }  // namespace glint::api

@@ -7,6 +7,7 @@
 #include "glint/api/any_ndf.h"
 #include "glint/query/brdf/bin_map_brdf.h"
 #include "glint/query/brdf/microfacet_brdf.h"
+#include "glint/query/brdf/wave_brdf.h"
 #include "glint/query/detail/common/sampling.h"
 
 namespace glint::api {
@@ -15,16 +16,18 @@ namespace glint::api {
 enum class BrdfFacets : std::uint8_t {
   distribution,  ///< mirrors, as dense as the NDF says: MicrofacetBrdf
   beckmann,      ///< kind bin-map: texels are facets of Beckmann microfacets that mask themselves: BinMapBrdf
+  waves,         ///< kind wave-pyramid, and only there: WaveBrdf. `distribution` of this kind is the same
 };
 
 /// A BRDF over a texture, of an asset of any kind that answers an NDF: a model, masking by the slopes of the map, and what the
-/// facets are made of. Every question names the footprint. MicrofacetBrdf and BinMapBrdf have the contracts of the answers.
+/// facets are made of. Every question names the footprint. MicrofacetBrdf, BinMapBrdf and WaveBrdf have the
+/// contracts of the answers.
 ///
 /// Points into the mapped asset, so the OpenedNdf must outlive it (it may be moved). Thread-safe; questions allocate nothing.
 class AnyBrdf {
  public:
   /// Kind normals: sums the slopes of all texels once where the asset does not hold them.
-  /// @throws Error  unsupported: Beckmann facets of another kind than bin-map
+  /// @throws Error  unsupported: Beckmann facets of another kind than bin-map, or waves of another kind than wave-pyramid
   AnyBrdf(const OpenedNdf& opened, const Fresnel& fresnel, BrdfFacets facets = BrdfFacets::distribution);
   AnyBrdf(const OpenedNdf&& opened, const Fresnel& fresnel, BrdfFacets facets = BrdfFacets::distribution) = delete;
 
@@ -33,10 +36,12 @@ class AnyBrdf {
   const Fresnel& fresnel() const { return fresnel_; }
   BrdfFacets facets() const { return facets_; }
 
-  /// Calls ask(brdf) with the MicrofacetBrdf or BinMapBrdf of a footprint, to ask it more than once. Returns the answer of ask.
+  /// Calls ask(brdf) with the MicrofacetBrdf, BinMapBrdf or WaveBrdf of a footprint, to ask it more than once. Returns the answer of ask.
   template <class Ask>
   auto at(const Footprint& footprint, Ask&& ask) const {
     if (facets_ == BrdfFacets::beckmann) return ask(BinMapBrdf(std::get<BinMapNdf>(model_), footprint, masking_, fresnel_));
+    if (facets_ == BrdfFacets::waves)
+      return ask(WaveBrdf(std::get<AnisotropicNdf<WaveNdf>>(model_), footprint, masking_, fresnel_));
     return std::visit([&](const auto& model) { return ask(MicrofacetBrdf(model, footprint, masking_, fresnel_)); }, model_);
   }
 

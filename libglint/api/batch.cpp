@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "glint/api/plane_position.h"
 #include "glint/query/detail/pyramid/pyramid_reader.h"
 
 namespace glint::api {
@@ -37,7 +38,7 @@ class PyramidChunk {
 template <class Model>
 void modelDensities(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                     float* out) {
-  for (std::size_t k = 0; k < count; ++k) out[k] = model.density(footprints[k], halves[k]);
+  for (std::size_t k = 0; k < count; ++k) out[k] = modelAt(model, footprints, k).density(footprints[k], halves[k]);
 }
 
 /// Three chunks are in flight, one step apart. While the memory fetches what one chunk needs next, the other two are computed.
@@ -97,7 +98,7 @@ void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArray
 template <class Model>
 void modelSamples(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
                   const SampleArrays& out) {
-  for (std::size_t k = 0; k < count; ++k) out.set(k, model.sample(footprints[k], xi[k]));
+  for (std::size_t k = 0; k < count; ++k) out.set(k, modelAt(model, footprints, k).sample(footprints[k], xi[k]));
 }
 
 /// Every loop is a step of all samples, and prefetches what the next loop reads. Smooth pixels: as for densities.
@@ -137,7 +138,7 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
 template <class Model>
 void modelMeans(const Model& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
                 float* out) {
-  for (std::size_t k = 0; k < count; ++k) out[k] = model.mean(footprints[k], ranges[k]);
+  for (std::size_t k = 0; k < count; ++k) out[k] = modelAt(model, footprints, k).mean(footprints[k], ranges[k]);
 }
 
 /// Whether every footprint of a batch is asked as it is, not as several parts.

@@ -8,6 +8,8 @@
 
 #include "glint/api/c_support.h"
 #include "glint/api/pack.h"
+#include "glint/api/plane_position.h"
+#include "glint/api/wave_colours.h"
 #include "glint/query/ray_footprint.h"
 
 namespace {
@@ -263,7 +265,33 @@ glint_status glint_ndf_pack(const glint_ndf* ndf, void* buffer, size_t capacity,
 glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy, float* density) {
   if (!isOpen(ndf) || footprint == nullptr || density == nullptr)
     return badArgument("glint_density", {{ndf, "ndf"}, {footprint, "footprint"}, {density, "density"}});
-  *density = ndf->body().opened.model().density(footprintOf(*footprint), {hx, hy});
+  *density = api::askAt(ndf->body().opened.model(), footprint->u, footprint->v, [&](const auto& model) {
+    return model.density(footprintOf(*footprint), {hx, hy});
+  });
+  return GLINT_OK;
+}
+
+glint_status glint_density_rgb(const glint_ndf* ndf, const glint_footprint* footprint, float psi_x, float psi_y, float rgb[3]) {
+  if (!isOpen(ndf) || footprint == nullptr || rgb == nullptr)
+    return badArgument("glint_density_rgb", {{ndf, "ndf"}, {footprint, "footprint"}, {rgb, "rgb"}});
+  set(rgb, api::densityRgb(ndf->body().opened.model(), footprintOf(*footprint), {psi_x, psi_y}));
+  return GLINT_OK;
+}
+
+glint_status glint_ndf_channels(const glint_ndf* ndf, int32_t* channels) {
+  if (!isOpen(ndf) || channels == nullptr) return badArgument("glint_ndf_channels", {{ndf, "ndf"}, {channels, "channels"}});
+  *channels = api::channelCount(ndf->body().opened.model());
+  return GLINT_OK;
+}
+
+glint_status glint_density_spectrum(const glint_ndf* ndf, const glint_footprint* footprint, float psi_x, float psi_y,
+                                    float* densities, size_t capacity) {
+  if (!isOpen(ndf) || footprint == nullptr || densities == nullptr)
+    return badArgument("glint_density_spectrum", {{ndf, "ndf"}, {footprint, "footprint"}, {densities, "densities"}});
+  const api::AnyNdf& model = ndf->body().opened.model();
+  if (capacity < static_cast<size_t>(api::channelCount(model)))
+    return usage("glint_density_spectrum", "capacity is below the number of channels (glint_ndf_channels)");
+  api::densitySpectrum(model, footprintOf(*footprint), {psi_x, psi_y}, densities);
   return GLINT_OK;
 }
 
@@ -271,7 +299,9 @@ glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, 
                         float* mean) {
   if (!isOpen(ndf) || footprint == nullptr || mean == nullptr)
     return badArgument("glint_mean", {{ndf, "ndf"}, {footprint, "footprint"}, {mean, "mean"}});
-  *mean = ndf->body().opened.model().mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}});
+  *mean = api::askAt(ndf->body().opened.model(), footprint->u, footprint->v, [&](const auto& model) {
+    return model.mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}});
+  });
   return GLINT_OK;
 }
 
@@ -279,7 +309,9 @@ glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint
                           float* pdf) {
   if (!isOpen(ndf) || footprint == nullptr || hx == nullptr || hy == nullptr || pdf == nullptr)
     return badArgument("glint_sample", {{ndf, "ndf"}, {footprint, "footprint"}, {hx, "hx"}, {hy, "hy"}, {pdf, "pdf"}});
-  const HalfVectorSample drawn = ndf->body().opened.model().sample(footprintOf(*footprint), {xi1, xi2});
+  const HalfVectorSample drawn = api::askAt(ndf->body().opened.model(), footprint->u, footprint->v, [&](const auto& model) {
+    return model.sample(footprintOf(*footprint), {xi1, xi2});
+  });
   *hx = drawn.h.x;
   *hy = drawn.h.y;
   *pdf = drawn.pdf;
@@ -292,6 +324,17 @@ glint_status glint_density_batch(const glint_ndf* ndf, size_t count, const glint
   if (const char* fault = faultOf(ndf, footprints, densities)) return usage("glint_density_batch", fault);
   if (hx.data == nullptr || hy.data == nullptr) return usage("glint_density_batch", "hx and hy must be given");
   api::densities(ndf->body().opened.model(), count, arraysOf(*footprints), {arrayOf(hx), arrayOf(hy)}, densities);
+  return GLINT_OK;
+}
+
+glint_status glint_density_rgb_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints, glint_floats psi_x,
+                                     glint_floats psi_y, float* rgb) {
+  if (count == 0) return GLINT_OK;
+  if (const char* fault = faultOf(ndf, footprints, rgb)) return usage("glint_density_rgb_batch", fault);
+  if (psi_x.data == nullptr || psi_y.data == nullptr) return usage("glint_density_rgb_batch", "psi_x and psi_y must be given");
+  const api::FootprintArrays arrays = arraysOf(*footprints);
+  const api::HalfVectorArrays psi = {arrayOf(psi_x), arrayOf(psi_y)};
+  for (size_t k = 0; k < count; ++k) set(rgb + 3 * k, api::densityRgb(ndf->body().opened.model(), arrays[k], psi[k]));
   return GLINT_OK;
 }
 

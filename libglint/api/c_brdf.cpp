@@ -22,6 +22,14 @@ namespace {
 using namespace glint;
 using namespace glint::api::c;
 
+/// The footprint that a BRDF is asked for. On a plane without end its centre keeps the whole parts, as far as floats have them.
+Footprint footprintFor(const api::AnyBrdf& brdf, const glint_footprint& p) {
+  Footprint footprint = footprintOf(p);
+  if (std::holds_alternative<TinyExampleNdf>(brdf.model()))
+    footprint.centre = {static_cast<float>(p.u), static_cast<float>(p.v)};
+  return footprint;
+}
+
 constexpr float kMostIndex = 1e3f, kLeastDielectric = 1e-3f;
 
 static_assert(offsetof(glint_brdf_options, k) + 3 * sizeof(float) == sizeof(glint_brdf_options),
@@ -85,7 +93,7 @@ glint_status glint_brdf_evaluate(const glint_brdf* brdf, const glint_footprint* 
     return badArgument("glint_brdf_evaluate", {{brdf, "brdf"}, {footprint, "footprint"}, {wi, "wi"}, {wo, "wo"}});
   if (f == nullptr && pdf == nullptr) return usage("glint_brdf_evaluate", "f and pdf are null");
   const api::BrdfValueArrays out = {f, pdf};
-  out.set(0, brdf->body().brdf.evaluateWithPdf(footprintOf(*footprint), vectorOf(wi), vectorOf(wo)));
+  out.set(0, brdf->body().brdf.evaluateWithPdf(footprintFor(brdf->body().brdf, *footprint), vectorOf(wi), vectorOf(wo)));
   return GLINT_OK;
 }
 
@@ -95,7 +103,7 @@ glint_status glint_brdf_sample(const glint_brdf* brdf, const glint_footprint* fo
     return badArgument("glint_brdf_sample",
                        {{brdf, "brdf"}, {footprint, "footprint"}, {wo, "wo"}, {wi, "wi"}, {weight, "weight"}, {pdf, "pdf"}});
   const api::BrdfSampleArrays out = {wi, weight, pdf};
-  out.set(0, brdf->body().brdf.sample(footprintOf(*footprint), vectorOf(wo), {xi1, xi2}));
+  out.set(0, brdf->body().brdf.sample(footprintFor(brdf->body().brdf, *footprint), vectorOf(wo), {xi1, xi2}));
   return GLINT_OK;
 }
 
@@ -140,8 +148,10 @@ glint_status askMicrofacets(const char* where, const glint_brdf* brdf, const gli
   const api::AnyBrdf& any = brdf->body().brdf;
   if (any.facets() == api::BrdfFacets::beckmann)
     return usage(where, "Beckmann facets have no averages over half vectors; make the BRDF with GLINT_FACETS_OF_DISTRIBUTION");
-  any.at(footprintOf(footprint), [&](const auto& b) {
-    if constexpr (!std::is_same_v<std::remove_cvref_t<decltype(b)>, BinMapBrdf>) ask(b);
+  if (any.facets() == api::BrdfFacets::waves)
+    return usage(where, "colours of a wave-pyramid have no averages over half vectors; take glint_brdf_evaluate and _sample");
+  any.at(footprintFor(any, footprint), [&](const auto& b) {
+    if constexpr (requires { b.valueOf(Vec3{}, Vec3{}, HalfVector{}, 0.0f); }) ask(b);
   });
   return GLINT_OK;
 }

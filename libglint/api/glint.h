@@ -100,12 +100,12 @@ typedef struct glint_open_options {
   float slant_tolerance;    /* kind histogram-sat: share of a footprint with slanted sides that may be counted in a wrong
                                place, up to 1; 0: 0.06; GLINT_SLANT_EXACT: none, and slower */
   int32_t gaussian_boxes;   /* kind histogram-sat: boxes that stand for a Gaussian footprint, 1 or 3; 0: 1 */
-  int32_t footprint_parts;  /* kinds ndf-pyramid, ndf-cp and slope-moments: most round footprints that stand for a stretched
+  int32_t footprint_parts;  /* kinds with levels of images, and slope-moments: most round footprints that stand for a stretched
                                one, up to 32, each at the cost of one; 1: one of the same mean square size, whatever the
                                shape; 0: 32 */
-  int32_t interpolation;    /* kinds ndf-pyramid and ndf-cp: GLINT_INTERPOLATION_*, how footprints between the stored ones are
+  int32_t interpolation;    /* kinds with levels of images: GLINT_INTERPOLATION_*, how footprints between the stored ones are
                                answered */
-  int32_t pixels;           /* kinds ndf-pyramid and ndf-cp: GLINT_PIXELS_*, how densities run between half vectors of one pixel
+  int32_t pixels;           /* kinds with levels of images: GLINT_PIXELS_*, how densities run between half vectors of one pixel
                                of an image */
 } glint_open_options;
 
@@ -116,7 +116,7 @@ typedef struct glint_open_options {
 /* clang-format on */
 
 /* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat,
- * slope-moments.
+ * slope-moments, tiny-example, wave-pyramid.
  *
  * The file is checked, then mapped; what queries read is not copied. Safe on untrusted files. A file must not be changed in
  * place while it is open (the tools never do: they replace files).
@@ -170,7 +170,8 @@ GLINT_API glint_status glint_ndf_pack(const glint_ndf* ndf, void* buffer, size_t
 enum { GLINT_FOOTPRINT_GAUSSIAN = 0, GLINT_FOOTPRINT_BOX = 1 };
 typedef struct glint_footprint {
   int32_t kind; /* GLINT_FOOTPRINT_*; other values count as Gaussian */
-  double u, v;  /* centre */
+  double u, v;  /* centre, in maps: the whole parts count on planes without end (kind tiny-example, in sizes of the example),
+                   for BRDFs as far as floats tell positions apart; maps repeat */
   float m[4];   /* Gaussian: covariance xx, xy, yy in texels^2, and unused. Box: a parallelogram's half axes ax, ay, bx, by
                    in texels */
 } glint_footprint;
@@ -216,6 +217,23 @@ GLINT_API glint_footprint glint_footprint_from_cone(glint_ray_cone cone, double 
 GLINT_API glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy,
                                      float* density);
 
+/* Density in linear sRGB towards a point psi, of kind wave-pyramid; other kinds: the density of glint_density in each channel.
+ *
+ * psi = ((wi + wo) / 2)_xy: for directions near the normal, the half vector. A flat mirror is white. rgb: three floats. They are
+ * finite, and may be below 0: colours of few wavelengths lie outside the gamut. Footprints and status as for glint_density. */
+GLINT_API glint_status glint_density_rgb(const glint_ndf* ndf, const glint_footprint* footprint, float psi_x, float psi_y,
+                                         float rgb[3]);
+
+/* Number of channels of kind wave-pyramid: 3 for CIE X, Y and Z, else one for each wavelength; 1 for other kinds. Returns
+ * GLINT_ERROR_USAGE for null arguments, else GLINT_OK. */
+GLINT_API glint_status glint_ndf_channels(const glint_ndf* ndf, int32_t* channels);
+
+/* Density of each channel towards psi; other kinds than wave-pyramid: the density of glint_density.
+ * capacity: floats of `densities`, at least the channels. Returns GLINT_ERROR_USAGE for null arguments or too small a capacity,
+ * else GLINT_OK. Footprints as for glint_density. */
+GLINT_API glint_status glint_density_spectrum(const glint_ndf* ndf, const glint_footprint* footprint, float psi_x, float psi_y,
+                                              float* densities, size_t capacity);
+
 /* Mean density over the box [x0, x1] x [y0, y1] of half vectors, as a light or a pixel of an NDF image asks for it.
  *
  * The average of glint_density, but for kind ndf-cp: there the density is what the compression leaves above zero, and the mean
@@ -255,7 +273,8 @@ typedef struct glint_footprints {
   glint_floats sigma;                 /* isotropic Gaussians: deviation, texels */
   glint_floats xx, xy, yy;            /* Gaussians: covariance, texels^2 */
   glint_floats ax, ay, bx, by;        /* boxes: half axes, texels */
-  glint_doubles precise_u, precise_v; /* centres as doubles: for positions far out. Where given, u and v are not read */
+  glint_doubles precise_u, precise_v; /* centres as doubles: for positions far out. Where given, u and v are not read. For
+                                         BRDFs of planes without end give u and v: here the whole parts do not count */
 } glint_footprints;
 
 /* densities[k] = glint_density of query k, k < count, to 1e-6 of its size; densities is contiguous.
@@ -264,6 +283,10 @@ typedef struct glint_footprints {
  * missing array, else GLINT_OK. Outputs must not overlap inputs. To use threads, split the batch. */
 GLINT_API glint_status glint_density_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints,
                                            glint_floats hx, glint_floats hy, float* densities);
+
+/* rgb[3 k] to rgb[3 k + 2] = glint_density_rgb of query k; rgb is contiguous. Else as glint_density_batch. */
+GLINT_API glint_status glint_density_rgb_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints,
+                                               glint_floats psi_x, glint_floats psi_y, float* rgb);
 
 /* means[k] = glint_mean of query k. Else as glint_density_batch. */
 GLINT_API glint_status glint_mean_batch(const glint_ndf* ndf, size_t count, const glint_footprints* footprints, glint_floats x0,
@@ -283,7 +306,8 @@ enum {
   GLINT_FRESNEL_CONDUCTOR = 2
 };
 enum {
-  GLINT_FACETS_OF_DISTRIBUTION = 0, /* f = D F G2 / (4 wi.z wo.z), D the density of the distribution */
+  GLINT_FACETS_OF_DISTRIBUTION = 0, /* f = D F G2 / (4 wi.z wo.z), D the density of the distribution; kind wave-pyramid: f = D F
+                                       G2 / 4 in colour, D of psi = ((wi + wo) / 2)_xy */
   GLINT_FACETS_BECKMANN = 1         /* kind bin-map: texels are facets of Beckmann microfacets, with masking of their own: for
                                        rough or steep maps */
 };
@@ -364,7 +388,8 @@ enum { GLINT_MOST_LOBE_CELLS = 8 };
  *
  * cells: cells along each axis that a lobe is cut into, 1 to GLINT_MOST_LOBE_CELLS; 0: 3. More follow wide lobes more closely.
  * radiance: red, green and blue; 0 for wo below the horizon. lobes may be null if count is 0.
- * Returns GLINT_ERROR_USAGE for null arguments, cells out of range, and a BRDF of Beckmann facets. */
+ * Returns GLINT_ERROR_USAGE for null arguments, cells out of range, and a BRDF of Beckmann facets or of
+ * kind wave-pyramid. */
 GLINT_API glint_status glint_lobes_reflected(const glint_brdf* brdf, const glint_footprint* footprint, const float wo[3],
                                              const glint_spherical_gaussian* lobes, size_t count, int32_t cells,
                                              float radiance[3]);

@@ -9,6 +9,8 @@
 #include "glint/api/models/moments.h"
 #include "glint/api/models/pyramid.h"
 #include "glint/api/models/reference.h"
+#include "glint/api/models/tiny.h"
+#include "glint/api/models/wave.h"
 
 namespace glint::api {
 
@@ -49,7 +51,7 @@ struct NdfModelList {
 /// A plane of tiles is one line, not one for each model of its tiles. It holds its tiles as a variant over a list of the models
 /// that tiles may have, and visits the variant once in each question, after it has chosen the tile. Its traits open a tile by
 /// the traits of the tile's model.
-using NdfModels =
-    NdfModelList<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, BinMapNdf, HistogramNdf, MomentsNdf>;
+using NdfModels = NdfModelList<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, BinMapNdf, HistogramNdf,
+                               MomentsNdf, TinyExampleNdf, AnisotropicNdf<WaveNdf>>;
 
 }  // namespace glint::api

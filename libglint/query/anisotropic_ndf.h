@@ -215,6 +215,29 @@ class AnisotropicNdf {
     return summed(parts(p), [&](const Footprint& part) { return model_.pixelMean(part, h); });
   }
 
+  /// Density in linear sRGB towards psi, of a model that has it (WaveNdf).
+  GLINT_HD Rgb densityRgb(const Footprint& p, Vec2 psi) const requires requires(const M& m) { m.densityRgb(p, psi); }
+  {
+    if (isWhole(p)) return model_.densityRgb(p, psi);
+    const IsotropicParts all = parts(p);
+    Rgb sum;
+    for (int k = 0; k < all.count; ++k) sum = sum + all.weights[k] * model_.densityRgb(all.footprints[k], psi);
+    return sum;
+  }
+
+  /// Density of each channel towards psi, of a model that has channels (WaveNdf).
+  /// @param out  [model.channels()]
+  GLINT_HD void densitySpectrum(const Footprint& p, Vec2 psi, float* out) const requires requires(const M& m) {
+    m.densitySpectrum(p, psi, out);
+  }
+  {
+    if (isWhole(p)) return model_.densitySpectrum(p, psi, out);
+    const IsotropicParts all = parts(p);
+    for (int c = 0; c < model_.channels(); ++c) out[c] = 0;
+    for (int k = 0; k < all.count; ++k)
+      model_.forEachChannel(all.footprints[k], psi, [&](int c, float density) { out[c] += all.weights[k] * density; });
+  }
+
   /// Average density over a box of half vectors.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     if (isWhole(p)) return model_.mean(p, range);

@@ -21,7 +21,7 @@ SCHEMAS = {path.name.removesuffix(".schema.json"): json.loads(path.read_text()) 
 
 LIGHTS = {"lights": [{"type": "sphere", "centre": [1, 0, 3], "radius": 0.5, "radiance": [3, 2, 1]}]}
 QUERIES = {"half.csv": "u,v,sigma,hx,hy\n.3,.3,4,0,0\n.1,.2,5,.1,0\n", "displaced.csv": "u,v,level,hx,hy\n.3,.3,0,0,0\n"}
-ASSETS = ("normals", "smooth", "heights", "flat", "damaged", "pyramid", "cp", "tucker", "pca", "bins", "range", "sat", "moments", "lobes", "zonal", "light",
+ASSETS = ("normals", "smooth", "heights", "flat", "damaged", "pyramid", "cp", "tucker", "pca", "bins", "range", "sat", "moments", "tiny", "wang", "wave", "lobes", "zonal", "light",
           "displaced", "rough", "colored")
 
 # Commands in the order that they run: each may read what the commands before it wrote.
@@ -44,6 +44,14 @@ MAKE = [
     "sat normals.glint -o sat.glint --bins 6x20",
     "moments normals.glint -o moments.glint",
     "moments heights.glint -o m.glint --finest 0 --roughness .3 --textures . --lobe gltf",
+    "tiny normals.glint -o tiny.glint --cut 8 --at 3 4 --mode scattered --resolution 32 --sigma-r .03",
+    "tiny normals.glint -o t.glint --cut 16 --resolution 32 --sigma-r .03",
+    "tiny tiny.glint -o plane.glint --explicit 24 16 --origin -100 7 --per-texel 2",
+    "wang normals.glint -o wang.glint --size 16",
+    "wang wang.glint --explicit 20 10 -o part.glint",
+    "synth grating --size 64 --height --texel-size-um 1 --depth-um .2 -o g.exr",
+    "ingest g.exr --kind height --to heights --height-scale-um 1 --texel-size-um 1 -o grating.glint",
+    "pyramid grating.glint -o wave.glint --optics wave --coherence-um 4 --wavelengths 3 --resolution 64 --stride 8",
     "shlobes -o lobes.glint --sigma-r .1 --order 6 --grid 5x8 --precision f32",
     "shlobes -o zonal.glint --sigma-r .1 --order 6 --grid none",
     "shlobes --light lights.json -o light.glint --order 6 --grid 5x8",
@@ -55,7 +63,7 @@ MAKE = [
 ]
 QUERY = "query {asset}.glint --uv .3 .6 --sigma 4 {asked}"
 ASKED = [
-    *(QUERY.format(asset=asset, asked="--half 0 .1") for asset in ("normals", "pyramid", "cp", "bins", "sat", "moments", "reflectance displaced")),
+    *(QUERY.format(asset=asset, asked="--half 0 .1") for asset in ("normals", "pyramid", "cp", "bins", "sat", "moments", "tiny", "wave", "reflectance displaced")),
     *(QUERY.format(asset=asset, asked="--half .1 0 --repeat 15") for asset in ("pyramid", "reflectance displaced")),
     *(QUERY.format(asset=asset, asked="--image ndf.png --image-size 16") for asset in ("tucker", "reflectance displaced")),
     *(QUERY.format(asset=asset, asked="--range -1 -1 1 1 --repeat 15") for asset in ("normals", "sat")),
@@ -67,6 +75,7 @@ ASKED = [
     "query reflectance displaced.glint --uv .3 .6 --level 1 --wi .5 0 1 --wo -.2 0 1",
     "query reflectance colored.glint --uv .3 .6 --sigma 3 --wi .5 0 1 --wo -.2 0 1 --repeat 15",
     "query reflectance displaced.glint --uv .3 .6 --level 0 --wo 0 0 1 --samples 3 -o samples.csv",
+    "query plane wang.glint --texel 1e12 -3.5 --sigma 4 --half 0 .1",
     "query reflectance displaced.glint --csv displaced.csv -o answers.csv",
 ]
 FOUND = [*(f"info {asset}.glint" for asset in ASSETS), "validate normals.glint pyramid.glint"]

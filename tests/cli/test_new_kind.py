@@ -15,7 +15,7 @@ ROOT = pathlib.Path(__file__).parents[2]
 LIST = "formats/kinds.h"
 LIST_EDITS = {
     '#include "glint/model/sh.h"\n': '#include "glint/model/sh.h"\n#include "glint/model/toy.h"\n',
-    "NormalMap, ShLight, ShLobes>;": "NormalMap, ShLight, ShLobes, Toy>;",
+    "std::variant<BinMap,": "std::variant<Toy, BinMap,",  # the end of the list changes with every kind
     'kKindName<ShLobes> = "sh-lobes";\n': 'kKindName<ShLobes> = "sh-lobes";\ntemplate <>\ninline constexpr std::string_view kKindName<Toy> = "toy";\n',
 }
 

@@ -15,8 +15,11 @@ GLINT_MAPS := maps
 GLINT_OUT := assets
 GLINT_PYRAMID_FLAGS := --resolution 64 --sigma-r 0.02
 GLINT_INGEST_FLAGS_dunes := --kind height
+GLINT_WANG_FLAGS := --size 64
 GLINT_DISPLACE_FLAGS := --factors 16,64 --angular 5
-all: $(foreach method,cp tucker pca binmap sat moments,assets/flakes.$(method).glint) assets/dunes.pca.glint assets/dunes.displaced.glint
+GLINT_HEIGHTS_FLAGS_dunes := --texel-size-um 1
+GLINT_WAVE_FLAGS := --wavelengths 2 --resolution 64 --stride 64
+all: $(foreach method,cp tucker pca binmap sat moments tiny wang,assets/flakes.$(method).glint) assets/dunes.pca.glint assets/dunes.displaced.glint assets/dunes.wave.glint
 include {root}/pipelines/glint.mk
 """
 
@@ -50,16 +53,16 @@ def later(path):
 
 def test_images_become_assets_and_only_changes_are_made_again(project):
     first = tools(project("-j2"))
-    assert first == ["glint-binmap"] + ["glint-compress"] * 4 + ["glint-displace"] + ["glint-ingest"] * 3 + ["glint-moments"] + ["glint-pyramid"] * 2 + ["glint-sat"]
+    assert first == ["glint-binmap"] + ["glint-compress"] * 4 + ["glint-displace"] + ["glint-ingest"] * 3 + ["glint-moments"] + ["glint-pyramid"] * 3 + ["glint-sat", "glint-tiny", "glint-wang"]
     made = {p.name for p in (project.folder / "assets").glob("*.glint")}
     assert made == {f"{n}.glint" for n in ("flakes", "flakes.pyramid", "flakes.cp", "flakes.tucker", "flakes.pca", "flakes.binmap",
-                                                 "flakes.sat", "flakes.moments", "dunes", "dunes.pyramid", "dunes.pca", "dunes.heights", "dunes.displaced")}
+                                                 "flakes.sat", "flakes.moments", "flakes.tiny", "flakes.wang", "dunes", "dunes.pyramid", "dunes.pca", "dunes.heights", "dunes.displaced", "dunes.wave")}
     assert subprocess.run([BIN / "glint-validate", *(project.folder / "assets").glob("*.glint")]).returncode == 0
 
     assert tools(project("-j2")) == []
 
     later(project.folder / "maps/dunes.exr")
-    assert tools(project("-j2")) == ["glint-compress", "glint-displace", "glint-ingest", "glint-ingest", "glint-pyramid"]
+    assert tools(project("-j2")) == ["glint-compress", "glint-displace", "glint-ingest", "glint-ingest", "glint-pyramid", "glint-pyramid"]
 
     later(project.folder / "Makefile")
     assert tools(project("--dry-run")) == first

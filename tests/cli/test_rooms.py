@@ -25,9 +25,10 @@ MAY_USE = {
 # The folders inside the rooms, and which of them each may include besides itself. A method has the same name in every room.
 FOLDERS = {
     "bake": {"common": set(), "ingest": {"common"}, "synth": {"common"}, "pyramid": {"common"}, "compressed": {"common"},
-             "bin_map": {"common"}, "histogram": {"common"}, "moments": {"common"}, "sh": {"common"}, "displace": {"common"}},
+             "bin_map": {"common"}, "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"}, "sh": {"common"}, "displace": {"common"},
+             "wang": {"common"}, "wave": {"common", "pyramid"}},
     "query/detail": {"common": set(), "pyramid": {"common"}, "compressed": {"common", "pyramid"}, "bin_map": {"common"},
-                     "histogram": {"common"}, "moments": {"common"}},
+                     "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"}, "wave": {"common", "pyramid"}},
 }
 
 # Headers of others that are kept in few places: pattern -> folders, relative to the root.
@@ -35,7 +36,7 @@ KEPT_IN = {
     r"^(hdf5|H5\w*)(\.h|\.hpp)$|^highfive/": ["formats"],
     r"^OpenImageIO/|^OpenEXR/|^Imath/|^Imf\w*\.h$": ["apps"],
     r"^CLI/": ["apps"],
-    r"^Eigen/|^fftw3|^libsharp/|^hwy/": ["libglint/bake"],
+    r"^Eigen/|^fftw3|^libsharp/|^hwy/|^boost/": ["libglint/bake"],
     r"^(tbb|oneapi)/": ["libglint/bake", "apps"],
 }
 

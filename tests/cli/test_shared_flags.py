@@ -10,7 +10,7 @@ from conftest import BIN
 
 APPS = pathlib.Path(__file__).parents[2] / "apps"
 TOOLS = sorted(path.parent.name.removeprefix("glint-") for path in APPS.glob("glint-*/main.cpp"))
-COMMANDS = [*TOOLS, "query light", "query reflectance"]  # programs, and their commands
+COMMANDS = [*TOOLS, "query light", "query plane", "query reflectance"]  # programs, and their commands
 SHARED = ["--threads", "--seed", "--json", "--progress", "--quiet", "--force", "--depfile", "--config", "--version", "--help"]
 
 
@@ -134,7 +134,7 @@ def test_examples_in_help_parse(glint):
 
 def test_commands_are_in_the_help_of_their_program(glint):
     text = glint("query", "--help").stdout
-    for command in ("light", "reflectance"):
+    for command in ("light", "plane", "reflectance"):
         assert f"glint-query {command} ASSET" in text
 
 

@@ -8,7 +8,7 @@ import subprocess
 import pytest
 from conftest import BIN
 
-KINDS = ["isotropic", "brushed", "flakes", "scratches", "leather", "weave", "sawtooth", "flat"]
+KINDS = ["isotropic", "brushed", "flakes", "scratches", "leather", "weave", "sawtooth", "flat", "grating"]
 
 
 @pytest.mark.parametrize("kind", KINDS)

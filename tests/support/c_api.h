@@ -42,8 +42,15 @@ inline void writeSample(std::type_identity<BinMap>, const std::string& path) {
 inline void writeSample(std::type_identity<HistogramSat>, const std::string& path) {
   formats::writeAsset(path, sampleHistograms(kSize, kSize).sat, sampleProvenance());
 }
+inline void writeSample(std::type_identity<WavePyramid>, const std::string& path) {
+  formats::writeAsset(path, sampleWavePyramid(kSize, WaveChannels::xyz, BlockPrecision::f16).wave, sampleProvenance());
+}
 inline void writeSample(std::type_identity<SlopeMoments>, const std::string& path) {
   formats::writeAsset(path, sampleSlopeMoments(kSize, kSize).moments, sampleProvenance());
+}
+
+inline void writeSample(std::type_identity<TinyExample>, const std::string& path) {
+  formats::writeAsset(path, sampleTinyExample(kSize, TinyMode::tiled).example, sampleProvenance());
 }
 
 /// Files of every kind that a model answers, and of some others.

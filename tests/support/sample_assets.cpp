@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "glint/model/slope_sums.h"
+
 namespace glint::test {
 namespace {
 
@@ -481,6 +483,35 @@ SampleDisplacement sampleDisplacement(int size, bool colored) {
   return sample;
 }
 
+namespace {
+
+/// Stores the occupied blocks of the images of a level.
+void addLevel(SamplePyramid& sample, int l, const std::vector<Image>& images) {
+  NdfPyramid& pyramid = sample.pyramid;
+  SamplePyramid::Level& level = sample.levels[static_cast<std::size_t>(l)];
+  for (const Image& image : images) {
+    level.mask_ranks.push_back(static_cast<std::uint32_t>(level.block_means.size()));  // one word: at most 64 blocks
+    level.masks.push_back(0);
+    for (int block = 0; block < pyramid.shape.blocksPerImage(); ++block) {
+      const double mean = blockMean(image, block);
+      if (mean == 0) continue;
+      level.masks.back() |= std::uint64_t{1} << block;
+      level.block_means.push_back(static_cast<float>(mean));
+      for (int k = 0; k < kBlockPixels; ++k) {
+        const double stored = blockPixel(image, block, k % kBlockSize, k / kBlockSize) / pyramid.value_scale;
+        level.halves.push_back(floatToHalf(static_cast<float>(stored)));
+        level.floats.push_back(static_cast<float>(stored));
+      }
+    }
+  }
+  level.mask_ranks.push_back(static_cast<std::uint32_t>(level.block_means.size()));
+  const void* pixels =
+      pyramid.precision == BlockPrecision::f16 ? static_cast<const void*>(level.halves.data()) : level.floats.data();
+  pyramid.levels[l] = {level.masks, level.mask_ranks, level.block_means, pixels};
+}
+
+}  // namespace
+
 SamplePyramid samplePyramid(int size, BlockPrecision precision) {
   SamplePyramid sample;
   const SampleNormals normals = sampleNormals(size, size, false);
@@ -489,26 +520,84 @@ SamplePyramid samplePyramid(int size, BlockPrecision precision) {
   pyramid.precision = precision;
   pyramid.value_scale = 4;
   sample.levels.resize(static_cast<std::size_t>(pyramid.shape.level_count));
-  for (int l = 0; l < pyramid.shape.level_count; ++l) {
-    SamplePyramid::Level& level = sample.levels[static_cast<std::size_t>(l)];
-    for (const Image& image : levelImages(normals.map, pyramid.shape.levels[l])) {
-      level.mask_ranks.push_back(static_cast<std::uint32_t>(level.block_means.size()));  // one word: at most 64 blocks
-      level.masks.push_back(0);
-      for (int block = 0; block < pyramid.shape.blocksPerImage(); ++block) {
-        const double mean = blockMean(image, block);
-        if (mean == 0) continue;
-        level.masks.back() |= std::uint64_t{1} << block;
-        level.block_means.push_back(static_cast<float>(mean));
-        for (int k = 0; k < kBlockPixels; ++k) {
-          const double stored = blockPixel(image, block, k % kBlockSize, k / kBlockSize) / pyramid.value_scale;
-          level.halves.push_back(floatToHalf(static_cast<float>(stored)));
-          level.floats.push_back(static_cast<float>(stored));
-        }
+  for (int l = 0; l < pyramid.shape.level_count; ++l) addLevel(sample, l, levelImages(normals.map, pyramid.shape.levels[l]));
+  return sample;
+}
+
+SampleTinyExample sampleTinyExample(int size, TinyMode mode) {
+  SampleTinyExample sample;
+  sample.normals = sampleNormals(size, size, false).normals;
+  TinyExample& tiny = sample.example;
+  tiny.mode = mode;
+  tiny.background_sigma_r = 0.125f;
+  if (mode == TinyMode::scattered) {
+    tiny.transforms = {
+        .scale = {0.5f, 1.5f}, .stretch = {1, 1.25f}, .shear = {-0.25f, 0}, .rotation_rad = {0, 6.25f}, .mirror = 0.5f};
+    tiny.density = 1.5f;
+    tiny.overlap = TinyOverlap::nearest;
+    tiny.seed = 7;
+  }
+  PyramidShape& shape = sample.images.pyramid.shape;
+  shape = sampleShape(size);
+  shape.level_count = 0;
+  const int levels = mode == TinyMode::scattered ? 1 : 0;
+  for (int side = 2; side <= size << levels; side *= 2)
+    shape.levels[shape.level_count++] = {static_cast<float>(side), std::max(1, size / side), std::max(1, size / side)};
+  sample.images.pyramid.value_scale = 4;
+  sample.images.levels.resize(static_cast<std::size_t>(shape.level_count));
+  const double pixel_area = 4.0 / (kResolution * kResolution);
+  for (int l = 0; l < shape.level_count; ++l) {
+    // Each texel fills the pixel of its normal: no lobe, but images that integrate to 1.
+    const int columns = shape.levels[l].columns, side = size / columns;
+    std::vector<Image> images(static_cast<std::size_t>(columns) * static_cast<std::size_t>(columns));
+    for (Image& image : images) image.assign(static_cast<std::size_t>(kResolution) * kResolution, 0);
+    for (int j = 0; j < size; ++j) {
+      for (int i = 0; i < size; ++i) {
+        const Vec2 n =
+            sample.normals[static_cast<std::size_t>(j) * static_cast<std::size_t>(size) + static_cast<std::size_t>(i)];
+        const auto pixel = [](float x) {
+          return std::clamp(static_cast<int>((x + 1) * 0.5f * kResolution), 0, kResolution - 1);
+        };
+        images[static_cast<std::size_t>(j / side * columns + i / side)]
+              [static_cast<std::size_t>(pixel(n.y) * kResolution + pixel(n.x))] += 1 / (pixel_area * side * side);
       }
     }
-    level.mask_ranks.push_back(static_cast<std::uint32_t>(level.block_means.size()));
-    const void* pixels = precision == BlockPrecision::f16 ? static_cast<const void*>(level.halves.data()) : level.floats.data();
-    pyramid.levels[l] = {level.masks, level.mask_ranks, level.block_means, pixels};
+    addLevel(sample.images, l, images);
+  }
+  tiny.images = sample.images.pyramid;
+  tiny.normals = sample.normals;
+  return sample;
+}
+
+SampleWavePyramid sampleWavePyramid(int size, WaveChannels meaning, BlockPrecision precision) {
+  SampleWavePyramid sample;
+  sample.grey = samplePyramid(size, precision);
+  WavePyramid& wave = sample.wave;
+  wave.grey = sample.grey.pyramid;
+  wave.meaning = meaning;
+  const std::vector<float> shares =
+      meaning == WaveChannels::xyz ? std::vector{1.25f, 1.0f, 0.75f} : std::vector{0.5f, 0.75f, 1.0f, 1.25f, 1.5f};
+  wave.channels = static_cast<int>(shares.size());
+  wave.texel_size_um = 1;
+  wave.coherence_um = 8;
+  for (int k = 0; k < wave.channels; ++k) {
+    sample.wavelengths_um.push_back(0.4f + 0.0625f * static_cast<float>(k));
+    const float even = 1 / static_cast<float>(wave.channels), lean = k == 0 ? 0.5f : k == 1 ? -0.5f : 0.0f;
+    sample.channel_rgb.push_back({even + lean, even, even - lean});
+  }
+  wave.wavelengths_um = sample.wavelengths_um;
+  wave.channel_rgb = sample.channel_rgb;
+  for (std::size_t l = 0; l < sample.grey.levels.size(); ++l) {
+    std::vector<std::uint16_t>& halves = sample.halves.emplace_back();
+    std::vector<float>& floats = sample.floats.emplace_back();
+    const std::vector<float>& grey = sample.grey.levels[l].floats;
+    for (std::size_t row = 0; row < grey.size(); row += kBlockSize)
+      for (const float share : shares)
+        for (std::size_t k = row; k < row + kBlockSize; ++k) {
+          floats.push_back(share * grey[k]);
+          halves.push_back(floatToHalf(share * grey[k]));
+        }
+    wave.pixels[l] = precision == BlockPrecision::f16 ? static_cast<const void*>(halves.data()) : floats.data();
   }
   return sample;
 }
@@ -752,6 +841,32 @@ SampleSlopeMoments sampleSlopeMoments(int width, int height) {
   return sample;
 }
 
+SampleWangTiles sampleWangTiles(WangScheme scheme) {
+  SampleWangTiles sample;
+  WangTiles& tiles = sample.tiles;
+  tiles.size = WangTiles::kLeastSize, tiles.scheme = scheme;
+  tiles.colors_h = tiles.colors_v = 2, tiles.tile_count = 16;
+  tiles.plane_seed = 7, tiles.texel_size_um = 2;
+  tiles.seam_cost = 1.5f, tiles.ndf_tv = 0.125f, tiles.repetition = 0.25f;
+  const int last = tiles.size - 1;
+  for (int t = 0; t < tiles.tile_count; ++t) {
+    const WangColors colors = tiles.colorsOfTile(t);
+    for (int j = 0; j <= last; ++j)
+      for (int i = 0; i <= last; ++i) {
+        // Scheme corner: the colour of the nearest corner. Scheme edge: that of the nearest edge.
+        const bool east = 2 * i > last, north = 2 * j > last;
+        const int to_u = east ? last - i : i, to_v = north ? last - j : j;
+        const std::size_t corner = (north ? 2u : 0u) + (east ? 1u : 0u);
+        const std::size_t side = to_v <= to_u ? (north ? 1u : 0u) : (east ? 3u : 2u);
+        const int color = colors[scheme == WangScheme::corner ? corner : side];
+        sample.normals.push_back({color == 0 ? 0.25f : -0.25f, static_cast<float>((i + 3 * j) % 5 - 2) / 8});
+      }
+  }
+  tiles.normals = sample.normals;
+  tiles.slopes = slopeSums(sample.normals.data(), sample.normals.size()).moments(static_cast<double>(sample.normals.size()));
+  return sample;
+}
+
 SampleShLobes sampleShLobes() {
   SampleShLobes s;
   s.zonal = {0.28f, 0.4f};
@@ -825,6 +940,11 @@ std::vector<SampleAsset> sampleAssets() {
       {"sh-light", [] { return owned(sampleShLight(), &SampleShLight::light); }},
       {"sh-lobes", [] { return owned(sampleShLobes(), &SampleShLobes::lobes); }},
       {"slope-moments", [] { return owned(sampleSlopeMoments(9, 4), &SampleSlopeMoments::moments); }},
+      {"tiny-example-scattered", [] { return owned(sampleTinyExample(8, TinyMode::scattered), &SampleTinyExample::example); }},
+      {"tiny-example-tiled", [] { return owned(sampleTinyExample(8, TinyMode::tiled), &SampleTinyExample::example); }},
+      {"wang-tiles", [] { return owned(sampleWangTiles(), &SampleWangTiles::tiles); }},
+      {"wave-pyramid",
+       [] { return owned(sampleWavePyramid(64, WaveChannels::xyz, BlockPrecision::f16), &SampleWavePyramid::wave); }},
   };
 }
 

@@ -51,6 +51,15 @@ struct SamplePyramid {
   NdfPyramid pyramid;
 };
 
+struct SampleWavePyramid {
+  SamplePyramid grey;
+  std::vector<float> wavelengths_um;
+  std::vector<Rgb> channel_rgb;
+  std::vector<std::vector<std::uint16_t>> halves;  ///< of each level
+  std::vector<std::vector<float>> floats;
+  WavePyramid wave;
+};
+
 struct SampleNdfCp {
   std::vector<std::uint16_t> image_regions;
   std::vector<std::uint16_t> image_slots;
@@ -102,6 +111,17 @@ struct SampleSlopeMoments {
   SlopeMoments moments;
 };
 
+struct SampleTinyExample {
+  SamplePyramid images;
+  std::vector<Vec2> normals;
+  TinyExample example;
+};
+
+struct SampleWangTiles {
+  std::vector<Vec2> normals;
+  WangTiles tiles;
+};
+
 struct SampleShLobes {
   std::vector<float> zonal;
   std::vector<float> coefficients;
@@ -131,8 +151,15 @@ SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type
 SampleBinMap sampleBinMap(int width, int height);
 /// Histograms of sampleNormals(width, height) over 12 x 8 bins; strides 4, 8 and 16 texels.
 SampleHistograms sampleHistograms(int width, int height);
+/// samplePyramid with channels: channel c is brighter than the mean by the same share at every pixel.
+SampleWavePyramid sampleWavePyramid(int size, WaveChannels meaning, BlockPrecision precision);
 /// Level 1 and up of a chain, whose slopes are simple fractions. Half the width and half the height, rounded down, are powers of two.
 SampleSlopeMoments sampleSlopeMoments(int width, int height);
+/// An example of the normals of sampleNormals. Its images have a pixel for each texel.
+/// @param size  a power of two
+SampleTinyExample sampleTinyExample(int size, TinyMode mode);
+/// Sixteen tiles of 16 x 16 texels, two colours. Normals are the same in all tiles of the same colours on a side, and simple fractions.
+SampleWangTiles sampleWangTiles(WangScheme scheme = WangScheme::corner);
 /// A lobe of order 1 with the zonal coefficients 0.28 and 0.4, on a grid of 3 x 4 directions.
 SampleShLobes sampleShLobes();
 /// Constant light of radiance 1, 2 and 3 in red, green and blue, order 2, on a grid of 3 x 4 directions.

@@ -60,6 +60,15 @@ TEST(AnyNdf, FitsWhereATemplateTakesAModel) {
   EXPECT_GT(prefilteredRadiance(brdf, test::direction(0.4, 4), lamp).g, 0);
 }
 
+/// The BRDF of a model's class.
+template <class Model>
+auto brdfOf(const Model& model, const Footprint& p, const SmithMasking& masking) {
+  if constexpr (WaveModel<Model>)
+    return WaveBrdf(model, p, masking, kCopper);
+  else
+    return MicrofacetBrdf(model, p, masking, kCopper);
+}
+
 TEST(AnyBrdf, AnswersAsTheClassOfItsModel) {
   int lit = 0;
   for (const char* kind : test::kKinds) {
@@ -70,7 +79,7 @@ TEST(AnyBrdf, AnswersAsTheClassOfItsModel) {
     const Footprint p = Footprint::isotropic({0.3f, 0.7f}, 20);
     std::visit(
         [&](const auto& model) {
-          const MicrofacetBrdf same(model, p, masking, kCopper);
+          const auto same = brdfOf(model, p, masking);
           lit += same.evaluate(wi, wo).r > 0;
           EXPECT_EQ(brdf.evaluate(p, wi, wo), same.evaluate(wi, wo)) << kind;
           EXPECT_EQ(brdf.pdf(p, wi, wo), same.pdf(wi, wo)) << kind;

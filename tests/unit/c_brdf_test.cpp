@@ -13,6 +13,7 @@
 #include "glint/query/brdf/bin_map_brdf.h"
 #include "glint/query/brdf/displaced_brdf.h"
 #include "glint/query/brdf/microfacet_brdf.h"
+#include "glint/query/brdf/wave_brdf.h"
 #include "support/c_api.h"
 #include "support/directions.h"
 
@@ -64,6 +65,15 @@ struct Directions {
   std::vector<Triple> wi, wo;
 };
 
+/// The BRDF of a model's class.
+template <class Model>
+auto classOf(const Model& model, const Footprint& p, const SmithMasking& masking) {
+  if constexpr (WaveModel<Model>)
+    return WaveBrdf(model, p, masking, kGold);
+  else
+    return MicrofacetBrdf(model, p, masking, kGold);
+}
+
 TEST(CBrdf, AnswersAsTheClassDoes) {
   for (const char* kind : kKinds) {
     SCOPED_TRACE(kind);
@@ -84,7 +94,7 @@ TEST(CBrdf, AnswersAsTheClassDoes) {
                 GLINT_OK);
       std::visit(
           [&](const auto& model) {
-            const MicrofacetBrdf same(model, Footprint::isotropic({q.u[k], q.v[k]}, q.sigma[k]), masking, kGold);
+            const auto same = classOf(model, Footprint::isotropic({q.u[k], q.v[k]}, q.sigma[k]), masking);
             EXPECT_EQ(f, tripleOf(same.evaluate(wi, wo))) << k;
             EXPECT_EQ(pdf, same.pdf(wi, wo));
             const BrdfSample s = same.sample(wo, {u1, u2});

@@ -40,14 +40,19 @@ enum class Base {
   bin_map,
   histograms,
   moments,
+  tiny_scattered,
+  tiny_tiled,
+  wang_tiles,
+  wave,
   sh_lobes,
   sh_light,
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,  Base::heights,      Base::pyramid,         Base::compressed, Base::compressed_f32,
-                           Base::spots,    Base::bin_map,      Base::histograms,      Base::moments,    Base::sh_lobes,
-                           Base::sh_light, Base::displacement, Base::displacement_rgb};
+constexpr Base kBases[] = {Base::normals,      Base::heights,         Base::pyramid,    Base::compressed, Base::compressed_f32,
+                           Base::spots,        Base::bin_map,         Base::histograms, Base::moments,    Base::tiny_scattered,
+                           Base::tiny_tiled,   Base::wang_tiles,      Base::wave,       Base::sh_lobes,   Base::sh_light,
+                           Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -75,6 +80,14 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleHistograms(22, 19).sat, provenance);
     case Base::moments:
       return writeAsset(path, test::sampleSlopeMoments(9, 4).moments, provenance);
+    case Base::tiny_scattered:
+      return writeAsset(path, test::sampleTinyExample(8, TinyMode::scattered).example, provenance);
+    case Base::tiny_tiled:
+      return writeAsset(path, test::sampleTinyExample(8, TinyMode::tiled).example, provenance);
+    case Base::wang_tiles:
+      return writeAsset(path, test::sampleWangTiles().tiles, provenance);
+    case Base::wave:
+      return writeAsset(path, test::sampleWavePyramid(64, WaveChannels::spectral, BlockPrecision::f16).wave, provenance);
     case Base::sh_lobes:
       return writeAsset(path, test::sampleShLobes().lobes, provenance);
     case Base::sh_light:
@@ -669,6 +682,33 @@ std::vector<Fixture> histogramFixtures() {
   };
 }
 
+std::vector<Fixture> waveFixtures() {
+  const auto changed = [](const char* rule, const char* array, std::size_t index, float value) {
+    return patched(rule, Base::wave,
+                   [=](const Patch& patch) { patch.change<float>(array, index, [=](float& number) { number = value; }); });
+  };
+  const auto changedHalf = [](const char* rule, std::size_t index, std::uint16_t value) {
+    return patched(
+        rule, Base::wave,
+        [=](const Patch& patch) {
+          patch.change<std::uint16_t>("level_00/channel_pixels", index, [=](std::uint16_t& half) { half = value; });
+        },
+        true);
+  };
+  constexpr std::uint16_t kHalfNan = 0x7e00, kHalfOfMinus1 = 0xbc00, kHalfOf9 = 0x4880;
+  return {
+      patched("wave.channels", Base::wave, [](const Patch& patch) { patch.setText("channel_meaning", "xyz"); }),
+      changed("wave.wavelengths", "wavelengths_um", 1, 0.7f),
+      changed("wave.wavelengths", "wavelengths_um", 0, 0),
+      changed("wave.wavelengths", "wavelengths_um", 4, kNan),
+      changed("wave.colours", "channel_rgb", 3, 0.5f),
+      changed("wave.colours", "channel_rgb", 3, kNan),
+      changedHalf("wave.pixels", 7, kHalfNan),
+      changedHalf("wave.pixels", 7, kHalfOfMinus1),
+      changedHalf("wave.grey", 7, kHalfOf9),
+  };
+}
+
 std::vector<Fixture> momentsFixtures() {
   const auto changed = [](const char* rule, const char* level, std::size_t index, float value) {
     return patched(
@@ -684,6 +724,57 @@ std::vector<Fixture> momentsFixtures() {
       changed("moments.covariance", "level_01/moments", 2, -0.1f),
       changed("moments.covariance", "level_00/moments", 8, 0.4f),
       changed("moments.top", "level_02/moments", 0, 0.1f),
+  };
+}
+
+std::vector<Fixture> tinyFixtures() {
+  const auto reals = [](const char* attribute, std::vector<float> values) {
+    return
+        [=](const Patch& patch) { patch.set("/", attribute, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, values.data(), values.size()); };
+  };
+  return {
+      patched("tiny.size", Base::tiny_tiled, [](const Patch& patch) { patch.setInteger("width", 12); }),
+      patched("tiny.size", Base::tiny_tiled,
+              [](const Patch& patch) {
+                patch.setInteger("width", 4);
+                patch.setInteger("height", 4);
+              }),
+      patched("tiny.levels", Base::tiny_tiled, [](const Patch& patch) { patch.setText("mode", "scattered"); }),
+      patched("tiny.levels", Base::tiny_scattered, [](const Patch& patch) { patch.setText("mode", "tiled"); }),
+      patched("tiny.matrix", Base::tiny_tiled, reals("matrix", {1, 2, 2, 4})),
+      patched("tiny.transforms", Base::tiny_scattered, reals("scale", {2, 1})),
+      patched("tiny.reach", Base::tiny_scattered, reals("shear", {-6, 0})),
+      patched("tiny.reach", Base::tiny_scattered, [](const Patch& patch) { patch.setReal("density", 8); }),
+      patched(
+          "tiny.normals", Base::tiny_scattered,
+          [](const Patch& patch) { patch.change<float>("normals", 3, [](float& x) { x = 1.5f; }); }, true),
+      patched(
+          "tiny.normals", Base::tiny_tiled,
+          [](const Patch& patch) { patch.change<float>("normals", 8, [](float& x) { x = kNan; }); }, true),
+  };
+}
+
+std::vector<Fixture> wangFixtures() {
+  const auto changed = [](const char* rule, std::size_t number, float value) {
+    return patched(
+        rule, Base::wang_tiles,
+        [=](const Patch& patch) { patch.change<float>("normals", number, [=](float& x) { x = value; }); }, true);
+  };
+  const std::size_t row = 2 * WangTiles::kLeastSize, tile = row * WangTiles::kLeastSize;
+  return {
+      patched("wang.set", Base::wang_tiles,
+              [](const Patch& patch) {
+                patch.setInteger("colors_h", 3);
+                patch.setInteger("colors_v", 3);
+              }),
+      patched("wang.corners", Base::wang_tiles, [](const Patch& patch) { patch.setInteger("colors_v", 4); }),
+      changed("wang.disk", 3 * tile + 5, kNan),
+      changed("wang.disk", 2 * row + 7, 1.25f),
+      changed("wang.sides", 5 * tile + 6, 0.3125f),              // south
+      changed("wang.sides", 16 * tile - row + 6, 0.3125f),       // north
+      changed("wang.sides", 9 * tile + 4 * row, 0.3125f),        // west
+      changed("wang.sides", 2 * tile + 5 * row - 1, 0.3125f),    // east
+      changed("wang.slopes", 2 * tile + 4 * row + 10, 0.96875f)  // inside
   };
 }
 
@@ -760,8 +851,8 @@ std::vector<Fixture> shFixtures() {
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
   for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), storageFixtures(), datasetFixtures(),
-                    pyramidFixtures(), ndfCpFixtures(), dataFixtures(), histogramFixtures(), momentsFixtures(),
-                    binMapFixtures(), shFixtures(), displacementFixtures()}) {
+                    pyramidFixtures(), ndfCpFixtures(), dataFixtures(), histogramFixtures(), momentsFixtures(), tinyFixtures(),
+                    wangFixtures(), waveFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
@@ -936,7 +1027,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 16u);
+  EXPECT_EQ(count, 20u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -965,9 +1056,20 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_FLOAT_EQ(sat.bin_normals[9].x, 0.0831450075f);
   EXPECT_EQ(sat.sums[(4 * 7 + 5) * 32 + 9], 1);
   EXPECT_EQ(sat.slopes.covariance.xy, 0.03125f);
+  const Asset tiny = Asset::open(folder / "tiny-example-scattered.glint");
+  EXPECT_EQ(tiny.get<TinyExample>().transforms.shear.low, -0.25f);
+  EXPECT_EQ(tiny.get<TinyExample>().images.shape.levels[3].stride, 16);
+  EXPECT_EQ(tiny.get<TinyExample>().overlap, TinyOverlap::nearest);
   const Asset moments = Asset::open(folder / "slope-moments.glint");
   EXPECT_EQ(moments.get<SlopeMoments>().levels[0].texels[5].mean.x, -0.0625f);
   EXPECT_EQ(moments.get<SlopeMoments>().levels[2].texels[0].covariance.xx, 0.03515625f);
+  const Asset wang = Asset::open(folder / "wang-tiles.glint");
+  EXPECT_EQ(wang.get<WangTiles>().at(9, 3, 2).x, -0.25f);
+  EXPECT_EQ(wang.get<WangTiles>().plane_seed, 7);
+  const Asset wave_asset = Asset::open(folder / "wave-pyramid.glint");
+  const WavePyramid& wave = wave_asset.get<WavePyramid>();
+  EXPECT_EQ(wave.channel_rgb[1], (Rgb{1 / 3.0f - 0.5f, 1 / 3.0f, 1 / 3.0f + 0.5f}));
+  EXPECT_EQ(wave.wavelengths_um[2], 0.4f + 0.125f);
   EXPECT_EQ(static_cast<const float*>(Asset::open(folder / "sh-lobes.glint").get<ShLobes>().coefficients)[5 * 4 + 3], 0.4f);
   EXPECT_EQ(Asset::open(folder / "sh-light.glint").get<ShLight>().band_norms[7], 12.2799206f);
   struct Recorded {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 #include <set>
 
 #include "glint/bake/common/slopes.h"
@@ -13,8 +14,9 @@
 namespace glint::bake {
 namespace {
 
-constexpr SynthKind kAllKinds[] = {SynthKind::isotropic, SynthKind::brushed, SynthKind::flakes,   SynthKind::scratches,
-                                   SynthKind::leather,   SynthKind::weave,   SynthKind::sawtooth, SynthKind::flat};
+constexpr SynthKind kAllKinds[] = {SynthKind::isotropic, SynthKind::brushed, SynthKind::flakes,
+                                   SynthKind::scratches, SynthKind::leather, SynthKind::weave,
+                                   SynthKind::sawtooth,  SynthKind::flat,    SynthKind::grating};
 
 SynthOptions sized(SynthKind kind, int width, int height) {
   SynthOptions p = defaultSynthOptions(kind);
@@ -118,8 +120,30 @@ TEST(SynthSawtooth, HasTheTwoSlopesOfItsRamps) {
   EXPECT_TRUE(slopes.contains(20));  // three quarters up, one quarter down
 }
 
+TEST(Synth, GratingsHaveTheirDepthAndProfile) {
+  constexpr float kTolerance = 1e-5f;
+  SynthOptions p = sized(SynthKind::grating, 64, 4);
+  p.alpha = 0;
+  p.feature_texels = 16;
+  p.depth_texels = 0.5f;
+  const std::vector<float> sine = synthHeights(p);
+  // The extremes of the sine lie between texels: the highest of them is at 3.5 or 4.5 sixteenths of a period.
+  const float amplitude = 0.25f / std::sin(7 * std::numbers::pi_v<float> / 16);
+  for (int i = 0; i < 64; ++i)
+    EXPECT_NEAR(sine[static_cast<std::size_t>(i)],
+                amplitude * std::sin((static_cast<float>(i) + 0.5f) * std::numbers::pi_v<float> / 8), kTolerance);
+  p.profile = bake::GratingProfile::blazed;
+  const std::vector<float> blazed = synthHeights(p);
+  int rising = 0;
+  for (int i = 0; i < 63; ++i) rising += blazed[static_cast<std::size_t>(i) + 1] > blazed[static_cast<std::size_t>(i)] ? 1 : 0;
+  EXPECT_EQ(rising, 4 * 13);  // of the 14 sixteenths of the ramp, 13 lie between texels of it
+  const auto [low, high] = std::minmax_element(blazed.begin(), blazed.end());
+  EXPECT_NEAR(*high - *low, 0.5f, kTolerance);
+}
+
 TEST(Synth, PatternsReachTheSlopeAskedFor) {
-  for (const SynthKind kind : {SynthKind::scratches, SynthKind::leather, SynthKind::weave, SynthKind::sawtooth}) {
+  for (const SynthKind kind :
+       {SynthKind::scratches, SynthKind::leather, SynthKind::weave, SynthKind::sawtooth, SynthKind::grating}) {
     SynthOptions p = sized(kind, 256, 192);
     p.alpha = 0;
     p.slope = 0.8f;

@@ -16,5 +16,6 @@ std::vector<float> leatherHeights(const SynthOptions& options);
 std::vector<float> scratchHeights(const SynthOptions& options);
 std::vector<float> weaveHeights(const SynthOptions& options);
 std::vector<float> sawtoothHeights(const SynthOptions& options);
+std::vector<float> gratingHeights(const SynthOptions& options);
 
 }  // namespace glint::bake

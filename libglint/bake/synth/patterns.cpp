@@ -148,20 +148,38 @@ std::vector<float> weaveHeights(const SynthOptions& p) {
   return heights;
 }
 
-std::vector<float> sawtoothHeights(const SynthOptions& p) {
-  constexpr float kRise = 0.75f;
+namespace {
+
+/// A pattern along u that repeats at whole parts of the map. @param height  of a phase in [0, 1), over a period of 1
+template <class Height>
+std::vector<float> periodicHeights(const SynthOptions& p, Height&& height) {
   const float teeth = std::max(1.0f, std::round(static_cast<float>(p.width) / p.feature_texels));
   const float period = static_cast<float>(p.width) / teeth;
   std::vector<float> row(static_cast<std::size_t>(p.width));
   for (int i = 0; i < p.width; ++i) {
     const float tooth = (static_cast<float>(i) + 0.5f) / period;
-    const float phase = tooth - std::floor(tooth);
-    row[static_cast<std::size_t>(i)] = period * std::min(phase / kRise, (1 - phase) / (1 - kRise));
+    row[static_cast<std::size_t>(i)] = period * height(tooth - std::floor(tooth));
   }
   std::vector<float> heights;
   heights.reserve(static_cast<std::size_t>(p.width) * p.height);
   for (int j = 0; j < p.height; ++j) heights.insert(heights.end(), row.begin(), row.end());
   return heights;
+}
+
+/// A ramp that rises over the share `rise` of a period.
+float rampAt(float phase, float rise) { return std::min(phase / rise, (1 - phase) / (1 - rise)); }
+
+}  // namespace
+
+std::vector<float> sawtoothHeights(const SynthOptions& p) {
+  constexpr float kRise = 0.75f;
+  return periodicHeights(p, [](float phase) { return rampAt(phase, kRise); });
+}
+
+std::vector<float> gratingHeights(const SynthOptions& p) {
+  constexpr float kRise = 0.875f;
+  if (p.profile == GratingProfile::blazed) return periodicHeights(p, [](float phase) { return rampAt(phase, kRise); });
+  return periodicHeights(p, [](float phase) { return std::sin(2 * std::numbers::pi_v<float> * phase); });
 }
 
 }  // namespace glint::bake

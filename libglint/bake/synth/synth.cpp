@@ -47,6 +47,7 @@ void check(const SynthOptions& p) {
   require(p.feature_texels >= 1 && p.feature_texels <= kMaxSize, "feature size", "1 to 65536 texels");
   require(p.density > 0 && p.density <= 64, "density", "more than 0, at most 64");
   require(p.slope >= 0 && p.slope <= 10, "slope", "0 to 10");
+  require(p.depth_texels >= 0 && p.depth_texels <= kMaxSize, "depth", "0 to 65536 texels");
   if (p.kind == SynthKind::scratches) checkScratches(p);
 }
 
@@ -64,6 +65,13 @@ std::vector<float> scaledNoise(const SynthOptions& p) {
   return heights;
 }
 
+/// Scales heights to a distance from the lowest to the highest; 0 leaves them as they are. A flat map stays flat.
+void scaleToDepth(std::vector<float>& heights, float depth_texels) {
+  const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
+  const double depth = double{*high} - *low;
+  if (depth_texels > 0 && depth > 0) scale(heights, depth_texels / depth);
+}
+
 std::vector<float> pattern(const SynthOptions& p) {
   switch (p.kind) {
     case SynthKind::scratches:
@@ -74,9 +82,23 @@ std::vector<float> pattern(const SynthOptions& p) {
       return weaveHeights(p);
     case SynthKind::sawtooth:
       return sawtoothHeights(p);
+    case SynthKind::grating:
+      return gratingHeights(p);
     default:
       return std::vector<float>(static_cast<std::size_t>(p.width) * p.height, 0.0f);
   }
+}
+
+/// The pattern, and noise on it.
+std::vector<float> patternHeights(const SynthOptions& p) {
+  std::vector<float> heights = pattern(p);
+  const float steepest = slopeVariances(p.width, p.height, heights).steepest;
+  scale(heights, steepest > 0 ? p.slope / steepest : 0);
+  if (p.alpha > 0 && p.kind != SynthKind::flat) {
+    const std::vector<float> noise = scaledNoise(p);
+    for (std::size_t i = 0; i < heights.size(); ++i) heights[i] += noise[i];
+  }
+  return heights;
 }
 
 }  // namespace
@@ -105,6 +127,9 @@ SynthOptions defaultSynthOptions(SynthKind kind) {
     case SynthKind::sawtooth:
       p.alpha = 0, p.feature_texels = 16;
       break;
+    case SynthKind::grating:
+      p.alpha = 0, p.feature_texels = 16, p.slope = 0.1f;
+      break;
     case SynthKind::flat:
       p.alpha = 0;
       break;
@@ -118,14 +143,9 @@ std::vector<float> synthHeights(const SynthOptions& p) {
     throw Error(ErrorCode::unsupported, "synth.flakes_height", "", "",
                 "flakes are separate facets without a common height field", "make their normals instead, or another kind");
   }
-  if (p.kind == SynthKind::isotropic || p.kind == SynthKind::brushed) return scaledNoise(p);
-  std::vector<float> heights = pattern(p);
-  const float steepest = slopeVariances(p.width, p.height, heights).steepest;
-  scale(heights, steepest > 0 ? p.slope / steepest : 0);
-  if (p.alpha > 0 && p.kind != SynthKind::flat) {
-    const std::vector<float> noise = scaledNoise(p);
-    for (std::size_t i = 0; i < heights.size(); ++i) heights[i] += noise[i];
-  }
+  const bool noise_alone = p.kind == SynthKind::isotropic || p.kind == SynthKind::brushed;
+  std::vector<float> heights = noise_alone ? scaledNoise(p) : patternHeights(p);
+  scaleToDepth(heights, p.depth_texels);
   return heights;
 }
 

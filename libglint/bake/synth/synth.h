@@ -17,6 +17,13 @@ enum class SynthKind : std::uint8_t {
   weave,      ///< plain weave of two thread directions, with fibres
   sawtooth,   ///< ramps along u: three quarters of a period up, one quarter down
   flat,       ///< constant
+  grating,    ///< grooves along v, one each period: sinusoidal or blazed
+};
+
+/// The shape of a groove of a grating.
+enum class GratingProfile : std::uint8_t {
+  sine,    ///< sinusoidal
+  blazed,  ///< a ramp that rises over seven eighths of the period and falls over one eighth
 };
 
 /// Kind, size and shape of a synthetic map. Lengths are in texels.
@@ -25,15 +32,17 @@ struct SynthOptions {
   int width = 512;
   int height = 512;
   std::uint64_t seed = 1;
-  /// isotropic, brushed: Beckmann roughness of the noise, across the streaks. scratches, leather, weave, sawtooth: roughness of
+  /// isotropic, brushed: Beckmann roughness of the noise, across the streaks. scratches, leather, weave, sawtooth, grating: roughness of
   /// the noise that is added to the pattern; 0: no noise. flakes: roughness of the GTR distribution.
   float alpha = 0.1f;
   float gamma = 2;               ///< exponent of the GTR distribution of flakes; 2 is GGX, larger exponents have a shorter tail
   float correlation_texels = 4;  ///< distance at which the correlation of the noise is 1/e (brushed: across the streaks)
   float streak_texels = 160;     ///< brushed: distance at which the correlation is 1/e along the streaks
-  float feature_texels = 8;      ///< size of a flake, pebble, thread or tooth, or width of a scratch
+  float feature_texels = 8;      ///< size of a flake, pebble, thread, tooth or groove, or width of a scratch
   float density = 1;             ///< number of scratches in each square of 64 x 64 texels
-  float slope = 0.5f;            ///< steepest slope of the pattern: scratches, leather, weave, sawtooth
+  float slope = 0.5f;            ///< steepest slope of the pattern: scratches, leather, weave, sawtooth, grating
+  GratingProfile profile = GratingProfile::sine;
+  float depth_texels = 0;  ///< distance from the lowest to the highest point of the heights; 0: as the slopes give it
 };
 
 /// Options with which maps of a kind look typical.

@@ -1,0 +1,88 @@
+#include "glint-query/plane_command.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "common/files.h"
+#include "common/footprint_rules.h"
+#include "glint-query/command_forms.h"
+#include "glint-query/usage.h"
+#include "glint/api/ndf_info.h"
+#include "glint/formats/asset_reader.h"
+
+namespace glint::apps {
+
+PlaneCommand::PlaneCommand(Tool& tool) : tool_(tool), halves_(tool), picture_(tool) {
+  tool.option("ASSET", path_, "asset of kind wang-tiles, from glint-wang").required();
+  tool.option("--texel", texel_, "centre of the footprint: texels X Y of the plane, up to 2^52 from the origin")
+      .count(2)
+      .range(-0x1p52, 0x1p52)
+      .required();
+  sigma_option_ =
+      &tool.option("--sigma", sigma_, "footprint: deviation of an isotropic Gaussian, texels").range(kLeastSigma, kMostSigma);
+  covariance_option_ = &tool.option("--cov", covariance_, "footprint: covariance SXX SXY SYY of a Gaussian, texels^2").count(3);
+  box_option_ = &tool.option("--box", box_, "footprint: half axes AX AY BX BY of a parallelogram, texels").count(4);
+  sigma_option_->excludes(*covariance_option_).excludes(*box_option_);
+  covariance_option_->excludes(*box_option_);
+  tool.choice("--surface", surface_, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
+              "how normals behave between texels");
+  tool.option("--sigma-r", sigma_r_, "intrinsic roughness, disk units").range(1e-4, 0.25);
+  tool.option("--repeat", repeat_, "time the query: nanoseconds, median of 15 runs of N / 15").range(1, 1000000000);
+  tool.pointTo(kDistributionForm.line, {"--uv", "--csv", "--samples"});
+  tool.addCheck([this] { check(); });
+}
+
+void PlaneCommand::check() const {
+  checkRegular(path_);
+  tool_.addInput(path_);
+  if (!sigma_option_->given() && !covariance_option_->given() && !box_option_->given())
+    throwUsage("the footprint has no size", "add --sigma S, --cov SXX SXY SYY or --box AX AY BX BY");
+  if (!sigma_option_->given())
+    if (const auto fault = footprintFault(footprint()))
+      throwUsage((box_option_->given() ? "--box " : "--cov ") + fault->what, fault->remedy);
+  if (!halves_.given() && !picture_.given()) throwUsage("nothing was asked", "add --half, --range or --image");
+}
+
+Footprint PlaneCommand::footprint() const {
+  if (covariance_option_->given()) return Footprint::gaussian({}, {covariance_[0], covariance_[1], covariance_[2]});
+  if (box_option_->given()) return Footprint::box({}, {box_[0], box_[1]}, {box_[2], box_[3]});
+  return Footprint::isotropic({}, sigma_);
+}
+
+void PlaneCommand::run() {
+  const formats::Asset asset = formats::Asset::openForBuilding(path_);
+  const WangReference tiles(asset.get<WangTiles>(), sigma_r_, surface_);
+  // The plane seen from the cell of the point, so that no digits are lost.
+  const WangPlace place = tiles.layout().placeOf(texel_[0], texel_[1]);
+  const WangReference plane = tiles.movedTo(place.cell_x, place.cell_y);
+  Footprint at = footprint();
+  at.centre = plane.positionIn(place);
+  if (picture_.given()) writePicture(plane, at);
+  if (!halves_.given()) return;
+  const Query q = halves_.query(at);
+  const auto ask = [&] { return q.range ? plane.mean(q.footprint, *q.range) : plane.density(q.footprint, *q.half); };
+  const float value = ask();
+  tool_.print(fmt::format("{:.9g}\n", value));
+  reportTimed(tool_, {{q.range ? "mean" : "density", value}, {"widened", false}}, repeat_, ask);
+}
+
+void PlaneCommand::writePicture(const WangReference& plane, const Footprint& footprint) {
+  const int size = picture_.size(api::kDefaultResolution);
+  const float pixel = 2.0f / static_cast<float>(size);
+  std::vector<float> densities(static_cast<std::size_t>(size) * static_cast<std::size_t>(size));
+  const bake::ProgressFn progress = tool_.progress("rows");
+  bake::ProgressCounter counter(progress, static_cast<std::size_t>(size));
+  tbb::parallel_for(0, size, [&](int y) {
+    for (int x = 0; x < size; ++x) {
+      const Vec2 low = {-1 + static_cast<float>(x) * pixel, -1 + static_cast<float>(y) * pixel};
+      densities[rowMajorIndex(x, y, size)] = plane.mean(footprint, {low, low + Vec2{pixel, pixel}});
+    }
+    counter.advance();
+  });
+  picture_.write(size, densities);
+}
+
+}  // namespace glint::apps

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/tool.h"
+#include "glint-query/distribution_command.h"
+#include "glint-query/output_options.h"
+#include "glint/query/wang_reference.h"
+
+namespace glint::apps {
+
+/// `glint-query plane`: how normals are distributed at a point of an endless plane of Wang tiles: a density, a mean, or a picture.
+class PlaneCommand {
+ public:
+  explicit PlaneCommand(Tool& tool);
+  void run();
+
+ private:
+  void check() const;
+  /// The footprint, with its centre at (0, 0).
+  Footprint footprint() const;
+  void writePicture(const WangReference& plane, const Footprint& footprint);
+
+  Tool& tool_;
+  std::string path_;
+  std::vector<double> texel_;
+  std::vector<float> covariance_, box_;
+  float sigma_ = 0;
+  Option *sigma_option_, *covariance_option_, *box_option_;
+  HalfVectorOptions halves_;
+  PictureOptions picture_;
+  Surface surface_ = Surface::flat;
+  float sigma_r_ = 0.005f;
+  int repeat_ = 0;
+};
+
+}  // namespace glint::apps

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "glint/api/batch.h"
+#include "glint/api/ndf_models.h"
+
+namespace glint::api {
+
+/// The cell of a plane that holds a coordinate; numbers that are not finite, or beyond 2^62, are in cell 0. wrappedUv gives the
+/// position in the cell.
+inline std::int64_t planeCell(double u) {
+  constexpr double kFarthest = 0x1p62;
+  return std::fabs(u) < kFarthest ? static_cast<std::int64_t>(std::floor(u)) : 0;
+}
+
+/// Calls ask(model) for a question at a position. A plane without end is moved so that its cell there is cell 0: the footprint of
+/// the question has its centre at wrappedUv(u, v). Maps repeat, so that they need no move.
+template <class Ask>
+auto askAt(const NdfModels::Any& model, double u, double v, Ask&& ask) {
+  if (const auto* plane = std::get_if<TinyExampleNdf>(&model)) return ask(plane->movedTo(planeCell(u), planeCell(v)));
+  return ask(model);
+}
+
+/// The model for questions at one position, as askAt gives it.
+inline NdfModels::Any movedTo(const NdfModels::Any& model, double u, double v) {
+  return askAt(model, u, v, [](const auto& m) { return NdfModels::Any(m); });
+}
+
+/// The model for query k of a batch: a plane without end is moved to the cell of a centre that is given precisely.
+template <class Model>
+const Model& modelAt(const Model& model, const FootprintArrays&, std::size_t) {
+  return model;
+}
+inline TinyExampleNdf modelAt(const TinyExampleNdf& plane, const FootprintArrays& footprints, std::size_t k) {
+  if (footprints.precise_u.data == nullptr) return plane;
+  return plane.movedTo(planeCell(footprints.precise_u[k]), planeCell(footprints.precise_v[k]));
+}
+
+}  // namespace glint::api
