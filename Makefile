@@ -43,6 +43,13 @@ stability: build  ## test every method where it fails; writes docs/stability.jso
 	@build/bin/glint-bench --stability -o build/stability/results.json --force
 	@$(PYTHON) tests/stability/write_docs.py build/stability/results.json --docs docs
 
+papers := gamboa2018 wu2019 atanasov2021 deng2022 xing2024
+.PHONY: papers
+papers: build  ## repeat the tables and plots of the five papers; writes docs/PAPERS.md
+	@mkdir -p build/papers
+	@for paper in $(papers); do build/bin/glint-bench --preset $$paper -o build/papers/$$paper.json --force --quiet; done
+	@$(PYTHON) tests/bench/papers_page.py $(papers:%=build/papers/%.json) --docs docs
+
 # Asks for Doxygen and graphviz here only: nothing else needs them.
 .PHONY: docs
 docs:  ## the API reference, in build/docs/html; lists public names without a contract

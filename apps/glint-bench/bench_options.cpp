@@ -54,6 +54,7 @@ void BenchOptions::checkAction() const {
     throw Error(ErrorCode::usage, "cli.usage", "", option, what, std::string("leave out ") + option);
   };
   if (settings_.maps.empty() && places_option_->given()) refuse("--places", "only measurements of maps have places to choose");
+  if (settings_.maps.empty() && assets_option_->given()) refuse("--assets", "only assets of maps of yours stay");
   if (!preset_.empty() && !settings_.only.empty()) refuse("--only", "a preset is made as a whole");
 }
 

@@ -9,7 +9,8 @@ int main(int argc, char** argv) {
        "do "
        "where they fail, repeats the figures of the papers, and shows results as a page with charts.",
        "glint-bench flakes.glint -o results.json --quick",
-       "Results are written after every measurement, one method at one setting on one map. The same command goes on where "
+       "Results of maps are written after every measurement, one method at one setting on one map. The same command goes on "
+       "where "
        "an earlier run "
        "was stopped. Then `glint-bench --report results.json -o report.html` makes the page."});
   const apps::BenchOptions options(tool);

@@ -159,8 +159,8 @@ void makeWavePyramid(Tool& tool, const formats::Asset& asset, const InputFile& i
                      const formats::Provenance& provenance, const OutputFile& output) {
   const HeightMap& map = heightsOf(asset, input.path());
   const bake::WaveOptions values = options.values();
-  const bake::WavePyramidData pyramid = build(map, values, input.path(), tool.progress("images"));
   warnAbout(tool, map, values, input.path());
+  const bake::WavePyramidData pyramid = build(map, values, input.path(), tool.progress("images"));
   formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
   tool.setResult(waveJson(pyramid));
   tool.summary(waveText(pyramid));

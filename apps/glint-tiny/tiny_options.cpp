@@ -80,7 +80,7 @@ NormalMap TinyOptions::example(const NormalMap& map) {
     return map;
   }
   const int x = at_[0], y = at_[1];
-  if (x < 0 || y < 0 || x + cut_ > map.width || y + cut_ > map.height)
+  if (x < 0 || y < 0 || x > map.width - cut_ || y > map.height - cut_)
     throw Error(
         ErrorCode::usage, "option.range", {}, "--cut",
         fmt::format("{} x {} texels at {}, {} are not inside a map of {} x {}", cut_, cut_, x, y, map.width, map.height),

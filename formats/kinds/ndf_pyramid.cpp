@@ -14,7 +14,7 @@ struct KindDescription<NdfPyramid> {
   static std::vector<Rule> valueRules() {
     return {errorRule("pyramid.pixels", "pixels are finite and not negative"),
             errorRule("pyramid.block_means", "block_means are the means of the pixels"),
-            warningRule("pyramid.integral", "every image integrates to 1 within 1e-3")};
+            warningRule("pyramid.integral", "every image integrates to 1 within 1e-3; of a wave-pyramid to at most that")};
   }
 
   static void describe(Fields auto& fields, auto& pyramid) {

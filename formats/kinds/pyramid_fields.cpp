@@ -78,7 +78,7 @@ void checkPyramidIndex(const NdfPyramid& pyramid, Findings& findings) {
   }
 }
 
-void checkPyramidValues(const NdfPyramid& pyramid, Findings& findings) {
+void checkPyramidValues(const NdfPyramid& pyramid, Findings& findings, bool loses_light) {
   const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
   const double pixel_area = 4.0 / (static_cast<double>(pyramid.shape.resolution) * pyramid.shape.resolution);
   for (int l = 0; l < pyramid.shape.level_count; ++l) {
@@ -90,7 +90,7 @@ void checkPyramidValues(const NdfPyramid& pyramid, Findings& findings) {
       double integral = 0;
       for (std::uint32_t b = level.mask_ranks[first]; b < level.mask_ranks[first + words]; ++b) integral += sums[b];
       integral *= pyramid.value_scale * pixel_area;
-      if (std::abs(integral - 1) <= kIntegralTolerance) continue;
+      if (std::abs(integral - 1) <= kIntegralTolerance || (loses_light && integral > 0 && integral < 1)) continue;
       ++bad;
       if (!(std::abs(integral - 1) <= std::abs(worst - 1))) worst = integral;
     }

@@ -74,8 +74,9 @@ struct KindDescription<TinyExample> {
     checkPyramidIndex(tiny.images, findings);
     checkLevels(tiny, levels + (tiny.mode == TinyMode::scattered ? 1 : 0), findings);
     const double xx = tiny.matrix[0], xy = tiny.matrix[1], yx = tiny.matrix[2], yy = tiny.matrix[3];
-    constexpr double kLeastDeterminant = 1e-6;
-    if (!(std::abs(xx * yy - xy * yx) >= kLeastDeterminant)) findings.add("tiny.matrix", "/@matrix", "is singular");
+    constexpr double kRounding = 0.999;
+    if (!(std::abs(xx * yy - xy * yx) >= kRounding * double{TinyExample::kLeastDeterminant}))
+      findings.add("tiny.matrix", "/@matrix", "is singular");
     checkTransforms(tiny, findings);
   }
 

@@ -94,7 +94,7 @@ struct KindDescription<WavePyramid> {
   }
 
   static void checkValues(const WavePyramid& wave, Findings& findings) {
-    checkPyramidValues(wave.grey, findings);
+    checkPyramidValues(wave.grey, findings, true);
     for (int l = 0; l < wave.grey.shape.level_count; ++l) checkLevel(wave, l, findings);
   }
 

@@ -274,7 +274,8 @@ glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprin
 glint_status glint_density_rgb(const glint_ndf* ndf, const glint_footprint* footprint, float psi_x, float psi_y, float rgb[3]) {
   if (!isOpen(ndf) || footprint == nullptr || rgb == nullptr)
     return badArgument("glint_density_rgb", {{ndf, "ndf"}, {footprint, "footprint"}, {rgb, "rgb"}});
-  set(rgb, api::densityRgb(ndf->body().opened.model(), footprintOf(*footprint), {psi_x, psi_y}));
+  const api::AnyNdf model = api::movedTo(ndf->body().opened.model(), footprint->u, footprint->v);
+  set(rgb, api::densityRgb(model, footprintOf(*footprint), {psi_x, psi_y}));
   return GLINT_OK;
 }
 
@@ -288,7 +289,7 @@ glint_status glint_density_spectrum(const glint_ndf* ndf, const glint_footprint*
                                     float* densities, size_t capacity) {
   if (!isOpen(ndf) || footprint == nullptr || densities == nullptr)
     return badArgument("glint_density_spectrum", {{ndf, "ndf"}, {footprint, "footprint"}, {densities, "densities"}});
-  const api::AnyNdf& model = ndf->body().opened.model();
+  const api::AnyNdf model = api::movedTo(ndf->body().opened.model(), footprint->u, footprint->v);
   if (capacity < static_cast<size_t>(api::channelCount(model)))
     return usage("glint_density_spectrum", "capacity is below the number of channels (glint_ndf_channels)");
   api::densitySpectrum(model, footprintOf(*footprint), {psi_x, psi_y}, densities);
@@ -334,7 +335,8 @@ glint_status glint_density_rgb_batch(const glint_ndf* ndf, size_t count, const g
   if (psi_x.data == nullptr || psi_y.data == nullptr) return usage("glint_density_rgb_batch", "psi_x and psi_y must be given");
   const api::FootprintArrays arrays = arraysOf(*footprints);
   const api::HalfVectorArrays psi = {arrayOf(psi_x), arrayOf(psi_y)};
-  for (size_t k = 0; k < count; ++k) set(rgb + 3 * k, api::densityRgb(ndf->body().opened.model(), arrays[k], psi[k]));
+  const api::AnyNdf& model = ndf->body().opened.model();
+  for (size_t k = 0; k < count; ++k) set(rgb + 3 * k, api::densityRgb(api::movedTo(model, arrays, k), arrays[k], psi[k]));
   return GLINT_OK;
 }
 

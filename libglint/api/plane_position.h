@@ -38,4 +38,9 @@ inline TinyExampleNdf modelAt(const TinyExampleNdf& plane, const FootprintArrays
   return plane.movedTo(planeCell(footprints.precise_u[k]), planeCell(footprints.precise_v[k]));
 }
 
+/// The same of any model.
+inline NdfModels::Any movedTo(const NdfModels::Any& model, const FootprintArrays& footprints, std::size_t k) {
+  return std::visit([&](const auto& m) { return NdfModels::Any(modelAt(m, footprints, k)); }, model);
+}
+
 }  // namespace glint::api

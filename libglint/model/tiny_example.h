@@ -48,6 +48,8 @@ struct TinyExample {
   static constexpr int kLeastSize = 2, kMostSize = 256;
   /// Largest number of examples in a cell, on average.
   static constexpr float kLeastDensity = 0.01f, kMostDensity = 8;
+  /// Largest number in a matrix of a tiled plane, and smallest determinant.
+  static constexpr float kMostMatrix = 64, kLeastDeterminant = 1e-6f;
   /// Largest distance between the centre of an example and its corners, in cells.
   static constexpr float kMostReach = 2;
   /// Footprints up to at least this deviation, in cells, are answered from the examples that they cover. More examples, or larger

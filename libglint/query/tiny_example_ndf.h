@@ -21,7 +21,7 @@ namespace glint {
 /// no digits left for a position in a cell, give the cell to movedTo(). Boxes count as Gaussians of the same second moments.
 ///
 /// The footprint is carried to the frames of the examples that it covers and weighs tiles there, or elements where it covers few.
-/// The work is bounded: at most 96 images or lobes. A half vector is carried to an example's frame as NormalTurn says, with the
+/// The work is bounded: at most 128 images and 128 lobes, of 96 examples. A half vector is carried to an example's frame as NormalTurn says, with the
 /// change of area; so a facet's roughness is stretched as the relief is, in images, and is sigma_r in elements.
 /// Thread-safe, allocates nothing; the arrays must outlive it.
 class TinyExampleNdf {

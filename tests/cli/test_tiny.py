@@ -176,6 +176,9 @@ def test_the_same_bytes_on_any_number_of_threads(glint, normals):
         ("", 3, "64 x 48"),
         ("--cut 12", 3, "12 x 12"),
         ("--cut 32 --at 40 0", 1, "not inside"),
+        ("--cut 16 --at 2147483647 0", 1, "not inside"),
+        ("--cut 16 --transforms vast.json", 1, "at most 64"),
+        ("--cut 16 --transforms dwarf.json", 1, "singular"),
         ("--cut 16 --density 2", 1, "--mode scattered"),
         ("--cut 16 --mode scattered --density 0", 1, "0.01 to 8"),
         ("--cut 16 --mode scattered --density 1000", 1, "0.01 to 8"),
@@ -194,7 +197,7 @@ def test_the_same_bytes_on_any_number_of_threads(glint, normals):
 def test_bad_input_is_named(glint, options, code, text):
     run(glint, "synth isotropic --size 64x48 -o map.exr", "ingest map.exr -o n.glint")
     files = {"singular": '{"matrix": [[1, 2], [2, 4]]}', "inside_out": '{"heights": -1}', "range": '{"scale": [1, 2]}', "unknown": '{"twist": 1}', "text": "{scale: 1}",
-             "swapped": '{"scale": [2, 1]}', "large": '{"scale": [1, 5]}'}
+             "swapped": '{"scale": [2, 1]}', "large": '{"scale": [1, 5]}', "vast": '{"scale": 2, "stretch": 40}', "dwarf": '{"matrix": [[1e-4, 0], [0, 1e-4]]}'}
     for name, content in files.items():
         (glint.folder / f"{name}.json").write_text(content)
     process = glint(*f"tiny n.glint -o t.glint {options}".split())

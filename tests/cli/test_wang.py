@@ -30,7 +30,7 @@ def normals(glint):
 
 
 class Plane:
-    """The plane of an asset, by section 13 of the specification alone."""
+    """The plane of an asset, by section 14 of the specification alone."""
 
     def __init__(self, path):
         with h5py.File(path) as file:

@@ -33,7 +33,7 @@ def pyramid(glint, name, options=""):
 
 
 def images(path, level=0):
-    """Densities [image][channel][y][x] of a level, by section 13 of the specification."""
+    """Densities [image][channel][y][x] of a level, by section 15 of the specification."""
     with h5py.File(path) as file:
         resolution, channels, scale = (file.attrs[name] for name in ("resolution", "channels", "value_scale"))
         group = file[f"level_{level:02}"]
@@ -155,6 +155,13 @@ def test_inputs_that_have_no_answer_are_refused(glint, grating):
     assert process.returncode == 3 and "unknown.glint" in process.stderr and "--texel-size-um" in process.stderr
     process = glint("pyramid", "n.glint", "-o", "w.glint", "--spectral")
     assert process.returncode == 1 and "add --optics wave" in process.stderr
+    # Texels of a millimetre, and a coherence area of 10 um.
+    run(glint, "ingest g.exr -o wide.glint --kind height --to heights --texel-size-um 100000")
+    process = glint("pyramid", "wide.glint", "-o", "w.glint", "--optics", "wave")
+    assert process.returncode == 1 and "coherent images" in process.stderr and "--coherence-um" in process.stderr, process.stderr
+    # A coherence area of centimetres asks for more samples than fit.
+    process = glint("pyramid", "wide.glint", "-o", "w.glint", "--optics", "wave", "--coherence-um", "10000")
+    assert process.returncode == 1 and "samples of the surface" in process.stderr, process.stderr
     pyramid(glint, "w.glint")
     process = glint("compress", "w.glint", "-o", "c.glint")
     assert process.returncode == 5 and "wave-pyramid" in process.stderr

@@ -41,7 +41,7 @@ def sentence(test):
 
 def section(results):
     """Markdown, between the two marks."""
-    lines = [BEGIN, "## Where methods stop holding", "",
+    lines = [BEGIN, "", "## Where methods stop holding", "",
              "Written by `make stability`; the figures are in [stability.json](stability.json), and `glint-bench --report docs/stability.json -o page.html` makes a "
              "page of them.", "",
              "One thing is changed at a time, on maps of 512x512 texels, up to where methods fail. A method holds where its figure is below the dashed line. Bin maps "

@@ -36,6 +36,11 @@ TEST(CPlane, AnswersAtAnyCell) {
     const Footprint same = Footprint::isotropic({static_cast<float>(u - std::floor(u)), 0.5f}, 3);
     EXPECT_EQ(density, there.density(same, {0.1f, 0.05f}));
     EXPECT_EQ(mean, there.mean(same, {{-1, -1}, {0.25f, 1}}));
+    float rgb[3] = {}, spectrum = 0;
+    ASSERT_EQ(glint_density_rgb(plane.ndf, &p, 0.1f, 0.05f, rgb), GLINT_OK);
+    ASSERT_EQ(glint_density_spectrum(plane.ndf, &p, 0.1f, 0.05f, &spectrum, 1), GLINT_OK);
+    EXPECT_EQ(rgb[1], density);
+    EXPECT_EQ(spectrum, density);
     EXPECT_EQ(pdf, there.sample(same, {0.3f, 0.7f}).pdf);
     EXPECT_NE(mean, before);  // cells are not alike
     before = mean;
@@ -52,11 +57,14 @@ TEST(CPlane, BatchesAnswerAsSingleQueriesDo) {
   float of_precise[3] = {}, of_plain[3] = {};
   ASSERT_EQ(glint_density_batch(plane.ndf, 3, &precise, {&x, 0}, {&y, 0}, of_precise), GLINT_OK);
   ASSERT_EQ(glint_density_batch(plane.ndf, 3, &plain, {&x, 0}, {&y, 0}, of_plain), GLINT_OK);
+  float colours[9] = {};
+  ASSERT_EQ(glint_density_rgb_batch(plane.ndf, 3, &precise, {&x, 0}, {&y, 0}, colours), GLINT_OK);
   for (int k = 0; k < 3; ++k) {
     float density = 0;
     glint_footprint p = glint_footprint_isotropic(u[k], v[k], sigma);
     ASSERT_EQ(glint_density(plane.ndf, &p, x, y, &density), GLINT_OK);
     EXPECT_EQ(of_precise[k], density);
+    EXPECT_EQ(colours[3 * k], density);
     p = glint_footprint_isotropic(double{float_u[k]}, double{float_v[k]}, sigma);
     ASSERT_EQ(glint_density(plane.ndf, &p, x, y, &density), GLINT_OK);
     EXPECT_EQ(of_plain[k], density);

@@ -309,6 +309,36 @@ TEST(TinyExampleNdf, OfScatteredExamplesIsNearThePlaneInsideThemAndWhereTheyMeet
   }
 }
 
+TEST(TinyExampleNdf, OfFewExamplesIsNearThePlaneOverManyCells) {
+  bake::TinyOptions options = scatteredOptions();
+  options.density = 0.05f;
+  const bake::TinyExampleData data = build(options);
+  const TinyExample tiny = data.view();
+  const TinyExampleNdf model(tiny);
+  // Seventeen cells of the plane, of which the footprint reaches fourteen.
+  constexpr int kTexels = 272, kPerTexel = 2;
+  constexpr float kSigma = 2.2f * kSize, kSquare = kPerTexel * kPerTexel;
+  ASSERT_LT(kSigma, 0.7f * model.largestSigma());  // the mean has no weight yet
+  const std::vector<Vec2> normals = bake::explicitNormals(tiny, {0, 0, kPerTexel * kTexels, kPerTexel * kTexels, kPerTexel});
+  const Footprint on_map = Footprint::gaussian({0.5f, 0.5f}, {kSquare * kSigma * kSigma, 0, kSquare * kSigma * kSigma});
+  const std::vector<float> truth = bake::referenceImage(mapOf(normals, kPerTexel * kTexels, kPerTexel * kTexels), kSigmaR,
+                                                        Surface::flat, Boundary::wrap, on_map, kImage);
+  const Footprint on_plane = Footprint::isotropic({0.5f * kTexels / kSize, 0.5f * kTexels / kSize}, kSigma);
+  EXPECT_LT(bake::imageErrors(imageOf(model, on_plane), truth, kImage).tv, 0.05);
+}
+
+TEST(TinyExampleNdf, OfTinyExamplesFarApartVisitsOnlyTheirTiles) {
+  // Footprints of many cells of examples of a 64th of their size: a lattice without bounds would have 1e9 squares.
+  bake::TinyOptions options = scatteredOptions();
+  options.density = 0.01f;
+  options.transforms.scale = {1.0f / 64, 1.0f / 64};
+  const bake::TinyExampleData data = build(options);
+  const TinyExample tiny = data.view();
+  const TinyExampleNdf model(tiny);
+  for (const float share : {0.1f, 0.5f, 0.99f})
+    EXPECT_TRUE(std::isfinite(model.density(Footprint::isotropic({}, share * model.largestSigma()), {0.01f, 0.02f})));
+}
+
 TEST(TinyExampleNdf, OfWideFootprintsIsTheMeanOfThePlane) {
   bake::TinyOptions options = scatteredOptions();
   options.transforms.scale = {0.7f, 1.3f};

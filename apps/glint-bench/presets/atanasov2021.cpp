@@ -71,14 +71,12 @@ void addFigure3(PresetRun& run) {
 /// Time of a query as the texture is tiled more often. The paper shows convergence plots.
 void addFigure7(PresetRun& run) {
   const LabMap& map = run.map(bake::SynthKind::brushed, run.sizeOf(2048));
-  double once = 0;
   for (const int tiling : {1, 8}) {
     for (const double alpha : {0.005 * std::numbers::sqrt2, 0.05}) {
       const api::OpenedNdf ndf = run.lab.open(map, kBinMap, ofAlpha(alpha));
       const auto sigma = static_cast<float>(4 * tiling);
       const std::vector<BenchQuery> queries = benchQueries(map.normals(), run.lab.seed(), 1 << 12, {sigma});
       const double ns = benchTimes(ndf, queries, {}, 0.05)["density"]["cold"]["ns"];
-      if (tiling == 1 && once == 0) once = ns;
       run.rows.push_back({"Fig. 7",
                           fmt::format("tiled x{}, alpha {:.3g}", tiling, alpha),
                           "time of a density",

@@ -29,7 +29,7 @@ void measureRanks(StabilityLab& lab, double rank, StabilityCurves& curves) {
     curves.add("cp: bias", truth.bias(ndf));
     curves.add("cp: total variation", truth.variation(ndf));
   } catch (const std::exception& error) {
-    curves.fail("cp: seen error", error.what());
+    for (const char* series : {"cp: seen error", "cp: bias", "cp: total variation"}) curves.fail(series, error.what());
   }
 }
 

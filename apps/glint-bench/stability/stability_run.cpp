@@ -81,7 +81,11 @@ Json runStability(Tool& tool, const AssetFolder& folder, const std::vector<std::
     StabilityLab lab(tool, folder, quick);
     for (const double x : quick ? test.quick_values : test.values) {
       curves.at(x);
-      test.measure(lab, x, curves);
+      try {
+        test.measure(lab, x, curves);
+      } catch (const std::exception& error) {
+        curves.fail(test.name, error.what());
+      }
       if (progress) progress(++done, total);
     }
     lab.forget();

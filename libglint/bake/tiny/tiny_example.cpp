@@ -30,6 +30,13 @@ void require(bool ok, const char* option, const std::string& range) {
   if (!ok) throw Error(ErrorCode::usage, "option.range", {}, option, "out of range", "give " + range);
 }
 
+/// A normal that rounding has moved over the rim of the disk, inside.
+Vec2 insideDisk(Vec2 n) {
+  constexpr float kMost = 1 - 0x1p-22f;
+  const float square = dot(n, n);
+  return square > kMost ? std::sqrt(kMost / square) * n : n;
+}
+
 void checkExample(const NormalMap& map) {
   const int n = map.width;
   const bool fits = n == map.height && n >= TinyExample::kLeastSize && n <= TinyExample::kMostSize &&
@@ -46,7 +53,11 @@ void checkTransforms(const TinyOptions& o) {
     const Matrix2& m = o.matrix;
     const float size = std::max({std::fabs(m.xx), std::fabs(m.xy), std::fabs(m.yx), std::fabs(m.yy)});
     constexpr float kThinnest = 1e-3f;  // of the determinant of a matrix of this size
-    if (!(std::isfinite(size) && size > 0 && std::fabs(m.determinant()) > kThinnest * size * size))
+    const float determinant = std::fabs(m.determinant());
+    if (size > TinyExample::kMostMatrix)
+      throw Error(ErrorCode::usage, "tiny.transform", {}, "--transforms", fmt::format("the matrix has a number of {:g}", size),
+                  fmt::format("give one whose numbers are at most {:g}", TinyExample::kMostMatrix));
+    if (!(std::isfinite(size) && determinant > kThinnest * size * size && determinant >= TinyExample::kLeastDeterminant))
       throw Error(ErrorCode::usage, "tiny.transform", {}, "--transforms", "the matrix is singular, or nearly so",
                   "give one whose determinant is not 0");
     return;
@@ -207,7 +218,7 @@ TinyExampleData buildTinyExample(const NormalMap& example, const TinyOptions& op
   data.normals.assign(example.normals.begin(), example.normals.end());
   if (options.mode == TinyMode::tiled) {
     const NormalTurn turn(options.matrix, options.heights);
-    for (Vec2& n : data.normals) n = turn.turned(n);
+    for (Vec2& n : data.normals) n = insideDisk(turn.turned(n));
     const Matrix2& m = options.matrix;
     shape.matrix[0] = m.xx, shape.matrix[1] = m.xy, shape.matrix[2] = m.yx, shape.matrix[3] = m.yy;
     shape.offset = options.offset;

@@ -15,9 +15,9 @@ using Graph = boost::compressed_sparse_row_graph<boost::directedS, boost::no_pro
                                                  std::uint32_t, std::uint32_t>;
 using Vertex = boost::graph_traits<Graph>::vertex_descriptor;
 using Edge = boost::graph_traits<Graph>::edge_descriptor;
-using Cost = std::int32_t;
+using Cost = std::int64_t;  // the library sums the cost of a whole seam in it
 
-constexpr float kCostScale = 65536;  // a difference of 1 of normals; sums of four stay far below 2^31
+constexpr float kCostScale = 65536;  // a difference of 1 of normals; differences below 2^-16 count alike
 constexpr Cost kShortSeam = 1;       // of each pair, so that seams are short where images agree
 constexpr std::int32_t kNoNode = -1;
 

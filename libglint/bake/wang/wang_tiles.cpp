@@ -290,8 +290,9 @@ std::optional<Patch> enlarged(const PatchSource& source, const WangTiles& shape,
     width = std::max(width, size.width), height = std::max(height, size.height);
   }
   if (source.holds(width, height)) return std::nullopt;
-  // Twice the size of a patch, so that patches of different colours differ.
-  return quiltedMap(source, std::max(2 * width, source.width()), std::max(2 * height, source.height()), seed);
+  // Twice the size of a patch, so that patches of different colours differ; of the long side of a strip no more than is of use.
+  const auto sizeOf = [](int patch, int map) { return std::max(2 * patch, std::min(map, 4 * patch)); };
+  return quiltedMap(source, sizeOf(width, source.width()), sizeOf(height, source.height()), seed);
 }
 
 void measure(const NormalMap& map, const PatchSource& source, const NormalCells& input, const SeamSum& seams,

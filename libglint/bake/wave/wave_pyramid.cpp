@@ -59,6 +59,14 @@ void checkOptions(const HeightMap& map, const WaveOptions& o) {
   require(o.coherence_um >= longest && o.coherence_um <= side_um, "--coherence-um", fmt::format("{:g} um", o.coherence_um),
           side_um >= longest ? fmt::format("give the longest wavelength, {:g}, to the size of the map, {:g}", longest, side_um)
                              : fmt::format("the map is {:g} um wide: take a larger one", side_um));
+  // Coherent images are a coherence area apart: texels that are far wider than the area would take as many images as it takes.
+  constexpr double kMostImages = 1 << 24;
+  const double gap_um = double{o.coherence_um} / double{o.kernels}, texel_um = double{map.texel_size_um};
+  const double images = map.width * texel_um / gap_um * (map.height * texel_um / gap_um);
+  require(images <= kMostImages, "--coherence-um",
+          fmt::format("{:g} um on texels of {:g} um takes {:.3g} coherent images", o.coherence_um, texel_um, images),
+          fmt::format("give at least {:.3g}, or heights of a smaller part of the surface",
+                      double{o.coherence_um} * std::sqrt(images / kMostImages)));
 }
 
 /// Mean and covariance of the slopes of the texels, by central differences. In one thread: O(texels).
@@ -100,6 +108,16 @@ double borderShare(const HeightSpline& spline, double texel_um, const WaveGrid& 
   return most;
 }
 
+/// The grid for directions up to psi, unless it is too large to compute with.
+WaveGrid gridFor(double wavelength, const WaveOptions& o, double psi) {
+  constexpr int kMostSamples = 4096;  // along an axis: 200 MB for each thread
+  const WaveGrid grid = waveGrid(wavelength, double{o.coherence_um}, o.resolution, psi);
+  require(grid.size <= kMostSamples, "--coherence-um",
+          fmt::format("{:g} um takes {} x {} samples of the surface for each image", o.coherence_um, grid.size, grid.size),
+          fmt::format("give at most about {:.3g}", double{o.coherence_um} * kMostSamples / grid.size));
+  return grid;
+}
+
 /// Grids that see all light of all wavelengths but for kMostAliased: from the steepest slope on, larger where the surface
 /// diffracts light beyond it.
 std::vector<WaveGrid> chooseGrids(const HeightSpline& spline, const HeightMap& map, const WaveOptions& o, double steepest) {
@@ -107,14 +125,14 @@ std::vector<WaveGrid> chooseGrids(const HeightSpline& spline, const HeightMap& m
   std::vector<WaveGrid> grids;
   for (const double wavelength : o.wavelengths_um) {
     double psi = steepest + kSpots * spotDeviation(wavelength, double{o.coherence_um});
-    WaveGrid grid = waveGrid(wavelength, double{o.coherence_um}, o.resolution, psi);
+    WaveGrid grid = gridFor(wavelength, o, psi);
     while (borderShare(spline, double{map.texel_size_um}, grid) > kMostAliased) {
       psi = std::max(psi, grid.largestPsi()) * kGrowth;
       if (psi > kMostPsi)
         throw Error(ErrorCode::unsupported, "heights.rough", {}, {},
                     fmt::format("the surface scatters light of {:g} um over the horizon and far beyond", wavelength),
                     "smooth the heights, or check --texel-size-um");
-      grid = waveGrid(wavelength, double{o.coherence_um}, o.resolution, psi);
+      grid = gridFor(wavelength, o, psi);
     }
     grids.push_back(grid);
   }

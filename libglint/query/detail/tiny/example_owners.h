@@ -27,7 +27,7 @@ class NearExamples {
     const int last_x = cellOf(point.offset.x + far_x), last_y = cellOf(point.offset.y + far_y);
     for (int j = cellOf(point.offset.y - far_y); j <= last_y; ++j) {
       for (int i = cellOf(point.offset.x - far_x); i <= last_x; ++i) {
-        const std::uint64_t key = cells.key(point.cell_x + i, point.cell_y + j);
+        const std::uint64_t key = cells.key(neighbour(point.cell_x, i), neighbour(point.cell_y, j));
         const Vec2 corner = {static_cast<float>(i) * size, static_cast<float>(j) * size};
         const int count = cells.count(key);
         for (int k = 0; k < count && count_ < kMost; ++k) {
@@ -40,6 +40,11 @@ class NearExamples {
         }
       }
     }
+  }
+
+  /// The cell some cells on; sums wrap.
+  static GLINT_HD std::int64_t neighbour(std::int64_t cell, int away) {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(cell) + static_cast<std::uint64_t>(std::int64_t{away}));
   }
 
   GLINT_HD int count() const { return count_; }

@@ -49,13 +49,22 @@ class GaussianLattice {
   /// @param x, y  centre of the footprint, in squares
   template <class Visitor>
   GLINT_HD void forEach(double x, double y, Visitor&& visitor) const {
+    constexpr int kFar = 1 << 30;
+    forEachInside(x, y, -kFar, kFar, visitor);
+  }
+
+  /// The same of the squares whose i and j are from `low` to `high`: however large the footprint is, no others are visited.
+  template <class Visitor>
+  GLINT_HD void forEachInside(double x, double y, int low, int high, Visitor&& visitor) const {
+    const auto above = [&](double k) { return static_cast<int>(std::clamp(std::ceil(k), double(low), high + 1.0)); };
+    const auto below = [&](double k) { return static_cast<int>(std::clamp(std::floor(k), low - 1.0, double(high))); };
     const double reach = kReach * sigma_y_;
     const float fall = std::exp(-across_);
-    const int last = static_cast<int>(std::floor(y + reach - 0.5));
-    for (int j = static_cast<int>(std::ceil(y - reach - 0.5)); j <= last; ++j) {
+    const int last = below(y + reach - 0.5);
+    for (int j = above(y - reach - 0.5); j <= last; ++j) {
       const double dy = j + 0.5 - y, t = dy / sigma_y_, wide = sigma_x_ * std::sqrt(std::max(0.0, kReach * kReach - t * t));
       const double middle = x + slant_ * dy - 0.5;
-      const int begin = static_cast<int>(std::ceil(middle - wide)), end = static_cast<int>(std::floor(middle + wide));
+      const int begin = above(middle - wide), end = below(middle + wide);
       if (begin > end) continue;
       // Along a row each weight is the one before times a ratio, and ratios fall by one factor.
       const auto first = static_cast<float>(begin - middle), fy = static_cast<float>(dy);

@@ -119,9 +119,10 @@ class ScatteredPieces {
       const double side = sideOf(shift);
       return GaussianLattice(c, side, side * side / 12);
     };
-    const int last = lowestBit(static_cast<std::uint64_t>(size_));
+    // Squares may be wider than an example: where examples are few, footprints of many cells are answered from them.
+    constexpr int kCoarsestShift = 30;
     int shift = kFinestShift;
-    while (shift < last && latticeOf(shift).squares() > kMostSquares) ++shift;
+    while (shift < kCoarsestShift && latticeOf(shift).squares() > kMostSquares) ++shift;
     const GaussianLattice lattice = latticeOf(shift);
     const float side = squares.side = sideOf(shift);
     squares.half_x = side * static_cast<float>(lattice.extentX());
@@ -162,8 +163,8 @@ class ScatteredPieces {
     const Vec2 at = localOf(placed, centre);
     Squares tiles;
     int numbers[kMostPoints];
-    lattice.forEach(double{at.x} / tile, double{at.y} / tile, [&](int i, int j, float weight) {
-      if (i < 0 || j < 0 || i >= columns || j >= columns || tiles.count == kMostPoints) return;
+    lattice.forEachInside(double{at.x} / tile, double{at.y} / tile, 0, columns - 1, [&](int i, int j, float weight) {
+      if (tiles.count == kMostPoints) return;
       const float half = 0.5f * size_, width = static_cast<float>(tile);
       const Vec2 middle = {(static_cast<float>(i) + 0.5f) * width - half, (static_cast<float>(j) + 0.5f) * width - half};
       numbers[tiles.count] = j * columns + i;
