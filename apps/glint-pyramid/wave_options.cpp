@@ -70,10 +70,12 @@ void warnAbout(Tool& tool, const HeightMap& map, const bake::WaveOptions& values
         std::ceil(values.coherence_um / (kFootprintPerStride * map.texel_size_um))));
 }
 
-/// Builds the pyramid; errors of the heights name their file.
-bake::WavePyramidData build(const HeightMap& map, const bake::WaveOptions& values, const std::string& path,
-                            const bake::ProgressFn& progress) {
+/// Builds the pyramid, and warns before that takes time; errors of the heights name their file.
+bake::WavePyramidData build(Tool& tool, const HeightMap& map, const bake::WaveOptions& values, const std::string& path) {
   try {
+    bake::checkWaveOptions(map, values);
+    warnAbout(tool, map, values, path);
+    const bake::ProgressFn progress = tool.progress("images");
     return bake::buildWavePyramid(map, values, progress);
   } catch (const Error& error) {
     if (error.code() == ErrorCode::usage || !error.path().empty()) throw;
@@ -159,8 +161,7 @@ void makeWavePyramid(Tool& tool, const formats::Asset& asset, const InputFile& i
                      const formats::Provenance& provenance, const OutputFile& output) {
   const HeightMap& map = heightsOf(asset, input.path());
   const bake::WaveOptions values = options.values();
-  warnAbout(tool, map, values, input.path());
-  const bake::WavePyramidData pyramid = build(map, values, input.path(), tool.progress("images"));
+  const bake::WavePyramidData pyramid = build(tool, map, values, input.path());
   formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
   tool.setResult(waveJson(pyramid));
   tool.summary(waveText(pyramid));

@@ -134,7 +134,7 @@ class WangReference {
     const UsableCovariance c = positiveCovariance(p.covariance);
     const double size = tiles_.size, mean = 0.5 * (c.xx + c.yy);
     const double longest = (mean + std::sqrt(std::max(0.0, mean * mean - c.determinant()))) / (size * size);
-    constexpr double kBegin = double{kExactTiles} * kExactTiles, kEnd = double{kFarTiles} * kFarTiles;
+    constexpr double kBegin = double{kExactTiles} * double{kExactTiles}, kEnd = double{kFarTiles} * double{kFarTiles};
     return static_cast<float>(std::clamp((longest - kBegin) / (kEnd - kBegin), 0.0, 1.0));
   }
 

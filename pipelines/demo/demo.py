@@ -1,5 +1,5 @@
 """The chain of tools on the sample maps: assets, a table of time, bytes and error, a picture before and after compression,
-and one of all models.
+one of all models, and one of planes without end and of diffraction.
 
 Normally run by `make demo`.
 """
@@ -14,6 +14,7 @@ import numpy as np
 import OpenImageIO as oiio
 
 import picture
+import planes
 from processes import Tools, readable_bytes, readable_time
 
 SAMPLES = pathlib.Path(__file__).parents[2] / "data-samples"
@@ -228,11 +229,13 @@ def main():
     draw_footprints(chains[-1], arguments.out / "ndf-before-after.png")
     draw_models([chain for chain in chains if chain.name not in NOT_DRAWN], arguments.out / "ndf-models.png")
 
+    planes.draw(tools, assets, arguments.out / "planes-and-waves.png")
+
     rows = [row for chain in chains for row in chain.rows]
     text = table_text(rows)
     (arguments.out / "table.txt").write_text(text)
     (arguments.out / "table.json").write_text(json.dumps([dataclasses.asdict(row) for row in rows], indent=1) + "\n")
-    print(f"\n{text}\nassets: {assets}/   table: {arguments.out}/table.txt, .json   pictures: {arguments.out}/ndf-before-after.png, ndf-models.png")
+    print(f"\n{text}\nassets: {assets}/   table: {arguments.out}/table.txt, .json   pictures: {arguments.out}/ndf-before-after.png, ndf-models.png, planes-and-waves.png")
 
 
 if __name__ == "__main__":

@@ -56,6 +56,8 @@ MAKE = [
     "shlobes -o zonal.glint --sigma-r .1 --order 6 --grid none",
     "shlobes --light lights.json -o light.glint --order 6 --grid 5x8",
     "bench normals.glint -o bench.json --quick --only moments,histograms",
+    "bench --stability -o stability.json --quick --only one-direction",
+    "bench --preset xing2024 -o paper.json --quick",
     "displace heights.glint -o displaced.glint --factors 4,16 --angular 3 --spatial 2",
     "displace heights.glint -o rough.glint --base ggx:.3:1,2 --factor 8 --angular 3 --spatial 2",
     "displace heights.glint -o colored.glint --base-color n.png --factor 8 --angular 3 --spatial 2",

@@ -10,6 +10,9 @@
 namespace glint::apps {
 namespace {
 
+/// The width of a thread of the weave: cells of whole threads are flat, so that all light of a furnace is in the BRDF.
+constexpr int kThreads = 32;
+
 struct TimedDisplacement {
   bake::DisplacementData data;
   double seconds;
@@ -83,7 +86,7 @@ void addAngular(PresetRun& run) {
   const std::vector<float> heights = heightsOf(run, bake::SynthKind::weave, texels);
   for (const int angular : {5, 15, 25}) {
     bake::DisplaceOptions options;
-    options.factors = {16}, options.angular = angular, options.spatial = 1, options.seed = run.lab.seed();
+    options.factors = {kThreads}, options.angular = angular, options.spatial = 1, options.seed = run.lab.seed();
     const TimedDisplacement made = timed(heights, texels, options);
     const std::string subject = fmt::format("N = {}, M = 1, white weave {}^2", angular, texels);
     const Displacement asset = made.data.view();
@@ -112,7 +115,7 @@ void addSpatial(PresetRun& run) {
   fadeRelief(heights, texels);
   for (const int spatial : {1, 4, 16}) {
     bake::DisplaceOptions options;
-    options.factors = {16}, options.spatial = spatial, options.seed = run.lab.seed();
+    options.factors = {kThreads}, options.spatial = spatial, options.seed = run.lab.seed();
     const TimedDisplacement made = timed(heights, texels, options);
     run.rows.push_back({"Fig. 9",
                         fmt::format("M = {}, weave that fades {}^2", spatial, texels),
@@ -130,7 +133,7 @@ void addFurnace(PresetRun& run) {
   const std::vector<float> heights = heightsOf(run, bake::SynthKind::weave, texels);
   for (const bool all : {false, true}) {
     bake::DisplaceOptions options;
-    options.factors = {16}, options.seed = run.lab.seed();
+    options.factors = {kThreads}, options.seed = run.lab.seed();
     if (!all) options.bounces = 1;
     const TimedDisplacement made = timed(heights, texels, options);
     const Displacement asset = made.data.view();

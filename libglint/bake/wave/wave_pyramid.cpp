@@ -44,31 +44,6 @@ void checkWavelengths(const WaveOptions& o) {
           "add --spectral, or wavelengths from 0.36 to 0.83");
 }
 
-void checkOptions(const HeightMap& map, const WaveOptions& o) {
-  if (!(map.texel_size_um > 0))
-    throw Error(ErrorCode::invalid_input, "heights.texel_size", {}, "/@texel_size_um", "the size of a texel is not known",
-                "make the heights again with glint-ingest --texel-size-um");
-  checkWavelengths(o);
-  require(o.stride >= 2 && o.stride <= 65536, "--stride", "out of range", "give 2 to 65536 texels");
-  require(o.overlap >= 1 && o.overlap <= kMostOverlap, "--overlap", "out of range", "give 1 to 4 footprints in a stride");
-  require(o.resolution >= kLeastResolution && o.resolution <= kMostResolution && o.resolution % kBlockSize == 0, "--resolution",
-          "out of range", "give a multiple of 16 from 32 to 1024");
-  require(o.levels >= 0 && o.levels < kMaxPyramidLevels, "--levels", "out of range", "give auto or 1 to 15");
-  const float side_um = static_cast<float>(std::min(map.width, map.height)) * map.texel_size_um;
-  const float longest = o.wavelengths_um.back();
-  require(o.coherence_um >= longest && o.coherence_um <= side_um, "--coherence-um", fmt::format("{:g} um", o.coherence_um),
-          side_um >= longest ? fmt::format("give the longest wavelength, {:g}, to the size of the map, {:g}", longest, side_um)
-                             : fmt::format("the map is {:g} um wide: take a larger one", side_um));
-  // Coherent images are a coherence area apart: texels that are far wider than the area would take as many images as it takes.
-  constexpr double kMostImages = 1 << 24;
-  const double gap_um = double{o.coherence_um} / double{o.kernels}, texel_um = double{map.texel_size_um};
-  const double images = map.width * texel_um / gap_um * (map.height * texel_um / gap_um);
-  require(images <= kMostImages, "--coherence-um",
-          fmt::format("{:g} um on texels of {:g} um takes {:.3g} coherent images", o.coherence_um, texel_um, images),
-          fmt::format("give at least {:.3g}, or heights of a smaller part of the surface",
-                      double{o.coherence_um} * std::sqrt(images / kMostImages)));
-}
-
 /// Mean and covariance of the slopes of the texels, by central differences. In one thread: O(texels).
 MapSlopes slopesOf(const HeightMap& map) {
   std::vector<Vec2> row(static_cast<std::size_t>(map.width));
@@ -363,8 +338,33 @@ WavePyramid WavePyramidData::view() const {
   return v;
 }
 
+void checkWaveOptions(const HeightMap& map, const WaveOptions& o) {
+  if (!(map.texel_size_um > 0))
+    throw Error(ErrorCode::invalid_input, "heights.texel_size", {}, "/@texel_size_um", "the size of a texel is not known",
+                "make the heights again with glint-ingest --texel-size-um");
+  checkWavelengths(o);
+  require(o.stride >= 2 && o.stride <= 65536, "--stride", "out of range", "give 2 to 65536 texels");
+  require(o.overlap >= 1 && o.overlap <= kMostOverlap, "--overlap", "out of range", "give 1 to 4 footprints in a stride");
+  require(o.resolution >= kLeastResolution && o.resolution <= kMostResolution && o.resolution % kBlockSize == 0, "--resolution",
+          "out of range", "give a multiple of 16 from 32 to 1024");
+  require(o.levels >= 0 && o.levels < kMaxPyramidLevels, "--levels", "out of range", "give auto or 1 to 15");
+  const float side_um = static_cast<float>(std::min(map.width, map.height)) * map.texel_size_um;
+  const float longest = o.wavelengths_um.back();
+  require(o.coherence_um >= longest && o.coherence_um <= side_um, "--coherence-um", fmt::format("{:g} um", o.coherence_um),
+          side_um >= longest ? fmt::format("give the longest wavelength, {:g}, to the size of the map, {:g}", longest, side_um)
+                             : fmt::format("the map is {:g} um wide: take a larger one", side_um));
+  // Coherent images are a coherence area apart: texels that are far wider than the area would take as many images as it takes.
+  constexpr double kMostImages = 1 << 24;
+  const double gap_um = double{o.coherence_um} / double{o.kernels}, texel_um = double{map.texel_size_um};
+  const double images = map.width * texel_um / gap_um * (map.height * texel_um / gap_um);
+  require(images <= kMostImages, "--coherence-um",
+          fmt::format("{:g} um on texels of {:g} um takes {:.3g} coherent images", o.coherence_um, texel_um, images),
+          fmt::format("give at least {:.3g}, or heights of a smaller part of the surface",
+                      double{o.coherence_um} * std::sqrt(images / kMostImages)));
+}
+
 WavePyramidData buildWavePyramid(const HeightMap& map, const WaveOptions& o, const ProgressFn& progress) {
-  checkOptions(map, o);
+  checkWaveOptions(map, o);
   const HeightSpline spline(map);
   const HeightSpline::Steepest steepest = spline.steepest();
   if (!(steepest.slope <= kMostPsi))

@@ -55,6 +55,10 @@ class WavePyramidData {
   WavePyramid view() const;
 };
 
+/// Checks what can be checked without computing: options, and that the size of a texel is known.
+/// @throws Error as buildWavePyramid does
+void checkWaveOptions(const HeightMap& map, const WaveOptions& options);
+
 /// Builds the NDF images of a height field under wave optics (Deng 2022, Eq. 3 and 4).
 ///
 /// Coherent images come from windowed Fourier transforms on a grid of places; images of level 0 are their means, weighed by the

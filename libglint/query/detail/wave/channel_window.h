@@ -100,7 +100,7 @@ class ChannelReader {
     constexpr int kLanes = 4;
     const int first = std::clamp(x, 0, kBlockSize - kLanes);
     const std::ptrdiff_t offset = from * rowPitch() + first;
-    Float4 sums[kCount];
+    Float4 sums[static_cast<std::size_t>(kCount)];
     for (Float4& sum : sums) sum = Float4::zero();
     for (int k = 0; k < rows.count; ++k) {
       const Pixel* pixels = rows.first[k] + offset;
