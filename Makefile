@@ -79,9 +79,8 @@ build: build/build.ninja  ## the optimised build, in build/
 debug: build-debug/build.ninja  ## a debug build, in build-debug/
 	cmake --build --preset debug --parallel $(JOBS)
 
-# Without ccache nothing is kept of a build, so that the quickest whole build is the best one.
 build/build.ninja: CMakePresets.json packages.txt | packages
-	cmake --preset release $(if $(shell command -v ccache),,-DGLINT_FAST_FULL_BUILD=ON)
+	cmake --preset release
 	@touch $@
 
 build-debug/build.ninja: CMakePresets.json packages.txt | packages
