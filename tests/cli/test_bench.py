@@ -72,7 +72,7 @@ def test_images_are_of_the_footprints(results):
 def test_summary_names_the_quickest_method(measured):
     text = (measured / "printed.txt").read_text()
     assert re.search(r"pyramid, stride 32 +[\d.]+ s +[\d.]+ MB +[\d.]+ to +[\d.]+ us", text)
-    assert "The quickest within" in text and re.search(r"8 texels .*(pyramid|brute force)", text)
+    assert "The quickest within" in text and re.search(r"8 texels +(tucker|pyramid|brute force|bin map)", text)
     assert not list(measured.glob("*.assets"))
 
 
