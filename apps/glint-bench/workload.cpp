@@ -68,6 +68,15 @@ std::vector<float> roundSizes(const std::vector<FootprintSet>& sets) {
   return sizes;
 }
 
+Vec2 litNormal(const NormalMap& map, Vec2 centre_uv, float sigma_texels, Vec2 deviations_away) {
+  const auto texel = [](float centre, float offset, int size) {
+    const auto at = static_cast<int>(std::floor(centre * static_cast<float>(size) + offset));
+    return (at % size + size) % size;
+  };
+  return map.at(texel(centre_uv.x, sigma_texels * deviations_away.x, map.width),
+                texel(centre_uv.y, sigma_texels * deviations_away.y, map.height));
+}
+
 std::vector<BenchQuery> benchQueries(const NormalMap& map, std::uint64_t seed, int count, const std::vector<float>& sigmas) {
   constexpr std::uint64_t kStream = 1000;
   constexpr float kRangeReach = 0.05f;
@@ -77,11 +86,7 @@ std::vector<BenchQuery> benchQueries(const NormalMap& map, std::uint64_t seed, i
     const float sigma = sigmas[static_cast<std::size_t>(k) % sigmas.size()];
     const Vec2 uv = bake::randomPair(seed, kStream, index), away = bake::randomGaussians(seed, kStream, index + 1);
     // A texel about one deviation from the centre, so that it counts in the footprint.
-    const auto texel = [](float centre, float offset, int size) {
-      const auto at = static_cast<int>(std::floor(centre * static_cast<float>(size) + offset));
-      return (at % size + size) % size;
-    };
-    const Vec2 normal = map.at(texel(uv.x, sigma * away.x, map.width), texel(uv.y, sigma * away.y, map.height));
+    const Vec2 normal = litNormal(map, uv, sigma, away);
     const Vec2 reach = {kRangeReach, kRangeReach};
     queries.push_back({Footprint::isotropic(uv, sigma),
                        normal,

@@ -40,6 +40,9 @@ struct BenchQuery {
   Vec2 xi;     ///< random numbers for a sample
 };
 
+/// A half vector that facets of a round footprint have: the normal of a texel that is so many deviations from its centre.
+Vec2 litNormal(const NormalMap& map, Vec2 centre_uv, float sigma_texels, Vec2 deviations_away);
+
 /// Questions about round footprints of these deviations in turn, texels, anywhere on the map.
 std::vector<BenchQuery> benchQueries(const NormalMap& map, std::uint64_t seed, int count, const std::vector<float>& sigmas);
 

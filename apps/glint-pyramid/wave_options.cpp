@@ -46,11 +46,6 @@ const HeightMap& heightsOf(const formats::Asset& asset, const std::string& path)
               "give heights, from glint-ingest --kind height --to heights");
 }
 
-/// Deviation of the spot of a flat surface at a wavelength.
-float spotOf(float wavelength_um, float coherence_um) {
-  return wavelength_um / (4 * std::numbers::pi_v<float> * std::numbers::sqrt2_v<float> * coherence_um);
-}
-
 void warnAbout(Tool& tool, const HeightMap& map, const bake::WaveOptions& values, const std::string& path) {
   const float shortest = values.wavelengths_um.front();
   if (map.texel_size_um > shortest)
@@ -153,7 +148,8 @@ bake::WaveOptions WaveOptions::values() const {
   options.precision = shared.precision;
   options.resolution = shared.resolution;
   if (pyramid_.autoResolution())
-    options.resolution = bake::resolutionFor(spotOf(options.wavelengths_um.front(), options.coherence_um));
+    options.resolution = bake::resolutionFor(
+        static_cast<float>(bake::spotDeviation(double{options.wavelengths_um.front()}, double{options.coherence_um})));
   return options;
 }
 

@@ -8,7 +8,24 @@
 
 namespace glint::apps {
 
-/// Mix-in: the footprint that is asked, as --uv and one of --sigma, --cov and --box.
+/// Mix-in: the size and shape of the footprint that is asked, as one of --sigma, --cov and --box.
+class FootprintSize {
+ public:
+  explicit FootprintSize(Tool& tool);
+
+  /// Checks that there is a size, and that it can be asked for.
+  /// @throws Error usage
+  void check() const;
+
+  Footprint at(Vec2 centre_uv) const;
+
+ private:
+  std::vector<float> covariance_, box_;
+  float sigma_ = 0;
+  Option *sigma_option_, *covariance_option_, *box_option_;
+};
+
+/// Mix-in: the footprint that is asked, as --uv and its size.
 class FootprintOptions {
  public:
   explicit FootprintOptions(Tool& tool);
@@ -17,9 +34,8 @@ class FootprintOptions {
   Option& centreOption() { return *uv_option_; }
   bool given() const { return uv_option_->given(); }
 
-  /// Checks that the footprint has a size, and that it can be asked for.
-  /// @throws Error usage
-  void check() const;
+  /// As FootprintSize::check.
+  void check() const { size_.check(); }
 
   Footprint footprint() const;
   /// Its centre as it was given: on a plane without end the whole part counts.
@@ -28,9 +44,8 @@ class FootprintOptions {
 
  private:
   std::vector<double> uv_;
-  std::vector<float> covariance_, box_;
-  float sigma_ = 0;
-  Option *uv_option_, *sigma_option_, *covariance_option_, *box_option_;
+  Option* uv_option_;
+  FootprintSize size_;
 };
 
 }  // namespace glint::apps

@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
-#include "common/footprint_rules.h"
 #include "glint-query/command_forms.h"
 #include "glint-query/usage.h"
 #include "glint/api/ndf_info.h"
@@ -21,12 +20,7 @@ PlaneCommand::PlaneCommand(Tool& tool) : tool_(tool), halves_(tool), picture_(to
       .count(2)
       .range(-0x1p52, 0x1p52)
       .required();
-  sigma_option_ =
-      &tool.option("--sigma", sigma_, "footprint: deviation of an isotropic Gaussian, texels").range(kLeastSigma, kMostSigma);
-  covariance_option_ = &tool.option("--cov", covariance_, "footprint: covariance SXX SXY SYY of a Gaussian, texels^2").count(3);
-  box_option_ = &tool.option("--box", box_, "footprint: half axes AX AY BX BY of a parallelogram, texels").count(4);
-  sigma_option_->excludes(*covariance_option_).excludes(*box_option_);
-  covariance_option_->excludes(*box_option_);
+  size_ = std::make_unique<FootprintSize>(tool);
   tool.choice("--surface", surface_, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
               "how normals behave between texels");
   tool.option("--sigma-r", sigma_r_, "intrinsic roughness, disk units").range(1e-4, 0.25);
@@ -38,18 +32,8 @@ PlaneCommand::PlaneCommand(Tool& tool) : tool_(tool), halves_(tool), picture_(to
 void PlaneCommand::check() const {
   checkRegular(path_);
   tool_.addInput(path_);
-  if (!sigma_option_->given() && !covariance_option_->given() && !box_option_->given())
-    throwUsage("the footprint has no size", "add --sigma S, --cov SXX SXY SYY or --box AX AY BX BY");
-  if (!sigma_option_->given())
-    if (const auto fault = footprintFault(footprint()))
-      throwUsage((box_option_->given() ? "--box " : "--cov ") + fault->what, fault->remedy);
+  size_->check();
   if (!halves_.given() && !picture_.given()) throwUsage("nothing was asked", "add --half, --range or --image");
-}
-
-Footprint PlaneCommand::footprint() const {
-  if (covariance_option_->given()) return Footprint::gaussian({}, {covariance_[0], covariance_[1], covariance_[2]});
-  if (box_option_->given()) return Footprint::box({}, {box_[0], box_[1]}, {box_[2], box_[3]});
-  return Footprint::isotropic({}, sigma_);
 }
 
 void PlaneCommand::run() {
@@ -58,8 +42,7 @@ void PlaneCommand::run() {
   // The plane seen from the cell of the point, so that no digits are lost.
   const WangPlace place = tiles.layout().placeOf(texel_[0], texel_[1]);
   const WangReference plane = tiles.movedTo(place.cell_x, place.cell_y);
-  Footprint at = footprint();
-  at.centre = plane.positionIn(place);
+  const Footprint at = size_->at(plane.positionIn(place));
   if (picture_.given()) writePicture(plane, at);
   if (!halves_.given()) return;
   const Query q = halves_.query(at);

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "common/tool.h"
 #include "glint-query/distribution_command.h"
+#include "glint-query/footprint_options.h"
 #include "glint-query/output_options.h"
 #include "glint/query/wang_reference.h"
 
@@ -18,16 +20,12 @@ class PlaneCommand {
 
  private:
   void check() const;
-  /// The footprint, with its centre at (0, 0).
-  Footprint footprint() const;
   void writePicture(const WangReference& plane, const Footprint& footprint);
 
   Tool& tool_;
   std::string path_;
   std::vector<double> texel_;
-  std::vector<float> covariance_, box_;
-  float sigma_ = 0;
-  Option *sigma_option_, *covariance_option_, *box_option_;
+  std::unique_ptr<FootprintSize> size_;  // its options come after --texel
   HalfVectorOptions halves_;
   PictureOptions picture_;
   Surface surface_ = Surface::flat;

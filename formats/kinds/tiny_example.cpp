@@ -19,13 +19,6 @@ int tileLevels(int size) {
   return lowestBit(static_cast<std::uint64_t>(size));
 }
 
-/// Largest distance between the centre of an example and its corners, in cells; as CellExamples::reach.
-double reachOf(const TinyTransforms& t) {
-  const double stretch = std::max({double{t.stretch.high}, 1 / double{t.stretch.low}, 1.0});
-  const double shear = std::max(std::abs(double{t.shear.low}), std::abs(double{t.shear.high}));
-  return std::sqrt(0.5) * double{t.scale.high} * stretch * (1 + shear);
-}
-
 }  // namespace
 
 template <>
@@ -145,16 +138,13 @@ struct KindDescription<TinyExample> {
           "a range of transforms goes from " + numberText(double{range.low}) + " to " + numberText(double{range.high}));
       return;
     }
-    const double reach = reachOf(t);
-    // Examples near a footprint of kLeastSigmaInCells; ScatteredPieces::sigmaInCells has the same numbers.
-    constexpr double kMostExamples = 64, kLatticeReach = 3.2;
-    const double across = std::sqrt(kMostExamples / double{tiny.density});
-    constexpr double kRounding = 1e-3;
-    if (reach <= double{TinyExample::kMostReach} + kRounding &&
-        across - 2 * reach >= 2 * kLatticeReach * double{TinyExample::kLeastSigmaInCells} - kRounding)
+    const float reach = t.reach();
+    constexpr float kRounding = 1e-3f;
+    if (reach <= TinyExample::kMostReach + kRounding &&
+        TinyExample::sigmaInCells(tiny.density, reach) >= TinyExample::kLeastSigmaInCells - kRounding)
       return;
     findings.add("tiny.reach", "/@density",
-                 "and the transforms lay too many examples over a point: they reach " + numberText(reach) + " cells");
+                 "and the transforms lay too many examples over a point: they reach " + numberText(double{reach}) + " cells");
   }
 };
 

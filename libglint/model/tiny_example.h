@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 
@@ -37,6 +39,14 @@ struct TinyTransforms {
   TinyRange rotation_rad;
   TinyRange heights = {1, 1};  ///< factor of the heights of the relief; normals turn with it
   float mirror = 0;            ///< share of the examples that are mirrored, 0 to 1
+
+  /// Largest distance between the centre of an example and its corners, in cells.
+  GLINT_HD float reach() const {
+    constexpr float kHalfDiagonal = 0.70710678f;
+    const float thinnest = std::max(std::max(stretch.high, 1 / stretch.low), 1.0f);
+    const float slanted = std::max(std::fabs(shear.low), std::fabs(shear.high));
+    return kHalfDiagonal * scale.high * thinnest * (1 + slanted);
+  }
 };
 
 /// A plane without end that is covered by copies of one small normal map, the example (asset kind `tiny-example`, Xing 2024).
@@ -55,6 +65,12 @@ struct TinyExample {
   /// Footprints up to at least this deviation, in cells, are answered from the examples that they cover. More examples, or larger
   /// ones, than that allows would cost too much.
   static constexpr float kLeastSigmaInCells = 0.1f;
+  /// Examples near a footprint that a query expects at most, and the deviations up to which it looks for them.
+  static constexpr float kMostExpected = 64, kFootprintReach = 3.2f;
+  /// Deviation, in cells, of footprints near which kMostExpected examples are.
+  static GLINT_HD float sigmaInCells(float density, float reach) {
+    return (std::sqrt(kMostExpected / density) - 2 * reach) / (2 * kFootprintReach);
+  }
 
   TinyMode mode = TinyMode::tiled;
   TinyOverlap overlap = TinyOverlap::quarters;  ///< of scattered examples

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "glint/math/hash.h"
 #include "glint/model/wang_tiles.h"
 
 namespace glint {
@@ -24,7 +25,7 @@ struct WangPlace {
 class WangLayout {
  public:
   GLINT_HD explicit WangLayout(const WangTiles& tiles)
-      : tiles_(tiles), key_(mixed(static_cast<std::uint64_t>(tiles.plane_seed) * kStep + kStep)) {}
+      : tiles_(tiles), key_(mixBits(static_cast<std::uint64_t>(tiles.plane_seed) * kCounterStep + kCounterStep)) {}
 
   GLINT_HD int size() const { return tiles_.size; }
 
@@ -57,17 +58,10 @@ class WangLayout {
   /// variant of the cell.
   enum class Stream : std::uint64_t { east = 0, north = 1, variant = 2 };
 
-  static constexpr std::uint64_t kStep = 0x9e3779b97f4a7c15u;  // 2^64 over the golden ratio
   static constexpr std::uint64_t kStepY = 0xd1342543de82ef95u;
 
-  /// The finaliser of SplitMix64: every bit of the result depends on every bit of z.
-  static GLINT_HD std::uint64_t mixed(std::uint64_t z) {
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  }
   GLINT_HD std::uint64_t hash(std::uint64_t x, std::uint64_t y, Stream stream) const {
-    return mixed(mixed(key_ + kStep * x) + kStepY * y + static_cast<std::uint64_t>(stream));
+    return mixBits(mixBits(key_ + kCounterStep * x) + kStepY * y + static_cast<std::uint64_t>(stream));
   }
   /// One of `count` numbers, from the upper 32 bits of a hash.
   static GLINT_HD int below(int count, std::uint64_t bits) {

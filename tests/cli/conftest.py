@@ -20,3 +20,10 @@ def glint(tmp_path):
     run.folder = tmp_path
     run.bin = BIN
     return run
+
+
+def run_all(glint, *commands):
+    """Runs command lines without "glint-", each of which must succeed."""
+    for command in commands:
+        process = glint(*command.split())
+        assert process.returncode == 0, process.stderr

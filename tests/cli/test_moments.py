@@ -7,20 +7,15 @@ import h5py
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from conftest import run_all
 
 PRINTED = 1e-6  # shell answers have nine digits
 SIZE = 96
 
 
-def run(glint, *commands):
-    for command in commands:
-        process = glint(*command.split())
-        assert process.returncode == 0, process.stderr
-
-
 @pytest.fixture
 def normals(glint):
-    run(glint, f"synth isotropic --size {SIZE} --alpha .3 -o map.exr", "ingest map.exr -o n.glint")
+    run_all(glint, f"synth isotropic --size {SIZE} --alpha .3 -o map.exr", "ingest map.exr -o n.glint")
     return glint.folder / "n.glint"
 
 
@@ -31,7 +26,7 @@ def heights(glint):
     x, y = np.meshgrid(np.arange(80), np.arange(56))
     image = (2 * np.sin(x / 5) + np.cos(0.3 * y + 0.1 * x) + 0.2 * rng.standard_normal(x.shape)).astype(np.float32)
     write(glint.folder / "h.exr", image)
-    run(glint, "ingest h.exr --kind height --to heights --boundary clamp -o h.glint")
+    run_all(glint, "ingest h.exr --kind height --to heights --boundary clamp -o h.glint")
     return image
 
 
@@ -64,7 +59,7 @@ def slopes_of(path):
 
 
 def test_the_asset_is_what_the_specification_says(glint, normals):
-    run(glint, "moments n.glint -o m.glint --finest 0")
+    run_all(glint, "moments n.glint -o m.glint --finest 0")
     assert glint("validate", "m.glint").returncode == 0
     slopes = slopes_of(normals)
     with h5py.File(glint.folder / "m.glint") as file:
@@ -84,7 +79,7 @@ def test_the_asset_is_what_the_specification_says(glint, normals):
 
 
 def test_info_tells_what_it_is(glint, normals):
-    run(glint, "moments n.glint -o m.glint")
+    run_all(glint, "moments n.glint -o m.glint")
     info = json.loads(glint("info", "m.glint", "--json").stdout)["result"]
     assert info["kind"] == "slope-moments" and info["properties"]["finest_level"] == 1
     deviations = info["statistics"]["slope_deviations"]
@@ -93,7 +88,7 @@ def test_info_tells_what_it_is(glint, normals):
 
 def test_answers_are_those_of_a_surface_with_normal_slopes(glint, normals):
     """Large footprints of noise: its alpha is known, and brute force agrees."""
-    run(glint, "moments n.glint -o m.glint")
+    run_all(glint, "moments n.glint -o m.glint")
     far = ["--uv", ".3", ".6", "--sigma", "60", "--half"]
     for half in (["0", "0"], ["0.2", "0.1"]):
         truth = number(glint("query", "n.glint", *far, *half, "--sigma-r", "0.05"))
@@ -102,14 +97,14 @@ def test_answers_are_those_of_a_surface_with_normal_slopes(glint, normals):
 
 
 def test_smooth_footprints_are_told_that_they_are_too_small(glint, normals):
-    run(glint, "moments n.glint -o m.glint --finest 3")
+    run_all(glint, "moments n.glint -o m.glint --finest 3")
     small = ["query", "m.glint", "--uv", ".3", ".6", "--half", "0", "0", "--sigma"]
     assert number(glint(*small, "1")) == number(glint(*small, "4"))
     assert number(glint(*small, "4")) != number(glint(*small, "8"))
 
 
 def test_heights_give_the_moments_of_their_normals(glint, heights):
-    run(glint, "ingest h.exr --kind height --boundary clamp -o n.glint", "moments n.glint --boundary clamp -o a.glint", "moments h.glint --boundary clamp -o b.glint")
+    run_all(glint, "ingest h.exr --kind height --boundary clamp -o n.glint", "moments n.glint --boundary clamp -o a.glint", "moments h.glint --boundary clamp -o b.glint")
     with h5py.File(glint.folder / "a.glint") as a, h5py.File(glint.folder / "b.glint") as b:
         for level in range(a.attrs["level_count"]):
             assert np.array(a[f"level_{level:02}/moments"]) == pytest.approx(np.array(b[f"level_{level:02}/moments"]), rel=1e-4, abs=1e-6)
@@ -118,7 +113,7 @@ def test_heights_give_the_moments_of_their_normals(glint, heights):
 def test_lean_textures_are_those_of_maketx(glint, heights):
     """maketx clamps slopes at the border. It filters levels of odd sizes in another way, so these are not compared."""
     (glint.folder / "t").mkdir()
-    run(glint, "moments h.glint --boundary clamp --gradient sobel -o m.glint --textures t")
+    run_all(glint, "moments h.glint --boundary clamp --gradient sobel -o m.glint --textures t")
     subprocess.run(["maketx", "--bumpslopes", "--bumpformat", "height", "-d", "float", "h.exr", "-o", "maketx.exr"], cwd=glint.folder, check=True, capture_output=True)
     compared = 0
     for level, side in enumerate(((80, 56), (40, 28), (20, 14), (10, 7))):
@@ -142,9 +137,9 @@ def lobes_of(moments, extra):
 
 @pytest.mark.parametrize("lobe", ["isotropic", "gltf", "materialx"])
 def test_textures_hold_the_lobes_of_every_level(glint, lobe):
-    run(glint, "synth brushed --size 64 -o map.exr", "ingest map.exr -o n.glint")
+    run_all(glint, "synth brushed --size 64 -o map.exr", "ingest map.exr -o n.glint")
     (glint.folder / "t").mkdir()
-    run(glint, f"moments n.glint -o m.glint --finest 0 --textures t --lobe {lobe} --bits 16 --roughness 0.4")
+    run_all(glint, f"moments n.glint -o m.glint --finest 0 --textures t --lobe {lobe} --bits 16 --roughness 0.4")
     extra = 0.4**4 / 2
     step = 1.5 / 65535
     with h5py.File(glint.folder / "m.glint") as file:
@@ -182,7 +177,7 @@ def test_textures_hold_the_lobes_of_every_level(glint, lobe):
 def test_roughness_may_vary_over_the_map(glint, normals):
     image = np.linspace(0.2, 0.6, SIZE * SIZE).reshape(SIZE, SIZE)
     write(glint.folder / "r.exr", image)
-    run(glint, "moments n.glint -o a.glint --finest 0", "moments n.glint -o b.glint --finest 0 --roughness r.exr")
+    run_all(glint, "moments n.glint -o a.glint --finest 0", "moments n.glint -o b.glint --finest 0 --roughness r.exr")
     with h5py.File(glint.folder / "a.glint") as a, h5py.File(glint.folder / "b.glint") as b:
         added = np.array(b["level_00/moments"]) - np.array(a["level_00/moments"])
         assert added[::-1, :, 2] == pytest.approx(image**4 / 2, abs=1e-6)
@@ -192,7 +187,7 @@ def test_roughness_may_vary_over_the_map(glint, normals):
 
 def test_other_tools_take_the_textures(glint, normals):
     (glint.folder / "t").mkdir()
-    run(glint, "moments n.glint -o m.glint --textures t")
+    run_all(glint, "moments n.glint -o m.glint --textures t")
     files = sorted(path.name for path in (glint.folder / "t").glob("roughness_*.png"))
     assert len(files) == 7
     first, *others = (f"t/{name}" for name in files)
@@ -203,7 +198,7 @@ def test_other_tools_take_the_textures(glint, normals):
 
 
 def test_errors_of_lobes_tell_where_one_lobe_is_not_enough(glint, normals):
-    run(glint, "synth weave --size 96 -o w.exr", "ingest w.exr -o w.glint")
+    run_all(glint, "synth weave --size 96 -o w.exr", "ingest w.exr -o w.glint")
     (glint.folder / "t").mkdir()
     errors = {}
     for name in "nw":
@@ -217,7 +212,7 @@ def test_the_same_bytes_on_any_number_of_threads(glint, normals):
     for threads in (1, 4):
         folder = glint.folder / f"t{threads}"
         folder.mkdir()
-        run(glint, f"moments n.glint -o m{threads}.glint --textures t{threads} --lobe gltf --threads {threads}")
+        run_all(glint, f"moments n.glint -o m{threads}.glint --textures t{threads} --lobe gltf --threads {threads}")
     names = sorted(path.name for path in (glint.folder / "t1").iterdir())
     assert len(names) == 1 + 3 * 7
     for name in names:
@@ -248,7 +243,7 @@ def test_bad_input_is_named(glint, normals):
     (glint.folder / "t/roughness_03.png").write_text("mine")
     assert "roughness_03.png" in refused(glint, 1, *out, "--textures", "t")
     assert (glint.folder / "t/roughness_03.png").read_text() == "mine"
-    run(glint, "pyramid n.glint -o p.glint --stride 32")
+    run_all(glint, "pyramid n.glint -o p.glint --stride 32")
     assert "ndf-pyramid" in refused(glint, 5, "p.glint", "-o", "m.glint")
     assert not (glint.folder / "m.glint").exists() and len(list((glint.folder / "t").iterdir())) == 1
 

@@ -6,6 +6,7 @@ import math
 import h5py
 import numpy as np
 import pytest
+from conftest import run_all
 
 SIZE = 64
 EXAMPLE = 16
@@ -15,15 +16,9 @@ TURNS = {"rotation_deg": [0, 360], "scale": [0.6, 1.3], "stretch": [1, 1.2], "sh
 SCATTERED = "--mode scattered --density 1.5 --transforms turns.json --seed 5 --resolution 64 --sigma-r .03"
 
 
-def run(glint, *commands):
-    for command in commands:
-        process = glint(*command.split())
-        assert process.returncode == 0, process.stderr
-
-
 @pytest.fixture
 def normals(glint):
-    run(glint, f"synth isotropic --size {SIZE} --alpha .3 --correlation 3 -o map.exr", "ingest map.exr -o n.glint")
+    run_all(glint, f"synth isotropic --size {SIZE} --alpha .3 --correlation 3 -o map.exr", "ingest map.exr -o n.glint")
     (glint.folder / "turns.json").write_text(json.dumps(TURNS))
     return stored(glint.folder / "n.glint")
 
@@ -107,7 +102,7 @@ class Plane:
 @pytest.mark.parametrize("overlap", ["quarters", "nearest"])
 def test_the_plane_is_that_of_the_specification(glint, normals, overlap):
     x0, y0, width, height = 999_983, -77, 40, 24
-    run(glint, f"tiny n.glint -o t.glint --cut {EXAMPLE} --at 9 20 {SCATTERED} --overlap {overlap}", f"tiny t.glint -o e.glint --explicit {width} {height} --origin {x0} {y0}")
+    run_all(glint, f"tiny n.glint -o t.glint --cut {EXAMPLE} --at 9 20 {SCATTERED} --overlap {overlap}", f"tiny t.glint -o e.glint --explicit {width} {height} --origin {x0} {y0}")
     plane, written = Plane(glint.folder / "t.glint"), stored(glint.folder / "e.glint").reshape(height, width, 2)
     assert np.array_equal(plane.normals, normals[20 : 20 + EXAMPLE, 9 : 9 + EXAMPLE])
     compared = 0
@@ -124,7 +119,7 @@ def test_the_plane_is_that_of_the_specification(glint, normals, overlap):
 def test_a_tiled_plane_is_moved_and_turned(glint, normals):
     transform = {"matrix": [[2, 0.5], [0, 1]], "offset": [3, -2], "heights": 1.5}
     (glint.folder / "m.json").write_text(json.dumps(transform))
-    run(glint, f"tiny n.glint -o t.glint --cut {EXAMPLE} --transforms m.json --resolution 64 --sigma-r .03", "tiny t.glint -o e.glint --explicit 40 30 --origin -7 1099511627776")
+    run_all(glint, f"tiny n.glint -o t.glint --cut {EXAMPLE} --transforms m.json --resolution 64 --sigma-r .03", "tiny t.glint -o e.glint --explicit 40 30 --origin -7 1099511627776")
     written = stored(glint.folder / "e.glint").reshape(30, 40, 2)
     matrix = np.array(transform["matrix"])
     for j in range(30):
@@ -141,7 +136,7 @@ def test_a_tiled_plane_is_moved_and_turned(glint, normals):
 
 
 def test_answers_are_those_of_the_explicit_map(glint, normals):
-    run(glint, f"tiny n.glint -o t.glint --cut {EXAMPLE} {SCATTERED}", "tiny t.glint -o e.glint --explicit 192 192 --per-texel 3")
+    run_all(glint, f"tiny n.glint -o t.glint --cut {EXAMPLE} {SCATTERED}", "tiny t.glint -o e.glint --explicit 192 192 --per-texel 3")
     differences, total = 0, 0
     for u, v in [(1.3, 2.2), (2.7, 1.4), (1.9, 2.9)]:
         for box in ["0 0 .5 .5", "-.25 -.25 .25 .25", "-.5 0 0 .5"]:
@@ -152,19 +147,19 @@ def test_answers_are_those_of_the_explicit_map(glint, normals):
 
 
 def test_positions_do_not_wrap(glint, normals):
-    run(glint, f"tiny n.glint -o t.glint --cut {EXAMPLE} {SCATTERED}")
+    run_all(glint, f"tiny n.glint -o t.glint --cut {EXAMPLE} {SCATTERED}")
     ask = lambda u, v: number(glint(*f"query t.glint --uv {u} {v} --sigma 2 --half .05 .05".split()))
     here = ask(0.25, 0.5)
     assert len({here, ask(1.25, 0.5), ask(0.25, 7.5), ask(-1000000.75, 0.5)}) == 4
     (glint.folder / "q.csv").write_text("u,v,sigma,hx,hy\n1.25,.5,2,.05,.05\n0.25,7.5,2,.05,.05\n")
-    run(glint, "query t.glint --csv q.csv -o a.csv")
+    run_all(glint, "query t.glint --csv q.csv -o a.csv")
     answers = [float(line.split(",")[-1]) for line in (glint.folder / "a.csv").read_text().splitlines()[1:]]
     assert answers == pytest.approx([ask(1.25, 0.5), ask(0.25, 7.5)], rel=1e-6)
 
 
 def test_the_same_bytes_on_any_number_of_threads(glint, normals):
     for threads in (1, 2):
-        run(glint, f"tiny n.glint -o t.glint --force --cut {EXAMPLE} {SCATTERED} --threads {threads}")
+        run_all(glint, f"tiny n.glint -o t.glint --force --cut {EXAMPLE} {SCATTERED} --threads {threads}")
         if threads == 1:
             first = (glint.folder / "t.glint").read_bytes()
     assert first == (glint.folder / "t.glint").read_bytes()
@@ -195,7 +190,7 @@ def test_the_same_bytes_on_any_number_of_threads(glint, normals):
     ],
 )
 def test_bad_input_is_named(glint, options, code, text):
-    run(glint, "synth isotropic --size 64x48 -o map.exr", "ingest map.exr -o n.glint")
+    run_all(glint, "synth isotropic --size 64x48 -o map.exr", "ingest map.exr -o n.glint")
     files = {"singular": '{"matrix": [[1, 2], [2, 4]]}', "inside_out": '{"heights": -1}', "range": '{"scale": [1, 2]}', "unknown": '{"twist": 1}', "text": "{scale: 1}",
              "swapped": '{"scale": [2, 1]}', "large": '{"scale": [1, 5]}', "vast": '{"scale": 2, "stretch": 40}', "dwarf": '{"matrix": [[1e-4, 0], [0, 1e-4]]}'}
     for name, content in files.items():

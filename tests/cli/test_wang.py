@@ -6,16 +6,11 @@ import shutil
 import h5py
 import numpy as np
 import pytest
+from conftest import run_all
 
 MASK = 2**64 - 1
 G, Y = 0x9E3779B97F4A7C15, 0xD1342543DE82EF95
 FAR = 2**40
-
-
-def run(glint, *commands):
-    for command in commands:
-        process = glint(*command.split())
-        assert process.returncode == 0, process.stderr
 
 
 def result(process):
@@ -25,7 +20,7 @@ def result(process):
 
 @pytest.fixture
 def normals(glint):
-    run(glint, "synth isotropic --size 160x120 --alpha .3 -o map.exr", "ingest map.exr -o n.glint --texel-size-um 3")
+    run_all(glint, "synth isotropic --size 160x120 --alpha .3 -o map.exr", "ingest map.exr -o n.glint --texel-size-um 3")
     return glint.folder / "n.glint"
 
 
@@ -77,12 +72,12 @@ class Plane:
 
 @pytest.mark.parametrize("flags", ["--scheme corner", "--scheme edge", "--scheme edge --colors 2,3 --tiles 72", "--colors 2 --tiles 48"])
 def test_a_part_of_the_plane_is_what_the_specification_says(glint, normals, flags):
-    run(glint, f"wang n.glint -o w.glint --size 20 --seed 5 {flags}")
+    run_all(glint, f"wang n.glint -o w.glint --size 20 --seed 5 {flags}")
     assert glint("validate", "w.glint").returncode == 0
     plane = Plane(glint.folder / "w.glint")
     assert plane.count == {"--scheme edge --colors 2,3 --tiles 72": 72, "--colors 2 --tiles 48": 48}.get(flags, 16)
     for x, y in ((0, 0), (-33, 7), (FAR + 5, -FAR)):
-        run(glint, f"wang w.glint --explicit 70 45 --origin {x} {y} -o part.glint --force")
+        run_all(glint, f"wang w.glint --explicit 70 45 --origin {x} {y} -o part.glint --force")
         assert glint("validate", "part.glint").returncode == 0
         with h5py.File(glint.folder / "part.glint") as file:
             assert np.array_equal(np.array(file["normals"]), plane.part(x, y, 70, 45))
@@ -102,17 +97,17 @@ def test_the_report_is_in_the_asset(glint, normals):
 
 
 def test_the_same_bytes_on_any_number_of_threads(glint, normals):
-    run(glint, "wang n.glint -o w.glint --size 24 --threads 1")
+    run_all(glint, "wang n.glint -o w.glint --size 24 --threads 1")
     one = (glint.folder / "w.glint").read_bytes()
-    run(glint, "wang n.glint -o w.glint --size 24 --threads 2")
+    run_all(glint, "wang n.glint -o w.glint --size 24 --threads 2")
     assert (glint.folder / "w.glint").read_bytes() == one
-    run(glint, "wang n.glint -o w.glint --size 24 --seed 2")
+    run_all(glint, "wang n.glint -o w.glint --size 24 --seed 2")
     assert (glint.folder / "w.glint").read_bytes() != one
 
 
 def test_maps_of_any_shape_become_tiles(glint):
     for size, tile in (("300x17", 32), ("16", 16), ("33x90", 64), ("130", 64)):
-        run(glint, f"synth flakes --size {size} -o map.exr", "ingest map.exr -o n.glint --force")
+        run_all(glint, f"synth flakes --size {size} -o map.exr", "ingest map.exr -o n.glint --force")
         process = glint("wang", "n.glint", "-o", "w.glint", "--size", tile, "--json")
         report = result(process)
         smaller = min(map(int, size.split("x")))
@@ -122,13 +117,13 @@ def test_maps_of_any_shape_become_tiles(glint):
 
 
 def test_a_map_that_repeats_is_cut_across_its_border(glint):
-    run(glint, "synth isotropic --size 48 --alpha .3 -o map.exr", "ingest map.exr -o n.glint")
+    run_all(glint, "synth isotropic --size 48 --alpha .3 -o map.exr", "ingest map.exr -o n.glint")
     assert result(glint("wang", "n.glint", "-o", "w.glint", "--size", 48, "--boundary", "wrap", "--json"))["enlarged"] is False
     assert glint("validate", "w.glint").returncode == 0
 
 
 def test_a_constant_map_is_a_constant_plane(glint):
-    run(glint, "synth flat --size 40 -o map.exr", "ingest map.exr --allow-constant -o n.glint")
+    run_all(glint, "synth flat --size 40 -o map.exr", "ingest map.exr --allow-constant -o n.glint")
     report = result(glint("wang", "n.glint", "-o", "w.glint", "--size", 20, "--json"))
     assert (report["seam_cost"], report["ndf_tv"], report["repetition"]) == (0, 0, 0)
 
@@ -160,7 +155,7 @@ def test_what_cannot_be_is_refused(glint, normals, flags):
 
 
 def test_tiny_maps_and_other_kinds_are_refused(glint, normals):
-    run(glint, "synth isotropic --size 15x200 -o tiny.exr", "ingest tiny.exr -o tiny.glint", "wang n.glint -o w.glint --size 24")
+    run_all(glint, "synth isotropic --size 15x200 -o tiny.exr", "ingest tiny.exr -o tiny.glint", "wang n.glint -o w.glint --size 24")
     process = glint("wang", "tiny.glint", "-o", "out.glint", "--size", 16)
     assert process.returncode == 3 and "tiny.glint" in process.stderr and "16 x 16" in process.stderr
     process = glint("wang", "w.glint", "-o", "out.glint")
@@ -171,7 +166,7 @@ def test_tiny_maps_and_other_kinds_are_refused(glint, normals):
 
 
 def test_damaged_sides_and_texels_are_found(glint, normals):
-    run(glint, "wang n.glint -o w.glint --size 24")
+    run_all(glint, "wang n.glint -o w.glint --size 24")
     for place, value, rule in (((3, 0, 5, 0), 0.5, "wang.sides"), ((2, 9, 9, 1), float("nan"), "wang.disk"), ((5, 8, 8), (0.98, 0), "wang.slopes")):
         shutil.copy(glint.folder / "w.glint", glint.folder / "bad.glint")
         with h5py.File(glint.folder / "bad.glint", "r+") as file:
@@ -184,11 +179,11 @@ def test_damaged_sides_and_texels_are_found(glint, normals):
 @pytest.mark.parametrize("size", ["--sigma 3", "--cov 30 -12 9", "--box 9 2 -3 6", "--sigma 20"])
 @pytest.mark.parametrize("surface", ["flat", "smooth"])
 def test_the_plane_answers_as_a_map_of_it_does(glint, normals, size, surface):
-    run(glint, "wang n.glint -o w.glint --size 24 --seed 3")
+    run_all(glint, "wang n.glint -o w.glint --size 24 --seed 3")
     half = 2 * 150
     for x, y in ((12.25, 7.5), (24 * 5 + 0.5, -24 * 2 - 0.25), (FAR + 8.75, -FAR - 0.5)):
         left, low = int(np.floor(x)) - half, int(np.floor(y)) - half
-        run(glint, f"wang w.glint --explicit {2 * half} {2 * half} --origin {left} {low} -o part.glint --force")
+        run_all(glint, f"wang w.glint --explicit {2 * half} {2 * half} --origin {left} {low} -o part.glint --force")
         at = f"--uv {(x - left) / (2 * half)} {(y - low) / (2 * half)} {size} --surface {surface} --sigma-r .05"
         for asked in ("--half .1 -.05", "--range -.2 -.1 .1 .3"):
             expected = float(glint("query", "part.glint", *at.split(), *asked.split(), "--boundary", "clamp").stdout)
@@ -197,7 +192,7 @@ def test_the_plane_answers_as_a_map_of_it_does(glint, normals, size, surface):
 
 
 def test_pictures_of_the_plane(glint, normals):
-    run(glint, "wang n.glint -o w.glint --size 24", "query plane w.glint --texel 5 5 --sigma 4 --image ndf.exr --image-size 32 --sigma-r .05")
+    run_all(glint, "wang n.glint -o w.glint --size 24", "query plane w.glint --texel 5 5 --sigma 4 --image ndf.exr --image-size 32 --sigma-r .05")
     assert (glint.folder / "ndf.exr").exists()
 
 
@@ -216,7 +211,7 @@ BAD_QUERIES = {
 
 @pytest.mark.parametrize("command", BAD_QUERIES)
 def test_questions_that_cannot_be_are_refused(glint, normals, command):
-    run(glint, "wang n.glint -o w.glint --size 24")
+    run_all(glint, "wang n.glint -o w.glint --size 24")
     process = glint(*command.split())
     code, text = BAD_QUERIES[command]
     assert process.returncode == code and text in process.stderr and process.stdout == ""

@@ -6,21 +6,16 @@ import h5py
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from conftest import run_all
 
 SIZE, STRIDE, RESOLUTION, PERIOD, DEPTH_UM = 96, 32, 128, 16, 0.25
 PRINTED = 1e-6  # shell answers have nine digits
 HALVES = 2e-3  # both sides are rounded to half precision
 
 
-def run(glint, *commands):
-    for command in commands:
-        process = glint(*command.split())
-        assert process.returncode == 0, process.stderr
-
-
 @pytest.fixture
 def grating(glint):
-    run(glint, f"synth grating --height --texel-size-um 1 --depth-um {DEPTH_UM} --feature-size {PERIOD} --size {SIZE} -o g.exr",
+    run_all(glint, f"synth grating --height --texel-size-um 1 --depth-um {DEPTH_UM} --feature-size {PERIOD} --size {SIZE} -o g.exr",
         "ingest g.exr -o g.glint --kind height --to heights --height-scale-um 1 --texel-size-um 1")
     return glint.folder / "g.glint"
 
@@ -111,7 +106,7 @@ def test_spectral_channels_are_the_wavelengths_and_have_the_orders_of_the_gratin
 def test_image_is_in_colour(glint, grating):
     pyramid(glint, "w.glint")
     for name in ("ndf.exr", "ndf.png"):
-        run(glint, f"query w.glint --uv .5 .5 --sigma 20 --image {name}")
+        run_all(glint, f"query w.glint --uv .5 .5 --sigma 20 --image {name}")
         pixels = oiio.ImageBuf(str(glint.folder / name)).get_pixels(oiio.FLOAT)
         assert pixels.shape == (RESOLUTION, RESOLUTION, 3)
         # Orders of other wavelengths lie beside each other.
@@ -147,7 +142,7 @@ def test_options_that_have_no_answer_are_refused(glint, grating, options, code, 
 
 
 def test_inputs_that_have_no_answer_are_refused(glint, grating):
-    run(glint, "synth flakes --size 64 -o n.exr", "ingest n.exr -o n.glint", "ingest g.exr -o unknown.glint --kind height --to heights")
+    run_all(glint, "synth flakes --size 64 -o n.exr", "ingest n.exr -o n.glint", "ingest g.exr -o unknown.glint --kind height --to heights")
     process = glint("pyramid", "n.glint", "-o", "w.glint", "--optics", "wave")
     assert process.returncode == 5 and "kind normals" in process.stderr and "--to heights" in process.stderr
     process = glint("pyramid", "unknown.glint", "-o", "w.glint", "--optics", "wave")
@@ -156,7 +151,7 @@ def test_inputs_that_have_no_answer_are_refused(glint, grating):
     process = glint("pyramid", "n.glint", "-o", "w.glint", "--spectral")
     assert process.returncode == 1 and "add --optics wave" in process.stderr
     # Texels of a millimetre, and a coherence area of 10 um.
-    run(glint, "ingest g.exr -o wide.glint --kind height --to heights --texel-size-um 100000")
+    run_all(glint, "ingest g.exr -o wide.glint --kind height --to heights --texel-size-um 100000")
     process = glint("pyramid", "wide.glint", "-o", "w.glint", "--optics", "wave")
     assert process.returncode == 1 and "coherent images" in process.stderr and "--coherence-um" in process.stderr, process.stderr
     # A coherence area of centimetres asks for more samples than fit.

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <random>
 #include <set>
@@ -325,6 +326,32 @@ TEST(TinyExampleNdf, OfFewExamplesIsNearThePlaneOverManyCells) {
                                                         Surface::flat, Boundary::wrap, on_map, kImage);
   const Footprint on_plane = Footprint::isotropic({0.5f * kTexels / kSize, 0.5f * kTexels / kSize}, kSigma);
   EXPECT_LT(bake::imageErrors(imageOf(model, on_plane), truth, kImage).tv, 0.05);
+}
+
+TEST(GaussianLattice, InsideASquareVisitsItsPointsAlone) {
+  const GaussianLattice lattice({400, 120, 90}, 1, 0);
+  std::map<std::pair<int, int>, float> all, inside;
+  lattice.forEach(7.3, -2.1, [&](int i, int j, float weight) { all[{i, j}] = weight; });
+  int visits = 0;
+  lattice.forEachInside(7.3, -2.1, -5, 10, [&](int i, int j, float weight) {
+    inside[{i, j}] = weight;
+    ++visits;
+  });
+  EXPECT_EQ(visits, static_cast<int>(inside.size()));
+  std::size_t expected = 0;
+  constexpr float kRounding = 1e-4f;  // each weight of a row is the one before times a ratio, and rows begin elsewhere
+  for (const auto& [at, weight] : all) {
+    if (std::min(at.first, at.second) < -5 || std::max(at.first, at.second) > 10) continue;
+    ++expected;
+    ASSERT_TRUE(inside.contains(at));
+    EXPECT_NEAR(inside[at], weight, kRounding);
+  }
+  EXPECT_EQ(inside.size(), expected);
+  EXPECT_GT(expected, 100u);
+  // However wide the footprint: no more than the square.
+  visits = 0;
+  GaussianLattice({1e12, 0, 1e12}, 1, 0).forEachInside(0, 0, 0, 15, [&](int, int, float) { ++visits; });
+  EXPECT_EQ(visits, 256);
 }
 
 TEST(TinyExampleNdf, OfTinyExamplesFarApartVisitsOnlyTheirTiles) {

@@ -6,8 +6,8 @@
 
 #include "common/ndf_image.h"
 #include "glint-bench/bench_times.h"
+#include "glint-bench/lab/ndf_figures.h"
 #include "glint-bench/presets/preset.h"
-#include "glint-bench/stability/ndf_figures.h"
 #include "glint-bench/workload.h"
 #include "glint/model/bin_map.h"
 

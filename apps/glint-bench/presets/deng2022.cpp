@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "glint-bench/bench_times.h"
+#include "glint-bench/lab/ndf_figures.h"
 #include "glint-bench/presets/preset.h"
-#include "glint-bench/stability/ndf_figures.h"
 #include "glint-bench/workload.h"
 
 namespace glint::apps {

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
+#include "glint-bench/lab/ndf_figures.h"
+#include "glint-bench/lab/sun_light.h"
 #include "glint-bench/presets/preset.h"
-#include "glint-bench/stability/ndf_figures.h"
-#include "glint-bench/stability/sun_light.h"
 #include "glint/bake/sh/lobes.h"
 
 namespace glint::apps {

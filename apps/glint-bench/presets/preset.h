@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "glint-bench/stability/stability_lab.h"
+#include "glint-bench/lab/bench_lab.h"
 
 namespace glint::apps {
 
@@ -24,7 +24,7 @@ struct PresetRow {
 /// What the steps of a preset work with.
 struct PresetRun {
   Tool& tool;
-  StabilityLab& lab;
+  BenchLab& lab;
   bool quick;
   std::vector<PresetRow>& rows;
 

@@ -53,7 +53,7 @@ void readAll(const Json& document) {
 Json runPreset(Tool& tool, const AssetFolder& folder, const std::string& name, bool quick) {
   const std::vector<Preset> all = presets();
   const Preset& preset = *std::find_if(all.begin(), all.end(), [&](const Preset& p) { return p.name == name; });
-  StabilityLab lab(tool, folder, quick);
+  BenchLab lab(tool, folder, quick);
   std::vector<PresetRow> rows;
   PresetRun run{tool, lab, quick, rows};
   const bake::ProgressFn progress = tool.progress("tables and plots");

@@ -3,8 +3,8 @@
 #include <chrono>
 #include <cmath>
 
+#include "glint-bench/lab/white_furnace.h"
 #include "glint-bench/presets/preset.h"
-#include "glint-bench/stability/white_furnace.h"
 #include "glint/bake/displace/displace.h"
 
 namespace glint::apps {

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
-#include "glint-bench/stability/ndf_figures.h"
+#include "glint-bench/lab/ndf_figures.h"
+#include "glint-bench/stability/stability_test.h"
 
 /// Compression by too few columns, too many, and on maps that differ by chance only.
 namespace glint::apps {
@@ -14,13 +15,13 @@ Candidate cpOfRank(int rank) {
   return {"cp", "rank " + text, "glint-compress", {"--method", "cp", "--rank", text}, "pyramid, stride 32", true};
 }
 
-const LabMap& flakes(StabilityLab& lab, std::uint64_t seed) {
+const LabMap& flakes(BenchLab& lab, std::uint64_t seed) {
   bake::SynthOptions options = lab.typical(bake::SynthKind::flakes);
   options.seed = seed;
   return lab.map(options);
 }
 
-void measureRanks(StabilityLab& lab, double rank, StabilityCurves& curves) {
+void measureRanks(BenchLab& lab, double rank, StabilityCurves& curves) {
   const LabMap& map = flakes(lab, lab.seed());
   const ImageTruth truth(map, roundFootprints(lab.seed(), 4 * lab.places(), kSigma));
   try {
@@ -33,13 +34,13 @@ void measureRanks(StabilityLab& lab, double rank, StabilityCurves& curves) {
   }
 }
 
-void measureSeeds(StabilityLab& lab, double seed, StabilityCurves& curves) {
+void measureSeeds(BenchLab& lab, double seed, StabilityCurves& curves) {
   const LabMap& map = flakes(lab, static_cast<std::uint64_t>(seed));
   const ImageTruth truth(map, roundFootprints(lab.seed(), 4 * lab.places(), kSigma));
   std::vector<Candidate> compressed;
-  for (const Candidate& c : StabilityLab::methods())
+  for (const Candidate& c : BenchLab::methods())
     if (c.tool == "glint-compress") compressed.push_back(c);
-  lab.forEach(curves, compressed, map, {}, [&](const api::OpenedNdf& ndf) { return truth.seen(ndf); });
+  addEach(curves, lab, compressed, map, {}, [&](const api::OpenedNdf& ndf) { return truth.seen(ndf); });
 }
 
 }  // namespace

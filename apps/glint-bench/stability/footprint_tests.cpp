@@ -1,7 +1,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "glint-bench/stability/ndf_figures.h"
+#include "glint-bench/lab/ndf_figures.h"
+#include "glint-bench/stability/stability_test.h"
 #include "glint/bake/common/counter_random.h"
 
 /// Footprints of all sizes and shapes: total variation between a method's images and brute force.
@@ -13,29 +14,29 @@ constexpr double kTolerable = 0.05;
 
 /// Total variation of every method.
 /// @param from_texels  whether to ask the pyramid with --normals too, as a series of its own
-void compareImages(StabilityLab& lab, StabilityCurves& curves, const LabMap& map, std::vector<Footprint> footprints,
+void compareImages(BenchLab& lab, StabilityCurves& curves, const LabMap& map, std::vector<Footprint> footprints,
                    LabQuestion question, bool from_texels) {
   const ImageTruth truth(map, std::move(footprints), question);
   const auto variation = [&](const api::OpenedNdf& ndf) { return truth.variation(ndf); };
-  lab.forEach(curves, StabilityLab::methods(), map, question, variation);
+  addEach(curves, lab, BenchLab::methods(), map, question, variation);
   if (!from_texels) return;
   question.normals_below_level_0 = true;
-  std::vector<Candidate> pyramid = StabilityLab::methods();
+  std::vector<Candidate> pyramid = BenchLab::methods();
   std::erase_if(pyramid, [](const Candidate& c) { return c.method != "pyramid"; });
   StabilityCurves added;
-  lab.forEach(added, pyramid, map, question, variation);
+  addEach(added, lab, pyramid, map, question, variation);
   for (const StabilityCurves::Point& p : added.points()) {
     const std::string series = p.series + ", --normals";
     p.message.empty() ? curves.add(series, p.value) : curves.fail(series, p.message);
   }
 }
 
-void measureSizes(StabilityLab& lab, double sigma, StabilityCurves& curves) {
+void measureSizes(BenchLab& lab, double sigma, StabilityCurves& curves) {
   const LabMap& map = lab.map(lab.typical(bake::SynthKind::scratches));
   compareImages(lab, curves, map, roundFootprints(lab.seed(), lab.places(), static_cast<float>(sigma)), {}, true);
 }
 
-void measureAspects(StabilityLab& lab, double aspect, StabilityCurves& curves) {
+void measureAspects(BenchLab& lab, double aspect, StabilityCurves& curves) {
   constexpr float kSigma = 12;
   constexpr std::uint64_t kStream = 4000;
   std::vector<Footprint> footprints;
@@ -50,7 +51,7 @@ void measureAspects(StabilityLab& lab, double aspect, StabilityCurves& curves) {
   compareImages(lab, curves, lab.map(lab.typical(bake::SynthKind::scratches)), std::move(footprints), {}, true);
 }
 
-void measureSmoothSurfaces(StabilityLab& lab, double sigma, StabilityCurves& curves) {
+void measureSmoothSurfaces(BenchLab& lab, double sigma, StabilityCurves& curves) {
   // An image of triangles costs a quadrature for each pixel and triangle.
   constexpr std::size_t kPlaces = 3;
   constexpr double kLargestFromTexels = 2;

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "glint-bench/lab/sun_light.h"
 #include "glint-bench/stability/stability_test.h"
-#include "glint-bench/stability/sun_light.h"
 
 /// Series of spherical harmonics that end too early.
 namespace glint::apps {
@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kTolerable = 0.01;  // of the brightest answer
 
-void measureOrders(StabilityLab&, double order, StabilityCurves& curves) {
+void measureOrders(BenchLab&, double order, StabilityCurves& curves) {
   const bake::Environment light = sunLight();
   for (const auto& [series, window] :
        {std::pair{"no window", ShWindow::none}, {"lanczos", ShWindow::lanczos}, {"hann", ShWindow::hann}}) {

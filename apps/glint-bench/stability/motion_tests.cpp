@@ -1,7 +1,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "glint-bench/stability/ndf_figures.h"
+#include "glint-bench/lab/ndf_figures.h"
+#include "glint-bench/stability/stability_test.h"
+#include "glint-bench/workload.h"
 #include "glint/bake/common/counter_random.h"
 
 /// Flicker (section 3 of the design): what changes from frame to frame that the surface does not change.
@@ -13,24 +15,14 @@ constexpr int kHalvesOfPlace = 4;
 /// Flicker over the truth's: a tenth more is not seen beside the truth's own.
 constexpr double kTolerable = 1.1;
 
-/// A half vector that some texel of a footprint has: a normal about a deviation from its centre.
-Vec2 litHalf(const NormalMap& map, const Footprint& footprint, std::uint64_t seed, std::uint64_t index) {
-  const float sigma = std::sqrt(footprint.covariance.xx);
-  const Vec2 away = bake::randomGaussians(seed, kStream + 1, index);
-  const auto texel = [](float centre, float offset, int size) {
-    const auto at = static_cast<int>(std::floor(centre * static_cast<float>(size) + offset));
-    return (at % size + size) % size;
-  };
-  return map.at(texel(footprint.centre.x, sigma * away.x, map.width), texel(footprint.centre.y, sigma * away.y, map.height));
-}
-
 /// Paths of a footprint, each towards some lit half vectors.
 /// @param step  (int k) -> the question at step k, from -steps to steps
 template <class Step>
 void addPaths(std::vector<Path>& paths, const NormalMap& map, const Footprint& start, std::uint64_t seed, int steps,
               Step&& step) {
   for (int k = 0; k < kHalvesOfPlace; ++k) {
-    const Vec2 half = litHalf(map, start, seed, paths.size());
+    const Vec2 away = bake::randomGaussians(seed, kStream + 1, paths.size());
+    const Vec2 half = litNormal(map, start.centre, std::sqrt(start.covariance.xx), away);
     Path& path = paths.emplace_back();
     for (int s = -steps; s <= steps; ++s) path.push_back(step(s, half));
   }
@@ -38,7 +30,7 @@ void addPaths(std::vector<Path>& paths, const NormalMap& map, const Footprint& s
 
 /// A footprint that moves in a random direction by 1/8 of a texel, through a random place or through a point of the border of
 /// the map at u = 0.
-std::vector<Path> movingPaths(const StabilityLab& lab, const NormalMap& map, float sigma, bool over_border) {
+std::vector<Path> movingPaths(const BenchLab& lab, const NormalMap& map, float sigma, bool over_border) {
   constexpr int kSteps = 32;
   constexpr float kStep = 0.125f;
   std::vector<Path> paths;
@@ -56,7 +48,7 @@ std::vector<Path> movingPaths(const StabilityLab& lab, const NormalMap& map, flo
 }
 
 /// A footprint that grows by 1 % a step, over an octave.
-std::vector<Path> growingPaths(const StabilityLab& lab, const NormalMap& map, float sigma) {
+std::vector<Path> growingPaths(const BenchLab& lab, const NormalMap& map, float sigma) {
   constexpr int kSteps = 35;
   std::vector<Path> paths;
   for (const Footprint& start : roundFootprints(lab.seed(), lab.places(), sigma)) {
@@ -68,7 +60,7 @@ std::vector<Path> growingPaths(const StabilityLab& lab, const NormalMap& map, fl
 }
 
 /// A light that turns, so that the half vector moves by 1/1024 of the disk's width a step, over more than a block of images.
-std::vector<Path> turningPaths(const StabilityLab& lab, const NormalMap& map, float sigma) {
+std::vector<Path> turningPaths(const BenchLab& lab, const NormalMap& map, float sigma) {
   constexpr int kSteps = 40;
   constexpr float kStep = 2.0f / 1024;
   std::vector<Path> paths;
@@ -90,16 +82,16 @@ std::vector<Path> withBoxes(std::vector<Path> paths) {
 }
 
 /// Flicker of every method over that of the truth for the footprints it knows.
-void compareFlicker(StabilityLab& lab, StabilityCurves& curves, const LabMap& map, const std::vector<Path>& paths) {
+void compareFlicker(BenchLab& lab, StabilityCurves& curves, const LabMap& map, const std::vector<Path>& paths) {
   const LabQuestion question{.normals_below_level_0 = true};
-  const api::OpenedNdf truth = StabilityLab::truth(map, question);
+  const api::OpenedNdf truth = BenchLab::truth(map, question);
   const double of_gaussians = flicker(truth, paths), of_boxes = flicker(truth, withBoxes(paths));
-  lab.forEach(curves, StabilityLab::methods(), map, question, [&](const api::OpenedNdf& ndf) {
+  addEach(curves, lab, BenchLab::methods(), map, question, [&](const api::OpenedNdf& ndf) {
     return flicker(ndf, paths) / (ndf.info().shapes.gaussians ? of_gaussians : of_boxes);
   });
 }
 
-using MakePaths = std::vector<Path> (*)(const StabilityLab&, const NormalMap&, float);
+using MakePaths = std::vector<Path> (*)(const BenchLab&, const NormalMap&, float);
 
 StabilityTest flickerTest(const std::string& name, const std::string& title, const std::string& change,
                           const std::string& instead, MakePaths paths) {
@@ -110,7 +102,7 @@ StabilityTest flickerTest(const std::string& name, const std::string& title, con
   test.axis = "deviation of the footprint, texels", test.figure = "flicker over the truth's";
   test.tolerable = kTolerable;
   test.values = {2, 4, 8, 16, 32}, test.quick_values = {4, 16};
-  test.measure = [paths](StabilityLab& lab, double sigma, StabilityCurves& curves) {
+  test.measure = [paths](BenchLab& lab, double sigma, StabilityCurves& curves) {
     const LabMap& map = lab.map(lab.typical(bake::SynthKind::flakes));
     compareFlicker(lab, curves, map, paths(lab, map.normals(), static_cast<float>(sigma)));
   };
@@ -118,14 +110,14 @@ StabilityTest flickerTest(const std::string& name, const std::string& title, con
 }
 
 /// The density of brute force is so even in the size that its flicker is no measure: second differences over densities.
-void measureGrowth(StabilityLab& lab, double sigma, StabilityCurves& curves) {
+void measureGrowth(BenchLab& lab, double sigma, StabilityCurves& curves) {
   const LabMap& map = lab.map(lab.typical(bake::SynthKind::flakes));
   const LabQuestion question{.normals_below_level_0 = true};
   const std::vector<Path> paths = growingPaths(lab, map.normals(), static_cast<float>(sigma));
-  const api::OpenedNdf truth = StabilityLab::truth(map, question);
+  const api::OpenedNdf truth = BenchLab::truth(map, question);
   curves.add("brute force", flicker(truth, paths));
   curves.add("brute force, boxes", flicker(truth, withBoxes(paths)));
-  lab.forEach(curves, StabilityLab::methods(), map, question, [&](const api::OpenedNdf& ndf) { return flicker(ndf, paths); });
+  addEach(curves, lab, BenchLab::methods(), map, question, [&](const api::OpenedNdf& ndf) { return flicker(ndf, paths); });
 }
 
 }  // namespace
@@ -134,13 +126,11 @@ std::vector<StabilityTest> motionTests() {
   const std::string finer =
       "Take a bin map, which flickers as brute force does; or a pyramid with --normals for small footprints.";
   return {
-      flickerTest(
-          "moving", "The footprint moves", "Footprints move by 1/8 of a texel a step.", finer,
-          [](const StabilityLab& lab, const NormalMap& map, float sigma) { return movingPaths(lab, map, sigma, false); }),
-      flickerTest(
-          "border", "The footprint moves over the border of the map",
-          "Footprints move by 1/8 of a texel a step, over u = 0, where cells, clusters and the map end.", finer,
-          [](const StabilityLab& lab, const NormalMap& map, float sigma) { return movingPaths(lab, map, sigma, true); }),
+      flickerTest("moving", "The footprint moves", "Footprints move by 1/8 of a texel a step.", finer,
+                  [](const BenchLab& lab, const NormalMap& map, float sigma) { return movingPaths(lab, map, sigma, false); }),
+      flickerTest("border", "The footprint moves over the border of the map",
+                  "Footprints move by 1/8 of a texel a step, over u = 0, where cells, clusters and the map end.", finer,
+                  [](const BenchLab& lab, const NormalMap& map, float sigma) { return movingPaths(lab, map, sigma, true); }),
       {"growing",
        "The footprint grows",
        "Flakes. Footprints grow by 1 % a step, over an octave around the size. The figure is the RMS of second differences "

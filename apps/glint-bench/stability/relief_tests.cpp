@@ -1,5 +1,6 @@
-#include "glint-bench/stability/stability_lab.h"
-#include "glint-bench/stability/white_furnace.h"
+#include "glint-bench/lab/bench_lab.h"
+#include "glint-bench/lab/white_furnace.h"
+#include "glint-bench/stability/stability_test.h"
 #include "glint/bake/displace/displace.h"
 
 /// Downsampled displacement of deep relief.
@@ -10,19 +11,19 @@ constexpr double kTolerable = 0.05;
 constexpr int kFactor = 32;
 
 /// A weave of white threads with this slope.
-std::vector<float> weave(const StabilityLab& lab, double slope) {
+std::vector<float> weave(const BenchLab& lab, double slope) {
   bake::SynthOptions options = lab.typical(bake::SynthKind::weave);
   options.slope = static_cast<float>(slope);
   return bake::synthHeights(options);
 }
 
-bake::DisplacementData downsampled(const StabilityLab& lab, const std::vector<float>& heights, int spatial) {
+bake::DisplacementData downsampled(const BenchLab& lab, const std::vector<float>& heights, int spatial) {
   bake::DisplaceOptions made;
   made.factors = {kFactor}, made.spatial = spatial, made.seed = lab.seed();
   return bake::displace({lab.mapSize(), lab.mapSize(), 0, heights}, made);
 }
 
-void measureDepth(StabilityLab& lab, double slope, StabilityCurves& curves) {
+void measureDepth(BenchLab& lab, double slope, StabilityCurves& curves) {
   constexpr int kPatches = 4;
   const bake::DisplacementData data = downsampled(lab, weave(lab, slope), kPatches);
   const Displacement asset = data.view();
@@ -34,7 +35,7 @@ void measureDepth(StabilityLab& lab, double slope, StabilityCurves& curves) {
   }
 }
 
-void measureFactors(StabilityLab& lab, double slope, StabilityCurves& curves) {
+void measureFactors(BenchLab& lab, double slope, StabilityCurves& curves) {
   std::vector<float> heights = weave(lab, slope);
   fadeRelief(heights, lab.mapSize());
   for (const int patches : {1, 4, 8}) {

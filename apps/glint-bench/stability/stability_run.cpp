@@ -6,8 +6,8 @@
 #include <cmath>
 #include <map>
 
+#include "glint-bench/lab/bench_lab.h"
 #include "glint-bench/result_file.h"
-#include "glint-bench/stability/stability_lab.h"
 #include "glint-bench/stability/stability_test.h"
 
 namespace glint::apps {
@@ -19,6 +19,17 @@ std::vector<StabilityTest> stabilityTests() {
   for (const auto& group : {motionTests(), footprintTests(), surfaceTests(), compressionTests(), lightTests(), reliefTests()})
     all.insert(all.end(), group.begin(), group.end());
   return all;
+}
+
+void addEach(StabilityCurves& curves, BenchLab& lab, const std::vector<Candidate>& methods, const LabMap& map,
+             const LabQuestion& question, const std::function<double(const api::OpenedNdf&)>& value) {
+  for (const Candidate& method : methods) {
+    try {
+      curves.add(method.name(), value(lab.open(map, method, question)));
+    } catch (const std::exception& error) {
+      curves.fail(method.name(), error.what());
+    }
+  }
 }
 
 std::vector<std::string> stabilityNames() {
@@ -78,7 +89,7 @@ Json runStability(Tool& tool, const AssetFolder& folder, const std::vector<std::
                   {"tests", Json::array()}};
   for (const StabilityTest& test : tests) {
     StabilityCurves curves;
-    StabilityLab lab(tool, folder, quick);
+    BenchLab lab(tool, folder, quick);
     for (const double x : quick ? test.quick_values : test.values) {
       curves.at(x);
       try {

@@ -5,9 +5,9 @@
 #include <string_view>
 #include <vector>
 
-namespace glint::apps {
+#include "glint-bench/lab/bench_lab.h"
 
-class StabilityLab;
+namespace glint::apps {
 
 /// The curves of one test: a figure of each method for each value of what is changed.
 class StabilityCurves {
@@ -44,8 +44,12 @@ struct StabilityTest {
   std::string instead;                       ///< one sentence: what to do where a method does not hold
   std::vector<double> values, quick_values;  ///< of the axis, ascending
   /// Measures at one value, and adds a point for each series.
-  std::function<void(StabilityLab&, double, StabilityCurves&)> measure;
+  std::function<void(BenchLab&, double, StabilityCurves&)> measure;
 };
+
+/// Adds the value of every method that has one. What fails is in the message of its point.
+void addEach(StabilityCurves& curves, BenchLab& lab, const std::vector<Candidate>& methods, const LabMap& map,
+             const LabQuestion& question, const std::function<double(const api::OpenedNdf&)>& value);
 
 /// Every test, in the order of the page. This is the one list.
 std::vector<StabilityTest> stabilityTests();

@@ -1,6 +1,7 @@
 #include <cmath>
 
-#include "glint-bench/stability/ndf_figures.h"
+#include "glint-bench/lab/ndf_figures.h"
+#include "glint-bench/stability/stability_test.h"
 
 /// Maps and materials that make methods fail.
 namespace glint::apps {
@@ -10,49 +11,49 @@ constexpr float kSigma = 20;  // of footprints, texels: more than that of level 
 constexpr double kTolerableSeen = 0.2, kTolerableVariation = 0.05;
 
 /// Total variation of every method on one map.
-void compareImages(StabilityLab& lab, StabilityCurves& curves, const LabMap& map, const LabQuestion& question = {}) {
+void compareImages(BenchLab& lab, StabilityCurves& curves, const LabMap& map, const LabQuestion& question = {}) {
   const ImageTruth truth(map, roundFootprints(lab.seed(), lab.places(), kSigma), question);
-  lab.forEach(curves, StabilityLab::methods(), map, question, [&](const api::OpenedNdf& ndf) { return truth.variation(ndf); });
+  addEach(curves, lab, BenchLab::methods(), map, question, [&](const api::OpenedNdf& ndf) { return truth.variation(ndf); });
 }
 
 /// Seen error of every method, over half vectors of one length.
-void compareRing(StabilityLab& lab, StabilityCurves& curves, const LabMap& map, double radius) {
+void compareRing(BenchLab& lab, StabilityCurves& curves, const LabMap& map, double radius) {
   constexpr double kWidth = 0.1;
   const ImageTruth truth(map, roundFootprints(lab.seed(), 4 * lab.places(), kSigma));
-  lab.forEach(curves, StabilityLab::methods(), map, {},
-              [&](const api::OpenedNdf& ndf) { return truth.seenInRing(ndf, radius - 0.5 * kWidth, radius + 0.5 * kWidth); });
+  addEach(curves, lab, BenchLab::methods(), map, {},
+          [&](const api::OpenedNdf& ndf) { return truth.seenInRing(ndf, radius - 0.5 * kWidth, radius + 0.5 * kWidth); });
 }
 
-void measureRoughness(StabilityLab& lab, double sigma_r, StabilityCurves& curves) {
+void measureRoughness(BenchLab& lab, double sigma_r, StabilityCurves& curves) {
   const LabMap& map = lab.map(lab.typical(bake::SynthKind::flakes));
   compareImages(lab, curves, map, {.sigma_r = static_cast<float>(sigma_r)});
 }
 
-void measureSteepness(StabilityLab& lab, double alpha, StabilityCurves& curves) {
+void measureSteepness(BenchLab& lab, double alpha, StabilityCurves& curves) {
   bake::SynthOptions options = lab.typical(bake::SynthKind::isotropic);
   options.alpha = static_cast<float>(alpha);
   compareImages(lab, curves, lab.map(options));
 }
 
-void measureGrazing(StabilityLab& lab, double radius, StabilityCurves& curves) {
+void measureGrazing(BenchLab& lab, double radius, StabilityCurves& curves) {
   bake::SynthOptions options = lab.typical(bake::SynthKind::isotropic);
   options.alpha = 0.8f;
   compareRing(lab, curves, lab.map(options), radius);
 }
 
-void measureDimDirections(StabilityLab& lab, double radius, StabilityCurves& curves) {
+void measureDimDirections(BenchLab& lab, double radius, StabilityCurves& curves) {
   compareRing(lab, curves, lab.map(lab.typical(bake::SynthKind::scratches)), radius);
 }
 
 /// A map of one normal. Its NDF is one lobe, which a method puts in its place or not.
-void measureOneDirection(StabilityLab& lab, double length, StabilityCurves& curves) {
+void measureOneDirection(BenchLab& lab, double length, StabilityCurves& curves) {
   const Vec2 normal = {0.8f * static_cast<float>(length), 0.6f * static_cast<float>(length)};
   const int size = lab.mapSize();
   compareImages(lab, curves, lab.map(size, size, std::vector<Vec2>(static_cast<std::size_t>(size) * size, normal)));
 }
 
 /// Grooves of two directions.
-void measureTwoLobes(StabilityLab& lab, double slope, StabilityCurves& curves) {
+void measureTwoLobes(BenchLab& lab, double slope, StabilityCurves& curves) {
   bake::SynthOptions options = lab.typical(bake::SynthKind::sawtooth);
   options.slope = static_cast<float>(slope);
   compareImages(lab, curves, lab.map(options));
@@ -70,7 +71,7 @@ std::vector<Vec2> throughEightBits(const NormalMap& map, bake::Dequantize dequan
 }
 
 /// Brute force over the stored texels against brute force over the original ones.
-void measureEightBits(StabilityLab& lab, double sigma_r, StabilityCurves& curves) {
+void measureEightBits(BenchLab& lab, double sigma_r, StabilityCurves& curves) {
   bake::SynthOptions options = lab.typical(bake::SynthKind::isotropic);
   options.alpha = 0.05f;
   const LabQuestion question{.sigma_r = static_cast<float>(sigma_r)};

@@ -4,20 +4,16 @@
 #include <cstdint>
 #include <numbers>
 
+#include "glint/math/hash.h"
 #include "glint/math/vec.h"
 
 namespace glint::bake {
 
-/// 64 random bits for element `index` of stream `stream`: the finaliser of SplitMix64 over a counter. Any thread can draw the
+/// 64 random bits for element `index` of stream `stream`: mixBits of a counter. Any thread can draw the
 /// numbers of any element, so results do not depend on the order of the work.
 inline std::uint64_t randomBits(std::uint64_t seed, std::uint64_t stream, std::uint64_t index) {
-  const auto mix = [](std::uint64_t z) {
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  };
-  const std::uint64_t key = mix(seed + 0x9e3779b97f4a7c15u * (stream + 1));
-  return mix(key + 0x9e3779b97f4a7c15u * (index + 1));
+  const std::uint64_t key = mixBits(seed + kCounterStep * (stream + 1));
+  return mixBits(key + kCounterStep * (index + 1));
 }
 
 /// Two independent numbers, uniform in the open interval (0, 1).

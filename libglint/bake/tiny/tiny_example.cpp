@@ -62,12 +62,12 @@ void checkTransforms(const TinyOptions& o) {
                   "give one whose determinant is not 0");
     return;
   }
-  const float reach = CellExamples::reach(o.transforms);
+  const float reach = o.transforms.reach();
   if (!(reach <= TinyExample::kMostReach))
     throw Error(ErrorCode::usage, "tiny.reach", {}, "--transforms",
                 fmt::format("examples reach {:.2g} cells from their centre", reach),
                 fmt::format("give a smaller scale, stretch or shear: at most {:.2g} cells", TinyExample::kMostReach));
-  const float sigma = ScatteredPieces::sigmaInCells(o.density, reach);
+  const float sigma = TinyExample::sigmaInCells(o.density, reach);
   if (!(sigma >= TinyExample::kLeastSigmaInCells))
     throw Error(
         ErrorCode::usage, "tiny.density", {}, "--density",

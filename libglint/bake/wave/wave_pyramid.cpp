@@ -62,11 +62,6 @@ MapSlopes slopesOf(const HeightMap& map) {
            rounded(std::max(sums[4] - sums[1] * sums[1], 0.0))}};
 }
 
-/// Deviation of the spot of a flat surface: lambda / (4 pi sqrt(2) sigma_c).
-double spotDeviation(double wavelength_um, double coherence_um) {
-  return wavelength_um / (4 * std::numbers::pi * std::numbers::sqrt2 * coherence_um);
-}
-
 /// Largest share of light where aliasing begins, of a few places all over the map.
 double borderShare(const HeightSpline& spline, double texel_um, const WaveGrid& grid) {
   constexpr int kPlaces = 4;  // along each axis
@@ -135,6 +130,7 @@ class FinestLevel {
         texel_um_(double{pyramid.shape.texel_size_um}),
         sigma_(double{kFootprintPerStride} * shape_.levels[0].stride),
         rows_v_(centresAlong(shape_, 0, 1)),
+        most_pixels_(mostPixels(grids_)),
         mean_(emptyImage()) {
     const double gap = std::min(double{options.coherence_um} / texel_um_, sigma_) / double{options.kernels};
     kernel_columns_ = std::max(1, static_cast<int>(std::ceil(shape_.width / gap)));
@@ -148,11 +144,7 @@ class FinestLevel {
     first_row_ = std::min<std::ptrdiff_t>(0, static_cast<std::ptrdiff_t>(std::floor((rows_v_.front() - reach) * per_texel)));
     end_row_ =
         std::max<std::ptrdiff_t>(kernel_rows_, static_cast<std::ptrdiff_t>(std::ceil((rows_v_.back() + reach) * per_texel)));
-    for (const WaveGrid& grid : grids_) {
-      imagers_.emplace_back(std::make_unique<CoherentImager>(grid));
-      most_pixels_ = std::max(most_pixels_, grid.pixels());
-    }
-    mean_ = emptyImage();
+    for (const WaveGrid& grid : grids_) imagers_.emplace_back(std::make_unique<CoherentImager>(grid));
   }
 
   std::size_t unitsOfWork() const { return static_cast<std::size_t>(end_row_ - first_row_) * grids_.size(); }
@@ -184,6 +176,11 @@ class FinestLevel {
   }
 
  private:
+  static int mostPixels(const std::vector<WaveGrid>& grids) {
+    int most = 2;
+    for (const WaveGrid& grid : grids) most = std::max(most, grid.pixels());
+    return most;
+  }
   DenseImage emptyImage() const { return {shape_.resolution, most_pixels_ / 2, pyramid_.shape.channels}; }
   double rowGap() const { return static_cast<double>(shape_.height) / kernel_rows_; }
   /// Position of a row of kernels, texels, counted beyond the map.
@@ -269,7 +266,7 @@ class FinestLevel {
   const PyramidShape& shape_;
   double texel_um_, sigma_;  // sigma_: of footprints, texels
   std::vector<double> rows_v_, kernels_u_;
-  int kernel_columns_ = 0, kernel_rows_ = 0, most_pixels_ = 2;
+  int kernel_columns_ = 0, kernel_rows_ = 0, most_pixels_;
   std::ptrdiff_t first_row_ = 0, end_row_ = 0;
   std::vector<std::vector<float>> shares_u_;  // [columns + 1][kernel_columns]
   std::vector<std::unique_ptr<CoherentImager>> imagers_;

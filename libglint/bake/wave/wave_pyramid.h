@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <numbers>
 #include <vector>
 
 #include "glint/bake/common/progress.h"
@@ -54,6 +55,11 @@ class WavePyramidData {
   /// Spans over the arrays; valid while this object lives and is not changed.
   WavePyramid view() const;
 };
+
+/// Deviation of the spot of a flat surface, units of psi: lambda / (4 pi sqrt(2) sigma_c).
+inline double spotDeviation(double wavelength_um, double coherence_um) {
+  return wavelength_um / (4 * std::numbers::pi * std::numbers::sqrt2 * coherence_um);
+}
 
 /// Checks what can be checked without computing: options, and that the size of a texel is known.
 /// @throws Error as buildWavePyramid does

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "glint/math/hash.h"
 #include "glint/model/tiny_example.h"
 #include "glint/query/detail/tiny/normal_turn.h"
 
@@ -27,13 +28,6 @@ struct PlacedExample {
   GLINT_HD Vec2 local(Vec2 point) const { return inverse * (point - centre); }
 };
 
-/// 64 random bits: the finaliser of SplitMix64 over a counter.
-GLINT_HD constexpr std::uint64_t mixBits(std::uint64_t z) {
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return z ^ (z >> 31);
-}
-
 /// The noise that places examples: the examples of each cell, drawn from a hash of the cell's number, so that any cell is known
 /// without its neighbours. Numbers of examples follow Poisson's distribution and centres are even, as of points without order.
 class CellExamples {
@@ -53,8 +47,8 @@ class CellExamples {
   }
 
   GLINT_HD std::uint64_t key(std::int64_t cell_x, std::int64_t cell_y) const {
-    return mixBits(mixBits(mixBits(seed_ + kStep) + static_cast<std::uint64_t>(cell_x) * kStep) +
-                   static_cast<std::uint64_t>(cell_y) * kStep);
+    return mixBits(mixBits(mixBits(seed_ + kCounterStep) + static_cast<std::uint64_t>(cell_x) * kCounterStep) +
+                   static_cast<std::uint64_t>(cell_y) * kCounterStep);
   }
   GLINT_HD int count(std::uint64_t key) const {
     const auto bits = static_cast<std::uint32_t>(mixBits(key) >> 32);
@@ -84,19 +78,9 @@ class CellExamples {
                           0.5f * size_ * (std::fabs(m.yx) + std::fabs(m.yy))};
   }
 
-  /// Largest distance between the centre of an example and its corners, in cells.
-  static GLINT_HD float reach(const TinyTransforms& t) {
-    const float stretch = std::max(std::max(t.stretch.high, 1 / t.stretch.low), 1.0f);
-    const float shear = std::max(std::fabs(t.shear.low), std::fabs(t.shear.high));
-    return kInvSqrt2Of * t.scale.high * stretch * (1 + shear);
-  }
-
  private:
-  static constexpr std::uint64_t kStep = 0x9e3779b97f4a7c15u;
-  static constexpr float kInvSqrt2Of = 0.70710678f;
-
   static GLINT_HD std::uint64_t numbers(std::uint64_t key, int k, int stream) {
-    return mixBits(key + kStep * static_cast<std::uint64_t>(3 * k + stream + 1));
+    return mixBits(key + kCounterStep * static_cast<std::uint64_t>(3 * k + stream + 1));
   }
   /// One of three numbers in [0, 1), of 21 bits.
   static GLINT_HD float unit(std::uint64_t bits, int k) {

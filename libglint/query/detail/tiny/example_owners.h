@@ -12,9 +12,8 @@ namespace glint {
 /// The examples near a footprint, and which of them is seen at each of some points (its owner).
 class NearExamples {
  public:
-  /// Most examples that are looked at. `mostExpected` keeps their number below, but for rare cells with many examples.
+  /// Most examples that are looked at. TinyExample::kMostExpected keeps their number below, but for rare cells with many examples.
   static constexpr int kMost = 96;
-  static constexpr float kMostExpected = 64;
   static constexpr int kMostPoints = 128;
   static constexpr int kNone = 255;
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "glint/model/tiny_example.h"
 #include "glint/query/detail/common/footprint_weights.h"
 
 namespace glint {
@@ -12,7 +13,7 @@ namespace glint {
 /// Together the squares have the variance of the footprint: the weights leave out the variance inside a square.
 class GaussianLattice {
  public:
-  static constexpr double kReach = 3.2;
+  static constexpr double kReach = double{TinyExample::kFootprintReach};
 
   /// @param c        covariance of the footprint, texels^2
   /// @param spacing  side of a square, texels

@@ -38,14 +38,8 @@ class ScatteredPieces {
         size_(static_cast<float>(example.size())),
         levels_(example.exampleLevels()),
         sigma_r_(example.images.shape.sigma_r),
-        reach_(std::min(CellExamples::reach(example.transforms), float{TinyExample::kMostReach})),
-        largest_sigma_(size_ * sigmaInCells(example.density, reach_)) {}
-
-  /// Deviation, in cells, of footprints near which NearExamples::kMostExpected examples are.
-  static GLINT_HD float sigmaInCells(float density, float reach) {
-    const float across = std::sqrt(NearExamples::kMostExpected / density);
-    return (across - 2 * reach) / (2 * static_cast<float>(GaussianLattice::kReach));
-  }
+        reach_(std::min(example.transforms.reach(), float{TinyExample::kMostReach})),
+        largest_sigma_(size_ * TinyExample::sigmaInCells(example.density, reach_)) {}
 
   /// Deviation, texels, from which on the mean of the plane answers alone.
   GLINT_HD float largestSigma() const { return largest_sigma_; }

@@ -1,4 +1,4 @@
-#include "glint-bench/stability/white_furnace.h"
+#include "glint-bench/lab/white_furnace.h"
 
 #include <cmath>
 #include <numbers>

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "glint-bench/stability/stability_lab.h"
+#include "glint-bench/lab/bench_lab.h"
 #include "glint/bake/common/seen_error.h"
 
 namespace glint::apps {

@@ -1,4 +1,4 @@
-#include "glint-bench/stability/ndf_figures.h"
+#include "glint-bench/lab/ndf_figures.h"
 
 #include <tbb/parallel_for.h>
 

@@ -8,7 +8,6 @@
 #include "common/tool.h"
 #include "glint-bench/asset_folder.h"
 #include "glint-bench/candidates.h"
-#include "glint-bench/stability/stability_test.h"
 #include "glint/api/any_ndf.h"
 #include "glint/bake/ingest/ingest.h"
 #include "glint/bake/synth/synth.h"
@@ -32,9 +31,9 @@ struct LabQuestion {
 };
 
 /// Makes the maps and assets of tests of stability and of presets.
-class StabilityLab {
+class BenchLab {
  public:
-  StabilityLab(Tool& tool, const AssetFolder& folder, bool quick) : tool_(tool), folder_(folder), quick_(quick) {}
+  BenchLab(Tool& tool, const AssetFolder& folder, bool quick) : tool_(tool), folder_(folder), quick_(quick) {}
 
   /// Texels of a map along each axis.
   int mapSize() const { return quick_ ? 256 : 512; }
@@ -64,10 +63,6 @@ class StabilityLab {
   double secondsOf(const LabMap& map, const Candidate& method, const LabQuestion& question = {});
   /// Bytes of its file.
   double bytesOf(const LabMap& map, const Candidate& method, const LabQuestion& question = {});
-
-  /// Adds the value of every method that has one. What fails is in the message of its point.
-  void forEach(StabilityCurves& curves, const std::vector<Candidate>& methods, const LabMap& map, const LabQuestion& question,
-               const std::function<double(const api::OpenedNdf&)>& value);
 
   /// Removes all maps and assets.
   void forget();

@@ -1,4 +1,4 @@
-#include "glint-bench/stability/sun_light.h"
+#include "glint-bench/lab/sun_light.h"
 
 #include <cmath>
 #include <numbers>

@@ -1,4 +1,4 @@
-#include "glint-bench/stability/stability_lab.h"
+#include "glint-bench/lab/bench_lab.h"
 
 #include <fmt/format.h>
 
@@ -38,7 +38,7 @@ const Candidate* sourceOf(const std::vector<Candidate>& all, const Candidate& me
 
 }  // namespace
 
-std::vector<Candidate> StabilityLab::methods() {
+std::vector<Candidate> BenchLab::methods() {
   std::vector<Candidate> chosen = benchCandidates(true);
   std::erase_if(chosen, [](const Candidate& c) { return c.tool.empty(); });
   for (const Candidate& c : benchCandidates(false))
@@ -46,20 +46,20 @@ std::vector<Candidate> StabilityLab::methods() {
   return chosen;
 }
 
-bake::SynthOptions StabilityLab::typical(bake::SynthKind kind) const {
+bake::SynthOptions BenchLab::typical(bake::SynthKind kind) const {
   bake::SynthOptions options = bake::defaultSynthOptions(kind);
   options.width = options.height = mapSize();
   options.seed = seed();
   return options;
 }
 
-const LabMap& StabilityLab::map(const bake::SynthOptions& options) {
+const LabMap& BenchLab::map(const bake::SynthOptions& options) {
   const LabMap*& made = synthetic_[keyOf(options)];
   if (made == nullptr) made = &map(options.width, options.height, bake::synthNormals(options));
   return *made;
 }
 
-const LabMap& StabilityLab::map(int width, int height, std::span<const Vec2> normals) {
+const LabMap& BenchLab::map(int width, int height, std::span<const Vec2> normals) {
   NormalMap made;
   made.width = width, made.height = height, made.normals = normals;
   made.slopes = bake::describeNormals(width, height, normals).slopes;
@@ -71,19 +71,19 @@ const LabMap& StabilityLab::map(int width, int height, std::span<const Vec2> nor
   return maps_.back();
 }
 
-api::OpenedNdf StabilityLab::truth(const LabMap& map, const LabQuestion& question) {
+api::OpenedNdf BenchLab::truth(const LabMap& map, const LabQuestion& question) {
   api::NdfOptions options;
   options.sigma_r = question.sigma_r;
   options.surface = question.surface;
   return api::OpenedNdf::open(map.path, options);
 }
 
-std::string StabilityLab::assetOf(const LabMap& map, const Candidate& method, const LabQuestion& question) const {
+std::string BenchLab::assetOf(const LabMap& map, const Candidate& method, const LabQuestion& question) const {
   const bool smooth = question.surface == Surface::smooth;
   return folder_.fileOf(map.id, fmt::format("{} {:.9g}{}", method.name(), question.sigma_r, smooth ? " smooth" : ""));
 }
 
-void StabilityLab::make(const LabMap& map, const Candidate& method, const LabQuestion& question) {
+void BenchLab::make(const LabMap& map, const Candidate& method, const LabQuestion& question) {
   const std::string file = assetOf(map, method, question);
   if (made_.contains(file)) return;
   const std::vector<Candidate> all = benchCandidates(false);
@@ -97,17 +97,17 @@ void StabilityLab::make(const LabMap& map, const Candidate& method, const LabQue
   made_[file] = run.wall_s;
 }
 
-double StabilityLab::secondsOf(const LabMap& map, const Candidate& method, const LabQuestion& question) {
+double BenchLab::secondsOf(const LabMap& map, const Candidate& method, const LabQuestion& question) {
   make(map, method, question);
   return made_.at(assetOf(map, method, question));
 }
 
-double StabilityLab::bytesOf(const LabMap& map, const Candidate& method, const LabQuestion& question) {
+double BenchLab::bytesOf(const LabMap& map, const Candidate& method, const LabQuestion& question) {
   make(map, method, question);
   return static_cast<double>(std::filesystem::file_size(assetOf(map, method, question)));
 }
 
-api::OpenedNdf StabilityLab::open(const LabMap& map, const Candidate& method, const LabQuestion& question) {
+api::OpenedNdf BenchLab::open(const LabMap& map, const Candidate& method, const LabQuestion& question) {
   make(map, method, question);
   api::NdfOptions options;
   options.sigma_r = question.sigma_r;
@@ -115,18 +115,7 @@ api::OpenedNdf StabilityLab::open(const LabMap& map, const Candidate& method, co
   return api::OpenedNdf::open(assetOf(map, method, question), options);
 }
 
-void StabilityLab::forEach(StabilityCurves& curves, const std::vector<Candidate>& methods, const LabMap& map,
-                           const LabQuestion& question, const std::function<double(const api::OpenedNdf&)>& value) {
-  for (const Candidate& method : methods) {
-    try {
-      curves.add(method.name(), value(open(map, method, question)));
-    } catch (const std::exception& error) {
-      curves.fail(method.name(), error.what());
-    }
-  }
-}
-
-void StabilityLab::forget() {
+void BenchLab::forget() {
   for (const LabMap& map : maps_) folder_.finish(map.id);
   synthetic_.clear();
   maps_.clear();
