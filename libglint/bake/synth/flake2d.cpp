@@ -124,13 +124,13 @@ int wholeCells(double cells) {
 class Flakes {
  public:
   explicit Flakes(const SynthOptions& p)
-      : size_(p.flake_size_uv),
-        probability_(probabilityOf(p.coverage)),
-        plane_(static_cast<std::uint32_t>(p.seed - 1)),
-        columns_(wholeCells(1 / double{p.flake_size_uv})),
-        rows_(wholeCells(static_cast<double>(p.height) / p.width / p.flake_size_uv)) {}
+      : size_(p.flake_size_uv), probability_(probabilityOf(p.coverage)), plane_(static_cast<std::uint32_t>(p.seed - 1)) {
+    const int columns = wholeCells(1 / double{p.flake_size_uv});
+    const int rows = wholeCells(static_cast<double>(p.height) / p.width / p.flake_size_uv);
+    if (columns > 0 && rows > 0) columns_ = columns, rows_ = rows;
+  }
 
-  bool tiles() const { return columns_ > 0 && rows_ > 0; }
+  bool tiles() const { return columns_ > 0; }
 
   struct Found {
     float presence = 0;  ///< of the uppermost flake, which hides the others; 0: no flake
@@ -168,8 +168,8 @@ class Flakes {
 
   float size_;
   float probability_;
-  std::uint32_t plane_;  ///< of cells; another plane has other flakes
-  int columns_, rows_;   ///< cells after which flakes repeat; 0: they do not
+  std::uint32_t plane_;         ///< of cells; another plane has other flakes
+  int columns_ = 0, rows_ = 0;  ///< cells after which flakes repeat; 0: they do not
 };
 
 /// Calls set(texel, flake) for every texel.
