@@ -43,6 +43,7 @@ def moments_material(name, folder, level=0, uv_map="UVMap", repeats=1, base_colo
     material.use_nodes = True
     nodes, link = material.node_tree.nodes, material.node_tree.links.new
     surface = nodes["Principled BSDF"]
+    surface.distribution = "GGX"  # single bounces between facets, as all models of glint
     surface.inputs["Base Color"].default_value = base_color
     surface.inputs["Metallic"].default_value = metallic
 
@@ -123,7 +124,7 @@ def main(arguments):
     parser.add_argument("textures", help="folder of glint-moments --lobe materialx --textures")
     parser.add_argument("-o", "--output", required=True, help="picture, .png or .exr")
     parser.add_argument("--level", type=int, default=0, help="level of the textures")
-    parser.add_argument("--repeats", type=float, default=1, help="repeats of the map over half of the square's side")
+    parser.add_argument("--repeats", type=float, default=1, help="of the map along a side of the square")
     parser.add_argument("--turn-deg", type=float, default=0, help="angle of the texture on the square, counter-clockwise")
     parser.add_argument("--height", type=float, default=4, help="of the camera and the lamp, in half sides of the square")
     parser.add_argument("--lamp-radius", type=float, default=0.05, help="radius of the lamp")

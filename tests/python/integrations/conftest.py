@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 
@@ -22,10 +23,12 @@ def run(folder, *commands):
 
 @pytest.fixture(scope="session")
 def car_paint(tmp_path_factory):
-    """A folder with the documents of the example and the asset that they name, made as they say, but smaller."""
+    """A folder with the documents of the example, and the asset that they name, made as docs/INTEGRATIONS.md says."""
     folder = tmp_path_factory.mktemp("car_paint")
-    run(folder, "synth flake2d -o flakes.png --size 128 --flake-size-uv .05 --roughness 0.35 --coverage 1", "ingest flakes.png -o flakes.glint",
-        "pyramid flakes.glint -o flakes.pyramid.glint --resolution 64 --stride 32")
+    page = (ROOT / "docs/INTEGRATIONS.md").read_text()
+    commands = re.findall(r"^glint-((?:synth flake2d|ingest|pyramid) .*flakes.*)$", page, re.MULTILINE)
+    assert [command.split()[0] for command in commands] == ["synth", "ingest", "pyramid"]
+    run(folder, *commands)
     for document in (*(PIPELINES / "materialx").glob("*.mtlx"), *(PIPELINES / "usd").glob("*.usda")):
         shutil.copy(document, folder)
     return folder
