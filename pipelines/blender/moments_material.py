@@ -128,12 +128,17 @@ def main(arguments):
     parser.add_argument("--turn-deg", type=float, default=0, help="angle of the texture on the square, counter-clockwise")
     parser.add_argument("--height", type=float, default=4, help="of the camera and the lamp, in half sides of the square")
     parser.add_argument("--lamp-radius", type=float, default=0.05, help="radius of the lamp")
-    parser.add_argument("--power", type=float, default=6, help="of the lamp, watts at a height of 1")
+    parser.add_argument("--power", type=float, default=1.5, help="of the lamp, watts at a height of 1")
     parser.add_argument("--resolution", type=int, default=512, help="pixels of a side")
     parser.add_argument("--samples", type=int, default=64, help="of a pixel")
     options = parser.parse_args(arguments)
+    if not options.output.endswith((".png", ".exr")):
+        parser.error(f"--output: {options.output} is neither .png nor .exr")
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    material = moments_material("moments", options.textures, options.level, repeats=options.repeats)
+    try:
+        material = moments_material("moments", options.textures, options.level, repeats=options.repeats)
+    except FileNotFoundError as error:
+        sys.exit(f"moments_material.py: error: {error}")
     square_scene(material, options.height, options.lamp_radius, options.power, options.resolution, options.samples, math.radians(options.turn_deg))
     render(options.output)
 

@@ -125,7 +125,8 @@ def test_blender_stretches_lobes_to_ten_to_one_at_most(tmp_path):
     assert large * small == pytest.approx(expected[0] * expected[1], rel=2 * ALPHA_ERROR)
 
 
-def test_a_missing_texture_is_named(tmp_path):
-    process = subprocess.run([PYTHON, SCRIPT, tmp_path, "-o", tmp_path / "a.png"], capture_output=True, text=True)
-    assert process.returncode != 0 and "normal_00.png: no such texture" in process.stderr + process.stdout
-    assert not (tmp_path / "a.png").exists()
+@pytest.mark.parametrize("name, message", [("a.png", "normal_00.png: no such texture"), ("a.jpeg", "a.jpeg is neither .png nor .exr")])
+def test_wrong_use_is_refused_and_leaves_nothing(tmp_path, name, message):
+    process = subprocess.run([PYTHON, SCRIPT, tmp_path, "-o", tmp_path / name], capture_output=True, text=True)
+    assert process.returncode != 0 and message in process.stderr
+    assert list(tmp_path.iterdir()) == []
