@@ -34,8 +34,6 @@ int main(int argc, char** argv) {
 
   return tool.run(argc, argv, [&] {
     const bake::SynthOptions& p = options.values(tool);
-    if (p.kind == bake::SynthKind::flake2d && !bake::flake2dTiles(p))
-      tool.warn("the map does not tile: its sides hold no whole numbers of flakes, so flakes are cut at the border");
     const apps::PixelFormat format = apps::pixelFormat(output.path(), bits);
     if (heights) {
       std::vector<float> values = bake::synthHeights(p);
@@ -47,6 +45,8 @@ int main(int argc, char** argv) {
     } else {
       apps::writeImage(output.path(), p.width, p.height, 3, apps::encodeNormals(bake::synthNormals(p)), format);
     }
+    if (p.kind == bake::SynthKind::flake2d && !bake::flake2dTiles(p))
+      tool.warn("the map does not tile: its sides hold no whole numbers of flakes, so flakes are cut at the border");
     tool.setResult({{"width", p.width}, {"height", p.height}, {"command", nlohmann::json::parse(tool.commandJson())}});
     tool.summary(tool.name() + ": " + std::to_string(p.width) + " x " + std::to_string(p.height) + " texels\n");
   });
