@@ -31,6 +31,7 @@ class GlintAsset {
     options.boundary = choice(props, "boundary", "wrap", "clamp");
     options.interpolation = choice(props, "interpolation", "footprint", "trilinear");
     options.pixels = choice(props, "pixels", "smooth", "constant");
+    options.footprint_parts = props.get<int>("footprint_parts", 0);
     check(glint_ndf_open(path_.c_str(), &options, &ndf_));
     info_.struct_size = sizeof info_;
     check(glint_ndf_get_info(ndf_, &info_));
@@ -62,7 +63,8 @@ class GlintAsset {
  private:
   static int32_t choice(const Properties& props, const char* name, const char* first, const char* second) {
     const std::string_view word = props.get<std::string_view>(name, first);
-    if (word != first && word != second) Throw("glint_native: '%s' is not known as %s; give %s or %s", word, name, first, second);
+    if (word != first && word != second)
+      Throw("glint_native: '%s' is not known as %s; give %s or %s", word, name, first, second);
     return word == second ? 1 : 0;
   }
 
@@ -257,11 +259,13 @@ class GlintNative final : public BSDF<Float, Spectrum> {
     conductor.remove_property("alpha");  // ours is that of a bin map
     for (const char* name : {"material", "eta", "k", "specular_reflectance"})
       if (props.has_property(name)) props.mark_queried(name);
+    mirror_ =
+        props.get<std::string_view>("material", props.has_property("eta") || props.has_property("k") ? "" : "none") == "none";
+    if (mirror_) conductor.set("material", std::string("none"), false);
     ref<Base> model = PluginManager::instance()->create_object<Base>(conductor);
     TextureCollector collector;
     model->traverse(&collector);
     eta_ = collector.eta, k_ = collector.k, reflectance_ = collector.specular_reflectance;
-    mirror_ = props.get<std::string_view>("material", "") == "none";
   }
 
   struct TextureCollector final : TraversalCallback {
@@ -321,7 +325,8 @@ class GlintNative final : public BSDF<Float, Spectrum> {
   // Scalar variants ask once, others hand the memory of a wavefront over.
 
   /// f without a cosine and as if facets were perfect mirrors, and pdf of `lit`. Directions in the frame of the map.
-  std::pair<UnpolarizedSpectrum, Float> value(const SurfaceInteraction3f& si, Vector3f viewed, Vector3f lit, Mask active) const {
+  std::pair<UnpolarizedSpectrum, Float> value(const SurfaceInteraction3f& si, Vector3f viewed, Vector3f lit,
+                                              Mask active) const {
     lit.z() = dr::select(active, lit.z(), -1.f);  // nothing is asked below the horizon
     const std::array<Vector3f, 1> directions = {lit};
     return asked(si, viewed, directions, [&](const Queries& q, const Batches& batches, size_t count) {
@@ -341,7 +346,8 @@ class GlintNative final : public BSDF<Float, Spectrum> {
       q.xi[0] = q.lit[0], q.xi[1] = q.lit[1];
       std::vector<float> wi(3 * count), weight(3 * count), pdf(count);
       batches.sample(q, wi.data(), weight.data(), pdf.data());
-      const Vector3f direction(arrayOf(wi.data(), count, 3), arrayOf(wi.data() + 1, count, 3), arrayOf(wi.data() + 2, count, 3));
+      const Vector3f direction(arrayOf(wi.data(), count, 3), arrayOf(wi.data() + 1, count, 3),
+                               arrayOf(wi.data() + 2, count, 3));
       return std::tuple<Vector3f, UnpolarizedSpectrum, Float>(direction, spectrumOf(weight, count),
                                                               arrayOf(pdf.data(), count, 1));
     });
@@ -357,8 +363,10 @@ class GlintNative final : public BSDF<Float, Spectrum> {
     q.count = 1;
     if constexpr (dr::is_jit_v<Float>) {
       if (jit_flag(JitFlag::SymbolicScope))
-        Throw("glint_native: %s: symbolic loops and calls cannot ask an asset. Render with glint_ndf.mitsuba.render(scene), with "
-              "the integrator `glint_path`, or inside `with glint_ndf.mitsuba.wavefront():`", asset_.path());
+        Throw(
+            "glint_native: %s: symbolic loops and calls cannot ask an asset. Render with glint_ndf.mitsuba.render(scene), with "
+            "the integrator `glint_path`, or inside `with glint_ndf.mitsuba.wavefront():`",
+            asset_.path());
       dr::eval(uv, dx, dy, viewed, other);
       dr::sync_thread();
       q.count = std::max({dr::width(uv), dr::width(dx), dr::width(dy), dr::width(viewed), dr::width(other)});
