@@ -15,7 +15,7 @@ class Footprints:
     @param width, height  of the map, texels
     @param scale          factor of the size that the differentials give
     @param sigma          texels; where it is given, differentials are not read
-    @param fallback       texels: deviation where the differentials are 0 or not finite
+    @param fallback       texels: deviation where the differentials are 0 or NaN
     """
 
     def __init__(self, plugin, path, width, height, scale, sigma, fallback):
@@ -32,9 +32,8 @@ class Footprints:
         if self.sigma is not None:
             return self.sigma
         covariance = gn.footprint.from_differentials(self.scale * dx, self.scale * dy, self.width, self.height)
-        trace = covariance[..., 0] + covariance[..., 2]
-        finite = np.isfinite(dx).all(axis=-1) & np.isfinite(dy).all(axis=-1)
-        missing = ~(finite & (trace > _NO_EXTENT**2))
+        # Steps of infinite length count as very long ones; only what has no extent at all has no footprint.
+        missing = ~(covariance[..., 0] + covariance[..., 2] > _NO_EXTENT**2)
         if missing.any():
             self._warn()
             covariance[missing] = (self.fallback**2, 0, self.fallback**2)

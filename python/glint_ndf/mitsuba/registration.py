@@ -18,11 +18,12 @@ def register():
         return
     if mi.is_polarized:
         return
-    from . import bsdf
+    from . import bsdf, integrator
 
-    classes = {"bsdf": bsdf.make_class()}
+    classes = {"bsdf": bsdf.make_class(), "integrator": integrator.make_class()}
     _classes[variant] = classes
     mi.register_bsdf(bsdf.NAME, lambda props: classes["bsdf"](props))
+    mi.register_integrator(integrator.NAME, lambda props: classes["integrator"](props))
 
 
 def watch_variants():
