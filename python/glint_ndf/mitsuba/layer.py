@@ -37,9 +37,10 @@ class GlintLayer:
             self._open_displaced(options)
         else:
             self._open_ndf(options)
-        self.placement = Placement(_scale_of(options, self.width, self.height), options.number("rotation", 0.0))
-        scale, sigma = options.number("footprint_scale", 1.0, above=0), options.number("sigma", None, above=0)
-        self._footprints = Footprints(plugin, self.path, self.width, self.height, scale, sigma, self._fallback)
+        scale, endless = _scale_of(options, self.width, self.height), self.kind == "tiny-example"
+        self.placement = Placement(scale, options.number("rotation", 0.0), endless)
+        factor, sigma = options.number("footprint_scale", 1.0, above=0), options.number("sigma", None, above=0)
+        self._footprints = Footprints(plugin, self.path, self.width, self.height, factor, sigma, self._fallback)
 
     def _open_displaced(self, options):
         displaced = _opened(self.plugin, self.path, lambda: gn.open_displaced(self.path))

@@ -12,9 +12,11 @@ class Placement:
 
     @param scale  maps per unit of uv along u and v
     @param rotation_deg  degrees
+    @param endless       whether whole parts of uv count: the map is a plane that does not repeat
     """
 
-    def __init__(self, scale, rotation_deg):
+    def __init__(self, scale, rotation_deg, endless=False):
+        self._endless = endless
         angle = math.radians(rotation_deg)
         c, s = math.cos(angle), math.sin(angle)
         self.cosine, self.sine = c, s
@@ -26,11 +28,12 @@ class Placement:
         return mi.Vector2f(a * d.x + b * d.y, c * d.x + e * d.y)
 
     def uv(self, uv):
-        """uv of the map, modulo 1. The product is taken in double precision: far out floats lose texels."""
+        """uv of the map, modulo 1 where it repeats. The product is taken in double precision: far out floats lose texels."""
         wide = dr.float64_array_t(mi.Float)
         x, y = wide(uv.x), wide(uv.y)
         (a, b), (c, e) = self._rows
-        return mi.Point2f(*(mi.Float(t - dr.floor(t)) for t in (a * x + b * y, c * x + e * y)))
+        placed = (a * x + b * y, c * x + e * y)
+        return mi.Point2f(*(mi.Float(t if self._endless else t - dr.floor(t)) for t in placed))
 
     def frame(self, si):
         """Tangents of the map in the coordinates of si.sh_frame: dp/du made orthogonal to n, and the perpendicular on dp/dv's
