@@ -23,11 +23,9 @@ class Coat:
     def __init__(self, eta, alpha, layer=None):
         self.eta, self.alpha, self.layer = eta, alpha, layer
         self.smooth = alpha == 0 and layer is None
-        self.internal = _internal_reflectance(eta)
-        self._table = None
-        if not self.smooth and layer is None:
-            table = _albedo_table(eta, alpha)
-            self._table = mi.Float(table) if dr.is_jit_v(mi.Float) else table
+        table = _albedo_table(eta, alpha) if alpha > 0 else None
+        self.internal = _internal_reflectance(eta, table)
+        self._table = mi.Float(table) if table is not None and dr.is_jit_v(mi.Float) else table
 
     def albedo(self, cosine):
         """Share of light from this cosine that the coat reflects at its surface."""
@@ -85,12 +83,14 @@ def _dielectric(cosine, eta):
     return 0.5 * (s * s + p * p)
 
 
-def _internal_reflectance(eta):
-    """Share of diffuse light that the surface reflects back inside: 1 - (1 - diffuse reflectance outside) / eta^2."""
+def _internal_reflectance(eta, table):
+    """Share of diffuse light that the surface reflects back inside. By reciprocity it is 1 - (1 - r) / eta^2, with r the share of
+    diffuse light that the surface reflects outside.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE)
     cosine = 0.5 * (nodes + 1)
-    outside = float(np.sum(weights * cosine * _dielectric(cosine, eta)))
-    return 1 - (1 - outside) / eta**2
+    albedo = _dielectric(cosine, eta) if table is None else np.interp(cosine * (_TABLE_SIZE - 1), np.arange(_TABLE_SIZE), table)
+    return 1 - (1 - float(np.sum(weights * cosine * albedo))) / eta**2
 
 
 def _smith(v, alpha):

@@ -36,18 +36,17 @@ class Placement:
         return mi.Point2f(*(mi.Float(t if self._endless else t - dr.floor(t)) for t in placed))
 
     def frame(self, si):
-        """Tangents of the map in the coordinates of si.sh_frame: dp/du made orthogonal to n, and the perpendicular on dp/dv's
-        side, both turned by the rotation. Where dp/du has no direction, the tangents of si.sh_frame.
+        """Tangents of the map as vectors of the plane of si.sh_frame: dp/du made orthogonal to n, and the perpendicular on dp/dv's
+        side, both turned by the rotation. Where dp/du has no direction, those of si.sh_frame, turned.
         """
-        n = si.sh_frame.n
-        along = si.dp_du - n * dr.dot(n, si.dp_du)
-        length2 = dr.squared_norm(along)
+        along, across = si.to_local(si.dp_du), si.to_local(si.dp_dv)
+        length2 = along.x * along.x + along.y * along.y
         valid = dr.isfinite(length2) & (length2 > 0)
-        s = dr.select(valid, along * dr.rsqrt(dr.select(valid, length2, 1)), si.sh_frame.s)
-        t = dr.cross(n, s)
+        scale = dr.rsqrt(dr.select(valid, length2, 1))
+        x, y = dr.select(valid, along.x * scale, 1), dr.select(valid, along.y * scale, 0)
         # A mirrored texture has dp/dv on the other side.
-        t = dr.select(dr.dot(t, si.dp_dv) < 0, -t, t)
-        s, t = si.to_local(s), si.to_local(t)
+        side = dr.select(across.y * x - across.x * y < 0, -1, 1)
+        s, t = mi.Vector2f(x, y), mi.Vector2f(-y * side, x * side)
         return self.cosine * s + self.sine * t, self.cosine * t - self.sine * s
 
 
