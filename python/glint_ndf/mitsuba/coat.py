@@ -40,16 +40,18 @@ class Coat:
 
     def evaluate(self, si, viewed, lit, active):
         """Reflection times the cosine of `lit`, and pdf, of a coat that is not smooth."""
-        h = dr.normalize(viewed + lit)
+        h = viewed + lit
+        h = h * dr.rsqrt(dr.maximum(dr.squared_norm(h), 1e-12))
         reflectance = fresnel(dr.dot(viewed, h), self.eta)
         if self.layer is not None:
             f, pdf = self.layer.evaluate(si, viewed, lit, active)
             return f * reflectance * lit.z, pdf
         distribution = self._distribution()
         d = distribution.eval(h)
-        valid = active & (viewed.z > 0) & (lit.z > 0) & (d > 0)
-        value = reflectance * d * distribution.G(viewed, lit, h) / (4 * viewed.z)
-        pdf = distribution.pdf(viewed, h) / (4 * dr.dot(lit, h))
+        valid = active & (viewed.z > 0) & (lit.z > 0) & (d > 0) & (dr.dot(lit, h) > 0)
+        # Quotients are 0 where they are not valid; scalar variants would raise an error for a division by 0.
+        value = reflectance * d * distribution.G(viewed, lit, h) / dr.select(valid, 4 * viewed.z, 1)
+        pdf = distribution.pdf(viewed, h) / dr.select(valid, 4 * dr.dot(lit, h), 1)
         return dr.select(valid, value, 0), dr.select(valid, pdf, 0)
 
     def sample(self, si, viewed, xi, active):

@@ -105,7 +105,7 @@ def _trace(options, scene, sampler, ray, active):
         throughput = throughput * weight
         eta = eta * drawn.eta
         previous, previous_pdf, previous_mirror = mi.Interaction3f(si), drawn.pdf, mirrored
-        beam = beams.bounced(beam, si, drawn.pdf, mirrored)
+        beam = beams.bounced(beam, si, drawn.wo, drawn.pdf, mirrored)
         ray = mi.RayDifferential3f(si.spawn_ray(si.to_world(drawn.wo)))
         depth += 1
 
