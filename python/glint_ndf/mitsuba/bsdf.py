@@ -61,7 +61,7 @@ def _merge_description(props):
         described = material.load(path)
     except gn.GlintError as error:
         raise PluginError(NAME, str(error)) from error
-    props.remove_property("description")
+    del props["description"]
     for name, value in described.items():
         if name not in props and name != "type":
             props[name] = _property(value)
