@@ -54,6 +54,7 @@ class GlintLayer:
             "alpha": options.number("alpha"),
             "surface": options.text("surface", None, ("flat", "smooth")),
             "boundary": options.text("boundary", None, ("wrap", "clamp")),
+            "footprint_parts": options.integer("footprint_parts", None, low=1),
             "interpolation": options.text("interpolation", None, ("footprint", "trilinear")),
             "pixels": options.text("pixels", None, ("smooth", "constant")),
         }

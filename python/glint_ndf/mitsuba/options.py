@@ -43,6 +43,8 @@ class Options:
 
     def integer(self, name, default=None, low=None):
         value = self._get(name, default)
+        if value is None:
+            return None
         if isinstance(value, bool) or not isinstance(value, int) or (low is not None and value < low):
             self.refuse(name, f"must be a whole number of at least {low}, and is {value!r}")
         return value
