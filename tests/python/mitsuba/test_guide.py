@@ -14,7 +14,7 @@ def test_the_first_picture_shows_glints(tmp_path, monkeypatch):
     # A quarter of the size, for time.
     small = program.replace('"width": 512, "height": 384', '"width": 128, "height": 96').replace("spp=16", "spp=4")
     # Pictures of screens end at white.
-    small = small.replace("flakes.png", "flakes.exr")
+    small = small.replace("flakes.png", "flakes.exr").replace("spp=4)", "spp=4), write_async=False")
     assert small.count('"width": 128') == 1 and small.count("spp=4") == 1
     monkeypatch.chdir(tmp_path)
     exec(compile(small, str(GUIDE), "exec"), {})
