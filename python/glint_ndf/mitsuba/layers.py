@@ -158,7 +158,7 @@ class Layers:
     def _gain(self, si, covered, active):
         if self.coat is None:
             return 1
-        albedo = dr.clip(self.base.eval_diffusereflectance(si, active), 0, 1)
+        albedo = dr.clip(self.base.eval_diffuse_reflectance(si, active), 0, 1)
         return 1 / (1 - (1 - covered) * self.coat.internal * albedo)
 
     def reflectance(self, si, v, l, active):
