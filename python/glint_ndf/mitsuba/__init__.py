@@ -12,10 +12,11 @@ from . import llvm as _llvm
 _llvm.prepare()
 
 from .errors import PluginError  # noqa: E402
+from .lobes import Lobes, fit_lobes  # noqa: E402
 from .registration import register, watch_variants as _watch_variants  # noqa: E402
 from .wavefront import render, wavefront  # noqa: E402
 
 _watch_variants()
 register()
 
-__all__ = ["PluginError", "register", "render", "wavefront"]
+__all__ = ["Lobes", "PluginError", "fit_lobes", "register", "render", "wavefront"]

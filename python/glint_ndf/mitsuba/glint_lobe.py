@@ -16,6 +16,9 @@ class GlintLobe:
     def __init__(self, ndf, facets):
         self._brdf = ndf.brdf(fresnel="mirror", facets=facets)
         self.channels = 3 if ndf.channels > 1 else 1
+        _, (xx, _, yy) = ndf.slopes()
+        #: Mean variance of the slopes along u and v: how broad the surface reflects from afar.
+        self.slope_variance = 0.5 * (xx + yy) + ndf.sigma_r**2
 
     def evaluate(self, uv, footprint, viewed, lit, threads):
         """f [lanes, channels] in 1/sr, without a cosine, and pdf [lanes] per unit solid angle."""
@@ -27,11 +30,18 @@ class GlintLobe:
         lit, weight, pdf = self._brdf.sample(uv, viewed, xi, threads=threads, **named(footprint))
         return lit, weight[..., : self.channels], pdf
 
+    def lit_by_lobe(self, uv, footprint, viewed, axis, sharpness, threads):
+        """Radiance [lanes] towards the viewer from one lobe of light a lane, exp(sharpness (w . axis - 1)) from direction w."""
+        ones = np.ones((len(uv), 1, 3), dtype=np.float32)
+        lobe = axis[:, None, :], sharpness[:, None], ones
+        return self._brdf.lobes(uv, viewed, *lobe, threads=threads, **named(footprint))[..., 0]
+
 
 class DisplacedLobe:
     """The lobe of an asset of kind displacement, with the colour of its base, on the coarse mesh. Members as in GlintLobe."""
 
     channels = 3
+    slope_variance = None
 
     def __init__(self, displaced, variant):
         self._displaced, self._variant = displaced, variant

@@ -5,6 +5,7 @@ import mitsuba as mi
 
 from . import beam as beams
 from .options import Options
+from .prefilter import Prefilter
 from .wavefront import is_jit, wavefront
 
 NAME = "glint_path"
@@ -30,24 +31,40 @@ def make_class():
             self.whole_pixels = options.text("footprint", "sample", ("sample", "pixel")) == "pixel"
             self.hides = options.flag("hide_emitters", False)
             self._widening = 1.0
+            self.lobes = options.integer("prefilter", 0, low=0)
+            self._prefilter = None
+            self._rendering = False
             options.any_of(_OF_THE_BASE_CLASS)
             options.finish()
 
         def render(self, scene, sensor=0, seed=0, spp=0, develop=True, evaluate=True):
+            if self._rendering:
+                # Mitsuba's own `render` calls this one first.
+                return mi.SamplingIntegrator.render(self, scene, sensor, seed, spp, develop, evaluate)
             if not isinstance(sensor, mi.Sensor):
                 sensor = scene.sensors()[sensor]
             samples = spp or sensor.sampler().sample_count()
-            self._widening = samples**0.5 if self.whole_pixels else 1.0
-            with wavefront():
-                return _in_passes(
-                    lambda part, n: mi.SamplingIntegrator.render(self, scene, sensor, seed + part, n, develop, evaluate),
-                    _passes(sensor, samples) if develop else [samples],
-                )
+            self._rendering = True
+            try:
+                with wavefront():
+                    if self._prefilter is None or self._prefilter.scene is not scene:
+                        self._prefilter = Prefilter.of(scene, self.lobes)
+                    passes = _passes(sensor, samples) if develop else [samples]
+                    return _mean_of_passes(
+                        lambda part, n: self._render_pass(scene, sensor, seed + part, n, samples, develop, evaluate), passes
+                    )
+            finally:
+                self._rendering = False
+
+        def _render_pass(self, scene, sensor, seed, spp, samples, develop, evaluate):
+            # Mitsuba shrinks differentials to the part of the pixel that one sample of this pass stands for.
+            self._widening = spp**0.5 if self.whole_pixels else (spp / samples) ** 0.5
+            return mi.SamplingIntegrator.render(self, scene, sensor, seed, spp, develop, evaluate)
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
             with wavefront():
                 ray = _with_differentials(ray, self._widening)
-                radiance, valid = _trace(self, scene, sampler, ray, mi.Bool(active))
+                radiance, valid = _trace(self, self._prefilter, scene, sampler, ray, mi.Bool(active))
                 return radiance, valid, []
 
         def aov_names(self):
@@ -59,20 +76,23 @@ def make_class():
     return GlintPath
 
 
-def _trace(options, scene, sampler, ray, active):
+def _trace(options, prefilter, scene, sampler, ray, active):
     """Radiance along camera rays, and whether they hit something that is shown."""
     context = mi.BSDFContext()
     radiance, throughput, eta = mi.Spectrum(0), mi.Spectrum(1), mi.Float(1)
     beam = beams.of_pixel(ray)
     previous = dr.zeros(mi.Interaction3f)
     previous_pdf, previous_mirror = mi.Float(1), mi.Bool(True)
+    # Lanes whose light of the environment has been counted by the prefilter.
+    lit_by_sky = mi.Bool(False)
     shown = mi.Bool(not options.hides and scene.environment() is not None)
     depth = 0
     while True:
         si = scene.ray_intersect(
             mi.Ray3f(ray), ray_flags=mi.RayFlags.All | mi.RayFlags.dNSdUV, coherent=mi.Bool(depth == 0), active=active
         )
-        radiance = radiance + _emission(options, scene, si, previous, previous_pdf, previous_mirror, throughput, depth, active)
+        found = active & ((lit_by_sky & (si.is_valid() ^ True)) ^ True)
+        radiance = radiance + _emission(options, scene, si, previous, previous_pdf, previous_mirror, throughput, depth, found)
         hit = active & si.is_valid()
         if depth == 0:
             of_light = (si.shape != None) & si.shape.is_emitter() if is_jit() else si.is_valid() and si.shape.is_emitter()  # noqa: E711
@@ -94,6 +114,10 @@ def _trace(options, scene, sampler, ray, active):
         bsdf = si.bsdf()
         ds, light = scene.sample_emitter_direction(si, sampler.next_2d(active), True, active)
         lit = active & (ds.pdf != 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        if prefilter is not None:
+            of_sky, lit_by_sky = prefilter.light(scene, si, sampler, active)
+            radiance = radiance + throughput * of_sky
+            lit = lit & ((lit_by_sky & prefilter.is_sky(ds.emitter)) ^ True)
         towards = si.to_local(ds.d)
         value, pdf, drawn, weight = bsdf.eval_pdf_sample(
             context, si, towards, sampler.next_1d(active), sampler.next_2d(active), active
@@ -122,9 +146,7 @@ def _trace(options, scene, sampler, ray, active):
 
 
 def _with_differentials(ray, widening):
-    """A copy of a camera ray. Mitsuba shrinks differentials to the part of the pixel that one sample stands for; `widening` times
-    that is kept. Plain copies of rays drop differentials.
-    """
+    """A copy of a camera ray, with its differentials times `widening`. Plain copies of rays drop differentials."""
     copy = mi.RayDifferential3f(ray)
     if getattr(ray, "has_differentials", False):
         copy.o_x, copy.o_y, copy.d_x, copy.d_y = ray.o_x, ray.o_y, ray.d_x, ray.d_y
@@ -162,7 +184,7 @@ def _passes(sensor, samples):
     return [min(largest, samples - first) for first in range(0, samples, largest)]
 
 
-def _in_passes(render, passes):
+def _mean_of_passes(render, passes):
     """The mean of several renderings, each weighted by its samples."""
     if len(passes) == 1:
         return render(0, passes[0])

@@ -108,6 +108,24 @@ class GlintLayer:
         valid = lit.z > 0
         return lit, dr.select(valid, self._spectrum(weight, si), 0), dr.select(valid, to_float(pdf), 0)
 
+    @property
+    def slope_variance(self):
+        """Of the map; None for assets that do not answer for lobes of light."""
+        return self.lobe.slope_variance if self.lobe.channels == 1 else None
+
+    def lit_by_lobe(self, si, viewed, axis, sharpness, active):
+        """Radiance towards `viewed` from the light exp(sharpness (w . axis - 1)), by perfect mirrors: a Float."""
+        self.check(si)
+        frame = self.placement.frame(si)
+        rows = self._rows(si, into(frame, viewed), into(frame, axis), mi.Vector1f(sharpness))
+        count = len(rows[0])
+        lanes = lanes_of(to_mask(active & (viewed.z > 0), count))
+        uv, dx, dy, v, a, k = take(lanes, *rows)
+        if len(uv) == 0:
+            return mi.Float(0)
+        radiance = self.lobe.lit_by_lobe(uv, self._footprints.of(dx, dy), v, a, k[:, 0], self._threads)
+        return to_float(spread(lanes, count, radiance))
+
     def _rows(self, si, *vectors):
         place = self.placement
         return to_rows(place.uv(si.uv), place.change(si.duv_dx), place.change(si.duv_dy), *vectors)

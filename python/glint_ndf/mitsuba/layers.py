@@ -54,7 +54,7 @@ class Layers:
         v, l, through, squeeze = self._below(viewed, lit)
         if shares.has_facets:
             f, p = self.facets.evaluate(si, v, l, active)
-            value += covered * through * lit.z * f * self._reflectance(si, v, l, active)
+            value += covered * through * lit.z * f * self.reflectance(si, v, l, active)
             pdf += shares.facets * squeeze * p
         if shares.has_base:
             f, p = self.base.eval_pdf(self._base_context(ctx), _seen_from(si, v), l, active)
@@ -123,7 +123,7 @@ class Layers:
         record.wo, weight, record.pdf = self.facets.sample(si, si.wi, xi, active)
         record.eta = 1.0
         record.sampled_type = mi.UInt32(int(mi.BSDFFlags.GlossyReflection))
-        weight = weight * self._reflectance(si, si.wi, record.wo, active)
+        weight = weight * self.reflectance(si, si.wi, record.wo, active)
         return record, dr.select(active & (record.pdf > 0), weight, 0)
 
     def traverse(self, callback):
@@ -161,7 +161,8 @@ class Layers:
         albedo = dr.clip(self.base.eval_diffuse_reflectance(si, active), 0, 1)
         return 1 / (1 - (1 - covered) * self.coat.internal * albedo)
 
-    def _reflectance(self, si, v, l, active):
+    def reflectance(self, si, v, l, active):
+        """Fresnel's share of the facets between two directions."""
         if self.conductor is None:
             return 1
         h = v + l

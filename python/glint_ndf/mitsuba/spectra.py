@@ -22,6 +22,27 @@ def spectrum_of(rgb, wavelengths):
     return red * r + green * g + blue * b
 
 
+def light_of(rgb, wavelengths):
+    """The spectrum of a light of this colour: white is D65, as for Mitsuba's emitters."""
+    spectrum = spectrum_of(rgb, wavelengths)
+    if not mi.is_spectral:
+        return spectrum
+    return spectrum * mi.Spectrum(*(mi.cie_d65(w) for w in wavelengths)) * (1 / _luminance_of_d65())
+
+
+def _luminance_of_d65():
+    """Of mi.cie_d65, where a spectrum of 1 has the luminance 1."""
+    if not _luminance:
+        nm = np.arange(360.0, 831.0, 2.0)
+        y = [float(np.array(mi.cie1931_xyz(mi.Float(w))).ravel()[1]) for w in nm]
+        d65 = [float(np.array(mi.cie_d65(mi.Float(w))).ravel()[0]) for w in nm]
+        _luminance.append(np.dot(y, d65) / np.sum(y))
+    return float(_luminance[0])
+
+
+_luminance = []
+
+
 def _bases(wavelengths):
     to_green = dr.clip((wavelengths - (_BLUE_TO_GREEN - _HALF_WIDTH)) / (2 * _HALF_WIDTH), 0, 1)
     to_red = dr.clip((wavelengths - (_GREEN_TO_RED - _HALF_WIDTH)) / (2 * _HALF_WIDTH), 0, 1)
