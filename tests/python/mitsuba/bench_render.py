@@ -2,7 +2,8 @@
 
     python tests/python/mitsuba/bench_render.py [--size 512] [--spp 16] [--variant llvm_ad_rgb] [--all]
 
-Prints the best of three renderings of each, after one that compiles the kernels.
+Prints the best of three renderings of each, after one that compiles the kernels. With GLINT_MITSUBA_PLUGINS set (test_native.py)
+the C++ form too. `path` has a fixed footprint, `glint_path` that of the pixel; roughconductor is rendered by plain mi.render.
 """
 
 import argparse
@@ -19,6 +20,8 @@ import glint_ndf.mitsuba as gm
 sys.path.insert(0, os.path.dirname(__file__))
 from conftest import make_scene  # noqa: E402
 
+PLUGINS = os.environ.get("GLINT_MITSUBA_PLUGINS", "")
+
 
 def seconds(render, scene, spp, repeats=3):
     times = []
@@ -31,6 +34,15 @@ def seconds(render, scene, spp, repeats=3):
     return min(times[1:])
 
 
+def assets(with_all):
+    noise = gn.synth("isotropic", 512, seed=1, alpha=0.2)
+    pyramid = gn.pyramid(noise, stride=16)
+    made = {"ndf-pyramid": pyramid}
+    if with_all:
+        made.update({"ndf-cp": gn.compress(pyramid, tolerance=0.1), "bin-map": gn.bin_map(noise)})
+    return made
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--size", type=int, default=512)
@@ -39,23 +51,25 @@ def main():
     parser.add_argument("--all", action="store_true", help="compressed pyramids and bin maps too: minutes")
     options = parser.parse_args()
     mi.set_variant(options.variant)
-    noise = gn.synth("isotropic", 512, seed=1, alpha=0.2)
-    pyramid = gn.pyramid(noise, stride=16)
-    glints = {"ndf-pyramid": pyramid}
-    if options.all:
-        glints.update({"ndf-cp": gn.compress(pyramid, tolerance=0.1), "bin-map": gn.bin_map(noise)})
+    scalar = options.variant.startswith("scalar")
+    if PLUGINS:
+        mi.file_resolver().append(PLUGINS)
+    # Python asks one point at a time in scalar variants: minutes.
+    forms = ([] if scalar and PLUGINS else ["glint"]) + (["glint_native"] if PLUGINS else [])
+    made = assets(options.all)
     for light in ("area", "constant"):
-        for integrator in ("path", "glint_path"):
+        for integrator in ("path",) if scalar else ("path", "glint_path"):
             depth = {"type": integrator, "max_depth": 3}
             plain = make_scene({"type": "roughconductor", "alpha": 0.2, "material": "Al"}, light, depth, options.size)
             base = seconds(mi.render, plain, options.spp)
             print(f"{light}, {integrator}: roughconductor {base:.2f} s", flush=True)
-            for kind, asset in glints.items():
-                bsdf = {"type": "glint", "asset": asset.path, "material": "Al", "uv_scale": 4.0}
-                if integrator == "path":
-                    bsdf["sigma"] = 4.0
-                took = seconds(gm.render, make_scene(bsdf, light, depth, options.size), options.spp)
-                print(f"  glint, {kind}: {took:.2f} s, {took / base:.1f} x", flush=True)
+            for kind, asset in made.items():
+                for form in forms:
+                    bsdf = {"type": form, "asset": asset.path, "material": "Al", "uv_scale": 4.0}
+                    if integrator == "path":
+                        bsdf["sigma"] = 8.0
+                    took = seconds(gm.render, make_scene(bsdf, light, depth, options.size), options.spp)
+                    print(f"  {form}, {kind}: {took:.2f} s, {took / base:.1f} x", flush=True)
 
 
 if __name__ == "__main__":
