@@ -11,6 +11,11 @@ from . import llvm as _llvm
 
 _llvm.prepare()
 
+try:
+    import mitsuba as _mitsuba
+except ImportError as _error:
+    raise ImportError(f"glint_ndf.mitsuba needs Mitsuba 3.9 or newer: pip install mitsuba ({_error})") from _error
+
 from .errors import PluginError  # noqa: E402
 from .lobes import Lobes, fit_lobes  # noqa: E402
 from .registration import register, watch_variants as _watch_variants  # noqa: E402

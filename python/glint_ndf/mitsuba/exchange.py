@@ -6,6 +6,7 @@ import numpy as np
 
 
 def is_jit():
+    """Whether the current variant compiles kernels (llvm_*, cuda_*)."""
     return dr.is_jit_v(mi.Float)
 
 

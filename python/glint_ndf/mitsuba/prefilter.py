@@ -80,12 +80,13 @@ class Prefilter:
             near = dr.exp(width * (dr.dot(mirrored, mi.Vector3f(*axis.tolist())) - 1))
             weights.append(float(strength) * (_SHARE_OF_POWER + (1 - _SHARE_OF_POWER) * near))
             total = total + weights[-1]
-        left, pick, chosen = xi * total, mi.UInt32(len(weights) - 1), weights[-1]
-        for k in reversed(range(len(weights))):
-            # Lobe k is picked where the sum of those before it is at most `left`.
-            before = sum(weights[:k], mi.Float(0))
-            inside = (left >= before) & (left < before + weights[k])
-            pick, chosen = dr.select(inside, mi.UInt32(k), pick), dr.select(inside, weights[k], chosen)
+        left, before = xi * total, mi.Float(0)
+        pick, chosen = mi.UInt32(0), weights[0]
+        for k, weight in enumerate(weights):
+            # The last lobe whose predecessors add up to at most `left`.
+            reached = left >= before
+            pick, chosen = dr.select(reached, mi.UInt32(k), pick), dr.select(reached, weight, chosen)
+            before = before + weight
         return pick, chosen / total
 
 

@@ -10,6 +10,7 @@ import drjit as dr
 import mitsuba as mi
 
 from .errors import PluginError
+from .exchange import is_jit
 
 _FLAGS = ("SymbolicLoops", "SymbolicCalls", "SymbolicConditionals")
 
@@ -31,11 +32,6 @@ def wavefront():
     finally:
         for name, value in before.items():
             dr.set_flag(getattr(dr.JitFlag, name), value)
-
-
-def is_jit():
-    """Whether the current variant compiles kernels (llvm_*, cuda_*)."""
-    return dr.is_jit_v(mi.Float)
 
 
 def require_numbers(plugin):

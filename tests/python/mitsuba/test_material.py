@@ -107,5 +107,5 @@ def test_every_parameter_of_a_description_is_known_to_the_plugin(llvm, write, no
         optics={"material": "Au", "specular_reflectance": 0.9, "facets": "distribution"},
         layers={"coat": {"ior": 1.5, "asset": {"file": "flakes.glint"}, "placement": {"uv_scale": 3}}},
     )
-    bsdf = mi.load_dict({**material.load(write(everything)), "sigma": 5.0})
+    bsdf = mi.load_dict({**material.load(write(everything)), "sigma": 5.0, "coat_sigma": 5.0})
     assert np.isfinite(render(make_scene(bsdf, "constant", "direct", size=4), 4)).all()
