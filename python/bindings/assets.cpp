@@ -2,11 +2,14 @@
 
 #include <nanobind/stl/string.h>
 
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "glint-info/summary.h"
 #include "glint/formats/asset_reader.h"
+#include "glint/formats/atomic_file.h"
 #include "glint/formats/hash.h"
 #include "glint/formats/validate.h"
 
@@ -39,12 +42,28 @@ std::string kindOf(const std::string& path, bool for_building) {
   return std::string((for_building ? formats::Asset::openForBuilding(path) : formats::Asset::open(path)).kind());
 }
 
+/// Copies a file, which appears whole or not at all.
+void copyFile(const std::string& from, const std::string& to, bool overwrite) {
+  const nb::gil_scoped_release others_may_run;
+  formats::AtomicFile target(to);
+  std::ifstream source(from, std::ios::binary);
+  std::vector<char> part(std::size_t{1} << 20);
+  std::uint64_t offset = 0;
+  while (source.read(part.data(), static_cast<std::streamsize>(part.size())), source.gcount() > 0) {
+    target.write(part.data(), static_cast<std::uint64_t>(source.gcount()), offset);
+    offset += static_cast<std::uint64_t>(source.gcount());
+  }
+  if (!source.eof()) throw Error(ErrorCode::io, "", from, "", "cannot be read");
+  target.publish(overwrite);
+}
+
 }  // namespace
 
 void bindAssets(nb::module_& m) {
   m.def("summary", &summary);
   m.def("validate", &validate);
   m.def("kind_of", &kindOf);
+  m.def("copy_file", &copyFile);
   m.def("hash_file", [](const std::string& path) { return formats::hashFile(path); });
   m.def("version", [] { return std::string(GLINT_VERSION); });
 }

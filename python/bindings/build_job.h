@@ -70,12 +70,25 @@ class PythonProgress {
   std::optional<nb::python_error> failure_;
 };
 
+/// Work of the library without the interpreter's lock.
+template <class Work>
+auto unlocked(Work&& work) {
+  const nb::gil_scoped_release others_may_run;
+  return work();
+}
+
+/// The asset that a builder reads, with hashes and values checked.
+inline formats::Asset openInput(const BuildJob& job) {
+  return unlocked([&] { return formats::Asset::openForBuilding(job.input); });
+}
+
 inline formats::Provenance provenanceOf(const BuildJob& job) {
   formats::Provenance p;
   p.generator = "glint-ndf " GLINT_VERSION;
   p.command_json = job.command_json;
   if (!job.input_name.empty())
-    p.inputs.push_back({job.input_name, job.input.empty() ? job.array_hash : formats::hashFile(job.input)});
+    p.inputs.push_back(
+        {job.input_name, job.input.empty() ? job.array_hash : unlocked([&] { return formats::hashFile(job.input); })});
   return p;
 }
 

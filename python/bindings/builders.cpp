@@ -42,7 +42,7 @@ void pyramid(const BuildJob& job, float stride, float overlap, int resolution, f
   o.boundary = boundaryOf(boundary);
   o.levels = levels;
   o.precision = precisionOf(precision);
-  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const formats::Asset input = openInput(job);
   const NormalMap& map = input.get<NormalMap>();
   run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::buildPyramid(map, o, progress); });
 }
@@ -58,7 +58,7 @@ void wavePyramid(const BuildJob& job, float stride, float overlap, int resolutio
   o.coherence_um = coherence_um;
   o.wavelengths_um = wavelengths_um;
   o.spectral = spectral;
-  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const formats::Asset input = openInput(job);
   const HeightMap& map = input.get<HeightMap>();
   run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::buildWavePyramid(map, o, progress); });
 }
@@ -91,7 +91,7 @@ nb::dict compress(const BuildJob& job, const std::string& method, int rank, doub
   o.regions = regions;
   o.min_improvement = min_improvement;
   o.max_iterations = max_iterations;
-  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const formats::Asset input = openInput(job);
   const NdfPyramid& from = input.get<NdfPyramid>();
   bake::CompressionReport report;
   run(job, formats::chained(provenanceOf(job), input.info().provenance),
@@ -101,14 +101,14 @@ nb::dict compress(const BuildJob& job, const std::string& method, int rank, doub
 
 void binMap(const BuildJob& job, float alpha, float alpha_max, int leaf_size) {
   const bake::BinMapOptions o = {alpha, leaf_size, alpha_max};
-  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const formats::Asset input = openInput(job);
   const NormalMap& map = input.get<NormalMap>();
   run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::buildBinMap(map, o, progress); });
 }
 
 void histogram(const BuildJob& job, int theta_bins, int phi_bins, int stride) {
   const bake::HistogramSatOptions o = {theta_bins, phi_bins, stride};
-  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const formats::Asset input = openInput(job);
   const NormalMap& map = input.get<NormalMap>();
   run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::buildHistogramSat(map, o, progress); });
 }
@@ -119,7 +119,7 @@ void moments(const BuildJob& job, int finest_level, const std::string& boundary,
   o.boundary = boundaryOf(boundary);
   o.gradient =
       choose<bake::Gradient>("gradient", gradient, {{"central", bake::Gradient::central}, {"sobel", bake::Gradient::sobel}});
-  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const formats::Asset input = openInput(job);
   run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) {
     if (input.kind() == formats::kKindName<HeightMap>) return bake::buildSlopeMoments(input.get<HeightMap>(), o, progress);
     return bake::buildSlopeMoments(input.get<NormalMap>(), o, progress);
@@ -140,7 +140,7 @@ void displace(const BuildJob& job, const std::vector<int>& factors, const std::s
   o.spatial = spatial;
   o.bounces = bounces;
   o.seed = seed;
-  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const formats::Asset input = openInput(job);
   const HeightMap& map = input.get<HeightMap>();
   run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::displace(map, o, progress); });
 }

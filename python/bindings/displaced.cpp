@@ -65,7 +65,8 @@ void sample(const Displaced& displaced, int variant, const Rows& levels, const D
 }
 
 void levels(const Displaced& displaced, const Rows& sigma, const Answers& out) {
-  for (std::size_t k = 0; k < out.shape(0); ++k) check(glint_displaced_level(displaced.get(), sigma(k, 0), from(out, k)));
+  const nb::gil_scoped_release others_may_run;
+  forEachQuery(out.shape(0), [&](std::size_t k) { check(glint_displaced_level(displaced.get(), sigma(k, 0), from(out, k))); });
 }
 
 /// Heights of a level as an array into the file, which `self` keeps open.

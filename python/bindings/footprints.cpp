@@ -3,6 +3,7 @@
 #include <nanobind/stl/optional.h>
 
 #include "glint/query/ray_footprint.h"
+#include "parallel.h"
 
 namespace glint::python {
 namespace {
@@ -23,18 +24,20 @@ void bindFootprints(nb::module_& m) {
 
   m.def("from_differentials",
         [](const Rows& dx, const Rows& dy, int width, int height, float filter_sigma, const Answers& out) {
-          for (std::size_t k = 0; k < out.shape(0); ++k) {
+          const nb::gil_scoped_release others_may_run;
+          forEachQuery(out.shape(0), [&](std::size_t k) {
             const Footprint p =
                 footprintFromDifferentials({}, {dx(k, 0), dx(k, 1)}, {dy(k, 0), dy(k, 1)}, width, height, filter_sigma);
             set(out, k, p.covariance);
-          }
+          });
         });
   m.def("from_cone", [](const Rows& widths, const Rows& directions, const Rows& texels_per_unit, const Answers& out) {
-    for (std::size_t k = 0; k < out.shape(0); ++k) {
+    const nb::gil_scoped_release others_may_run;
+    forEachQuery(out.shape(0), [&](std::size_t k) {
       const Footprint p =
           footprintOfCone({widths(k, 0), 0}, {}, {directions(k, 0), directions(k, 1), directions(k, 2)}, texels_per_unit(k, 0));
       set(out, k, p.covariance);
-    }
+    });
   });
 }
 

@@ -129,14 +129,14 @@ nb::dict ingest(const BuildJob& job, const Pixels& image, const std::string& kin
         [&](const bake::ProgressFn&) { return NormalMapData(array.width, array.height, texel_size_um, std::move(normals)); });
   };
   if (!of_heights) {
-    bake::IngestedNormals made = bake::ingestNormals(array, o);
+    bake::IngestedNormals made = unlocked([&] { return bake::ingestNormals(array, o); });
     report = made.report;
     writeNormals(std::move(made.normals));
   } else {
-    bake::IngestedHeights made = bake::ingestHeights(array, o);
+    bake::IngestedHeights made = unlocked([&] { return bake::ingestHeights(array, o); });
     report = made.report;
     if (!to_heights) {
-      writeNormals(bake::normalsFromHeights(array.width, array.height, made.heights, o.boundary));
+      writeNormals(unlocked([&] { return bake::normalsFromHeights(array.width, array.height, made.heights, o.boundary); }));
     } else {
       run(job, provenanceOf(job), [&](const bake::ProgressFn&) {
         return HeightMapData{array.width, array.height, texel_size_um, std::move(made.heights)};
@@ -157,23 +157,25 @@ bake::SynthKind synthKind(const std::string& word) {
                             {"weave", SynthKind::weave},
                             {"sawtooth", SynthKind::sawtooth},
                             {"flat", SynthKind::flat},
-                            {"grating", SynthKind::grating}});
+                            {"grating", SynthKind::grating},
+                            {"flake2d", SynthKind::flake2d}});
 }
 
 /// Options that are not given have the values with which maps of the kind look typical.
 void synth(const BuildJob& job, const std::string& kind, int width, int height, std::uint64_t seed, bool heights,
-           float texel_size_um, const std::optional<float>& alpha, const std::optional<float>& gamma,
-           const std::optional<float>& correlation, const std::optional<float>& streak, const std::optional<float>& feature,
-           const std::optional<float>& density, const std::optional<float>& slope) {
+           float texel_size_um, const nb::dict& given) {
   bake::SynthOptions o = bake::defaultSynthOptions(synthKind(kind));
   o.width = width, o.height = height, o.seed = seed;
-  o.alpha = alpha.value_or(o.alpha);
-  o.gamma = gamma.value_or(o.gamma);
-  o.correlation_texels = correlation.value_or(o.correlation_texels);
-  o.streak_texels = streak.value_or(o.streak_texels);
-  o.feature_texels = feature.value_or(o.feature_texels);
-  o.density = density.value_or(o.density);
-  o.slope = slope.value_or(o.slope);
+  const std::pair<const char*, float*> numbers[] = {
+      {"alpha", &o.alpha},          {"gamma", &o.gamma},        {"correlation", &o.correlation_texels},
+      {"streak", &o.streak_texels}, {"density", &o.density},    {"feature", &o.feature_texels},
+      {"slope", &o.slope},          {"depth", &o.depth_texels}, {"flake_size_uv", &o.flake_size_uv},
+      {"roughness", &o.roughness},  {"coverage", &o.coverage}};
+  for (const auto& [name, value] : numbers)
+    if (given.contains(name)) *value = nb::cast<float>(given[name]);
+  if (given.contains("profile"))
+    o.profile = choose<bake::GratingProfile>("profile", nb::cast<std::string>(given["profile"]),
+                                             {{"sine", bake::GratingProfile::sine}, {"blazed", bake::GratingProfile::blazed}});
   if (heights) {
     run(job, provenanceOf(job), [&](const bake::ProgressFn&) {
       return HeightMapData{width, height, texel_size_um, bake::synthHeights(o)};
@@ -212,12 +214,12 @@ void bindMaps(nb::module_& m) {
         nb::arg("encoding"), nb::arg("dequantize"), nb::arg("boundary"), nb::arg("fix_invalid"), nb::arg("allow_constant"),
         nb::arg("height_scale"), nb::arg("no_data").none(), nb::arg("seed"), nb::arg("texel_size_um"));
   m.def("synth", &synth, nb::arg("job"), words_only, nb::arg("kind"), nb::arg("width"), nb::arg("height"), nb::arg("seed"),
-        nb::arg("heights"), nb::arg("texel_size_um"), nb::arg("alpha").none(), nb::arg("gamma").none(),
-        nb::arg("correlation").none(), nb::arg("streak").none(), nb::arg("feature").none(), nb::arg("density").none(),
-        nb::arg("slope").none());
+        nb::arg("heights"), nb::arg("texel_size_um"), nb::arg("given"));
   m.def("texels", &texels);
-  m.def("hash_array",
-        [](const nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>& a) { return formats::hashBytes(a.data(), a.nbytes()); });
+  m.def("hash_array", [](const nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>& a) {
+    const nb::gil_scoped_release others_may_run;
+    return formats::hashBytes(a.data(), a.nbytes());
+  });
 }
 
 }  // namespace glint::python

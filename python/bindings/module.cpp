@@ -8,6 +8,7 @@
 // The functions here take plain arrays of queries. Package glint_ndf gives them shapes, defaults and docstrings.
 NB_MODULE(_glint, m) {
   using namespace glint::python;
+  nanobind::set_leak_warnings(false);  // Mitsuba keeps classes of plugins, and what they hold, until the process ends
   registerErrors();
   bindFootprints(m);
   bindNdf(m);

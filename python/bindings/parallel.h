@@ -23,4 +23,12 @@ void inRuns(std::size_t count, int threads, Work&& work) {
   });
 }
 
+/// Calls work(query) for every query, on all cores.
+template <class Work>
+void forEachQuery(std::size_t count, Work&& work) {
+  inRuns(count, 0, [&](std::size_t first, std::size_t run) {
+    for (std::size_t k = first; k < first + run; ++k) work(k);
+  });
+}
+
 }  // namespace glint::python

@@ -15,7 +15,10 @@ def members(value, count: int, name: str, dtype=np.float32) -> np.ndarray:
 
     Arrays of `dtype` are not copied.
     """
-    array = np.asarray(value, dtype=dtype)
+    try:
+        array = np.require(value, dtype=dtype, requirements="A")
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{name}: {error}") from error
     if count == 1:
         return array[..., np.newaxis]
     if array.ndim == 0 or array.shape[-1] != count:

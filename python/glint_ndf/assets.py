@@ -63,20 +63,7 @@ class Asset:
         target = Path(path)
         if target.exists() and not overwrite:
             raise FileError(f"{target}: exists; give overwrite=True to replace it", path=str(target))
-        try:
-            with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as made:
-                try:
-                    with open(self.path, "rb") as source:
-                        shutil.copyfileobj(source, made, 1 << 20)
-                    made.flush()
-                    os.fsync(made.fileno())
-                    os.chmod(made.name, 0o666 & ~_umask())
-                    os.replace(made.name, target)
-                except BaseException:
-                    os.unlink(made.name)
-                    raise
-        except OSError as error:
-            raise FileError(f"{target}: cannot be written: {error.strerror or error}", path=str(target)) from error
+        _glint.copy_file(self.path, str(target), overwrite)
 
     def info(self) -> dict[str, Any]:
         """Kind, sizes, parts, provenance and statistics: the result of ``glint-info --json``."""
@@ -99,12 +86,6 @@ class Asset:
 
     def __repr__(self) -> str:
         return f"<glint_ndf.Asset of kind {self.kind}, {os.path.getsize(self.path)} bytes>"
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def temporary_file(owner: object, suffix: str = ".glint") -> str:

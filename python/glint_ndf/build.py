@@ -21,6 +21,8 @@ Progress = Callable[[int, int], None]
 def _made(function: str, options: dict[str, Any], source: Asset | np.ndarray | None, threads: int, progress: Progress | None,
           *arrays: np.ndarray) -> Asset:
     """Runs a builder of the extension module into a temporary file."""
+    options = {name: _checked(name, value) for name, value in options.items()}
+    threads = _checked("threads", threads, least=0)
     asset = Asset.__new__(Asset)
     path = temporary_file(asset)
     command = json.dumps({"function": function, **options}, sort_keys=True)
@@ -30,9 +32,24 @@ def _made(function: str, options: dict[str, Any], source: Asset | np.ndarray | N
         job = _glint.BuildJob(path, command, "", "array", _glint.hash_array(source), threads, progress)
     else:
         job = _glint.BuildJob(path, command, "", "", "", threads, progress)
-    report = getattr(_glint, function)(job, *arrays, **options)
+    try:
+        report = getattr(_glint, function)(job, *arrays, **options)
+    except TypeError as error:
+        broken = [name for name, value in options.items() if isinstance(value, float) and value != int(value)]
+        raise ArgumentError(f"{', '.join(broken) or function}: must be whole numbers, or of another type") from error
     asset.__init__(path, report)
     return asset
+
+
+def _checked(name: str, value: Any, least: int = -2**31) -> Any:
+    """A number as Python has it. Whole numbers must fit the library's: 32 bits, seeds 64."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, int) and not isinstance(value, bool):
+        low, high = (0, 2**64) if name == "seed" else (least, 2**31)
+        if not low <= value < high:
+            raise ArgumentError(f"{name}: {value} is out of range; give {low} to {high - 1}")
+    return value
 
 
 def _expect(asset: Asset, name: str) -> Asset:
@@ -73,6 +90,7 @@ def ingest(image, *, kind: str = "normal", to: str = "normals", convention: str 
         pixels = pixels[..., np.newaxis]
     if pixels.ndim != 3 or pixels.size == 0:
         raise ArgumentError(f"image: the shape must be [height][width] or [height][width][channels], and is {pixels.shape}")
+    pixels = pixels.astype(pixels.dtype.newbyteorder("="), copy=False)
     if pixels.dtype not in (np.uint8, np.uint16):
         if not (np.issubdtype(pixels.dtype, np.floating)):
             raise ArgumentError(f"image: of type {pixels.dtype}; give uint8, uint16 or floats")
@@ -86,20 +104,28 @@ def ingest(image, *, kind: str = "normal", to: str = "normals", convention: str 
 
 def synth(kind: str, width: int = 512, height: int | None = None, *, seed: int = 1, heights: bool = False,
           texel_size_um: float = 0.0, alpha: float | None = None, gamma: float | None = None, correlation: float | None = None,
-          streak: float | None = None, feature: float | None = None, density: float | None = None,
-          slope: float | None = None) -> Asset:
+          streak: float | None = None, feature: float | None = None, density: float | None = None, slope: float | None = None,
+          depth: float | None = None, profile: str | None = None, flake_size_uv: float | None = None,
+          roughness: float | None = None, coverage: float | None = None) -> Asset:
     """Makes a periodic procedural map, as ``glint-synth``. Options that are None have values typical of the kind.
 
     Args:
-        kind: "isotropic", "brushed", "flakes", "scratches", "leather", "weave", "sawtooth", "flat" or "grating".
+        kind: "isotropic", "brushed", "flakes", "scratches", "leather", "weave", "sawtooth", "flat", "grating" or "flake2d".
         heights: make an asset of kind heights instead of normals.
         alpha: Beckmann roughness of the noise, or roughness of the flakes.
         gamma: exponent of the distribution of flakes.
         correlation, streak, feature: lengths in texels. density: scratches in a square of 64 x 64 texels. slope: steepest slope.
+        depth: from the lowest to the highest point, texels.
+        profile: of a grating, "sine" or "blazed".
+        flake_size_uv, roughness, coverage: of flake2d, as MaterialX's node has them; the size in widths of the map.
     """
+    numbers = dict(alpha=alpha, gamma=gamma, correlation=correlation, streak=streak, feature=feature, density=density, slope=slope,
+                   depth=depth, flake_size_uv=flake_size_uv, roughness=roughness, coverage=coverage)
+    given = {name: _number(name, value) for name, value in numbers.items() if value is not None}
+    if profile is not None:
+        given["profile"] = profile
     options = dict(kind=kind, width=width, height=width if height is None else height, seed=seed, heights=heights,
-                   texel_size_um=texel_size_um, alpha=alpha, gamma=gamma, correlation=correlation, streak=streak, feature=feature,
-                   density=density, slope=slope)
+                   texel_size_um=texel_size_um, given=given)
     return _made("synth", options, None, 0, None)
 
 
@@ -134,7 +160,7 @@ def wave_pyramid(heights: Asset, *, stride: float = 32.0, overlap: float = 2 ** 
         wavelengths: a number of wavelengths over the visible range, or a rising list of them in micrometres.
         spectral: a channel for each wavelength instead of X, Y and Z.
     """
-    waves = _glint.even_wavelengths(wavelengths) if isinstance(wavelengths, int) else [float(w) for w in wavelengths]
+    waves = _glint.even_wavelengths(wavelengths) if isinstance(wavelengths, (int, np.integer)) else [float(w) for w in wavelengths]
     options = dict(stride=stride, overlap=overlap, resolution=resolution, levels=_auto("levels", levels), precision=precision,
                    coherence_um=coherence_um, wavelengths_um=waves, spectral=spectral)
     return _made("wave_pyramid", options, _expect(heights, "heights"), threads, progress)
@@ -212,6 +238,13 @@ def _auto(name: str, value: int | str) -> int:
     """A number, or 0 for "auto"."""
     if value == "auto":
         return 0
-    if not isinstance(value, (int, np.integer)) or value < 1:
+    if not isinstance(value, (int, np.integer)) or isinstance(value, bool) or value < 1:
         raise ArgumentError(f'{name}: {value!r} is no number above 0; give "auto", or 1 or more')
     return int(value)
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{name}: {value!r} is no number") from None

@@ -54,12 +54,11 @@ _CLASSES = {e.exit_code: e for e in (ArgumentError, FileError, InvalidInputError
 
 
 def error_of(code: int, rule: str, path: str, message: str) -> GlintError:
-    """The exception for a code of the library, whose messages name options of the tools: here they are arguments.
+    """The exception for a code of the library. The extension module calls this.
 
-    The extension module calls this.
+    The library's messages name options of the tools, as --sigma-r or glint-ingest --fix-invalid: here they are arguments.
     """
-    def argument(option: re.Match) -> str:
-        return option[0] if option[1] else option[2].replace("-", "_")
-
-    message = re.sub(r"(glint-[a-z]+ )?--([a-z][a-z-]*)", argument, message)
-    return _CLASSES.get(code, GlintError)(message, rule, path)
+    named = message.startswith(f"{path}: ") if path else False
+    head, text = (path, message[len(path):]) if named else ("", message)
+    text = re.sub(r"(^|(?<=[\s(]))(glint-[a-z]+ )?--([a-z][a-z-]*)", lambda option: option[3].replace("-", "_"), text)
+    return _CLASSES.get(code, GlintError)(head + text, rule, path)

@@ -149,15 +149,18 @@ class Ndf:
             if (value is not None) != (name in wants):
                 raise ArgumentError(f"{name}: {'missing' if value is None else 'given'}, with fresnel=\"{fresnel}\", which takes "
                                     f"{' and '.join(wants) or 'neither eta nor k'}")
-        handle = _glint.make_brdf(self._handle, model, _three(eta), _three(k), _word("facets", facets, _FACETS))
+        handle = _glint.make_brdf(self._handle, model, _three("eta", eta), _three("k", k), _word("facets", facets, _FACETS))
         return Brdf(handle, self)
 
     def __repr__(self) -> str:
         return f"<glint_ndf.Ndf of kind {self.kind}, {self.width} x {self.height} texels>"
 
 
-def _three(value) -> list[float]:
-    return np.broadcast_to(np.asarray(0 if value is None else value, dtype=np.float32), (3,)).tolist()
+def _three(name: str, value) -> list[float]:
+    numbers = np.asarray(0 if value is None else value, dtype=np.float32)
+    if numbers.shape not in ((), (1,), (3,)):
+        raise ArgumentError(f"{name}: give one number, or three for red, green and blue; the shape is {numbers.shape}")
+    return np.broadcast_to(numbers, (3,)).tolist()
 
 
 class Brdf:
@@ -238,7 +241,13 @@ class Brdf:
 def _lobe_members(axes: np.ndarray, sharpness, amplitudes: np.ndarray) -> list[np.ndarray]:
     """Axis, sharpness and amplitude of lobes, all of the same leading shape."""
     sharp = members(sharpness, 1, "sharpness")
-    shape = np.broadcast_shapes(axes.shape[:-1], sharp.shape[:-1], amplitudes.shape[:-1])
+    try:
+        shape = np.broadcast_shapes(axes.shape[:-1], sharp.shape[:-1], amplitudes.shape[:-1])
+    except ValueError:
+        raise ArgumentError(f"axes, sharpness and amplitudes do not broadcast: {axes.shape}, {sharp.shape[:-1]} and "
+                            f"{amplitudes.shape}") from None
+    if not shape:
+        raise ArgumentError("axes, sharpness and amplitudes: one of them must have a dimension of lobes, [..., lobes, 3]")
     return [np.broadcast_to(a, shape + a.shape[-1:]) for a in (axes, sharp, amplitudes)]
 
 

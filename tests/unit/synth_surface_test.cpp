@@ -240,6 +240,12 @@ TEST(SynthFlake2d, CoversItsShareOfTheMap) {
   }
 }
 
+TEST(SynthFlake2d, OfSmoothFlakesIsLevelEverywhere) {
+  SynthOptions p = sized(SynthKind::flake2d, 4096, 4096);
+  p.flake_size_uv = 0.0004f, p.roughness = 0, p.coverage = 1;  // the hash of some flakes rounds to 1
+  for (const Vec2 n : synthNormals(p)) ASSERT_LT(std::abs(n.x) + std::abs(n.y), 1e-3f);
+}
+
 TEST(SynthFlake2d, TilesWhereItsSidesHoldWholeCells) {
   SynthOptions p = sized(SynthKind::flake2d, 200, 100);
   EXPECT_TRUE(flake2dTiles(p));

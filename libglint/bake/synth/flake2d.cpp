@@ -188,7 +188,8 @@ void forTexels(const SynthOptions& p, const Set& set) {
 /// Normal of a flake: a quantile of GGX with alpha = roughness^2, not steeper than kMinFlakeCosine.
 Vec2 normalOf(const Cell& cell, float roughness) {
   const Point3 xi = cell.numbers(2);
-  const float tangent = std::min(roughness * roughness * std::sqrt(xi.y) / std::sqrt(1 - xi.y), kSteepestTangent);
+  constexpr float kLeast = 1e-12f;  // the hash may round to 1
+  const float tangent = std::min(roughness * roughness * std::sqrt(xi.y / std::max(1 - xi.y, kLeast)), kSteepestTangent);
   const float sine = tangent / std::sqrt(1 + tangent * tangent);
   return {std::cos(kTwoPi * xi.x) * sine, std::sin(kTwoPi * xi.x) * sine};
 }

@@ -1,4 +1,4 @@
-"""Runs MaterialX's own code of the node flake2d on this machine: its GLSL, with the few changes that make it C++."""
+"""Runs MaterialX's own code of the node flake2d: its GLSL, with the few changes that make it C++."""
 
 import pathlib
 import re

@@ -1,5 +1,6 @@
 """The BSDF in C++ answers as the BSDF in Python."""
 
+import pathlib
 import shutil
 
 import drjit as dr
@@ -97,6 +98,12 @@ def test_footprints_without_extent_are_the_narrowest_of_the_asset(noise_pyramid,
     ({"interpolation": "cubic"}, "give footprint or trilinear"),
     ({"uv_scale": 1.0, "texels_per_unit": 5.0}, "give one of them"),
     ({"facets": "beckmann"}, "bin-map"),
+    ({"uv_scale": -1.0}, "uv_scale"),
+    ({"uv_scale": float("nan")}, "uv_scale"),
+    ({"texels_per_unit": 0.0}, "texels_per_unit"),
+    ({"sigma": -4.0}, "sigma"),
+    ({"footprint_scale": -1.0}, "footprint_scale"),
+    ({"footprint_parts": 99}, "footprint_parts"),
     ({"coat": 1.5}, "coat"),
     ({}, "asset"),
 ])
@@ -115,6 +122,21 @@ def test_symbolic_loops_are_an_error_and_no_crash(llvm, noise_pyramid, loaded):
     while error is not None:
         words, error = words + str(error), error.__cause__ or error.__context__
     assert "glint_native" in words and "wavefront" in words
+
+
+def test_failed_plugins_close_their_assets(llvm, noise_pyramid, loaded, tmp_path):
+    noise_pyramid.save(tmp_path / "noise.glint")
+    for _ in range(3):
+        with pytest.raises(RuntimeError):
+            mi.load_dict({"type": "glint_native", "asset": str(tmp_path / "noise.glint"), "facets": "beckmann"})
+    assert str(tmp_path) not in pathlib.Path("/proc/self/maps").read_text()
+
+
+def test_assets_are_found_beside_the_scene(llvm, noise_pyramid, loaded, tmp_path):
+    noise_pyramid.save(tmp_path / "noise.glint")
+    (tmp_path / "scene.xml").write_text('<scene version="3.0.0"><shape type="rectangle"><bsdf type="glint_native">'
+                                        '<string name="asset" value="noise.glint"/></bsdf></shape></scene>')
+    assert "noise.glint" in str(mi.load_file(str(tmp_path / "scene.xml")).shapes()[0].bsdf())
 
 
 def test_a_missing_compiler_is_said(monkeypatch, tmp_path):

@@ -1,9 +1,12 @@
 """Compiles the plugin for the Mitsuba that is installed, and tells Mitsuba where it is."""
 
 import hashlib
+import importlib.metadata
 import importlib.util
 import os
 import pathlib
+import platform
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -34,10 +37,12 @@ def load(folder=None):
 
 def compiled_plugin(folder=None) -> pathlib.Path:
     """The plugin `FOLDER/HASH/plugins/glint_native.so`, compiled where it is not there. HASH is that of the source and the versions."""
-    compiler = shutil.which(os.environ.get("CXX", "g++"))
-    if compiler is None:
+    if platform.machine() not in ("x86_64", "AMD64"):
+        raise gn.UnsupportedError(f"glint_native: is for x86-64, and this processor is {platform.machine()}; take the BSDF `glint`")
+    compiler = shlex.split(os.environ.get("CXX", "g++"))
+    if not compiler or shutil.which(compiler[0]) is None:
         raise gn.UnsupportedError("glint_native: there is no C++ compiler; install g++, or name one in CXX")
-    command = [compiler, *_flags()]
+    command = [*compiler, *_flags()]
     home = pathlib.Path(folder) if folder is not None else _cache_folder()
     plugin = home / _hash_of(command) / "plugins" / _PLUGIN
     if not plugin.exists():
@@ -64,6 +69,9 @@ def _flags() -> list[str]:
                 module.parent / "include"]
     libraries = [(mitsuba, ["-lmitsuba"]), (drjit, ["-ldrjit-core", "-ldrjit-extra", "-lnanothread"]),
                  (module.parent, [f"-l:{module.name}"])]
+    for folder in includes:
+        if not folder.is_dir():
+            raise gn.UnsupportedError(f"glint_native: there are no headers in {folder}; install the wheels of Mitsuba, Dr.Jit and nanobind")
     flags = ["-std=c++20", "-O2", "-march=x86-64-v2", "-fPIC", "-shared", "-fvisibility=hidden", "-w"]
     flags += [f"-I{folder}" for folder in includes] + [str(_SOURCE)]
     for folder, names in libraries:
@@ -72,10 +80,8 @@ def _flags() -> list[str]:
 
 
 def _hash_of(command: list[str]) -> str:
-    import drjit
-    import mitsuba
-
-    parts = [*command, mitsuba.__version__, drjit.__version__, gn.__version__, _SOURCE.read_text()]
+    versions = [importlib.metadata.version(package) for package in ("mitsuba", "drjit", "nanobind")]
+    parts = [*command, *versions, gn.__version__, _SOURCE.read_text()]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
 
 

@@ -1,7 +1,8 @@
 // The BSDF `glint_native` of Mitsuba 3: the facets of an asset as conductors, in C++. It asks the library by its C interface.
-// It answers as the BSDF `glint` does without layers; docs/MITSUBA.md has the parameters.
+// It answers as the BSDF `glint` does without layers; docs/MITSUBA.md has its parameters.
 
 #include <glint.h>
+#include <mitsuba/core/fresolver.h>
 #include <mitsuba/core/fwd.h>
 #include <mitsuba/core/plugin.h>
 #include <mitsuba/core/properties.h>
@@ -13,17 +14,28 @@
 
 #include <array>
 #include <cmath>
+#include <memory>
 #include <string>
 #include <vector>
 
 NAMESPACE_BEGIN(mitsuba)
 
+/// A parameter that must lie in a range, as the BSDF `glint` has it.
+/// @param above  whether `low` itself is out of range
+inline float numberOf(const Properties& props, const char* name, float otherwise, float low = -dr::Infinity<float>,
+                      bool above = false) {
+  const float value = props.get<float>(name, otherwise);
+  if (std::isfinite(value) && (value > low || (!above && value == low) || (value == otherwise && !props.has_property(name))))
+    return value;
+  Throw("glint_native: %s = %f is out of range; give a number %s %f", name, value, above ? "above" : "of at least", low);
+}
+
 /// The distribution and the BRDF of an asset. Facets are mirrors: reflectance is the caller's.
 class GlintAsset {
  public:
-  explicit GlintAsset(const Properties& props) : path_(props.get<std::string>("asset")) {
+  explicit GlintAsset(const Properties& props) : path_(fileOf(props, "asset")) {
     glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
-    const std::string normals(props.get<std::string_view>("normals", ""));
+    const std::string normals = props.has_property("normals") ? fileOf(props, "normals") : "";
     if (!normals.empty()) options.normals_path = normals.c_str();
     options.sigma_r = props.get<float>("sigma_r", 0.f);
     options.alpha = props.get<float>("alpha", 0.f);
@@ -32,27 +44,23 @@ class GlintAsset {
     options.interpolation = choice(props, "interpolation", "footprint", "trilinear");
     options.pixels = choice(props, "pixels", "smooth", "constant");
     options.footprint_parts = props.get<int>("footprint_parts", 0);
-    check(glint_ndf_open(path_.c_str(), &options, &ndf_));
+    glint_ndf* ndf = nullptr;
+    check(glint_ndf_open(path_.c_str(), &options, &ndf));
+    ndf_.reset(ndf);
     info_.struct_size = sizeof info_;
-    check(glint_ndf_get_info(ndf_, &info_));
+    check(glint_ndf_get_info(ndf, &info_));
     int32_t channels = 0;
-    check(glint_ndf_channels(ndf_, &channels));
+    check(glint_ndf_channels(ndf, &channels));
     coloured_ = channels > 1;
-    glint_brdf_options brdf = GLINT_BRDF_OPTIONS_INIT;
-    brdf.facets = choice(props, "facets", "distribution", "beckmann");
-    check(glint_brdf_create(ndf_, &brdf, &brdf_));
+    glint_brdf_options mirrors = GLINT_BRDF_OPTIONS_INIT;
+    mirrors.facets = choice(props, "facets", "distribution", "beckmann");
+    glint_brdf* brdf = nullptr;
+    check(glint_brdf_create(ndf, &mirrors, &brdf));
+    brdf_.reset(brdf);
   }
-
-  ~GlintAsset() {
-    glint_brdf_destroy(brdf_);
-    glint_ndf_close(ndf_);
-  }
-
-  GlintAsset(const GlintAsset&) = delete;
-  GlintAsset& operator=(const GlintAsset&) = delete;
 
   const std::string& path() const { return path_; }
-  const glint_brdf* brdf() const { return brdf_; }
+  const glint_brdf* brdf() const { return brdf_.get(); }
   int width() const { return info_.width; }
   int height() const { return info_.height; }
   bool coloured() const { return coloured_; }
@@ -61,6 +69,16 @@ class GlintAsset {
   float fallbackSigma() const { return std::max(info_.smallest_sigma_texels, 0.5f); }
 
  private:
+  struct Close {
+    void operator()(glint_ndf* ndf) const { glint_ndf_close(ndf); }
+    void operator()(glint_brdf* brdf) const { glint_brdf_destroy(brdf); }
+  };
+
+  /// A file as the scene names it: beside the scene, or in a folder that Mitsuba searches.
+  static std::string fileOf(const Properties& props, const char* name) {
+    return file_resolver()->resolve(fs::path(props.get<std::string>(name))).string();
+  }
+
   static int32_t choice(const Properties& props, const char* name, const char* first, const char* second) {
     const std::string_view word = props.get<std::string_view>(name, first);
     if (word != first && word != second)
@@ -68,13 +86,13 @@ class GlintAsset {
     return word == second ? 1 : 0;
   }
 
-  void check(glint_status status) const {
+  static void check(glint_status status) {
     if (status != GLINT_OK) Throw("glint_native: %s", glint_error_message());
   }
 
   std::string path_;
-  glint_ndf* ndf_ = nullptr;
-  glint_brdf* brdf_ = nullptr;
+  std::unique_ptr<glint_ndf, Close> ndf_;
+  std::unique_ptr<glint_brdf, Close> brdf_;
   glint_ndf_info info_ = {};
   bool coloured_ = false;
 };
@@ -178,18 +196,18 @@ class GlintNative final : public BSDF<Float, Spectrum> {
   explicit GlintNative(const Properties& props) : Base(props), asset_(props) {
     if (asset_.coloured() && !is_rgb_v<Spectrum>)
       Throw("glint_native: %s: colours of kind wave-pyramid need an RGB variant; take the BSDF `glint`", asset_.path());
-    const float scale = props.get<float>("uv_scale", 1.f);
+    const float scale = numberOf(props, "uv_scale", 1.f, 0.f, true);
     const bool in_texels = props.has_property("texels_per_unit");
     if (in_texels && props.has_property("uv_scale"))
       Throw("glint_native: 'texels_per_unit' says the same as 'uv_scale'; give one of them");
-    const float texels = props.get<float>("texels_per_unit", 1.f);
+    const float texels = numberOf(props, "texels_per_unit", 1.f, 0.f, true);
     const double scale_u = in_texels ? double(texels) / asset_.width() : double(scale);
     const double scale_v = in_texels ? double(texels) / asset_.height() : double(scale);
-    const double angle = double(props.get<float>("rotation", 0.f)) * dr::Pi<double> / 180;
+    const double angle = double(numberOf(props, "rotation", 0.f)) * dr::Pi<double> / 180;
     cosine_ = std::cos(angle), sine_ = std::sin(angle);
     to_map_ = {scale_u * cosine_, scale_u * sine_, -scale_v * sine_, scale_v * cosine_};
-    footprints_ = {asset_.width(), asset_.height(), props.get<float>("footprint_scale", 1.f), props.get<float>("sigma", 0.f),
-                   asset_.fallbackSigma()};
+    footprints_ = {asset_.width(), asset_.height(), numberOf(props, "footprint_scale", 1.f, 0.f, true),
+                   numberOf(props, "sigma", 0.f, 0.f, true), asset_.fallbackSigma()};
     readConductor(props);
     m_flags = BSDFFlags::GlossyReflection | BSDFFlags::FrontSide | BSDFFlags::Anisotropic | BSDFFlags::SpatiallyVarying |
               BSDFFlags::NeedsDifferentials;
