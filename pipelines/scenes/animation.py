@@ -1,0 +1,75 @@
+"""A zoom as an animation, and how much it flickers.
+
+The camera turns nothing but its zoom: every point of the surface keeps its directions of light and view, so a frame differs from the one before only by
+what its pixels cover. Frame t, shrunk to the scale of frame t + 1, should be frame t + 1. The flicker is the mean absolute difference of the two over the
+mean of the frames. It is not 0 for an exact answer, because shrinking a picture interpolates between pixels: so the exact answer's is given, too.
+"""
+
+import numpy as np
+
+import ball
+import pictures
+
+FROM_CM, TO_CM = 1.2, 16.0
+
+
+def widths(frames):
+    return FROM_CM * (TO_CM / FROM_CM) ** (np.arange(frames) / (frames - 1))
+
+
+def shrink(image, factor):
+    """A picture at another scale round its centre; the pixel filter grows with it (a Gaussian of deviation half a pixel)."""
+    n = image.shape[0]
+    centres = (np.arange(n) + 0.5 - n / 2) * factor + n / 2
+    deviation = np.sqrt(max(0.25 * (factor**2 - 1), 0.3**2))  # at least so wide that single pixels do not show
+    weights = np.exp(-0.5 * ((np.arange(n) + 0.5 - centres[:, None]) / deviation) ** 2)
+    weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
+    return np.einsum("ij,jkc,lk->ilc", weights, image, weights, optimize=True)
+
+
+def flicker(frames, factor):
+    """@param frames  linear light of square frames
+    @param factor  by which each frame sees more than the one before
+    """
+    n = frames[0].shape[0]
+    edge = int(np.ceil(0.5 * n * (1 - 1 / factor))) + 2  # of frame t + 1, which frame t does not see
+    inside = slice(edge, n - edge)
+    differences = [np.abs(shrink(a, factor) - shrink(b, 1.0))[inside, inside].mean() for a, b in zip(frames, frames[1:])]
+    return float(np.mean(differences) / np.mean([frame[inside, inside].mean() for frame in frames]))
+
+
+def one_texel(kit):
+    """The map as a renderer takes it without filtering: one texel for each sample."""
+    def bsdf(of):
+        import mitsuba as mi
+
+        texture = {"type": "bitmap", "filename": str(of.image), "raw": True, "filter_type": "nearest",
+                   "to_uv": mi.ScalarTransform4f().scale([1 / of.cm, 1 / of.cm, 1])}
+        facet = {"type": "roughconductor", "material": "Cu", "distribution": "beckmann", "alpha": 0.01}
+        return {"type": "normalmap", "normalmap": texture, "bsdf": facet}
+    return bsdf
+
+
+def frames_of(gallery, label, count, size, spp, **how):
+    scenes = (ball.scene(gallery.kit, width, size, spp, **how) for width in widths(count))
+    return [gallery.render(f"{label}, frame {k + 1} of {count}", scene, quiet=True) for k, scene in enumerate(scenes)]
+
+
+def draw(gallery):
+    size, spp = gallery.scaled((256, 256), 32)
+    count = 12 if gallery.kit.quick else 40
+    rendered = {"glint": frames_of(gallery, "animation", count, size, spp)}
+    short = slice(0, 8)  # frames for which the others are rendered, too: Reference is slow
+    factor = widths(count)[1] / widths(count)[0]
+    rendered["Reference"] = frames_of(gallery, "animation, Reference", count, size, spp, asset=lambda of: of.normals)
+    rendered["one texel for each sample"] = frames_of(gallery, "animation, one texel", count, size, spp, bsdf=one_texel(gallery.kit))
+    values = {name: flicker([p.linear for p in frames], factor) for name, frames in rendered.items()}
+    file = gallery.out / "animation.gif"
+    glints = rendered["glint"]
+    pictures.animation([p.srgb() for p in glints + glints[-2:0:-1]], file)
+    gallery.enter("animation", file, {
+        "title": "A zoom without flicker", "alt": "An animated zoom from a patch of flakes to the whole ball and back",
+        "method": "pyramid", "text": "Frames differ by their zoom alone. Flicker is the mean difference of a frame from the one before, brought to its scale: "
+        + "; ".join(f"{name} {100 * value:.1f} %" for name, value in values.items()) + ". "
+        "What the exact answer shows is the error of bringing a frame to scale; the rest is flicker."},
+        spp=spp, seconds=sum(p.seconds for p in glints))

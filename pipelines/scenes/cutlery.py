@@ -1,0 +1,69 @@
+"""Used cutlery with scratches on a slate, under a room with windows (Gamboa 2018, figure 13)."""
+
+import numpy as np
+
+import shapes
+from kit import envmap, look_at, point_light, rgb, studio
+
+TEXEL_UM = 12
+ROOM = studio([(80, 42, 11, 20, 5.0, (1, 1, 1.05)), (108, 42, 11, 20, 5.0, (1, 1, 1.05)), (150, 35, 11, 22, 5.0, (1, 1, 1.05)), (-40, 60, 25, 12, 2.0, (1, 0.85, 0.65)), (20, 12, 50, 8, 0.8, (0.9, 0.95, 1))],
+              floor=0.12, ceiling=0.5)
+SHEET = lambda t: 0.17 + 0 * t
+
+
+def by_knots(*rows):
+    c = shapes.curve(rows, 2000)
+    return lambda t: np.interp(t, c[:, 0], c[:, 1])
+
+
+def spoon():
+    width = by_knots((0, 0.02), (0.012, 0.75), (0.05, 1.45), (0.13, 2.0), (0.22, 1.9), (0.31, 1.05), (0.36, 0.5), (0.45, 0.36), (0.7, 0.5), (0.9, 0.85), (0.97, 0.85), (0.995, 0.4), (1, 0.02))
+    rise = by_knots((0, 0.75), (0.13, 0.62), (0.3, 0.85), (0.4, 1.35), (0.6, 1.45), (0.85, 0.7), (1, 0.35))
+    bowl = by_knots((0, 0.0), (0.03, 0.25), (0.14, 0.75), (0.26, 0.5), (0.34, 0.05), (0.4, -0.06), (0.9, -0.08), (1, 0.0))
+    return shapes.blade(19.0, width, rise, bowl, SHEET)
+
+
+def knife():
+    width = by_knots((0, 0.02), (0.02, 0.45), (0.1, 0.8), (0.35, 0.98), (0.5, 0.9), (0.545, 0.5), (0.6, 0.55), (0.8, 0.75), (0.96, 0.82), (0.99, 0.5), (1, 0.02))
+    sheet = by_knots((0, 0.06), (0.5, 0.16), (0.56, 0.5), (0.8, 0.6), (0.97, 0.5), (1, 0.1))
+    return shapes.blade(22.0, width, lambda t: 0.35 + 0 * t, lambda t: 0 * t, sheet)
+
+
+def fork():
+    width = by_knots((0, 1.15), (0.06, 1.22), (0.13, 1.1), (0.2, 0.55), (0.27, 0.36), (0.6, 0.46), (0.87, 0.85), (0.96, 0.85), (0.994, 0.4), (1, 0.02))
+    rise = by_knots((0, 0.50), (0.1, 0.55), (0.22, 1.25), (0.5, 1.4), (0.8, 0.7), (1, 0.35))
+    bowl = by_knots((0, 0.1), (0.12, 0.16), (0.25, -0.05), (1, -0.06))
+    mesh = shapes.blade(14.2, width, rise, bowl, SHEET, start=4.8)
+    tine = by_knots((0, 0.02), (0.02, 0.09), (0.1, 0.14), (0.9, 0.2), (1, 0.2))
+    tine_rise = by_knots((0, 1.05), (0.3, 0.66), (0.7, 0.46), (1, 0.50))
+    for at in (-0.98, -0.327, 0.327, 0.98):
+        shapes.blade(5.0, tine, lambda t: tine_rise(t) - 0.02 * abs(at), lambda t: 0 * t, SHEET, rows=200, columns=64, mesh=mesh, offset=at * (1 + 0), start=0)
+    return mesh
+
+
+def scene(kit, size=(960, 640), spp=128, crop=None):
+    import mitsuba as mi
+
+    of = kit.map("scratches", texel_um=TEXEL_UM, density=1.2, feature_size=3, slope=0.25)
+    metal = kit.metal(of, of.pyramid(), material="Ag")
+    t = mi.ScalarTransform4f
+
+    def piece(name, mesh, at, turn):
+        return kit.mesh(name, mesh) | {"bsdf": metal, "to_world": t().translate(list(at)) @ t().rotate([0, 0, 1], turn)}
+
+    return {
+        "type": "scene",
+        "integrator": kit.integrator(5),
+        "camera": look_at((0, -24, 26), (0.4, 0.9, 0), 40, size, spp, crop=crop),
+        "spoon": piece("spoon", spoon(), (-9.5, 2.4, 0), -4),
+        "fork": piece("fork", fork(), (-9.8, -3.6, 0), 5),
+        "knife": piece("knife", knife(), (-10.5, 6.6, 0), -2),
+        "table": {"type": "rectangle", "to_world": t().scale(120), "bsdf": {"type": "roughplastic", "diffuse_reflectance": rgb(0.06, 0.065, 0.075), "alpha": 0.3}},
+        "lamp": point_light((-14, 30, 40), 5200, (1, 0.93, 0.82)),
+        "room": envmap(ROOM, 1.0),
+    }
+
+
+def draw(gallery):
+    picture = gallery.render("cutlery", scene(gallery.kit, *gallery.scaled((960, 640), 128)), exposure=1.0)
+    gallery.save("cutlery", picture, title="Scratched cutlery", method="pyramid", text="")

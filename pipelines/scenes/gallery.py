@@ -1,0 +1,145 @@
+"""Renders the pictures of the gallery with Mitsuba 3 and the plugins of glint_ndf.
+
+Normally run by `make gallery`. Writes pictures, and an index README.md with what is seen, how, with how many samples, and in what time.
+"""
+
+import argparse
+import dataclasses
+import importlib
+import json
+import pathlib
+import sys
+import time
+
+import numpy as np
+
+import kit as kits
+import pictures
+
+# In the order of the index. Each module has draw(gallery).
+SCENES = ("car_paint", "kettle", "cutlery", "bent_quad", "environment", "cloth", "diffraction", "zoom", "models", "animation")
+QUICK_SCENES = ("car_paint", "kettle", "cutlery")  # of `make demo`
+SAMPLES_A_PASS = 16
+TONE = "Khronos PBR Neutral tone curve, sRGB"
+
+
+@dataclasses.dataclass
+class Picture:
+    """A rendering: linear light, and how it was made."""
+
+    linear: np.ndarray
+    seconds: float
+    spp: int
+    exposure: float
+
+    def srgb(self):
+        return kits.tone(self.linear, self.exposure)
+
+
+class Gallery:
+    """Renders, writes, and keeps what the index says."""
+
+    def __init__(self, kit, out):
+        self.kit, self.out, self.entries = kit, out, []
+        out.mkdir(parents=True, exist_ok=True)
+
+    def scaled(self, size, spp):
+        """(size, samples) of a picture; both are smaller in a quick run."""
+        return (tuple(n // 2 for n in size), max(8, spp // 8)) if self.kit.quick else (size, spp)
+
+    def render(self, label, description, exposure=1.0, seed=0, quiet=False):
+        """Renders a scene's dictionary in passes, with a line of progress for each tenth."""
+        import mitsuba as mi
+
+        scene = mi.load_dict(description)
+        spp = description["camera"]["sampler"]["sample_count"]
+        passes = max(1, spp // SAMPLES_A_PASS)
+        total, start, told = 0, time.perf_counter(), -1
+        for index in range(passes):
+            total = total + np.array(mi.render(scene, spp=spp // passes, seed=seed + index))
+            tenth = 10 * (index + 1) // passes
+            if tenth != told and not (quiet and tenth < 10):
+                told = tenth
+                print(f"{label}: {10 * tenth} %, {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)
+        return Picture((total / passes).astype(np.float32), time.perf_counter() - start, spp // passes * passes, exposure)
+
+    def enter(self, name, file, seen, **facts):
+        """Adds a line to the index."""
+        self.entries.append({"name": name, "file": file.name, **seen, **facts})
+
+    def save(self, name, picture, inset=None, **seen):
+        """Writes one picture.
+
+        @param inset  (another picture, (left, top, right, bottom) of its frame as shares of this picture, its corner) 
+        @param seen   title, text and method for the index
+        """
+        file = self.out / f"{name}.png"
+        pictures.save(pictures.with_inset(picture.srgb(), inset) if inset else picture.srgb(), file)
+        self.enter(name, file, seen, spp=picture.spp, seconds=picture.seconds)
+        return file
+
+    def sheet(self, name, sheet, columns, notes=None, **seen):
+        """Writes pictures with titles as one. @param sheet  title -> Picture or sRGB array"""
+        file = self.out / f"{name}.png"
+        rendered = [p for p in sheet.values() if isinstance(p, Picture)]
+        pictures.save(pictures.sheet({title: p.srgb() if isinstance(p, Picture) else p for title, p in sheet.items()}, columns, notes or {}), file)
+        self.enter(name, file, seen, spp=max(p.spp for p in rendered), seconds=sum(p.seconds for p in rendered))
+        return file
+
+
+def index_text(entries, pictures_folder="", extra=""):
+    """The entries as Markdown."""
+    lines = []
+    for entry in entries:
+        lines += [f"## {entry['title']}", "", f"![{entry['alt']}]({pictures_folder}{entry['file']})", "", entry["text"], ""]
+        if entry.get("table"):
+            lines += [*entry["table"], ""]
+        lines += [f"*{entry['method']}; {entry['spp']} samples a pixel; {entry['seconds']:.0f} s on {entry['cores']} cores.*", ""]
+    return "\n".join(lines)
+
+
+HEAD = f"""# Gallery
+
+Rendered by Mitsuba 3 with the BSDF `glint` and the integrator `glint_path` of the package glint_ndf. `make gallery` renders all pictures again, from
+maps of `glint-synth` to files in `gallery/`; the scenes are small programs in `pipelines/scenes/`. Nothing is denoised. Every picture is shown
+through the {TONE}. Times are those of the rendering, without the preparation of maps.
+"""
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--bin", type=pathlib.Path, default="build/bin", help="folder of the programs")
+    parser.add_argument("--out", type=pathlib.Path, default="gallery", help="folder to make")
+    parser.add_argument("--only", action="append", choices=SCENES, help="draw this scene; may be given again")
+    parser.add_argument("--quick", action="store_true", help=f"small and with few samples: {', '.join(QUICK_SCENES)}")
+    parser.add_argument("--docs", type=pathlib.Path, help="also write DOCS/GALLERY.md and DOCS/pictures/gallery")
+    parser.add_argument("--variant", default="llvm_ad_rgb", help="of Mitsuba")
+    arguments = parser.parse_args()
+    kits.start_mitsuba(arguments.variant)
+    gallery = Gallery(kits.Kit(arguments.bin, arguments.out / "assets", arguments.quick), arguments.out)
+    names = arguments.only or (QUICK_SCENES if arguments.quick else SCENES)
+    start = time.perf_counter()
+    for name in names:
+        importlib.import_module(name).draw(gallery)
+    write_index(gallery, arguments.docs)
+    print(f"{len(gallery.entries)} pictures in {time.perf_counter() - start:.0f} s; index: {arguments.out}/README.md")
+
+
+def write_index(gallery, docs):
+    """Writes the index of all pictures that are there: those of this run, and those of earlier runs with the same folder."""
+    record = gallery.out / "index.json"
+    kept = {entry["name"]: entry for entry in (json.loads(record.read_text()) if record.exists() else [])}
+    kept |= {entry["name"]: entry | {"cores": kits.cores()} for entry in gallery.entries}
+    order = [name.replace("_", "-") for name in SCENES]
+    entries = sorted(kept.values(), key=lambda entry: order.index(entry["name"]))
+    record.write_text(json.dumps(entries, indent=1) + "\n")
+    (gallery.out / "README.md").write_text(HEAD + "\n" + index_text(entries))
+    if docs:
+        folder = docs / "pictures" / "gallery"
+        folder.mkdir(parents=True, exist_ok=True)
+        shown = [entry | {"file": pictures.for_documents(gallery.out / entry["file"], folder).name} for entry in entries]
+        (docs / "GALLERY.md").write_text(HEAD + "\n" + index_text(shown, "pictures/gallery/"))
+
+
+if __name__ == "__main__":
+    main()

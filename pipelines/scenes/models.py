@@ -1,0 +1,54 @@
+"""One scene by every method: time and error against Reference, with equal samples and with equal time."""
+
+import numpy as np
+
+import bent_quad
+import pictures
+
+MAP = "flakes"
+SIZE = (320, 240)
+TRUTH_SPP = 64
+SPP = 16
+
+# title -> how the map is prepared
+METHODS = {
+    "pyramid": lambda of: of.pyramid(),
+    "cp, rank 32": lambda of: of.made("cp", "compress", "--method", "cp", "--rank", 32, source=of.pyramid()),
+    "tucker, 10 %": lambda of: of.made("tucker", "compress", "--method", "tucker", "--tolerance", 0.1, source=of.pyramid()),
+    "bin map": lambda of: of.made("bins", "binmap"),
+    "histograms": lambda of: of.made("sat", "sat"),
+    "moments": lambda of: of.made("moments", "moments"),
+}
+
+
+def flip(truth, image):
+    """Mean FLIP error of sRGB pictures, 0..1."""
+    import flip_evaluator
+
+    return float(flip_evaluator.evaluate(truth.astype(np.float32), image.astype(np.float32), "LDR", inputsRGB=True, applyMagma=False)[1])
+
+
+def draw(gallery):
+    kit = gallery.kit
+    size, spp = gallery.scaled(SIZE, SPP)
+    of = kit.map(**bent_quad.MAPS[MAP][0], texel_um=bent_quad.TEXEL_UM)
+    scene = lambda asset, samples: bent_quad.scene(kit, MAP, size, samples, asset=asset)
+    exact = lambda of: of.normals
+    truth = gallery.render("models, truth", scene(exact, max(SPP, TRUTH_SPP if not kit.quick else SPP)))
+    reference = gallery.render("models, Reference", scene(exact, spp), seed=1000)
+    equal = {"Reference": reference} | {title: gallery.render(f"models, {title}", scene(asset, spp), seed=1000) for title, asset in METHODS.items()}
+    slowest = reference.seconds
+    table = ["| method | file | time, equal samples | FLIP | samples in the time of Reference | FLIP |", "|---|---|---|---|---|---|"]
+    notes, sheet = {}, {}
+    for title, picture in equal.items():
+        path = exact(of) if title == "Reference" else METHODS[title](of)
+        samples = max(1, round(spp * slowest / picture.seconds))
+        same_time = picture if title == "Reference" else gallery.render(f"models, {title}, equal time", scene(METHODS[title], samples), seed=2000)
+        errors = [flip(truth.srgb(), p.srgb()) for p in (picture, same_time)]
+        notes[title] = f"{picture.seconds:.1f} s, FLIP {errors[0]:.3f}\n{same_time.spp} samples: {errors[1]:.3f}"
+        sheet[title] = picture
+        table.append(f"| {title} | {path.stat().st_size / 1e6:.1f} MB | {picture.seconds:.1f} s | {errors[0]:.3f} | {same_time.spp} | {errors[1]:.3f} |")
+    sheet = {f"truth: Reference, {truth.spp} samples": truth} | sheet
+    gallery.sheet("models", sheet, columns=4, notes=notes, title="Every method", method="as titled", table=table,
+                  alt="The bent sheet of flakes by Reference, pyramid, cp, tucker, bin map, histograms and moments",
+                  text="")
