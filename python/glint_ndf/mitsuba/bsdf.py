@@ -1,0 +1,79 @@
+"""The BSDF `glint`: any asset as a reflecting surface, alone or as flakes between a clear coat and a base."""
+
+import drjit as dr
+import mitsuba as mi
+
+from .coat import Coat
+from .conductor import Conductor
+from .errors import PluginError
+from .layer import GlintLayer
+from .layers import Layers
+from .options import Options
+
+NAME = "glint"
+
+
+def make_class():
+    """The class of the plugin, for the current variant."""
+
+    class Glint(mi.BSDF):
+        """See docs/MITSUBA.md for the parameters."""
+
+        def __init__(self, props):
+            mi.BSDF.__init__(self, props)
+            options = Options(NAME, props)
+            self.layers = _read_layers(options, props)
+            options.finish()
+            self.m_components = self.layers.components()
+            self.m_flags = 0
+            for component in self.m_components:
+                self.m_flags |= component
+
+        def eval_pdf(self, ctx, si, wo, active=True):
+            return self.layers.evaluate(ctx, si, wo, active)
+
+        def eval(self, ctx, si, wo, active=True):
+            return self.eval_pdf(ctx, si, wo, active)[0]
+
+        def pdf(self, ctx, si, wo, active=True):
+            return self.eval_pdf(ctx, si, wo, active)[1]
+
+        def sample(self, ctx, si, sample1, sample2, active=True):
+            return self.layers.sample(ctx, si, sample1, sample2, active)
+
+        def traverse(self, callback):
+            self.layers.traverse(callback)
+
+        def to_string(self):
+            return f"Glint[asset = {self.layers.facets.path}]"
+
+    return Glint
+
+
+def _read_layers(options, props):
+    path = options.text("asset")
+    if path is None:
+        raise PluginError(NAME, "the parameter 'asset' is missing; give the path of a .glint asset")
+    facets = GlintLayer(NAME, options, path)
+    given = options.any_of(Conductor.parameters)
+    if facets.kind == "displacement" and given:
+        options.refuse(given[0], "does not apply to assets of kind displacement, which hold their own base")
+    conductor = None if facets.kind == "displacement" else Conductor(props)
+    base, transparency = options.object("base", mi.BSDF, "a BSDF"), options.texture("transparency")
+    if base is None and transparency is not None:
+        options.refuse("base", "is missing: the BSDF that shows through, by 'transparency'")
+    if base is not None and transparency is None:
+        options.refuse("transparency", "is missing: the share of the 'base' that shows between the facets, 0 to 1 or a texture")
+    return Layers(facets, conductor, _read_coat(options), base, transparency)
+
+
+def _read_coat(options):
+    eta = options.number("coat", None, low=1.0, high=4.0)
+    path = options.text("coat_asset")
+    alpha = None if path is not None else options.number("coat_alpha", None, low=0.0, high=1.0)
+    if eta is None and (alpha is not None or path is not None):
+        options.refuse("coat", "is missing: the index of refraction of the coat, such as 1.5")
+    if eta is None or eta == 1:
+        return None
+    layer = None if path is None else GlintLayer(NAME, options.under("coat_"), path)
+    return Coat(eta, alpha or 0.0, layer)

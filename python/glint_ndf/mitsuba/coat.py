@@ -1,0 +1,124 @@
+"""A clear dielectric layer over other layers: its reflection, and what light loses and how it bends on the way through."""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+#: Cosines of the table of a rough coat's albedo, and points of its quadrature along each axis. Their error is below 0.2 %
+#: (tests/python/mitsuba/test_coat.py).
+_TABLE_SIZE, _QUADRATURE = 64, 64
+
+
+def fresnel(cosine, eta):
+    """Reflectance of a smooth dielectric, seen from outside at this cosine."""
+    return mi.fresnel(cosine, eta)[0]
+
+
+class Coat:
+    """@param eta  index of refraction over that of air, > 1
+    @param alpha   Beckmann roughness; 0: smooth, a mirror
+    @param layer   GlintLayer of the coat's own normals, or None. What it reflects is counted as that of a smooth surface
+    """
+
+    def __init__(self, eta, alpha, layer=None):
+        self.eta, self.alpha, self.layer = eta, alpha, layer
+        self.smooth = alpha == 0 and layer is None
+        self.internal = _internal_reflectance(eta)
+        self._table = None
+        if not self.smooth and layer is None:
+            table = _albedo_table(eta, alpha)
+            self._table = mi.Float(table) if dr.is_jit_v(mi.Float) else table
+
+    def albedo(self, cosine):
+        """Share of light from this cosine that the coat reflects at its surface."""
+        if self._table is None:
+            return fresnel(cosine, self.eta)
+        position = dr.clip(cosine, 0, 1) * (_TABLE_SIZE - 1)
+        if not dr.is_jit_v(mi.Float):
+            return float(np.interp(position, np.arange(_TABLE_SIZE), self._table))
+        low = mi.UInt32(dr.minimum(position, _TABLE_SIZE - 2))
+        part = position - mi.Float(low)
+        return dr.lerp(dr.gather(mi.Float, self._table, low), dr.gather(mi.Float, self._table, low + 1), part)
+
+    def evaluate(self, si, viewed, lit, active):
+        """Reflection times the cosine of `lit`, and pdf, of a coat that is not smooth."""
+        h = dr.normalize(viewed + lit)
+        reflectance = fresnel(dr.dot(viewed, h), self.eta)
+        if self.layer is not None:
+            f, pdf = self.layer.evaluate(si, viewed, lit, active)
+            return f * reflectance * lit.z, pdf
+        distribution = self._distribution()
+        d = distribution.eval(h)
+        valid = active & (viewed.z > 0) & (lit.z > 0) & (d > 0)
+        value = reflectance * d * distribution.G(viewed, lit, h) / (4 * viewed.z)
+        pdf = distribution.pdf(viewed, h) / (4 * dr.dot(lit, h))
+        return dr.select(valid, value, 0), dr.select(valid, pdf, 0)
+
+    def sample(self, si, viewed, xi, active):
+        """A direction by the lobe of the coat; z is 0 or less where nothing was drawn."""
+        if self.smooth:
+            return mi.Vector3f(-viewed.x, -viewed.y, viewed.z)
+        if self.layer is not None:
+            lit, _, pdf = self.layer.sample(si, viewed, xi, active)
+            return dr.select(pdf > 0, lit, mi.Vector3f(0, 0, 0))
+        h, _ = self._distribution().sample(viewed, xi)
+        return mi.reflect(viewed, h)
+
+    def _distribution(self):
+        return mi.MicrofacetDistribution(mi.MicrofacetType.Beckmann, self.alpha, True)
+
+    def inside(self, v):
+        """The direction below the surface of a direction above it."""
+        x, y = v.x / self.eta, v.y / self.eta
+        return mi.Vector3f(x, y, dr.sqrt(dr.maximum(1 - x * x - y * y, 0)))
+
+    def outside(self, v):
+        """The inverse of `inside`; z is 0 where the light is reflected back totally."""
+        x, y = v.x * self.eta, v.y * self.eta
+        return mi.Vector3f(x, y, dr.safe_sqrt(1 - x * x - y * y))
+
+
+def _dielectric(cosine, eta):
+    """Fresnel reflectance in numpy, from the side of index 1."""
+    inner = np.sqrt(1 - (1 - cosine**2) / eta**2)
+    s, p = (cosine - eta * inner) / (cosine + eta * inner), (inner - eta * cosine) / (inner + eta * cosine)
+    return 0.5 * (s * s + p * p)
+
+
+def _internal_reflectance(eta):
+    """Share of diffuse light that the surface reflects back inside: 1 - (1 - diffuse reflectance outside) / eta^2."""
+    nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE)
+    cosine = 0.5 * (nodes + 1)
+    outside = float(np.sum(weights * cosine * _dielectric(cosine, eta)))
+    return 1 - (1 - outside) / eta**2
+
+
+def _smith(v, alpha):
+    """Smith's G1 of Beckmann's distribution (the rational fit of Walter 2007), for rows of unit vectors."""
+    a = v[..., 2] / (alpha * np.sqrt(np.maximum(1e-12, 1 - v[..., 2] ** 2)))
+    return np.where(a >= 1.6, 1.0, (3.535 * a + 2.181 * a * a) / (1 + 2.276 * a + 2.577 * a * a))
+
+
+def _albedo_table(eta, alpha):
+    """Directional albedo of the rough surface for cosines from 0 to 1: quadrature over normals, in slopes."""
+    nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE)
+    # Normals: uniform quantiles of the slope distribution and of the azimuth.
+    quantile, share = 0.5 * (nodes + 1), 0.5 * weights
+    tan2 = -(alpha**2) * np.log1p(-quantile)
+    azimuth = 2 * np.pi * (np.arange(_QUADRATURE) + 0.5) / _QUADRATURE
+    z = 1 / np.sqrt(1 + tan2)
+    radius = np.sqrt(1 - z * z)
+    h = np.stack(
+        [radius[:, None] * np.cos(azimuth), radius[:, None] * np.sin(azimuth), np.broadcast_to(z[:, None], (len(z), _QUADRATURE))],
+        axis=-1,
+    )
+    table = np.empty(_TABLE_SIZE)
+    for k, mu in enumerate(np.linspace(0, 1, _TABLE_SIZE)):
+        view = np.array([np.sqrt(max(0.0, 1 - mu * mu)), 0, max(mu, 1e-4)])
+        towards = h @ view
+        lit = 2 * towards[..., None] * h - view
+        valid = (towards > 0) & (lit[..., 2] > 0)
+        # f cosine / pdf of normals drawn by D h.z: F G (v.h) / (v.z h.z).
+        weight = _dielectric(np.clip(towards, 1e-6, 1), eta) * _smith(view, alpha) * _smith(lit, alpha) * towards
+        table[k] = np.sum(np.where(valid, weight / (view[2] * h[..., 2]), 0) * share[:, None]) / _QUADRATURE
+    return np.minimum(table, 1).astype(np.float32)

@@ -1,0 +1,61 @@
+"""Reflection by the facets of an asset, as mirrors: numpy in, numpy out. Fresnel's share is the caller's."""
+
+import glint_ndf as gn
+import numpy as np
+
+from .errors import PluginError
+
+
+class GlintLobe:
+    """The lobe of an asset that answers an NDF.
+
+    Directions are rows of unit vectors in the frame of the map. `viewed` points to the viewer (Mitsuba's si.wi), `lit` is the
+    other direction (Mitsuba's wo). Footprints are a deviation in texels, or covariances [lanes, 3].
+    """
+
+    def __init__(self, ndf, facets):
+        self._brdf = ndf.brdf(fresnel="mirror", facets=facets)
+        self.channels = 3 if ndf.channels > 1 else 1
+
+    def evaluate(self, uv, footprint, viewed, lit, threads):
+        """f [lanes, channels] in 1/sr, without a cosine, and pdf [lanes] per unit solid angle."""
+        f, pdf = self._brdf.evaluate(uv, lit, viewed, threads=threads, **_named(footprint))
+        return f[..., : self.channels], pdf
+
+    def sample(self, uv, footprint, viewed, xi, threads):
+        """Direction [lanes, 3], weight [lanes, channels] = f cosine / pdf, and pdf [lanes]."""
+        lit, weight, pdf = self._brdf.sample(uv, viewed, xi, threads=threads, **_named(footprint))
+        return lit, weight[..., : self.channels], pdf
+
+
+class DisplacedLobe:
+    """The lobe of an asset of kind displacement, with the colour of its base, on the coarse mesh. Members as in GlintLobe."""
+
+    channels = 3
+
+    def __init__(self, displaced, variant):
+        self._displaced, self._variant = displaced, variant
+
+    def evaluate(self, uv, footprint, viewed, lit, threads):
+        level = self._level(footprint)
+        reflected, pdf = self._displaced.evaluate(level, uv, lit, viewed, variant=self._variant, threads=threads)
+        cosine = np.maximum(lit[..., 2:3], 1e-6)
+        return reflected / cosine, pdf
+
+    def sample(self, uv, footprint, viewed, xi, threads):
+        return self._displaced.sample(self._level(footprint), uv, viewed, xi, variant=self._variant, threads=threads)
+
+    def _level(self, footprint):
+        if np.ndim(footprint) == 0:
+            return self._displaced.level(footprint)
+        return self._displaced.level(np.sqrt(0.5 * (footprint[..., 0] + footprint[..., 2])))
+
+
+def _named(footprint):
+    return {"sigma": footprint} if np.ndim(footprint) == 0 else {"covariance": footprint}
+
+
+def require_ndf(plugin, path, kind, kinds):
+    """Raises an error where an asset is of a kind that this plugin cannot ask."""
+    if kind not in kinds:
+        raise PluginError(plugin, f"assets of kind '{kind}' do not answer an NDF; give one of kind {', '.join(kinds)}", path)

@@ -1,0 +1,165 @@
+"""The integrator `glint_path`: a path tracer that knows the footprint of every hit."""
+
+import drjit as dr
+import mitsuba as mi
+
+from . import beam as beams
+from .options import Options
+from .wavefront import is_jit, wavefront
+
+NAME = "glint_path"
+
+#: Samples that are traced at once: their state takes about 1 GB.
+_MOST_LANES = 1 << 22
+
+_OF_THE_BASE_CLASS = ("hide_emitters", "samples_per_pass", "block_size", "timeout")
+
+
+def make_class():
+    """The class of the plugin, for the current variant."""
+
+    class GlintPath(mi.SamplingIntegrator):
+        """See docs/MITSUBA.md for the parameters."""
+
+        def __init__(self, props):
+            mi.SamplingIntegrator.__init__(self, props)
+            options = Options(NAME, props)
+            depth = options.integer("max_depth", -1, low=-1)
+            self.max_depth = 0x7FFFFFFF if depth == -1 else depth
+            self.rr_depth = options.integer("rr_depth", 5, low=1)
+            self.whole_pixels = options.text("footprint", "sample", ("sample", "pixel")) == "pixel"
+            self.hides = options.flag("hide_emitters", False)
+            self._widening = 1.0
+            options.any_of(_OF_THE_BASE_CLASS)
+            options.finish()
+
+        def render(self, scene, sensor=0, seed=0, spp=0, develop=True, evaluate=True):
+            if not isinstance(sensor, mi.Sensor):
+                sensor = scene.sensors()[sensor]
+            samples = spp or sensor.sampler().sample_count()
+            self._widening = samples**0.5 if self.whole_pixels else 1.0
+            with wavefront():
+                return _in_passes(
+                    lambda part, n: mi.SamplingIntegrator.render(self, scene, sensor, seed + part, n, develop, evaluate),
+                    _passes(sensor, samples) if develop else [samples],
+                )
+
+        def sample(self, scene, sampler, ray, medium=None, active=True):
+            with wavefront():
+                ray = mi.RayDifferential3f(ray)
+                if ray.has_differentials:
+                    # Mitsuba shrinks differentials to the part of the pixel that one sample stands for.
+                    ray.scale_differential(self._widening)
+                radiance, valid = _trace(self, scene, sampler, ray, mi.Bool(active))
+                return radiance, valid, []
+
+        def aov_names(self):
+            return []
+
+        def to_string(self):
+            return f"GlintPath[max_depth = {self.max_depth}, rr_depth = {self.rr_depth}]"
+
+    return GlintPath
+
+
+def _trace(options, scene, sampler, ray, active):
+    """Radiance along camera rays, and whether they hit something that is shown."""
+    context = mi.BSDFContext()
+    radiance, throughput, eta = mi.Spectrum(0), mi.Spectrum(1), mi.Float(1)
+    beam = beams.of_pixel(ray)
+    previous = dr.zeros(mi.Interaction3f)
+    previous_pdf, previous_mirror = mi.Float(1), mi.Bool(True)
+    shown = mi.Bool(not options.hides and scene.environment() is not None)
+    depth = 0
+    while True:
+        si = scene.ray_intersect(
+            mi.Ray3f(ray), ray_flags=mi.RayFlags.All | mi.RayFlags.dNSdUV, coherent=mi.Bool(depth == 0), active=active
+        )
+        radiance = radiance + _emission(options, scene, si, previous, previous_pdf, previous_mirror, throughput, depth, active)
+        hit = active & si.is_valid()
+        if depth == 0:
+            of_light = (si.shape != None) & si.shape.is_emitter() if is_jit() else si.is_valid() and si.shape.is_emitter()  # noqa: E711
+            shown = shown | (hit & (of_light & options.hides) ^ hit)
+        if depth + 1 >= options.max_depth:
+            break
+        active = hit
+        if not dr.any(active):
+            break
+
+        # The footprint: exact for the pixel, a cone for all that follows.
+        beam = beams.propagated(beam, dr.select(active, si.t, 0))
+        if depth == 0 and ray.has_differentials:
+            si.compute_uv_partials(ray)
+        else:
+            beams.write_partials(beam, ray, si)
+
+        # Light from a sample of an emitter, and the next direction.
+        bsdf = si.bsdf()
+        ds, light = scene.sample_emitter_direction(si, sampler.next_2d(active), True, active)
+        lit = active & (ds.pdf != 0) & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        towards = si.to_local(ds.d)
+        value, pdf, drawn, weight = bsdf.eval_pdf_sample(
+            context, si, towards, sampler.next_1d(active), sampler.next_2d(active), active
+        )
+        mis = dr.select(ds.delta, 1, _power(ds.pdf, pdf))
+        radiance = radiance + dr.select(lit, throughput * value * light * mis, 0)
+
+        mirrored = mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
+        throughput = throughput * weight
+        eta = eta * drawn.eta
+        previous, previous_pdf, previous_mirror = mi.Interaction3f(si), drawn.pdf, mirrored
+        beam = beams.bounced(beam, si, drawn.pdf, mirrored)
+        ray = mi.RayDifferential3f(si.spawn_ray(si.to_world(drawn.wo)))
+        depth += 1
+
+        # Russian roulette.
+        largest = dr.max(throughput)
+        active = active & (largest > 0)
+        if depth >= options.rr_depth:
+            keep = dr.minimum(largest * eta * eta, 0.95)
+            active = active & (sampler.next_1d(active) < keep)
+            throughput = throughput * dr.rcp(dr.maximum(keep, 1e-6))
+        if is_jit():
+            dr.eval(radiance, throughput, eta, beam, previous, previous_pdf, previous_mirror, ray, active)
+    return dr.select(shown, radiance, 0) if options.hides else radiance, shown
+
+
+def _emission(options, scene, si, previous, pdf, mirrored, throughput, depth, active):
+    """Light that the hit emits, weighted against the chance that a sample of an emitter had found it."""
+    if depth == 0 and options.hides:
+        return mi.Spectrum(0)
+    emitter = si.emitter(scene, active)
+    if not is_jit() and emitter is None:
+        return mi.Spectrum(0)
+    found = active & (emitter != None) if is_jit() else active  # noqa: E711
+    ds = mi.DirectionSample3f(scene, si, previous)
+    of_emitter = scene.pdf_emitter_direction(previous, ds, found & (mirrored ^ True))
+    weight = dr.select(mirrored, 1, _power(pdf, of_emitter))
+    return dr.select(found, throughput * emitter.eval(si, found) * weight, 0)
+
+
+def _power(a, b):
+    """The power heuristic of multiple importance sampling."""
+    a2, b2 = a * a, b * b
+    return dr.select(a > 0, a2 / dr.maximum(a2 + b2, 1e-37), 0)
+
+
+def _passes(sensor, samples):
+    """Samples of each pass, so that the state of all paths fits into memory."""
+    if not is_jit():
+        return [samples]
+    size = sensor.film().crop_size()
+    largest = max(1, _MOST_LANES // max(1, int(size[0]) * int(size[1])))
+    return [min(largest, samples - first) for first in range(0, samples, largest)]
+
+
+def _in_passes(render, passes):
+    """The mean of several renderings, each weighted by its samples."""
+    if len(passes) == 1:
+        return render(0, passes[0])
+    image = None
+    for part, samples in enumerate(passes):
+        share = render(part, samples) * (samples / sum(passes))
+        image = share if image is None else image + share
+        dr.eval(image)
+    return image

@@ -1,0 +1,133 @@
+"""The layer of an asset on a surface: reads the asset and its placement, and asks it at surface interactions."""
+
+import os
+
+import drjit as dr
+import glint_ndf as gn
+import mitsuba as mi
+import numpy as np
+
+from .asset_file import AssetFile
+from .errors import PluginError
+from .exchange import lanes_of, spread, take, to_float, to_mask, to_rows, to_vector
+from .footprints import Footprints
+from .glint_lobe import DisplacedLobe, GlintLobe
+from .meshes import UvCheck
+from .placement import Placement, into, out_of
+from .spectra import spectrum_of
+from .wavefront import is_jit, require_numbers
+
+_VARIANTS = ("full", "lobes", "single")
+
+#: Texels: footprints without differentials are at least as wide as half a texel.
+_NARROWEST = 0.5
+
+
+class GlintLayer:
+    """An asset, opened and placed by the options of a plugin."""
+
+    def __init__(self, plugin, options, path):
+        self.plugin = plugin
+        self.path = os.fspath(path)
+        self._files = [AssetFile(plugin, self.path)]
+        self.kind = _opened(plugin, self.path, lambda: gn.load(self.path).kind)
+        self._uv_check = UvCheck(plugin, self.path)
+        self._threads = 0 if is_jit() else 1
+        if self.kind == "displacement":
+            self._open_displaced(options)
+        else:
+            self._open_ndf(options)
+        self.placement = Placement(_scale_of(options, self.width, self.height), options.number("rotation", 0.0))
+        scale, sigma = options.number("footprint_scale", 1.0, above=0), options.number("sigma", None, above=0)
+        self._footprints = Footprints(plugin, self.path, self.width, self.height, scale, sigma, self._fallback)
+
+    def _open_displaced(self, options):
+        displaced = _opened(self.plugin, self.path, lambda: gn.open_displaced(self.path))
+        self.width, self.height = displaced.width, displaced.height
+        self._fallback = _NARROWEST
+        self.lobe = DisplacedLobe(displaced, options.text("variant", "full", _VARIANTS))
+
+    def _open_ndf(self, options):
+        given = {
+            "normals": options.text("normals"),
+            "sigma_r": options.number("sigma_r"),
+            "alpha": options.number("alpha"),
+            "surface": options.text("surface", None, ("flat", "smooth")),
+            "boundary": options.text("boundary", None, ("wrap", "clamp")),
+            "interpolation": options.text("interpolation", None, ("footprint", "trilinear")),
+            "pixels": options.text("pixels", None, ("smooth", "constant")),
+        }
+        given = {name: value for name, value in given.items() if value is not None}
+        facets = options.text("facets", "distribution", ("distribution", "beckmann"))
+        if "normals" in given:
+            self._files.append(AssetFile(self.plugin, given["normals"]))
+        ndf = _opened(self.plugin, self.path, lambda: gn.open(self.path, **given))
+        self.width, self.height = ndf.width, ndf.height
+        self._fallback = max(ndf.smallest_sigma, _NARROWEST)
+        self.lobe = _opened(self.plugin, self.path, lambda: GlintLobe(ndf, facets))
+
+    def check(self, si):
+        """Raises an error where the asset cannot be asked: symbolic loops, a replaced file, a mesh without uv."""
+        require_numbers(self.plugin)
+        for file in self._files:
+            file.check()
+        self._uv_check.of(si)
+
+    def evaluate(self, si, viewed, lit, active):
+        """f without a cosine (a spectrum, as if facets were perfect mirrors), and pdf per unit solid angle of `lit`."""
+        self.check(si)
+        frame = self.placement.frame(si)
+        rows = self._rows(si, into(frame, viewed), into(frame, lit))
+        count = len(rows[0])
+        lanes = lanes_of(to_mask(active & (viewed.z > 0) & (lit.z > 0), count))
+        uv, dx, dy, v, l = take(lanes, *rows)
+        if len(uv) == 0:
+            return mi.Spectrum(0), mi.Float(0)
+        f, pdf = self.lobe.evaluate(uv, self._footprints.of(dx, dy), v, l, self._threads)
+        return self._spectrum(spread(lanes, count, f), si), to_float(spread(lanes, count, pdf))
+
+    def sample(self, si, viewed, xi, active):
+        """A direction, weight f cosine / pdf (a spectrum, as for `evaluate`) and pdf; pdf 0: nothing was drawn."""
+        self.check(si)
+        frame = self.placement.frame(si)
+        rows = self._rows(si, into(frame, viewed), xi)
+        count = len(rows[0])
+        lanes = lanes_of(to_mask(active & (viewed.z > 0), count))
+        uv, dx, dy, v, random = take(lanes, *rows)
+        if len(uv) == 0:
+            return mi.Vector3f(0, 0, 1), mi.Spectrum(0), mi.Float(0)
+        drawn = self.lobe.sample(uv, self._footprints.of(dx, dy), v, random, self._threads)
+        lit, weight, pdf = (spread(lanes, count, a) for a in drawn)
+        lit = out_of(frame, to_vector(lit))
+        valid = lit.z > 0
+        return lit, dr.select(valid, self._spectrum(weight, si), 0), dr.select(valid, to_float(pdf), 0)
+
+    def _rows(self, si, *vectors):
+        place = self.placement
+        return to_rows(place.uv(si.uv), place.change(si.duv_dx), place.change(si.duv_dy), *vectors)
+
+    def _spectrum(self, values, si):
+        if values.shape[-1] == 1:
+            return mi.Spectrum(to_float(values[..., 0]))
+        values = np.maximum(values, 0)
+        return spectrum_of([to_float(values[..., c]) for c in range(3)], si.wavelengths)
+
+
+def _scale_of(options, width, height):
+    """Maps per unit of uv, along u and v."""
+    scale = options.number("uv_scale", None, above=0)
+    texels = options.number("texels_per_unit", None, above=0)
+    if scale is not None and texels is not None:
+        options.refuse("texels_per_unit", "says the same as 'uv_scale'; give one of them")
+    if texels is not None:
+        return texels / width, texels / height
+    return (1.0, 1.0) if scale is None else (scale, scale)
+
+
+def _opened(plugin, path, open_it):
+    """What `open_it` returns. Errors of the library get the name of the plugin."""
+    try:
+        return open_it()
+    except gn.GlintError as error:
+        text = str(error)
+        raise PluginError(plugin, text, None if path in text else path) from error
