@@ -5,7 +5,7 @@ from kit import envmap, look_at, point_light, rgb, studio
 
 import numpy as np
 
-TEXEL_UM = 12
+TEXEL_UM = 10
 RADIUS = 5.0
 DISTANCE = 60.0  # from the camera to the point it looks at
 ROOM = studio([(-110, 40, 25, 20, 2.2, (1, 1, 1)), (20, 30, 12, 30, 1.6, (0.85, 0.92, 1))], floor=0.05, ceiling=0.2)

@@ -12,7 +12,7 @@ MAPS = {
 }
 TEXEL_UM = 10
 LIGHT = (-1.5, 5.5, 20.0)
-ROOM = studio([(-90, 70, 180, 20, 0.10, (0.9, 0.95, 1))], floor=0.045, ceiling=0.045)
+ROOM = studio([(-90, 70, 180, 20, 0.05, (0.9, 0.95, 1))], floor=0.045, ceiling=0.045)
 
 
 def scene(kit, name="flakes", size=(480, 360), spp=64, asset=None, crop=None, fov=36.0):
@@ -24,7 +24,7 @@ def scene(kit, name="flakes", size=(480, 360), spp=64, asset=None, crop=None, fo
         "integrator": kit.integrator(2),
         "camera": look_at((0, -27, 19), (0, 0.3, 0.6), fov, size, spp, crop=crop),
         "quad": quad | {"bsdf": kit.metal(of, asset(of) if asset else of.pyramid())},
-        "light": point_light(LIGHT, 300),
+        "light": point_light(LIGHT, 90),
         "room": envmap(ROOM),
     }
 

@@ -6,7 +6,7 @@ import shapes
 from kit import envmap, look_at, point_light, rgb, studio
 
 TEXEL_UM = 8
-ROOM = studio([(90, 44, 75, 2.5, 2.6, (1, 1, 1)), (180, 25, 20, 20, 0.7, (1, 0.93, 0.85)), (0, 25, 20, 20, 0.6, (0.85, 0.92, 1))], floor=0.03, ceiling=0.10)
+ROOM = studio([(90, 46, 75, 1.2, 9.0, (1, 1, 1)), (90, 40, 75, 0.8, 7.0, (1, 1, 1)), (180, 25, 20, 20, 0.7, (1, 0.93, 0.85)), (0, 25, 20, 20, 0.6, (0.85, 0.92, 1))], floor=0.03, ceiling=0.10)
 
 
 def panel():
@@ -23,13 +23,15 @@ def panel():
 
 
 def paint(kit, of, asset):
-    """Flakes over a deep blue base, all under a clear coat."""
-    base = {"type": "plastic", "diffuse_reflectance": rgb(0.006, 0.03, 0.14), "int_ior": 1.5}
-    return {"type": "blendbsdf", "weight": 0.35, "base": base, "flakes": kit.metal(of, asset, material="Al")}
+    """Flakes over 25 % of a deep red base, all under a clear coat."""
+    base = {"type": "diffuse", "reflectance": rgb(0.22, 0.008, 0.006)}
+    if kit.smooth:
+        return {"type": "blendbsdf", "weight": 0.25, "base": base, "flakes": kit.metal(of, asset)}
+    return kit.metal(of, asset, material="Cu", coat=1.5, coat_alpha=0.01, base=base, transparency=0.75)
 
 
 def scene(kit, size=(960, 640), spp=96, crop=None):
-    of = kit.map("flakes", texel_um=TEXEL_UM, alpha=0.22, flake_size=7)
+    of = kit.map("flakes", texel_um=TEXEL_UM, alpha=0.13, flake_size=5)
     return {
         "type": "scene",
         "integrator": kit.integrator(4),

@@ -6,8 +6,8 @@ import shapes
 from kit import envmap, look_at, point_light, rgb, studio
 
 TEXEL_UM = 12
-ROOM = studio([(80, 42, 11, 20, 5.0, (1, 1, 1.05)), (108, 42, 11, 20, 5.0, (1, 1, 1.05)), (150, 35, 11, 22, 5.0, (1, 1, 1.05)), (-40, 60, 25, 12, 2.0, (1, 0.85, 0.65)), (20, 12, 50, 8, 0.8, (0.9, 0.95, 1))],
-              floor=0.12, ceiling=0.5)
+ROOM = studio([(80, 42, 11, 20, 0.9, (1, 1, 1.05)), (108, 42, 11, 20, 0.9, (1, 1, 1.05)), (150, 35, 11, 22, 0.9, (1, 1, 1.05)), (-40, 60, 25, 12, 2.0, (1, 0.85, 0.65)), (20, 12, 50, 8, 0.8, (0.9, 0.95, 1))],
+              floor=0.10, ceiling=0.30)
 SHEET = lambda t: 0.17 + 0 * t
 
 
@@ -18,7 +18,7 @@ def by_knots(*rows):
 
 def spoon():
     width = by_knots((0, 0.02), (0.012, 0.75), (0.05, 1.45), (0.13, 2.0), (0.22, 1.9), (0.31, 1.05), (0.36, 0.5), (0.45, 0.36), (0.7, 0.5), (0.9, 0.85), (0.97, 0.85), (0.995, 0.4), (1, 0.02))
-    rise = by_knots((0, 0.75), (0.13, 0.62), (0.3, 0.85), (0.4, 1.35), (0.6, 1.45), (0.85, 0.7), (1, 0.35))
+    rise = by_knots((0, 1.05), (0.13, 0.9), (0.3, 1.0), (0.4, 1.35), (0.6, 1.45), (0.85, 0.7), (1, 0.35))
     bowl = by_knots((0, 0.0), (0.03, 0.25), (0.14, 0.75), (0.26, 0.5), (0.34, 0.05), (0.4, -0.06), (0.9, -0.08), (1, 0.0))
     return shapes.blade(19.0, width, rise, bowl, SHEET)
 
@@ -44,7 +44,7 @@ def fork():
 def scene(kit, size=(960, 640), spp=128, crop=None):
     import mitsuba as mi
 
-    of = kit.map("scratches", texel_um=TEXEL_UM, density=1.2, feature_size=3, slope=0.25)
+    of = kit.map("scratches", texel_um=TEXEL_UM, density=5, feature_size=3, slope=0.3, sigma_r=0.008)
     metal = kit.metal(of, of.pyramid(), material="Ag")
     t = mi.ScalarTransform4f
 
@@ -58,8 +58,8 @@ def scene(kit, size=(960, 640), spp=128, crop=None):
         "spoon": piece("spoon", spoon(), (-9.5, 2.4, 0), -4),
         "fork": piece("fork", fork(), (-9.8, -3.6, 0), 5),
         "knife": piece("knife", knife(), (-10.5, 6.6, 0), -2),
-        "table": {"type": "rectangle", "to_world": t().scale(120), "bsdf": {"type": "roughplastic", "diffuse_reflectance": rgb(0.06, 0.065, 0.075), "alpha": 0.3}},
-        "lamp": point_light((-14, 30, 40), 5200, (1, 0.93, 0.82)),
+        "table": {"type": "rectangle", "to_world": t().scale(120), "bsdf": {"type": "roughplastic", "diffuse_reflectance": rgb(0.05, 0.054, 0.062), "alpha": 0.4}},
+        "lamp": point_light((-14, 30, 40), 2600, (1, 0.93, 0.82)),
         "room": envmap(ROOM, 1.0),
     }
 

@@ -6,7 +6,7 @@ import shapes
 from kit import envmap, look_at, point_light, rgb, studio
 
 TEXEL_UM = 40
-ROOM = studio([(-60, 30, 30, 30, 2.2, (1, 0.97, 0.92)), (140, 25, 12, 40, 3.0, (0.9, 0.95, 1)), (60, 70, 60, 10, 1.5, (1, 1, 1))], floor=0.15, ceiling=0.55)
+ROOM = studio([(-60, 30, 30, 30, 0.8, (1, 0.97, 0.92)), (140, 25, 12, 40, 1.5, (0.9, 0.95, 1)), (60, 70, 60, 10, 0.8, (1, 1, 1))], floor=0.12, ceiling=0.38)
 
 
 def body(map_cm):
@@ -41,7 +41,7 @@ def cup(map_cm):
 
 def scene(kit, size=(720, 720), spp=128, max_depth=6, crop=None):
     steel = kit.map("brushed", texel_um=TEXEL_UM, alpha=0.16, streak=220)
-    metal = kit.metal(steel, steel.pyramid(), material="Cr")
+    metal = kit.metal(steel, steel.pyramid(), material="Al")
     import mitsuba as mi
 
     def part(name, mesh, bsdf, at=None):

@@ -53,7 +53,7 @@ class Map:
         """The asset that a tool makes of the normals, or of another asset."""
         return self.kit.make(f"{self.name}.{suffix}", tool, source or self.normals, *flags)
 
-    def pyramid(self, stride=32):
+    def pyramid(self, stride=16):
         return self.made("pyramid", "pyramid", "--stride", stride, "--sigma-r", self.sigma_r, "--resolution", "auto")
 
 
@@ -104,7 +104,10 @@ class Kit:
         return {"type": "glint", "asset": str(asset), **({} if asset == of.normals else {"normals": str(of.normals)}), "uv_scale": 1 / of.cm, "material": material, **parameters}
 
     def integrator(self, max_depth=2, **parameters):
-        return {"type": "path" if self.smooth else "glint_path", "max_depth": max_depth, **({} if self.smooth else parameters)}
+        """Footprints are those of whole pixels: a few samples show a glint without noise."""
+        if self.smooth:
+            return {"type": "path", "max_depth": max_depth}
+        return {"type": "glint_path", "max_depth": max_depth, "footprint": "pixel", **parameters}
 
     def mesh(self, name, mesh):
         """The dictionary of a shape, without its BSDF."""
@@ -120,7 +123,7 @@ def look_at(origin, target, fov, size, spp, up=(0, 0, 1), crop=None):
     import mitsuba as mi
 
     film = {"type": "hdrfilm", "width": size[0], "height": size[1], "pixel_format": "rgb", "component_format": "float32",
-            "rfilter": {"type": "gaussian", "stddev": 0.5}}
+            "rfilter": {"type": "gaussian", "stddev": 0.4}}
     if crop:
         film |= dict(zip(("crop_offset_x", "crop_offset_y", "crop_width", "crop_height"), crop))
     return {"type": "perspective", "fov": fov, "near_clip": 0.1, "far_clip": 10000,
