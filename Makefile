@@ -17,12 +17,30 @@ help:  ## list the targets
 demo: build  ## run every tool on the sample maps, draw demo/*.png (DEMO_MAP=image.png adds yours)
 	@$(PYTHON) pipelines/demo/demo.py --bin build/bin --out demo $(if $(DEMO_MAP),--map '$(DEMO_MAP)')
 
+# The wheel links the libraries of the build; HDF5 statically. Its environment is made anew when the requirements change.
+venv := build/venv
+.PHONY: python
+python: build $(venv)/requirements.txt  ## the Python package: a wheel in build/wheels, installed with Mitsuba 3 in build/venv
+	@rm -rf build/python/wheels build/wheels
+	$(venv)/bin/pip wheel . --quiet --no-deps --no-build-isolation --wheel-dir build/python/wheels --config-settings=build-dir=build/python \
+	  --config-settings=cmake.define.GLINT_BUILD_TREE=$(CURDIR)/build --config-settings=cmake.define.GLINT_STATIC_HDF5=ON
+	@PATH="$(CURDIR)/$(venv)/bin:$$PATH" auditwheel repair --wheel-dir build/wheels build/python/wheels/*.whl 2>build/python/auditwheel.log \
+	  || { cat build/python/auditwheel.log >&2; exit 1; }
+	@$(venv)/bin/pip install --quiet --force-reinstall --no-deps build/wheels/*.whl
+	@echo "$$(ls build/wheels/*.whl), installed in $(venv)"
+
+$(venv)/requirements.txt: python/requirements.txt packages.txt | packages
+	@rm -rf $(venv)
+	/usr/bin/python3 -m venv $(venv)
+	$(venv)/bin/pip install --quiet --disable-pip-version-check --requirement $<
+	@cp $< $@
+
 .PHONY: test
-test: build  ## build and run the tests, except slow ones
+test: build python  ## build and run the tests, except slow ones
 	ctest --preset release --parallel $(JOBS) --label-exclude '^slow$$' --no-label-summary
 
 .PHONY: test-all
-test-all: build  ## the same with the slow ones: fuzzing, large maps
+test-all: build python  ## the same with the slow ones: fuzzing, large maps
 	ctest --preset release --parallel $(JOBS) --no-label-summary
 
 .PHONY: bench

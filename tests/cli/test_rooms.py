@@ -8,11 +8,12 @@ import pytest
 ROOT = pathlib.Path(__file__).parents[2]
 ROOMS = {"formats": ROOT / "formats"} | {room: ROOT / "libglint" / room for room in ("math", "model", "query", "api", "bake")}
 APPS = ROOT / "apps"
+PYTHON = ROOT / "python" / "bindings"
 MAX_MAIN_LINES = 60
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^">]+)[">]', re.MULTILINE)
 SOURCES = {".h", ".hpp", ".inl", ".cpp", ".cc", ".c", ".cu"}
 
-# What each room may include of ours. The apps may include everything.
+# What each room may include of ours. The apps and the Python package may include everything.
 MAY_USE = {
     "math": {"math"},
     "model": {"model", "math"},
@@ -37,7 +38,8 @@ KEPT_IN = {
     r"^OpenImageIO/|^OpenEXR/|^Imath/|^Imf\w*\.h$": ["apps"],
     r"^CLI/": ["apps"],
     r"^Eigen/|^fftw3|^libsharp/|^hwy/|^boost/": ["libglint/bake"],
-    r"^(tbb|oneapi)/": ["libglint/bake", "apps"],
+    r"^(tbb|oneapi)/": ["libglint/bake", "apps", "python/bindings"],
+    r"^(nanobind|pybind11)/|^Python\.h$": ["python/bindings"],
 }
 
 
@@ -70,7 +72,7 @@ def name_of(path):
 
 def test_headers_that_a_room_includes_exist():
     missing = []
-    for path in [p for folder in (*ROOMS.values(), APPS) for p in sources(folder)]:
+    for path in [p for folder in (*ROOMS.values(), APPS, PYTHON) for p in sources(folder)]:
         for _, name in includes(path):
             if match := re.match(r"glint/(\w+)/(.+)", name):
                 if not (ROOMS[match[1]] / match[2]).exists():
@@ -132,7 +134,7 @@ def test_room_is_header_only(room):
 def test_library_stays_in_its_room(pattern):
     homes = [ROOT / folder for folder in KEPT_IN[pattern]]
     wrong = []
-    for path in [p for folder in (ROOT / "libglint", ROOT / "formats", APPS) for p in sources(folder)]:
+    for path in [p for folder in (ROOT / "libglint", ROOT / "formats", APPS, PYTHON) for p in sources(folder)]:
         if any(path.is_relative_to(home) for home in homes):
             continue
         wrong += [f"{name_of(path)} includes {name}" for _, name in includes(path) if re.search(pattern, name)]

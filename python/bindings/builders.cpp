@@ -1,0 +1,187 @@
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <cstdint>
+
+#include "assets.h"
+#include "build_job.h"
+#include "glint/bake/bin_map/bin_map.h"
+#include "glint/bake/compressed/compress.h"
+#include "glint/bake/displace/displace.h"
+#include "glint/bake/histogram/histogram_sat.h"
+#include "glint/bake/moments/slope_moments.h"
+#include "glint/bake/pyramid/pyramid.h"
+#include "glint/bake/wave/colour_weights.h"
+#include "glint/bake/wave/wave_pyramid.h"
+
+namespace glint::python {
+namespace {
+
+Surface surfaceOf(const std::string& word) {
+  return choose<Surface>("surface", word, {{"flat", Surface::flat}, {"smooth", Surface::smooth}});
+}
+
+Boundary boundaryOf(const std::string& word) {
+  return choose<Boundary>("boundary", word, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}});
+}
+
+BlockPrecision precisionOf(const std::string& word) {
+  return choose<BlockPrecision>("precision", word, {{"half", BlockPrecision::f16}, {"float", BlockPrecision::f32}});
+}
+
+void pyramid(const BuildJob& job, float stride, float overlap, int resolution, float sigma_r, const std::string& surface,
+             const std::string& boundary, int levels, const std::string& precision) {
+  bake::PyramidOptions o;
+  o.stride = stride;
+  o.overlap = overlap;
+  o.resolution = resolution > 0 ? resolution : bake::resolutionFor(sigma_r);
+  o.sigma_r = sigma_r;
+  o.surface = surfaceOf(surface);
+  o.boundary = boundaryOf(boundary);
+  o.levels = levels;
+  o.precision = precisionOf(precision);
+  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const NormalMap& map = input.get<NormalMap>();
+  run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::buildPyramid(map, o, progress); });
+}
+
+void wavePyramid(const BuildJob& job, float stride, float overlap, int resolution, int levels, const std::string& precision,
+                 float coherence_um, const std::vector<float>& wavelengths_um, bool spectral) {
+  bake::WaveOptions o;
+  o.stride = stride;
+  o.overlap = overlap;
+  o.resolution = resolution;
+  o.levels = levels;
+  o.precision = precisionOf(precision);
+  o.coherence_um = coherence_um;
+  o.wavelengths_um = wavelengths_um;
+  o.spectral = spectral;
+  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const HeightMap& map = input.get<HeightMap>();
+  run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::buildWavePyramid(map, o, progress); });
+}
+
+nb::dict reportDict(const bake::CompressionReport& r) {
+  nb::dict d;
+  d["seen"] = r.total.seen.seen;
+  d["seen_worst"] = r.total.seen.worst;
+  d["bias"] = r.total.seen.bias;
+  d["rel_l2"] = r.total.rel_l2;
+  d["total_bytes"] = r.total_bytes;
+  d["ratio_to_stored"] = r.ratio_to_stored;
+  return d;
+}
+
+nb::dict compress(const BuildJob& job, const std::string& method, int rank, double tolerance, const std::string& metric,
+                  const std::string& quantize, bool spots, int regions, double min_improvement, int max_iterations) {
+  bake::CompressionOptions o;
+  o.method = choose<CompressionMethod>(
+      "method", method,
+      {{"cp", CompressionMethod::cp}, {"tucker", CompressionMethod::tucker}, {"pca", CompressionMethod::pca}});
+  o.rank = rank;
+  o.tolerance = tolerance;
+  o.metric = choose<bake::ErrorMetric>("metric", metric, {{"seen", bake::ErrorMetric::seen}, {"l2", bake::ErrorMetric::l2}});
+  using Type = std::optional<CoefficientType>;
+  o.coefficient_type = choose<Type>(
+      "quantize", quantize,
+      {{"auto", std::nullopt}, {"f32", CoefficientType::f32}, {"f16", CoefficientType::f16}, {"i8", CoefficientType::i8}});
+  o.spots = spots;
+  o.regions = regions;
+  o.min_improvement = min_improvement;
+  o.max_iterations = max_iterations;
+  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const NdfPyramid& from = input.get<NdfPyramid>();
+  bake::CompressionReport report;
+  run(job, formats::chained(provenanceOf(job), input.info().provenance),
+      [&](const bake::ProgressFn& progress) { return bake::compressPyramid(from, o, &report, progress); });
+  return reportDict(report);
+}
+
+void binMap(const BuildJob& job, float alpha, float alpha_max, int leaf_size) {
+  const bake::BinMapOptions o = {alpha, leaf_size, alpha_max};
+  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const NormalMap& map = input.get<NormalMap>();
+  run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::buildBinMap(map, o, progress); });
+}
+
+void histogram(const BuildJob& job, int theta_bins, int phi_bins, int stride) {
+  const bake::HistogramSatOptions o = {theta_bins, phi_bins, stride};
+  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const NormalMap& map = input.get<NormalMap>();
+  run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::buildHistogramSat(map, o, progress); });
+}
+
+void moments(const BuildJob& job, int finest_level, const std::string& boundary, const std::string& gradient) {
+  bake::SlopeMomentsOptions o;
+  o.finest_level = finest_level;
+  o.boundary = boundaryOf(boundary);
+  o.gradient =
+      choose<bake::Gradient>("gradient", gradient, {{"central", bake::Gradient::central}, {"sobel", bake::Gradient::sobel}});
+  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) {
+    if (input.kind() == formats::kKindName<HeightMap>) return bake::buildSlopeMoments(input.get<HeightMap>(), o, progress);
+    return bake::buildSlopeMoments(input.get<NormalMap>(), o, progress);
+  });
+}
+
+void displace(const BuildJob& job, const std::vector<int>& factors, const std::string& base, float albedo, float alpha,
+              float eta, float k, int lobes, int angular, int spatial, int bounces, std::uint64_t seed) {
+  bake::DisplaceOptions o;
+  o.factors = factors;
+  o.base.kind = choose<BaseBrdf::Kind>("base", base, {{"diffuse", BaseBrdf::Kind::diffuse}, {"ggx", BaseBrdf::Kind::ggx}});
+  o.base.albedo = albedo;
+  o.base.alpha = alpha;
+  o.base.eta = eta;
+  o.base.k = k;
+  o.lobes = lobes;
+  o.angular = angular;
+  o.spatial = spatial;
+  o.bounces = bounces;
+  o.seed = seed;
+  const formats::Asset input = formats::Asset::openForBuilding(job.input);
+  const HeightMap& map = input.get<HeightMap>();
+  run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::displace(map, o, progress); });
+}
+
+}  // namespace
+
+void bindMaps(nb::module_& m);
+
+void bindBuilders(nb::module_& m) {
+  nb::class_<BuildJob>(m, "BuildJob")
+      .def(
+          "__init__",
+          [](BuildJob* job, std::string output, std::string command_json, std::string input, std::string input_name,
+             std::string array_hash, int threads, nb::object progress) {
+            new (job) BuildJob{std::move(output),     std::move(command_json), std::move(input),
+                               std::move(input_name), std::move(array_hash),   threads,
+                               std::move(progress)};
+          },
+          nb::arg("output"), nb::arg("command_json"), nb::arg("input"), nb::arg("input_name"), nb::arg("array_hash"),
+          nb::arg("threads"), nb::arg("progress").none());
+  const nb::kw_only words_only;
+  m.def("pyramid", &pyramid, nb::arg("job"), words_only, nb::arg("stride"), nb::arg("overlap"), nb::arg("resolution"),
+        nb::arg("sigma_r"), nb::arg("surface"), nb::arg("boundary"), nb::arg("levels"), nb::arg("precision"));
+  m.def("wave_pyramid", &wavePyramid, nb::arg("job"), words_only, nb::arg("stride"), nb::arg("overlap"), nb::arg("resolution"),
+        nb::arg("levels"), nb::arg("precision"), nb::arg("coherence_um"), nb::arg("wavelengths_um"), nb::arg("spectral"));
+  m.def("compress", &compress, nb::arg("job"), words_only, nb::arg("method"), nb::arg("rank"), nb::arg("tolerance"),
+        nb::arg("metric"), nb::arg("quantize"), nb::arg("spots"), nb::arg("regions"), nb::arg("min_improvement"),
+        nb::arg("max_iterations"));
+  m.def("bin_map", &binMap, nb::arg("job"), words_only, nb::arg("alpha"), nb::arg("alpha_max"), nb::arg("leaf_size"));
+  m.def("histogram", &histogram, nb::arg("job"), words_only, nb::arg("theta_bins"), nb::arg("phi_bins"), nb::arg("stride"));
+  m.def("moments", &moments, nb::arg("job"), words_only, nb::arg("finest_level"), nb::arg("boundary"), nb::arg("gradient"));
+  m.def("displace", &displace, nb::arg("job"), words_only, nb::arg("factors"), nb::arg("base"), nb::arg("albedo"),
+        nb::arg("alpha"), nb::arg("eta"), nb::arg("k"), nb::arg("lobes"), nb::arg("angular"), nb::arg("spatial"),
+        nb::arg("bounces"), nb::arg("seed"));
+  m.def("even_wavelengths", [](int count) {
+    if (count < 1 || count > kMostWaveChannels)
+      throw Error(ErrorCode::usage, "option.range", "", "wavelengths", std::to_string(count) + " wavelengths",
+                  "give 1 to " + std::to_string(kMostWaveChannels) + ", or a list in micrometres");
+    return bake::evenWavelengths(count);
+  });
+  bindMaps(m);
+}
+
+}  // namespace glint::python

@@ -1,0 +1,41 @@
+#include "footprints.h"
+
+#include <nanobind/stl/optional.h>
+
+#include "glint/query/ray_footprint.h"
+
+namespace glint::python {
+namespace {
+
+void set(const Answers& covariances, std::size_t k, const Covariance& c) {
+  float* out = from(covariances, k);
+  out[0] = c.xx, out[1] = c.xy, out[2] = c.yy;
+}
+
+}  // namespace
+
+void bindFootprints(nb::module_& m) {
+  nb::class_<Footprints>(m, "Footprints")
+      .def(nb::init<std::optional<Rows>, std::optional<DoubleRows>, std::optional<Rows>, std::optional<Rows>,
+                    std::optional<Rows>>(),
+           nb::arg("uv").none(), nb::arg("precise_uv").none(), nb::arg("sigma").none(), nb::arg("covariance").none(),
+           nb::arg("box").none());
+
+  m.def("from_differentials",
+        [](const Rows& dx, const Rows& dy, int width, int height, float filter_sigma, const Answers& out) {
+          for (std::size_t k = 0; k < out.shape(0); ++k) {
+            const Footprint p =
+                footprintFromDifferentials({}, {dx(k, 0), dx(k, 1)}, {dy(k, 0), dy(k, 1)}, width, height, filter_sigma);
+            set(out, k, p.covariance);
+          }
+        });
+  m.def("from_cone", [](const Rows& widths, const Rows& directions, const Rows& texels_per_unit, const Answers& out) {
+    for (std::size_t k = 0; k < out.shape(0); ++k) {
+      const Footprint p =
+          footprintOfCone({widths(k, 0), 0}, {}, {directions(k, 0), directions(k, 1), directions(k, 2)}, texels_per_unit(k, 0));
+      set(out, k, p.covariance);
+    }
+  });
+}
+
+}  // namespace glint::python
