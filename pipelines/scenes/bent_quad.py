@@ -11,8 +11,9 @@ MAPS = {
     "scratches": ({"kind": "scratches", "density": 1.5, "feature_size": 4, "slope": 0.35, "sigma_r": 0.01}, "scratches"),
 }
 TEXEL_UM = 10
+EXPOSURES = {"brushed": 0.4}
 LIGHT = (-1.5, 5.5, 20.0)
-ROOM = studio([(-90, 70, 180, 20, 0.05, (0.9, 0.95, 1))], floor=0.045, ceiling=0.045)
+ROOM = studio([(-90, 70, 180, 22, 0.09, (0.9, 0.95, 1))], floor=0.06, ceiling=0.06)
 
 
 def scene(kit, name="flakes", size=(480, 360), spp=64, asset=None, crop=None, fov=36.0):
@@ -32,6 +33,6 @@ def scene(kit, name="flakes", size=(480, 360), spp=64, asset=None, crop=None, fo
 def draw(gallery):
     sheets = {}
     for name, (_, title) in MAPS.items():
-        sheets[title] = gallery.render(f"bent quad, {title}", scene(gallery.kit, name, *gallery.scaled((480, 360), 64)), exposure=1.0)
+        sheets[title] = gallery.render(f"bent quad, {title}", scene(gallery.kit, name, *gallery.scaled((480, 340), 32)), exposure=EXPOSURES.get(name, 1.0))
     gallery.sheet("bent-quad", sheets, columns=2, title="A bent sheet under one small light",
                   text="Four maps of 2048 x 2048 texels of 10 um, each repeated ten times along the sheet.", method="pyramid")

@@ -17,9 +17,10 @@ import kit as kits
 import pictures
 
 # In the order of the index. Each module has draw(gallery).
-SCENES = ("car_paint", "kettle", "cutlery", "bent_quad", "environment", "cloth", "diffraction", "zoom", "models", "animation")
+SCENES = ("car_paint", "kettle", "cutlery", "bent_quad", "cloth", "diffraction", "zoom", "models", "animation")
 QUICK_SCENES = ("car_paint", "kettle", "cutlery")  # of `make demo`
-SAMPLES_A_PASS = 16
+PASSES = 8
+OUTLIER = 4.0  # times the median of the passes at a pixel, at which a pass is cut
 TONE = "Khronos PBR Neutral tone curve, sRGB"
 
 
@@ -36,6 +37,19 @@ class Picture:
         return kits.tone(self.linear, self.exposure)
 
 
+def combined(passes):
+    """The mean of renderings [n][height][width][3], of which each is cut at OUTLIER times the median.
+
+    A glint is in every pass, because its footprint is that of the pixel, and stays. Light that a rough surface gets by way of a glint is in few passes,
+    and would be white dots for thousands of samples: most of it is lost.
+    """
+    if len(passes) < 4:
+        return passes.mean(axis=0).astype(np.float32)
+    light = passes.max(axis=-1, keepdims=True)
+    limit = OUTLIER * np.median(light, axis=0) + 0.1 * float(np.median(light))
+    return (passes * np.minimum(1, limit / np.maximum(light, 1e-9))).mean(axis=0).astype(np.float32)
+
+
 class Gallery:
     """Renders, writes, and keeps what the index says."""
 
@@ -48,20 +62,21 @@ class Gallery:
         return (tuple(n // 2 for n in size), max(8, spp // 8)) if self.kit.quick else (size, spp)
 
     def render(self, label, description, exposure=1.0, seed=0, quiet=False):
-        """Renders a scene's dictionary in passes, with a line of progress for each tenth."""
+        """Renders a scene's dictionary in passes, with a line of progress for each."""
         import mitsuba as mi
 
         scene = mi.load_dict(description)
         spp = description["camera"]["sampler"]["sample_count"]
-        passes = max(1, spp // SAMPLES_A_PASS)
-        total, start, told = 0, time.perf_counter(), -1
-        for index in range(passes):
-            total = total + np.array(mi.render(scene, spp=spp // passes, seed=seed + index))
-            tenth = 10 * (index + 1) // passes
+        passes = []
+        start, told = time.perf_counter(), -1
+        for index in range(min(PASSES, spp)):
+            passes.append(np.array(mi.render(scene, spp=max(1, spp // PASSES), seed=seed + index)))
+            tenth = 10 * len(passes) // min(PASSES, spp)
             if tenth != told and not (quiet and tenth < 10):
                 told = tenth
                 print(f"{label}: {10 * tenth} %, {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)
-        return Picture((total / passes).astype(np.float32), time.perf_counter() - start, spp // passes * passes, exposure)
+        seconds = time.perf_counter() - start
+        return Picture(combined(np.array(passes)), seconds, len(passes) * max(1, spp // PASSES), exposure)
 
     def enter(self, name, file, seen, **facts):
         """Adds a line to the index."""
@@ -101,8 +116,9 @@ def index_text(entries, pictures_folder="", extra=""):
 HEAD = f"""# Gallery
 
 Rendered by Mitsuba 3 with the BSDF `glint` and the integrator `glint_path` of the package glint_ndf. `make gallery` renders all pictures again, from
-maps of `glint-synth` to files in `gallery/`; the scenes are small programs in `pipelines/scenes/`. Nothing is denoised. Every picture is shown
-through the {TONE}. Times are those of the rendering, without the preparation of maps.
+maps of `glint-synth` to files in `gallery/`; the scenes are small programs in `pipelines/scenes/`. Pictures are not denoised; each is the mean of
+{PASSES} renderings, of which a pixel is cut at {OUTLIER:g} times the median, so rare paths from rough surfaces over glints are lost. All are shown through the
+{TONE}. Times are those of the rendering, without the preparation of maps.
 """
 
 

@@ -101,7 +101,9 @@ class Kit:
         """A BSDF of a prepared map on a mesh whose uv are centimetres. With `smooth`, Mitsuba's own metal of the same mean roughness."""
         if self.smooth:
             return {"type": "twosided", "bsdf": {"type": "roughconductor", "material": material, "distribution": "beckmann", "alpha": of.alpha()}}
-        return {"type": "glint", "asset": str(asset), **({} if asset == of.normals else {"normals": str(of.normals)}), "uv_scale": 1 / of.cm, "material": material, **parameters}
+        # Reference has no roughness of its own; what is made of the normals has.
+        exact = {"sigma_r": of.sigma_r} if asset == of.normals else {"normals": str(of.normals)}
+        return {"type": "glint", "asset": str(asset), **exact, "uv_scale": 1 / of.cm, "material": material, **parameters}
 
     def integrator(self, max_depth=2, **parameters):
         """Footprints are those of whole pixels: a few samples show a glint without noise."""

@@ -6,16 +6,22 @@ Tangents of a mesh are constant on a triangle, so meshes are finer than the curv
 import numpy as np
 
 
-def curve(points, count, closed=False):
-    """A smooth curve through points [n][d] (Catmull-Rom), as `count` points at equal distances along it."""
+def curve(points, count):
+    """A smooth curve through points [n][d], as `count` points at equal distances along it.
+
+    Centripetal Catmull-Rom: it makes no loops where points lie close together.
+    """
     p = np.asarray(points, float)
-    p = np.vstack([p[-1], p, p[:2]]) if closed else np.vstack([2 * p[0] - p[1], p, 2 * p[-1] - p[-2]])
+    p = np.vstack([2 * p[0] - p[1], p, 2 * p[-1] - p[-2]])
+    step = np.sqrt(np.linalg.norm(np.diff(p, axis=0), axis=1))[:, None]
+    slope = np.diff(p, axis=0) / step
+    tangent = slope[:-1] - (p[2:] - p[:-2]) / (step[:-1] + step[1:]) + slope[1:]
     parts = len(p) - 3
     x = np.linspace(0, parts, 64 * parts + 1)
     i = np.minimum(x.astype(int), parts - 1)
     t = (x - i)[:, None]
-    a, b, c, d = p[i], p[i + 1], p[i + 2], p[i + 3]
-    dense = 0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - a - 3 * c + d) * t**3)
+    a, b, m, n = p[i + 1], p[i + 2], tangent[i] * step[i + 1], tangent[i + 1] * step[i + 1]
+    dense = a + t * m + t**2 * (3 * (b - a) - 2 * m - n) + t**3 * (2 * (a - b) + m + n)
     along = arc_length(dense)
     return np.stack([np.interp(np.linspace(0, along[-1], count), along, column) for column in dense.T], axis=1)
 
