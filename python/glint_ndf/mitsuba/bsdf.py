@@ -1,7 +1,8 @@
 """The BSDF `glint`: any asset as a reflecting surface, alone or as flakes between a clear coat and a base."""
 
-import drjit as dr
+import glint_ndf as gn
 import mitsuba as mi
+from glint_ndf import material
 
 from .coat import Coat
 from .conductor import Conductor
@@ -21,6 +22,7 @@ def make_class():
 
         def __init__(self, props):
             mi.BSDF.__init__(self, props)
+            _merge_description(props)
             options = Options(NAME, props)
             self.layers = _read_layers(options, props)
             options.finish()
@@ -48,6 +50,28 @@ def make_class():
             return f"Glint[asset = {self.layers.facets.path}]"
 
     return Glint
+
+
+def _merge_description(props):
+    """Replaces the parameter `description` by the parameters that the file says. Parameters of the scene have precedence."""
+    if "description" not in props:
+        return
+    path = props["description"]
+    try:
+        described = material.load(path)
+    except gn.GlintError as error:
+        raise PluginError(NAME, str(error)) from error
+    del props["description"]
+    for name, value in described.items():
+        if name not in props and name != "type":
+            props[name] = _property(value)
+
+
+def _property(value):
+    """A value of a dictionary for mi.load_dict as Mitsuba hands it to plugins."""
+    if not isinstance(value, dict):
+        return value
+    return mi.ScalarColor3f(value["value"]) if value["type"] == "rgb" else mi.load_dict(value)
 
 
 def _read_layers(options, props):

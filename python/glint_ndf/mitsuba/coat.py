@@ -23,11 +23,9 @@ class Coat:
     def __init__(self, eta, alpha, layer=None):
         self.eta, self.alpha, self.layer = eta, alpha, layer
         self.smooth = alpha == 0 and layer is None
-        self.internal = _internal_reflectance(eta)
-        self._table = None
-        if not self.smooth and layer is None:
-            table = _albedo_table(eta, alpha)
-            self._table = mi.Float(table) if dr.is_jit_v(mi.Float) else table
+        table = _albedo_table(eta, alpha) if alpha > 0 else None
+        self.internal = _internal_reflectance(eta, table)
+        self._table = mi.Float(table) if table is not None and dr.is_jit_v(mi.Float) else table
 
     def albedo(self, cosine):
         """Share of light from this cosine that the coat reflects at its surface."""
@@ -42,16 +40,18 @@ class Coat:
 
     def evaluate(self, si, viewed, lit, active):
         """Reflection times the cosine of `lit`, and pdf, of a coat that is not smooth."""
-        h = dr.normalize(viewed + lit)
+        h = viewed + lit
+        h = h * dr.rsqrt(dr.maximum(dr.squared_norm(h), 1e-12))
         reflectance = fresnel(dr.dot(viewed, h), self.eta)
         if self.layer is not None:
             f, pdf = self.layer.evaluate(si, viewed, lit, active)
             return f * reflectance * lit.z, pdf
         distribution = self._distribution()
         d = distribution.eval(h)
-        valid = active & (viewed.z > 0) & (lit.z > 0) & (d > 0)
-        value = reflectance * d * distribution.G(viewed, lit, h) / (4 * viewed.z)
-        pdf = distribution.pdf(viewed, h) / (4 * dr.dot(lit, h))
+        valid = active & (viewed.z > 0) & (lit.z > 0) & (d > 0) & (dr.dot(lit, h) > 0)
+        # Quotients are 0 where they are not valid; scalar variants would raise an error for a division by 0.
+        value = reflectance * d * distribution.G(viewed, lit, h) / dr.select(valid, 4 * viewed.z, 1)
+        pdf = distribution.pdf(viewed, h) / dr.select(valid, 4 * dr.dot(lit, h), 1)
         return dr.select(valid, value, 0), dr.select(valid, pdf, 0)
 
     def sample(self, si, viewed, xi, active):
@@ -85,12 +85,14 @@ def _dielectric(cosine, eta):
     return 0.5 * (s * s + p * p)
 
 
-def _internal_reflectance(eta):
-    """Share of diffuse light that the surface reflects back inside: 1 - (1 - diffuse reflectance outside) / eta^2."""
+def _internal_reflectance(eta, table):
+    """Share of diffuse light that the surface reflects back inside. By reciprocity it is 1 - (1 - r) / eta^2, with r the share of
+    diffuse light that the surface reflects outside.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE)
     cosine = 0.5 * (nodes + 1)
-    outside = float(np.sum(weights * cosine * _dielectric(cosine, eta)))
-    return 1 - (1 - outside) / eta**2
+    albedo = _dielectric(cosine, eta) if table is None else np.interp(cosine * (_TABLE_SIZE - 1), np.arange(_TABLE_SIZE), table)
+    return 1 - (1 - float(np.sum(weights * cosine * albedo))) / eta**2
 
 
 def _smith(v, alpha):

@@ -1,6 +1,5 @@
 """Fresnel reflectance of a conductor, with the materials and textures of Mitsuba's own `roughconductor`."""
 
-import drjit as dr
 import mitsuba as mi
 
 _PARAMETERS = ("material", "eta", "k", "specular_reflectance")
@@ -12,7 +11,7 @@ class Conductor:
     parameters = _PARAMETERS
 
     def __init__(self, props):
-        given = {name: props[name] for name in _PARAMETERS if name in props}
+        given = {name: _for_dictionary(props[name]) for name in _PARAMETERS if name in props}
         model = mi.load_dict({"type": "roughconductor", **given})
         textures = _textures_of(model)
         self.eta, self.k = textures["eta"], textures["k"]
@@ -33,6 +32,11 @@ class Conductor:
         callback.put("k", self.k, mi.ParamFlags.NonDifferentiable)
         if self.scale is not None:
             callback.put("specular_reflectance", self.scale, mi.ParamFlags.NonDifferentiable)
+
+
+def _for_dictionary(value):
+    """A parameter as `mi.load_dict` takes it: colours of a scene reach plugins as three numbers."""
+    return {"type": "rgb", "value": list(value)} if isinstance(value, mi.ScalarColor3f) else value
 
 
 def _textures_of(plugin):

@@ -19,12 +19,12 @@ class GlintLobe:
 
     def evaluate(self, uv, footprint, viewed, lit, threads):
         """f [lanes, channels] in 1/sr, without a cosine, and pdf [lanes] per unit solid angle."""
-        f, pdf = self._brdf.evaluate(uv, lit, viewed, threads=threads, **_named(footprint))
+        f, pdf = self._brdf.evaluate(uv, lit, viewed, threads=threads, **named(footprint))
         return f[..., : self.channels], pdf
 
     def sample(self, uv, footprint, viewed, xi, threads):
         """Direction [lanes, 3], weight [lanes, channels] = f cosine / pdf, and pdf [lanes]."""
-        lit, weight, pdf = self._brdf.sample(uv, viewed, xi, threads=threads, **_named(footprint))
+        lit, weight, pdf = self._brdf.sample(uv, viewed, xi, threads=threads, **named(footprint))
         return lit, weight[..., : self.channels], pdf
 
 
@@ -51,7 +51,7 @@ class DisplacedLobe:
         return self._displaced.level(np.sqrt(0.5 * (footprint[..., 0] + footprint[..., 2])))
 
 
-def _named(footprint):
+def named(footprint):
     return {"sigma": footprint} if np.ndim(footprint) == 0 else {"covariance": footprint}
 
 

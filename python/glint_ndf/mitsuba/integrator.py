@@ -46,10 +46,7 @@ def make_class():
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
             with wavefront():
-                ray = mi.RayDifferential3f(ray)
-                if ray.has_differentials:
-                    # Mitsuba shrinks differentials to the part of the pixel that one sample stands for.
-                    ray.scale_differential(self._widening)
+                ray = _with_differentials(ray, self._widening)
                 radiance, valid = _trace(self, scene, sampler, ray, mi.Bool(active))
                 return radiance, valid, []
 
@@ -108,7 +105,7 @@ def _trace(options, scene, sampler, ray, active):
         throughput = throughput * weight
         eta = eta * drawn.eta
         previous, previous_pdf, previous_mirror = mi.Interaction3f(si), drawn.pdf, mirrored
-        beam = beams.bounced(beam, si, drawn.pdf, mirrored)
+        beam = beams.bounced(beam, si, drawn.wo, drawn.pdf, mirrored)
         ray = mi.RayDifferential3f(si.spawn_ray(si.to_world(drawn.wo)))
         depth += 1
 
@@ -122,6 +119,18 @@ def _trace(options, scene, sampler, ray, active):
         if is_jit():
             dr.eval(radiance, throughput, eta, beam, previous, previous_pdf, previous_mirror, ray, active)
     return dr.select(shown, radiance, 0) if options.hides else radiance, shown
+
+
+def _with_differentials(ray, widening):
+    """A copy of a camera ray. Mitsuba shrinks differentials to the part of the pixel that one sample stands for; `widening` times
+    that is kept. Plain copies of rays drop differentials.
+    """
+    copy = mi.RayDifferential3f(ray)
+    if getattr(ray, "has_differentials", False):
+        copy.o_x, copy.o_y, copy.d_x, copy.d_y = ray.o_x, ray.o_y, ray.d_x, ray.d_y
+        copy.has_differentials = True
+        copy.scale_differential(widening)
+    return copy
 
 
 def _emission(options, scene, si, previous, pdf, mirrored, throughput, depth, active):

@@ -15,6 +15,7 @@ from .glint_lobe import DisplacedLobe, GlintLobe
 from .meshes import UvCheck
 from .placement import Placement, into, out_of
 from .spectra import spectrum_of
+from .wave_lobe import SpectralLobe, wavelengths_of
 from .wavefront import is_jit, require_numbers
 
 _VARIANTS = ("full", "lobes", "single")
@@ -37,9 +38,10 @@ class GlintLayer:
             self._open_displaced(options)
         else:
             self._open_ndf(options)
-        self.placement = Placement(_scale_of(options, self.width, self.height), options.number("rotation", 0.0))
-        scale, sigma = options.number("footprint_scale", 1.0, above=0), options.number("sigma", None, above=0)
-        self._footprints = Footprints(plugin, self.path, self.width, self.height, scale, sigma, self._fallback)
+        scale, endless = _scale_of(options, self.width, self.height), self.kind == "tiny-example"
+        self.placement = Placement(scale, options.number("rotation", 0.0), endless)
+        factor, sigma = options.number("footprint_scale", 1.0, above=0), options.number("sigma", None, above=0)
+        self._footprints = Footprints(plugin, self.path, self.width, self.height, factor, sigma, self._fallback)
 
     def _open_displaced(self, options):
         displaced = _opened(self.plugin, self.path, lambda: gn.open_displaced(self.path))
@@ -64,7 +66,11 @@ class GlintLayer:
         ndf = _opened(self.plugin, self.path, lambda: gn.open(self.path, **given))
         self.width, self.height = ndf.width, ndf.height
         self._fallback = max(ndf.smallest_sigma, _NARROWEST)
-        self.lobe = _opened(self.plugin, self.path, lambda: GlintLobe(ndf, facets))
+        self.lobe = _opened(self.plugin, self.path, lambda: self._lobe_of(ndf, facets))
+
+    def _lobe_of(self, ndf, facets):
+        wavelengths = wavelengths_of(self.path) if mi.is_spectral and ndf.kind == "wave-pyramid" else None
+        return GlintLobe(ndf, facets) if wavelengths is None else SpectralLobe(ndf, wavelengths)
 
     def check(self, si):
         """Raises an error where the asset cannot be asked: symbolic loops, a replaced file, a mesh without uv."""
@@ -109,6 +115,10 @@ class GlintLayer:
     def _spectrum(self, values, si):
         if values.shape[-1] == 1:
             return mi.Spectrum(to_float(values[..., 0]))
+        if isinstance(self.lobe, SpectralLobe):
+            (wavelengths,) = to_rows(si.wavelengths)
+            at = self.lobe.at(values, np.broadcast_to(wavelengths, (len(values), wavelengths.shape[-1])))
+            return mi.Spectrum(*(to_float(at[..., c]) for c in range(at.shape[-1])))
         values = np.maximum(values, 0)
         return spectrum_of([to_float(values[..., c]) for c in range(3)], si.wavelengths)
 

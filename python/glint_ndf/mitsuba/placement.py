@@ -12,9 +12,11 @@ class Placement:
 
     @param scale  maps per unit of uv along u and v
     @param rotation_deg  degrees
+    @param endless       whether whole parts of uv count: the map is a plane that does not repeat
     """
 
-    def __init__(self, scale, rotation_deg):
+    def __init__(self, scale, rotation_deg, endless=False):
+        self._endless = endless
         angle = math.radians(rotation_deg)
         c, s = math.cos(angle), math.sin(angle)
         self.cosine, self.sine = c, s
@@ -26,25 +28,25 @@ class Placement:
         return mi.Vector2f(a * d.x + b * d.y, c * d.x + e * d.y)
 
     def uv(self, uv):
-        """uv of the map, modulo 1. The product is taken in double precision: far out floats lose texels."""
+        """uv of the map, modulo 1 where it repeats. The product is taken in double precision: far out floats lose texels."""
         wide = dr.float64_array_t(mi.Float)
         x, y = wide(uv.x), wide(uv.y)
         (a, b), (c, e) = self._rows
-        return mi.Point2f(*(mi.Float(t - dr.floor(t)) for t in (a * x + b * y, c * x + e * y)))
+        placed = (a * x + b * y, c * x + e * y)
+        return mi.Point2f(*(mi.Float(t if self._endless else t - dr.floor(t)) for t in placed))
 
     def frame(self, si):
-        """Tangents of the map in the coordinates of si.sh_frame: dp/du made orthogonal to n, and the perpendicular on dp/dv's
-        side, both turned by the rotation. Where dp/du has no direction, the tangents of si.sh_frame.
+        """Tangents of the map as vectors of the plane of si.sh_frame: dp/du made orthogonal to n, and the perpendicular on dp/dv's
+        side, both turned by the rotation. Where dp/du has no direction, those of si.sh_frame, turned.
         """
-        n = si.sh_frame.n
-        along = si.dp_du - n * dr.dot(n, si.dp_du)
-        length2 = dr.squared_norm(along)
+        along, across = si.to_local(si.dp_du), si.to_local(si.dp_dv)
+        length2 = along.x * along.x + along.y * along.y
         valid = dr.isfinite(length2) & (length2 > 0)
-        s = dr.select(valid, along * dr.rsqrt(dr.select(valid, length2, 1)), si.sh_frame.s)
-        t = dr.cross(n, s)
+        scale = dr.rsqrt(dr.select(valid, length2, 1))
+        x, y = dr.select(valid, along.x * scale, 1), dr.select(valid, along.y * scale, 0)
         # A mirrored texture has dp/dv on the other side.
-        t = dr.select(dr.dot(t, si.dp_dv) < 0, -t, t)
-        s, t = si.to_local(s), si.to_local(t)
+        side = dr.select(across.y * x - across.x * y < 0, -1, 1)
+        s, t = mi.Vector2f(x, y), mi.Vector2f(-y * side, x * side)
         return self.cosine * s + self.sine * t, self.cosine * t - self.sine * s
 
 

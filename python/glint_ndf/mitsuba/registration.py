@@ -5,6 +5,7 @@ import functools
 import mitsuba as mi
 
 from . import llvm
+from .errors import PluginError
 
 _classes = {}
 
@@ -16,14 +17,23 @@ def register():
     variant = mi.variant()
     if variant is None or variant in _classes:
         return
-    if mi.is_polarized:
-        return
     from . import bsdf, integrator
 
+    if mi.is_polarized:
+        for name, add in ((bsdf.NAME, mi.register_bsdf), (integrator.NAME, mi.register_integrator)):
+            add(name, _refuse_polarization(name))
+        return
     classes = {"bsdf": bsdf.make_class(), "integrator": integrator.make_class()}
     _classes[variant] = classes
     mi.register_bsdf(bsdf.NAME, lambda props: classes["bsdf"](props))
     mi.register_integrator(integrator.NAME, lambda props: classes["integrator"](props))
+
+
+def _refuse_polarization(name):
+    def construct(props):
+        raise PluginError(name, "polarized variants are not supported; take one without polarization, such as llvm_ad_rgb")
+
+    return construct
 
 
 def watch_variants():

@@ -1,0 +1,109 @@
+"""Coats, flakes and bases."""
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+from conftest import follows_pdf, glint, make_scene, render, render_batches
+
+from glint_ndf.mitsuba.coat import Coat
+
+WHITE = {"type": "diffuse", "reflectance": 1.0}
+
+
+def stack(asset, **parameters):
+    return glint(asset, sigma=20.0, **parameters)
+
+
+@pytest.mark.parametrize("coat", [{}, {"coat_alpha": 0.2}])
+@pytest.mark.parametrize("transparency", [0.0, 0.5, 1.0])
+def test_layers_add_no_energy(llvm, noise_pyramid, coat, transparency):
+    """White layers under even light reflect at most all of it. A base keeps almost all. Steep facets lose what they turn beyond
+    the critical angle of the coat: a third here.
+    """
+    bsdf = stack(noise_pyramid, coat=1.5, transparency=transparency, base=WHITE, **coat)
+    image = render(make_scene(bsdf, "constant", "direct"), 256)
+    assert image.mean() < 1.005
+    assert image.mean() > (0.95 if transparency == 1 else 0.65)
+
+
+def test_a_coat_over_a_diffuse_base_is_mitsubas_plastic(llvm, noise_pyramid):
+    """Facets that let everything through leave the coat and the base: Mitsuba's `plastic`, which counts light in the same way."""
+    base = {"type": "diffuse", "reflectance": 0.5}
+    ours = stack(noise_pyramid, coat=1.5, transparency=1.0, base=base)
+    theirs = {"type": "plastic", "int_ior": 1.5, "ext_ior": 1.0, "diffuse_reflectance": 0.5, "nonlinear": True}
+    mean_a, error_a = render_batches(make_scene(ours, "constant", "direct"), 128, 4)
+    mean_b, error_b = render_batches(make_scene(theirs, "constant", "direct"), 128, 4, seed=50)
+    deviation = np.sqrt((error_a**2 + error_b**2).sum()) / mean_a.size
+    # Mitsuba tabulates the internal reflectance to about 1 in 1000.
+    assert mean_a.mean() == pytest.approx(mean_b.mean(), abs=5 * deviation, rel=2e-3)
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.5])
+def test_albedo_of_a_rough_coat(llvm, alpha):
+    """The table agrees with an integral over samples."""
+    coat = Coat(1.5, alpha)
+    lanes = 400_000
+    xi = mi.Point2f(*np.random.default_rng(1).random((2, lanes), dtype=np.float32))
+    for cosine in (1.0, 0.6, 0.2):
+        viewed = mi.Vector3f((1 - cosine**2) ** 0.5, 0, cosine)
+        lit = coat.sample(None, viewed, xi, True)
+        value, pdf = coat.evaluate(None, viewed, lit, True)
+        albedo = float(np.array(dr.mean(dr.select(pdf > 0, value / pdf, 0))).item())
+        assert float(np.array(coat.albedo(mi.Float(cosine))).item()) == pytest.approx(albedo, rel=0.01, abs=1e-3)
+
+
+def test_samples_of_layers_follow_the_pdf(llvm, noise_pyramid):
+    bsdf = stack(noise_pyramid, coat=1.5, coat_alpha=0.3, transparency=0.5, base={"type": "diffuse"})
+    assert follows_pdf(mi.load_dict(bsdf), (0.4, 0.1, 0.9))
+
+
+def test_smooth_coats_mirror(llvm, noise_pyramid):
+    """The share of samples that a smooth coat mirrors is its reflectance, and their weight is that of a mirror."""
+    bsdf = mi.load_dict(stack(noise_pyramid, coat=1.5))
+    lanes = 10_000
+    si = dr.zeros(mi.SurfaceInteraction3f, lanes)
+    si.wi = [0, 0, 1]
+    random = np.random.default_rng(3)
+    drawn, weight = bsdf.sample(
+        mi.BSDFContext(), si, mi.Float(random.random(lanes, dtype=np.float32)), mi.Point2f(*random.random((2, lanes), dtype=np.float32))
+    )
+    mirrored = np.array(mi.has_flag(drawn.sampled_type, mi.BSDFFlags.DeltaReflection))
+    reflectance = 0.04
+    assert mirrored.mean() == pytest.approx(reflectance, abs=4 * np.sqrt(reflectance / lanes))
+    assert np.array(weight)[0][mirrored] == pytest.approx(1, rel=1e-4)
+
+
+def test_transparency_follows_the_map(llvm, noise_pyramid):
+    """A texture of transparency is laid like the map: where it is 1, only the base shows."""
+    half = np.zeros((4, 4, 1), dtype=np.float32)
+    half[:, :2] = 1
+    mask = {"type": "bitmap", "bitmap": mi.Bitmap(half), "raw": True, "filter_type": "nearest"}
+    bsdf = mi.load_dict(stack(noise_pyramid, uv_scale=2.0, transparency=mask, base={"type": "diffuse", "reflectance": 0.5}))
+    si = dr.zeros(mi.SurfaceInteraction3f, 2)
+    si.uv = mi.Point2f([0.1, 0.4], [0.25, 0.25])  # 0.2 and 0.8 of the map
+    si.wi = [0, 0, 1]
+    value = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(0.95, 0, 0.312)))[0]
+    assert value[0] == pytest.approx(0.5 * 0.312 / np.pi, rel=1e-3)
+    assert value[1] < 0.1 * value[0]
+
+
+def test_layers_agree_in_scalar_variants(noise_pyramid):
+    values = {}
+    for variant in ("scalar_rgb", "llvm_ad_rgb"):
+        mi.set_variant(variant)
+        bsdf = mi.load_dict(stack(noise_pyramid, coat=1.5, coat_alpha=0.2, transparency=0.5, base={"type": "diffuse"}))
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.wi = dr.normalize(mi.Vector3f(0.1, 0.2, 1))
+        values[variant] = [np.array(bsdf.eval(mi.BSDFContext(), si, dr.normalize(mi.Vector3f(-0.2, -0.1, 1)))).ravel()]
+        for choice in (0.01, 0.4, 0.9):
+            drawn, weight = bsdf.sample(mi.BSDFContext(), si, choice, mi.Point2f(0.3, 0.6), True)
+            values[variant] += [np.array(drawn.wo).ravel(), np.array(weight).ravel(), np.array(drawn.pdf).ravel()]
+    scalar, llvm = (np.concatenate(values[v]) for v in ("scalar_rgb", "llvm_ad_rgb"))
+    assert scalar == pytest.approx(llvm, rel=2e-4, abs=1e-6)
+
+
+def test_a_coat_can_have_normals_of_its_own(llvm, noise_pyramid, brushed_pyramid):
+    bsdf = stack(brushed_pyramid, coat=1.5, coat_asset=noise_pyramid.path, coat_sigma=10.0)
+    image = render(make_scene(bsdf, "constant", "direct"), 128)
+    assert 0.8 < image.mean() < 1.02
