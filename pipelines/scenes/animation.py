@@ -53,12 +53,12 @@ def frames_of(gallery, label, which, count, size, spp, **how):
 
 
 def draw(gallery):
-    size, spp = gallery.scaled((256, 256), 16)
-    count = 12 if gallery.kit.quick else 40
+    size, spp = gallery.scaled((208, 208), 8)
+    count = 12 if gallery.kit.quick else 32
     factor = widths(count)[1] / widths(count)[0]
     glints = frames_of(gallery, "animation", range(count), count, size, spp)
     # Reference takes long for large footprints, so flicker is measured over the middle of the zoom.
-    middle = range(count // 3, count // 3 + 8)
+    middle = range(count // 3, count // 3 + 6)
     rendered = {"glint": [glints[k] for k in middle],
                 "Reference": frames_of(gallery, "animation, Reference", middle, count, size, spp, asset=lambda of: of.normals),
                 "one texel for each sample": frames_of(gallery, "animation, one texel", middle, count, size, spp, bsdf=one_texel)}

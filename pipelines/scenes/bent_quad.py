@@ -7,11 +7,11 @@ from kit import envmap, look_at, point_light, rgb, studio
 MAPS = {
     "isotropic": ({"kind": "isotropic", "alpha": 0.18, "correlation": 6, "sigma_r": 0.01}, "isotropic noise"),
     "flakes": ({"kind": "flakes", "alpha": 0.25, "flake_size": 8}, "flakes"),
-    "brushed": ({"kind": "brushed", "alpha": 0.2, "sigma_r": 0.01}, "brushed metal"),
+    "brushed": ({"kind": "brushed", "alpha": 0.35, "streak": 80, "sigma_r": 0.01}, "brushed metal"),
     "scratches": ({"kind": "scratches", "density": 1.5, "feature_size": 4, "slope": 0.35, "sigma_r": 0.01}, "scratches"),
 }
 TEXEL_UM = 10
-EXPOSURES = {"brushed": 0.4}
+EXPOSURES = {"brushed": 0.25}
 LIGHT = (-1.5, 5.5, 20.0)
 ROOM = studio([(-90, 70, 180, 22, 0.09, (0.9, 0.95, 1))], floor=0.06, ceiling=0.06)
 
@@ -33,6 +33,7 @@ def scene(kit, name="flakes", size=(480, 360), spp=64, asset=None, crop=None, fo
 def draw(gallery):
     sheets = {}
     for name, (_, title) in MAPS.items():
-        sheets[title] = gallery.render(f"bent quad, {title}", scene(gallery.kit, name, *gallery.scaled((480, 340), 32)), exposure=EXPOSURES.get(name, 1.0))
+        sheets[title] = gallery.render(f"bent quad, {title}", scene(gallery.kit, name, *gallery.scaled((400, 290), 24)), exposure=EXPOSURES.get(name, 1.0))
     gallery.sheet("bent-quad", sheets, columns=2, title="A bent sheet under one small light",
+                  alt="A bent sheet, four times: isotropic noise, flakes, brushed metal and scratches under a lamp",
                   text="Four maps of 2048 x 2048 texels of 10 um, each repeated ten times along the sheet.", method="pyramid")

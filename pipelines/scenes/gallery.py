@@ -78,18 +78,30 @@ class Gallery:
         seconds = time.perf_counter() - start
         return Picture(combined(np.array(passes)), seconds, len(passes) * max(1, spp // PASSES), exposure)
 
+    def detail(self, label, scene, size, spp, frame, magnified, exposure=1.0):
+        """An inset for `save`: a part of a picture, rendered larger.
+
+        @param scene  (size, spp, crop) -> dictionary of the scene
+        @param frame  (left, top, width, height) in pixels of the picture
+        """
+        crop = tuple(magnified * n for n in frame)
+        large = tuple(magnified * n for n in size)
+        return self.render(f"{label}, detail", scene(large, spp, crop), exposure), frame
+
     def enter(self, name, file, seen, **facts):
         """Adds a line to the index."""
         self.entries.append({"name": name, "file": file.name, **seen, **facts})
 
-    def save(self, name, picture, inset=None, **seen):
+    def save(self, name, picture, inset=None, corner=(1, 1), **seen):
         """Writes one picture.
 
-        @param inset  (another picture, (left, top, right, bottom) of its frame as shares of this picture, its corner) 
-        @param seen   title, text and method for the index
+        @param inset   from `detail`
+        @param corner  of the inset: 1 is right, 1 is below
+        @param seen    title, text, alt and method for the index
         """
         file = self.out / f"{name}.png"
-        pictures.save(pictures.with_inset(picture.srgb(), inset) if inset else picture.srgb(), file)
+        pixels = picture.srgb()
+        pictures.save(pictures.with_inset(pixels, inset[0].srgb(), inset[1], corner) if inset else pixels, file)
         self.enter(name, file, seen, spp=picture.spp, seconds=picture.seconds)
         return file
 

@@ -45,18 +45,18 @@ def sheet(titled, columns, notes):
     return page
 
 
-def with_inset(pixels, inset):
+def with_inset(pixels, detail, frame, corner):
     """A picture with a detail of it, rendered larger, in a corner.
 
-    @param inset  (detail, (left, top, right, bottom) of its frame in pixels of the picture, corner as (right?, bottom?))
+    @param frame   (left, top, width, height) of the detail in the picture
+    @param corner  of the detail: 1 is right, 1 is below
     """
-    detail, frame, (right, bottom) = inset
     page, piece = to_image(pixels), to_image(detail)
     draw = PIL.ImageDraw.Draw(page)
     margin = 12
-    x = page.width - piece.width - margin if right else margin
-    y = page.height - piece.height - margin if bottom else margin
-    draw.rectangle(frame, outline=(255, 255, 255), width=2)
+    x, y = ((room - margin if side else margin) for room, side in zip((page.width - piece.width, page.height - piece.height), corner))
+    left, top, width, height = frame
+    draw.rectangle((left, top, left + width, top + height), outline=(255, 255, 255), width=2)
     draw.rectangle((x - 2, y - 2, x + piece.width + 1, y + piece.height + 1), fill=(255, 255, 255))
     page.paste(piece, (x, y))
     return page

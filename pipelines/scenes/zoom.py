@@ -6,7 +6,7 @@ WIDTHS_CM = (0.35, 1.0, 3.0, 9.0, 27.0)
 
 
 def draw(gallery):
-    size, spp = gallery.scaled((280, 280), 64)
+    size, spp = gallery.scaled((224, 224), 32)
     sheet = {}
     for width in WIDTHS_CM:
         texels = width / size[0] / (ball.TEXEL_UM * 1e-4)
