@@ -7,7 +7,8 @@ import pictures
 
 MAP = "flakes"
 SIZE = (280, 200)
-TRUTH_SPP = 64
+TRUTH_SPP = 48
+FOV = 8.5  # degrees: a pixel sees 17 texels
 SPP = 16
 
 # title -> how the map is prepared
@@ -32,7 +33,7 @@ def draw(gallery):
     kit = gallery.kit
     size, spp = gallery.scaled(SIZE, SPP)
     of = kit.map(**bent_quad.MAPS[MAP][0], texel_um=bent_quad.TEXEL_UM)
-    scene = lambda asset, samples: bent_quad.scene(kit, MAP, size, samples, asset=asset)
+    scene = lambda asset, samples: bent_quad.scene(kit, MAP, size, samples, asset=asset, fov=FOV)
     exact = lambda of: of.normals
     truth = gallery.render("models, truth", scene(exact, max(SPP, TRUTH_SPP if not kit.quick else SPP)))
     reference = gallery.render("models, Reference", scene(exact, spp), seed=1000)
