@@ -12,6 +12,8 @@ class Conductor:
 
     def __init__(self, props):
         given = {name: _for_dictionary(props[name]) for name in _PARAMETERS if name in props}
+        if not given.keys() & {"material", "eta", "k"}:
+            given["material"] = "none"
         model = mi.load_dict({"type": "roughconductor", **given})
         textures = _textures_of(model)
         self.eta, self.k = textures["eta"], textures["k"]

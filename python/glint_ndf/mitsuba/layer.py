@@ -1,7 +1,5 @@
 """The layer of an asset on a surface: reads the asset and its placement, and asks it at surface interactions."""
 
-import os
-
 import drjit as dr
 import glint_ndf as gn
 import mitsuba as mi
@@ -29,7 +27,7 @@ class GlintLayer:
 
     def __init__(self, plugin, options, path):
         self.plugin = plugin
-        self.path = os.fspath(path)
+        self.path = _resolved(path)
         self._files = [AssetFile(plugin, self.path)]
         self.kind = _opened(plugin, self.path, lambda: gn.load(self.path).kind)
         self._uv_check = UvCheck(plugin, self.path)
@@ -62,6 +60,7 @@ class GlintLayer:
         given = {name: value for name, value in given.items() if value is not None}
         facets = options.text("facets", "distribution", ("distribution", "beckmann"))
         if "normals" in given:
+            given["normals"] = _resolved(given["normals"])
             self._files.append(AssetFile(self.plugin, given["normals"]))
         ndf = _opened(self.plugin, self.path, lambda: gn.open(self.path, **given))
         self.width, self.height = ndf.width, ndf.height
@@ -121,6 +120,11 @@ class GlintLayer:
             return mi.Spectrum(*(to_float(at[..., c]) for c in range(at.shape[-1])))
         values = np.maximum(values, 0)
         return spectrum_of([to_float(values[..., c]) for c in range(3)], si.wavelengths)
+
+
+def _resolved(path):
+    """The file that a path of a scene names: Mitsuba looks in the folder of the scene too."""
+    return str(mi.file_resolver().resolve(path))
 
 
 def _scale_of(options, width, height):
