@@ -30,7 +30,8 @@ python: build $(venv)/requirements.txt  ## the Python package: a wheel in build/
 	@$(venv)/bin/pip install --quiet --force-reinstall --no-deps build/wheels/*.whl
 	@echo "$$(ls build/wheels/*.whl), installed in $(venv)"
 
-$(venv)/requirements.txt: python/requirements.txt packages.txt | packages
+requirements := python/requirements.txt tests/python/integrations/requirements.txt
+$(venv)/requirements.txt: $(requirements) packages.txt | packages
 	@rm -rf $(venv)
 	/usr/bin/python3 -m venv $(venv)
 	$(venv)/bin/pip install --quiet --disable-pip-version-check --requirement $<

@@ -17,9 +17,13 @@ int main(int argc, char** argv) {
        "glint-synth flakes -o flakes.exr --size 1024 --alpha 0.2 --flake-size 6 --seed 7"});
   apps::SynthOptions options(tool);
   const apps::OutputFile output(tool, apps::OutputFormat::image, "image; the extension gives the format");
-  bool heights = false;
+  bool heights = false, presence = false;
   int bits = 0;
-  tool.flag("--height", heights, "write heights, in texels or (--texel-size-um) micrometres, instead of normals");
+  const apps::Option& height_option =
+      tool.flag("--height", heights, "write heights, in texels or (--texel-size-um) micrometres, instead of normals");
+  tool.flag("--presence", presence,
+            "write the output `presence` of flake2d instead of normals: one channel, 0 where there is no flake")
+      .excludes(height_option);
   const apps::Option& bits_option = tool.option("--bits", bits, "of a channel: 8 or 16 (png), 16 or 32 (exr)")
                                         .range(8, 32)
                                         .defaultText("8 for png, 32 for exr");
@@ -36,9 +40,13 @@ int main(int argc, char** argv) {
       if (options.texelSize() > 0)
         for (float& value : values) value *= options.texelSize();
       apps::writeImage(output.path(), p.width, p.height, 1, values, format);
+    } else if (presence) {
+      apps::writeImage(output.path(), p.width, p.height, 1, bake::synthPresence(p), format);
     } else {
       apps::writeImage(output.path(), p.width, p.height, 3, apps::encodeNormals(bake::synthNormals(p)), format);
     }
+    if (p.kind == bake::SynthKind::flake2d && !bake::flake2dTiles(p))
+      tool.warn("the map does not tile: its sides hold no whole numbers of flakes, so flakes are cut at the border");
     tool.setResult({{"width", p.width}, {"height", p.height}, {"command", nlohmann::json::parse(tool.commandJson())}});
     tool.summary(tool.name() + ": " + std::to_string(p.width) + " x " + std::to_string(p.height) + " texels\n");
   });

@@ -30,7 +30,8 @@ SynthOptions::SynthOptions(Tool& tool) {
                {"weave", SynthKind::weave},
                {"sawtooth", SynthKind::sawtooth},
                {"flat", SynthKind::flat},
-               {"grating", SynthKind::grating}},
+               {"grating", SynthKind::grating},
+               {"flake2d", SynthKind::flake2d}},
               "the surface to make")
       .required();
   tool.option("--size", size_, "N or NxM texels");
@@ -45,6 +46,12 @@ SynthOptions::SynthOptions(Tool& tool) {
   slope_ = &tool.option("--slope", p.slope, "steepest slope of scratches, leather, weave, sawtooth, grating").range(0, 10);
   tool.choice("--profile", p.profile, {{"sine", bake::GratingProfile::sine}, {"blazed", bake::GratingProfile::blazed}},
               "shape of the grooves of a grating");
+  flake_size_uv_ =
+      &tool.option("--flake-size-uv", p.flake_size_uv,
+                   "flake2d: the input `size` of MaterialX's node, in widths of the map; the map tiles where 1 / size is whole")
+           .range(1e-5, 1);
+  roughness_ = &tool.option("--roughness", p.roughness, "flake2d: the node's input; alpha is its square").range(0, 1);
+  coverage_ = &tool.option("--coverage", p.coverage, "flake2d: the node's input, the share that flakes cover").range(0, 1);
   texel_size_ = &tool.option("--texel-size-um", texel_size_um_,
                              "size of a texel in micrometres: --height then writes micrometres instead of texels")
                      .range(1e-6, 1e9);
@@ -56,8 +63,26 @@ SynthOptions::SynthOptions(Tool& tool) {
   tool.usesSeed();
 }
 
+void SynthOptions::checkFlake2d() const {
+  const auto refuse = [](const char* option, const char* problem, const char* hint) {
+    throw Error(ErrorCode::usage, "cli.usage", "", option, problem, hint);
+  };
+  if (values_.kind == SynthKind::flake2d) {
+    if (feature_->given())
+      refuse("--flake-size", "flake2d takes sizes as its node has them", "give --flake-size-uv: texels / width");
+    if (alpha_->given())
+      refuse("--alpha", "flake2d takes roughness as its node has it", "give --roughness: the square root of alpha");
+    return;
+  }
+  const char* hint = "take kind flake2d, or leave it out";
+  if (flake_size_uv_->given()) refuse("--flake-size-uv", "only flake2d has this option", hint);
+  if (roughness_->given()) refuse("--roughness", "only flake2d has this option", hint);
+  if (coverage_->given()) refuse("--coverage", "only flake2d has this option", hint);
+}
+
 const bake::SynthOptions& SynthOptions::values(Tool& tool) {
   bake::SynthOptions& p = values_;
+  checkFlake2d();
   const bake::SynthOptions defaults = bake::defaultSynthOptions(p.kind);
   if (!alpha_->given()) p.alpha = defaults.alpha;
   if (!gamma_->given()) p.gamma = defaults.gamma;
@@ -69,7 +94,7 @@ const bake::SynthOptions& SynthOptions::values(Tool& tool) {
   parseSize(size_, p.width, p.height);
   p.seed = tool.seed();
   if (depth_->given()) {
-    if (p.kind == SynthKind::flakes)
+    if (p.kind == SynthKind::flakes || p.kind == SynthKind::flake2d)
       throw Error(ErrorCode::usage, "cli.usage", "", "--depth-um", "flakes have no common height field", "take another kind");
     p.depth_texels = depth_um_ / texel_size_um_;
   }

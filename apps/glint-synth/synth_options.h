@@ -20,6 +20,9 @@ class SynthOptions {
   float texelSize() const { return texel_size_->given() ? texel_size_um_ : 0; }
 
  private:
+  /// Refuses options that kind flake2d does not know, and options of flake2d for another kind.
+  void checkFlake2d() const;
+
   bake::SynthOptions values_;
   std::string size_ = "512";
   float texel_size_um_ = 0, depth_um_ = 0;
@@ -30,6 +33,9 @@ class SynthOptions {
   Option* feature_;
   Option* density_;
   Option* slope_;
+  Option* flake_size_uv_;
+  Option* roughness_;
+  Option* coverage_;
   Option* texel_size_;
   Option* depth_;
 };

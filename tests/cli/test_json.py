@@ -29,6 +29,7 @@ MAKE = [
     "synth flakes --size 32 -o n.exr",
     "synth weave --size 32 -o h.exr --height",
     "synth flat --size 16 -o flat.exr --height",
+    "synth flake2d --size 32 --flake-size-uv .125 --roughness .4 --coverage .7 --presence -o presence.exr",
     "synth isotropic --size 32 -o n.png --bits 16",
     "ingest n.exr -o normals.glint",
     "ingest n.png -o smooth.glint --texel-size-um 5",

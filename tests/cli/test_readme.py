@@ -94,7 +94,7 @@ def test_links_lead_somewhere(document):
         assert not anchor or anchor in anchors(linked.read_text()), target
 
 
-@pytest.mark.parametrize("document", ["docs/ARCHITECTURE.md", "docs/METHODS.md", "docs/FORMAT.md", "docs/TOOLS.md", "docs/LINKING.md"])
+@pytest.mark.parametrize("document", ["docs/ARCHITECTURE.md", "docs/METHODS.md", "docs/FORMAT.md", "docs/TOOLS.md", "docs/LINKING.md", "docs/INTEGRATIONS.md"])
 def test_files_that_are_named_exist(document):
     rooms = r"(?:libglint|formats|apps|tests|pipelines)/"
     named = set(re.findall(rf"`({rooms}[\w./-]+)`", (ROOT / document).read_text()))

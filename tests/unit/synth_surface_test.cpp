@@ -14,9 +14,9 @@
 namespace glint::bake {
 namespace {
 
-constexpr SynthKind kAllKinds[] = {SynthKind::isotropic, SynthKind::brushed, SynthKind::flakes,
-                                   SynthKind::scratches, SynthKind::leather, SynthKind::weave,
-                                   SynthKind::sawtooth,  SynthKind::flat,    SynthKind::grating};
+constexpr SynthKind kAllKinds[] = {SynthKind::isotropic, SynthKind::brushed, SynthKind::flakes,   SynthKind::scratches,
+                                   SynthKind::leather,   SynthKind::weave,   SynthKind::sawtooth, SynthKind::flat,
+                                   SynthKind::grating,   SynthKind::flake2d};
 
 SynthOptions sized(SynthKind kind, int width, int height) {
   SynthOptions p = defaultSynthOptions(kind);
@@ -200,7 +200,8 @@ TEST(Synth, SameBytesForAnyNumberOfThreads) {
 }
 
 TEST(Synth, SeedsDiffer) {
-  for (const SynthKind kind : {SynthKind::isotropic, SynthKind::flakes, SynthKind::scratches, SynthKind::leather}) {
+  for (const SynthKind kind :
+       {SynthKind::isotropic, SynthKind::flakes, SynthKind::scratches, SynthKind::leather, SynthKind::flake2d}) {
     SynthOptions p = sized(kind, 64, 64);
     const auto first = synthNormals(p);
     p.seed = 2;
@@ -217,17 +218,47 @@ TEST(Synth, AnySizeHasNormalsInsideTheDisk) {
 }
 
 TEST(Synth, FlakesHaveNoHeights) {
-  try {
-    synthHeights(sized(SynthKind::flakes, 8, 8));
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::unsupported);
+  for (const SynthKind kind : {SynthKind::flakes, SynthKind::flake2d}) {
+    try {
+      synthHeights(sized(kind, 8, 8));
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::unsupported);
+    }
   }
 }
+
+TEST(SynthFlake2d, CoversItsShareOfTheMap) {
+  for (const float coverage : {0.0f, 0.25f, 0.5f, 0.75f, 1.0f}) {
+    SynthOptions p = sized(SynthKind::flake2d, 1024, 1024);
+    p.coverage = coverage;
+    double covered = 0;
+    for (const float presence : synthPresence(p)) covered += presence > 0 ? 1.0 / (1024 * 1024) : 0;
+    // The node has a curve that was fitted to its own flakes; the map has 10,000 cells.
+    constexpr double kFit = 0.03;
+    EXPECT_NEAR(covered, coverage, kFit);
+  }
+}
+
+TEST(SynthFlake2d, TilesWhereItsSidesHoldWholeCells) {
+  SynthOptions p = sized(SynthKind::flake2d, 200, 100);
+  EXPECT_TRUE(flake2dTiles(p));
+  p.height = 101;  // 50.5 cells of two texels
+  EXPECT_FALSE(flake2dTiles(p));
+  p.flake_size_uv = 1.0f / 3;
+  EXPECT_FALSE(flake2dTiles(p));
+  p.height = 200;
+  EXPECT_TRUE(flake2dTiles(p));
+}
+
+TEST(SynthFlake2d, OtherKindsHaveNoPresence) { EXPECT_THROW(synthPresence(sized(SynthKind::flakes, 8, 8)), Error); }
 
 TEST(Synth, RefusesParametersOutOfRange) {
   SynthOptions p = sized(SynthKind::flakes, 8, 8);
   p.alpha = 1;
+  EXPECT_THROW(synthNormals(p), Error);
+  p = sized(SynthKind::flake2d, 8, 8);
+  p.coverage = 1.1f;
   EXPECT_THROW(synthNormals(p), Error);
   p = sized(SynthKind::isotropic, 0, 8);
   EXPECT_THROW(synthNormals(p), Error);

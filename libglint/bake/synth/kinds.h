@@ -12,6 +12,8 @@ namespace glint::bake {
 std::vector<float> noiseHeights(const SynthOptions& options, float correlation_x, float correlation_y);
 
 std::vector<Vec2> flakeNormals(const SynthOptions& options);
+std::vector<Vec2> flake2dNormals(const SynthOptions& options);
+std::vector<float> flake2dPresence(const SynthOptions& options);
 std::vector<float> leatherHeights(const SynthOptions& options);
 std::vector<float> scratchHeights(const SynthOptions& options);
 std::vector<float> weaveHeights(const SynthOptions& options);

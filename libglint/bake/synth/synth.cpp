@@ -48,6 +48,9 @@ void check(const SynthOptions& p) {
   require(p.density > 0 && p.density <= 64, "density", "more than 0, at most 64");
   require(p.slope >= 0 && p.slope <= 10, "slope", "0 to 10");
   require(p.depth_texels >= 0 && p.depth_texels <= kMaxSize, "depth", "0 to 65536 texels");
+  require(p.flake_size_uv >= 1e-5f && p.flake_size_uv <= 1, "flake size", "1e-05 to 1 widths of the map");
+  require(p.roughness >= 0 && p.roughness <= 1, "roughness", "0 to 1");
+  require(p.coverage >= 0 && p.coverage <= 1, "coverage", "0 to 1");
   if (p.kind == SynthKind::scratches) checkScratches(p);
 }
 
@@ -131,6 +134,7 @@ SynthOptions defaultSynthOptions(SynthKind kind) {
       p.alpha = 0, p.feature_texels = 16, p.slope = 0.1f;
       break;
     case SynthKind::flat:
+    case SynthKind::flake2d:
       p.alpha = 0;
       break;
   }
@@ -139,7 +143,7 @@ SynthOptions defaultSynthOptions(SynthKind kind) {
 
 std::vector<float> synthHeights(const SynthOptions& p) {
   check(p);
-  if (p.kind == SynthKind::flakes) {
+  if (p.kind == SynthKind::flakes || p.kind == SynthKind::flake2d) {
     throw Error(ErrorCode::unsupported, "synth.flakes_height", "", "",
                 "flakes are separate facets without a common height field", "make their normals instead, or another kind");
   }
@@ -152,7 +156,16 @@ std::vector<float> synthHeights(const SynthOptions& p) {
 std::vector<Vec2> synthNormals(const SynthOptions& p) {
   check(p);
   if (p.kind == SynthKind::flakes) return flakeNormals(p);
+  if (p.kind == SynthKind::flake2d) return flake2dNormals(p);
   return normalsFromHeights(p.width, p.height, synthHeights(p));
+}
+
+std::vector<float> synthPresence(const SynthOptions& p) {
+  check(p);
+  if (p.kind != SynthKind::flake2d)
+    throw Error(ErrorCode::usage, "synth.presence", "", "presence", "only flake2d says which texels have a flake",
+                "make a map of flake2d");
+  return flake2dPresence(p);
 }
 
 }  // namespace glint::bake
