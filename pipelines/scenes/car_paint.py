@@ -43,11 +43,11 @@ def scene(kit, size=(960, 640), spp=96, crop=None):
 
 
 def draw(gallery):
-    size, spp = gallery.scaled((720, 480), 48)
+    size, spp = gallery.scaled((640, 430), 40)
     picture = gallery.render("car paint", scene(gallery.kit, size, spp), exposure=1.0)
     inset = None
     if not gallery.kit.quick:
-        inset = gallery.detail("car paint", lambda *how: scene(gallery.kit, *how), size, spp, (300, 170, 80, 60), 3, 1.0)
+        inset = gallery.detail("car paint", lambda *how: scene(gallery.kit, *how), size, spp, (150, 150, 70, 50), 3, 1.0)
     gallery.save("car-paint", picture, inset, (1, 1), title="Metallic paint", method="pyramid, trilinear, between a clear coat and a diffuse base",
                  alt="A bonnet in red metallic paint under a lamp and a soft light; the inset shows single flakes",
                  text="Copper flakes cover a fifth of a red base, under a clear coat of index 1.5: layers of one BSDF. A flake is 72 um wide. "

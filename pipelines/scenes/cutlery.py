@@ -71,11 +71,11 @@ def scene(kit, size=(960, 640), spp=128, crop=None):
 
 
 def draw(gallery):
-    size, spp = gallery.scaled((800, 460), 48)
+    size, spp = gallery.scaled((720, 414), 40)
     picture = gallery.render("cutlery", scene(gallery.kit, size, spp), exposure=1.3)
     inset = None
     if not gallery.kit.quick:
-        inset = gallery.detail("cutlery", lambda *how: scene(gallery.kit, *how), size, spp, (110, 160, 80, 52), 3, 1.3)
+        inset = gallery.detail("cutlery", lambda *how: scene(gallery.kit, *how), size, spp, (100, 142, 76, 50), 3, 1.3)
     gallery.save("cutlery", picture, inset, (1, 1), title="Scratched cutlery", method="pyramid; paths of up to 5 segments",
                  alt="A knife, a spoon and a fork on slate, full of fine scratches; the inset shows scratches in the bowl of the spoon",
                  text="Used cutlery in a room with three windows and a lamp. Scratches are 36 um wide, in a map of 2048 x 2048 texels of 12 um. They show where they mirror "

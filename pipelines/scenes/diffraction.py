@@ -8,7 +8,7 @@ from kit import envmap, look_at, point_light, rgb, studio
 TEXEL_UM = 0.2
 SIZE = 128
 PERIOD_TEXELS = 8
-ROOM = studio([(90, 60, 50, 12, 0.5, (1, 1, 1))], floor=0.03, ceiling=0.08)
+ROOM = studio([(90, 60, 60, 25, 0.25, (1, 1, 1))], floor=0.04, ceiling=0.06)
 
 
 def asset(kit):
@@ -44,7 +44,7 @@ def scene(kit, size=(720, 480), spp=64, crop=None):
 
 
 def draw(gallery):
-    picture = gallery.render("diffraction", scene(gallery.kit, *gallery.scaled((640, 420), 48)))
+    picture = gallery.render("diffraction", scene(gallery.kit, *gallery.scaled((640, 420), 128)))
     gallery.save("diffraction", picture, title="Colours of a grating", method="wave optics: pyramid of 24 wavelengths, shown as colours",
                  alt="A disc with rainbow bands across it under two lamps",
                  text="Grooves lie 1.6 um apart, as those of a compact disc. The colours are no texture: they are the diffraction of a height map of 26 um.")

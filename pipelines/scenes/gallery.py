@@ -9,6 +9,7 @@ import importlib
 import json
 import pathlib
 import sys
+import textwrap
 import time
 
 import numpy as np
@@ -21,6 +22,7 @@ SCENES = ("car_paint", "kettle", "cutlery", "bent_quad", "cloth", "diffraction",
 QUICK_SCENES = ("car_paint", "kettle", "cutlery")  # of `make demo`
 PASSES = 8
 OUTLIER = 4.0  # times the median of the passes at a pixel, at which a pass is cut
+WIDTH = 150  # characters of a line of the index
 TONE = "Khronos PBR Neutral tone curve, sRGB"
 
 
@@ -29,7 +31,7 @@ class Picture:
     """A rendering: linear light, and how it was made."""
 
     linear: np.ndarray
-    seconds: float
+    seconds: float  # of processor time, of all threads
     spp: int
     exposure: float
 
@@ -68,14 +70,14 @@ class Gallery:
         scene = mi.load_dict(description)
         spp = description["camera"]["sampler"]["sample_count"]
         passes = []
-        start, told = time.perf_counter(), -1
+        start, started, told = time.perf_counter(), time.process_time(), -1
         for index in range(min(PASSES, spp)):
             passes.append(np.array(mi.render(scene, spp=max(1, spp // PASSES), seed=seed + index)))
             tenth = 10 * len(passes) // min(PASSES, spp)
             if tenth != told and not (quiet and tenth < 10):
                 told = tenth
                 print(f"{label}: {10 * tenth} %, {time.perf_counter() - start:.1f} s", file=sys.stderr, flush=True)
-        seconds = time.perf_counter() - start
+        seconds = time.process_time() - started
         return Picture(combined(np.array(passes)), seconds, len(passes) * max(1, spp // PASSES), exposure)
 
     def detail(self, label, scene, size, spp, frame, magnified, exposure=1.0):
@@ -118,10 +120,10 @@ def index_text(entries, pictures_folder="", extra=""):
     """The entries as Markdown."""
     lines = []
     for entry in entries:
-        lines += [f"## {entry['title']}", "", f"![{entry['alt']}]({pictures_folder}{entry['file']})", "", entry["text"], ""]
+        lines += [f"## {entry['title']}", "", f"![{entry['alt']}]({pictures_folder}{entry['file']})", "", textwrap.fill(entry["text"], WIDTH), ""]
         if entry.get("table"):
             lines += [*entry["table"], ""]
-        lines += [f"*{entry['method']}; {entry['spp']} samples a pixel; {entry['seconds']:.0f} s on {entry['cores']} cores.*", ""]
+        lines += [f"*{entry['method']}; {entry['spp']} samples a pixel; {entry['seconds']:.0f} s of processor time.*", ""]
     return "\n".join(lines)
 
 
@@ -130,7 +132,15 @@ HEAD = f"""# Gallery
 Rendered by Mitsuba 3 with the BSDF `glint` and the integrator `glint_path` of the package glint_ndf. `make gallery` renders all pictures again, from
 maps of `glint-synth` to files in `gallery/`; the scenes are small programs in `pipelines/scenes/`. Pictures are not denoised; each is the mean of
 {PASSES} renderings, of which a pixel is cut at {OUTLIER:g} times the median, so rare paths from rough surfaces over glints are lost. All are shown through the
-{TONE}. Times are those of the rendering, without the preparation of maps.
+{TONE}. Times are seconds of processor time of the rendering, of all threads together, without the preparation of
+maps.
+"""
+
+BALL = """
+The copper ball first, by another program (`docs/pictures/ball.py`): one texel for each pixel; one roughness for all pixels; glint; and the slow sum over
+all texels under each pixel, which the third has to match.
+
+![A copper ball with flakes, four times: a few lonely dots; three smooth highlights without a sparkle; sparkling highlights; the same sparkling highlights](pictures/ball.png)
 """
 
 
@@ -143,13 +153,15 @@ def main():
     parser.add_argument("--docs", type=pathlib.Path, help="also write DOCS/GALLERY.md and DOCS/pictures/gallery")
     parser.add_argument("--variant", default="llvm_ad_rgb", help="of Mitsuba")
     arguments = parser.parse_args()
+    if arguments.quick and arguments.docs:
+        parser.error("--docs needs pictures of full size: leave out --quick")
     kits.start_mitsuba(arguments.variant)
     gallery = Gallery(kits.Kit(arguments.bin, arguments.out / "assets", arguments.quick), arguments.out)
     names = arguments.only or (QUICK_SCENES if arguments.quick else SCENES)
     start = time.perf_counter()
     for name in names:
         importlib.import_module(name).draw(gallery)
-    write_index(gallery, arguments.docs)
+        write_index(gallery, arguments.docs)
     print(f"{len(gallery.entries)} pictures in {time.perf_counter() - start:.0f} s; index: {arguments.out}/README.md")
 
 
@@ -157,7 +169,7 @@ def write_index(gallery, docs):
     """Writes the index of all pictures that are there: those of this run, and those of earlier runs with the same folder."""
     record = gallery.out / "index.json"
     kept = {entry["name"]: entry for entry in (json.loads(record.read_text()) if record.exists() else [])}
-    kept |= {entry["name"]: entry | {"cores": kits.cores()} for entry in gallery.entries}
+    kept |= {entry["name"]: entry for entry in gallery.entries}
     order = [name.replace("_", "-") for name in SCENES]
     entries = sorted(kept.values(), key=lambda entry: order.index(entry["name"]))
     record.write_text(json.dumps(entries, indent=1) + "\n")
@@ -166,7 +178,7 @@ def write_index(gallery, docs):
         folder = docs / "pictures" / "gallery"
         folder.mkdir(parents=True, exist_ok=True)
         shown = [entry | {"file": pictures.for_documents(gallery.out / entry["file"], folder).name} for entry in entries]
-        (docs / "GALLERY.md").write_text(HEAD + "\n" + index_text(shown, "pictures/gallery/"))
+        (docs / "GALLERY.md").write_text(HEAD + BALL + "\n" + index_text(shown, "pictures/gallery/"))
 
 
 if __name__ == "__main__":

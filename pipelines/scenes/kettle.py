@@ -67,7 +67,7 @@ def scene(kit, size=(720, 720), spp=128, max_depth=6, crop=None):
 
 
 def draw(gallery):
-    size, spp = gallery.scaled((560, 560), 64)
+    size, spp = gallery.scaled((560, 560), 56)
     picture = gallery.render("kettle", scene(gallery.kit, size, spp), exposure=1.2)
     inset = None
     if not gallery.kit.quick:

@@ -3,17 +3,11 @@
 import dataclasses
 import hashlib
 import json
-import os
 import pathlib
 import subprocess
 import sys
 
 import numpy as np
-
-
-def cores():
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0))
 
 
 def start_mitsuba(variant="llvm_ad_rgb"):
@@ -24,7 +18,7 @@ def start_mitsuba(variant="llvm_ad_rgb"):
         mi.set_variant(variant)
         import glint_ndf.mitsuba  # noqa: F401
     except ImportError as error:
-        sys.exit(f"{error}: run `make python`, and use build/venv/bin/python")
+        sys.exit(f"{error}; run `make python`, and use build/venv/bin/python")
 
 
 @dataclasses.dataclass

@@ -39,7 +39,7 @@ def draw(gallery):
     reference = gallery.render("models, Reference", scene(exact, spp), seed=1000)
     equal = {"Reference": reference} | {title: gallery.render(f"models, {title}", scene(asset, spp), seed=1000) for title, asset in METHODS.items()}
     slowest = reference.seconds
-    table = ["| method | file | time, equal samples | FLIP | samples in the time of Reference | FLIP |", "|---|---|---|---|---|---|"]
+    table = ["| method | file | processor time, equal samples | FLIP | samples in the time of Reference | FLIP |", "|---|---|---|---|---|---|"]
     notes, sheet = {}, {}
     for title, picture in equal.items():
         path = exact(of) if title == "Reference" else METHODS[title](of)
@@ -52,6 +52,6 @@ def draw(gallery):
     sheet = {f"truth: Reference, {truth.spp} samples": truth} | sheet
     gallery.sheet("models", sheet, columns=4, notes=notes, title="Every method", method="as titled, times of each in the table", table=table,
                   alt="The bent sheet of flakes by Reference, pyramid, cp, tucker, bin map, histograms and moments",
-                  text=f"Every method answers the same scene; notes say the time of {spp} samples a pixel and the FLIP error against Reference with {truth.spp}, then how many "
+                  text=f"Every method answers the same scene; notes say the processor time of {spp} samples a pixel and the FLIP error against Reference with {truth.spp}, then how many "
                        "samples fit into the time of Reference, and the error with these. Part of an error is the noise of sampling: Reference with other random "
                        "numbers has it, too. Histograms know directions to ten degrees, and moments one lobe: neither is made for small lights.")

@@ -6,7 +6,7 @@ WIDTHS_CM = (0.35, 1.0, 4.0, 11.0, 30.0)
 
 
 def draw(gallery):
-    size, spp = gallery.scaled((224, 224), 32)
+    size, spp = gallery.scaled((208, 208), 16)
     sheet = {}
     for width in WIDTHS_CM:
         texels = width / size[0] / (ball.TEXEL_UM * 1e-4)
