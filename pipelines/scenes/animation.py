@@ -11,7 +11,7 @@ import ball
 import pictures
 
 FROM_CM, TO_CM = 3.6, 24.0
-TEXELS_A_PIXEL = 16  # of the first frame in which flicker is measured: just above the finest level of the pyramid
+TEXELS_A_PIXEL = 20  # of the first frame in which flicker is measured: above the finest level of the pyramid
 
 
 def widths(frames):
@@ -56,7 +56,7 @@ def frames_of(gallery, label, which, count, size, spp, **how):
 def measured(gallery):
     """Flicker of the pyramid, of the exact answer and of a map without filtering, over small frames: the exact answer is slow."""
     size, spp, count = (96, 96), 4, 6
-    factor = (TO_CM / FROM_CM) ** (1 / 31)
+    factor = (TO_CM / FROM_CM) ** (1 / 23)
     width = size[0] * TEXELS_A_PIXEL * ball.TEXEL_UM * 1e-4 * factor ** np.arange(count)
     frames = lambda **how: [gallery.render("flicker", ball.scene(gallery.kit, w, size, spp, max_depth=2, **how), quiet=True).linear for w in width]
     return {"the pyramid": flicker(frames(), factor), "Reference": flicker(frames(asset=lambda of: of.normals), factor),
@@ -64,8 +64,8 @@ def measured(gallery):
 
 
 def draw(gallery):
-    size, spp = gallery.scaled((208, 208), 8)
-    count = 12 if gallery.kit.quick else 32
+    size, spp = gallery.scaled((200, 200), 8)
+    count = 12 if gallery.kit.quick else 24
     factor = widths(count)[1] / widths(count)[0]
     frames = frames_of(gallery, "animation", range(count), count, size, spp)
     steps = [flicker([a.linear, b.linear], factor) for a, b in zip(frames, frames[1:])]

@@ -33,7 +33,7 @@ def scene(kit, name="flakes", size=(480, 360), spp=64, asset=None, crop=None, fo
 def draw(gallery):
     sheets = {}
     for name, (_, title) in MAPS.items():
-        sheets[title] = gallery.render(f"bent quad, {title}", scene(gallery.kit, name, *gallery.scaled((400, 290), 24)), exposure=EXPOSURES.get(name, 1.0))
+        sheets[title] = gallery.render(f"bent quad, {title}", scene(gallery.kit, name, *gallery.scaled((400, 290), 16)), exposure=EXPOSURES.get(name, 1.0))
     gallery.sheet("bent-quad", sheets, columns=2, title="A bent sheet under one small light",
                   alt="A bent sheet, four times: isotropic noise, flakes, brushed metal and scratches under a lamp",
                   text="Four maps of 2048 x 2048 texels of 10 um, each repeated ten times along the sheet.", method="pyramid")

@@ -47,7 +47,7 @@ def draw(gallery):
     picture = gallery.render("car paint", scene(gallery.kit, size, spp), exposure=1.0)
     inset = None
     if not gallery.kit.quick:
-        inset = gallery.detail("car paint", lambda *how: scene(gallery.kit, *how), size, spp, (150, 150, 70, 50), 3, 1.0)
+        inset = gallery.detail("car paint", lambda *how: scene(gallery.kit, *how), size, spp, (150, 150, 100, 70), 2, 1.0)
     gallery.save("car-paint", picture, inset, (1, 1), title="Metallic paint", method="pyramid, trilinear, between a clear coat and a diffuse base",
                  alt="A bonnet in red metallic paint under a lamp and a soft light; the inset shows single flakes",
                  text="Copper flakes cover a fifth of a red base, under a clear coat of index 1.5: layers of one BSDF. A flake is 72 um wide. "

@@ -116,7 +116,7 @@ class Gallery:
         return file
 
 
-def index_text(entries, pictures_folder="", extra=""):
+def index_text(entries, pictures_folder=""):
     """The entries as Markdown."""
     lines = []
     for entry in entries:

@@ -5,7 +5,7 @@ import numpy as np
 import shapes
 from kit import envmap, look_at, point_light, rgb, studio
 
-TEXEL_UM = 40
+TEXEL_UM = 25
 ROOM = studio([(-60, 30, 30, 30, 0.8, (1, 0.97, 0.92)), (140, 25, 12, 40, 1.5, (0.9, 0.95, 1)), (60, 70, 60, 10, 0.8, (1, 1, 1))], floor=0.12, ceiling=0.38)
 
 
@@ -40,7 +40,7 @@ def cup(map_cm):
 
 
 def scene(kit, size=(720, 720), spp=128, max_depth=6, crop=None):
-    steel = kit.map("brushed", texel_um=TEXEL_UM, alpha=0.16, streak=220)
+    steel = kit.map("brushed", texel_um=TEXEL_UM, alpha=0.16, streak=320)
     metal = kit.metal(steel, steel.pyramid(), interpolation="trilinear")
     import mitsuba as mi
 
@@ -67,12 +67,12 @@ def scene(kit, size=(720, 720), spp=128, max_depth=6, crop=None):
 
 
 def draw(gallery):
-    size, spp = gallery.scaled((560, 560), 56)
+    size, spp = gallery.scaled((500, 500), 40)
     picture = gallery.render("kettle", scene(gallery.kit, size, spp), exposure=1.2)
     inset = None
     if not gallery.kit.quick:
-        inset = gallery.detail("kettle", lambda *how: scene(gallery.kit, *how), size, spp, (190, 270, 60, 60), 3, 1.2)
+        inset = gallery.detail("kettle", lambda size, spp, crop: scene(gallery.kit, size, spp, crop=crop), size, spp, (170, 240, 56, 56), 3, 1.2)
     gallery.save("kettle", picture, inset, (1, 0), title="A kettle and a cup of brushed steel", method="pyramid, trilinear; paths of up to 6 segments",
                  alt="A kettle and a cup of brushed metal on a grey table, with streaked highlights; the inset shows the streaks of one highlight",
-                 text="Kettle, spout and cup reflect each other. Streaks run round the axis, in a map of 2048 x 2048 texels of 40 um, so highlights are drawn out along the "
+                 text="Kettle, spout and cup reflect each other. Streaks run round the axis, in a map of 2048 x 2048 texels of 25 um, so highlights are drawn out along the "
                       "body and break into glints. The inset is the frame, rendered three times as large.")

@@ -70,7 +70,7 @@ class Kit:
         try:
             done = subprocess.run(command, stdout=subprocess.PIPE)
         except FileNotFoundError:
-            sys.exit(f"no programs in {self.bin}; run `make build` first")
+            sys.exit(f"{command[0]} is missing: run `make build` first")
         if done.returncode:
             sys.exit(f"failed with exit code {done.returncode}: {' '.join(command)}")
         return json.loads(done.stdout)["result"] if done.stdout else {}

@@ -6,17 +6,17 @@ import bent_quad
 import pictures
 
 MAP = "flakes"
-SIZE = (280, 200)
-TRUTH_SPP = 48
-FOV = 8.5  # degrees: a pixel sees 17 texels
+SIZE = (240, 170)
+TRUTH_SPP = 32
+FOV = 7.3  # degrees: a pixel sees 17 texels
 SPP = 16
 
 # title -> how the map is prepared
 METHODS = {
     "pyramid": lambda of: of.pyramid(),
-    "cp, rank 32": lambda of: of.made("cp", "compress", "--method", "cp", "--rank", 32, source=of.pyramid()),
-    "tucker, 10 %": lambda of: of.made("tucker", "compress", "--method", "tucker", "--tolerance", 0.1, source=of.pyramid()),
-    "bin map": lambda of: of.made("bins", "binmap"),
+    "cp, rank 32": lambda of: of.made("compress", "cp", "--method", "cp", "--rank", 32, source=of.pyramid()),
+    "tucker, 10 %": lambda of: of.made("compress", "tucker", "--method", "tucker", "--tolerance", 0.1, source=of.pyramid()),
+    "bin map": lambda of: of.made("binmap", "bins", "--alpha", 2**0.5 * of.sigma_r),
     "histograms": lambda of: of.made("sat", "sat"),
     "moments": lambda of: of.made("moments", "moments"),
 }

@@ -128,3 +128,25 @@ def test_every_body_faces_outwards():
         a, b, c = (points[faces[:, k]] for k in range(3))
         # The volume of a closed body is positive when its triangles face outwards; open ends change little.
         assert np.sum(a * np.cross(b, c)) / 6 > 0
+
+
+def test_a_glint_stays_and_a_rare_flash_is_cut():
+    import gallery
+
+    passes = np.full((8, 4, 4, 3), 0.5)
+    passes[:, 1, 1] = 40.0  # a glint is in every pass
+    passes[3, 2, 2] = 40.0  # a flash is in one
+    image = gallery.combined(passes)
+    assert image[1, 1] == pytest.approx(40)
+    assert image[2, 2].max() < 2 * 0.5
+    assert image[0, 0] == pytest.approx(0.5)
+
+
+def test_the_index_says_how_each_picture_was_made():
+    import gallery
+
+    entry = {"name": "kettle", "file": "kettle.png", "title": "A kettle", "alt": "A kettle on a table", "text": "It is of steel.", "method": "pyramid",
+             "spp": 48, "seconds": 12.3, "table": ["| a |", "|---|"]}
+    text = gallery.index_text([entry], "pictures/")
+    for part in ("## A kettle", "![A kettle on a table](pictures/kettle.png)", "It is of steel.", "| a |\n|---|", "*pyramid; 48 samples a pixel; 12 s of processor time.*"):
+        assert part in text
