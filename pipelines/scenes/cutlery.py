@@ -6,6 +6,7 @@ import shapes
 from kit import envmap, look_at, point_light, rgb, studio
 
 TEXEL_UM = 12
+FRAME = (95, 128, 60, 40)  # of the inset, pixels
 ROOM = studio([(80, 42, 11, 20, 0.9, (1, 1, 1.05)), (108, 42, 11, 20, 0.9, (1, 1, 1.05)), (150, 35, 11, 22, 0.9, (1, 1, 1.05)), (-40, 60, 25, 12, 2.0, (1, 0.85, 0.65)), (20, 12, 50, 8, 0.8, (0.9, 0.95, 1))],
               floor=0.10, ceiling=0.30)
 SHEET = lambda t: 0.17 + 0 * t
@@ -59,7 +60,7 @@ def scene(kit, size=(960, 640), spp=128, crop=None):
 
     return {
         "type": "scene",
-        "integrator": kit.integrator(5),
+        "integrator": kit.integrator(4),
         "camera": look_at((0, -25, 22), (0.4, 0.9, 0), 39, size, spp, crop=crop),
         "spoon": piece("spoon", spoon(), (-8.9, 2.0, 0), -4),
         "fork": piece("fork", fork(), (-9.0, -3.0, 0), 4),
@@ -71,12 +72,10 @@ def scene(kit, size=(960, 640), spp=128, crop=None):
 
 
 def draw(gallery):
-    size, spp = gallery.scaled((720, 414), 40)
+    size, spp = gallery.scaled((680, 390), 32)
     picture = gallery.render("cutlery", scene(gallery.kit, size, spp), exposure=1.3)
-    inset = None
-    if not gallery.kit.quick:
-        inset = gallery.detail("cutlery", lambda *how: scene(gallery.kit, *how), size, spp, (100, 142, 76, 50), 3, 1.3)
-    gallery.save("cutlery", picture, inset, (1, 1), title="Scratched cutlery", method="pyramid; paths of up to 5 segments",
+    inset = None if gallery.kit.quick else gallery.magnified(picture, FRAME, 4)
+    gallery.save("cutlery", picture, inset, (1, 1), title="Scratched cutlery", method="pyramid; paths of up to 4 segments",
                  alt="A knife, a spoon and a fork on slate, full of fine scratches; the inset shows scratches in the bowl of the spoon",
                  text="Used cutlery in a room with three windows and a lamp. Scratches are 36 um wide, in a map of 2048 x 2048 texels of 12 um. They show where they mirror "
-                      "the lamp or a window, and nowhere else.")
+                      "the lamp or a window, and nowhere else. The inset shows pixels of the frame.")

@@ -90,6 +90,15 @@ class Gallery:
         large = tuple(magnified * n for n in size)
         return self.render(f"{label}, detail", scene(large, spp, crop), exposure), frame
 
+    def magnified(self, picture, frame, factor):
+        """An inset for `save`: the pixels of a part of a picture, each shown as a square.
+
+        @param frame  (left, top, width, height) in pixels of the picture
+        """
+        left, top, width, height = frame
+        part = picture.linear[top : top + height, left : left + width]
+        return dataclasses.replace(picture, linear=part.repeat(factor, axis=0).repeat(factor, axis=1)), frame
+
     def enter(self, name, file, seen, **facts):
         """Adds a line to the index."""
         self.entries.append({"name": name, "file": file.name, **seen, **facts})
@@ -97,7 +106,7 @@ class Gallery:
     def save(self, name, picture, inset=None, corner=(1, 1), **seen):
         """Writes one picture.
 
-        @param inset   from `detail`
+        @param inset   from `detail` or `magnified`
         @param corner  of the inset: 1 is right, 1 is below
         @param seen    title, text, alt and method for the index
         """
