@@ -90,15 +90,6 @@ class Gallery:
         large = tuple(magnified * n for n in size)
         return self.render(f"{label}, detail", scene(large, spp, crop), exposure), frame
 
-    def magnified(self, picture, frame, factor):
-        """An inset for `save`: the pixels of a part of a picture, each shown as a square.
-
-        @param frame  (left, top, width, height) in pixels of the picture
-        """
-        left, top, width, height = frame
-        part = picture.linear[top : top + height, left : left + width]
-        return dataclasses.replace(picture, linear=part.repeat(factor, axis=0).repeat(factor, axis=1)), frame
-
     def enter(self, name, file, seen, **facts):
         """Adds a line to the index."""
         self.entries.append({"name": name, "file": file.name, **seen, **facts})
@@ -106,7 +97,7 @@ class Gallery:
     def save(self, name, picture, inset=None, corner=(1, 1), **seen):
         """Writes one picture.
 
-        @param inset   from `detail` or `magnified`
+        @param inset   from `detail`
         @param corner  of the inset: 1 is right, 1 is below
         @param seen    title, text, alt and method for the index
         """
@@ -159,18 +150,21 @@ def main():
     parser.add_argument("--out", type=pathlib.Path, default="gallery", help="folder to make")
     parser.add_argument("--only", action="append", choices=SCENES, help="draw this scene; may be given again")
     parser.add_argument("--quick", action="store_true", help=f"small and with few samples: {', '.join(QUICK_SCENES)}")
+    parser.add_argument("--index", action="store_true", help="render nothing; write the index of the pictures that are there")
     parser.add_argument("--docs", type=pathlib.Path, help="also write DOCS/GALLERY.md and DOCS/pictures/gallery")
     parser.add_argument("--variant", default="llvm_ad_rgb", help="of Mitsuba")
     arguments = parser.parse_args()
     if arguments.quick and arguments.docs:
         parser.error("--docs needs pictures of full size: leave out --quick")
-    kits.start_mitsuba(arguments.variant)
+    if not arguments.index:
+        kits.start_mitsuba(arguments.variant)
     gallery = Gallery(kits.Kit(arguments.bin, arguments.out / "assets", arguments.quick), arguments.out)
-    names = arguments.only or (QUICK_SCENES if arguments.quick else SCENES)
+    names = () if arguments.index else arguments.only or (QUICK_SCENES if arguments.quick else SCENES)
     start = time.perf_counter()
     for name in names:
         importlib.import_module(name).draw(gallery)
         write_index(gallery, arguments.docs)
+    write_index(gallery, arguments.docs)
     print(f"{len(gallery.entries)} pictures in {time.perf_counter() - start:.0f} s; index: {arguments.out}/README.md")
 
 

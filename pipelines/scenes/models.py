@@ -6,10 +6,10 @@ import bent_quad
 import pictures
 
 MAP = "flakes"
-SIZE = (240, 170)
-TRUTH_SPP = 32
-FOV = 7.3  # degrees: a pixel sees 17 texels
-SPP = 16
+SIZE = (160, 120)
+TRUTH_SPP = 16
+FOV = 5.0  # degrees: a pixel sees 17 texels
+SPP = 8
 
 # title -> how the map is prepared
 METHODS = {
