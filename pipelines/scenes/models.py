@@ -49,7 +49,7 @@ def draw(gallery):
         notes[title] = f"{picture.seconds:.1f} s, FLIP {errors[0]:.3f}\n{same_time.spp} samples: {errors[1]:.3f}"
         sheet[title] = picture
         table.append(f"| {title} | {path.stat().st_size / 1e6:.1f} MB | {picture.seconds:.1f} s | {errors[0]:.3f} | {same_time.spp} | {errors[1]:.3f} |")
-    sheet = {f"truth: Reference, {truth.spp} samples": truth} | sheet
+    sheet = {f"truth, {truth.spp} samples": truth} | sheet
     gallery.sheet("models", sheet, columns=4, notes=notes, title="Every method", method="as titled, times of each in the table", table=table,
                   alt="The bent sheet of flakes by Reference, pyramid, cp, tucker, bin map, histograms and moments",
                   text=f"Every method answers the same scene; notes say the processor time of {spp} samples a pixel and the FLIP error against Reference with {truth.spp}, then how many "
