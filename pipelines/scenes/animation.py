@@ -75,6 +75,6 @@ def draw(gallery):
         "title": "A zoom without flicker", "alt": "An animated zoom from a patch of flakes to the whole ball and back", "method": "pyramid",
         "text": "Frames differ by their zoom alone. Flicker is the mean difference of a frame from the one before, brought to its scale, over the mean of the "
         "frames. Six small frames flicker by " + ", ".join(f"{100 * value:.1f} % with {name}" for name, value in measured(gallery).items())
-        + f": what Reference shows is the error of bringing frames to scale. Nothing pops: from frame to frame of this zoom the difference is {100 * np.median(steps):.0f} %, "
+        + f": what Reference shows is the noise of samples and the error of bringing frames to scale. Nothing pops: from frame to frame of this zoom the difference is {100 * np.median(steps):.0f} %, "
         f"at most {100 * max(steps):.0f} %."},
         spp=frames[0].spp, seconds=sum(p.seconds for p in frames))
