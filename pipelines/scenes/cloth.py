@@ -74,7 +74,7 @@ def scene(kit, width_cm=34.0, size=(480, 360), spp=64):
 
 
 def draw(gallery):
-    size, spp = gallery.scaled((340, 280), 32)
+    size, spp = gallery.scaled((340, 280), 24)
     pixel = lambda width: width / size[0] / (TEXEL_UM * 1e-4)
     sheet = {f"{width:g} cm wide: {pixel(width):.2g} texels a pixel": gallery.render(f"cloth, {width:g} cm", scene(gallery.kit, width, size, spp))
              for width in WIDTHS_CM}

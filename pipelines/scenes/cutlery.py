@@ -5,7 +5,7 @@ import numpy as np
 import shapes
 from kit import envmap, look_at, point_light, rgb, studio
 
-TEXEL_UM = 10
+TEXEL_UM = 7
 ROOM = studio([(80, 42, 11, 20, 0.9, (1, 1, 1.05)), (108, 42, 11, 20, 0.9, (1, 1, 1.05)), (150, 35, 11, 22, 0.9, (1, 1, 1.05)), (-40, 60, 25, 12, 2.0, (1, 0.85, 0.65)), (20, 12, 50, 8, 0.8, (0.9, 0.95, 1))],
               floor=0.10, ceiling=0.30)
 SHEET = lambda t: 0.17 + 0 * t
@@ -50,7 +50,7 @@ def fork():
 def scene(kit, size=(960, 640), spp=128, crop=None):
     import mitsuba as mi
 
-    of = kit.map("scratches", texel_um=TEXEL_UM, density=3, feature_size=3, slope=0.3, sigma_r=0.008)
+    of = kit.map("scratches", texel_um=TEXEL_UM, density=2, feature_size=4, slope=0.3, sigma_r=0.008)
     metal = kit.metal(of, of.pyramid(), material="Ag")
     t = mi.ScalarTransform4f
 
@@ -71,9 +71,9 @@ def scene(kit, size=(960, 640), spp=128, crop=None):
 
 
 def draw(gallery):
-    size, spp = gallery.scaled((640, 420), 32)
+    size, spp = gallery.scaled((600, 400), 24)
     picture = gallery.render("cutlery", scene(gallery.kit, size, spp), exposure=1.3)
     gallery.save("cutlery", picture, title="Scratched cutlery", method="pyramid; paths of up to 4 segments",
                  alt="A knife, a spoon and a fork on slate, full of fine scratches",
-                 text="Used cutlery in a room with three windows and a lamp. Scratches are 30 um wide, in a map of 2048 x 2048 texels of 10 um. They show where they mirror "
+                 text="Used cutlery in a room with three windows and a lamp. Scratches are 28 um wide, in a map of 2048 x 2048 texels of 7 um. They show where they mirror "
                       "the lamp or a window, and nowhere else.")

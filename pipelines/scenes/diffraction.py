@@ -44,7 +44,7 @@ def scene(kit, size=(720, 480), spp=64, crop=None):
 
 
 def draw(gallery):
-    picture = gallery.render("diffraction", scene(gallery.kit, *gallery.scaled((640, 420), 96)))
+    picture = gallery.render("diffraction", scene(gallery.kit, *gallery.scaled((640, 420), 64)))
     gallery.save("diffraction", picture, title="Colours of a grating", method="wave optics: pyramid of 24 wavelengths, shown as colours",
                  alt="A disc with rainbow bands across it under two lamps",
                  text="Grooves lie 1.6 um apart, as those of a compact disc. The colours are no texture: they are the diffraction of a height map of 26 um.")
