@@ -14,8 +14,9 @@ help:  ## list the targets
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
 
 .PHONY: demo
-demo: build  ## run every tool on the sample maps, draw demo/*.png (DEMO_MAP=image.png adds yours)
+demo: build python  ## run every tool on the sample maps, draw demo/*.png (DEMO_MAP=image.png adds yours), render three pictures
 	@$(PYTHON) pipelines/demo/demo.py --bin build/bin --out demo $(if $(DEMO_MAP),--map '$(DEMO_MAP)')
+	@$(venv)/bin/python pipelines/scenes/gallery.py --bin build/bin --out demo/gallery --quick
 
 # The wheel links the libraries of the build; HDF5 statically. Its environment is made anew when the requirements change.
 venv := build/venv
@@ -55,6 +56,10 @@ bench-report: bench  ## the same, and write docs/BENCHMARKS.md, its charts and d
 .PHONY: limits
 limits: build  ## draw with every method, compare with brute force; writes docs/LIMITS.md and its pictures
 	@$(PYTHON) tests/render/compare.py --bin build/bin --out build/limits --docs docs
+
+.PHONY: gallery
+gallery: build python  ## pictures rendered by Mitsuba 3, in gallery/ (GALLERY_FLAGS='--only kettle', '--quick', or '--docs docs' for docs/GALLERY.md)
+	@$(venv)/bin/python pipelines/scenes/gallery.py --bin build/bin --out gallery $(GALLERY_FLAGS)
 
 .PHONY: stability
 stability: build  ## test every method where it fails; writes docs/stability.json, its chart and its section of docs/LIMITS.md
@@ -120,4 +125,4 @@ packages:  ## install what is missing of packages.txt
 
 .PHONY: clean
 clean:  ## remove everything that was built
-	rm -rf build build-* demo
+	rm -rf build build-* demo gallery
