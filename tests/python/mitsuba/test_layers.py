@@ -27,6 +27,55 @@ def test_layers_add_no_energy(llvm, noise_pyramid, coat, transparency):
     assert image.mean() > (0.95 if transparency == 1 else 0.65)
 
 
+#: Bases that reflect all light, and the least share of the light that must leave a coat over them. Glossy light that the coat reflects
+#: back inside is lost, and a base whose diffuse part cannot be told apart gets no light back.
+WHITE_BASES = {
+    "plastic": ({"type": "plastic", "diffuse_reflectance": 1.0}, 0.93),
+    "roughplastic": ({"type": "roughplastic", "diffuse_reflectance": 1.0, "alpha": 0.2}, 0.8),
+    "smooth metal": ({"type": "conductor", "material": "none"}, 0.93),
+    "metal": ({"type": "roughconductor", "material": "none", "alpha": 0.1}, 0.93),
+    "rough metal": ({"type": "roughconductor", "material": "none", "alpha": 0.3}, 0.6),
+    "principled metal": ({"type": "principled", "base_color": {"type": "rgb", "value": 1.0}, "metallic": 1.0, "roughness": 0.3}, 0.85),
+    "principled": ({"type": "principled", "base_color": {"type": "rgb", "value": 1.0}, "roughness": 0.5}, 0.4),
+    "mixed": ({"type": "blendbsdf", "weight": 0.5, "a": WHITE, "b": {"type": "roughconductor", "material": "none"}}, 0.7),
+}
+
+#: Means of 20000 weights, which deviate by up to 1 from their mean, are within this of their expectation.
+NOISE_OF_WEIGHTS = 5 / 20_000**0.5
+
+
+@pytest.mark.parametrize("coat", [{}, {"coat_alpha": 0.2}], ids=["smooth coat", "rough coat"])
+@pytest.mark.parametrize("base", WHITE_BASES)
+def test_a_coat_adds_no_energy_to_any_base(llvm, noise_pyramid, base, coat):
+    """The mean weight of samples is the albedo. Light that a coat reflects back inside is given to diffuse parts alone."""
+    description, least = WHITE_BASES[base]
+    bsdf = mi.load_dict(stack(noise_pyramid, coat=1.5, transparency=1.0, base=description, **coat))
+    lanes, random = 20_000, np.random.default_rng(5)
+    for view in ((0, 0, 1), (0.6, 0, 0.8)):
+        si = dr.zeros(mi.SurfaceInteraction3f, lanes)
+        si.wi = view
+        xi = random.random((3, lanes), dtype=np.float32)
+        _, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(xi[0]), mi.Point2f(xi[1], xi[2]))
+        albedo = np.array(weight).mean()
+        assert least < albedo < 1 + NOISE_OF_WEIGHTS
+
+
+def test_a_base_of_two_parts_answers_the_same_for_each_part(llvm, noise_pyramid):
+    """What contexts for each component of a coated base answer adds up to the whole."""
+    bsdf = mi.load_dict(stack(noise_pyramid, coat=1.5, transparency=1.0, base={"type": "roughplastic", "diffuse_reflectance": 1.0}))
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = dr.normalize(mi.Vector3f(0.1, 0.2, 1))
+    lit = dr.normalize(mi.Vector3f(-0.2, -0.1, 1))
+    parts = []
+    for component in range(bsdf.component_count()):
+        ctx = mi.BSDFContext()
+        ctx.component = component
+        parts.append(np.array(bsdf.eval(ctx, si, lit)).ravel())
+    whole = np.array(bsdf.eval(mi.BSDFContext(), si, lit)).ravel()
+    assert whole.min() > 0
+    assert sum(parts) == pytest.approx(whole, rel=1e-5)
+
+
 def test_a_coat_over_a_diffuse_base_is_mitsubas_plastic(llvm, noise_pyramid):
     """Facets that let everything through leave the coat and the base: Mitsuba's `plastic`, which counts light in the same way."""
     base = {"type": "diffuse", "reflectance": 0.5}
