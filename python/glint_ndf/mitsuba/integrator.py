@@ -47,14 +47,15 @@ def make_class():
             self._rendering = True
             try:
                 with wavefront():
-                    if self._prefilter is None or self._prefilter.scene is not scene:
-                        self._prefilter = Prefilter.of(scene, self.lobes)
+                    self._prefilter = Prefilter.of(scene, self.lobes)
                     passes = _passes(sensor, samples) if develop else [samples]
                     return _mean_of_passes(
                         lambda part, n: self._render_pass(scene, sensor, seed + part, n, samples, develop, evaluate), passes
                     )
             finally:
                 self._rendering = False
+                # The prefilter refers to the scene, which refers to this integrator; and the scene may change until the next picture.
+                self._prefilter = None
 
         def _render_pass(self, scene, sensor, seed, spp, samples, develop, evaluate):
             # Mitsuba shrinks differentials to the part of the pixel that one sample of this pass stands for.
