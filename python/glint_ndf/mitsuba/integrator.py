@@ -4,9 +4,10 @@ import drjit as dr
 import mitsuba as mi
 
 from . import beam as beams
+from .exchange import is_jit
 from .options import Options
 from .prefilter import Prefilter
-from .wavefront import is_jit, wavefront
+from .wavefront import wavefront
 
 NAME = "glint_path"
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from conftest import follows_pdf, glint, make_scene, render, render_batches
 
+import glint_ndf as gn
 from glint_ndf.mitsuba.coat import Coat
 
 WHITE = {"type": "diffuse", "reflectance": 1.0}
@@ -156,3 +157,22 @@ def test_a_coat_can_have_normals_of_its_own(llvm, noise_pyramid, brushed_pyramid
     bsdf = stack(brushed_pyramid, coat=1.5, coat_asset=noise_pyramid.path, coat_sigma=10.0)
     image = render(make_scene(bsdf, "constant", "direct"), 128)
     assert 0.8 < image.mean() < 1.02
+
+
+def test_a_coat_of_the_index_of_air_is_no_coat(llvm, noise_pyramid):
+    """Its other parameters are known all the same."""
+    bsdf = stack(noise_pyramid, coat=1.0, coat_asset=noise_pyramid.path, coat_uv_scale=2.0)
+    assert mi.load_dict(bsdf).layers.coat is None
+
+
+def test_coat_alpha_is_the_roughness_of_a_coat_or_of_its_bin_map(llvm, noise, noise_pyramid):
+    """No other asset of a coat reads it."""
+    flakes = gn.bin_map(gn.synth("flakes", 64, seed=3), alpha=0.1, alpha_max=0.3)
+    assert mi.load_dict(stack(noise_pyramid, coat=1.5, coat_asset=flakes.path, coat_alpha=0.2, coat_sigma=4.0)).layers.coat.alpha == 0
+    with pytest.raises(Exception, match="'coat_alpha' is for assets of kind bin-map"):
+        mi.load_dict(stack(noise_pyramid, coat=1.5, coat_asset=noise.path, coat_alpha=0.2))
+
+
+def test_a_placement_of_a_coat_without_an_asset_is_refused(llvm, noise_pyramid):
+    with pytest.raises(Exception, match="'coat_uv_scale' needs 'coat_asset'"):
+        mi.load_dict(stack(noise_pyramid, coat=1.5, coat_uv_scale=2.0))
