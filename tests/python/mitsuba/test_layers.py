@@ -7,7 +7,7 @@ import pytest
 from conftest import follows_pdf, glint, make_scene, render, render_batches
 
 import glint_ndf as gn
-from glint_ndf.mitsuba.coat import Coat
+from glint_ndf.mitsuba.coat import Coat, _albedos
 
 WHITE = {"type": "diffuse", "reflectance": 1.0}
 
@@ -89,13 +89,26 @@ def test_a_coat_over_a_diffuse_base_is_mitsubas_plastic(llvm, noise_pyramid):
     assert mean_a.mean() == pytest.approx(mean_b.mean(), abs=5 * deviation, rel=2e-3)
 
 
-@pytest.mark.parametrize("alpha", [0.1, 0.5])
+#: Largest error in albedo of the table of a coat, between its entries.
+ERROR_OF_TABLE = 0.002
+
+
+@pytest.mark.parametrize("alpha", [0.003, 0.01, 0.03, 0.1, 1.0])
+def test_the_table_of_a_rough_coat_is_dense_enough(any_variant, alpha):
+    """Also at low cosines, where the albedo of a smooth coat is steep."""
+    cosines = np.concatenate([np.geomspace(1e-3, 0.1, 30), np.linspace(0.1, 1, 10)])
+    coat = Coat(1.5, alpha)
+    found = [float(np.array(coat.albedo(mi.Float(float(c)))).item()) for c in cosines]
+    assert found == pytest.approx(_albedos(1.5, alpha, cosines), abs=ERROR_OF_TABLE)
+
+
+@pytest.mark.parametrize("alpha", [0.01, 0.1, 0.5])
 def test_albedo_of_a_rough_coat(llvm, alpha):
     """The table agrees with an integral over samples."""
     coat = Coat(1.5, alpha)
     lanes = 400_000
     xi = mi.Point2f(*np.random.default_rng(1).random((2, lanes), dtype=np.float32))
-    for cosine in (1.0, 0.6, 0.2):
+    for cosine in (1.0, 0.6, 0.2, 0.02):
         viewed = mi.Vector3f((1 - cosine**2) ** 0.5, 0, cosine)
         lit = coat.sample(None, viewed, xi, True)
         value, pdf = coat.evaluate(None, viewed, lit, True)
