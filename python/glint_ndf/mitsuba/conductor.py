@@ -30,10 +30,10 @@ class Conductor:
         return value if self.scale is None else value * self.scale.eval(si, active)
 
     def traverse(self, callback):
-        callback.put("eta", self.eta, mi.ParamFlags.NonDifferentiable)
-        callback.put("k", self.k, mi.ParamFlags.NonDifferentiable)
+        callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
+        callback.put("k", self.k, mi.ParamFlags.Differentiable)
         if self.scale is not None:
-            callback.put("specular_reflectance", self.scale, mi.ParamFlags.NonDifferentiable)
+            callback.put("specular_reflectance", self.scale, mi.ParamFlags.Differentiable)
 
 
 def _for_dictionary(value):

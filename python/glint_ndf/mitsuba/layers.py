@@ -140,7 +140,8 @@ class Layers:
         if self.conductor is not None:
             self.conductor.traverse(callback)
         if self.base is not None:
-            callback.put("base", self.base, mi.ParamFlags.NonDifferentiable)
+            callback.put("base", self.base, mi.ParamFlags.Differentiable)
+            # Shares of the layers, by which samples are drawn, depend on the transparency.
             callback.put("transparency", self.transparency, mi.ParamFlags.NonDifferentiable)
 
     def _below(self, viewed, lit):
