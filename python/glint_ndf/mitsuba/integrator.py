@@ -51,7 +51,7 @@ def make_class():
                         self._prefilter = Prefilter.of(scene, self.lobes)
                     passes = _passes(sensor, samples) if develop else [samples]
                     return _mean_of_passes(
-                        lambda part, n: self._render_pass(scene, sensor, seed + part, n, samples, develop, evaluate), passes
+                        lambda part, n: self._render_pass(scene, sensor, _seed_of(seed, part), n, samples, develop, evaluate), passes
                     )
             finally:
                 self._rendering = False
@@ -103,10 +103,9 @@ def _trace(options, prefilter, scene, sampler, ray, active):
         if not dr.any(active):
             break
 
-        # The footprint: exact for the pixel, a cone for all that follows.
         beam = beams.propagated(beam, dr.select(active, si.t, 0))
         if depth == 0 and ray.has_differentials:
-            si.compute_uv_partials(ray)
+            si.compute_uv_partials(ray)  # exact
         else:
             beams.write_partials(beam, ray, si)
 
@@ -133,16 +132,25 @@ def _trace(options, prefilter, scene, sampler, ray, active):
         ray = mi.RayDifferential3f(si.spawn_ray(si.to_world(drawn.wo)))
         depth += 1
 
-        # Russian roulette.
-        largest = dr.max(throughput)
-        active = active & (largest > 0)
-        if depth >= options.rr_depth:
-            keep = dr.minimum(largest * eta * eta, 0.95)
-            active = active & (sampler.next_1d(active) < keep)
-            throughput = throughput * dr.rcp(dr.maximum(keep, 1e-6))
+        active, throughput = _roulette(sampler, throughput, eta, active, depth >= options.rr_depth)
         if is_jit():
             dr.eval(radiance, throughput, eta, beam, previous, previous_pdf, previous_mirror, ray, active)
     return dr.select(shown, radiance, 0) if options.hides else radiance, shown
+
+
+def _roulette(sampler, throughput, eta, active, play):
+    """Ends paths that carry no light, and where `play` says so paths that carry little, at random."""
+    largest = dr.max(throughput)
+    active = active & (largest > 0)
+    if not play:
+        return active, throughput
+    keep = dr.minimum(largest * eta * eta, 0.95)
+    return active & (sampler.next_1d(active) < keep), throughput / dr.maximum(keep, 1e-6)
+
+
+def _seed_of(seed, part):
+    """The seed of a pass: far from those that a user gives to other renderings, which are small numbers."""
+    return (seed + 0x9E3779B9 * part) & 0xFFFFFFFF
 
 
 def _with_differentials(ray, widening):

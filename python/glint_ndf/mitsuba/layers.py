@@ -23,11 +23,14 @@ _SMALLEST = 1e-30
 
 
 class Layers:
-    """@param facets  the GlintLayer of the asset
-    @param conductor     reflectance of the facets; None: the asset has its own
-    @param coat          Coat or None
-    @param base          BSDF below the facets, or None
-    @param transparency  texture over the uv of the map: share of the surface where the base shows; None: 0
+    """All layers of one BSDF.
+
+    Args:
+        facets: the GlintLayer of the asset.
+        conductor: reflectance of the facets; None: the asset has its own.
+        coat: Coat or None.
+        base: BSDF below the facets, or None.
+        transparency: texture over the uv of the map: share of the surface where the base shows; None: 0.
     """
 
     def __init__(self, facets, conductor, coat, base, transparency):
