@@ -4,9 +4,10 @@ Below the coat the directions are those that the coat refracts. A pair of direct
 
     coat(v, l)  +  T(v) T(l) / eta^2  ( c facets(v', l')  +  (1 - c) g base(v', l') )
 
-with T = 1 - albedo of the coat, c the share of the surface that the facets cover, and g = 1 / (1 - (1 - c) rho R): the coat reflects
-the share R of diffuse light back inside, and the base, of diffuse albedo rho, reflects it again. No light is added: the coat
-reflects 1 - T of the light from v, and of the rest at most the share c + (1 - c) leaves.
+with T = 1 - albedo of the coat, c the share of the surface that the facets cover, and g = 1 / (1 - (c F + (1 - c) rho) R): the
+coat reflects the share R of the base's diffuse light back inside, and facets of reflectance F and the base of diffuse albedo rho
+reflect it again. No light is added: the coat reflects 1 - T of the light from v; of the rest the facets return at most the share c,
+and the base at most (1 - c) rho (1 - R) g, which is at most 1 - c.
 """
 
 import drjit as dr
@@ -161,8 +162,10 @@ class Layers:
     def _gain(self, si, covered, active):
         if self.coat is None:
             return 1
-        albedo = dr.clip(self.base.eval_diffuse_reflectance(si, active), 0, 1)
-        return 1 / (1 - (1 - covered) * self.coat.internal * albedo)
+        up = mi.Vector3f(0, 0, 1)
+        of_base = dr.clip(self.base.eval_diffuse_reflectance(si, active), 0, 1)
+        of_facets = 0 if self.conductor is None else dr.minimum(self.reflectance(si, up, up, active), 1)
+        return 1 / (1 - self.coat.internal * (covered * of_facets + (1 - covered) * of_base))
 
     def reflectance(self, si, v, l, active):
         """Fresnel's share of the facets between two directions."""
