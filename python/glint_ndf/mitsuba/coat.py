@@ -16,9 +16,12 @@ def fresnel(cosine, eta):
 
 
 class Coat:
-    """@param eta  index of refraction over that of air, > 1
-    @param alpha   Beckmann roughness; 0: smooth, a mirror
-    @param layer   GlintLayer of the coat's own normals, or None. What it reflects is counted as that of a smooth surface
+    """A dielectric surface.
+
+    Args:
+        eta: index of refraction over that of air, above 1.
+        alpha: Beckmann roughness; 0: smooth, a mirror.
+        layer: GlintLayer of the coat's own normals, or None. Its albedo counts as that of a smooth surface.
     """
 
     def __init__(self, eta, alpha, layer=None):

@@ -21,7 +21,7 @@ class Conductor:
         self._mirror = given.get("material") == "none"
 
     def reflectance(self, si, cosine, active):
-        """@param cosine  between a direction and the normal of the facet"""
+        """Share of light that a facet reflects. `cosine`: between a direction and the normal of the facet."""
         if self._mirror:
             value = mi.Spectrum(1.0)
         else:

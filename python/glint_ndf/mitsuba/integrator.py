@@ -110,10 +110,9 @@ def _trace(options, prefilter, scene, sampler, ray, active):
         if not dr.any(active):
             break
 
-        # The footprint: exact for the pixel, a cone for all that follows.
         beam = beams.propagated(beam, dr.select(active, si.t, 0))
         if depth == 0 and ray.has_differentials:
-            si.compute_uv_partials(ray)
+            si.compute_uv_partials(ray)  # exact
         else:
             beams.write_partials(beam, ray, si)
 
@@ -140,13 +139,7 @@ def _trace(options, prefilter, scene, sampler, ray, active):
         ray = mi.RayDifferential3f(si.spawn_ray(si.to_world(drawn.wo)))
         depth += 1
 
-        # Russian roulette.
-        largest = dr.max(throughput)
-        active = active & (largest > 0)
-        if depth >= options.rr_depth:
-            keep = dr.minimum(largest * eta * eta, 0.95)
-            active = active & (sampler.next_1d(active) < keep)
-            throughput = throughput * dr.rcp(dr.maximum(keep, 1e-6))
+        active, throughput = _roulette(sampler, throughput, eta, active, depth >= options.rr_depth)
         if is_jit():
             dr.eval(radiance, throughput, eta, beam, previous, previous_pdf, previous_mirror, ray, active)
     return dr.select(shown, radiance, 0) if options.hides else radiance, shown
@@ -158,9 +151,20 @@ def _behind_emitters(scene, ray, si, active):
         emits = active & (si.shape != None) & si.shape.is_emitter() if is_jit() else si.is_valid() and si.shape.is_emitter()  # noqa: E711
         if not dr.any(emits):
             return si
-        behind = scene.ray_intersect(si.spawn_ray(ray.d), ray_flags=mi.RayFlags.All | mi.RayFlags.dNSdUV, coherent=mi.Bool(True), active=emits)
+        flags = mi.RayFlags.All | mi.RayFlags.dNSdUV
+        behind = scene.ray_intersect(si.spawn_ray(ray.d), ray_flags=flags, coherent=mi.Bool(True), active=emits)
         behind.t = behind.t + si.t
         si = dr.select(emits, behind, si)
+
+
+def _roulette(sampler, throughput, eta, active, play):
+    """Ends paths that carry no light, and where `play` says so paths that carry little, at random."""
+    largest = dr.max(throughput)
+    active = active & (largest > 0)
+    if not play:
+        return active, throughput
+    keep = dr.minimum(largest * eta * eta, 0.95)
+    return active & (sampler.next_1d(active) < keep), throughput / dr.maximum(keep, 1e-6)
 
 
 def _with_differentials(ray, widening):

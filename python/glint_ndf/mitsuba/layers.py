@@ -5,9 +5,9 @@ Below the coat the directions are those that the coat refracts. A pair of direct
     coat(v, l)  +  T(v) T(l) / eta^2  ( c facets(v', l')  +  (1 - c) ( gloss(v', l') + g diffuse(v', l') ) )
 
 with T = 1 - albedo of the coat, c the share of the surface that the facets cover, gloss and diffuse the parts of the base, and
-g = 1 / (1 - (1 - c) rho R): the coat reflects the share R of diffuse light back inside, and the diffuse part, of albedo rho, reflects
-it again. Glossy light that the coat reflects back inside is lost. No light is added: the coat reflects 1 - T of the light from v, and
-of the rest at most the share c + (1 - c) leaves.
+g = 1 / (1 - (c F + (1 - c) rho) R): the coat reflects the share R of the base's diffuse light back inside, and facets of reflectance F
+and the diffuse part of albedo rho reflect it again. Glossy light that the coat reflects back inside is lost. No light is added: the
+coat reflects 1 - T of the light from v; of the rest the facets return at most the share c, and the base at most 1 - c.
 """
 
 import drjit as dr
@@ -31,11 +31,14 @@ _SMALLEST = 1e-30
 
 
 class Layers:
-    """@param facets  the GlintLayer of the asset
-    @param conductor     reflectance of the facets; None: the asset has its own
-    @param coat          Coat or None
-    @param base          BSDF below the facets, or None
-    @param transparency  texture over the uv of the map: share of the surface where the base shows; None: 0
+    """All layers of one BSDF.
+
+    Args:
+        facets: the GlintLayer of the asset.
+        conductor: reflectance of the facets; None: the asset has its own.
+        coat: Coat or None.
+        base: BSDF below the facets, or None.
+        transparency: texture over the uv of the map: share of the surface where the base shows; None: 0.
     """
 
     def __init__(self, facets, conductor, coat, base, transparency):
@@ -177,7 +180,8 @@ class Layers:
         up = mi.Vector3f(0, 0, 1)
         along_normal = self.base.eval(_diffuse_context(mi.BSDFContext()), _seen_from(si, up), up, active)
         albedo = dr.clip(self._roundness * dr.pi * along_normal, 0, 1)
-        gain = 1 / (1 - (1 - covered) * self.coat.internal * albedo)
+        of_facets = 0 if self.conductor is None else dr.minimum(self.reflectance(si, up, up, active), 1)
+        gain = 1 / (1 - self.coat.internal * (covered * of_facets + (1 - covered) * albedo))
         return f + (gain - 1) * of_diffuse, pdf
 
     def reflectance(self, si, v, l, active):

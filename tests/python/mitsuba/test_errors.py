@@ -109,10 +109,11 @@ def test_a_mesh_without_uv(any_variant, noise_pyramid, tmp_path):
             },
         }
     )
-    with pytest.raises(Exception) as caught:
+    with pytest.raises(gm.PluginError) as caught:
         gm.render(scene, spp=1)
-    text = message_of(caught.value)
-    assert "bare" in text or "mesh" in text
+    text = str(caught.value)
+    assert caught.value.plugin == "glint" and caught.value.path == noise_pyramid.path
+    assert "mesh" in text
     assert "no texture coordinates" in text
     assert noise_pyramid.path in text
 

@@ -88,6 +88,15 @@ def test_hidden_lamps_show_what_lies_behind_them(variant, spp):
     assert difference.mean() < 0.03
 
 
+def test_long_paths_in_scalar_variants():
+    """Russian roulette included."""
+    images = {}
+    for variant, spp in (("scalar_rgb", 4), ("llvm_ad_rgb", 64)):
+        mi.set_variant(variant)
+        images[variant] = render(room(type="glint_path", max_depth=12, rr_depth=2), spp).mean()
+    assert images["scalar_rgb"] == pytest.approx(images["llvm_ad_rgb"], rel=0.1)
+
+
 def test_glints_agree_with_path(llvm, noise_pyramid):
     material = glint(noise_pyramid, material="Au", sigma=10.0)
     mean_a, error_a = render_batches(make_scene(material, "area", "glint_path"), 64, 4)
@@ -109,6 +118,11 @@ def test_passes_average(llvm, noise_pyramid, monkeypatch):
     split = render(scene, 256)
     assert split.mean() == pytest.approx(whole.mean(), rel=0.01)
     assert not np.array_equal(split, whole)
+    # The passes of one rendering are not those of the next seed.
+    monkeypatch.setattr(integrator, "_MOST_LANES", 8 * 8 * 4)
+    first, second = render(scene, 8, seed=1), render(scene, 8, seed=2)
+    shared = 2 * np.abs(first - second).mean() / (np.abs(first - whole).mean() + np.abs(second - whole).mean())
+    assert shared > 1.2
 
 
 def test_passes_leave_the_sampler_as_it_was(llvm, noise_pyramid, monkeypatch):
