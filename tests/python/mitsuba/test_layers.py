@@ -172,6 +172,33 @@ def test_a_coat_can_have_normals_of_its_own(llvm, noise_pyramid, brushed_pyramid
     assert 0.8 < image.mean() < 1.02
 
 
+def test_light_has_derivatives_by_the_base(llvm, noise_pyramid):
+    """As differences of two values say; the gain under a coat is included."""
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = dr.normalize(mi.Vector3f(0.1, 0.2, 1))
+    lit = dr.normalize(mi.Vector3f(-0.2, -0.1, 1))
+    bsdf = mi.load_dict(stack(noise_pyramid, coat=1.5, transparency=0.5, base={"type": "diffuse", "reflectance": 0.5}))
+    parameters = mi.traverse(bsdf)
+    key = next(name for name in parameters.keys() if name.startswith("base") and "reflectance" in name)
+    assert not parameters.flags(key) & int(mi.ParamFlags.NonDifferentiable)
+
+    def value(reflectance):
+        parameters[key] = type(parameters[key])(reflectance)
+        dr.enable_grad(parameters[key])
+        parameters.update()
+        return dr.sum(bsdf.eval(mi.BSDFContext(), si, lit))
+
+    def number(x):
+        return float(np.array(dr.detach(x)).sum())
+
+    step = 0.05
+    difference = (number(value(0.5 + step)) - number(value(0.5 - step))) / (2 * step)
+    dr.backward(value(0.5))
+    # A central difference errs by the third derivative, here about step^2.
+    assert number(dr.grad(parameters[key])) == pytest.approx(difference, rel=4 * step**2)
+    assert difference > 0
+
+
 def test_a_coat_of_the_index_of_air_is_no_coat(llvm, noise_pyramid):
     """Its other parameters are known all the same."""
     bsdf = stack(noise_pyramid, coat=1.0, coat_asset=noise_pyramid.path, coat_uv_scale=2.0)
