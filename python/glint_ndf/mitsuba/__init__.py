@@ -12,7 +12,7 @@ from . import llvm as _llvm
 _llvm.prepare()
 
 try:
-    import mitsuba as _mitsuba
+    import mitsuba as _  # noqa: F401
 except ImportError as _error:
     raise ImportError(f"glint_ndf.mitsuba needs Mitsuba 3.9 or newer: pip install mitsuba ({_error})") from _error
 

@@ -19,9 +19,10 @@ class Beam:
     """Offsets across a ray and angles to it, of the light that one sample of a pixel stands for: their variances, and their
     covariance. Rays from one point have a covariance, so their width grows as the distance; what a rough surface adds has none.
 
-    @param width2  scene units^2
-    @param tilt    scene units times radians
-    @param spread2 radians^2
+    Args:
+        width2: scene units^2.
+        tilt: covariance, scene units times radians.
+        spread2: radians^2.
     """
 
     DRJIT_STRUCT = {"width2": None, "tilt": None, "spread2": None}

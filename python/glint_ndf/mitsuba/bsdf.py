@@ -7,7 +7,7 @@ from glint_ndf import material
 from .coat import Coat
 from .conductor import Conductor
 from .errors import PluginError
-from .layer import GlintLayer
+from .layer import LAYER_OPTIONS, GlintLayer, resolved
 from .layers import Layers
 from .options import Options
 
@@ -52,19 +52,50 @@ def make_class():
     return Glint
 
 
+#: Parameters that exclude each other. What a scene gives drops the others of its group from the description.
+_EXCLUSIVE = (
+    (("uv_scale",), ("texels_per_unit",)),
+    (("material",), ("eta", "k")),
+    (("coat_uv_scale",), ("coat_texels_per_unit",)),
+)
+
+#: Parameters of the coat's own asset.
+_OF_COAT_ASSET = ("coat_asset", *("coat_" + name for name in LAYER_OPTIONS))
+
+
 def _merge_description(props):
     """Replaces the parameter `description` by the parameters that the file says. Parameters of the scene have precedence."""
     if "description" not in props:
         return
     path = props["description"]
+    if not isinstance(path, str):
+        raise PluginError(NAME, f"parameter 'description' must be a text, the path of a material description, and is {path!r}")
     try:
-        described = material.load(path)
+        described = material.load(resolved(path))
     except gn.GlintError as error:
         raise PluginError(NAME, str(error)) from error
     del props["description"]
+    dropped = {"type"}
+    for group in _EXCLUSIVE:
+        for members in group:
+            if any(name in props for name in members):
+                dropped.update(name for others in group if others is not members for name in others)
+    # A coat has a roughness, or an asset, which may have a roughness of its own.
+    if "coat_asset" in props and "coat_asset" not in described:
+        dropped.add("coat_alpha")
+    elif "coat_asset" not in props and "coat_alpha" in props and not _takes_alpha(described.get("coat_asset")):
+        dropped.update(_OF_COAT_ASSET)
     for name, value in described.items():
-        if name not in props and name != "type":
+        if name not in props and name not in dropped:
             props[name] = _property(value)
+
+
+def _takes_alpha(path):
+    """Whether `coat_alpha` is the roughness of an asset of the coat, and not that of a coat without an asset."""
+    try:
+        return path is not None and gn.load(path).kind == "bin-map"
+    except gn.GlintError:
+        return False  # no asset; the error says so when it is opened
 
 
 def _property(value):
@@ -93,11 +124,15 @@ def _read_layers(options, props):
 
 def _read_coat(options):
     eta = options.number("coat", None, low=1.0, high=4.0)
-    path = options.text("coat_asset")
-    alpha = None if path is not None else options.number("coat_alpha", None, low=0.0, high=1.0)
-    if eta is None and (alpha is not None or path is not None):
+    path, of_asset = options.text("coat_asset"), options.under("coat_")
+    if path is None:
+        layer, alpha = None, options.number("coat_alpha", None, low=0.0, high=1.0)
+        for name in LAYER_OPTIONS:
+            if name != "alpha" and of_asset.given(name):
+                of_asset.refuse(name, "needs 'coat_asset', an asset of the coat's own normals")
+    else:
+        # `coat_alpha` is then the roughness of an asset of kind bin-map.
+        layer, alpha = GlintLayer(NAME, of_asset, path), None
+    if eta is None and (alpha is not None or layer is not None):
         options.refuse("coat", "is missing: the index of refraction of the coat, such as 1.5")
-    if eta is None or eta == 1:
-        return None
-    layer = None if path is None else GlintLayer(NAME, options.under("coat_"), path)
-    return Coat(eta, alpha or 0.0, layer)
+    return None if eta is None or eta == 1 else Coat(eta, alpha or 0.0, layer)

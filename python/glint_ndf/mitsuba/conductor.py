@@ -21,7 +21,7 @@ class Conductor:
         self._mirror = given.get("material") == "none"
 
     def reflectance(self, si, cosine, active):
-        """@param cosine  between a direction and the normal of the facet"""
+        """Share of light that a facet reflects. `cosine`: between a direction and the normal of the facet."""
         if self._mirror:
             value = mi.Spectrum(1.0)
         else:
@@ -30,10 +30,10 @@ class Conductor:
         return value if self.scale is None else value * self.scale.eval(si, active)
 
     def traverse(self, callback):
-        callback.put("eta", self.eta, mi.ParamFlags.NonDifferentiable)
-        callback.put("k", self.k, mi.ParamFlags.NonDifferentiable)
+        callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
+        callback.put("k", self.k, mi.ParamFlags.Differentiable)
         if self.scale is not None:
-            callback.put("specular_reflectance", self.scale, mi.ParamFlags.NonDifferentiable)
+            callback.put("specular_reflectance", self.scale, mi.ParamFlags.Differentiable)
 
 
 def _for_dictionary(value):

@@ -3,7 +3,6 @@
 import warnings
 
 import glint_ndf as gn
-import numpy as np
 
 #: A footprint narrower than this, in texels, has no extent: its ray had no differentials.
 _NO_EXTENT = 1e-6
@@ -12,10 +11,11 @@ _NO_EXTENT = 1e-6
 class Footprints:
     """Makes the footprint of each lane.
 
-    @param width, height  of the map, texels
-    @param scale          factor of the size that the differentials give
-    @param sigma          texels; where it is given, differentials are not read
-    @param fallback       texels: deviation where the differentials are 0 or NaN
+    Args:
+        width, height: of the map, texels.
+        scale: factor of the size that the differentials give.
+        sigma: deviation of all footprints, texels, or None: that of the differentials.
+        fallback: deviation where the differentials are 0 or NaN, texels.
     """
 
     def __init__(self, plugin, path, width, height, scale, sigma, fallback):
@@ -27,7 +27,8 @@ class Footprints:
     def of(self, dx, dy):
         """Covariances [lanes, 3] (xx, xy, yy in texels^2), or a number: the deviation of all.
 
-        @param dx, dy  [lanes, 2] change of the map's uv from one pixel to the next
+        Args:
+            dx, dy: [lanes, 2] change of the map's uv from one pixel to the next.
         """
         if self.sigma is not None:
             return self.sigma

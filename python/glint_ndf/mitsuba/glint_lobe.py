@@ -1,9 +1,6 @@
 """Reflection by the facets of an asset, as mirrors: numpy in, numpy out. Fresnel's share is the caller's."""
 
-import glint_ndf as gn
 import numpy as np
-
-from .errors import PluginError
 
 
 class GlintLobe:
@@ -63,9 +60,3 @@ class DisplacedLobe:
 
 def named(footprint):
     return {"sigma": footprint} if np.ndim(footprint) == 0 else {"covariance": footprint}
-
-
-def require_ndf(plugin, path, kind, kinds):
-    """Raises an error where an asset is of a kind that this plugin cannot ask."""
-    if kind not in kinds:
-        raise PluginError(plugin, f"assets of kind '{kind}' do not answer an NDF; give one of kind {', '.join(kinds)}", path)

@@ -4,9 +4,10 @@ import drjit as dr
 import mitsuba as mi
 
 from . import beam as beams
+from .exchange import is_jit
 from .options import Options
 from .prefilter import Prefilter
-from .wavefront import is_jit, wavefront
+from .wavefront import wavefront
 
 NAME = "glint_path"
 
@@ -43,18 +44,22 @@ def make_class():
                 return mi.SamplingIntegrator.render(self, scene, sensor, seed, spp, develop, evaluate)
             if not isinstance(sensor, mi.Sensor):
                 sensor = scene.sensors()[sensor]
-            samples = spp or sensor.sampler().sample_count()
+            own = sensor.sampler().sample_count()
+            samples = spp or own
             self._rendering = True
             try:
                 with wavefront():
-                    if self._prefilter is None or self._prefilter.scene is not scene:
-                        self._prefilter = Prefilter.of(scene, self.lobes)
+                    self._prefilter = Prefilter.of(scene, self.lobes)
                     passes = _passes(sensor, samples) if develop else [samples]
                     return _mean_of_passes(
-                        lambda part, n: self._render_pass(scene, sensor, seed + part, n, samples, develop, evaluate), passes
+                        lambda part, n: self._render_pass(scene, sensor, _seed(seed, part), n, samples, develop, evaluate), passes
                     )
             finally:
                 self._rendering = False
+                # Passes leave their number of samples in the sampler.
+                sensor.sampler().set_sample_count(own)
+                # The prefilter refers to the scene, which refers to this integrator; and the scene may change until the next picture.
+                self._prefilter = None
 
         def _render_pass(self, scene, sensor, seed, spp, samples, develop, evaluate):
             # Mitsuba shrinks differentials to the part of the pixel that one sample of this pass stands for.
@@ -85,28 +90,29 @@ def _trace(options, prefilter, scene, sampler, ray, active):
     previous_pdf, previous_mirror = mi.Float(1), mi.Bool(True)
     # Lanes whose light of the environment has been counted by the prefilter.
     lit_by_sky = mi.Bool(False)
+    # Lanes that see something: the environment counts, unless emitters are hidden.
     shown = mi.Bool(not options.hides and scene.environment() is not None)
     depth = 0
     while True:
         si = scene.ray_intersect(
             mi.Ray3f(ray), ray_flags=mi.RayFlags.All | mi.RayFlags.dNSdUV, coherent=mi.Bool(depth == 0), active=active
         )
+        if depth == 0 and options.hides:
+            si = _behind_emitters(scene, ray, si, active)
         found = active & ((lit_by_sky & (si.is_valid() ^ True)) ^ True)
         radiance = radiance + _emission(options, scene, si, previous, previous_pdf, previous_mirror, throughput, depth, found)
         hit = active & si.is_valid()
         if depth == 0:
-            of_light = (si.shape != None) & si.shape.is_emitter() if is_jit() else si.is_valid() and si.shape.is_emitter()  # noqa: E711
-            shown = shown | (hit & (of_light & options.hides) ^ hit)
+            shown = shown | hit
         if depth + 1 >= options.max_depth:
             break
         active = hit
         if not dr.any(active):
             break
 
-        # The footprint: exact for the pixel, a cone for all that follows.
         beam = beams.propagated(beam, dr.select(active, si.t, 0))
         if depth == 0 and ray.has_differentials:
-            si.compute_uv_partials(ray)
+            si.compute_uv_partials(ray)  # exact
         else:
             beams.write_partials(beam, ray, si)
 
@@ -133,16 +139,32 @@ def _trace(options, prefilter, scene, sampler, ray, active):
         ray = mi.RayDifferential3f(si.spawn_ray(si.to_world(drawn.wo)))
         depth += 1
 
-        # Russian roulette.
-        largest = dr.max(throughput)
-        active = active & (largest > 0)
-        if depth >= options.rr_depth:
-            keep = dr.minimum(largest * eta * eta, 0.95)
-            active = active & (sampler.next_1d(active) < keep)
-            throughput = throughput * dr.rcp(dr.maximum(keep, 1e-6))
+        active, throughput = _roulette(sampler, throughput, eta, active, depth >= options.rr_depth)
         if is_jit():
             dr.eval(radiance, throughput, eta, beam, previous, previous_pdf, previous_mirror, ray, active)
     return dr.select(shown, radiance, 0) if options.hides else radiance, shown
+
+
+def _behind_emitters(scene, ray, si, active):
+    """The first hit of a camera ray that does not emit; emitting shapes before it are passed."""
+    while True:
+        emits = active & (si.shape != None) & si.shape.is_emitter() if is_jit() else si.is_valid() and si.shape.is_emitter()  # noqa: E711
+        if not dr.any(emits):
+            return si
+        flags = mi.RayFlags.All | mi.RayFlags.dNSdUV
+        behind = scene.ray_intersect(si.spawn_ray(ray.d), ray_flags=flags, coherent=mi.Bool(True), active=emits)
+        behind.t = behind.t + si.t
+        si = dr.select(emits, behind, si)
+
+
+def _roulette(sampler, throughput, eta, active, play):
+    """Ends paths that carry no light, and where `play` says so paths that carry little, at random."""
+    largest = dr.max(throughput)
+    active = active & (largest > 0)
+    if not play:
+        return active, throughput
+    keep = dr.minimum(largest * eta * eta, 0.95)
+    return active & (sampler.next_1d(active) < keep), throughput / dr.maximum(keep, 1e-6)
 
 
 def _with_differentials(ray, widening):
@@ -182,6 +204,11 @@ def _passes(sensor, samples):
     size = sensor.film().crop_size()
     largest = max(1, _MOST_LANES // max(1, int(size[0]) * int(size[1])))
     return [min(largest, samples - first) for first in range(0, samples, largest)]
+
+
+def _seed(seed, part):
+    """The seed of a pass: the first has the seed of the picture. Others are hashed, so that neighbouring seeds share no pass."""
+    return seed if part == 0 else mi.sample_tea_32(mi.UInt32(seed), part)[0]
 
 
 def _mean_of_passes(render, passes):

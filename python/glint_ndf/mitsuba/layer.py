@@ -7,16 +7,36 @@ import numpy as np
 
 from .asset_file import AssetFile
 from .errors import PluginError
-from .exchange import lanes_of, spread, take, to_float, to_mask, to_rows, to_vector
+from .exchange import is_jit, lanes_of, spread, take, to_float, to_mask, to_rows, to_vector
 from .footprints import Footprints
 from .glint_lobe import DisplacedLobe, GlintLobe
 from .meshes import UvCheck
 from .placement import Placement, into, out_of
 from .spectra import spectrum_of
 from .wave_lobe import SpectralLobe, wavelengths_of
-from .wavefront import is_jit, require_numbers
+from .wavefront import require_numbers
 
 _VARIANTS = ("full", "lobes", "single")
+
+_WITH_LEVELS = ("ndf-pyramid", "ndf-cp", "wave-pyramid")
+_WITH_NDF = (*_WITH_LEVELS, "slope-moments", "bin-map", "histogram-sat", "tiny-example", "normals")
+
+#: Options of an asset, and the kinds that read them.
+_KINDS_OF_OPTIONS = {
+    "normals": ("ndf-pyramid", "ndf-cp"),
+    "sigma_r": ("normals", "slope-moments"),
+    "alpha": ("bin-map",),
+    "surface": ("normals",),
+    "boundary": ("normals",),
+    "footprint_parts": (*_WITH_LEVELS, "slope-moments"),
+    "interpolation": _WITH_LEVELS,
+    "pixels": _WITH_LEVELS,
+    "facets": _WITH_NDF,
+    "variant": ("displacement",),
+}
+
+#: All options of an asset and of its placement.
+LAYER_OPTIONS = (*_KINDS_OF_OPTIONS, "uv_scale", "texels_per_unit", "rotation", "footprint_scale", "sigma")
 
 #: Texels: footprints without differentials are at least as wide as half a texel.
 _NARROWEST = 0.5
@@ -27,11 +47,12 @@ class GlintLayer:
 
     def __init__(self, plugin, options, path):
         self.plugin = plugin
-        self.path = _resolved(path)
+        self.path = resolved(path)
         self._files = [AssetFile(plugin, self.path)]
         self.kind = _opened(plugin, self.path, lambda: gn.load(self.path).kind)
         self._uv_check = UvCheck(plugin, self.path)
         self._threads = 0 if is_jit() else 1
+        self._refuse_options_of_other_kinds(options)
         if self.kind == "displacement":
             self._open_displaced(options)
         else:
@@ -40,6 +61,13 @@ class GlintLayer:
         self.placement = Placement(scale, options.number("rotation", 0.0), endless)
         factor, sigma = options.number("footprint_scale", 1.0, above=0), options.number("sigma", None, above=0)
         self._footprints = Footprints(plugin, self.path, self.width, self.height, factor, sigma, self._fallback)
+
+    def _refuse_options_of_other_kinds(self, options):
+        if self.kind not in (*_WITH_NDF, "displacement"):
+            return  # refused when it is opened
+        for name, kinds in _KINDS_OF_OPTIONS.items():
+            if options.given(name) and self.kind not in kinds:
+                options.refuse(name, f"is for assets of kind {', '.join(kinds)}, and {self.path} is of kind {self.kind}; leave it out")
 
     def _open_displaced(self, options):
         displaced = _opened(self.plugin, self.path, lambda: gn.open_displaced(self.path))
@@ -61,7 +89,7 @@ class GlintLayer:
         given = {name: value for name, value in given.items() if value is not None}
         facets = options.text("facets", "distribution", ("distribution", "beckmann"))
         if "normals" in given:
-            given["normals"] = _resolved(given["normals"])
+            given["normals"] = resolved(given["normals"])
             self._files.append(AssetFile(self.plugin, given["normals"]))
         ndf = _opened(self.plugin, self.path, lambda: gn.open(self.path, **given))
         self.width, self.height = ndf.width, ndf.height
@@ -141,7 +169,7 @@ class GlintLayer:
         return spectrum_of([to_float(values[..., c]) for c in range(3)], si.wavelengths)
 
 
-def _resolved(path):
+def resolved(path):
     """The file that a path of a scene names: Mitsuba looks in the folder of the scene too."""
     return str(mi.file_resolver().resolve(path))
 

@@ -2,15 +2,17 @@
 
 Below the coat the directions are those that the coat refracts. A pair of directions v, l reflects
 
-    coat(v, l)  +  T(v) T(l) / eta^2  ( c facets(v', l')  +  (1 - c) g base(v', l') )
+    coat(v, l)  +  T(v) T(l) / eta^2  ( c facets(v', l')  +  (1 - c) ( gloss(v', l') + g diffuse(v', l') ) )
 
-with T = 1 - albedo of the coat, c the share of the surface that the facets cover, and g = 1 / (1 - (1 - c) rho R): the coat reflects
-the share R of diffuse light back inside, and the base, of diffuse albedo rho, reflects it again. No light is added: the coat
-reflects 1 - T of the light from v, and of the rest at most the share c + (1 - c) leaves.
+with T = 1 - albedo of the coat, c the share of the surface that the facets cover, gloss and diffuse the parts of the base, and
+g = 1 / (1 - (c F + (1 - c) rho) R): the coat reflects the share R of the base's diffuse light back inside, and facets of reflectance F
+and the diffuse part of albedo rho reflect it again. Glossy light that the coat reflects back inside is lost. No light is added: the
+coat reflects 1 - T of the light from v; of the rest the facets return at most the share c, and the base at most 1 - c.
 """
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 #: BSDFFlags::NeedsDifferentials, which Mitsuba 3.9 does not name in Python: `direct` then computes differentials (scalar variants).
 _NEEDS_DIFFERENTIALS = 0x20000
@@ -18,21 +20,32 @@ _NEEDS_DIFFERENTIALS = 0x20000
 #: Smallest cosine that is divided by. Directions this low carry no light.
 _LEAST = 1e-6
 
+#: nm: a visible wavelength.
+_SOME_NM = 550.0
+
+#: Cosines of a quadrature over diffuse light.
+_NODES = 6
+
 #: Stands for a pdf of 0 in a quotient that is not used.
 _SMALLEST = 1e-30
 
 
 class Layers:
-    """@param facets  the GlintLayer of the asset
-    @param conductor     reflectance of the facets; None: the asset has its own
-    @param coat          Coat or None
-    @param base          BSDF below the facets, or None
-    @param transparency  texture over the uv of the map: share of the surface where the base shows; None: 0
+    """All layers of one BSDF.
+
+    Args:
+        facets: the GlintLayer of the asset.
+        conductor: reflectance of the facets; None: the asset has its own.
+        coat: Coat or None.
+        base: BSDF below the facets, or None.
+        transparency: texture over the uv of the map: share of the surface where the base shows; None: 0.
     """
 
     def __init__(self, facets, conductor, coat, base, transparency):
         self.facets, self.conductor, self.coat, self.base, self.transparency = facets, conductor, coat, base, transparency
         self._base_component = 1 if coat is None else 2
+        self._diffuse_part = "none" if coat is None or base is None else _diffuse_part(base)
+        self._roundness = 1.0 if self._diffuse_part == "none" else _roundness(base)
 
     def components(self):
         """Flags: of the facets, then of the coat, then of the base."""
@@ -57,8 +70,8 @@ class Layers:
             value += covered * through * lit.z * f * self.reflectance(si, v, l, active)
             pdf += shares.facets * squeeze * p
         if shares.has_base:
-            f, p = self.base.eval_pdf(self._base_context(ctx), _seen_from(si, v), l, active)
-            value += (1 - covered) * self._gain(si, covered, active) * through * (lit.z / dr.maximum(l.z, _LEAST)) * f
+            f, p = self._evaluate_base(self._base_context(ctx), _seen_from(si, v), l, covered, active)
+            value += (1 - covered) * through * (lit.z / dr.maximum(l.z, _LEAST)) * f
             pdf += shares.base * squeeze * p
         if shares.has_coat and not self.coat.smooth:
             f, p = self.coat.evaluate(si, viewed, lit, active)
@@ -106,7 +119,7 @@ class Layers:
             of_mirror = chosen & mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
             record.pdf = dr.select(of_mirror, shares.base * drawn.pdf, record.pdf)
             covered, through = self._covered(si, active), self._below(si.wi, record.wo)[2] * self._eta2()
-            part = (1 - covered) * self._gain(si, covered, active) * through / dr.maximum(shares.base, _LEAST)
+            part = (1 - covered) * through / dr.maximum(shares.base, _LEAST)
             weight = dr.select(of_mirror, w * part, weight)
             mirrored = mirrored | of_mirror
 
@@ -130,7 +143,8 @@ class Layers:
         if self.conductor is not None:
             self.conductor.traverse(callback)
         if self.base is not None:
-            callback.put("base", self.base, mi.ParamFlags.NonDifferentiable)
+            callback.put("base", self.base, mi.ParamFlags.Differentiable)
+            # Shares of the layers, by which samples are drawn, depend on the transparency.
             callback.put("transparency", self.transparency, mi.ParamFlags.NonDifferentiable)
 
     def _below(self, viewed, lit):
@@ -155,11 +169,20 @@ class Layers:
         placed.uv = self.facets.placement.uv(si.uv)
         return dr.clip(1 - self.transparency.eval_1(placed, active), 0, 1)
 
-    def _gain(self, si, covered, active):
-        if self.coat is None:
-            return 1
-        albedo = dr.clip(self.base.eval_diffuse_reflectance(si, active), 0, 1)
-        return 1 / (1 - (1 - covered) * self.coat.internal * albedo)
+    def _evaluate_base(self, ctx, si, lit, covered, active):
+        """The base times the cosine of `lit`, with the gain of its diffuse part, and pdf. Directions are below the coat."""
+        f, pdf = self.base.eval_pdf(ctx, si, lit, active)
+        if self._diffuse_part == "none":
+            return f, pdf
+        diffuse = _diffuse_context(ctx)
+        of_diffuse = f if self._diffuse_part == "all" else self.base.eval(diffuse, si, lit, active)
+        # Albedo of the diffuse part, by its value along the normal.
+        up = mi.Vector3f(0, 0, 1)
+        along_normal = self.base.eval(_diffuse_context(mi.BSDFContext()), _seen_from(si, up), up, active)
+        albedo = dr.clip(self._roundness * dr.pi * along_normal, 0, 1)
+        of_facets = 0 if self.conductor is None else dr.minimum(self.reflectance(si, up, up, active), 1)
+        gain = 1 / (1 - self.coat.internal * (covered * of_facets + (1 - covered) * albedo))
+        return f + (gain - 1) * of_diffuse, pdf
 
     def reflectance(self, si, v, l, active):
         """Fresnel's share of the facets between two directions."""
@@ -198,6 +221,53 @@ class _Shares:
 
 
 _ALL = 0xFFFFFFFF
+
+
+def _diffuse_part(base):
+    """How much of a base is diffuse: "all", "some", or "none". It counts as "none" where the base does not answer for its lobes apart:
+    such a BSDF gives light to a context that asks for no lobe.
+    """
+    diffuse = [mi.has_flag(base.flags(k), mi.BSDFFlags.DiffuseReflection) for k in range(base.component_count())]
+    if all(diffuse) and diffuse:
+        return "all"
+    if not any(diffuse):
+        return "none"
+    nothing = mi.BSDFContext()
+    nothing.type_mask = 0
+    return "none" if _value(base, nothing, 1, 1, (0.5, 0.5)) > 0 else "some"
+
+
+def _roundness(base):
+    """Albedo of the diffuse part of a base for diffuse light, over pi times its value along the normal: 1 for a diffuse BSDF, less for
+    a base with a surface of its own, which reflects low light before the light gets to the diffuse part.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    cosines, weights = 0.5 * (nodes + 1), 0.5 * weights
+    diffuse, uvs = _diffuse_context(mi.BSDFContext()), [(0.1 + 0.2 * k, (0.3 + 0.6 * k) % 1) for k in range(5)]
+    for uv in uvs:
+        along_normal = _value(base, diffuse, 1, 1, uv)
+        if along_normal > 0:
+            mean = sum(
+                4 * a * m * b * _value(base, diffuse, m, c, uv) for m, a in zip(cosines, weights) for c, b in zip(cosines, weights)
+            )
+            return float(mean / along_normal)
+    return 0.0  # black
+
+
+def _value(base, ctx, view_cosine, lit_cosine, uv):
+    """Mean over the spectrum of a BSDF times the cosine of the light, between two directions a quarter turn apart."""
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.uv, si.wavelengths = uv, dr.full(type(si.wavelengths), _SOME_NM)
+    si.wi = mi.Vector3f(float(1 - view_cosine**2) ** 0.5, 0, float(view_cosine))
+    answer = base.eval(ctx, si, mi.Vector3f(0, float(1 - lit_cosine**2) ** 0.5, float(lit_cosine)))
+    return float(np.mean(np.array(answer)))
+
+
+def _diffuse_context(ctx):
+    """A context that asks for the diffuse lobes of those that `ctx` asks for."""
+    diffuse = mi.BSDFContext(ctx.mode)
+    diffuse.type_mask, diffuse.component = ctx.type_mask & int(mi.BSDFFlags.Diffuse), ctx.component
+    return diffuse
 
 
 def _seen_from(si, direction):

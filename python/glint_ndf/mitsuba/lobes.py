@@ -10,6 +10,9 @@ _ITERATIONS = 60
 _SHARPNESS_RANGE = (0.5, 1500.0)
 _TINY = 1e-12
 
+#: A mean of unit vectors that is shorter than this has no direction.
+_NO_DIRECTION = 1e-6
+
 
 class Lobes:
     """Light from each direction w: the sum of amplitudes exp(sharpness (w . axis - 1)) over all lobes.
@@ -63,8 +66,10 @@ def fit(radiance, directions, solid, count, seed=1):
         part *= weight[:, None] / part.sum(axis=1, keepdims=True)
         shares = part.sum(axis=0)
         mean = part.T @ directions / (shares[:, None] + _TINY)
-        length = np.clip(np.linalg.norm(mean, axis=1), 1e-6, 1 - 1e-6)
-        axes = mean / length[:, None]
+        length = np.linalg.norm(mean, axis=1)
+        # Light that comes evenly from all sides has no mean direction: its lobe keeps its axis.
+        axes = np.where(length[:, None] > _NO_DIRECTION, mean / np.maximum(length, _TINY)[:, None], axes)
+        length = np.minimum(length, 1 - 1e-6)
         sharpness = np.clip(length * (3 - length**2) / (1 - length**2), *_SHARPNESS_RANGE)
     return Lobes(axes, sharpness, _amplitudes(radiance, directions, solid, axes, sharpness))
 

@@ -67,6 +67,10 @@ class Options:
             self.refuse(name, f"must be {what}, and is {value!r}")
         return value
 
+    def given(self, name):
+        """Whether a parameter is given."""
+        return self._prefix + name in self._props
+
     def any_of(self, names):
         """Marks parameters as known without reading them. Returns those that are given."""
         self._known.update(names)

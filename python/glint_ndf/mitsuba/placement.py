@@ -10,9 +10,10 @@ class Placement:
     """uv of the map = scale * (uv of the mesh turned by -rotation). So the picture on the surface turns by `rotation`, from dp/du
     towards dp/dv.
 
-    @param scale  maps per unit of uv along u and v
-    @param rotation_deg  degrees
-    @param endless       whether whole parts of uv count: the map is a plane that does not repeat
+    Args:
+        scale: maps per unit of uv along u and v.
+        rotation_deg: degrees.
+        endless: whether whole parts of uv count: the map is a plane that does not repeat.
     """
 
     def __init__(self, scale, rotation_deg, endless=False):

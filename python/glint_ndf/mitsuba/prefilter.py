@@ -21,7 +21,7 @@ class Prefilter:
     """Lobes of the environment of a scene, and the materials that they light."""
 
     def __init__(self, scene, count):
-        self.scene, self.environment = scene, scene.environment()
+        self.environment = scene.environment()
         self.lobes = fit(*_seen(self.environment), count)
         self.materials = _materials(scene)
 
@@ -63,9 +63,10 @@ class Prefilter:
         upwards = mi.Vector3f(towards.x, towards.y, dr.maximum(towards.z, 1e-3))
         f = f * layers.reflectance(si, si.wi, dr.normalize(upwards), active)
         rgb = [_at(lobes.amplitudes[:, c], pick) / probability for c in range(3)]
+        # One direction says whether the lobe is hidden. Directions below the surface are folded above it: they must not count as free.
         direction = _around(axis, sharpness, around)
-        above = dr.dot(direction, si.n) > 0
-        hidden = scene.ray_test(si.spawn_ray(direction), active & above)
+        direction = direction - 2 * dr.minimum(dr.dot(direction, si.n), 0) * si.n
+        hidden = scene.ray_test(si.spawn_ray(direction), active)
         return dr.select(active & (hidden ^ True), f * light_of(rgb, si.wavelengths), 0)
 
     def _pick(self, si, slope_variance, xi):

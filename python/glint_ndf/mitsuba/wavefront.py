@@ -45,9 +45,26 @@ def require_numbers(plugin):
 
 
 def render(scene, *arguments, **keywords):
-    """mi.render inside `wavefront()`; same arguments, same answer. Works with any integrator."""
+    """mi.render inside `wavefront()`; same arguments, same answer. Works with any integrator.
+
+    Errors of the plugins are raised as they are, not inside those that Mitsuba wraps around them.
+    """
     with wavefront():
-        image = mi.render(scene, *arguments, **keywords)
-        if is_jit():
-            dr.eval(image)
-        return image
+        try:
+            image = mi.render(scene, *arguments, **keywords)
+            if is_jit():
+                dr.eval(image)
+            return image
+        except Exception as error:
+            refused = _plugin_error_in(error)
+            if refused is None:
+                raise
+    # Outside of the handler: the exception that wraps this one must not become its context.
+    raise refused
+
+
+def _plugin_error_in(error):
+    """The error of a plugin that an exception wraps, or None."""
+    while error is not None and not isinstance(error, PluginError):
+        error = error.__cause__ or error.__context__
+    return error

@@ -50,9 +50,12 @@ def displaced():
     return gn.displace(heights, factors=[16], base="diffuse", albedo=0.8)
 
 
-def make_scene(bsdf, light, integrator="path", size=16, distance=3.0):
-    """A square of 2 x 2 units in the plane z = 0, seen from 45 degrees, under one light: "area", "point" or "constant"."""
+def make_scene(bsdf, light, integrator="path", size=16, distance=3.0, turn=0.0):
+    """A square of 2 x 2 units in the plane z = 0, seen from 45 degrees, under one light: "area", "point" or "constant". The square
+    turns about z by `turn` degrees.
+    """
     transform = mi.ScalarTransform4f
+    square = {"type": "rectangle", "to_world": transform().rotate([0, 0, 1], turn), "bsdf": bsdf}
     lights = {
         "area": {
             "type": "rectangle",
@@ -69,7 +72,7 @@ def make_scene(bsdf, light, integrator="path", size=16, distance=3.0):
         "film": {"type": "hdrfilm", "width": size, "height": size, "pixel_format": "rgb", "rfilter": {"type": "box"}},
         "sampler": {"type": "independent"},
     }
-    parts = {"square": {"type": "rectangle", "bsdf": bsdf}, "light": lights[light], "camera": camera}
+    parts = {"square": square, "light": lights[light], "camera": camera}
     return mi.load_dict({"type": "scene", "integrator": integrator if isinstance(integrator, dict) else {"type": integrator}, **parts})
 
 

@@ -35,6 +35,12 @@ def test_a_missing_file(any_variant):
     refused({"type": "glint", "asset": "no/such.glint"}, "no/such.glint", "no such file")
 
 
+def test_the_text_of_an_error_of_loading_ends_with_that_of_the_plugin(any_variant):
+    with pytest.raises(RuntimeError) as caught:
+        mi.load_dict({"type": "glint", "asset": "no/such.glint"})
+    assert str(caught.value).rstrip().endswith("PluginError: glint: no/such.glint: there is no such file; give the path of a .glint asset")
+
+
 def test_a_missing_asset(llvm):
     refused({"type": "glint"}, "'asset' is missing")
 
@@ -109,10 +115,11 @@ def test_a_mesh_without_uv(any_variant, noise_pyramid, tmp_path):
             },
         }
     )
-    with pytest.raises(Exception) as caught:
+    with pytest.raises(gm.PluginError) as caught:
         gm.render(scene, spp=1)
-    text = message_of(caught.value)
-    assert "bare" in text or "mesh" in text
+    text = str(caught.value)
+    assert caught.value.plugin == "glint" and caught.value.path == noise_pyramid.path
+    assert "mesh" in text
     assert "no texture coordinates" in text
     assert noise_pyramid.path in text
 

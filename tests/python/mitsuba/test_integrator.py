@@ -49,6 +49,54 @@ def test_the_light_is_that_of_path(llvm, options):
     assert deviation < 0.02 * mean_b.mean() + 1e-6
 
 
+@pytest.mark.parametrize("variant, spp", [("llvm_ad_rgb", 16), ("scalar_rgb", 1)])
+def test_hidden_lamps_show_what_lies_behind_them(variant, spp):
+    """Pixel by pixel as in `path`: one lamp behind another, and a floor or nothing behind both. Light of a constant sky on a diffuse
+    floor is seen at depth 2, where few samples deviate little.
+    """
+    mi.set_variant(variant)
+    transform = mi.ScalarTransform4f
+    lamp = {"type": "sphere", "radius": 0.3, "emitter": {"type": "area", "radiance": 0.01}}
+    images = {}
+    for name in ("glint_path", "path"):
+        scene = mi.load_dict(
+            {
+                "type": "scene",
+                "integrator": {"type": name, "max_depth": 2, "hide_emitters": True},
+                "floor": {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": 0.6}},
+                "near": {**lamp, "center": [0, 0, 2.0]},
+                "far": {**lamp, "center": [0, 0, 1.0]},
+                "aside": {**lamp, "center": [1.2, 0, 0.5]},
+                "sky": {"type": "constant", "radiance": 1.0},
+                "camera": {
+                    "type": "perspective",
+                    "fov": 40,
+                    "to_world": transform().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]),
+                    "film": {"type": "hdrfilm", "width": 16, "height": 16, "pixel_format": "rgba", "rfilter": {"type": "box"}},
+                    "sampler": {"type": "independent"},
+                },
+            }
+        )
+        images[name] = render(scene, 16 * spp)
+    difference = np.abs(images["glint_path"] - images["path"])
+    middle = images["path"][7:9, 7:9]
+    assert middle.min() > 0.3  # the floor, not a lamp
+    assert images["path"][..., 3].min() == 0  # beside the floor
+    assert difference[..., 3].max() < 0.5  # pixels on the border of the floor have shares
+    assert difference[..., 3].mean() < 0.02
+    assert difference[7:9, 7:9].max() < 0.25 * middle.max()
+    assert difference.mean() < 0.03
+
+
+def test_long_paths_in_scalar_variants():
+    """Russian roulette included."""
+    images = {}
+    for variant, spp in (("scalar_rgb", 4), ("llvm_ad_rgb", 64)):
+        mi.set_variant(variant)
+        images[variant] = render(room(type="glint_path", max_depth=12, rr_depth=2), spp).mean()
+    assert images["scalar_rgb"] == pytest.approx(images["llvm_ad_rgb"], rel=0.1)
+
+
 def test_glints_agree_with_path(llvm, noise_pyramid):
     material = glint(noise_pyramid, material="Au", sigma=10.0)
     mean_a, error_a = render_batches(make_scene(material, "area", "glint_path"), 64, 4)
@@ -70,6 +118,31 @@ def test_passes_average(llvm, noise_pyramid, monkeypatch):
     split = render(scene, 256)
     assert split.mean() == pytest.approx(whole.mean(), rel=0.01)
     assert not np.array_equal(split, whole)
+    # The passes of one rendering are not those of the next seed.
+    monkeypatch.setattr(integrator, "_MOST_LANES", 8 * 8 * 4)
+    first, second = render(scene, 8, seed=1), render(scene, 8, seed=2)
+    shared = 2 * np.abs(first - second).mean() / (np.abs(first - whole).mean() + np.abs(second - whole).mean())
+    assert shared > 1.2
+
+
+def test_passes_leave_the_sampler_as_it_was(llvm, noise_pyramid, monkeypatch):
+    scene = make_scene(glint(noise_pyramid, sigma=10.0), "constant", "glint_path", size=8)
+    sampler = scene.sensors()[0].sampler()
+    sampler.set_sample_count(128)
+    monkeypatch.setattr(integrator, "_MOST_LANES", 8 * 8 * 60)
+    render(scene, 0)
+    assert sampler.sample_count() == 128
+
+
+def test_neighbouring_seeds_share_no_pass(llvm, noise_pyramid, monkeypatch):
+    """The second of two passes with seed 0 is not the first with seed 1, and the first is that of a single pass."""
+    scene = make_scene(glint(noise_pyramid, sigma=10.0), "area", "glint_path", size=8)
+    first, other = render(scene, 16, seed=0), render(scene, 16, seed=1)
+    monkeypatch.setattr(integrator, "_MOST_LANES", 8 * 8 * 16)
+    second = 2 * render(scene, 32, seed=0) - first
+    differences = [np.abs(second - image).mean() for image in (other, first)]
+    # Independent pictures of 16 samples deviate by far more than rounding.
+    assert min(differences) > 0.1 * np.abs(other - first).mean()
 
 
 @pytest.fixture

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from conftest import follows_pdf, glint, make_scene, render, render_batches
 
-from glint_ndf.mitsuba.coat import Coat
+import glint_ndf as gn
+from glint_ndf.mitsuba.coat import Coat, _albedos
 
 WHITE = {"type": "diffuse", "reflectance": 1.0}
 
@@ -27,6 +28,55 @@ def test_layers_add_no_energy(llvm, noise_pyramid, coat, transparency):
     assert image.mean() > (0.95 if transparency == 1 else 0.65)
 
 
+#: Bases that reflect all light, and the least share of the light that must leave a coat over them. Glossy light that the coat reflects
+#: back inside is lost, and a base whose diffuse part cannot be told apart gets no light back.
+WHITE_BASES = {
+    "plastic": ({"type": "plastic", "diffuse_reflectance": 1.0}, 0.93),
+    "roughplastic": ({"type": "roughplastic", "diffuse_reflectance": 1.0, "alpha": 0.2}, 0.8),
+    "smooth metal": ({"type": "conductor", "material": "none"}, 0.93),
+    "metal": ({"type": "roughconductor", "material": "none", "alpha": 0.1}, 0.93),
+    "rough metal": ({"type": "roughconductor", "material": "none", "alpha": 0.3}, 0.6),
+    "principled metal": ({"type": "principled", "base_color": {"type": "rgb", "value": 1.0}, "metallic": 1.0, "roughness": 0.3}, 0.85),
+    "principled": ({"type": "principled", "base_color": {"type": "rgb", "value": 1.0}, "roughness": 0.5}, 0.4),
+    "mixed": ({"type": "blendbsdf", "weight": 0.5, "a": WHITE, "b": {"type": "roughconductor", "material": "none"}}, 0.7),
+}
+
+#: Means of 20000 weights, which deviate by up to 1 from their mean, are within this of their expectation.
+NOISE_OF_WEIGHTS = 5 / 20_000**0.5
+
+
+@pytest.mark.parametrize("coat", [{}, {"coat_alpha": 0.2}], ids=["smooth coat", "rough coat"])
+@pytest.mark.parametrize("base", WHITE_BASES)
+def test_a_coat_adds_no_energy_to_any_base(llvm, noise_pyramid, base, coat):
+    """The mean weight of samples is the albedo. Light that a coat reflects back inside is given to diffuse parts alone."""
+    description, least = WHITE_BASES[base]
+    bsdf = mi.load_dict(stack(noise_pyramid, coat=1.5, transparency=1.0, base=description, **coat))
+    lanes, random = 20_000, np.random.default_rng(5)
+    for view in ((0, 0, 1), (0.6, 0, 0.8)):
+        si = dr.zeros(mi.SurfaceInteraction3f, lanes)
+        si.wi = view
+        xi = random.random((3, lanes), dtype=np.float32)
+        _, weight = bsdf.sample(mi.BSDFContext(), si, mi.Float(xi[0]), mi.Point2f(xi[1], xi[2]))
+        albedo = np.array(weight).mean()
+        assert least < albedo < 1 + NOISE_OF_WEIGHTS
+
+
+def test_a_base_of_two_parts_answers_the_same_for_each_part(llvm, noise_pyramid):
+    """What contexts for each component of a coated base answer adds up to the whole."""
+    bsdf = mi.load_dict(stack(noise_pyramid, coat=1.5, transparency=1.0, base={"type": "roughplastic", "diffuse_reflectance": 1.0}))
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = dr.normalize(mi.Vector3f(0.1, 0.2, 1))
+    lit = dr.normalize(mi.Vector3f(-0.2, -0.1, 1))
+    parts = []
+    for component in range(bsdf.component_count()):
+        ctx = mi.BSDFContext()
+        ctx.component = component
+        parts.append(np.array(bsdf.eval(ctx, si, lit)).ravel())
+    whole = np.array(bsdf.eval(mi.BSDFContext(), si, lit)).ravel()
+    assert whole.min() > 0
+    assert sum(parts) == pytest.approx(whole, rel=1e-5)
+
+
 def test_a_coat_over_a_diffuse_base_is_mitsubas_plastic(llvm, noise_pyramid):
     """Facets that let everything through leave the coat and the base: Mitsuba's `plastic`, which counts light in the same way."""
     base = {"type": "diffuse", "reflectance": 0.5}
@@ -39,13 +89,26 @@ def test_a_coat_over_a_diffuse_base_is_mitsubas_plastic(llvm, noise_pyramid):
     assert mean_a.mean() == pytest.approx(mean_b.mean(), abs=5 * deviation, rel=2e-3)
 
 
-@pytest.mark.parametrize("alpha", [0.1, 0.5])
+#: Largest error in albedo of the table of a coat, between its entries.
+ERROR_OF_TABLE = 0.002
+
+
+@pytest.mark.parametrize("alpha", [0.003, 0.01, 0.03, 0.1, 1.0])
+def test_the_table_of_a_rough_coat_is_dense_enough(any_variant, alpha):
+    """Also at low cosines, where the albedo of a smooth coat is steep."""
+    cosines = np.concatenate([np.geomspace(1e-3, 0.1, 30), np.linspace(0.1, 1, 10)])
+    coat = Coat(1.5, alpha)
+    found = [float(np.array(coat.albedo(mi.Float(float(c)))).item()) for c in cosines]
+    assert found == pytest.approx(_albedos(1.5, alpha, cosines), abs=ERROR_OF_TABLE)
+
+
+@pytest.mark.parametrize("alpha", [0.01, 0.1, 0.5])
 def test_albedo_of_a_rough_coat(llvm, alpha):
     """The table agrees with an integral over samples."""
     coat = Coat(1.5, alpha)
     lanes = 400_000
     xi = mi.Point2f(*np.random.default_rng(1).random((2, lanes), dtype=np.float32))
-    for cosine in (1.0, 0.6, 0.2):
+    for cosine in (1.0, 0.6, 0.2, 0.02):
         viewed = mi.Vector3f((1 - cosine**2) ** 0.5, 0, cosine)
         lit = coat.sample(None, viewed, xi, True)
         value, pdf = coat.evaluate(None, viewed, lit, True)
@@ -107,3 +170,49 @@ def test_a_coat_can_have_normals_of_its_own(llvm, noise_pyramid, brushed_pyramid
     bsdf = stack(brushed_pyramid, coat=1.5, coat_asset=noise_pyramid.path, coat_sigma=10.0)
     image = render(make_scene(bsdf, "constant", "direct"), 128)
     assert 0.8 < image.mean() < 1.02
+
+
+def test_light_has_derivatives_by_the_base(llvm, noise_pyramid):
+    """As differences of two values say; the gain under a coat is included."""
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi = dr.normalize(mi.Vector3f(0.1, 0.2, 1))
+    lit = dr.normalize(mi.Vector3f(-0.2, -0.1, 1))
+    bsdf = mi.load_dict(stack(noise_pyramid, coat=1.5, transparency=0.5, base={"type": "diffuse", "reflectance": 0.5}))
+    parameters = mi.traverse(bsdf)
+    key = next(name for name in parameters.keys() if name.startswith("base") and "reflectance" in name)
+    assert not parameters.flags(key) & int(mi.ParamFlags.NonDifferentiable)
+
+    def value(reflectance):
+        parameters[key] = type(parameters[key])(reflectance)
+        dr.enable_grad(parameters[key])
+        parameters.update()
+        return dr.sum(bsdf.eval(mi.BSDFContext(), si, lit))
+
+    def number(x):
+        return float(np.array(dr.detach(x)).sum())
+
+    step = 0.05
+    difference = (number(value(0.5 + step)) - number(value(0.5 - step))) / (2 * step)
+    dr.backward(value(0.5))
+    # A central difference errs by the third derivative, here about step^2.
+    assert number(dr.grad(parameters[key])) == pytest.approx(difference, rel=4 * step**2)
+    assert difference > 0
+
+
+def test_a_coat_of_the_index_of_air_is_no_coat(llvm, noise_pyramid):
+    """Its other parameters are known all the same."""
+    bsdf = stack(noise_pyramid, coat=1.0, coat_asset=noise_pyramid.path, coat_uv_scale=2.0)
+    assert mi.load_dict(bsdf).layers.coat is None
+
+
+def test_coat_alpha_is_the_roughness_of_a_coat_or_of_its_bin_map(llvm, noise, noise_pyramid):
+    """No other asset of a coat reads it."""
+    flakes = gn.bin_map(gn.synth("flakes", 64, seed=3), alpha=0.1, alpha_max=0.3)
+    assert mi.load_dict(stack(noise_pyramid, coat=1.5, coat_asset=flakes.path, coat_alpha=0.2, coat_sigma=4.0)).layers.coat.alpha == 0
+    with pytest.raises(Exception, match="'coat_alpha' is for assets of kind bin-map"):
+        mi.load_dict(stack(noise_pyramid, coat=1.5, coat_asset=noise.path, coat_alpha=0.2))
+
+
+def test_a_placement_of_a_coat_without_an_asset_is_refused(llvm, noise_pyramid):
+    with pytest.raises(Exception, match="'coat_uv_scale' needs 'coat_asset'"):
+        mi.load_dict(stack(noise_pyramid, coat=1.5, coat_uv_scale=2.0))

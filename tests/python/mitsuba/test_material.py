@@ -55,6 +55,42 @@ def test_parameters_of_the_scene_have_precedence(llvm, write):
         mi.load_dict({"type": "glint", "description": path, "rotation": "x"})
 
 
+def test_a_scene_can_take_the_alternative_of_a_described_parameter(llvm, write, noise_pyramid):
+    """What excludes what the scene gives is dropped from the description."""
+    described = write(PAINT)
+    scaled = mi.load_dict({"type": "glint", "description": described, "uv_scale": 2.0, "rotation": 0.0})
+    assert np.array(scaled.layers.facets.placement.uv(mi.Point2f(0.25, 0.125))).ravel() == pytest.approx([0.5, 0.25])
+    mirror = mi.load_dict({"type": "glint", "description": described, "material": "none"})
+    assert np.array(mirror.layers.conductor.reflectance(None, mi.Float(0.5), True)).ravel() == pytest.approx([1, 1, 1])
+    rough = mi.load_dict({"type": "glint", "description": described, "coat_asset": noise_pyramid.path, "coat_sigma": 4.0})
+    assert rough.layers.coat.layer is not None
+
+    with_normals = write(changed(layers={"coat": {"ior": 1.5, "asset": {"file": "flakes.glint"}, "placement": {"uv_scale": 3}}}))
+    assert mi.load_dict({"type": "glint", "description": with_normals, "coat_alpha": 0.2}).layers.coat.layer is None
+    assert mi.load_dict({"type": "glint", "description": with_normals, "coat_asset": noise_pyramid.path}).layers.coat.layer is not None
+    assert mi.load_dict({"type": "glint", "description": with_normals, "coat_texels_per_unit": 50.0}).layers.coat.layer is not None
+    named = write(changed(optics={"material": "Au"}))
+    assert mi.load_dict({"type": "glint", "description": named, "eta": 1.5, "k": 7.0}).layers.conductor is not None
+
+
+def test_a_description_lies_beside_the_scene(llvm, write, tmp_path, monkeypatch):
+    write(PAINT)
+    scene = tmp_path / "scene.xml"
+    scene.write_text(
+        '<scene version="3.0.0"><shape type="rectangle"><bsdf type="glint"><string name="description" value="material.json"/>'
+        "</bsdf></shape></scene>"
+    )
+    other = tmp_path / "elsewhere"
+    other.mkdir()
+    monkeypatch.chdir(other)
+    assert "flakes.glint" in str(mi.load_file(str(scene)).shapes()[0].bsdf())
+
+
+def test_a_description_that_is_no_text(llvm):
+    with pytest.raises(Exception, match="glint: parameter 'description' must be a text"):
+        mi.load_dict({"type": "glint", "description": 3.0})
+
+
 def test_files_are_relative_to_the_description(llvm, write, tmp_path):
     assert material.load(write(PAINT))["asset"] == str(tmp_path / "flakes.glint")
 
@@ -77,6 +113,10 @@ BROKEN = [
     (changed(layers={"base": {"reflectance": 0.5}}), "transparency"),
     (changed(layers={"transparency": 1.5, "base": {"reflectance": 0.5}}), "transparency"),
     (changed(layers={"transparency": 0.5, "base": {"reflectance": [0.5, 0.5, 2]}}), "reflectance"),
+    (changed(layers={"coat": {"ior": 1.5, "alpha": 0.1, "asset": {"file": "flakes.glint"}}}), "'alpha' and 'asset'"),
+    (changed(layers={"coat": {"ior": 1.5, "placement": {"uv_scale": 2}}}), "lacks 'asset'"),
+    (changed(placement={"uv_scale": 2, "texels_per_unit": 100}), "'uv_scale' and 'texels_per_unit'"),
+    (changed(optics={"material": "Au", "eta": 1, "k": 3}), "'material' and 'eta'"),
     ([], "object"),
 ]
 
@@ -100,12 +140,35 @@ def test_files_that_cannot_be_read(llvm, write, tmp_path):
         mi.load_dict({"type": "glint", "description": str(tmp_path / "none.json")})
 
 
-def test_every_parameter_of_a_description_is_known_to_the_plugin(llvm, write, noise_pyramid):
-    """Options of kinds that the asset is not of are refused by the library, not as unknown parameters."""
+EVERYTHING = [
+    {"file": "flakes.glint", "interpolation": "trilinear", "pixels": "constant"},
+    {"file": "texels.glint", "sigma_r": 0.02, "surface": "flat", "boundary": "wrap"},
+]
+
+
+@pytest.mark.parametrize("asset", EVERYTHING, ids=["pyramid", "normals"])
+def test_every_parameter_of_a_description_is_known_to_the_plugin(llvm, write, noise, tmp_path, asset):
+    noise.save(tmp_path / "texels.glint")
     everything = changed(
-        asset={"file": "flakes.glint", "sigma_r": 0.02, "surface": "flat", "boundary": "wrap", "interpolation": "trilinear", "pixels": "constant"},
+        asset=asset,
         optics={"material": "Au", "specular_reflectance": 0.9, "facets": "distribution"},
-        layers={"coat": {"ior": 1.5, "asset": {"file": "flakes.glint"}, "placement": {"uv_scale": 3}}},
+        layers={"coat": {"ior": 1.5, "asset": asset, "placement": {"uv_scale": 3}}},
     )
     bsdf = mi.load_dict({**material.load(write(everything)), "sigma": 5.0, "coat_sigma": 5.0})
     assert np.isfinite(render(make_scene(bsdf, "constant", "direct", size=4), 4)).all()
+
+
+@pytest.mark.parametrize("prefix", ["", "coat_"])
+@pytest.mark.parametrize("option", [{"sigma_r": 0.02}, {"alpha": 0.1}, {"surface": "flat"}, {"boundary": "wrap"}, {"variant": "full"}])
+def test_options_of_other_kinds_are_refused(llvm, noise_pyramid, prefix, option):
+    """The message says which kinds read the option, and of which kind the asset is."""
+    (name, value), path = *option.items(), noise_pyramid.path
+    coat = {"coat": 1.5, "coat_asset": path} if prefix else {}
+    with pytest.raises(Exception, match=f"'{prefix}{name}' .*ndf-pyramid"):
+        mi.load_dict({"type": "glint", "asset": path, **coat, prefix + name: value})
+
+
+def test_options_of_levels_are_refused_without_levels(llvm, noise):
+    for option in ({"interpolation": "trilinear"}, {"pixels": "constant"}, {"footprint_parts": 4}, {"normals": noise.path}):
+        with pytest.raises(Exception, match="ndf-pyramid, ndf-cp.* is of kind normals"):
+            mi.load_dict({"type": "glint", "asset": noise.path, **option})

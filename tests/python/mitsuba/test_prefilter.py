@@ -36,6 +36,14 @@ def test_a_fit_finds_the_lobes_of_which_an_image_is_made():
     assert (solid[..., None] * got).sum(axis=(0, 1)) == pytest.approx((solid[..., None] * wanted).sum(axis=(0, 1)), rel=0.01)
 
 
+@pytest.mark.parametrize("image", [np.ones((16, 32, 3)), sky(16)], ids=["even", "lamps"])
+@pytest.mark.parametrize("count", [1, 3])
+def test_axes_are_unit_vectors(image, count):
+    """Also where light comes evenly from all sides, which has no mean direction."""
+    found = gm.fit_lobes(image, count)
+    assert np.linalg.norm(found.axes, axis=1) == pytest.approx(np.ones(count), abs=1e-9)
+
+
 def test_the_brightest_lobe_lies_where_mitsuba_shows_it(llvm):
     """The frame of the fit is that of `envmap`."""
     found = gm.fit_lobes(sky(), 3)
@@ -56,10 +64,11 @@ def test_bad_images_are_refused(bitmap, count):
         gm.fit_lobes(bitmap, count)
 
 
-def plate(noise_pyramid, prefilter, size=12):
+def plate(noise_pyramid, prefilter, size=12, **more):
     transform = mi.ScalarTransform4f
     return mi.load_dict(
         {
+            **more,
             "type": "scene",
             "integrator": {"type": "glint_path", "max_depth": 2, "prefilter": prefilter},
             "plate": {"type": "rectangle", "bsdf": glint(noise_pyramid, material="Al", sigma=20.0)},
@@ -84,6 +93,30 @@ def test_prefiltered_light_is_that_of_samples(noise_pyramid, variant, spp):
     mi.set_variant(variant)
     prefiltered = render(plate(noise_pyramid, 8), spp).mean(axis=(0, 1))
     assert prefiltered == pytest.approx(sampled, rel=0.15)
+
+
+def test_a_closed_room_is_dark(llvm, noise_pyramid):
+    """A black ball around plate and camera hides the whole sky."""
+    black = {"type": "sphere", "radius": 20.0, "bsdf": {"type": "diffuse", "reflectance": 0.0}}
+    assert render(plate(noise_pyramid, 4), 16).max() > 0
+    assert render(plate(noise_pyramid, 4, ball=black), 16).max() == 0
+
+
+def test_a_sky_that_changes_is_fitted_again(llvm, noise_pyramid):
+    scene = plate(noise_pyramid, 4)
+    before = render(scene, 16)
+    parameters = mi.traverse(scene)
+    parameters["sky.scale"] = 2.0 * parameters["sky.scale"]
+    parameters.update()
+    assert render(scene, 16) == pytest.approx(2 * before, rel=1e-3)
+
+
+def test_a_picture_leaves_no_reference_to_the_scene(llvm, noise_pyramid):
+    """The scene holds its integrator, so a reference back would keep both for ever."""
+    scene = plate(noise_pyramid, 4)
+    render(scene, 1)
+    holders = [value for value in vars(scene.integrator()).values() if type(value).__name__ == "Prefilter"]
+    assert not holders
 
 
 def test_scenes_without_a_sky_are_left_alone(llvm, noise_pyramid):
