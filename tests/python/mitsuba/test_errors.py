@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from conftest import glint, make_scene, render
+from scenes import glint, make_scene, render
 
 import glint_ndf as gn
 import glint_ndf.mitsuba as gm

@@ -3,7 +3,7 @@
 import mitsuba as mi
 import numpy as np
 import pytest
-from conftest import glint, make_scene, render, render_batches
+from scenes import glint, make_scene, render, render_batches
 
 import glint_ndf.mitsuba as gm
 from glint_ndf.mitsuba import footprints, integrator

@@ -4,7 +4,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from conftest import follows_pdf, glint, make_scene, render, render_batches
+from scenes import follows_pdf, glint, make_scene, render, render_batches
 
 import glint_ndf as gn
 from glint_ndf.mitsuba.coat import Coat, _albedos

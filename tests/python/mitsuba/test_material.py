@@ -6,7 +6,7 @@ import jsonschema
 import mitsuba as mi
 import numpy as np
 import pytest
-from conftest import make_scene, render
+from scenes import make_scene, render
 
 from glint_ndf import FileError, InvalidInputError, material
 

@@ -12,7 +12,7 @@ import glint_ndf as gn
 import glint_ndf.mitsuba as gm
 from glint_ndf.mitsuba import native
 
-from conftest import make_scene, render
+from scenes import make_scene, render
 
 # Rounding of directions: a lobe of sigma_r 0.02 magnifies it.
 ROUNDING = 2e-4

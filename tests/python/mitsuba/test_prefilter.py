@@ -3,7 +3,7 @@
 import mitsuba as mi
 import numpy as np
 import pytest
-from conftest import glint, render
+from scenes import glint, render
 
 import glint_ndf.mitsuba as gm
 from glint_ndf.mitsuba import lobes
@@ -120,7 +120,7 @@ def test_a_picture_leaves_no_reference_to_the_scene(llvm, noise_pyramid):
 
 
 def test_scenes_without_a_sky_are_left_alone(llvm, noise_pyramid):
-    from conftest import make_scene
+    from scenes import make_scene
 
     scene = make_scene(glint(noise_pyramid, sigma=10.0), "area", {"type": "glint_path", "prefilter": 8})
     plain = make_scene(glint(noise_pyramid, sigma=10.0), "area", {"type": "glint_path"})

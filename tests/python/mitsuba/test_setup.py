@@ -6,7 +6,7 @@ import sys
 
 import mitsuba as mi
 import pytest
-from conftest import glint
+from scenes import glint
 
 import glint_ndf.mitsuba as gm
 from glint_ndf.mitsuba import llvm as finder

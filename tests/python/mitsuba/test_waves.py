@@ -4,7 +4,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from conftest import make_scene, render
+from scenes import make_scene, render
 
 import glint_ndf as gn
 
