@@ -25,7 +25,7 @@ constexpr double kErrorBudget_s = 0.3, kLongestTime_s = 0.004;
 /// Texels along an axis of a probe; 0: the map is no larger.
 int edgeOf(const MapQuestion& question, const NormalMap& map) {
   constexpr int kUsual = 512, kLeast = 256;
-  constexpr double kFootprintsAcross = 8, kStridesAcross = 90;  // images of fine pyramids take long
+  constexpr double kFootprintsAcross = 8, kStridesAcross = 24;  // images of fine pyramids take long
   const double stride = question.footprints.smallest / kLevelSigma;
   int edge = std::clamp(16 * static_cast<int>(kStridesAcross * stride / 16), kLeast, kUsual);
   const double wide = kFootprintsAcross * std::min(question.footprints.smallest, 1e4);

@@ -31,11 +31,8 @@ Json candidateJson(const Candidate& candidate) {
 
 Json optionJson(const PlanOption& option) {
   Json json = {{"name", option.candidate.name()}};
-  if (!option.failure.empty()) {
-    json["failure"] = option.failure;
-    return json;
-  }
-  json["costs"] = costsJson(option.costs);
+  if (!option.failure.empty()) json["failure"] = option.failure;
+  if (option.costed) json["costs"] = costsJson(option.costs);
   if (option.seen >= 0) json[option.at_least ? "seen_at_least" : "seen"] = option.seen;
   return json;
 }

@@ -70,22 +70,21 @@ std::string sceneText(const Scene& scene, const std::vector<MapQuestion>& questi
 std::vector<std::string> reasonsOf(const Scene& scene, const MaterialPlan& plan) {
   const PlanOption& choice = plan.choice();
   std::vector<std::string> reasons;
-  const auto compared =
-      std::count_if(plan.options.begin(), plan.options.end(), [](const PlanOption& o) { return o.failure.empty(); });
+  const auto compared = std::count_if(plan.options.begin(), plan.options.end(), [](const PlanOption& o) { return o.costed; });
   if (choice.candidate.tool.empty()) {
     reasons.push_back("The texels themselves have no error.");
   } else {
     reasons.push_back(fmt::format("Its seen error is {:.2g}; the tolerance is {:g}, of which a plan uses {:g}.", choice.seen,
                                   plan.material->tolerance, kSafeShare * plan.material->tolerance));
   }
-  reasons.push_back(fmt::format("Of {} candidates that can be made it has {} within the tolerance and the budgets.", compared,
+  reasons.push_back(fmt::format("Of {} candidates that were measured it has {} within the tolerance and the budgets.", compared,
                                 goalText(scene.goal)));
   // Cheaper candidates of other methods that do not do.
   std::vector<std::string> methods = {choice.candidate.method};
   for (std::size_t k = 0; k < plan.options.size(); ++k) {
     const PlanOption& option = plan.options[k];
     const bool named = std::find(methods.begin(), methods.end(), option.candidate.method) != methods.end();
-    if (k >= plan.chosen || named || !option.failure.empty() || option.seen < 0) continue;
+    if (k >= plan.chosen || named || !option.costed || option.seen < 0) continue;
     methods.push_back(option.candidate.method);
     reasons.push_back(fmt::format("{} would be cheaper, but its seen error is {}{:.2g}.", option.candidate.name(),
                                   option.at_least ? "at least " : "", option.seen));
@@ -93,7 +92,7 @@ std::vector<std::string> reasonsOf(const Scene& scene, const MaterialPlan& plan)
   for (std::size_t k = 0; k < plan.chosen; ++k) {
     const PlanOption& option = plan.options[k];
     const bool named = std::find(methods.begin(), methods.end(), option.candidate.method) != methods.end();
-    if (named || !option.failure.empty()) continue;
+    if (named || !option.costed) continue;
     methods.push_back(option.candidate.method);
     reasons.push_back(fmt::format("{} would be over a budget: {}, {:.2g} s to prepare, {:.2g} ns for a density.",
                                   option.candidate.name(), sizeText(option.costs.bytes), option.costs.preparation_s,

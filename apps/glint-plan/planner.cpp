@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <limits>
-#include <tuple>
+#include <utility>
 
 #include "glint-plan/totals.h"
 
@@ -33,6 +33,16 @@ const BudgetKind kBudgets[] = {
     {"query_ns", &Budgets::query_ns, &Costs::query_ns, [](double ns) { return fmt::format("{:.3g} ns", ns); }},
 };
 
+/// Sorts options by cost, with the unmeasured ones at the end.
+void sortByCost(MaterialPlan& plan, Goal goal) {
+  const std::string chosen = plan.choice().candidate.name();
+  const auto rank = [&](const PlanOption& o) { return std::pair(!o.costed, o.cost(goal)); };
+  std::stable_sort(plan.options.begin(), plan.options.end(),
+                   [&](const PlanOption& a, const PlanOption& b) { return rank(a) < rank(b); });
+  plan.chosen = 0;
+  while (plan.choice().candidate.name() != chosen) ++plan.chosen;
+}
+
 }  // namespace
 
 double PlanOption::cost(Goal goal) const {
@@ -45,7 +55,7 @@ struct Planner::Work {
   MaterialPlan plan;
   std::unique_ptr<ProbeCache> cache;
   std::unique_ptr<MapProbe> probe;
-  std::vector<std::size_t> numbers;  ///< of the plan's options, in the list of the probe
+  bool found = false;  ///< whether the plan has a choice
 };
 
 MapQuestion questionOf(const Scene& scene, const SceneMaterial& material, const NormalMap& map) {
@@ -69,44 +79,39 @@ void Planner::open(const SceneMaterial& material) {
   work.plan.question = questionOf(scene_, material, work.plan.map.normals());
 }
 
-void Planner::measureCosts(Work& work) {
+void Planner::prepare(Work& work) {
   work.cache = std::make_unique<ProbeCache>(cache_, work.plan.map.hash);
   work.probe = std::make_unique<MapProbe>(tool_, folder_, work.plan.map, work.plan.question, *work.cache);
   work.plan.probe_edge = work.probe->edge();
-  std::vector<std::pair<PlanOption, std::size_t>> options;
-  const std::vector<Candidate>& candidates = work.probe->candidates();
-  for (std::size_t k = 0; k < candidates.size(); ++k) {
+  for (const Candidate& candidate : work.probe->candidates()) {
     PlanOption option;
-    option.candidate = candidates[k];
-    try {
-      option.costs = work.probe->costs(k);
-    } catch (const Error& error) {
-      option.failure = error.what();
-    }
-    options.emplace_back(std::move(option), k);
-  }
-  const auto rank = [&](const PlanOption& o) {
-    return std::tuple(!o.failure.empty(), o.cost(scene_.goal), o.costs.bytes, o.costs.query_ns);
-  };
-  std::stable_sort(options.begin(), options.end(), [&](const auto& a, const auto& b) { return rank(a.first) < rank(b.first); });
-  for (auto& [option, number] : options) {
+    option.candidate = candidate;
     work.plan.options.push_back(std::move(option));
-    work.numbers.push_back(number);
   }
+}
+
+bool Planner::cost(Work& work, PlanOption& option) {
+  if (option.costed || !option.failure.empty()) return option.costed;
+  try {
+    option.costs = work.probe->costs(static_cast<std::size_t>(&option - work.plan.options.data()));
+    option.costed = true;
+  } catch (const Error& error) {
+    option.failure = error.what();
+  }
+  return option.costed;
 }
 
 bool Planner::meets(Work& work, PlanOption& option) {
   const double most = kSafeShare * work.plan.material->tolerance;
   if (option.seen < 0) {
-    const auto place = static_cast<std::size_t>(&option - work.plan.options.data());
     try {
-      option.seen = work.probe->seen(work.numbers[place], most);
+      option.seen = work.probe->seen(static_cast<std::size_t>(&option - work.plan.options.data()), most);
       option.at_least = option.seen > most;
     } catch (const Error& error) {
       option.failure = error.what();
     }
   }
-  return option.failure.empty() && option.seen <= most;
+  return option.costed && option.failure.empty() && option.seen <= most;
 }
 
 bool Planner::affordable(const Work& work, const PlanOption& option) const {
@@ -115,20 +120,43 @@ bool Planner::affordable(const Work& work, const PlanOption& option) const {
   });
 }
 
-void Planner::choose(Work& work, bool all) {
-  bool found = false;
-  for (std::size_t k = 0; k < work.plan.options.size() && (all || !found); ++k) {
-    PlanOption& option = work.plan.options[k];
-    if (!option.failure.empty() || !affordable(work, option) || !meets(work, option) || found) continue;
-    work.plan.chosen = k;
-    found = true;
+bool Planner::choose(Work& work) {
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < work.plan.options.size(); ++k)
+    if (work.plan.options[k].costed && affordable(work, work.plan.options[k])) order.push_back(k);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return work.plan.options[a].cost(scene_.goal) < work.plan.options[b].cost(scene_.goal);
+  });
+  const auto first = std::find_if(order.begin(), order.end(), [&](std::size_t k) { return meets(work, work.plan.options[k]); });
+  work.found = first != order.end();
+  if (work.found) work.plan.chosen = *first;
+  return work.found;
+}
+
+void Planner::measureCompressed(Work& work, bool all) {
+  const auto pyramid = std::find_if(work.plan.options.begin(), work.plan.options.end(),
+                                    [](const PlanOption& option) { return option.candidate.method == "pyramid"; });
+  const bool usable = pyramid->costed && meets(work, *pyramid);
+  std::string done;  // method that needs no finer setting
+  for (PlanOption& option : work.plan.options) {
+    if (option.candidate.source.empty() || option.costed || option.candidate.method == done) continue;
+    if (!usable) {
+      option.failure = pyramid->failure.empty()
+                           ? fmt::format("the pyramid that it is made of has a seen error of {:.2g} already", pyramid->seen)
+                           : "its pyramid cannot be made: " + pyramid->failure;
+      continue;
+    }
+    if (!cost(work, option)) continue;
+    const bool too_dear = work.found && option.cost(scene_.goal) >= work.plan.choice().cost(scene_.goal);
+    if ((too_dear && !all) || meets(work, option)) done = option.candidate.method;
+    if (done == option.candidate.method && affordable(work, option)) choose(work);
   }
-  if (!found) refuse(work);
 }
 
 void Planner::refuse(Work& work) {
   // The option that would do if one budget alone were larger, and else the one that is nearest to all budgets.
   const SceneMaterial& material = *work.plan.material;
+  measureCompressed(work, true);
   std::string text, fields, needs;
   for (const BudgetKind& kind : kBudgets) {
     const double own = (material.budgets.*kind.limit).value_or(kNoLimit);
@@ -136,7 +164,7 @@ void Planner::refuse(Work& work) {
     if (limit == kNoLimit) continue;
     const PlanOption* least = nullptr;
     for (PlanOption& option : work.plan.options) {
-      if (!option.failure.empty() || !meets(work, option)) continue;
+      if (!meets(work, option)) continue;
       if (least == nullptr || option.costs.*kind.cost < least->costs.*kind.cost) least = &option;
     }
     const std::string field = (own <= limit ? material.path + "." : std::string()) + "budgets." + kind.name;
@@ -153,7 +181,7 @@ void Planner::refuse(Work& work) {
     throw Error(ErrorCode::failed, "plan.budget", scene_.file, "", what + text, "allow " + needs + ", or a larger tolerance");
   std::string each;
   for (PlanOption& option : work.plan.options) {
-    if (!option.failure.empty() || !meets(work, option)) continue;
+    if (!meets(work, option)) continue;
     each += (each.empty() ? "" : "; ") + fmt::format("{} takes {}, {:.3g} s and {:.3g} ns", option.candidate.name(),
                                                      sizeText(option.costs.bytes), option.costs.preparation_s,
                                                      option.costs.query_ns);
@@ -174,11 +202,11 @@ void Planner::fitTotals() {
   std::vector<std::vector<Share>> shares;
   std::vector<std::vector<std::size_t>> places;
   for (auto& work : works_) {
-    choose(*work, true);
+    measureCompressed(*work, true);
     shares.emplace_back(), places.emplace_back();
     for (std::size_t k = 0; k < work->plan.options.size(); ++k) {
       PlanOption& option = work->plan.options[k];
-      if (!option.failure.empty() || !affordable(*work, option) || !meets(*work, option)) continue;
+      if (!option.costed || !affordable(*work, option) || !meets(*work, option)) continue;
       shares.back().push_back({option.cost(scene_.goal), option.costs.bytes, option.costs.preparation_s});
       places.back().push_back(k);
     }
@@ -212,9 +240,13 @@ std::vector<MaterialPlan> Planner::plan() {
   std::size_t done = 0;
   for (auto& work : works_) {
     const Clock::time_point start = Clock::now();
-    measureCosts(*work);
+    prepare(*work);
     try {
-      choose(*work, false);
+      for (PlanOption& option : work->plan.options)
+        if (option.candidate.source.empty()) cost(*work, option);
+      choose(*work);
+      measureCompressed(*work, false);
+      if (!choose(*work)) refuse(*work);
     } catch (const Error&) {
       work->cache->save();
       throw;
@@ -227,6 +259,7 @@ std::vector<MaterialPlan> Planner::plan() {
   std::vector<MaterialPlan> plans;
   for (auto& work : works_) {
     work->cache->save();
+    sortByCost(work->plan, scene_.goal);
     plans.push_back(std::move(work->plan));
   }
   works_.clear();

@@ -18,7 +18,8 @@ struct PlanOption {
   Costs costs;
   double seen = -1;       ///< below 0: not measured, because a cheaper one was good enough
   bool at_least = false;  ///< the error is `seen` or more
-  std::string failure;    ///< why it cannot be made; empty: it can
+  bool costed = false;    ///< whether the costs are known
+  std::string failure;    ///< why it was not measured; may be empty
   double cost(Goal goal) const;
 };
 
@@ -48,10 +49,15 @@ class Planner {
  private:
   struct Work;
   void open(const SceneMaterial& material);
-  void choose(Work& work, bool all);
+  void prepare(Work& work);
+  /// Sets the choice, if an option is good enough.
+  bool choose(Work& work);
+  /// Measures what is compressed from the pyramid, each method from coarse to fine until it is good enough.
+  /// @param all  also when it costs more than the choice so far
+  void measureCompressed(Work& work, bool all);
+  bool cost(Work& work, PlanOption& option);
   bool meets(Work& work, PlanOption& option);
   bool affordable(const Work& work, const PlanOption& option) const;
-  void measureCosts(Work& work);
   [[noreturn]] void refuse(Work& work);
   void fitTotals();
 
