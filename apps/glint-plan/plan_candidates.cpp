@@ -34,41 +34,46 @@ int levelsOf(double largest, int stride, int width, int height) {
   return std::clamp(static_cast<int>(needed), 1, most);
 }
 
-/// Pixels of images along each axis, 256 or as few as the facets and the light allow.
-int resolutionOf(const MapQuestion& question) {
+/// Pixels of images along each axis: 256, and fewer where the facets or the light are so wide that fewer may do.
+std::vector<int> resolutionsOf(const MapQuestion& question) {
   constexpr int kUsual = 256, kFewest = 32, kBlock = 16;
   constexpr double kPixelsOfSigma = 1.5, kPixelsOfLight = 2;
   const double pixels = std::min(2 * kPixelsOfSigma / double{question.sigma_r},
                                  2 * kPixelsOfLight / std::max(halfVectorsOfLight(question.light_deg), 1e-9));
-  const double enough = kBlock * std::ceil(pixels / kBlock);
-  return static_cast<int>(std::clamp(enough, double{kFewest}, double{kUsual}));
+  const int fewest = static_cast<int>(std::clamp(kBlock * std::ceil(pixels / kBlock), double{kFewest}, double{kUsual}));
+  std::vector<int> resolutions;
+  for (int resolution = fewest; resolution < kUsual; resolution *= 2) resolutions.push_back(resolution);
+  resolutions.push_back(kUsual);
+  return resolutions;
 }
 
 void addPyramids(const MapQuestion& question, int width, int height, std::vector<Candidate>& all) {
   const int stride = strideOf(question.footprints.smallest, width, height);
   const bool needs_texels = question.footprints.smallest < kLevelSigma * stride;
   const std::string levels = std::to_string(levelsOf(question.footprints.largest, stride, width, height));
-  const std::string resolution = std::to_string(resolutionOf(question));
-  const std::string images = fmt::format("stride {}, {} pixels", stride, resolution);
-  const Candidate pyramid = {"pyramid",
-                             images,
-                             "glint-pyramid",
-                             {"--stride", std::to_string(stride), "--levels", levels, "--resolution", resolution, "--sigma-r",
-                              fmt::format("{:.9g}", question.sigma_r)},
-                             "",
-                             needs_texels};
-  all.push_back(pyramid);
-  const auto compressed = [&](const char* method, const char* option, const char* value) {
-    all.push_back({method,
-                   fmt::format("{} {} of {}", option + 2, value, images),
-                   "glint-compress",
-                   {"--method", method, option, value},
-                   pyramid.name(),
-                   needs_texels});
-  };
-  for (const char* tolerance : {"0.4", "0.2", "0.1", "0.05"}) compressed("tucker", "--tolerance", tolerance);
-  for (const char* tolerance : {"0.4", "0.2", "0.1", "0.05"}) compressed("pca", "--tolerance", tolerance);
-  for (const char* rank : {"16", "32"}) compressed("cp", "--rank", rank);
+  for (const int pixels : resolutionsOf(question)) {
+    const std::string resolution = std::to_string(pixels);
+    const std::string images = fmt::format("stride {}, {} pixels", stride, resolution);
+    const Candidate pyramid = {"pyramid",
+                               images,
+                               "glint-pyramid",
+                               {"--stride", std::to_string(stride), "--levels", levels, "--resolution", resolution, "--sigma-r",
+                                fmt::format("{:.9g}", question.sigma_r)},
+                               "",
+                               needs_texels};
+    all.push_back(pyramid);
+    const auto compressed = [&](const char* method, const char* option, const char* value) {
+      all.push_back({method,
+                     fmt::format("{} {} of {}", option + 2, value, images),
+                     "glint-compress",
+                     {"--method", method, option, value},
+                     pyramid.name(),
+                     needs_texels});
+    };
+    for (const char* tolerance : {"0.4", "0.2", "0.1", "0.05"}) compressed("tucker", "--tolerance", tolerance);
+    for (const char* tolerance : {"0.4", "0.2", "0.1", "0.05"}) compressed("pca", "--tolerance", tolerance);
+    for (const char* rank : {"16", "32"}) compressed("cp", "--rank", rank);
+  }
 }
 
 }  // namespace

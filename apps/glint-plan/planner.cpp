@@ -134,22 +134,23 @@ bool Planner::choose(Work& work) {
 }
 
 void Planner::measureCompressed(Work& work, bool all) {
-  const auto pyramid = std::find_if(work.plan.options.begin(), work.plan.options.end(),
-                                    [](const PlanOption& option) { return option.candidate.method == "pyramid"; });
-  const bool usable = pyramid->costed && meets(work, *pyramid);
-  std::string done;  // method that needs no finer setting
+  std::string done;  // method and pyramid that need no finer setting
   for (PlanOption& option : work.plan.options) {
-    if (option.candidate.source.empty() || option.costed || option.candidate.method == done) continue;
-    if (!usable) {
-      option.failure = pyramid->failure.empty()
-                           ? fmt::format("the pyramid that it is made of has a seen error of {:.2g} already", pyramid->seen)
-                           : "its pyramid cannot be made: " + pyramid->failure;
+    const std::string kind = option.candidate.method + " of " + option.candidate.source;
+    if (option.candidate.source.empty() || option.costed || kind == done) continue;
+    PlanOption& pyramid = *std::find_if(work.plan.options.begin(), work.plan.options.end(), [&](const PlanOption& other) {
+      return other.candidate.name() == option.candidate.source;
+    });
+    if (!pyramid.costed || !meets(work, pyramid)) {
+      option.failure = pyramid.failure.empty()
+                           ? fmt::format("the pyramid that it is made of has a seen error of {:.2g} already", pyramid.seen)
+                           : "its pyramid cannot be made: " + pyramid.failure;
       continue;
     }
     if (!cost(work, option)) continue;
     const bool too_dear = work.found && option.cost(scene_.goal) >= work.plan.choice().cost(scene_.goal);
-    if ((too_dear && !all) || meets(work, option)) done = option.candidate.method;
-    if (done == option.candidate.method && affordable(work, option)) choose(work);
+    if ((too_dear && !all) || meets(work, option)) done = kind;
+    if (done == kind) choose(work);
   }
 }
 
