@@ -134,7 +134,9 @@ bool Planner::choose(Work& work) {
 }
 
 void Planner::measureCompressed(Work& work, bool all) {
-  std::string done;  // method and pyramid that need no finer setting
+  constexpr double kAmple = 0.5;  // share of the error that may be the pyramid's own, so that more pixels gain nothing
+  std::string done;               // method and pyramid that need no finer setting
+  const PlanOption* ample = nullptr;
   for (PlanOption& option : work.plan.options) {
     const std::string kind = option.candidate.method + " of " + option.candidate.source;
     if (option.candidate.source.empty() || option.costed || kind == done) continue;
@@ -147,6 +149,11 @@ void Planner::measureCompressed(Work& work, bool all) {
                            : "its pyramid cannot be made: " + pyramid.failure;
       continue;
     }
+    if (ample != nullptr && ample != &pyramid) {
+      option.failure = "images of fewer pixels are good enough";
+      continue;
+    }
+    if (pyramid.seen <= kAmple * kSafeShare * work.plan.material->tolerance) ample = &pyramid;
     if (!cost(work, option)) continue;
     const bool too_dear = work.found && option.cost(scene_.goal) >= work.plan.choice().cost(scene_.goal);
     if ((too_dear && !all) || meets(work, option)) done = kind;
