@@ -91,6 +91,10 @@ bool mayReplace(const std::string& path, OutputFormat format) {
       return head.starts_with("{\"schema\":\"glint-bench results"sv);
     case OutputFormat::page:
       return head.starts_with("<!doctype html>"sv) && head.find("content=\"glint-bench\"") != std::string::npos;
+    case OutputFormat::plan:
+      return head.starts_with("{\n \"schema\": \"glint-plan plan"sv);
+    case OutputFormat::plan_rules:
+      return head.starts_with("# Made by glint-plan"sv);
   }
   return false;
 }

@@ -33,12 +33,14 @@ class InputFiles {
 
 /// The content of an output. It decides which files the output may replace.
 enum class OutputFormat : unsigned char {
-  asset,    ///< .glint
-  image,    ///< any image format
-  table,    ///< CSV with answers
-  depfile,  ///< rule for Make
-  results,  ///< JSON of glint-bench
-  page,     ///< HTML of glint-bench
+  asset,       ///< .glint
+  image,       ///< any image format
+  table,       ///< CSV with answers
+  depfile,     ///< rule for Make
+  results,     ///< JSON of glint-bench
+  page,        ///< HTML of glint-bench
+  plan,        ///< JSON of glint-plan
+  plan_rules,  ///< Makefile of glint-plan
 };
 
 /// Checks an output before the work starts. Checks again, when all inputs and outputs are known, that no other file of the run

@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "glint-bench/candidates.h"
+#include "measure/candidates.h"
 #include "glint-bench/presets/preset_run.h"
 #include "glint-bench/stability/stability_run.h"
 #include "glint/api/alternatives.h"

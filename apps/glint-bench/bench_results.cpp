@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/files.h"
-#include "glint-bench/candidates.h"
+#include "measure/candidates.h"
 #include "glint-bench/machine.h"
 #include "glint/model/error.h"
 

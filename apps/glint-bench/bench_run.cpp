@@ -7,10 +7,10 @@
 #include <list>
 #include <map>
 
-#include "glint-bench/bench_errors.h"
-#include "glint-bench/bench_times.h"
-#include "glint-bench/candidates.h"
-#include "glint-bench/child_process.h"
+#include "measure/bench_errors.h"
+#include "measure/bench_times.h"
+#include "measure/candidates.h"
+#include "measure/child_process.h"
 #include "glint-bench/rounded_image.h"
 #include "glint/formats/hash.h"
 

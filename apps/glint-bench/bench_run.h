@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "common/tool.h"
-#include "glint-bench/asset_folder.h"
+#include "measure/asset_folder.h"
 #include "glint-bench/bench_results.h"
 
 namespace glint::apps {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "glint-bench/bench_errors.h"
+#include "measure/bench_errors.h"
 
 namespace glint::apps {
 namespace {

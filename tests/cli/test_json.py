@@ -20,6 +20,9 @@ TOOLS = sorted(path.parent.name for path in (ROOT / "apps").glob("glint-*/main.c
 SCHEMAS = {path.name.removesuffix(".schema.json"): json.loads(path.read_text()) for path in sorted(FOLDER.glob("*.schema.json"))}
 
 LIGHTS = {"lights": [{"type": "sphere", "centre": [1, 0, 3], "radius": 0.5, "radiance": [3, 2, 1]}]}
+# A map this small, asked at one size.
+SCENE = {"schema": "glint-plan scene 1", "lights": [{"type": "environment", "band_limit_deg": 60}],
+         "materials": [{"map": "n.png", "footprints": {"smallest_texels": 4, "largest_texels": 4}, "sigma_r": 0.1, "tolerance": 9}]}
 QUERIES = {"half.csv": "u,v,sigma,hx,hy\n.3,.3,4,0,0\n.1,.2,5,.1,0\n", "displaced.csv": "u,v,level,hx,hy\n.3,.3,0,0,0\n"}
 ASSETS = ("normals", "smooth", "heights", "flat", "damaged", "pyramid", "cp", "tucker", "pca", "bins", "range", "sat", "moments", "tiny", "wang", "wave", "lobes", "zonal", "light",
           "displaced", "rough", "colored")
@@ -59,6 +62,9 @@ MAKE = [
     "bench normals.glint -o bench.json --quick --only moments,histograms",
     "bench --stability -o stability.json --quick --only one-direction",
     "bench --preset xing2024 -o paper.json --quick",
+    "plan scene.json -o plan.json",
+    "plan scene.json --explain",
+    "plan --check plan.json --sweep",
     "displace heights.glint -o displaced.glint --factors 4,16 --angular 3 --spatial 2",
     "displace heights.glint -o rough.glint --base ggx:.3:1,2 --factor 8 --angular 3 --spatial 2",
     "displace heights.glint -o colored.glint --base-color n.png --factor 8 --angular 3 --spatial 2",
@@ -100,6 +106,7 @@ def documents(tmp_path_factory):
     """[(schema, command, document)] of every command, and of the lines of progress."""
     folder = tmp_path_factory.mktemp("json")
     (folder / "lights.json").write_text(json.dumps(LIGHTS))
+    (folder / "scene.json").write_text(json.dumps(SCENE))
     for name, text in QUERIES.items():
         (folder / name).write_text(text)
     found = []

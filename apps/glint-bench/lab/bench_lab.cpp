@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "glint-bench/child_process.h"
+#include "measure/child_process.h"
 #include "glint/bake/common/slopes.h"
 #include "glint/bake/ingest/normal_bounds.h"
 #include "glint/formats/asset_writer.h"

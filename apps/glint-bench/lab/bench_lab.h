@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/tool.h"
-#include "glint-bench/asset_folder.h"
-#include "glint-bench/candidates.h"
+#include "measure/asset_folder.h"
+#include "measure/candidates.h"
 #include "glint/api/any_ndf.h"
 #include "glint/bake/ingest/ingest.h"
 #include "glint/bake/synth/synth.h"

@@ -5,10 +5,10 @@
 #include <numbers>
 
 #include "common/ndf_image.h"
-#include "glint-bench/bench_times.h"
+#include "measure/bench_times.h"
 #include "glint-bench/lab/ndf_figures.h"
 #include "glint-bench/presets/preset.h"
-#include "glint-bench/workload.h"
+#include "measure/workload.h"
 #include "glint/model/bin_map.h"
 
 namespace glint::apps {

@@ -2,10 +2,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "glint-bench/bench_times.h"
+#include "measure/bench_times.h"
 #include "glint-bench/lab/ndf_figures.h"
 #include "glint-bench/presets/preset.h"
-#include "glint-bench/workload.h"
+#include "measure/workload.h"
 
 namespace glint::apps {
 namespace {

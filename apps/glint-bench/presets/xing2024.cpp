@@ -2,9 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "glint-bench/bench_times.h"
+#include "measure/bench_times.h"
 #include "glint-bench/presets/preset.h"
-#include "glint-bench/workload.h"
+#include "measure/workload.h"
 #include "glint/model/tiny_example.h"
 
 namespace glint::apps {

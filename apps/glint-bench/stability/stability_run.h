@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/tool.h"
-#include "glint-bench/asset_folder.h"
+#include "measure/asset_folder.h"
 
 namespace glint::apps {
 

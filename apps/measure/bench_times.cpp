@@ -1,4 +1,4 @@
-#include "glint-bench/bench_times.h"
+#include "measure/bench_times.h"
 
 #include <algorithm>
 #include <array>
@@ -102,6 +102,14 @@ nlohmann::json benchTimes(const api::OpenedNdf& ndf, std::span<const BenchQuery>
       ndf.model());
   times["density"]["batch"] = batchTime(ndf, queries, longest_s);
   return times;
+}
+
+double densityTime(const api::OpenedNdf& ndf, std::span<const BenchQuery> queries, double longest_s) {
+  const auto time = [&](const auto& model) {
+    return timeOf(queries.size(), longest_s,
+                  [&](std::size_t k) { keep(model.density(queries[k].footprint, queries[k].half)); });
+  };
+  return std::visit(time, ndf.model())["ns"].template get<double>();
 }
 
 nlohmann::json plainLobeTime(std::span<const BenchQuery> queries) {

@@ -1,4 +1,4 @@
-#include "glint-bench/child_process.h"
+#include "measure/child_process.h"
 
 #include <fcntl.h>
 #include <poll.h>

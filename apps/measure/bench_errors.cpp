@@ -1,4 +1,4 @@
-#include "glint-bench/bench_errors.h"
+#include "measure/bench_errors.h"
 
 #include <tbb/parallel_for.h>
 
@@ -10,6 +10,7 @@
 #include "glint/bake/common/image_errors.h"
 #include "glint/bake/common/reference_image.h"
 #include "glint/bake/common/seen_error.h"
+#include "measure/light_blur.h"
 
 namespace glint::apps {
 namespace {
@@ -22,9 +23,11 @@ bool answersAsAsked(const api::FootprintShapes& shapes, FootprintShape shape) {
 
 }  // namespace
 
-SetTruth::SetTruth(const NormalMap& map, const FootprintSet& set) : set_(&set), images_(set.footprints.size()) {
+SetTruth::SetTruth(const NormalMap& map, const FootprintSet& set, float sigma_r, double light_deg)
+    : set_(&set), light_deg_(light_deg), images_(set.footprints.size()) {
   tbb::parallel_for(std::size_t{0}, images_.size(), [&](std::size_t k) {
-    images_[k] = bake::referenceImage(map, kBenchSigmaR, Surface::flat, Boundary::wrap, set.footprints[k], kResolution);
+    images_[k] = bake::referenceImage(map, sigma_r, Surface::flat, Boundary::wrap, set.footprints[k], kResolution);
+    blurByLight(images_[k], kResolution, light_deg);
   });
 }
 
@@ -36,6 +39,7 @@ nlohmann::json SetTruth::errorsOf(const api::OpenedNdf& ndf, double budget_s, st
   std::size_t places = 0;
   while (places < set_->places) {
     std::vector<float> image = ndfImage(ndf.model(), set_->footprints[places], kResolution);
+    blurByLight(image, kResolution, light_deg_);
     seen.add(image.data(), images_[places].data());
     const bake::ImageErrors errors = bake::imageErrors(image, images_[places], kResolution);
     sums.rel_l2 += errors.rel_l2, sums.tv += errors.tv, sums.energy += errors.energy;

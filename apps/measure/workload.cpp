@@ -1,4 +1,4 @@
-#include "glint-bench/workload.h"
+#include "measure/workload.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "glint-bench/candidates.h"
+#include "measure/candidates.h"
 
 #include <algorithm>
 

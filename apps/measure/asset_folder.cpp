@@ -1,4 +1,4 @@
-#include "glint-bench/asset_folder.h"
+#include "measure/asset_folder.h"
 
 #include <algorithm>
 #include <filesystem>

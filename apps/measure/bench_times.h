@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "glint-bench/workload.h"
 #include "glint/api/any_ndf.h"
+#include "measure/workload.h"
 
 namespace glint::apps {
 
@@ -22,6 +22,10 @@ struct SizedQueries {
 /// @param longest_s  after which a run of slow questions ends
 nlohmann::json benchTimes(const api::OpenedNdf& ndf, std::span<const BenchQuery> queries, std::span<const SizedQueries> sizes,
                           double longest_s);
+
+/// Nanoseconds of a density, on one thread: the median of five runs over all questions.
+/// @param longest_s  after which a run of slow questions ends
+double densityTime(const api::OpenedNdf& ndf, std::span<const BenchQuery> queries, double longest_s);
 
 /// Nanoseconds of a plain microfacet lobe (anisotropic GGX), for comparison in the same run: {ns, spread}.
 nlohmann::json plainLobeTime(std::span<const BenchQuery> queries);

@@ -3,8 +3,8 @@
 #include <nlohmann/json_fwd.hpp>
 #include <vector>
 
-#include "glint-bench/workload.h"
 #include "glint/api/any_ndf.h"
+#include "measure/workload.h"
 
 namespace glint::apps {
 
@@ -14,7 +14,9 @@ class SetTruth {
   /// Pixels of an image along each axis.
   static constexpr int kResolution = 128;
 
-  SetTruth(const NormalMap& map, const FootprintSet& set);
+  /// @param sigma_r    intrinsic roughness of the facets, disk units
+  /// @param light_deg  angular diameter of the light under which errors are seen, degrees: images are blurred by it
+  SetTruth(const NormalMap& map, const FootprintSet& set, float sigma_r = kBenchSigmaR, double light_deg = 0);
 
   const FootprintSet& set() const { return *set_; }
 
@@ -28,6 +30,7 @@ class SetTruth {
 
  private:
   const FootprintSet* set_;
+  double light_deg_;
   std::vector<std::vector<float>> images_;
 };
 

@@ -1,0 +1,51 @@
+#include "glint-plan/asset_maker.h"
+
+#include <filesystem>
+
+#include "glint-plan/plan_candidates.h"
+#include "measure/child_process.h"
+
+namespace glint::apps {
+
+AssetMaker::AssetMaker(Tool& tool, const AssetFolder& folder, std::string hash, std::string label, std::string path,
+                       std::vector<Candidate> all, float sigma_r)
+    : tool_(tool),
+      folder_(folder),
+      hash_(std::move(hash)),
+      label_(std::move(label)),
+      path_(std::move(path)),
+      all_(std::move(all)),
+      sigma_r_(sigma_r) {}
+
+const MadeAsset& AssetMaker::make(const Candidate& candidate) {
+  const std::string name = candidate.name();
+  if (const auto made = made_.find(name); made != made_.end()) return made->second;
+  const auto bytesOf = [](const std::string& file) { return static_cast<double>(std::filesystem::file_size(file)); };
+  if (candidate.tool.empty()) return made_[name] = {path_, bytesOf(path_), 0};
+  if (const auto failed = failed_.find(name); failed != failed_.end())
+    throw Error(ErrorCode::failed, "plan.candidate", "", "", failed->second);
+  const Candidate* source = sourceOf(all_, candidate);
+  const MadeAsset input = source != nullptr ? make(*source) : MadeAsset{path_, 0, 0};
+  MadeAsset made;
+  made.file = folder_.fileOf(hash_, label_ + " " + name);
+  std::vector<std::string> words = {candidate.tool, input.file, "-o", made.file};
+  words.insert(words.end(), candidate.flags.begin(), candidate.flags.end());
+  words.insert(words.end(), {"--force", "--quiet", "--threads", std::to_string(tool_.threads())});
+  const ChildRun run = runProgram(words);
+  if (run.exit_code != 0) {
+    failed_[name] = run.message;
+    throw Error(ErrorCode::failed, "plan.candidate", "", "", run.message);
+  }
+  made.bytes = bytesOf(made.file);
+  made.seconds = input.seconds + run.wall_s;
+  return made_[name] = made;
+}
+
+api::OpenedNdf AssetMaker::open(const Candidate& candidate) {
+  api::NdfOptions options;
+  options.sigma_r = sigma_r_;
+  if (candidate.takes_normals) options.normals = path_;
+  return api::OpenedNdf::open(make(candidate).file, options);
+}
+
+}  // namespace glint::apps

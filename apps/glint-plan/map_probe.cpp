@@ -1,0 +1,161 @@
+#include "glint-plan/map_probe.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "glint-plan/plan_candidates.h"
+#include "glint-plan/probe_map.h"
+#include "glint/bake/common/slopes.h"
+#include "glint/bake/ingest/ingest.h"
+#include "glint/bake/ingest/normal_bounds.h"
+#include "glint/formats/asset_writer.h"
+#include "measure/bench_times.h"
+
+namespace glint::apps {
+namespace {
+
+constexpr int kVersion = 1;  // of the way in which probes measure: other versions' measurements are not used
+constexpr int kSizes = 4, kPlaces = 6, kTruths = 24, kQueries = 512;
+constexpr double kErrorBudget_s = 0.3, kLongestTime_s = 0.004;
+
+/// Texels along an axis of a probe; 0: the map is no larger.
+int edgeOf(const MapQuestion& question, const NormalMap& map) {
+  constexpr int kUsual = 512, kLeast = 256;
+  constexpr double kFootprintsAcross = 8, kStridesAcross = 24;  // images of fine pyramids take long
+  const double stride = question.footprints.smallest / kLevelSigma;
+  int edge = std::clamp(16 * static_cast<int>(kStridesAcross * stride / 16), kLeast, kUsual);
+  const double wide = kFootprintsAcross * std::min(question.footprints.smallest, 1e4);
+  edge = std::max(edge, static_cast<int>(std::bit_ceil(static_cast<unsigned>(wide))));
+  return 2 * edge <= std::min(map.width, map.height) ? edge : 0;
+}
+
+/// A constant and a share for each texel, from two measurements: y1 at n1 texels, y2 at more.
+double extrapolated(double texels, double n1, double y1, double n2, double y2) {
+  const double each = std::max(0.0, (y2 - y1) / (n2 - n1)), constant = y2 - each * n2;
+  return constant < 0 ? y2 * texels / n2 : constant + each * texels;
+}
+
+}  // namespace
+
+/// A probe: a map, its assets and the exact images of its questions.
+struct MapProbe::Part {
+  std::optional<formats::Asset> asset;
+  std::optional<AssetMaker> maker;
+  std::vector<FootprintSet> sets;
+  std::list<SetTruth> truths;
+};
+
+MapProbe::MapProbe(Tool& tool, const AssetFolder& folder, const PlanMap& map, const MapQuestion& question, ProbeCache& cache)
+    : tool_(tool), folder_(folder), map_(map), question_(question), cache_(cache) {
+  const NormalMap& normals = map_.normals();
+  all_ = planCandidates(question_, normals.width, normals.height);
+  edge_ = edgeOf(question_, normals);
+  constexpr double kFootprintsAcross = 8;  // larger footprints would be most of the probe
+  const double across = edge_ > 0 ? edge_ : std::min(normals.width, normals.height);
+  sizes_ = question_.sizes(kSizes, std::max(question_.footprints.smallest, across / kFootprintsAcross));
+}
+
+MapProbe::~MapProbe() = default;
+
+double MapProbe::edgeTexels(bool large) const {
+  const double edge = large ? edge_ : edge_ / 2;
+  return edge * edge;
+}
+
+MapProbe::Part& MapProbe::part(bool large) {
+  std::unique_ptr<Part>& part = large ? large_ : small_;
+  if (part) return *part;
+  part = std::make_unique<Part>();
+  std::string path = map_.path, label = "whole " + question_.key();
+  std::vector<Candidate> all = all_;
+  if (edge_ > 0) {
+    const int edge = large ? edge_ : edge_ / 2;
+    const ProbeMap probe = probeMap(map_.normals(), edge, tool_.seed());
+    NormalMap made;
+    made.width = probe.width, made.height = probe.height, made.normals = probe.normals;
+    made.slopes = bake::describeNormals(probe.width, probe.height, probe.normals).slopes;
+    const auto bounds = bake::buildNormalBounds(made.width, made.height, made.normals);
+    bake::attachBounds(made, bounds);
+    label = fmt::format("probe {} {}", edge, question_.key());
+    path = folder_.fileOf(map_.hash, label);
+    formats::writeAsset(path, made, tool_.provenance(), {true});
+    all = planCandidates(question_, edge, edge);
+  }
+  part->asset = formats::Asset::open(path);
+  part->maker.emplace(tool_, folder_, map_.hash, label, path, std::move(all), question_.sigma_r);
+  return *part;
+}
+
+template <class Measure>
+double MapProbe::kept(const std::string& key, const Measure& measure) {
+  const std::string whole =
+      fmt::format("{} {}, seed {}, probe {}: {}: {}", tool_.generator(), kVersion, tool_.seed(), edge_, question_.key(), key);
+  if (const std::optional<double> known = cache_.find(whole)) return *known;
+  const double value = measure();
+  cache_.put(whole, value);
+  return value;
+}
+
+Costs MapProbe::costsOf(bool large, std::size_t candidate) {
+  const std::string key = fmt::format("{} {} ", large ? "large" : "small", all_[candidate].name());
+  const auto made = [&]() -> const MadeAsset& { return part(large).maker->make(part(large).maker->all()[candidate]); };
+  Costs costs;
+  costs.bytes = kept(key + "bytes", [&] { return made().bytes; });
+  costs.preparation_s = kept(key + "preparation_s", [&] { return made().seconds; });
+  costs.query_ns = kept(key + "query_ns", [&] {
+    Part& asked = part(large);
+    const auto queries = benchQueries(asked.asset->get<NormalMap>(), tool_.seed(), kQueries, sizes_);
+    return densityTime(asked.maker->open(asked.maker->all()[candidate]), queries, kLongestTime_s);
+  });
+  return costs;
+}
+
+Costs MapProbe::costs(std::size_t candidate) {
+  Costs costs = costsOf(true, candidate);
+  if (edge_ > 0) {
+    const Costs other = costsOf(false, candidate);
+    const double texels = static_cast<double>(map_.normals().normals.size());
+    const double n1 = edgeTexels(false), n2 = edgeTexels(true);
+    // Each factor of four in size adds as much as the last: misses of the caches.
+    constexpr double kMostSlower = 3;
+    const double slower = std::max(0.0, costs.query_ns - other.query_ns) * std::log2(texels / n2) / 2;
+    costs.query_ns = std::min(costs.query_ns + slower, kMostSlower * costs.query_ns);
+    costs.bytes = extrapolated(texels, n1, other.bytes, n2, costs.bytes);
+    costs.preparation_s = extrapolated(texels, n1, other.preparation_s, n2, costs.preparation_s);
+  }
+  if (all_[candidate].tool.empty()) costs.bytes = map_.bytes;
+  if (all_[candidate].takes_normals) costs.bytes += map_.bytes;
+  costs.preparation_s += map_.ingest_s;
+  return costs;
+}
+
+double MapProbe::seenOf(std::size_t candidate, std::size_t size) {
+  const std::string key = fmt::format("{} seen at {:.6g}", all_[candidate].name(), sizes_[size]);
+  return kept(key, [&] {
+    Part& asked = part(true);
+    if (asked.sets.empty()) asked.sets = questionSets(tool_.seed(), sizes_, kPlaces, kTruths);
+    while (asked.truths.size() <= size) {
+      asked.truths.emplace_back(asked.asset->get<NormalMap>(), asked.sets[asked.truths.size()], question_.sigma_r,
+                                question_.light_deg);
+    }
+    std::vector<float> first;
+    const api::OpenedNdf ndf = asked.maker->open(asked.maker->all()[candidate]);
+    return std::next(asked.truths.begin(), static_cast<std::ptrdiff_t>(size))
+        ->errorsOf(ndf, kErrorBudget_s, first)["seen"]
+        .get<double>();
+  });
+}
+
+double MapProbe::seen(std::size_t candidate, double enough) {
+  if (all_[candidate].tool.empty()) return 0;  // the texels themselves
+  double largest = 0;
+  for (std::size_t size = 0; size < sizes_.size() && largest <= enough; ++size)
+    largest = std::max(largest, seenOf(candidate, size));
+  return largest;
+}
+
+}  // namespace glint::apps

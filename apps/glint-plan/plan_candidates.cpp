@@ -1,0 +1,111 @@
+#include "glint-plan/plan_candidates.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "measure/light_blur.h"
+
+namespace glint::apps {
+namespace {
+
+/// First level of moments that answers a footprint as it is: level 1 does from 1.2 texels on, and each level from twice as many.
+int finestMoments(double smallest, int width, int height) {
+  constexpr double kSmallestOfLevel1 = 1.2;
+  const int last = static_cast<int>(std::log2(std::min(width, height)));
+  const double level = std::floor(std::log2(std::max(smallest, kSmallestOfLevel1 / 2) / kSmallestOfLevel1)) + 1;
+  return std::clamp(static_cast<int>(level), 0, last);
+}
+
+/// Whole texels between images such that level 0 answers the smallest footprint.
+int strideOf(double smallest, int width, int height) {
+  constexpr double kSmallestOverLevel = 1.2;  // of sizes that level 0 answers
+  const int most = std::max(2, std::min(width, height) / 4);
+  return std::clamp(static_cast<int>(smallest / (kSmallestOverLevel * kLevelSigma)), 2, most);
+}
+
+/// Levels whose images are as large as the largest footprint needs.
+int levelsOf(double largest, int stride, int width, int height) {
+  constexpr double kLargestOverLevel = 1.9;  // of sizes that a level answers without the next
+  const int most = std::max(1, 1 + static_cast<int>(std::log2(std::min(width, height) / static_cast<double>(stride))));
+  const double needed = std::ceil(std::log2(largest / (kLargestOverLevel * kLevelSigma * stride))) + 1;
+  return std::clamp(static_cast<int>(needed), 1, most);
+}
+
+/// Pixels of images along each axis: 256, and fewer where the facets or the light are so wide that fewer may do.
+std::vector<int> resolutionsOf(const MapQuestion& question) {
+  constexpr int kUsual = 256, kFewest = 32, kBlock = 16;
+  constexpr double kPixelsOfSigma = 1.5, kPixelsOfLight = 2;
+  const double pixels = std::min(2 * kPixelsOfSigma / double{question.sigma_r},
+                                 2 * kPixelsOfLight / std::max(halfVectorsOfLight(question.light_deg), 1e-9));
+  const int fewest = static_cast<int>(std::clamp(kBlock * std::ceil(pixels / kBlock), double{kFewest}, double{kUsual}));
+  std::vector<int> resolutions;
+  for (int resolution = fewest; resolution < kUsual; resolution *= 2) resolutions.push_back(resolution);
+  resolutions.push_back(kUsual);
+  return resolutions;
+}
+
+void addPyramids(const MapQuestion& question, int width, int height, std::vector<Candidate>& all) {
+  const int stride = strideOf(question.footprints.smallest, width, height);
+  const bool needs_texels = question.footprints.smallest < kLevelSigma * stride;
+  const std::string levels = std::to_string(levelsOf(question.footprints.largest, stride, width, height));
+  for (const int pixels : resolutionsOf(question)) {
+    const std::string resolution = std::to_string(pixels);
+    const std::string images = fmt::format("stride {}, {} pixels", stride, resolution);
+    const Candidate pyramid = {"pyramid",
+                               images,
+                               "glint-pyramid",
+                               {"--stride", std::to_string(stride), "--levels", levels, "--resolution", resolution, "--sigma-r",
+                                fmt::format("{:.9g}", question.sigma_r)},
+                               "",
+                               needs_texels};
+    all.push_back(pyramid);
+    const auto compressed = [&](const char* method, const char* option, const char* value) {
+      all.push_back({method,
+                     fmt::format("{} {} of {}", option + 2, value, images),
+                     "glint-compress",
+                     {"--method", method, option, value},
+                     pyramid.name(),
+                     needs_texels});
+    };
+    for (const char* tolerance : {"0.4", "0.2", "0.1", "0.05"}) compressed("tucker", "--tolerance", tolerance);
+    for (const char* tolerance : {"0.4", "0.2", "0.1", "0.05"}) compressed("pca", "--tolerance", tolerance);
+    for (const char* rank : {"16", "32"}) compressed("cp", "--rank", rank);
+  }
+}
+
+}  // namespace
+
+std::vector<Candidate> planCandidates(const MapQuestion& question, int width, int height) {
+  std::vector<Candidate> all = {{"brute force", "", "", {}, "", false}};
+  const int finest = finestMoments(question.footprints.smallest, width, height);
+  all.push_back(
+      {"moments", fmt::format("finest level {}", finest), "glint-moments", {"--finest", std::to_string(finest)}, "", false});
+  all.push_back({"bin map",
+                 "",
+                 "glint-binmap",
+                 {"--alpha", fmt::format("{:.9g}", std::numbers::sqrt2_v<float> * question.sigma_r)},
+                 "",
+                 false});
+  for (const auto& [bins, text] : {std::pair{"9x32", "9 x 32 bins"}, std::pair{"18x64", "18 x 64 bins"}}) {
+    for (const char* stride : {"8", "32"})
+      all.push_back({"histograms",
+                     fmt::format("{}, stride {}", text, stride),
+                     "glint-sat",
+                     {"--bins", bins, "--stride", stride},
+                     "",
+                     false});
+  }
+  addPyramids(question, width, height, all);
+  return all;
+}
+
+const Candidate* sourceOf(const std::vector<Candidate>& all, const Candidate& candidate) {
+  if (candidate.source.empty()) return nullptr;
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Candidate& c) { return c.name() == candidate.source; });
+  return found == all.end() ? nullptr : &*found;
+}
+
+}  // namespace glint::apps

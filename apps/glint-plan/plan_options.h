@@ -1,0 +1,36 @@
+#pragma once
+
+#include <string>
+
+#include "common/tool.h"
+
+namespace glint::apps {
+
+/// The command line of glint-plan.
+class PlanOptions {
+ public:
+  explicit PlanOptions(Tool& tool);
+
+  const std::string& scene() const { return scene_; }
+  const std::string& check() const { return check_; }
+  const std::string& output() const { return output_; }
+  const std::string& rules() const { return rules_; }
+  const std::string& cache() const { return cache_; }
+  bool explains() const { return explain_; }
+  bool sweeps() const { return sweep_; }
+  /// The folder of maps: the one that was given, or else this one.
+  std::string maps(const std::string& other) const { return maps_.empty() ? other : maps_; }
+  /// The folder for assets, which is removed unless it was given.
+  const std::string& assets() const { return assets_; }
+  bool removesAssets() const { return !assets_option_->given(); }
+
+ private:
+  void checkFiles();
+
+  Tool& tool_;
+  std::string scene_, check_, output_, rules_, cache_, maps_, assets_;
+  bool explain_ = false, sweep_ = false;
+  Option* assets_option_ = nullptr;
+};
+
+}  // namespace glint::apps

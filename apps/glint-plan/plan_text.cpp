@@ -1,0 +1,141 @@
+#include "glint-plan/plan_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "glint-plan/plan_candidates.h"
+
+namespace glint::apps {
+namespace {
+
+std::string goalText(Goal goal) {
+  if (goal == Goal::bytes) return "the fewest bytes";
+  return goal == Goal::query_ns ? "the quickest density" : "the shortest preparation";
+}
+
+std::string budgetText(const Budgets& budgets) {
+  std::string text;
+  const auto add = [&](const std::string& part) { text += (text.empty() ? "" : ", ") + part; };
+  if (budgets.bytes) add(sizeText(*budgets.bytes));
+  if (budgets.preparation_s) add(fmt::format("{:g} s to prepare", *budgets.preparation_s));
+  if (budgets.query_ns) add(fmt::format("{:g} ns for a density", *budgets.query_ns));
+  return text.empty() ? "no limit" : "at most " + text;
+}
+
+std::string lightText(const SceneLight& light) {
+  if (light.type == "environment")
+    return fmt::format("an environment that changes over {:g} degrees and more", light.smooth_deg);
+  if (!(light.smooth_deg > 0)) return fmt::format("a {} light, which is sharp", light.type);
+  return fmt::format("a {} light {:g} degrees wide", light.type, light.smooth_deg);
+}
+
+/// The value of a flag of a candidate; empty if it has none.
+std::string flagOf(const Candidate& candidate, const std::string& name) {
+  const auto found = std::find(candidate.flags.begin(), candidate.flags.end(), name);
+  return found == candidate.flags.end() ? "" : *(found + 1);
+}
+
+const Candidate* pyramidOf(const MaterialPlan& plan) {
+  const PlanOption& choice = plan.choice();
+  if (choice.candidate.tool == "glint-pyramid") return &choice.candidate;
+  for (const PlanOption& option : plan.options)
+    if (option.candidate.name() == choice.candidate.source) return &option.candidate;
+  return nullptr;
+}
+
+}  // namespace
+
+std::string sceneText(const Scene& scene, const std::vector<MapQuestion>& questions) {
+  std::string text =
+      fmt::format("The plan takes {}, with {} for the scene.\n", goalText(scene.goal), budgetText(scene.budgets));
+  if (const auto& c = scene.camera) {
+    text += fmt::format(
+        "The camera sees {:g} degrees in {} columns, from {:g} to {:g} units away (a unit is {:g} m), with {} sample{} of a "
+        "pixel.\n",
+        c->field_of_view_deg, c->columns, c->nearest, c->farthest, scene.unit_m, c->samples, c->samples == 1 ? "" : "s");
+  }
+  for (const SceneLight& light : scene.lights) text += "Light: " + lightText(light) + ".\n";
+  text += "Errors are seen under " + lightText(scene.sharpest()) + ".\n";
+  for (std::size_t k = 0; k < scene.materials.size(); ++k) {
+    const SceneMaterial& material = scene.materials[k];
+    text += fmt::format(
+        "{} is {}: footprints of {:.3g} to {:.3g} texels{}, facets blurred by {:g}, a seen error of at most {:g}, {} for it.\n",
+        material.name, material.map, questions[k].footprints.smallest, questions[k].footprints.largest,
+        material.footprints ? "" : " from the camera", material.sigma_r, material.tolerance, budgetText(material.budgets));
+  }
+  return text;
+}
+
+std::vector<std::string> reasonsOf(const Scene& scene, const MaterialPlan& plan) {
+  const PlanOption& choice = plan.choice();
+  std::vector<std::string> reasons;
+  const auto compared = std::count_if(plan.options.begin(), plan.options.end(), [](const PlanOption& o) { return o.costed; });
+  if (choice.candidate.tool.empty()) {
+    reasons.push_back("The texels themselves have no error.");
+  } else {
+    reasons.push_back(fmt::format("Its seen error is {:.2g}; the tolerance is {:g}, of which a plan uses {:g}.", choice.seen,
+                                  plan.material->tolerance, kSafeShare * plan.material->tolerance));
+  }
+  reasons.push_back(fmt::format("Of {} candidates that were measured it has {} within the tolerance and the budgets.", compared,
+                                goalText(scene.goal)));
+  // Cheaper candidates of other methods that do not do.
+  std::vector<std::string> methods = {choice.candidate.method};
+  for (std::size_t k = 0; k < plan.options.size(); ++k) {
+    const PlanOption& option = plan.options[k];
+    const bool named = std::find(methods.begin(), methods.end(), option.candidate.method) != methods.end();
+    if (k >= plan.chosen || named || !option.costed || option.seen < 0) continue;
+    methods.push_back(option.candidate.method);
+    reasons.push_back(fmt::format("{} would be cheaper, but its seen error is {}{:.2g}.", option.candidate.name(),
+                                  option.at_least ? "at least " : "", option.seen));
+  }
+  for (std::size_t k = 0; k < plan.chosen; ++k) {
+    const PlanOption& option = plan.options[k];
+    const bool named = std::find(methods.begin(), methods.end(), option.candidate.method) != methods.end();
+    if (named || !option.costed) continue;
+    methods.push_back(option.candidate.method);
+    reasons.push_back(fmt::format("{} would be over a budget: {}, {:.2g} s to prepare, {:.2g} ns for a density.",
+                                  option.candidate.name(), sizeText(option.costs.bytes), option.costs.preparation_s,
+                                  option.costs.query_ns));
+  }
+  return reasons;
+}
+
+std::vector<std::string> leftOutOf(const Scene& scene, const MaterialPlan& plan) {
+  std::vector<std::string> out;
+  const Candidate& chosen = plan.choice().candidate;
+  const FootprintRange& range = plan.question.footprints;
+  if (const std::string finest = flagOf(chosen, "--finest"); !finest.empty() && finest != "0") {
+    out.push_back(
+        fmt::format("Levels of moments before level {}: no footprint is smaller than {:.3g} texels.", finest, range.smallest));
+  }
+  const Candidate* pyramid = pyramidOf(plan);
+  if (pyramid == nullptr) return out;
+  out.push_back(fmt::format("Levels finer than a stride of {} texels: no footprint is smaller than {:.3g} texels.",
+                            flagOf(*pyramid, "--stride"), range.smallest));
+  out.push_back(
+      fmt::format("Levels after the first {}, but for the mean of the map: no footprint is larger than {:.3g} texels.",
+                  flagOf(*pyramid, "--levels"), range.largest));
+  if (!chosen.takes_normals)
+    out.push_back("The map itself at run time: no footprint is so small that single texels answer it.");
+  if (flagOf(*pyramid, "--resolution") != "256") {
+    out.push_back(fmt::format("Images of more than {} pixels: facets are blurred by {:g}, and the sharpest is {}.",
+                              flagOf(*pyramid, "--resolution"), plan.material->sigma_r, lightText(scene.sharpest())));
+  }
+  return out;
+}
+
+std::string planText(const Scene& scene, const std::vector<MaterialPlan>& plans) {
+  std::string text;
+  for (const MaterialPlan& plan : plans) {
+    const PlanOption& choice = plan.choice();
+    text += fmt::format("{}: {}; seen error {:.2g} of at most {:g}, {}, {:.2g} s to prepare, {:.3g} ns for a density\n",
+                        plan.material->name, choice.candidate.name(), choice.seen, plan.material->tolerance,
+                        sizeText(choice.costs.bytes), choice.costs.preparation_s, choice.costs.query_ns);
+    for (const std::string& reason : reasonsOf(scene, plan)) text += "  " + reason + "\n";
+    for (const std::string& part : leftOutOf(scene, plan)) text += "  Left out. " + part + "\n";
+  }
+  return text;
+}
+
+}  // namespace glint::apps

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/tool.h"
+#include "glint-plan/map_probe.h"
+
+namespace glint::apps {
+
+/// Share of a tolerance that a predicted error may reach: places that were not probed err differently.
+inline constexpr double kSafeShare = 0.9;
+
+/// A candidate of a material, as predicted.
+struct PlanOption {
+  Candidate candidate;
+  Costs costs;
+  double seen = -1;       ///< below 0: not measured, because a cheaper one was good enough
+  bool at_least = false;  ///< the error is `seen` or more
+  bool costed = false;    ///< whether the costs are known
+  std::string failure;    ///< why it was not measured; may be empty
+  double cost(Goal goal) const;
+};
+
+/// A material's part of a plan.
+struct MaterialPlan {
+  const SceneMaterial* material = nullptr;
+  MapQuestion question;
+  PlanMap map;
+  int probe_edge = 0;               ///< texels; 0: the whole map was probed
+  std::vector<PlanOption> options;  ///< cheapest first
+  std::size_t chosen = 0;
+  double probe_s = 0;  ///< time of the probe
+
+  const PlanOption& choice() const { return options[chosen]; }
+};
+
+/// Plans the materials of a scene.
+class Planner {
+ public:
+  Planner(Tool& tool, const AssetFolder& folder, const Scene& scene, std::string maps, std::string cache);
+  ~Planner();
+
+  /// The cheapest candidates that meet the tolerances within the budgets.
+  /// @throws Error failed if there are none: names the budget, and says what would meet it
+  std::vector<MaterialPlan> plan();
+
+ private:
+  struct Work;
+  void open(const SceneMaterial& material);
+  void prepare(Work& work);
+  /// Sets the choice, if an option is good enough.
+  bool choose(Work& work);
+  /// Measures what is compressed from the pyramid, each method from coarse to fine until it is good enough.
+  /// @param all  also when it costs more than the choice so far
+  void measureCompressed(Work& work, bool all);
+  bool cost(Work& work, PlanOption& option);
+  bool meets(Work& work, PlanOption& option);
+  bool affordable(const Work& work, const PlanOption& option) const;
+  [[noreturn]] void refuse(Work& work);
+  void fitTotals();
+
+  Tool& tool_;
+  const AssetFolder& folder_;
+  const Scene& scene_;
+  std::string maps_, cache_;
+  std::vector<std::unique_ptr<Work>> works_;
+};
+
+/// The question that a scene asks of a material's map.
+MapQuestion questionOf(const Scene& scene, const SceneMaterial& material, const NormalMap& map);
+
+}  // namespace glint::apps

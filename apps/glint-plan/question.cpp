@@ -1,0 +1,40 @@
+#include "glint-plan/question.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "glint/bake/common/counter_random.h"
+
+namespace glint::apps {
+
+std::vector<float> MapQuestion::sizes(int most, double cap) const {
+  constexpr double kSame = 1.05;  // sizes that answers do not tell apart
+  const double low = std::min(footprints.smallest, cap), high = std::min(footprints.largest, cap);
+  if (high <= kSame * low) return {static_cast<float>(low)};
+  const int count = std::clamp(static_cast<int>(std::ceil(std::log2(high / low))) + 1, 2, most);
+  std::vector<float> sizes;
+  for (int k = 0; k < count; ++k) sizes.push_back(static_cast<float>(low * std::pow(high / low, double(k) / (count - 1))));
+  return sizes;
+}
+
+std::string MapQuestion::key() const {
+  return fmt::format("{:.6g}..{:.6g} texels, sigma_r {:.6g}, light {:.6g} deg", footprints.smallest, footprints.largest,
+                     sigma_r, light_deg);
+}
+
+std::vector<FootprintSet> questionSets(std::uint64_t seed, const std::vector<float>& sizes, int places, int truths) {
+  constexpr std::uint64_t kStream = 3000;
+  std::vector<FootprintSet> sets;
+  for (std::size_t s = 0; s < sizes.size(); ++s) {
+    FootprintSet set{FootprintShape::round, sizes[s], {}, static_cast<std::size_t>(places)};
+    for (int k = 0; k < truths; ++k)
+      set.footprints.push_back(
+          Footprint::isotropic(bake::randomPair(seed, kStream + s, static_cast<std::uint64_t>(k)), sizes[s]));
+    sets.push_back(std::move(set));
+  }
+  return sets;
+}
+
+}  // namespace glint::apps

@@ -1,0 +1,184 @@
+"""glint-plan: the cheapest method for every map of a scene; plans hold; errors name the field of the scene."""
+
+import json
+import pathlib
+import subprocess
+
+import jsonschema
+import pytest
+from conftest import BIN, run_all
+
+ROOT = pathlib.Path(__file__).parents[2]
+SCHEMAS = ROOT / "docs/json/files"
+SAMPLE = ROOT / "data-samples/plan_scene.json"
+POINT = [{"type": "point"}]
+SKY = [{"type": "environment", "band_limit_deg": 40}]
+
+
+def material(name="flakes.png", smallest=8, largest=16, tolerance=0.3, **more):
+    return {"map": name, "footprints": {"smallest_texels": smallest, "largest_texels": largest}, "tolerance": tolerance, **more}
+
+
+def scene(*materials, lights=POINT, **more):
+    return {"schema": "glint-plan scene 1", "lights": lights, "materials": list(materials), **more}
+
+
+def check_schema(document, name):
+    schema = json.loads((SCHEMAS / f"{name}.schema.json").read_text())
+    jsonschema.Draft202012Validator(schema).validate(document)
+
+
+@pytest.fixture
+def plan(glint):
+    """plan(scene, *arguments) -> (process, plan or None), in a folder with small maps."""
+    run_all(glint, "synth flakes --size 128 -o flakes.png --seed 3", "synth isotropic --size 128 -o noise.png --seed 4",
+            "synth brushed --size 128 -o brushed.png --seed 5")
+
+    def run(document, *arguments):
+        (glint.folder / "scene.json").write_text(json.dumps(document))
+        output = glint.folder / "plan.json"
+        output.unlink(missing_ok=True)
+        process = glint("plan", "scene.json", "-o", "plan.json", *arguments)
+        return process, json.loads(output.read_text()) if output.exists() else None
+
+    return run
+
+
+def test_different_questions_have_different_methods(plan):
+    sharp = material("flakes.png", 2, 2, 0.1)
+    wide = material("noise.png", 8, 16, 0.5, sigma_r=0.1)
+    process, point = plan(scene(sharp, lights=POINT))
+    assert process.returncode == 0, process.stderr
+    process, sky = plan(scene(wide, lights=SKY))
+    assert process.returncode == 0, process.stderr
+    methods = point["materials"][0]["asset"]["method"], sky["materials"][0]["asset"]["method"]
+    assert methods[0] in {"brute force", "bin map"}, "flakes of two texels under a point light are asked exactly"
+    assert methods[1] == "moments", "rough noise under a sky is one lobe"
+    check_schema(json.loads((ROOT / SAMPLE).read_text()), "scene")
+    for document in point, sky:
+        check_schema(document, "plan")
+        check_schema(document["scene"], "scene")
+        assert document["materials"][0]["reasons"]
+
+
+def test_plan_holds_and_is_checked(plan, glint):
+    document = scene(material("noise.png", 8, 16, 0.4, sigma_r=0.05), material("brushed.png", 8, 16, 0.4, sigma_r=0.05), lights=SKY)
+    process, made = plan(document)
+    assert process.returncode == 0, process.stderr
+    process = glint("plan", "--check", "plan.json", "--json")
+    assert process.returncode == 0, process.stdout + process.stderr
+    for checked, planned in zip(json.loads(process.stdout)["result"]["materials"], made["materials"]):
+        assert checked["holds"] and checked["asset"] == planned["asset"]["name"]
+        # A map this small is its own probe: bytes are those of the probe but for the flags in the record.
+        assert checked["actual"]["bytes"] == pytest.approx(planned["predicted"]["bytes"], rel=0.02)
+    assert list(glint.folder.glob("*.assets*")) == []
+
+
+def test_a_plan_that_does_not_hold_ends_with_7(plan, glint):
+    _, made = plan(scene(material("flakes.png", 8, 16, 9.9, sigma_r=0.05), lights=SKY))
+    made["scene"]["materials"][0]["tolerance"] = 0.001
+    made["materials"][0]["asset"] = {"name": "moments", "method": "moments", "setting": "", "tool": "glint-moments", "flags": [], "source": "",
+                                     "takes_normals": False}
+    (glint.folder / "plan.json").write_text(json.dumps(made))
+    process = glint("plan", "--check", "plan.json")
+    assert process.returncode == 7
+    assert "NOT met" in process.stdout
+
+
+def test_another_map_than_the_planned_one_is_refused(plan, glint):
+    plan(scene(material("noise.png", 8, 16, 0.5, sigma_r=0.1), lights=SKY))
+    run_all(glint, "synth isotropic --size 128 -o noise.png --seed 9")
+    process = glint("plan", "--check", "plan.json")
+    assert process.returncode == 7
+    assert "is not the map that was planned" in process.stderr
+
+
+def test_rules_build_exactly_the_plan(plan, glint):
+    process, made = plan(scene(material("noise.png", 8, 16, 0.5, sigma_r=0.1), lights=SKY), "--make", "plan.mk")
+    assert process.returncode == 0, process.stderr
+    make = ["make", "-s", "-f", "plan.mk", f"GLINT_BIN={BIN}", f"GLINT_MK={ROOT}/pipelines/glint.mk"]
+    built = subprocess.run(make, cwd=glint.folder, capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr
+    asset = made["materials"][0]["asset"]
+    assert asset["method"] == "moments"
+    assert (glint.folder / "assets/noise.moments.glint").stat().st_size == pytest.approx(made["materials"][0]["predicted"]["bytes"], rel=0.02)
+    info = json.loads(glint("info", "assets/noise.moments.glint", "--json").stdout)
+    assert str(info["result"]["properties"]["finest_level"]) == asset["flags"][asset["flags"].index("--finest") + 1]
+
+
+def test_measurements_are_kept(plan, glint):
+    document = scene(material("noise.png", 8, 16, 0.5, sigma_r=0.1), lights=SKY)
+    _, first = plan(document, "--cache", "probes")
+    kept = list((glint.folder / "probes").iterdir())
+    assert [path.name for path in kept] == [first["materials"][0]["map"]["hash"] + ".probe.json"]
+    values = json.loads(kept[0].read_text())
+    kept[0].write_text(json.dumps({key: 0.25 if " seen at " in key else value for key, value in values.items()}))
+    _, second = plan(document, "--cache", "probes")
+    assert second["materials"][0]["predicted"]["seen"] == 0.25, "the kept measurement is used"
+
+
+def test_explanation_is_in_words(plan, glint):
+    camera = {"nearest": 2, "farthest": 4, "field_of_view_deg": 40, "columns": 1000}
+    (glint.folder / "scene.json").write_text(json.dumps(scene({"map": "noise.png", "texel_size_um": 100, "tolerance": 0.2}, camera=camera)))
+    process = glint("plan", "scene.json", "--explain")
+    assert process.returncode == 0, process.stderr
+    # 0.5 * 2 * 2 m * tan(20 deg) / 1000 / 100 um
+    assert "footprints of 7.28 to 14.6 texels from the camera" in process.stdout
+    assert "a point light, which is sharp" in process.stdout
+
+
+CAMERA = {"nearest": 2, "farthest": 4, "field_of_view_deg": 40, "columns": 1000}
+
+
+@pytest.mark.parametrize("document, field", [
+    (scene(material(tolerance=0)), "materials[0].tolerance"),
+    (scene(material(tolerance="small")), "materials[0].tolerance"),
+    (scene({"map": "flakes.png", "tolerance": 0.1}), "materials[0].footprints"),
+    (scene({"map": "flakes.png", "tolerance": 0.1}, camera=CAMERA), "materials[0].texel_size_um"),
+    (scene({"map": "flakes.png", "tolerance": 0.1, "texel_size_um": 1e6}, camera=CAMERA), "materials[0].texel_size_um"),
+    (scene({"map": "flakes.png", "tolerance": 0.1, "uv_size": 128}, camera=CAMERA), "materials[0].uv_size"),
+    (scene(material(), material("missing.png")), "materials[1].map"),
+    (scene(material(), material()), "materials[1]"),
+    (scene(material(tolerence=0.1)), "materials[0].tolerence"),
+    (scene(material(smallest=9, largest=8)), "materials[0].footprints.largest_texels"),
+    (scene(material(), lights=[]), "lights"),
+    (scene(material(), lights=[{"type": "environment"}]), "lights[0].band_limit_deg"),
+    (scene(material(), camera=CAMERA | {"farthest": 1}), "camera.farthest"),
+    (scene(material(budgets={"bytes": -1})), "materials[0].budgets.bytes"),
+    (scene(material(), minimise="beauty"), "minimise"),
+    (scene(material({"file": "flakes.png", "height_scale": 2})), "materials[0].map.height_scale"),
+    (scene(), "materials"),
+])
+def test_errors_name_the_field(plan, document, field):
+    process, made = plan(document)
+    assert process.returncode in (2, 3), process.stderr
+    assert f"{field}: " in process.stderr and len(process.stderr.splitlines()) == 1
+    assert made is None
+
+
+def test_impossible_plan_names_the_budget_and_the_way_out(plan):
+    for budget, most in ("bytes", 100), ("query_ns", 0.01), ("preparation_s", 1e-6):
+        document = scene(material("noise.png", 8, 16, 0.5, sigma_r=0.1, budgets={budget: most}), lights=SKY)
+        process, made = plan(document, "--cache", "probes")
+        assert process.returncode == 4 and made is None
+        assert f"materials[0].budgets.{budget}" in process.stderr
+        assert f"allow {budget} of" in process.stderr
+
+
+def test_impossible_total_names_the_sum(plan):
+    rough = {"smallest": 8, "largest": 16, "tolerance": 0.5, "sigma_r": 0.1}
+    process, alone = plan(scene(material("noise.png", **rough), lights=SKY), "--cache", "probes")
+    most = alone["total"]["bytes"] * 1.5
+    process, made = plan(scene(material("noise.png", **rough), material("brushed.png", **rough), lights=SKY, budgets={"bytes": most}), "--cache", "probes")
+    assert process.returncode == 4 and made is None
+    assert "budgets" in process.stderr and "together" in process.stderr
+
+
+@pytest.mark.parametrize("arguments, text", [
+    ([], "there is nothing to plan"), (["scene.json", "--check", "scene.json"], "exclude"), (["scene.json", "--sweep"], "--sweep"),
+    (["--check", "scene.json"], "is not known here")])
+def test_wrong_use_is_refused(glint, arguments, text):
+    (glint.folder / "scene.json").write_text(json.dumps(scene(material())))
+    process = glint("plan", *arguments)
+    assert process.returncode in (1, 3)
+    assert text in process.stderr
