@@ -10,7 +10,7 @@
 namespace glint::apps {
 
 /// Share of a tolerance that a predicted error may reach: places that were not probed err differently.
-inline constexpr double kSafeShare = 0.9;
+inline constexpr double kSafeShare = 0.8;
 
 /// A candidate of a material, as predicted.
 struct PlanOption {

@@ -95,8 +95,12 @@ class Kit:
         """A BSDF of a prepared map on a mesh whose uv are centimetres. With `smooth`, Mitsuba's own metal of the same mean roughness."""
         if self.smooth:
             return {"type": "twosided", "bsdf": {"type": "roughconductor", "material": material, "distribution": "beckmann", "alpha": of.alpha()}}
-        # Reference has no roughness of its own; what is made of the normals has.
-        exact = {"sigma_r": of.sigma_r} if asset == of.normals else {"normals": str(of.normals)}
+        import glint_ndf
+
+        # Some kinds have no roughness of their own; pyramids take the normals for footprints below level 0.
+        kind = glint_ndf.load(asset).kind
+        exact = {"sigma_r": of.sigma_r} if kind in ("normals", "slope-moments") else {}
+        exact |= {"normals": str(of.normals)} if kind in ("ndf-pyramid", "ndf-cp") else {}
         return {"type": "glint", "asset": str(asset), **exact, "uv_scale": 1 / of.cm, "material": material, **parameters}
 
     def integrator(self, max_depth=2, **parameters):
