@@ -7,7 +7,7 @@ import pictures
 
 MAP = "flakes"
 SIZE = (160, 120)
-TRUTH_SPP = 64
+TRUTH_SPP = 16
 FOV = 5.0  # degrees: a pixel sees 17 texels
 SPP = 8
 
