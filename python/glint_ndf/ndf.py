@@ -255,7 +255,7 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
          surface: str = "flat", boundary: str = "wrap", sigma_r: float = 0.005, alpha: float = 0.0,
          slant_tolerance: float = 0.06, gaussian_boxes: int = 1, footprint_parts: int = 32, interpolation: str = "footprint",
          pixels: str = "smooth", verify_hashes: bool = False) -> Ndf:
-    """Opens an asset that holds a distribution of normals. The file is checked, and then mapped.
+    """Opens an asset that holds a distribution of normals. The file is checked, and then mapped. Options of other kinds are ignored.
 
     Args:
         source: a file, its bytes, or an `Asset`. Bytes go through a temporary file.

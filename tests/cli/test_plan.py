@@ -182,3 +182,10 @@ def test_wrong_use_is_refused(glint, arguments, text):
     process = glint("plan", *arguments)
     assert process.returncode in (1, 3)
     assert text in process.stderr
+
+
+def test_the_sample_scene_has_a_plan_that_holds(glint):
+    process = glint("plan", SAMPLE, "-o", "plan.json", "--make", "plan.mk")
+    assert process.returncode == 0, process.stderr
+    process = glint("plan", "--check", "plan.json")
+    assert process.returncode == 0, process.stdout + process.stderr
