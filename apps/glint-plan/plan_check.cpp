@@ -69,8 +69,8 @@ nlohmann::json costsJson(const Costs& costs, double seen) {
 }
 
 std::string line(const std::string& what, double seen, const Costs& costs) {
-  return fmt::format("  {:<10} {:>8.3g} {:>14} {:>10.3g} {:>10.3g}\n", what, seen, sizeText(costs.bytes), costs.preparation_s,
-                     costs.query_ns);
+  return fmt::format("  {:<10} {:>8.3g} {:>14} {:>10.3g} {:>12}\n", what, seen, sizeText(costs.bytes), costs.preparation_s,
+                     queryTimeText(costs.query_ns));
 }
 
 }  // namespace
@@ -111,8 +111,8 @@ std::vector<CheckedMaterial> checkPlan(Tool& tool, const AssetFolder& folder, co
 std::string checkText(const PlanFile& plan, const std::vector<CheckedMaterial>& checked) {
   std::string text;
   for (const CheckedMaterial& material : checked) {
-    text += fmt::format("{}: {}\n  {:<10} {:>8} {:>14} {:>10} {:>10}\n", plan.scene.materials[material.planned->index].name,
-                        material.actual.name, "", "seen", "size", "prepare, s", "query, ns");
+    text += fmt::format("{}: {}\n  {:<10} {:>8} {:>14} {:>10} {:>12}\n", plan.scene.materials[material.planned->index].name,
+                        material.actual.name, "", "seen", "size", "prepare, s", "query");
     text += line("predicted", material.planned->seen, material.planned->costs) +
             line("actual", material.actual.seen, material.actual.costs);
     text += fmt::format("  The tolerance of {:g} is {}.\n", material.tolerance, material.holds() ? "met" : "NOT met");

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include "common/files.h"
@@ -64,6 +65,12 @@ std::string sizeText(double bytes) {
   if (bytes < 1e4) return fmt::format("{:.0f} bytes", bytes);
   if (bytes < 1e6) return fmt::format("{:.3g} kB", bytes / 1e3);
   return fmt::format("{:.3g} MB", bytes / 1e6);
+}
+
+std::string queryTimeText(double nanoseconds) {
+  if (nanoseconds < 100) return fmt::format("{:.3g} ns", nanoseconds);
+  const double unit = std::pow(10, std::floor(std::log10(nanoseconds)) - 2);
+  return fmt::format("{:.0f} ns", unit * std::round(nanoseconds / unit));
 }
 
 }  // namespace glint::apps

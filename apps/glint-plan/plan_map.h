@@ -34,4 +34,7 @@ void checkMaps(Tool& tool, const Scene& scene, const std::string& maps);
 /// The number of bytes in words: "1.2 MB".
 std::string sizeText(double bytes);
 
+/// The time of a query in words, to three digits: "3.21 ns", "126000 ns", as budgets have it.
+std::string queryTimeText(double nanoseconds);
+
 }  // namespace glint::apps

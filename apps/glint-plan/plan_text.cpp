@@ -19,7 +19,7 @@ std::string budgetText(const Budgets& budgets) {
   const auto add = [&](const std::string& part) { text += (text.empty() ? "" : ", ") + part; };
   if (budgets.bytes) add(sizeText(*budgets.bytes));
   if (budgets.preparation_s) add(fmt::format("{:g} s to prepare", *budgets.preparation_s));
-  if (budgets.query_ns) add(fmt::format("{:g} ns for a density", *budgets.query_ns));
+  if (budgets.query_ns) add(queryTimeText(*budgets.query_ns) + " for a density");
   return text.empty() ? "no limit" : "at most " + text;
 }
 
@@ -94,9 +94,9 @@ std::vector<std::string> reasonsOf(const Scene& scene, const MaterialPlan& plan)
     const bool named = std::find(methods.begin(), methods.end(), option.candidate.method) != methods.end();
     if (named || !option.costed) continue;
     methods.push_back(option.candidate.method);
-    reasons.push_back(fmt::format("{} would be over a budget: {}, {:.2g} s to prepare, {:.2g} ns for a density.",
+    reasons.push_back(fmt::format("{} would be over a budget: {}, {:.2g} s to prepare, {} for a density.",
                                   option.candidate.name(), sizeText(option.costs.bytes), option.costs.preparation_s,
-                                  option.costs.query_ns));
+                                  queryTimeText(option.costs.query_ns)));
   }
   return reasons;
 }
@@ -129,9 +129,9 @@ std::string planText(const Scene& scene, const std::vector<MaterialPlan>& plans)
   std::string text;
   for (const MaterialPlan& plan : plans) {
     const PlanOption& choice = plan.choice();
-    text += fmt::format("{}: {}; seen error {:.2g} of at most {:g}, {}, {:.2g} s to prepare, {:.3g} ns for a density\n",
+    text += fmt::format("{}: {}; seen error {:.2g} of at most {:g}, {}, {:.2g} s to prepare, {} for a density\n",
                         plan.material->name, choice.candidate.name(), choice.seen, plan.material->tolerance,
-                        sizeText(choice.costs.bytes), choice.costs.preparation_s, choice.costs.query_ns);
+                        sizeText(choice.costs.bytes), choice.costs.preparation_s, queryTimeText(choice.costs.query_ns));
     for (const std::string& reason : reasonsOf(scene, plan)) text += "  " + reason + "\n";
     for (const std::string& part : leftOutOf(scene, plan)) text += "  Left out. " + part + "\n";
   }

@@ -30,7 +30,7 @@ struct BudgetKind {
 const BudgetKind kBudgets[] = {
     {"bytes", &Budgets::bytes, &Costs::bytes, sizeText},
     {"preparation_s", &Budgets::preparation_s, &Costs::preparation_s, [](double s) { return fmt::format("{:.3g} s", s); }},
-    {"query_ns", &Budgets::query_ns, &Costs::query_ns, [](double ns) { return fmt::format("{:.3g} ns", ns); }},
+    {"query_ns", &Budgets::query_ns, &Costs::query_ns, queryTimeText},
 };
 
 /// Sorts options by cost, with the unmeasured ones at the end.
@@ -190,9 +190,9 @@ void Planner::refuse(Work& work) {
   std::string each;
   for (PlanOption& option : work.plan.options) {
     if (!meets(work, option)) continue;
-    each += (each.empty() ? "" : "; ") + fmt::format("{} takes {}, {:.3g} s and {:.3g} ns", option.candidate.name(),
+    each += (each.empty() ? "" : "; ") + fmt::format("{} takes {}, {:.3g} s and {}", option.candidate.name(),
                                                      sizeText(option.costs.bytes), option.costs.preparation_s,
-                                                     option.costs.query_ns);
+                                                     queryTimeText(option.costs.query_ns));
   }
   throw Error(
       ErrorCode::failed, "plan.budget", scene_.file, "",

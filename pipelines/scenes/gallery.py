@@ -61,7 +61,7 @@ class Gallery:
 
     def scaled(self, size, spp):
         """(size, samples) of a picture; both are smaller in a quick run."""
-        return (tuple(n // 2 for n in size), max(8, spp // 8)) if self.kit.quick else (size, spp)
+        return (tuple(2 * n // 3 for n in size), max(8, spp // 4)) if self.kit.quick else (size, spp)
 
     def render(self, label, description, exposure=1.0, seed=0, quiet=False):
         """Renders a scene's dictionary in passes, with a line of progress for each."""

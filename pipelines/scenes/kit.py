@@ -85,7 +85,7 @@ class Kit:
 
     def map(self, kind, size=2048, texel_um=5.0, sigma_r=0.02, seed=7, **flags):
         """Normals by glint-synth; flags are its options, with _ for -."""
-        size = size // 4 if self.quick else size
+        size = size // 2 if self.quick else size  # smaller ones show that they repeat
         options = [word for key, value in flags.items() for word in (f"--{key.replace('_', '-')}", value)]
         image = self.make(kind, "synth", None, kind, "--size", size, "--seed", seed, *options, suffix=".exr")
         name = image.stem
