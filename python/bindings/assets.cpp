@@ -10,7 +10,6 @@
 #include "glint-info/summary.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/atomic_file.h"
-#include "glint/formats/hash.h"
 #include "glint/formats/validate.h"
 
 namespace glint::python {
@@ -36,10 +35,9 @@ nb::tuple validate(const std::string& path, bool hashes, bool data) {
   return nb::make_tuple(report.kind, findings);
 }
 
-/// The kind of an asset that is fit for building from: values and hashes are checked, too.
-std::string kindOf(const std::string& path, bool for_building) {
+std::string kindOf(const std::string& path) {
   const nb::gil_scoped_release others_may_run;
-  return std::string((for_building ? formats::Asset::openForBuilding(path) : formats::Asset::open(path)).kind());
+  return std::string(formats::Asset::open(path).kind());
 }
 
 /// Copies a file, which appears whole or not at all.
@@ -64,7 +62,6 @@ void bindAssets(nb::module_& m) {
   m.def("validate", &validate);
   m.def("kind_of", &kindOf);
   m.def("copy_file", &copyFile);
-  m.def("hash_file", [](const std::string& path) { return formats::hashFile(path); });
   m.def("version", [] { return std::string(GLINT_VERSION); });
 }
 

@@ -16,8 +16,6 @@ class Failure : public std::exception {
  public:
   /// Takes the message and the rule of this thread's last error.
   explicit Failure(glint_status status) : status_(status), message_(glint_error_message()), rule_(glint_error_rule()) {}
-  Failure(glint_status status, std::string message, std::string rule)
-      : status_(status), message_(std::move(message)), rule_(std::move(rule)) {}
 
   glint_status status() const { return status_; }
   const char* what() const noexcept override { return message_.c_str(); }

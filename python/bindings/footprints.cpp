@@ -31,6 +31,10 @@ void bindFootprints(nb::module_& m) {
             set(out, k, p.covariance);
           });
         });
+  m.def("bounced", [](const Rows& spreads, const Rows& slope_sigmas, const Answers& out) {
+    const nb::gil_scoped_release others_may_run;
+    forEachQuery(out.shape(0), [&](std::size_t k) { *from(out, k) = bounced({0, spreads(k, 0)}, slope_sigmas(k, 0)).spread; });
+  });
   m.def("from_cone", [](const Rows& widths, const Rows& directions, const Rows& texels_per_unit, const Answers& out) {
     const nb::gil_scoped_release others_may_run;
     forEachQuery(out.shape(0), [&](std::size_t k) {

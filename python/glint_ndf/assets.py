@@ -52,7 +52,7 @@ class Asset:
     def __init__(self, path: PathLike, report: dict[str, Any] | None = None):
         self.path = os.fspath(path)  #: file of the asset
         self.report = report or {}  #: counts and errors that the builder found
-        self.kind = _glint.kind_of(self.path, False)  #: such as ``"ndf-pyramid"``
+        self.kind = _glint.kind_of(self.path)  #: such as ``"ndf-pyramid"``
 
     def save(self, path: PathLike, overwrite: bool = False) -> None:
         """Writes the asset to a file, which appears whole or not at all.

@@ -58,5 +58,8 @@ def from_cone(width, direction, texels_per_unit) -> np.ndarray:
 
 def bounced_spread(spread, slope_sigma) -> np.ndarray:
     """Spread of a beam, radians, after facets whose slopes deviate by `slope_sigma` have reflected it: at most 0.75."""
-    turned = 2 * np.arctan(np.asarray(slope_sigma, dtype=np.float32))
-    return np.minimum(np.sqrt(np.square(np.asarray(spread, dtype=np.float32)) + turned * turned), np.float32(0.75))
+    spreads, slopes = members(spread, 1, "spread"), members(slope_sigma, 1, "slope_sigma")
+    batch = Batch(spreads, slopes)
+    out = batch.answers()
+    _glint.bounced(batch.rows(spreads), batch.rows(slopes), out)
+    return batch.shaped(out)

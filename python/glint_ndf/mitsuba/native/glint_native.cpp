@@ -346,8 +346,7 @@ class GlintNative final : public BSDF<Float, Spectrum> {
   std::pair<UnpolarizedSpectrum, Float> value(const SurfaceInteraction3f& si, Vector3f viewed, Vector3f lit,
                                               Mask active) const {
     lit.z() = dr::select(active, lit.z(), -1.f);  // nothing is asked below the horizon
-    const std::array<Vector3f, 1> directions = {lit};
-    return asked(si, viewed, directions, [&](const Queries& q, const Batches& batches, size_t count) {
+    return asked(si, viewed, lit, [&](const Queries& q, const Batches& batches, size_t count) {
       std::vector<float> f(3 * count), pdf(count);
       batches.evaluate(q, f.data(), pdf.data());
       return std::pair<UnpolarizedSpectrum, Float>(spectrumOf(f, count), arrayOf(pdf.data(), count, 1));
@@ -358,7 +357,7 @@ class GlintNative final : public BSDF<Float, Spectrum> {
   std::tuple<Vector3f, UnpolarizedSpectrum, Float> drawn(const SurfaceInteraction3f& si, Vector3f viewed, const Point2f& xi,
                                                          Mask active) const {
     viewed.z() = dr::select(active, viewed.z(), -1.f);
-    const std::array<Vector3f, 1> random = {Vector3f(xi.x(), xi.y(), 0.f)};
+    const Vector3f random(xi.x(), xi.y(), 0.f);
     return asked(si, viewed, random, [&](const Queries& given, const Batches& batches, size_t count) {
       Queries q = given;
       q.xi[0] = q.lit[0], q.xi[1] = q.lit[1];
@@ -372,11 +371,9 @@ class GlintNative final : public BSDF<Float, Spectrum> {
   }
 
   template <class Answer>
-  auto asked(const SurfaceInteraction3f& si, const Vector3f& viewed, const std::array<Vector3f, 1>& others,
-             Answer&& answer) const {
+  auto asked(const SurfaceInteraction3f& si, const Vector3f& viewed, const Vector3f& other, Answer&& answer) const {
     const Point2f uv = mapUv(si);
     const Vector2f dx = mapChange(si.duv_dx), dy = mapChange(si.duv_dy);
-    const Vector3f& other = others[0];
     Queries q;
     q.count = 1;
     if constexpr (dr::is_jit_v<Float>) {
