@@ -6,10 +6,10 @@ namespace glint::formats {
 
 ValidationReport validateAsset(const std::filesystem::path& path, const ValidateOptions& options) {
   Findings findings(path);
-  const LoadedAsset loaded = loadAsset(path, findings);
+  const LoadedAsset loaded = loadFile(findings);
   if (options.hashes) checkHashes(loaded, findings);
   // Values are only looked at through indices that hold.
-  if (options.data && loaded.asset) loaded.kind->check_values(*loaded.asset, findings);
+  if (options.data && loaded.asset) checkValues(loaded, findings);
   return std::move(findings.report());
 }
 

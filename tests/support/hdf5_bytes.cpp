@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "glint/formats/hash.h"
-#include "glint/formats/hdf5_checksum.h"
+#include "glint/formats/container/checksum.h"
 
 namespace glint::test {
 namespace {

@@ -8,7 +8,7 @@
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 #include "glint/formats/conformance.h"
-#include "glint/formats/hdf5_precheck.h"
+#include "glint/formats/container/container.h"
 #include "glint/formats/validate.h"
 #include "support/hdf5_bytes.h"
 #include "support/sample_assets.h"
@@ -59,11 +59,10 @@ TEST(DamagedFiles, EveryFlippedByteOfAlignmentIsFound) {
   const fs::path path = folder / "a.glint";
   for (const char* name : {"ndf-cp-cp-i8.glint", "bin-map.glint", "normals.glint"}) {
     test::Bytes bytes = test::readBytes(golden(name));
-    const ObjectPlaces places = checkObjectHeaders(bytes);
-    ASSERT_TRUE(places.complete);
+    const std::vector<Extent> extents = readContainer(bytes).extents;
     std::uint64_t end = 0;
     std::size_t between = 0;
-    for (const Extent& extent : places.extents) {
+    for (const Extent& extent : extents) {
       for (; end < extent.begin; ++end, ++between) {
         bytes[end] ^= std::byte{0x10};
         test::writeBytes(path.string(), bytes);
@@ -89,15 +88,12 @@ TEST(DamagedFiles, AppendedBytesAreFound) {
   }
 }
 
-TEST(DamagedFiles, AHeapThatIsNotThereIsRefusedBeforeHdf5LooksForIt) {
+TEST(DamagedFiles, AHeapIsRefusedBeforeAnyoneLooksForIt) {
   const test::TempFolder folder;
   const fs::path path = folder / "a.glint";
   // Byte 114 of this file is the lowest of the address of the root's heap of attributes, which it does not have.
   test::writeBytes(path.string(), damaged("heights.glint", 114, {0xf7}));
-  EXPECT_EQ(ruleOf(path), "file.hdf5");
-  const ValidationReport report = validateAsset(path);
-  ASSERT_FALSE(report.valid());
-  EXPECT_THAT(report.findings[0].message, testing::HasSubstr("heap"));
+  EXPECT_EQ(ruleOf(path), "object.heap");
 }
 
 TEST(DamagedFiles, EveryBitOfMetadataMayBeWrongBehindARightChecksum) {
@@ -131,7 +127,11 @@ TEST(DamagedFiles, TruncatedObjectHeadersAreRefused) {
   const test::Bytes good = test::readBytes(golden("ndf-cp-cp-i8.glint"));
   for (const test::ChecksummedRange& range : test::checksummedRanges(good)) {
     for (std::size_t size = std::max<std::size_t>(range.begin, 48); size < range.end; ++size) {
-      EXPECT_THROW(checkObjectHeaders(std::span(good).first(size)), Error) << size;
+      test::Bytes bytes(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(size));
+      constexpr std::size_t kEndOfFile = 28;  // place of the file's length in the superblock
+      std::memcpy(bytes.data() + kEndOfFile, &size, sizeof size);
+      test::renewChecksums(bytes, {{0, 48}});
+      EXPECT_THROW(readContainer(bytes), Error) << size;
     }
   }
 }
@@ -201,7 +201,7 @@ TEST(FormatVersions, OlderFilesNeedNotHaveWhatALaterMinorVersionAdded) {
   const fs::path path = folder / "a.glint";
   writeAsset(path, test::sampleHeights(16, 16).map, test::sampleProvenance());
   Findings reading(path);
-  FileStructure structure = readStructure(path, reading);
+  FileStructure structure = readStructure(FileBytes::ofFile(path, false), reading);
   ASSERT_FALSE(reading.failed());
   const KindSchema schema = heightsWithNewAttribute();
   const auto missing = [&] {
