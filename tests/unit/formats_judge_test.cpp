@@ -5,6 +5,7 @@
 #endif
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <set>
@@ -73,7 +74,7 @@ class Judge {
     std::vector<std::byte> bytes(record.size_bytes);
     ASSERT_EQ(H5Tget_size(type) * static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)), bytes.size()) << path;
     ASSERT_GE(H5Dread(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()), 0) << path;
-    if (!bytes.empty()) EXPECT_EQ(std::memcmp(bytes.data(), record.data, bytes.size()), 0) << path;
+    EXPECT_TRUE(std::equal(bytes.begin(), bytes.end(), record.data)) << path;
     compareAttributes(dataset, record.attributes, path);
   }
 
