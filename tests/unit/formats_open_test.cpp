@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <cstring>
 #include <filesystem>
@@ -112,6 +113,22 @@ TEST_F(OpenTest, AFunctionMayReadTheBytes) {
 TEST_F(OpenTest, AFunctionThatCannotReadIsAnErrorOfInput) {
   EXPECT_THAT(messageOf({"archive", bytes_.size(), [](std::uint64_t, std::span<std::byte>) { return false; }}),
               testing::StartsWith("archive: cannot be read at offset 0"));
+}
+
+TEST_F(OpenTest, TooFewDescriptorsAreNotDamage) {
+  rlimit all = {};
+  ASSERT_EQ(getrlimit(RLIMIT_NOFILE, &all), 0);
+  const rlimit none = {0, all.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &none), 0);
+  std::string message;
+  try {
+    Asset::open(path_);
+  } catch (const Error& error) {
+    message = error.what();
+    EXPECT_EQ(error.code(), ErrorCode::io);
+  }
+  ASSERT_EQ(setrlimit(RLIMIT_NOFILE, &all), 0);
+  EXPECT_THAT(message, testing::HasSubstr("Too many open files"));
 }
 
 TEST_F(OpenTest, ACopyOutlivesATruncatedFile) {
