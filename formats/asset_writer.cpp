@@ -82,10 +82,7 @@ Attributes attributesOf(const PackedArray& array, const std::string& hash) {
 /// Groups of the arrays, those that hold groups included.
 std::set<std::string> groupsOf(const PackedAsset& packed) {
   std::set<std::string> groups;
-  for (const PackedArray& array : packed.arrays) {
-    for (std::size_t end = array.path.find('/'); end != array.path.npos; end = array.path.find('/', end + 1))
-      groups.insert(array.path.substr(0, end));
-  }
+  for (const PackedArray& array : packed.arrays) addGroups(array.path, groups);
   return groups;
 }
 

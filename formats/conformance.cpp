@@ -209,9 +209,7 @@ void checkConformance(const FileStructure& structure, const KindSchema& schema, 
     place = end - 1;
   }
   std::set<std::string> groups;
-  for (const std::string& path : known) {
-    for (std::size_t end = path.find('/'); end != path.npos; end = path.find('/', end + 1)) groups.insert(path.substr(0, end));
-  }
+  for (const std::string& path : known) addGroups(path, groups);
   for (const auto& [path, attributes] : structure.groups) {
     if (!groups.contains(path)) findings.add("group.unknown", "/" + path, "is not in the schema");
     warnOfUnknown(attributes, "/" + path, {}, {}, findings);

@@ -176,4 +176,8 @@ FileStructure readStructure(FileBytes bytes, Findings& findings) {
   return structure;
 }
 
+void addGroups(const std::string& path, std::set<std::string>& groups) {
+  for (std::size_t end = path.find('/'); end != path.npos; end = path.find('/', end + 1)) groups.insert(path.substr(0, end));
+}
+
 }  // namespace glint::formats

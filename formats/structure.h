@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -51,5 +52,8 @@ struct FileStructure {
 ///
 /// Safe on untrusted input: see readContainer.
 FileStructure readStructure(FileBytes bytes, Findings& findings);
+
+/// Adds the groups on the path of a dataset, "a" and "a/b" of "a/b/c".
+void addGroups(const std::string& path, std::set<std::string>& groups);
 
 }  // namespace glint::formats

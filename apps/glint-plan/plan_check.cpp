@@ -13,8 +13,8 @@
 namespace glint::apps {
 namespace {
 
-constexpr int kSizes = 6, kPlaces = 12, kTruths = 48, kQueries = 4096;
-constexpr double kErrorBudget_s = 3, kLongestTime_s = 0.02;
+constexpr int kCheckedSizes = 6, kCheckedPlaces = 12, kCheckedTruths = 48, kCheckedQueries = 4096;
+constexpr double kCheckErrorBudget_s = 3, kCheckLongestTime_s = 0.02;
 
 /// Measures candidates on one whole map.
 class MapCheck {
@@ -26,11 +26,11 @@ class MapCheck {
     const NormalMap& normals = map_.normals();
     constexpr double kWidest = 0.125;  // of the map, as in the bench: larger footprints look like the mean of the map
     const double cap = std::max(question_.footprints.smallest, kWidest * std::min(normals.width, normals.height));
-    sizes_ = question_.sizes(kSizes, cap);
+    sizes_ = question_.sizes(kCheckedSizes, cap);
     const std::uint64_t other_places = tool.seed() + 1;
-    sets_ = questionSets(other_places, sizes_, kPlaces, kTruths);
+    sets_ = questionSets(other_places, sizes_, kCheckedPlaces, kCheckedTruths);
     for (const FootprintSet& set : sets_) truths_.emplace_back(normals, set, question_.sigma_r, question_.light_deg);
-    queries_ = benchQueries(normals, other_places, kQueries, sizes_);
+    queries_ = benchQueries(normals, other_places, kCheckedQueries, sizes_);
   }
 
   CheckedOption measure(const Candidate& candidate) {
@@ -39,11 +39,11 @@ class MapCheck {
     CheckedOption option;
     option.name = candidate.name();
     option.costs = {made.bytes + (candidate.takes_normals ? map_.bytes : 0), made.seconds + map_.ingest_s,
-                    densityTime(ndf, queries_, kLongestTime_s)};
+                    densityTime(ndf, queries_, kCheckLongestTime_s)};
     if (candidate.tool.empty()) return option;  // the texels themselves
     std::vector<float> first;
     for (const SetTruth& truth : truths_)
-      option.seen = std::max(option.seen, truth.errorsOf(ndf, kErrorBudget_s, first)["seen"].get<double>());
+      option.seen = std::max(option.seen, truth.errorsOf(ndf, kCheckErrorBudget_s, first)["seen"].get<double>());
     return option;
   }
 
@@ -127,21 +127,21 @@ std::string checkText(const PlanFile& plan, const std::vector<CheckedMaterial>& 
 nlohmann::json checkJson(const PlanFile& plan, const std::vector<CheckedMaterial>& checked) {
   nlohmann::json list = nlohmann::json::array();
   for (const CheckedMaterial& material : checked) {
-    nlohmann::json json = {{"name", plan.scene.materials[material.planned->index].name},
-                           {"asset", material.actual.name},
-                           {"tolerance", material.tolerance},
-                           {"holds", material.holds()},
-                           {"predicted", costsJson(material.planned->costs, material.planned->seen)},
-                           {"actual", costsJson(material.actual.costs, material.actual.seen)}};
+    nlohmann::json entry = {{"name", plan.scene.materials[material.planned->index].name},
+                            {"asset", material.actual.name},
+                            {"tolerance", material.tolerance},
+                            {"holds", material.holds()},
+                            {"predicted", costsJson(material.planned->costs, material.planned->seen)},
+                            {"actual", costsJson(material.actual.costs, material.actual.seen)}};
     if (!material.sweep.empty()) {
-      json["over_cheapest"] = material.overCheapest(plan.scene.goal);
-      json["sweep"] = nlohmann::json::array();
+      entry["over_cheapest"] = material.overCheapest(plan.scene.goal);
+      entry["sweep"] = nlohmann::json::array();
       for (const CheckedOption& option : material.sweep) {
-        json["sweep"].push_back(costsJson(option.costs, option.seen));
-        json["sweep"].back()["name"] = option.name;
+        entry["sweep"].push_back(costsJson(option.costs, option.seen));
+        entry["sweep"].back()["name"] = option.name;
       }
     }
-    list.push_back(std::move(json));
+    list.push_back(std::move(entry));
   }
   return {{"materials", std::move(list)}};
 }
