@@ -13,7 +13,7 @@ int main(int argc, char** argv) {
                    "Compresses a pyramid of NDF images, so that densities and range means are still answered in constant time "
                    "from the compressed data.",
                    "glint-compress flakes-pyramid.glint -o flakes-cp.glint --method tucker --tolerance 0.1"});
-  const apps::InputFile input(tool, "pyramid of NDF images (.glint)", "PYRAMID");
+  const apps::InputFile input(tool, "pyramid of NDF images (.glint), of kind ndf-pyramid or wang-pyramid", "PYRAMID");
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of compressed NDF images");
   const apps::CompressOptions options(tool);
 
@@ -22,8 +22,14 @@ int main(int argc, char** argv) {
     // The map that the pyramid was made from is named, too: --normals of queries must be this map.
     const formats::Provenance provenance = formats::chained(tool.provenance(), asset.info().provenance);
     bake::CompressionReport report;
-    const auto data = bake::compressPyramid(asset.get<NdfPyramid>(), options.values(), &report, tool.progress("compress"));
-    formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
+    const bool is_plane = asset.kind() == "wang-pyramid";
+    const auto data = bake::compressPyramid(is_plane ? asset.get<WangPyramid>().images : asset.get<NdfPyramid>(),
+                                            options.values(), &report, tool.progress("compress"));
+    if (is_plane)
+      formats::writeAsset(output.path(), WangCp{asset.get<WangPyramid>().plane, data.view()}, provenance,
+                          output.writeOptions());
+    else
+      formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
     if (report.unscaled_images > 0)
       tool.warn(std::to_string(report.unscaled_images) +
                 " images decode to half of their energy or less and are not normalised; ask for a higher rank or a smaller "
