@@ -3,6 +3,7 @@
 
 #include "common/files.h"
 #include "glint-compress/compress_options.h"
+#include "glint/bake/wang/tile_pyramid.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
@@ -22,14 +23,14 @@ int main(int argc, char** argv) {
     // The map that the pyramid was made from is named, too: --normals of queries must be this map.
     const formats::Provenance provenance = formats::chained(tool.provenance(), asset.info().provenance);
     bake::CompressionReport report;
-    const bool is_plane = asset.kind() == "wang-pyramid";
-    const auto data = bake::compressPyramid(is_plane ? asset.get<WangPyramid>().images : asset.get<NdfPyramid>(),
-                                            options.values(), &report, tool.progress("compress"));
-    if (is_plane)
-      formats::writeAsset(output.path(), WangCp{asset.get<WangPyramid>().plane, data.view()}, provenance,
-                          output.writeOptions());
-    else
+    if (asset.kind() == "wang-pyramid") {
+      const auto& tiles = asset.get<WangPyramid>();
+      const auto data = apps::compress(tiles.images, bake::imageMasses(tiles), options, report, tool);
+      formats::writeAsset(output.path(), WangCp{tiles.plane, data.view()}, provenance, output.writeOptions());
+    } else {
+      const auto data = apps::compress(asset.get<NdfPyramid>(), {}, options, report, tool);
       formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
+    }
     if (report.unscaled_images > 0)
       tool.warn(std::to_string(report.unscaled_images) +
                 " images decode to half of their energy or less and are not normalised; ask for a higher rank or a smaller "

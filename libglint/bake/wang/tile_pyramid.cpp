@@ -163,4 +163,16 @@ WangPyramidData buildWangPyramid(const WangTiles& tiles, const PyramidOptions& o
   return data;
 }
 
+std::vector<float> imageMasses(const WangPyramid& pyramid) {
+  std::vector<float> masses;
+  for (int l = 0; l < pyramid.images.shape.level_count; ++l) {
+    const PyramidGrid& images = pyramid.images.shape.levels[l];
+    const WangGrid& grid = pyramid.plane.grids[l];
+    for (int j = 0; j < images.rows; ++j)
+      for (int i = 0; i < images.columns; ++i)
+        masses.push_back(grid.masses[static_cast<std::size_t>(i)] * grid.masses[static_cast<std::size_t>(j % grid.side())]);
+  }
+  return masses;
+}
+
 }  // namespace glint::bake
