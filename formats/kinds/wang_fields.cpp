@@ -54,7 +54,7 @@ void checkTileMasses(const WangImages& plane, const PyramidShape& shape, Finding
         sum += double{mass};
       }
       if (valid && std::abs(sum - 1) <= kRounding) continue;
-      findings.add("wang.masses", "/level_" + std::to_string(l) + "/masses",
+      findings.add("wang.masses", "/" + levelPath("level_{l}/masses", l),
                    "do not sum to 1 at centre " + std::to_string(k) + " of a tile");
       return;
     }

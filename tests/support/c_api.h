@@ -53,6 +53,16 @@ inline void writeSample(std::type_identity<TinyExample>, const std::string& path
   formats::writeAsset(path, sampleTinyExample(kSize, TinyMode::tiled).example, sampleProvenance());
 }
 
+inline void writeSample(std::type_identity<WangTiles>, const std::string& path) {
+  formats::writeAsset(path, sampleWangTiles().tiles, sampleProvenance());
+}
+inline void writeSample(std::type_identity<WangPyramid>, const std::string& path) {
+  formats::writeAsset(path, sampleWangPyramid().asset, sampleProvenance());
+}
+inline void writeSample(std::type_identity<WangCp>, const std::string& path) {
+  formats::writeAsset(path, sampleWangCp().asset, sampleProvenance());
+}
+
 /// Files of every kind that a model answers, and of some others.
 class Assets {
  public:

@@ -882,22 +882,24 @@ SampleWangTiles sampleWangTiles(WangScheme scheme) {
 
 namespace {
 
-/// A plane whose tiles have one centre each, and images one centre beyond every border.
-void fillPlane(WangImages& plane, PyramidShape& shape, std::vector<float>& masses) {
+/// A plane whose tiles have one centre each.
+/// @param margin  images beyond every border, 0 or 1
+void fillPlane(int margin, WangImages& plane, PyramidShape& shape, std::vector<float>& masses) {
   plane.tiles = sampleWangTiles().tiles;
   plane.tiles.normals = {};
   shape = sampleShape(plane.tiles.size);
   shape.boundary = Boundary::clamp;
   shape.level_count = 2;
-  plane.grids[0] = {1, 1, {}}, plane.grids[1] = {1, 0, {}};
+  plane.grids[0] = {1, margin, {}}, plane.grids[1] = {1, 0, {}};
   const int side = plane.grids[0].side();
   shape.levels[0] = {static_cast<float>(plane.tiles.size), side, plane.tiles.tile_count * side};
   shape.levels[1] = {2.0f * static_cast<float>(plane.tiles.size), 1, 1};
-  masses = {0.125f, 0.75f, 0.125f, 1};
+  if (margin == 1) masses = {0.125f, 0.75f, 0.125f, 1};
+  if (margin == 0) masses = {1, 1};
 }
 void linkMasses(const std::vector<float>& masses, WangImages& plane) {
-  plane.grids[0].masses = {masses.data(), 3};
-  plane.grids[1].masses = {masses.data() + 3, 1};
+  plane.grids[0].masses = {masses.data(), masses.size() - 1};
+  plane.grids[1].masses = {masses.data() + masses.size() - 1, 1};
 }
 /// Images of one even block each.
 std::vector<Image> blockImages(std::size_t count) {
@@ -920,7 +922,7 @@ std::vector<Image> blockImages(std::size_t count) {
 SampleWangPyramid sampleWangPyramid() {
   SampleWangPyramid sample;
   NdfPyramid& pyramid = sample.images.pyramid;
-  fillPlane(sample.asset.plane, pyramid.shape, sample.masses);
+  fillPlane(1, sample.asset.plane, pyramid.shape, sample.masses);
   pyramid.value_scale = 4;
   sample.images.levels.resize(static_cast<std::size_t>(pyramid.shape.level_count));
   for (int l = 0; l < pyramid.shape.level_count; ++l)
@@ -933,7 +935,7 @@ SampleWangPyramid sampleWangPyramid() {
 SampleWangCp sampleWangCp() {
   SampleWangCp sample;
   PyramidShape shape;
-  fillPlane(sample.asset.plane, shape, sample.masses);
+  fillPlane(0, sample.asset.plane, shape, sample.masses);
   std::vector<std::vector<Image>> images;
   for (int l = 0; l < shape.level_count; ++l) images.push_back(blockImages(shape.levels[l].imageCount()));
   sample.images = ndfCpOf(shape, std::move(images), CompressionMethod::tucker, CoefficientType::i8, SampleForm::wide);
