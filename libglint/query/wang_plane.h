@@ -53,9 +53,9 @@ class WangPlane {
   /// a corner.
   GLINT_DEVICE_CALL GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
-    const PixelPlace place = pixelPlace(shape(), h);
-    if (pixels_ == Pixels::constant) return finitePositive(pixelMeanOf(p, place));
-    return splineDensity(shape(), windowOf(p, place), h);
+    const PixelPlace pixel = pixelPlace(shape(), h);
+    if (pixels_ == Pixels::constant) return finitePositive(pixelMeanOf(p, pixel));
+    return splineDensity(shape(), windowOf(p, pixel), h);
   }
 
   /// Average of the density over the pixel of the images that holds h, >= 0.
@@ -66,10 +66,11 @@ class WangPlane {
   /// Average density over a box of half vectors, >= 0, 0 if the box is empty: as PyramidNdf::mean or CpNdf::mean.
   GLINT_DEVICE_CALL GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
+    const PlacedFootprint placed = place(p);
     float sum = 0;
-    forEachPart(p, [&](const Footprint& part, float weight) {
+    forEachPart(placed, [&](const Footprint& part, float weight) {
       TileSlices slices;
-      choose(part, slices);
+      choose(part, placed, slices);
       forEachGroup(slices, [&](const PyramidSlices& group) { sum += weight * images_.mean(group, range, pixels_); });
     });
     return finitePositive(sum);
@@ -79,21 +80,43 @@ class WangPlane {
   /// pixel. The pdf is the density.
   GLINT_DEVICE_CALL GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     xi = clampUnit(xi);
-    const Footprint part = chosenPart(p, xi.x);
+    const PlacedFootprint placed = place(p);
+    const Footprint part = chosenPart(placed.footprint, xi.x);
     TileSlices slices;
-    choose(part, slices);
+    choose(part, placed, slices);
     const int k = chooseIndex(
         slices.count, 1, [&](int i) { return slices.weights[i]; }, xi.x);
     if (k < 0) return {};
-    const PixelPlace place = images_.draw(slices[k], xi);
-    if (place.x < 0) return {};
-    if (pixels_ == Pixels::constant) return drawnAt(pointInPixel(shape(), place, xi), finitePositive(pixelMeanOf(p, place)));
-    return splineSample(shape(), place, windowOf(p, place), xi);
+    const PixelPlace pixel = images_.draw(slices[k], xi);
+    if (pixel.x < 0) return {};
+    if (pixels_ == Pixels::constant) return drawnAt(pointInPixel(shape(), pixel, xi), finitePositive(pixelMeanOf(p, pixel)));
+    return splineSample(shape(), pixel, windowOf(p, pixel), xi);
   }
 
  private:
   GLINT_HD bool isWhole(const Footprint& p) const {
     return most_parts_ == 1 || (p.covariance.xx == p.covariance.yy && p.covariance.xy == 0);
+  }
+
+  /// A footprint whose centre lies in a cell: [0, 1)^2 from its lower left corner.
+  struct PlacedFootprint {
+    std::uint64_t cell_x, cell_y;
+    Footprint footprint;
+  };
+  GLINT_HD PlacedFootprint place(Footprint p) const { return place(p, origin_x_, origin_y_); }
+  static GLINT_HD PlacedFootprint place(Footprint p, std::uint64_t from_x, std::uint64_t from_y) {
+    const auto split = [](float& u, std::uint64_t from) {
+      constexpr float kFarthest = 9e15f;  // whole numbers beyond are no cells that a float can name
+      const float cell = std::floor(u);
+      if (!(cell > -kFarthest && cell < kFarthest)) {
+        u = 0;
+        return from;
+      }
+      u = u - cell < 1 ? u - cell : float{kBelowOne};
+      return from + static_cast<std::uint64_t>(static_cast<std::int64_t>(cell));
+    };
+    const std::uint64_t cell_x = split(p.centre.x, from_x), cell_y = split(p.centre.y, from_y);
+    return {cell_x, cell_y, p};
   }
 
   /// The round footprints of a stretched one. Their centres are on a map that is too large to be met twice, around its middle.
@@ -110,7 +133,8 @@ class WangPlane {
     return parts;
   }
   template <class Visit>
-  GLINT_HD void forEachPart(const Footprint& p, Visit&& visit) const {
+  GLINT_HD void forEachPart(const PlacedFootprint& placed, Visit&& visit) const {
+    const Footprint& p = placed.footprint;
     if (isWhole(p)) return visit(p, 1.0f);
     const IsotropicParts parts = partsOf(p);
     for (int k = 0; k < parts.count; ++k) visit(parts.footprints[k], parts.weights[k]);
@@ -124,42 +148,34 @@ class WangPlane {
     return parts.footprints[k < 0 ? 0 : k];
   }
 
-  /// The images of a round footprint.
-  GLINT_HD void choose(const Footprint& p, TileSlices& slices) const {
-    const auto split = [](float u, std::uint64_t origin, float& inside) {
-      constexpr float kFarthest = 9e15f;  // whole numbers beyond are no cells that a float can name
-      const float cell = std::floor(u);
-      if (!(cell > -kFarthest && cell < kFarthest)) {
-        inside = 0;
-        return origin;
-      }
-      inside = u - cell < 1 ? u - cell : float{kBelowOne};
-      return origin + static_cast<std::uint64_t>(static_cast<std::int64_t>(cell));
-    };
-    Vec2 at;
-    const std::uint64_t cell_x = split(p.centre.x, origin_x_, at.x), cell_y = split(p.centre.y, origin_y_, at.y);
+  /// The images of a round footprint, whose centre counts from a cell.
+  GLINT_HD void choose(const Footprint& p, const PlacedFootprint& from, TileSlices& slices) const {
+    const PlacedFootprint placed = place(p, from.cell_x, from.cell_y);
     chooser_.choose(
-        cell_x, cell_y, at, p.covariance, [&](const PyramidSlice& slice) { return images_.isUsable(slice); }, slices);
+        placed.cell_x, placed.cell_y, placed.footprint.centre, p.covariance,
+        [&](const PyramidSlice& slice) { return images_.isUsable(slice); }, slices);
   }
 
-  GLINT_HD PixelWindow windowOf(const Footprint& p, const PixelPlace& place) const {
+  GLINT_HD PixelWindow windowOf(const Footprint& p, const PixelPlace& pixel) const {
+    const PlacedFootprint placed = place(p);
     PixelWindow sum;
-    forEachPart(p, [&](const Footprint& part, float weight) {
+    forEachPart(placed, [&](const Footprint& part, float weight) {
       TileSlices slices;
-      choose(part, slices);
+      choose(part, placed, slices);
       PixelWindow window;
-      forEachGroup(slices, [&](const PyramidSlices& group) { images_.addWindow(group, place, window); });
+      forEachGroup(slices, [&](const PyramidSlices& group) { images_.addWindow(group, pixel, window); });
       for (int y = 0; y < PixelWindow::kSize; ++y)
         for (int x = 0; x < PixelWindow::kSize; ++x) sum.pixels[y][x] += weight * window.pixels[y][x];
     });
     return sum;
   }
-  GLINT_HD float pixelMeanOf(const Footprint& p, const PixelPlace& place) const {
+  GLINT_HD float pixelMeanOf(const Footprint& p, const PixelPlace& pixel) const {
+    const PlacedFootprint placed = place(p);
     float sum = 0;
-    forEachPart(p, [&](const Footprint& part, float weight) {
+    forEachPart(placed, [&](const Footprint& part, float weight) {
       TileSlices slices;
-      choose(part, slices);
-      forEachGroup(slices, [&](const PyramidSlices& group) { sum += weight * images_.pixelMean(group, place); });
+      choose(part, placed, slices);
+      forEachGroup(slices, [&](const PyramidSlices& group) { sum += weight * images_.pixelMean(group, pixel); });
     });
     return sum;
   }

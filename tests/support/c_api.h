@@ -17,6 +17,7 @@
 #include "glint.h"
 #include "glint/api/ndf_models.h"
 #include "glint/formats/asset_writer.h"
+#include "glint/model/slope_sums.h"
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 
@@ -54,7 +55,17 @@ inline void writeSample(std::type_identity<TinyExample>, const std::string& path
 }
 
 inline void writeSample(std::type_identity<WangTiles>, const std::string& path) {
-  formats::writeAsset(path, sampleWangTiles().tiles, sampleProvenance());
+  // Sixteen times one tile of many normals.
+  SampleWangTiles sample = sampleWangTiles();
+  const SampleNormals tile = sampleNormals(kSize, kSize, false);
+  sample.normals.clear();
+  for (int k = 0; k < sample.tiles.tile_count; ++k)
+    sample.normals.insert(sample.normals.end(), tile.normals.begin(), tile.normals.end());
+  sample.tiles.size = kSize;
+  sample.tiles.normals = sample.normals;
+  sample.tiles.slopes =
+      slopeSums(sample.normals.data(), sample.normals.size()).moments(static_cast<double>(sample.normals.size()));
+  formats::writeAsset(path, sample.tiles, sampleProvenance());
 }
 inline void writeSample(std::type_identity<WangPyramid>, const std::string& path) {
   formats::writeAsset(path, sampleWangPyramid().asset, sampleProvenance());
