@@ -30,9 +30,8 @@ struct WangPyramidData {
 };
 
 /// A centre beyond the border of a tile has an image in the tile if at least this share of its footprint lies in the tile along
-/// the axis of the border. What is left out is spread over the tiles that have an image: at the default overlap 0.7 % of footprints
-/// one and a half gaps inside a tile, and 5e-5 of those farther inside. With all of it, tiles would have a quarter more images,
-/// which take four times the bytes compressed, because they hardly count and are hard to compress.
+/// the axis of the border. What is left out is spread over the tiles that have an image: at most this share of a footprint, at
+/// centres near a border. Images of less hardly count in any answer, and take most of the bytes when they are compressed.
 inline constexpr double kLeastTileShare = 0.01;
 
 /// Builds the NDF images of all tiles of a plane, in one pyramid (Deng 2022, section 5.5 and Fig. 12).

@@ -75,7 +75,7 @@ class TileChooser {
   }
 
  private:
-  /// Images with less than this weight are left out. At a corner it saves a third of the images and changes an answer by 2e-4.
+  /// Images with less than this weight are left out: rounding of weights, and products of two small shares at corners.
   static constexpr float kNegligible = 1e-5f;
 
   /// The shape of one tile whose columns are those of the tile alone, which is what SliceChooser asks for.
