@@ -38,9 +38,6 @@ void requireSameMap(const formats::Asset& asset, const std::filesystem::path& pa
 }
 
 [[noreturn]] void refuseKind(std::string_view kind, const std::filesystem::path& path) {
-  if (kind == formats::kKindName<WangTiles>)
-    throw Error(ErrorCode::unsupported, "format.kind", path.string(), "", "is of kind wang-tiles, a plane without end",
-                "ask WangReference, or make a map of a part of the plane with glint-wang --explicit");
   throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",
               "is of kind " + std::string(kind) + ", which holds no distribution of normals",
               kind == "displacement" ? "ask for the light that it reflects, with DisplacedBrdf or glint_displaced_open"

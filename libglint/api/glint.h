@@ -118,7 +118,7 @@ typedef struct glint_open_options {
 /* clang-format on */
 
 /* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat,
- * slope-moments, tiny-example, wave-pyramid.
+ * slope-moments, tiny-example, wang-cp, wang-pyramid, wang-tiles, wave-pyramid.
  *
  * The file is checked, then mapped; what queries read is not copied. Safe on untrusted files. A file must not be changed in
  * place while it is open (the tools never do: they replace files).
@@ -193,8 +193,8 @@ GLINT_API glint_status glint_ndf_pack(const glint_ndf* ndf, void* buffer, size_t
 enum { GLINT_FOOTPRINT_GAUSSIAN = 0, GLINT_FOOTPRINT_BOX = 1 };
 typedef struct glint_footprint {
   int32_t kind; /* GLINT_FOOTPRINT_*; other values count as Gaussian */
-  double u, v;  /* centre, in maps: the whole parts count on planes without end (kind tiny-example, in sizes of the example),
-                   for BRDFs as far as floats tell positions apart; maps repeat */
+  double u, v;  /* centre, in maps: the whole parts count on planes without end (kind tiny-example, in sizes of the example;
+                   kinds wang-cp, wang-pyramid and wang-tiles, in tiles), for BRDFs as far as floats tell positions apart; maps repeat */
   float m[4];   /* Gaussian: covariance xx, xy, yy in texels^2, and unused. Box: a parallelogram's half axes ax, ay, bx, by
                    in texels */
 } glint_footprint;

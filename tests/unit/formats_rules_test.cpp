@@ -44,16 +44,18 @@ enum class Base {
   tiny_scattered,
   tiny_tiled,
   wang_tiles,
+  wang_pyramid,
+  wang_cp,
   wave,
   sh_lobes,
   sh_light,
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,      Base::heights,         Base::pyramid,    Base::compressed, Base::compressed_f32,
-                           Base::spots,        Base::bin_map,         Base::histograms, Base::moments,    Base::tiny_scattered,
-                           Base::tiny_tiled,   Base::wang_tiles,      Base::wave,       Base::sh_lobes,   Base::sh_light,
-                           Base::displacement, Base::displacement_rgb};
+constexpr Base kBases[] = {Base::normals,    Base::heights,    Base::pyramid,      Base::compressed,      Base::compressed_f32,
+                           Base::spots,      Base::bin_map,    Base::histograms,   Base::moments,         Base::tiny_scattered,
+                           Base::tiny_tiled, Base::wang_tiles, Base::wang_pyramid, Base::wang_cp,         Base::wave,
+                           Base::sh_lobes,   Base::sh_light,   Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -87,6 +89,10 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleTinyExample(8, TinyMode::tiled).example, provenance);
     case Base::wang_tiles:
       return writeAsset(path, test::sampleWangTiles().tiles, provenance);
+    case Base::wang_pyramid:
+      return writeAsset(path, test::sampleWangPyramid().asset, provenance);
+    case Base::wang_cp:
+      return writeAsset(path, test::sampleWangCp().asset, provenance);
     case Base::wave:
       return writeAsset(path, test::sampleWavePyramid(64, WaveChannels::spectral, BlockPrecision::f16).wave, provenance);
     case Base::sh_lobes:
@@ -836,11 +842,19 @@ std::vector<Fixture> wangFixtures() {
       patched("wang.corners", Base::wang_tiles, [](const Patch& patch) { patch.setInteger("colors_v", 4); }),
       changed("wang.disk", 3 * tile + 5, kNan),
       changed("wang.disk", 2 * row + 7, 1.25f),
-      changed("wang.sides", 5 * tile + 6, 0.3125f),              // south
-      changed("wang.sides", 16 * tile - row + 6, 0.3125f),       // north
-      changed("wang.sides", 9 * tile + 4 * row, 0.3125f),        // west
-      changed("wang.sides", 2 * tile + 5 * row - 1, 0.3125f),    // east
-      changed("wang.slopes", 2 * tile + 4 * row + 10, 0.96875f)  // inside
+      changed("wang.sides", 5 * tile + 6, 0.3125f),               // south
+      changed("wang.sides", 16 * tile - row + 6, 0.3125f),        // north
+      changed("wang.sides", 9 * tile + 4 * row, 0.3125f),         // west
+      changed("wang.sides", 2 * tile + 5 * row - 1, 0.3125f),     // east
+      changed("wang.slopes", 2 * tile + 4 * row + 10, 0.96875f),  // inside
+      patched("wang.levels", Base::wang_pyramid, [](const Patch& patch) { patch.setInteger("tile_count", 32); }),
+      patched("wang.levels", Base::wang_cp, [](const Patch& patch) { patch.setInteger("tile_count", 32); }),
+      patched(
+          "wang.masses", Base::wang_pyramid,
+          [](const Patch& patch) { patch.change<float>("level_00/masses", 1, [](float& x) { x = 0.5f; }); }, true),
+      patched(
+          "wang.masses", Base::wang_cp,
+          [](const Patch& patch) { patch.change<float>("level_00/masses", 0, [](float& x) { x = kNan; }); }, true),
   };
 }
 
@@ -1101,7 +1115,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 20u);
+  EXPECT_EQ(count, 22u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -1140,6 +1154,11 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   const Asset wang = Asset::open(folder / "wang-tiles.glint");
   EXPECT_EQ(wang.get<WangTiles>().at(9, 3, 2).x, -0.25f);
   EXPECT_EQ(wang.get<WangTiles>().plane_seed, 7);
+  const Asset tile_images = Asset::open(folder / "wang-pyramid.glint");
+  EXPECT_EQ(tile_images.get<WangPyramid>().plane.tiles.plane_seed, 7);
+  EXPECT_EQ(tile_images.get<WangPyramid>().plane.grids[0].margin, 1);
+  EXPECT_EQ(tile_images.get<WangPyramid>().plane.grids[0].masses[1], 0.75f);
+  EXPECT_EQ(Asset::open(folder / "wang-cp.glint").get<WangCp>().images.shape.levels[0].rows, 16);
   const Asset wave_asset = Asset::open(folder / "wave-pyramid.glint");
   const WavePyramid& wave = wave_asset.get<WavePyramid>();
   EXPECT_EQ(wave.channel_rgb[1], (Rgb{1 / 3.0f - 0.5f, 1 / 3.0f, 1 / 3.0f + 0.5f}));

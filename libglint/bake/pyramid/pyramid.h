@@ -64,6 +64,9 @@ class NdfPyramidData {
 /// side of the map; the last level is the mean of the map.
 PyramidShape pyramidShape(int width, int height, const PyramidOptions& options);
 
+/// @throws Error (usage) for options out of range
+void checkPyramidOptions(const PyramidOptions& options);
+
 /// Builds the NDF images of every level (Deng 2022, section 4.1).
 ///
 /// Facets are scattered: each texel of a footprint adds its weight to bins of directions. Then one separable filter for each
