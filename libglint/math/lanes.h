@@ -4,12 +4,10 @@
 #include <cstdint>
 
 #include "glint/math/device.h"
+#include "glint/math/float4.h"
 
 #if defined(__GNUC__) && !defined(__CUDACC__) && !defined(__CUDA__)
 #define GLINT_LANES
-#ifdef __SSE2__
-#include <emmintrin.h>
-#endif
 #endif
 
 namespace glint {
@@ -67,7 +65,7 @@ struct Lanes8 {
   GLINT_LANE friend Lanes8 operator/(const Lanes8& a, const Lanes8& b) { return {a.v / b.v}; }
   GLINT_LANE friend Lanes8 rootOf(const Lanes8& a) {
     Lanes8 out;
-#ifdef __SSE2__
+#ifdef GLINT_SSE
     __m128 half[2];
     __builtin_memcpy(half, &a.v, sizeof half);
     half[0] = _mm_sqrt_ps(half[0]);
@@ -81,7 +79,7 @@ struct Lanes8 {
   GLINT_LANE friend Mask less(const Lanes8& a, const Lanes8& b) { return {a.v < b.v}; }
   GLINT_LANE friend Lanes8 where(const Mask& mask, const Lanes8& yes, const Lanes8& no) { return {mask.v ? yes.v : no.v}; }
   GLINT_LANE friend unsigned bitsOf(const Mask& mask) {
-#ifdef __SSE2__
+#ifdef GLINT_SSE
     __m128 half[2];
     __builtin_memcpy(half, &mask.v, sizeof half);
     return static_cast<unsigned>(_mm_movemask_ps(half[0])) | static_cast<unsigned>(_mm_movemask_ps(half[1])) << 4;
