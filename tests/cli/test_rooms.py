@@ -28,7 +28,7 @@ FOLDERS = {
     "bake": {"common": set(), "ingest": {"common"}, "synth": {"common"}, "pyramid": {"common"}, "compressed": {"common"},
              "bin_map": {"common"}, "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"}, "sh": {"common"}, "displace": {"common"},
              "wang": {"common"}, "wave": {"common", "pyramid"}},
-    "query/detail": {"common": set(), "pyramid": {"common"}, "compressed": {"common", "pyramid"}, "bin_map": {"common"},
+    "query/detail": {"common": set(), "manifold": {"common"}, "pyramid": {"common"}, "compressed": {"common", "pyramid"}, "bin_map": {"common"},
                      "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"}, "wave": {"common", "pyramid"}},
 }
 

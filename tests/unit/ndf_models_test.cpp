@@ -15,6 +15,7 @@
 #include "glint/api/alternatives.h"
 #include "glint/api/any_ndf.h"
 #include "glint/bake/common/slopes.h"
+#include "glint/query/reference.h"
 #include "support/c_api.h"
 
 namespace glint {
