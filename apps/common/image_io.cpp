@@ -10,6 +10,7 @@
 #include "common/files.h"
 #include "common/image_formats.h"
 #include "common/image_layout.h"
+#include "common/memory.h"
 #include "common/tiff_tags.h"
 #include "glint/formats/atomic_file.h"
 #include "glint/model/error.h"
@@ -47,7 +48,7 @@ void checkJpegComplete(const std::string& path) {
 Image readImage(const std::string& path, const ImageChoice& choice) {
   checkRegular(path);
   const bool png = isPng(path);
-  StoredImage stored = png ? readPng(path) : imageFormats().read(path, choice.part);
+  StoredImage stored = png ? readPng(path, availableMemory()) : imageFormats().read(path, choice.part, availableMemory());
   Image& image = stored.image;
   if (png) findPart(path, choice.part, image.parts);
   if (image.format == "jpeg") checkJpegComplete(path);

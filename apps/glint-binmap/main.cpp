@@ -1,10 +1,10 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "common/tool.h"
 #include "glint-binmap/bin_map_options.h"
 #include "glint/bake/bin_map/bin_map.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
@@ -20,7 +20,7 @@ int main(int argc, char** argv) {
   apps::BinMapOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     const formats::Provenance provenance = tool.provenance();
     const apps::BuiltBinMap built = options.build(asset.get<NormalMap>(), tool.progress("passes"));
     formats::writeAsset(output.path(), built.data.view(), provenance, output.writeOptions());

@@ -2,8 +2,8 @@
 #include <variant>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "glint-compress/compress_options.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
   const apps::CompressOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     // The map that the pyramid was made from is named, too: --normals of queries must be this map.
     const formats::Provenance provenance = formats::chained(tool.provenance(), asset.info().provenance);
     bake::CompressionReport report;

@@ -1,9 +1,9 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "common/tool.h"
 #include "glint-displace/displace_options.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
   apps::DisplaceOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     bake::DisplaceOptions values = options.values(asset.get<HeightMap>());
     values.seed = tool.seed();
     const formats::Provenance provenance = tool.provenance();

@@ -1,11 +1,11 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "common/tool.h"
 #include "glint-pyramid/pyramid_options.h"
 #include "glint-pyramid/wave_options.h"
 #include "glint/bake/pyramid/pyramid.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
   const apps::WaveOptions wave(tool, options);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     const formats::Provenance provenance = tool.provenance();
     if (wave.optics() == apps::Optics::wave) return apps::makeWavePyramid(tool, asset, input, wave, provenance, output);
     const bake::NdfPyramidData pyramid = bake::buildPyramid(asset.get<NormalMap>(), options.values(), tool.progress("images"));

@@ -7,10 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "glint-query/command_forms.h"
 #include "glint-query/usage.h"
 #include "glint/api/ndf_info.h"
-#include "glint/formats/asset_reader.h"
 
 namespace glint::apps {
 
@@ -37,7 +37,7 @@ void PlaneCommand::check() const {
 }
 
 void PlaneCommand::run() {
-  const formats::Asset asset = formats::Asset::openForBuilding(path_);
+  const formats::Asset asset = openInput(tool_, path_);
   const WangReference tiles(asset.get<WangTiles>(), sigma_r_, surface_);
   // The plane seen from the cell of the point, so that no digits are lost.
   const WangPlace place = tiles.layout().placeOf(texel_[0], texel_[1]);

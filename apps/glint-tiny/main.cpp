@@ -1,10 +1,10 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "common/tool.h"
 #include "glint-tiny/tiny_options.h"
 #include "glint/bake/ingest/normal_bounds.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 #include "glint/model/slope_sums.h"
 
@@ -41,7 +41,7 @@ int main(int argc, char** argv) {
   const apps::ExplicitOptions window(tool, options.options());
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     if (window.wanted()) return writeMap(tool, asset.get<TinyExample>(), window.window(), output);
     const bake::TinyOptions values = options.values();
     const NormalMap example = options.example(asset.get<NormalMap>());

@@ -1,11 +1,11 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "common/tool.h"
 #include "glint-wang/wang_options.h"
 #include "glint/bake/common/slopes.h"
 #include "glint/bake/ingest/normal_bounds.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
@@ -38,7 +38,7 @@ int main(int argc, char** argv) {
   const apps::WangOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     if (options.wantsMap()) return writeMap(tool, output, asset.get<WangTiles>(), options);
     apps::refuseTiles(asset, input.path());
     const auto& map = asset.get<NormalMap>();
