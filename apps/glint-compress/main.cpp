@@ -19,6 +19,10 @@ int main(int argc, char** argv) {
 
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = apps::openInput(tool, input.path());
+    // The packed images, and the blocks of all images that are being factored.
+    constexpr double kBytesPerByte = 3;
+    tool.requireMemory(kBytesPerByte * static_cast<double>(asset.info().file_bytes), "the compression of this pyramid",
+                       "make the pyramid with a larger --stride");
     // The map that the pyramid was made from is named, too: --normals of queries must be this map.
     const formats::Provenance provenance = formats::chained(tool.provenance(), asset.info().provenance);
     bake::CompressionReport report;

@@ -2,6 +2,7 @@
 
 #include "common/files.h"
 #include "common/input_asset.h"
+#include "common/memory_needs.h"
 #include "common/tool.h"
 #include "glint-displace/displace_options.h"
 #include "glint/formats/asset_writer.h"
@@ -19,10 +20,12 @@ int main(int argc, char** argv) {
 
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = apps::openInput(tool, input.path());
-    bake::DisplaceOptions values = options.values(asset.get<HeightMap>());
+    const auto& map = asset.get<HeightMap>();
+    apps::requireMemoryFor(tool, "a displacement of", map.width, map.height, apps::BytesPerTexel::kDisplace);
+    bake::DisplaceOptions values = options.values(map);
     values.seed = tool.seed();
     const formats::Provenance provenance = tool.provenance();
-    const bake::DisplacementData data = bake::displace(asset.get<HeightMap>(), values, tool.progress("levels"));
+    const bake::DisplacementData data = bake::displace(map, values, tool.progress("levels"));
     formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
     apps::warnAbout(tool, data);
     tool.setResult(apps::displacementJson(data));

@@ -2,6 +2,7 @@
 
 #include "common/files.h"
 #include "common/input_asset.h"
+#include "common/memory_needs.h"
 #include "common/tool.h"
 #include "glint-moments/moments_options.h"
 #include "glint-moments/texture_output.h"
@@ -23,6 +24,8 @@ int main(int argc, char** argv) {
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = apps::openInput(tool, input.path());
     const auto [width, height] = apps::mapSize(asset, input.path());
+    apps::requireMemoryFor(tool, "moments of", width, height,
+                           textures.wanted() ? apps::BytesPerTexel::kTextures : apps::BytesPerTexel::kMoments);
     const bake::SlopeMomentsOptions values = options.values(width, height);
     if (textures.wanted()) textures.check(tool, SlopeMoments::chainLength(width, height));
     const formats::Provenance provenance = tool.provenance();

@@ -26,7 +26,11 @@ int main(int argc, char** argv) {
     const formats::Asset asset = apps::openInput(tool, input.path());
     const formats::Provenance provenance = tool.provenance();
     if (wave.optics() == apps::Optics::wave) return apps::makeWavePyramid(tool, asset, input, wave, provenance, output);
-    const bake::NdfPyramidData pyramid = bake::buildPyramid(asset.get<NormalMap>(), options.values(), tool.progress("images"));
+    const auto& map = asset.get<NormalMap>();
+    const bake::PyramidOptions values = options.values();
+    tool.requireMemory(bake::pyramidBytes(map, values, static_cast<double>(tool.maxMemory())), "the NDF images",
+                       "give a larger --stride, or a smaller --resolution or --overlap");
+    const bake::NdfPyramidData pyramid = bake::buildPyramid(map, values, tool.progress("images"));
     formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
     tool.setResult(apps::pyramidJson(pyramid));
     tool.summary(apps::pyramidText(pyramid));

@@ -20,9 +20,10 @@ int main(int argc, char** argv) {
 
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = apps::openInput(tool, input.path());
+    const auto& map = asset.get<NormalMap>();
+    tool.requireMemory(bake::histogramSatBytes(map, options.values()), "the tables", "give a larger --stride, or fewer --bins");
     const formats::Provenance provenance = tool.provenance();
-    const bake::HistogramSatData sat =
-        bake::buildHistogramSat(asset.get<NormalMap>(), options.values(), tool.progress("tables"));
+    const bake::HistogramSatData sat = bake::buildHistogramSat(map, options.values(), tool.progress("tables"));
     formats::writeAsset(output.path(), sat.view(), provenance, output.writeOptions());
     tool.setResult(apps::satJson(sat));
     tool.summary(apps::satText(sat));

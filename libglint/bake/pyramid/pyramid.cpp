@@ -337,6 +337,43 @@ int resolutionFor(float sigma_r) {
   return static_cast<int>(std::ceil(pixels / kBlockSize)) * kBlockSize;
 }
 
+double pyramidBytes(const NormalMap& map, const PyramidOptions& options, double most_bytes) {
+  // Images are packed while others of their level still have their own arrays, which grew by doubling.
+  constexpr double kCopies = 2.5;
+  constexpr std::size_t kSampledImages = 8;  // of a level
+  // Triangles of smooth surfaces lie between the blocks of their corners.
+  const double spread = options.surface == Surface::smooth ? 4 : 1;
+  checkOptions(map, options);
+  PyramidShape shape = pyramidShape(map.width, map.height, options);
+  const double block_bytes = kBlockPixels * (options.precision == BlockPrecision::f16 ? 2.0 : 4.0) + sizeof(float);
+  const double empty_image = static_cast<double>(sizeof(PackedImage)) + static_cast<double>(shape.maskWords()) * 24;
+  double full = 0, counted = 0;
+  for (int l = 0; l < shape.level_count; ++l)
+    full += static_cast<double>(shape.levels[l].imageCount()) * (empty_image + shape.blocksPerImage() * block_bytes * kCopies);
+  if (full <= most_bytes) return full;
+
+  const float sigma_pixels = 0.5f * options.sigma_r * static_cast<float>(options.resolution);
+  const PixelFilter filter(sigma_pixels, subdivisionFor(sigma_pixels), Spline::quadratic);
+  const ImagePacker packer(shape, BlockPrecision::f16, 1);
+  Scratch scratch(options.resolution, filter);
+  const Layer layer = {&scratch.bins, &filter};
+  for (int l = 0; l < shape.footprintLevels(); ++l) {
+    const PyramidGrid& grid = shape.levels[l];
+    const std::size_t samples = std::min(kSampledImages, grid.imageCount());
+    double blocks = 0;
+    for (std::size_t k = 0; k < samples; ++k) {
+      const std::size_t image = (2 * k + 1) * grid.imageCount() / (2 * samples);
+      const Vec2 centre = shape.centre(l, static_cast<int>(image % grid.columns), static_cast<int>(image / grid.columns));
+      scatterFlatFootprint(map, shape.boundary, centre, kFootprintPerStride * grid.stride, scratch.bins, scratch.band);
+      blocks += static_cast<double>(packer.pack({&layer, 1}, 1).means.size());
+      scratch.bins.clear();
+    }
+    const double blocks_per_image = std::min<double>(shape.blocksPerImage(), spread * blocks / static_cast<double>(samples));
+    counted += static_cast<double>(grid.imageCount()) * (empty_image + blocks_per_image * block_bytes * kCopies);
+  }
+  return counted;
+}
+
 NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options, const ProgressFn& progress) {
   checkOptions(map, options);
   NdfPyramidData pyramid;
