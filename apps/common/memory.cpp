@@ -4,7 +4,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <array>
+#include <atomic>
 #include <cctype>
 #include <cmath>
 #include <fstream>
@@ -19,6 +19,7 @@ namespace {
 constexpr std::uint64_t kUnlimited = std::numeric_limits<std::uint64_t>::max();
 constexpr double kKilo = 1024;
 constexpr std::string_view kUnits = "KMGT";
+std::atomic<std::uint64_t> most_bytes = 0;  // of limitMemory()
 // Kept free for the system and for other programs: this share, and at least this much.
 constexpr std::uint64_t kMarginShare = 20;
 constexpr std::uint64_t kLeastMargin = std::uint64_t{64} << 20;
@@ -93,21 +94,14 @@ std::uint64_t remainingOf(decltype(RLIMIT_AS) resource, const std::string& used_
 }  // namespace
 
 std::uint64_t availableMemory() {
+  if (most_bytes > 0) return most_bytes;
   const std::uint64_t least = std::min({namedBytes("/proc/meminfo", "MemAvailable:"), remainingInGroups(),
                                         remainingOf(RLIMIT_AS, "VmSize:"), remainingOf(RLIMIT_DATA, "VmData:")});
   if (least == kUnlimited) return least;
   return least - std::min(least, std::max(least / kMarginShare, kLeastMargin));
 }
 
-void limitMemory(std::uint64_t bytes, int threads) {
-  // The program itself with its libraries, and the stack and the heap of each thread, which are reserved and hardly used.
-  constexpr std::uint64_t kProgram = std::uint64_t{96} << 20, kThread = std::uint64_t{16} << 20;
-  const std::uint64_t more = kProgram + kThread * static_cast<std::uint64_t>(std::max(threads, 1));
-  rlimit limit = {};
-  if (bytes > kUnlimited - more || ::getrlimit(RLIMIT_DATA, &limit) != 0) return;
-  limit.rlim_cur = std::min<rlim_t>(limit.rlim_cur, bytes + more);
-  ::setrlimit(RLIMIT_DATA, &limit);
-}
+void limitMemory(std::uint64_t bytes) { most_bytes = bytes; }
 
 std::string memoryText(double bytes) {
   double value = bytes;

@@ -10,8 +10,8 @@ namespace glint::apps {
 /// the process's control groups leave, and what ulimit -v and ulimit -d leave, less a margin.
 std::uint64_t availableMemory();
 
-/// Makes allocations fail with std::bad_alloc once the process holds this much writable memory, and what its threads need.
-void limitMemory(std::uint64_t bytes, int threads);
+/// Makes availableMemory() return this. No limit of the system is set: libraries for images hang where they get no memory.
+void limitMemory(std::uint64_t bytes);
 
 /// "1.5 GB", "12 MB". Rounded up, so that the text as a value of --max-memory is no less than the number.
 std::string memoryText(double bytes);

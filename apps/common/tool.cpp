@@ -392,7 +392,7 @@ int Tool::work(const std::function<void()>& body) {
     checkOutput(*this, s.depfile, OutputFormat::depfile);
   }
   for (const auto& check : s.late_checks) check();
-  if (s.max_memory > 0) limitMemory(s.max_memory, threads());
+  if (s.max_memory > 0) limitMemory(s.max_memory);
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads()));
   body();
   s.reporter.reset();
