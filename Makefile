@@ -46,6 +46,15 @@ test: build python  ## build and run the tests, except slow ones
 test-all: build python  ## the same with the slow ones: fuzzing, large maps
 	ctest --preset release --parallel $(JOBS) --no-label-summary
 
+# A file that breaks something lands in build-fuzz/. Put it, made small by -minimize_crash=1, into tests/fuzz/corpus.
+SECONDS := 60
+.PHONY: fuzz
+fuzz: | packages  ## fuzz the reader, the validator and all queries for SECONDS=60, guided by coverage
+	cmake --preset fuzz
+	cmake --build --preset fuzz --parallel $(JOBS) --target glint-fuzz
+	@mkdir -p build-fuzz/corpus
+	cd build-fuzz && bin/glint-fuzz -max_total_time=$(SECONDS) -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 corpus ../tests/fuzz/corpus ../tests/golden/v1.0
+
 .PHONY: bench
 bench: build  ## time whole commands and queries on 2K^2 maps; writes build/bench/results.json
 	@$(PYTHON) tests/bench/bench.py --bin build/bin --out build/bench

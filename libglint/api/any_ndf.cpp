@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "glint/api/alternatives.h"
@@ -60,7 +61,11 @@ std::vector<std::string_view> ndfKinds() {
 }
 
 OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& options) {
-  OpenedNdf opened(path, options);
+  return open(formats::Asset::open(path, options.checks), path, options);
+}
+
+OpenedNdf OpenedNdf::open(formats::Asset asset, const std::filesystem::path& path, const NdfOptions& options) {
+  OpenedNdf opened(std::move(asset), path, options);
   if (!options.normals.empty()) opened.normals_ = formats::Asset::open(options.normals, options.checks);
   const std::string_view kind = opened.asset_.kind();
   if (!answersNdf(kind)) refuseKind(kind, path);

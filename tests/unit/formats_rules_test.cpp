@@ -20,6 +20,7 @@
 #include "glint/formats/kinds/kind.h"
 #include "glint/formats/validate.h"
 #include "glint/query/detail/bin_map/bin_blocks.h"
+#include "support/hdf5_bytes.h"
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 #include "support/test_maps.h"
@@ -173,6 +174,28 @@ class Patch {
   hid_t file_;
 };
 
+constexpr unsigned kMost = 2000;  // more links and attributes than a file may have
+
+/// A new group that keeps up to `compact` links and attributes in its object header.
+class Group {
+ public:
+  Group(hid_t file, const char* name, unsigned compact) {
+    const hid_t properties = H5Pcreate(H5P_GROUP_CREATE);
+    H5Pset_link_phase_change(properties, compact, 0);
+    H5Pset_est_link_info(properties, compact, 8);  // room for all: each link would add a part to the header
+    H5Pset_attr_phase_change(properties, compact, 0);
+    id_ = H5Gcreate2(file, name, H5P_DEFAULT, properties, H5P_DEFAULT);
+    H5Pclose(properties);
+  }
+  ~Group() { H5Gclose(id_); }
+  Group(const Group&) = delete;
+  Group& operator=(const Group&) = delete;
+  hid_t id() const { return id_; }
+
+ private:
+  hid_t id_;
+};
+
 struct Fixture {
   const char* rule;
   Base base;
@@ -221,9 +244,27 @@ std::vector<Fixture> linkFixtures() {
               }),
       patched("group.size", Base::heights,
               [](const Patch& patch) {
-                for (int k = 0; k < 1100; ++k)
-                  H5Lcreate_soft("/heights", patch.file(), ("l" + std::to_string(k)).c_str(), 0, 0);
+                const Group group(patch.file(), "g", kMost);
+                for (int k = 0; k < 1100; ++k) H5Gclose(H5Gcreate2(group.id(), ("l" + std::to_string(k)).c_str(), 0, 0, 0));
               }),
+      patched("object.heap", Base::heights,
+              [](const Patch& patch) {
+                for (int k = 0; k < 1100; ++k) H5Gclose(H5Gcreate2(patch.file(), ("l" + std::to_string(k)).c_str(), 0, 0, 0));
+              }),
+      patched("object.heap", Base::heights,
+              [](const Patch& patch) {
+                for (int k = 0; k < 80; ++k) patch.setInteger(("a" + std::to_string(k)).c_str(), k);
+              }),
+      patched("file.objects", Base::heights,
+              [](const Patch& patch) {
+                for (int g = 0; g < 5; ++g) {
+                  const Group group(patch.file(), ("g" + std::to_string(g)).c_str(), kMost);
+                  for (int k = 0; k < 1000; ++k) H5Gclose(H5Gcreate2(group.id(), ("l" + std::to_string(k)).c_str(), 0, 0, 0));
+                }
+              }),
+      patched("text.padding", Base::heights,
+              [](const Patch& patch) { patch.setText("generator", std::string("tool 1.0\0hidden", 15)); }),
+      patched("text.utf8", Base::heights, [](const Patch& patch) { patch.setText("generator", "tool \u202e0.1"); }),
       patched("group.size", Base::heights,
               [](const Patch& patch) { H5Lcreate_soft("/heights", patch.file(), std::string(300, 'x').c_str(), 0, 0); }),
       patched("text.utf8", Base::heights, [](const Patch& patch) { patch.setText("generator", "tool \xff 1.0"); }),
@@ -254,9 +295,23 @@ std::vector<Fixture> linkFixtures() {
               }),
       patched("object.attributes", Base::heights,
               [](const Patch& patch) {
-                for (int k = 0; k < 80; ++k) patch.setInteger(("a" + std::to_string(k)).c_str(), k);
+                const Group group(patch.file(), "g", kMost);
+                for (int k = 0; k < 80; ++k)
+                  patch.set("g", ("a" + std::to_string(k)).c_str(), H5T_STD_I32LE, H5T_NATIVE_INT, &k);
               }),
   };
+}
+
+/// Says behind right checksums that the attribute `inputs` has 2^20 elements.
+void growInputs(const fs::path& path) {
+  test::Bytes bytes = test::readBytes(path.string());
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  constexpr std::size_t kNameAndType = 7 + 8, kDimension = 4;  // "inputs" and its NUL, a datatype of 8 bytes; then a dataspace
+  const std::uint64_t count = 1 << 20;
+  for (const std::size_t place : {0, 8})  // its size, and the most that it may be
+    std::memcpy(bytes.data() + text.find("inputs") + kNameAndType + kDimension + place, &count, sizeof count);
+  test::renewChecksums(bytes, test::checksummedRanges(bytes));
+  test::writeBytes(path.string(), bytes);
 }
 
 std::vector<Fixture> attributeFixtures() {
@@ -269,7 +324,8 @@ std::vector<Fixture> attributeFixtures() {
                 patch.set("/", "generator", type, type, &text);
                 H5Tclose(type);
               }),
-      patched("attribute.size", Base::heights, [](const Patch& patch) { patch.setText("command", std::string(100000, ' ')); }),
+      {"attribute.size", Base::heights, &growInputs},
+      patched("object.heap", Base::heights, [](const Patch& patch) { patch.setText("command", std::string(100000, ' ')); }),
       patched("attribute.missing", Base::heights, [](const Patch& patch) { patch.remove("/", "width"); }),
       patched("attribute.missing", Base::heights, [](const Patch& patch) { patch.remove("/", "glint_format"); }),
       patched("attribute.missing", Base::heights, [](const Patch& patch) { patch.remove("/heights", "units"); }),
@@ -298,6 +354,16 @@ std::vector<Fixture> attributeFixtures() {
       patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setInteger("resolution", 2048); }),
       patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setInteger("level_count", 17); }),
       patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setText("surface", "bumpy"); }),
+      patched(
+          "attribute.json", Base::heights, [](const Patch& patch) { patch.setText("command", "{\"a\": 1"); }, true),
+      patched(
+          "attribute.json", Base::heights, [](const Patch& patch) { patch.setText("command", "[1]"); }, true),
+      patched(
+          "file.digest", Base::heights, [](const Patch& patch) { patch.setText("generator", "another 1.0"); }, true),
+      patched(
+          "file.digest", Base::heights, [](const Patch& patch) { patch.setText("digest", std::string(32, '0')); }, true),
+      patched(
+          "group.unknown", Base::heights, [](const Patch& patch) { H5Gclose(H5Gcreate2(patch.file(), "g", 0, 0, 0)); }, true),
       patched(
           "attribute.unknown", Base::heights, [](const Patch& patch) { patch.setInteger("answer", 42); }, true),
       patched("format.name", Base::heights, [](const Patch& patch) { patch.setText("glint_format", "other"); }),
@@ -993,6 +1059,14 @@ TEST(FormatRules, NothingOfHdf5StaysOpen) {
     validateAsset(path);
     EXPECT_EQ(open_objects(), objects) << fixture.rule;
   }
+}
+
+TEST(FormatRules, FilesMayLackADigest) {
+  const test::TempFolder folder;
+  const fs::path path = folder / "a.glint";
+  writeBase(path, Base::heights);
+  Patch(path).remove("/", "digest");
+  EXPECT_THAT(validateAsset(path).findings, testing::IsEmpty());
 }
 
 TEST(FormatVersions, ANewerMinorIsReadWithAWarning) {

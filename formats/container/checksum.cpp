@@ -1,4 +1,4 @@
-#include "glint/formats/hdf5_checksum.h"
+#include "glint/formats/container/checksum.h"
 
 #include <algorithm>
 #include <bit>
