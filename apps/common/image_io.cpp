@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
+#include <new>
 
 #include "common/files.h"
 #include "common/image_formats.h"
@@ -21,13 +23,16 @@ const ImageFormats& imageFormats() {
   static const ImageFormats& loaded = []() -> const ImageFormats& {
     const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe");
     const std::string path = (program.parent_path() / GLINT_IMAGE_FORMATS).lexically_normal();
+    errno = 0;
     void* object = ::dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
     void* table = object ? ::dlsym(object, "glint_image_formats") : nullptr;
     if (!table) {
-      const char* reason = ::dlerror();
+      if (errno == ENOMEM) throw std::bad_alloc();
+      const char* text = ::dlerror();
+      const std::string reason = text ? " (" + std::string(text) + ")" : "";  // the text goes with the next call
       if (std::filesystem::exists(path)) checkSystemReads(path);
       throw Error(ErrorCode::failed, "image.formats", path, "",
-                  "the part that reads and writes images cannot be loaded" + (reason ? " (" + std::string(reason) + ")" : ""),
+                  "the part that reads and writes images cannot be loaded" + reason,
                   "install the whole package: this file belongs to the programs");
     }
     return *static_cast<const ImageFormats*>(table);

@@ -15,6 +15,7 @@ namespace glint::apps {
 namespace {
 
 bool pipe_ended_process = false;
+std::atomic<bool> memory_ran_out = false;
 
 void endBy(int signal) {
   formats::removeTemporaryFiles();
@@ -42,6 +43,7 @@ void endBy(int signal) {
 /// Exceptions that nobody catches: of what runs before Tool::run() or after it, of functions that must not throw, of threads of
 /// libraries.
 [[noreturn]] void onTerminate() noexcept {
+  if (memory_ran_out) endUncaught("out of memory", kMemoryRemedy);
   try {
     if (const std::exception_ptr current = std::current_exception()) std::rethrow_exception(current);
   } catch (const std::bad_alloc&) {
@@ -52,8 +54,6 @@ void endBy(int signal) {
   }
   endUncaught("the program ended without a reason", "please report this as a defect");
 }
-
-std::atomic<bool> memory_ran_out = false;
 
 /// Libraries may catch std::bad_alloc and give another reason.
 [[noreturn]] void onNoMemory() {

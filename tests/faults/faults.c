@@ -26,9 +26,9 @@
 
 enum { REQUESTS = 198, ANSWERS = 199, NO_NUMBER = -1, SHORT = -1, MOST_SECONDS = 30 };
 
-// Memory that HDF5 asks for is a class of its own: the library does not always bear to be refused any.
-enum Class { MEMORY, MEMORY_HDF5, OPEN, READ, WRITE, FSYNC, RENAME, MMAP, CLOSE, RESERVE, CLASSES };
-static const char* const kNames[CLASSES] = {"memory", "memory_hdf5", "open", "read",  "write",
+// Memory that libraries for C ask for is a class of its own: some of them end the process when they are refused any.
+enum Class { MEMORY, MEMORY_LIBRARIES, OPEN, READ, WRITE, FSYNC, RENAME, MMAP, CLOSE, RESERVE, CLASSES };
+static const char* const kNames[CLASSES] = {"memory", "memory_libraries", "open", "read",  "write",
                                             "fsync",  "rename",      "mmap", "close", "reserve"};
 
 struct Shared {
@@ -38,7 +38,12 @@ static struct Shared* shared = NULL;  // set once main() is about to run
 static int fault_class = CLASSES;
 static long fault_number = NO_NUMBER;
 static int fault_error = 0;
-static uintptr_t hdf5_begin = 0, hdf5_end = 0;
+enum { MOST_PARTS = 16 };
+static struct {
+  uintptr_t begin, end;
+} library_parts[MOST_PARTS];  // machine code of kLibraries
+static int part_count = 0;
+static const char* const kLibraries[] = {"/libhdf5", "/libfftw3", "/libgomp"};
 
 /// Counts a call, and says whether it is the one that fails. Sets errno.
 static int fails(enum Class class) {
@@ -50,7 +55,9 @@ static int fails(enum Class class) {
 }
 
 static enum Class memoryOf(void* caller) {
-  return (uintptr_t)caller >= hdf5_begin && (uintptr_t)caller < hdf5_end ? MEMORY_HDF5 : MEMORY;
+  for (int k = 0; k < part_count; ++k)
+    if ((uintptr_t)caller >= library_parts[k].begin && (uintptr_t)caller < library_parts[k].end) return MEMORY_LIBRARIES;
+  return MEMORY;
 }
 
 #define REAL(name) ((__typeof__(&name))real(#name))
@@ -155,16 +162,18 @@ void* mmap64(void* at, size_t size, int protection, int flags, int file, off64_t
 
 // The program's main(), once for each line.
 
-static int findHdf5(struct dl_phdr_info* info, size_t size, void* unused) {
+static int findLibrary(struct dl_phdr_info* info, size_t size, void* unused) {
   (void)size, (void)unused;
   const char* name = strrchr(info->dlpi_name, '/');
-  if (name == NULL || strncmp(name, "/libhdf5", 8) != 0) return 0;
-  for (int k = 0; k < info->dlpi_phnum; ++k) {
+  int wanted = 0;
+  for (size_t k = 0; name != NULL && k < sizeof kLibraries / sizeof *kLibraries; ++k)
+    wanted |= strncmp(name, kLibraries[k], strlen(kLibraries[k])) == 0;
+  for (int k = 0; wanted && k < info->dlpi_phnum && part_count < MOST_PARTS; ++k) {
     const ElfW(Phdr)* part = &info->dlpi_phdr[k];
     if (part->p_type != PT_LOAD || !(part->p_flags & PF_X)) continue;
-    hdf5_begin = info->dlpi_addr + part->p_vaddr;
-    hdf5_end = hdf5_begin + part->p_memsz;
-    return 1;
+    library_parts[part_count].begin = info->dlpi_addr + part->p_vaddr;
+    library_parts[part_count].end = info->dlpi_addr + part->p_vaddr + part->p_memsz;
+    ++part_count;
   }
   return 0;
 }
@@ -184,7 +193,7 @@ static int (*program_main)(int, char**, char**) = NULL;
 
 static int serve(int argc, char** argv, char** environment) {
   if (fcntl(REQUESTS, F_GETFD) < 0) return program_main(argc, argv, environment);
-  dl_iterate_phdr(findHdf5, NULL);
+  dl_iterate_phdr(findLibrary, NULL);
   struct Shared* counts =
       REAL(mmap)(NULL, sizeof(struct Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   char line[128];
