@@ -27,8 +27,9 @@ python: build $(venv)/requirements.txt  ## the Python package: a wheel in build/
 	  --config-settings=cmake.define.GLINT_BUILD_TREE=$(CURDIR)/build --config-settings=cmake.define.GLINT_STATIC_HDF5=ON
 	@PATH="$(CURDIR)/$(venv)/bin:$$PATH" auditwheel repair --wheel-dir build/wheels build/python/wheels/*.whl 2>build/python/auditwheel.log \
 	  || { cat build/python/auditwheel.log >&2; exit 1; }
+	@$(PYTHON) python/sbom.py build/wheels/*.whl --build build --build build/python -o build/wheels/glint_ndf.cdx.json
 	@$(venv)/bin/pip install --quiet --force-reinstall --no-deps build/wheels/*.whl
-	@echo "$$(ls build/wheels/*.whl), installed in $(venv)"
+	@echo "$$(ls build/wheels/*.whl), with a list of its libraries beside it; installed in $(venv)"
 
 requirements := python/requirements.txt tests/python/integrations/requirements.txt
 $(venv)/requirements.txt: $(requirements) packages.txt | packages

@@ -2,9 +2,9 @@
 #include <variant>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "glint-compress/compress_options.h"
 #include "glint/bake/wang/tile_pyramid.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
@@ -19,7 +19,11 @@ int main(int argc, char** argv) {
   const apps::CompressOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
+    // The packed images, and the blocks of all images that are being factored.
+    constexpr double kBytesPerByte = 3;
+    tool.requireMemory(kBytesPerByte * static_cast<double>(asset.info().file_bytes), "the compression of this pyramid",
+                       "make the pyramid with a larger --stride");
     // The map that the pyramid was made from is named, too: --normals of queries must be this map.
     const formats::Provenance provenance = formats::chained(tool.provenance(), asset.info().provenance);
     bake::CompressionReport report;

@@ -1,21 +1,26 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "common/tool.h"
 #include "glint-pyramid/pyramid_options.h"
 #include "glint-pyramid/wave_options.h"
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/bake/wang/tile_pyramid.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
 
 namespace {
+constexpr auto kLessMemory = "give a larger --stride, or a smaller --resolution or --overlap";
+
 /// Writes the images of all tiles of a plane.
 void makeWangPyramid(apps::Tool& tool, const WangTiles& tiles, const apps::PyramidOptions& options,
                      const formats::Provenance& provenance, const apps::OutputFile& output) {
-  const bake::WangPyramidData pyramid = bake::buildWangPyramid(tiles, options.values(), tool.progress("images"));
+  const bake::PyramidOptions values = options.values();
+  tool.requireMemory(bake::wangPyramidBytes(tiles, values, static_cast<double>(tool.maxMemory())), "the NDF images",
+                     kLessMemory);
+  const bake::WangPyramidData pyramid = bake::buildWangPyramid(tiles, values, tool.progress("images"));
   formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
   tool.setResult(apps::pyramidJson(pyramid.images));
   tool.summary(apps::pyramidText(pyramid.images));
@@ -38,11 +43,14 @@ int main(int argc, char** argv) {
   const apps::WaveOptions wave(tool, options);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     const formats::Provenance provenance = tool.provenance();
     if (wave.optics() == apps::Optics::wave) return apps::makeWavePyramid(tool, asset, input, wave, provenance, output);
     if (asset.kind() == "wang-tiles") return makeWangPyramid(tool, asset.get<WangTiles>(), options, provenance, output);
-    const bake::NdfPyramidData pyramid = bake::buildPyramid(asset.get<NormalMap>(), options.values(), tool.progress("images"));
+    const auto& map = asset.get<NormalMap>();
+    const bake::PyramidOptions values = options.values();
+    tool.requireMemory(bake::pyramidBytes(map, values, static_cast<double>(tool.maxMemory())), "the NDF images", kLessMemory);
+    const bake::NdfPyramidData pyramid = bake::buildPyramid(map, values, tool.progress("images"));
     formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
     tool.setResult(apps::pyramidJson(pyramid));
     tool.summary(apps::pyramidText(pyramid));

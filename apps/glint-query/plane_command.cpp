@@ -7,10 +7,10 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "glint-query/command_forms.h"
 #include "glint-query/usage.h"
 #include "glint/api/ndf_info.h"
-#include "glint/formats/asset_reader.h"
 
 namespace glint::apps {
 
@@ -38,7 +38,7 @@ void PlaneCommand::check() const {
 }
 
 void PlaneCommand::run() {
-  const formats::Asset asset = formats::Asset::openForBuilding(path_);
+  const formats::Asset asset = openInput(tool_, path_);
   const auto kind = asset.kind();
   if (kind == "wang-pyramid") return ask(WangPlane<PyramidTiles>(asset.get<WangPyramid>()));
   if (kind == "wang-cp") return ask(WangPlane<CompressedTiles>(asset.get<WangCp>()));

@@ -133,6 +133,11 @@ NdfPyramidData::Level packLevel(std::vector<PackedImage>& images, BlockPrecision
   return level;
 }
 
+PixelFilter flatFilter(const PyramidOptions& options) {
+  const float sigma_pixels = 0.5f * options.sigma_r * static_cast<float>(options.resolution);
+  return {sigma_pixels, subdivisionFor(sigma_pixels), Spline::quadratic};
+}
+
 float valueScaleFor(int resolution) {
   // The largest half is 65504: images of more than 256 pixels are scaled down.
   return resolution > 256 ? static_cast<float>(resolution * resolution) / (256 * 256) : 1;

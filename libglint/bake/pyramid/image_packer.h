@@ -47,6 +47,9 @@ class ImagePacker {
 /// Joins the images of a level, and frees them.
 NdfPyramidData::Level packLevel(std::vector<PackedImage>& images, BlockPrecision precision);
 
+/// The filter that makes pixels of the bins of flat surfaces.
+PixelFilter flatFilter(const PyramidOptions& options);
+
 /// What the pixels of images of this resolution are divided by: the largest pixel mean, (resolution / 2)^2, must be a half.
 float valueScaleFor(int resolution);
 

@@ -13,6 +13,7 @@
 #include "glint/bake/pyramid/agreement.h"
 #include "glint/bake/pyramid/direction_bins.h"
 #include "glint/bake/pyramid/flat_scatter.h"
+#include "glint/bake/pyramid/image_bytes.h"
 #include "glint/bake/pyramid/image_packer.h"
 #include "glint/bake/pyramid/smooth_scatter.h"
 #include "glint/model/error.h"
@@ -40,6 +41,25 @@ struct Scratch {
   DirectionBins bins, band;
 };
 
+void checkTexels(const NormalMap& map) {
+  if (map.width < 1 || map.height < 1) throw Error(ErrorCode::invalid_input, "normals.size", {}, {}, "the map has no texels");
+}
+
+/// Makes one image of a flat surface.
+PackedImage flatImage(const NormalMap& map, const PyramidShape& shape, int level, std::size_t image, const ImagePacker& packer,
+                      const PixelFilter& filter, Scratch& s) {
+  const PyramidGrid& grid = shape.levels[level];
+  const Vec2 centre = shape.centre(level, static_cast<int>(image % grid.columns), static_cast<int>(image / grid.columns));
+  if (level < shape.footprintLevels())
+    scatterFlatFootprint(map, shape.boundary, centre, kFootprintPerStride * grid.stride, s.bins, s.band);
+  else
+    scatterFlatMap(map, s.bins, s.band);
+  const Layer layer = {&s.bins, &filter};
+  PackedImage packed = packer.pack({&layer, 1}, 1);
+  s.bins.clear();
+  return packed;
+}
+
 /// Makes the images of all levels of a flat surface.
 /// @return [levels][images]
 std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const PyramidShape& shape, const ImagePacker& packer,
@@ -53,15 +73,7 @@ std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const Pyra
     const PyramidGrid& grid = shape.levels[l];
     images[l].resize(grid.imageCount());
     tbb::parallel_for(std::size_t{0}, grid.imageCount(), [&](std::size_t k) {
-      Scratch& s = scratch.local();
-      const Vec2 centre = shape.centre(l, static_cast<int>(k % grid.columns), static_cast<int>(k / grid.columns));
-      if (l < shape.footprintLevels())
-        scatterFlatFootprint(map, shape.boundary, centre, kFootprintPerStride * grid.stride, s.bins, s.band);
-      else
-        scatterFlatMap(map, s.bins, s.band);
-      const Layer layer = {&s.bins, &filter};
-      images[l][k] = packer.pack({&layer, 1}, 1);
-      s.bins.clear();
+      images[l][k] = flatImage(map, shape, l, k, packer, filter, scratch.local());
       counter.advance();
     });
   }
@@ -87,8 +99,10 @@ void unpackBins(const BlockBins& sparse, const DirectionTiles::Grid& grid, Direc
 /// Makes the images of all levels of a smooth surface, from a fine and a coarse grid of bins.
 /// @return [levels][images]
 std::vector<std::vector<PackedImage>> buildSmooth(const NormalMap& map, const PyramidShape& shape, const ImagePacker& packer,
-                                                  int subdivision, const ProgressFn& progress) {
+                                                  const ProgressFn& progress) {
   const float sigma_pixels = 0.5f * shape.sigma_r * static_cast<float>(shape.resolution);
+  // The coarse grid has half the bins along each axis.
+  const int subdivision = 2 * ((subdivisionFor(sigma_pixels) + 1) / 2);
   const PixelFilter fine_filter(sigma_pixels, subdivision, Spline::cubic);
   const PixelFilter coarse_filter(sigma_pixels, subdivision / 2, Spline::cubic);
   const DirectionTiles tiles(shape.resolution * subdivision);
@@ -184,21 +198,32 @@ void checkPyramidOptions(const PyramidOptions& o) {
   require(o.levels >= 0 && o.levels <= kMaxFootprintLevels, "--levels", "auto or 1 to " + std::to_string(kMaxFootprintLevels));
 }
 
+double pyramidBytes(const NormalMap& map, const PyramidOptions& options, double most_bytes) {
+  // Triangles of smooth surfaces lie between the blocks of their corners.
+  const double spread = options.surface == Surface::smooth ? 4 : 1;
+  checkPyramidOptions(options);
+  checkTexels(map);
+  const PyramidShape shape = pyramidShape(map.width, map.height, options);
+  const PixelFilter filter = flatFilter(options);
+  const ImagePacker packer(shape, BlockPrecision::f16, 1);
+  Scratch scratch(options.resolution, filter);
+  return imageBytes(
+      shape, options.precision, most_bytes,
+      [&](int level, std::size_t image) { return flatImage(map, shape, level, image, packer, filter, scratch).means.size(); },
+      spread);
+}
+
 NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options, const ProgressFn& progress) {
   checkPyramidOptions(options);
-  if (map.width < 1 || map.height < 1) throw Error(ErrorCode::invalid_input, "normals.size", {}, {}, "the map has no texels");
+  checkTexels(map);
   NdfPyramidData pyramid;
   pyramid.shape = pyramidShape(map.width, map.height, options);
   pyramid.shape.slopes = mapSlopes(map);
   pyramid.precision = options.precision;
   pyramid.value_scale = valueScaleFor(options.resolution);
-  const float sigma_pixels = 0.5f * options.sigma_r * static_cast<float>(options.resolution);
-  const int subdivision = subdivisionFor(sigma_pixels);
   const ImagePacker packer(pyramid.shape, options.precision, pyramid.value_scale);
-  // The coarse grid of smooth surfaces has half the bins along each axis, so the subdivision must be even.
-  auto images = options.surface == Surface::flat
-                    ? buildFlat(map, pyramid.shape, packer, PixelFilter(sigma_pixels, subdivision, Spline::quadratic), progress)
-                    : buildSmooth(map, pyramid.shape, packer, subdivision + subdivision % 2, progress);
+  auto images = options.surface == Surface::flat ? buildFlat(map, pyramid.shape, packer, flatFilter(options), progress)
+                                                 : buildSmooth(map, pyramid.shape, packer, progress);
   pyramid.levels.resize(images.size());
   tbb::parallel_for(std::size_t{0}, images.size(),
                     [&](std::size_t l) { pyramid.levels[l] = packLevel(images[l], options.precision); });

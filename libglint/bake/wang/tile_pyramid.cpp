@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "glint/bake/pyramid/flat_scatter.h"
+#include "glint/bake/pyramid/image_bytes.h"
 #include "glint/bake/pyramid/image_packer.h"
 #include "glint/model/error.h"
 
@@ -65,15 +66,20 @@ class LevelMaker {
           return Scratch(shape.resolution, filter);
         }) {}
 
+  /// Makes the image k of a level.
+  PackedImage makeOne(const WangGrid& grid, const Centres& centres, std::size_t k) {
+    const auto side = static_cast<std::size_t>(grid.side());
+    const auto column = static_cast<int>(k % side), row = static_cast<int>(k / side % side);
+    const NormalMap tile = mapOf(tiles_, static_cast<int>(k / (side * side)), 1);
+    return image([&](Scratch& s) {
+      scatterFlatTile(tile, {centres.at(column - grid.margin), centres.at(row - grid.margin)}, centres.sigma, s.bins, s.band);
+    });
+  }
   std::vector<PackedImage> make(const WangGrid& grid, const Centres& centres, ProgressCounter& counter) {
     const auto side = static_cast<std::size_t>(grid.side());
     std::vector<PackedImage> images(static_cast<std::size_t>(tiles_.tile_count) * side * side);
     tbb::parallel_for(std::size_t{0}, images.size(), [&](std::size_t k) {
-      const auto column = static_cast<int>(k % side), row = static_cast<int>(k / side % side);
-      const NormalMap tile = mapOf(tiles_, static_cast<int>(k / (side * side)), 1);
-      images[k] = image([&](Scratch& s) {
-        scatterFlatTile(tile, {centres.at(column - grid.margin), centres.at(row - grid.margin)}, centres.sigma, s.bins, s.band);
-      });
+      images[k] = makeOne(grid, centres, k);
       counter.advance();
     });
     return images;
@@ -104,6 +110,49 @@ class LevelMaker {
   tbb::enumerable_thread_specific<Scratch> scratch_;
 };
 
+/// Where the images of all levels are.
+struct Layout {
+  WangImagesData plane;
+  PyramidShape shape;
+  std::vector<Centres> centres;  ///< of each level of footprints
+
+  std::size_t imageCount() const {
+    std::size_t count = 0;
+    for (int l = 0; l < shape.level_count; ++l) count += shape.levels[l].imageCount();
+    return count;
+  }
+};
+
+Layout layoutOf(const WangTiles& tiles, const PyramidOptions& options) {
+  checkPyramidOptions(options);
+  if (options.surface == Surface::smooth)
+    throw Error(ErrorCode::unsupported, "option.value", {}, "--surface", "smooth surfaces of Wang tiles have no pyramid",
+                "give --surface flat, or ask the tiles themselves with glint-query plane");
+  PyramidOptions tile_options = options;
+  tile_options.boundary = Boundary::clamp;
+  Layout layout;
+  WangImagesData& plane = layout.plane;
+  plane.tiles = tiles;
+  plane.tiles.normals = {};
+  PyramidShape& shape = layout.shape;
+  shape = pyramidShape(tiles.size, tiles.size, tile_options);
+  shape.slopes = tiles.slopes;
+  plane.level_count = shape.footprintLevels();
+  for (int l = 0; l < shape.footprintLevels(); ++l) {
+    const int columns = shape.levels[l].columns;
+    layout.centres.push_back({columns, static_cast<float>(tiles.size) / static_cast<float>(columns),
+                              kFootprintPerStride * shape.levels[l].stride, tiles.size});
+    const auto at = static_cast<std::size_t>(l);
+    plane.grids[at] = gridOf(layout.centres.back(), plane.masses[at]);
+    shape.levels[l].columns = plane.grids[at].side();
+    shape.levels[l].rows = tiles.tile_count * shape.levels[l].columns;
+  }
+  const auto last = static_cast<std::size_t>(shape.footprintLevels());
+  plane.grids[last].columns = 1;
+  plane.masses[last] = {1};
+  return layout;
+}
+
 }  // namespace
 
 WangImages WangImagesData::view() const {
@@ -113,51 +162,34 @@ WangImages WangImagesData::view() const {
   return v;
 }
 
+double wangPyramidBytes(const WangTiles& tiles, const PyramidOptions& options, double most_bytes) {
+  const Layout layout = layoutOf(tiles, options);
+  const PixelFilter filter = flatFilter(options);
+  const ImagePacker packer(layout.shape, BlockPrecision::f16, 1);
+  LevelMaker maker(tiles, layout.shape, filter, packer);
+  return imageBytes(layout.shape, options.precision, most_bytes, [&](int level, std::size_t image) {
+    const auto at = static_cast<std::size_t>(level);
+    return maker.makeOne(layout.plane.grids[at], layout.centres[at], image).means.size();
+  });
+}
+
 WangPyramidData buildWangPyramid(const WangTiles& tiles, const PyramidOptions& options, const ProgressFn& progress) {
-  checkPyramidOptions(options);
-  if (options.surface == Surface::smooth)
-    throw Error(ErrorCode::unsupported, "option.value", {}, "--surface", "smooth surfaces of Wang tiles have no pyramid",
-                "give --surface flat, or ask the tiles themselves with glint-query plane");
-  PyramidOptions tile_options = options;
-  tile_options.boundary = Boundary::clamp;
+  const Layout layout = layoutOf(tiles, options);
   WangPyramidData data;
-  data.plane.tiles = tiles;
-  data.plane.tiles.normals = {};
-  PyramidShape& shape = data.images.shape;
-  shape = pyramidShape(tiles.size, tiles.size, tile_options);
-  shape.slopes = tiles.slopes;
+  data.plane = layout.plane;
+  data.images.shape = layout.shape;
   data.images.precision = options.precision;
   data.images.value_scale = valueScaleFor(options.resolution);
-  data.plane.level_count = shape.footprintLevels();
 
-  // Lay out the images of all levels.
-  std::vector<Centres> centres;
-  std::size_t total = 1;
-  for (int l = 0; l < shape.footprintLevels(); ++l) {
-    const int columns = shape.levels[l].columns;
-    centres.push_back({columns, static_cast<float>(tiles.size) / static_cast<float>(columns),
-                       kFootprintPerStride * shape.levels[l].stride, tiles.size});
+  const PixelFilter filter = flatFilter(options);
+  const ImagePacker packer(layout.shape, options.precision, data.images.value_scale);
+  LevelMaker maker(tiles, layout.shape, filter, packer);
+  ProgressCounter counter(progress, layout.imageCount());
+  for (int l = 0; l < layout.shape.level_count; ++l) {
     const auto at = static_cast<std::size_t>(l);
-    data.plane.grids[at] = gridOf(centres.back(), data.plane.masses[at]);
-    shape.levels[l].columns = data.plane.grids[at].side();
-    shape.levels[l].rows = tiles.tile_count * shape.levels[l].columns;
-    total += shape.levels[l].imageCount();
-  }
-
-  const auto last = static_cast<std::size_t>(shape.footprintLevels());
-  data.plane.grids[last].columns = 1;
-  data.plane.masses[last] = {1};
-
-  // Make them, one level after the other.
-  const float sigma_pixels = 0.5f * options.sigma_r * static_cast<float>(options.resolution);
-  const PixelFilter filter(sigma_pixels, subdivisionFor(sigma_pixels), Spline::quadratic);
-  const ImagePacker packer(shape, options.precision, data.images.value_scale);
-  LevelMaker maker(tiles, shape, filter, packer);
-  ProgressCounter counter(progress, total);
-  for (int l = 0; l < shape.level_count; ++l) {
-    const auto at = static_cast<std::size_t>(l);
-    std::vector<PackedImage> images =
-        l < shape.footprintLevels() ? maker.make(data.plane.grids[at], centres[at], counter) : maker.makeMean(counter);
+    std::vector<PackedImage> images = l < layout.shape.footprintLevels()
+                                          ? maker.make(layout.plane.grids[at], layout.centres[at], counter)
+                                          : maker.makeMean(counter);
     data.images.levels.push_back(packLevel(images, options.precision));
   }
   return data;

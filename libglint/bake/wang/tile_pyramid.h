@@ -34,6 +34,10 @@ struct WangPyramidData {
 /// centres near a border. Images of less hardly count in any answer, and take most of the bytes when they are compressed.
 inline constexpr double kLeastTileShare = 0.01;
 
+/// The memory that buildWangPyramid takes at its peak, bytes, as pyramidBytes says it.
+/// @throws Error  as buildWangPyramid
+double wangPyramidBytes(const WangTiles& tiles, const PyramidOptions& options, double most_bytes);
+
 /// Builds the NDF images of all tiles of a plane, in one pyramid (Deng 2022, section 5.5 and Fig. 12).
 ///
 /// The images of a tile are those of buildPyramid, of the texels in the tile alone; and also of centres beyond its border whose
