@@ -218,9 +218,9 @@ TEST(Manifold, OneLaneAndEightAgree) {
   Error error;
   for (int k = 0; k < 100; ++k) {
     const Footprint p = random.footprint(k % 3, random.logBetween(0.3f, 12));
-    const FootprintWeights weights = weightsOf(surface, p);
+    const FootprintWeights weights = weightsOf(surface.grid(), p);
     const NearPoint lobe{random.half(rough().map(), p, 0.01f)};
-    error.add(nearSum(surface, weights, lobe), NearSum<Lanes1, NearPoint>(surface, weights, lobe).sum());
+    error.add(nearSum(surface, weights, lobe, surface.reach2), NearSum<Lanes1, NearPoint>(surface, weights, lobe, surface.reach2).sum());
   }
   EXPECT_LT(error.relative(), kRule);
 }
