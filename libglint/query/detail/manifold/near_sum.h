@@ -45,27 +45,21 @@ GLINT_LANE void addBatches(const Lobe& lobe, bool smooth, const Pending<Lobe::kN
   }
   sum.store(sums);
 }
-/// addBatches in code for every processor, as a function that is not inlined.
-struct AnyProcessor {
+/// addBatches as a function that is not inlined: for Lanes8 in code for processors with AVX2, else for every processor.
+template <class V>
+struct PendingSum {
   template <class Lobe>
   GLINT_DEVICE_CALL static GLINT_HD void add(const Lobe& lobe, bool smooth, const Pending<Lobe::kNumbers>& pending, int count,
-                                             float (&sums)[1]) {
-    addBatches<Lanes1>(lobe, smooth, pending, count, sums);
+                                             float* sums) {
+    addBatches<V>(lobe, smooth, pending, count, sums);
   }
-#ifdef GLINT_LANES
-  template <class Lobe>
-  [[gnu::noinline]] static void add(const Lobe& lobe, bool smooth, const Pending<Lobe::kNumbers>& pending, int count,
-                                    float (&sums)[8]) {
-    addBatches<Lanes8>(lobe, smooth, pending, count, sums);
-  }
-#endif
 };
 #ifdef GLINT_AVX2
-/// The same in code for processors with AVX2.
-struct Avx2Processor {
+template <>
+struct PendingSum<Lanes8> {
   template <class Lobe>
   [[gnu::noinline]] GLINT_AVX2 static void add(const Lobe& lobe, bool smooth, const Pending<Lobe::kNumbers>& pending, int count,
-                                               float (&sums)[8]) {
+                                               float* sums) {
     addBatches<Lanes8>(lobe, smooth, pending, count, sums);
   }
 };
@@ -77,9 +71,8 @@ struct Avx2Processor {
 /// visits only facets inside a ball of the four-dimensional space of position and normal, whose radius is given in deviations.
 /// A node of the min-max pyramid is skipped if its distance from the centre and the half vector in this space exceeds the radius.
 /// Nodes are tested in strips of eight; a node that is kept has 8x8 nodes three levels below.
-/// @tparam V          Lanes1 or Lanes8
-/// @tparam Processor  AnyProcessor or Avx2Processor
-template <class V, class Lobe, class Processor = AnyProcessor>
+/// @tparam V  Lanes1, Lanes4x2, or Lanes8 in functions that are marked GLINT_AVX2
+template <class V, class Lobe>
 class NearSum {
  public:
   /// @param reach2  squared radius of the ball, deviations
@@ -330,7 +323,7 @@ class NearSum {
       }
     const int end = last ? pending_.count + V::kCount - 1 : pending_.count, done = end - end % V::kCount;
     float sums[V::kCount] = {};
-    Processor::add(lobe_, smooth_, pending_, done, sums);
+    PendingSum<V>::add(lobe_, smooth_, pending_, done, sums);
     for (const float lane : sums) total_ += double{lane};
     const int rest = std::max(pending_.count - done, 0);
     for (int k = 0; k < rest; ++k) {
@@ -361,7 +354,7 @@ class NearSum {
 template <class Lobe>
 GLINT_AVX2 GLINT_FLATTEN double nearSumAvx2(const NearSurface& surface, const FootprintWeights& weights, const Lobe& lobe,
                                             float reach2) {
-  return NearSum<Lanes8, Lobe, Avx2Processor>(surface, weights, lobe, reach2).sum();
+  return NearSum<Lanes8, Lobe>(surface, weights, lobe, reach2).sum();
 }
 #endif
 /// nearSum without AVX2.
@@ -369,7 +362,7 @@ template <class Lobe>
 GLINT_FLATTEN GLINT_HD double nearSumAny(const NearSurface& surface, const FootprintWeights& weights, const Lobe& lobe,
                                          float reach2) {
 #ifdef GLINT_LANES
-  return NearSum<Lanes8, Lobe>(surface, weights, lobe, reach2).sum();
+  return NearSum<Lanes4x2, Lobe>(surface, weights, lobe, reach2).sum();
 #else
   return NearSum<Lanes1, Lobe>(surface, weights, lobe, reach2).sum();
 #endif
