@@ -50,10 +50,10 @@ GLINT_DEVICE_CALL inline GLINT_HD double nearTotal(const NearSurface& s, const F
 /// Squared radius of the ball for a footprint whose weights sum to `total`, deviations.
 ///
 /// All texels of a narrow footprint may lie in its tail, so that `total` is smaller than the sum of the closed form. The ball then
-/// grows until the mass outside, about exp(-radius^2 / 2) of the closed form, is the same share of `total`. kFewTexels: a sum over
-/// few texels is not the integral.
+/// grows until the mass outside, about exp(-radius^2 / 2) of the closed form, is the same share of `total`. kFewTexels is added because a
+/// sum over few texels is not the integral: between two texels .8 is missing, and the functions of a lane need the rest.
 inline GLINT_HD float nearReach2(const NearSurface& s, const FootprintWeights& w, double total) {
-  constexpr float kFewTexels = 0.5f;
+  constexpr float kFewTexels = 2;
   if (w.hasClosedFormTotal() || !(total > 0)) return s.reach2;
   return s.reach2 + kFewTexels + 2 * static_cast<float>(std::log(std::max(w.closedFormTotal() / total, 1.0)));
 }
