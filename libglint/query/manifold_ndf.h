@@ -17,9 +17,10 @@ namespace glint {
 /// Reference made fast: the same weights and lobes, with a stated error.
 ///
 /// A facet counts by two Gaussians, the footprint at its place and the lobe at its normal. Answers leave out facets beyond a ball in the
-/// four-dimensional space of place and normal, in deviations. The ball is so large that what is left out integrates to at most `loss`
-/// over the disk. The lobe over a triangle costs the same for triangles of every size (TriangleDensity, TriangleMass). Answers differ from
-/// those of Reference by about half of `loss` (root mean square over places of one footprint size, over that of the density).
+/// four-dimensional space of place and normal, in deviations. The ball is so large that the part that is left out integrates to at most
+/// `loss` over the disk. The lobe over a triangle costs at most a fixed number of nodes, however large the triangle is (TriangleDensity).
+/// Densities differ from those of Reference by less than `loss` at the default (root mean square over places, in each octave of footprint
+/// size, over that of the density). Towards half vectors farther than the ball from all normals the density is 0.
 ///
 /// The min-max pyramid of the map makes the cost of a query follow the number of facets near the half vector; maps without it are
 /// answered too, more slowly. Gaussian and box footprints, flat and smooth surfaces. Stores nothing. Thread-safe, allocates nothing; the
