@@ -55,7 +55,7 @@ GLINT_DEVICE_CALL inline GLINT_HD double nearTotal(const NearSurface& s, const F
 inline GLINT_HD float nearReach2(const NearSurface& s, const FootprintWeights& w, double total) {
   constexpr float kFewTexels = 2;
   if (w.hasClosedFormTotal() || !(total > 0)) return s.reach2;
-  return s.reach2 + kFewTexels + 2 * static_cast<float>(std::log(std::max(w.closedFormTotal() / total, 1.0)));
+  return s.reach2 + kFewTexels + 2 * std::log(std::max(static_cast<float>(w.closedFormTotal() / total), 1.0f));
 }
 
 }  // namespace glint
