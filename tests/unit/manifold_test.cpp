@@ -242,6 +242,24 @@ TEST(Manifold, SumsOverManyTexelsKeepTheirDigits) {
           << sigma;
 }
 
+TEST(Manifold, NarrowFootprintsKeepTheirWeightsFarFromTheOrigin) {
+  // Every texel has the same normal, so that only the sum of the weights can be wrong. Places are rounded to a thousandth of a texel.
+  constexpr float kSigmaR = 0.1f;
+  constexpr int kWidth = 16384;
+  constexpr double kLane = 2e-4;  // error of the functions of a lane
+  const Vec2 n = {0.1f, -0.05f};
+  const double peak = gaussianDensity({}, kSigmaR);
+  const OwnedMap owned(kWidth, 2, std::vector<Vec2>(2 * kWidth, n));
+  Random random(12);
+  for (const Surface surface : {Surface::flat, Surface::smooth}) {
+    const ManifoldNdf ndf(owned.map(), kSigmaR, surface);
+    for (int k = 0; k < 200; ++k) {
+      const Footprint p = Footprint::isotropic({random.between(0.6f, 1), random.unit()}, random.between(0.25f, 0.6f));
+      ASSERT_NEAR(ndf.density(p, n), peak, kLane * peak) << p.centre.x << ' ' << p.centre.y;
+    }
+  }
+}
+
 TEST(Manifold, AnswersStripsAndMapsOfFewTexels) {
   constexpr float kSigmaR = 0.04f;
   constexpr double kFew = 2e-3;  // few questions of every size together
