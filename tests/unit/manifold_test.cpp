@@ -327,6 +327,29 @@ TEST(Manifold, ASmallerLossIsNearerToTheReference) {
   }
 }
 
+TEST(Manifold, ASmallerLossNeverHasMoreError) {
+  constexpr double kLane = 1e-4;  // error of the functions of a lane
+  const OwnedMap owned(64, 64, test::randomNormals(64, 64, 0.3f, 3));
+  const auto error = [&](const ManifoldNdf& ndf, const Reference& reference) {
+    Random random(5);
+    Error sum;
+    for (int k = 0; k < 40; ++k) {
+      const Footprint p = Footprint::isotropic({random.unit(), random.unit()}, 4);
+      const Vec2 h = random.point(0.3f);
+      sum.add(ndf.density(p, h), reference.density(p, h));
+    }
+    return sum.relative();
+  };
+  for (const Surface surface : {Surface::flat, Surface::smooth}) {
+    const Reference reference(owned.map(), 0.02f, surface, Boundary::wrap, Reference::Search::pruned);
+    for (const float loss : {1e-2f, 1e-3f, 1e-4f})
+      EXPECT_LT(error({owned.map(), 0.02f, surface, Boundary::wrap, loss}, reference), double{loss} + kLane) << loss;
+    // The smallest loss is 1e-4.
+    EXPECT_EQ(error({owned.map(), 0.02f, surface, Boundary::wrap, 0}, reference),
+              error({owned.map(), 0.02f, surface, Boundary::wrap, 1e-4f}, reference));
+  }
+}
+
 TEST(Manifold, BoundsOfNormalsChangeTheCostAndNotTheAnswer) {
   constexpr double kOrder = 1e-5;  // facets are added in another order
   NormalMap bare = rough().map();
