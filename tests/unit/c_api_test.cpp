@@ -11,6 +11,7 @@
 
 #include "glint.h"
 #include "glint/api/any_ndf.h"
+#include "glint/query/manifold_ndf.h"
 #include "glint/query/ray_footprint.h"
 #include "support/hdf5_bytes.h"
 
@@ -389,8 +390,7 @@ TEST(CApi, OptionsReachTheModel) {
   const Handle with_normals = openHandle("ndf-cp", &below);
   const glint_footprint narrow = glint_footprint_isotropic(0.1f, 0.9f, 2);
   glint_density(with_normals.get(), &narrow, 0.05f, 0.1f, &density);
-  EXPECT_EQ(density, Reference(map.map, 0.05f, Surface::flat, Boundary::wrap, Reference::Search::pruned)
-                         .density(Footprint::isotropic({0.1f, 0.9f}, 2), {0.05f, 0.1f}));
+  EXPECT_EQ(density, ManifoldNdf(map.map, 0.05f).density(Footprint::isotropic({0.1f, 0.9f}, 2), {0.05f, 0.1f}));
   glint_ndf_info info = {};
   info.struct_size = sizeof info;
   glint_ndf_get_info(with_normals.get(), &info);
