@@ -17,6 +17,7 @@
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/histogram_ndf.h"
+#include "glint/query/manifold_ndf.h"
 #include "glint/query/moments_ndf.h"
 #include "glint/query/pyramid_ndf.h"
 #include "glint/query/reference.h"
