@@ -337,10 +337,6 @@ TEST(CApi, BytesThatCannotBeUsedAreRefusedByName) {
   EXPECT_EQ(glint_displaced_open_source(&empty, 0, &displaced), GLINT_ERROR_IO);
   EXPECT_EQ(glint_displaced_open_source(nullptr, 0, &displaced), GLINT_ERROR_USAGE);
   EXPECT_EQ(displaced, nullptr);
-  glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
-  options.reserved = 1;
-  EXPECT_EQ(glint_ndf_open(assets().path("ndf-cp").c_str(), &options, &ndf), GLINT_ERROR_USAGE);
-  EXPECT_STREQ(glint_error_message(), "glint_open_options: reserved is not 0");
 }
 
 TEST(CApi, PixelsAreSmoothOrConstant) {
@@ -476,6 +472,7 @@ TEST(CApi, OptionsOutOfRangeAreRefusedByName) {
   for (const float value : {-0.1f, 0.3f, kNan}) refused(&glint_open_options::sigma_r, value, "sigma_r");
   refused(&glint_open_options::surface, 2, "surface");
   refused(&glint_open_options::boundary, -1, "boundary");
+  for (const int32_t value : {-1, 2}) refused(&glint_open_options::estimator, value, "estimator");
   for (const int32_t value : {-1, 33}) refused(&glint_open_options::footprint_parts, value, "footprint_parts");
 }
 
