@@ -79,7 +79,7 @@ void NdfAsset::addBinOptions() {
             tool_.choice(
                 "--estimator", options_.estimator, {{"exact", BinEstimator::exact}, {"published", BinEstimator::published}},
                 "how densities are made of the texels: by their normals, or by the centres of 21 bins, which is quicker "
-                "and 1 to 20 % off (kind bin-map)"));
+                "and less exact (kind bin-map)"));
   }
   if (!asks({"histogram-sat"})) return;
   useOnly({"histogram-sat"}, "--gaussian-boxes",

@@ -83,7 +83,7 @@ enum {
 
 enum {
   GLINT_ESTIMATOR_EXACT = 0,    /* by the normals of the texels */
-  GLINT_ESTIMATOR_PUBLISHED = 1 /* by the centres of 21 bins around the half vector: quicker, and 1 to 20 % off */
+  GLINT_ESTIMATOR_PUBLISHED = 1 /* by the centres of 21 bins around the half vector: quicker, and less exact */
 };
 
 /* Structs that start with a struct_size may grow: it says which version of the struct the caller has. A size that is smaller

@@ -273,7 +273,7 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
         footprint_parts: kinds with levels: most round footprints that stand for a stretched one, 1 to 32.
         interpolation: kinds with levels: "footprint", or "trilinear" (quicker, and answers a wider footprint).
         pixels: kinds with levels: "smooth", or "constant" (quicker; small lights show the borders of pixels).
-        estimator: kind bin-map: "exact", or "published" (densities by the centres of 21 bins: quicker, and 1 to 20 % off).
+        estimator: kind bin-map: "exact", or "published" (densities by the centres of 21 bins: quicker, and less exact).
         verify_hashes: compare all arrays with their hashes.
 
     Raises:

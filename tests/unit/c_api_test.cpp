@@ -393,6 +393,20 @@ TEST(CApi, OptionsReachTheModel) {
   EXPECT_EQ(info.has_normals, 1);
 }
 
+TEST(CApi, EstimatorsOfBinMapsReachTheModel) {
+  const auto opened = api::OpenedNdf::open(assets().path("bin-map"));
+  const auto& map = opened.asset().get<BinMap>();
+  const glint_footprint p = glint_footprint_isotropic(0.4f, 0.6f, 6);
+  glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+  float exact = -1, published = -1;
+  glint_density(openHandle("bin-map", &options).get(), &p, 0.05f, 0.02f, &exact);
+  options.estimator = GLINT_ESTIMATOR_PUBLISHED;
+  glint_density(openHandle("bin-map", &options).get(), &p, 0.05f, 0.02f, &published);
+  const BinMapNdf same(map, map.alpha_min, BinEstimator::published);
+  EXPECT_EQ(published, same.density(Footprint::isotropic({0.4f, 0.6f}, 6), {0.05f, 0.02f}));
+  EXPECT_NE(published, exact);
+}
+
 TEST(CApi, OptionsOfHistogramsReachTheModel) {
   const Footprint slanted = Footprint::box({0.4f, 0.6f}, {14, 5}, {-5, 14}), round = Footprint::isotropic({0.4f, 0.6f}, 9);
   const glint_footprint c_slanted = {GLINT_FOOTPRINT_BOX, 0.4f, 0.6f, {14, 5, -5, 14}};
