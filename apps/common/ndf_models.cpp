@@ -70,11 +70,17 @@ void NdfAsset::addNormalsOptions() {
 }
 
 void NdfAsset::addBinOptions() {
-  if (asks({"bin-map"}))
+  if (asks({"bin-map"})) {
     useOnly({"bin-map"}, "--alpha",
             tool_.option("--alpha", options_.alpha, "Beckmann roughness, in the range of the asset (kind bin-map)")
                 .range(1e-4, 1)
                 .defaultText("the smallest of the asset"));
+    useOnly({"bin-map"}, "--estimator",
+            tool_.choice(
+                "--estimator", options_.estimator, {{"exact", BinEstimator::exact}, {"published", BinEstimator::published}},
+                "how densities are made of the texels: by their normals, or by the centres of 21 bins, which is quicker "
+                "and less exact (kind bin-map)"));
+  }
   if (!asks({"histogram-sat"})) return;
   useOnly({"histogram-sat"}, "--gaussian-boxes",
           tool_.choice("--gaussian-boxes", options_.gaussian_boxes, {{"1", GaussianBoxes::one}, {"3", GaussianBoxes::three}},

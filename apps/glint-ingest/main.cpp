@@ -14,11 +14,9 @@ namespace {
 void writeNormals(const apps::OutputFile& output, const apps::Image& image, float texel_size_um, std::span<const Vec2> normals,
                   const MapSlopes& slopes, const formats::Provenance& provenance) {
   NormalMap map;
-  map.width = image.width;
-  map.height = image.height;
+  map.width = image.width, map.height = image.height;
   map.texel_size_um = texel_size_um;
-  map.normals = normals;
-  map.slopes = slopes;
+  map.normals = normals, map.slopes = slopes;
   const auto bounds = bake::buildNormalBounds(map.width, map.height, map.normals);
   bake::attachBounds(map, bounds);
   formats::writeAsset(output.path(), map, provenance, output.writeOptions());

@@ -4,7 +4,6 @@
 #include "common/files.h"
 #include "common/input_asset.h"
 #include "common/memory_needs.h"
-#include "common/tool.h"
 #include "glint-tiny/tiny_options.h"
 #include "glint/bake/ingest/normal_bounds.h"
 #include "glint/formats/asset_writer.h"
@@ -17,14 +16,13 @@ namespace {
 void writeMap(apps::Tool& tool, const TinyExample& tiny, const bake::PlaneWindow& window, const apps::OutputFile& output) {
   apps::requireMemoryFor(tool, "a map of", window.width, window.height, apps::BytesPerTexel::kExplicit,
                          "give a smaller --explicit");
-  const formats::Provenance provenance = tool.provenance();
   const std::vector<Vec2> normals = bake::explicitNormals(tiny, window, tool.progress("rows"));
   NormalMap map;
   map.width = window.width, map.height = window.height, map.normals = normals;
   map.slopes = slopesOf(map);
   const auto bounds = bake::buildNormalBounds(map.width, map.height, map.normals);
   bake::attachBounds(map, bounds);
-  formats::writeAsset(output.path(), map, provenance, output.writeOptions());
+  formats::writeAsset(output.path(), map, tool.provenance(), output.writeOptions());
   tool.setResult({{"width", map.width}, {"height", map.height}});
 }
 }  // namespace

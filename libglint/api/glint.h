@@ -81,6 +81,11 @@ enum {
   GLINT_PIXELS_CONSTANT = 1 /* quicker, but small lights show the borders of pixels */
 };
 
+enum {
+  GLINT_ESTIMATOR_EXACT = 0,    /* by the normals of the texels */
+  GLINT_ESTIMATOR_PUBLISHED = 1 /* by the centres of 21 bins around the half vector: quicker, and less exact */
+};
+
 /* Structs that start with a struct_size may grow: it says which version of the struct the caller has. A size that is smaller
  * than the first version's or above this is no size of a struct, and GLINT_ERROR_USAGE. */
 #define GLINT_MOST_STRUCT_SIZE 4096
@@ -106,9 +111,9 @@ typedef struct glint_open_options {
                                answered */
   int32_t pixels;           /* kinds with levels of images: GLINT_PIXELS_*, how densities run between half vectors of one pixel
                                of an image */
-  int32_t copy;     /* not 0: copy the bytes of the asset into memory of its own. For files that others may truncate while
+  int32_t copy;      /* not 0: copy the bytes of the asset into memory of its own. For files that others may truncate while
                                they are open, which would end the program with SIGBUS, and for memory that does not stay */
-  int32_t reserved; /* 0 */
+  int32_t estimator; /* kind bin-map: GLINT_ESTIMATOR_*, how densities are made of the texels; means and samples are exact */
 } glint_open_options;
 
 #define GLINT_SLANT_EXACT (-1.0f)

@@ -5,6 +5,7 @@
 #include "glint/formats/asset_reader.h"
 #include "glint/model/normal_map.h"
 #include "glint/query/anisotropic_ndf.h"
+#include "glint/query/bin_map_ndf.h"
 #include "glint/query/histogram_ndf.h"
 #include "glint/query/interpolation.h"
 
@@ -17,6 +18,7 @@ struct NdfOptions {
   Boundary boundary = Boundary::wrap;  ///< kind normals: beyond the border of the map
   float sigma_r = 0.005f;              ///< kinds normals and slope-moments: intrinsic roughness, disk units
   float alpha = 0;                     ///< kind bin-map: Beckmann roughness, in the range of the asset; 0: the smallest
+  BinEstimator estimator = BinEstimator::exact;       ///< kind bin-map: how densities are made of the texels
   GaussianBoxes gaussian_boxes = GaussianBoxes::one;  ///< kind histogram-sat: boxes that stand for a Gaussian footprint
   float slant_tolerance = kSlantTolerance;  ///< kind histogram-sat: share of a slanted footprint that may be misplaced
   int footprint_parts =

@@ -8,6 +8,7 @@
 #include "glint/math/half.h"
 #include "glint/query/detail/bin_map/bin_window.h"
 #include "glint/query/detail/bin_map/facet_lobe.h"
+#include "glint/query/detail/bin_map/lobe_sums.h"
 #include "glint/query/detail/bin_map/subbin_moments.h"
 #include "glint/query/detail/common/sampling.h"
 #include "glint/query/ndf_model.h"
@@ -21,12 +22,19 @@ struct BinFacet {
   Covariance spread;  ///< covariance of the normals of the facets, squared disk units; 0 for a single texel
 };
 
+/// How a density is made of the texels of a bin map.
+enum class BinEstimator {
+  exact,  ///< by the normals of the texels
+  published  ///< by the weights of the 21 bins around the half vector and their centres (Atanasov 2021, section 5.2): several times as quick
+};
+
 /// The NDF from an inverse bin map (Atanasov 2021): exact shares of the footprint for every texel near the half vector.
 ///
 /// Each texel in reach has a lobe (FacetLobe) around its own normal, which is stored to a fraction of a bin (blockCode). Where
 /// a block has more than kManyTexels texels in the footprint, and is no wider than the lobe allows, one Gaussian replaces them,
 /// with the mean and covariance of their normals. Between kFewTexels and kManyTexels both answers are blended, so that the
-/// density is continuous in footprint and half vector.
+/// density is continuous in footprint and half vector. Blocks farther than kNear deviations from the half vector are counted, and
+/// answered by the Gaussian of all their texels, the sooner the farther they are (farShare).
 ///
 /// Boxes are answered exactly, Gaussians by the box of the same second moments. TexelCover also says how boxes without area and
 /// boxes larger than the map are answered. Thread-safe, allocates nothing; the arrays must outlive it.
@@ -37,11 +45,15 @@ class BinMapNdf {
   static constexpr double kManyTexels = 512;
   /// Distance, in deviations of a facet's lobe, up to which bins are asked. The Gaussian of a block is wider than the lobe.
   static constexpr float kBinReach = 5.5f;
+  /// Distance, in deviations, beyond which blocks may be answered by the Gaussian of all their texels.
+  static constexpr float kNear = 2.5f;
 
   /// The NDF of the smallest roughness that the map is made for.
   GLINT_HD explicit BinMapNdf(const BinMap& map) : BinMapNdf(map, map.alpha_min) {}
   /// @param alpha  Beckmann roughness of the facets, alpha_min to alpha_max of the map
-  GLINT_HD BinMapNdf(const BinMap& map, float alpha) : blocks_(map), sigma_(alpha * kInvSqrt2), wider_(alpha / map.alpha) {
+  /// @param estimator  of densities; means and samples are exact
+  GLINT_HD BinMapNdf(const BinMap& map, float alpha, BinEstimator estimator = BinEstimator::exact)
+      : blocks_(map), sigma_(alpha * kInvSqrt2), wider_(alpha / map.alpha), estimator_(estimator) {
     bin_size_ = 2.0f / static_cast<float>(map.bins_per_axis);
     block_classes_ = map.classCount() == map.blockCount();
   }
@@ -52,9 +64,33 @@ class BinMapNdf {
 
   /// Density towards h, per unit projected area; >= 0.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
-    if (!(std::fabs(h.x) <= 1 && std::fabs(h.y) <= 1)) return 0;
+    if (!insideSquare(h)) return 0;
+    return estimator_ == BinEstimator::published ? publishedDensity(p, h) : exactDensity(p, h);
+  }
+
+  GLINT_DEVICE_CALL GLINT_HD float exactDensity(const Footprint& p, Vec2 h) const {
+    const TexelCover cover(p, map().width, map().height);
+    const BinReach reach({h, h}, kBinReach * sigma_);
     double sum = 0;
-    forEachFacet(p, {h, h}, [&](const BinFacet& f) { sum += f.weight * lobe(f, h); });
+    const auto add = [&](const BinFacet& f) { sum += f.weight * lobe(f, h); };
+    if (answeredByTexel(cover)) {
+      forEachFacetByTexel(cover, reach, add);
+      return finitePositive(static_cast<float>(sum));
+    }
+    BlockLobes blocks(*this, cover, h);
+    forEachBlockInReach(reach, [&](const BinBlock& block) { blocks.add(block); });
+    return finitePositive(static_cast<float>(blocks.sum() / cover.area()));
+  }
+
+  /// The lobes of the 21 bins around h, each around the centre of its bin.
+  GLINT_DEVICE_CALL GLINT_HD float publishedDensity(const Footprint& p, Vec2 h) const {
+    const auto across = static_cast<std::uint32_t>(map().bins_per_axis);
+    const BinWeights bins = weights(p, h);
+    double sum = 0;
+    for (int k = 0; k < bins.count; ++k) {
+      const Vec2 bin = {static_cast<float>(bins.bins[k] % across), static_cast<float>(bins.bins[k] / across)};
+      sum += bins.weights[k] * lobe({1, Vec2{-1, -1} + bin_size_ * (bin + Vec2{0.5f, 0.5f}), {}}, h);
+    }
     return finitePositive(static_cast<float>(sum));
   }
 
@@ -75,7 +111,7 @@ class BinMapNdf {
     if (!sampleNormal(p, xi, normal)) return {};
     const float radius = sigma_ * FacetLobe::radius(xi.x), angle = 2 * kPi * xi.y;
     const Vec2 h = normal + radius * Vec2{std::cos(angle), std::sin(angle)};
-    return drawnAt(h, density(p, h));
+    return insideSquare(h) ? drawnAt(h, exactDensity(p, h)) : HalfVectorSample{};
   }
 
   /// The normal of the texel at a point drawn evenly from the footprint. Uses up the leading digits of xi; the digits that are
@@ -114,19 +150,17 @@ class BinMapNdf {
   GLINT_HD void forEachFacet(const Footprint& p, const Box2& support, Visitor&& visitor) const {
     const TexelCover cover(p, map().width, map().height);
     const BinReach reach(support, kBinReach * sigma_);
-    if (cover.area() <= kFewTexels && boxTexels(cover) <= 2 * kFewTexels) {
+    if (answeredByTexel(cover)) {
       forEachFacetByTexel(cover, reach, visitor);
       return;
     }
     CellRows rows;
-    blocks_.forEachBlock(binsIn(reach), [&](const BinBlock& block) {
-      const float side = bin_size_ * static_cast<float>(block.side());
-      if (reach.meets(corner(block), side)) visitBlock(cover, block, reach, rows, visitor);
-    });
+    forEachBlockInReach(reach, [&](const BinBlock& block) { visitBlock(cover, block, reach, rows, visitor); });
   }
 
  private:
   static constexpr float kStrata = 4096;
+  static constexpr double kMostLookedUp = 128;  // from glint-binmap-bench: both ways take as long between 64 and 256 texels
   /// Blocks count as one facet unless the lobe is much narrower than the lobe for which bins as wide as the block are made.
   static constexpr double kNarrowestMerged = 0.9;
 
@@ -209,9 +243,22 @@ class BinMapNdf {
     });
   }
 
+  /// Whether looking up every texel of a footprint is quicker than reading lists.
+  static GLINT_HD bool answeredByTexel(const TexelCover& cover) {
+    return cover.area() <= kMostLookedUp && boxTexels(cover) <= 2 * kMostLookedUp;
+  }
+
+  template <class Visitor>
+  GLINT_HD void forEachBlockInReach(const BinReach& reach, Visitor&& visitor) const {
+    blocks_.forEachBlock(binsIn(reach), [&](const BinBlock& block) {
+      const float side = bin_size_ * static_cast<float>(block.side());
+      if (reach.meets(corner(block), side)) visitor(block);
+    });
+  }
+
   /// Looks up every texel. For footprints of so few texels that no block counts as one facet.
   template <class Visitor>
-  GLINT_HD void forEachFacetByTexel(const TexelCover& cover, const BinReach& reach, Visitor& visitor) const {
+  GLINT_HD void forEachFacetByTexel(const TexelCover& cover, const BinReach& reach, Visitor&& visitor) const {
     prefetchClasses(cover);
     const double scale = 1 / cover.area();
     const BinRect bins = binsIn(reach);
@@ -360,10 +407,8 @@ class BinMapNdf {
   GLINT_HD double mergedShare(const TexelCover& cover, const BinBlock& block) const {
     const double wider = double{wider_} / block.side();
     if (wider < kNarrowestMerged) return 0;
-    const auto texels = static_cast<double>(blocks_.end(block) - blocks_.begin(block));
-    const double expected = texels * cover.area() / static_cast<double>(map().texels.size());
-    return std::clamp(
-        (std::min(std::max(1.0, wider * wider) * expected, cover.area()) - kFewTexels) / (kManyTexels - kFewTexels), 0.0, 1.0);
+    const double texels = std::min(std::max(1.0, wider * wider) * expectedTexels(cover, block), cover.area());
+    return std::clamp((texels - kFewTexels) / (kManyTexels - kFewTexels), 0.0, 1.0);
   }
 
   /// Sums over all texels of a block.
@@ -394,6 +439,92 @@ class BinMapNdf {
     return {sums.weight,
             corner(block) + Vec2{middle, middle} + mean,
             {static_cast<float>(squared * xx), static_cast<float>(squared * xy), static_cast<float>(squared * yy)}};
+  }
+
+  /// Weight, 0 to 1, with which the texels of a block count by the moments of the whole block. Their lobes are in reach of h, but so far
+  /// that the density hardly depends on where in the block the texels of the footprint are.
+  GLINT_HD double farShare(const TexelCover& cover, const BinBlock& block, Vec2 h) const {
+    if (double{wider_} / block.side() < kNarrowestMerged) return 0;
+    const Vec2 low = corner(block);
+    const float side = bin_size_ * static_cast<float>(block.side());
+    const float dx = std::max({low.x - h.x, h.x - low.x - side, 0.0f}), dy = std::max({low.y - h.y, h.y - low.y - side, 0.0f});
+    const float squared = (dx * dx + dy * dy) / (sigma_ * sigma_);
+    if (squared <= kNear * kNear) return 0;
+    // What an answer errs by is the less against the densities nearby, the more texels there are and the farther they are.
+    const double more = std::exp(0.5f * squared) - std::exp(0.5f * kNear * kNear);
+    const double texels = (more * expectedTexels(cover, block) - kFewTexels) / (kManyTexels - kFewTexels);
+    return std::clamp(texels, 0.0, 1.0) * std::clamp(cover.area() / kMostLookedUp - 1, 0.0, 1.0);
+  }
+  /// Texels of a block in the footprint, if they were spread evenly over the map.
+  GLINT_HD double expectedTexels(const TexelCover& cover, const BinBlock& block) const {
+    const auto texels = static_cast<double>(blocks_.end(block) - blocks_.begin(block));
+    return texels * cover.area() / static_cast<double>(map().texels.size());
+  }
+  /// The lobe at h of all texels of a block as one.
+  GLINT_HD double lobeOfAll(const BinBlock& block, Vec2 h) const {
+    const std::uint16_t* stored = map().block_moments.data() + 5 * std::size_t{block.number};
+    const float side = bin_size_ * static_cast<float>(block.side()), squared = side * side;
+    const Vec2 mean = corner(block) + side * Vec2{halfToFloat(stored[0]), halfToFloat(stored[1])};
+    const auto variance = [&](int k) { return squared * halfToFloat(stored[k]); };
+    return lobe({1, mean, {variance(2), variance(3), variance(4)}}, h);
+  }
+
+  /// Adds up the lobes of blocks at a half vector, each times its area in the footprint. Reads the lists of many blocks together, so
+  /// that their cache misses overlap.
+  class BlockLobes {
+   public:
+    GLINT_HD BlockLobes(const BinMapNdf& ndf, const TexelCover& cover, Vec2 h)
+        : ndf_(ndf), cover_(cover), h_(h), factor_(1 / (double{2 * kPi * FacetLobe::kMass} * ndf.sigma_ * ndf.sigma_)) {}
+    GLINT_HD void add(const BinBlock& block) {
+      const double far = ndf_.farShare(cover_, block, h_);
+      const double merged = (1 - far) * ndf_.mergedShare(cover_, block), apart = 1 - far - merged;
+      if (merged > 0)
+        ndf_.visitMerged(cover_, block, merged * cover_.area(), rows_,
+                         [&](const BinFacet& f) { sum_ += f.weight * ndf_.lobe(f, h_); });
+      if (merged == 1) return;
+      ndf_.blocks_.prefetchCells(cover_, block, rows_);
+      shares_[count_] = {far, apart};
+      blocks_[count_++] = {block, ndf_.blocks_.code(block), ndf_.lobeFrom(block, h_), far > 0, apart > 0};
+      if (count_ == LobeSums::kMostBlocks) flush();
+    }
+    GLINT_HD double sum() {
+      flush();
+      return sum_;
+    }
+
+   private:
+    struct Shares {
+      double far, apart;
+    };
+
+    GLINT_HD void flush() {
+      LobeSums sums(ndf_.map().texels.data(), cover_, blocks_);
+      ndf_.blocks_.forEachRun(cover_, blocks_, count_, rows_, sums);
+      sums.finish();
+      for (int k = 0; k < count_; ++k) {
+        if (sums.area(k) > 0) sum_ += shares_[k].far * sums.area(k) * ndf_.lobeOfAll(blocks_[k].block, h_);
+        sum_ += shares_[k].apart * factor_ * sums.lobes(k);
+      }
+      count_ = 0;
+    }
+
+    const BinMapNdf& ndf_;
+    const TexelCover& cover_;
+    Vec2 h_;
+    double factor_;  ///< of the lobes of single texels
+    double sum_ = 0;
+    int count_ = 0;
+    CellRows rows_;
+    LobeBlock blocks_[LobeSums::kMostBlocks];
+    Shares shares_[LobeSums::kMostBlocks];
+  };
+
+  /// The half vector as texels of a block see it.
+  GLINT_HD SubbinLobe lobeFrom(const BinBlock& block, Vec2 h) const {
+    const TexelCode code = blocks_.code(block);
+    const float size = subbinSize(block, code), middle = 0.5f * static_cast<float>(1 << code.subbin_bits);
+    const Vec2 at = (1 / size) * (h - corner(block)) - Vec2{middle, middle};
+    return {at.x, at.y, 0.5f * size * size / (sigma_ * sigma_)};
   }
 
   /// A visitor of runs that makes one facet of each texel that is in reach and in the footprint.
@@ -456,11 +587,15 @@ class BinMapNdf {
       EachTexel<Visitor> each(*this, cover, block, reach, (1 - merged) / cover.area(), visitor);
       blocks_.forEachRun(cover, block, rows, each);
     }
-    if (merged > 0) {
-      BinFacet facet = blockFacet(cover, block, rows);
-      facet.weight *= merged / cover.area();
-      if (facet.weight > 0) visitor(facet);
-    }
+    if (merged > 0) visitMerged(cover, block, merged, rows, visitor);
+  }
+
+  template <class Visitor>
+  GLINT_HD void visitMerged(const TexelCover& cover, const BinBlock& block, double merged, CellRows& rows,
+                            Visitor&& visitor) const {
+    BinFacet facet = blockFacet(cover, block, rows);
+    facet.weight *= merged / cover.area();
+    if (facet.weight > 0) visitor(facet);
   }
 
   GLINT_HD double lobe(const BinFacet& f, Vec2 h) const {
@@ -491,6 +626,7 @@ class BinMapNdf {
   float sigma_ = 0;
   float wider_ = 1;  ///< deviation of the lobe over the deviation that the bins are made for
   float bin_size_ = 0;
+  BinEstimator estimator_;
   bool block_classes_ = false;  ///< whether the class of a texel is the number of its block
 };
 

@@ -19,6 +19,7 @@ _INTERPOLATIONS = {"footprint": 0, "trilinear": 1}
 _PIXELS = {"smooth": 0, "constant": 1}
 _FRESNELS = {"mirror": 0, "dielectric": 1, "conductor": 2}
 _FACETS = {"distribution": 0, "beckmann": 1}
+_ESTIMATORS = {"exact": 0, "published": 1}
 _SLANT_EXACT = -1.0
 
 #: Kinds of planes without end: the whole parts of uv count.
@@ -257,7 +258,7 @@ def _lobe_members(axes: np.ndarray, sharpness, amplitudes: np.ndarray) -> list[n
 def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: PathLike | Asset | None = None, *,
          surface: str = "flat", boundary: str = "wrap", sigma_r: float = 0.005, alpha: float = 0.0,
          slant_tolerance: float = 0.06, gaussian_boxes: int = 1, footprint_parts: int = 32, interpolation: str = "footprint",
-         pixels: str = "smooth", verify_hashes: bool = False) -> Ndf:
+         pixels: str = "smooth", estimator: str = "exact", verify_hashes: bool = False) -> Ndf:
     """Opens an asset that holds a distribution of normals. The file is checked, and then mapped. Options of other kinds are ignored.
 
     Args:
@@ -272,6 +273,7 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
         footprint_parts: kinds with levels: most round footprints that stand for a stretched one, 1 to 32.
         interpolation: kinds with levels: "footprint", or "trilinear" (quicker, and answers a wider footprint).
         pixels: kinds with levels: "smooth", or "constant" (quicker; small lights show the borders of pixels).
+        estimator: kind bin-map: "exact", or "published" (densities by the centres of 21 bins: quicker, and less exact).
         verify_hashes: compare all arrays with their hashes.
 
     Raises:
@@ -284,7 +286,8 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
         sigma_r=sigma_r, surface=_word("surface", surface, _SURFACES), boundary=_word("boundary", boundary, _BOUNDARIES),
         alpha=alpha, slant_tolerance=_SLANT_EXACT if slant_tolerance == 0 else slant_tolerance, gaussian_boxes=gaussian_boxes,
         footprint_parts=footprint_parts, interpolation=_word("interpolation", interpolation, _INTERPOLATIONS),
-        pixels=_word("pixels", pixels, _PIXELS), verify_hashes=verify_hashes)
+        pixels=_word("pixels", pixels, _PIXELS), estimator=_word("estimator", estimator, _ESTIMATORS),
+        verify_hashes=verify_hashes)
     of_texels = None if normals is None else normals.path if isinstance(normals, Asset) else os.fspath(normals)
     return Ndf(_glint.open_ndf(path, of_texels, **options), asset, path)
 

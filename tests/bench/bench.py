@@ -345,9 +345,14 @@ class Bench:
                     self.table.add(figure, entry["weights_ns"], "ns", target=authors[k] / 5, paper=f"the authors' code here {authors[k]} ns, {ratio:.1f} x", **entry)
                 else:
                     self.table.add(figure, entry["weights_ns"], "ns", **entry)
+                # The authors' density takes their weights, and a lobe for each.
+                cell = f"{name}, {alpha}, {entry['side']:.0f}^2"
+                self.table.add(f"bin map, density, {cell}", entry["density_ns"], "ns", target=authors[k] if k < len(authors) else None)
+                self.table.add(f"bin map, published density, {cell}", entry["published_ns"], "ns")
             limit = 0.05 if "8-bit" in name else 0.015
             for entry in run["errors"]:
                 self.table.add(f"bin map, median error, {name}, {alpha}, {entry['side']:.0f}^2", entry["median"], "", target=limit)
+                self.table.add(f"bin map, median error as published, {name}, {alpha}, {entry['side']:.0f}^2", entry["published_median"], "")
                 self.table.add(f"bin map, energy, {name}, {alpha}, {entry['side']:.0f}^2", abs(entry["energy"]), "", target=0.005)
 
         text = call([self.tools.folder / "glint-binmap-bench", "--range"])

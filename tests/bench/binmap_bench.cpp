@@ -116,7 +116,8 @@ double medianNanoseconds(const std::vector<Query>& queries, Ask ask) {
 /// finds a glint, and the error of all densities together.
 ordered_json errors(const Map& m, const BinMapNdf& ndf, float side, std::size_t count) {
   const Reference reference(m.map, ndf.sigma());
-  std::vector<double> relative;
+  const BinMapNdf published(ndf.map(), ndf.map().alpha_min, BinEstimator::published);
+  std::vector<double> relative, published_relative;
   double sum = 0, expected = 0;
   std::mt19937 random(9);
   const auto unit = [&] { return static_cast<float>(random() >> 8) * 0x1p-24f; };
@@ -128,9 +129,13 @@ ordered_json errors(const Map& m, const BinMapNdf& ndf, float side, std::size_t 
              radius * Vec2{std::cos(angle), std::sin(angle)};
     const double truth = reference.density(q.footprint, q.half), value = ndf.density(q.footprint, q.half);
     relative.push_back(std::abs(value / truth - 1));
+    if (ndf.sigma() == published.sigma())
+      published_relative.push_back(std::abs(double{published.density(q.footprint, q.half)} / truth - 1));
     sum += value, expected += truth;
   }
-  return {{"side", side}, {"median", median(relative)}, {"energy", sum / expected - 1}};
+  ordered_json result = {{"side", side}, {"median", median(relative)}, {"energy", sum / expected - 1}};
+  if (!published_relative.empty()) result["published_median"] = median(published_relative);
+  return result;
 }
 
 ordered_json measure(const Map& m, float alpha, std::size_t queries) {
@@ -143,7 +148,7 @@ ordered_json measure(const Map& m, float alpha, std::size_t queries) {
     wall.push_back(now() - start);
     cpu.push_back(cpuSeconds() - cpu_start);
   }
-  const BinMapNdf ndf(data.view());
+  const BinMapNdf ndf(data.view()), published(data.view(), alpha, BinEstimator::published);
   ordered_json result = {{"map", m.name},
                          {"size", m.map.width},
                          {"alpha", alpha},
@@ -154,12 +159,16 @@ ordered_json measure(const Map& m, float alpha, std::size_t queries) {
   for (const float side : kSides) {
     const auto aligned = randomQueries(m, side, queries, 0), turned = randomQueries(m, side, queries / 10, kPi);
     const auto weights = [&](const Query& q) { return ndf.weights(q.footprint, q.half).weights[0]; };
-    const auto density = [&](const Query& q) { return ndf.density(q.footprint, q.half); };
+    const std::vector<Query> fewer(aligned.begin(), aligned.begin() + static_cast<std::ptrdiff_t>(queries / 10));
+    const auto densityOf = [](const BinMapNdf& asked) {
+      return [&asked](const Query& q) { return asked.density(q.footprint, q.half); };
+    };
     ordered_json entry = {{"side", side}};
     entry["weights_ns"] = medianNanoseconds(aligned, weights);
     entry["turned_ns"] = medianNanoseconds(turned, weights);
-    entry["density_ns"] =
-        medianNanoseconds({aligned.begin(), aligned.begin() + static_cast<std::ptrdiff_t>(queries / 10)}, density);
+    entry["density_ns"] = medianNanoseconds(fewer, densityOf(ndf));
+    entry["turned_density_ns"] = medianNanoseconds(turned, densityOf(ndf));
+    entry["published_ns"] = medianNanoseconds(fewer, densityOf(published));
     result["queries"].push_back(entry);
   }
   for (const float side : {8.0f, 16.0f, 64.0f, 256.0f}) result["errors"].push_back(errors(m, ndf, side, side < 200 ? 400 : 60));

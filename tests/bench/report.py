@@ -62,7 +62,9 @@ METHODS = [
     ("Bin map", r"bin_maps: .*", "Texels sorted by direction, by glint-binmap; 21 weights are one query. Spans are over maps and roughnesses.",
      [("build, 2K maps", r"bin map, build, .* 2K.*"), ("bytes, 2K maps", r"bin map, bytes, .* 2K.*"),
       *((f"weights of {side}^2 texels", rf"bin map, weights, .*, {side}\^2") for side in (4, 64, 1024)),
-      ("median error", r"bin map, median error, .*"), ("energy", r"bin map, energy, .*")]),
+      *((f"density of {side}^2 texels", rf"bin map, density, .*, {side}\^2") for side in (4, 64, 1024)),
+      *((f"density of {side}^2 texels, as published", rf"bin map, published density, .*, {side}\^2") for side in (4, 64, 1024)),
+      ("median error", r"bin map, median error, .*"), ("median error, as published", r"bin map, median error as published, .*"), ("energy", r"bin map, energy, .*")]),
     ("Texels", r"below_level_0: .*", "Footprints of a deviation of .5 to 8 texels, answered from the texels by `ManifoldNdf`, beside `Reference` in one run. Spans are over maps and sizes.",
      [line for surface in ("smooth", "flat") for shape in ("round", "box") for line in (
          (f"density, {surface}, {shape} footprints", rf"from texels, density, random, .*, {surface}, {shape}, .*"),

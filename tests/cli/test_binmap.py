@@ -92,6 +92,16 @@ def test_a_range_of_roughnesses_is_one_asset(glint, assets):
     assert glint("query", assets / "bins.glint", *question, "--alpha", "0.1").returncode == 1
 
 
+def test_published_densities_are_of_the_centres_of_bins(glint, assets):
+    question = ["--uv", "0.3", "0.6", "--box", "20", "20", "--half", "0.05", "0.02"]
+    exact = number(glint("query", assets / "bins.glint", *question))
+    published = number(glint("query", assets / "bins.glint", *question, "--estimator", "published"))
+    assert published != exact
+    assert published == pytest.approx(exact, rel=0.3)
+    assert number(glint("query", assets / "bins.glint", *question, "--estimator", "exact")) == exact
+    assert "--estimator has no effect" in glint("query", assets / "map.glint", *question, "--estimator", "published").stderr
+
+
 @pytest.mark.parametrize("alpha", ["0.1:0.05", "0.1:", ":0.1", "0.1:2", "0.001:0.1", "0.1:x", "0.1-0.2", "0.1:0"])
 def test_bad_ranges_are_usage_errors(glint, assets, alpha):
     process = glint("binmap", assets / "map.glint", "-o", "b.glint", "--alpha", alpha)

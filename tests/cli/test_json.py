@@ -24,7 +24,7 @@ LIGHTS = {"lights": [{"type": "sphere", "centre": [1, 0, 3], "radius": 0.5, "rad
 SCENE = {"schema": "glint-plan scene 1", "lights": [{"type": "environment", "band_limit_deg": 60}],
          "materials": [{"map": "n.png", "footprints": {"smallest_texels": 4, "largest_texels": 4}, "sigma_r": 0.1, "tolerance": 9}]}
 QUERIES = {"half.csv": "u,v,sigma,hx,hy\n.3,.3,4,0,0\n.1,.2,5,.1,0\n", "displaced.csv": "u,v,level,hx,hy\n.3,.3,0,0,0\n"}
-ASSETS = ("normals", "smooth", "heights", "flat", "damaged", "pyramid", "cp", "tucker", "pca", "bins", "range", "sat", "moments", "tiny", "wang", "wave", "lobes", "zonal", "light",
+ASSETS = ("normals", "smooth", "heights", "flat", "damaged", "pyramid", "cp", "tucker", "pca", "bins", "range", "sat", "moments", "tiny", "wang", "wangpyramid", "wangcp", "wave", "lobes", "zonal", "light",
           "displaced", "rough", "colored")
 
 # Commands in the order that they run: each may read what the commands before it wrote.
@@ -53,6 +53,8 @@ MAKE = [
     "tiny tiny.glint -o plane.glint --explicit 24 16 --origin -100 7 --per-texel 2",
     "wang normals.glint -o wang.glint --size 16",
     "wang wang.glint --explicit 20 10 -o part.glint",
+    "pyramid wang.glint -o wangpyramid.glint --resolution 64 --stride 8 --sigma-r .02",
+    "compress wangpyramid.glint -o wangcp.glint --method cp --rank 4",
     "synth grating --size 64 --height --texel-size-um 1 --depth-um .2 -o g.exr",
     "ingest g.exr --kind height --to heights --height-scale-um 1 --texel-size-um 1 -o grating.glint",
     "pyramid grating.glint -o wave.glint --optics wave --coherence-um 4 --wavelengths 3 --resolution 64 --stride 8",

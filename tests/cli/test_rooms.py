@@ -27,9 +27,10 @@ MAY_USE = {
 FOLDERS = {
     "bake": {"common": set(), "ingest": {"common"}, "synth": {"common"}, "pyramid": {"common"}, "compressed": {"common"},
              "bin_map": {"common"}, "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"}, "sh": {"common"}, "displace": {"common"},
-             "wang": {"common"}, "wave": {"common", "pyramid"}},
+             "wang": {"common", "pyramid"}, "wave": {"common", "pyramid"}},
     "query/detail": {"common": set(), "manifold": {"common"}, "pyramid": {"common"}, "compressed": {"common", "pyramid"}, "bin_map": {"common"},
-                     "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"}, "wave": {"common", "pyramid"}},
+                     "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"},
+                     "wang": {"common", "pyramid"}, "wave": {"common", "pyramid"}},
 }
 
 # Headers of others that are kept in few places: pattern -> folders, relative to the root.

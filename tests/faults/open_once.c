@@ -3,7 +3,7 @@
 
 #include <stdio.h>
 
-#include "glint/api/glint.h"
+#include "glint.h"
 
 static int fail(glint_status status) {
   fprintf(stderr, "open_once: error: %s\n", glint_error_message());

@@ -147,6 +147,7 @@ def current_umask():
     (lambda n: gn.open(gn.synth("weave", 32, heights=True)), gn.UnsupportedError, "heights"),
     (lambda n: gn.open(n, sigma_r=9), gn.ArgumentError, "sigma_r"),
     (lambda n: gn.open(n, surface="round"), gn.ArgumentError, "flat, smooth"),
+    (lambda n: gn.open(n, estimator="best"), gn.ArgumentError, "exact, published"),
     (lambda n: n.open().density([0, 0], [0, 0]), gn.ArgumentError, "sigma, covariance and box"),
     (lambda n: n.open().density([0, 0], [0, 0], sigma=1, box=[[1, 0], [0, 1]]), gn.ArgumentError, "sigma, box"),
     (lambda n: n.open().density([0, 0, 0], [0, 0], sigma=1), gn.ArgumentError, "uv"),

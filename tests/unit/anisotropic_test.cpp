@@ -246,7 +246,7 @@ TEST(AnisotropicNdf, IsClearlyCloserToTheTexelsThanARoundFootprint) {
     const Baked baked(kind, 8);
     const PyramidNdf round(baked.pyramid.view(), baked.map.map());
     const AnisotropicNdf stretched(round);
-    for (const int aspect : {1, 2, 4, 8, 16, 32, 64}) {
+    for (const int aspect : {1, 4, 16, 64}) {
       Random random(5);
       double round_error = 0, error = 0;
       for (int k = 0; k < 3; ++k) {

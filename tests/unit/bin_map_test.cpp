@@ -8,6 +8,7 @@
 #include <tuple>
 #include <vector>
 
+#include "glint/bake/bin_map/bin_map_image.h"
 #include "glint/model/error.h"
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/reference.h"
@@ -361,6 +362,59 @@ TEST(BinMapNdf, MergedBinsKeepTheError) {
   const DensityErrors errors = densityErrors(map, bins.ndf(), 300, true, 10);
   EXPECT_LT(errors.median, kNoiseTolerance);
   EXPECT_LT(std::abs(errors.energy), kEnergyTolerance);
+}
+
+TEST(BinMapNdf, PublishedDensitiesAreOfTheCentresOfBins) {
+  const test::OwnedMap map(64, 50, test::randomNormals(64, 50, 0.8f, 3));
+  const OwnedBinMap bins(map, 0.16f);
+  const BinMapNdf published(bins.data().view(), 0.16f, BinEstimator::published);
+  const int across = published.map().bins_per_axis;
+  const float variance = published.sigma() * published.sigma(), bin = 2.0f / static_cast<float>(across);
+  Random random(13);
+  for (int k = 0; k < 60; ++k) {
+    const Footprint p = randomBox(random, 25);
+    const Vec2 h = map.normals()[random.below(map.normals().size())];
+    const auto columnOf = [&](float x) { return static_cast<int>((x + 1) / bin); };
+    double expected = 0;
+    for (const auto& [number, weight] : test::bruteWeights(map.map(), across, p)) {
+      const int column = static_cast<int>(number) % across, row = static_cast<int>(number) / across;
+      const int dx = std::abs(column - columnOf(h.x)), dy = std::abs(row - columnOf(h.y));
+      if (dx > 2 || dy > 2 || dx * dy == 4) continue;  // 21 bins: 5 x 5 without the corners
+      const Vec2 centre = {-1 + (static_cast<float>(column) + 0.5f) * bin, -1 + (static_cast<float>(row) + 0.5f) * bin};
+      expected += weight * FacetLobe::density({variance, 0, variance}, h - centre);
+    }
+    EXPECT_NEAR(published.density(p, h), expected, 1e-4 * expected + 1e-5);
+    EXPECT_EQ(published.mean(p, {h, h + Vec2{0.1f, 0.1f}}), bins.ndf().mean(p, {h, h + Vec2{0.1f, 0.1f}}));
+    const HalfVectorSample s = published.sample(p, {random.unit(), random.unit()});
+    if (s.pdf > 0) {
+      EXPECT_EQ(s.pdf, bins.ndf().density(p, s.h));
+    }
+  }
+}
+
+TEST(BinMapNdf, ImagesAreMeansOverPixels) {
+  constexpr int kResolution = 40;
+  const test::OwnedMap map(128, 100, test::roughSurface(128, 100, 0.3f));
+  for (const float alpha : {0.02f, 0.16f, 0.5f}) {
+    const OwnedBinMap bins(map, alpha);
+    for (const float side : {3.0f, 70.0f}) {
+      const Footprint p = Footprint::box({0.3f, 0.9f}, {side, 0.2f * side}, {-0.1f, side});
+      const std::vector<float> image = bake::binMapImage(bins.ndf(), p, kResolution);
+      double most = 0, total = 0;
+      for (const float x : image) most = std::max(most, double{x}), total += double{x};
+      constexpr int kEvery = 3;  // means are slow
+      for (int y = 0; y < kResolution; y += kEvery) {
+        for (int x = 0; x < kResolution; x += kEvery) {
+          const float pixel = 2.0f / kResolution;
+          const Vec2 low = {-1 + static_cast<float>(x) * pixel, -1 + static_cast<float>(y) * pixel};
+          EXPECT_NEAR(image[rowMajorIndex(x, y, kResolution)], bins.ndf().mean(p, {low, low + Vec2{pixel, pixel}}),
+                      1e-5 * most);
+        }
+      }
+      EXPECT_NEAR(total / (kResolution * kResolution), bins.ndf().mean(p, {{-1, -1}, {1, 1}}), 1e-4) << alpha << " " << side;
+      EXPECT_EQ(image, bake::binMapImage(bins.ndf(), p, kResolution));
+    }
+  }
 }
 
 /// 512 x 512 maps on which the normals inside a footprint are not those of the whole map.

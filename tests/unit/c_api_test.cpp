@@ -11,6 +11,7 @@
 
 #include "glint.h"
 #include "glint/api/any_ndf.h"
+#include "glint/query/manifold_ndf.h"
 #include "glint/query/ray_footprint.h"
 #include "support/hdf5_bytes.h"
 
@@ -337,10 +338,6 @@ TEST(CApi, BytesThatCannotBeUsedAreRefusedByName) {
   EXPECT_EQ(glint_displaced_open_source(&empty, 0, &displaced), GLINT_ERROR_IO);
   EXPECT_EQ(glint_displaced_open_source(nullptr, 0, &displaced), GLINT_ERROR_USAGE);
   EXPECT_EQ(displaced, nullptr);
-  glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
-  options.reserved = 1;
-  EXPECT_EQ(glint_ndf_open(assets().path("ndf-cp").c_str(), &options, &ndf), GLINT_ERROR_USAGE);
-  EXPECT_STREQ(glint_error_message(), "glint_open_options: reserved is not 0");
 }
 
 TEST(CApi, PixelsAreSmoothOrConstant) {
@@ -389,12 +386,25 @@ TEST(CApi, OptionsReachTheModel) {
   const Handle with_normals = openHandle("ndf-cp", &below);
   const glint_footprint narrow = glint_footprint_isotropic(0.1f, 0.9f, 2);
   glint_density(with_normals.get(), &narrow, 0.05f, 0.1f, &density);
-  EXPECT_EQ(density, Reference(map.map, 0.05f, Surface::flat, Boundary::wrap, Reference::Search::pruned)
-                         .density(Footprint::isotropic({0.1f, 0.9f}, 2), {0.05f, 0.1f}));
+  EXPECT_EQ(density, ManifoldNdf(map.map, 0.05f).density(Footprint::isotropic({0.1f, 0.9f}, 2), {0.05f, 0.1f}));
   glint_ndf_info info = {};
   info.struct_size = sizeof info;
   glint_ndf_get_info(with_normals.get(), &info);
   EXPECT_EQ(info.has_normals, 1);
+}
+
+TEST(CApi, EstimatorsOfBinMapsReachTheModel) {
+  const auto opened = api::OpenedNdf::open(assets().path("bin-map"));
+  const auto& map = opened.asset().get<BinMap>();
+  const glint_footprint p = glint_footprint_isotropic(0.4f, 0.6f, 6);
+  glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+  float exact = -1, published = -1;
+  glint_density(openHandle("bin-map", &options).get(), &p, 0.05f, 0.02f, &exact);
+  options.estimator = GLINT_ESTIMATOR_PUBLISHED;
+  glint_density(openHandle("bin-map", &options).get(), &p, 0.05f, 0.02f, &published);
+  const BinMapNdf same(map, map.alpha_min, BinEstimator::published);
+  EXPECT_EQ(published, same.density(Footprint::isotropic({0.4f, 0.6f}, 6), {0.05f, 0.02f}));
+  EXPECT_NE(published, exact);
 }
 
 TEST(CApi, OptionsOfHistogramsReachTheModel) {
@@ -476,6 +486,7 @@ TEST(CApi, OptionsOutOfRangeAreRefusedByName) {
   for (const float value : {-0.1f, 0.3f, kNan}) refused(&glint_open_options::sigma_r, value, "sigma_r");
   refused(&glint_open_options::surface, 2, "surface");
   refused(&glint_open_options::boundary, -1, "boundary");
+  for (const int32_t value : {-1, 2}) refused(&glint_open_options::estimator, value, "estimator");
   for (const int32_t value : {-1, 33}) refused(&glint_open_options::footprint_parts, value, "footprint_parts");
 }
 

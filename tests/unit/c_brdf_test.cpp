@@ -233,8 +233,8 @@ TEST(CBrdf, SamplesAreThoseOfThePdfAndWeighWhatIsReflected) {
       ++drawn;
       other += std::fabs(pdf / drawn_pdf - 1) > kRounding || std::fabs(f[0] * wi[2] / drawn_pdf - weight[0]) > kRounding;
     }
-    EXPECT_GT(drawn, 120);
-    EXPECT_LE(other, 2);  // half vectors that rounding moves across the border of a bin
+    EXPECT_GT(drawn, 60);  // steep facets reflect below the surface
+    EXPECT_LE(other, 2);   // half vectors that rounding moves across the border of a bin
   }
 }
 

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "glint.h"
 #include "glint/api/any_ndf.h"
-#include "glint/api/glint.h"
 #include "glint/formats/asset_reader.h"
 #include "support/hdf5_bytes.h"
 #include "support/temp_folder.h"

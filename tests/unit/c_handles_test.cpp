@@ -231,8 +231,9 @@ TEST(CApi, BeckmannFacetsHaveNoAveragesOverLobes) {
 
 TEST(CApi, PositionsFarOutAreThoseOfTheMap) {
   // The same texels 4096 maps away: in floats the density would be off by percents.
-  for (const char* kind : kKinds) {
-    const Handle ndf = openHandle(kind);
+  for (const std::string kind : kKinds) {
+    if (kind == "wang-pyramid" || kind == "wang-cp") continue;  // their tiles differ, so the plane does not repeat
+    const Handle ndf = openHandle(kind.c_str());
     for (int k = 0; k < 20; ++k) {
       const double u = 0.013 + 0.05 * k, v = 0.871 - 0.04 * k, far_u = u + 4096, far_v = v - 4096;
       const glint_footprint near = glint_footprint_isotropic(u, v, 1.5f), far = glint_footprint_isotropic(far_u, far_v, 1.5f);

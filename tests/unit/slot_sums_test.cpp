@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -136,6 +137,39 @@ void expectMoments() {
   }
 }
 
+/// Lobes of all texels at a half vector, by their formula in double precision.
+double expectedLobes(const Case& c, const SubbinLobe& lobe) {
+  const double middle = 0.5 * ((1 << c.code.subbin_bits) - 1), end = std::exp(-12.5);
+  double sum = 0;
+  for (const std::uint32_t texel : c.texels) {
+    const double x = c.code.subbinX(texel) - middle - double{lobe.x}, y = c.code.subbinY(texel) - middle - double{lobe.y};
+    sum += partOf<3>(c, texel) * std::max(0.0, std::exp(-double{lobe.exponent} * (x * x + y * y)) - end);
+  }
+  return sum;
+}
+
+template <class Texels>
+void expectLobes() {
+  std::mt19937 random(9);
+  std::uniform_real_distribution<float> unit;
+  for (int k = 0; k < 3000 && !testing::Test::HasFailure(); ++k) {
+    Case c = randomCase(random);
+    if (c.code.column_bits + c.code.row_bits + 2 * c.code.subbin_bits > 31) continue;  // shifts of a whole word
+    if (c.texels.size() > 500) c.texels.resize(500);
+    SCOPED_TRACE(k);
+    const float side = static_cast<float>(1 << c.code.subbin_bits), deviation = side * (0.1f + 2 * unit(random));
+    const SubbinLobe lobe = {4 * side * (unit(random) - 0.5f), 4 * side * (unit(random) - 0.5f),
+                             0.5f / (deviation * deviation)};
+    const float sum = Texels::template lobes<3>(c.texels.data(), static_cast<int>(c.texels.size()),
+                                                typename Texels::Parts(c.parts()), SubbinFields(c.code), lobe);
+    constexpr double kDecay = 1e-4, kEnds = 1e-9;  // decayOf twice; lobes end where they are 3.7e-6
+    const double expected = expectedLobes(c, lobe);
+    EXPECT_NEAR(sum, expected, kDecay * expected + kEnds * static_cast<double>(c.texels.size()));
+  }
+}
+
+TEST(SubbinLobes, AddUpTexelByTexel) { expectLobes<SingleTexels>(); }
+
 TEST(SubbinMoments, AddUpTexelByTexel) { expectMoments<SingleTexels>(); }
 
 TEST(SlotSums, AddUpTexelByTexel) { expectAreas<SingleTexels>(); }
@@ -144,6 +178,11 @@ TEST(SlotSums, AddUpTexelByTexel) { expectAreas<SingleTexels>(); }
 TEST(SlotSums, AddUpEightTexelsAtATime) {
   if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
   expectAreas<Avx2Texels>();
+}
+
+TEST(SubbinLobes, AddUpEightTexelsAtATime) {
+  if (!hasAvx2()) GTEST_SKIP() << "no AVX2";
+  expectLobes<Avx2Texels>();
 }
 
 TEST(SubbinMoments, AddUpEightTexelsAtATime) {

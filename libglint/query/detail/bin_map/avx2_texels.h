@@ -96,6 +96,25 @@ struct Avx2Texels {
     return {total(sums.w), total(sums.x), total(sums.y), total(sums.xx), total(sums.xy), total(sums.yy)};
   }
 
+  /// SingleTexels::lobes.
+  template <unsigned kCut>
+  GLINT_AVX2 static float lobes(const std::uint32_t* texels, int count, const Parts& parts, const SubbinFields& fields,
+                                const SubbinLobe& lobe) {
+    const Positions positions(fields);
+    __m256 sums = _mm256_setzero_ps();
+    int k = 0;
+    for (; k + 8 <= count; k += 8) {
+      const __m256i eight = load(texels + k);
+      sums = _mm256_add_ps(sums, _mm256_mul_ps(parts.of<kCut>(eight), positions.lobes(eight, lobe)));
+    }
+    if (k < count) {
+      const __m256i exist = firstLanes(count - k), some = load(texels + k, exist);
+      const __m256 weights = _mm256_and_ps(parts.of<kCut>(some), _mm256_castsi256_ps(exist));
+      sums = _mm256_add_ps(sums, _mm256_mul_ps(weights, positions.lobes(some, lobe)));
+    }
+    return total(sums);
+  }
+
  private:
   /// SlotFields for eight texels.
   struct Slots {
@@ -120,27 +139,41 @@ struct Avx2Texels {
     __m256i mask, first_x, first_y;
   };
 
-  /// SubbinMoments, eight sums each.
-  struct Moments {
-    GLINT_AVX2 explicit Moments(const SubbinFields& f)
+  /// SubbinFields for eight texels.
+  struct Positions {
+    GLINT_AVX2 explicit Positions(const SubbinFields& f)
         : shift_x(_mm_cvtsi32_si128(f.shift_x)),
           shift_y(_mm_cvtsi32_si128(f.shift_y)),
           mask(all(static_cast<std::uint32_t>(f.mask))),
           middle(_mm256_set1_ps(f.middle)) {}
+    GLINT_AVX2 __m256 x(__m256i texels) const { return position(texels, shift_x); }
+    GLINT_AVX2 __m256 y(__m256i texels) const { return position(texels, shift_y); }
+    GLINT_AVX2 __m256 lobes(__m256i texels, const SubbinLobe& lobe) const {
+      return reinterpret_cast<__m256>(lobe.at(lanes(x(texels)), lanes(y(texels))).v);
+    }
+
+   private:
+    GLINT_AVX2 static Lanes8 lanes(__m256 v) { return {reinterpret_cast<Lanes8::Floats>(v)}; }
     GLINT_AVX2 __m256 position(__m256i texels, __m128i shift) const {
       return _mm256_sub_ps(_mm256_cvtepi32_ps(_mm256_and_si256(_mm256_srl_epi32(texels, shift), mask)), middle);
     }
+    __m128i shift_x, shift_y;
+    __m256i mask;
+    __m256 middle;
+  };
+
+  /// SubbinMoments, eight sums each.
+  struct Moments {
+    GLINT_AVX2 explicit Moments(const SubbinFields& f) : positions(f) {}
     GLINT_AVX2 void add(__m256i texels, __m256 weights) {
-      const __m256 px = position(texels, shift_x), py = position(texels, shift_y);
+      const __m256 px = positions.x(texels), py = positions.y(texels);
       const __m256 wx = _mm256_mul_ps(weights, px), wy = _mm256_mul_ps(weights, py);
       w = _mm256_add_ps(w, weights), x = _mm256_add_ps(x, wx), y = _mm256_add_ps(y, wy);
       xx = _mm256_add_ps(xx, _mm256_mul_ps(wx, px));
       xy = _mm256_add_ps(xy, _mm256_mul_ps(wx, py));
       yy = _mm256_add_ps(yy, _mm256_mul_ps(wy, py));
     }
-    __m128i shift_x, shift_y;
-    __m256i mask;
-    __m256 middle;
+    Positions positions;
     __m256 w = _mm256_setzero_ps(), x = w, y = w, xx = w, xy = w, yy = w;
   };
 

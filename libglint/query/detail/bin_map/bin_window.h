@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <type_traits>
 
 #include "glint/query/detail/bin_map/bin_blocks.h"
+#include "glint/query/detail/bin_map/run_reader.h"
 #include "glint/query/detail/bin_map/slot_sums.h"
-#include "glint/query/detail/bin_map/texel_filter.h"
 
 namespace glint {
 
@@ -78,78 +77,18 @@ struct WindowBlock {
   SlotFields fields;
 };
 
-/// Covered parts of the columns and rows of a footprint's bounding box, for footprints with sides along the axes: less than 1
-/// for the first and the last column and row.
-struct BoxSides {
-  GLINT_HD explicit BoxSides(const TexelCover& cover)
-      : last_x(cover.columns() - 1),
-        last_y(cover.rows() - 1),
-        left(cover.firstColumn()),
-        right(cover.lastColumn()),
-        lower(cover.firstRow()),
-        upper(cover.lastRow()) {}
-  GLINT_HD double column(int x) const { return x == 0 ? left : x == last_x ? right : 1; }
-  GLINT_HD double row(int y) const { return y == 0 ? lower : y == last_y ? upper : 1; }
-
-  GLINT_HD RangeEnds columns() const { return {static_cast<float>(left), static_cast<float>(right)}; }
-  GLINT_HD RangeEnds rows() const { return {static_cast<float>(lower), static_cast<float>(upper)}; }
-
-  /// Covered area of a texel of a run.
-  /// @tparam kCut  fields along which the run may be cut (withCut)
-  template <unsigned kCut>
-  GLINT_HD double texelArea(const TexelCover& cover, const TexelRun& run, const TexelCode& code, std::uint32_t texel) const {
-    const int x = static_cast<int>(code.column(texel)) + run.x, y = static_cast<int>(code.row(texel)) + run.y;
-    if (kCut == 0) return 1;
-    if (!cover.aligned()) return cover.texel(x, y);
-    return ((kCut & TexelFilter::kColumn) != 0 ? column(x) : 1) * ((kCut & TexelFilter::kRow) != 0 ? row(y) : 1);
-  }
-
-  int last_x, last_y;
-  double left, right, lower, upper;
-};
-
-/// Ranges of the column and row fields of a run that are inside the footprint's bounding box.
-inline GLINT_HD IndexRange columnsIn(const TexelCover& cover, const TexelRun& run) {
-  return {-run.x, cover.columns() - 1 - run.x};
-}
-inline GLINT_HD IndexRange rowsIn(const TexelCover& cover, const TexelRun& run) { return {-run.y, cover.rows() - 1 - run.y}; }
-
-/// Calls visitor(c), where c() is a constant: the fields of TexelFilter along which the footprint may cut the run.
-template <class Visitor>
-GLINT_HD void withCut(const TexelRun& run, Visitor&& visitor) {
-  constexpr unsigned kColumn = TexelFilter::kColumn, kRow = TexelFilter::kRow;
-  if (run.cut_x && run.cut_y)
-    visitor(std::integral_constant<unsigned, kColumn | kRow>());
-  else if (run.cut_x)
-    visitor(std::integral_constant<unsigned, kColumn>());
-  else if (run.cut_y)
-    visitor(std::integral_constant<unsigned, kRow>());
-  else
-    visitor(std::integral_constant<unsigned, 0>());
-}
-
-/// Adds up the covered areas of runs (BinBlocks::forEachRun) by bin. Prefetches up to kMost runs before it reads them, so that
-/// their cache misses overlap.
-class WindowSum {
+/// Adds up the covered areas of runs by bin.
+class WindowSum : public RunReader<WindowSum, WindowBlock> {
  public:
   /// @param texels  the lists of all blocks, one after the other
   /// @param areas   sums by slot of the window; results are added
   GLINT_HD WindowSum(const std::uint32_t* texels, const TexelCover& cover, double* areas)
-      : cover_(cover), sides_(cover), texels_(texels), areas_(areas) {}
-  /// Sets the block of the next runs. `block` must stay alive until `finish`.
-  GLINT_HD void select(const WindowBlock& block) { block_ = &block; }
+      : RunReader(texels, cover), areas_(areas) {}
   GLINT_HD void whole(std::uint64_t begin, std::uint64_t end) {
-    if (block_->isBin())
-      sums_.add(block_->slot, static_cast<double>(end - begin));
+    if (selected().isBin())
+      sums_.add(selected().slot, static_cast<double>(end - begin));
     else
       partial({begin, end, 0, 0, false, false});
-  }
-  GLINT_HD void partial(const TexelRun& run) {
-    constexpr std::uint64_t kLine = 16, kAhead = 16 * kLine;  // texels
-    for (std::uint64_t k = run.begin; k < std::min(run.end, run.begin + kAhead); k += kLine) prefetch(texels_ + k);
-    prefetch(texels_ + run.end - 1);
-    items_[count_++] = {run, block_};
-    if (count_ == kMost) flush();
   }
   /// Completes the sums: call once, after the last run.
   GLINT_HD void finish() {
@@ -158,79 +97,27 @@ class WindowSum {
   }
 
  private:
-  static constexpr int kMost = 32;
-  struct Item {
-    TexelRun run;
-    const WindowBlock* block;
-  };
-
-  GLINT_DEVICE_CALL GLINT_HD void flush() {
-#ifdef GLINT_AVX2
-    hasAvx2() ? flushAvx2() : flushBy<SingleTexels>();
-#else
-    flushBy<SingleTexels>();
-#endif
-    count_ = 0;
-  }
-#ifdef GLINT_AVX2
-  GLINT_AVX2 GLINT_FLATTEN void flushAvx2() { flushBy<Avx2Texels>(); }
-#endif
-
-  template <class Texels>
-  GLINT_HD void flushBy() {
-    for (int k = 0; k < count_;) {
-      const Item& first = items_[k];
-      const typename Texels::Parts parts(partsOf(first));
-      withCut(first.run, [&](auto cut) {
-        do add<Texels, cut()>(items_[k], parts);
-        while (++k < count_ && countAlike(first, items_[k]));
-      });
-    }
-  }
+  friend RunReader;
 
   template <class Texels, unsigned kCut>
   GLINT_HD void add(const Item& item, const typename Texels::Parts& parts) {
-    const std::uint32_t* texels = texels_ + item.run.begin;
-    const std::uint64_t count = item.run.end - item.run.begin;
-    if (kCut != 0 && !cover_.aligned())
+    if (isTurned<kCut>())
       addTurned(item);
     else if (item.block->isBin())
-      sums_.addBin<Texels, kCut>(texels, count, parts, item.block->slot);
+      sums_.addBin<Texels, kCut>(texelsOf(item), sizeOf(item), parts, item.block->slot);
     else
-      sums_.addBins<Texels, kCut>(texels, count, parts, item.block->fields);
+      sums_.addBins<Texels, kCut>(texelsOf(item), sizeOf(item), parts, item.block->fields);
   }
 
-  /// Whether equal codes of two runs have equal weights, so that one TexelParts serves both.
-  static GLINT_HD bool countAlike(const Item& a, const Item& b) {
-    return a.run.x == b.run.x && a.run.y == b.run.y && a.run.cut_x == b.run.cut_x && a.run.cut_y == b.run.cut_y &&
-           a.block->code.column_bits == b.block->code.column_bits && a.block->code.row_bits == b.block->code.row_bits;
-  }
-
-  GLINT_HD TexelParts partsOf(const Item& item) const {
-    const TexelCode& code = item.block->code;
-    return {{0, code.column_bits, columnsIn(cover_, item.run), sides_.columns()},
-            {code.column_bits, code.row_bits, rowsIn(cover_, item.run), sides_.rows()}};
-  }
-
-  /// Adds a run where the sides of the footprint are not along the axes.
   GLINT_DEVICE_CALL GLINT_HD void addTurned(const Item& item) {
-    constexpr unsigned kPosition = TexelFilter::kPosition;
-    const TexelFilter near(item.block->code, columnsIn(cover_, item.run), rowsIn(cover_, item.run), {}, {});
-    near.forEach<kPosition>(texels_ + item.run.begin, item.run.end - item.run.begin, [&](std::uint32_t texel) {
+    forEachTurned(item, [&](std::uint32_t texel, auto area) {
       const std::uint32_t slot = item.block->fields.slotOf(texel);
-      if (slot == SlotFields::kNone) return;
-      sums_.add(static_cast<int>(slot), sides_.texelArea<kPosition>(cover_, item.run, item.block->code, texel));
+      if (slot != SlotFields::kNone) sums_.add(static_cast<int>(slot), area());
     });
   }
 
-  const TexelCover& cover_;
-  BoxSides sides_;
-  const std::uint32_t* texels_;
   double* areas_;
   SlotSums sums_;
-  const WindowBlock* block_ = nullptr;
-  int count_ = 0;
-  Item items_[kMost];
 };
 
 }  // namespace glint

@@ -11,7 +11,8 @@ namespace glint {
 /// The lobe of a facet: a Gaussian minus its value at kReach deviations, so that it ends there without a step, scaled to
 /// integrate to 1.
 struct FacetLobe {
-  static constexpr float kReach = 5;  ///< deviations
+  static constexpr float kReach = 5;            ///< deviations
+  static constexpr float kEnd = 3.7266532e-6f;  ///< exp(-kReach^2 / 2)
 
   /// @param c  covariance, not singular
   /// @param d  offset from the centre
@@ -34,8 +35,7 @@ struct FacetLobe {
     return std::sqrt(2 * std::max(t, 0.0f));
   }
 
- private:
-  static constexpr float kEnd = 3.7266532e-6f;  // exp(-kReach^2 / 2)
+  /// What the integral of exp(-r^2 / 2) - kEnd is of that of exp(-r^2 / 2).
   static constexpr float kMass = 1 - kEnd * (1 + 0.5f * kReach * kReach);
 };
 

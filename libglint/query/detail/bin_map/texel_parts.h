@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "glint/math/lanes.h"
 #include "glint/model/bin_map.h"
+#include "glint/query/detail/bin_map/facet_lobe.h"
 #include "glint/query/detail/bin_map/texel_filter.h"
 
 namespace glint {
@@ -104,6 +106,21 @@ struct SubbinFields {
   float middle;  ///< middle of the block, in units of the field
 };
 
+/// The lobes of texels (FacetLobe) at one half vector, without their common factor. Positions are those of SubbinFields.
+struct SubbinLobe {
+  float x, y;      ///< the half vector
+  float exponent;  ///< half the square of a sub-bin over the variance of the lobe
+
+  /// @tparam V  Lanes1 or Lanes8: positions of one normal or of eight
+  template <class V>
+  GLINT_LANE V at(const V& normal_x, const V& normal_y) const {
+    const V dx = normal_x - V::all(x), dy = normal_y - V::all(y);
+    // exp(-u) is taken as the square of exp(-u / 2), because the lobe ends at u = 12.5 and decayOf at 10.
+    const V root = decayOf(V::all(0.5f * exponent) * (dx * dx + dy * dy));
+    return upperOf(root * root - V::all(FacetLobe::kEnd), V::all(0));
+  }
+};
+
 /// Reads lists one texel after the other. Avx2Texels does the same eight at a time.
 struct SingleTexels {
   using Parts = TexelParts;
@@ -139,6 +156,16 @@ struct SingleTexels {
       for (int i = 0; i < 6; ++i) sums[i][k % 8] += values[i];
     }
     return {total(sums[0]), total(sums[1]), total(sums[2]), total(sums[3]), total(sums[4]), total(sums[5])};
+  }
+
+  /// Sum of the weights of a list times the lobes at a half vector, added in eight sums like `sum`.
+  template <unsigned kCut>
+  static GLINT_HD float lobes(const std::uint32_t* texels, int count, const Parts& parts, const SubbinFields& fields,
+                              const SubbinLobe& lobe) {
+    float sums[8] = {};
+    for (int k = 0; k < count; ++k)
+      sums[k % 8] += parts.of<kCut>(texels[k]) * lobe.at(Lanes1{fields.x(texels[k])}, Lanes1{fields.y(texels[k])}).v;
+    return total(sums);
   }
 
  private:
