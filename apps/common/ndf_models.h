@@ -21,7 +21,7 @@ struct AskedAssets {
 };
 
 /// Mix-in: the asset that a tool asks, and the options of the kinds that it asks. Reference answers normals, with --surface,
-/// --sigma-r and --boundary. With --normals, Reference also answers footprints below level 0 of a pyramid.
+/// --sigma-r and --boundary. With --normals, ManifoldNdf answers footprints below level 0 of a pyramid.
 class NdfAsset {
  public:
   explicit NdfAsset(Tool& tool, const AskedAssets& asked = {});

@@ -16,7 +16,7 @@ namespace glint {
 /// The NDF from a pyramid of images.
 ///
 /// Footprints are answered as isotropic Gaussians of the same mean square size. Between the centres and the sizes of the images
-/// see Interpolation. Reference answers footprints below level 0 if the normals are given, blended with the images up to a fifth
+/// see Interpolation. ManifoldNdf answers footprints below level 0 if the normals are given, blended with the images up to a fifth
 /// above it (TexelBlend). Without normals level 0 answers them, too wide (smallestSigma). Answers of footprints larger than the
 /// map tend to its mean (SliceChooser). Between the half vectors of a pixel see Pixels. Thread-safe, allocates nothing; the arrays
 /// must outlive it.

@@ -6,6 +6,7 @@
 #include "glint/math/gaussian.h"
 #include "glint/model/normal_map.h"
 #include "glint/query/detail/common/footprint_weights.h"
+#include "glint/query/detail/common/half_vector_draw.h"
 #include "glint/query/detail/common/sampling.h"
 #include "glint/query/detail/common/texel_choice.h"
 #include "glint/query/detail/common/triangle_lobe.h"
@@ -58,26 +59,14 @@ class Reference {
   /// boxes, plus the cost of a density. Each choice uses up the leading digits of `xi` that are left; 24 bits are enough for
   /// one sample.
   GLINT_DEVICE_CALL GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
-    xi = clampUnit(xi);
-    const FootprintWeights weights = weightsOf(p);
-    const TexelChoice texel = chooseTexel(weights, {map_.width, map_.height, surface_, boundary_}, xi);
-    if (!texel.found) return {};
-    Vec2 n = normal(texel.i, texel.j);
-    if (surface_ == Surface::smooth) {
-      const Vec2 side = texel.half == 0 ? normal(texel.i + 1, texel.j) : normal(texel.i, texel.j + 1);
-      const Vec2 far = normal(texel.i + 1, texel.j + 1);
-      const float r = std::sqrt(xi.y);  // makes the point uniform in the triangle
-      n = (1 - r) * n + (r * (1 - xi.x)) * side + (r * xi.x) * far;
-      xi = {lowerDigits(xi.x, 7), lowerDigits(xi.y, 7)};
-    }
-    const Vec2 h = n + sigma_r_ * Vec2{normalQuantile(xi.x), normalQuantile(xi.y)};
-    return drawnAt(h, density(p, h));
+    const DrawnHalfVector drawn = drawHalfVector(map_, grid(), weightsOf(grid(), p), sigma_r_, clampUnit(xi));
+    return drawn.found ? drawnAt(drawn.h, density(p, drawn.h)) : HalfVectorSample{};
   }
 
   /// Visits every facet in a footprint: visitor(weight, normal) on a flat surface. Weights sum to the returned total.
   template <class Visitor>
   GLINT_HD double forEachTexel(const Footprint& p, Visitor&& visitor) const {
-    const FootprintWeights weights = weightsOf(p);
+    const FootprintWeights weights = weightsOf(grid(), p);
     double total = 0;
     forEachCell(weights, [&](int i, int j) {
       const float w = weights.texel(i, j);
@@ -91,7 +80,7 @@ class Reference {
   /// Visits every triangle in a footprint: visitor(weight, n0, n1, n2) on a smooth surface. Weights sum to the returned total.
   template <class Visitor>
   GLINT_HD double forEachTriangle(const Footprint& p, Visitor&& visitor) const {
-    const FootprintWeights weights = weightsOf(p);
+    const FootprintWeights weights = weightsOf(grid(), p);
     double total = 0;
     forEachCell(weights, [&](int i, int j) {
       if (!hasCell(i, j)) return;
@@ -121,15 +110,7 @@ class Reference {
     GLINT_HD float triangle(Vec2 a, Vec2 b, Vec2 c) const { return triangleMass(a, b, c, box, sigma); }
   };
 
-  GLINT_HD FootprintWeights weightsOf(Footprint p) const {
-    const auto onSurface = [](float u, int texels) {
-      const float border = 0.5f / static_cast<float>(texels);
-      return std::clamp(wrapUnit(u), border, 1 - border);
-    };
-    if (surface_ == Surface::smooth && boundary_ == Boundary::clamp)
-      p.centre = {onSurface(p.centre.x, map_.width), onSurface(p.centre.y, map_.height)};
-    return {p, map_.width, map_.height, boundary_};
-  }
+  GLINT_HD TexelGrid grid() const { return {map_.width, map_.height, surface_, boundary_}; }
 
   template <class Lobe>
   GLINT_HD double average(const Footprint& p, const Lobe& lobe) const {
@@ -144,7 +125,7 @@ class Reference {
 
   template <class Lobe>
   GLINT_HD double averagePruned(const Footprint& p, const Lobe& lobe) const {
-    const FootprintWeights weights = weightsOf(p);
+    const FootprintWeights weights = weightsOf(grid(), p);
     const Box2 support = lobe.support();
     const float reach = kLobeReach * sigma_r_;
     double sum = 0;
@@ -242,10 +223,6 @@ class Reference {
     }
   }
 
-  static GLINT_HD int floorTo(int value, int step) {
-    const int remainder = value % step;
-    return value - (remainder < 0 ? remainder + step : remainder);
-  }
   GLINT_HD Vec2 normal(int i, int j) const { return map_.at(wrapIndex(i, map_.width), wrapIndex(j, map_.height)); }
   /// Cells in the last row and column reach over the border: they exist only with Boundary::wrap.
   GLINT_HD bool hasCell(int i, int j) const {

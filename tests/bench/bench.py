@@ -87,7 +87,7 @@ def print_header():
     print(f"{'figure':<46} {'measured':>13} {'target':>13} {'':<5} {'paper':<19} design's floor")
 
 
-SECTIONS = ["synth_and_ingest", "pyramids", "compressions", "moments", "queries", "query_command", "displacements", "histograms", "light", "bin_maps", "accuracy"]
+SECTIONS = ["synth_and_ingest", "pyramids", "compressions", "moments", "queries", "query_command", "below_level_0", "displacements", "histograms", "light", "bin_maps", "accuracy"]
 
 
 class Bench:
@@ -299,6 +299,20 @@ class Bench:
         asset = self.path("flakes", "cp32")
         run = self.tools.repeat(self.repeats, "query", asset, "--uv", 0.3, 0.7, "--sigma", 40, "--half", 0.1, -0.05, "--repeat", 300000)
         self.table.add("density, warm, by glint-query --repeat", run.result["nanoseconds"], "ns", target=150)
+
+    def below_level_0(self):
+        """Footprints of a few texels from the texels, beside Reference in one process; see near_bench.cpp."""
+        text = call([self.tools.folder / "glint-near-bench", *(self.path(name) for name in MAPS)])
+        (self.folder / "near.json").write_text(text)
+        for run in json.loads(text):
+            kind = f"{run['map'].removesuffix('.glint')}, {run['surface']}, {run['shape']}, sigma {run['sigma_texels']:g}"
+            for what in ("random", "own", "sample", "mean"):
+                asked = run[what]
+                name = f"{what if what in ('sample', 'mean') else f'density, {what}'}, {kind}"
+                self.table.add(f"from texels, {name}", asked["us"], "us", reference_us=asked["reference_us"])
+                self.table.add(f"from texels over Reference, {name}", asked["us"] / asked["reference_us"], "x")
+                # The stated error, of many questions together; a mean has few.
+                self.table.add(f"from texels, error, {name}", asked["error"], "", target=1e-3)
 
     def accuracy(self):
         for name in MAPS:

@@ -65,6 +65,12 @@ METHODS = [
       *((f"density of {side}^2 texels", rf"bin map, density, .*, {side}\^2") for side in (4, 64, 1024)),
       *((f"density of {side}^2 texels, as published", rf"bin map, published density, .*, {side}\^2") for side in (4, 64, 1024)),
       ("median error", r"bin map, median error, .*"), ("median error, as published", r"bin map, median error as published, .*"), ("energy", r"bin map, energy, .*")]),
+    ("Texels", r"below_level_0: .*", "Footprints of a deviation of .5 to 8 texels, answered from the texels by `ManifoldNdf`, beside `Reference` in one run. Spans are over maps and sizes.",
+     [line for surface in ("smooth", "flat") for shape in ("round", "box") for line in (
+         (f"density, {surface}, {shape} footprints", rf"from texels, density, random, .*, {surface}, {shape}, .*"),
+         (f"mean over a range, {surface}, {shape} footprints", rf"from texels, mean, .*, {surface}, {shape}, .*"),
+         (f"time over that of Reference, {surface}, {shape} footprints", rf"from texels over Reference, .*, {surface}, {shape}, .*"),
+         (f"error, {surface}, {shape} footprints", rf"from texels, error, .*, {surface}, {shape}, .*"))]),
     ("Moments", r"moments: .*|queries: .* moments\b.*", "Moments of slopes, by glint-moments: one lobe for each footprint. What pictures of them lack is in [LIMITS](LIMITS.md).",
      [("build", r"moments, \S+"), ("bytes", r"bytes of moments, .*"), *query_lines("moments")[:-2]]),
     ("Histograms", r"histograms: .*", "Accumulated histograms of 9 x 32 directions, by glint-sat.",

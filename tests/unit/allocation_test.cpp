@@ -11,6 +11,7 @@
 #include "glint/bake/compressed/compress.h"
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/cp_ndf.h"
+#include "glint/query/manifold_ndf.h"
 #include "glint/query/pyramid_ndf.h"
 #include "glint/query/reference.h"
 #include "support/c_api.h"
@@ -54,9 +55,11 @@ TEST(Queries, AllocateNothing) {
   options.resolution = 64;
   options.sigma_r = 0.02f;
   const bake::NdfPyramidData pyramid = bake::buildPyramid(map.map(), options);
-  for (const Surface surface : {Surface::flat, Surface::smooth})
+  for (const Surface surface : {Surface::flat, Surface::smooth}) {
+    expectNoAllocation(ManifoldNdf(map.map(), 0.02f, surface));
     for (const auto search : {Reference::Search::exhaustive, Reference::Search::pruned})
       expectNoAllocation(Reference(map.map(), 0.02f, surface, Boundary::wrap, search));
+  }
   expectNoAllocation(PyramidNdf(pyramid.view()));
   expectNoAllocation(PyramidNdf(pyramid.view(), map.map()));
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {

@@ -16,6 +16,7 @@
 #include "glint/query/brdf/microfacet_brdf.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/light/environment.h"
+#include "glint/query/manifold_ndf.h"
 #include "glint/query/pyramid_ndf.h"
 #include "glint/query/reference.h"
 #include "support/c_api.h"
@@ -37,8 +38,10 @@ void forEachModel(Visitor&& visitor) {
   // A mean over a smooth surface of random normals costs a piece for every deviation of every triangle: few, and wide ones.
   const auto small = test::sampleNormals(8, 8);
   for (const Surface surface : {Surface::flat, Surface::smooth})
-    for (const Boundary boundary : {Boundary::wrap, Boundary::clamp})
+    for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
       visitor(Reference(small.map, 0.25f, surface, boundary, Reference::Search::pruned), "Reference");
+      visitor(ManifoldNdf(map.map, 0.02f, surface, boundary), "ManifoldNdf");
+    }
   for (const auto precision : {BlockPrecision::f16, BlockPrecision::f32}) {
     const auto pyramid = test::samplePyramid(kSize, precision);
     const PyramidNdf round(pyramid.pyramid);
@@ -113,7 +116,10 @@ template <class Visitor>
 void forEachSpoiledModel(float bad, std::uint16_t bad_half, Visitor&& visitor) {
   auto map = test::sampleNormals(8, 8, false);
   spoil(map.normals, Vec2{bad, bad});
-  for (const Surface surface : {Surface::flat, Surface::smooth}) visitor(Reference(map.map, 0.25f, surface), "Reference");
+  for (const Surface surface : {Surface::flat, Surface::smooth}) {
+    visitor(Reference(map.map, 0.25f, surface), "Reference");
+    visitor(ManifoldNdf(map.map, 0.25f, surface), "ManifoldNdf");
+  }
   for (const auto precision : {BlockPrecision::f16, BlockPrecision::f32}) {
     auto pyramid = test::samplePyramid(kSize, precision);
     for (auto& level : pyramid.levels) {

@@ -11,6 +11,7 @@
 #include "glint/query/anisotropic_ndf.h"
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/histogram_ndf.h"
+#include "glint/query/manifold_ndf.h"
 #include "glint/query/reference.h"
 #include "support/bin_weights.h"
 #include "support/test_maps.h"
@@ -310,6 +311,11 @@ TEST(LongGaussians, OfRoundPartsAreEvenAlongTheirWay) {
   }
 }
 
+/// Error of one answer of ManifoldNdf with the default loss, of the peak of a lobe: 1e-4 is left out at the rim of the ball.
+constexpr double kNearOfPeak = 2e-4;
+/// Of the answer: the functions of a lane.
+constexpr double kNearOfAnswer = 2e-4;
+
 /// A map of four rough quarters, so that footprints that miss some of it are wrong.
 std::vector<Vec2> quarters(int width, int height) {
   std::vector<Vec2> normals = test::randomNormals(width, height, 0.1f, 5);
@@ -332,12 +338,14 @@ TEST(LongFootprints, HaveTheSameAnswersFromAllThatSumTexels) {
     const HistogramNdf histogram(sat.view(), GaussianBoxes::one, 0);
     const Reference all(map.map(), ndf.sigma());
     const Reference pruned(map.map(), ndf.sigma(), Surface::flat, Boundary::wrap, Reference::Search::pruned);
+    const ManifoldNdf near(map.map(), ndf.sigma());
     for (int k = 0; k < 30; ++k) {
       const Footprint p = strip(random, std::exp2(random.between(5, 14)), std::exp2(random.between(-1, 4)));
       const Vec2 h = {random.between(-0.4f, 0.4f), random.between(-0.3f, 0.3f)};
       const double expected = all.density(p, h);
       constexpr double kSmall = 1e-3;
       EXPECT_NEAR(pruned.density(p, h), expected, 1e-4 * expected + 1e-5) << k;
+      EXPECT_NEAR(near.density(p, h), expected, kNearOfAnswer * expected + kNearOfPeak * gaussianDensity({}, ndf.sigma())) << k;
       EXPECT_NEAR(ndf.density(p, h), expected, kLobe * expected + kSmall) << k;
       const Shares shares = covered(p, width, height);
       double count = 0;
@@ -362,7 +370,9 @@ struct Models {
         bin_map(bins.view()),
         histogram(sat.view(), GaussianBoxes::one, 0),
         three(sat.view(), GaussianBoxes::three, 0),
-        reference(map.map(), bin_map.sigma(), Surface::flat, Boundary::wrap, Reference::Search::pruned) {}
+        reference(map.map(), bin_map.sigma(), Surface::flat, Boundary::wrap, Reference::Search::pruned),
+        near(map.map(), bin_map.sigma()) {}
+  double nearTolerance() const { return kNearOfPeak * gaussianDensity({}, bin_map.sigma()); }
   double binMapOf(const Shares& shares, Vec2 h) const {
     double sum = 0;
     for (std::size_t k = 0; k < shares.of.size(); ++k)
@@ -383,6 +393,7 @@ struct Models {
   BinMapNdf bin_map;
   HistogramNdf histogram, three;
   Reference reference;
+  ManifoldNdf near;
 };
 
 constexpr Size kShapes[] = {{1, 1}, {1, 7}, {7, 1}, {512, 1}, {1, 300}, {3, 5}, {33, 17}, {7000, 4}, {2, 2048}};
@@ -404,6 +415,8 @@ TEST(FootprintsOfAllSizes, AreRightOnMapsOfAllShapes) {
                                 length + narrow > kSurePeriods * static_cast<float>(std::min(width, height));
       const double rounding = is_shortened ? kShortened : 1e-3;
       ASSERT_NEAR(models.reference.density(p, h), expected, rounding * expected + kSmall) << width << 'x' << height << ' ' << k;
+      ASSERT_NEAR(models.near.density(p, h), expected, (kNearOfAnswer + rounding) * expected + models.nearTolerance() + kSmall)
+          << width << 'x' << height << ' ' << k;
       ASSERT_NEAR(models.bin_map.density(p, h), expected, (kLobe + rounding) * expected + kSmall) << width << ' ' << k;
       ASSERT_NEAR(models.histogram.density(p, h), counted, 2 * rounding * counted + kSmall) << width << ' ' << k;
     }
@@ -422,6 +435,8 @@ TEST(FootprintsOfAllSizes, AboveTheMapAreItsMean) {
           const Footprint p = Footprint::isotropic(centre, sigma);
           const double expected = models.binMapOf(all, h), counted = models.histogramOf(all, h);
           EXPECT_NEAR(models.reference.density(p, h), expected, kFarField * expected + kSmall) << width << 'x' << height;
+          EXPECT_NEAR(models.near.density(p, h), expected, kFarField * expected + models.nearTolerance() + kSmall)
+              << width << 'x' << height;
           EXPECT_NEAR(models.bin_map.density(p, h), expected, kFarField * expected + kSmall) << width << 'x' << height;
           EXPECT_NEAR(models.histogram.density(p, h), counted, kFarField * counted + kSmall) << width << 'x' << height;
           EXPECT_NEAR(models.three.density(p, h), counted, kFarField * counted + kSmall) << width << 'x' << height;
@@ -439,6 +454,7 @@ TEST(FootprintsOfAllSizes, AreFiniteWhateverTheyAre) {
     const Models models(width, height);
     const Reference clamped(models.map.map(), 0.1f, Surface::flat, Boundary::clamp);
     const Reference smooth(models.map.map(), 0.1f, Surface::smooth, Boundary::wrap, Reference::Search::pruned);
+    const ManifoldNdf near_smooth(models.map.map(), 0.1f, Surface::smooth);
     const Vec2 h = {0.2f, 0.15f};
     for (int k = 0; k < 80; ++k) {
       const Footprint p = k % 2 == 0 ? Footprint::box({size(), random.upTo(1)}, {size(), size()}, {size(), size()})
@@ -455,6 +471,8 @@ TEST(FootprintsOfAllSizes, AreFiniteWhateverTheyAre) {
       expectFinite(models.histogram);
       expectFinite(models.three);
       expectFinite(models.reference);
+      expectFinite(models.near);
+      expectFinite(near_smooth);
       expectFinite(clamped);
       if (k % 8 < 2) expectFinite(smooth);  // a hundred times slower
       EXPECT_LE(models.bin_map.weights(p, h).count, BinWeights::kMost);

@@ -162,7 +162,7 @@ void expectLobes() {
                              0.5f / (deviation * deviation)};
     const float sum = Texels::template lobes<3>(c.texels.data(), static_cast<int>(c.texels.size()),
                                                 typename Texels::Parts(c.parts()), SubbinFields(c.code), lobe);
-    constexpr double kDecay = 1e-4, kEnds = 1e-9;  // decayOf twice; lobes end where they are 3.7e-6
+    constexpr double kDecay = 1e-4, kEnds = 1e-9;  // decayOf; lobes end where they are 3.7e-6
     const double expected = expectedLobes(c, lobe);
     EXPECT_NEAR(sum, expected, kDecay * expected + kEnds * static_cast<double>(c.texels.size()));
   }

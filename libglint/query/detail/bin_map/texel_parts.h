@@ -115,9 +115,7 @@ struct SubbinLobe {
   template <class V>
   GLINT_LANE V at(const V& normal_x, const V& normal_y) const {
     const V dx = normal_x - V::all(x), dy = normal_y - V::all(y);
-    // exp(-u) is taken as the square of exp(-u / 2), because the lobe ends at u = 12.5 and decayOf at 10.
-    const V root = decayOf(V::all(0.5f * exponent) * (dx * dx + dy * dy));
-    return upperOf(root * root - V::all(FacetLobe::kEnd), V::all(0));
+    return upperOf(decayOf(V::all(exponent) * (dx * dx + dy * dy)) - V::all(FacetLobe::kEnd), V::all(0));
   }
 };
 

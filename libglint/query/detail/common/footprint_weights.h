@@ -22,6 +22,9 @@ inline GLINT_HD int wrapIndex(int i, int n) {
   return r < 0 ? r + n : r;
 }
 
+/// The largest multiple of `step` that is not above `value`: where the copy of a map begins that holds a texel of the endless plane.
+inline GLINT_HD int floorTo(int value, int step) { return value - wrapIndex(value, step); }
+
 /// Wraps a coordinate of a footprint's centre into [0, 1); numbers that are not finite become 0.
 inline GLINT_HD float wrapUnit(float u) {
   const float wrapped = u - std::floor(u);

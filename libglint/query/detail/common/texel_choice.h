@@ -16,6 +16,18 @@ struct TexelGrid {
   Boundary boundary;
 };
 
+/// The weights of a footprint on a map. A smooth surface with Boundary::clamp ends at the outermost texel centres: footprints whose
+/// centre lies beyond, in the outer half texel, are moved to the end of the surface.
+inline GLINT_HD FootprintWeights weightsOf(const TexelGrid& grid, Footprint p) {
+  const auto onSurface = [](float u, int texels) {
+    const float border = 0.5f / static_cast<float>(texels);
+    return std::clamp(wrapUnit(u), border, 1 - border);
+  };
+  if (grid.surface == Surface::smooth && grid.boundary == Boundary::clamp)
+    p.centre = {onSurface(p.centre.x, grid.width), onSurface(p.centre.y, grid.height)};
+  return {p, grid.width, grid.height, grid.boundary};
+}
+
 /// A texel of the endless plane, or one of the two triangles of the cell that starts there.
 struct TexelChoice {
   bool found = false;  ///< false: no texel has a weight

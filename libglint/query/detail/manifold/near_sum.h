@@ -3,10 +3,12 @@
 #include <algorithm>
 
 #include "glint/math/avx2.h"
+#include "glint/math/bits.h"
 #include "glint/model/normal_map.h"
 #include "glint/query/detail/common/footprint_weights.h"
-#include "glint/query/detail/manifold/triangle_lanes.h"
-#include "glint/query/detail/manifold/triangle_mass_lanes.h"
+#include "glint/query/detail/common/texel_choice.h"
+#include "glint/query/detail/manifold/near_loads.h"
+#include "glint/query/detail/manifold/near_lobes.h"
 
 namespace glint {
 
@@ -16,66 +18,10 @@ struct NearSurface {
   float sigma_r = 0;
   Surface surface = Surface::flat;
   Boundary boundary = Boundary::wrap;
-  float reach2 = 0;  ///< squared radius of the ball in which facets count, deviations
-};
+  float reach2 = 0;  ///< squared radius of the ball in which facets count, deviations, for footprints with a closed-form total
 
-/// Loads the bounds of nodes side by side.
-template <class V>
-struct NodeBounds {
-  V low_x, low_y, high_x, high_y;
+  GLINT_HD TexelGrid grid() const { return {map.width, map.height, surface, boundary}; }
 };
-inline GLINT_HD void loadNodes(const NormalBounds* p, NodeBounds<Lanes1>& out) {
-  out = {{p->low_x}, {p->low_y}, {p->high_x}, {p->high_y}};
-}
-#ifdef GLINT_LANES
-GLINT_LANE void loadNodes(const NormalBounds* p, NodeBounds<Lanes8>& out) {
-  // Rows hold nodes k and k + 4; a transposition of 4x4 numbers in each half puts lanes in order.
-  using Floats = Lanes8::Floats;
-  Floats row[4];
-  for (int k = 0; k < 4; ++k) {
-    __builtin_memcpy(&row[k], p + k, 16);
-    __builtin_memcpy(reinterpret_cast<char*>(&row[k]) + 16, p + k + 4, 16);
-  }
-  const Floats a = __builtin_shufflevector(row[0], row[1], 0, 8, 1, 9, 4, 12, 5, 13);
-  const Floats b = __builtin_shufflevector(row[2], row[3], 0, 8, 1, 9, 4, 12, 5, 13);
-  const Floats c = __builtin_shufflevector(row[0], row[1], 2, 10, 3, 11, 6, 14, 7, 15);
-  const Floats d = __builtin_shufflevector(row[2], row[3], 2, 10, 3, 11, 6, 14, 7, 15);
-  out.low_x.v = __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13);
-  out.low_y.v = __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
-  out.high_x.v = __builtin_shufflevector(c, d, 0, 1, 8, 9, 4, 5, 12, 13);
-  out.high_y.v = __builtin_shufflevector(c, d, 2, 3, 10, 11, 6, 7, 14, 15);
-}
-#endif
-
-/// Loads the corners of triangles of 2x2 cells in units of the lobe's deviation: cells in reading order, for each the lower right
-/// triangle and the upper left one.
-/// @param row    three rows of four normals, of which the first three count
-/// @param first  of the eight triangles, the one that goes into lane 0
-inline GLINT_HD void loadCorners(const Vec2* const* row, int first, Vec2 origin, float inverse_sigma, Corners<Lanes1>& out) {
-  const int x = first >> 1 & 1, y = first >> 2, half = first & 1;
-  const auto relative = [&](const Vec2& n) { return inverse_sigma * (n - origin); };
-  const Vec2 a = relative(row[y][x]), b = relative(half == 0 ? row[y][x + 1] : row[y + 1][x]), c = relative(row[y + 1][x + 1]);
-  out = {{a.x}, {a.y}, {b.x}, {b.y}, {c.x}, {c.y}};
-}
-#ifdef GLINT_LANES
-GLINT_LANE void loadCorners(const Vec2* const* row, int, Vec2 origin, float inverse_sigma, Corners<Lanes8>& out) {
-  using Floats = Lanes8::Floats;
-  const Floats centre = {origin.x, origin.y, origin.x, origin.y, origin.x, origin.y, origin.x, origin.y};
-  Floats r[3];
-  for (int y = 0; y < 3; ++y) {
-    __builtin_memcpy(&r[y], row[y], sizeof r[y]);
-    r[y] = (r[y] - centre) * inverse_sigma;
-  }
-  out.ax.v = __builtin_shufflevector(r[0], r[1], 0, 0, 2, 2, 8, 8, 10, 10);
-  out.ay.v = __builtin_shufflevector(r[0], r[1], 1, 1, 3, 3, 9, 9, 11, 11);
-  out.cx.v = __builtin_shufflevector(r[1], r[2], 2, 2, 4, 4, 10, 10, 12, 12);
-  out.cy.v = __builtin_shufflevector(r[1], r[2], 3, 3, 5, 5, 11, 11, 13, 13);
-  const Floats low = __builtin_shufflevector(r[0], r[1], 2, 3, 8, 9, 4, 5, 10, 11);   // of the lower cells: x and y by turns
-  const Floats high = __builtin_shufflevector(r[1], r[2], 2, 3, 8, 9, 4, 5, 10, 11);  // of the upper cells
-  out.bx.v = __builtin_shufflevector(low, high, 0, 2, 4, 6, 8, 10, 12, 14);
-  out.by.v = __builtin_shufflevector(low, high, 1, 3, 5, 7, 9, 11, 13, 15);
-}
-#endif
 
 /// Triangles or facets that wait until enough of them are there to fill all lanes.
 template <int kNumbers>
@@ -87,7 +33,7 @@ struct Pending {
   alignas(32) float number[kNumbers][kFull + 16];
 };
 
-/// Adds weight times value of the first `count` that wait, lane by lane.
+/// Adds weight times value of the first `count` that wait, lane by lane. A value that is NaN, of a broken normal, counts as 0.
 template <class V, class Lobe>
 GLINT_LANE void addBatches(const Lobe& lobe, bool smooth, const Pending<Lobe::kNumbers>& pending, int count, float* sums) {
   V sum = V::load(sums);
@@ -95,23 +41,28 @@ GLINT_LANE void addBatches(const Lobe& lobe, bool smooth, const Pending<Lobe::kN
     V numbers[Lobe::kNumbers];
     for (int q = 0; q < Lobe::kNumbers; ++q) numbers[q] = V::load(pending.number[q] + k);
     const V value = smooth ? lobe.triangle(numbers) : lobe.facet(numbers[0], numbers[1]);
-    // Lanes beyond the end hold any numbers, also NaN.
-    const V weight = V::load(pending.weight + k);
-    sum = sum + where(less(V::all(0), weight), weight * value, V::all(0));
+    sum = sum + V::load(pending.weight + k) * upperOf(V::all(0), value);
   }
   sum.store(sums);
 }
-template <class Lobe>
-GLINT_DEVICE_CALL GLINT_HD void addPending(const Lobe& lobe, bool smooth, const Pending<Lobe::kNumbers>& pending, int count,
-                                           float (&sums)[1]) {
-  addBatches<Lanes1>(lobe, smooth, pending, count, sums);
-}
+/// addBatches as a function that is not inlined: for Lanes8 in code for processors with AVX2, else for every processor.
+template <class V>
+struct PendingSum {
+  template <class Lobe>
+  GLINT_DEVICE_CALL static GLINT_HD void add(const Lobe& lobe, bool smooth, const Pending<Lobe::kNumbers>& pending, int count,
+                                             float* sums) {
+    addBatches<V>(lobe, smooth, pending, count, sums);
+  }
+};
 #ifdef GLINT_AVX2
-template <class Lobe>
-[[gnu::noinline]] GLINT_AVX2 void addPending(const Lobe& lobe, bool smooth, const Pending<Lobe::kNumbers>& pending, int count,
-                                             float (&sums)[8]) {
-  addBatches<Lanes8>(lobe, smooth, pending, count, sums);
-}
+template <>
+struct PendingSum<Lanes8> {
+  template <class Lobe>
+  [[gnu::noinline]] GLINT_AVX2 static void add(const Lobe& lobe, bool smooth, const Pending<Lobe::kNumbers>& pending, int count,
+                                               float* sums) {
+    addBatches<Lanes8>(lobe, smooth, pending, count, sums);
+  }
+};
 #endif
 
 /// Sum over the texels of a footprint near a half vector, or near a box of half vectors.
@@ -120,17 +71,18 @@ template <class Lobe>
 /// visits only facets inside a ball of the four-dimensional space of position and normal, whose radius is given in deviations.
 /// A node of the min-max pyramid is skipped if its distance from the centre and the half vector in this space exceeds the radius.
 /// Nodes are tested in strips of eight; a node that is kept has 8x8 nodes three levels below.
-/// @tparam V  Lanes1 or Lanes8
+/// @tparam V  Lanes1, Lanes4x2, or Lanes8 in functions that are marked GLINT_AVX2
 template <class V, class Lobe>
 class NearSum {
  public:
-  GLINT_LANE NearSum(const NearSurface& surface, const FootprintWeights& weights, const Lobe& lobe)
-      : s_(surface), w_(weights), lobe_(lobe) {
+  /// @param reach2  squared radius of the ball, deviations
+  GLINT_LANE NearSum(const NearSurface& surface, const FootprintWeights& weights, const Lobe& lobe, float reach2)
+      : s_(surface), w_(weights), lobe_(lobe), reach2_(reach2) {
     inverse_sigma_ = 1 / s_.sigma_r;
     smooth_ = s_.surface == Surface::smooth;
     if (!w_.isBox()) {
       white_ = w_.whitening();
-      const float reach = std::sqrt(s_.reach2);
+      const float reach = std::sqrt(reach2_);
       row_reach_ = reach / white_.along;
       column_reach_ =
           reach * std::sqrt(1 / (white_.across * white_.across) + white_.slant * white_.slant / (white_.along * white_.along));
@@ -153,17 +105,19 @@ class NearSum {
       last_column_ = last_x = std::min(last_x, width - (smooth_ ? 1 : 0));
       last_row_ = last_y = std::min(last_y, height - (smooth_ ? 1 : 0));
     }
-    for (int y = floorTo(first_y, height); y < last_y; y += height)
-      for (int x = floorTo(first_x, width); x < last_x; x += width) {
+    for (int y = floorTo(first_y, height); y < last_y; y += height) {
+      // Long footprints meet few copies of the map in each row of copies.
+      const auto columns = w_.columnsIn(std::max(first_y, y), std::min(last_y, y + height));
+      const int begin = std::max(first_x, columns.begin), end = std::min(last_x, columns.end);
+      for (int x = floorTo(begin, width); x < end; x += width) {
         offset_x_ = x, offset_y_ = y;
         if (w_.isBox() || insidePeriod(x, y))
-          window(std::max(first_x - x, 0), std::min(last_x - x, width), std::max(first_y - y, 0), std::min(last_y - y, height));
+          window(std::max(begin - x, 0), std::min(end - x, width), std::max(first_y - y, 0), std::min(last_y - y, height));
         visitLeaves();  // of this copy of the map
       }
+    }
     evaluate(true);
-    double total = whole_;
-    for (const float lane : sums_) total += double{lane};
-    return total;
+    return total_;
   }
 
  private:
@@ -173,10 +127,6 @@ class NearSum {
   static constexpr int kStep = 3;  ///< levels between the nodes that are tested: each has 8x8 nodes below
 
   GLINT_LANE static int toInt(float x) { return static_cast<int>(std::floor(std::clamp(x, -1e9f, 1e9f))); }
-  GLINT_LANE static int floorTo(int value, int step) {
-    const int remainder = value % step;
-    return value - (remainder < 0 ? remainder + step : remainder);
-  }
 
   /// Squared distance from the footprint's centre to a rectangle, in its deviations; a lower bound if the Gaussian is slanted.
   /// @param dx,dy  from the centre of the footprint to the centre of the rectangle
@@ -193,7 +143,7 @@ class NearSum {
     const Vec2 c = w_.centre();
     return squaredPosition(Lanes1{static_cast<float>(x) + half_x - c.x}, Lanes1{static_cast<float>(y) + half_y - c.y},
                            half_x + 1, half_y + 1)
-               .v < s_.reach2;
+               .v < reach2_;
   }
 
   /// Visits the texels of a window of the map.
@@ -239,7 +189,7 @@ class NearSum {
         V far = V::all(0);
         if (!w_.isBox()) far = squaredPosition(V::all(dx) + V::all(size) * V::load(kLane), V::all(dy), half, half);
         if (bounded) far = far + squaredNormal(level, i, j, lanes);
-        unsigned kept = bitsOf(less(far, V::all(s_.reach2))) & ((1u << lanes) - 1);
+        unsigned kept = bitsOf(less(far, V::all(reach2_))) & ((1u << lanes) - 1);
         for (; kept != 0; kept &= kept - 1) {
           const int k = lowestBit(kept);
           if (w_.isBox() && w_.misses(offset_x_ + static_cast<double>(static_cast<float>(i + k) * size + middle),
@@ -253,15 +203,6 @@ class NearSum {
         }
       }
     }
-  }
-  GLINT_LANE static int lowestBit(unsigned bits) {
-#if defined(__GNUC__) && !defined(__CUDA_ARCH__)
-    return __builtin_ctz(bits);
-#else
-    int k = 0;
-    while ((bits >> k & 1u) == 0) ++k;
-    return k;
-#endif
   }
 
   /// Squared distance in deviations of the bounds of nodes i to i + lanes - 1 of row j from the lobe.
@@ -277,8 +218,8 @@ class NearSum {
       loadNodes(copy, n);
     }
     const V zero = V::all(0);
-    const V x = upperOf(upperOf(n.low_x - V::all(lobe_.high().x), V::all(lobe_.low().x) - n.high_x), zero);
-    const V y = upperOf(upperOf(n.low_y - V::all(lobe_.high().y), V::all(lobe_.low().y) - n.high_y), zero);
+    const V x = upperOf(zero, upperOf(n.low_x - V::all(lobe_.high().x), V::all(lobe_.low().x) - n.high_x));
+    const V y = upperOf(zero, upperOf(n.low_y - V::all(lobe_.high().y), V::all(lobe_.low().y) - n.high_y));
     return (x * x + y * y) * V::all(inverse_sigma_ * inverse_sigma_);
   }
 
@@ -314,7 +255,7 @@ class NearSum {
       const float dx = static_cast<float>(offset_x_ + x) + 0.5f - w_.centre().x,
                   dy = static_cast<float>(offset_y_ + y) + 0.5f - w_.centre().y;
       const float position = w_.isBox() ? 0.0f : squaredPosition(Lanes1{dx}, Lanes1{dy}, 0, 0).v;
-      if (!(position + lobe_.squaredDistance(Lanes1{n.x}, Lanes1{n.y}).v < s_.reach2)) continue;
+      if (!(position + lobe_.squaredDistance(Lanes1{n.x}, Lanes1{n.y}).v < reach2_)) continue;
       const float weight = w_.isBox() ? w_.texel(offset_x_ + x, offset_y_ + y) : decayOf(Lanes1{0.5f * position}).v;
       const int at = pending_.count++;
       pending_.weight[at] = weight;
@@ -354,7 +295,7 @@ class NearSum {
       V far = V::all(0);
       unsigned whole = 0;
       lobe_.prepare(c, far, whole, numbers);
-      unsigned kept = bitsOf(less(position + far, V::all(s_.reach2)));
+      unsigned kept = bitsOf(less(position + far, V::all(reach2_)));
       kept &= (columns & rows) >> first;
       if (kept == 0) continue;
       (V::all(0.5f) * decayOf(V::all(0.5f) * position)).store(weight);
@@ -362,8 +303,8 @@ class NearSum {
         const int k = lowestBit(kept), lane = first + k;
         const float w =
             w_.isBox() ? w_.triangle(offset_x_ + i + (lane >> 1 & 1), offset_y_ + j + (lane >> 2), lane & 1) : weight[k];
-        if (whole >> k & 1u) {
-          whole_ += double{w};
+        if (whole >> k & 1u) {  // inside the box of half vectors with its lobe
+          total_ += double{w};
           continue;
         }
         const int at = pending_.count++;
@@ -375,10 +316,15 @@ class NearSum {
 
   /// Adds what waits. Unless it is the last time, keeps what does not fill all lanes.
   GLINT_LANE void evaluate(bool last) {
-    if (last)
-      for (int k = 0; k < V::kCount; ++k) pending_.weight[pending_.count + k] = 0;
+    if (last)  // lanes beyond the end hold a triangle that is a point, and no weight
+      for (int k = 0; k < V::kCount; ++k) {
+        pending_.weight[pending_.count + k] = 0;
+        for (int q = 0; q < Lobe::kNumbers; ++q) pending_.number[q][pending_.count + k] = 0;
+      }
     const int end = last ? pending_.count + V::kCount - 1 : pending_.count, done = end - end % V::kCount;
-    addPending(lobe_, smooth_, pending_, done, sums_);
+    float sums[V::kCount] = {};
+    PendingSum<V>::add(lobe_, smooth_, pending_, done, sums);
+    for (const float lane : sums) total_ += double{lane};
     const int rest = std::max(pending_.count - done, 0);
     for (int k = 0; k < rest; ++k) {
       pending_.weight[k] = pending_.weight[done + k];
@@ -390,6 +336,7 @@ class NearSum {
   const NearSurface& s_;
   const FootprintWeights& w_;
   const Lobe lobe_;
+  float reach2_;
   FootprintWeights::Whitening white_{};
   float inverse_sigma_ = 0, row_reach_ = 0, column_reach_ = 0;
   bool smooth_ = false;
@@ -399,97 +346,33 @@ class NearSum {
   int leaf_count_ = 0;
   using Waiting = Pending<Lobe::kNumbers>;
   Waiting pending_;
-  float sums_[V::kCount] = {};
-  double whole_ = 0;  ///< of triangles that lie inside the box of half vectors with their lobes
+  double total_ = 0;
 };
 
-/// The lobe of a facet at a half vector, in units of its own deviation.
-struct NearPoint {
-  static constexpr int kNumbers = 5;
-  Vec2 h;
-  GLINT_HD Vec2 low() const { return h; }
-  GLINT_HD Vec2 high() const { return h; }
-  GLINT_HD Vec2 origin() const { return h; }
-  template <class V>
-  GLINT_LANE V squaredDistance(const V& x, const V& y) const {
-    return x * x + y * y;
-  }
-  template <class V>
-  GLINT_LANE V facet(const V& x, const V& y) const {
-    return V::all(0.5f / kPi) * decayOf(V::all(0.5f) * (x * x + y * y));
-  }
-  template <class V>
-  GLINT_LANE void prepare(const Corners<V>& c, V& far, unsigned&, float (*numbers)[V::kCount]) const {
-    const TriangleFrames<V> f = TriangleFrames<V>::of(c);
-    far = f.squaredDistance();
-    f.left.store(numbers[0]);
-    f.right.store(numbers[1]);
-    f.apex.store(numbers[2]);
-    f.base.store(numbers[3]);
-    f.height.store(numbers[4]);
-  }
-  template <class V>
-  GLINT_LANE V triangle(const V* n) const {
-    return TriangleDensity<V>::of(TriangleFrames<V>{n[0], n[1], n[2], n[3], n[4]});
-  }
-};
-
-/// The mass of the lobe of a facet in a box of half vectors. Positions are relative to the centre of the box, in deviations of the lobe.
-struct NearBox {
-  static constexpr int kNumbers = 6;
-  Box2 box;
-  Vec2 half;  ///< half sides, deviations
-  GLINT_HD Vec2 low() const { return box.low; }
-  GLINT_HD Vec2 high() const { return box.high; }
-  GLINT_HD Vec2 origin() const { return 0.5f * (box.low + box.high); }
-  template <class V>
-  GLINT_LANE V squaredDistance(const V& x, const V& y) const {
-    const V zero = V::all(0), dx = upperOf(magnitudeOf(x) - V::all(half.x), zero),
-            dy = upperOf(magnitudeOf(y) - V::all(half.y), zero);
-    return dx * dx + dy * dy;
-  }
-  template <class V>
-  GLINT_LANE V facet(const V& x, const V& y) const {
-    return massBetween(x, V::all(half.x)) * massBetween(y, V::all(half.y));
-  }
-  template <class V>
-  GLINT_LANE void prepare(const Corners<V>& c, V& far, unsigned& whole, float (*numbers)[V::kCount]) const {
-    const V zero = V::all(0);
-    const V low_x = lowerOf(lowerOf(c.ax, c.bx), c.cx), high_x = upperOf(upperOf(c.ax, c.bx), c.cx);
-    const V low_y = lowerOf(lowerOf(c.ay, c.by), c.cy), high_y = upperOf(upperOf(c.ay, c.by), c.cy);
-    const V dx = upperOf(upperOf(low_x - V::all(half.x), V::all(-half.x) - high_x), zero);
-    const V dy = upperOf(upperOf(low_y - V::all(half.y), V::all(-half.y) - high_y), zero);
-    far = dx * dx + dy * dy;
-    // Deepest reach of a corner: below 0 where the whole triangle lies inside by kInside.
-    const V depth = upperOf(upperOf(high_x, zero - low_x) - V::all(half.x), upperOf(high_y, zero - low_y) - V::all(half.y));
-    whole = bitsOf(less(depth, V::all(-kInside)));
-    c.ax.store(numbers[0]);
-    c.ay.store(numbers[1]);
-    c.bx.store(numbers[2]);
-    c.by.store(numbers[3]);
-    c.cx.store(numbers[4]);
-    c.cy.store(numbers[5]);
-  }
-  static constexpr float kInside = 4;  ///< the lobe has 6e-5 of its mass beyond
-  template <class V>
-  GLINT_LANE V triangle(const V* n) const {
-    return TriangleMass<V>::of(n, half);
-  }
-};
-
-/// Sum over the facets near a lobe (NearSum), with the widest lanes that the processor has.
+/// Sum over the facets near a lobe, in lanes of eight where the compiler has vectors. The sum has the same bits with and without AVX2.
 #ifdef GLINT_AVX2
 template <class Lobe>
-GLINT_AVX2 GLINT_FLATTEN double nearSumAvx2(const NearSurface& surface, const FootprintWeights& weights, const Lobe& lobe) {
-  return NearSum<Lanes8, Lobe>(surface, weights, lobe).sum();
+GLINT_AVX2 GLINT_FLATTEN double nearSumAvx2(const NearSurface& surface, const FootprintWeights& weights, const Lobe& lobe,
+                                            float reach2) {
+  return NearSum<Lanes8, Lobe>(surface, weights, lobe, reach2).sum();
 }
 #endif
+/// nearSum without AVX2.
 template <class Lobe>
-GLINT_HD double nearSum(const NearSurface& surface, const FootprintWeights& weights, const Lobe& lobe) {
-#ifdef GLINT_AVX2
-  if (hasAvx2()) return nearSumAvx2(surface, weights, lobe);
+GLINT_FLATTEN GLINT_HD double nearSumAny(const NearSurface& surface, const FootprintWeights& weights, const Lobe& lobe,
+                                         float reach2) {
+#ifdef GLINT_LANES
+  return NearSum<Lanes4x2, Lobe>(surface, weights, lobe, reach2).sum();
+#else
+  return NearSum<Lanes1, Lobe>(surface, weights, lobe, reach2).sum();
 #endif
-  return NearSum<Lanes1, Lobe>(surface, weights, lobe).sum();
+}
+template <class Lobe>
+GLINT_HD double nearSum(const NearSurface& surface, const FootprintWeights& weights, const Lobe& lobe, float reach2) {
+#ifdef GLINT_AVX2
+  if (hasAvx2()) return nearSumAvx2(surface, weights, lobe, reach2);
+#endif
+  return nearSumAny(surface, weights, lobe, reach2);
 }
 
 }  // namespace glint

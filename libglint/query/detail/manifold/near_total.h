@@ -1,23 +1,12 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 
 #include "glint/query/detail/common/footprint_weights.h"
 #include "glint/query/detail/manifold/near_sum.h"
 
 namespace glint {
-
-/// The weights of a footprint on a surface. A smooth surface with Boundary::clamp ends at the outermost texel centres: footprints whose
-/// centre lies beyond are moved to its end.
-inline GLINT_HD FootprintWeights weightsOf(const NearSurface& s, Footprint p) {
-  const auto onSurface = [](float u, int texels) {
-    const float border = 0.5f / static_cast<float>(texels);
-    return std::clamp(wrapUnit(u), border, 1 - border);
-  };
-  if (s.surface == Surface::smooth && s.boundary == Boundary::clamp)
-    p.centre = {onSurface(p.centre.x, s.map.width), onSurface(p.centre.y, s.map.height)};
-  return {p, s.map.width, s.map.height, s.boundary};
-}
 
 /// Sum of the weights of all facets in a footprint.
 GLINT_DEVICE_CALL inline GLINT_HD double nearTotal(const NearSurface& s, const FootprintWeights& w) {
@@ -36,15 +25,16 @@ GLINT_DEVICE_CALL inline GLINT_HD double nearTotal(const NearSurface& s, const F
     for (int half = 0; half < (smooth ? 2 : 1); ++half) {
       const float third = 1.0f / 3, x0 = 0.5f + (smooth ? (half == 0 ? 2 * third : third) : 0),
                   y0 = 0.5f + (smooth ? (half == 0 ? third : 2 * third) : 0);
-      const auto sum = [](int begin, int end, float offset, float scale) {
+      const auto sum = [](int begin, int end, float centre, float offset, float scale) {
         double out = 0;
         for (int k = begin; k < end; ++k) {
-          const float d = scale * (static_cast<float>(k) + offset);
+          // The difference of texel and centre first: far from the origin their sums with the offset would be rounded.
+          const float d = scale * (static_cast<float>(k) - centre + offset);
           out += double{std::exp(-0.5f * d * d)};
         }
         return out;
       };
-      total += sum(column_begin, column_end, x0 - c.x, white.across) * sum(row_begin, row_end, y0 - c.y, white.along);
+      total += sum(column_begin, column_end, c.x, x0, white.across) * sum(row_begin, row_end, c.y, y0, white.along);
     }
     return smooth ? 0.5 * total : total;
   }
@@ -55,6 +45,17 @@ GLINT_DEVICE_CALL inline GLINT_HD double nearTotal(const NearSurface& s, const F
       total += smooth ? double{w.triangle(i, j, 0)} + double{w.triangle(i, j, 1)} : double{w.texel(i, j)};
   }
   return total;
+}
+
+/// Squared radius of the ball for a footprint whose weights sum to `total`, deviations.
+///
+/// All texels of a narrow footprint may lie in its tail, so that `total` is smaller than the sum of the closed form. The ball then
+/// grows until the mass outside, about exp(-radius^2 / 2) of the closed form, is the same share of `total`. kFewTexels is added because a
+/// sum over few texels is not the integral: between two texels .8 is missing, and the functions of a lane need the rest.
+inline GLINT_HD float nearReach2(const NearSurface& s, const FootprintWeights& w, double total) {
+  constexpr float kFewTexels = 2;
+  if (w.hasClosedFormTotal() || !(total > 0)) return s.reach2;
+  return s.reach2 + kFewTexels + 2 * std::log(std::max(static_cast<float>(w.closedFormTotal() / total), 1.0f));
 }
 
 }  // namespace glint
