@@ -3,6 +3,7 @@
 import os
 import pathlib
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -115,6 +116,47 @@ def test_what_a_killed_writer_left_goes_with_the_next_write(folder, name):
         (folder / f".{path}.4194304-0-1f.tmp").write_bytes(b"half")
     assert run(folder, words).returncode == 0
     assert contents(folder) == good
+
+
+def fields_of(process):
+    """State and parent of a process; nothing once it has ended."""
+    try:
+        return pathlib.Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[:2]
+    except OSError:
+        return None
+
+
+def stopped_child(process):
+    """Stops a process that this one has started. Returns its number; None if there is none now."""
+    for path in pathlib.Path("/proc").glob("[0-9]*"):
+        fields = fields_of(path.name)
+        if fields is None or fields[1] != str(process) or fields[0] == "Z":
+            continue
+        os.kill(int(path.name), signal.SIGSTOP)
+        while (fields := fields_of(path.name)) is not None and fields[0] not in "TZ":
+            time.sleep(0.001)
+        if fields is not None and fields[0] == "T":
+            return int(path.name)
+    return None
+
+
+def test_a_signal_to_the_bench_ends_the_program_that_it_has_started(folder):
+    process = start(folder, ["glint-bench", "map.glint", "-o", "results.json"])
+    deadline = time.monotonic() + 60
+    while (child := stopped_child(process.pid)) is None:
+        assert process.poll() is None and time.monotonic() < deadline, "starts no program"
+    try:
+        time.sleep(0.2)  # the bench notes the program right after it has started it
+        process.terminate()
+        process.wait(timeout=60)
+        assert process.returncode == -signal.SIGTERM
+        status = pathlib.Path(f"/proc/{child}/status").read_text()
+        pending = int(re.search(r"^ShdPnd:\s*([0-9a-f]+)", status, re.MULTILINE)[1], 16)
+        assert pending >> (signal.SIGTERM - 1) & 1, "the program that has been started goes on"
+    finally:
+        process.kill()
+        os.kill(child, signal.SIGCONT)
+        process.communicate(timeout=60)
 
 
 @pytest.mark.parametrize("words", [["glint-query", "map.glint", "--uv", ".5", ".5", "--sigma", "4", "--half", "0", "0"],
