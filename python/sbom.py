@@ -88,19 +88,30 @@ def shipped(wheel):
 
 
 def package_of_library(name):
-    """The package of a library whose name has a hash in the wheel: libtbb-4d79fbbd.so.12.8."""
+    """The package of a library whose name has a hash in the wheel: libtbb-4d79fbbd.so.12.8. None if it is of no package."""
     soname = re.sub(r"-[0-9a-f]{8}(?=\.so)", "", pathlib.Path(name).name)
-    found = run("dpkg-query", "--search", f"*/{soname}")
-    return found.split(":")[0]
+    found = subprocess.run(["dpkg-query", "--search", f"*/{soname}"], capture_output=True, text=True)
+    return found.stdout.split(":")[0] if found.returncode == 0 else None
+
+
+def other_component(name, properties):
+    """A library that no package has brought."""
+    soname = re.sub(r"-[0-9a-f]{8}(?=\.so)", "", pathlib.Path(name).name)
+    stem, _, version = soname.partition(".so")
+    version = version.lstrip(".") or "unknown"
+    purl = f"pkg:generic/{stem}@{version}"
+    return {"type": "library", "bom-ref": purl, "name": stem, "version": version, "purl": purl,
+            "licenses": [{"license": {"name": "unknown"}}], "properties": [{"name": "glint:source", "value": "unknown"}, *properties]}
 
 
 def document(wheel, builds):
     components = {}
     for name, content in shipped(wheel):
         package = package_of_library(name)
-        component = debian_component(package, [{"name": "glint:how", "value": "shared library in the wheel"}, {"name": "glint:file", "value": name}])
+        properties = [{"name": "glint:how", "value": "shared library in the wheel"}, {"name": "glint:file", "value": name}]
+        component = debian_component(package, properties) if package else other_component(name, properties)
         component["hashes"] = [{"alg": HASH, "content": hashlib.sha256(content).hexdigest()}]
-        components[package] = component
+        components[package or component["name"]] = component
     headers = set().union(*(headers_of(build) for build in builds))
     in_python = {path for path in headers if "site-packages/" in path}
     for path in in_python:

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstdio>
@@ -13,6 +14,7 @@
 #include "common/image_formats.h"
 #include "common/name_list.h"
 #include "glint/model/error.h"
+#include "glint/model/memory_text.h"
 #include "glint/model/shown_text.h"
 
 namespace glint::apps {
@@ -46,17 +48,22 @@ void throwDamagedImage(const std::string& path, const std::string& reason) {
 
 void checkDeclaredSize(const std::string& path, const std::string& format, std::uint64_t pixel_bytes,
                        std::uint64_t most_bytes) {
-  // Below a gigabyte any header of a compressed format is believed. Above, no map compresses so well: deflate ends at 1 : 1032.
-  constexpr std::uint64_t kBelieved = std::uint64_t{1} << 30, kBestRatio = 2048;
+  // Up to these sizes any header of a compressed format is believed. Above, no map compresses so well: deflate ends at 1 : 1032.
+  // The lower one is for formats of run lengths or deflate; others could hold one colour in any number of pixels.
+  constexpr std::uint64_t kBelieved = std::uint64_t{1} << 30, kBelievedOfBounded = std::uint64_t{64} << 20, kBestRatio = 2048;
+  static constexpr std::array kBounded = {"bmp", "targa", "sgi", "hdr", "png", "ico", "psd", "rla", "dpx", "zfile", "iff"};
+  const bool bounded = std::find(kBounded.begin(), kBounded.end(), format) != kBounded.end();
   // Without compression: only pixels of one bit (PBM) take less in the file than in memory.
   constexpr std::uint64_t kBits = 8;
   const bool plain = format == "pnm" || format == "fits" || format == "cineon";
   const std::uint64_t ratio = plain ? kBits : kBestRatio;
-  if ((plain || pixel_bytes > kBelieved) && pixel_bytes / ratio > std::filesystem::file_size(path))
+  if ((plain || pixel_bytes > (bounded ? kBelievedOfBounded : kBelieved)) &&
+      pixel_bytes / ratio > std::filesystem::file_size(path))
     throwDamagedImage(path, "it declares more pixels than the file can hold");
   if (pixel_bytes > most_bytes)
     throw Error(ErrorCode::failed, "memory.limit", path, "",
-                fmt::format("its pixels take {} MB of memory, and {} MB may be used", pixel_bytes >> 20, most_bytes >> 20),
+                fmt::format("its pixels take {} of memory, and {} may be used", memoryText(static_cast<double>(pixel_bytes)),
+                            memoryText(static_cast<double>(most_bytes))),
                 "scale the image down, or raise --max-memory where the machine has more");
 }
 

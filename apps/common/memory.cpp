@@ -9,7 +9,9 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <optional>
 #include <string_view>
+#include <vector>
 
 #include "common/numbers.h"
 
@@ -20,7 +22,7 @@ constexpr std::uint64_t kUnlimited = std::numeric_limits<std::uint64_t>::max();
 constexpr double kKilo = 1024;
 constexpr std::string_view kUnits = "KMGT";
 std::atomic<std::uint64_t> most_bytes = 0;  // of limitMemory()
-// Kept free for the system and for other programs: this share, and at least this much.
+// Kept free for the system and for other programs: this share, and at least this much, but no more than half.
 constexpr std::uint64_t kMarginShare = 20;
 constexpr std::uint64_t kLeastMargin = std::uint64_t{64} << 20;
 
@@ -31,14 +33,20 @@ std::uint64_t numberIn(const std::string& path) {
   return file >> number ? number : kUnlimited;
 }
 
-/// Number of bytes behind a name in a file of lines "Name:   123 kB".
-std::uint64_t namedBytes(const std::string& path, const std::string& name) {
+/// Number behind a name in a file of lines of a name and a number.
+std::optional<std::uint64_t> numberAfter(const std::string& path, const std::string& name) {
   std::ifstream file(path);
   for (std::string word; file >> word;) {
-    std::uint64_t kilobytes = 0;
-    if (word == name && file >> kilobytes) return kilobytes << 10;
+    std::uint64_t number = 0;
+    if (word == name && file >> number) return number;
   }
-  return kUnlimited;
+  return std::nullopt;
+}
+
+/// Bytes of a line "Name:   123 kB" of /proc; kUnlimited where there is none.
+std::uint64_t procBytes(const std::string& path, const std::string& name) {
+  const std::optional<std::uint64_t> kilobytes = numberAfter(path, name);
+  return kilobytes ? *kilobytes << 10 : kUnlimited;
 }
 
 std::uint64_t remaining(std::uint64_t limit, std::uint64_t used) {
@@ -46,25 +54,17 @@ std::uint64_t remaining(std::uint64_t limit, std::uint64_t used) {
   return limit > used ? limit - used : 0;
 }
 
-/// Pages of files in a control group's use, which the kernel drops when memory is short.
-std::uint64_t droppable(const std::string& folder, const std::string& name) {
-  std::ifstream file(folder + "/memory.stat");
-  for (std::string word; file >> word;) {
-    std::uint64_t bytes = 0;
-    if (word == name && file >> bytes) return bytes;
-  }
-  return 0;
-}
-
-/// What a control group leaves, of either version.
+/// What a control group leaves, of either version. The kernel drops pages of files and caches of names when memory is short.
 std::uint64_t remainingIn(const std::string& folder) {
   std::uint64_t used = numberIn(folder + "/memory.current"), limit = numberIn(folder + "/memory.max");
-  std::uint64_t files = droppable(folder, "inactive_file");
+  std::vector<const char*> droppable = {"inactive_file", "active_file", "slab_reclaimable"};
   if (used == kUnlimited) {
     used = numberIn(folder + "/memory.usage_in_bytes"), limit = numberIn(folder + "/memory.limit_in_bytes");
-    files = droppable(folder, "total_inactive_file");
+    droppable = {"total_inactive_file", "total_active_file"};
   }
-  return remaining(limit, used == kUnlimited ? used : used - std::min(used, files));
+  if (used == kUnlimited) return kUnlimited;
+  for (const char* name : droppable) used -= std::min(used, numberAfter(folder + "/memory.stat", name).value_or(0));
+  return remaining(limit, used);
 }
 
 /// What all control groups of this process leave: its own, and those that hold it.
@@ -88,32 +88,22 @@ std::uint64_t remainingInGroups() {
 std::uint64_t remainingOf(decltype(RLIMIT_AS) resource, const std::string& used_name) {
   rlimit limit = {};
   if (::getrlimit(resource, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kUnlimited;
-  return remaining(limit.rlim_cur, namedBytes("/proc/self/status", used_name));
+  return remaining(limit.rlim_cur, procBytes("/proc/self/status", used_name));
 }
 
 }  // namespace
 
 std::uint64_t availableMemory() {
   if (most_bytes > 0) return most_bytes;
-  const std::uint64_t least = std::min({namedBytes("/proc/meminfo", "MemAvailable:"), remainingInGroups(),
+  const std::uint64_t least = std::min({procBytes("/proc/meminfo", "MemAvailable:"), remainingInGroups(),
                                         remainingOf(RLIMIT_AS, "VmSize:"), remainingOf(RLIMIT_DATA, "VmData:")});
   if (least == kUnlimited) return least;
-  return least - std::min(least, std::max(least / kMarginShare, kLeastMargin));
+  return least - std::min(least / 2, std::max(least / kMarginShare, kLeastMargin));
 }
 
 void limitMemory(std::uint64_t bytes) { most_bytes = bytes; }
 
-std::string memoryText(double bytes) {
-  double value = bytes;
-  std::string unit = "bytes";
-  for (const char letter : kUnits) {
-    if (value < kKilo) break;
-    value /= kKilo;
-    unit = fmt::format("{}B", letter);
-  }
-  const double step = value < 10 ? 0.01 : value < 100 ? 0.1 : 1;
-  return fmt::format("{:.{}f} {}", std::ceil(value / step) * step, unit == "bytes" || step == 1 ? 0 : value < 10 ? 2 : 1, unit);
-}
+std::uint64_t memoryLimit() { return most_bytes; }
 
 CLI::Validator memorySize() {
   return {[](std::string& text) {

@@ -16,8 +16,12 @@ namespace {
 
 bool pipe_ended_process = false;
 std::atomic<bool> memory_ran_out = false;
+thread_local bool may_fail = false;  // in an allocation with std::nothrow
+std::atomic<pid_t> running_child = 0;
+static_assert(std::atomic<pid_t>::is_always_lock_free, "a handler of signals reads it");
 
 void endBy(int signal) {
+  if (const pid_t child = running_child; child > 0) ::kill(child, SIGTERM);
   formats::removeTemporaryFiles();
   struct sigaction fatal = {};
   fatal.sa_handler = SIG_DFL;
@@ -57,7 +61,7 @@ void endBy(int signal) {
 
 /// Libraries may catch std::bad_alloc and give another reason.
 [[noreturn]] void onNoMemory() {
-  memory_ran_out = true;
+  if (!may_fail) memory_ran_out = true;
   throw std::bad_alloc();
 }
 
@@ -84,6 +88,8 @@ SignalScope::~SignalScope() {
   pipe_ended_process = false;
 }
 
+void setChild(pid_t child) { running_child = child; }
+
 bool memoryRanOut() { return memory_ran_out; }
 
 void endByBrokenPipe() {
@@ -91,3 +97,18 @@ void endByBrokenPipe() {
 }
 
 }  // namespace glint::apps
+
+// As the standard library has them, but the handler of failures knows that the caller goes on without the memory.
+
+void* operator new(std::size_t size, const std::nothrow_t& /*unused*/) noexcept {
+  glint::apps::may_fail = true;
+  void* memory = nullptr;
+  try {
+    memory = ::operator new(size);
+  } catch (const std::bad_alloc&) {
+  }
+  glint::apps::may_fail = false;
+  return memory;
+}
+
+void* operator new[](std::size_t size, const std::nothrow_t& tag) noexcept { return ::operator new(size, tag); }

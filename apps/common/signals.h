@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <array>
 #include <csignal>
 
@@ -25,7 +27,11 @@ class SignalScope {
   std::array<struct sigaction, kSignals.size()> old_ = {};
 };
 
-/// Whether an allocation of C++ has failed in this process, here or in a library.
+/// A process that ends with this one: a signal that ends this process is sent to it as TERM. 0: none.
+void setChild(pid_t child);
+
+/// Whether an allocation of C++ has failed in this process, here or in a library. Allocations that may fail (std::nothrow) do not
+/// count.
 bool memoryRanOut();
 
 /// Ends the process by SIGPIPE, without temporary files, if SIGPIPE ended it before the SignalScope; returns otherwise.

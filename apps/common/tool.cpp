@@ -284,8 +284,9 @@ std::uint64_t Tool::seed() const {
 std::uint64_t Tool::maxMemory() const { return state_->max_memory > 0 ? state_->max_memory : availableMemory(); }
 
 void Tool::requireMemory(double bytes, const std::string& what, const std::string& remedy) const {
+  constexpr double kAlwaysTried = 32 << 20;  // what a system has left is a guess, and so little may still be found
   const auto most = static_cast<double>(maxMemory());
-  if (bytes <= most) return;
+  if (bytes <= (state_->max_memory > 0 ? most : std::max(most, kAlwaysTried))) return;
   throw Error(ErrorCode::failed, "memory.limit", "", "",
               fmt::format("{} would take {} of memory, and {} may be used", what, memoryText(bytes), memoryText(most)),
               remedy + ", or raise --max-memory where the machine has more");

@@ -149,8 +149,8 @@ class MapBench {
     if (candidate.tool.empty()) return {{"wall_s", 0.0}, {"cpu_s", 0.0}, {"peak_bytes", 0}, {"total_s", 0.0}};
     const double source_s = sourceTime(candidate);
     std::vector<std::string> command = words(candidate);
-    for (const char* word : {"--force", "--quiet", "--threads"}) command.emplace_back(word);
-    command.push_back(std::to_string(tool_.threads()));
+    for (const char* word : {"--force", "--quiet"}) command.emplace_back(word);
+    for (const std::string& flag : childFlags(tool_)) command.push_back(flag);
     const ChildRun run = runProgram(command);
     if (run.exit_code != 0) {
       const std::string message = fmt::format("exit code {}: {}", run.exit_code, run.message);

@@ -21,8 +21,11 @@ int main(int argc, char** argv) {
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = apps::openInput(tool, input.path());
     const auto& map = asset.get<HeightMap>();
-    apps::requireMemoryFor(tool, "a displacement of", map.width, map.height, apps::BytesPerTexel::kDisplace);
     bake::DisplaceOptions values = options.values(map);
+    const bool fine = !values.factors.empty() && values.factors.front() < apps::kFineFactor;
+    apps::requireMemoryFor(tool, "a displacement of", map.width, map.height,
+                           fine ? apps::BytesPerTexel::kDisplaceFinely : apps::BytesPerTexel::kDisplace,
+                           fine ? "give a larger --factor, or take a smaller map" : "take a smaller map");
     values.seed = tool.seed();
     const formats::Provenance provenance = tool.provenance();
     const bake::DisplacementData data = bake::displace(map, values, tool.progress("levels"));

@@ -30,7 +30,8 @@ const MadeAsset& AssetMaker::make(const Candidate& candidate) {
   made.file = folder_.fileOf(hash_, label_ + " " + name);
   std::vector<std::string> words = {candidate.tool, input.file, "-o", made.file};
   words.insert(words.end(), candidate.flags.begin(), candidate.flags.end());
-  words.insert(words.end(), {"--force", "--quiet", "--threads", std::to_string(tool_.threads())});
+  words.insert(words.end(), {"--force", "--quiet"});
+  for (const std::string& flag : childFlags(tool_)) words.push_back(flag);
   const ChildRun run = runProgram(words);
   if (run.exit_code != 0) {
     failed_[name] = run.message;

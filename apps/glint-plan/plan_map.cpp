@@ -45,7 +45,7 @@ PlanMap openMap(Tool& tool, const AssetFolder& folder, const Scene& scene, const
     map.path = folder.fileOf(map.hash, id);
     std::vector<std::string> words = {"glint-ingest", map.image, "-o", map.path, "--force", "--quiet"};
     words.insert(words.end(), material.ingest_flags.begin(), material.ingest_flags.end());
-    words.insert(words.end(), {"--threads", std::to_string(tool.threads())});
+    for (const std::string& flag : childFlags(tool)) words.push_back(flag);
     const ChildRun run = runProgram(words);
     if (run.exit_code != 0)
       throw Error(ErrorCode::invalid_input, "scene.map", scene.file, material.path + ".map", run.message,

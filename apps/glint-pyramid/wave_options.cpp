@@ -69,6 +69,8 @@ void warnAbout(Tool& tool, const HeightMap& map, const bake::WaveOptions& values
 bake::WavePyramidData build(Tool& tool, const HeightMap& map, const bake::WaveOptions& values, const std::string& path) {
   try {
     bake::checkWaveOptions(map, values);
+    tool.requireMemory(bake::wavePyramidBytes(map, values, static_cast<double>(tool.maxMemory())), "the NDF images",
+                       "give a larger --stride, a smaller --resolution or --overlap, or fewer --wavelengths with --spectral");
     warnAbout(tool, map, values, path);
     const bake::ProgressFn progress = tool.progress("images");
     return bake::buildWavePyramid(map, values, progress);

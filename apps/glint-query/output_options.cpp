@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/memory_needs.h"
 #include "common/ndf_picture.h"
 #include "glint-query/usage.h"
 
@@ -54,6 +55,12 @@ void PictureOptions::check() const {
   checkPictureName(path_);
   checkOutput(tool_, path_, OutputFormat::image);
   tool_.addOutput(path_);
+}
+
+int PictureOptions::size(int own) const {
+  const int size = size_ > 0 ? size_ : own;
+  requireMemoryFor(tool_, "a picture of", size, size, BytesPerTexel::kPicture, "give a smaller --image-size");
+  return size;
 }
 
 void PictureOptions::write(int size, std::span<const float> densities) const {

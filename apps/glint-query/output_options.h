@@ -42,7 +42,8 @@ class PictureOptions {
   Option& option() { return *option_; }
   bool given() const { return option_->given(); }
   /// @param own  pixels along each axis where --image-size was not given
-  int size(int own) const { return size_ > 0 ? size_ : own; }
+  /// @throws Error failed if the picture takes more than --max-memory
+  int size(int own) const;
 
   /// Writes the picture, and sets it as the result of the tool.
   /// @param densities  [size][size], bottom row first

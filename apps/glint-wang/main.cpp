@@ -46,7 +46,9 @@ int main(int argc, char** argv) {
     apps::refuseTiles(asset, input.path());
     const auto& map = asset.get<NormalMap>();
     const bake::WangOptions values = options.values(tool, input.path());
-    apps::requireMemoryFor(tool, "tiles of", values.size, values.size, apps::BytesPerTexel::kTile, "give a smaller --size");
+    apps::requireMemoryFor(tool, "tiles of", values.size, values.size,
+                           apps::BytesPerTexel::kTiles * values.tile_count + apps::BytesPerTexel::kSeams,
+                           "give a smaller --size, or fewer --colors or --tiles");
     const bake::WangTilesData tiles = bake::buildWangTiles(map, values, tool.progress("tiles"));
     formats::writeAsset(output.path(), tiles.view(), tool.provenance(), output.writeOptions());
     apps::warnOfLargeTiles(tool, input.path(), map, tiles);

@@ -39,7 +39,6 @@ std::vector<T> readFlipped(OIIO::ImageInput& input, int part, const OIIO::ImageS
   if (complete && !input.has_error()) return pixels;
   checkSystemReason(path, reason);
   throwDamagedImage(path, trimmed(input.geterror()));
-  ;
 }
 
 void checkSize(const OIIO::ImageSpec& spec, const std::string& path, const std::string& format, std::uint64_t most_bytes) {

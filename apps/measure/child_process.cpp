@@ -16,6 +16,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "common/memory.h"
+#include "common/signals.h"
 #include "glint/model/error.h"
 
 extern char** environ;
@@ -79,6 +81,13 @@ double seconds(const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 *
 
 }  // namespace
 
+std::vector<std::string> childFlags(const Tool& tool) {
+  std::vector<std::string> flags = {"--threads", std::to_string(tool.threads())};
+  if (memoryLimit() > 0) flags.insert(flags.end(), {"--max-memory", std::to_string(memoryLimit())});
+  if (tool.trust()) flags.emplace_back("--trust");
+  return flags;
+}
+
 ChildRun runProgram(const std::vector<std::string>& words) {
   const std::string folder = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
   const std::string program = folder + "/" + words.front();
@@ -99,6 +108,7 @@ ChildRun runProgram(const std::vector<std::string>& words) {
     throw Error(ErrorCode::failed, "bench.process", program, "", std::string("cannot be started: ") + std::strerror(failure),
                 "install the whole package: programs of one folder call each other");
   }
+  setChild(child);
   errors.closeWrite();
   ChildRun run;
   run.message = watch(child, errors.read, run.peak_bytes);
@@ -109,6 +119,7 @@ ChildRun runProgram(const std::vector<std::string>& words) {
       throw Error(ErrorCode::failed, "bench.process", program, "",
                   std::string("cannot be waited for: ") + std::strerror(errno));
   }
+  setChild(0);
   run.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   run.exit_code = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
   run.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);

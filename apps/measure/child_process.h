@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "common/tool.h"
+
 namespace glint::apps {
 
 /// A program that ran to its end.
@@ -15,7 +17,11 @@ struct ChildRun {
   std::string message;          ///< last line that it wrote to stderr
 };
 
-/// Runs a program of this package, with nothing on stdin and stdout, and waits for it.
+/// The flags of this run that hold for programs that it starts: --threads, and --max-memory and --trust where they are given.
+std::vector<std::string> childFlags(const Tool& tool);
+
+/// Runs a program of this package, with nothing on stdin and stdout, and waits for it. A signal that ends this process ends the
+/// program, too.
 /// @param words  name of the program, without folder, and its arguments
 /// @throws Error failed if the program cannot be started
 ChildRun runProgram(const std::vector<std::string>& words);

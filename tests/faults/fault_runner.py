@@ -7,6 +7,7 @@ import tempfile
 from dataclasses import dataclass
 
 REQUESTS, ANSWERS = 198, 199
+STOP = -2  # instead of an error: the signal TERM
 
 
 @dataclass

@@ -3,7 +3,7 @@
 //
 // The test writes lines "CLASS NUMBER ERROR" to descriptor 198: of the calls of this class, the one of this number (from 1) fails
 // with this errno; 0 lets all succeed, and of the class `none` nothing fails. An ERROR of -1 makes the call transfer one byte
-// only. The library answers each line on descriptor 199: the wait status of the child, and the number of its calls of each class.
+// only; one of -2 sends TERM to the process at the call. The library answers each line on descriptor 199: the wait status of the child, and the number of its calls of each class.
 //
 // Calls that the C library makes by itself (fwrite to a file, dlopen) are not seen. Calls before main() are not counted.
 
@@ -12,6 +12,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <link.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdint.h>
@@ -24,7 +25,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { REQUESTS = 198, ANSWERS = 199, NO_NUMBER = -1, SHORT = -1, MOST_SECONDS = 30 };
+enum { REQUESTS = 198, ANSWERS = 199, NO_NUMBER = -1, SHORT = -1, STOP = -2, MOST_SECONDS = 30 };
 
 // Memory that libraries for C ask for is a class of its own: some of them end the process when they are refused any.
 enum Class { MEMORY, MEMORY_LIBRARIES, OPEN, READ, WRITE, FSYNC, RENAME, MMAP, CLOSE, RESERVE, CLASSES };
@@ -50,6 +51,10 @@ static int fails(enum Class class) {
   if (shared == NULL) return 0;
   const long number = atomic_fetch_add(&shared->counts[class], 1) + 1;
   if ((int)class != fault_class || number != fault_number) return 0;
+  if (fault_error == STOP) {
+    raise(SIGTERM);
+    return 0;
+  }
   if (fault_error >= 0) errno = fault_error;
   return 1;
 }

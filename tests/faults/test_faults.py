@@ -1,6 +1,7 @@
 """Every call of the system fails once, in every program: exit code and blame are right, and outputs are whole or not there.
 
-GLINT_FAULTS=all walks over every call; otherwise over some of each class, other ones for each tool."""
+GLINT_FAULTS=all walks over every call; otherwise over some of each class, other ones for each tool.
+GLINT_FAULTS_PART=1/2 takes the second half of the programs: two processes share the time."""
 
 import errno
 import os
@@ -8,6 +9,7 @@ import pathlib
 import shutil
 import signal
 import subprocess
+import time
 
 import pytest
 from fault_runner import FaultRunner, contents
@@ -16,8 +18,10 @@ BIN = pathlib.Path(os.environ["GLINT_BIN_DIR"]).resolve()
 LIBRARY = pathlib.Path(os.environ["GLINT_FAULT_LIBRARY"]).resolve()
 OPENER = pathlib.Path(os.environ["GLINT_FAULT_OPENER"]).resolve()
 ALL = os.environ.get("GLINT_FAULTS") == "all"
-SAMPLED = int(os.environ.get("GLINT_FAULTS_SAMPLED", 12))  # calls of a class that fail in each tool, unless all do
-MOST = 4000  # of all: some programs take memory more often
+PART, PARTS = (int(word) for word in os.environ.get("GLINT_FAULTS_PART", "0/1").split("/"))
+# Calls of a class that fail in each program, unless all do: as many as SECONDS allow.
+LEAST, MOST_SAMPLED, SECONDS = 3, 12, 2
+MOST = 1000  # of all: some programs take memory more often
 
 LONGEST_ERROR = 2000  # bytes, as in test_outputs.py
 MEMORY, INPUT_OUTPUT = 4, 2  # exit codes
@@ -85,11 +89,10 @@ def inputs(tmp_path_factory):
     return folder
 
 
-def chosen(count, seed):
+def chosen(count, most, seed):
     """Numbers of calls that fail: all, or a few that are spread evenly, other ones for each seed."""
-    most = MOST if ALL else SAMPLED
     if count <= most:
-        return range(1, count + 1)
+        return list(range(1, count + 1))
     step = count / most
     return sorted({1 + int(k * step + seed * 0.618 * step % step) for k in range(most)})
 
@@ -100,13 +103,18 @@ class Walk:
     def __init__(self, runner, folder, outputs):
         self.runner, self.folder, self.outputs = runner, folder, outputs
         self.before = contents(folder)
+        begin = time.monotonic()
         self.good = runner.run()
+        seconds = time.monotonic() - begin
+        self.most = MOST if ALL else max(LEAST, min(MOST_SAMPLED, int(SECONDS / seconds)))
         assert self.good.status == 0, self.good.stderr
         self.results = {name: (folder / name).read_bytes() for name in outputs}
         assert set(contents(folder)) == set(self.before) | set(outputs)
 
     def reset(self, old):
-        """Puts outputs of an earlier run there, or none."""
+        """Puts outputs of an earlier run there, or none, and takes away all else."""
+        for leftover in set(contents(self.folder)) - set(self.before) - set(self.outputs):
+            (self.folder / leftover).unlink()
         for name in self.outputs:
             if old:
                 (self.folder / name).write_bytes(self.results[name])
@@ -130,37 +138,64 @@ class Walk:
         assert message.count("\n") == 1 and len(message) <= LONGEST_ERROR, message
         assert not any(word in message for word in ("damaged", "truncated", "defect", "internal")), message
 
-
-@pytest.mark.parametrize("kind", FAULTS)
-@pytest.mark.parametrize("name", TOOLS)
-def test_every_call_may_fail(inputs, tmp_path, name, kind):
-    line, outputs = TOOLS[name]
-    shutil.copytree(inputs, tmp_path, dirs_exist_ok=True)
-    if (name, kind) == ("shlobes-light", "memory"):
-        pytest.skip("libsharp, which is linked in, does not check what it allocates")
-    wrong = []
-    with FaultRunner(LIBRARY, command_of(line), tmp_path) as runner:
-        walk = Walk(runner, tmp_path, outputs)
-        for error, codes, reasons in FAULTS[kind]:
-            for number in chosen(walk.good.counts[kind], list(TOOLS).index(name)):
-                walk.reset(old=number % 2 == 0)
+    def failures(self, kind, seed=0):
+        """Lets calls of a class fail, each in a run of its own. Returns how many runs failed, and what was wrong."""
+        failed, wrong = 0, []
+        numbers = chosen(self.good.counts[kind], self.most, seed)
+        for k, (error, codes, reasons) in enumerate(FAULTS[kind]):
+            for number in numbers[k :: len(FAULTS[kind])]:
+                self.reset(old=number % 2 == 0)
+                outcome = self.runner.run(kind, number, error)
+                failed += outcome.status != 0
                 try:
-                    walk.check(runner.run(kind, number, error), codes, reasons)
+                    self.check(outcome, codes, reasons)
                 except AssertionError as failure:
                     wrong.append(f"{kind} {number}, {errno.errorcode[error]}: {str(failure).splitlines()[0][:400]}")
-                    walk.reset(old=False)
-                    for leftover in set(contents(tmp_path)) - set(walk.before):
-                        (tmp_path / leftover).unlink()
-    assert not wrong, f"{len(wrong)} of {walk.good.counts[kind]}:\n" + "\n".join(wrong[:20])
+        self.reset(old=False)
+        return failed, wrong
 
 
-@pytest.mark.parametrize("kind", ["memory", "open", "read", "mmap", "close"])
+# Classes of which each program makes calls, and those of which at least one call is needed for its result.
+READS = {"memory", "open", "mmap", "close"}
+WRITES = READS | {"write", "fsync", "rename"}
+NEEDED = {"memory", "write", "fsync", "rename"}
+
+
+def check_walk(walk, kind, expected, seed=0):
+    count = walk.good.counts[kind]
+    if count == 0:
+        assert kind not in expected, f"calls of the class {kind} are not seen"
+        pytest.skip("makes no such call")
+    failed, wrong = walk.failures(kind, seed)
+    assert not wrong, f"{len(wrong)} of {count}:\n" + "\n".join(wrong[:20])
+    assert failed > 0 or kind not in NEEDED, "no run failed"
+
+
+@pytest.fixture(scope="module")
+def walk(request, inputs, tmp_path_factory):
+    """One program, which serves all tests of it."""
+    line, outputs = TOOLS[request.param]
+    folder = tmp_path_factory.mktemp(request.param)
+    shutil.copytree(inputs, folder, dirs_exist_ok=True)
+    with FaultRunner(LIBRARY, command_of(line), folder) as runner:
+        yield Walk(runner, folder, outputs)
+
+
+@pytest.mark.parametrize("walk, name", [(name, name) for name in list(TOOLS)[PART::PARTS]], indirect=["walk"], scope="module")
+@pytest.mark.parametrize("kind", FAULTS)
+def test_every_call_may_fail(walk, name, kind):
+    if (name, kind) == ("shlobes-light", "memory"):
+        pytest.skip("libsharp, which is linked in, does not check what it allocates")
+    check_walk(walk, kind, WRITES if walk.outputs else READS, list(TOOLS).index(name))
+
+
+@pytest.mark.skipif(PART > 0, reason="in the first part")
 @pytest.mark.parametrize("asset", ["normals.glint", "pyramid.glint"])
-def test_opening_in_a_program_of_others_may_fail(inputs, tmp_path, asset, kind):
+def test_opening_in_a_program_of_others_may_fail(inputs, tmp_path, asset):
     """glint_ndf_open returns the error: it does not end the program, and does not call the file damaged."""
     shutil.copytree(inputs, tmp_path, dirs_exist_ok=True)
     with FaultRunner(LIBRARY, [OPENER, asset], tmp_path) as runner:
         walk = Walk(runner, tmp_path, [])
-        for error, codes, reasons in FAULTS[kind]:
-            for number in range(1, walk.good.counts[kind] + 1):
-                walk.check(runner.run(kind, number, error), codes, reasons)
+        walk.most = MOST
+        for kind in sorted(READS):
+            check_walk(walk, kind, READS)

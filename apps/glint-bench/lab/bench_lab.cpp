@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <numbers>
 
-#include "measure/child_process.h"
 #include "glint/bake/common/slopes.h"
 #include "glint/bake/ingest/normal_bounds.h"
 #include "glint/formats/asset_writer.h"
+#include "measure/child_process.h"
 
 namespace glint::apps {
 namespace {
@@ -91,7 +91,8 @@ void BenchLab::make(const LabMap& map, const Candidate& method, const LabQuestio
   if (source != nullptr) make(map, *source, question);
   std::vector<std::string> words = {method.tool, source != nullptr ? assetOf(map, *source, question) : map.path, "-o", file};
   for (const std::string& flag : flagsOf(method, question)) words.push_back(flag);
-  words.insert(words.end(), {"--force", "--quiet", "--threads", std::to_string(tool_.threads())});
+  words.insert(words.end(), {"--force", "--quiet"});
+  for (const std::string& flag : childFlags(tool_)) words.push_back(flag);
   const ChildRun run = runProgram(words);
   if (run.exit_code != 0) throw Error(ErrorCode::failed, "bench.candidate", "", "", run.message);
   made_[file] = run.wall_s;

@@ -4,11 +4,13 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <string>
 
 #include "glint/bake/common/slopes.h"
 #include "glint/model/error.h"
+#include "glint/model/texel_name.h"
 #include "glint/query/detail/histogram/spherical_bins.h"
 
 namespace glint::bake {
@@ -94,6 +96,11 @@ BinStatistics binTexels(const NormalMap& map, const SphericalBins& bins, Histogr
     for (int j = begin * kTile; j < std::min(end * kTile, map.height); ++j) {
       for (int i = 0; i < map.width; ++i) {
         const Vec2 n = map.at(i, j);
+        if (std::isnan(dot(n, n))) {
+          throw Error(ErrorCode::invalid_input, "normals.finite", {}, {},
+                      "a normal is no number " + texelName(map.width, map.height, rowMajorIndex(i, j, map.width)),
+                      "ingest the image again with glint-ingest, which checks it");
+        }
         const int bin = bins.find(n);
         parts[part].add(bin, n);
         sat.texels.values[sat.shape.texelIndex(i, j)] = static_cast<std::uint16_t>(bin);
@@ -215,18 +222,22 @@ std::size_t HistogramSatData::sizeBytes() const {
 
 double histogramSatBytes(const NormalMap& map, const HistogramSatOptions& options) {
   checkOptions(map, options);
-  const HistogramSat shape = shapeFor(map, options);
+  HistogramSat shape = shapeFor(map, options);
   const SphericalBins bins(options.theta_bins, options.phi_bins);
   std::vector<bool> occurs(static_cast<std::size_t>(bins.count()));
-  for (const Vec2 n : map.normals) occurs[static_cast<std::size_t>(bins.find(n))] = true;
-  const auto bin_count = static_cast<double>(std::count(occurs.begin(), occurs.end(), true));
+  for (const Vec2 n : map.normals) {
+    if (std::isnan(dot(n, n))) continue;  // buildHistogramSat() refuses it
+    occurs[static_cast<std::size_t>(bins.find(n))] = true;
+  }
+  shape.bin_count = static_cast<int>(std::count(occurs.begin(), occurs.end(), true));
+  const double counters = shape.rowLength();
   const auto points = [&](int stride) { return static_cast<double>(shape.pointsX(stride)) * shape.pointsY(stride); };
   const double texels = static_cast<double>(map.width) * map.height;
   // Lines of texels in both directions have a point in every line_stride texels.
   const double lines = 2 * (texels / shape.line_stride + map.width + map.height);
   return texels * sizeof(std::uint16_t) +
-         bin_count * (points(shape.stride) * sizeof(std::uint16_t) + points(shape.coarse_stride) * sizeof(std::uint32_t) +
-                      lines * sizeof(std::uint16_t));
+         counters * (points(shape.stride) * sizeof(std::uint16_t) + points(shape.coarse_stride) * sizeof(std::uint32_t) +
+                     lines * sizeof(std::uint16_t));
 }
 
 HistogramSatData buildHistogramSat(const NormalMap& map, const HistogramSatOptions& options, const ProgressFn& progress) {

@@ -1,6 +1,8 @@
 #include "glint/bake/sh/light.h"
 
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -151,6 +153,20 @@ class LightTask {
   std::vector<Matrix> turned_cosines_, turned_sines_;  ///< one matrix [bands][3 columns] for every m
 };
 
+int bandLimit(const ShLightOptions& options) {
+  return options.band_limit > 0 ? options.band_limit : lightBandLimit(options.order);
+}
+
+/// Memory that a task takes for each column of the grid.
+std::size_t columnBytes(const ShLightOptions& options) {
+  return 2 * 3 * sizeof(double) * (static_cast<std::size_t>(options.order) + 1) * static_cast<std::size_t>(bandLimit(options));
+}
+
+/// Columns of a row that one task makes: as many as its memory allows.
+int taskColumns(const ShLightOptions& options) {
+  return std::clamp(static_cast<int>(kTaskBytes / columnBytes(options)), 1, options.grid.columns);
+}
+
 void requireUsableOptions(const ShLightOptions& options) {
   if (options.order < 0 || options.order > kMaxShLightOrder)
     throw Error(
@@ -164,8 +180,14 @@ void requireUsableOptions(const ShLightOptions& options) {
     throw Error(ErrorCode::usage, "sh.band_limit", {}, {},
                 "the band limit " + std::to_string(options.band_limit) + " is not between the order and twice " +
                     std::to_string(lightBandLimit(options.order)));
+  // Beside the table, the transfers of every m take (order - m + 1)(band limit - m + 1) doubles: for each of the order^2
+  // coefficients no more than 4 (band limit) bytes. Each thread has a task.
+  const std::size_t threads = std::min<std::size_t>(
+      tbb::this_task_arena::max_concurrency(), tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  const double tasks = static_cast<double>(threads * static_cast<std::size_t>(taskColumns(options)) * columnBytes(options));
   requireTableFits(options.order,
-                   static_cast<double>(options.grid.directionCount()) * (options.precision == ShPrecision::f16 ? 6 : 12),
+                   static_cast<double>(options.grid.directionCount()) * (options.precision == ShPrecision::f16 ? 6 : 12) +
+                       4.0 * bandLimit(options) + tasks / static_cast<double>(shCount(options.order)),
                    options.max_bytes);
 }
 
@@ -217,7 +239,7 @@ ShLightData buildShLight(const Environment& environment, const ShLightOptions& o
   requireUsable(environment);
   requireUsableOptions(options);
   // Project the environment, fade its upper bands out, and compute the transfer to half vectors.
-  Setup setup{options, options.band_limit > 0 ? options.band_limit : lightBandLimit(options.order), {}, {}};
+  Setup setup{options, bandLimit(options), {}, {}};
   setup.light = projectEnvironment(environment, setup.band_limit);
   for (std::size_t channel = 0; channel < 3; ++channel)
     for (int l = 0; l <= setup.band_limit; ++l)
@@ -227,10 +249,8 @@ ShLightData buildShLight(const Environment& environment, const ShLightOptions& o
   tbb::parallel_for(0, options.order + 1,
                     [&](int m) { setup.transfers[m] = halfVectorTransfer(m, options.order, setup.band_limit); });
 
-  // A task has as many columns of a row as its memory allows.
   ShLightData data = emptyTable(options);
-  const std::size_t column_bytes = 2 * 3 * sizeof(double) * (static_cast<std::size_t>(options.order) + 1) * setup.band_limit;
-  const int columns = std::clamp(static_cast<int>(kTaskBytes / column_bytes), 1, options.grid.columns);
+  const int columns = taskColumns(options);
   const int chunks = (options.grid.columns + columns - 1) / columns, tasks = chunks * options.grid.rows;
   ProgressCounter counter(progress, static_cast<std::size_t>(tasks));
   tbb::parallel_for(0, tasks, [&](int task) {

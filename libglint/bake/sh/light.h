@@ -21,7 +21,7 @@ struct ShLightOptions {
   /// Highest band of the environment; 0: lightBandLimit(order). The upper half of its bands fade out smoothly (lightTaper).
   int band_limit = 0;
   ShPrecision precision = ShPrecision::f16;
-  std::uint64_t max_bytes = std::uint64_t{4} << 30;  ///< largest table that is allowed
+  std::uint64_t max_bytes = std::uint64_t{4} << 30;  ///< largest table that is allowed, with what it is made with
 };
 
 /// A ShLight that owns its arrays.
@@ -59,8 +59,8 @@ std::vector<double> halfVectorTransfer(int m, int order, int band_limit);
 /// Builds the table of light coefficients for every outgoing direction of a grid (Gamboa 2018, section 6.4). The harmonics of
 /// the environment are turned to each outgoing direction and mapped to half vectors, both by exact matrices.
 /// O(directions * order * band_limit^2). The result does not depend on the number of threads.
-/// @throws Error usage if an option is out of range or the table is larger than max_bytes; invalid_input if requireUsable
-///         throws
+/// @throws Error usage if an option is out of range; failed if the table and what it is made with are larger than max_bytes;
+///         invalid_input if requireUsable throws
 ShLightData buildShLight(const Environment& environment, const ShLightOptions& options, const ProgressFn& progress = {});
 
 }  // namespace glint::bake

@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
 #include <string>
 
 #include "glint/bake/sh/gauss_legendre.h"
 #include "glint/math/half.h"
 #include "glint/model/error.h"
+#include "glint/model/memory_text.h"
 #include "glint/query/light/sh_basis.h"
 
 namespace glint::bake {
@@ -113,10 +113,9 @@ void requireTableFits(int order, double bytes_per_coefficient, std::uint64_t max
   const double bytes = static_cast<double>(shCount(order)) * bytes_per_coefficient;
   if (bytes <= static_cast<double>(max_bytes)) return;
   const int fits = static_cast<int>(std::sqrt(static_cast<double>(max_bytes) / bytes_per_coefficient)) - 1;
-  char what[160];
-  std::snprintf(what, sizeof what, "a table of order %d needs %.3g GB, more than the limit of %.3g GB", order, bytes / 1e9,
-                static_cast<double>(max_bytes) / 1e9);
-  throw Error(ErrorCode::failed, "memory.limit", {}, "order", what,
+  throw Error(ErrorCode::failed, "memory.limit", {}, "order",
+              fmt::format("a table of order {} needs {} of memory, and {} may be used", order, memoryText(bytes),
+                          memoryText(static_cast<double>(max_bytes))),
               (fits >= 0 ? "order " + std::to_string(fits) + " fits; " : std::string()) +
                   "ask for a smaller grid or order, or raise --max-memory where the machine has more");
 }

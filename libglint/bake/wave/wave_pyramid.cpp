@@ -11,6 +11,7 @@
 
 #include "glint/bake/common/slopes.h"
 #include "glint/bake/pyramid/agreement.h"
+#include "glint/bake/pyramid/image_bytes.h"
 #include "glint/bake/wave/coherent_images.h"
 #include "glint/bake/wave/colour_weights.h"
 #include "glint/bake/wave/wave_images.h"
@@ -22,6 +23,8 @@ namespace {
 
 /// Slopes above this are refused: psi would be far outside its square, and samples many in each texel.
 constexpr double kMostPsi = 4;
+/// Light of a facet reaches so many deviations of its spot.
+constexpr double kSpots = 6;
 
 void require(bool ok, const char* option, const std::string& what, const std::string& remedy) {
   if (!ok) throw Error(ErrorCode::usage, "option.range", {}, option, what, remedy);
@@ -91,7 +94,7 @@ WaveGrid gridFor(double wavelength, const WaveOptions& o, double psi) {
 /// Grids that see all light of all wavelengths but for kMostAliased: from the steepest slope on, larger where the surface
 /// diffracts light beyond it.
 std::vector<WaveGrid> chooseGrids(const HeightSpline& spline, const HeightMap& map, const WaveOptions& o, double steepest) {
-  constexpr double kSpots = 6, kGrowth = 1.2;
+  constexpr double kGrowth = 1.2;
   std::vector<WaveGrid> grids;
   for (const double wavelength : o.wavelengths_um) {
     double psi = steepest + kSpots * spotDeviation(wavelength, double{o.coherence_um});
@@ -358,6 +361,27 @@ void checkWaveOptions(const HeightMap& map, const WaveOptions& o) {
           fmt::format("{:g} um on texels of {:g} um takes {:.3g} coherent images", o.coherence_um, texel_um, images),
           fmt::format("give at least {:.3g}, or heights of a smaller part of the surface",
                       double{o.coherence_um} * std::sqrt(images / kMostImages)));
+}
+
+double wavePyramidBytes(const HeightMap& map, const WaveOptions& o, double most_bytes) {
+  checkWaveOptions(map, o);
+  const std::size_t waves = o.wavelengths_um.size();
+  const double images = 1 + static_cast<double>(o.spectral || waves == 1 ? waves : 3);  // grey, and one for each channel
+  const PyramidShape shape = shapeOf(map, o);
+  // Few images see the steepest slopes: most see those of a few deviations.
+  constexpr double kDeviations = 3;
+  const MapSlopes& slopes = shape.slopes;
+  const double half_trace = 0.5 * (double{slopes.covariance.xx} + slopes.covariance.yy);
+  const double half_gap = 0.5 * (double{slopes.covariance.xx} - slopes.covariance.yy);
+  const double largest = half_trace + std::hypot(half_gap, double{slopes.covariance.xy});
+  const double reach = std::hypot(slopes.mean.x, slopes.mean.y) + kDeviations * std::sqrt(largest) +
+                       kSpots * spotDeviation(double{o.wavelengths_um.back()}, double{o.coherence_um});
+  // Blocks that a disk meets, in the mean over its places.
+  const double radius = std::min(1.0, reach) * 0.5 * shape.blocksPerAxis();
+  const double blocks_of_disk =
+      std::min(static_cast<double>(shape.blocksPerImage()), std::numbers::pi * radius * radius + 4 * radius + 1);
+  const auto blocks = [&](int, std::size_t) { return static_cast<std::size_t>(blocks_of_disk); };
+  return images * imageBytes(shape, o.precision, most_bytes / images, blocks);
 }
 
 WavePyramidData buildWavePyramid(const HeightMap& map, const WaveOptions& o, const ProgressFn& progress) {

@@ -65,6 +65,11 @@ inline double spotDeviation(double wavelength_um, double coherence_um) {
 /// @throws Error as buildWavePyramid does
 void checkWaveOptions(const HeightMap& map, const WaveOptions& options);
 
+/// The memory that the images take while buildWavePyramid makes them, bytes. Where every block of every image would fit into
+/// `most_bytes`, it is the bytes of all blocks; otherwise of blocks for the slopes that most texels have.
+/// @throws Error as buildWavePyramid does for options
+double wavePyramidBytes(const HeightMap& map, const WaveOptions& options, double most_bytes);
+
 /// Builds the NDF images of a height field under wave optics (Deng 2022, Eq. 3 and 4).
 ///
 /// Coherent images come from windowed Fourier transforms on a grid of places; images of level 0 are their means, weighed by the
