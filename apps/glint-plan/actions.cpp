@@ -49,7 +49,8 @@ nlohmann::json resultOf(const std::vector<MaterialPlan>& plans) {
     const PlanOption& choice = plan.choice();
     list.push_back({{"name", plan.material->name},
                     {"asset", choice.candidate.name()},
-                    {"seen", choice.seen},
+                    {"seen", choice.errors->seen},
+                    {"bias", choice.errors->bias},
                     {"bytes", choice.costs.bytes},
                     {"preparation_s", choice.costs.preparation_s},
                     {"query_ns", choice.costs.query_ns},

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include "measure/light_blur.h"
 
@@ -70,8 +71,10 @@ void addPyramids(const MapQuestion& question, int width, int height, std::vector
                      pyramid.name(),
                      needs_texels});
     };
-    for (const char* tolerance : {"0.4", "0.2", "0.1", "0.05"}) compressed("tucker", "--tolerance", tolerance);
-    for (const char* tolerance : {"0.4", "0.2", "0.1", "0.05"}) compressed("pca", "--tolerance", tolerance);
+    // Steps of a square root of 2, so that the next finer one takes little more.
+    for (const char* method : {"tucker", "pca"})
+      for (const char* tolerance : {"0.56", "0.4", "0.28", "0.2", "0.14", "0.1", "0.07", "0.05"})
+        compressed(method, "--tolerance", tolerance);
     for (const char* rank : {"16", "32"}) compressed("cp", "--rank", rank);
   }
 }
@@ -106,6 +109,11 @@ const Candidate* sourceOf(const std::vector<Candidate>& all, const Candidate& ca
   if (candidate.source.empty()) return nullptr;
   const auto found = std::find_if(all.begin(), all.end(), [&](const Candidate& c) { return c.name() == candidate.source; });
   return found == all.end() ? nullptr : &*found;
+}
+
+double toleranceOf(const Candidate& candidate) {
+  const auto found = std::find(candidate.flags.begin(), candidate.flags.end(), "--tolerance");
+  return found == candidate.flags.end() ? 0 : std::stod(*(found + 1));
 }
 
 }  // namespace glint::apps

@@ -14,6 +14,9 @@ std::vector<Candidate> planCandidates(const MapQuestion& question, int width, in
 /// The candidate whose asset is the input of another; nullptr: the map.
 const Candidate* sourceOf(const std::vector<Candidate>& all, const Candidate& candidate);
 
+/// The tolerance with which a candidate is compressed; 0: it has none.
+double toleranceOf(const Candidate& candidate);
+
 /// Deviation of level 0 of a pyramid over its stride.
 inline constexpr double kLevelSigma = 0.4330127;  // 1.5 / sqrt(12)
 

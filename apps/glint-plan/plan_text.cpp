@@ -74,8 +74,12 @@ std::vector<std::string> reasonsOf(const Scene& scene, const MaterialPlan& plan)
   if (choice.candidate.tool.empty()) {
     reasons.push_back("The texels themselves have no error.");
   } else {
-    reasons.push_back(fmt::format("Its seen error is {:.2g}; the tolerance is {:g}, of which a plan uses {:g}.", choice.seen,
-                                  plan.material->tolerance, kSafeShare * plan.material->tolerance));
+    const PlaceErrors& errors = *choice.errors;
+    reasons.push_back(
+        fmt::format("Its seen error is {:.2g}, and up to {:.2g} at other places; the tolerance is {:g}. Its bias is {:.2g} of "
+                    "at most {:.2g}.",
+                    errors.seen, errors.seen + kSureDeviations * errors.deviation, plan.material->tolerance, errors.bias,
+                    kBiasShare * plan.material->tolerance));
   }
   reasons.push_back(fmt::format("Of {} candidates that were measured it has {} within the tolerance and the budgets.", compared,
                                 goalText(scene.goal)));
@@ -84,10 +88,14 @@ std::vector<std::string> reasonsOf(const Scene& scene, const MaterialPlan& plan)
   for (std::size_t k = 0; k < plan.options.size(); ++k) {
     const PlanOption& option = plan.options[k];
     const bool named = std::find(methods.begin(), methods.end(), option.candidate.method) != methods.end();
-    if (k >= plan.chosen || named || !option.costed || option.seen < 0) continue;
+    if (k >= plan.chosen || named || !option.costed || !option.errors) continue;
     methods.push_back(option.candidate.method);
-    reasons.push_back(fmt::format("{} would be cheaper, but its seen error is {}{:.2g}.", option.candidate.name(),
-                                  option.at_least ? "at least " : "", option.seen));
+    const PlaceErrors& errors = *option.errors;
+    const bool biased = errors.seen + kSureDeviations * errors.deviation <= plan.material->tolerance;
+    reasons.push_back(
+        biased ? fmt::format("{} would be cheaper, but its bias is {:.2g}.", option.candidate.name(), errors.bias)
+               : fmt::format("{} would be cheaper, but its seen error is {:.2g}, and up to {:.2g} at other places.",
+                             option.candidate.name(), errors.seen, errors.seen + kSureDeviations * errors.deviation));
   }
   for (std::size_t k = 0; k < plan.chosen; ++k) {
     const PlanOption& option = plan.options[k];
@@ -130,7 +138,7 @@ std::string planText(const Scene& scene, const std::vector<MaterialPlan>& plans)
   for (const MaterialPlan& plan : plans) {
     const PlanOption& choice = plan.choice();
     text += fmt::format("{}: {}; seen error {:.2g} of at most {:g}, {}, {:.2g} s to prepare, {} for a density\n",
-                        plan.material->name, choice.candidate.name(), choice.seen, plan.material->tolerance,
+                        plan.material->name, choice.candidate.name(), choice.errors->seen, plan.material->tolerance,
                         sizeText(choice.costs.bytes), choice.costs.preparation_s, queryTimeText(choice.costs.query_ns));
     for (const std::string& reason : reasonsOf(scene, plan)) text += "  " + reason + "\n";
     for (const std::string& part : leftOutOf(scene, plan)) text += "  Left out. " + part + "\n";

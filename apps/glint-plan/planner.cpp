@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <limits>
 #include <utility>
 
+#include "glint-plan/plan_candidates.h"
 #include "glint-plan/totals.h"
 
 namespace glint::apps {
@@ -102,16 +104,16 @@ bool Planner::cost(Work& work, PlanOption& option) {
 }
 
 bool Planner::meets(Work& work, PlanOption& option) {
-  const double most = kSafeShare * work.plan.material->tolerance;
-  if (option.seen < 0) {
+  const double tolerance = work.plan.material->tolerance;
+  if (!option.errors && option.failure.empty()) {
     try {
-      option.seen = work.probe->seen(static_cast<std::size_t>(&option - work.plan.options.data()), most);
-      option.at_least = option.seen > most;
+      option.errors = work.probe->errors(static_cast<std::size_t>(&option - work.plan.options.data()), tolerance);
+      option.at_least = !surelyWithin(*option.errors, tolerance);
     } catch (const Error& error) {
       option.failure = error.what();
     }
   }
-  return option.costed && option.failure.empty() && option.seen <= most;
+  return option.costed && option.failure.empty() && !option.at_least;
 }
 
 bool Planner::affordable(const Work& work, const PlanOption& option) const {
@@ -133,31 +135,53 @@ bool Planner::choose(Work& work) {
   return work.found;
 }
 
-void Planner::measureCompressed(Work& work, bool all) {
-  constexpr double kAmple = 0.5;  // share of the error that may be the pyramid's own, so that more pixels gain nothing
-  std::string done;               // method and pyramid that need no finer setting
-  const PlanOption* ample = nullptr;
-  for (PlanOption& option : work.plan.options) {
-    const std::string kind = option.candidate.method + " of " + option.candidate.source;
-    if (option.candidate.source.empty() || option.costed || kind == done) continue;
-    PlanOption& pyramid = *std::find_if(work.plan.options.begin(), work.plan.options.end(), [&](const PlanOption& other) {
-      return other.candidate.name() == option.candidate.source;
-    });
-    if (!pyramid.costed || !meets(work, pyramid)) {
-      option.failure = pyramid.failure.empty()
-                           ? fmt::format("the pyramid that it is made of has a seen error of {:.2g} already", pyramid.seen)
-                           : "its pyramid cannot be made: " + pyramid.failure;
-      continue;
-    }
-    if (ample != nullptr && ample != &pyramid) {
-      option.failure = "images of fewer pixels are good enough";
-      continue;
-    }
-    if (pyramid.seen <= kAmple * kSafeShare * work.plan.material->tolerance) ample = &pyramid;
-    if (!cost(work, option)) continue;
+void Planner::measureLadder(Work& work, const PlanOption& pyramid, std::vector<PlanOption*> ladder, bool all) {
+  // The error of the pyramid and that of the compression add up like independent errors: where the sum fits is the first guess.
+  const double tolerance = work.plan.material->tolerance, own = pyramid.errors->seen;
+  const double left = std::sqrt(std::max(0.0, tolerance * tolerance - own * own));
+  std::size_t guess = 0;
+  while (guess + 1 < ladder.size() && toleranceOf(ladder[guess]->candidate) > left) ++guess;
+  const auto isGood = [&](std::size_t k) {
+    PlanOption& option = *ladder[k];
+    if (!cost(work, option)) return false;
     const bool too_dear = work.found && option.cost(scene_.goal) >= work.plan.choice().cost(scene_.goal);
-    if ((too_dear && !all) || meets(work, option)) done = kind;
-    if (done == kind) choose(work);
+    return (all || !too_dear) && meets(work, option);
+  };
+  const auto isDear = [&](std::size_t k) {
+    return !all && work.found && ladder[k]->costed && ladder[k]->cost(scene_.goal) >= work.plan.choice().cost(scene_.goal);
+  };
+  std::size_t good = guess;
+  while (good < ladder.size() && !isGood(good) && !isDear(good)) ++good;
+  if (good == ladder.size() || isDear(good)) return;
+  while (good == guess && guess > 0 && isGood(guess - 1)) good = --guess;
+  choose(work);
+}
+
+void Planner::measureCompressed(Work& work, bool all) {
+  constexpr double kAmple = 0.4;  // share of the tolerance that may be the pyramid's own, so that more pixels gain nothing
+  std::vector<PlanOption*> pyramids;
+  for (PlanOption& option : work.plan.options)
+    if (option.candidate.tool == "glint-pyramid") pyramids.push_back(&option);
+  const PlanOption* ample = nullptr;
+  for (PlanOption* pyramid : pyramids) {
+    std::vector<std::vector<PlanOption*>> ladders;
+    for (PlanOption& option : work.plan.options) {
+      if (option.candidate.source != pyramid->candidate.name() || option.costed) continue;
+      if (ample != nullptr) {
+        option.failure = "images of fewer pixels are good enough";
+      } else if (!pyramid->costed || !meets(work, *pyramid)) {
+        option.failure =
+            pyramid->failure.empty()
+                ? fmt::format("the pyramid that it is made of has a seen error of {:.2g} already", pyramid->errors->seen)
+                : "its pyramid cannot be made: " + pyramid->failure;
+      } else {
+        if (ladders.empty() || ladders.back().front()->candidate.method != option.candidate.method) ladders.emplace_back();
+        ladders.back().push_back(&option);
+      }
+    }
+    for (const std::vector<PlanOption*>& ladder : ladders) measureLadder(work, *pyramid, ladder, all);
+    const bool is_ample = !ladders.empty() && pyramid->errors->seen <= kAmple * work.plan.material->tolerance;
+    if (is_ample && ample == nullptr) ample = pyramid;
   }
 }
 

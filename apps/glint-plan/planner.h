@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,17 +10,14 @@
 
 namespace glint::apps {
 
-/// Share of a tolerance that a predicted error may reach: places that were not probed err differently.
-inline constexpr double kSafeShare = 0.8;
-
 /// A candidate of a material, as predicted.
 struct PlanOption {
   Candidate candidate;
   Costs costs;
-  double seen = -1;       ///< below 0: not measured, because a cheaper one was good enough
-  bool at_least = false;  ///< the error is `seen` or more
-  bool costed = false;    ///< whether the costs are known
-  std::string failure;    ///< why it was not measured; may be empty
+  std::optional<PlaceErrors> errors;  ///< nothing: not measured, because a cheaper one was good enough
+  bool at_least = false;              ///< errors are these or more: other sizes were not measured
+  bool costed = false;                ///< whether the costs are known
+  std::string failure;                ///< why it was not measured; may be empty
   double cost(Goal goal) const;
 };
 
@@ -55,6 +53,8 @@ class Planner {
   /// Measures what is compressed from the pyramid, each method from coarse to fine until it is good enough.
   /// @param all  also when it costs more than the choice so far
   void measureCompressed(Work& work, bool all);
+  /// Measures the settings of one method, compressed from one pyramid, until the coarsest one that is good enough is known.
+  void measureLadder(Work& work, const PlanOption& pyramid, std::vector<PlanOption*> ladder, bool all);
   bool cost(Work& work, PlanOption& option);
   bool meets(Work& work, PlanOption& option);
   bool affordable(const Work& work, const PlanOption& option) const;

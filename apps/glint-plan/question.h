@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "glint-plan/scene.h"
-#include "measure/workload.h"
+#include "glint/model/footprint.h"
 
 namespace glint::apps {
 
@@ -22,7 +22,13 @@ struct MapQuestion {
   std::string key() const;
 };
 
-/// Round footprints of these sizes at random places of a map.
-std::vector<FootprintSet> questionSets(std::uint64_t seed, const std::vector<float>& sizes, int places, int truths);
+/// Sizes at which errors are measured, at most.
+inline constexpr int kQuestionSizes = 5;
+/// Places at which the error of a plan is measured.
+inline constexpr int kQuestionPlaces = 48;
+
+/// Round footprints of one size at random places of a map.
+/// @param number  of the size: each has other places
+std::vector<Footprint> questionFootprints(std::uint64_t seed, std::size_t number, float sigma_texels);
 
 }  // namespace glint::apps
