@@ -20,9 +20,9 @@ namespace {
 
 constexpr int kVersion = 2;  // of the way in which probes measure: other versions' measurements are not used
 constexpr int kQueries = 512;
-constexpr double kLongestErrors_s = 2, kLongestTime_s = 0.004;
+constexpr double kLongestErrors_s = 3, kLongestTime_s = 0.004;
 /// Places after which errors are looked at: candidates that are clearly good or clearly bad are asked no more.
-constexpr int kSteps[] = {8, 24, kQuestionPlaces};
+constexpr int kSteps[] = {8, kUsualPlaces, kQuestionPlaces};
 
 /// Texels along an axis of a probe; 0: the map is no larger.
 int edgeOf(const MapQuestion& question, const NormalMap& map) {
@@ -156,7 +156,7 @@ PlaceErrors MapProbe::errorsOf(std::size_t candidate, std::size_t size, double t
     errors.seen = kept(key + "seen", [&] { return measured(places).seen; });
     errors.deviation = kept(key + "deviation", [&] { return measured(places).deviation; });
     errors.bias = kept(key + "bias", [&] { return measured(places).bias; });
-    errors.places = places;
+    errors.places = static_cast<int>(kept(key + "count", [&] { return double(measured(places).places); }));
     // Far beyond a tolerance no more places bring an error back to it.
     constexpr double kHopeless = 4;
     if (errors.seen - kHopeless * errors.deviation > tolerance || surelyWithin(errors, tolerance)) break;
@@ -167,7 +167,7 @@ PlaceErrors MapProbe::errorsOf(std::size_t candidate, std::size_t size, double t
 PlaceErrors MapProbe::errors(std::size_t candidate, double tolerance) {
   PlaceErrors largest;
   if (all_[candidate].tool.empty()) return largest;  // the texels themselves
-  const auto needs = [](const PlaceErrors& e) { return std::max(e.seen + kSureDeviations * e.deviation, e.bias / kBiasShare); };
+  const auto needs = [](const PlaceErrors& e) { return std::max(surelySeen(e), e.bias / kBiasShare); };
   for (std::size_t size = 0; size < sizes_.size() && surelyWithin(largest, tolerance); ++size) {
     const PlaceErrors errors = errorsOf(candidate, size, tolerance);
     if (needs(errors) > needs(largest)) largest = errors;

@@ -28,9 +28,18 @@ inline constexpr double kSureDeviations = 2;
 /// Share of a tolerance that may be bias, which the eye does not average over places.
 inline constexpr double kBiasShare = 1.0 / 3;
 
+/// Places that tell their own deviation. Fewer ones miss the few places that err most.
+inline constexpr int kUsualPlaces = 24;
+
+/// The seen error that other places will hardly exceed.
+inline double surelySeen(const PlaceErrors& errors) {
+  constexpr double kFewPlaces = 2;  // deviations of few places are taken so many times
+  return errors.seen + (errors.places < kUsualPlaces ? kFewPlaces : 1) * kSureDeviations * errors.deviation;
+}
+
 /// Whether errors are within a tolerance at other places, too.
 inline bool surelyWithin(const PlaceErrors& errors, double tolerance) {
-  return errors.seen + kSureDeviations * errors.deviation <= tolerance && errors.bias <= kBiasShare * tolerance;
+  return surelySeen(errors) <= tolerance && errors.bias <= kBiasShare * tolerance;
 }
 
 /// Measures candidates on small maps that stand for a large one, and predicts what they cost and err on it.

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "common/files.h"
+#include "glint-plan/light_band.h"
 #include "glint-plan/plan_candidates.h"
 #include "glint-plan/plan_text.h"
 #include "glint/model/error.h"
@@ -56,6 +57,7 @@ Json materialJson(const Scene& scene, const MaterialPlan& plan) {
             {"largest_texels", question.footprints.largest},
             {"sigma_r", plan.material->sigma_r},
             {"light_deg", question.light_deg},
+            {"sh_order", shOrder(question.light_deg, plan.material->sigma_r)},
             {"tolerance", plan.material->tolerance}}},
           {"asset", candidateJson(plan.choice().candidate)},
           {"predicted", std::move(predicted)},

@@ -25,7 +25,8 @@ std::string budgetText(const Budgets& budgets) {
 
 std::string lightText(const SceneLight& light) {
   if (light.type == "environment")
-    return fmt::format("an environment that changes over {:g} degrees and more", light.smooth_deg);
+    return light.smooth_deg > 0 ? fmt::format("an environment that changes over {:.3g} degrees and more", light.smooth_deg)
+                                : "an environment with sharp lights";
   if (!(light.smooth_deg > 0)) return fmt::format("a {} light, which is sharp", light.type);
   return fmt::format("a {} light {:g} degrees wide", light.type, light.smooth_deg);
 }
@@ -75,11 +76,10 @@ std::vector<std::string> reasonsOf(const Scene& scene, const MaterialPlan& plan)
     reasons.push_back("The texels themselves have no error.");
   } else {
     const PlaceErrors& errors = *choice.errors;
-    reasons.push_back(
-        fmt::format("Its seen error is {:.2g}, and up to {:.2g} at other places; the tolerance is {:g}. Its bias is {:.2g} of "
-                    "at most {:.2g}.",
-                    errors.seen, errors.seen + kSureDeviations * errors.deviation, plan.material->tolerance, errors.bias,
-                    kBiasShare * plan.material->tolerance));
+    reasons.push_back(fmt::format(
+        "Its seen error is {:.2g}, and up to {:.2g} at other places; the tolerance is {:g}. Its bias is {:.2g} of "
+        "at most {:.2g}.",
+        errors.seen, surelySeen(errors), plan.material->tolerance, errors.bias, kBiasShare * plan.material->tolerance));
   }
   reasons.push_back(fmt::format("Of {} candidates that were measured it has {} within the tolerance and the budgets.", compared,
                                 goalText(scene.goal)));
@@ -91,11 +91,11 @@ std::vector<std::string> reasonsOf(const Scene& scene, const MaterialPlan& plan)
     if (k >= plan.chosen || named || !option.costed || !option.errors) continue;
     methods.push_back(option.candidate.method);
     const PlaceErrors& errors = *option.errors;
-    const bool biased = errors.seen + kSureDeviations * errors.deviation <= plan.material->tolerance;
-    reasons.push_back(
-        biased ? fmt::format("{} would be cheaper, but its bias is {:.2g}.", option.candidate.name(), errors.bias)
-               : fmt::format("{} would be cheaper, but its seen error is {:.2g}, and up to {:.2g} at other places.",
-                             option.candidate.name(), errors.seen, errors.seen + kSureDeviations * errors.deviation));
+    const bool biased = surelySeen(errors) <= plan.material->tolerance;
+    reasons.push_back(biased
+                          ? fmt::format("{} would be cheaper, but its bias is {:.2g}.", option.candidate.name(), errors.bias)
+                          : fmt::format("{} would be cheaper, but its seen error is {:.2g}, and up to {:.2g} at other places.",
+                                        option.candidate.name(), errors.seen, surelySeen(errors)));
   }
   for (std::size_t k = 0; k < plan.chosen; ++k) {
     const PlanOption& option = plan.options[k];

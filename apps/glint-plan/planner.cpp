@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <string>
 #include <utility>
 
 #include "glint-plan/plan_candidates.h"
@@ -135,53 +137,49 @@ bool Planner::choose(Work& work) {
   return work.found;
 }
 
-void Planner::measureLadder(Work& work, const PlanOption& pyramid, std::vector<PlanOption*> ladder, bool all) {
-  // The error of the pyramid and that of the compression add up like independent errors: where the sum fits is the first guess.
-  const double tolerance = work.plan.material->tolerance, own = pyramid.errors->seen;
-  const double left = std::sqrt(std::max(0.0, tolerance * tolerance - own * own));
-  std::size_t guess = 0;
-  while (guess + 1 < ladder.size() && toleranceOf(ladder[guess]->candidate) > left) ++guess;
-  const auto isGood = [&](std::size_t k) {
-    PlanOption& option = *ladder[k];
-    if (!cost(work, option)) return false;
-    const bool too_dear = work.found && option.cost(scene_.goal) >= work.plan.choice().cost(scene_.goal);
-    return (all || !too_dear) && meets(work, option);
-  };
+std::size_t Planner::measureLadder(Work& work, const std::vector<PlanOption*>& ladder, std::size_t first, bool all) {
   const auto isDear = [&](std::size_t k) {
     return !all && work.found && ladder[k]->costed && ladder[k]->cost(scene_.goal) >= work.plan.choice().cost(scene_.goal);
   };
-  std::size_t good = guess;
-  while (good < ladder.size() && !isGood(good) && !isDear(good)) ++good;
-  if (good == ladder.size() || isDear(good)) return;
-  while (good == guess && guess > 0 && isGood(guess - 1)) good = --guess;
-  choose(work);
+  const auto isGood = [&](std::size_t k) { return cost(work, *ladder[k]) && !isDear(k) && meets(work, *ladder[k]); };
+  std::size_t k = first;
+  bool good = isGood(k);
+  // Coarser settings while this one is too dear, then finer ones until one is good enough, and again coarser ones while they are.
+  while (!good && isDear(k) && k > 0) good = isGood(--k);
+  while (!good && !isDear(k) && k + 1 < ladder.size()) good = isGood(++k);
+  while (good && k > 0 && isGood(k - 1)) --k;
+  if (good) choose(work);
+  return k;
 }
 
 void Planner::measureCompressed(Work& work, bool all) {
-  constexpr double kAmple = 0.4;  // share of the tolerance that may be the pyramid's own, so that more pixels gain nothing
-  std::vector<PlanOption*> pyramids;
-  for (PlanOption& option : work.plan.options)
-    if (option.candidate.tool == "glint-pyramid") pyramids.push_back(&option);
-  const PlanOption* ample = nullptr;
-  for (PlanOption* pyramid : pyramids) {
+  const double tolerance = work.plan.material->tolerance;
+  std::map<std::string, std::size_t> last;  // setting that the ladder of a method ended with, on images of fewer pixels
+  for (PlanOption& pyramid : work.plan.options) {
+    if (pyramid.candidate.tool != "glint-pyramid") continue;
     std::vector<std::vector<PlanOption*>> ladders;
+    const bool usable = pyramid.costed && meets(work, pyramid);
     for (PlanOption& option : work.plan.options) {
-      if (option.candidate.source != pyramid->candidate.name() || option.costed) continue;
-      if (ample != nullptr) {
-        option.failure = "images of fewer pixels are good enough";
-      } else if (!pyramid->costed || !meets(work, *pyramid)) {
+      if (option.candidate.source != pyramid.candidate.name()) continue;
+      if (!usable) {
         option.failure =
-            pyramid->failure.empty()
-                ? fmt::format("the pyramid that it is made of has a seen error of {:.2g} already", pyramid->errors->seen)
-                : "its pyramid cannot be made: " + pyramid->failure;
-      } else {
-        if (ladders.empty() || ladders.back().front()->candidate.method != option.candidate.method) ladders.emplace_back();
-        ladders.back().push_back(&option);
+            pyramid.failure.empty()
+                ? fmt::format("the pyramid that it is made of has a seen error of {:.2g} already", pyramid.errors->seen)
+                : "its pyramid cannot be made: " + pyramid.failure;
+        continue;
       }
+      if (ladders.empty() || ladders.back().front()->candidate.method != option.candidate.method) ladders.emplace_back();
+      ladders.back().push_back(&option);
     }
-    for (const std::vector<PlanOption*>& ladder : ladders) measureLadder(work, *pyramid, ladder, all);
-    const bool is_ample = !ladders.empty() && pyramid->errors->seen <= kAmple * work.plan.material->tolerance;
-    if (is_ample && ample == nullptr) ample = pyramid;
+    for (const std::vector<PlanOption*>& ladder : ladders) {
+      // The error of the pyramid and that of the compression add up like independent errors: where the sum fits is the first guess.
+      const double own = pyramid.errors->seen, left = std::sqrt(std::max(0.0, tolerance * tolerance - own * own));
+      std::size_t guess = 0;
+      while (guess + 1 < ladder.size() && toleranceOf(ladder[guess]->candidate) > left) ++guess;
+      const std::string& method = ladder.front()->candidate.method;
+      const auto known = last.find(method);
+      last[method] = measureLadder(work, ladder, known == last.end() ? guess : known->second, all);
+    }
   }
 }
 

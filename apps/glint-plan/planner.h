@@ -53,8 +53,10 @@ class Planner {
   /// Measures what is compressed from the pyramid, each method from coarse to fine until it is good enough.
   /// @param all  also when it costs more than the choice so far
   void measureCompressed(Work& work, bool all);
-  /// Measures the settings of one method, compressed from one pyramid, until the coarsest one that is good enough is known.
-  void measureLadder(Work& work, const PlanOption& pyramid, std::vector<PlanOption*> ladder, bool all);
+  /// Measures settings of one method, compressed from one pyramid, until the coarsest one that is good enough is known.
+  /// @param first  number of the setting to begin with
+  /// @return number of the setting that it ended with
+  std::size_t measureLadder(Work& work, const std::vector<PlanOption*>& ladder, std::size_t first, bool all);
   bool cost(Work& work, PlanOption& option);
   bool meets(Work& work, PlanOption& option);
   bool affordable(const Work& work, const PlanOption& option) const;

@@ -25,7 +25,7 @@ struct MapQuestion {
 /// Sizes at which errors are measured, at most.
 inline constexpr int kQuestionSizes = 5;
 /// Places at which the error of a plan is measured.
-inline constexpr int kQuestionPlaces = 48;
+inline constexpr int kQuestionPlaces = 96;
 
 /// Round footprints of one size at random places of a map.
 /// @param number  of the size: each has other places

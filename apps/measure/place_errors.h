@@ -47,7 +47,7 @@ class PlaceSample {
   /// @param longest_s  of all processors, after which a slow model is asked no more; then there are fewer places, at least kFewest
   PlaceErrors ask(int places, double longest_s);
 
-  static constexpr int kFewest = 4;
+  static constexpr int kFewest = 12;
 
  private:
   void askNext();
