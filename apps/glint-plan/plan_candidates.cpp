@@ -7,6 +7,7 @@
 #include <numbers>
 #include <string>
 
+#include "glint/bake/pyramid/asked_levels.h"
 #include "measure/light_blur.h"
 
 namespace glint::apps {
@@ -22,17 +23,13 @@ int finestMoments(double smallest, int width, int height) {
 
 /// Whole texels between images such that level 0 answers the smallest footprint.
 int strideOf(double smallest, int width, int height) {
-  constexpr double kSmallestOverLevel = 1.2;  // of sizes that level 0 answers
-  const int most = std::max(2, std::min(width, height) / 4);
-  return std::clamp(static_cast<int>(smallest / (kSmallestOverLevel * kLevelSigma)), 2, most);
+  return std::min(bake::strideFor(smallest), std::max(2, std::min(width, height) / 4));
 }
 
 /// Levels whose images are as large as the largest footprint needs.
 int levelsOf(double largest, int stride, int width, int height) {
-  constexpr double kLargestOverLevel = 1.9;  // of sizes that a level answers without the next
   const int most = std::max(1, 1 + static_cast<int>(std::log2(std::min(width, height) / static_cast<double>(stride))));
-  const double needed = std::ceil(std::log2(largest / (kLargestOverLevel * kLevelSigma * stride))) + 1;
-  return std::clamp(static_cast<int>(needed), 1, most);
+  return std::min(bake::levelsFor(largest, stride), most);
 }
 
 /// Pixels of images along each axis: 256, and fewer where the facets or the light are so wide that fewer may do.

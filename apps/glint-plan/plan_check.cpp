@@ -96,7 +96,7 @@ double CheckedMaterial::overCheapest(Goal goal) const {
 
 namespace {
 
-void sweepCandidates(Tool& tool, MapCheck& check, Goal goal, CheckedMaterial& material) {
+void sweepCandidates(MapCheck& check, Goal goal, CheckedMaterial& material, std::vector<std::string>& warnings) {
   const double planned = costOf(material.actual.costs, goal);
   std::string done;  // method and pyramid that need no finer setting
   for (const Candidate& candidate : check.all()) {
@@ -109,7 +109,7 @@ void sweepCandidates(Tool& tool, MapCheck& check, Goal goal, CheckedMaterial& ma
       if (dear || material.holds(option)) done = ladder;
       if (!dear) material.sweep.push_back(std::move(option));
     } catch (const Error& error) {
-      tool.warn(candidate.name() + " cannot be made: " + error.what());
+      warnings.push_back(candidate.name() + " cannot be made: " + error.what());
     }
   }
 }
@@ -119,6 +119,7 @@ void sweepCandidates(Tool& tool, MapCheck& check, Goal goal, CheckedMaterial& ma
 std::vector<CheckedMaterial> checkPlan(Tool& tool, const AssetFolder& folder, const PlanFile& plan, const std::string& maps,
                                        bool sweep) {
   std::vector<CheckedMaterial> checked;
+  std::vector<std::string> warnings;  // a warning ends the progress, so warnings come last
   const bake::ProgressFn progress = tool.progress("materials");
   for (const PlannedMaterial& planned : plan.materials) {
     const SceneMaterial& material = plan.scene.materials[planned.index];
@@ -131,9 +132,10 @@ std::vector<CheckedMaterial> checkPlan(Tool& tool, const AssetFolder& folder, co
     CheckedOption actual = check.costOf(planned.candidate);
     actual.errors = check.errorsOf(planned.candidate);
     checked.push_back({&planned, std::move(actual), material.tolerance, {}});
-    if (sweep) sweepCandidates(tool, check, plan.scene.goal, checked.back());
+    if (sweep) sweepCandidates(check, plan.scene.goal, checked.back(), warnings);
     if (progress) progress(checked.size(), plan.materials.size());
   }
+  for (const std::string& warning : warnings) tool.warn(warning);
   return checked;
 }
 

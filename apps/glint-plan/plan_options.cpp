@@ -29,8 +29,9 @@ PlanOptions::PlanOptions(Tool& tool) : tool_(tool) {
               "instead of a scene: a plan to build and to measure; ends with exit code 7 if it does not hold")
       .defaultText("none")
       .unrecorded();
-  tool.flag("--sweep", sweep_,
-            "with --check: build and measure every candidate, and say how far the plan is from the cheapest");
+  tool.flag(
+      "--sweep", sweep_,
+      "with --check: build every candidate, measure those that take no more, and say how far the plan is from the cheapest");
   assets_option_ =
       &tool.option("--assets", assets_, "folder in which assets stay").defaultText("none: they are removed").unrecorded();
   tool.usesSeed();

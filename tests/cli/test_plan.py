@@ -1,7 +1,9 @@
 """glint-plan: the cheapest method for every map of a scene; plans hold; errors name the field of the scene."""
 
 import json
+import math
 import pathlib
+import re
 import subprocess
 
 import jsonschema
@@ -106,13 +108,57 @@ def test_rules_build_exactly_the_plan(plan, glint):
     assert str(info["result"]["properties"]["finest_level"]) == asset["flags"][asset["flags"].index("--finest") + 1]
 
 
+def test_jobs_build_exactly_the_plan(plan, glint):
+    process, made = plan(scene(material("noise.png", 8, 16, 0.4, sigma_r=0.05), lights=SKY), "--jobs", "jobs.json")
+    assert process.returncode == 0, process.stderr
+    jobs = json.loads((glint.folder / "jobs.json").read_text())
+    check_schema(jobs, "jobs")
+    (glint.folder / "assets").mkdir()
+    done, files = set(), {"noise.png"}
+    for job in jobs["jobs"]:
+        assert set(job["after"]) <= done and set(job["inputs"]) <= files, "a job comes after those that it needs"
+        program, *arguments = job["command"]
+        assert glint(program.removeprefix("glint-"), *arguments).returncode == 0
+        done.add(job["id"])
+        files |= set(job["outputs"])
+    size = (glint.folder / jobs["materials"][0]["asset"]).stat().st_size
+    assert size == pytest.approx(made["materials"][0]["predicted"]["bytes"], rel=0.02)
+
+
+def write_sky(path, sun, rows=32):
+    """A Radiance picture of light that fades from the zenith down, with or without a pixel of sun."""
+    pixels = b""
+    for row in range(rows):
+        value = 1 + math.cos(math.pi * (row + 0.5) / rows)
+        for column in range(2 * rows):
+            mantissa, exponent = math.frexp(1000.0 if sun and (row, column) == (4, 9) else value)
+            pixels += bytes([int(256 * mantissa)] * 3 + [128 + exponent])
+    path.write_bytes(f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {rows} +X {2 * rows}\n".encode() + pixels)
+
+
+def test_band_limits_of_environments_are_measured(plan, glint):
+    write_sky(glint.folder / "soft.hdr", sun=False)
+    write_sky(glint.folder / "sun.hdr", sun=True)
+    texts = []
+    for name in "soft.hdr", "sun.hdr":
+        document = scene(material(), lights=[{"type": "environment", "image": name}])
+        check_schema(document, "scene")
+        (glint.folder / "scene.json").write_text(json.dumps(document))
+        process = glint("plan", "scene.json", "--explain")
+        assert process.returncode == 0, process.stderr
+        texts.append(process.stdout)
+    degrees = float(re.search(r"Errors are seen under an environment that changes over ([0-9.]+) degrees", texts[0]).group(1))
+    assert degrees > 40, "a sky that fades from the zenith to the ground has a few bands"
+    assert "Errors are seen under an environment with sharp lights" in texts[1]
+
+
 def test_measurements_are_kept(plan, glint):
     document = scene(material("noise.png", 8, 16, 0.5, sigma_r=0.1), lights=SKY)
     _, first = plan(document, "--cache", "probes")
     kept = list((glint.folder / "probes").iterdir())
     assert [path.name for path in kept] == [first["materials"][0]["map"]["hash"] + ".probe.json"]
     values = json.loads(kept[0].read_text())
-    kept[0].write_text(json.dumps({key: 0.25 if " seen at " in key else value for key, value in values.items()}))
+    kept[0].write_text(json.dumps({key: 0.25 if key.endswith(": seen") else value for key, value in values.items()}))
     _, second = plan(document, "--cache", "probes")
     assert second["materials"][0]["predicted"]["seen"] == 0.25, "the kept measurement is used"
 
@@ -143,6 +189,9 @@ CAMERA = {"nearest": 2, "farthest": 4, "field_of_view_deg": 40, "columns": 1000}
     (scene(material(smallest=9, largest=8)), "materials[0].footprints.largest_texels"),
     (scene(material(), lights=[]), "lights"),
     (scene(material(), lights=[{"type": "environment"}]), "lights[0].band_limit_deg"),
+    (scene(material(), lights=[{"type": "environment", "image": "missing.exr"}]), "lights[0].image"),
+    (scene(material(), lights=[{"type": "environment", "image": "flakes.png"}]), "lights[0].image"),
+    (scene(material(), lights=[{"type": "environment", "image": "sky.exr", "band_limit_deg": 5}]), "lights[0].band_limit_deg"),
     (scene(material(), camera=CAMERA | {"farthest": 1}), "camera.farthest"),
     (scene(material(budgets={"bytes": -1})), "materials[0].budgets.bytes"),
     (scene(material(), minimise="beauty"), "minimise"),

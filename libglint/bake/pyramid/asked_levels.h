@@ -4,7 +4,7 @@ namespace glint::bake {
 
 /// The stride between the images of level 0 that answers footprints from this size on, whole texels, at least 2.
 /// @param smallest_texels  deviation of the smallest footprint
-/// @note smaller footprints are answered by level 0 too, which sees them as wide as its own (NdfPyramidModel::smallestSigma)
+/// @note smaller footprints are answered by level 0 too, which sees them as wide as its own (PyramidNdf::smallestSigma)
 int strideFor(double smallest_texels);
 
 /// The number of levels of footprints up to this size, at least 1, as many as PyramidShape holds at most.
