@@ -16,7 +16,7 @@ PyramidOptions::PyramidOptions(Tool& tool) {
   tool.option(
           "--finest", finest_,
           "instead of --stride: deviation of the smallest footprint that will be asked, texels; finer levels are left out, and "
-          "smaller footprints are answered by the finest level")
+          "queries about smaller footprints need the map: glint-query --normals")
       .range(0.05, 28000)
       .excludes(stride)
       .defaultText("none");

@@ -4,7 +4,7 @@ namespace glint::bake {
 
 /// The stride between the images of level 0 that answers footprints from this size on, whole texels, at least 2.
 /// @param smallest_texels  deviation of the smallest footprint
-/// @note smaller footprints are answered by level 0 too, which sees them as wide as its own (PyramidNdf::smallestSigma)
+/// @note without the map, smaller footprints are seen as wide as those of level 0: PyramidNdf::smallestSigma says from which size on
 int strideFor(double smallest_texels);
 
 /// The number of levels of footprints up to this size, at least 1, as many as PyramidShape holds at most.
