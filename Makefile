@@ -27,8 +27,9 @@ python: build $(venv)/requirements.txt  ## the Python package: a wheel in build/
 	  --config-settings=cmake.define.GLINT_BUILD_TREE=$(CURDIR)/build --config-settings=cmake.define.GLINT_STATIC_HDF5=ON
 	@PATH="$(CURDIR)/$(venv)/bin:$$PATH" auditwheel repair --wheel-dir build/wheels build/python/wheels/*.whl 2>build/python/auditwheel.log \
 	  || { cat build/python/auditwheel.log >&2; exit 1; }
+	@$(PYTHON) python/sbom.py build/wheels/*.whl --build build --build build/python -o build/wheels/glint_ndf.cdx.json
 	@$(venv)/bin/pip install --quiet --force-reinstall --no-deps build/wheels/*.whl
-	@echo "$$(ls build/wheels/*.whl), installed in $(venv)"
+	@echo "$$(ls build/wheels/*.whl), with a list of its libraries beside it; installed in $(venv)"
 
 requirements := python/requirements.txt tests/python/integrations/requirements.txt
 $(venv)/requirements.txt: $(requirements) packages.txt | packages
@@ -44,6 +45,15 @@ test: build python  ## build and run the tests, except slow ones
 .PHONY: test-all
 test-all: build python  ## the same with the slow ones: fuzzing, large maps
 	ctest --preset release --parallel $(JOBS) --no-label-summary
+
+# A file that breaks something lands in build-fuzz/. Put it, made small by -minimize_crash=1, into tests/fuzz/corpus.
+SECONDS := 60
+.PHONY: fuzz
+fuzz: | packages  ## fuzz the reader, the validator and all queries for SECONDS=60, guided by coverage
+	cmake --preset fuzz
+	cmake --build --preset fuzz --parallel $(JOBS) --target glint-fuzz
+	@mkdir -p build-fuzz/corpus
+	cd build-fuzz && bin/glint-fuzz -max_total_time=$(SECONDS) -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 corpus ../tests/fuzz/corpus ../tests/golden/v1.0
 
 .PHONY: bench
 bench: build  ## time whole commands and queries on 2K^2 maps; writes build/bench/results.json

@@ -77,20 +77,28 @@ function(glint_add_library room)
   set_target_properties(glint_${room} PROPERTIES EXPORT_NAME ${room} CXX_EXTENSIONS OFF)
 endfunction()
 
-# For full builds: large headers are parsed once, and sources of a target that agree on names are compiled together. Off by default,
-# because ccache does not keep objects that were compiled with precompiled headers.
+# Large headers are parsed once. Not where ccache is: it does not keep objects that were compiled with precompiled headers.
+if(CCACHE_PROGRAM)
+  set(precompile OFF)
+else()
+  set(precompile ON)
+endif()
+option(GLINT_PRECOMPILE_HEADERS "Precompile headers" ${precompile})
+
+# For full builds: sources of a target that agree on names are compiled together, and headers precompiled with ccache, too. Off by
+# default, because a change of one source then compiles all of them.
 option(GLINT_FAST_FULL_BUILD "Precompile headers and compile sources together" OFF)
 
 # Of headers that make each source that does not need them slower (CLI11, nlohmann-json): only where most sources do.
 function(glint_precompile_headers owner)
-  if(GLINT_FAST_FULL_BUILD)
+  if(GLINT_PRECOMPILE_HEADERS OR GLINT_FAST_FULL_BUILD)
     target_precompile_headers(${owner} PRIVATE ${ARGN})
   endif()
 endfunction()
 
 # Targets use the precompiled headers of the first one. They must be compiled with all of its definitions.
 function(glint_share_precompiled_headers owner)
-  if(GLINT_FAST_FULL_BUILD)
+  if(GLINT_PRECOMPILE_HEADERS OR GLINT_FAST_FULL_BUILD)
     foreach(target IN LISTS ARGN)
       target_precompile_headers(${target} REUSE_FROM ${owner})
     endforeach()

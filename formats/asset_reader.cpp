@@ -1,11 +1,13 @@
 #include "glint/formats/asset_reader.h"
 
+#include <utility>
+
 #include "glint/formats/load.h"
 
 namespace glint::formats {
 
 struct Asset::State {
-  std::string path;
+  Findings findings;
   LoadedAsset loaded;
 };
 
@@ -15,15 +17,36 @@ Asset& Asset::operator=(Asset&&) noexcept = default;
 Asset::~Asset() = default;
 
 Asset Asset::open(const std::filesystem::path& path, const OpenOptions& options) {
-  Findings findings(path);
-  auto state = std::make_unique<State>(State{path.string(), loadAsset(path, findings)});
-  // Values first: they say which texel is wrong where a hash can only say which dataset.
-  if (options.check_values && !findings.failed()) state->loaded.kind->check_values(*state->loaded.asset, findings);
-  if (options.verify_hashes && !findings.failed()) checkHashes(state->loaded, findings);
-  findings.throwFirstError();
-  for (const Finding& finding : findings.report().findings) {
-    state->loaded.info.warnings.push_back(finding.object + ": " + finding.message);
+  auto state = std::make_unique<State>(State{Findings(path), {}});
+  state->loaded = loadFile(state->findings, options.copy);
+  return checked(std::move(state), options);
+}
+
+Asset Asset::openMemory(std::span<const std::byte> bytes, const std::string& name, const OpenOptions& options) {
+  auto state = std::make_unique<State>(State{Findings(name), {}});
+  state->loaded = loadAsset(FileBytes::ofMemory(bytes, options.copy), state->findings);
+  return checked(std::move(state), options);
+}
+
+Asset Asset::openSource(const AssetSource& source, const OpenOptions& options) {
+  auto state = std::make_unique<State>(State{Findings(source.name), {}});
+  try {
+    state->loaded = loadAsset(FileBytes::ofSource(source.size, source.read), state->findings);
+  } catch (const Error& error) {
+    state->findings.add(error);
   }
+  return checked(std::move(state), options);
+}
+
+Asset Asset::checked(std::unique_ptr<State> state, const OpenOptions& options) {
+  Findings& findings = state->findings;
+  LoadedAsset& loaded = state->loaded;
+  // Values first: they say which texel is wrong where a hash can only say which dataset.
+  if (options.check_values && !findings.failed()) checkValues(loaded, findings);
+  if (options.verify_hashes && !findings.failed()) checkHashes(loaded, findings);
+  findings.throwFirstError();
+  for (const Finding& finding : findings.report().findings)
+    loaded.info.warnings.push_back(finding.object + ": " + finding.message);
   return Asset(std::move(state));
 }
 
@@ -35,7 +58,7 @@ const AnyAsset& Asset::any() const { return *state_->loaded.asset; }
 
 void Asset::refuse(const AnyAsset& wanted) const {
   const std::string kind(kinds()[wanted.index()]->schema.name);
-  throw Error(ErrorCode::unsupported, "format.kind", state_->path, {},
+  throw Error(ErrorCode::unsupported, "format.kind", state_->findings.path(), {},
               "is of kind " + state_->loaded.info.kind + ", not " + kind, "pass an asset of kind " + kind);
 }
 

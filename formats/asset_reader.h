@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -55,21 +58,40 @@ struct OpenOptions {
   bool verify_hashes =
       false;  ///< also compare datasets with their hashes, and bytes between objects with 0; reads the whole file
   bool check_values = false;  ///< also check values as validateAsset() does (finite, in the disk, ...); reads the whole file
+  /// Copy the bytes into memory instead of using them in place: for files that others may change or truncate while they are open,
+  /// and for memory that does not stay.
+  bool copy = false;
+};
+
+/// Bytes of an asset that are neither a file nor in memory, for example a part of an archive.
+struct AssetSource {
+  std::string name;        ///< name of the asset in messages
+  std::uint64_t size = 0;  ///< bytes of the asset
+  /// Fills `to` with the bytes from `offset` on. Called for ranges inside the asset only. Returns false where reading fails.
+  std::function<bool(std::uint64_t offset, std::span<std::byte> to)> read;
 };
 
 /// An asset of any kind, mapped read-only. The structs that it returns point into the mapping and live as long as it does.
 ///
 /// Safe on untrusted input: the structure and every index that a query follows are checked by open(), so no query reads out of
 /// bounds, and answers are finite whatever the values are; values (finite, in the disk) are checked by openForBuilding() and
-/// validateAsset() only. The file must not be changed or truncated in place while it is open: the writers of this library never
-/// do, they replace files.
+/// validateAsset() only. A file that is mapped must not be changed or truncated in place while it is open: the writers of this
+/// library never do, they replace files. Open files that others may truncate with OpenOptions::copy.
 class Asset {
  public:
-  /// Opens and checks an asset. HDF5 is not used after this returns.
+  /// Opens and checks an asset.
   /// @throws Error  io: cannot be opened; invalid_input: breaks a rule (its id is in the error); unsupported: a newer major
   ///                version, an unknown feature or kind
-  /// @note O(size of the index arrays); with verify_hashes O(file). Thread-safe: one file is opened at a time.
+  /// @note O(size of the index arrays); with verify_hashes or copy O(file). Thread-safe, without a lock.
   static Asset open(const std::filesystem::path& path, const OpenOptions& options = {});
+
+  /// The same for the bytes of a file in memory, which must stay unchanged as long as the asset. They are copied with
+  /// OpenOptions::copy, and where they do not start at a multiple of 64.
+  /// @param name  name of the asset in messages
+  static Asset openMemory(std::span<const std::byte> bytes, const std::string& name, const OpenOptions& options = {});
+
+  /// The same for bytes that a function reads. All bytes are read into memory before this returns.
+  static Asset openSource(const AssetSource& source, const OpenOptions& options = {});
 
   /// Opens an asset to make something of all that it holds: builders trust their inputs, so hashes and values are checked, too.
   /// @throws Error  as open(); invalid_input also for values, naming the first texel that is wrong
@@ -99,6 +121,7 @@ class Asset {
  private:
   struct State;
   explicit Asset(std::unique_ptr<State> state);
+  static Asset checked(std::unique_ptr<State> state, const OpenOptions& options);
   [[noreturn]] void refuse(const AnyAsset& wanted) const;
 
   std::unique_ptr<State> state_;

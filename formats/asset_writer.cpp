@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "glint/formats/atomic_file.h"
+#include "glint/formats/digest.h"
 #include "glint/formats/hash.h"
 #include "glint/formats/hdf5_handle.h"
 #include "glint/formats/load.h"
@@ -67,8 +69,39 @@ Attributes commonValues(std::string_view kind, const Provenance& provenance) {
           {"required_features", {ElementType::text, false, {}, {}}},
           {"kind", text(std::string(kind))},
           {"generator", text(provenance.generator)},
-          {"command", text(provenance.command_json)},
+          {"command", text(provenance.command_json.empty() ? "{}" : provenance.command_json)},
           {"inputs", {ElementType::text, false, {}, std::move(inputs)}}};
+}
+
+/// Attributes of a dataset.
+Attributes attributesOf(const PackedArray& array, const std::string& hash) {
+  return {
+      {"long_name", text(std::string(array.long_name))}, {"units", text(std::string(array.units))}, {"xxh3_128", text(hash)}};
+}
+
+/// Groups of the arrays, those that hold groups included.
+std::set<std::string> groupsOf(const PackedAsset& packed) {
+  std::set<std::string> groups;
+  for (const PackedArray& array : packed.arrays) addGroups(array.path, groups);
+  return groups;
+}
+
+/// Attributes of the root, the digest of the whole asset included.
+Attributes rootAttributes(const PackedAsset& packed, const Provenance& provenance,
+                          const std::map<std::string, std::string>& hashes) {
+  FileStructure file;
+  file.attributes = commonValues(packed.kind, provenance);
+  file.attributes.insert(packed.attributes.begin(), packed.attributes.end());
+  for (const std::string& group : groupsOf(packed)) file.groups[group];
+  for (const PackedArray& array : packed.arrays) {
+    DatasetRecord& record = file.datasets[array.path];
+    record.known_type = true;
+    record.type = array.type;
+    record.dims = array.dims;
+    record.attributes = attributesOf(array, hashes.at(array.path));
+  }
+  file.attributes[std::string(kDigestAttribute)] = text(digestOf(file));
+  return std::move(file.attributes);
 }
 
 /// Writes everything but the bytes of the datasets, and finds the places of these bytes in the file.
@@ -87,9 +120,7 @@ class MetadataWriter {
     {
       hdf5::Handle file = create();
       const hdf5::Handle root(H5Gopen2(file, "/", H5P_DEFAULT), "cannot be written", "/", ErrorCode::io);
-      Attributes attributes = commonValues(packed_.kind, provenance);
-      attributes.insert(packed_.attributes.begin(), packed_.attributes.end());
-      for (const auto& [name, value] : attributes) writeAttribute(root, name, value, types);
+      for (const auto& [name, value] : rootAttributes(packed_, provenance, hashes_)) writeAttribute(root, name, value, types);
       createGroups(file);
       createDatasets(file, false, types);
       hdf5::check(file.close(), "cannot be written", {}, ErrorCode::io);
@@ -131,12 +162,7 @@ class MetadataWriter {
   }
 
   void createGroups(hid_t file) const {
-    std::set<std::string> groups;
-    for (const PackedArray& array : packed_.arrays) {
-      const std::size_t slash = array.path.rfind('/');
-      if (slash != std::string::npos) groups.insert(array.path.substr(0, slash));
-    }
-    for (const std::string& group : groups) {
+    for (const std::string& group : groupsOf(packed_)) {
       const hdf5::Handle handle(H5Gcreate2(file, group.c_str(), H5P_DEFAULT, creation(H5P_GROUP_CREATE), H5P_DEFAULT),
                                 "cannot be written", "/" + group, kIo);
     }
@@ -163,9 +189,7 @@ class MetadataWriter {
     const hdf5::Handle dataset(
         H5Dcreate2(file, array.path.c_str(), types[array.type], space, H5P_DEFAULT, properties, H5P_DEFAULT),
         "cannot be written", object, kIo);
-    writeAttribute(dataset, "long_name", text(std::string(array.long_name)), types);
-    writeAttribute(dataset, "units", text(std::string(array.units)), types);
-    writeAttribute(dataset, "xxh3_128", text(hashes_.at(array.path)), types);
+    for (const auto& [name, value] : attributesOf(array, hashes_.at(array.path))) writeAttribute(dataset, name, value, types);
     if (array.size_bytes == 0) return;
     const haddr_t offset = H5Dget_offset(dataset);
     if (offset == HADDR_UNDEF) hdf5::fail("has no place in the file", object, kIo);
@@ -195,7 +219,7 @@ std::map<std::string, std::uint64_t> writeMetadata(AtomicFile& file, const Packe
 /// Reads the finished file as a reader would.
 void checkWritten(const fs::path& temporary) {
   Findings findings(temporary);
-  loadAsset(temporary, findings);
+  loadFile(findings);
   for (const Finding& finding : findings.report().findings) {
     if (finding.severity != Severity::error) continue;
     if (findRule(finding.rule).code == ErrorCode::io)

@@ -208,6 +208,12 @@ void checkConformance(const FileStructure& structure, const KindSchema& schema, 
     }
     place = end - 1;
   }
+  std::set<std::string> groups;
+  for (const std::string& path : known) addGroups(path, groups);
+  for (const auto& [path, attributes] : structure.groups) {
+    if (!groups.contains(path)) findings.add("group.unknown", "/" + path, "is not in the schema");
+    warnOfUnknown(attributes, "/" + path, {}, {}, findings);
+  }
   for (const auto& [path, record] : structure.datasets) {
     if (!known.contains(path)) findings.add("dataset.unknown", "/" + path, "is not in the schema");
   }

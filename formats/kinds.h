@@ -12,6 +12,7 @@
 #include "glint/model/sh.h"
 #include "glint/model/slope_moments.h"
 #include "glint/model/tiny_example.h"
+#include "glint/model/wang_images.h"
 #include "glint/model/wang_tiles.h"
 #include "glint/model/wave_pyramid.h"
 
@@ -20,7 +21,7 @@ namespace glint::formats {
 /// The struct of any kind of asset: the one list of kinds, in the order of their names. To add a kind, add its struct and its
 /// name here, and describe the kind in a file of formats/kinds/.
 using AnyAsset = std::variant<BinMap, Displacement, HeightMap, HistogramSat, NdfCp, NdfPyramid, NormalMap, ShLight, ShLobes,
-                              SlopeMoments, TinyExample, WangTiles, WavePyramid>;
+                              SlopeMoments, TinyExample, WangCp, WangPyramid, WangTiles, WavePyramid>;
 
 /// Name of the kind whose assets are of struct `Model`, as files and messages have it, e.g. "bin-map".
 template <class Model>
@@ -47,6 +48,10 @@ template <>
 inline constexpr std::string_view kKindName<SlopeMoments> = "slope-moments";
 template <>
 inline constexpr std::string_view kKindName<TinyExample> = "tiny-example";
+template <>
+inline constexpr std::string_view kKindName<WangCp> = "wang-cp";
+template <>
+inline constexpr std::string_view kKindName<WangPyramid> = "wang-pyramid";
 template <>
 inline constexpr std::string_view kKindName<WangTiles> = "wang-tiles";
 template <>

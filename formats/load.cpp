@@ -1,9 +1,12 @@
 #include "glint/formats/load.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "glint/formats/conformance.h"
+#include "glint/formats/digest.h"
 #include "glint/formats/hash.h"
+#include "glint/formats/json_text.h"
 
 namespace glint::formats {
 namespace {
@@ -37,7 +40,7 @@ AssetInfo describe(const FileStructure& structure) {
     const std::size_t gap = line.find("  ");
     info.provenance.inputs.push_back({gap == std::string::npos ? std::string() : line.substr(gap + 2), line.substr(0, gap)});
   }
-  info.file_bytes = structure.mapping.size();
+  info.file_bytes = structure.bytes.size();
   for (const auto& [path, record] : structure.datasets) {
     info.datasets.push_back({"/" + path, record.known_type ? std::string(name(record.type)) : "unknown", record.dims,
                              record.size_bytes, record.offset, textOf(record.attributes, "xxh3_128"),
@@ -61,8 +64,7 @@ std::vector<AttributeInfo> describe(const Attributes& attributes, const KindSche
 
 /// Looks for bytes that belong to no object and are not 0.
 void checkPadding(const FileStructure& structure, Findings& findings) {
-  if (!structure.places.complete) return;
-  const std::byte* bytes = structure.mapping.data();
+  const std::byte* bytes = structure.bytes.data();
   const auto check = [&](std::uint64_t begin, std::uint64_t end) {
     const std::byte* bad = std::find_if(bytes + begin, bytes + end, [](std::byte b) { return b != std::byte{0}; });
     if (bad == bytes + end) return;
@@ -70,18 +72,36 @@ void checkPadding(const FileStructure& structure, Findings& findings) {
                  "has a byte that is not 0 at offset " + std::to_string(bad - bytes) + ", where no object is");
   };
   std::uint64_t end = 0;
-  for (const Extent& extent : structure.places.extents) {
+  for (const Extent& extent : structure.extents) {
     if (extent.begin > end) check(end, extent.begin);
     end = std::max(end, extent.end);
   }
-  check(end, structure.mapping.size());
+  check(end, structure.bytes.size());
+}
+
+void checkDigest(const FileStructure& structure, Findings& findings) {
+  const std::string stored = textOf(structure.attributes, kDigestAttribute);
+  if (!structure.attributes.contains(kDigestAttribute)) return;
+  const std::string actual = digestOf(structure);
+  if (stored != actual) findings.add("file.digest", {}, "has contents with digest " + actual + ", not " + stored);
 }
 
 }  // namespace
 
-LoadedAsset loadAsset(const std::filesystem::path& path, Findings& findings) {
+LoadedAsset loadFile(Findings& findings, bool copy) {
+  FileBytes bytes;
+  try {
+    bytes = FileBytes::ofFile(findings.path(), copy);
+  } catch (const Error& error) {
+    findings.add(error);
+    return {};
+  }
+  return loadAsset(std::move(bytes), findings);
+}
+
+LoadedAsset loadAsset(FileBytes bytes, Findings& findings) {
   LoadedAsset loaded;
-  loaded.structure = readStructure(path, findings);
+  loaded.structure = readStructure(std::move(bytes), findings);
   if (loaded.structure.attributes.empty() && findings.failed()) return loaded;
   loaded.info = describe(loaded.structure);
   findings.report().kind = loaded.info.kind;
@@ -98,7 +118,14 @@ LoadedAsset loadAsset(const std::filesystem::path& path, Findings& findings) {
   return loaded;
 }
 
+void checkValues(const LoadedAsset& loaded, Findings& findings) {
+  if (!isJsonObject(loaded.info.provenance.command_json)) findings.add("attribute.json", "/@command", "is no JSON object");
+  loaded.kind->check_values(*loaded.asset, findings);
+}
+
 void checkHashes(const LoadedAsset& loaded, Findings& findings) {
+  if (loaded.structure.extents.empty()) return;  // the structure could not be read
+  checkDigest(loaded.structure, findings);
   checkPadding(loaded.structure, findings);
   for (const auto& [path, record] : loaded.structure.datasets) {
     const std::string stored = textOf(record.attributes, "xxh3_128");

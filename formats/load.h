@@ -19,10 +19,17 @@ struct LoadedAsset {
   const Kind* kind = nullptr;
 };
 
-/// Reads a file and checks structure, schema and indices. Broken rules are added to `findings`.
-LoadedAsset loadAsset(const std::filesystem::path& path, Findings& findings);
+/// Checks structure, schema and indices of the bytes of a file. Broken rules are added to `findings`.
+LoadedAsset loadAsset(FileBytes bytes, Findings& findings);
 
-/// Compares every dataset with its hash attribute, and the bytes between objects with 0: then every bit of the file is checked.
+/// The same for the file at the path of `findings`. Where it cannot be read, that is a finding, too.
+LoadedAsset loadFile(Findings& findings, bool copy = false);
+
+/// Checks the values of the kind, and the texts that all kinds have. Only for assets without a broken rule.
+void checkValues(const LoadedAsset& loaded, Findings& findings);
+
+/// Compares the asset with its digest, every dataset with its hash, and the bytes between objects with 0: then every bit of the
+/// file is checked.
 void checkHashes(const LoadedAsset& loaded, Findings& findings);
 
 }  // namespace glint::formats

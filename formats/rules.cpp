@@ -16,6 +16,8 @@ using enum ErrorCode;
 constexpr std::string_view kDamaged = "the file is damaged: make it again or restore a copy";
 constexpr std::string_view kAppended = "remove what was appended to the file, or make it again";
 constexpr std::string_view kForeign = "write assets with the glint tools, or follow formats/SPEC.md";
+constexpr std::string_view kRewrite =
+    "make the file again with the glint tools: copies by other programs may have chunks, filters or heaps (SPEC.md, section 2)";
 constexpr std::string_view kHostile = "do not trust this file";
 constexpr std::string_view kUpdate = "read it with a newer version of glint";
 
@@ -27,14 +29,19 @@ constexpr std::array kIndexRules = {
          kForeign},
     Rule{"file.truncated", error, invalid_input, "the file is as long as its superblock says", kDamaged},
     Rule{"file.trailing", error, invalid_input, "the file is not longer than its superblock says", kAppended},
-    Rule{"file.hdf5", error, invalid_input, "HDF5 can read the file's metadata and its checksums hold", kDamaged},
+    Rule{"file.hdf5", error, invalid_input, "the metadata is whole, of forms that section 2 allows, and its checksums hold",
+         kDamaged},
+    Rule{"file.objects", error, invalid_input, "a file has at most 4096 groups and datasets", kHostile},
     Rule{"group.depth", error, invalid_input, "groups are nested at most 4 deep", kHostile},
     Rule{"group.size", error, invalid_input, "a group has at most 1024 links with names of at most 255 bytes", kHostile},
-    Rule{"text.utf8", error, invalid_input, "names and texts are UTF-8 without control characters", kHostile},
+    Rule{"text.utf8", error, invalid_input, "names and texts are UTF-8 without control characters and marks of direction",
+         kHostile},
+    Rule{"text.padding", error, invalid_input, "only NUL follows the NUL that ends a text", kHostile},
     Rule{"link.hard", error, invalid_input, "every link is a hard link", kHostile},
     Rule{"link.single", error, invalid_input, "every object has exactly one link", kHostile},
     Rule{"object.type", error, invalid_input, "every object is a group or a dataset", kHostile},
     Rule{"object.attributes", error, invalid_input, "an object has at most 64 attributes", kHostile},
+    Rule{"object.heap", error, invalid_input, "links and attributes are in object headers, not in heaps", kRewrite},
     Rule{"attribute.fixed", error, invalid_input, "no attribute has variable length or a committed type", kForeign},
     Rule{"attribute.size", error, invalid_input, "an attribute holds at most 65536 bytes", kHostile},
     Rule{"attribute.missing", error, invalid_input, "every required attribute exists", kForeign},
@@ -50,11 +57,13 @@ constexpr std::array kIndexRules = {
     Rule{"dataset.vlen", error, invalid_input, "no dataset has variable-length elements", kForeign},
     Rule{"dataset.virtual", error, invalid_input, "no dataset is virtual", kHostile},
     Rule{"dataset.external", error, invalid_input, "no dataset is stored in another file", kHostile},
-    Rule{"dataset.layout", error, invalid_input, "every dataset is contiguous without filters", kForeign},
+    Rule{"dataset.layout", error, invalid_input, "every dataset is contiguous without filters", kRewrite},
     Rule{"dataset.storage", error, invalid_input, "a dataset's bytes all lie inside the file", kDamaged},
     Rule{"dataset.alignment", error, invalid_input, "a dataset's offset is a multiple of 8", kForeign},
     Rule{"dataset.alignment_64", warning, invalid_input, "a dataset's offset is a multiple of 64",
          "write with H5Pset_alignment"},
+    Rule{"group.unknown", warning, invalid_input, "every group is one of a dataset in the schema",
+         "ignore it, or read with a newer version"},
     Rule{"dataset.unknown", warning, invalid_input, "every dataset is in the schema",
          "ignore it, or read with a newer version"},
     Rule{"dataset.missing", error, invalid_input, "every required dataset exists", kForeign},
@@ -70,7 +79,10 @@ constexpr std::array kIndexRules = {
 
 /// Rules of all kinds on values.
 constexpr std::array kValueRules = {
+    Rule{"attribute.json", error, invalid_input, "command is a JSON object", kForeign},
     Rule{"file.padding", error, invalid_input, "bytes between objects are 0", kDamaged},
+    Rule{"file.digest", error, invalid_input, "attributes, sizes and hashes have the digest of root attribute digest",
+         kDamaged},
     Rule{"dataset.hash", error, invalid_input, "a dataset's bytes have the hash of its attribute xxh3_128", kDamaged},
     Rule{"sh.finite", error, invalid_input, "coefficients, scales and norms are finite, the latter two not negative",
          kMakeAgain},

@@ -78,6 +78,12 @@ std::span<const AttributeSchema> commonAttributes() {
       {"kind", text, "", "1", "kind of asset", 0, 0},
       {"generator", text, "", "1", "tool and version that made the file", 0, 0},
       {"command", text, "", "1", "JSON of every parameter that changed the result", 0, 0},
+      {.name = "digest",
+       .type = text,
+       .count = "",
+       .units = "1",
+       .long_name = "digest of all attributes and sizes, 32 hexadecimal digits",
+       .required = false},
       {"inputs", text, "*", "1", "hash, two spaces and name of every input", 0, 0},
   };
   return table;

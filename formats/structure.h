@@ -4,41 +4,17 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "glint/formats/container/file_bytes.h"
+#include "glint/formats/container/object_header.h"
 #include "glint/formats/findings.h"
-#include "glint/formats/hdf5_precheck.h"
 #include "glint/formats/schema.h"
 
 namespace glint::formats {
-
-/// A read-only view of a whole file.
-class Mapping {
- public:
-  Mapping() = default;
-  /// Maps `size` bytes of an open file. Throws Error (io).
-  Mapping(int file, std::size_t size);
-  Mapping(Mapping&& other) noexcept { swap(other); }
-  Mapping& operator=(Mapping&& other) noexcept {
-    swap(other);
-    return *this;
-  }
-  ~Mapping();
-
-  const std::byte* data() const { return data_; }
-  std::size_t size() const { return size_; }
-
- private:
-  void swap(Mapping& other) noexcept {
-    std::swap(data_, other.data_);
-    std::swap(size_, other.size_);
-  }
-  const std::byte* data_ = nullptr;
-  std::size_t size_ = 0;
-};
 
 /// Value of an attribute. Numbers of every schema type are exact in a double.
 struct AttributeValue {
@@ -59,22 +35,25 @@ struct DatasetRecord {
   std::vector<std::uint64_t> dims;
   std::uint64_t size_bytes = 0;
   std::uint64_t offset = 0;         ///< from the start of the file; 0 if empty
-  const std::byte* data = nullptr;  ///< in the mapping; not null unless empty
+  const std::byte* data = nullptr;  ///< in the bytes of the file; not null unless empty
   Attributes attributes;
 };
 
-/// Everything that a file holds, apart from what it means.
+/// Everything that a file holds, apart from what it means. Paths are without the leading '/'.
 struct FileStructure {
-  Mapping mapping;
-  ObjectPlaces places;
-  Attributes attributes;                          ///< of the root
-  std::map<std::string, DatasetRecord> datasets;  ///< by path without the leading '/'
+  FileBytes bytes;
+  std::vector<Extent> extents;                            ///< all bytes that belong to an object, in order
+  Attributes attributes;                                  ///< of the root
+  std::map<std::string, Attributes, std::less<>> groups;  ///< of all groups but the root
+  std::map<std::string, DatasetRecord> datasets;
 };
 
-/// Reads a file's structure. Broken rules are added to `findings`; what can still be read is returned.
+/// Reads what a file holds. Broken rules are added to `findings`; what can still be read is returned.
 ///
-/// Safe on untrusted input: follows hard links only, opens no other file, loads no plugin, and checks the place of every
-/// dataset. Nothing of HDF5 stays open.
-FileStructure readStructure(const std::filesystem::path& path, Findings& findings);
+/// Safe on untrusted input: see readContainer.
+FileStructure readStructure(FileBytes bytes, Findings& findings);
+
+/// Adds the groups on the path of a dataset, "a" and "a/b" of "a/b/c".
+void addGroups(const std::string& path, std::set<std::string>& groups);
 
 }  // namespace glint::formats

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -39,5 +40,8 @@ struct ValidateOptions {
 /// Checks a file against every rule of rules(). Contents of the file never make it throw: they become findings.
 /// Safe on untrusted input, as long as nobody changes the file meanwhile.
 ValidationReport validateAsset(const std::filesystem::path& path, const ValidateOptions& options = {});
+
+/// The same for the bytes of a file in memory, as Asset::openMemory takes them.
+ValidationReport validateMemory(std::span<const std::byte> bytes, const std::string& name, const ValidateOptions& options = {});
 
 }  // namespace glint::formats

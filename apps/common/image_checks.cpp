@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
@@ -5,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <new>
 #include <vector>
 
 #include "common/image_formats.h"
@@ -26,6 +29,13 @@ void checkSystemReads(const std::string& path) {
   if (std::ferror(file.get())) fail(errno);
 }
 
+void checkSystemReason(const std::string& path, int error) {
+  if (error == ENOMEM) throw std::bad_alloc();
+  if (error != EMFILE && error != ENFILE && error != EIO) return;
+  throw Error(ErrorCode::io, "file.readable", path, "", std::string("cannot be read: ") + std::strerror(error),
+              "check the file's permissions and disk, and the limits of the system");
+}
+
 void throwDamagedImage(const std::string& path, const std::string& reason) {
   constexpr std::size_t kMostReason = 200;  // bytes; decoders can complain about every row
   checkSystemReads(path);
@@ -34,11 +44,20 @@ void throwDamagedImage(const std::string& path, const std::string& reason) {
               "copy or export the file again");
 }
 
-void checkDeclaredSize(const std::string& path, std::uint64_t pixel_bytes) {
-  // Below a gigabyte any header is believed. Above, no map compresses so well: deflate ends at 1 : 1032.
+void checkDeclaredSize(const std::string& path, const std::string& format, std::uint64_t pixel_bytes,
+                       std::uint64_t most_bytes) {
+  // Below a gigabyte any header of a compressed format is believed. Above, no map compresses so well: deflate ends at 1 : 1032.
   constexpr std::uint64_t kBelieved = std::uint64_t{1} << 30, kBestRatio = 2048;
-  if (pixel_bytes > kBelieved && pixel_bytes / kBestRatio > std::filesystem::file_size(path))
+  // Without compression: only pixels of one bit (PBM) take less in the file than in memory.
+  constexpr std::uint64_t kBits = 8;
+  const bool plain = format == "pnm" || format == "fits" || format == "cineon";
+  const std::uint64_t ratio = plain ? kBits : kBestRatio;
+  if ((plain || pixel_bytes > kBelieved) && pixel_bytes / ratio > std::filesystem::file_size(path))
     throwDamagedImage(path, "it declares more pixels than the file can hold");
+  if (pixel_bytes > most_bytes)
+    throw Error(ErrorCode::failed, "memory.limit", path, "",
+                fmt::format("its pixels take {} MB of memory, and {} MB may be used", pixel_bytes >> 20, most_bytes >> 20),
+                "scale the image down, or raise --max-memory where the machine has more");
 }
 
 std::string partList(const std::vector<std::string>& names) {

@@ -31,7 +31,8 @@ struct MipLevel {
 struct ImageFormats {
   /// @throws Error invalid_input, unsupported
   /// @param part  number (from 0) or name of one of several images; empty: the first
-  StoredImage (*read)(const std::string& path, const std::string& part);
+  /// @param most_bytes  of pixels, as checkDeclaredSize() has it
+  StoredImage (*read)(const std::string& path, const std::string& part, std::uint64_t most_bytes);
   /// The bytes of an image file. @throws Error usage, unsupported
   std::vector<unsigned char> (*encode)(const std::string& path, int width, int height, int channels,
                                        std::span<const float> pixels, PixelFormat format);
@@ -49,14 +50,21 @@ const ImageFormats& imageFormats();
 
 /// Reads a PNG without it.
 /// @throws Error invalid_input if the file is damaged or truncated
-StoredImage readPng(const std::string& path);
+StoredImage readPng(const std::string& path, std::uint64_t most_bytes);
 
 /// Whether a file starts as every PNG does.
 bool isPng(const std::string& path);
 
-/// Refuses a header that declares far more than its file can hold, before memory is taken for it.
-/// @throws Error invalid_input
-void checkDeclaredSize(const std::string& path, std::uint64_t pixel_bytes);
+/// Refuses a header that declares more than its file can hold, or more than may be taken, before memory is taken for it.
+/// @param format      as Image has it; files of some formats are as long as their pixels
+/// @param most_bytes  memory that the pixels may take
+/// @throws Error invalid_input; failed if it is the memory that does not suffice
+void checkDeclaredSize(const std::string& path, const std::string& format, std::uint64_t pixel_bytes, std::uint64_t most_bytes);
+
+/// Throws as the system's reason asks, if the last call of a library failed for one: too many open files, a disk that fails, no
+/// memory. Set errno to 0 before the call. A library may give such a failure for damage.
+/// @throws Error io, std::bad_alloc
+void checkSystemReason(const std::string& path, int error);
 
 /// The number of the part that is meant.
 /// @param names  of all parts

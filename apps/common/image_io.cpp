@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
+#include <new>
 
 #include "common/files.h"
 #include "common/image_formats.h"
 #include "common/image_layout.h"
+#include "common/memory.h"
 #include "common/tiff_tags.h"
 #include "glint/formats/atomic_file.h"
 #include "glint/model/error.h"
@@ -20,13 +23,16 @@ const ImageFormats& imageFormats() {
   static const ImageFormats& loaded = []() -> const ImageFormats& {
     const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe");
     const std::string path = (program.parent_path() / GLINT_IMAGE_FORMATS).lexically_normal();
+    errno = 0;
     void* object = ::dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
     void* table = object ? ::dlsym(object, "glint_image_formats") : nullptr;
     if (!table) {
-      const char* reason = ::dlerror();
+      if (errno == ENOMEM) throw std::bad_alloc();
+      const char* text = ::dlerror();
+      const std::string reason = text ? " (" + std::string(text) + ")" : "";  // the text goes with the next call
       if (std::filesystem::exists(path)) checkSystemReads(path);
       throw Error(ErrorCode::failed, "image.formats", path, "",
-                  "the part that reads and writes images cannot be loaded" + (reason ? " (" + std::string(reason) + ")" : ""),
+                  "the part that reads and writes images cannot be loaded" + reason,
                   "install the whole package: this file belongs to the programs");
     }
     return *static_cast<const ImageFormats*>(table);
@@ -47,7 +53,7 @@ void checkJpegComplete(const std::string& path) {
 Image readImage(const std::string& path, const ImageChoice& choice) {
   checkRegular(path);
   const bool png = isPng(path);
-  StoredImage stored = png ? readPng(path) : imageFormats().read(path, choice.part);
+  StoredImage stored = png ? readPng(path, availableMemory()) : imageFormats().read(path, choice.part, availableMemory());
   Image& image = stored.image;
   if (png) findPart(path, choice.part, image.parts);
   if (image.format == "jpeg") checkJpegComplete(path);

@@ -1,13 +1,17 @@
 #include <png.h>
 
 #include <bit>
+#include <cerrno>
 #include <csetjmp>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
+#include <new>
 #include <span>
 
 #include "common/image_formats.h"
 #include "common/tiff_tags.h"
+#include "glint/formats/system_error.h"
 
 namespace glint::apps {
 namespace {
@@ -20,9 +24,18 @@ struct PngReader {
   png_infop info = nullptr;
   char message[128] = "";
 
+  bool memory_ran_out = false;
+
   explicit PngReader(const std::string& path) : file(std::fopen(path.c_str(), "rb")) {
-    png = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, fail, [](png_structp, png_const_charp) {});
+    if (!file) formats::throwUnreadable(path, "cannot be opened", errno);
+    png = png_create_read_struct_2(
+        PNG_LIBPNG_VER_STRING, this, fail, [](png_structp, png_const_charp) {}, this, allocate,
+        [](png_structp, png_voidp memory) { std::free(memory); });
     info = png_create_info_struct(png);
+    if (info) return;
+    png_destroy_read_struct(&png, nullptr, nullptr);
+    std::fclose(file);
+    throw std::bad_alloc();
   }
   ~PngReader() {
     png_destroy_read_struct(&png, &info, nullptr);
@@ -30,6 +43,18 @@ struct PngReader {
   }
   PngReader(const PngReader&) = delete;
   PngReader& operator=(const PngReader&) = delete;
+
+  static png_voidp allocate(png_structp png, png_alloc_size_t size) {
+    void* memory = std::malloc(size);
+    if (!memory) static_cast<PngReader*>(png_get_mem_ptr(png))->memory_ran_out = true;
+    return memory;
+  }
+
+  [[noreturn]] void throwFault(const std::string& path) const {
+    if (memory_ran_out) throw std::bad_alloc();
+    if (std::ferror(file)) formats::throwUnreadable(path, "cannot be read", EIO);
+    throwDamagedImage(path, message);
+  }
 
   [[noreturn]] static void fail(png_structp png, png_const_charp text) {
     auto* self = static_cast<PngReader*>(png_get_error_ptr(png));
@@ -73,7 +98,7 @@ std::vector<T> readPixels(PngReader& reader, const Image& image, const std::stri
   std::vector<T> pixels(row * image.height);
   std::vector<png_bytep> rows(image.height);
   for (int j = 0; j < image.height; ++j) rows[j] = reinterpret_cast<png_bytep>(pixels.data() + row * (image.height - 1 - j));
-  if (!reader.readRows(rows.data())) throwDamagedImage(path, reader.message);
+  if (!reader.readRows(rows.data())) reader.throwFault(path);
   return pixels;
 }
 
@@ -86,9 +111,9 @@ bool isPng(const std::string& path) {
          png_sig_cmp(signature, 0, 8) == 0;
 }
 
-StoredImage readPng(const std::string& path) {
+StoredImage readPng(const std::string& path, std::uint64_t most_bytes) {
   PngReader reader(path);
-  if (!reader.file || !reader.info || !reader.readHeader()) throwDamagedImage(path, reader.message);
+  if (!reader.readHeader()) reader.throwFault(path);
   static const std::vector<std::string> kNames[] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"}, {"R", "G", "B", "A"}};
   StoredImage stored;
   Image& image = stored.image;
@@ -102,7 +127,7 @@ StoredImage readPng(const std::string& path) {
   image.alpha = image.channels % 2 == 0 ? image.channels - 1 : -1;
   image.parts = {""};
   stored.display = {0, 0, image.width, image.height};
-  checkDeclaredSize(path, std::uint64_t{png_get_rowbytes(reader.png, reader.info)} * image.height);
+  checkDeclaredSize(path, image.format, std::uint64_t{png_get_rowbytes(reader.png, reader.info)} * image.height, most_bytes);
   if (image.bits == 16) {
     image.pixels = readPixels<std::uint16_t>(reader, image, path);
   } else {

@@ -29,11 +29,11 @@ void NdfAsset::addPyramidOptions() {
   useOnly({"ndf-pyramid", "ndf-cp"}, "--normals",
           tool_.option("--normals", normals_path_,
                        "asset of kind normals that the pyramid was made from, for footprints below its finest level"));
-  useOnly({"ndf-pyramid", "ndf-cp", "slope-moments", "wave-pyramid"}, "--parts",
+  useOnly({"ndf-pyramid", "ndf-cp", "slope-moments", "wang-cp", "wang-pyramid", "wave-pyramid"}, "--parts",
           tool_
               .option("--parts", options_.footprint_parts,
                       "most round footprints that stand for a stretched one; 1: one of the same mean square size (kinds "
-                      "ndf-pyramid, ndf-cp, slope-moments and wave-pyramid)")
+                      "ndf-pyramid, ndf-cp, slope-moments, wang-cp, wang-pyramid and wave-pyramid)")
               .range(1, IsotropicParts::kMost));
   addImageOptions();
 }
@@ -44,25 +44,29 @@ void NdfAsset::addImageOptions() {
                        {{"footprint", Interpolation::footprint}, {"trilinear", Interpolation::trilinear}},
                        "how footprints between the stored ones are answered: by images that together see the footprint, or "
                        "trilinearly, which is quicker and sees a wider one (kinds ndf-pyramid, ndf-cp and wave-pyramid)"));
-  useOnly({"ndf-pyramid", "ndf-cp", "wave-pyramid"}, "--pixels",
-          tool_.choice("--pixels", options_.pixels, {{"smooth", Pixels::smooth}, {"constant", Pixels::constant}},
-                       "how densities run between half vectors of one pixel of an image: continuously, or constant, which is "
-                       "quicker and shows borders of pixels under small lights (kinds ndf-pyramid, ndf-cp and wave-pyramid)"));
+  useOnly(
+      {"ndf-pyramid", "ndf-cp", "wang-cp", "wang-pyramid", "wave-pyramid"}, "--pixels",
+      tool_.choice("--pixels", options_.pixels, {{"smooth", Pixels::smooth}, {"constant", Pixels::constant}},
+                   "how densities run between half vectors of one pixel of an image: continuously, or constant, which is "
+                   "quicker and shows borders of pixels under small lights (kinds ndf-pyramid, ndf-cp, wang-cp, wang-pyramid "
+                   "and wave-pyramid)"));
 }
 
 void NdfAsset::addNormalsOptions() {
   if (asked_.smooth_surfaces)
-    useOnly({"normals"}, "--surface",
+    useOnly({"normals", "wang-tiles"}, "--surface",
             tool_.choice("--surface", options_.surface, {{"flat", Surface::flat}, {"smooth", Surface::smooth}},
-                         "how normals behave between texels (kind normals)"));
+                         "how normals behave between texels (kinds normals and wang-tiles)"));
   useOnly({"normals"}, "--boundary",
           tool_.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
                        "beyond the border of the map (kind normals)"));
-  useOnly({"normals", "histogram-sat", "slope-moments"}, "--sigma-r",
-          tool_
-              .option("--sigma-r", options_.sigma_r,
-                      "intrinsic roughness, disk units (kinds normals and slope-moments; the light of kind histogram-sat)")
-              .range(1e-4, 0.25));
+  useOnly(
+      {"normals", "histogram-sat", "slope-moments", "wang-tiles"}, "--sigma-r",
+      tool_
+          .option(
+              "--sigma-r", options_.sigma_r,
+              "intrinsic roughness, disk units (kinds normals, slope-moments and wang-tiles; the light of kind histogram-sat)")
+          .range(1e-4, 0.25));
 }
 
 void NdfAsset::addBinOptions() {
@@ -97,10 +101,6 @@ void NdfAsset::refuseOtherKinds() const {
     throw Error(
         ErrorCode::unsupported, "format.kind", path_, "", "is of kind displacement, which holds no distribution of normals",
         "ask for the light that it reflects: glint-query reflectance " + path_ + " --uv U V --sigma S --wi X Y Z --wo X Y Z");
-  if (kind == "wang-tiles")
-    throw Error(ErrorCode::unsupported, "format.kind", path_, "", "is of kind wang-tiles, a plane without end",
-                "ask for a point of it, glint-query plane " + path_ +
-                    " --texel X Y --sigma S --half HX HY, or make a map of a part of it with glint-wang --explicit");
   if (api::answersNdf(kind) && !asks({kind}))
     throw Error(ErrorCode::unsupported, "format.kind", path_, "", "is of kind " + kind + ", which is not asked this",
                 "pass an asset of kind " + api::alternatives(asked_.kinds));

@@ -20,6 +20,7 @@
 
 #include "common/files.h"
 #include "common/help_formatter.h"
+#include "common/memory.h"
 #include "common/number_checks.h"
 #include "common/progress_reporter.h"
 #include "common/signals.h"
@@ -135,6 +136,8 @@ struct Tool::State {
   bool quiet = false;
   bool verbose = false;
   bool force = false;
+  bool trust = false;
+  std::uint64_t max_memory = 0;
   ProgressMode progress_mode = ProgressMode::automatic;
   std::string depfile;
 
@@ -180,6 +183,11 @@ void Tool::addStandardOptions() {
       ->type_name("N")
       ->transform(strictNumber<int>())
       ->transform(numberRange(0, kMaxThreads));  // the last transform comes first, so that large numbers are told the range
+  app.add_option("--max-memory", s.max_memory, "most memory to use, such as 500M or 8G; by default what the machine has left")
+      ->group(group)
+      ->type_name("SIZE")
+      ->default_str("")
+      ->transform(memorySize());
   app.add_option("--seed", s.seed, "seed of every random choice")
       ->group(group)
       ->type_name("N")
@@ -192,6 +200,8 @@ void Tool::addStandardOptions() {
   CLI::Option* quiet = app.add_flag("--quiet,-q", s.quiet, "no warnings and no progress")->group(group);
   app.add_flag("--verbose,-v", s.verbose, "print a summary of the result")->group(group)->excludes(quiet);
   app.add_flag("--force,-f", s.force, "replace an output that is an input, read-only or of another kind")->group(group);
+  app.add_flag("--trust", s.trust, "do not check hashes and values of assets; for files that glint-validate has accepted")
+      ->group(group);
   app.add_option("--depfile", s.depfile, "write what the output depends on, as a Make rule")->group(group)->type_name("FILE");
 }
 
@@ -250,6 +260,7 @@ bool Tool::quiet() const { return state_->quiet; }
 bool Tool::verbose() const { return state_->verbose; }
 bool Tool::wantsJson() const { return state_->json_result; }
 bool Tool::force() const { return state_->force; }
+bool Tool::trust() const { return state_->trust; }
 int Tool::threads() const { return state_->threads > 0 ? state_->threads : tbb::info::default_concurrency(); }
 void Tool::setResult(const nlohmann::json& result) { state_->result = result; }
 void Tool::setExitCode(ErrorCode code) { state_->exit_code = code; }
@@ -268,6 +279,16 @@ std::vector<std::string> Tool::readPaths() const {
 std::uint64_t Tool::seed() const {
   if (!state_->uses_seed) throw std::logic_error(name() + " takes a seed that it does not record");
   return state_->seed;
+}
+
+std::uint64_t Tool::maxMemory() const { return state_->max_memory > 0 ? state_->max_memory : availableMemory(); }
+
+void Tool::requireMemory(double bytes, const std::string& what, const std::string& remedy) const {
+  const auto most = static_cast<double>(maxMemory());
+  if (bytes <= most) return;
+  throw Error(ErrorCode::failed, "memory.limit", "", "",
+              fmt::format("{} would take {} of memory, and {} may be used", what, memoryText(bytes), memoryText(most)),
+              remedy + ", or raise --max-memory where the machine has more");
 }
 
 bake::ProgressFn Tool::progress(const std::string& stage) {
@@ -371,6 +392,7 @@ int Tool::work(const std::function<void()>& body) {
     checkOutput(*this, s.depfile, OutputFormat::depfile);
   }
   for (const auto& check : s.late_checks) check();
+  if (s.max_memory > 0) limitMemory(s.max_memory);
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads()));
   body();
   s.reporter.reset();
@@ -422,6 +444,13 @@ void Tool::printFailure(const Error& error) const {
 int Tool::run(int argc, char** argv, const std::function<void()>& body) {
   openStandardStreams();
   const SignalScope signals;
+  const auto fail_without_memory = [&]() noexcept {
+    try {
+      return fail({ErrorCode::failed, "memory", "", "", "out of memory", kMemoryRemedy});
+    } catch (const std::bad_alloc&) {
+      return static_cast<int>(ErrorCode::failed);  // not even for the message; the code says it
+    }
+  };
   try {
     // Parsing stops at the first error, possibly before it reads --json.
     for (int i = 1; i < argc; ++i) state_->json_result |= std::string(argv[i]) == "--json";
@@ -429,14 +458,15 @@ int Tool::run(int argc, char** argv, const std::function<void()>& body) {
     if (parse(argc, argv)) return work(body);
     flushStdout();
     return 0;
-  } catch (const Error& error) {
-    return fail(error);
   } catch (const std::bad_alloc&) {
-    return fail({ErrorCode::failed, "memory", "", "", "out of memory",
-                 "use a smaller map or lower resolution, or a machine with more memory"});
-  } catch (const std::system_error& error) {  // includes std::filesystem::filesystem_error
+    return fail_without_memory();
+  } catch (const Error& error) {
+    return memoryRanOut() ? fail_without_memory() : fail(error);  // a library may have given another reason
+  } catch (const std::system_error& error) {                      // includes std::filesystem::filesystem_error
+    if (memoryRanOut() || error.code() == std::errc::not_enough_memory) return fail_without_memory();
     return fail({ErrorCode::io, "system", "", "", error.what()});
   } catch (const std::exception& error) {
+    if (memoryRanOut()) return fail_without_memory();
     return fail({ErrorCode::failed, "internal", "", "", error.what(), "please report this as a defect"});
   }
 }

@@ -32,7 +32,8 @@ struct ToolInfo {
 
 /// A command-line program: declares the flags that every tool shares, parses, runs the work, and exits.
 ///
-/// Shared flags: --threads --seed --json --progress --quiet --verbose --force --depfile --config --version --help.
+/// Shared flags: --threads --max-memory --seed --json --progress --quiet --verbose --force --trust --depfile --config --version
+/// --help.
 /// Declare inputs and outputs with the mix-ins of files.h and parameters with option(), flag() and choice(); then
 /// `return tool.run(argc, argv, [&] { ... });`. References passed in must outlive run().
 ///
@@ -106,6 +107,15 @@ class Tool {
   bool verbose() const;
   bool wantsJson() const;
   bool force() const;
+  /// Value of --trust: hashes and values of assets are not checked. Open inputs with openInput() (input_asset.h).
+  bool trust() const;
+  /// Value of --max-memory in bytes, or the memory that the process may still take (memory.h).
+  std::uint64_t maxMemory() const;
+  /// Refuses work that needs more than maxMemory(). Call it before the work, with an estimate that is no smaller than the need.
+  /// @param what    "8192 NDF images"; the message says how much they take
+  /// @param remedy  an option that makes the need smaller: "give a larger --stride"
+  /// @throws Error failed
+  void requireMemory(double bytes, const std::string& what, const std::string& remedy) const;
   /// Value of --threads, or the number of the processor's threads. oneTBB is already limited to it.
   int threads() const;
   /// Value of --seed.

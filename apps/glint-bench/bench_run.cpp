@@ -7,12 +7,13 @@
 #include <list>
 #include <map>
 
+#include "common/input_asset.h"
+#include "glint-bench/rounded_image.h"
+#include "glint/formats/hash.h"
 #include "measure/bench_errors.h"
 #include "measure/bench_times.h"
 #include "measure/candidates.h"
 #include "measure/child_process.h"
-#include "glint-bench/rounded_image.h"
-#include "glint/formats/hash.h"
 
 namespace glint::apps {
 namespace {
@@ -31,13 +32,13 @@ void checkKind(const std::string& path) {
 /// One map: its asset, and the questions that every method is asked.
 class BenchMap {
  public:
-  BenchMap(const std::string& path, const BenchSettings& settings, std::uint64_t seed)
-      : path_(path), asset_(formats::Asset::openForBuilding(path)), hash_(formats::hashFile(path)) {
+  BenchMap(const Tool& tool, const std::string& path, const BenchSettings& settings)
+      : path_(path), asset_(openInput(tool, path)), hash_(formats::hashFile(path)) {
     constexpr int kQueries = 1 << 14, kOfSize = 1 << 12, kTruthsOfPlace = 4;
-    sets_ = benchFootprints(map(), seed, settings.places, kTruthsOfPlace * settings.places);
+    sets_ = benchFootprints(map(), tool.seed(), settings.places, kTruthsOfPlace * settings.places);
     const std::vector<float> sizes = roundSizes(sets_);
-    queries_ = benchQueries(map(), seed, kQueries, sizes);
-    for (const float sigma : sizes) sized_queries_.push_back({sigma, benchQueries(map(), seed + 1, kOfSize, {sigma})});
+    queries_ = benchQueries(map(), tool.seed(), kQueries, sizes);
+    for (const float sigma : sizes) sized_queries_.push_back({sigma, benchQueries(map(), tool.seed() + 1, kOfSize, {sigma})});
   }
 
   const std::string& path() const { return path_; }
@@ -202,7 +203,7 @@ void runBench(Tool& tool, const BenchSettings& settings, const AssetFolder& fold
   const std::size_t total = settings.maps.size() * candidates.size();
   std::size_t done = 0;
   for (const std::string& path : settings.maps) {
-    BenchMap map(path, settings, tool.seed());
+    BenchMap map(tool, path, settings);
     MapBench bench(tool, settings, folder, map);
     if (!results.hasMap(map.hash())) {
       results.addMap(map.json());

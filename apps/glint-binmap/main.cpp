@@ -1,10 +1,11 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
+#include "common/memory_needs.h"
 #include "common/tool.h"
 #include "glint-binmap/bin_map_options.h"
 #include "glint/bake/bin_map/bin_map.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
@@ -20,9 +21,11 @@ int main(int argc, char** argv) {
   apps::BinMapOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     const formats::Provenance provenance = tool.provenance();
-    const apps::BuiltBinMap built = options.build(asset.get<NormalMap>(), tool.progress("passes"));
+    const auto& map = asset.get<NormalMap>();
+    apps::requireMemoryFor(tool, "a bin map of", map.width, map.height, apps::BytesPerTexel::kBinMap);
+    const apps::BuiltBinMap built = options.build(map, tool.progress("passes"));
     formats::writeAsset(output.path(), built.data.view(), provenance, output.writeOptions());
     tool.setResult(apps::binMapJson(built));
     tool.summary(apps::binMapText(built));

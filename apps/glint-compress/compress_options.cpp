@@ -49,6 +49,13 @@ CompressOptions::CompressOptions(Tool& tool) {
   tool.option("--max-iterations", values_.max_iterations, "cp: sweeps at most").range(1, 1e6);
 }
 
+bake::NdfCpData compress(const NdfPyramid& pyramid, const std::vector<float>& masses, const CompressOptions& options,
+                         bake::CompressionReport& report, Tool& tool) {
+  bake::CompressionOptions values = options.values();
+  values.image_masses = masses;
+  return bake::compressPyramid(pyramid, values, &report, tool.progress("compress"));
+}
+
 nlohmann::json compressionJson(const bake::CompressionReport& report) {
   const auto level = [](const bake::CompressionLevelReport& l) {
     return nlohmann::json{

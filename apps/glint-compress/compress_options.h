@@ -2,6 +2,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "common/tool.h"
 #include "glint/bake/compressed/compress.h"
@@ -19,6 +20,11 @@ class CompressOptions {
  private:
   bake::CompressionOptions values_;
 };
+
+/// Compresses images.
+/// @param masses  CompressionOptions::image_masses
+bake::NdfCpData compress(const NdfPyramid& pyramid, const std::vector<float>& masses, const CompressOptions& options,
+                         bake::CompressionReport& report, Tool& tool);
 
 /// The report as --json prints it. Sizes in bytes, errors relative.
 nlohmann::json compressionJson(const bake::CompressionReport& report);

@@ -1,9 +1,10 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
+#include "common/memory_needs.h"
 #include "common/tool.h"
 #include "glint-displace/displace_options.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
@@ -18,11 +19,13 @@ int main(int argc, char** argv) {
   apps::DisplaceOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
-    bake::DisplaceOptions values = options.values(asset.get<HeightMap>());
+    const formats::Asset asset = apps::openInput(tool, input.path());
+    const auto& map = asset.get<HeightMap>();
+    apps::requireMemoryFor(tool, "a displacement of", map.width, map.height, apps::BytesPerTexel::kDisplace);
+    bake::DisplaceOptions values = options.values(map);
     values.seed = tool.seed();
     const formats::Provenance provenance = tool.provenance();
-    const bake::DisplacementData data = bake::displace(asset.get<HeightMap>(), values, tool.progress("levels"));
+    const bake::DisplacementData data = bake::displace(map, values, tool.progress("levels"));
     formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
     apps::warnAbout(tool, data);
     tool.setResult(apps::displacementJson(data));

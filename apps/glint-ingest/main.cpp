@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/memory_needs.h"
 #include "glint-ingest/ingest_options.h"
 #include "glint/bake/common/slopes.h"
 #include "glint/bake/ingest/normal_bounds.h"
@@ -34,6 +35,7 @@ int main(int argc, char** argv) {
 
   return tool.run(argc, argv, [&] {
     const apps::Image image = options.read(tool, input.path());
+    apps::requireMemoryFor(tool, "a map of", image.width, image.height, apps::BytesPerTexel::kIngest, "scale the image down");
     const bake::IngestOptions values = options.values(tool, input.path(), image);
     const formats::Provenance provenance = tool.provenance();
     bake::IngestReport report;

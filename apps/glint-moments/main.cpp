@@ -1,10 +1,11 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
+#include "common/memory_needs.h"
 #include "common/tool.h"
 #include "glint-moments/moments_options.h"
 #include "glint-moments/texture_output.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
@@ -21,8 +22,10 @@ int main(int argc, char** argv) {
   const apps::TextureOutput textures(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     const auto [width, height] = apps::mapSize(asset, input.path());
+    apps::requireMemoryFor(tool, "moments of", width, height,
+                           textures.wanted() ? apps::BytesPerTexel::kTextures : apps::BytesPerTexel::kMoments);
     const bake::SlopeMomentsOptions values = options.values(width, height);
     if (textures.wanted()) textures.check(tool, SlopeMoments::chainLength(width, height));
     const formats::Provenance provenance = tool.provenance();

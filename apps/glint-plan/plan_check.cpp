@@ -13,8 +13,8 @@
 namespace glint::apps {
 namespace {
 
-constexpr int kQueries = 4096;
-constexpr double kLongestErrors_s = 30, kLongestTime_s = 0.02;
+constexpr int kCheckedQueries = 4096;
+constexpr double kCheckLongestErrors_s = 30, kCheckLongestTime_s = 0.02;
 
 /// Measures candidates on one whole map.
 class MapCheck {
@@ -31,7 +31,7 @@ class MapCheck {
     for (std::size_t k = 0; k < sizes_.size(); ++k) {
       truths_.emplace_back(normals, questionFootprints(other_places, k, sizes_[k]), question_.sigma_r, question_.light_deg);
     }
-    queries_ = benchQueries(normals, other_places, kQueries, sizes_);
+    queries_ = benchQueries(normals, other_places, kCheckedQueries, sizes_);
   }
 
   /// What a candidate costs; its errors are not measured.
@@ -40,7 +40,7 @@ class MapCheck {
     CheckedOption option;
     option.name = candidate.name();
     option.costs = {made.bytes + (candidate.takes_normals ? map_.bytes : 0), made.seconds + map_.ingest_s,
-                    densityTime(maker_.open(candidate), queries_, kLongestTime_s)};
+                    densityTime(maker_.open(candidate), queries_, kCheckLongestTime_s)};
     return option;
   }
 
@@ -49,7 +49,7 @@ class MapCheck {
     if (candidate.tool.empty()) return largest;  // the texels themselves
     const api::OpenedNdf ndf = maker_.open(candidate);
     for (const PlaceTruth& truth : truths_) {
-      const PlaceErrors errors = PlaceSample(truth, ndf).ask(truth.places(), kLongestErrors_s);
+      const PlaceErrors errors = PlaceSample(truth, ndf).ask(truth.places(), kCheckLongestErrors_s);
       largest.bias = std::max(largest.bias, errors.bias);
       if (errors.seen > largest.seen) largest.seen = errors.seen, largest.deviation = errors.deviation;
     }
@@ -160,21 +160,21 @@ std::string checkText(const PlanFile& plan, const std::vector<CheckedMaterial>& 
 nlohmann::json checkJson(const PlanFile& plan, const std::vector<CheckedMaterial>& checked) {
   nlohmann::json list = nlohmann::json::array();
   for (const CheckedMaterial& material : checked) {
-    nlohmann::json json = {{"name", plan.scene.materials[material.planned->index].name},
-                           {"asset", material.actual.name},
-                           {"tolerance", material.tolerance},
-                           {"holds", material.holds()},
-                           {"predicted", costsJson(material.planned->costs, material.planned->errors)},
-                           {"actual", costsJson(material.actual.costs, material.actual.errors)}};
+    nlohmann::json entry = {{"name", plan.scene.materials[material.planned->index].name},
+                            {"asset", material.actual.name},
+                            {"tolerance", material.tolerance},
+                            {"holds", material.holds()},
+                            {"predicted", costsJson(material.planned->costs, material.planned->errors)},
+                            {"actual", costsJson(material.actual.costs, material.actual.errors)}};
     if (!material.sweep.empty()) {
-      json["over_cheapest"] = material.overCheapest(plan.scene.goal);
-      json["sweep"] = nlohmann::json::array();
+      entry["over_cheapest"] = material.overCheapest(plan.scene.goal);
+      entry["sweep"] = nlohmann::json::array();
       for (const CheckedOption& option : material.sweep) {
-        json["sweep"].push_back(costsJson(option.costs, option.errors));
-        json["sweep"].back()["name"] = option.name;
+        entry["sweep"].push_back(costsJson(option.costs, option.errors));
+        entry["sweep"].back()["name"] = option.name;
       }
     }
-    list.push_back(std::move(json));
+    list.push_back(std::move(entry));
   }
   return {{"materials", std::move(list)}};
 }

@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kForm = "glint-plan plan 1";
+constexpr const char* kPlanForm = "glint-plan plan 1";
 
 Json costsJson(const Costs& costs) {
   return {{"bytes", costs.bytes}, {"preparation_s", costs.preparation_s}, {"query_ns", costs.query_ns}};
@@ -99,20 +99,20 @@ nlohmann::ordered_json planDocument(const Tool& tool, const Scene& scene, const 
     total.preparation_s += plan.choice().costs.preparation_s;
     total.query_ns = std::max(total.query_ns, plan.choice().costs.query_ns);
   }
-  return {{"schema", kForm},         {"generator", tool.generator()},     {"seed", tool.seed()},      {"maps", maps},
+  return {{"schema", kPlanForm},     {"generator", tool.generator()},     {"seed", tool.seed()},      {"maps", maps},
           {"scene", scene_document}, {"materials", std::move(materials)}, {"total", costsJson(total)}};
 }
 
 PlanFile readPlan(const std::string& path) {
   const JsonField document = JsonField::read(path);
-  document.member("schema", "give a file that glint-plan SCENE -o FILE made").word({kForm});
+  document.member("schema", "give a file that glint-plan SCENE -o FILE made").word({kPlanForm});
   PlanFile plan;
   plan.path = path;
   plan.scene = sceneOf(document.member("scene", "make the plan again"), path);
   try {
-    const Json json = document.value();
-    plan.maps = (fs::path(path).parent_path() / json.at("maps").get<std::string>()).string();
-    for (const Json& material : json.at("materials")) plan.materials.push_back(plannedOf(material, plan.scene));
+    const Json value = document.value();
+    plan.maps = (fs::path(path).parent_path() / value.at("maps").get<std::string>()).string();
+    for (const Json& material : value.at("materials")) plan.materials.push_back(plannedOf(material, plan.scene));
   } catch (const std::exception&) {
     throw Error(ErrorCode::invalid_input, "plan.form", path, "", "lacks a part of a plan",
                 "make it again with glint-plan SCENE -o FILE");

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "glint/formats/hash.h"
 #include "measure/child_process.h"
 
@@ -51,7 +52,7 @@ PlanMap openMap(Tool& tool, const AssetFolder& folder, const Scene& scene, const
                   "say in the scene how the image is read: kind, convention, height_scale");
     map.ingest_s = run.wall_s;
   }
-  map.asset = formats::Asset::openForBuilding(map.path);
+  map.asset = openInput(tool, map.path);
   map.bytes = static_cast<double>(fs::file_size(map.path));
   if (map.asset->kind() != "normals") {
     throw Error(ErrorCode::unsupported, "scene.map", scene.file, material.path + ".map",

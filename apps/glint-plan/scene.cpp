@@ -10,7 +10,7 @@
 namespace glint::apps {
 namespace {
 
-constexpr const char* kForm = "glint-plan scene 1";
+constexpr const char* kSceneForm = "glint-plan scene 1";
 /// Deviations of footprints that a scene may ask for, texels: from the middle of a texel to larger than any map.
 constexpr double kSmallestTexels = 0.05, kLargestTexels = 1e6;
 /// Texels of more than a centimetre are no microstructure.
@@ -159,7 +159,7 @@ Scene readScene(const std::string& path) { return sceneOf(JsonField::read(path),
 
 Scene sceneOf(const JsonField& document, const std::string& path) {
   document.allow({"schema", "minimise", "budgets", "unit_m", "camera", "lights", "materials"});
-  document.member("schema", std::string("give \"") + kForm + "\"").word({kForm});
+  document.member("schema", std::string("give \"") + kSceneForm + "\"").word({kSceneForm});
   Scene scene;
   scene.file = path;
   if (const auto goal = document.find("minimise")) {

@@ -1,14 +1,31 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "common/tool.h"
 #include "glint-pyramid/pyramid_options.h"
 #include "glint-pyramid/wave_options.h"
 #include "glint/bake/pyramid/pyramid.h"
-#include "glint/formats/asset_reader.h"
+#include "glint/bake/wang/tile_pyramid.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
+
+namespace {
+constexpr auto kLessMemory = "give a larger --stride, or a smaller --resolution or --overlap";
+
+/// Writes the images of all tiles of a plane.
+void makeWangPyramid(apps::Tool& tool, const WangTiles& tiles, const apps::PyramidOptions& options,
+                     const formats::Provenance& provenance, const apps::OutputFile& output) {
+  const bake::PyramidOptions values = options.values();
+  tool.requireMemory(bake::wangPyramidBytes(tiles, values, static_cast<double>(tool.maxMemory())), "the NDF images",
+                     kLessMemory);
+  const bake::WangPyramidData pyramid = bake::buildWangPyramid(tiles, values, tool.progress("images"));
+  formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
+  tool.setResult(apps::pyramidJson(pyramid.images));
+  tool.summary(apps::pyramidText(pyramid.images));
+}
+}  // namespace
 
 int main(int argc, char** argv) {
   apps::Tool tool(
@@ -16,17 +33,24 @@ int main(int argc, char** argv) {
        "Computes the NDF images of a normal map for footprints of every size and position: the level of detail of its "
        "glints, ready to be queried or compressed. With --optics wave it takes heights, and computes their diffraction.",
        "glint-pyramid flakes.glint -o flakes.pyramid.glint --stride 32 --sigma-r 0.005"});
-  const apps::InputFile input(tool, "asset of kind normals, or with --optics wave of kind heights, from glint-ingest",
+  const apps::InputFile input(tool,
+                              "asset of kind normals, or with --optics wave of kind heights, from glint-ingest; or of kind "
+                              "wang-tiles, from glint-wang",
                               "NORMALS");
-  const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind ndf-pyramid or wave-pyramid");
+  const apps::OutputFile output(tool, apps::OutputFormat::asset,
+                                "asset (.glint) of kind ndf-pyramid, wang-pyramid or wave-pyramid");
   const apps::PyramidOptions options(tool);
   const apps::WaveOptions wave(tool, options);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     const formats::Provenance provenance = tool.provenance();
     if (wave.optics() == apps::Optics::wave) return apps::makeWavePyramid(tool, asset, input, wave, provenance, output);
-    const bake::NdfPyramidData pyramid = bake::buildPyramid(asset.get<NormalMap>(), options.values(), tool.progress("images"));
+    if (asset.kind() == "wang-tiles") return makeWangPyramid(tool, asset.get<WangTiles>(), options, provenance, output);
+    const auto& map = asset.get<NormalMap>();
+    const bake::PyramidOptions values = options.values();
+    tool.requireMemory(bake::pyramidBytes(map, values, static_cast<double>(tool.maxMemory())), "the NDF images", kLessMemory);
+    const bake::NdfPyramidData pyramid = bake::buildPyramid(map, values, tool.progress("images"));
     formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
     tool.setResult(apps::pyramidJson(pyramid));
     tool.summary(apps::pyramidText(pyramid));

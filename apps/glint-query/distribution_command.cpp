@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/footprint_rules.h"
+#include "common/input_asset.h"
 #include "common/ndf_image.h"
 #include "glint-query/command_forms.h"
 #include "glint-query/usage.h"
@@ -60,7 +61,7 @@ void DistributionCommand::check() const {
 }
 
 void DistributionCommand::run() {
-  asset_.open({.verify_hashes = true, .check_values = true});
+  asset_.open(inputChecks(tool_));
   if (table_.csvGiven()) return answerTable();
   if (const auto fault = asset_.unanswerable(footprint_.footprint()))
     throw Error(ErrorCode::usage, "query.footprint", asset_.path(), "", fault->what, fault->remedy);

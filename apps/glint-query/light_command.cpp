@@ -9,10 +9,10 @@
 #include <type_traits>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "glint-query/command_forms.h"
 #include "glint-query/directions.h"
 #include "glint/bake/sh/lobes.h"
-#include "glint/formats/asset_reader.h"
 
 namespace glint::apps {
 namespace {
@@ -109,10 +109,10 @@ void LightCommand::check() const {
 }
 
 void LightCommand::run() {
-  asset_.open({.verify_hashes = true, .check_values = true});
+  asset_.open(inputChecks(tool_));
   if (const auto fault = asset_.unanswerable(footprint_.footprint()))
     throw Error(ErrorCode::usage, "query.footprint", asset_.path(), "", fault->what, fault->remedy);
-  const formats::Asset light_asset = formats::Asset::openForBuilding(path_);
+  const formats::Asset light_asset = openInput(tool_, path_);
   const ShLight& light = light_asset.get<ShLight>();
   const Lobe facets = lobe(light.order);
   const Vec3 wo = directionOf(wo_, "--wo");
@@ -121,7 +121,7 @@ void LightCommand::run() {
 
 LightCommand::Lobe LightCommand::lobe(int order) const {
   if (!lobes_path_.empty()) {
-    const formats::Asset lobes = formats::Asset::openForBuilding(lobes_path_);
+    const formats::Asset lobes = openInput(tool_, lobes_path_);
     return {{lobes.get<ShLobes>().zonal.begin(), lobes.get<ShLobes>().zonal.end()}, lobes.get<ShLobes>().sigma_r};
   }
   const std::vector<double> f = bake::zonalLobe(asset_.facetRoughness(), order);

@@ -8,6 +8,7 @@
 #include "glint-query/distribution_command.h"
 #include "glint-query/footprint_options.h"
 #include "glint-query/output_options.h"
+#include "glint/query/wang_plane.h"
 #include "glint/query/wang_reference.h"
 
 namespace glint::apps {
@@ -20,7 +21,11 @@ class PlaneCommand {
 
  private:
   void check() const;
-  void writePicture(const WangReference& plane, const Footprint& footprint);
+  /// @tparam Plane  WangReference or WangPlane
+  template <class Plane>
+  void ask(const Plane& tiles);
+  template <class Plane>
+  void writePicture(const Plane& plane, const Footprint& footprint);
 
   Tool& tool_;
   std::string path_;

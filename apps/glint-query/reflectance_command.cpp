@@ -10,12 +10,12 @@
 
 #include "common/answer_columns.h"
 #include "common/footprint_rules.h"
+#include "common/input_asset.h"
 #include "glint-query/command_forms.h"
 #include "glint-query/directions.h"
 #include "glint-query/queries.h"
 #include "glint-query/usage.h"
 #include "glint/bake/common/counter_random.h"
-#include "glint/formats/asset_reader.h"
 
 namespace glint::apps {
 namespace {
@@ -122,7 +122,7 @@ void ReflectanceCommand::check() const {
 }
 
 void ReflectanceCommand::run() {
-  const formats::Asset opened = formats::Asset::openForBuilding(asset_.path());
+  const formats::Asset opened = openInput(tool_, asset_.path());
   if (opened.kind() != "displacement")
     throw Error(ErrorCode::unsupported, "format.kind", asset_.path(), "",
                 "is of kind " + std::string(opened.kind()) + ", which holds no displacement",

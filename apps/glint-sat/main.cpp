@@ -1,9 +1,9 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
 #include "common/tool.h"
 #include "glint-sat/sat_options.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
@@ -19,10 +19,11 @@ int main(int argc, char** argv) {
   apps::SatOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
+    const auto& map = asset.get<NormalMap>();
+    tool.requireMemory(bake::histogramSatBytes(map, options.values()), "the tables", "give a larger --stride, or fewer --bins");
     const formats::Provenance provenance = tool.provenance();
-    const bake::HistogramSatData sat =
-        bake::buildHistogramSat(asset.get<NormalMap>(), options.values(), tool.progress("tables"));
+    const bake::HistogramSatData sat = bake::buildHistogramSat(map, options.values(), tool.progress("tables"));
     formats::writeAsset(output.path(), sat.view(), provenance, output.writeOptions());
     tool.setResult(apps::satJson(sat));
     tool.summary(apps::satText(sat));

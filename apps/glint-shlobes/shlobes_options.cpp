@@ -31,7 +31,6 @@ ShLobesOptions::ShLobesOptions(Tool& tool) {
   tool.option("--order", order_, "highest band of the spherical harmonics").range(0, kMaxShOrder);
   tool.option("--grid", grid_, "directions, ROWSxCOLUMNS; lobes: none for no table").defaultText("65x128; --light: 17x32");
   tool.choice("--precision", precision_, {{"f16", ShPrecision::f16}, {"f32", ShPrecision::f32}}, "type of the coefficients");
-  tool.option("--max-memory", max_memory_, "refuse larger tables, GB").range(0, 1e6).unrecorded();
   tool.option("--band-limit", band_limit_, "--light: highest band of the environment itself")
       .range(0, 10000)
       .defaultText("3 order + 24; below order 60 the least of 6 order + 24 and 204");
@@ -44,6 +43,7 @@ ShLobesOptions::ShLobesOptions(Tool& tool) {
 
 void ShLobesOptions::check(Tool& tool) {
   grid({});
+  max_bytes_ = tool.maxMemory();
   if (light_.empty()) {
     if (!sigma_option_->given())
       throw Error(ErrorCode::usage, "arguments", "", "", "nothing was asked for", "add --sigma-r S for lobes, or --light FILE");
@@ -61,7 +61,7 @@ bake::ShLobesOptions ShLobesOptions::lobesOptions() const {
   options.order = order_;
   options.grid = grid(options.grid);
   options.precision = precision_;
-  options.max_bytes = maxBytes();
+  options.max_bytes = max_bytes_;
   return options;
 }
 
@@ -71,7 +71,7 @@ bake::ShLightOptions ShLobesOptions::lightOptions() const {
   options.grid = grid(options.grid);
   options.band_limit = band_limit_;
   options.precision = precision_;
-  options.max_bytes = maxBytes();
+  options.max_bytes = max_bytes_;
   return options;
 }
 

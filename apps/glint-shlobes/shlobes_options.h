@@ -25,12 +25,11 @@ class ShLobesOptions {
  private:
   void check(Tool& tool);
   ShGrid grid(ShGrid other) const;
-  std::uint64_t maxBytes() const { return static_cast<std::uint64_t>(max_memory_ * 1e9); }
 
   std::string light_, grid_;
   float sigma_r_ = 0;
   int order_ = 60, band_limit_ = 0;
-  double max_memory_ = 4;
+  std::uint64_t max_bytes_ = 0;
   ShPrecision precision_ = ShPrecision::f16;
   AreaLightOptions area_lights_;
   Option* sigma_option_;

@@ -4,6 +4,7 @@
 
 #include "common/files.h"
 #include "common/image_io.h"
+#include "common/memory_needs.h"
 #include "common/normal_image.h"
 #include "glint-synth/synth_options.h"
 
@@ -34,6 +35,7 @@ int main(int argc, char** argv) {
 
   return tool.run(argc, argv, [&] {
     const bake::SynthOptions& p = options.values(tool);
+    apps::requireMemoryFor(tool, "a map of", p.width, p.height, apps::BytesPerTexel::kSynth, "give a smaller --size");
     const apps::PixelFormat format = apps::pixelFormat(output.path(), bits);
     if (heights) {
       std::vector<float> values = bake::synthHeights(p);

@@ -1,10 +1,12 @@
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
+#include "common/memory_needs.h"
 #include "common/tool.h"
 #include "glint-tiny/tiny_options.h"
 #include "glint/bake/ingest/normal_bounds.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 #include "glint/model/slope_sums.h"
 
@@ -13,6 +15,8 @@ using namespace glint;
 namespace {
 /// Writes a part of a plane as an asset of kind normals.
 void writeMap(apps::Tool& tool, const TinyExample& tiny, const bake::PlaneWindow& window, const apps::OutputFile& output) {
+  apps::requireMemoryFor(tool, "a map of", window.width, window.height, apps::BytesPerTexel::kExplicit,
+                         "give a smaller --explicit");
   const formats::Provenance provenance = tool.provenance();
   const std::vector<Vec2> normals = bake::explicitNormals(tiny, window, tool.progress("rows"));
   NormalMap map;
@@ -41,10 +45,13 @@ int main(int argc, char** argv) {
   const apps::ExplicitOptions window(tool, options.options());
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     if (window.wanted()) return writeMap(tool, asset.get<TinyExample>(), window.window(), output);
     const bake::TinyOptions values = options.values();
     const NormalMap example = options.example(asset.get<NormalMap>());
+    const double images = std::max(1.0, static_cast<double>(values.resolution) * values.resolution / (128.0 * 128.0));
+    apps::requireMemoryFor(tool, "an example of", example.width, example.height, images * apps::BytesPerTexel::kExample,
+                           "give a smaller --cut or --resolution");
     const formats::Provenance provenance = tool.provenance();
     const bake::TinyExampleData tiny = bake::buildTinyExample(example, values, tool.progress("images"));
     formats::writeAsset(output.path(), tiny.view(), provenance, output.writeOptions());

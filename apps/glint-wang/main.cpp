@@ -1,11 +1,12 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "common/input_asset.h"
+#include "common/memory_needs.h"
 #include "common/tool.h"
 #include "glint-wang/wang_options.h"
 #include "glint/bake/common/slopes.h"
 #include "glint/bake/ingest/normal_bounds.h"
-#include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
 
 using namespace glint;
@@ -13,6 +14,8 @@ using namespace glint;
 namespace {
 /// Writes a part of the plane.
 void writeMap(apps::Tool& tool, const apps::OutputFile& output, const WangTiles& tiles, const apps::WangOptions& options) {
+  apps::requireMemoryFor(tool, "a map of", options.mapWidth(), options.mapHeight(), apps::BytesPerTexel::kExplicit,
+                         "give a smaller --explicit");
   const auto normals =
       bake::explicitPlane(tiles, options.originX(), options.originY(), options.mapWidth(), options.mapHeight());
   NormalMap map;
@@ -38,11 +41,13 @@ int main(int argc, char** argv) {
   const apps::WangOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = formats::Asset::openForBuilding(input.path());
+    const formats::Asset asset = apps::openInput(tool, input.path());
     if (options.wantsMap()) return writeMap(tool, output, asset.get<WangTiles>(), options);
     apps::refuseTiles(asset, input.path());
     const auto& map = asset.get<NormalMap>();
-    const bake::WangTilesData tiles = bake::buildWangTiles(map, options.values(tool, input.path()), tool.progress("tiles"));
+    const bake::WangOptions values = options.values(tool, input.path());
+    apps::requireMemoryFor(tool, "tiles of", values.size, values.size, apps::BytesPerTexel::kTile, "give a smaller --size");
+    const bake::WangTilesData tiles = bake::buildWangTiles(map, values, tool.progress("tiles"));
     formats::writeAsset(output.path(), tiles.view(), tool.provenance(), output.writeOptions());
     apps::warnOfLargeTiles(tool, input.path(), map, tiles);
     tool.setResult(apps::wangJson(tiles));

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <memory>
 #include <string_view>
@@ -32,12 +33,16 @@ std::vector<T> readFlipped(OIIO::ImageInput& input, int part, const OIIO::ImageS
   std::vector<T> pixels(row * spec.height);
   const auto row_bytes = static_cast<OIIO::stride_t>(row * sizeof(T));
   T* last_row = pixels.data() + row * (spec.height - 1);
+  errno = 0;
   const bool complete = input.read_image(part, 0, 0, spec.nchannels, type, last_row, OIIO::AutoStride, -row_bytes);
-  if (!complete || input.has_error()) throwDamagedImage(path, trimmed(input.geterror()));
-  return pixels;
+  const int reason = errno;
+  if (complete && !input.has_error()) return pixels;
+  checkSystemReason(path, reason);
+  throwDamagedImage(path, trimmed(input.geterror()));
+  ;
 }
 
-void checkSize(const OIIO::ImageSpec& spec, const std::string& path) {
+void checkSize(const OIIO::ImageSpec& spec, const std::string& path, const std::string& format, std::uint64_t most_bytes) {
   if (spec.depth > 1) {
     throw Error(ErrorCode::unsupported, "image.planar", path, "", "volumes are not supported", "export one slice as an image");
   }
@@ -45,7 +50,7 @@ void checkSize(const OIIO::ImageSpec& spec, const std::string& path) {
     throw Error(ErrorCode::unsupported, "image.planar", path, "", "deep images are not supported", "flatten the image first");
   }
   if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1) throwDamagedImage(path, "it has no pixels");
-  checkDeclaredSize(path, spec.image_bytes(true));
+  checkDeclaredSize(path, format, spec.image_bytes(true), most_bytes);
 }
 
 /// @throws Error usage if a value does not fit
@@ -114,8 +119,10 @@ std::string unreadableRemedy(const std::string& reason) {
 std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
+  errno = 0;
   auto input = OIIO::ImageInput::open(path, &config);
   if (input) return input;
+  checkSystemReason(path, errno);
   checkSystemReads(path);
   const std::string reason = trimmed(OIIO::geterror());
   throw Error(ErrorCode::invalid_input, "image.readable", path, "", "cannot be read as an image: " + reason,
@@ -160,7 +167,7 @@ void invertWhiteZero(const OIIO::ImageSpec& spec, const std::string& path, Image
   for (std::uint16_t& code : *codes) code = static_cast<std::uint16_t>(65535 - code);
 }
 
-StoredImage readImageFile(const std::string& path, const std::string& part) {
+StoredImage readImageFile(const std::string& path, const std::string& part, std::uint64_t most_bytes) {
   // OpenImageIO has threads of its own, which --threads is to limit as well.
   OIIO::attribute("threads", static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
   StoredImage stored;
@@ -170,7 +177,7 @@ StoredImage readImageFile(const std::string& path, const std::string& part) {
   const auto input = open(path);
   if (image.part > 0 && !input->seek_subimage(image.part, 0)) throwDamagedImage(path, trimmed(input->geterror()));
   const OIIO::ImageSpec spec = input->spec();
-  checkSize(spec, path);
+  checkSize(spec, path, input->format_name(), most_bytes);
   image.width = spec.width;
   image.height = spec.height;
   image.channels = spec.nchannels;

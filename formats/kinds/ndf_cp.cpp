@@ -6,6 +6,7 @@
 #include "glint/formats/kinds/description.h"
 #include "glint/formats/kinds/shared_fields.h"
 #include "glint/formats/kinds/tally.h"
+#include "glint/formats/kinds/wang_fields.h"
 #include "glint/formats/number_text.h"
 #include "glint/math/half.h"
 
@@ -415,6 +416,10 @@ struct KindDescription<NdfCp> {
 
   static void describe(Fields auto& fields, auto& ndf) {
     describeShape(fields, ndf.shape);
+    describeCompression(fields, ndf);
+  }
+  /// Everything but the shape.
+  static void describeCompression(Fields auto& fields, auto& ndf) {
     fields.choice("method", ndf.method, "cp|tucker|pca", "how the basis images of a cluster are made");
     fields.choice("coefficient_type", ndf.coefficient_type, "i8|f16|f32", "type of the stored coefficients");
     fields.integer("regions", ndf.regions, {1, 65535}, "1", "regions of images, by place on the map or by level");
@@ -427,6 +432,10 @@ struct KindDescription<NdfCp> {
 
   static void checkIndex(const NdfCp& ndf, Findings& findings) {
     checkShape(ndf.shape, findings);
+    checkFactorIndex(ndf, findings);
+  }
+  /// Everything but the shape.
+  static void checkFactorIndex(const NdfCp& ndf, Findings& findings) {
     const std::vector<std::uint32_t> slots = checkImages(ndf, findings);
     if (slots.empty()) return;
     if (!checkPlaces(ndf, findings)) return;
@@ -474,5 +483,31 @@ struct KindDescription<NdfCp> {
 };
 
 template const Kind& kindOf<NdfCp>();
+
+template <>
+struct KindDescription<WangCp> {
+  static constexpr std::string_view kTitle = "Compressed pyramid of NDF images of Wang tiles";
+
+  static std::vector<Rule> indexRules() { return {}; }
+  static std::vector<Rule> valueRules() { return {}; }
+
+  static void describe(Fields auto& fields, auto& ndf) {
+    describeTileImages(fields, ndf.plane, ndf.images.shape);
+    KindDescription<NdfCp>::describeCompression(fields, ndf.images);
+    describeTileMasses(fields, ndf.plane, ndf.images.shape);
+  }
+
+  static void checkIndex(const WangCp& ndf, Findings& findings) {
+    checkTileImages(ndf.plane, ndf.images.shape, findings);
+    KindDescription<NdfCp>::checkFactorIndex(ndf.images, findings);
+  }
+
+  static void checkValues(const WangCp& ndf, Findings& findings) {
+    checkTileMasses(ndf.plane, ndf.images.shape, findings);
+    KindDescription<NdfCp>::checkValues(ndf.images, findings);
+  }
+};
+
+template const Kind& kindOf<WangCp>();
 
 }  // namespace glint::formats

@@ -57,6 +57,10 @@ std::string imageOf(const NdfPyramid& pyramid, int l, std::size_t block) {
 
 void checkPyramidIndex(const NdfPyramid& pyramid, Findings& findings) {
   checkShape(pyramid.shape, findings);
+  checkPyramidMasks(pyramid, findings);
+}
+
+void checkPyramidMasks(const NdfPyramid& pyramid, Findings& findings) {
   const auto words = static_cast<std::size_t>(pyramid.shape.maskWords());
   const int tail_bits = pyramid.shape.blocksPerImage() % 64;
   const std::uint64_t beyond = tail_bits == 0 ? 0 : ~std::uint64_t{0} << tail_bits;

@@ -45,6 +45,8 @@ std::string imageOf(const NdfPyramid& pyramid, int l, std::size_t block);
 
 /// Rules pyramid.masks and pyramid.mask_ranks, and those of shapes.
 void checkPyramidIndex(const NdfPyramid& pyramid, Findings& findings);
+/// Rules pyramid.masks and pyramid.mask_ranks.
+void checkPyramidMasks(const NdfPyramid& pyramid, Findings& findings);
 /// Rules pyramid.pixels, pyramid.block_means and pyramid.integral.
 /// @param loses_light  whether images may integrate to less than 1, because light may leave the square of half vectors
 void checkPyramidValues(const NdfPyramid& pyramid, Findings& findings, bool loses_light = false);

@@ -7,6 +7,7 @@
 #include "glint/formats/kinds/description.h"
 #include "glint/formats/kinds/shared_fields.h"
 #include "glint/formats/kinds/tally.h"
+#include "glint/formats/kinds/wang_fields.h"
 #include "glint/model/slope_sums.h"
 
 namespace glint::formats {
@@ -82,15 +83,7 @@ struct KindDescription<WangTiles> {
   }
 
   static void describe(Fields auto& fields, auto& tiles) {
-    fields.integer("tile_size", tiles.size, {WangTiles::kLeastSize, WangTiles::kMostSize}, "texel",
-                   "width and height of a tile");
-    fields.choice("scheme", tiles.scheme, "edge|corner", "what has colours: the sides of tiles, or their corners");
-    constexpr Range kColors = {WangTiles::kLeastColors, WangTiles::kMostColors};
-    fields.integer("colors_h", tiles.colors_h, kColors, "1", "colours of south and north sides; scheme corner: of corners");
-    fields.integer("colors_v", tiles.colors_v, kColors, "1", "colours of west and east sides; scheme corner: as colors_h");
-    fields.integer("tile_count", tiles.tile_count, {1, WangTiles::kMostTiles}, "1", "number of tiles");
-    fields.integer("plane_seed", tiles.plane_seed, {0, 1 << 30}, "1", "seed of the colours of the plane");
-    fields.real("texel_size_um", tiles.texel_size_um, {0, FLT_MAX}, "um", "width of a texel; 0 when unknown");
+    describeTileSet(fields, tiles);
     fields.real("seam_cost", tiles.seam_cost, {0, FLT_MAX}, "1",
                 "mean difference of normals along seams, over that of neighbouring texels of the input");
     fields.real("ndf_tv", tiles.ndf_tv, {0, 1}, "1", "total variation between the normals of the tiles and of the input");
@@ -103,15 +96,7 @@ struct KindDescription<WangTiles> {
 
   static void checkIndex(const WangTiles& tiles, Findings& findings) {
     checkSlopes(tiles.slopes, findings);
-    if (tiles.scheme == WangScheme::corner && tiles.colors_h != tiles.colors_v) {
-      findings.add("wang.corners", "/@colors_v",
-                   "is " + std::to_string(tiles.colors_v) + ", and colors_h is " + std::to_string(tiles.colors_h));
-      return;
-    }
-    if (tiles.tile_count % tiles.combinations() != 0)
-      findings.add("wang.set", "/@tile_count",
-                   "is " + std::to_string(tiles.tile_count) + ", no multiple of " + std::to_string(tiles.combinations()) +
-                       " combinations of colours");
+    checkTileSet(tiles, findings);
   }
 
   static void checkValues(const WangTiles& tiles, Findings& findings) {

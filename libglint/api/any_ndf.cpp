@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "glint/api/alternatives.h"
@@ -37,9 +38,6 @@ void requireSameMap(const formats::Asset& asset, const std::filesystem::path& pa
 }
 
 [[noreturn]] void refuseKind(std::string_view kind, const std::filesystem::path& path) {
-  if (kind == formats::kKindName<WangTiles>)
-    throw Error(ErrorCode::unsupported, "format.kind", path.string(), "", "is of kind wang-tiles, a plane without end",
-                "ask WangReference, or make a map of a part of the plane with glint-wang --explicit");
   throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",
               "is of kind " + std::string(kind) + ", which holds no distribution of normals",
               kind == "displacement" ? "ask for the light that it reflects, with DisplacedBrdf or glint_displaced_open"
@@ -60,7 +58,11 @@ std::vector<std::string_view> ndfKinds() {
 }
 
 OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& options) {
-  OpenedNdf opened(path, options);
+  return open(formats::Asset::open(path, options.checks), path, options);
+}
+
+OpenedNdf OpenedNdf::open(formats::Asset asset, const std::filesystem::path& path, const NdfOptions& options) {
+  OpenedNdf opened(std::move(asset), path, options);
   if (!options.normals.empty()) opened.normals_ = formats::Asset::open(options.normals, options.checks);
   const std::string_view kind = opened.asset_.kind();
   if (!answersNdf(kind)) refuseKind(kind, path);

@@ -31,6 +31,10 @@ class OpenedNdf {
   ///                that the asset was made from, by the hash that the asset names, or by size where it names none
   static OpenedNdf open(const std::filesystem::path& path, const NdfOptions& options = {});
 
+  /// The same for an asset that is open, from memory for example. Messages call it `name`; `options.checks` is for
+  /// `options.normals` only.
+  static OpenedNdf open(formats::Asset asset, const std::filesystem::path& name, const NdfOptions& options = {});
+
   /// Points into the mapped asset: lives as long as this object, also when that is moved.
   const AnyNdf& model() const { return model_; }
   const NdfInfo& info() const { return info_; }
@@ -52,8 +56,8 @@ class OpenedNdf {
   }
 
  private:
-  OpenedNdf(std::filesystem::path path, const NdfOptions& options)
-      : path_(std::move(path)), options_(options), asset_(formats::Asset::open(path_, options.checks)) {}
+  OpenedNdf(formats::Asset asset, std::filesystem::path path, const NdfOptions& options)
+      : path_(std::move(path)), options_(options), asset_(std::move(asset)) {}
 
   std::filesystem::path path_;
   NdfOptions options_;

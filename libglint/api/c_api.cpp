@@ -108,6 +108,25 @@ FootprintArrays arraysOf(const glint_footprints& p) {
   return out;
 }
 
+const char* faultOf(const glint_source* source) {
+  if (source == nullptr) return "source is null";
+  return source->read == nullptr ? "read is null" : nullptr;
+}
+
+formats::Asset openMemory(const void* bytes, std::size_t size_bytes, const std::string& name,
+                          const formats::OpenOptions& options) {
+  return formats::Asset::openMemory({static_cast<const std::byte*>(bytes), size_bytes}, name, options);
+}
+
+formats::Asset openSource(const glint_source& source, const formats::OpenOptions& options) {
+  const auto read = [&](std::uint64_t offset, std::span<std::byte> to) {
+    return source.read(source.context, offset, to.data(), to.size()) == 0;
+  };
+  return formats::Asset::openSource({nameOr(source.name, "source"), source.size_bytes, read}, options);
+}
+
+std::string nameOr(const char* name, const char* other) { return name == nullptr ? other : name; }
+
 }  // namespace glint::api::c
 
 namespace {
@@ -117,7 +136,7 @@ using namespace glint::api::c;
 constexpr float kLeastSigmaR = 1e-4f, kMostSigmaR = 0.25f;
 /// Size of the options in the first version of the struct.
 constexpr std::size_t kFirstOptionsSize = offsetof(glint_open_options, verify_hashes) + sizeof(int32_t);
-static_assert(offsetof(glint_open_options, pixels) + sizeof(int32_t) == sizeof(glint_open_options),
+static_assert(offsetof(glint_open_options, reserved) + sizeof(int32_t) == sizeof(glint_open_options),
               "padding at the end would be read as a member by a later library");
 
 /// @return null if the options can be used, else the fault
@@ -138,6 +157,7 @@ const char* takeOptions(const glint_open_options* from, glint_open_options& to) 
   if (to.interpolation != GLINT_INTERPOLATION_FOOTPRINT && to.interpolation != GLINT_INTERPOLATION_TRILINEAR)
     return "unknown interpolation";
   if (to.pixels != GLINT_PIXELS_SMOOTH && to.pixels != GLINT_PIXELS_CONSTANT) return "unknown pixels";
+  if (to.reserved != 0) return "reserved is not 0";
   return nullptr;
 }
 
@@ -148,6 +168,7 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   options.surface = static_cast<Surface>(o.surface);
   options.boundary = static_cast<Boundary>(o.boundary);
   options.checks.verify_hashes = o.verify_hashes != 0;
+  options.checks.copy = o.copy != 0;
   options.alpha = o.alpha;
   if (o.slant_tolerance != 0) options.slant_tolerance = std::max(0.0f, o.slant_tolerance);
   if (o.footprint_parts != 0) options.footprint_parts = o.footprint_parts;
@@ -155,6 +176,12 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   options.pixels = static_cast<Pixels>(o.pixels);
   if (o.gaussian_boxes == 3) options.gaussian_boxes = GaussianBoxes::three;
   return options;
+}
+
+/// The handle of an opened asset.
+glint_ndf* handleOf(api::OpenedNdf opened) {
+  std::string kind(opened.asset().kind());
+  return new glint_ndf(std::make_shared<NdfBody>(NdfBody{std::move(opened), std::move(kind)}));
 }
 
 glint_footprint gaussianAt(double u, double v, const Covariance& c) {
@@ -181,10 +208,30 @@ glint_status glint_ndf_open(const char* path, const glint_open_options* options,
   if (ndf == nullptr) return usage("glint_ndf_open", "ndf is null");
   glint_open_options given;
   if (const char* fault = takeOptions(options, given)) return usage("glint_open_options", fault);
+  return guarded([&] { *ndf = handleOf(api::OpenedNdf::open(path, optionsOf(given))); });
+}
+
+glint_status glint_ndf_open_memory(const void* bytes, size_t size_bytes, const char* name, const glint_open_options* options,
+                                   glint_ndf** ndf) {
+  if (bytes == nullptr) return usage("glint_ndf_open_memory", "bytes is null");
+  if (ndf == nullptr) return usage("glint_ndf_open_memory", "ndf is null");
+  glint_open_options given;
+  if (const char* fault = takeOptions(options, given)) return usage("glint_open_options", fault);
   return guarded([&] {
-    auto opened = api::OpenedNdf::open(path, optionsOf(given));
-    std::string kind(opened.asset().kind());
-    *ndf = new glint_ndf(std::make_shared<NdfBody>(NdfBody{std::move(opened), std::move(kind)}));
+    const api::NdfOptions use = optionsOf(given);
+    const std::string shown = nameOr(name, "memory");
+    *ndf = handleOf(api::OpenedNdf::open(openMemory(bytes, size_bytes, shown, use.checks), shown, use));
+  });
+}
+
+glint_status glint_ndf_open_source(const glint_source* source, const glint_open_options* options, glint_ndf** ndf) {
+  if (const char* fault = faultOf(source)) return usage("glint_ndf_open_source", fault);
+  if (ndf == nullptr) return usage("glint_ndf_open_source", "ndf is null");
+  glint_open_options given;
+  if (const char* fault = takeOptions(options, given)) return usage("glint_open_options", fault);
+  return guarded([&] {
+    const api::NdfOptions use = optionsOf(given);
+    *ndf = handleOf(api::OpenedNdf::open(openSource(*source, use.checks), nameOr(source->name, "source"), use));
   });
 }
 

@@ -5,6 +5,7 @@
 #include "glint/api/any_brdf.h"
 #include "glint/api/brdf_batch.h"
 #include "glint/api/c_support.h"
+#include "glint/api/plane_position.h"
 #include "glint/query/light/environment.h"
 
 namespace glint::api::c {
@@ -25,8 +26,7 @@ using namespace glint::api::c;
 /// The footprint that a BRDF is asked for. On a plane without end its centre keeps the whole parts, as far as floats have them.
 Footprint footprintFor(const api::AnyBrdf& brdf, const glint_footprint& p) {
   Footprint footprint = footprintOf(p);
-  if (std::holds_alternative<TinyExampleNdf>(brdf.model()))
-    footprint.centre = {static_cast<float>(p.u), static_cast<float>(p.v)};
+  if (api::isEndless(brdf.model())) footprint.centre = {static_cast<float>(p.u), static_cast<float>(p.v)};
   return footprint;
 }
 

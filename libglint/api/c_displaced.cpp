@@ -93,6 +93,26 @@ glint_status glint_displaced_open(const char* path, int32_t verify_hashes, glint
   });
 }
 
+glint_status glint_displaced_open_memory(const void* bytes, size_t size_bytes, const char* name, int32_t verify_hashes,
+                                         int32_t copy, glint_displaced** displaced) {
+  if (bytes == nullptr) return usage("glint_displaced_open_memory", "bytes is null");
+  if (displaced == nullptr) return usage("glint_displaced_open_memory", "displaced is null");
+  return guarded([&] {
+    const formats::OpenOptions options{.verify_hashes = verify_hashes != 0, .copy = copy != 0};
+    *displaced =
+        new glint_displaced(std::make_shared<DisplacedBody>(openMemory(bytes, size_bytes, nameOr(name, "memory"), options)));
+  });
+}
+
+glint_status glint_displaced_open_source(const glint_source* source, int32_t verify_hashes, glint_displaced** displaced) {
+  if (const char* fault = faultOf(source)) return usage("glint_displaced_open_source", fault);
+  if (displaced == nullptr) return usage("glint_displaced_open_source", "displaced is null");
+  return guarded([&] {
+    const formats::OpenOptions options{.verify_hashes = verify_hashes != 0};
+    *displaced = new glint_displaced(std::make_shared<DisplacedBody>(openSource(*source, options)));
+  });
+}
+
 void glint_displaced_close(glint_displaced* displaced) { glint_displaced::close(displaced); }
 
 glint_status glint_displaced_get_info(const glint_displaced* displaced, glint_displaced_info* info) {

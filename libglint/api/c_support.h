@@ -58,6 +58,17 @@ const char* faultOf(const glint_ndf* ndf);
 const char* faultOf(const glint_brdf* brdf);
 const char* faultOf(const glint_displaced* displaced);
 
+/// The fault of a source of bytes; null if there is none.
+const char* faultOf(const glint_source* source);
+
+/// The asset of bytes in memory that a caller gives.
+formats::Asset openMemory(const void* bytes, std::size_t size_bytes, const std::string& name,
+                          const formats::OpenOptions& options);
+/// The asset of bytes that a caller's function reads.
+formats::Asset openSource(const glint_source& source, const formats::OpenOptions& options);
+/// A name that a caller gives, or another where that is null.
+std::string nameOr(const char* name, const char* other);
+
 /// Fails for the first argument that is null or closed, and names it. There must be one.
 glint_status badArgument(const char* where, std::initializer_list<Argument> arguments);
 

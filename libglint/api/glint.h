@@ -18,9 +18,8 @@
  * Closed handles: a function that is given one, or a handle of another kind, returns GLINT_ERROR_USAGE. For that, some 40 bytes
  * of each handle stay in memory until the program ends.
  *
- * Threads: handles are immutable; any number of threads may ask one at once. Opening is thread-safe (one file at a time) and
- * uses HDF5 while it lasts: a program with HDF5 code of its own on other threads must keep it apart from that. Queries do not
- * use HDF5, and allocate nothing.
+ * Threads: handles are immutable; any number of threads may ask one at once. Opening is thread-safe and takes no lock. Queries
+ * allocate nothing.
  *
  * Versions: three numbers, each with its rule. GLINT_ABI_VERSION, the number in the name of the shared library, rises when a
  * program has to be compiled again; functions, kinds and members at the end of sized structs come without that. glint_version()
@@ -107,16 +106,19 @@ typedef struct glint_open_options {
                                answered */
   int32_t pixels;           /* kinds with levels of images: GLINT_PIXELS_*, how densities run between half vectors of one pixel
                                of an image */
+  int32_t copy;     /* not 0: copy the bytes of the asset into memory of its own. For files that others may truncate while
+                               they are open, which would end the program with SIGBUS, and for memory that does not stay */
+  int32_t reserved; /* 0 */
 } glint_open_options;
 
 #define GLINT_SLANT_EXACT (-1.0f)
 
 /* clang-format off */
-#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f, 0.0f, 0, 0, 0, 0 }
+#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f, 0.0f, 0, 0, 0, 0, 0, 0 }
 /* clang-format on */
 
 /* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat,
- * slope-moments, tiny-example, wave-pyramid.
+ * slope-moments, tiny-example, wang-cp, wang-pyramid, wang-tiles, wave-pyramid.
  *
  * The file is checked, then mapped; what queries read is not copied. Safe on untrusted files. A file must not be changed in
  * place while it is open (the tools never do: they replace files).
@@ -124,6 +126,27 @@ typedef struct glint_open_options {
  * Returns GLINT_ERROR_USAGE for null path or ndf, or options out of range; IO, INVALID_INPUT and UNSUPPORTED as listed
  * above. */
 GLINT_API glint_status glint_ndf_open(const char* path, const glint_open_options* options, glint_ndf** ndf);
+
+/* The same for an asset whose bytes are in memory. They must stay unchanged as long as the asset is open, unless
+ * options->copy is set. They are copied, too, where they do not start at a multiple of 64.
+ * bytes: not null. name: UTF-8, name of the asset in messages; null: "memory".
+ * Returns what glint_ndf_open returns; GLINT_ERROR_USAGE for null bytes. */
+GLINT_API glint_status glint_ndf_open_memory(const void* bytes, size_t size_bytes, const char* name,
+                                             const glint_open_options* options, glint_ndf** ndf);
+
+/* Where the bytes of an asset come from that is neither a file nor in memory, such as a part of an archive. */
+typedef struct glint_source {
+  const char* name;    /* UTF-8, name of the asset in messages; null: "source" */
+  uint64_t size_bytes; /* of the asset */
+  void* context;       /* passed to read */
+  /* Fills size_bytes bytes at `to` with those of the asset from `offset` on, which are inside the asset. Returns 0, or another
+   * number where reading fails. Not null. */
+  int32_t (*read)(void* context, uint64_t offset, void* to, size_t size_bytes);
+} glint_source;
+
+/* The same for bytes that a function reads: all of them, on the calling thread, before this returns.
+ * Returns what glint_ndf_open returns; GLINT_ERROR_USAGE for a null source or read, GLINT_ERROR_IO where read fails. */
+GLINT_API glint_status glint_ndf_open_source(const glint_source* source, const glint_open_options* options, glint_ndf** ndf);
 
 /* Closes a handle; null and closed handles are ignored. No thread may be asking it. BRDFs of the handle stay usable: the asset
  * stays open until the last of them is destroyed. */
@@ -170,8 +193,8 @@ GLINT_API glint_status glint_ndf_pack(const glint_ndf* ndf, void* buffer, size_t
 enum { GLINT_FOOTPRINT_GAUSSIAN = 0, GLINT_FOOTPRINT_BOX = 1 };
 typedef struct glint_footprint {
   int32_t kind; /* GLINT_FOOTPRINT_*; other values count as Gaussian */
-  double u, v;  /* centre, in maps: the whole parts count on planes without end (kind tiny-example, in sizes of the example),
-                   for BRDFs as far as floats tell positions apart; maps repeat */
+  double u, v;  /* centre, in maps: the whole parts count on planes without end (kind tiny-example, in sizes of the example;
+                   kinds wang-cp, wang-pyramid and wang-tiles, in tiles), for BRDFs as far as floats tell positions apart; maps repeat */
   float m[4];   /* Gaussian: covariance xx, xy, yy in texels^2, and unused. Box: a parallelogram's half axes ax, ay, bx, by
                    in texels */
 } glint_footprint;
@@ -425,6 +448,14 @@ enum {
 
 /* Opens an asset of kind displacement; as glint_ndf_open. verify_hashes: as glint_open_options. */
 GLINT_API glint_status glint_displaced_open(const char* path, int32_t verify_hashes, glint_displaced** displaced);
+
+/* The same for bytes in memory; as glint_ndf_open_memory. copy: as glint_open_options. */
+GLINT_API glint_status glint_displaced_open_memory(const void* bytes, size_t size_bytes, const char* name,
+                                                   int32_t verify_hashes, int32_t copy, glint_displaced** displaced);
+
+/* The same for bytes that a function reads; as glint_ndf_open_source. */
+GLINT_API glint_status glint_displaced_open_source(const glint_source* source, int32_t verify_hashes,
+                                                   glint_displaced** displaced);
 
 /* Closes a handle; null and closed handles are ignored. No thread may be asking it. */
 GLINT_API void glint_displaced_close(glint_displaced* displaced);

@@ -10,6 +10,7 @@
 #include "glint/api/models/pyramid.h"
 #include "glint/api/models/reference.h"
 #include "glint/api/models/tiny.h"
+#include "glint/api/models/wang.h"
 #include "glint/api/models/wave.h"
 
 namespace glint::api {
@@ -48,10 +49,10 @@ struct NdfModelList {
 /// Every model that an asset can hold, for footprints of any shape. A new model is a line here and a file of traits in models/:
 /// opening, the C interface, packing, the tools, and the tests of all models take it from here.
 ///
-/// A plane of tiles is one line, not one for each model of its tiles. It holds its tiles as a variant over a list of the models
-/// that tiles may have, and visits the variant once in each question, after it has chosen the tile. Its traits open a tile by
-/// the traits of the tile's model.
-using NdfModels = NdfModelList<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, BinMapNdf, HistogramNdf,
-                               MomentsNdf, TinyExampleNdf, AnisotropicNdf<WaveNdf>>;
+/// A plane of tiles is a line for each form of its tiles. A plane of tiles of several models holds them as a variant over a list of
+/// these models, and visits the variant once in each question, after it has chosen the tile: its models do not multiply it.
+using NdfModels =
+    NdfModelList<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, BinMapNdf, HistogramNdf, MomentsNdf,
+                 TinyExampleNdf, WangReference, WangPlane<PyramidTiles>, WangPlane<CompressedTiles>, AnisotropicNdf<WaveNdf>>;
 
 }  // namespace glint::api

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cmath>
+#include <concepts>
 #include <cstdint>
+#include <variant>
 
 #include "glint/api/batch.h"
 #include "glint/api/ndf_models.h"
@@ -15,12 +17,30 @@ inline std::int64_t planeCell(double u) {
   return std::fabs(u) < kFarthest ? static_cast<std::int64_t>(std::floor(u)) : 0;
 }
 
+/// A model of a plane without end, which can be seen from any of its cells.
+template <class Model>
+concept EndlessNdf = requires(const Model& model, std::int64_t cell) {
+  { model.movedTo(cell, cell) } -> std::same_as<Model>;
+};
+
+/// Whether a model is one of a plane without end: then the whole parts of the centre of a footprint count.
+inline bool isEndless(const NdfModels::Any& model) {
+  return std::visit([]<class Model>(const Model&) { return EndlessNdf<Model>; }, model);
+}
+
 /// Calls ask(model) for a question at a position. A plane without end is moved so that its cell there is cell 0: the footprint of
 /// the question has its centre at wrappedUv(u, v). Maps repeat, so that they need no move.
 template <class Ask>
 auto askAt(const NdfModels::Any& model, double u, double v, Ask&& ask) {
-  if (const auto* plane = std::get_if<TinyExampleNdf>(&model)) return ask(plane->movedTo(planeCell(u), planeCell(v)));
-  return ask(model);
+  const auto cell_x = planeCell(u), cell_y = planeCell(v);
+  return std::visit(
+      [&]<class Model>(const Model& m) {
+        if constexpr (EndlessNdf<Model>)
+          return ask(m.movedTo(cell_x, cell_y));
+        else
+          return ask(m);
+      },
+      model);
 }
 
 /// The model for questions at one position, as askAt gives it.
@@ -33,7 +53,8 @@ template <class Model>
 const Model& modelAt(const Model& model, const FootprintArrays&, std::size_t) {
   return model;
 }
-inline TinyExampleNdf modelAt(const TinyExampleNdf& plane, const FootprintArrays& footprints, std::size_t k) {
+template <EndlessNdf Model>
+Model modelAt(const Model& plane, const FootprintArrays& footprints, std::size_t k) {
   if (footprints.precise_u.data == nullptr) return plane;
   return plane.movedTo(planeCell(footprints.precise_u[k]), planeCell(footprints.precise_v[k]));
 }

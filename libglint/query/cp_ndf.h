@@ -105,6 +105,8 @@ class CpNdf {
   }
 
  private:
+  friend class CompressedTiles;  // asks images that it has chosen itself
+
   GLINT_HD float imageDensity(const Footprint& p, Vec2 h) const {
     const PyramidSlices chosen = chooser_.choose(p);
     const PixelPlace place = pixelPlace(shape(), h);

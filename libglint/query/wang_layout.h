@@ -8,6 +8,9 @@
 
 namespace glint {
 
+/// value / step, rounded down. `step` is positive.
+inline GLINT_HD int floorDiv(int value, int step) { return value / step - (value % step < 0 ? 1 : 0); }
+
 /// A place of the plane: a cell, and a position inside it. Whole numbers of 64 bits name the cell, so that places far out lose no
 /// digits.
 struct WangPlace {

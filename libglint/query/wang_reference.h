@@ -264,8 +264,6 @@ class WangReference {
     return facetOfTile(tile, i, j, half);
   }
 
-  static GLINT_HD int floorDiv(int value, int step) { return value / step - (value % step < 0 ? 1 : 0); }
-
   WangTiles tiles_;
   WangLayout layout_;
   float sigma_r_;

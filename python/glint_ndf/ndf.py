@@ -21,6 +21,9 @@ _FRESNELS = {"mirror": 0, "dielectric": 1, "conductor": 2}
 _FACETS = {"distribution": 0, "beckmann": 1}
 _SLANT_EXACT = -1.0
 
+#: Kinds of planes without end: the whole parts of uv count.
+ENDLESS_KINDS = ("tiny-example", "wang-cp", "wang-pyramid", "wang-tiles")
+
 
 def _word(name: str, value: str, words: dict[str, int]) -> int:
     if value not in words:
@@ -49,7 +52,7 @@ class Ndf:
         for name, value in handle.info().items():
             setattr(self, name, value)
 
-    kind: str  #: "normals", "ndf-pyramid", "ndf-cp", "bin-map", "histogram-sat", "slope-moments", "tiny-example" or "wave-pyramid"
+    kind: str  #: "normals", "ndf-pyramid", "ndf-cp", "bin-map", "histogram-sat", "slope-moments", "tiny-example", "wang-cp", "wang-pyramid", "wang-tiles" or "wave-pyramid"
     width: int  #: of the normal map, texels
     height: int  #: of the normal map, texels
     resolution: int  #: pixels of an NDF image along each axis; 256 where there are none
@@ -176,7 +179,7 @@ class Brdf:
 
     def _footprints(self, uv, sigma, covariance, box) -> FootprintArrays:
         # On a plane without end the whole parts of uv count, and batches of doubles drop them.
-        return FootprintArrays(uv, sigma, covariance, box, keep_whole_parts=self.ndf.kind == "tiny-example")
+        return FootprintArrays(uv, sigma, covariance, box, keep_whole_parts=self.ndf.kind in ENDLESS_KINDS)
 
     def evaluate(self, uv, wi, wo, *, sigma=None, covariance=None, box=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
         """The BRDF and the density of its samples.

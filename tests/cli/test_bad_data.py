@@ -153,3 +153,40 @@ def test_normals_of_another_map_are_refused(glint, assets):
 def test_the_inputs_of_a_compressed_pyramid_name_its_map(glint, assets):
     text = glint("info", "compressed.glint").stdout
     assert "pyramid.glint/normals.glint" in text
+
+
+# Tools that read assets, and the asset of which a bit is flipped.
+READERS = [
+    ("pyramid", "normals.glint", ["-o", "out.glint"]),
+    ("sat", "normals.glint", ["-o", "out.glint"]),
+    ("moments", "normals.glint", ["-o", "out.glint"]),
+    ("binmap", "normals.glint", ["-o", "out.glint", "--alpha", "0.02"]),
+    ("tiny", "normals.glint", ["-o", "out.glint", "--cut", "16"]),
+    ("wang", "normals.glint", ["-o", "out.glint", "--size", "32"]),
+    ("displace", "heights.glint", ["-o", "out.glint", "--factor", "16", "--base", "diffuse:0.8"]),
+    ("compress", "pyramid.glint", ["-o", "out.glint", "--rank", "4"]),
+    ("query", "normals.glint", ["--uv", ".5", ".5", "--sigma", "9", "--half", ".1", "0"]),
+    ("query", "compressed.glint", ["--uv", ".5", ".5", "--sigma", "20", "--half", ".1", "0"]),
+    ("query", "sat.glint", ["--uv", ".5", ".5", "--sigma", "20", "--half", ".1", "0"]),
+    ("query", "displaced.glint", []),
+]
+
+
+@pytest.mark.parametrize("tool, source, arguments", READERS, ids=[f"{tool}-{source}" for tool, source, _ in READERS])
+def test_flipped_bits_are_refused_unless_they_are_trusted(glint, assets, tool, source, arguments):
+    """The lowest bit of a float is a value like any other: only the hash can tell."""
+    if source == "displaced.glint":
+        tool, arguments = "query", ["--uv", ".05", ".05", "--level", "0", "--wi", ".3", ".1", ".9", "--wo", "-.2", ".1", ".9"]
+    with h5py.File(assets / source, "r") as file:
+        arrays = []
+        file.visititems(lambda _, thing: arrays.append(thing.id.get_offset()) if isinstance(thing, h5py.Dataset) and thing.dtype == "<f4" else None)
+    data = bytearray((assets / source).read_bytes())
+    data[arrays[0]] ^= 1
+    (assets / "flipped.glint").write_bytes(data)
+    command = [tool, *(["reflectance"] if source == "displaced.glint" else []), "flipped.glint", *arguments]
+    process = glint(*command)
+    assert process.returncode == 3, process.stderr
+    assert "has bytes with hash" in process.stderr or "hash" in process.stderr
+    assert process.stdout == "" and not (assets / "out.glint").exists()
+    trusted = glint(*command, "--trust")
+    assert trusted.returncode == 0, trusted.stderr

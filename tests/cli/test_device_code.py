@@ -46,7 +46,7 @@ def test_query_headers_compile_as_device_code(clang, tmp_path):
     assert process.returncode == 0, process.stderr
     assert 'target triple = "nvptx64' in code
     kernels = " ".join(re.findall(r'!\{ptr @(\w+), !"kernel", i32 1\}', code))
-    models = ("9ReferenceE", "10PyramidNdfE", "5CpNdfE", "9BinMapNdfE", "12HistogramNdfE", "10MomentsNdfE", "14TinyExampleNdfE", "13WangReferenceE", "7WaveNdfE")
+    models = ("9ReferenceE", "11ManifoldNdfE", "10PyramidNdfE", "5CpNdfE", "9BinMapNdfE", "12HistogramNdfE", "10MomentsNdfE", "14TinyExampleNdfE", "13WangReferenceE", "7WaveNdfE")
     for name in (*(f"answerINS_{model}" for model in models), "answerPacked", "weigh", "drawBrdf", "shade", "reflect", "light"):
         assert name in kernels
     # All else is in the module: nothing waits for a function of the host.

@@ -121,6 +121,12 @@ def test_soname_is_the_version_of_the_abi(prefix, library_dir):
     assert f"soname: [libglint.so.{version}]" in run("readelf", "-d", library_dir / "libglint.so")
 
 
+def test_the_library_needs_runtimes_only(library_dir):
+    """Opening assets needs no HDF5, nor anything else but the runtimes of C and C++ and of a sanitizer."""
+    needed = set(re.findall(r"\(NEEDED\).*\[(.*?)\.so", run("readelf", "-d", library_dir / "libglint.so")))
+    assert needed - {"libstdc++", "libm", "libgcc_s", "libc", "ld-linux-x86-64", "libasan", "libubsan", "libtsan"} == set()
+
+
 def installed_headers(prefix):
     headers = [header.relative_to(prefix / "include") for header in sorted((prefix / "include/glint").rglob("*.h"))]
     assert len(headers) > 15

@@ -92,9 +92,10 @@ int main(int, char** argv) {
 
 BUILD = """cmake_minimum_required(VERSION 3.25)
 project(toy LANGUAGES C CXX)
+set(GLINT_BUILD_WRITER ON)
 add_subdirectory(glint)
 add_executable(toy toy.cpp)
-target_link_libraries(toy PRIVATE glint::formats)
+target_link_libraries(toy PRIVATE glint::writer)
 """
 
 

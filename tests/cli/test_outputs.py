@@ -327,9 +327,9 @@ def test_hdf5_may_lock_files(shell, value):
     assert (shell.folder / "b.glint").read_bytes() == (shell.folder / "a.glint").read_bytes()
 
 
-@pytest.mark.parametrize("command", ["glint-validate a.glint", "glint-ingest t.png -o b.glint"])
-def test_too_few_descriptors_are_not_damage(shell, command):
-    process = shell(f"ulimit -n 4; {command}")
+# Opening an asset takes one descriptor, as loading the program does before: OpenTest in tests/unit has it.
+def test_too_few_descriptors_are_not_damage(shell):
+    process = shell("ulimit -n 4; glint-ingest t.png -o b.glint")
     assert process.returncode == 2
     assert b"Too many open files" in process.stdout + process.stderr
     assert b"damaged" not in process.stdout + process.stderr

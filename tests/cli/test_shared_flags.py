@@ -11,7 +11,7 @@ from conftest import BIN
 APPS = pathlib.Path(__file__).parents[2] / "apps"
 TOOLS = sorted(path.parent.name.removeprefix("glint-") for path in APPS.glob("glint-*/main.cpp"))
 COMMANDS = [*TOOLS, "query light", "query plane", "query reflectance"]  # programs, and their commands
-SHARED = ["--threads", "--seed", "--json", "--progress", "--quiet", "--force", "--depfile", "--config", "--version", "--help"]
+SHARED = ["--threads", "--max-memory", "--trust", "--seed", "--json", "--progress", "--quiet", "--force", "--depfile", "--config", "--version", "--help"]
 
 
 def test_there_are_tools():

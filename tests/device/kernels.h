@@ -1,6 +1,7 @@
 #pragma once
 
 #include "glint/query/brdf/bin_map_brdf.h"
+#include "glint/query/manifold_ndf.h"
 #include "glint/query/packed_ndf_view.h"
 
 namespace glint::device {
@@ -50,6 +51,7 @@ __global__ void answerPacked(const void* buffer, const Footprint* footprints, co
 }
 
 template __global__ void answer<Reference>(Reference, const Footprint*, const Vec2*, float, int, float*, float*);
+template __global__ void answer<ManifoldNdf>(ManifoldNdf, const Footprint*, const Vec2*, float, int, float*, float*);
 template __global__ void answer<PyramidNdf>(PyramidNdf, const Footprint*, const Vec2*, float, int, float*, float*);
 template __global__ void answer<CpNdf>(CpNdf, const Footprint*, const Vec2*, float, int, float*, float*);
 
@@ -57,6 +59,7 @@ template __global__ void answer<BinMapNdf>(BinMapNdf, const Footprint*, const Ve
 
 template __global__ void draw<BinMapNdf>(BinMapNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 template __global__ void draw<Reference>(Reference, const Footprint*, const Vec2*, int, HalfVectorSample*);
+template __global__ void draw<ManifoldNdf>(ManifoldNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 template __global__ void draw<PyramidNdf>(PyramidNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 template __global__ void draw<CpNdf>(CpNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 

@@ -5,26 +5,21 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
+#include <cstring>
 #include <limits>
+#include <memory>
+#include <span>
+#include <utility>
 #include <variant>
 
+#include "fuzz/opens_asset.h"
 #include "glint/api/any_ndf.h"
 #include "glint/formats/validate.h"
 #include "glint/query/brdf/displaced_brdf.h"
-#include "support/hdf5_bytes.h"
-#include "support/temp_folder.h"
 
 namespace {
 
 using namespace glint;
-
-/// A file of its own: HDF5 opens paths, and none in /proc/self/fd. The folder goes when the program ends.
-const std::filesystem::path& filePath() {
-  static const test::TempFolder folder;
-  static const std::filesystem::path path = folder / "fuzz.glint";
-  return path;
-}
 
 bool isDensity(float value) { return value >= 0 && value < std::numeric_limits<float>::infinity(); }
 bool isDensity(Rgb value) { return isDensity(value.r) && isDensity(value.g) && isDensity(value.b); }
@@ -61,26 +56,27 @@ void ask(const Displacement& displacement) {
 
 }  // namespace
 
-/// Whether the bytes opened as an asset.
 bool opensAsset(const std::uint8_t* data, std::size_t size) {
-  const auto* bytes = reinterpret_cast<const std::byte*>(data);
-  test::writeBytes(filePath().string(), test::Bytes(bytes, bytes + size));
+  // At a multiple of 64, so that the bytes are used in place and the sanitizer sees their end.
+  struct Free {
+    void operator()(void* memory) const { std::free(memory); }
+  };
+  void* memory = nullptr;
+  if (::posix_memalign(&memory, 64, size == 0 ? 1 : size) != 0) std::abort();
+  const std::unique_ptr<void, Free> owner(memory);
+  if (size > 0) std::memcpy(memory, data, size);
+  const std::span bytes(static_cast<const std::byte*>(memory), size);
+  // Data checks evaluate every block and cluster, through the same indices as queries.
+  formats::validateMemory(bytes, "fuzz");
   try {
-    const formats::Asset asset = formats::Asset::open(filePath());
-    // Data checks evaluate every block and cluster, through the same indices as queries.
-    formats::validateAsset(filePath());
+    formats::Asset asset = formats::Asset::openMemory(bytes, "fuzz");
     if (asset.kind() == "displacement") {
       ask(asset.get<Displacement>());
     } else if (api::answersNdf(asset.kind())) {
-      ask(api::OpenedNdf::open(filePath()).model());
+      ask(api::OpenedNdf::open(std::move(asset), "fuzz").model());
     }
     return true;
   } catch (const Error&) {
     return false;
   }
-}
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  opensAsset(data, size);
-  return 0;
 }

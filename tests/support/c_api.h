@@ -17,6 +17,7 @@
 #include "glint.h"
 #include "glint/api/ndf_models.h"
 #include "glint/formats/asset_writer.h"
+#include "glint/model/slope_sums.h"
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 
@@ -51,6 +52,26 @@ inline void writeSample(std::type_identity<SlopeMoments>, const std::string& pat
 
 inline void writeSample(std::type_identity<TinyExample>, const std::string& path) {
   formats::writeAsset(path, sampleTinyExample(kSize, TinyMode::tiled).example, sampleProvenance());
+}
+
+inline void writeSample(std::type_identity<WangTiles>, const std::string& path) {
+  // Sixteen times one tile of many normals.
+  SampleWangTiles sample = sampleWangTiles();
+  const SampleNormals tile = sampleNormals(kSize, kSize, false);
+  sample.normals.clear();
+  for (int k = 0; k < sample.tiles.tile_count; ++k)
+    sample.normals.insert(sample.normals.end(), tile.normals.begin(), tile.normals.end());
+  sample.tiles.size = kSize;
+  sample.tiles.normals = sample.normals;
+  sample.tiles.slopes =
+      slopeSums(sample.normals.data(), sample.normals.size()).moments(static_cast<double>(sample.normals.size()));
+  formats::writeAsset(path, sample.tiles, sampleProvenance());
+}
+inline void writeSample(std::type_identity<WangPyramid>, const std::string& path) {
+  formats::writeAsset(path, sampleWangPyramid().asset, sampleProvenance());
+}
+inline void writeSample(std::type_identity<WangCp>, const std::string& path) {
+  formats::writeAsset(path, sampleWangCp().asset, sampleProvenance());
 }
 
 /// Files of every kind that a model answers, and of some others.

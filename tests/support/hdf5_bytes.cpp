@@ -6,8 +6,8 @@
 #include <iterator>
 #include <string_view>
 
+#include "glint/formats/container/checksum.h"
 #include "glint/formats/hash.h"
-#include "glint/formats/hdf5_checksum.h"
 
 namespace glint::test {
 namespace {
@@ -92,6 +92,29 @@ std::vector<ChecksummedRange> checksummedRanges(const Bytes& bytes) {
     forEachPart(bytes, at, [&](ChecksummedRange part, std::size_t, std::size_t) { ranges.push_back(part); });
   });
   return ranges;
+}
+
+std::vector<ByteRange> messagesOf(const Bytes& bytes) {
+  std::vector<ByteRange> messages;
+  forEachHeader(bytes, [&](std::size_t at) {
+    forEachPart(bytes, at, [&](ChecksummedRange part, std::size_t first, std::size_t head_bytes) {
+      forEachMessage(bytes, first, part.end - kChecksumBytes, head_bytes, [&](unsigned, std::size_t begin, std::size_t end) {
+        messages.push_back({begin, end});
+      });
+    });
+  });
+  return messages;
+}
+
+std::vector<ByteRange> datasetsOf(const Bytes& bytes) {
+  std::vector<ByteRange> datasets;
+  for (const ByteRange message : messagesOf(bytes)) {
+    constexpr std::uint16_t kContiguous = 0x0103;  // version 3, class 1
+    if (message.end - message.begin < 18 || load<std::uint16_t>(bytes, message.begin) != kContiguous) continue;
+    const auto place = load<std::uint64_t>(bytes, message.begin + 2), size = load<std::uint64_t>(bytes, message.begin + 10);
+    if (size > 0 && place < bytes.size() && size <= bytes.size() - place) datasets.push_back({place, place + size});
+  }
+  return datasets;
 }
 
 void renewChecksums(Bytes& bytes, const std::vector<ChecksummedRange>& ranges) {

@@ -18,6 +18,18 @@ struct ChecksummedRange {
   std::size_t end = 0;
 };
 
+/// A range of bytes of a file.
+struct ByteRange {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
+/// Bodies of all messages of object headers, as far as they can be followed.
+std::vector<ByteRange> messagesOf(const Bytes& bytes);
+
+/// Bytes of all datasets that lie inside the file.
+std::vector<ByteRange> datasetsOf(const Bytes& bytes);
+
 /// The superblock and every part of an object header in the bytes of an asset, as far as it can be followed.
 std::vector<ChecksummedRange> checksummedRanges(const Bytes& bytes);
 

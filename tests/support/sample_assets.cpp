@@ -602,11 +602,14 @@ SampleWavePyramid sampleWavePyramid(int size, WaveChannels meaning, BlockPrecisi
   return sample;
 }
 
-SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type, SampleForm form) {
+namespace {
+
+/// @param level_images  [levels][images]
+SampleNdfCp ndfCpOf(const PyramidShape& shape, std::vector<std::vector<Image>> level_images, CompressionMethod method,
+                    CoefficientType type, SampleForm form) {
   SampleNdfCp sample;
-  const SampleNormals normals = sampleNormals(size, size, false);
   NdfCp& ndf = sample.ndf;
-  ndf.shape = sampleShape(size);
+  ndf.shape = shape;
   ndf.method = method;
   ndf.coefficient_type = type;
   ndf.regions = 2;
@@ -626,9 +629,9 @@ SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type
   for (int l = 0; l < ndf.shape.level_count; ++l) {
     ndf.first_image[l] = static_cast<std::uint32_t>(images.size());
     const PyramidGrid& grid = ndf.shape.levels[l];
-    for (Image& image : levelImages(normals.map, grid)) {
+    for (Image& image : level_images[static_cast<std::size_t>(l)]) {
       const int column = static_cast<int>(images.size() - ndf.first_image[l]) % grid.columns;
-      const std::size_t region = (column + 0.5) * grid.stride * 2 >= ndf.shape.width;
+      const std::size_t region = 2 * column + 1 >= grid.columns;
       sample.image_regions.push_back(static_cast<std::uint16_t>(region));
       sample.image_slots.push_back(static_cast<std::uint16_t>(region_images[region].size()));
       region_images[region].push_back(images.size());
@@ -654,6 +657,16 @@ SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type
   addBlockMasses(sample);
   linkSpans(sample);
   return sample;
+}
+
+}  // namespace
+
+SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type, SampleForm form) {
+  const SampleNormals normals = sampleNormals(size, size, false);
+  const PyramidShape shape = sampleShape(size);
+  std::vector<std::vector<Image>> images;
+  for (int l = 0; l < shape.level_count; ++l) images.push_back(levelImages(normals.map, shape.levels[l]));
+  return ndfCpOf(shape, std::move(images), method, type, form);
 }
 
 namespace {
@@ -867,6 +880,70 @@ SampleWangTiles sampleWangTiles(WangScheme scheme) {
   return sample;
 }
 
+namespace {
+
+/// A plane whose tiles have one centre each.
+/// @param margin  images beyond every border, 0 or 1
+void fillPlane(int margin, WangImages& plane, PyramidShape& shape, std::vector<float>& masses) {
+  plane.tiles = sampleWangTiles().tiles;
+  plane.tiles.normals = {};
+  shape = sampleShape(plane.tiles.size);
+  shape.boundary = Boundary::clamp;
+  shape.level_count = 2;
+  plane.grids[0] = {1, margin, {}}, plane.grids[1] = {1, 0, {}};
+  const int side = plane.grids[0].side();
+  shape.levels[0] = {static_cast<float>(plane.tiles.size), side, plane.tiles.tile_count * side};
+  shape.levels[1] = {2.0f * static_cast<float>(plane.tiles.size), 1, 1};
+  if (margin == 1) masses = {0.125f, 0.75f, 0.125f, 1};
+  if (margin == 0) masses = {1, 1};
+}
+void linkMasses(const std::vector<float>& masses, WangImages& plane) {
+  plane.grids[0].masses = {masses.data(), masses.size() - 1};
+  plane.grids[1].masses = {masses.data() + masses.size() - 1, 1};
+}
+/// Images of one even block each.
+std::vector<Image> blockImages(std::size_t count) {
+  constexpr int kBlocks = kResolution / kBlockSize;
+  std::vector<Image> images(count);
+  for (std::size_t k = 0; k < count; ++k) {
+    images[k].assign(static_cast<std::size_t>(kResolution) * kResolution, 0);
+    const int block = static_cast<int>(k % (kBlocks * kBlocks));
+    for (int y = 0; y < kBlockSize; ++y)
+      for (int x = 0; x < kBlockSize; ++x)
+        images[k]
+              [static_cast<std::size_t>((block / kBlocks * kBlockSize + y) * kResolution + block % kBlocks * kBlockSize + x)] =
+                  kBlocks * kBlocks / 4.0f;
+  }
+  return images;
+}
+
+}  // namespace
+
+SampleWangPyramid sampleWangPyramid() {
+  SampleWangPyramid sample;
+  NdfPyramid& pyramid = sample.images.pyramid;
+  fillPlane(1, sample.asset.plane, pyramid.shape, sample.masses);
+  pyramid.value_scale = 4;
+  sample.images.levels.resize(static_cast<std::size_t>(pyramid.shape.level_count));
+  for (int l = 0; l < pyramid.shape.level_count; ++l)
+    addLevel(sample.images, l, blockImages(pyramid.shape.levels[l].imageCount()));
+  sample.asset.images = pyramid;
+  linkMasses(sample.masses, sample.asset.plane);
+  return sample;
+}
+
+SampleWangCp sampleWangCp() {
+  SampleWangCp sample;
+  PyramidShape shape;
+  fillPlane(0, sample.asset.plane, shape, sample.masses);
+  std::vector<std::vector<Image>> images;
+  for (int l = 0; l < shape.level_count; ++l) images.push_back(blockImages(shape.levels[l].imageCount()));
+  sample.images = ndfCpOf(shape, std::move(images), CompressionMethod::tucker, CoefficientType::i8, SampleForm::wide);
+  sample.asset.images = sample.images.ndf;
+  linkMasses(sample.masses, sample.asset.plane);
+  return sample;
+}
+
 SampleShLobes sampleShLobes() {
   SampleShLobes s;
   s.zonal = {0.28f, 0.4f};
@@ -942,6 +1019,8 @@ std::vector<SampleAsset> sampleAssets() {
       {"slope-moments", [] { return owned(sampleSlopeMoments(9, 4), &SampleSlopeMoments::moments); }},
       {"tiny-example-scattered", [] { return owned(sampleTinyExample(8, TinyMode::scattered), &SampleTinyExample::example); }},
       {"tiny-example-tiled", [] { return owned(sampleTinyExample(8, TinyMode::tiled), &SampleTinyExample::example); }},
+      {"wang-cp", [] { return owned(sampleWangCp(), &SampleWangCp::asset); }},
+      {"wang-pyramid", [] { return owned(sampleWangPyramid(), &SampleWangPyramid::asset); }},
       {"wang-tiles", [] { return owned(sampleWangTiles(), &SampleWangTiles::tiles); }},
       {"wave-pyramid",
        [] { return owned(sampleWavePyramid(64, WaveChannels::xyz, BlockPrecision::f16), &SampleWavePyramid::wave); }},

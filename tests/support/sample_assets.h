@@ -122,6 +122,18 @@ struct SampleWangTiles {
   WangTiles tiles;
 };
 
+struct SampleWangPyramid {
+  SamplePyramid images;
+  std::vector<float> masses;
+  WangPyramid asset;
+};
+
+struct SampleWangCp {
+  SampleNdfCp images;
+  std::vector<float> masses;
+  WangCp asset;
+};
+
 struct SampleShLobes {
   std::vector<float> zonal;
   std::vector<float> coefficients;
@@ -160,6 +172,9 @@ SampleSlopeMoments sampleSlopeMoments(int width, int height);
 SampleTinyExample sampleTinyExample(int size, TinyMode mode);
 /// Sixteen tiles of 16 x 16 texels, two colours. Normals are the same in all tiles of the same colours on a side, and simple fractions.
 SampleWangTiles sampleWangTiles(WangScheme scheme = WangScheme::corner);
+/// Images of the tiles of sampleWangTiles, an even block each; compressed as sampleNdfCp.
+SampleWangPyramid sampleWangPyramid();
+SampleWangCp sampleWangCp();
 /// A lobe of order 1 with the zonal coefficients 0.28 and 0.4, on a grid of 3 x 4 directions.
 SampleShLobes sampleShLobes();
 /// Constant light of radiance 1, 2 and 3 in red, green and blue, order 2, on a grid of 3 x 4 directions.

@@ -12,6 +12,7 @@
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"
+#include "glint/query/reference.h"
 #include "support/c_api.h"
 #include "support/test_maps.h"
 

@@ -10,6 +10,7 @@
 #include "glint/query/anisotropic_ndf.h"
 #include "glint/query/cp_ndf.h"
 #include "glint/query/pyramid_ndf.h"
+#include "glint/query/reference.h"
 #include "support/directions.h"
 #include "support/test_maps.h"
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -11,6 +12,7 @@
 #include "glint.h"
 #include "glint/api/any_ndf.h"
 #include "glint/query/ray_footprint.h"
+#include "support/hdf5_bytes.h"
 
 namespace glint {
 namespace {
@@ -271,6 +273,74 @@ TEST(CApi, ErrorsNameTheArgumentThatIsNull) {
   EXPECT_EQ(message(glint_sample(ndf.get(), &p, 0, 0, &a, nullptr, &b)), "glint_sample: hy is null");
   EXPECT_EQ(message(glint_brdf_evaluate(nullptr, &p, nullptr, nullptr, nullptr, nullptr)), "glint_brdf_evaluate: brdf is null");
   EXPECT_EQ(message(glint_displaced_level(nullptr, 1, &a)), "glint_displaced_level: displaced is null");
+}
+
+/// Answers of a handle that tell assets apart.
+float densityOf(const glint_ndf* ndf) {
+  const glint_footprint p = glint_footprint_isotropic(0.1f, 0.9f, 20);
+  float density = 0;
+  EXPECT_EQ(glint_density(ndf, &p, 0.05f, 0.1f, &density), GLINT_OK);
+  return density;
+}
+
+/// Bytes that a function reads; fails where there are none.
+int32_t readFrom(void* context, uint64_t offset, void* to, size_t size) {
+  const auto& bytes = *static_cast<const test::Bytes*>(context);
+  if (bytes.empty()) return 1;
+  std::memcpy(to, bytes.data() + offset, size);
+  return 0;
+}
+
+TEST(CApi, BytesInMemoryAnswerAsTheFile) {
+  const Handle file = openHandle("ndf-cp");
+  for (const int32_t copy : {0, 1}) {
+    test::Bytes bytes = test::readBytes(assets().path("ndf-cp"));
+    glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+    options.copy = copy;
+    glint_ndf* opened = nullptr;
+    ASSERT_EQ(glint_ndf_open_memory(bytes.data(), bytes.size(), "shelf", &options, &opened), GLINT_OK) << glint_error_message();
+    const Handle memory(opened);
+    if (copy != 0) std::fill(bytes.begin(), bytes.end(), std::byte{0});
+    EXPECT_EQ(densityOf(memory.get()), densityOf(file.get()));
+  }
+}
+
+TEST(CApi, BytesThatAFunctionReadsAnswerAsTheFile) {
+  test::Bytes bytes = test::readBytes(assets().path("ndf-cp"));
+  const glint_source source = {nullptr, bytes.size(), &bytes, &readFrom};
+  glint_ndf* opened = nullptr;
+  ASSERT_EQ(glint_ndf_open_source(&source, nullptr, &opened), GLINT_OK) << glint_error_message();
+  const Handle read(opened);
+  EXPECT_EQ(densityOf(read.get()), densityOf(openHandle("ndf-cp").get()));
+}
+
+TEST(CApi, BytesThatCannotBeUsedAreRefusedByName) {
+  test::Bytes none;
+  const glint_source empty = {"archive", 100, &none, &readFrom}, unread = {"archive", 100, &none, nullptr};
+  const char text[] = "no asset";
+  glint_ndf* ndf = nullptr;
+  EXPECT_EQ(glint_ndf_open_memory(text, sizeof text, "shelf", nullptr, &ndf), GLINT_ERROR_INVALID_INPUT);
+  EXPECT_STREQ(glint_error_rule(), "file.signature");
+  EXPECT_EQ(std::string(glint_error_message()).find("shelf: "), 0u);
+  EXPECT_EQ(glint_ndf_open_memory(text, sizeof text, nullptr, nullptr, &ndf), GLINT_ERROR_INVALID_INPUT);
+  EXPECT_EQ(std::string(glint_error_message()).find("memory: "), 0u);
+  EXPECT_EQ(glint_ndf_open_memory(nullptr, 8, nullptr, nullptr, &ndf), GLINT_ERROR_USAGE);
+  EXPECT_EQ(glint_ndf_open_memory(text, sizeof text, nullptr, nullptr, nullptr), GLINT_ERROR_USAGE);
+  EXPECT_EQ(glint_ndf_open_source(&empty, nullptr, &ndf), GLINT_ERROR_IO);
+  EXPECT_EQ(std::string(glint_error_message()).find("archive: "), 0u);
+  EXPECT_EQ(glint_ndf_open_source(&unread, nullptr, &ndf), GLINT_ERROR_USAGE);
+  EXPECT_EQ(glint_ndf_open_source(nullptr, nullptr, &ndf), GLINT_ERROR_USAGE);
+  EXPECT_EQ(ndf, nullptr);
+  glint_displaced* displaced = nullptr;
+  EXPECT_EQ(glint_displaced_open_memory(text, sizeof text, nullptr, 0, 0, &displaced), GLINT_ERROR_INVALID_INPUT);
+  EXPECT_EQ(glint_displaced_open_memory(nullptr, 8, nullptr, 0, 0, &displaced), GLINT_ERROR_USAGE);
+  EXPECT_EQ(glint_displaced_open_source(&empty, 0, &displaced), GLINT_ERROR_IO);
+  EXPECT_EQ(glint_displaced_open_source(nullptr, 0, &displaced), GLINT_ERROR_USAGE);
+  EXPECT_EQ(displaced, nullptr);
+  glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+  options.reserved = 1;
+  EXPECT_EQ(glint_ndf_open(assets().path("ndf-cp").c_str(), &options, &ndf), GLINT_ERROR_USAGE);
+  EXPECT_STREQ(glint_error_message(), "glint_open_options: reserved is not 0");
 }
 
 TEST(CApi, PixelsAreSmoothOrConstant) {

@@ -16,6 +16,7 @@
 #include "glint/query/brdf/wave_brdf.h"
 #include "support/c_api.h"
 #include "support/directions.h"
+#include "support/hdf5_bytes.h"
 
 namespace glint {
 namespace {
@@ -356,6 +357,17 @@ DisplacedHandle openDisplaced() {
   glint_displaced* displaced = nullptr;
   EXPECT_EQ(glint_displaced_open(assets().path("displacement").c_str(), 1, &displaced), GLINT_OK) << glint_error_message();
   return DisplacedHandle(displaced);
+}
+
+TEST(CDisplaced, OpensBytesInMemory) {
+  const test::Bytes bytes = test::readBytes(assets().path("displacement"));
+  glint_displaced* opened = nullptr;
+  ASSERT_EQ(glint_displaced_open_memory(bytes.data(), bytes.size(), "shelf", 1, 1, &opened), GLINT_OK) << glint_error_message();
+  const DisplacedHandle displaced(opened);
+  glint_displaced_info info = {};
+  info.struct_size = sizeof info;
+  ASSERT_EQ(glint_displaced_get_info(displaced.get(), &info), GLINT_OK);
+  EXPECT_EQ(info.file_bytes, bytes.size());
 }
 
 TEST(CDisplaced, AnswersAsTheClassDoesAlsoInBatches) {

@@ -38,7 +38,7 @@ class EveryKind : public testing::TestWithParam<SampleAsset> {
   /// What the file holds, to be broken.
   FileStructure structure() const {
     Findings findings(path_);
-    FileStructure read = readStructure(path_, findings);
+    FileStructure read = readStructure(FileBytes::ofFile(path_, false), findings);
     EXPECT_FALSE(findings.failed());
     return read;
   }
@@ -117,7 +117,7 @@ TEST(Kinds, OptionalValuesNeedAllOfTheirAttributes) {
   sample.map.slopes = MapSlopes{{0.5f, 0.25f}, {1, 0, 1}};
   writeAsset(folder / "a.glint", sample.map, test::sampleProvenance());
   Findings findings(folder / "a.glint");
-  FileStructure file = readStructure(folder / "a.glint", findings);
+  FileStructure file = readStructure(FileBytes::ofFile(folder / "a.glint", false), findings);
   const auto slopes = [&] { return std::get<NormalMap>(formats::kindOf<NormalMap>().read(file)).slopes; };
   ASSERT_TRUE(slopes());
   EXPECT_EQ(slopes()->mean.x, 0.5f);

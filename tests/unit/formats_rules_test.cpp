@@ -20,6 +20,7 @@
 #include "glint/formats/kinds/kind.h"
 #include "glint/formats/validate.h"
 #include "glint/query/detail/bin_map/bin_blocks.h"
+#include "support/hdf5_bytes.h"
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 #include "support/test_maps.h"
@@ -43,16 +44,18 @@ enum class Base {
   tiny_scattered,
   tiny_tiled,
   wang_tiles,
+  wang_pyramid,
+  wang_cp,
   wave,
   sh_lobes,
   sh_light,
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,      Base::heights,         Base::pyramid,    Base::compressed, Base::compressed_f32,
-                           Base::spots,        Base::bin_map,         Base::histograms, Base::moments,    Base::tiny_scattered,
-                           Base::tiny_tiled,   Base::wang_tiles,      Base::wave,       Base::sh_lobes,   Base::sh_light,
-                           Base::displacement, Base::displacement_rgb};
+constexpr Base kBases[] = {Base::normals,    Base::heights,    Base::pyramid,      Base::compressed,      Base::compressed_f32,
+                           Base::spots,      Base::bin_map,    Base::histograms,   Base::moments,         Base::tiny_scattered,
+                           Base::tiny_tiled, Base::wang_tiles, Base::wang_pyramid, Base::wang_cp,         Base::wave,
+                           Base::sh_lobes,   Base::sh_light,   Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -86,6 +89,10 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleTinyExample(8, TinyMode::tiled).example, provenance);
     case Base::wang_tiles:
       return writeAsset(path, test::sampleWangTiles().tiles, provenance);
+    case Base::wang_pyramid:
+      return writeAsset(path, test::sampleWangPyramid().asset, provenance);
+    case Base::wang_cp:
+      return writeAsset(path, test::sampleWangCp().asset, provenance);
     case Base::wave:
       return writeAsset(path, test::sampleWavePyramid(64, WaveChannels::spectral, BlockPrecision::f16).wave, provenance);
     case Base::sh_lobes:
@@ -173,6 +180,28 @@ class Patch {
   hid_t file_;
 };
 
+constexpr unsigned kMost = 2000;  // more links and attributes than a file may have
+
+/// A new group that keeps up to `compact` links and attributes in its object header.
+class Group {
+ public:
+  Group(hid_t file, const char* name, unsigned compact) {
+    const hid_t properties = H5Pcreate(H5P_GROUP_CREATE);
+    H5Pset_link_phase_change(properties, compact, 0);
+    H5Pset_est_link_info(properties, compact, 8);  // room for all: each link would add a part to the header
+    H5Pset_attr_phase_change(properties, compact, 0);
+    id_ = H5Gcreate2(file, name, H5P_DEFAULT, properties, H5P_DEFAULT);
+    H5Pclose(properties);
+  }
+  ~Group() { H5Gclose(id_); }
+  Group(const Group&) = delete;
+  Group& operator=(const Group&) = delete;
+  hid_t id() const { return id_; }
+
+ private:
+  hid_t id_;
+};
+
 struct Fixture {
   const char* rule;
   Base base;
@@ -221,9 +250,27 @@ std::vector<Fixture> linkFixtures() {
               }),
       patched("group.size", Base::heights,
               [](const Patch& patch) {
-                for (int k = 0; k < 1100; ++k)
-                  H5Lcreate_soft("/heights", patch.file(), ("l" + std::to_string(k)).c_str(), 0, 0);
+                const Group group(patch.file(), "g", kMost);
+                for (int k = 0; k < 1100; ++k) H5Gclose(H5Gcreate2(group.id(), ("l" + std::to_string(k)).c_str(), 0, 0, 0));
               }),
+      patched("object.heap", Base::heights,
+              [](const Patch& patch) {
+                for (int k = 0; k < 1100; ++k) H5Gclose(H5Gcreate2(patch.file(), ("l" + std::to_string(k)).c_str(), 0, 0, 0));
+              }),
+      patched("object.heap", Base::heights,
+              [](const Patch& patch) {
+                for (int k = 0; k < 80; ++k) patch.setInteger(("a" + std::to_string(k)).c_str(), k);
+              }),
+      patched("file.objects", Base::heights,
+              [](const Patch& patch) {
+                for (int g = 0; g < 5; ++g) {
+                  const Group group(patch.file(), ("g" + std::to_string(g)).c_str(), kMost);
+                  for (int k = 0; k < 1000; ++k) H5Gclose(H5Gcreate2(group.id(), ("l" + std::to_string(k)).c_str(), 0, 0, 0));
+                }
+              }),
+      patched("text.padding", Base::heights,
+              [](const Patch& patch) { patch.setText("generator", std::string("tool 1.0\0hidden", 15)); }),
+      patched("text.utf8", Base::heights, [](const Patch& patch) { patch.setText("generator", "tool \u202e0.1"); }),
       patched("group.size", Base::heights,
               [](const Patch& patch) { H5Lcreate_soft("/heights", patch.file(), std::string(300, 'x').c_str(), 0, 0); }),
       patched("text.utf8", Base::heights, [](const Patch& patch) { patch.setText("generator", "tool \xff 1.0"); }),
@@ -254,9 +301,23 @@ std::vector<Fixture> linkFixtures() {
               }),
       patched("object.attributes", Base::heights,
               [](const Patch& patch) {
-                for (int k = 0; k < 80; ++k) patch.setInteger(("a" + std::to_string(k)).c_str(), k);
+                const Group group(patch.file(), "g", kMost);
+                for (int k = 0; k < 80; ++k)
+                  patch.set("g", ("a" + std::to_string(k)).c_str(), H5T_STD_I32LE, H5T_NATIVE_INT, &k);
               }),
   };
+}
+
+/// Says behind right checksums that the attribute `inputs` has 2^20 elements.
+void growInputs(const fs::path& path) {
+  test::Bytes bytes = test::readBytes(path.string());
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  constexpr std::size_t kNameAndType = 7 + 8, kDimension = 4;  // "inputs" and its NUL, a datatype of 8 bytes; then a dataspace
+  const std::uint64_t count = 1 << 20;
+  for (const std::size_t place : {0, 8})  // its size, and the most that it may be
+    std::memcpy(bytes.data() + text.find("inputs") + kNameAndType + kDimension + place, &count, sizeof count);
+  test::renewChecksums(bytes, test::checksummedRanges(bytes));
+  test::writeBytes(path.string(), bytes);
 }
 
 std::vector<Fixture> attributeFixtures() {
@@ -269,7 +330,8 @@ std::vector<Fixture> attributeFixtures() {
                 patch.set("/", "generator", type, type, &text);
                 H5Tclose(type);
               }),
-      patched("attribute.size", Base::heights, [](const Patch& patch) { patch.setText("command", std::string(100000, ' ')); }),
+      {"attribute.size", Base::heights, &growInputs},
+      patched("object.heap", Base::heights, [](const Patch& patch) { patch.setText("command", std::string(100000, ' ')); }),
       patched("attribute.missing", Base::heights, [](const Patch& patch) { patch.remove("/", "width"); }),
       patched("attribute.missing", Base::heights, [](const Patch& patch) { patch.remove("/", "glint_format"); }),
       patched("attribute.missing", Base::heights, [](const Patch& patch) { patch.remove("/heights", "units"); }),
@@ -298,6 +360,16 @@ std::vector<Fixture> attributeFixtures() {
       patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setInteger("resolution", 2048); }),
       patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setInteger("level_count", 17); }),
       patched("attribute.value", Base::pyramid, [](const Patch& patch) { patch.setText("surface", "bumpy"); }),
+      patched(
+          "attribute.json", Base::heights, [](const Patch& patch) { patch.setText("command", "{\"a\": 1"); }, true),
+      patched(
+          "attribute.json", Base::heights, [](const Patch& patch) { patch.setText("command", "[1]"); }, true),
+      patched(
+          "file.digest", Base::heights, [](const Patch& patch) { patch.setText("generator", "another 1.0"); }, true),
+      patched(
+          "file.digest", Base::heights, [](const Patch& patch) { patch.setText("digest", std::string(32, '0')); }, true),
+      patched(
+          "group.unknown", Base::heights, [](const Patch& patch) { H5Gclose(H5Gcreate2(patch.file(), "g", 0, 0, 0)); }, true),
       patched(
           "attribute.unknown", Base::heights, [](const Patch& patch) { patch.setInteger("answer", 42); }, true),
       patched("format.name", Base::heights, [](const Patch& patch) { patch.setText("glint_format", "other"); }),
@@ -770,11 +842,19 @@ std::vector<Fixture> wangFixtures() {
       patched("wang.corners", Base::wang_tiles, [](const Patch& patch) { patch.setInteger("colors_v", 4); }),
       changed("wang.disk", 3 * tile + 5, kNan),
       changed("wang.disk", 2 * row + 7, 1.25f),
-      changed("wang.sides", 5 * tile + 6, 0.3125f),              // south
-      changed("wang.sides", 16 * tile - row + 6, 0.3125f),       // north
-      changed("wang.sides", 9 * tile + 4 * row, 0.3125f),        // west
-      changed("wang.sides", 2 * tile + 5 * row - 1, 0.3125f),    // east
-      changed("wang.slopes", 2 * tile + 4 * row + 10, 0.96875f)  // inside
+      changed("wang.sides", 5 * tile + 6, 0.3125f),               // south
+      changed("wang.sides", 16 * tile - row + 6, 0.3125f),        // north
+      changed("wang.sides", 9 * tile + 4 * row, 0.3125f),         // west
+      changed("wang.sides", 2 * tile + 5 * row - 1, 0.3125f),     // east
+      changed("wang.slopes", 2 * tile + 4 * row + 10, 0.96875f),  // inside
+      patched("wang.levels", Base::wang_pyramid, [](const Patch& patch) { patch.setInteger("tile_count", 32); }),
+      patched("wang.levels", Base::wang_cp, [](const Patch& patch) { patch.setInteger("tile_count", 32); }),
+      patched(
+          "wang.masses", Base::wang_pyramid,
+          [](const Patch& patch) { patch.change<float>("level_00/masses", 1, [](float& x) { x = 0.5f; }); }, true),
+      patched(
+          "wang.masses", Base::wang_cp,
+          [](const Patch& patch) { patch.change<float>("level_00/masses", 0, [](float& x) { x = kNan; }); }, true),
   };
 }
 
@@ -995,6 +1075,14 @@ TEST(FormatRules, NothingOfHdf5StaysOpen) {
   }
 }
 
+TEST(FormatRules, FilesMayLackADigest) {
+  const test::TempFolder folder;
+  const fs::path path = folder / "a.glint";
+  writeBase(path, Base::heights);
+  Patch(path).remove("/", "digest");
+  EXPECT_THAT(validateAsset(path).findings, testing::IsEmpty());
+}
+
 TEST(FormatVersions, ANewerMinorIsReadWithAWarning) {
   const test::TempFolder folder;
   writeBase(folder / "a.glint", Base::heights);
@@ -1027,7 +1115,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 20u);
+  EXPECT_EQ(count, 22u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
@@ -1066,6 +1154,11 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   const Asset wang = Asset::open(folder / "wang-tiles.glint");
   EXPECT_EQ(wang.get<WangTiles>().at(9, 3, 2).x, -0.25f);
   EXPECT_EQ(wang.get<WangTiles>().plane_seed, 7);
+  const Asset tile_images = Asset::open(folder / "wang-pyramid.glint");
+  EXPECT_EQ(tile_images.get<WangPyramid>().plane.tiles.plane_seed, 7);
+  EXPECT_EQ(tile_images.get<WangPyramid>().plane.grids[0].margin, 1);
+  EXPECT_EQ(tile_images.get<WangPyramid>().plane.grids[0].masses[1], 0.75f);
+  EXPECT_EQ(Asset::open(folder / "wang-cp.glint").get<WangCp>().images.shape.levels[0].rows, 16);
   const Asset wave_asset = Asset::open(folder / "wave-pyramid.glint");
   const WavePyramid& wave = wave_asset.get<WavePyramid>();
   EXPECT_EQ(wave.channel_rgb[1], (Rgb{1 / 3.0f - 0.5f, 1 / 3.0f, 1 / 3.0f + 0.5f}));

@@ -14,6 +14,7 @@
 #include "glint/query/histogram_ndf.h"
 #include "glint/query/light/sh_light_query.h"
 #include "glint/query/light/sh_transfer.h"
+#include "glint/query/reference.h"
 #include "support/light_reference.h"
 #include "support/test_maps.h"
 

@@ -14,6 +14,8 @@
 namespace glint::apps {
 namespace {
 
+constexpr std::uint64_t kPlenty = std::uint64_t{1} << 40;  // bytes: more than any image of these tests takes
+
 class ImageFile : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -53,7 +55,7 @@ TEST_F(ImageFile, ReadsPngAsOpenImageIoDoes) {
   for (int channels = 1; channels <= 4; ++channels) {
     for (const PixelFormat format : {PixelFormat::u8, PixelFormat::u16}) {
       writeImage(path("a.png"), 13, 7, channels, std::span(pixels).first(13 * 7 * channels), format);
-      const Image direct = readImage(path("a.png")), other = imageFormats().read(path("a.png"), "").image;
+      const Image direct = readImage(path("a.png")), other = imageFormats().read(path("a.png"), "", kPlenty).image;
       EXPECT_EQ(direct.channels, channels);
       EXPECT_EQ(direct.channel_names, other.channel_names);
       EXPECT_EQ(direct.bits, other.bits);
@@ -65,8 +67,10 @@ TEST_F(ImageFile, ReadsPngAsOpenImageIoDoes) {
 
 TEST_F(ImageFile, RefusesSizesThatTheFileCannotHold) {
   writeImage(path("a.png"), 3, 2, 3, pixels_, PixelFormat::u8);
-  EXPECT_NO_THROW(checkDeclaredSize(path("a.png"), std::uint64_t{1} << 20));
-  EXPECT_THROW(checkDeclaredSize(path("a.png"), std::uint64_t{1} << 40), Error);
+  EXPECT_NO_THROW(checkDeclaredSize(path("a.png"), "png", std::uint64_t{1} << 20, kPlenty));
+  EXPECT_THROW(checkDeclaredSize(path("a.png"), "png", std::uint64_t{1} << 40, kPlenty), Error);
+  EXPECT_THROW(checkDeclaredSize(path("a.png"), "png", std::uint64_t{1} << 20, std::uint64_t{1} << 19), Error);
+  EXPECT_THROW(checkDeclaredSize(path("a.png"), "pnm", std::uint64_t{1} << 20, kPlenty), Error);
 }
 
 TEST_F(ImageFile, FilesStoreTheTopRowFirst) {

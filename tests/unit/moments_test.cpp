@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -81,6 +82,19 @@ TEST(SlopeLobe, MassOfABoxIsTheIntegralOfTheDensity) {
       const Box2 inside = insideSquare(box);
       EXPECT_NEAR(lobe.mass(box), massByLattice(density, inside, 1200), kSumOfLattice)
           << k << " " << slopes.mean.x << ": " << box.low.x << " " << box.low.y << " " << box.high.x << " " << box.high.y;
+    }
+  }
+}
+
+TEST(SlopeLobe, OfMomentsThatAreNoNumbersAnswersWithNumbers) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
+  for (const float bad : {kNan, kInf, -kInf, 1e30f}) {
+    for (const MapSlopes& slopes : {MapSlopes{{bad, 0}, {}}, MapSlopes{{0, bad}, {}}, MapSlopes{{0, 0}, {bad, 0, 0.01f}},
+                                    MapSlopes{{0, 0}, {0.01f, bad, 0.01f}}, MapSlopes{{0, 0}, {0.01f, 0, bad}}}) {
+      const SlopeLobe lobe(slopes, 0.01f);
+      const float mass = lobe.mass({{-0.3f, -0.2f}, {0.4f, 0.6f}}), density = lobe.density({0.1f, 0.2f});
+      EXPECT_TRUE(mass >= 0 && mass <= 1) << mass;
+      EXPECT_TRUE(density >= 0 && density < kInf) << density;
     }
   }
 }

@@ -10,6 +10,7 @@
 #include "glint/api/pack.h"
 #include "glint/formats/asset_writer.h"
 #include "glint/query/packed_ndf_view.h"
+#include "glint/query/reference.h"
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 

@@ -12,6 +12,7 @@
 #include "glint/bake/pyramid/agreement.h"
 #include "glint/model/error.h"
 #include "glint/query/pyramid_ndf.h"
+#include "glint/query/reference.h"
 #include "support/test_maps.h"
 
 namespace glint::bake {

@@ -9,7 +9,9 @@
 #include "glint/bake/compressed/compress.h"
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/query/cp_ndf.h"
+#include "glint/query/manifold_ndf.h"
 #include "glint/query/pyramid_ndf.h"
+#include "glint/query/reference.h"
 #include "support/test_maps.h"
 #include "unit/compress_reference.h"
 
@@ -410,7 +412,7 @@ TEST(PyramidSlices, CentresGetTheirOwnImageOfTrilinearInterpolation) {
 template <class Model>
 void expectLevelsAreExtended(const Model& model, const Model& with_normals, const Boundary boundary) {
   RandomQueries random(7);
-  const Reference exact(map().map(), 0.02f, Surface::flat, boundary, Reference::Search::pruned);
+  const ManifoldNdf exact(map().map(), 0.02f, Surface::flat, boundary);
   constexpr double kFade = 2e-4;  // of 1 / (1 + x), x at most 1e4, on a map that ends
   const float finest = finestSigma(model.shape()), coarsest = 4 * finest;
   int positive = 0;

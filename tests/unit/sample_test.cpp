@@ -19,6 +19,7 @@
 #include "glint/query/histogram_ndf.h"
 #include "glint/query/moments_ndf.h"
 #include "glint/query/pyramid_ndf.h"
+#include "glint/query/reference.h"
 #include "support/test_maps.h"
 
 namespace glint {

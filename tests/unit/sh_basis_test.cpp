@@ -286,7 +286,7 @@ TEST(ShLobes, RefusesWhatCannotBe) {
   };
   EXPECT_EQ(code({.order = -1}), "sh.order");
   EXPECT_EQ(code({.order = 1001}), "sh.order");
-  EXPECT_EQ(code({.order = 1000}), "sh.memory");
+  EXPECT_EQ(code({.order = 1000}), "memory.limit");
   EXPECT_EQ(code({.sigma_r = 0}), "sh.sigma_r");
   EXPECT_EQ(code({.grid = {1, 8}}), "sh.grid");
   EXPECT_EQ(code({.order = 1000, .grid = {0, 0}}), "none");

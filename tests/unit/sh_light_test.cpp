@@ -274,7 +274,7 @@ TEST(ShLight, RefusesOrdersAndGridsThatCannotBe) {
   const auto rule = [&](const ShLightOptions& options) { return ruleOf([&] { buildShLight(e, options); }); };
   EXPECT_EQ(rule({.order = -1}), "sh.order");
   EXPECT_EQ(rule({.order = 1000}), "sh.order");
-  EXPECT_EQ(rule({.order = 300, .grid = {65, 128}}), "sh.memory");
+  EXPECT_EQ(rule({.order = 300, .grid = {65, 128}}), "memory.limit");
   EXPECT_EQ(rule({.order = 4, .grid = {0, 0}}), "sh.grid");
   EXPECT_EQ(rule({.order = 4, .grid = {2, 3}, .band_limit = 2}), "sh.band_limit");
 }

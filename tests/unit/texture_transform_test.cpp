@@ -64,8 +64,8 @@ std::vector<double> countedOnSurface(const NormalMap& map, const Footprint& p, c
       double weight = 0;  // of the texel and of its copies in the maps around
       for (int y = -2; y <= 2; ++y)
         for (int x = -2; x <= 2; ++x) {
-          const double dx = i + 0.5 + x * map.width - p.centre.x * map.width,
-                       dy = j + 0.5 + y * map.height - p.centre.y * map.height;
+          const double dx = i + 0.5 + x * map.width - double{p.centre.x} * map.width,
+                       dy = j + 0.5 + y * map.height - double{p.centre.y} * map.height;
           const double xx = p.covariance.xx, xy = p.covariance.xy, yy = p.covariance.yy, det = xx * yy - xy * xy;
           weight += std::exp(-0.5 * (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / det);
         }

@@ -128,7 +128,7 @@ TEST(SeamCut, RunsWhereImagesAgree) {
 
 class WangTilesOf : public testing::TestWithParam<WangScheme> {};
 INSTANTIATE_TEST_SUITE_P(Schemes, WangTilesOf, testing::Values(WangScheme::edge, WangScheme::corner),
-                         [](const auto& info) { return info.param == WangScheme::edge ? "Edge" : "Corner"; });
+                         [](const auto& scheme) { return scheme.param == WangScheme::edge ? "Edge" : "Corner"; });
 
 TEST_P(WangTilesOf, TexelsOnBothSidesOfAnEdgeAreNeighboursInTheInput) {
   constexpr int kSize = 32, kCells = 6;

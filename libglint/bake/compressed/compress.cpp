@@ -24,6 +24,8 @@ namespace {
 
 // An image that decodes to this share of its mass or less is mostly error, and is not scaled up.
 constexpr double kLeastEnergy = 0.5;
+// Images of less mass hardly count in any answer, and are not reported when they are not scaled.
+constexpr double kLeastMass = 0.01;
 
 void checkOptions(const CompressionOptions& options) {
   const auto require = [](bool valid, const char* rule, const std::string& what) {
@@ -89,7 +91,7 @@ class Compressor {
       : pyramid_(pyramid),
         options_(options),
         type_(attempt.type),
-        index_(pyramid, regions(options), levelGroups(options)),
+        index_(pyramid, regions(options), levelGroups(options), options.image_masses),
         weights_(index_, options.metric, attempt.scale_range),
         groups_(index_.levelGroupCount()),
         progress_(progress),
@@ -213,7 +215,7 @@ class Compressor {
     if (!keeps_bases) kept.reset();
   }
 
-  /// Finds the scale with which each image integrates to 1.
+  /// Finds the scale with which each image integrates to its mass.
   void scaleImages() {
     std::vector<double> sums(index_.imageCount(), 0.0);
     std::vector<double> positive(index_.imageCount(), 0.0);
@@ -228,10 +230,11 @@ class Compressor {
     unscaled_images_ = 0;
     for (std::size_t i = 0; i < sums.size(); ++i) {
       const double integral = sums[i] * pyramid_.value_scale * pixel * pixel;
-      const bool scaled = integral > kLeastEnergy;
-      image_scales_[i] = scaled ? static_cast<float>(1 / integral) : 1.0f;
-      unscaled_images_ += !scaled;
-      const auto density_scale = static_cast<float>(1 / (positive[i] * pyramid_.value_scale * pixel * pixel));
+      const double mass = index_.imageMass(i);
+      const bool scaled = integral > kLeastEnergy * mass;
+      image_scales_[i] = scaled ? static_cast<float>(mass / integral) : 1.0f;
+      unscaled_images_ += !scaled && mass > kLeastMass;
+      const auto density_scale = static_cast<float>(mass / (positive[i] * pyramid_.value_scale * pixel * pixel));
       density_scales_[i] = std::isfinite(density_scale) ? density_scale : 0.0f;
     }
   }
@@ -341,8 +344,10 @@ class Compressor {
     index_.describe(data);
     data.header.method = options_.method;
     data.header.coefficient_type = type_;
-    data.image_scales = image_scales_;
-    data.density_scales = density_scales_;
+    for (std::size_t i = 0; i < index_.imageCount(); ++i) {
+      data.image_scales.push_back(image_scales_[i] / index_.imageMass(i));
+      data.density_scales.push_back(density_scales_[i] / index_.imageMass(i));
+    }
     numberBlocks(data);
     const std::size_t blocks = pyramid_.shape.blocksPerImage();
     for (int region = 0; region < index_.regionCount(); ++region)
@@ -417,7 +422,7 @@ class Compressor {
       for (const std::uint32_t s : encoded_[c].kept) {
         const std::size_t image = index_.sliceImage(c, s);
         masses[image * places + data.block_places[c % blocks]] =
-            static_cast<float>(unit * encoded_[c].errors.slices[s].positive * density_scales_[image]) * kRounding;
+            static_cast<float>(unit * encoded_[c].errors.slices[s].positive * data.density_scales[image]) * kRounding;
       }
     }
     data.block_masks.assign(images * words, 0);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "glint/bake/common/progress.h"
@@ -47,6 +48,10 @@ struct CompressionOptions {
   /// otherwise. With tucker, level 0 and level 1 have regions of their own, and all coarser levels share theirs. With a
   /// tolerance for the seen error, level 2 has regions of its own, too, whatever the method.
   int regions = 0;
+
+  /// [images]: what each image counts in answers, > 0; empty: 1 each. Errors are those of masses times images. Images integrate to 1
+  /// all the same.
+  std::span<const float> image_masses;
 
   double min_improvement = 1e-4;  ///< cp: the search ends when a sweep improves the relative error of a cluster by less, >= 0
   int max_iterations = 500;       ///< cp: most sweeps, >= 1

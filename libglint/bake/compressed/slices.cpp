@@ -57,11 +57,18 @@ void checkShape(const PyramidShape& shape) {
 
 }  // namespace
 
-SliceIndex::SliceIndex(const NdfPyramid& pyramid, int regions, int level_groups)
-    : pyramid_(pyramid), regions_(regions), level_groups_(std::min(level_groups, pyramid.shape.level_count)) {
+SliceIndex::SliceIndex(const NdfPyramid& pyramid, int regions, int level_groups, std::span<const float> image_masses)
+    : pyramid_(pyramid),
+      regions_(regions),
+      level_groups_(std::min(level_groups, pyramid.shape.level_count)),
+      image_masses_(image_masses) {
   checkShape(pyramid.shape);
   for (int l = 0; l < pyramid.shape.level_count; ++l) checkLevel(pyramid, l);
   assignImages();
+  if (!image_masses_.empty() && image_masses_.size() != imageCount())
+    throw Error(
+        ErrorCode::usage, "compress.masses", "", "",
+        "there are " + std::to_string(image_masses_.size()) + " masses for " + std::to_string(imageCount()) + " images");
   assignSlices();
 }
 
@@ -129,6 +136,8 @@ void SliceIndex::load(std::size_t cluster, int first, int count, const float* fa
     loadStoredBlock(pyramid_, pyramid_.levels[level(images_[slice])], blocks_[slice], out);
     if (factors != nullptr)
       for (int p = 0; p < kBlockPixels; ++p) out[p] *= factors[p];
+    if (const float mass = imageMass(images_[slice]); mass != 1)
+      for (int p = 0; p < kBlockPixels; ++p) out[p] *= mass;
   }
 }
 

@@ -24,7 +24,8 @@ class SliceIndex {
   /// @param level_groups  groups of levels with regions of their own, >= 1: each of the finest levels is a group, and the last
   ///                      group has all coarser levels
   /// @throw Error usage if a region has more than 65536 images, invalid_input if the arrays of the pyramid do not fit its shape
-  SliceIndex(const NdfPyramid& pyramid, int regions, int level_groups);
+  /// @param image_masses  [images]: what the pixels of each image are multiplied by; empty: 1. Must outlive the index
+  SliceIndex(const NdfPyramid& pyramid, int regions, int level_groups, std::span<const float> image_masses = {});
 
   /// @return number of groups of levels. All groups have the same number of clusters, and clusters are in the order of groups
   int levelGroupCount() const { return level_groups_; }
@@ -40,6 +41,7 @@ class SliceIndex {
 
   std::size_t clusterCount() const { return first_slices_.size() - 1; }
   std::size_t imageCount() const { return slots_.size(); }
+  float imageMass(std::size_t image) const { return image_masses_.empty() ? 1.0f : image_masses_[image]; }
   /// @return number of slices of a cluster
   int sliceCount(std::size_t cluster) const { return static_cast<int>(first_slices_[cluster + 1] - first_slices_[cluster]); }
   std::uint64_t totalSlices() const { return first_slices_.back(); }
@@ -64,7 +66,7 @@ class SliceIndex {
   /// @return pixels of an image along each axis
   int resolution() const { return pyramid_.shape.resolution; }
 
-  /// Converts slices first..first+count-1 of a cluster to floats.
+  /// Converts slices first..first+count-1 of a cluster to floats, times the masses of their images.
   /// @param factors  [256]: what each pixel is multiplied by; null: 1
   /// @param out      [count][kSliceStride]; the padding is not written
   void load(std::size_t cluster, int first, int count, const float* factors, float* out) const;
@@ -79,6 +81,7 @@ class SliceIndex {
   const NdfPyramid& pyramid_;
   int regions_;
   int level_groups_;
+  std::span<const float> image_masses_;
   std::vector<std::uint32_t> region_slots_;   // [regions]: number of images
   std::vector<std::uint32_t> first_image_;    // [levels + 1]
   std::vector<std::uint16_t> image_regions_;  // [images]

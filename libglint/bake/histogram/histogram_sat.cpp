@@ -213,6 +213,22 @@ std::size_t HistogramSatData::sizeBytes() const {
          sat.sums.size_bytes() + sat.coarse_sums.size_bytes() + sat.row_sums.size_bytes() + sat.column_sums.size_bytes();
 }
 
+double histogramSatBytes(const NormalMap& map, const HistogramSatOptions& options) {
+  checkOptions(map, options);
+  const HistogramSat shape = shapeFor(map, options);
+  const SphericalBins bins(options.theta_bins, options.phi_bins);
+  std::vector<bool> occurs(static_cast<std::size_t>(bins.count()));
+  for (const Vec2 n : map.normals) occurs[static_cast<std::size_t>(bins.find(n))] = true;
+  const auto bin_count = static_cast<double>(std::count(occurs.begin(), occurs.end(), true));
+  const auto points = [&](int stride) { return static_cast<double>(shape.pointsX(stride)) * shape.pointsY(stride); };
+  const double texels = static_cast<double>(map.width) * map.height;
+  // Lines of texels in both directions have a point in every line_stride texels.
+  const double lines = 2 * (texels / shape.line_stride + map.width + map.height);
+  return texels * sizeof(std::uint16_t) +
+         bin_count * (points(shape.stride) * sizeof(std::uint16_t) + points(shape.coarse_stride) * sizeof(std::uint32_t) +
+                      lines * sizeof(std::uint16_t));
+}
+
 HistogramSatData buildHistogramSat(const NormalMap& map, const HistogramSatOptions& options, const ProgressFn& progress) {
   checkOptions(map, options);
   HistogramSatData sat;

@@ -47,6 +47,10 @@ class HistogramSatData {
   std::size_t sizeBytes() const;
 };
 
+/// The memory of the tables of a map, bytes, as far as the map's directions fill its bins.
+/// @throws Error as buildHistogramSat. O(texels)
+double histogramSatBytes(const NormalMap& map, const HistogramSatOptions& options);
+
 /// Accumulates the histograms of a map (Gamboa 2018, section 4.1).
 ///
 /// Each texel gets the bin of its normal. Then each table counts the texels of its cells, and sums counts along rows and down

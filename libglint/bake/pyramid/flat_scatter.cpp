@@ -66,7 +66,7 @@ struct Range {
 Range texelsWithin(float centre, float reach, int size, Boundary boundary) {
   int begin = static_cast<int>(std::ceil(centre - reach - 0.5f)), end = static_cast<int>(std::floor(centre + reach - 0.5f)) + 1;
   if (boundary == Boundary::clamp) begin = std::max(begin, 0), end = std::min(end, size);
-  return {begin, end};
+  return {begin, std::max(begin, end)};
 }
 
 /// Weights of texels along one axis, not normalised.
@@ -78,8 +78,8 @@ struct AxisWeights {
 
 /// Weights of a Gaussian up to its reach. If the Gaussian is longer than the map, the weights are folded, so that no texel is
 /// visited twice.
-AxisWeights gaussianWeights(float centre, float sigma, int size, Boundary boundary) {
-  const Range range = texelsWithin(centre, kPyramidReach * sigma, size, boundary);
+AxisWeights gaussianWeights(float centre, float sigma, int size, Boundary boundary, float reach) {
+  const Range range = texelsWithin(centre, reach * sigma, size, boundary);
   const bool folded = range.size() > size;
   AxisWeights axis = {folded ? Range{0, size} : range, {}, folded};
   axis.weights.assign(static_cast<std::size_t>(axis.range.size()), 0.0f);
@@ -146,8 +146,8 @@ void scatter(const NormalMap& map, const AxisWeights& x, const AxisWeights& y, c
 void scatterFlatFootprint(const NormalMap& map, Boundary boundary, Vec2 centre, float sigma, DirectionBins& bins,
                           DirectionBins& band) {
   const float reach = kPyramidReach * sigma;
-  const AxisWeights x = gaussianWeights(centre.x, sigma, map.width, boundary);
-  const AxisWeights y = gaussianWeights(centre.y, sigma, map.height, boundary);
+  const AxisWeights x = gaussianWeights(centre.x, sigma, map.width, boundary, kPyramidReach);
+  const AxisWeights y = gaussianWeights(centre.y, sigma, map.height, boundary, kPyramidReach);
   const auto insideCircle = [&](int j) {
     if (x.folded || y.folded) return x.range;
     const float dy = static_cast<float>(j) + 0.5f - centre.y;
@@ -155,6 +155,27 @@ void scatterFlatFootprint(const NormalMap& map, Boundary boundary, Vec2 centre, 
     return Range{std::max(r.begin, x.range.begin), std::min(r.end, x.range.end)};
   };
   scatter(map, x, y, insideCircle, bins, band);
+}
+
+double shareInTile(float centre, float sigma, int size) {
+  const auto sum = [](const AxisWeights& axis) {
+    double total = 0;
+    for (const float weight : axis.weights) total += double{weight};
+    return total;
+  };
+  // A map that is long enough holds the whole footprint.
+  const int reach = static_cast<int>(std::ceil(kTileReach * sigma)) + 1;
+  const float nearest = std::floor(centre);
+  const AxisWeights all =
+      gaussianWeights(static_cast<float>(reach) + (centre - nearest), sigma, 2 * reach + 1, Boundary::clamp, kTileReach);
+  return sum(gaussianWeights(centre, sigma, size, Boundary::clamp, kTileReach)) / sum(all);
+}
+
+void scatterFlatTile(const NormalMap& tile, Vec2 centre, float sigma, DirectionBins& bins, DirectionBins& band) {
+  const AxisWeights x = gaussianWeights(centre.x, sigma, tile.width, Boundary::clamp, kTileReach);
+  const AxisWeights y = gaussianWeights(centre.y, sigma, tile.height, Boundary::clamp, kTileReach);
+  scatter(
+      tile, x, y, [&](int) { return x.range; }, bins, band);
 }
 
 void scatterFlatMap(const NormalMap& map, DirectionBins& bins, DirectionBins& band) {

@@ -64,6 +64,14 @@ class NdfPyramidData {
 /// side of the map; the last level is the mean of the map.
 PyramidShape pyramidShape(int width, int height, const PyramidOptions& options);
 
+/// @throws Error (usage) for options out of range
+void checkPyramidOptions(const PyramidOptions& options);
+
+/// The memory that buildPyramid takes at its peak, bytes: images before and after they are packed. Where every block of every image
+/// would fit into `most_bytes`, it is the bytes of all blocks; otherwise blocks are counted on a few images of each level.
+/// @throws Error usage for options out of range
+double pyramidBytes(const NormalMap& map, const PyramidOptions& options, double most_bytes);
+
 /// Builds the NDF images of every level (Deng 2022, section 4.1).
 ///
 /// Facets are scattered: each texel of a footprint adds its weight to bins of directions. Then one separable filter for each

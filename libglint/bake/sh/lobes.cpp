@@ -114,11 +114,11 @@ void requireTableFits(int order, double bytes_per_coefficient, std::uint64_t max
   if (bytes <= static_cast<double>(max_bytes)) return;
   const int fits = static_cast<int>(std::sqrt(static_cast<double>(max_bytes) / bytes_per_coefficient)) - 1;
   char what[160];
-  std::snprintf(what, sizeof what, "a table of order %d needs %.1f GB, more than the limit of %.1f GB", order, bytes / 1e9,
+  std::snprintf(what, sizeof what, "a table of order %d needs %.3g GB, more than the limit of %.3g GB", order, bytes / 1e9,
                 static_cast<double>(max_bytes) / 1e9);
-  throw Error(ErrorCode::usage, "sh.memory", {}, "order", what,
+  throw Error(ErrorCode::failed, "memory.limit", {}, "order", what,
               (fits >= 0 ? "order " + std::to_string(fits) + " fits; " : std::string()) +
-                  "ask for a smaller grid or order, or allow more memory");
+                  "ask for a smaller grid or order, or raise --max-memory where the machine has more");
 }
 
 ShLobesData buildShLobes(const ShLobesOptions& options, const ProgressFn& progress) {

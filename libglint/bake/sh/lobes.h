@@ -36,12 +36,12 @@ std::vector<double> zonalLobe(double sigma_r, int order);
 
 /// Builds the table of the lobe, turned towards every direction of a grid (Gamboa 2018, Eq. 10 and 12; section 6.2).
 /// O(directions * order^2). The result does not depend on the number of threads.
-/// @throws Error usage if an option is out of range or the table is larger than max_bytes
+/// @throws Error usage if an option is out of range; failed if the table is larger than max_bytes
 ShLobesData buildShLobes(const ShLobesOptions& options, const ProgressFn& progress = {});
 
 /// Throws Error usage unless a grid of directions is 0 x 0, or has 2 to 4096 rows and 3 to 8192 columns.
 void requireUsableGrid(const ShGrid& grid);
-/// Throws Error usage if a table would be larger than the limit. The error names the size, and the largest order that fits.
+/// Throws Error failed if a table would be larger than the limit. The error names the size, and the largest order that fits.
 /// @param bytes_per_coefficient  bytes of one coefficient in all directions together
 void requireTableFits(int order, double bytes_per_coefficient, std::uint64_t max_bytes);
 

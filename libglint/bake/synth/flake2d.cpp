@@ -1,13 +1,12 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
 
 #include "glint/bake/synth/kinds.h"
+#include "glint/math/lookup3.h"
 
 namespace glint::bake {
 namespace {
@@ -21,40 +20,22 @@ struct Point3 {
   float x, y, z;
 };
 
-/// The hash of cells that OSL and MaterialX use: lookup3 of Bob Jenkins (2006), over the words of one key.
+/// The hash of cells that OSL and MaterialX use: lookup3 over the words of one key.
 class CellHash {
  public:
   /// @param words  words of the whole key, which the hash counts
-  explicit CellHash(std::uint32_t words) { state_.fill(0xdeadbeefu + (words << 2) + 13); }
+  explicit CellHash(std::uint32_t words) : state_((words << 2) + 13) {}
 
-  void add(std::uint32_t x, std::uint32_t y, std::uint32_t z) { state_[0] += x, state_[1] += y, state_[2] += z; }
+  void add(std::uint32_t x, std::uint32_t y, std::uint32_t z) { state_.add(x, y, z); }
 
   /// Stirs three words, where more words follow.
-  void mix() {
-    auto& [a, b, c] = state_;
-    a -= c, a ^= std::rotl(c, 4), c += b;
-    b -= a, b ^= std::rotl(a, 6), a += c;
-    c -= b, c ^= std::rotl(b, 8), b += a;
-    a -= c, a ^= std::rotl(c, 16), c += b;
-    b -= a, b ^= std::rotl(a, 19), a += c;
-    c -= b, c ^= std::rotl(b, 4), b += a;
-  }
+  void mix() { state_.mix(); }
 
   /// A number in [0, 1], of the last words.
-  float number() const {
-    auto [a, b, c] = state_;
-    c ^= b, c -= std::rotl(b, 14);
-    a ^= c, a -= std::rotl(c, 11);
-    b ^= a, b -= std::rotl(a, 25);
-    c ^= b, c -= std::rotl(b, 16);
-    a ^= c, a -= std::rotl(c, 4);
-    b ^= a, b -= std::rotl(a, 14);
-    c ^= b, c -= std::rotl(b, 24);
-    return static_cast<float>(c) / 4294967295.0f;
-  }
+  float number() const { return static_cast<float>(Lookup3(state_).finish()) / 4294967295.0f; }
 
  private:
-  std::array<std::uint32_t, 3> state_{};
+  Lookup3 state_;
 };
 
 /// A cell of the node's grid, as the hash counts it.

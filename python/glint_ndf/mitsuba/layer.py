@@ -4,6 +4,7 @@ import drjit as dr
 import glint_ndf as gn
 import mitsuba as mi
 import numpy as np
+from glint_ndf.ndf import ENDLESS_KINDS
 
 from .asset_file import AssetFile
 from .errors import PluginError
@@ -19,18 +20,19 @@ from .wavefront import require_numbers
 _VARIANTS = ("full", "lobes", "single")
 
 _WITH_LEVELS = ("ndf-pyramid", "ndf-cp", "wave-pyramid")
-_WITH_NDF = (*_WITH_LEVELS, "slope-moments", "bin-map", "histogram-sat", "tiny-example", "normals")
+_WITH_IMAGES = (*_WITH_LEVELS, "wang-cp", "wang-pyramid")
+_WITH_NDF = (*_WITH_IMAGES, "slope-moments", "bin-map", "histogram-sat", "tiny-example", "wang-tiles", "normals")
 
 #: Options of an asset, and the kinds that read them.
 _KINDS_OF_OPTIONS = {
     "normals": ("ndf-pyramid", "ndf-cp"),
-    "sigma_r": ("normals", "slope-moments"),
+    "sigma_r": ("normals", "slope-moments", "wang-tiles"),
     "alpha": ("bin-map",),
-    "surface": ("normals",),
+    "surface": ("normals", "wang-tiles"),
     "boundary": ("normals",),
-    "footprint_parts": (*_WITH_LEVELS, "slope-moments"),
+    "footprint_parts": (*_WITH_IMAGES, "slope-moments"),
     "interpolation": _WITH_LEVELS,
-    "pixels": _WITH_LEVELS,
+    "pixels": _WITH_IMAGES,
     "facets": _WITH_NDF,
     "variant": ("displacement",),
 }
@@ -57,7 +59,7 @@ class GlintLayer:
             self._open_displaced(options)
         else:
             self._open_ndf(options)
-        scale, endless = _scale_of(options, self.width, self.height), self.kind == "tiny-example"
+        scale, endless = _scale_of(options, self.width, self.height), self.kind in ENDLESS_KINDS
         self.placement = Placement(scale, options.number("rotation", 0.0), endless)
         factor, sigma = options.number("footprint_scale", 1.0, above=0), options.number("sigma", None, above=0)
         self._footprints = Footprints(plugin, self.path, self.width, self.height, factor, sigma, self._fallback)

@@ -209,6 +209,18 @@ class FootprintWeights {
   }
 
   GLINT_HD bool isBox() const { return is_box_; }
+  /// A Gaussian is exp(-(a^2 + b^2) / 2) with a = across (x - slant y), b = along y, from its centre.
+  struct Whitening {
+    float slant, across, along;
+  };
+  GLINT_HD Whitening whitening() const { return {static_cast<float>(slant_[0]), std::sqrt(across_), std::sqrt(along_)}; }
+  /// Whether a box surely misses a rectangle with the given centre and half sides, texels.
+  GLINT_HD bool misses(double x, double y, double half_x, double half_y) const {
+    const Vec2 middle = local(x - centre_x_, y - centre_y_), right = columnStep(), up = rowStep();
+    const auto sx = static_cast<float>(half_x), sy = static_cast<float>(half_y);
+    return std::fabs(middle.x) - std::fabs(right.x) * sx - std::fabs(up.x) * sy >= 1 ||
+           std::fabs(middle.y) - std::fabs(right.y) * sx - std::fabs(up.y) * sy >= 1;
+  }
   GLINT_HD Vec2 centre() const { return {static_cast<float>(centre_x_), static_cast<float>(centre_y_)}; }
 
   /// A Gaussian along one line y = const of texel space: position of its peak, its deviation, and its integral over the line

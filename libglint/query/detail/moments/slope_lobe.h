@@ -55,7 +55,7 @@ class SlopeLobe {
     const int count = panelEnds(box, ends);
     double sum = 0;
     for (int k = 0; k + 1 < count; ++k) sum += integral(box, ends[k], ends[k + 1]);
-    return static_cast<float>(std::clamp(sum, 0.0, 1.0));
+    return std::min(1.0f, finitePositive(static_cast<float>(sum)));
   }
 
   /// Half vector with probability density `density`: slopes from the quantiles of xi.
@@ -140,7 +140,9 @@ class SlopeLobe {
     // Where the lobe is narrow along a diagonal, intervals of p move past it within a short way along q.
     const float turn = std::fabs(x_by_y_) * sigma_y_;
     const float longest = kPanel * sigma_y_ * std::min(1.0f, sigma_x_given_y_ / std::max(turn, 1e-20f));
-    const int panels = static_cast<int>(std::clamp(std::ceil((high - low) / longest), 1.0f, static_cast<float>(kMostPanels)));
+    // One panel where damaged moments leave no number: fmax takes the other one.
+    const int panels =
+        static_cast<int>(std::fmin(std::fmax(std::ceil((high - low) / longest), 1.0f), static_cast<float>(kMostPanels)));
     const float half = 0.5f * (high - low) / static_cast<float>(panels);
     const Rule rule = ruleFor(2 * half / longest);
     double sum = 0;

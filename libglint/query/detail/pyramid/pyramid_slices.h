@@ -113,6 +113,31 @@ class SliceChooser {
     return out;
   }
 
+  /// Four neighbouring centres along each axis of a level, on a grid that goes on beyond the map: what answers a footprint on a
+  /// plane of tiles.
+  struct Centres {
+    int column, row;         ///< of the first centres; below 0 before the map, as many as the level has or more beyond it
+    float across[4], up[4];  ///< weights, >= 0, which sum to 1
+  };
+  /// Chooses the levels of a footprint of this variance, texels^2.
+  GLINT_HD LevelPlace levelFor(float variance) const { return levelOf(variance); }
+  /// Chooses the centres of a level of footprints. Centres must be spread evenly over the map.
+  /// @param at        position on the map, [0, 1)^2
+  /// @param variance  of the footprint, texels^2
+  GLINT_HD Centres centresAround(int level, Vec2 at, float variance) const {
+    const LevelCentres& centres = levels_[level];
+    const float lacking = (variance < largest_variance_ ? variance : largest_variance_) - centres.variance;
+    Centres found;
+    const auto along = [&](int axis, float coordinate, int& first, float(&weights)[4]) {
+      const float place = coordinate * (centres.last[axis] + 1) - 0.5f, low = std::floor(place);
+      first = static_cast<int>(low) - 1;
+      FootprintKernel::weights(lacking * centres.per_square_gap[axis], place - low).store(weights);
+    };
+    along(0, at.x, found.column, found.across);
+    along(1, at.y, found.row, found.up);
+    return found;
+  }
+
   /// The position of a footprint between the levels.
   /// @param ratio  variance of the footprint over the largest variance that level 0 answers alone; 1 to 4^15
   static GLINT_HD LevelPlace levelPlace(float ratio, Interpolation interpolation) {

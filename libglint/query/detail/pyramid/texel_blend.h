@@ -5,7 +5,7 @@
 #include "glint/model/ndf_pyramid.h"
 #include "glint/query/detail/common/sampling.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
-#include "glint/query/reference.h"
+#include "glint/query/manifold_ndf.h"
 
 namespace glint {
 
@@ -26,7 +26,7 @@ class TexelBlend {
   /// Without normals: images answer everything.
   TexelBlend() = default;
   GLINT_HD TexelBlend(const PyramidShape& shape, const NormalMap& normals)
-      : texels_(normals, shape.sigma_r, shape.surface, shape.boundary, Reference::Search::pruned) {
+      : texels_(normals, shape.sigma_r, shape.surface, shape.boundary) {
     const float finest = finestSigma(shape);
     const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
     largest_u_ = width * width;
@@ -82,7 +82,7 @@ class TexelBlend {
     return share * texels() + (1 - share) * images();
   }
 
-  Reference texels_;
+  ManifoldNdf texels_;
   float largest_u_ = 0, largest_v_ = 0;  // texels^2
   float end_ = 0;                        // variance from which on the images answer alone, texels^2
   float per_range_ = 0;

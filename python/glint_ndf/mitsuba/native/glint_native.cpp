@@ -64,7 +64,10 @@ class GlintAsset {
   int width() const { return info_.width; }
   int height() const { return info_.height; }
   bool coloured() const { return coloured_; }
-  bool endless() const { return std::string_view(info_.kind) == "tiny-example"; }
+  bool endless() const {
+    const std::string_view kind(info_.kind);
+    return kind == "tiny-example" || kind.substr(0, 5) == "wang-";
+  }
   /// Deviation that footprints without extent count as, texels.
   float fallbackSigma() const { return std::max(info_.smallest_sigma_texels, 0.5f); }
 

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <string>
+
+#include "common/tool.h"
+
+namespace glint::apps {
+
+/// Memory that the builders take at their peak, bytes for each texel of what they work on, rounded up. test_memory.py fails where a
+/// builder takes more. pyramidBytes() of the builder and the tables of others are estimates of their own.
+struct BytesPerTexel {
+  static constexpr double kSynth = 96;      ///< normals or heights, the spectrum of noise, the encoded image
+  static constexpr double kIngest = 64;     ///< pixels, normals or heights, bounds
+  static constexpr double kBinMap = 64;     ///< texels sorted by bins, twice
+  static constexpr double kMoments = 64;    ///< six moments of all levels
+  static constexpr double kTextures = 160;  ///< the same, and pictures of them
+  static constexpr double kExplicit = 48;   ///< normals, and their bounds
+  static constexpr double kDisplace = 512;  ///< heights, geometry, masks of visible directions
+  static constexpr double kTile = 800;      ///< of one Wang tile along both axes: all tiles, and the candidates of seams
+  static constexpr double kExample = 4096;  ///< of the example at 128 pixels an image: a table for each texel
+};
+
+/// Refuses work on so many texels if it takes more than --max-memory.
+/// @param what  "a bin map of"; the size is added
+/// @throws Error failed
+inline void requireMemoryFor(const Tool& tool, const std::string& what, int width, int height, double bytes_per_texel,
+                             const std::string& remedy = "take a smaller map") {
+  tool.requireMemory(bytes_per_texel * width * height, fmt::format("{} {} x {} texels", what, width, height), remedy);
+}
+
+}  // namespace glint::apps

@@ -1,0 +1,12 @@
+#pragma once
+
+// Private to formats/.
+
+#include <string_view>
+
+namespace glint::formats {
+
+/// Whether a text is one JSON object.
+bool isJsonObject(std::string_view text);
+
+}  // namespace glint::formats

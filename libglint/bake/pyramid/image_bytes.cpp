@@ -1,0 +1,34 @@
+#include "glint/bake/pyramid/image_bytes.h"
+
+#include <algorithm>
+
+#include "glint/bake/pyramid/image_packer.h"
+
+namespace glint::bake {
+
+double imageBytes(const PyramidShape& shape, BlockPrecision precision, double most_bytes, const BlockCountFn& blocks,
+                  double spread) {
+  // Images are packed while others of their level still have their own arrays, which grew by doubling.
+  constexpr double kCopies = 2.5;
+  constexpr std::size_t kSampledImages = 8;  // of a level
+  const double block_bytes = kCopies * (kBlockPixels * (precision == BlockPrecision::f16 ? 2.0 : 4.0) + sizeof(float));
+  const double empty_image = static_cast<double>(sizeof(PackedImage)) + static_cast<double>(shape.maskWords()) * 24;
+  const double most_blocks = shape.blocksPerImage();
+  double full = 0;
+  for (int l = 0; l < shape.level_count; ++l)
+    full += static_cast<double>(shape.levels[l].imageCount()) * (empty_image + most_blocks * block_bytes);
+  if (full <= most_bytes) return full;
+
+  double counted = 0;
+  for (int l = 0; l < shape.footprintLevels(); ++l) {
+    const std::size_t count = shape.levels[l].imageCount();
+    const std::size_t samples = std::min(kSampledImages, count);
+    double sum = 0;
+    for (std::size_t k = 0; k < samples; ++k) sum += static_cast<double>(blocks(l, (2 * k + 1) * count / (2 * samples)));
+    const double mean = std::min(most_blocks, spread * sum / static_cast<double>(samples));
+    counted += static_cast<double>(count) * (empty_image + mean * block_bytes);
+  }
+  return counted;
+}
+
+}  // namespace glint::bake
