@@ -2,8 +2,8 @@
 
     build/venv/bin/python pipelines/mitsuba_scene.py scene.xml --tolerance 0.2 -o scene.json
 
-The scene is an XML file, or JSON with the dictionary of `mitsuba.load_dict`, where a `to_world` is a list of four rows. With several files, which are the frames of a camera's
-path, distances are those of all frames. Maps are the assets that the BSDFs name, which must be of kind normals; --map ID=FILE names another
+The scene is an XML file, or JSON with the dictionary of `mitsuba.load_dict`, where a `to_world` is a list of four rows. Several files are the
+frames of a camera's path: distances are those of all frames. Maps are the assets that the BSDFs name, which must be of kind normals; --map ID=FILE names another
 file for the asset of a shape. The size of a texel follows from the mesh: lengths of edges in the scene over their lengths in uv.
 """
 
@@ -17,6 +17,14 @@ import xml.etree.ElementTree
 import numpy as np
 
 SHARP = {"point", "spot", "directional"}
+NEAREST_SHARE = 1e-3  # smallest distance over the largest
+
+
+def read_json(path):
+    try:
+        return json.loads(path.read_text())
+    except ValueError as error:
+        sys.exit(f"{path}: is no JSON: {error}")
 
 
 def with_transforms(value, mi):
@@ -31,7 +39,7 @@ def load(mi, path):
     mi.file_resolver().append(str(path.resolve().parent))
     if path.suffix != ".json":
         return mi.load_file(str(path))
-    return mi.load_dict(with_transforms(json.loads(path.read_text()), mi))
+    return mi.load_dict(with_transforms(read_json(path), mi))
 
 
 def uv_scale_of(mesh, mi):
@@ -57,11 +65,13 @@ def camera_of(sensor, mi):
 
 
 def distances(shape, camera):
-    """Smallest and largest distance of the corners of a shape's box along the camera's axis, of those in front."""
+    """Smallest and largest distance of the corners of a shape's box along the camera's axis; None: all are behind the camera."""
     box = shape.bbox()
     corners = np.array([[(box.min, box.max)[i >> k & 1][k] for k in range(3)] for i in range(8)])
     along = (corners - camera["origin"]) @ camera["axis"]
-    return max(float(along.min()), 1e-3 * float(along.max())), float(along.max())
+    farthest = float(along.max())
+    # A shape around the camera has no smallest distance, and a plan needs one.
+    return (max(float(along.min()), NEAREST_SHARE * farthest), farthest) if farthest > 0 else None
 
 
 def light_of(emitter, mi):
@@ -69,17 +79,19 @@ def light_of(emitter, mi):
     if any(name in kind for name in SHARP):
         return {"type": "directional" if "directional" in kind else "point"}
     if "envmap" in kind:
-        return {"type": "environment", "band_limit_deg": 360 / max(1, int(mi.traverse(emitter)["data"].shape[1]) // 2)}
+        # Two columns of pixels, which is the finest wave that an image can hold.
+        return {"type": "environment", "band_limit_deg": min(180.0, 360 / max(1, int(mi.traverse(emitter)["data"].shape[1]) // 2))}
     if "constant" in kind:
         return {"type": "environment", "band_limit_deg": 180}
     return None  # an area light: its shape says how large it looks
 
 
 def area_light(shape, target):
+    """A light as wide as the shape looks from a point."""
     box = shape.bbox()
     centre, size = np.array(box.center()).ravel(), float(np.linalg.norm(np.array(box.extents()).ravel()))
     distance = max(1e-9, float(np.linalg.norm(centre - target)))
-    # Of its box the diagonal: round lights look a little smaller.
+    # The diagonal of the box: round lights look a little smaller.
     return {"type": "point", "angular_diameter_deg": min(180.0, 2 * math.degrees(math.atan(size / 2 / distance)))}
 
 
@@ -97,7 +109,10 @@ def glints_of_dictionary(document):
 
 
 def glints_of_xml(path):
-    root = xml.etree.ElementTree.parse(path).getroot()
+    try:
+        root = xml.etree.ElementTree.parse(path).getroot()
+    except xml.etree.ElementTree.ParseError as error:
+        sys.exit(f"{path}: is no XML: {error}")
     named = {bsdf.get("id"): bsdf for bsdf in root.iter("bsdf") if bsdf.get("id")}
 
     def parameters(element):
@@ -114,40 +129,56 @@ def glints_of_xml(path):
     return {name: glint for name, glint in glints.items() if glint}
 
 
+def material_of(name, glint, shape, file, tolerance, mi):
+    if not shape.is_mesh():
+        sys.exit(f"{name}: is no mesh, so its uv have no scale; write it as a .ply or .obj")
+    if file is None:
+        sys.exit(f"{name}: its BSDF names no asset; name a map with --map {name}=FILE")
+    scale = uv_scale_of(shape, mi)
+    if scale is None:
+        sys.exit(f"{name}: its mesh has no uv; add them, because the map is laid out by them")
+    material = {"name": name, "map": file, "uv_size": scale / glint.get("uv_scale", 1), "tolerance": tolerance}
+    return material | ({"sigma_r": glint["sigma_r"]} if "sigma_r" in glint else {})
+
+
+def lights_of(scene, target, mi):
+    lights = []
+    for emitter in scene.emitters():
+        light = light_of(emitter, mi)
+        if light is None:
+            shape = next((s for s in scene.shapes() if s.is_emitter() and s.emitter() == emitter), None)
+            light = area_light(shape, target) if shape is not None else {"type": "point"}
+        if light not in lights:
+            lights.append(light)
+    return lights
+
+
 def plan_scene(scenes, mi, tolerance, unit_m, maps, glints):
-    """@param glints  {id of a shape: parameters of its BSDF `glint`}"""
+    """The scene of glint-plan.
+
+    @param scenes  frames of one scene
+    @param maps    {id of a shape: file of its map}, instead of the asset
+    @param glints  {id of a shape: parameters of its BSDF `glint`}
+    """
     cameras = [camera_of(scene.sensors()[0], mi) for scene in scenes]
-    near, far, materials, centres = math.inf, 0.0, [], []
+    ranges, materials, centres = [], [], []
     for name, glint in glints.items():
         for scene, camera in zip(scenes, cameras):
             shape = next((s for s in scene.shapes() if s.id() == name), None)
             if shape is None:
                 sys.exit(f"{name}: no shape has this id; the shapes are {', '.join(s.id() for s in scene.shapes())}")
-            low, high = distances(shape, camera)
-            near, far = min(near, low), max(far, high)
+            ranges.append(distances(shape, camera))
             centres.append(np.array(shape.bbox().center()).ravel())
-        if not shape.is_mesh():
-            sys.exit(f"{name}: is no mesh, so its uv have no scale; write it as a .ply or .obj")
-        scale = uv_scale_of(shape, mi)
-        if scale is None:
-            sys.exit(f"{name}: its mesh has no uv; add them, because the map is laid out by them")
-        file = maps.get(name) or pathlib.Path(glint["asset"]).name
-        materials.append({"name": name, "map": file, "uv_size": scale / glint.get("uv_scale", 1), "tolerance": tolerance,
-                          **({"sigma_r": glint["sigma_r"]} if "sigma_r" in glint else {})})
-    target = np.mean(centres, axis=0)
-    lights = []
-    for emitter in scenes[0].emitters():
-        light = light_of(emitter, mi)
-        if light is None:
-            shape = next((s for s in scenes[0].shapes() if s.is_emitter() and s.emitter() == emitter), None)
-            light = area_light(shape, target) if shape is not None else {"type": "point"}
-        if light not in lights:
-            lights.append(light)
-    first = cameras[0]
+        file = maps.get(name) or (pathlib.Path(glint["asset"]).name if "asset" in glint else None)
+        materials.append(material_of(name, glint, shape, file, tolerance, mi))
+    seen = [pair for pair in ranges if pair]
+    if not seen:
+        sys.exit("all shapes with the BSDF glint are behind the camera; turn the camera, because distances are those in front of it")
     return {"schema": "glint-plan scene 1", "unit_m": unit_m,
-            "camera": {"nearest": near, "farthest": far, "field_of_view_deg": min(c["fov"] for c in cameras),
-                       "columns": max(c["columns"] for c in cameras), "samples_per_pixel": first["samples"]},
-            "lights": lights, "materials": materials}
+            "camera": {"nearest": min(near for near, _ in seen), "farthest": max(far for _, far in seen),
+                       "field_of_view_deg": min(c["fov"] for c in cameras), "columns": max(c["columns"] for c in cameras),
+                       "samples_per_pixel": cameras[0]["samples"]},
+            "lights": lights_of(scenes[0], np.mean(centres, axis=0), mi), "materials": materials}
 
 
 def main():
@@ -158,6 +189,11 @@ def main():
     parser.add_argument("--unit-m", type=float, default=1.0, help="metres in a scene unit")
     parser.add_argument("--map", action="append", default=[], metavar="ID=FILE", help="map of the shape with this id, instead of its asset")
     arguments = parser.parse_args()
+    for path in arguments.scenes:
+        if not path.is_file():
+            parser.error(f"{path}: there is no such file; check the name")
+    if wrong := [entry for entry in arguments.map if "=" not in entry]:
+        parser.error(f"--map {wrong[0]}: is not ID=FILE; give the id of a shape, =, and the file of its map")
     try:
         import mitsuba as mi
 
@@ -167,7 +203,7 @@ def main():
     except ImportError as error:
         sys.exit(f"{error}; run `make python`, and use build/venv/bin/python")
     first = arguments.scenes[0]
-    glints = glints_of_dictionary(json.loads(first.read_text())) if first.suffix == ".json" else glints_of_xml(first)
+    glints = glints_of_dictionary(read_json(first)) if first.suffix == ".json" else glints_of_xml(first)
     if not glints:
         sys.exit(f"{first}: no mesh has the BSDF glint; give the shapes to plan this BSDF, with the map as its asset")
     maps = dict(entry.split("=", 1) for entry in arguments.map)

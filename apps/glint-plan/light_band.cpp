@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <vector>
 
-#include "common/files.h"
+#include "glint-plan/plan_map.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/hash.h"
 #include "glint/model/sh.h"
@@ -21,6 +20,8 @@ namespace fs = std::filesystem;
 constexpr int kMostBands = 60;
 /// Share of the light's square that may lie beyond the band limit: a tenth of its norm.
 constexpr double kLost = 0.01;
+/// Angle of light that hardly changes, as the largest band_limit_deg of scenes.
+constexpr double kWidest_deg = 180;
 
 /// The smallest angle over which light changes, as a surface sees it from straight above; 0: too sharp for the bands.
 double smoothnessOf(const ShLight& light) {
@@ -36,8 +37,8 @@ double smoothnessOf(const ShLight& light) {
   if (last > kLost * sum) return 0;
   std::size_t limit = bands - 1;
   while (limit > 1 && beyond + squares[limit] <= kLost * sum) beyond += squares[limit--];
-  // A half vector turns by half of what the light turns.
-  return 2 * 180.0 / static_cast<double>(limit);
+  // Band l changes over 180 / l degrees of half vectors, which are twice as many of the light.
+  return std::min(kWidest_deg, 2 * 180.0 / static_cast<double>(limit));
 }
 
 }  // namespace
@@ -47,18 +48,14 @@ void measureEnvironments(Tool& tool, const AssetFolder& folder, Scene& scene, co
     SceneLight& light = scene.lights[k];
     if (light.image.empty()) continue;
     const std::string field = "lights[" + std::to_string(k) + "].image", image = (fs::path(maps) / light.image).string();
-    const auto refuse = [&](const std::string& what, const std::string& remedy) {
-      throw Error(ErrorCode::invalid_input, "scene.light", scene.file, field, what, remedy);
-    };
-    try {
-      checkRegular(image);
-    } catch (const Error& error) {
-      refuse(image + ": " + error.clause(), "check the name, and the folder that --maps names");
-    }
+    checkSceneFile(tool, scene, field, image);
     const std::string table = folder.fileOf(formats::hashFile(image), "light");
     const ChildRun run = runProgram({"glint-shlobes", "--light", image, "-o", table, "--order", std::to_string(kMostBands),
                                      "--grid", "3x4", "--force", "--quiet", "--threads", std::to_string(tool.threads())});
-    if (run.exit_code != 0) refuse(run.message, "give an image of a whole sphere, twice as wide as high, or band_limit_deg");
+    if (run.exit_code != 0) {
+      throw Error(ErrorCode::invalid_input, "scene.light", scene.file, field, run.message,
+                  "give an image of a whole sphere, twice as wide as high, or band_limit_deg");
+    }
     light.smooth_deg = smoothnessOf(formats::Asset::open(table).get<ShLight>());
   }
 }

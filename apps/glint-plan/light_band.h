@@ -10,7 +10,7 @@ namespace glint::apps {
 
 /// Measures the band limits of the environments that a scene names as images, and sets their `smooth_deg`.
 /// @param maps  folder in which the images are
-/// @throws Error invalid_input, with the field of the scene, if an image cannot be read
+/// @throws Error io or invalid_input, with the field of the scene, if an image cannot be read
 void measureEnvironments(Tool& tool, const AssetFolder& folder, Scene& scene, const std::string& maps);
 
 /// Order of the spherical harmonics that a light needs on facets of this roughness: the smaller of the band limits of both.

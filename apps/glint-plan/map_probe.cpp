@@ -13,6 +13,7 @@
 #include "glint/bake/ingest/ingest.h"
 #include "glint/bake/ingest/normal_bounds.h"
 #include "glint/formats/asset_writer.h"
+#include "glint/model/ndf_pyramid.h"
 #include "measure/bench_times.h"
 
 namespace glint::apps {
@@ -28,7 +29,7 @@ constexpr int kSteps[] = {8, kUsualPlaces, kQuestionPlaces};
 int edgeOf(const MapQuestion& question, const NormalMap& map) {
   constexpr int kUsual = 512, kLeast = 256;
   constexpr double kFootprintsAcross = 8, kStridesAcross = 24;  // images of fine pyramids take long
-  const double stride = question.footprints.smallest / kLevelSigma;
+  const double stride = question.footprints.smallest / double{kFootprintPerStride};
   int edge = std::clamp(16 * static_cast<int>(kStridesAcross * stride / 16), kLeast, kUsual);
   const double wide = kFootprintsAcross * std::min(question.footprints.smallest, 1e4);
   edge = std::max(edge, static_cast<int>(std::bit_ceil(static_cast<unsigned>(wide))));

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "glint/bake/pyramid/asked_levels.h"
+#include "glint/model/ndf_pyramid.h"
 #include "measure/light_blur.h"
 
 namespace glint::apps {
@@ -47,7 +48,7 @@ std::vector<int> resolutionsOf(const MapQuestion& question) {
 
 void addPyramids(const MapQuestion& question, int width, int height, std::vector<Candidate>& all) {
   const int stride = strideOf(question.footprints.smallest, width, height);
-  const bool needs_texels = question.footprints.smallest < kLevelSigma * stride;
+  const bool needs_texels = question.footprints.smallest < double{kFootprintPerStride} * stride;
   const std::string levels = std::to_string(levelsOf(question.footprints.largest, stride, width, height));
   for (const int pixels : resolutionsOf(question)) {
     const std::string resolution = std::to_string(pixels);
@@ -108,9 +109,14 @@ const Candidate* sourceOf(const std::vector<Candidate>& all, const Candidate& ca
   return found == all.end() ? nullptr : &*found;
 }
 
+std::string flagOf(const Candidate& candidate, const std::string& name) {
+  const auto found = std::find(candidate.flags.begin(), candidate.flags.end(), name);
+  return found == candidate.flags.end() ? "" : *(found + 1);
+}
+
 double toleranceOf(const Candidate& candidate) {
-  const auto found = std::find(candidate.flags.begin(), candidate.flags.end(), "--tolerance");
-  return found == candidate.flags.end() ? 0 : std::stod(*(found + 1));
+  const std::string text = flagOf(candidate, "--tolerance");
+  return text.empty() ? 0 : std::stod(text);
 }
 
 }  // namespace glint::apps

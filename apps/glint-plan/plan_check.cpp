@@ -67,11 +67,6 @@ class MapCheck {
   std::vector<BenchQuery> queries_;
 };
 
-double costOf(const Costs& costs, Goal goal) {
-  if (goal == Goal::query_ns) return costs.query_ns;
-  return goal == Goal::bytes ? costs.bytes : costs.preparation_s;
-}
-
 nlohmann::json costsJson(const Costs& costs, const PlaceErrors& errors) {
   return {{"seen", errors.seen},
           {"bias", errors.bias},

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
+#include <utility>
 
 #include "glint-plan/plan_candidates.h"
 
@@ -31,18 +33,35 @@ std::string lightText(const SceneLight& light) {
   return fmt::format("a {} light {:g} degrees wide", light.type, light.smooth_deg);
 }
 
-/// The value of a flag of a candidate; empty if it has none.
-std::string flagOf(const Candidate& candidate, const std::string& name) {
-  const auto found = std::find(candidate.flags.begin(), candidate.flags.end(), name);
-  return found == candidate.flags.end() ? "" : *(found + 1);
+const Candidate* pyramidOf(const MaterialPlan& plan) {
+  const Candidate& chosen = plan.choice().candidate;
+  return chosen.tool == "glint-pyramid" ? &chosen : plan.choiceSource();
 }
 
-const Candidate* pyramidOf(const MaterialPlan& plan) {
-  const PlanOption& choice = plan.choice();
-  if (choice.candidate.tool == "glint-pyramid") return &choice.candidate;
-  for (const PlanOption& option : plan.options)
-    if (option.candidate.name() == choice.candidate.source) return &option.candidate;
-  return nullptr;
+/// Why an option that is cheaper than the choice is not chosen.
+std::string objectionTo(const PlanOption& option, double tolerance) {
+  const std::string name = option.candidate.name();
+  if (!option.errors)
+    return fmt::format("{} would be over a budget: {}, {:.2g} s to prepare, {} for a density.", name,
+                       sizeText(option.costs.bytes), option.costs.preparation_s, queryTimeText(option.costs.query_ns));
+  if (surelySeen(*option.errors) <= tolerance)
+    return fmt::format("{} would be cheaper, but its bias is {:.2g}.", name, option.errors->bias);
+  return fmt::format("{} would be cheaper, but its seen error is {:.2g}, and up to {:.2g} at other places.", name,
+                     option.errors->seen, surelySeen(*option.errors));
+}
+
+/// Objections to the cheapest option of each method that is cheaper than the choice: those that were measured first.
+std::vector<std::string> objectionsIn(const MaterialPlan& plan) {
+  std::vector<std::string> objections;
+  std::set<std::string> methods = {plan.choice().candidate.method};
+  for (const bool measured : {true, false}) {
+    for (std::size_t k = 0; k < plan.chosen; ++k) {
+      const PlanOption& option = plan.options[k];
+      if (!option.costed || option.errors.has_value() != measured || !methods.insert(option.candidate.method).second) continue;
+      objections.push_back(objectionTo(option, plan.material->tolerance));
+    }
+  }
+  return objections;
 }
 
 }  // namespace
@@ -83,29 +102,7 @@ std::vector<std::string> reasonsOf(const Scene& scene, const MaterialPlan& plan)
   }
   reasons.push_back(fmt::format("Of {} candidates that were measured it has {} within the tolerance and the budgets.", compared,
                                 goalText(scene.goal)));
-  // Cheaper candidates of other methods that do not do.
-  std::vector<std::string> methods = {choice.candidate.method};
-  for (std::size_t k = 0; k < plan.options.size(); ++k) {
-    const PlanOption& option = plan.options[k];
-    const bool named = std::find(methods.begin(), methods.end(), option.candidate.method) != methods.end();
-    if (k >= plan.chosen || named || !option.costed || !option.errors) continue;
-    methods.push_back(option.candidate.method);
-    const PlaceErrors& errors = *option.errors;
-    const bool biased = surelySeen(errors) <= plan.material->tolerance;
-    reasons.push_back(biased
-                          ? fmt::format("{} would be cheaper, but its bias is {:.2g}.", option.candidate.name(), errors.bias)
-                          : fmt::format("{} would be cheaper, but its seen error is {:.2g}, and up to {:.2g} at other places.",
-                                        option.candidate.name(), errors.seen, surelySeen(errors)));
-  }
-  for (std::size_t k = 0; k < plan.chosen; ++k) {
-    const PlanOption& option = plan.options[k];
-    const bool named = std::find(methods.begin(), methods.end(), option.candidate.method) != methods.end();
-    if (named || !option.costed) continue;
-    methods.push_back(option.candidate.method);
-    reasons.push_back(fmt::format("{} would be over a budget: {}, {:.2g} s to prepare, {} for a density.",
-                                  option.candidate.name(), sizeText(option.costs.bytes), option.costs.preparation_s,
-                                  queryTimeText(option.costs.query_ns)));
-  }
+  for (std::string& objection : objectionsIn(plan)) reasons.push_back(std::move(objection));
   return reasons;
 }
 

@@ -47,11 +47,46 @@ void sortByCost(MaterialPlan& plan, Goal goal) {
   while (plan.choice().candidate.name() != chosen) ++plan.chosen;
 }
 
+/// Settings of each method that is compressed from a pyramid, from coarse to fine.
+std::vector<std::vector<PlanOption*>> laddersOf(MaterialPlan& plan, const PlanOption& pyramid) {
+  std::vector<std::vector<PlanOption*>> ladders;
+  for (PlanOption& option : plan.options) {
+    if (option.candidate.source != pyramid.candidate.name()) continue;
+    if (ladders.empty() || ladders.back().front()->candidate.method != option.candidate.method) ladders.emplace_back();
+    ladders.back().push_back(&option);
+  }
+  return ladders;
+}
+
+/// The coarsest setting that may meet a tolerance: the errors of the pyramid and of the compression add up like independent errors.
+/// @param own  seen error of the pyramid
+std::size_t firstGuess(const std::vector<PlanOption*>& ladder, double own, double tolerance) {
+  const double left = std::sqrt(std::max(0.0, tolerance * tolerance - own * own));
+  std::size_t guess = 0;
+  while (guess + 1 < ladder.size() && toleranceOf(ladder[guess]->candidate) > left) ++guess;
+  return guess;
+}
+
+/// Why nothing is compressed from a pyramid that does not do.
+std::string failureOfPyramid(const PlanOption& pyramid) {
+  if (!pyramid.failure.empty()) return "its pyramid cannot be made: " + pyramid.failure;
+  return fmt::format("the pyramid that it is made of has a seen error of {:.2g} and a bias of {:.2g} already",
+                     pyramid.errors->seen, pyramid.errors->bias);
+}
+
 }  // namespace
 
-double PlanOption::cost(Goal goal) const {
+double costOf(const Costs& costs, Goal goal) {
   if (goal == Goal::query_ns) return costs.query_ns;
   return goal == Goal::bytes ? costs.bytes : costs.preparation_s;
+}
+
+const Candidate* MaterialPlan::choiceSource() const {
+  if (choice().candidate.source.empty()) return nullptr;
+  const auto found = std::find_if(options.begin(), options.end(), [&](const PlanOption& option) {
+    return option.candidate.name() == choice().candidate.source;
+  });
+  return found == options.end() ? nullptr : &found->candidate;
 }
 
 /// A material while it is planned.
@@ -153,32 +188,20 @@ std::size_t Planner::measureLadder(Work& work, const std::vector<PlanOption*>& l
 }
 
 void Planner::measureCompressed(Work& work, bool all) {
-  const double tolerance = work.plan.material->tolerance;
   std::map<std::string, std::size_t> last;  // setting that the ladder of a method ended with, on images of fewer pixels
   for (PlanOption& pyramid : work.plan.options) {
     if (pyramid.candidate.tool != "glint-pyramid") continue;
-    std::vector<std::vector<PlanOption*>> ladders;
     const bool usable = pyramid.costed && meets(work, pyramid);
-    for (PlanOption& option : work.plan.options) {
-      if (option.candidate.source != pyramid.candidate.name()) continue;
+    for (const std::vector<PlanOption*>& ladder : laddersOf(work.plan, pyramid)) {
       if (!usable) {
-        option.failure =
-            pyramid.failure.empty()
-                ? fmt::format("the pyramid that it is made of has a seen error of {:.2g} already", pyramid.errors->seen)
-                : "its pyramid cannot be made: " + pyramid.failure;
+        for (PlanOption* option : ladder) option->failure = failureOfPyramid(pyramid);
         continue;
       }
-      if (ladders.empty() || ladders.back().front()->candidate.method != option.candidate.method) ladders.emplace_back();
-      ladders.back().push_back(&option);
-    }
-    for (const std::vector<PlanOption*>& ladder : ladders) {
-      // The error of the pyramid and that of the compression add up like independent errors: where the sum fits is the first guess.
-      const double own = pyramid.errors->seen, left = std::sqrt(std::max(0.0, tolerance * tolerance - own * own));
-      std::size_t guess = 0;
-      while (guess + 1 < ladder.size() && toleranceOf(ladder[guess]->candidate) > left) ++guess;
       const std::string& method = ladder.front()->candidate.method;
       const auto known = last.find(method);
-      last[method] = measureLadder(work, ladder, known == last.end() ? guess : known->second, all);
+      const std::size_t first =
+          known == last.end() ? firstGuess(ladder, pyramid.errors->seen, work.plan.material->tolerance) : known->second;
+      last[method] = measureLadder(work, ladder, first, all);
     }
   }
 }

@@ -10,6 +10,9 @@
 
 namespace glint::apps {
 
+/// The cost that a goal makes small.
+double costOf(const Costs& costs, Goal goal);
+
 /// A candidate of a material, as predicted.
 struct PlanOption {
   Candidate candidate;
@@ -18,7 +21,7 @@ struct PlanOption {
   bool at_least = false;              ///< errors are these or more: other sizes were not measured
   bool costed = false;                ///< whether the costs are known
   std::string failure;                ///< why it was not measured; may be empty
-  double cost(Goal goal) const;
+  double cost(Goal goal) const { return costOf(costs, goal); }
 };
 
 /// A material's part of a plan.
@@ -32,6 +35,8 @@ struct MaterialPlan {
   double probe_s = 0;  ///< time of the probe
 
   const PlanOption& choice() const { return options[chosen]; }
+  /// The candidate whose asset is the input of the choice; nullptr: the map.
+  const Candidate* choiceSource() const;
 };
 
 /// Plans the materials of a scene.
@@ -50,7 +55,7 @@ class Planner {
   void prepare(Work& work);
   /// Sets the choice, if an option is good enough.
   bool choose(Work& work);
-  /// Measures what is compressed from the pyramid, each method from coarse to fine until it is good enough.
+  /// Measures what is compressed from the pyramids that are good enough themselves, until the cheapest setting of each method is known.
   /// @param all  also when it costs more than the choice so far
   void measureCompressed(Work& work, bool all);
   /// Measures settings of one method, compressed from one pyramid, until the coarsest one that is good enough is known.

@@ -14,7 +14,7 @@ struct MapQuestion {
   float sigma_r = 0.005f;
   double light_deg = 0;  ///< of the sharpest light
 
-  /// Sizes at which errors are measured: the ends, and so many between them that neighbours are at most `step` apart.
+  /// Sizes at which errors are measured: the ends, and so many between them that each is at most twice the one before, if `most` allows.
   /// @param most  sizes in all
   /// @param cap   larger footprints look like this one, texels
   std::vector<float> sizes(int most, double cap) const;

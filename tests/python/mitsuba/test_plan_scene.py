@@ -88,7 +88,19 @@ def test_xml_is_read_too(write_scene):
     check_material(scene)
 
 
-def test_a_scene_without_glints_is_refused(write_scene):
-    done, scene = write_scene("plain.json")
+@pytest.mark.parametrize("arguments, text", [
+    (["plain.json"], "no mesh has the BSDF glint"), (["missing.xml"], "missing.xml: there is no such file"), (["broken.json"], "is no JSON"),
+    (["broken.xml"], "is no XML"), (["behind.json"], "behind the camera"), (["at8.json", "--map", "flakes.png"], "is not ID=FILE")])
+def test_bad_input_is_refused(write_scene, tmp_path, arguments, text):
+    (tmp_path / "broken.json").write_text("{")
+    (tmp_path / "broken.xml").write_text("<scene>")
+    (tmp_path / "behind.json").write_text(json.dumps(dictionary(-8, tmp_path / "flakes.glint")))
+    done, scene = write_scene(*arguments)
     assert done.returncode != 0 and scene is None
-    assert "no mesh has the BSDF glint" in done.stderr and len(done.stderr.splitlines()) == 1
+    assert text in done.stderr.splitlines()[-1] and "Traceback" not in done.stderr
+
+
+def test_a_map_takes_the_place_of_an_asset(write_scene):
+    done, scene = write_scene("at8.json", "--map", "panel=steel.png")
+    assert done.returncode == 0, done.stderr
+    assert scene["materials"][0]["map"] == "steel.png"
