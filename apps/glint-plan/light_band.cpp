@@ -61,8 +61,8 @@ void measureEnvironments(Tool& tool, const AssetFolder& folder, Scene& scene, co
 }
 
 int shOrder(double light_deg, double sigma_r) {
-  // A lobe of deviation s weighs band l by exp(-l^2 s^2 / 2), which is a hundredth at l = 3.03 / s.
-  constexpr double kBandsOfLobe = 3.03;
+  // A lobe of deviation s weighs band l by exp(-l^2 s^2 / 2), which is a hundredth at l = 3.035 / s.
+  constexpr double kBandsOfLobe = 3.035;
   const double of_facets = kBandsOfLobe / sigma_r;
   const double of_light = light_deg > 0 ? 360 / light_deg : of_facets;  // half vectors turn by half of the angle
   return std::max(1, static_cast<int>(std::ceil(std::min(of_facets, of_light))));

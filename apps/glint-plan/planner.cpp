@@ -141,6 +141,7 @@ bool Planner::cost(Work& work, PlanOption& option) {
 }
 
 bool Planner::meets(Work& work, PlanOption& option) {
+  if (!option.costed) return false;
   const double tolerance = work.plan.material->tolerance;
   if (!option.errors && option.failure.empty()) {
     try {
@@ -150,7 +151,7 @@ bool Planner::meets(Work& work, PlanOption& option) {
       option.failure = error.what();
     }
   }
-  return option.costed && option.failure.empty() && !option.at_least;
+  return option.failure.empty() && !option.at_least;
 }
 
 bool Planner::affordable(const Work& work, const PlanOption& option) const {
@@ -191,7 +192,7 @@ void Planner::measureCompressed(Work& work, bool all) {
   std::map<std::string, std::size_t> last;  // setting that the ladder of a method ended with, on images of fewer pixels
   for (PlanOption& pyramid : work.plan.options) {
     if (pyramid.candidate.tool != "glint-pyramid") continue;
-    const bool usable = pyramid.costed && meets(work, pyramid);
+    const bool usable = meets(work, pyramid);
     for (const std::vector<PlanOption*>& ladder : laddersOf(work.plan, pyramid)) {
       if (!usable) {
         for (PlanOption* option : ladder) option->failure = failureOfPyramid(pyramid);

@@ -62,7 +62,10 @@ class Planner {
   /// @param first  number of the setting to begin with
   /// @return number of the setting that it ended with
   std::size_t measureLadder(Work& work, const std::vector<PlanOption*>& ladder, std::size_t first, bool all);
+  /// Measures the costs of an option, unless they are known.
+  /// @return whether it can be made
   bool cost(Work& work, PlanOption& option);
+  /// Whether an option whose costs are known meets the tolerance. Measures its errors, unless they are known.
   bool meets(Work& work, PlanOption& option);
   bool affordable(const Work& work, const PlanOption& option) const;
   [[noreturn]] void refuse(Work& work);

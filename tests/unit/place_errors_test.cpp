@@ -12,9 +12,9 @@
 namespace glint::apps {
 namespace {
 
-constexpr int kEdge = 96;
+constexpr int kEdge = 48;
 constexpr int kPlaces = 24;
-constexpr float kRadius = 0.5f, kSigmaR = 0.1f, kFootprint = 3;
+constexpr float kRadius = 0.5f, kSigmaR = 0.05f, kFootprint = 0.8f;
 
 test::OwnedMap randomMap(float radius, unsigned seed) {
   return {kEdge, kEdge, test::randomNormals(kEdge, kEdge, radius, seed)};
@@ -65,7 +65,7 @@ TEST_F(PlaceErrorsTest, OfAnotherDistributionAreBias) {
 }
 
 TEST_F(PlaceErrorsTest, DeviateBetweenChoicesOfPlacesAsTheySay) {
-  constexpr int kChoices = 12, kFew = 12;
+  constexpr int kChoices = 12, kFew = 8;
   constexpr double kOfFewChoices =
       2.5;  // factor between the deviation of 12 numbers and the true one in all but one of 1000 cases
   const test::OwnedMap model = randomMap(kRadius, 2), map = randomMap(kRadius, 1);
