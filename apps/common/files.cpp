@@ -92,7 +92,7 @@ bool mayReplace(const std::string& path, OutputFormat format) {
     case OutputFormat::page:
       return head.starts_with("<!doctype html>"sv) && head.find("content=\"glint-bench\"") != std::string::npos;
     case OutputFormat::plan:
-      return head.starts_with("{\n \"schema\": \"glint-plan plan"sv);
+      return head.starts_with("{\n \"schema\": \"glint-plan plan"sv) || head.starts_with("{\n \"schema\": \"glint-plan jobs"sv);
     case OutputFormat::plan_rules:
       return head.starts_with("# Made by glint-plan"sv);
   }

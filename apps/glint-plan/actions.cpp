@@ -5,8 +5,10 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
+#include "glint-plan/light_band.h"
 #include "glint-plan/plan_check.h"
 #include "glint-plan/plan_document.h"
+#include "glint-plan/plan_jobs.h"
 #include "glint-plan/plan_make.h"
 #include "glint-plan/plan_text.h"
 
@@ -49,7 +51,8 @@ nlohmann::json resultOf(const std::vector<MaterialPlan>& plans) {
     const PlanOption& choice = plan.choice();
     list.push_back({{"name", plan.material->name},
                     {"asset", choice.candidate.name()},
-                    {"seen", choice.seen},
+                    {"seen", choice.errors->seen},
+                    {"bias", choice.errors->bias},
                     {"bytes", choice.costs.bytes},
                     {"preparation_s", choice.costs.preparation_s},
                     {"query_ns", choice.costs.query_ns},
@@ -61,15 +64,16 @@ nlohmann::json resultOf(const std::vector<MaterialPlan>& plans) {
 }  // namespace
 
 void planScene(Tool& tool, const PlanOptions& options) {
-  const Scene scene = readScene(options.scene());
+  Scene scene = readScene(options.scene());
   const std::string maps = options.maps(folderOf(options.scene()));
   checkMaps(tool, scene, maps);
   const AssetFolder folder(options.assets(), options.removesAssets());
+  measureEnvironments(tool, folder, scene, maps);
   if (options.explains()) {
     const std::string text = explained(tool, folder, scene, maps);
     tool.print(text);
     tool.setResult({{"explanation", text}});
-    if (options.output().empty() && options.rules().empty()) return;
+    if (options.output().empty() && options.rules().empty() && options.jobs().empty()) return;
   }
   const std::vector<MaterialPlan> plans = Planner(tool, folder, scene, maps, options.cache()).plan();
   // Rules come first: where they cannot be made there is no plan either.
@@ -81,6 +85,8 @@ void planScene(Tool& tool, const PlanOptions& options) {
     writeTextFile(options.output(), document.dump(1) + "\n");
   }
   if (!options.rules().empty()) writeTextFile(options.rules(), rules);
+  if (!options.jobs().empty())
+    writeTextFile(options.jobs(), planJobs(tool, plans, seenFrom(options.jobs(), maps)).dump(1) + "\n");
   tool.setResult(resultOf(plans));
   const std::string text = planText(scene, plans);
   if (options.output().empty())
@@ -90,10 +96,11 @@ void planScene(Tool& tool, const PlanOptions& options) {
 }
 
 void checkScene(Tool& tool, const PlanOptions& options) {
-  const PlanFile plan = readPlan(options.check());
+  PlanFile plan = readPlan(options.check());
   const std::string maps = options.maps(plan.maps);
   checkMaps(tool, plan.scene, maps);
   const AssetFolder folder(options.assets(), options.removesAssets());
+  measureEnvironments(tool, folder, plan.scene, maps);
   const std::vector<CheckedMaterial> checked = checkPlan(tool, folder, plan, maps, options.sweeps());
   tool.setResult(checkJson(plan, checked));
   tool.print(checkText(plan, checked));

@@ -13,20 +13,23 @@
 #include "glint/bake/ingest/ingest.h"
 #include "glint/bake/ingest/normal_bounds.h"
 #include "glint/formats/asset_writer.h"
+#include "glint/model/ndf_pyramid.h"
 #include "measure/bench_times.h"
 
 namespace glint::apps {
 namespace {
 
-constexpr int kVersion = 1;  // of the way in which probes measure: other versions' measurements are not used
-constexpr int kSizes = 4, kPlaces = 6, kTruths = 24, kQueries = 512;
-constexpr double kErrorBudget_s = 0.3, kLongestTime_s = 0.004;
+constexpr int kVersion = 2;  // of the way in which probes measure: other versions' measurements are not used
+constexpr int kQueries = 512;
+constexpr double kLongestErrors_s = 3, kLongestTime_s = 0.004;
+/// Places after which errors are looked at: candidates that are clearly good or clearly bad are asked no more.
+constexpr int kSteps[] = {8, kUsualPlaces, kQuestionPlaces};
 
 /// Texels along an axis of a probe; 0: the map is no larger.
 int edgeOf(const MapQuestion& question, const NormalMap& map) {
   constexpr int kUsual = 512, kLeast = 256;
   constexpr double kFootprintsAcross = 8, kStridesAcross = 24;  // images of fine pyramids take long
-  const double stride = question.footprints.smallest / kLevelSigma;
+  const double stride = question.footprints.smallest / double{kFootprintPerStride};
   int edge = std::clamp(16 * static_cast<int>(kStridesAcross * stride / 16), kLeast, kUsual);
   const double wide = kFootprintsAcross * std::min(question.footprints.smallest, 1e4);
   edge = std::max(edge, static_cast<int>(std::bit_ceil(static_cast<unsigned>(wide))));
@@ -45,8 +48,7 @@ double extrapolated(double texels, double n1, double y1, double n2, double y2) {
 struct MapProbe::Part {
   std::optional<formats::Asset> asset;
   std::optional<AssetMaker> maker;
-  std::vector<FootprintSet> sets;
-  std::list<SetTruth> truths;
+  std::list<PlaceTruth> truths;
 };
 
 MapProbe::MapProbe(Tool& tool, const AssetFolder& folder, const PlanMap& map, const MapQuestion& question, ProbeCache& cache)
@@ -56,7 +58,7 @@ MapProbe::MapProbe(Tool& tool, const AssetFolder& folder, const PlanMap& map, co
   edge_ = edgeOf(question_, normals);
   constexpr double kFootprintsAcross = 8;  // larger footprints would be most of the probe
   const double across = edge_ > 0 ? edge_ : std::min(normals.width, normals.height);
-  sizes_ = question_.sizes(kSizes, std::max(question_.footprints.smallest, across / kFootprintsAcross));
+  sizes_ = question_.sizes(kQuestionSizes, std::max(question_.footprints.smallest, across / kFootprintsAcross));
 }
 
 MapProbe::~MapProbe() = default;
@@ -133,28 +135,44 @@ Costs MapProbe::costs(std::size_t candidate) {
   return costs;
 }
 
-double MapProbe::seenOf(std::size_t candidate, std::size_t size) {
-  const std::string key = fmt::format("{} seen at {:.6g}", all_[candidate].name(), sizes_[size]);
-  return kept(key, [&] {
-    Part& asked = part(true);
-    if (asked.sets.empty()) asked.sets = questionSets(tool_.seed(), sizes_, kPlaces, kTruths);
-    while (asked.truths.size() <= size) {
-      asked.truths.emplace_back(asked.asset->get<NormalMap>(), asked.sets[asked.truths.size()], question_.sigma_r,
-                                question_.light_deg);
+PlaceErrors MapProbe::errorsOf(std::size_t candidate, std::size_t size, double tolerance) {
+  std::optional<api::OpenedNdf> ndf;
+  std::optional<PlaceSample> sample;
+  const auto measured = [&](int places) {
+    if (!sample) {
+      Part& asked = part(true);
+      while (asked.truths.size() <= size) {
+        const std::size_t next = asked.truths.size();
+        asked.truths.emplace_back(asked.asset->get<NormalMap>(), questionFootprints(tool_.seed(), next, sizes_[next]),
+                                  question_.sigma_r, question_.light_deg);
+      }
+      ndf.emplace(asked.maker->open(asked.maker->all()[candidate]));
+      sample.emplace(*std::next(asked.truths.begin(), static_cast<std::ptrdiff_t>(size)), *ndf);
     }
-    std::vector<float> first;
-    const api::OpenedNdf ndf = asked.maker->open(asked.maker->all()[candidate]);
-    return std::next(asked.truths.begin(), static_cast<std::ptrdiff_t>(size))
-        ->errorsOf(ndf, kErrorBudget_s, first)["seen"]
-        .get<double>();
-  });
+    return sample->ask(places, kLongestErrors_s);
+  };
+  PlaceErrors errors;
+  for (const int places : kSteps) {
+    const std::string key = fmt::format("{} at {:.6g}, {} places: ", all_[candidate].name(), sizes_[size], places);
+    errors.seen = kept(key + "seen", [&] { return measured(places).seen; });
+    errors.deviation = kept(key + "deviation", [&] { return measured(places).deviation; });
+    errors.bias = kept(key + "bias", [&] { return measured(places).bias; });
+    errors.places = static_cast<int>(kept(key + "count", [&] { return double(measured(places).places); }));
+    // Far beyond a tolerance no more places bring an error back to it.
+    constexpr double kHopeless = 4;
+    if (errors.seen - kHopeless * errors.deviation > tolerance || surelyWithin(errors, tolerance)) break;
+  }
+  return errors;
 }
 
-double MapProbe::seen(std::size_t candidate, double enough) {
-  if (all_[candidate].tool.empty()) return 0;  // the texels themselves
-  double largest = 0;
-  for (std::size_t size = 0; size < sizes_.size() && largest <= enough; ++size)
-    largest = std::max(largest, seenOf(candidate, size));
+PlaceErrors MapProbe::errors(std::size_t candidate, double tolerance) {
+  PlaceErrors largest;
+  if (all_[candidate].tool.empty()) return largest;  // the texels themselves
+  const auto needs = [](const PlaceErrors& e) { return std::max(surelySeen(e), e.bias / kBiasShare); };
+  for (std::size_t size = 0; size < sizes_.size() && surelyWithin(largest, tolerance); ++size) {
+    const PlaceErrors errors = errorsOf(candidate, size, tolerance);
+    if (needs(errors) > needs(largest)) largest = errors;
+  }
   return largest;
 }
 

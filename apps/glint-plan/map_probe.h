@@ -11,7 +11,7 @@
 #include "glint-plan/plan_map.h"
 #include "glint-plan/probe_cache.h"
 #include "glint-plan/question.h"
-#include "measure/bench_errors.h"
+#include "measure/place_errors.h"
 
 namespace glint::apps {
 
@@ -21,6 +21,26 @@ struct Costs {
   double preparation_s = 0;  ///< from the image
   double query_ns = 0;       ///< of a density on one thread, mean over the sizes that are asked
 };
+
+/// Deviations of a seen error that a plan keeps free below the tolerance: other places than the probed ones, and those of a check,
+/// err differently, and 2 deviations hold for 49 of 50 when errors are spread evenly.
+inline constexpr double kSureDeviations = 2;
+/// Share of a tolerance that may be bias, which the eye does not average over places.
+inline constexpr double kBiasShare = 1.0 / 3;
+
+/// Places that tell their own deviation. Fewer ones miss the few places that err most.
+inline constexpr int kUsualPlaces = 24;
+
+/// The seen error that other places will hardly exceed.
+inline double surelySeen(const PlaceErrors& errors) {
+  constexpr double kFewPlaces = 2;  // deviations of few places are taken so many times
+  return errors.seen + (errors.places < kUsualPlaces ? kFewPlaces : 1) * kSureDeviations * errors.deviation;
+}
+
+/// Whether errors are within a tolerance at other places, too.
+inline bool surelyWithin(const PlaceErrors& errors, double tolerance) {
+  return surelySeen(errors) <= tolerance && errors.bias <= kBiasShare * tolerance;
+}
 
 /// Measures candidates on small maps that stand for a large one, and predicts what they cost and err on it.
 class MapProbe {
@@ -36,10 +56,10 @@ class MapProbe {
   /// @throws Error failed if the candidate cannot be made
   Costs costs(std::size_t candidate);
 
-  /// Largest seen error over the sizes of the question. Measuring ends at the first size whose error is over `enough`, and then the
-  /// error is that or more.
+  /// Errors at the size of the question that leaves least of the tolerance. Measuring ends at the first size whose errors are not
+  /// surely within it.
   /// @throws Error failed if the candidate cannot be made
-  double seen(std::size_t candidate, double enough);
+  PlaceErrors errors(std::size_t candidate, double tolerance);
 
   /// Texels of the larger probe along an axis; 0: the map is so small that it is the probe.
   int edge() const { return edge_; }
@@ -48,7 +68,7 @@ class MapProbe {
   struct Part;
   Part& part(bool large);
   Costs costsOf(bool large, std::size_t candidate);
-  double seenOf(std::size_t candidate, std::size_t size);
+  PlaceErrors errorsOf(std::size_t candidate, std::size_t size, double tolerance);
   /// The value of a key in the cache, or that of a measurement.
   template <class Measure>
   double kept(const std::string& key, const Measure& measure);

@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 
+#include "glint/bake/pyramid/asked_levels.h"
+#include "glint/model/ndf_pyramid.h"
 #include "measure/light_blur.h"
 
 namespace glint::apps {
@@ -21,17 +24,13 @@ int finestMoments(double smallest, int width, int height) {
 
 /// Whole texels between images such that level 0 answers the smallest footprint.
 int strideOf(double smallest, int width, int height) {
-  constexpr double kSmallestOverLevel = 1.2;  // of sizes that level 0 answers
-  const int most = std::max(2, std::min(width, height) / 4);
-  return std::clamp(static_cast<int>(smallest / (kSmallestOverLevel * kLevelSigma)), 2, most);
+  return std::min(bake::strideFor(smallest), std::max(2, std::min(width, height) / 4));
 }
 
 /// Levels whose images are as large as the largest footprint needs.
 int levelsOf(double largest, int stride, int width, int height) {
-  constexpr double kLargestOverLevel = 1.9;  // of sizes that a level answers without the next
   const int most = std::max(1, 1 + static_cast<int>(std::log2(std::min(width, height) / static_cast<double>(stride))));
-  const double needed = std::ceil(std::log2(largest / (kLargestOverLevel * kLevelSigma * stride))) + 1;
-  return std::clamp(static_cast<int>(needed), 1, most);
+  return std::min(bake::levelsFor(largest, stride), most);
 }
 
 /// Pixels of images along each axis: 256, and fewer where the facets or the light are so wide that fewer may do.
@@ -49,7 +48,7 @@ std::vector<int> resolutionsOf(const MapQuestion& question) {
 
 void addPyramids(const MapQuestion& question, int width, int height, std::vector<Candidate>& all) {
   const int stride = strideOf(question.footprints.smallest, width, height);
-  const bool needs_texels = question.footprints.smallest < kLevelSigma * stride;
+  const bool needs_texels = question.footprints.smallest < double{kFootprintPerStride} * stride;
   const std::string levels = std::to_string(levelsOf(question.footprints.largest, stride, width, height));
   for (const int pixels : resolutionsOf(question)) {
     const std::string resolution = std::to_string(pixels);
@@ -70,8 +69,10 @@ void addPyramids(const MapQuestion& question, int width, int height, std::vector
                      pyramid.name(),
                      needs_texels});
     };
-    for (const char* tolerance : {"0.4", "0.2", "0.1", "0.05"}) compressed("tucker", "--tolerance", tolerance);
-    for (const char* tolerance : {"0.4", "0.2", "0.1", "0.05"}) compressed("pca", "--tolerance", tolerance);
+    // Steps of a square root of 2, so that the next finer one takes little more.
+    for (const char* method : {"tucker", "pca"})
+      for (const char* tolerance : {"0.56", "0.4", "0.28", "0.2", "0.14", "0.1", "0.07", "0.05"})
+        compressed(method, "--tolerance", tolerance);
     for (const char* rank : {"16", "32"}) compressed("cp", "--rank", rank);
   }
 }
@@ -106,6 +107,16 @@ const Candidate* sourceOf(const std::vector<Candidate>& all, const Candidate& ca
   if (candidate.source.empty()) return nullptr;
   const auto found = std::find_if(all.begin(), all.end(), [&](const Candidate& c) { return c.name() == candidate.source; });
   return found == all.end() ? nullptr : &*found;
+}
+
+std::string flagOf(const Candidate& candidate, const std::string& name) {
+  const auto found = std::find(candidate.flags.begin(), candidate.flags.end(), name);
+  return found == candidate.flags.end() ? "" : *(found + 1);
+}
+
+double toleranceOf(const Candidate& candidate) {
+  const std::string text = flagOf(candidate, "--tolerance");
+  return text.empty() ? 0 : std::stod(text);
 }
 
 }  // namespace glint::apps

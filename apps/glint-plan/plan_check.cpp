@@ -13,8 +13,8 @@
 namespace glint::apps {
 namespace {
 
-constexpr int kCheckedSizes = 6, kCheckedPlaces = 12, kCheckedTruths = 48, kCheckedQueries = 4096;
-constexpr double kCheckErrorBudget_s = 3, kCheckLongestTime_s = 0.02;
+constexpr int kCheckedQueries = 4096;
+constexpr double kCheckLongestErrors_s = 30, kCheckLongestTime_s = 0.02;
 
 /// Measures candidates on one whole map.
 class MapCheck {
@@ -26,25 +26,34 @@ class MapCheck {
     const NormalMap& normals = map_.normals();
     constexpr double kWidest = 0.125;  // of the map, as in the bench: larger footprints look like the mean of the map
     const double cap = std::max(question_.footprints.smallest, kWidest * std::min(normals.width, normals.height));
-    sizes_ = question_.sizes(kCheckedSizes, cap);
+    sizes_ = question_.sizes(kQuestionSizes, cap);
     const std::uint64_t other_places = tool.seed() + 1;
-    sets_ = questionSets(other_places, sizes_, kCheckedPlaces, kCheckedTruths);
-    for (const FootprintSet& set : sets_) truths_.emplace_back(normals, set, question_.sigma_r, question_.light_deg);
+    for (std::size_t k = 0; k < sizes_.size(); ++k) {
+      truths_.emplace_back(normals, questionFootprints(other_places, k, sizes_[k]), question_.sigma_r, question_.light_deg);
+    }
     queries_ = benchQueries(normals, other_places, kCheckedQueries, sizes_);
   }
 
-  CheckedOption measure(const Candidate& candidate) {
+  /// What a candidate costs; its errors are not measured.
+  CheckedOption costOf(const Candidate& candidate) {
     const MadeAsset made = maker_.make(candidate);
-    const api::OpenedNdf ndf = maker_.open(candidate);
     CheckedOption option;
     option.name = candidate.name();
     option.costs = {made.bytes + (candidate.takes_normals ? map_.bytes : 0), made.seconds + map_.ingest_s,
-                    densityTime(ndf, queries_, kCheckLongestTime_s)};
-    if (candidate.tool.empty()) return option;  // the texels themselves
-    std::vector<float> first;
-    for (const SetTruth& truth : truths_)
-      option.seen = std::max(option.seen, truth.errorsOf(ndf, kCheckErrorBudget_s, first)["seen"].get<double>());
+                    densityTime(maker_.open(candidate), queries_, kCheckLongestTime_s)};
     return option;
+  }
+
+  PlaceErrors errorsOf(const Candidate& candidate) {
+    PlaceErrors largest;
+    if (candidate.tool.empty()) return largest;  // the texels themselves
+    const api::OpenedNdf ndf = maker_.open(candidate);
+    for (const PlaceTruth& truth : truths_) {
+      const PlaceErrors errors = PlaceSample(truth, ndf).ask(truth.places(), kCheckLongestErrors_s);
+      largest.bias = std::max(largest.bias, errors.bias);
+      if (errors.seen > largest.seen) largest.seen = errors.seen, largest.deviation = errors.deviation;
+    }
+    return largest;
   }
 
   const std::vector<Candidate>& all() const { return maker_.all(); }
@@ -54,23 +63,21 @@ class MapCheck {
   MapQuestion question_;
   AssetMaker maker_;
   std::vector<float> sizes_;
-  std::vector<FootprintSet> sets_;
-  std::list<SetTruth> truths_;
+  std::list<PlaceTruth> truths_;
   std::vector<BenchQuery> queries_;
 };
 
-double costOf(const Costs& costs, Goal goal) {
-  if (goal == Goal::query_ns) return costs.query_ns;
-  return goal == Goal::bytes ? costs.bytes : costs.preparation_s;
+nlohmann::json costsJson(const Costs& costs, const PlaceErrors& errors) {
+  return {{"seen", errors.seen},
+          {"bias", errors.bias},
+          {"bytes", costs.bytes},
+          {"preparation_s", costs.preparation_s},
+          {"query_ns", costs.query_ns}};
 }
 
-nlohmann::json costsJson(const Costs& costs, double seen) {
-  return {{"seen", seen}, {"bytes", costs.bytes}, {"preparation_s", costs.preparation_s}, {"query_ns", costs.query_ns}};
-}
-
-std::string line(const std::string& what, double seen, const Costs& costs) {
-  return fmt::format("  {:<10} {:>8.3g} {:>14} {:>10.3g} {:>12}\n", what, seen, sizeText(costs.bytes), costs.preparation_s,
-                     queryTimeText(costs.query_ns));
+std::string line(const std::string& what, const PlaceErrors& errors, const Costs& costs) {
+  return fmt::format("  {:<10} {:>8.3g} {:>8.3g} {:>14} {:>10.3g} {:>12}\n", what, errors.seen, errors.bias,
+                     sizeText(costs.bytes), costs.preparation_s, queryTimeText(costs.query_ns));
 }
 
 }  // namespace
@@ -78,13 +85,36 @@ std::string line(const std::string& what, double seen, const Costs& costs) {
 double CheckedMaterial::overCheapest(Goal goal) const {
   double cheapest = std::numeric_limits<double>::infinity();
   for (const CheckedOption& option : sweep)
-    if (option.seen <= tolerance) cheapest = std::min(cheapest, costOf(option.costs, goal));
+    if (holds(option)) cheapest = std::min(cheapest, costOf(option.costs, goal));
   return sweep.empty() ? 0 : costOf(actual.costs, goal) / cheapest;
 }
+
+namespace {
+
+void sweepCandidates(MapCheck& check, Goal goal, CheckedMaterial& material, std::vector<std::string>& warnings) {
+  const double planned = costOf(material.actual.costs, goal);
+  std::string done;  // method and pyramid that need no finer setting
+  for (const Candidate& candidate : check.all()) {
+    const std::string ladder = candidate.method + " of " + candidate.source;
+    if (!candidate.source.empty() && ladder == done) continue;
+    try {
+      CheckedOption option = check.costOf(candidate);
+      const bool dear = costOf(option.costs, goal) > planned;
+      if (!dear) option.errors = check.errorsOf(candidate);
+      if (dear || material.holds(option)) done = ladder;
+      if (!dear) material.sweep.push_back(std::move(option));
+    } catch (const Error& error) {
+      warnings.push_back(candidate.name() + " cannot be made: " + error.what());
+    }
+  }
+}
+
+}  // namespace
 
 std::vector<CheckedMaterial> checkPlan(Tool& tool, const AssetFolder& folder, const PlanFile& plan, const std::string& maps,
                                        bool sweep) {
   std::vector<CheckedMaterial> checked;
+  std::vector<std::string> warnings;  // a warning ends the progress, so warnings come last
   const bake::ProgressFn progress = tool.progress("materials");
   for (const PlannedMaterial& planned : plan.materials) {
     const SceneMaterial& material = plan.scene.materials[planned.index];
@@ -94,28 +124,26 @@ std::vector<CheckedMaterial> checkPlan(Tool& tool, const AssetFolder& folder, co
     }
     const MapQuestion question = questionOf(plan.scene, material, map.normals());
     MapCheck check(tool, folder, map, question, planCandidates(question, map.normals().width, map.normals().height));
-    checked.push_back({&planned, check.measure(planned.candidate), material.tolerance, {}});
-    for (const Candidate& candidate : check.all()) {
-      if (!sweep) break;
-      try {
-        checked.back().sweep.push_back(check.measure(candidate));
-      } catch (const Error& error) {
-        tool.warn(candidate.name() + " cannot be made: " + error.what());
-      }
-    }
+    CheckedOption actual = check.costOf(planned.candidate);
+    actual.errors = check.errorsOf(planned.candidate);
+    checked.push_back({&planned, std::move(actual), material.tolerance, {}});
+    if (sweep) sweepCandidates(check, plan.scene.goal, checked.back(), warnings);
     if (progress) progress(checked.size(), plan.materials.size());
   }
+  for (const std::string& warning : warnings) tool.warn(warning);
   return checked;
 }
 
 std::string checkText(const PlanFile& plan, const std::vector<CheckedMaterial>& checked) {
   std::string text;
   for (const CheckedMaterial& material : checked) {
-    text += fmt::format("{}: {}\n  {:<10} {:>8} {:>14} {:>10} {:>12}\n", plan.scene.materials[material.planned->index].name,
-                        material.actual.name, "", "seen", "size", "prepare, s", "query");
-    text += line("predicted", material.planned->seen, material.planned->costs) +
-            line("actual", material.actual.seen, material.actual.costs);
-    text += fmt::format("  The tolerance of {:g} is {}.\n", material.tolerance, material.holds() ? "met" : "NOT met");
+    text +=
+        fmt::format("{}: {}\n  {:<10} {:>8} {:>8} {:>14} {:>10} {:>12}\n", plan.scene.materials[material.planned->index].name,
+                    material.actual.name, "", "seen", "bias", "size", "prepare, s", "query");
+    text += line("predicted", material.planned->errors, material.planned->costs) +
+            line("actual", material.actual.errors, material.actual.costs);
+    text += fmt::format("  The tolerance of {:g}, of which {:.3g} may be bias, is {}.\n", material.tolerance,
+                        kBiasShare * material.tolerance, material.holds() ? "met" : "NOT met");
     if (!material.sweep.empty()) {
       text += fmt::format("  It takes {:.3g} times the {} of the cheapest candidate that meets the tolerance.\n",
                           material.overCheapest(plan.scene.goal), goalName(plan.scene.goal));
@@ -131,13 +159,13 @@ nlohmann::json checkJson(const PlanFile& plan, const std::vector<CheckedMaterial
                             {"asset", material.actual.name},
                             {"tolerance", material.tolerance},
                             {"holds", material.holds()},
-                            {"predicted", costsJson(material.planned->costs, material.planned->seen)},
-                            {"actual", costsJson(material.actual.costs, material.actual.seen)}};
+                            {"predicted", costsJson(material.planned->costs, material.planned->errors)},
+                            {"actual", costsJson(material.actual.costs, material.actual.errors)}};
     if (!material.sweep.empty()) {
       entry["over_cheapest"] = material.overCheapest(plan.scene.goal);
       entry["sweep"] = nlohmann::json::array();
       for (const CheckedOption& option : material.sweep) {
-        entry["sweep"].push_back(costsJson(option.costs, option.seen));
+        entry["sweep"].push_back(costsJson(option.costs, option.errors));
         entry["sweep"].back()["name"] = option.name;
       }
     }

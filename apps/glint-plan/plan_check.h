@@ -13,7 +13,7 @@ namespace glint::apps {
 struct CheckedOption {
   std::string name;
   Costs costs;
-  double seen = 0;
+  PlaceErrors errors;  ///< at the sizes with the largest
 };
 
 /// A material's part of a plan, as it was predicted and as it is.
@@ -21,16 +21,21 @@ struct CheckedMaterial {
   const PlannedMaterial* planned = nullptr;
   CheckedOption actual;
   double tolerance = 0;
-  std::vector<CheckedOption> sweep;  ///< every candidate that can be made; empty: not asked for
+  std::vector<CheckedOption> sweep;  ///< candidates that could be cheaper than the planned one; empty: not asked for
 
-  bool holds() const { return actual.seen <= tolerance; }
+  /// Whether the seen error is within the tolerance, and the bias within its share of it.
+  bool holds() const { return holds(actual); }
+  bool holds(const CheckedOption& option) const {
+    return option.errors.seen <= tolerance && option.errors.bias <= kBiasShare * tolerance;
+  }
   /// The planned cost over that of the cheapest candidate of the sweep that meets the tolerance; 0 without a sweep.
   double overCheapest(Goal goal) const;
 };
 
 /// Builds the assets of a plan and measures them on the questions of its scene, at other places than the plan was made with.
 /// @param maps   folder of the maps
-/// @param sweep  builds and measures every candidate, too
+/// @param sweep  builds every candidate, too, and measures those that cost no more than the plan. The settings of a compression end
+///               at the first that holds: finer ones take more
 /// @throws Error as openMap; differs if a map is not the one that was planned; failed if an asset cannot be made
 std::vector<CheckedMaterial> checkPlan(Tool& tool, const AssetFolder& folder, const PlanFile& plan, const std::string& maps,
                                        bool sweep);

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "common/files.h"
+#include "glint-plan/light_band.h"
 #include "glint-plan/plan_candidates.h"
 #include "glint-plan/plan_text.h"
 #include "glint/model/error.h"
@@ -33,13 +34,14 @@ Json optionJson(const PlanOption& option) {
   Json json = {{"name", option.candidate.name()}};
   if (!option.failure.empty()) json["failure"] = option.failure;
   if (option.costed) json["costs"] = costsJson(option.costs);
-  if (option.seen >= 0) json[option.at_least ? "seen_at_least" : "seen"] = option.seen;
+  if (option.errors) json[option.at_least ? "seen_at_least" : "seen"] = option.errors->seen;
   return json;
 }
 
 Json materialJson(const Scene& scene, const MaterialPlan& plan) {
   const MapQuestion& question = plan.question;
-  Json predicted = {{"seen", plan.choice().seen}};
+  const PlaceErrors& errors = *plan.choice().errors;
+  Json predicted = {{"seen", errors.seen}, {"seen_deviation", errors.deviation}, {"bias", errors.bias}};
   predicted.update(costsJson(plan.choice().costs));
   Json considered = Json::array();
   for (const PlanOption& option : plan.options) considered.push_back(optionJson(option));
@@ -55,6 +57,7 @@ Json materialJson(const Scene& scene, const MaterialPlan& plan) {
             {"largest_texels", question.footprints.largest},
             {"sigma_r", plan.material->sigma_r},
             {"light_deg", question.light_deg},
+            {"sh_order", shOrder(question.light_deg, plan.material->sigma_r)},
             {"tolerance", plan.material->tolerance}}},
           {"asset", candidateJson(plan.choice().candidate)},
           {"predicted", std::move(predicted)},
@@ -77,7 +80,8 @@ PlannedMaterial plannedOf(const Json& json, const Scene& scene) {
   material.map_hash = json.at("map").at("hash").get<std::string>();
   material.candidate = candidateOf(json.at("asset"));
   const Json& predicted = json.at("predicted");
-  material.seen = predicted.at("seen").get<double>();
+  material.errors = {predicted.at("seen").get<double>(), predicted.at("seen_deviation").get<double>(),
+                     predicted.at("bias").get<double>(), 0};
   material.costs = {predicted.at("bytes").get<double>(), predicted.at("preparation_s").get<double>(),
                     predicted.at("query_ns").get<double>()};
   return material;

@@ -19,7 +19,7 @@ struct PlannedMaterial {
   std::string map_hash;
   Candidate candidate;
   Costs costs;
-  double seen = 0;
+  PlaceErrors errors;
 };
 
 /// A plan file that was read.

@@ -63,8 +63,7 @@ class Rules {
     if (file.extension() == ".glint") assets_[name] = plan.material->map;
     set(plan, "GLINT_INGEST_FLAGS_" + name, flagsText(plan.material->ingest_flags));
     const Candidate& chosen = plan.choice().candidate;
-    for (const PlanOption& option : plan.options)
-      if (!chosen.source.empty() && option.candidate.name() == chosen.source) addFlags(plan, name, option.candidate);
+    if (const Candidate* source = plan.choiceSource()) addFlags(plan, name, *source);
     addFlags(plan, name, chosen);
     const std::string suffix = suffixOf(chosen);
     targets_.insert(name + (suffix.empty() ? "" : "." + suffix) + ".glint");

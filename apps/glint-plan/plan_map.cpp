@@ -20,18 +20,20 @@ std::string fileOf(const SceneMaterial& material, const std::string& maps) { ret
 
 }  // namespace
 
-void checkMaps(Tool& tool, const Scene& scene, const std::string& maps) {
-  for (const SceneMaterial& material : scene.materials) {
-    const std::string file = fileOf(material, maps);
-    try {
-      checkRegular(file);
-    } catch (const Error& error) {
-      throw Error(error.code(), error.rule(), scene.file, material.path + ".map", file + ": " + error.clause(),
-                  "check the name, and the folder that --maps names");
-    }
-    const std::vector<std::string> known = tool.readPaths();
-    if (std::find(known.begin(), known.end(), file) == known.end()) tool.addInput(file);
+void checkSceneFile(Tool& tool, const Scene& scene, const std::string& field, const std::string& file) {
+  try {
+    checkRegular(file);
+  } catch (const Error& error) {
+    throw Error(error.code(), error.rule(), scene.file, field, file + ": " + error.clause(),
+                "check the name, and the folder that --maps names");
   }
+  const std::vector<std::string> known = tool.readPaths();
+  if (std::find(known.begin(), known.end(), file) == known.end()) tool.addInput(file);
+}
+
+void checkMaps(Tool& tool, const Scene& scene, const std::string& maps) {
+  for (const SceneMaterial& material : scene.materials)
+    checkSceneFile(tool, scene, material.path + ".map", fileOf(material, maps));
 }
 
 PlanMap openMap(Tool& tool, const AssetFolder& folder, const Scene& scene, const SceneMaterial& material,

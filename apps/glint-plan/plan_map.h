@@ -28,7 +28,12 @@ struct PlanMap {
 PlanMap openMap(Tool& tool, const AssetFolder& folder, const Scene& scene, const SceneMaterial& material,
                 const std::string& maps);
 
-/// Throws Error io, with the field of the scene, unless the maps of all materials can be read. Adds them to the inputs of the run.
+/// Adds a file that a scene names to the inputs of the run.
+/// @param field  of the scene, which names the file
+/// @throws Error io, with the field, unless the file can be read
+void checkSceneFile(Tool& tool, const Scene& scene, const std::string& field, const std::string& file);
+
+/// The same for the maps of all materials.
 void checkMaps(Tool& tool, const Scene& scene, const std::string& maps);
 
 /// The number of bytes in words: "1.2 MB".

@@ -17,16 +17,21 @@ PlanOptions::PlanOptions(Tool& tool) : tool_(tool) {
   tool.option("--make", rules_, "Makefile that builds the assets of the plan, over pipelines/glint.mk")
       .defaultText("none")
       .unrecorded();
+  tool.option("--jobs", jobs_,
+              "manifest for a farm: programs with inputs and outputs (.json): docs/json/files/jobs.schema.json")
+      .defaultText("none")
+      .unrecorded();
   tool.option("--cache", cache_, "folder in which measurements of maps are kept for later plans")
       .defaultText("none")
       .unrecorded();
-  tool.flag("--explain", explain_, "say in words what was understood of the scene; without -o and --make that is all");
+  tool.flag("--explain", explain_, "say in words what was understood of the scene; without -o, --make and --jobs that is all");
   tool.option("--check", check_,
               "instead of a scene: a plan to build and to measure; ends with exit code 7 if it does not hold")
       .defaultText("none")
       .unrecorded();
-  tool.flag("--sweep", sweep_,
-            "with --check: build and measure every candidate, and say how far the plan is from the cheapest");
+  tool.flag(
+      "--sweep", sweep_,
+      "with --check: build every candidate, measure those that take no more, and say how far the plan is from the cheapest");
   assets_option_ =
       &tool.option("--assets", assets_, "folder in which assets stay").defaultText("none: they are removed").unrecorded();
   tool.usesSeed();
@@ -43,13 +48,14 @@ void PlanOptions::checkFiles() {
   }
   if (sweep_ && check_.empty())
     refuse("--sweep", "only a check of a plan can sweep", "give --check PLAN.json, or leave out --sweep");
-  if (!check_.empty() && !(output_.empty() && rules_.empty() && cache_.empty() && !explain_))
-    refuse("--check", "a check makes no plan", "leave out -o, --make, --cache and --explain");
+  if (!check_.empty() && !(output_.empty() && rules_.empty() && jobs_.empty() && cache_.empty() && !explain_))
+    refuse("--check", "a check makes no plan", "leave out -o, --make, --jobs, --cache and --explain");
   const std::string& input = scene_.empty() ? check_ : scene_;
   checkRegular(input);
   tool_.addInput(input);
   if (!output_.empty()) checkOutput(tool_, output_, OutputFormat::plan), tool_.addOutput(output_);
   if (!rules_.empty()) checkOutput(tool_, rules_, OutputFormat::plan_rules), tool_.addOutput(rules_);
+  if (!jobs_.empty()) checkOutput(tool_, jobs_, OutputFormat::plan), tool_.addOutput(jobs_);
   if (!assets_option_->given()) {
     // Beside the plan, so that large assets are on a disk that was meant for them.
     const fs::path beside = output_.empty() ? fs::temp_directory_path() / "glint-plan" : fs::path(output_);

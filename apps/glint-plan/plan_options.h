@@ -15,6 +15,7 @@ class PlanOptions {
   const std::string& check() const { return check_; }
   const std::string& output() const { return output_; }
   const std::string& rules() const { return rules_; }
+  const std::string& jobs() const { return jobs_; }
   const std::string& cache() const { return cache_; }
   bool explains() const { return explain_; }
   bool sweeps() const { return sweep_; }
@@ -28,7 +29,7 @@ class PlanOptions {
   void checkFiles();
 
   Tool& tool_;
-  std::string scene_, check_, output_, rules_, cache_, maps_, assets_;
+  std::string scene_, check_, output_, rules_, jobs_, cache_, maps_, assets_;
   bool explain_ = false, sweep_ = false;
   Option* assets_option_ = nullptr;
 };

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
+#include <utility>
 
 #include "glint-plan/plan_candidates.h"
 
@@ -25,23 +27,41 @@ std::string budgetText(const Budgets& budgets) {
 
 std::string lightText(const SceneLight& light) {
   if (light.type == "environment")
-    return fmt::format("an environment that changes over {:g} degrees and more", light.smooth_deg);
+    return light.smooth_deg > 0 ? fmt::format("an environment that changes over {:.3g} degrees and more", light.smooth_deg)
+                                : "an environment with sharp lights";
   if (!(light.smooth_deg > 0)) return fmt::format("a {} light, which is sharp", light.type);
   return fmt::format("a {} light {:g} degrees wide", light.type, light.smooth_deg);
 }
 
-/// The value of a flag of a candidate; empty if it has none.
-std::string flagOf(const Candidate& candidate, const std::string& name) {
-  const auto found = std::find(candidate.flags.begin(), candidate.flags.end(), name);
-  return found == candidate.flags.end() ? "" : *(found + 1);
+const Candidate* pyramidOf(const MaterialPlan& plan) {
+  const Candidate& chosen = plan.choice().candidate;
+  return chosen.tool == "glint-pyramid" ? &chosen : plan.choiceSource();
 }
 
-const Candidate* pyramidOf(const MaterialPlan& plan) {
-  const PlanOption& choice = plan.choice();
-  if (choice.candidate.tool == "glint-pyramid") return &choice.candidate;
-  for (const PlanOption& option : plan.options)
-    if (option.candidate.name() == choice.candidate.source) return &option.candidate;
-  return nullptr;
+/// Why an option that is cheaper than the choice is not chosen.
+std::string objectionTo(const PlanOption& option, double tolerance) {
+  const std::string name = option.candidate.name();
+  if (!option.errors)
+    return fmt::format("{} would be over a budget: {}, {:.2g} s to prepare, {} for a density.", name,
+                       sizeText(option.costs.bytes), option.costs.preparation_s, queryTimeText(option.costs.query_ns));
+  if (surelySeen(*option.errors) <= tolerance)
+    return fmt::format("{} would be cheaper, but its bias is {:.2g}.", name, option.errors->bias);
+  return fmt::format("{} would be cheaper, but its seen error is {:.2g}, and up to {:.2g} at other places.", name,
+                     option.errors->seen, surelySeen(*option.errors));
+}
+
+/// Objections to the cheapest option of each method that is cheaper than the choice: those that were measured first.
+std::vector<std::string> objectionsIn(const MaterialPlan& plan) {
+  std::vector<std::string> objections;
+  std::set<std::string> methods = {plan.choice().candidate.method};
+  for (const bool measured : {true, false}) {
+    for (std::size_t k = 0; k < plan.chosen; ++k) {
+      const PlanOption& option = plan.options[k];
+      if (!option.costed || option.errors.has_value() != measured || !methods.insert(option.candidate.method).second) continue;
+      objections.push_back(objectionTo(option, plan.material->tolerance));
+    }
+  }
+  return objections;
 }
 
 }  // namespace
@@ -74,30 +94,15 @@ std::vector<std::string> reasonsOf(const Scene& scene, const MaterialPlan& plan)
   if (choice.candidate.tool.empty()) {
     reasons.push_back("The texels themselves have no error.");
   } else {
-    reasons.push_back(fmt::format("Its seen error is {:.2g}; the tolerance is {:g}, of which a plan uses {:g}.", choice.seen,
-                                  plan.material->tolerance, kSafeShare * plan.material->tolerance));
+    const PlaceErrors& errors = *choice.errors;
+    reasons.push_back(fmt::format(
+        "Its seen error is {:.2g}, and up to {:.2g} at other places; the tolerance is {:g}. Its bias is {:.2g} of "
+        "at most {:.2g}.",
+        errors.seen, surelySeen(errors), plan.material->tolerance, errors.bias, kBiasShare * plan.material->tolerance));
   }
   reasons.push_back(fmt::format("Of {} candidates that were measured it has {} within the tolerance and the budgets.", compared,
                                 goalText(scene.goal)));
-  // Cheaper candidates of other methods that do not do.
-  std::vector<std::string> methods = {choice.candidate.method};
-  for (std::size_t k = 0; k < plan.options.size(); ++k) {
-    const PlanOption& option = plan.options[k];
-    const bool named = std::find(methods.begin(), methods.end(), option.candidate.method) != methods.end();
-    if (k >= plan.chosen || named || !option.costed || option.seen < 0) continue;
-    methods.push_back(option.candidate.method);
-    reasons.push_back(fmt::format("{} would be cheaper, but its seen error is {}{:.2g}.", option.candidate.name(),
-                                  option.at_least ? "at least " : "", option.seen));
-  }
-  for (std::size_t k = 0; k < plan.chosen; ++k) {
-    const PlanOption& option = plan.options[k];
-    const bool named = std::find(methods.begin(), methods.end(), option.candidate.method) != methods.end();
-    if (named || !option.costed) continue;
-    methods.push_back(option.candidate.method);
-    reasons.push_back(fmt::format("{} would be over a budget: {}, {:.2g} s to prepare, {} for a density.",
-                                  option.candidate.name(), sizeText(option.costs.bytes), option.costs.preparation_s,
-                                  queryTimeText(option.costs.query_ns)));
-  }
+  for (std::string& objection : objectionsIn(plan)) reasons.push_back(std::move(objection));
   return reasons;
 }
 
@@ -130,7 +135,7 @@ std::string planText(const Scene& scene, const std::vector<MaterialPlan>& plans)
   for (const MaterialPlan& plan : plans) {
     const PlanOption& choice = plan.choice();
     text += fmt::format("{}: {}; seen error {:.2g} of at most {:g}, {}, {:.2g} s to prepare, {} for a density\n",
-                        plan.material->name, choice.candidate.name(), choice.seen, plan.material->tolerance,
+                        plan.material->name, choice.candidate.name(), choice.errors->seen, plan.material->tolerance,
                         sizeText(choice.costs.bytes), choice.costs.preparation_s, queryTimeText(choice.costs.query_ns));
     for (const std::string& reason : reasonsOf(scene, plan)) text += "  " + reason + "\n";
     for (const std::string& part : leftOutOf(scene, plan)) text += "  Left out. " + part + "\n";

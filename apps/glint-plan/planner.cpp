@@ -4,9 +4,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <limits>
+#include <map>
+#include <string>
 #include <utility>
 
+#include "glint-plan/plan_candidates.h"
 #include "glint-plan/totals.h"
 
 namespace glint::apps {
@@ -43,11 +47,46 @@ void sortByCost(MaterialPlan& plan, Goal goal) {
   while (plan.choice().candidate.name() != chosen) ++plan.chosen;
 }
 
+/// Settings of each method that is compressed from a pyramid, from coarse to fine.
+std::vector<std::vector<PlanOption*>> laddersOf(MaterialPlan& plan, const PlanOption& pyramid) {
+  std::vector<std::vector<PlanOption*>> ladders;
+  for (PlanOption& option : plan.options) {
+    if (option.candidate.source != pyramid.candidate.name()) continue;
+    if (ladders.empty() || ladders.back().front()->candidate.method != option.candidate.method) ladders.emplace_back();
+    ladders.back().push_back(&option);
+  }
+  return ladders;
+}
+
+/// The coarsest setting that may meet a tolerance: the errors of the pyramid and of the compression add up like independent errors.
+/// @param own  seen error of the pyramid
+std::size_t firstGuess(const std::vector<PlanOption*>& ladder, double own, double tolerance) {
+  const double left = std::sqrt(std::max(0.0, tolerance * tolerance - own * own));
+  std::size_t guess = 0;
+  while (guess + 1 < ladder.size() && toleranceOf(ladder[guess]->candidate) > left) ++guess;
+  return guess;
+}
+
+/// Why nothing is compressed from a pyramid that does not do.
+std::string failureOfPyramid(const PlanOption& pyramid) {
+  if (!pyramid.failure.empty()) return "its pyramid cannot be made: " + pyramid.failure;
+  return fmt::format("the pyramid that it is made of has a seen error of {:.2g} and a bias of {:.2g} already",
+                     pyramid.errors->seen, pyramid.errors->bias);
+}
+
 }  // namespace
 
-double PlanOption::cost(Goal goal) const {
+double costOf(const Costs& costs, Goal goal) {
   if (goal == Goal::query_ns) return costs.query_ns;
   return goal == Goal::bytes ? costs.bytes : costs.preparation_s;
+}
+
+const Candidate* MaterialPlan::choiceSource() const {
+  if (choice().candidate.source.empty()) return nullptr;
+  const auto found = std::find_if(options.begin(), options.end(), [&](const PlanOption& option) {
+    return option.candidate.name() == choice().candidate.source;
+  });
+  return found == options.end() ? nullptr : &found->candidate;
 }
 
 /// A material while it is planned.
@@ -102,16 +141,17 @@ bool Planner::cost(Work& work, PlanOption& option) {
 }
 
 bool Planner::meets(Work& work, PlanOption& option) {
-  const double most = kSafeShare * work.plan.material->tolerance;
-  if (option.seen < 0) {
+  if (!option.costed) return false;
+  const double tolerance = work.plan.material->tolerance;
+  if (!option.errors && option.failure.empty()) {
     try {
-      option.seen = work.probe->seen(static_cast<std::size_t>(&option - work.plan.options.data()), most);
-      option.at_least = option.seen > most;
+      option.errors = work.probe->errors(static_cast<std::size_t>(&option - work.plan.options.data()), tolerance);
+      option.at_least = !surelyWithin(*option.errors, tolerance);
     } catch (const Error& error) {
       option.failure = error.what();
     }
   }
-  return option.costed && option.failure.empty() && option.seen <= most;
+  return option.failure.empty() && !option.at_least;
 }
 
 bool Planner::affordable(const Work& work, const PlanOption& option) const {
@@ -133,31 +173,37 @@ bool Planner::choose(Work& work) {
   return work.found;
 }
 
+std::size_t Planner::measureLadder(Work& work, const std::vector<PlanOption*>& ladder, std::size_t first, bool all) {
+  const auto isDear = [&](std::size_t k) {
+    return !all && work.found && ladder[k]->costed && ladder[k]->cost(scene_.goal) >= work.plan.choice().cost(scene_.goal);
+  };
+  const auto isGood = [&](std::size_t k) { return cost(work, *ladder[k]) && !isDear(k) && meets(work, *ladder[k]); };
+  std::size_t k = first;
+  bool good = isGood(k);
+  // Coarser settings while this one is too dear, then finer ones until one is good enough, and again coarser ones while they are.
+  while (!good && isDear(k) && k > 0) good = isGood(--k);
+  while (!good && !isDear(k) && k + 1 < ladder.size()) good = isGood(++k);
+  while (good && k > 0 && isGood(k - 1)) --k;
+  if (good) choose(work);
+  return k;
+}
+
 void Planner::measureCompressed(Work& work, bool all) {
-  constexpr double kAmple = 0.5;  // share of the error that may be the pyramid's own, so that more pixels gain nothing
-  std::string done;               // method and pyramid that need no finer setting
-  const PlanOption* ample = nullptr;
-  for (PlanOption& option : work.plan.options) {
-    const std::string kind = option.candidate.method + " of " + option.candidate.source;
-    if (option.candidate.source.empty() || option.costed || kind == done) continue;
-    PlanOption& pyramid = *std::find_if(work.plan.options.begin(), work.plan.options.end(), [&](const PlanOption& other) {
-      return other.candidate.name() == option.candidate.source;
-    });
-    if (!pyramid.costed || !meets(work, pyramid)) {
-      option.failure = pyramid.failure.empty()
-                           ? fmt::format("the pyramid that it is made of has a seen error of {:.2g} already", pyramid.seen)
-                           : "its pyramid cannot be made: " + pyramid.failure;
-      continue;
+  std::map<std::string, std::size_t> last;  // setting that the ladder of a method ended with, on images of fewer pixels
+  for (PlanOption& pyramid : work.plan.options) {
+    if (pyramid.candidate.tool != "glint-pyramid") continue;
+    const bool usable = meets(work, pyramid);
+    for (const std::vector<PlanOption*>& ladder : laddersOf(work.plan, pyramid)) {
+      if (!usable) {
+        for (PlanOption* option : ladder) option->failure = failureOfPyramid(pyramid);
+        continue;
+      }
+      const std::string& method = ladder.front()->candidate.method;
+      const auto known = last.find(method);
+      const std::size_t first =
+          known == last.end() ? firstGuess(ladder, pyramid.errors->seen, work.plan.material->tolerance) : known->second;
+      last[method] = measureLadder(work, ladder, first, all);
     }
-    if (ample != nullptr && ample != &pyramid) {
-      option.failure = "images of fewer pixels are good enough";
-      continue;
-    }
-    if (pyramid.seen <= kAmple * kSafeShare * work.plan.material->tolerance) ample = &pyramid;
-    if (!cost(work, option)) continue;
-    const bool too_dear = work.found && option.cost(scene_.goal) >= work.plan.choice().cost(scene_.goal);
-    if ((too_dear && !all) || meets(work, option)) done = kind;
-    if (done == kind) choose(work);
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,18 +10,18 @@
 
 namespace glint::apps {
 
-/// Share of a tolerance that a predicted error may reach: places that were not probed err differently.
-inline constexpr double kSafeShare = 0.8;
+/// The cost that a goal makes small.
+double costOf(const Costs& costs, Goal goal);
 
 /// A candidate of a material, as predicted.
 struct PlanOption {
   Candidate candidate;
   Costs costs;
-  double seen = -1;       ///< below 0: not measured, because a cheaper one was good enough
-  bool at_least = false;  ///< the error is `seen` or more
-  bool costed = false;    ///< whether the costs are known
-  std::string failure;    ///< why it was not measured; may be empty
-  double cost(Goal goal) const;
+  std::optional<PlaceErrors> errors;  ///< nothing: not measured, because a cheaper one was good enough
+  bool at_least = false;              ///< errors are these or more: other sizes were not measured
+  bool costed = false;                ///< whether the costs are known
+  std::string failure;                ///< why it was not measured; may be empty
+  double cost(Goal goal) const { return costOf(costs, goal); }
 };
 
 /// A material's part of a plan.
@@ -34,6 +35,8 @@ struct MaterialPlan {
   double probe_s = 0;  ///< time of the probe
 
   const PlanOption& choice() const { return options[chosen]; }
+  /// The candidate whose asset is the input of the choice; nullptr: the map.
+  const Candidate* choiceSource() const;
 };
 
 /// Plans the materials of a scene.
@@ -52,10 +55,17 @@ class Planner {
   void prepare(Work& work);
   /// Sets the choice, if an option is good enough.
   bool choose(Work& work);
-  /// Measures what is compressed from the pyramid, each method from coarse to fine until it is good enough.
+  /// Measures what is compressed from the pyramids that are good enough themselves, until the cheapest setting of each method is known.
   /// @param all  also when it costs more than the choice so far
   void measureCompressed(Work& work, bool all);
+  /// Measures settings of one method, compressed from one pyramid, until the coarsest one that is good enough is known.
+  /// @param first  number of the setting to begin with
+  /// @return number of the setting that it ended with
+  std::size_t measureLadder(Work& work, const std::vector<PlanOption*>& ladder, std::size_t first, bool all);
+  /// Measures the costs of an option, unless they are known.
+  /// @return whether it can be made
   bool cost(Work& work, PlanOption& option);
+  /// Whether an option whose costs are known meets the tolerance. Measures its errors, unless they are known.
   bool meets(Work& work, PlanOption& option);
   bool affordable(const Work& work, const PlanOption& option) const;
   [[noreturn]] void refuse(Work& work);

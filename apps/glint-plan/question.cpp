@@ -24,17 +24,12 @@ std::string MapQuestion::key() const {
                      sigma_r, light_deg);
 }
 
-std::vector<FootprintSet> questionSets(std::uint64_t seed, const std::vector<float>& sizes, int places, int truths) {
+std::vector<Footprint> questionFootprints(std::uint64_t seed, std::size_t number, float sigma_texels) {
   constexpr std::uint64_t kStream = 3000;
-  std::vector<FootprintSet> sets;
-  for (std::size_t s = 0; s < sizes.size(); ++s) {
-    FootprintSet set{FootprintShape::round, sizes[s], {}, static_cast<std::size_t>(places)};
-    for (int k = 0; k < truths; ++k)
-      set.footprints.push_back(
-          Footprint::isotropic(bake::randomPair(seed, kStream + s, static_cast<std::uint64_t>(k)), sizes[s]));
-    sets.push_back(std::move(set));
-  }
-  return sets;
+  std::vector<Footprint> footprints;
+  for (std::uint64_t k = 0; k < kQuestionPlaces; ++k)
+    footprints.push_back(Footprint::isotropic(bake::randomPair(seed, kStream + number, k), sigma_texels));
+  return footprints;
 }
 
 }  // namespace glint::apps

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "glint-plan/scene.h"
-#include "measure/workload.h"
+#include "glint/model/footprint.h"
 
 namespace glint::apps {
 
@@ -14,7 +14,7 @@ struct MapQuestion {
   float sigma_r = 0.005f;
   double light_deg = 0;  ///< of the sharpest light
 
-  /// Sizes at which errors are measured: the ends, and so many between them that neighbours are at most `step` apart.
+  /// Sizes at which errors are measured: the ends, and so many between them that each is at most twice the one before, if `most` allows.
   /// @param most  sizes in all
   /// @param cap   larger footprints look like this one, texels
   std::vector<float> sizes(int most, double cap) const;
@@ -22,7 +22,13 @@ struct MapQuestion {
   std::string key() const;
 };
 
-/// Round footprints of these sizes at random places of a map.
-std::vector<FootprintSet> questionSets(std::uint64_t seed, const std::vector<float>& sizes, int places, int truths);
+/// Sizes at which errors are measured, at most.
+inline constexpr int kQuestionSizes = 5;
+/// Places at which the error of a plan is measured.
+inline constexpr int kQuestionPlaces = 96;
+
+/// Round footprints of one size at random places of a map.
+/// @param number  of the size: each has other places
+std::vector<Footprint> questionFootprints(std::uint64_t seed, std::size_t number, float sigma_texels);
 
 }  // namespace glint::apps

@@ -44,8 +44,17 @@ SceneLight lightOf(const JsonField& field) {
   SceneLight light;
   light.type = field.member("type", "give point, directional or environment").word({"point", "directional", "environment"});
   if (light.type == "environment") {
-    field.allow({"type", "band_limit_deg"});
-    light.smooth_deg = field.member("band_limit_deg", "give the smallest angle over which the light changes").number(0.01, 180);
+    field.allow({"type", "band_limit_deg", "image"});
+    const auto image = field.find("image"), limit = field.find("band_limit_deg");
+    if (image && limit) limit->refuse("is measured from the image", "leave one of them out");
+    if (image) {
+      light.image = image->text();
+    } else {
+      light.smooth_deg =
+          field
+              .member("band_limit_deg", "give the smallest angle over which the light changes, or the image of the environment")
+              .number(0.01, 180);
+    }
     return light;
   }
   field.allow({"type", "angular_diameter_deg"});

@@ -23,6 +23,7 @@ struct Budgets {
 /// A light, by the smallest angle over which it changes what a facet shows.
 struct SceneLight {
   std::string type;       ///< "point", "directional" or "environment"
+  std::string image;      ///< of an environment, in the folder of maps: its band limit is measured; may be empty
   double smooth_deg = 0;  ///< angular diameter, or band limit of an environment, degrees; 0: sharp
 };
 

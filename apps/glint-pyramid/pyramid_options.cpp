@@ -5,13 +5,21 @@
 #include <nlohmann/json.hpp>
 
 #include "common/numbers.h"
+#include "glint/bake/pyramid/asked_levels.h"
 
 namespace glint::apps {
 
 PyramidOptions::PyramidOptions(Tool& tool) {
-  tool.option("--stride", values_.stride,
-              "stride of the finest level, texels; its footprints have a deviation of 0.433 strides")
-      .range(2, 65536);
+  const Option& stride = tool.option("--stride", values_.stride,
+                                     "stride of the finest level, texels; its footprints have a deviation of 0.433 strides")
+                             .range(2, 65536);
+  tool.option(
+          "--finest", finest_,
+          "instead of --stride: deviation of the smallest footprint that will be asked, texels; finer levels are left out, and "
+          "queries about smaller footprints need the map: glint-query --normals")
+      .range(0.05, 28000)
+      .excludes(stride)
+      .defaultText("none");
   tool.option("--overlap", values_.overlap, "footprints in a stride along each axis; 1: the grid of Deng 2022")
       .range(1, kMostOverlap)
       .defaultText("sqrt(2)");
@@ -24,8 +32,16 @@ PyramidOptions::PyramidOptions(Tool& tool) {
                                       "each texel is a facet (flat), or normals are interpolated between texels (smooth)");
   const Option& boundary = tool.choice("--boundary", values_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
                                        "whether the map repeats or ends at its border");
-  tool.option("--levels", levels_,
-              "number of levels besides the mean of the map; auto: until levels agree to 1 % or the stride reaches the map");
+  const Option& levels = tool.option(
+      "--levels", levels_,
+      "number of levels besides the mean of the map; auto: until levels agree to 1 % or the stride reaches the map");
+  tool.option("--coarsest", coarsest_,
+              "instead of --levels: deviation of the largest footprint that will be asked, texels; coarser levels are left "
+              "out, and "
+              "larger footprints are answered by the coarsest level and the mean of the map")
+      .range(0.05, 1e6)
+      .excludes(levels)
+      .defaultText("none");
   tool.choice("--precision", values_.precision, {{"half", BlockPrecision::f16}, {"float", BlockPrecision::f32}},
               "of stored pixels");
   geometric_ = {{"--sigma-r", &sigma_r}, {"--surface", &surface}, {"--boundary", &boundary}};
@@ -39,6 +55,7 @@ std::string PyramidOptions::geometricOption() const {
 
 bake::PyramidOptions PyramidOptions::values() const {
   bake::PyramidOptions options = values_;
+  if (finest_ > 0) options.stride = static_cast<float>(bake::strideFor(finest_));
   if (resolution_ == "auto" && options.sigma_r > 0) options.resolution = bake::resolutionFor(options.sigma_r);
   const auto readUnlessAuto = [](const std::string& text, const char* name, const char* what, const char* remedy, int& value) {
     if (text == "auto") return;
@@ -46,6 +63,7 @@ bake::PyramidOptions PyramidOptions::values() const {
       throw Error(ErrorCode::usage, "option.range", {}, name, "'" + text + "' is not a number of " + what, remedy);
   };
   readUnlessAuto(levels_, "--levels", "levels", "give auto, or 1 or more", options.levels);
+  if (coarsest_ > 0) options.levels = bake::levelsFor(coarsest_, double{options.stride});
   readUnlessAuto(resolution_, "--resolution", "pixels", "give auto, or a multiple of 16 from 32 to 1024", options.resolution);
   return options;
 }

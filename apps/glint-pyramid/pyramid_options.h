@@ -24,6 +24,7 @@ class PyramidOptions {
 
  private:
   bake::PyramidOptions values_;
+  double finest_ = 0, coarsest_ = 0;
   std::string levels_ = "auto", resolution_ = std::to_string(values_.resolution);
   std::vector<std::pair<std::string, const Option*>> geometric_;
 };

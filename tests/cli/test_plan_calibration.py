@@ -4,7 +4,7 @@ import json
 import os
 import random
 
-from test_plan import POINT, material, plan, scene  # noqa: F401 (plan is a fixture)
+from test_plan import POINT, material, plan, scene, shared  # noqa: F401 (plan and shared are fixtures)
 
 SCENES = int(os.environ.get("GLINT_PLAN_SCENES", 8))
 # Bounds of what is reached: 7 of these 8 plans hold, at 1 (median) and 2.2 (worst) times the cheapest candidate that does. The goals of
