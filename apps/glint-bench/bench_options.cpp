@@ -3,11 +3,11 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 
-#include "measure/candidates.h"
 #include "glint-bench/presets/preset_run.h"
 #include "glint-bench/stability/stability_run.h"
 #include "glint/api/alternatives.h"
 #include "glint/formats/atomic_file.h"
+#include "measure/candidates.h"
 
 namespace glint::apps {
 namespace {

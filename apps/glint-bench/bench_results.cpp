@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "common/files.h"
-#include "measure/candidates.h"
 #include "glint-bench/machine.h"
 #include "glint/model/error.h"
+#include "measure/candidates.h"
 
 namespace glint::apps {
 namespace {

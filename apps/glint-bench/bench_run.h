@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "common/tool.h"
-#include "measure/asset_folder.h"
 #include "glint-bench/bench_results.h"
+#include "measure/asset_folder.h"
 
 namespace glint::apps {
 

@@ -30,7 +30,7 @@ enum { REQUESTS = 198, ANSWERS = 199, NO_NUMBER = -1, SHORT = -1, STOP = -2, MOS
 // Memory that libraries for C ask for is a class of its own: some of them end the process when they are refused any.
 enum Class { MEMORY, MEMORY_LIBRARIES, OPEN, READ, WRITE, FSYNC, RENAME, MMAP, CLOSE, RESERVE, CLASSES };
 static const char* const kNames[CLASSES] = {"memory", "memory_libraries", "open", "read",  "write",
-                                            "fsync",  "rename",      "mmap", "close", "reserve"};
+                                            "fsync",  "rename",           "mmap", "close", "reserve"};
 
 struct Shared {
   atomic_long counts[CLASSES];
@@ -40,9 +40,7 @@ static int fault_class = CLASSES;
 static long fault_number = NO_NUMBER;
 static int fault_error = 0;
 enum { MOST_PARTS = 16 };
-static struct {
-  uintptr_t begin, end;
-} library_parts[MOST_PARTS];  // machine code of kLibraries
+static struct { uintptr_t begin, end; } library_parts[MOST_PARTS];  // machine code of kLibraries
 static int part_count = 0;
 static const char* const kLibraries[] = {"/libhdf5", "/libfftw3", "/libgomp"};
 
@@ -104,12 +102,12 @@ char* strdup(const char* text) {
 
 static mode_t modeOf(int flags, va_list list) { return flags & (O_CREAT | O_TMPFILE) ? va_arg(list, mode_t) : 0; }
 
-#define DEFINE_OPEN(name)                    \
-  int name(const char* path, int flags, ...) { \
-    va_list list;                            \
-    va_start(list, flags);                   \
-    const mode_t mode = modeOf(flags, list); \
-    va_end(list);                            \
+#define DEFINE_OPEN(name)                                                        \
+  int name(const char* path, int flags, ...) {                                   \
+    va_list list;                                                                \
+    va_start(list, flags);                                                       \
+    const mode_t mode = modeOf(flags, list);                                     \
+    va_end(list);                                                                \
     return fails(OPEN) ? -1 : openat(AT_FDCWD, path, flags | O_LARGEFILE, mode); \
   }
 DEFINE_OPEN(open)
@@ -118,9 +116,9 @@ DEFINE_OPEN(open64)
 FILE* fopen(const char* path, const char* mode) { return fails(OPEN) ? NULL : REAL(fopen)(path, mode); }
 FILE* fopen64(const char* path, const char* mode) { return fails(OPEN) ? NULL : REAL(fopen64)(path, mode); }
 
-#define TRANSFER(class, call_short, call) \
-  do {                                    \
-    if (!fails(class)) return call;       \
+#define TRANSFER(class, call_short, call)                                                    \
+  do {                                                                                       \
+    if (!fails(class)) return call;                                                          \
     return fault_error == SHORT && size > 1 ? call_short : fault_error == SHORT ? call : -1; \
   } while (0)
 
@@ -199,8 +197,7 @@ static int (*program_main)(int, char**, char**) = NULL;
 static int serve(int argc, char** argv, char** environment) {
   if (fcntl(REQUESTS, F_GETFD) < 0) return program_main(argc, argv, environment);
   dl_iterate_phdr(findLibrary, NULL);
-  struct Shared* counts =
-      REAL(mmap)(NULL, sizeof(struct Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  struct Shared* counts = REAL(mmap)(NULL, sizeof(struct Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   char line[128];
   while (readLine(line, sizeof line)) {
     char name[32] = "";

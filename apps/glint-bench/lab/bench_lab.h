@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "common/tool.h"
-#include "measure/asset_folder.h"
-#include "measure/candidates.h"
 #include "glint/api/any_ndf.h"
 #include "glint/bake/ingest/ingest.h"
 #include "glint/bake/synth/synth.h"
 #include "glint/formats/asset_reader.h"
+#include "measure/asset_folder.h"
+#include "measure/candidates.h"
 
 namespace glint::apps {
 

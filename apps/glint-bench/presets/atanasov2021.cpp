@@ -5,11 +5,11 @@
 #include <numbers>
 
 #include "common/ndf_image.h"
-#include "measure/bench_times.h"
 #include "glint-bench/lab/ndf_figures.h"
 #include "glint-bench/presets/preset.h"
-#include "measure/workload.h"
 #include "glint/model/bin_map.h"
+#include "measure/bench_times.h"
+#include "measure/workload.h"
 
 namespace glint::apps {
 namespace {

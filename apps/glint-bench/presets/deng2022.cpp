@@ -2,9 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "measure/bench_times.h"
 #include "glint-bench/lab/ndf_figures.h"
 #include "glint-bench/presets/preset.h"
+#include "measure/bench_times.h"
 #include "measure/workload.h"
 
 namespace glint::apps {

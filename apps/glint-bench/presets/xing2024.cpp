@@ -2,10 +2,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "measure/bench_times.h"
 #include "glint-bench/presets/preset.h"
-#include "measure/workload.h"
 #include "glint/model/tiny_example.h"
+#include "measure/bench_times.h"
+#include "measure/workload.h"
 
 namespace glint::apps {
 namespace {

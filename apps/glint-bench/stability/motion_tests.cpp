@@ -3,8 +3,8 @@
 
 #include "glint-bench/lab/ndf_figures.h"
 #include "glint-bench/stability/stability_test.h"
-#include "measure/workload.h"
 #include "glint/bake/common/counter_random.h"
+#include "measure/workload.h"
 
 /// Flicker (section 3 of the design): what changes from frame to frame that the surface does not change.
 namespace glint::apps {

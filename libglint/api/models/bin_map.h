@@ -12,7 +12,9 @@ struct NdfTraits<BinMapNdf> {
   using Asset = BinMap;
   static constexpr std::string_view kKind = formats::kKindName<Asset>;
 
-  static BinMapNdf open(const NdfSource<BinMap>& source) { return {source.asset, askedAlpha(source), source.options.estimator}; }
+  static BinMapNdf open(const NdfSource<BinMap>& source) {
+    return {source.asset, askedAlpha(source), source.options.estimator};
+  }
 
   static NdfInfo info(const NdfSource<BinMap>& source) {
     NdfInfo info;
