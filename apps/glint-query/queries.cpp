@@ -13,9 +13,8 @@
 namespace glint::apps {
 
 float answer(const AnyNdf& model, const Query& query) {
-  return api::askAt(model, query.u, query.v, [&](const auto& m) {
-    return query.range ? m.mean(query.footprint, *query.range) : m.density(query.footprint, *query.half);
-  });
+  return query.range ? api::meanAt(model, query.u, query.v, query.footprint, *query.range)
+                     : api::densityAt(model, query.u, query.v, query.footprint, *query.half);
 }
 
 std::vector<float> answerAll(const AnyNdf& model, std::span<const Query> queries) {

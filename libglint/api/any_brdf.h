@@ -42,7 +42,7 @@ class AnyBrdf {
     if (facets_ == BrdfFacets::beckmann) return ask(BinMapBrdf(std::get<BinMapNdf>(model_), footprint, masking_, fresnel_));
     if (facets_ == BrdfFacets::waves)
       return ask(WaveBrdf(std::get<AnisotropicNdf<WaveNdf>>(model_), footprint, masking_, fresnel_));
-    return std::visit([&](const auto& model) { return ask(MicrofacetBrdf(model, footprint, masking_, fresnel_)); }, model_);
+    return ask(MicrofacetBrdf(model_, footprint, masking_, fresnel_));
   }
 
   /// The BRDF f, 1/sr, each channel >= 0; without the cosine wi.z.

@@ -9,6 +9,9 @@
 #include "glint/formats/hash.h"
 
 namespace glint::api {
+
+template class OneOfNdfs<NdfModels>;
+
 namespace {
 
 /// The inputs that may be the map of an asset. A pyramid names its map as an input. A compressed pyramid names the map as an input

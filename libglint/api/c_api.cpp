@@ -313,9 +313,7 @@ glint_status glint_ndf_pack(const glint_ndf* ndf, void* buffer, size_t capacity,
 glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy, float* density) {
   if (!isOpen(ndf) || footprint == nullptr || density == nullptr)
     return badArgument("glint_density", {{ndf, "ndf"}, {footprint, "footprint"}, {density, "density"}});
-  *density = api::askAt(ndf->body().opened.model(), footprint->u, footprint->v, [&](const auto& model) {
-    return model.density(footprintOf(*footprint), {hx, hy});
-  });
+  *density = api::densityAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {hx, hy});
   return GLINT_OK;
 }
 
@@ -348,9 +346,7 @@ glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, 
                         float* mean) {
   if (!isOpen(ndf) || footprint == nullptr || mean == nullptr)
     return badArgument("glint_mean", {{ndf, "ndf"}, {footprint, "footprint"}, {mean, "mean"}});
-  *mean = api::askAt(ndf->body().opened.model(), footprint->u, footprint->v, [&](const auto& model) {
-    return model.mean(footprintOf(*footprint), {{x0, y0}, {x1, y1}});
-  });
+  *mean = api::meanAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {{x0, y0}, {x1, y1}});
   return GLINT_OK;
 }
 
@@ -358,9 +354,8 @@ glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint
                           float* pdf) {
   if (!isOpen(ndf) || footprint == nullptr || hx == nullptr || hy == nullptr || pdf == nullptr)
     return badArgument("glint_sample", {{ndf, "ndf"}, {footprint, "footprint"}, {hx, "hx"}, {hy, "hy"}, {pdf, "pdf"}});
-  const HalfVectorSample drawn = api::askAt(ndf->body().opened.model(), footprint->u, footprint->v, [&](const auto& model) {
-    return model.sample(footprintOf(*footprint), {xi1, xi2});
-  });
+  const HalfVectorSample drawn =
+      api::sampleAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {xi1, xi2});
   *hx = drawn.h.x;
   *hy = drawn.h.y;
   *pdf = drawn.pdf;

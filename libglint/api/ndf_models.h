@@ -17,27 +17,37 @@ namespace glint::api {
 
 /// One of several models, and a model itself: it answers as the model that it holds, so that it fits wherever a template takes
 /// an NdfModel. Its questions choose the model once each; std::visit chooses it once for many questions.
-template <NdfModel... Models>
-class OneOfNdfs : public std::variant<Models...> {
+/// @tparam List  an NdfModelList
+template <class List>
+class OneOfNdfs : public List::Variant {
  public:
-  using std::variant<Models...>::variant;
+  using Variant = typename List::Variant;
+  using Variant::Variant;
 
-  float density(const Footprint& p, Vec2 h) const {
-    return std::visit([&](const auto& model) { return model.density(p, h); }, *this);
-  }
-  float mean(const Footprint& p, const Box2& range) const {
-    return std::visit([&](const auto& model) { return model.mean(p, range); }, *this);
-  }
-  HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
-    return std::visit([&](const auto& model) { return model.sample(p, xi); }, *this);
-  }
+  float density(const Footprint& p, Vec2 h) const;
+  float mean(const Footprint& p, const Box2& range) const;
+  HalfVectorSample sample(const Footprint& p, Vec2 xi) const;
 };
+
+template <class List>
+float OneOfNdfs<List>::density(const Footprint& p, Vec2 h) const {
+  return std::visit([&](const auto& model) { return model.density(p, h); }, *this);
+}
+template <class List>
+float OneOfNdfs<List>::mean(const Footprint& p, const Box2& range) const {
+  return std::visit([&](const auto& model) { return model.mean(p, range); }, *this);
+}
+template <class List>
+HalfVectorSample OneOfNdfs<List>::sample(const Footprint& p, Vec2 xi) const {
+  return std::visit([&](const auto& model) { return model.sample(p, xi); }, *this);
+}
 
 /// A list of models. A model whose traits lack a member cannot be in it.
 template <DescribedNdf... Models>
 struct NdfModelList {
+  using Variant = std::variant<Models...>;
   /// Any model of the list.
-  using Any = OneOfNdfs<Models...>;
+  using Any = OneOfNdfs<NdfModelList>;
 
   /// Calls visit(std::type_identity<Model>{}) for each model.
   template <class Visit>
@@ -54,5 +64,8 @@ struct NdfModelList {
 using NdfModels =
     NdfModelList<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, BinMapNdf, HistogramNdf, MomentsNdf,
                  TinyExampleNdf, WangReference, WangPlane<PyramidTiles>, WangPlane<CompressedTiles>, AnisotropicNdf<WaveNdf>>;
+
+/// Compiled once, in any_ndf.cpp: the models are large.
+extern template class OneOfNdfs<NdfModels>;
 
 }  // namespace glint::api

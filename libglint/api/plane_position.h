@@ -28,25 +28,14 @@ inline bool isEndless(const NdfModels::Any& model) {
   return std::visit([]<class Model>(const Model&) { return EndlessNdf<Model>; }, model);
 }
 
-/// Calls ask(model) for a question at a position. A plane without end is moved so that its cell there is cell 0: the footprint of
-/// the question has its centre at wrappedUv(u, v). Maps repeat, so that they need no move.
-template <class Ask>
-auto askAt(const NdfModels::Any& model, double u, double v, Ask&& ask) {
-  const auto cell_x = planeCell(u), cell_y = planeCell(v);
-  return std::visit(
-      [&]<class Model>(const Model& m) {
-        if constexpr (EndlessNdf<Model>)
-          return ask(m.movedTo(cell_x, cell_y));
-        else
-          return ask(m);
-      },
-      model);
-}
+/// The model for questions at one position. A plane without end is moved so that its cell there is cell 0: the footprint of a
+/// question has its centre at wrappedUv(u, v). Maps repeat, so that they need no move.
+NdfModels::Any movedTo(const NdfModels::Any& model, double u, double v);
 
-/// The model for questions at one position, as askAt gives it.
-inline NdfModels::Any movedTo(const NdfModels::Any& model, double u, double v) {
-  return askAt(model, u, v, [](const auto& m) { return NdfModels::Any(m); });
-}
+/// Answers to one question at a position, of the model that movedTo gives.
+float densityAt(const NdfModels::Any& model, double u, double v, const Footprint& p, Vec2 h);
+float meanAt(const NdfModels::Any& model, double u, double v, const Footprint& p, const Box2& range);
+HalfVectorSample sampleAt(const NdfModels::Any& model, double u, double v, const Footprint& p, Vec2 xi);
 
 /// The model for query k of a batch: a plane without end is moved to the cell of a centre that is given precisely.
 template <class Model>
