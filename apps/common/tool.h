@@ -111,7 +111,8 @@ class Tool {
   bool trust() const;
   /// Value of --max-memory in bytes, or the memory that the process may still take (memory.h).
   std::uint64_t maxMemory() const;
-  /// Refuses work that needs more than maxMemory(). Call it before the work, with an estimate that is no smaller than the need.
+  /// Refuses work that needs more than maxMemory(); without --max-memory, work of up to 32 MB is always tried. Call it before the
+  /// work, with an estimate that is no smaller than the need.
   /// @param what    "8192 NDF images"; the message says how much they take
   /// @param remedy  an option that makes the need smaller: "give a larger --stride"
   /// @throws Error failed

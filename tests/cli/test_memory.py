@@ -151,3 +151,9 @@ def test_pixels_that_need_more_than_may_be_used_are_refused(folder):
     code, error = run(folder, "ingest large.exr -o out2.glint", "--max-memory", "1M")
     assert code == 4 and "--max-memory" in error
     assert not (folder / "out2.glint").exists()
+
+
+def test_programs_that_the_bench_starts_keep_the_limit(folder):
+    code, error = run(folder, "bench small.glint -o results.json --quick --only pyramid", "--max-memory", "100K")
+    results = (folder / "results.json").read_text()
+    assert "and 100 KB may be used" in results, error
