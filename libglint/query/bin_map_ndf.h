@@ -474,7 +474,7 @@ class BinMapNdf {
   class BlockLobes {
    public:
     GLINT_HD BlockLobes(const BinMapNdf& ndf, const TexelCover& cover, Vec2 h)
-        : ndf_(ndf), cover_(cover), h_(h), factor_(1 / (double{2 * kPi * FacetLobe::kMass} * ndf.sigma_ * ndf.sigma_)) {}
+        : ndf_(ndf), cover_(cover), h_(h), factor_(1 / double{2 * kPi * FacetLobe::kMass * ndf.sigma_ * ndf.sigma_}) {}
     GLINT_HD void add(const BinBlock& block) {
       const double far = ndf_.farShare(cover_, block, h_);
       const double merged = (1 - far) * ndf_.mergedShare(cover_, block), apart = 1 - far - merged;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 
 #include "glint/math/avx2.h"
 #include "glint/math/bits.h"
@@ -30,7 +31,7 @@ struct Pending {
   int count = 0;
   // A leaf adds eight at most, and the last lanes are loaded with the others.
   alignas(32) float weight[kFull + 16];
-  alignas(32) float number[kNumbers][kFull + 16];
+  alignas(32) float number[std::size_t{kNumbers}][kFull + 16];
 };
 
 /// Adds weight times value of the first `count` that wait, lane by lane. A value that is NaN, of a broken normal, counts as 0.

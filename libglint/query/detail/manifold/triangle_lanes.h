@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+
 #include "glint/math/gaussian.h"
 #include "glint/math/lanes.h"
 
@@ -163,7 +165,8 @@ class TriangleDensity {
 /// Half of the nodes and weights of Gauss-Legendre rules on [-1, 1], which are symmetric; a middle node first.
 template <int kNodes>
 struct GaussLegendre {
-  float node[(kNodes + 1) / 2], weight[(kNodes + 1) / 2];
+  static constexpr std::size_t kHalf = (std::size_t{kNodes} + 1) / 2;
+  float node[kHalf], weight[kHalf];
 };
 inline GLINT_HD constexpr GaussLegendre<3> gaussLegendre(const GaussLegendre<3>&) {
   return {{0, 0.7745966692f}, {0.8888888889f, 0.5555555556f}};
