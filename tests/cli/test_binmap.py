@@ -93,7 +93,7 @@ def test_a_range_of_roughnesses_is_one_asset(glint, assets):
 
 
 def test_published_densities_are_of_the_centres_of_bins(glint, assets):
-    question = ["--uv", "0.3", "0.6", "--box", "20", "20", "--half", "0.05", "0.02"]
+    question = ["--uv", "0.3", "0.6", "--box", "20", "0", "0", "20", "--half", "0.05", "0.02"]
     exact = number(glint("query", assets / "bins.glint", *question))
     published = number(glint("query", assets / "bins.glint", *question, "--estimator", "published"))
     assert published != exact
