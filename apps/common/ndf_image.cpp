@@ -12,16 +12,13 @@ std::vector<float> ndfImage(const api::AnyNdf& any, const Footprint& footprint, 
   std::vector<float> image(static_cast<std::size_t>(resolution) * resolution);
   const float pixel = 2.0f / static_cast<float>(resolution);
   bake::ProgressCounter counter(progress, static_cast<std::size_t>(resolution));
-  const auto ask = [&](const auto& model) {
-    tbb::parallel_for(0, resolution, [&](int y) {
-      for (int x = 0; x < resolution; ++x) {
-        const Vec2 low = {-1 + static_cast<float>(x) * pixel, -1 + static_cast<float>(y) * pixel};
-        image[rowMajorIndex(x, y, resolution)] = model.mean(footprint, {low, low + Vec2{pixel, pixel}});
-      }
-      counter.advance();
-    });
-  };
-  std::visit(ask, any);
+  tbb::parallel_for(0, resolution, [&](int y) {
+    for (int x = 0; x < resolution; ++x) {
+      const Vec2 low = {-1 + static_cast<float>(x) * pixel, -1 + static_cast<float>(y) * pixel};
+      image[rowMajorIndex(x, y, resolution)] = any.mean(footprint, {low, low + Vec2{pixel, pixel}});
+    }
+    counter.advance();
+  });
   return image;
 }
 

@@ -80,36 +80,32 @@ nlohmann::json batchTime(const api::OpenedNdf& ndf, std::span<const BenchQuery> 
 
 nlohmann::json benchTimes(const api::OpenedNdf& ndf, std::span<const BenchQuery> queries, std::span<const SizedQueries> sizes,
                           double longest_s) {
+  // Times include the choice of the model, as those of the C interface do.
+  const api::AnyNdf& model = ndf.model();
   nlohmann::json times;
-  std::visit(
-      [&](const auto& model) {
-        const auto density = [&](std::size_t k) { keep(model.density(queries[k].footprint, queries[k].half)); };
-        times["density"]["cold"] = timeOf(queries.size(), longest_s, density);
-        times["density"]["warm"] = timeOf(std::min(kWarm, queries.size()), longest_s, density);
-        times["density"]["sizes"] = nlohmann::json::array();
-        for (const SizedQueries& of_size : sizes) {
-          nlohmann::json time = timeOf(of_size.queries.size(), longest_s, [&](std::size_t k) {
-            keep(model.density(of_size.queries[k].footprint, of_size.queries[k].half));
-          });
-          time["sigma_texels"] = of_size.sigma_texels;
-          times["density"]["sizes"].push_back(std::move(time));
-        }
-        times["mean"]["cold"] =
-            timeOf(queries.size(), longest_s, [&](std::size_t k) { keep(model.mean(queries[k].footprint, queries[k].range)); });
-        times["sample"]["cold"] = timeOf(queries.size(), longest_s,
-                                         [&](std::size_t k) { keep(model.sample(queries[k].footprint, queries[k].xi).pdf); });
-      },
-      ndf.model());
+  const auto density = [&](std::size_t k) { keep(model.density(queries[k].footprint, queries[k].half)); };
+  times["density"]["cold"] = timeOf(queries.size(), longest_s, density);
+  times["density"]["warm"] = timeOf(std::min(kWarm, queries.size()), longest_s, density);
+  times["density"]["sizes"] = nlohmann::json::array();
+  for (const SizedQueries& of_size : sizes) {
+    nlohmann::json time = timeOf(of_size.queries.size(), longest_s, [&](std::size_t k) {
+      keep(model.density(of_size.queries[k].footprint, of_size.queries[k].half));
+    });
+    time["sigma_texels"] = of_size.sigma_texels;
+    times["density"]["sizes"].push_back(std::move(time));
+  }
+  times["mean"]["cold"] =
+      timeOf(queries.size(), longest_s, [&](std::size_t k) { keep(model.mean(queries[k].footprint, queries[k].range)); });
+  times["sample"]["cold"] =
+      timeOf(queries.size(), longest_s, [&](std::size_t k) { keep(model.sample(queries[k].footprint, queries[k].xi).pdf); });
   times["density"]["batch"] = batchTime(ndf, queries, longest_s);
   return times;
 }
 
 double densityTime(const api::OpenedNdf& ndf, std::span<const BenchQuery> queries, double longest_s) {
-  const auto time = [&](const auto& model) {
-    return timeOf(queries.size(), longest_s,
-                  [&](std::size_t k) { keep(model.density(queries[k].footprint, queries[k].half)); });
-  };
-  return std::visit(time, ndf.model())["ns"].template get<double>();
+  const nlohmann::json time = timeOf(queries.size(), longest_s,
+                                     [&](std::size_t k) { keep(ndf.model().density(queries[k].footprint, queries[k].half)); });
+  return time["ns"].get<double>();
 }
 
 nlohmann::json plainLobeTime(std::span<const BenchQuery> queries) {

@@ -27,3 +27,16 @@ def run_all(glint, *commands):
     for command in commands:
         process = glint(*command.split())
         assert process.returncode == 0, process.stderr
+
+
+_MADE = {}  # commands -> {name: bytes} of the files that they have made
+
+
+def run_once(glint, *commands):
+    """Makes the files of command lines. Of several tests that ask the same, the first runs them, and the others get copies."""
+    if commands not in _MADE:
+        before = set(glint.folder.iterdir())
+        run_all(glint, *commands)
+        _MADE[commands] = {path.name: path.read_bytes() for path in set(glint.folder.iterdir()) - before}
+    for name, data in _MADE[commands].items():
+        (glint.folder / name).write_bytes(data)

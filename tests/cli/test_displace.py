@@ -5,12 +5,12 @@ import json
 import h5py
 import numpy
 import pytest
+from conftest import run_once
 
 
 @pytest.fixture
 def heights(glint):
-    assert glint("synth", "weave", "--size", "64x96", "-o", "h.exr", "--height").returncode == 0
-    assert glint("ingest", "h.exr", "--kind", "height", "--to", "heights", "-o", "h.glint").returncode == 0
+    run_once(glint, "synth weave --size 64x96 -o h.exr --height", "ingest h.exr --kind height --to heights -o h.glint")
     return "h.glint"
 
 
@@ -113,8 +113,8 @@ def write_image(path, pixels, kind="uint8"):
 @pytest.fixture
 def two_colours(glint):
     """A sawtooth, red (sRGB) where it falls towards +u, blue where it rises."""
-    assert glint("synth", "sawtooth", "--size", "64x32", "--feature-size", "16", "--slope", "1", "-o", "s.exr", "--height").returncode == 0
-    assert glint("ingest", "s.exr", "--kind", "height", "--to", "heights", "-o", "s.glint").returncode == 0
+    run_once(glint, "synth sawtooth --size 64x32 --feature-size 16 --slope 1 -o s.exr --height",
+             "ingest s.exr --kind height --to heights -o s.glint")
     with h5py.File(glint.folder / "s.glint") as file:
         h = file["heights"][...]
     falls = (numpy.roll(h, -1, 1) < h)[::-1]
@@ -215,7 +215,7 @@ def test_roughness_needs_a_glossy_base_and_enough_of_it(glint, heights):
 
 @pytest.fixture
 def displaced(glint, heights):
-    assert glint("displace", heights, "-o", "d.glint", "--factors", "4,16", "--base", "ggx:0.4", "--quiet", *QUICK).returncode == 0
+    run_once(glint, f"displace {heights} -o d.glint --factors 4,16 --base ggx:0.4 --quiet {' '.join(QUICK)}")
     return "d.glint"
 
 

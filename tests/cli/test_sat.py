@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from conftest import run_once
 
 # Shell answers are printed with nine digits.
 PRINTED = 1e-6
@@ -11,9 +12,7 @@ BOX = ["--uv", "0.3", "0.7", "--box", "20", "0", "0", "12"]
 
 @pytest.fixture
 def normals(glint):
-    for command in (["synth", "isotropic", "--size", "96", "-o", "map.exr"], ["ingest", "map.exr", "-o", "n.glint"]):
-        process = glint(*command)
-        assert process.returncode == 0, process.stderr
+    run_once(glint, "synth isotropic --size 96 -o map.exr", "ingest map.exr -o n.glint")
     return glint.folder / "n.glint"
 
 

@@ -6,7 +6,7 @@ import math
 import h5py
 import numpy as np
 import pytest
-from conftest import run_all
+from conftest import run_all, run_once
 
 SIZE = 64
 EXAMPLE = 16
@@ -18,7 +18,7 @@ SCATTERED = "--mode scattered --density 1.5 --transforms turns.json --seed 5 --r
 
 @pytest.fixture
 def normals(glint):
-    run_all(glint, f"synth isotropic --size {SIZE} --alpha .3 --correlation 3 -o map.exr", "ingest map.exr -o n.glint")
+    run_once(glint, f"synth isotropic --size {SIZE} --alpha .3 --correlation 3 -o map.exr", "ingest map.exr -o n.glint")
     (glint.folder / "turns.json").write_text(json.dumps(TURNS))
     return stored(glint.folder / "n.glint")
 

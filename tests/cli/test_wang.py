@@ -6,7 +6,7 @@ import shutil
 import h5py
 import numpy as np
 import pytest
-from conftest import run_all
+from conftest import run_all, run_once
 
 MASK = 2**64 - 1
 G, Y = 0x9E3779B97F4A7C15, 0xD1342543DE82EF95
@@ -20,7 +20,7 @@ def result(process):
 
 @pytest.fixture
 def normals(glint):
-    run_all(glint, "synth isotropic --size 160x120 --alpha .3 -o map.exr", "ingest map.exr -o n.glint --texel-size-um 3")
+    run_once(glint, "synth isotropic --size 160x120 --alpha .3 -o map.exr", "ingest map.exr -o n.glint --texel-size-um 3")
     return glint.folder / "n.glint"
 
 

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 import OpenImageIO as oiio
 import pytest
-from conftest import run_all
+from conftest import run_all, run_once
 
 SIZE, STRIDE, RESOLUTION, PERIOD, DEPTH_UM = 96, 32, 128, 16, 0.25
 PRINTED = 1e-6  # shell answers have nine digits
@@ -15,8 +15,8 @@ HALVES = 2e-3  # both sides are rounded to half precision
 
 @pytest.fixture
 def grating(glint):
-    run_all(glint, f"synth grating --height --texel-size-um 1 --depth-um {DEPTH_UM} --feature-size {PERIOD} --size {SIZE} -o g.exr",
-        "ingest g.exr -o g.glint --kind height --to heights --height-scale-um 1 --texel-size-um 1")
+    run_once(glint, f"synth grating --height --texel-size-um 1 --depth-um {DEPTH_UM} --feature-size {PERIOD} --size {SIZE} -o g.exr",
+             "ingest g.exr -o g.glint --kind height --to heights --height-scale-um 1 --texel-size-um 1")
     return glint.folder / "g.glint"
 
 

@@ -100,19 +100,16 @@ double ImageTruth::seenInRing(const api::OpenedNdf& ndf, double inner, double ou
 
 double flicker(const api::OpenedNdf& ndf, std::span<const Path> paths) {
   std::vector<double> changes(paths.size()), squares(paths.size());
-  const auto follow = [&](const auto& model) {
-    tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t k) {
-      double before = 0, here = 0;
-      for (std::size_t step = 0; step < paths[k].size(); ++step) {
-        const PathStep& question = paths[k][step];
-        const double next = model.density(askedShape(question.footprint, ndf.info()), question.half);
-        const double change = step < 2 ? 0 : before - 2 * here + next;
-        changes[k] += change * change, squares[k] += next * next;
-        before = here, here = next;
-      }
-    });
-  };
-  std::visit(follow, ndf.model());
+  tbb::parallel_for(std::size_t{0}, paths.size(), [&](std::size_t k) {
+    double before = 0, here = 0;
+    for (std::size_t step = 0; step < paths[k].size(); ++step) {
+      const PathStep& question = paths[k][step];
+      const double next = ndf.model().density(askedShape(question.footprint, ndf.info()), question.half);
+      const double change = step < 2 ? 0 : before - 2 * here + next;
+      changes[k] += change * change, squares[k] += next * next;
+      before = here, here = next;
+    }
+  });
   double change = 0, square = 0;
   for (std::size_t k = 0; k < paths.size(); ++k) change += changes[k], square += squares[k];
   return square > 0 ? std::sqrt(change / square) : 0;
