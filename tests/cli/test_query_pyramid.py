@@ -10,7 +10,7 @@ from conftest import BIN
 
 # Shell answers are printed with nine digits.
 PRINTED = 1e-6
-LEFT_OUT = 2e-3  # below level 0 answers leave out up to a thousandth of the light
+LEFT_OUT = 2e-3  # texels answer below level 0: up to a thousandth of the light is left out, and a single density may lose twice that
 FOOTPRINT = ["--uv", "0.3", "0.7", "--sigma", "20"]
 
 
