@@ -50,7 +50,7 @@ void PlaneCommand::ask(const Plane& tiles) {
   // The plane seen from the cell of the point, so that no digits are lost.
   const WangPlace place = tiles.layout().placeOf(texel_[0], texel_[1]);
   const Plane plane = tiles.movedTo(place.cell_x, place.cell_y);
-  const Footprint at = size_->at(plane.positionIn(place));
+  const Footprint at = size_->at(plane.layout().positionIn(place));
   if (picture_.given()) writePicture(plane, at);
   if (!halves_.given()) return;
   const Query q = halves_.query(at);

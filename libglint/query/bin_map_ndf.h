@@ -24,8 +24,8 @@ struct BinFacet {
 
 /// How a density is made of the texels of a bin map.
 enum class BinEstimator {
-  exact,  ///< by the normals of the texels
-  published  ///< by the weights of the 21 bins around the half vector and their centres (Atanasov 2021, section 5.2): several times as quick
+  exact,     ///< by the normals of the texels
+  published  ///< by the weights of the 21 bins around the half vector and their centres (Atanasov 2021, section 5.2): mostly quicker, and less exact
 };
 
 /// The NDF from an inverse bin map (Atanasov 2021): exact shares of the footprint for every texel near the half vector.
@@ -66,32 +66,6 @@ class BinMapNdf {
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!insideSquare(h)) return 0;
     return estimator_ == BinEstimator::published ? publishedDensity(p, h) : exactDensity(p, h);
-  }
-
-  GLINT_DEVICE_CALL GLINT_HD float exactDensity(const Footprint& p, Vec2 h) const {
-    const TexelCover cover(p, map().width, map().height);
-    const BinReach reach({h, h}, kBinReach * sigma_);
-    double sum = 0;
-    const auto add = [&](const BinFacet& f) { sum += f.weight * lobe(f, h); };
-    if (answeredByTexel(cover)) {
-      forEachFacetByTexel(cover, reach, add);
-      return finitePositive(static_cast<float>(sum));
-    }
-    BlockLobes blocks(*this, cover, h);
-    forEachBlockInReach(reach, [&](const BinBlock& block) { blocks.add(block); });
-    return finitePositive(static_cast<float>(blocks.sum() / cover.area()));
-  }
-
-  /// The lobes of the 21 bins around h, each around the centre of its bin.
-  GLINT_DEVICE_CALL GLINT_HD float publishedDensity(const Footprint& p, Vec2 h) const {
-    const auto across = static_cast<std::uint32_t>(map().bins_per_axis);
-    const BinWeights bins = weights(p, h);
-    double sum = 0;
-    for (int k = 0; k < bins.count; ++k) {
-      const Vec2 bin = {static_cast<float>(bins.bins[k] % across), static_cast<float>(bins.bins[k] / across)};
-      sum += bins.weights[k] * lobe({1, Vec2{-1, -1} + bin_size_ * (bin + Vec2{0.5f, 0.5f}), {}}, h);
-    }
-    return finitePositive(static_cast<float>(sum));
   }
 
   /// Average density over a box of half vectors; 0 if the box is empty. O(bins that the box reaches and their texels).
@@ -160,7 +134,8 @@ class BinMapNdf {
 
  private:
   static constexpr float kStrata = 4096;
-  static constexpr double kMostLookedUp = 128;  // from glint-binmap-bench: both ways take as long between 64 and 256 texels
+  /// Texels of a footprint up to which each is looked up. By looking up, the time grows with the texels; by lists, with the bins.
+  static constexpr double kMostLookedUp = 128;
   /// Blocks count as one facet unless the lobe is much narrower than the lobe for which bins as wide as the block are made.
   static constexpr double kNarrowestMerged = 0.9;
 
@@ -241,6 +216,32 @@ class BinMapNdf {
                 blocks_.texelClass(indexOf(row) + static_cast<std::uint64_t>(k)));
       }
     });
+  }
+
+  GLINT_DEVICE_CALL GLINT_HD float exactDensity(const Footprint& p, Vec2 h) const {
+    const TexelCover cover(p, map().width, map().height);
+    const BinReach reach({h, h}, kBinReach * sigma_);
+    double sum = 0;
+    const auto add = [&](const BinFacet& f) { sum += f.weight * lobe(f, h); };
+    if (answeredByTexel(cover)) {
+      forEachFacetByTexel(cover, reach, add);
+      return finitePositive(static_cast<float>(sum));
+    }
+    BlockLobes blocks(*this, cover, h);
+    forEachBlockInReach(reach, [&](const BinBlock& block) { blocks.add(block); });
+    return finitePositive(static_cast<float>(blocks.sum() / cover.area()));
+  }
+
+  /// The lobes of the 21 bins around h, each around the centre of its bin.
+  GLINT_DEVICE_CALL GLINT_HD float publishedDensity(const Footprint& p, Vec2 h) const {
+    const auto across = static_cast<std::uint32_t>(map().bins_per_axis);
+    const BinWeights bins = weights(p, h);
+    double sum = 0;
+    for (int k = 0; k < bins.count; ++k) {
+      const Vec2 bin = {static_cast<float>(bins.bins[k] % across), static_cast<float>(bins.bins[k] / across)};
+      sum += bins.weights[k] * lobe({1, Vec2{-1, -1} + bin_size_ * (bin + Vec2{0.5f, 0.5f}), {}}, h);
+    }
+    return finitePositive(static_cast<float>(sum));
   }
 
   /// Whether looking up every texel of a footprint is quicker than reading lists.

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "glint/math/hash.h"
+#include "glint/math/vec.h"
 #include "glint/model/wang_tiles.h"
 
 namespace glint {
@@ -17,6 +18,31 @@ struct WangPlace {
   std::int64_t cell_x = 0, cell_y = 0;
   float x = 0, y = 0;  ///< texels from the lower left corner of the cell, in [0, size]
 };
+
+/// A cell of the plane, whose numbers wrap at 2^64, and a position in it: [0, 1)^2 from its lower left corner.
+struct WangCell {
+  std::uint64_t x, y;
+  Vec2 at;
+};
+
+/// The cell of a position that counts in tiles from the lower left corner of cell (from_x, from_y). A coordinate that is not finite,
+/// or so large that floats name no cells there, is 0 in that cell.
+inline GLINT_HD WangCell wangCell(Vec2 position, std::uint64_t from_x, std::uint64_t from_y) {
+  const auto split = [](float u, std::uint64_t from, float& at) {
+    constexpr float kFarthest = 9e15f;  // whole numbers beyond are no cells that a float can name
+    const float cell = std::floor(u);
+    if (!(cell > -kFarthest && cell < kFarthest)) {
+      at = 0;
+      return from;
+    }
+    at = u - cell < 1 ? u - cell : float{kBelowOne};
+    return from + static_cast<std::uint64_t>(static_cast<std::int64_t>(cell));
+  };
+  WangCell cell = {};
+  cell.x = split(position.x, from_x, cell.at.x);
+  cell.y = split(position.y, from_y, cell.at.y);
+  return cell;
+}
 
 /// Which tile lies in which cell of a plane without end (Deng 2022, section 5.5, Fig. 13). Cell (i, j) covers the texels
 /// [i size, (i+1) size) x [j size, (j+1) size).
@@ -54,6 +80,11 @@ class WangLayout {
     split(texel_x, place.cell_x, place.x);
     split(texel_y, place.cell_y, place.y);
     return place;
+  }
+  /// A position in its cell as the centre of a footprint, in tiles.
+  GLINT_HD Vec2 positionIn(const WangPlace& place) const {
+    const float per_tile = 1 / static_cast<float>(tiles_.size);
+    return {place.x * per_tile, place.y * per_tile};
   }
 
  private:

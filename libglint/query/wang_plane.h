@@ -43,11 +43,6 @@ class WangPlane {
     moved.origin_y_ = static_cast<std::uint64_t>(cell_y);
     return moved;
   }
-  /// The position in its cell as the centre of a footprint.
-  GLINT_HD Vec2 positionIn(const WangPlace& place) const {
-    const float per_tile = 1 / static_cast<float>(chooser_.size());
-    return {place.x * per_tile, place.y * per_tile};
-  }
 
   /// Density towards h, >= 0; O(1): nine pixels, or one (Pixels), of 16 or 32 images inside a tile, of up to four times as many at
   /// a corner.
@@ -105,18 +100,9 @@ class WangPlane {
   };
   GLINT_HD PlacedFootprint place(Footprint p) const { return place(p, origin_x_, origin_y_); }
   static GLINT_HD PlacedFootprint place(Footprint p, std::uint64_t from_x, std::uint64_t from_y) {
-    const auto split = [](float& u, std::uint64_t from) {
-      constexpr float kFarthest = 9e15f;  // whole numbers beyond are no cells that a float can name
-      const float cell = std::floor(u);
-      if (!(cell > -kFarthest && cell < kFarthest)) {
-        u = 0;
-        return from;
-      }
-      u = u - cell < 1 ? u - cell : float{kBelowOne};
-      return from + static_cast<std::uint64_t>(static_cast<std::int64_t>(cell));
-    };
-    const std::uint64_t cell_x = split(p.centre.x, from_x), cell_y = split(p.centre.y, from_y);
-    return {cell_x, cell_y, p};
+    const WangCell cell = wangCell(p.centre, from_x, from_y);
+    p.centre = cell.at;
+    return {cell.x, cell.y, p};
   }
 
   /// The round footprints of a stretched one. Their centres are on a map that is too large to be met twice, around its middle.

@@ -22,7 +22,7 @@ namespace glint {
 /// lose texels far out, so move the origin to the cell of the point, and ask with the position in the cell:
 ///
 ///     const WangPlace place = plane.layout().placeOf(texel_x, texel_y);  // doubles, in texels
-///     plane.movedTo(place.cell_x, place.cell_y).density(Footprint::isotropic(plane.positionIn(place), sigma), h);
+///     plane.movedTo(place.cell_x, place.cell_y).density(Footprint::isotropic(plane.layout().positionIn(place), sigma), h);
 ///
 /// Gaussian and box footprints, flat and smooth surfaces are exact up to a deviation of kExactTiles tiles. Wider ones tend to the
 /// mean of all tiles, which are equally frequent: from kFarTiles on the plane is asked by its mean, so that no footprint costs more
@@ -45,11 +45,6 @@ class WangReference {
     moved.origin_x_ = static_cast<std::uint64_t>(cell_x);
     moved.origin_y_ = static_cast<std::uint64_t>(cell_y);
     return moved;
-  }
-  /// The position in its cell as the centre of a footprint.
-  GLINT_HD Vec2 positionIn(const WangPlace& place) const {
-    const float per_tile = 1 / static_cast<float>(tiles_.size);
-    return {place.x * per_tile, place.y * per_tile};
   }
 
   /// Density towards h, per unit projected area; >= 0, finite.
@@ -113,20 +108,9 @@ class WangReference {
     FootprintWeights weights;
   };
   GLINT_HD Local localOf(Footprint p) const {
-    const auto split = [](float u, std::uint64_t origin, float& inside) {
-      constexpr float kFarthest = 9e15f;  // whole numbers beyond are no cells that a float can name
-      const float cell = std::floor(u);
-      if (!(cell > -kFarthest && cell < kFarthest)) {
-        inside = 0;
-        return origin;
-      }
-      inside = u - cell < 1 ? u - cell : float{kBelowOne};
-      return origin + static_cast<std::uint64_t>(static_cast<std::int64_t>(cell));
-    };
-    Vec2 inside;
-    const std::uint64_t cell_x = split(p.centre.x, origin_x_, inside.x), cell_y = split(p.centre.y, origin_y_, inside.y);
-    p.centre = inside;
-    return {cell_x, cell_y, FootprintWeights(p, tiles_.size, tiles_.size, Boundary::clamp)};
+    const WangCell cell = wangCell(p.centre, origin_x_, origin_y_);
+    p.centre = cell.at;
+    return {cell.x, cell.y, FootprintWeights(p, tiles_.size, tiles_.size, Boundary::clamp)};
   }
 
   /// Share of the mean of all tiles in the answer of a footprint, 0 to 1: linear in the variance.

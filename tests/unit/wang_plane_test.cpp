@@ -77,7 +77,7 @@ template <class Model>
 Model at(const Model& model, const Asked& asked, Footprint& p) {
   const WangPlace place = model.layout().placeOf(asked.x, asked.y);
   p = asked.shape;
-  p.centre = model.positionIn(place);
+  p.centre = model.layout().positionIn(place);
   return model.movedTo(place.cell_x, place.cell_y);
 }
 

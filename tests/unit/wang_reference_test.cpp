@@ -60,7 +60,7 @@ std::vector<Asked> footprints() {
 float implicitDensity(const WangReference& plane, const Asked& asked, Vec2 h) {
   const WangPlace place = plane.layout().placeOf(asked.x, asked.y);
   Footprint p = asked.shape;
-  p.centre = plane.positionIn(place);
+  p.centre = plane.layout().positionIn(place);
   return plane.movedTo(place.cell_x, place.cell_y).density(p, h);
 }
 
@@ -112,7 +112,7 @@ TEST(WangReference, MeansAreThoseOfTheExplicitPlane) {
     const Explicit part(tiles.data.view(), asked, Surface::flat, kReach);
     const WangPlace place = plane.layout().placeOf(asked.x, asked.y);
     Footprint p = asked.shape;
-    p.centre = plane.positionIn(place);
+    p.centre = plane.layout().positionIn(place);
     const double expected = part.reference.mean(part.footprint, range);
     EXPECT_NEAR(plane.movedTo(place.cell_x, place.cell_y).mean(p, range), expected, kRelative * expected) << asked.name;
   }
