@@ -18,7 +18,7 @@ struct BenchSettings {
   double budget_s = 1.5;          ///< for the errors of a set
   double longest_run_s = 0.05;    ///< of one of the five runs of a time
   int picture_pixels = 96;        ///< of a lit picture along each axis
-  std::size_t picture_sizes = 8;  ///< of pictures at most, the smallest footprints first: two octaves apart
+  std::size_t picture_sizes = 4;  ///< sizes of lit pictures at most, from the smallest on
   std::string assets;             ///< folder for the assets
   std::string output;             ///< file of the results, which is written after every measurement
 };
