@@ -13,8 +13,10 @@ const SHAPES = { round: "round", stretched: "stretched, 8 to 1", box: "square, t
 const SCENES = { plane: "lit plane", sphere: "lit sphere" };
 const isOfPictures = (metric) => metric === "rmse" || metric === "flip";
 const WITHIN = [0.01, 0.05, 0.1, 0.2];
-const SMALLEST = 1e-3, LARGEST = 10; // errors beyond are drawn there: a log axis has no 0, and beyond 1000 % nothing is right
-const inChart = (error) => Math.min(LARGEST, Math.max(SMALLEST, error));
+const LARGEST = 10; // beyond 1000 % nothing is right
+/** Least and largest error that charts show, which draw errors beyond there: a log axis has no 0. */
+const errorDomain = () => (state.metric === "flip" ? [1e-4, 1] : [1e-3, LARGEST]);
+const inChart = (error) => Math.min(errorDomain()[1], Math.max(errorDomain()[0], error));
 
 // Measurements and figures
 
@@ -85,12 +87,13 @@ function paretoFront(points) {
 const methodColors = () => ({ domain: [...new Set(results.measurements.map((measurement) => measurement.method))], scheme: "tableau10" });
 const chartWidth = () => Math.min(620, element("charts").clientWidth);
 const tickText = (x) => (state.metric === "flip" ? String(+x.toPrecision(1)) : x >= 0.01 ? `${+(100 * x).toPrecision(2)} %` : `${+(100 * x).toPrecision(1)} %`);
-const errorAxis = () => ({ type: "log", domain: [SMALLEST, state.metric === "flip" ? 1 : LARGEST], label: `↓ ${METRICS[state.metric]}`, tickFormat: tickText, grid: true });
+const errorAxis = () => ({ type: "log", domain: errorDomain(), label: `↓ ${METRICS[state.metric]}`, tickFormat: tickText, grid: true });
 
 function drawCost(id) {
   const { of, label } = COSTS[id];
   const points = measured().filter((measurement) => !isTruth(measurement)).map((measurement) => ({ measurement, cost: of(measurement), error: errorOf(measurement, state.metric, state.shape, state.size) }))
     .filter((point) => point.error != null && point.cost > 0).map((point) => ({ ...point, shown: inChart(point.error) }));
+  const front = paretoFront(points);
   const truth = measured().filter((measurement) => isTruth(measurement) && of(measurement) > 0);
   const asked = (point) => (setOf(point.measurement, state.shape, state.size).as_asked ? "" : "\nanswers a footprint of the same second moments");
   const chart = Plot.plot({
@@ -102,9 +105,9 @@ function drawCost(id) {
     marks: [
       Plot.ruleX(truth, { x: of, stroke: "currentColor", strokeDasharray: "3,3", strokeOpacity: 0.6 }),
       Plot.text(truth, { x: of, frameAnchor: "top-right", text: () => "brute force", rotate: -90, dx: -8, dy: 4, textAnchor: "end", fillOpacity: 0.7 }),
-      Plot.line(paretoFront(points), { x: "cost", y: "shown", stroke: "currentColor", strokeOpacity: 0.35, strokeWidth: 1.5 }),
+      Plot.line(front, { x: "cost", y: "shown", stroke: "currentColor", strokeOpacity: 0.35, strokeWidth: 1.5 }),
       Plot.dot(points, { x: "cost", y: "shown", fill: (point) => point.measurement.method, r: 5, stroke: "var(--paper)" }),
-      Plot.text(points, { x: "cost", y: "shown", text: (point) => point.measurement.setting, dy: -10, fontSize: 10, fillOpacity: 0.75 }),
+      Plot.text(front, { x: "cost", y: "shown", text: (point) => point.measurement.setting, dy: -10, fontSize: 10, fillOpacity: 0.75 }),
       Plot.tip(points, Plot.pointer({ x: "cost", y: "shown", fill: "var(--paper)",
         title: (point) => `${point.measurement.name}\n${errorText(state.metric, point.error)} · ${nsText(COSTS.time.of(point.measurement))} · ${bytesText(point.measurement.file_bytes)} · ${secondsText(point.measurement.prepare.total_s)}\n${point.measurement.command}${asked(point)}` })),
     ],
