@@ -8,7 +8,9 @@ import re
 import shutil
 import struct
 import subprocess
+import sys
 import time
+from xml.etree import ElementTree
 
 import jsonschema
 import pytest
@@ -317,6 +319,29 @@ def test_the_page_draws_and_its_choices_work(measured, tmp_path, width):
     assert shown["pictures"] == 5 and shown["same"]  # the plane's method, truth and error, a sphere and an NDF
     assert shown["figures"] == 1 + methods + 1 and shown["strip"] == methods + 1 and shown["cheapest"] >= 3
     assert shown["wide"], "the page is wider than the window"
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+def test_charts_are_written_as_files(measured, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    script = ROOT / "pipelines/bench_charts.py"
+
+    def run(page, *choices):
+        return subprocess.run([sys.executable, script, page, "--out", tmp_path / "charts", *choices], capture_output=True, text=True, timeout=250)
+
+    process = run(measured / "report.html", "--metric", "flip", "--shape", "sphere", "--size", "8")
+    assert process.returncode == 0, process.stderr
+    assert sorted(path.name for path in (tmp_path / "charts").iterdir()) == sorted(f"{name}.{ending}" for name in ("time", "bytes", "prepare", "sizes") for ending in ("svg", "png"))
+    for name in ("time", "bytes", "prepare", "sizes"):
+        svg = ElementTree.parse(tmp_path / f"charts/{name}.svg").getroot()
+        texts = ["".join(text.itertext()) for text in svg.iter("{http://www.w3.org/2000/svg}text")]
+        assert "bin map" in texts and any("FLIP" in text for text in texts)  # the legend and the axis
+        with image.open(tmp_path / f"charts/{name}.png") as picture:
+            assert picture.size == (2 * int(svg.get("width")), 2 * int(svg.get("height")))
+            assert len(picture.convert("RGB").getcolors(1 << 20)) > 20, "is empty"
+    assert "is no file" in run(tmp_path / "missing.html").stderr
+    (tmp_path / "other.html").write_text("<p>no charts</p>")
+    assert "has no charts" in run(tmp_path / "other.html").stderr
 
 
 PAGE_ACT = """<script>

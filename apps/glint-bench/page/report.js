@@ -100,7 +100,7 @@ function drawCost(id) {
     width: chartWidth(), height: 340, marginLeft: 56, marginRight: 20, marginBottom: 42,
     style: { background: "transparent", fontSize: "12px" },
     color: methodColors(),
-    x: { type: "log", label: `← ${label}`, grid: true, tickFormat: "~s", nice: true },
+    x: { type: "log", label: `← ${label}`, grid: true, tickFormat: "~s", nice: true, insetLeft: 32 },
     y: errorAxis(),
     marks: [
       Plot.ruleX(truth, { x: of, stroke: "currentColor", strokeDasharray: "3,3", strokeOpacity: 0.6 }),
@@ -133,9 +133,30 @@ function drawSizes() {
   element("sizes").replaceChildren(Plot.legend({ color: methodColors(), style: { background: "transparent" } }), chart);
 }
 
+/** Adds the methods and their colours above a chart, which has them beside it on the page. */
+function addLegend(chart, color) {
+  const width = Number(chart.getAttribute("width")), height = Number(chart.getAttribute("height")), line = 16, letter = 6.5;
+  let x = 6, row = 0;
+  const legend = d3.create("svg:g").attr("font-size", 11).attr("fill", "currentColor").attr("text-anchor", "start");
+  for (const method of color.domain) {
+    const needed = 26 + letter * method.length;
+    if (x + needed > width) { x = 6; row += 1; }
+    legend.append("circle").attr("cx", x + 5).attr("cy", line * row).attr("r", 5).attr("fill", color.apply(method));
+    legend.append("text").attr("x", x + 14).attr("y", line * row).attr("dy", "0.35em").text(method);
+    x += needed;
+  }
+  const above = line * (row + 1) + 8;
+  legend.attr("transform", `translate(0,${10 - above})`);
+  chart.append(legend.node());
+  chart.setAttribute("viewBox", `0 ${-above} ${width} ${height + above}`);
+  chart.setAttribute("height", height + above);
+}
+
 /** A chart as an SVG document of its own, with colours instead of the page's variables. */
 function svgText(id) {
-  const copy = element(id).querySelector("figure > svg, :scope > svg:last-of-type").cloneNode(true);
+  const chart = element(id).querySelector("figure > svg, :scope > svg:last-of-type");
+  const copy = chart.cloneNode(true);
+  addLegend(copy, chart.scale("color"));
   copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
   copy.style.background = "white";
   copy.style.color = "#24211b";
@@ -320,6 +341,20 @@ function draw() {
   drawImages();
 }
 
+/** Choices of the address, "report.html#metric=flip&shape=sphere&size=32&map=flakes"; "charts=all" keeps the charts for pipelines/bench_charts.py. */
+function chooseFromAddress() {
+  const asked = new URLSearchParams(location.hash.slice(1));
+  const map = results.maps.findIndex((map) => map.name === asked.get("map"));
+  if (map >= 0) state.map = map;
+  if (asked.get("metric") in METRICS) state.metric = asked.get("metric");
+  const shape = asked.get("shape");
+  if (shape in SHAPES || shape in SCENES) state.shape = shape;
+  if (shape in SCENES && hasPictures) chooseSubject(shape);
+  if (Number(asked.get("size")) > 0) state.size = Number(asked.get("size"));
+  element("map").value = state.map;
+  element("metric").value = state.metric;
+}
+
 function start() {
   if (results.maps.length === 0) {
     element("about").textContent = "The results hold no map.";
@@ -358,7 +393,9 @@ function start() {
   for (const button of document.querySelectorAll("[data-save-png]")) button.addEventListener("click", () => savePng(button.dataset.savePng));
   let width = chartWidth();
   addEventListener("resize", () => { if (chartWidth() !== width) { width = chartWidth(); draw(); } });
+  chooseFromAddress();
   draw();
+  if (location.hash.includes("charts=all")) document.body.dataset.charts = JSON.stringify(Object.fromEntries([...Object.keys(COSTS), "sizes"].map((id) => [id, svgText(id)])));
 }
 
 start();
