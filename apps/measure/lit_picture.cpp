@@ -27,17 +27,18 @@ constexpr Vec3 kToLight = {0.06f, 0.705f, 0.7067f};
 constexpr double kDark = 1e-3;
 
 /// What a pixel sees; nothing where there is no surface.
-std::optional<LitPixel> litPixel(const NormalMap& map, const SmithMasking& masking, const Scene& scene, const Ray& ray) {
-  const std::optional<Hit> hit = scene.intersect(ray);
+std::optional<LitPixel> litPixel(const NormalMap& map, const SmithMasking& masking, const lit::Scene& scene,
+                                 const lit::Ray& ray) {
+  const std::optional<lit::Hit> hit = scene.intersect(ray);
   if (!hit) return {};
-  const Vec3 s = normalized(hit->dpdu), t = cross(hit->normal, s);
+  const Vec3 s = lit::normalized(hit->dpdu), t = lit::cross(hit->normal, s);
   const auto local = [&](Vec3 w) { return Vec3{dot(w, s), dot(w, t), dot(w, hit->normal)}; };
   LitPixel pixel;
   const Vec2 middle = {0.5f, 0.5f};  // the middle of the map is in the middle of the picture
-  pixel.footprint =
-      footprintFromDifferentials(hit->uv + middle, uvDifferential(hit->dpdu, hit->dpdv, stepOnSurface(ray, *hit, ray.dx)),
-                                 uvDifferential(hit->dpdu, hit->dpdv, stepOnSurface(ray, *hit, ray.dy)), map.width, map.height);
-  const Vec3 wo = local(-1.0f * ray.direction), wi = local(normalized(kToLight));
+  pixel.footprint = footprintFromDifferentials(
+      hit->uv + middle, uvDifferential(hit->dpdu, hit->dpdv, lit::stepOnSurface(ray, *hit, ray.dx)),
+      uvDifferential(hit->dpdu, hit->dpdv, lit::stepOnSurface(ray, *hit, ray.dy)), map.width, map.height);
+  const Vec3 wo = local(-1.0f * ray.direction), wi = local(lit::normalized(kToLight));
   if (!aboveHorizon(wo) || !aboveHorizon(wi)) return pixel;
   pixel.half = halfVectorOf(wi, wo).disk;
   pixel.response = masking.visibility(wi, wo) * wi.z;
@@ -68,17 +69,17 @@ std::string packed(const std::vector<float>& radiance) {
 
 }  // namespace
 
-std::string_view sceneName(Shape shape) { return shape == Shape::quad ? "plane" : "sphere"; }
+std::string_view sceneName(lit::Shape shape) { return shape == lit::Shape::quad ? "plane" : "sphere"; }
 
-std::vector<LitPixel> litPixels(const NormalMap& map, Shape shape, float sigma_texels, int size) {
+std::vector<LitPixel> litPixels(const NormalMap& map, lit::Shape shape, float sigma_texels, int size) {
   const SmithMasking masking(slopesOf(map), kBenchSigmaR);
   // Footprints are as wide as the camera is far away.
   const auto middle = 0.5f * static_cast<float>(size);
-  const LitPixel near = *litPixel(map, masking, Scene(shape, 1), Camera(1, size).ray(middle, middle));
+  const LitPixel near = *litPixel(map, masking, lit::Scene(shape, 1), lit::Camera(1, size).ray(middle, middle));
   const Covariance& c = near.footprint.covariance;
   const float distance = sigma_texels / std::sqrt(std::sqrt(c.xx * c.yy - c.xy * c.xy));
-  const Scene scene(shape, distance);
-  const Camera camera(distance, size);
+  const lit::Scene scene(shape, distance);
+  const lit::Camera camera(distance, size);
   std::vector<LitPixel> pixels;
   for (int y = 0; y < size; ++y)
     for (int x = 0; x < size; ++x)
@@ -87,7 +88,7 @@ std::vector<LitPixel> litPixels(const NormalMap& map, Shape shape, float sigma_t
   return pixels;
 }
 
-LitTruth::LitTruth(const NormalMap& map, const NormalSearch& truth, Shape shape, float sigma_texels, int size)
+LitTruth::LitTruth(const NormalMap& map, const NormalSearch& truth, lit::Shape shape, float sigma_texels, int size)
     : shape_(shape), sigma_texels_(sigma_texels), size_(size), pixels_(litPixels(map, shape, sigma_texels, size)) {
   radiance_ = radianceOf(pixels_, [&](const Footprint& p, Vec2 h) { return truth.density(p, h); });
 }
@@ -136,7 +137,7 @@ nlohmann::json LitTruth::errorsOf(const api::OpenedNdf& ndf) const {
 std::vector<LitTruth> litTruths(const NormalMap& map, const std::vector<float>& sizes, int pixels) {
   const NormalSearch search(map, kBenchSigmaR);
   std::vector<LitTruth> truths;
-  for (const Shape shape : {Shape::quad, Shape::sphere}) {
+  for (const lit::Shape shape : {lit::Shape::quad, lit::Shape::sphere}) {
     const std::size_t first = truths.size();
     for (const float sigma : sizes) truths.emplace_back(map, search, shape, sigma, pixels);
     for (std::size_t k = first; k < truths.size(); ++k) truths[k].setWhite(std::max(kDark, truths.back().brightRadiance()));

@@ -24,18 +24,18 @@ struct LitPixel {
 /// @param shape         quad or sphere
 /// @param sigma_texels  deviation of the footprint in the middle of the picture, geometric mean of both axes, texels
 /// @param size          of the square picture, pixels
-std::vector<LitPixel> litPixels(const NormalMap& map, Shape shape, float sigma_texels, int size);
+std::vector<LitPixel> litPixels(const NormalMap& map, lit::Shape shape, float sigma_texels, int size);
 
 /// "plane", "sphere"
-std::string_view sceneName(Shape shape);
+std::string_view sceneName(lit::Shape shape);
 
 /// The exact picture of a surface.
 class LitTruth {
  public:
   /// @param truth  of the map
-  LitTruth(const NormalMap& map, const NormalSearch& truth, Shape shape, float sigma_texels, int size);
+  LitTruth(const NormalMap& map, const NormalSearch& truth, lit::Shape shape, float sigma_texels, int size);
 
-  Shape shape() const { return shape_; }
+  lit::Shape shape() const { return shape_; }
   float sigmaTexels() const { return sigma_texels_; }
   /// Radiance that one in fifty pixels of the surface exceeds.
   double brightRadiance() const;
@@ -51,7 +51,7 @@ class LitTruth {
  private:
   std::vector<float> shown(const std::vector<float>& radiance) const;
 
-  Shape shape_;
+  lit::Shape shape_;
   float sigma_texels_;
   int size_;
   double white_ = 1;

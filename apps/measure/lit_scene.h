@@ -8,7 +8,7 @@
 
 /// Surfaces in front of a camera. World: x right, y away from the eye, z up; one unit is the width of the map. So a camera that
 /// moves away sees more of the map in each pixel.
-namespace glint::apps {
+namespace glint::apps::lit {
 
 constexpr float kRadiansPerDegree = 0.0174532925f;
 
@@ -131,4 +131,4 @@ class Scene {
   Sphere sphere_;
 };
 
-}  // namespace glint::apps
+}  // namespace glint::apps::lit

@@ -8,16 +8,16 @@ namespace render {
 using glint::dot;
 using glint::Vec2;
 using glint::Vec3;
-using glint::apps::Camera;
-using glint::apps::cross;
-using glint::apps::Hit;
-using glint::apps::kRadiansPerDegree;
-using glint::apps::normalized;
-using glint::apps::Quad;
-using glint::apps::Ray;
-using glint::apps::Scene;
-using glint::apps::Shape;
-using glint::apps::Sphere;
-using glint::apps::stepOnSurface;
+using glint::apps::lit::Camera;
+using glint::apps::lit::cross;
+using glint::apps::lit::Hit;
+using glint::apps::lit::kRadiansPerDegree;
+using glint::apps::lit::normalized;
+using glint::apps::lit::Quad;
+using glint::apps::lit::Ray;
+using glint::apps::lit::Scene;
+using glint::apps::lit::Shape;
+using glint::apps::lit::Sphere;
+using glint::apps::lit::stepOnSurface;
 
 }  // namespace render

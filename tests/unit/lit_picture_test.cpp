@@ -38,7 +38,7 @@ TEST(NormalSearch, SumsAsReference) {
 
 TEST(LitPicture, HasTheFootprintThatIsAskedInTheMiddle) {
   const test::OwnedMap map = someMap();
-  for (const Shape shape : {Shape::quad, Shape::sphere}) {
+  for (const lit::Shape shape : {lit::Shape::quad, lit::Shape::sphere}) {
     for (const float sigma : {2.0f, 32.0f}) {
       const std::vector<LitPixel> pixels = litPixels(map.map(), shape, sigma, kSize);
       ASSERT_EQ(pixels.size(), std::size_t{kSize} * kSize);
@@ -54,7 +54,7 @@ TEST(LitPicture, HasTheFootprintThatIsAskedInTheMiddle) {
 
 TEST(LitPicture, MiddleOfThePlaneMirrorsTheLight) {
   const test::OwnedMap map = someMap();
-  const std::vector<LitPixel> pixels = litPixels(map.map(), Shape::quad, 4, kSize);
+  const std::vector<LitPixel> pixels = litPixels(map.map(), lit::Shape::quad, 4, kSize);
   const Vec2 half = pixels[kSize * kSize / 2 + kSize / 2].half;
   EXPECT_LT(std::hypot(half.x, half.y), 0.05f);
 }
