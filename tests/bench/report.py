@@ -1,6 +1,7 @@
 """Writes docs/BENCHMARKS.md, its charts and docs/benchmarks.csv from the results of bench.py. Normally run by `make bench-report`.
 
-The page has a short table for each method; the CSV has every number.
+The page answers the questions that people bring, each with one chart and one table; then come the figures of each method, folded. The CSV has every
+number. What pictures show is read from docs/limits.csv, which `make limits` writes.
 """
 
 import argparse
@@ -14,16 +15,30 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-LABELS = {"pyramid": "pyramid", "cp16": "cp", "cp32": "cp", "tucker-tolerance": "tucker", "pca-tolerance": "pca"}
+LABELS = {"pyramid": "pyramid", "cp16": "cp", "cp32": "cp", "tucker-tolerance": "tucker", "pca-tolerance": "pca", "moments": "moments"}
+# Of methods, the same in every chart.
+COLOURS = {"pyramid": "C0", "cp": "C1", "tucker": "C2", "pca": "C3", "bin map": "C4", "histograms": "C5", "moments": "C6", "brute force": "0.5", "light": "C8",
+           "displacement": "C9"}
+MARKERS = ("o", "s", "^", "D", "v")  # of maps
 PAGE = """# Measurements
 
-Written by `make bench-report`; do not edit. Every number is in [benchmarks.csv](benchmarks.csv).
+Written by `make bench-report`; do not edit. Every number, with its target and the figure of its paper, is a line of [benchmarks.csv](benchmarks.csv).
+`glint-bench map.glint -o results.json` measures the same on a map of yours, and `glint-bench --report results.json -o report.html` charts it.
 
-## What the numbers mean
+- [Which method for my scene?](#which-method-for-my-scene)
+- [How right, and how quick, is an answer?](#how-right-and-how-quick-is-an-answer)
+- [How small is an asset?](#how-small-is-an-asset)
+- [How long does an asset take to make?](#how-long-does-an-asset-take-to-make)
+- [What is not reached yet?](#what-is-not-reached-yet)
+- Every method by itself: {methods}
+- [How it was measured](#how-it-was-measured): read it before you quote a number
+"""
+CONDITIONS = """
+## How it was measured
 
 {machine}
-Maps are {size}^2 texels unless a line says otherwise, made by glint-synth and stored as 8-bit PNG (arguments:
-`tests/bench/bench.py`).
+Maps are {size}^2 texels unless a line says otherwise, made by glint-synth and stored as 8-bit PNG (arguments: `tests/bench/bench.py`). `make bench` measures,
+`make bench-report` writes this page; what pictures show is measured by `make limits`, on maps of 1024^2 texels: [LIMITS](LIMITS.md) says how.
 
 - **Time** of a command is the time of its whole process, reading and writing files included, {repeats}.
   Time of a query is of one thread. *Random* queries ask footprints of every size anywhere, so that most miss the caches;
@@ -31,7 +46,7 @@ Maps are {size}^2 texels unless a line says otherwise, made by glint-synth and s
 - **Error** is |D' - D| / |D| over the pixels of an NDF image: D' as the asset answers, D by brute force over the texels.
   *At centres*, the footprints are the ones that the asset stores. *At random*, they lie anywhere and have any size of an
   octave, so that the asset has to interpolate.
-- **Target** is the figure that this project aims for. Missed targets are listed below each table.
+- **Target** is the figure that this project aims for.
 - **Paper** is the figure of the method's paper, on its authors' machine and maps.
 - A span, such as 1 to 3 s, is over the maps unless the text above the table says otherwise.
 """
@@ -144,26 +159,51 @@ def folded(title, lines):
 
 
 def target_notes(rows):
-    """Targets that cannot hold for the method, and a folded list of the missed ones."""
+    """Targets that cannot hold for the method."""
     text = ""
     for reason in dict.fromkeys(filter(None, map(cannot_hold, rows))):
         group = [row for row in rows if cannot_hold(row) == reason]
         figures = ", ".join(dict.fromkeys(f"*{row['figure'].rpartition(', ')[0]}*" for row in group))
         text += f"\nCannot hold here ({limits(group)}; measured {span([row['value'] for row in group], group[0]['unit'])}): {figures}. {reason}\n"
-    over = missed(rows)
-    return text + folded(f"{len(over)} of {len(judged(rows))} targets missed",
-                         [f"- {row['figure']}: {span([row['value']], row['unit'])}, target {limits([row])}" for row in over])
+    return text
 
 
-def method_sections(rows, charts):
-    """A section for each method that was measured, with its charts."""
-    text, rest = "", rows
+def by_method(rows):
+    """(title, what it is, its lines, its rows) of each method that was measured."""
+    rest = rows
     for title, belongs, what, lines in METHODS:
         own = [row for row in rest if re.fullmatch(belongs, f"{row['section']}: {row['figure']}")]
         rest = [row for row in rest if row not in own]
         if own:
-            text += f"\n## {title}\n\n{what}\n\n{method_table(own, lines)}\n{target_notes(own)}{charts.get(title, '')}"
+            yield title, what, lines, own
+
+
+def method_sections(rows, charts):
+    """A section for each method that was measured: its chart, and its figures, folded."""
+    text = "\n## Every method by itself\n"
+    for title, what, lines, own in by_method(rows):
+        met = len(judged(own)) - len(missed(own))
+        summary = "figures" + (f": {met} of {len(judged(own))} targets are met" if judged(own) else "")
+        text += f"\n### {title}\n\n{what}\n{charts.get(title, '')}{folded(summary, [method_table(own, lines), *target_notes(own).splitlines()])}"
     return text
+
+
+def targets_table(rows):
+    """Targets of each method, and the figure that is furthest from its own."""
+    text = ["| method | targets met | cannot hold | furthest from its target |", "|---|---|---|---|"]
+    for title, _, _, own in by_method(rows):
+        if not judged(own):
+            continue
+        worst = max(judged(own), key=lambda row: row["value"] / row["target"] if row["target"] else 0)
+        over = len(missed(own))
+        furthest = f"{worst['figure']}: {span([worst['value']], worst['unit'])}, target {limits([worst])}" if over else ""
+        text.append(f"| [{title}](#{anchor(title)}) | {len(judged(own)) - over} of {len(judged(own))} | {sum(1 for row in own if cannot_hold(row)) or ''} | {furthest} |")
+    return "\n".join(text)
+
+
+def anchor(title):
+    """Name of a heading in links."""
+    return re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")
 
 
 def octave_rows(accuracy):
@@ -216,21 +256,35 @@ def points(accuracy, rows):
 
 def chart(data, column, label, path):
     figure, axis = plt.subplots(figsize=(6, 4))
-    markers = {"pyramid": "s", "cp": "o", "tucker": "^", "pca": "D"}
     names = sorted({name for name, _ in data})
     for (name, kind), point in data.items():
-        if point[column] is None:
-            continue
-        axis.plot(point[column], point[1], markers[LABELS[kind]], color=f"C{names.index(name)}", markersize=7)
-    for k, name in enumerate(names):
-        axis.plot([], [], "-", color=f"C{k}", label=name, linewidth=4)
-    for method, marker in markers.items():
-        axis.plot([], [], marker, color="0.3", label=method)
+        if point[column] is not None:
+            axis.plot(point[column], point[1], MARKERS[names.index(name)], color=COLOURS[LABELS[kind]], markersize=7)
+    legend(axis, dict.fromkeys(LABELS[kind] for _, kind in data), names)
     finish(figure, axis, path, xlabel=label, ylabel="relative L2 error, mean over octaves")
 
 
-def finish(figure, axis, path, **labels):
-    axis.set(xscale="log", yscale="log", **labels)
+def legend(axis, methods, maps):
+    """Entries for the colours of methods and the markers of maps."""
+    for method in methods:
+        axis.plot([], [], "-", color=COLOURS[method], label=method, linewidth=4)
+    for name, marker in zip(maps, MARKERS):
+        axis.plot([], [], marker, color="0.3", label=name)
+
+
+def plain_numbers(axis):
+    """Ticks of a log axis without powers; 2 and 5 are labelled, too, where there are few others."""
+    low, high = axis.get_view_interval()
+    is_short = high < 50 * low
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_formatter(lambda value, _: f"{value:g}" if is_short and f"{value:e}"[0] in "25" else "")
+
+
+def finish(figure, axis, path, scales=None, **labels):
+    axis.set(**(scales or {"xscale": "log", "yscale": "log"}), **labels)
+    for one in (axis.xaxis, axis.yaxis):
+        if one.get_scale() == "log":
+            plain_numbers(one)
     axis.grid(True, which="both", color="0.92", linewidth=0.6)
     axis.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1, 0.5))
     figure.savefig(path, dpi=110, bbox_inches="tight", metadata={"Software": None})
@@ -284,17 +338,242 @@ def stride_chart(rows, path):
     return path.name
 
 
-def overview(data, rows, docs):
-    """Charts of error against bytes and time of every kind that answers densities."""
+def named(rows, pattern, scale=1):
+    """Values of the rows whose figures have this form."""
+    return [scale * row["value"] for row in rows if re.fullmatch(pattern, row["figure"])]
+
+
+def in_units(values, units):
+    """A span in the largest of some units in which its least value is not below .1: [(1e9, "s"), (1e6, "ms")]."""
+    if not values:
+        return ""
+    scale, unit = next(((scale, unit) for scale, unit in units if min(values) >= 0.1 * scale), units[-1])
+    return span([value / scale for value in values], unit)
+
+
+def times(nanoseconds):
+    return in_units(nanoseconds, [(1e9, "s"), (1e6, "ms"), (1e3, "µs"), (1, "ns")])
+
+
+def sizes(megabytes):
+    return in_units(megabytes, [(1, "MB"), (1e-3, "kB")])
+
+
+def percents(errors):
+    return span([100 * error for error in errors], "%") if errors else ""
+
+
+def answers_table(rows):
+    """Times and errors of an answer, a line for each method."""
+    text = ["| method | density anywhere | the same again | mean over a range | half vector drawn | error, stored footprints | error, any footprints |",
+            "|---|---|---|---|---|---|---|"]
+    for title, kind in (("Pyramid", "pyramid"), ("Compressed pyramid: CP", r"cp\d+"), ("Compressed pyramid: Tucker", "tucker-tolerance"),
+                        ("Compressed pyramid: PCA", "pca-tolerance"), ("Moments", "moments")):
+        cells = [times(named(rows, rf"{figure}, \S+ {kind}")) for figure in ("density, random", "density, warm", "mean, random", "sample, random")]
+        cells += [percents(named(rows, rf"rel_l2 at {place}, worst octave, \S+ {kind}")) for place in ("centres", "random")]
+        text.append(line_of(title, cells))
+    us = 1e3
+    text.append(line_of("Bin map", [times(named(rows, r"bin map, density, .* 2K.*")), "", "", "", percents(named(rows, r"bin map, median error, .* 2K.*")), ""]))
+    near = r"flat, round, sigma (?:1|2|4)"
+    text.append(line_of("Texels", [times(named(rows, rf"from texels, density, random, .*, {near}", us)), "", times(named(rows, rf"from texels, mean, .*, {near}", us)), "",
+                                   percents(named(rows, rf"from texels, error, density, random, .*, {near}")), ""]))
+    text.append(line_of("Histograms", [times(named(rows, r"histogram of (?:64|256|1024)\^2, stride 8, .*", us)) + ", all directions", "", "", "", "", ""]))
+    text.append("| plain GGX, for comparison | " + " | ".join(times(named(rows, rf"{figure}, \S+ ggx")) for figure in (
+        "density, random", "density, warm", "mean, random", "sample, random")) + " | | |")
+    return "\n".join(text)
+
+
+def line_of(title, cells):
+    return f"| [{title}](#{anchor(title)}) | {' | '.join(cells)} |"
+
+
+def megabytes_of(data, kind):
+    """MB of the assets of a kind."""
+    return [point[0] for (_, name), point in data.items() if re.fullmatch(kind, name)]
+
+
+def preparations(rows, data):
+    """(title, method, seconds, MB, paper) of each method."""
+    ms, mib = 1e-3, 1.048576
+    build = {"Pyramid": ("pyramid", r"pyramid, flat, .*", 1), "Compressed pyramid: CP": ("cp", r"compress, cp .*", 1),
+             "Compressed pyramid: Tucker": ("tucker", r"compress, tucker to the error of cp.*", 1), "Compressed pyramid: PCA": ("pca", r"compress, pca .*", 1),
+             "Bin map": ("bin map", r"bin map, build, .* 2K.*", ms), "Moments": ("moments", r"moments, \S+", 1),
+             "Histograms": ("histograms", r"histograms, stride 8, .*", 1), "Light": ("light", r"SH l.*, 65x128", 1),
+             "Displacement": ("displacement", r"displace, factor 16, .*, 1024\^2", 1)}
+    small = {"Bin map": named(rows, r"bin map, bytes, .* 2K.*", mib), "Moments": named(rows, r"bytes of moments, .*"),
+             "Histograms": named(rows, r"bytes of histograms, stride 8, .*"), "Displacement": named(rows, r"bytes of T and S.*", 1e-3)}
+    kinds = {"Pyramid": "pyramid", "Compressed pyramid: CP": r"cp\d+", "Compressed pyramid: Tucker": "tucker-tolerance", "Compressed pyramid: PCA": "pca-tolerance"}
+    for title, (method, pattern, scale) in build.items():
+        paper = "; ".join(dict.fromkeys(row["paper"] for row in rows if re.fullmatch(pattern, row["figure"]) and row["paper"]))
+        yield title, method, named(rows, pattern, scale), small.get(title) or megabytes_of(data, kinds.get(title, "")), paper
+
+
+def preparation_table(rows, data):
+    text = ["| method | time | in the paper |", "|---|---|---|"]
+    text += [line_of(title, [times([1e9 * value for value in seconds]), paper]) for title, _, seconds, _, paper in preparations(rows, data) if seconds]
+    return "\n".join(text)
+
+
+def bytes_table(rows, data):
+    papers = {"Compressed pyramid: CP": r"bytes, cp .*", "Bin map": r"bin map, bytes, .* 2K.*", "Histograms": r"bytes of histograms, stride 8, .*",
+              "Displacement": r"bytes of T and S.*"}
+    text = ["| method | asset | in the paper |", "|---|---|---|"]
+    for title, _, _, megabytes, _ in preparations(rows, data):
+        paper = "; ".join(dict.fromkeys(row["paper"] for row in rows if re.fullmatch(papers.get(title, ""), row["figure"]) and row["paper"]))
+        if megabytes:
+            text.append(line_of(title, [sizes(megabytes), paper]))
+    return "\n".join(text)
+
+
+def paper_seconds(text):
+    """The shortest time that a paper's figure names, "22 to 36 min, 6 cores"; nothing if it names none."""
+    found = [float(match[1]) * {"s": 1, "min": 60}[match[2]] for match in re.finditer(r"([\d.]+)(?: to [\d.]+)? (s|min)\b", text)]
+    return min(found) if found else None
+
+
+def preparation_chart(rows, data, path):
+    """Times to prepare: bars over the maps, and crosses for the papers."""
+    figure, axis = plt.subplots(figsize=(6, 3.4))
+    found = [entry for entry in preparations(rows, data) if entry[2]]
+    for k, (_, method, seconds, _, paper) in enumerate(found):
+        axis.plot([min(seconds), max(seconds)], [k, k], "o-", color=COLOURS[method], linewidth=5, markersize=6)
+        if (theirs := paper_seconds(paper)) is not None:
+            axis.plot(theirs, k, "x", color="0.3", markersize=7)
+    axis.set_yticks(range(len(found)), [title for title, *_ in found])
+    axis.invert_yaxis()
+    axis.plot([], [], "o-", color="0.5", linewidth=5, label="here, two cores")
+    axis.plot([], [], "x", color="0.3", label="paper, its machine")
+    finish(figure, axis, path, {"xscale": "log"}, xlabel="seconds")
+
+
+# What pictures show
+
+SURFACES = {"isotropic": "fine noise", "brushed": "brushed metal", "scratches": "scratches", "weave": "a weave", "flakes": "flakes"}
+SMALL_LIGHT = "0.5"
+DISTANCES = {"0.25": "2", "1": "8", "4": "32"}  # of the eye in map widths: deviations in the middle of the square, texels
+CLOSE, ROUGH = 0.02, 0.1  # FLIP of the methods in the table; 0 is equal pictures
+
+
+class Pictures:
+    """Figures of docs/limits.csv."""
+
+    def __init__(self, path):
+        self.values = {}
+        with open(path, newline="", encoding="utf-8") as file:
+            for row in csv.DictReader(file):
+                self.values[row["map"], row["model"], row["figure"], row["distance"], row["light"]] = float(row["value"])
+
+    def models(self):
+        return list(dict.fromkeys(model for _, model, *_ in self.values if not model.startswith("Reference")))
+
+    def flip(self, surface, model, distance, light=SMALL_LIGHT):
+        return self.values.get((surface, model, "flip", distance, light))
+
+    def microseconds(self, surface, model, distance):
+        """Of a mean over a range. Where a compressed pyramid answers as the pyramid does, that was timed."""
+        times = [self.values.get((surface, name, "microseconds of a mean", distance, "")) for name in (model, "pyramid")]
+        return next((time for time in times if time is not None), None)
+
+
+def quickest(pictures, surface, distance, flip):
+    """(microseconds, the quickest method whose picture has at most this FLIP, its FLIP); nothing if there is none."""
+    able = [(pictures.microseconds(surface, model, distance), model) for model in pictures.models() if pictures.flip(surface, model, distance) <= flip]
+    return (*min(able), pictures.flip(surface, min(able)[1], distance)) if able else None
+
+
+def scene_cell(pictures, surface, distance):
+    """The quickest close method, and a rough one that takes at most half its time."""
+    close, rough = (quickest(pictures, surface, distance, flip) for flip in (CLOSE, ROUGH))
+    words = [f"{title}**{found[1]}**, {times([1e3 * found[0]])} ({found[2]:.2g})"
+             for title, found in (("", close), ("rough: ", rough if close is None or rough[0] <= 0.5 * close[0] else None)) if found]
+    return "; ".join(words) or "none"
+
+
+def scene_table(pictures):
+    """The quickest method whose picture is close, or roughly right, for each surface and distance."""
+    text = [f"| surface | {' | '.join(f'pixels of {texels} texels' for texels in DISTANCES.values())} |", "|---" * (1 + len(DISTANCES)) + "|"]
+    for surface, words in SURFACES.items():
+        text.append(f"| {words} | {' | '.join(scene_cell(pictures, surface, distance) for distance in DISTANCES)} |")
+    return "\n".join(text)
+
+
+def scene_chart(pictures, path):
+    """FLIP against the time of a mean, far away."""
+    figure, axis = plt.subplots(figsize=(6, 4))
+    far = list(DISTANCES)[-1]
+    for k, surface in enumerate(SURFACES):
+        for model in pictures.models():
+            axis.plot(pictures.microseconds(surface, model, far), pictures.flip(surface, model, far), MARKERS[k], color=COLOURS[model], markersize=7)
+    for flip in (CLOSE, ROUGH):
+        axis.axhline(flip, color="0.5", linestyle=":")
+    legend(axis, pictures.models(), SURFACES.values())
+    finish(figure, axis, path, xlabel="microseconds of a mean over a range", ylabel=f"FLIP, pixels of {DISTANCES[far]} texels")
+
+
+def scene_section(docs):
+    """Which method for which scene; nothing where no pictures were made."""
+    if not (docs / "limits.csv").exists():
+        return ""
+    pictures = Pictures(docs / "limits.csv")
+    scene_chart(pictures, docs / "flip-time.png")
+    return f"""
+## Which method for my scene?
+
+The quickest method whose pictures are close to those of brute force (FLIP up to {CLOSE}; *rough*: up to {ROUGH}), by the surface and by how much of it a pixel sees. The
+light is as small as the sun, and glints are hardest under small lights. Time is of one mean over a range of half vectors; the number in brackets is the FLIP of the picture:
+what a person sees who looks at both in turns, 0 to 1.
+
+{scene_table(pictures)}
+
+From far away, each point is a method (colour) on a surface (marker). Down and to the left is better.
+
+![FLIP against the time of a mean](flip-time.png)
+
+Bin maps answer boxes, and are compared with brute force over boxes. Tucker and PCA have `--tolerance 0.1`, CP `--rank 16`: a smaller tolerance errs less. Your
+tolerance is another one: `glint-plan` [chooses](TOOLS.md#plans) for a scene. What each method does to pictures is in [LIMITS](LIMITS.md).
+"""
+
+
+def question_sections(data, rows, docs):
+    """The questions that people bring, each with a chart and a table."""
     chart(data, 0, "MB", docs / "error-bytes.png")
     chart(data, 2, "nanoseconds of a density query, random", docs / "error-time.png")
+    preparation_chart(rows, data, docs / "prepare-time.png")
     held, excused = judged(rows), sum(1 for row in rows if cannot_hold(row))
-    return f"""
-Every point is an asset: its error against its bytes, and against the time of a query. Down and to the left is better.
-{len(held) - len(missed(rows))} of {len(held)} targets are met; {excused} more cannot hold for their kind of asset, as its section says.
+    return f"""{scene_section(docs)}
+## How right, and how quick, is an answer?
+
+{answers_table(rows)}
+
+Errors are of the octave of footprint sizes in which they are largest. Moments are one smooth lobe, whatever the map: their error is that of a lobe. Bin maps of every
+roughness, with the median error of their own boxes; texels at footprints of 1 to 4 texels.
+
+![Error against time of a density](error-time.png)
+
+## How small is an asset?
+
+{bytes_table(rows, data)}
+
+CP has as many columns as its paper, Tucker and PCA have its error. `--tolerance` trades bytes for error. Histograms have a stride of 8. The tables of a
+displacement need the cells of its map, too.
 
 ![Error against bytes](error-bytes.png)
-![Error against time](error-time.png)
+
+## How long does an asset take to make?
+
+{preparation_table(rows, data)}
+
+Whole processes, from file to file. A compressed pyramid is made from a pyramid, whose time comes before. Light is 65 x 128 directions at order 60: its two tables.
+Displacement is of maps of 1024^2 texels.
+
+![Time to make an asset](prepare-time.png)
+
+## What is not reached yet?
+
+{len(held) - len(missed(rows))} of {len(held)} targets are met; {excused} more cannot hold for their kind of asset. Lines of [benchmarks.csv](benchmarks.csv) whose value is above the
+target are the missed ones.
+
+{targets_table(rows)}
 """
 
 
@@ -330,10 +609,10 @@ def main():
     docs.mkdir(exist_ok=True)
     machine = "{processor}, {cores} cores; load {load:.1f} before the run; revision {revision}.".format(**results["machine"])
     repeats = f"the median of {results['repeats']} runs" if results["repeats"] > 1 else "of one run"
-    text = PAGE.format(machine=machine, size=results["size_texels"], repeats=repeats)
-    if data := points(accuracy, rows):
-        text += overview(data, rows, docs)
-    text += method_sections(rows, method_charts(rows, light, docs))
+    data = points(accuracy, rows)
+    links = ", ".join(f"[{title}](#{anchor(title)})" for title, *_ in by_method(rows))
+    text = PAGE.format(methods=links) + question_sections(data, rows, docs) + method_sections(rows, method_charts(rows, light, docs))
+    text += CONDITIONS.format(machine=machine, size=results["size_texels"], repeats=repeats)
     (docs / "BENCHMARKS.md").write_text(text, encoding="utf-8")
     write_csv([*rows, *octave_rows(accuracy), *light_rows(light)], docs / "benchmarks.csv")
     print(f"wrote {docs}/BENCHMARKS.md, its charts and benchmarks.csv")
