@@ -10,16 +10,10 @@ import json
 import pathlib
 import re
 
-import matplotlib
+from charts import chart, light_error_chart, light_time_chart, preparation_chart, stride_chart
+from scenes import scene_section
+from words import percents, sizes, span, times
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
-
-LABELS = {"pyramid": "pyramid", "cp16": "cp", "cp32": "cp", "tucker-tolerance": "tucker", "pca-tolerance": "pca", "moments": "moments"}
-# Of methods, the same in every chart.
-COLOURS = {"pyramid": "C0", "cp": "C1", "tucker": "C2", "pca": "C3", "bin map": "C4", "histograms": "C5", "moments": "C6", "brute force": "0.5", "light": "C8",
-           "displacement": "C9"}
-MARKERS = ("o", "s", "^", "D", "v")  # of maps
 PAGE = """# Measurements
 
 Written by `make bench-report`; do not edit. Every number, with its target and the figure of its paper, is a line of [benchmarks.csv](benchmarks.csv).
@@ -118,17 +112,6 @@ def judged(rows):
 
 def missed(rows):
     return [row for row in judged(rows) if row["value"] > row["target"]]
-
-
-def digits(value):
-    """Three digits, without an exponent where the number is large."""
-    return f"{value:.3g}" if abs(value) < 1000 else f"{float(f'{value:.3g}'):,.0f}"
-
-
-def span(values, unit):
-    """The value, or the least and the greatest of several."""
-    low, high = digits(min(values)), digits(max(values))
-    return f"{low if low == high else f'{low} to {high}'} {unit}".strip()
 
 
 def limits(rows):
@@ -254,113 +237,9 @@ def points(accuracy, rows):
             for name, assets in accuracy.items() for asset in assets}
 
 
-def chart(data, column, label, path):
-    figure, axis = plt.subplots(figsize=(6, 4))
-    names = sorted({name for name, _ in data})
-    for (name, kind), point in data.items():
-        if point[column] is not None:
-            axis.plot(point[column], point[1], MARKERS[names.index(name)], color=COLOURS[LABELS[kind]], markersize=7)
-    legend(axis, dict.fromkeys(LABELS[kind] for _, kind in data), names)
-    finish(figure, axis, path, xlabel=label, ylabel="relative L2 error, mean over octaves")
-
-
-def legend(axis, methods, maps):
-    """Entries for the colours of methods and the markers of maps."""
-    for method in methods:
-        axis.plot([], [], "-", color=COLOURS[method], label=method, linewidth=4)
-    for name, marker in zip(maps, MARKERS):
-        axis.plot([], [], marker, color="0.3", label=name)
-
-
-def plain_numbers(axis):
-    """Ticks of a log axis without powers; 2 and 5 are labelled, too, where there are few others."""
-    low, high = axis.get_view_interval()
-    is_short = high < 50 * low
-    axis.set_major_formatter(lambda value, _: f"{value:g}")
-    axis.set_minor_formatter(lambda value, _: f"{value:g}" if is_short and f"{value:e}"[0] in "25" else "")
-
-
-def finish(figure, axis, path, scales=None, **labels):
-    axis.set(**(scales or {"xscale": "log", "yscale": "log"}), **labels)
-    for one in (axis.xaxis, axis.yaxis):
-        if one.get_scale() == "log":
-            plain_numbers(one)
-    axis.grid(True, which="both", color="0.92", linewidth=0.6)
-    axis.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1, 0.5))
-    figure.savefig(path, dpi=110, bbox_inches="tight", metadata={"Software": None})
-    plt.close(figure)
-
-
-def light_error_chart(light, path):
-    """Error of the product integral against the order, for every environment and roughness of the lobes."""
-    figure, axis = plt.subplots(figsize=(6, 4))
-    lights = list(dict.fromkeys(row["light"] for row in light["errors_by_order"]))
-    styles = dict(zip(sorted({row["sigma_r"] for row in light["errors_by_order"]}), (":", "-", "--")))
-    for k, name in enumerate(lights):
-        for sigma, style in styles.items():
-            rows = [row for row in light["errors_by_order"] if row["light"] == name and row["sigma_r"] == sigma and row["order"] >= 5]
-            axis.plot([row["order"] for row in rows], [row["none"] for row in rows], "o" + style, color=f"C{k}", markersize=4,
-                      label=f"{name.replace('_', ' ')}, roughness {sigma:.2g}")
-    finish(figure, axis, path, xlabel="order", ylabel="relative RMS error against quadrature")
-    return path.name
-
-
-def light_time_chart(light, path):
-    """Time of the product integral, and of Monte Carlo for the same error."""
-    figure, axis = plt.subplots(figsize=(6, 4))
-    lights = list(dict.fromkeys(row["light"] for row in light["times_at_equal_error"]))
-    for k, name in enumerate(lights):
-        rows = [row for row in light["times_at_equal_error"] if row["light"] == name]
-        errors = [row["nearest"]["error"] for row in rows]
-        label = name.replace("_", " ")
-        axis.plot(errors, [row["nearest"]["us"] for row in rows], "o-", color=f"C{k}", label=f"{label}, harmonics")
-        axis.plot(errors, [row["nearest"]["monte_carlo_us"] for row in rows], "x--", color=f"C{k}", label=f"{label}, Monte Carlo")
-        for row in rows:
-            axis.annotate(f"{row['order']}", (row["nearest"]["error"], row["nearest"]["us"]), textcoords="offset points", xytext=(5, 4), fontsize=7)
-    finish(figure, axis, path, xlabel="relative RMS error against quadrature", ylabel="microseconds of one shading point")
-    return path.name
-
-
-def stride_chart(rows, path):
-    """Bytes of accumulated histograms against the time of a query, along the strides of their tables."""
-    figure, axis = plt.subplots(figsize=(6, 4))
-    values = {row["figure"]: row["value"] for row in rows}
-    strides = {int(match[1]) for figure_name in values if (match := re.fullmatch(r"bytes of histograms, stride (\d+), \S+", figure_name))}
-    names = sorted({figure_name.split(", ")[2] for figure_name in values if figure_name.startswith("bytes of histograms")})
-    for k, name in enumerate(names):
-        for size, style in ((64, "o:"), (256, "s-"), (1024, "^--")):
-            points = [(values[f"bytes of histograms, stride {s}, {name}"], values[f"histogram of {size}^2, stride {s}, {name}"], s) for s in sorted(strides)]
-            axis.plot([p[0] for p in points], [p[1] for p in points], style, color=f"C{k}", markersize=5, label=f"{name}, {size}$^2$ texels")
-            if size == 256:
-                for megabytes, us, stride in points:
-                    axis.annotate(f"{stride}", (megabytes, us), textcoords="offset points", xytext=(4, 4), fontsize=7)
-    finish(figure, axis, path, xlabel="MB (numbers: stride in texels)", ylabel="microseconds of a histogram")
-    return path.name
-
-
 def named(rows, pattern, scale=1):
     """Values of the rows whose figures have this form."""
     return [scale * row["value"] for row in rows if re.fullmatch(pattern, row["figure"])]
-
-
-def in_units(values, units):
-    """A span in the largest of some units in which its least value is not below .1: [(1e9, "s"), (1e6, "ms")]."""
-    if not values:
-        return ""
-    scale, unit = next(((scale, unit) for scale, unit in units if min(values) >= 0.1 * scale), units[-1])
-    return span([value / scale for value in values], unit)
-
-
-def times(nanoseconds):
-    return in_units(nanoseconds, [(1e9, "s"), (1e6, "ms"), (1e3, "µs"), (1, "ns")])
-
-
-def sizes(megabytes):
-    return in_units(megabytes, [(1, "MB"), (1e-3, "kB")])
-
-
-def percents(errors):
-    return span([100 * error for error in errors], "%") if errors else ""
 
 
 def answers_table(rows):
@@ -425,120 +304,11 @@ def bytes_table(rows, data):
     return "\n".join(text)
 
 
-def paper_seconds(text):
-    """The shortest time that a paper's figure names, "22 to 36 min, 6 cores"; nothing if it names none."""
-    found = [float(match[1]) * {"s": 1, "min": 60}[match[2]] for match in re.finditer(r"([\d.]+)(?: to [\d.]+)? (s|min)\b", text)]
-    return min(found) if found else None
-
-
-def preparation_chart(rows, data, path):
-    """Times to prepare: bars over the maps, and crosses for the papers."""
-    figure, axis = plt.subplots(figsize=(6, 3.4))
-    found = [entry for entry in preparations(rows, data) if entry[2]]
-    for k, (_, method, seconds, _, paper) in enumerate(found):
-        axis.plot([min(seconds), max(seconds)], [k, k], "o-", color=COLOURS[method], linewidth=5, markersize=6)
-        if (theirs := paper_seconds(paper)) is not None:
-            axis.plot(theirs, k, "x", color="0.3", markersize=7)
-    axis.set_yticks(range(len(found)), [title for title, *_ in found])
-    axis.invert_yaxis()
-    axis.plot([], [], "o-", color="0.5", linewidth=5, label="here, two cores")
-    axis.plot([], [], "x", color="0.3", label="paper, its machine")
-    finish(figure, axis, path, {"xscale": "log"}, xlabel="seconds")
-
-
-# What pictures show
-
-SURFACES = {"isotropic": "fine noise", "brushed": "brushed metal", "scratches": "scratches", "weave": "a weave", "flakes": "flakes"}
-SMALL_LIGHT = "0.5"
-DISTANCES = {"0.25": "2", "1": "8", "4": "32"}  # of the eye in map widths: deviations in the middle of the square, texels
-CLOSE, ROUGH = 0.02, 0.1  # FLIP of the methods in the table; 0 is equal pictures
-
-
-class Pictures:
-    """Figures of docs/limits.csv."""
-
-    def __init__(self, path):
-        self.values = {}
-        with open(path, newline="", encoding="utf-8") as file:
-            for row in csv.DictReader(file):
-                self.values[row["map"], row["model"], row["figure"], row["distance"], row["light"]] = float(row["value"])
-
-    def models(self):
-        return list(dict.fromkeys(model for _, model, *_ in self.values if not model.startswith("Reference")))
-
-    def flip(self, surface, model, distance, light=SMALL_LIGHT):
-        return self.values.get((surface, model, "flip", distance, light))
-
-    def microseconds(self, surface, model, distance):
-        """Of a mean over a range. Where a compressed pyramid answers as the pyramid does, that was timed."""
-        times = [self.values.get((surface, name, "microseconds of a mean", distance, "")) for name in (model, "pyramid")]
-        return next((time for time in times if time is not None), None)
-
-
-def quickest(pictures, surface, distance, flip):
-    """(microseconds, the quickest method whose picture has at most this FLIP, its FLIP); nothing if there is none."""
-    able = [(pictures.microseconds(surface, model, distance), model) for model in pictures.models() if pictures.flip(surface, model, distance) <= flip]
-    return (*min(able), pictures.flip(surface, min(able)[1], distance)) if able else None
-
-
-def scene_cell(pictures, surface, distance):
-    """The quickest close method, and a rough one that takes at most half its time."""
-    close, rough = (quickest(pictures, surface, distance, flip) for flip in (CLOSE, ROUGH))
-    words = [f"{title}**{found[1]}**, {times([1e3 * found[0]])} ({found[2]:.2g})"
-             for title, found in (("", close), ("rough: ", rough if close is None or rough[0] <= 0.5 * close[0] else None)) if found]
-    return "; ".join(words) or "none"
-
-
-def scene_table(pictures):
-    """The quickest method whose picture is close, or roughly right, for each surface and distance."""
-    text = [f"| surface | {' | '.join(f'pixels of {texels} texels' for texels in DISTANCES.values())} |", "|---" * (1 + len(DISTANCES)) + "|"]
-    for surface, words in SURFACES.items():
-        text.append(f"| {words} | {' | '.join(scene_cell(pictures, surface, distance) for distance in DISTANCES)} |")
-    return "\n".join(text)
-
-
-def scene_chart(pictures, path):
-    """FLIP against the time of a mean, far away."""
-    figure, axis = plt.subplots(figsize=(6, 4))
-    far = list(DISTANCES)[-1]
-    for k, surface in enumerate(SURFACES):
-        for model in pictures.models():
-            axis.plot(pictures.microseconds(surface, model, far), pictures.flip(surface, model, far), MARKERS[k], color=COLOURS[model], markersize=7)
-    for flip in (CLOSE, ROUGH):
-        axis.axhline(flip, color="0.5", linestyle=":")
-    legend(axis, pictures.models(), SURFACES.values())
-    finish(figure, axis, path, xlabel="microseconds of a mean over a range", ylabel=f"FLIP, pixels of {DISTANCES[far]} texels")
-
-
-def scene_section(docs):
-    """Which method for which scene; nothing where no pictures were made."""
-    if not (docs / "limits.csv").exists():
-        return ""
-    pictures = Pictures(docs / "limits.csv")
-    scene_chart(pictures, docs / "flip-time.png")
-    return f"""
-## Which method for my scene?
-
-The quickest method whose pictures are close to those of brute force (FLIP up to {CLOSE}; *rough*: up to {ROUGH}), by the surface and by how much of it a pixel sees. The
-light is as small as the sun, and glints are hardest under small lights. Time is of one mean over a range of half vectors; the number in brackets is the FLIP of the picture:
-what a person sees who looks at both in turns, 0 to 1.
-
-{scene_table(pictures)}
-
-From far away, each point is a method (colour) on a surface (marker). Down and to the left is better.
-
-![FLIP against the time of a mean](flip-time.png)
-
-Bin maps answer boxes, and are compared with brute force over boxes. Tucker and PCA have `--tolerance 0.1`, CP `--rank 16`: a smaller tolerance errs less. Your
-tolerance is another one: `glint-plan` [chooses](TOOLS.md#plans) for a scene. What each method does to pictures is in [LIMITS](LIMITS.md).
-"""
-
-
 def question_sections(data, rows, docs):
     """The questions that people bring, each with a chart and a table."""
     chart(data, 0, "MB", docs / "error-bytes.png")
     chart(data, 2, "nanoseconds of a density query, random", docs / "error-time.png")
-    preparation_chart(rows, data, docs / "prepare-time.png")
+    preparation_chart(preparations(rows, data), docs / "prepare-time.png")
     held, excused = judged(rows), sum(1 for row in rows if cannot_hold(row))
     return f"""{scene_section(docs)}
 ## How right, and how quick, is an answer?
