@@ -345,7 +345,7 @@ TEST(AreaLights, SmallAndLargeLightsHideEachOther) {
 TEST(AreaLights, TextureLiesAlongTheAxes) {
   // Red along +u, green along +v.
   const RectangleLight light{{0, 0, 2}, {1, 0, 0}, {0, -1, 0}, {1, 1, 1}, 2, 2, {0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1}};
-  const Environment e = renderAreaLights({&light, 1}, {}, 64, 1);
+  const Environment e = renderAreaLights({&light, 1}, {}, 64, 2);
   const auto at = [&](float x, float y) { return e.at({x, y, 2}); };
   EXPECT_EQ(at(0.5f, 0.5f)[0], 1);
   EXPECT_EQ(at(-0.5f, 0.5f)[0], 0);
@@ -356,7 +356,7 @@ TEST(AreaLights, TextureLiesAlongTheAxes) {
 
 TEST(AreaLights, NearerLightsHideOthers) {
   const SphereLight spheres[] = {{{0, 0, 5}, 1, {1, 0, 0}, 0, 0, {}}, {{0, 0, 3}, 1, {0, 1, 0}, 0, 0, {}}};
-  const Environment e = renderAreaLights({}, spheres, 32, 2);
+  const Environment e = renderAreaLights({}, spheres, 64, 4);
   EXPECT_EQ(e.at({0, 0, 1})[0], 0);
   EXPECT_EQ(e.at({0, 0, 1})[1], 1);
 }

@@ -81,7 +81,7 @@ double pixelSolidAngle(int height, int row) {
 }
 
 /// A light is drawn from its own points where fewer rays than this lie across it.
-constexpr double kFewRays = 16;
+constexpr double kFewRays = 24;
 
 double angleBetween(Vec3 a, Vec3 b) {
   const Vec3 normal = cross(a, b);
@@ -278,7 +278,10 @@ Environment renderAreaLights(std::span<const RectangleLight> rectangles, std::sp
         // Rows of samples have equal shares of the pixel's solid angle: equal steps of cos(theta).
         const double low = std::cos(kPi * (1 - static_cast<double>(j) / height));
         const double high = std::cos(kPi * (1 - static_cast<double>(j + 1) / height));
-        const double z = low + (high - low) * (s / samples + 0.5) / samples;
+        // Neighbours around the axis are shifted against each other: else rings of rays would enter a light near the pole at once.
+        constexpr double kGoldenShare = 0.6180339887498949;
+        const double shift = std::fmod(kGoldenShare * (i * samples + s % samples), 1.0);
+        const double z = low + (high - low) * (s / samples + shift) / samples;
         const double phi = 2 * kPi * (i + (s % samples + 0.5) / samples) / environment.width;
         const double sine = std::sqrt(std::max(0.0, 1 - z * z));
         const Vec3 direction = {static_cast<float>(sine * std::cos(phi)), static_cast<float>(sine * std::sin(phi)),
