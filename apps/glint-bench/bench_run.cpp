@@ -13,7 +13,7 @@
 #include "measure/bench_errors.h"
 #include "measure/bench_times.h"
 #include "measure/candidates.h"
-#include "measure/child_process.h"
+#include "common/child_process.h"
 
 namespace glint::apps {
 namespace {

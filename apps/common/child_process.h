@@ -15,15 +15,23 @@ struct ChildRun {
   double cpu_s = 0;
   std::int64_t peak_bytes = 0;  ///< largest resident memory, as often as one looks: every few milliseconds
   std::string message;          ///< last line that it wrote to stderr
+  std::string output;           ///< what it wrote to stdout, if it was kept
+};
+
+/// How a program is run.
+struct ChildOptions {
+  bool keep_output = false;  ///< return what it writes to stdout
+  std::string folder = {};   ///< folder in which it runs; empty: that of this process
+  int shared_file = -1;      ///< open file that it gets too, so that a lock holds until both have ended; -1: none
 };
 
 /// The flags of this run that hold for programs that it starts: --threads, and --max-memory and --trust where they are given.
 std::vector<std::string> childFlags(const Tool& tool);
 
-/// Runs a program of this package, with nothing on stdin and stdout, and waits for it. A signal that ends this process ends the
-/// program, too.
+/// Runs a program of this package, with nothing on stdin, and waits for it. A signal that ends this process ends the program, too.
 /// @param words  name of the program, without folder, and its arguments
 /// @throws Error failed if the program cannot be started
-ChildRun runProgram(const std::vector<std::string>& words);
+/// @note thread-safe
+ChildRun runProgram(const std::vector<std::string>& words, const ChildOptions& options = {});
 
 }  // namespace glint::apps
