@@ -95,6 +95,13 @@ bool mayReplace(const std::string& path, OutputFormat format) {
       return head.starts_with("{\n \"schema\": \"glint-plan plan"sv) || head.starts_with("{\n \"schema\": \"glint-plan jobs"sv);
     case OutputFormat::plan_rules:
       return head.starts_with("# Made by glint-plan"sv);
+    case OutputFormat::manifest:
+      return head.starts_with("{\n \"schema\": \"glint-farm manifest"sv);
+    case OutputFormat::farm_log:
+      return head.starts_with("{\"key\":"sv);
+    case OutputFormat::test_report:
+      return head.find("glint-validate"sv) != std::string::npos &&
+             (head.starts_with("<?xml"sv) || head.starts_with("{\n \"$schema\""sv));
   }
   return false;
 }

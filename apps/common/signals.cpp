@@ -17,7 +17,7 @@ namespace {
 
 bool pipe_ended_process = false;
 std::atomic<bool> memory_ran_out = false;
-thread_local bool may_fail = false;  // in an allocation with std::nothrow
+thread_local bool may_fail = false;                                   // in an allocation with std::nothrow
 std::array<std::atomic<pid_t>, kMostChildren> running_children = {};  // 0: a free slot
 static_assert(std::atomic<pid_t>::is_always_lock_free, "a handler of signals reads it");
 std::atomic<int> stop_signal = 0;

@@ -437,7 +437,8 @@ bool Tool::isUnchanged() const {
   if (s.makes_more) return false;
   const formats::Provenance run{generator(), commandJson(), {}};
   return std::all_of(s.outputs.begin(), s.outputs.end(), [&](const std::string& output) {
-    return isMadeBy(output, run, [this] { return provenance(); }, s.trust);
+    return isMadeBy(
+        output, run, [this] { return provenance(); }, s.trust);
   });
 }
 
