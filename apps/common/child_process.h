@@ -13,7 +13,7 @@ struct ChildRun {
   int exit_code = 0;  ///< as a shell has it: 128 + n after signal n
   double wall_s = 0;
   double cpu_s = 0;
-  std::int64_t peak_bytes = 0;  ///< largest resident memory, as often as one looks: every few milliseconds
+  std::int64_t peak_bytes = 0;  ///< largest resident memory; of programs that take less than this one, as often as one looks
   std::string message;          ///< last line that it wrote to stderr
   std::string output;           ///< what it wrote to stdout, if it was kept
 };
