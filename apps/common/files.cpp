@@ -181,8 +181,9 @@ InputFile::InputFile(Tool& tool, const std::string& help, const std::string& nam
   });
 }
 
-InputFiles::InputFiles(Tool& tool, const std::string& help, const std::string& name) {
-  tool.parser().add_option(name, paths_, help)->required()->expected(1, CLI::detail::expected_max_vector_size);
+InputFiles::InputFiles(Tool& tool, const std::string& help, const std::string& name, bool required) {
+  CLI::Option* option = tool.parser().add_option(name, paths_, help);
+  option->expected(required ? 1 : 0, CLI::detail::expected_max_vector_size)->required(required);
   tool.addCheck([this, &tool] {
     for (const std::string& path : paths_) {
       checkRegular(path);

@@ -21,10 +21,10 @@ class InputFile {
   std::string path_;
 };
 
-/// Mix-in: one or more positional input files.
+/// Mix-in: positional input files, one or more, or any number where they are not required.
 class InputFiles {
  public:
-  InputFiles(Tool& tool, const std::string& help, const std::string& name = "INPUT");
+  InputFiles(Tool& tool, const std::string& help, const std::string& name, bool required);
   const std::vector<std::string>& paths() const { return paths_; }
 
  private:

@@ -9,37 +9,10 @@ using namespace glint;
 namespace {
 /// Runs one command: a tool with its options.
 template <class Command>
-int work(const apps::ToolInfo& info, int argc, char** argv) {
-  apps::Tool tool(info);
+int work(int argc, char** argv) {
+  apps::Tool tool(Command::info());
   Command command(tool);
   return tool.run(argc, argv, [&] { command.run(); });
-}
-
-int plan(int argc, char** argv) {
-  return work<apps::FarmPlanCommand>(
-      {"glint-farm plan",
-       "Writes down which assets to make of which maps, each once. Maps of the same bytes share their assets.",
-       "glint-farm plan textures -o farm.json --make 'normals --convention directx' --make 'pyramid --stride 8' --make cp",
-       "Kinds and the flags that they have by default are those of pipelines/glint.mk; a kind that another is made of comes "
-       "with it. "
-       "In flags, % stands for the name of the map without its ending, as in --make 'displaced --base-color colours/%.png'."},
-      argc, argv);
-}
-
-int run(int argc, char** argv) {
-  return work<apps::FarmRunCommand>({"glint-farm run",
-                                     "Makes the assets of a manifest that are missing, changed or damaged. Several may run on "
-                                     "one manifest at once, on one machine or "
-                                     "on many that see its folder. To go on after an interruption, run it again.",
-                                     "glint-farm run farm.json --jobs 4"},
-                                    argc, argv);
-}
-
-int status(int argc, char** argv) {
-  return work<apps::FarmStatusCommand>(
-      {"glint-farm status", "Says how many assets of a manifest are made, and why others are not.",
-       "glint-farm status farm.json"},
-      argc, argv);
 }
 
 /// Without a command there is only help.
@@ -60,5 +33,8 @@ int nothing(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return apps::runCommand(argc, argv, {{"plan", plan}, {"run", run}, {"status", status}}, nothing);
+  using namespace apps;
+  return runCommand(argc, argv,
+                    {{"plan", work<FarmPlanCommand>}, {"run", work<FarmRunCommand>}, {"status", work<FarmStatusCommand>}},
+                    nothing);
 }

@@ -36,6 +36,16 @@ std::size_t countDone(const Manifest& manifest) {
 
 }  // namespace
 
+ToolInfo FarmPlanCommand::info() {
+  return {
+      "glint-farm plan",
+      "Writes down which assets to make of which maps, each once. Maps of the same bytes share their assets.",
+      "glint-farm plan textures -o farm.json --make 'normals --convention directx' --make 'pyramid --stride 8' --make cp",
+      "Kinds and the flags that they have by default are those of pipelines/glint.mk; a kind that another is made of comes "
+      "with it. "
+      "In flags, % stands for the name of the map without its ending, as in --make 'displaced --base-color colours/%.png'."};
+}
+
 FarmPlanCommand::FarmPlanCommand(Tool& tool)
     : tool_(tool), output_(tool, OutputFormat::manifest, "manifest (.json): docs/json/files/farm-manifest.schema.json") {
   tool.option("FOLDER", folder_, "images, also those in its folders").unrecorded();

@@ -12,6 +12,7 @@ namespace glint::apps {
 /// `glint-farm plan`: which assets to make of which maps.
 class FarmPlanCommand {
  public:
+  static ToolInfo info();
   explicit FarmPlanCommand(Tool& tool);
   /// Writes the manifest.
   void run();

@@ -27,6 +27,14 @@ void requireOurVersion(const Manifest& manifest, const std::string& ours) {
 
 }  // namespace
 
+ToolInfo FarmRunCommand::info() {
+  return {"glint-farm run",
+          "Makes the assets of a manifest that are missing, changed or damaged. Several may run on "
+          "one manifest at once, on one machine or "
+          "on many that see its folder. To go on after an interruption, run it again.",
+          "glint-farm run farm.json --jobs 4"};
+}
+
 FarmRunCommand::FarmRunCommand(Tool& tool) : tool_(tool), manifest_(tool, "manifest of glint-farm plan (.json)", "MANIFEST") {
   tool.option("--shard", shard_, "make one part of the assets: I/N is part I of N, from 1/N to N/N")
       .defaultText("1/1")

@@ -13,6 +13,7 @@ namespace glint::apps {
 /// `glint-farm run`: makes what is missing of a manifest.
 class FarmRunCommand {
  public:
+  static ToolInfo info();
   explicit FarmRunCommand(Tool& tool);
   /// Exit code 4 if an entry could not be made. Ends the process by the signal that stopped it.
   void run();

@@ -80,6 +80,11 @@ std::string textOf(const FarmStatus& s) {
 
 }  // namespace
 
+ToolInfo FarmStatusCommand::info() {
+  return {"glint-farm status", "Says how many assets of a manifest are made, and why others are not.",
+          "glint-farm status farm.json"};
+}
+
 FarmStatusCommand::FarmStatusCommand(Tool& tool)
     : tool_(tool), manifest_(tool, "manifest of glint-farm plan (.json)", "MANIFEST") {}
 

@@ -8,6 +8,7 @@ namespace glint::apps {
 /// `glint-farm status`: what is made of a manifest.
 class FarmStatusCommand {
  public:
+  static ToolInfo info();
   explicit FarmStatusCommand(Tool& tool);
   void run();
 
