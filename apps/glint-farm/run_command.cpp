@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "common/memory.h"
 #include "common/signals.h"
@@ -76,6 +78,12 @@ std::vector<std::string> FarmRunCommand::flags() const {
 void FarmRunCommand::run() {
   const Manifest manifest = readManifest(manifest_.path());
   requireOurVersion(manifest, tool_.generator());
+  std::error_code none;
+  if (!log_.empty() &&
+      std::filesystem::weakly_canonical(log_, none) == std::filesystem::weakly_canonical(manifest.logPath(), none)) {
+    throw Error(ErrorCode::usage, "cli.usage", log_, "--log", "is the file in which the manifest's own records are kept",
+                "name another file, or leave out --log: the records have the same lines");
+  }
   const StopScope stop;
   EntryRecords records(manifest);
   HashCache hashes(manifest.hashesPath());

@@ -303,6 +303,16 @@ def test_status_counts_and_gives_reasons(farm):
     assert status()["changed"] == 1
 
 
+def test_the_log_is_another_file_than_the_records(farm):
+    plan(farm, "normals")
+    process = farm("run", "farm.json", "--log", "farm.json.log")
+    assert process.returncode == 1 and "name another file" in process.stderr
+    (farm.folder / "mine.txt").write_text("mine")
+    process = farm("run", "farm.json", "--log", "mine.txt")
+    assert process.returncode == 1 and "--force" in process.stderr
+    assert (farm.folder / "mine.txt").read_text() == "mine"
+
+
 # Faults.
 
 
