@@ -112,7 +112,10 @@ EntryTry EntryMaker::make(const ManifestEntry& entry) {
     }
     if (!readsPlannedMaps(manifest_, entry, hashes_))
       throw Error(ErrorCode::invalid_input, "farm.map_changed", entry.inputs.front(), "",
-                  "is not the map that was planned: its bytes have changed", "run glint-farm plan again");
+                  entry.twins.empty()
+                      ? "is not the map that was planned: its bytes have changed"
+                      : "and its twins, such as " + entry.twins.front() + ", are not the maps that were planned",
+                  "run glint-farm plan again");
     return runLocked(entry, lock->file());
   } catch (const Error& error) {
     return failure(error);

@@ -88,11 +88,15 @@ void ManifestBuilder::add(FarmJob job) {
   if (const auto known = maker_of_.find(job.output); known != maker_of_.end() && known->second == key) return;
   claim(job.output, key);
   if (const auto same = manifest_.entry_of_key.find(key); same != manifest_.entry_of_key.end()) {
-    manifest_.entries[same->second].links.push_back(job.output);
+    ManifestEntry& entry = manifest_.entries[same->second];
+    entry.links.push_back(job.output);
+    for (const std::string& input : job.inputs)
+      if (maps_.contains(input) && std::find(entry.inputs.begin(), entry.inputs.end(), input) == entry.inputs.end())
+        entry.twins.push_back(input);
     ++duplicates_;
     return;
   }
-  ManifestEntry entry{key, job.output, {}, job.command, job.inputs, {}};
+  ManifestEntry entry{key, job.output, {}, {}, job.command, job.inputs, {}};
   for (const std::string& input : job.inputs)
     if (const auto maker = maker_of_.find(input); maker != maker_of_.end()) entry.after.push_back(maker->second);
   manifest_.entry_of_key.emplace(key, manifest_.entries.size());

@@ -47,12 +47,14 @@ void HashCache::save() {
 }
 
 bool readsPlannedMaps(const Manifest& manifest, const ManifestEntry& entry, HashCache& hashes) {
-  return std::all_of(entry.inputs.begin(), entry.inputs.end(), [&](const std::string& input) {
+  const auto is_planned = [&](const std::string& input) {
     const auto map = manifest.hash_of_map.find(input);
     if (map == manifest.hash_of_map.end()) return true;
     const std::string file = manifest.at(input);
     return !stampOf(file) || hashes.hash(input, file) == map->second;
-  });
+  };
+  return std::all_of(entry.inputs.begin(), entry.inputs.end(), is_planned) &&
+         std::all_of(entry.twins.begin(), entry.twins.end(), is_planned);
 }
 
 }  // namespace glint::apps

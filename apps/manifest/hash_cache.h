@@ -45,7 +45,7 @@ class HashCache {
   std::size_t read_files_ = 0;
 };
 
-/// Whether the maps that an entry reads have the bytes that were planned. Maps that are missing do not count.
+/// Whether the maps that an entry reads, and their twins, have the bytes that were planned. Maps that are missing do not count.
 /// @throws Error io
 bool readsPlannedMaps(const Manifest& manifest, const ManifestEntry& entry, HashCache& hashes);
 

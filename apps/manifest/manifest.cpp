@@ -30,11 +30,12 @@ bool isProgram(std::string_view name) {
 ManifestEntry entryOf(const Json& json) {
   using Texts = std::vector<std::string>;
   return {json.at("key").get<std::string>(), json.at("output").get<std::string>(), json.at("links").get<Texts>(),
-          json.at("command").get<Texts>(),   json.at("inputs").get<Texts>(),       json.at("after").get<Texts>()};
+          json.at("twins").get<Texts>(),     json.at("command").get<Texts>(),      json.at("inputs").get<Texts>(),
+          json.at("after").get<Texts>()};
 }
 
 Json entryJson(const ManifestEntry& entry) {
-  return {{"key", entry.key},         {"output", entry.output}, {"links", entry.links},
+  return {{"key", entry.key},         {"output", entry.output}, {"links", entry.links}, {"twins", entry.twins},
           {"command", entry.command}, {"inputs", entry.inputs}, {"after", entry.after}};
 }
 

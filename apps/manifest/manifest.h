@@ -17,6 +17,7 @@ struct ManifestEntry {
   std::string key;     ///< hash of what decides the bytes: version, program, flags, and hashes of maps or keys of inputs
   std::string output;  ///< the asset
   std::vector<std::string> links;    ///< further names of the same asset, of maps with the same bytes
+  std::vector<std::string> twins;    ///< these maps, as far as the entry would read them itself
   std::vector<std::string> command;  ///< program of this package, and arguments; it runs in the folder of the manifest
   std::vector<std::string> inputs;   ///< files that it reads
   std::vector<std::string> after;    ///< keys of entries, before this one, that make some of them

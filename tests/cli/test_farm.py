@@ -339,6 +339,15 @@ def test_a_map_that_changed_since_the_plan_is_not_made(farm):
     assert (farm.folder / "assets/a.glint").samefile(farm.folder / "assets/b.glint")
 
 
+def test_a_map_that_is_no_longer_the_twin_of_another_is_told(farm):
+    shutil.copy(farm.folder / "maps/a.png", farm.folder / "maps/b.png")
+    assert plan(farm, "normals")["duplicates"] == 1
+    run(farm)
+    shutil.copy(farm.folder / "maps/c.png", farm.folder / "maps/b.png")
+    process = farm("run", "farm.json")
+    assert process.returncode == 4 and "maps/b.png" in process.stderr and "run glint-farm plan again" in process.stderr
+
+
 def test_a_damaged_asset_is_made_again(farm):
     plan(farm, PYRAMID)
     run(farm)
