@@ -100,7 +100,8 @@ man:  ## manual pages of the tools from their --help, in build/man
 	@command -v help2man >/dev/null || { echo 'make man needs help2man: install the package help2man' >&2; exit 1; }
 	@$(MAKE) build
 	@mkdir -p build/man
-	@for tool in $$(cd apps && echo glint-*) 'glint-query light' 'glint-query reflectance' 'glint-query plane'; do \
+	@for tool in $$(cd apps && echo glint-*) 'glint-query light' 'glint-query reflectance' 'glint-query plane' 'glint-farm plan' \
+	  'glint-farm run' 'glint-farm status'; do \
 	  summary=$$(build/bin/$$tool --help | sed -n '1s/\. .*\|\.$$//p'); \
 	  help2man --no-info --manual glint --name "$$summary" --output "build/man/$${tool// /-}.1" "build/bin/$$tool"; done
 	@echo "build/man; for example: man -l build/man/glint-query.1"

@@ -95,6 +95,13 @@ bool mayReplace(const std::string& path, OutputFormat format) {
       return head.starts_with("{\n \"schema\": \"glint-plan plan"sv) || head.starts_with("{\n \"schema\": \"glint-plan jobs"sv);
     case OutputFormat::plan_rules:
       return head.starts_with("# Made by glint-plan"sv);
+    case OutputFormat::manifest:
+      return head.starts_with("{\n \"schema\": \"glint-farm manifest"sv);
+    case OutputFormat::farm_log:
+      return head.starts_with("{\"key\":"sv);
+    case OutputFormat::test_report:
+      return head.find("glint-validate"sv) != std::string::npos &&
+             (head.starts_with("<?xml"sv) || head.starts_with("{\n \"$schema\""sv));
   }
   return false;
 }
@@ -174,8 +181,9 @@ InputFile::InputFile(Tool& tool, const std::string& help, const std::string& nam
   });
 }
 
-InputFiles::InputFiles(Tool& tool, const std::string& help, const std::string& name) {
-  tool.parser().add_option(name, paths_, help)->required()->expected(1, CLI::detail::expected_max_vector_size);
+InputFiles::InputFiles(Tool& tool, const std::string& help, const std::string& name, bool required) {
+  CLI::Option* option = tool.parser().add_option(name, paths_, help);
+  option->expected(required ? 1 : 0, CLI::detail::expected_max_vector_size)->required(required);
   tool.addCheck([this, &tool] {
     for (const std::string& path : paths_) {
       checkRegular(path);

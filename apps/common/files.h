@@ -21,10 +21,10 @@ class InputFile {
   std::string path_;
 };
 
-/// Mix-in: one or more positional input files.
+/// Mix-in: positional input files, one or more, or any number where they are not required.
 class InputFiles {
  public:
-  InputFiles(Tool& tool, const std::string& help, const std::string& name = "INPUT");
+  InputFiles(Tool& tool, const std::string& help, const std::string& name, bool required);
   const std::vector<std::string>& paths() const { return paths_; }
 
  private:
@@ -33,14 +33,17 @@ class InputFiles {
 
 /// The content of an output. It decides which files the output may replace.
 enum class OutputFormat : unsigned char {
-  asset,       ///< .glint
-  image,       ///< any image format
-  table,       ///< CSV with answers
-  depfile,     ///< rule for Make
-  results,     ///< JSON of glint-bench
-  page,        ///< HTML of glint-bench
-  plan,        ///< JSON of glint-plan
-  plan_rules,  ///< Makefile of glint-plan
+  asset,        ///< .glint
+  image,        ///< any image format
+  table,        ///< CSV with answers
+  depfile,      ///< rule for Make
+  results,      ///< JSON of glint-bench
+  page,         ///< HTML of glint-bench
+  plan,         ///< JSON of glint-plan
+  plan_rules,   ///< Makefile of glint-plan
+  manifest,     ///< JSON of glint-farm
+  farm_log,     ///< JSON lines of glint-farm, which grow
+  test_report,  ///< JUnit XML or SARIF of glint-validate
 };
 
 /// Checks an output before the work starts. Checks again, when all inputs and outputs are known, that no other file of the run

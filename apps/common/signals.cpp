@@ -7,6 +7,7 @@
 #include <cstring>
 #include <exception>
 #include <new>
+#include <stdexcept>
 
 #include "glint/formats/atomic_file.h"
 #include "glint/model/error.h"
@@ -16,12 +17,19 @@ namespace {
 
 bool pipe_ended_process = false;
 std::atomic<bool> memory_ran_out = false;
-thread_local bool may_fail = false;  // in an allocation with std::nothrow
-std::atomic<pid_t> running_child = 0;
+thread_local bool may_fail = false;                                   // in an allocation with std::nothrow
+std::array<std::atomic<pid_t>, kMostChildren> running_children = {};  // 0: a free slot
 static_assert(std::atomic<pid_t>::is_always_lock_free, "a handler of signals reads it");
+std::atomic<int> stop_signal = 0;
+static_assert(std::atomic<int>::is_always_lock_free, "a handler of signals sets it");
+
+void endChildren() {
+  for (const std::atomic<pid_t>& child : running_children)
+    if (const pid_t process = child; process > 0) ::kill(process, SIGTERM);
+}
 
 void endBy(int signal) {
-  if (const pid_t child = running_child; child > 0) ::kill(child, SIGTERM);
+  endChildren();
   formats::removeTemporaryFiles();
   struct sigaction fatal = {};
   fatal.sa_handler = SIG_DFL;
@@ -32,6 +40,14 @@ void endBy(int signal) {
   ::pthread_sigmask(SIG_UNBLOCK, &set, nullptr);
   ::raise(signal);
   ::_exit(128 + signal);  // the first process of a container does not end by a signal
+}
+
+void stopBy(int signal) {
+  int none = 0;
+  if (!stop_signal.compare_exchange_strong(none, signal)) endBy(signal);
+  const int error = errno;
+  endChildren();
+  errno = error;
 }
 
 /// Writes a message without taking memory, and ends the process.
@@ -88,7 +104,40 @@ SignalScope::~SignalScope() {
   pipe_ended_process = false;
 }
 
-void setChild(pid_t child) { running_child = child; }
+ChildScope::ChildScope(pid_t child) : slot_(0) {
+  for (; slot_ < running_children.size(); ++slot_) {
+    pid_t none = 0;
+    if (running_children[slot_].compare_exchange_strong(none, child)) break;
+  }
+  if (slot_ == running_children.size()) throw std::logic_error("too many children");
+  if (stop_signal != 0) ::kill(child, SIGTERM);  // the signal came before the child had its slot
+}
+
+ChildScope::~ChildScope() { running_children[slot_] = 0; }
+
+StopScope::StopScope() {
+  stop_signal = 0;
+  for (std::size_t k = 0; k < kSignals.size(); ++k) {
+    ::sigaction(kSignals[k], nullptr, &old_[k]);
+    if (old_[k].sa_handler == SIG_IGN) continue;
+    struct sigaction action = {};
+    action.sa_handler = stopBy;
+    action.sa_flags = SA_RESTART;
+    ::sigaction(kSignals[k], &action, nullptr);
+  }
+}
+
+StopScope::~StopScope() {
+  for (std::size_t k = 0; k < kSignals.size(); ++k) ::sigaction(kSignals[k], &old_[k], nullptr);
+  stop_signal = 0;
+}
+
+int StopScope::stopped() const { return stop_signal; }
+
+void endBySignal(int signal) {
+  endBy(signal);
+  ::_exit(128 + signal);
+}
 
 bool memoryRanOut() { return memory_ran_out; }
 

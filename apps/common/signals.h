@@ -4,6 +4,7 @@
 
 #include <array>
 #include <csignal>
+#include <cstddef>
 
 namespace glint::apps {
 
@@ -27,8 +28,39 @@ class SignalScope {
   std::array<struct sigaction, kSignals.size()> old_ = {};
 };
 
-/// A process that ends with this one: a signal that ends this process is sent to it as TERM. 0: none.
-void setChild(pid_t child);
+/// A process that ends with this one: as long as the scope lives, a signal that ends this process is sent to it as TERM.
+class ChildScope {
+ public:
+  /// @param child  a process that this one has started, and has not waited for before the end of the scope
+  explicit ChildScope(pid_t child);
+  ChildScope(const ChildScope&) = delete;
+  ChildScope& operator=(const ChildScope&) = delete;
+  ~ChildScope();
+
+ private:
+  std::size_t slot_;
+};
+/// Most processes that end with this one.
+inline constexpr std::size_t kMostChildren = 256;
+
+/// Within a SignalScope, makes INT, TERM, HUP and QUIT no end at once: the children get TERM, and the program, which asks stopped(),
+/// finishes what it has begun and calls endBySignal(). A second signal ends it at once. One scope at a time.
+class StopScope {
+ public:
+  StopScope();
+  ~StopScope();
+  StopScope(const StopScope&) = delete;
+  StopScope& operator=(const StopScope&) = delete;
+  /// The signal that came; 0: none.
+  int stopped() const;
+
+ private:
+  static constexpr std::array kSignals = {SIGINT, SIGTERM, SIGHUP, SIGQUIT};
+  std::array<struct sigaction, kSignals.size()> old_ = {};
+};
+
+/// Removes temporary files and ends the process by a signal: a shell sees 128 + n.
+[[noreturn]] void endBySignal(int signal);
 
 /// Whether an allocation of C++ has failed in this process, here or in a library. Allocations that may fail (std::nothrow) do not
 /// count.

@@ -26,6 +26,7 @@
 #include "common/signals.h"
 #include "common/standard_streams.h"
 #include "common/suggest.h"
+#include "common/unchanged.h"
 #include "glint/formats/hash.h"
 #include "glint/model/shown_text.h"
 
@@ -136,6 +137,8 @@ struct Tool::State {
   bool quiet = false;
   bool verbose = false;
   bool force = false;
+  bool skip_unchanged = false;
+  bool makes_more = false;
   bool trust = false;
   std::uint64_t max_memory = 0;
   ProgressMode progress_mode = ProgressMode::automatic;
@@ -200,6 +203,9 @@ void Tool::addStandardOptions() {
   CLI::Option* quiet = app.add_flag("--quiet,-q", s.quiet, "no warnings and no progress")->group(group);
   app.add_flag("--verbose,-v", s.verbose, "print a summary of the result")->group(group)->excludes(quiet);
   app.add_flag("--force,-f", s.force, "replace an output that is an input, read-only or of another kind")->group(group);
+  app.add_flag("--skip-unchanged", s.skip_unchanged,
+               "leave an asset alone if this version has made it of the same inputs and parameters, and it is whole")
+      ->group(group);
   app.add_flag("--trust", s.trust, "do not check hashes and values of assets; for files that glint-validate has accepted")
       ->group(group);
   app.add_option("--depfile", s.depfile, "write what the output depends on, as a Make rule")->group(group)->type_name("FILE");
@@ -266,6 +272,7 @@ void Tool::setResult(const nlohmann::json& result) { state_->result = result; }
 void Tool::setExitCode(ErrorCode code) { state_->exit_code = code; }
 void Tool::addInput(const std::string& path) { state_->inputs.push_back(path); }
 void Tool::addOutput(const std::string& path) { state_->outputs.push_back(path); }
+void Tool::makesMore() { state_->makes_more = true; }
 const std::vector<std::string>& Tool::outputPaths() const { return state_->outputs; }
 std::string Tool::generator() const { return state_->info.name + " " GLINT_VERSION; }
 
@@ -385,8 +392,10 @@ bool Tool::parse(int argc, char** argv) {
 int Tool::work(const std::function<void()>& body) {
   State& s = *state_;
   for (const auto& check : s.checks) check();
-  const bool makes_depfile = s.app.get_option("--depfile")->count() > 0;
-  if (makes_depfile) {
+  if (s.skip_unchanged && s.outputs.empty())
+    throw Error(ErrorCode::usage, "cli.skip_unchanged", "", "--skip-unchanged", "nothing is made that could be left alone",
+                "ask for an output file, or leave out --skip-unchanged");
+  if (s.app.get_option("--depfile")->count() > 0) {
     if (s.outputs.empty())
       throw Error(ErrorCode::usage, "cli.depfile", "", "--depfile", "nothing is made that could depend on anything",
                   "ask for an output file, or leave out --depfile");
@@ -396,9 +405,14 @@ int Tool::work(const std::function<void()>& body) {
   for (const auto& check : s.late_checks) check();
   if (s.max_memory > 0) limitMemory(s.max_memory);
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads()));
+  if (s.skip_unchanged && isUnchanged()) {
+    writeDepfile();
+    reportUnchanged();
+    return 0;
+  }
   body();
   s.reporter.reset();
-  if (makes_depfile) writeTextFile(s.depfile, makeDepfile(s.outputs, readPaths()));
+  writeDepfile();
   const int code = s.exit_code ? static_cast<int>(*s.exit_code) : 0;
   if (s.json_result) {
     const char* status = s.exit_code ? codeName(*s.exit_code) : "ok";
@@ -412,6 +426,38 @@ int Tool::work(const std::function<void()>& body) {
   }
   flushStdout();
   return code;
+}
+
+void Tool::writeDepfile() const {
+  const State& s = *state_;
+  if (s.app.get_option("--depfile")->count() > 0) writeTextFile(s.depfile, makeDepfile(s.outputs, readPaths()));
+}
+
+bool Tool::isUnchanged() const {
+  const State& s = *state_;
+  if (s.makes_more) return false;
+  const formats::Provenance run{generator(), commandJson(), {}};
+  return std::all_of(s.outputs.begin(), s.outputs.end(), [&](const std::string& output) {
+    return isMadeBy(
+        output, run, [this] { return provenance(); }, s.trust);
+  });
+}
+
+void Tool::reportUnchanged() const {
+  const State& s = *state_;
+  if (!s.quiet)
+    for (const std::string& output : s.outputs)
+      writeStderr(fmt::format("{}: {}: unchanged\n", s.info.name, escapedText(output)));
+  if (s.json_result) {
+    writeStdout(dump({{"schema", kJsonSchema},
+                      {"tool", s.info.name},
+                      {"version", GLINT_VERSION},
+                      {"status", "unchanged"},
+                      {"outputs", s.outputs},
+                      {"warnings", s.warnings}}) +
+                "\n");
+  }
+  flushStdout();
 }
 
 int Tool::fail(const Error& error) {

@@ -32,14 +32,15 @@ struct ToolInfo {
 
 /// A command-line program: declares the flags that every tool shares, parses, runs the work, and exits.
 ///
-/// Shared flags: --threads --max-memory --seed --json --progress --quiet --verbose --force --trust --depfile --config --version
-/// --help.
+/// Shared flags: --threads --max-memory --seed --json --progress --quiet --verbose --force --skip-unchanged --trust --depfile --config
+/// --version --help.
 /// Declare inputs and outputs with the mix-ins of files.h and parameters with option(), flag() and choice(); then
 /// `return tool.run(argc, argv, [&] { ... });`. References passed in must outlive run().
 ///
 /// With --json, stdout holds exactly one JSON document: {"schema", "tool", "version", "status": "ok", "result", "warnings"}, or
 /// on failure {..., "status": "error", "error": {"code", "rule", "path", "object", "message", "remedy"}}. The message for
-/// people is on stderr in both cases: one line, whatever goes wrong.
+/// people is on stderr in both cases: one line, whatever goes wrong. A run that --skip-unchanged skips has the status "unchanged", and
+/// "outputs" in place of a result.
 ///
 /// Signals that end the process remove temporary files first (signals.h). A failure to write stdout is an error (io); a failure
 /// to write stderr is ignored.
@@ -139,6 +140,9 @@ class Tool {
   void addInput(const std::string& path);
   /// Adds a file that the run makes to the targets of the depfile. The mix-ins of files.h call this.
   void addOutput(const std::string& path);
+  /// Declares that the run writes files that addOutput() does not name before the work, so that --skip-unchanged cannot tell whether
+  /// they are there: nothing is skipped.
+  void makesMore();
   /// Files that the run reads: the inputs declared so far, and the configuration file.
   std::vector<std::string> readPaths() const;
   /// Outputs declared so far.
@@ -164,6 +168,12 @@ class Tool {
   /// Throws Error usage if words were left over that look like options.
   void refuseUnknownOptions() const;
   int work(const std::function<void()>& work);
+  /// Whether every output is an asset that this run would only make again.
+  bool isUnchanged() const;
+  /// Tells of a run that was skipped.
+  void reportUnchanged() const;
+  /// Writes the depfile, if one is asked for.
+  void writeDepfile() const;
   int fail(const Error& error);
   void printFailure(const Error& error) const;
 

@@ -55,7 +55,8 @@ TextureOutput::TextureOutput(Tool& tool) {
           "KHR_materials_anisotropy has them; materialx: roughness, anisotropy and rotation")
       .needs(textures);
   tool.option("--bits", bits_, "of a channel of the textures: 8 or 16").range(8, 16).needs(textures);
-  tool.addCheck([this] {
+  tool.addCheck([this, &tool] {
+    if (wanted()) tool.makesMore();
     if (bits_ != 8 && bits_ != 16)
       throw Error(ErrorCode::usage, "image.bits", {}, "--bits", std::to_string(bits_) + " is neither 8 nor 16", "give 8 or 16");
   });

@@ -80,8 +80,9 @@ void planScene(Tool& tool, const PlanOptions& options) {
   std::string rules;
   if (!options.rules().empty()) rules = planRules(plans, maps, pipelineFile());
   if (!options.output().empty()) {
-    const auto document =
-        planDocument(tool, scene, JsonField::read(options.scene()).value(), seenFrom(options.output(), maps), plans);
+    const std::string maps_from_plan = seenFrom(options.output(), maps);
+    auto document = planDocument(tool, scene, JsonField::read(options.scene()).value(), maps_from_plan, plans);
+    document["jobs"] = planJobs(tool, plans, maps_from_plan)["jobs"];
     writeTextFile(options.output(), document.dump(1) + "\n");
   }
   if (!options.rules().empty()) writeTextFile(options.rules(), rules);

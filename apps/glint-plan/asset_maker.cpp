@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "glint-plan/plan_candidates.h"
-#include "measure/child_process.h"
+#include "common/child_process.h"
 
 namespace glint::apps {
 

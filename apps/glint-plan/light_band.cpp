@@ -9,7 +9,7 @@
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/hash.h"
 #include "glint/model/sh.h"
-#include "measure/child_process.h"
+#include "common/child_process.h"
 
 namespace glint::apps {
 namespace {

@@ -9,7 +9,7 @@
 #include "common/files.h"
 #include "common/input_asset.h"
 #include "glint/formats/hash.h"
-#include "measure/child_process.h"
+#include "common/child_process.h"
 
 namespace glint::apps {
 namespace {

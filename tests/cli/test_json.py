@@ -71,6 +71,11 @@ MAKE = [
     "displace heights.glint -o rough.glint --base ggx:.3:1,2 --factor 8 --angular 3 --spatial 2",
     "displace heights.glint -o colored.glint --base-color n.png --factor 8 --angular 3 --spatial 2",
     "displace flat.glint -o level.glint --factor 8 --angular 3 --spatial 2",
+    "pyramid normals.glint -o pyramid.glint --resolution 64 --stride 8 --sigma-r .02 --skip-unchanged",
+    "farm plan --from plan.json -o farm.json",
+    "farm run farm.json",
+    "farm status farm.json",
+    "farm plan broken -o broken.json --make pyramid",
 ]
 QUERY = "query {asset}.glint --uv .3 .6 --sigma 4 {asked}"
 ASKED = [
@@ -91,6 +96,7 @@ ASKED = [
 ]
 FOUND = [*(f"info {asset}.glint" for asset in ASSETS), "validate normals.glint pyramid.glint"]
 REFUSED = [
+    "farm run broken.json",
     "validate damaged.glint lights.json normals.glint",
     "validate missing.glint",
     *(f"{tool.removeprefix('glint-')} --nonsense" for tool in TOOLS),
@@ -111,6 +117,8 @@ def documents(tmp_path_factory):
     (folder / "scene.json").write_text(json.dumps(SCENE))
     for name, text in QUERIES.items():
         (folder / name).write_text(text)
+    (folder / "broken").mkdir()
+    (folder / "broken/image.png").write_text("no image")
     found = []
     for command in MAKE + ASKED + FOUND + REFUSED:
         process = run(folder, command + " --json")

@@ -62,7 +62,7 @@ def room_of(path, name):
     for room, folder in ROOMS.items():
         if resolved.is_relative_to(folder) and resolved.exists():
             return room
-    if name.startswith(("common/", "measure/")) or resolved.is_relative_to(APPS) or re.match(r"glint-\w+/", name):
+    if name.startswith(("common/", "manifest/", "measure/")) or resolved.is_relative_to(APPS) or re.match(r"glint-\w+/", name):
         return "apps"
     return None
 

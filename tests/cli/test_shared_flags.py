@@ -10,8 +10,8 @@ from conftest import BIN
 
 APPS = pathlib.Path(__file__).parents[2] / "apps"
 TOOLS = sorted(path.parent.name.removeprefix("glint-") for path in APPS.glob("glint-*/main.cpp"))
-COMMANDS = [*TOOLS, "query light", "query plane", "query reflectance"]  # programs, and their commands
-SHARED = ["--threads", "--max-memory", "--trust", "--seed", "--json", "--progress", "--quiet", "--force", "--depfile", "--config", "--version", "--help"]
+COMMANDS = [*TOOLS, "farm plan", "farm run", "farm status", "query light", "query plane", "query reflectance"]  # programs, and their commands
+SHARED = ["--threads", "--max-memory", "--trust", "--seed", "--json", "--progress", "--quiet", "--force", "--skip-unchanged", "--depfile", "--config", "--version", "--help"]
 
 
 def test_there_are_tools():

@@ -9,7 +9,7 @@
 #include "glint/bake/common/slopes.h"
 #include "glint/bake/ingest/normal_bounds.h"
 #include "glint/formats/asset_writer.h"
-#include "measure/child_process.h"
+#include "common/child_process.h"
 
 namespace glint::apps {
 namespace {

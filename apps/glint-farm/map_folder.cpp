@@ -1,0 +1,100 @@
+#include "glint-farm/map_folder.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <system_error>
+
+#include "glint/model/error.h"
+
+namespace glint::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool isImage(const fs::path& file) {
+  std::string type = file.extension().string();
+  if (type.empty()) return false;
+  for (char& c : type) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return std::find(imageTypes().begin(), imageTypes().end(), type.substr(1)) != imageTypes().end();
+}
+
+std::string join(const std::string& folder, const std::string& file) {
+  return (fs::path(folder) / file).lexically_normal().string();
+}
+
+/// Puts the name of the image, without ending, in place of the first %, as pattern rules of Make do.
+std::string withStem(const std::string& word, const std::string& stem) {
+  const std::size_t place = word.find('%');
+  return place == std::string::npos ? word : word.substr(0, place) + stem + word.substr(place + 1);
+}
+
+/// Adds the flags of a step. A flag that names a file is an input.
+void addFlags(FarmJob& job, const RecipeStep& step, const std::string& stem, const std::string& here) {
+  std::error_code none;
+  for (const std::string& flag : step.flags) {
+    std::string word = withStem(flag, stem);
+    if (fs::is_regular_file(word, none)) {
+      if (!fs::path(word).is_absolute()) word = join(here, word);
+      job.inputs.push_back(word);
+    }
+    job.command.push_back(std::move(word));
+  }
+}
+
+void refuseTwins(const std::vector<std::string>& images, const std::string& folder) {
+  std::map<std::string, std::string> by_stem;
+  for (const std::string& image : images) {
+    const auto [twin, is_new] = by_stem.emplace(fs::path(image).replace_extension().string(), image);
+    if (is_new) continue;
+    throw Error(ErrorCode::usage, "farm.twins", join(folder, image), "", "and " + twin->second + " would be assets of one name",
+                "rename one of the images, or move it to another folder");
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> imagesIn(const std::string& folder, const std::string& assets) {
+  std::vector<std::string> images;
+  std::error_code error;
+  fs::recursive_directory_iterator entry(folder, error);
+  for (; !error && entry != fs::recursive_directory_iterator(); entry.increment(error)) {
+    const fs::path& path = entry->path();
+    std::error_code none;
+    const bool hidden = path.filename().string().starts_with('.');
+    if (entry->is_directory(none)) {
+      if (hidden || fs::equivalent(path, assets, none)) entry.disable_recursion_pending();
+    } else if (!hidden && isImage(path) && entry->is_regular_file(none)) {
+      images.push_back(path.lexically_relative(folder).string());
+    }
+  }
+  if (error) throw Error(ErrorCode::io, "file.readable", folder, "", error.message(), "name a folder of images");
+  if (images.empty()) {
+    throw Error(ErrorCode::io, "farm.empty", folder, "", "holds no image",
+                "name a folder of images (exr, png, tif, tga, jpg, hdr), or give a plan with --from");
+  }
+  std::sort(images.begin(), images.end());
+  refuseTwins(images, folder);
+  return images;
+}
+
+std::vector<FarmJob> jobsOf(const std::string& image, const std::string& maps, const std::string& assets,
+                            const std::string& here, const std::vector<RecipeStep>& recipe) {
+  const std::string stem = fs::path(image).replace_extension().string();
+  std::map<std::string, std::string> made;  // kind -> file
+  std::vector<FarmJob> jobs;
+  for (const RecipeStep& step : recipe) {
+    const RecipeKind& kind = *step.kind;
+    FarmJob job;
+    job.output = join(assets, stem + kind.suffix + ".glint");
+    job.inputs = {*kind.source == '\0' ? join(maps, image) : made.at(kind.source)};
+    job.command = {*kind.command.begin(), job.inputs.front(), "-o", job.output};
+    job.command.insert(job.command.end(), kind.command.begin() + 1, kind.command.end());
+    addFlags(job, step, stem, here);
+    made[kind.name] = job.output;
+    jobs.push_back(std::move(job));
+  }
+  return jobs;
+}
+
+}  // namespace glint::apps
