@@ -7,13 +7,13 @@
 #include <list>
 #include <map>
 
+#include "common/child_process.h"
 #include "common/input_asset.h"
 #include "glint-bench/rounded_image.h"
 #include "glint/formats/hash.h"
 #include "measure/bench_errors.h"
 #include "measure/bench_times.h"
 #include "measure/candidates.h"
-#include "common/child_process.h"
 
 namespace glint::apps {
 namespace {
