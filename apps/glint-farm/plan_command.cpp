@@ -58,7 +58,8 @@ FarmPlanCommand::FarmPlanCommand(Tool& tool)
                   "more kinds: " +
                       recipeKindNames())
       ->allow_extra_args(false)
-      ->type_name("KIND");
+      ->type_name("KIND")
+      ->default_str("");
   tool.option("--assets", assets_, "folder of the assets").defaultText("assets, beside the manifest").unrecorded();
   tool.addCheck([this] { check(); });
 }

@@ -2,8 +2,8 @@
 
 #include <filesystem>
 
-#include "glint-plan/plan_candidates.h"
 #include "common/child_process.h"
+#include "glint-plan/plan_candidates.h"
 
 namespace glint::apps {
 

@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <vector>
 
+#include "common/child_process.h"
 #include "glint-plan/plan_map.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/hash.h"
 #include "glint/model/sh.h"
-#include "common/child_process.h"
 
 namespace glint::apps {
 namespace {

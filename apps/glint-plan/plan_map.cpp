@@ -6,10 +6,10 @@
 #include <cmath>
 #include <filesystem>
 
+#include "common/child_process.h"
 #include "common/files.h"
 #include "common/input_asset.h"
 #include "glint/formats/hash.h"
-#include "common/child_process.h"
 
 namespace glint::apps {
 namespace {

@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <numbers>
 
+#include "common/child_process.h"
 #include "glint/bake/common/slopes.h"
 #include "glint/bake/ingest/normal_bounds.h"
 #include "glint/formats/asset_writer.h"
-#include "common/child_process.h"
 
 namespace glint::apps {
 namespace {
