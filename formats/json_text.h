@@ -6,7 +6,7 @@
 
 namespace glint::formats {
 
-/// Whether a text is one JSON object.
+/// Whether a text is one JSON object, nested at most kMostJsonDepth deep.
 bool isJsonObject(std::string_view text);
 
 }  // namespace glint::formats

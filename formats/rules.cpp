@@ -79,7 +79,7 @@ constexpr std::array kIndexRules = {
 
 /// Rules of all kinds on values.
 constexpr std::array kValueRules = {
-    Rule{"attribute.json", error, invalid_input, "command is a JSON object", kForeign},
+    Rule{"attribute.json", error, invalid_input, "command is a JSON object, at most 100 levels deep", kForeign},
     Rule{"file.padding", error, invalid_input, "bytes between objects are 0", kDamaged},
     Rule{"file.digest", error, invalid_input, "attributes, sizes and hashes have the digest of root attribute digest",
          kDamaged},

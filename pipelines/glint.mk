@@ -64,18 +64,25 @@ glint_types = $(shell for type in $(2); do if [ -e $(call glint_quote,$(GLINT_MA
 # Refuses two files of the name $(1), whose types are $(3), of those in the variable $(2).
 glint_one = $(if $(word 2,$(3)),$(error $(GLINT_MAPS)/$(1).$(firstword $(3)) and $(GLINT_MAPS)/$(1).$(word 2,$(3)) would be one asset \
   of the name $(1); rename one of them, or say which type is meant, as $(2) := $(firstword $(3))))
+# Refuses two images $(1) and $(1).$(2): the asset $(1).$(2).glint would be of either.
+glint_apart = $(if $(and $(call glint_types,$(1),$(GLINT_IMAGES)),$(call glint_types,$(1).$(2),$(GLINT_IMAGES))),$(error images \
+  $(GLINT_MAPS)/$(1) and $(GLINT_MAPS)/$(1).$(2) would both make $(GLINT_OUT)/$(1).$(2).glint; rename one of them))
+# The same for an image $(1) whose name ends as those of assets do.
+glint_endings := pyramid cp tucker pca binmap sat moments tiny wang heights displaced wave light lobes
+glint_apart_of = $(foreach ending,$(glint_endings),$(call glint_apart_at,$(shell printf '%s' $(call glint_quote,$(1)) | sed -n 's,\.$(ending)$$,,p'),$(ending)))
+glint_apart_at = $(if $(1),$(call glint_apart,$(1),$(2)))
 # The file of a rule's name: the one that exists, or what Make thought of where a dry run has not made it.
 glint_source = $(call glint_source_of,$(1),$(call glint_types,$*,$($(1))))
 glint_source_of = $(call glint_one,$*,$(1),$(2))$(call glint_quote,$(if $(2),$(GLINT_MAPS)/$*.$(2),$<))
 
 define glint_ingest_rule
 $(GLINT_OUT)/%.glint: $(GLINT_MAPS)/%.$(1) $(GLINT_SETTINGS) | $(GLINT_OUT)
-	$$(call glint_tool,glint-ingest) $$(call glint_source,GLINT_IMAGES) $$(glint_out) $$(call glint_flags,GLINT_INGEST_FLAGS)
+	$$(call glint_apart_of,$$*)$$(call glint_tool,glint-ingest) $$(call glint_source,GLINT_IMAGES) $$(glint_out) $$(call glint_flags,GLINT_INGEST_FLAGS)
 endef
 
 define glint_heights_rule
 $(GLINT_OUT)/%.heights.glint: $(GLINT_MAPS)/%.$(1) $(GLINT_SETTINGS) | $(GLINT_OUT)
-	$$(call glint_tool,glint-ingest) $$(call glint_source,GLINT_IMAGES) $$(glint_out) --kind height --to heights \
+	$$(call glint_apart,$$*,heights)$$(call glint_tool,glint-ingest) $$(call glint_source,GLINT_IMAGES) $$(glint_out) --kind height --to heights \
 	  $$(call glint_flags,GLINT_HEIGHTS_FLAGS)
 endef
 
@@ -86,12 +93,12 @@ endef
 
 define glint_normals_rule
 $(GLINT_OUT)/%.$(1).glint: $(GLINT_OUT)/%.glint $(GLINT_SETTINGS)
-	$$(call glint_tool,glint-$(1)) $$(call glint_quote,$$<) $$(glint_out) $$(call glint_flags,$(2))
+	$$(call glint_apart,$$*,$(1))$$(call glint_tool,glint-$(1)) $$(call glint_quote,$$<) $$(glint_out) $$(call glint_flags,$(2))
 endef
 
 define glint_compress_rule
 $(GLINT_OUT)/%.$(1).glint: $(GLINT_OUT)/%.pyramid.glint $(GLINT_SETTINGS)
-	$$(call glint_tool,glint-compress) $$(call glint_quote,$$<) $$(glint_out) --method $(1) $$(call glint_flags,$(2))
+	$$(call glint_apart,$$*,$(1))$$(call glint_tool,glint-compress) $$(call glint_quote,$$<) $$(glint_out) --method $(1) $$(call glint_flags,$(2))
 endef
 
 $(eval $(call glint_normals_rule,pyramid,GLINT_PYRAMID_FLAGS))

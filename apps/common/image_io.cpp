@@ -57,6 +57,7 @@ Image readImage(const std::string& path, const ImageChoice& choice) {
   Image& image = stored.image;
   if (png) findPart(path, choice.part, image.parts);
   if (image.format == "jpeg") checkJpegComplete(path);
+  if (image.format == "webp") stored.orientation = webpOrientation(path);
   if (image.format == "tiff") image.no_data = geoTiffNoData(path, image.part);
   if (choice.window == ImageChoice::Window::display) cropToDisplay(stored, choice, path);
   orient(stored);

@@ -20,6 +20,7 @@ struct Image {
   int bits = 0;        ///< bits of a channel in the file: 1 to 16 (integers), 16 or 32 (floating point)
   bool floating = false;
   double code_scale = 1;          ///< number in the file that a pixel value of 1 stands for: 1, or the largest code of integers
+  bool inverted = false;          ///< 0 is white in the file: its codes are code_scale minus those of `pixels`
   int alpha = -1;                 ///< channel of alpha, if there is one
   bool associated = false;        ///< the other channels are multiplied by alpha
   std::optional<double> no_data;  ///< number in the file that pixels without data hold, if the file names one

@@ -80,6 +80,24 @@ float valueOf(T code) {
                   (choice.has_options ? ", or read the colours as they are with --alpha ignore" : ""));
 }
 
+/// Colours of a WebP are multiplied by alpha with 8 bits where they are read: under half an alpha a normal is off by more than a code.
+void checkAlphaBits(const Image& image, const std::string& path) {
+  const auto* pixels = std::get_if<std::vector<std::uint8_t>>(&image.pixels);
+  if (image.format != "webp" || !pixels) return;
+  constexpr std::uint8_t kLeast = 128;
+  TexelTally thin(image.width, image.height);
+  const auto channels = static_cast<std::size_t>(image.channels);
+  for (std::size_t k = 0; k < pixels->size(); k += channels) {
+    const std::uint8_t alpha = (*pixels)[k + static_cast<std::size_t>(image.alpha)];
+    if (alpha > 0 && alpha < kLeast) thin.add(k / channels);
+  }
+  if (thin.count() == 0) return;
+  throw Error(ErrorCode::invalid_input, "image.alpha_bits", path, "",
+              counted(thin.count(), {"pixel has", "pixels have"}) +
+                  " an alpha below a half, under which a WebP loses bits of colour (first at " + thin.firstName() + ")",
+              "export the image without alpha, or as PNG");
+}
+
 /// The colours of all pixels divided by their alpha; NaN where alpha is 0.
 template <class T>
 std::vector<float> divided(const Image& image, const ImageChoice& choice, const std::vector<T>& pixels, TexelTally& lost,
@@ -228,6 +246,7 @@ void divideByAlpha(Image& image, const ImageChoice& choice, const std::string& p
   if (image.alpha < 0 || image.channels < 2)
     throw Error(ErrorCode::invalid_input, "image.alpha", path, "", "has no alpha to divide by", "leave out --alpha divide");
   image.associated = false;
+  checkAlphaBits(image, path);
   TexelTally lost(image.width, image.height);
   std::vector<float> values;
   std::visit(

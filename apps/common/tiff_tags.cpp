@@ -5,6 +5,10 @@
 #include <cstdlib>
 #include <fstream>
 #include <functional>
+#include <string_view>
+#include <vector>
+
+#include "common/files.h"
 
 namespace glint::apps {
 namespace {
@@ -95,6 +99,28 @@ std::optional<double> geoTiffNoData(const std::string& path, int directory) {
   const double value = std::strtod(text.c_str(), &end);
   if (end == text.c_str()) return {};
   return value;
+}
+
+int webpOrientation(const std::string& path) {
+  // A file is "RIFF", its size, "WEBP", and chunks: a name, a size (both of four bytes), and as many bytes, padded to an even number.
+  const std::vector<std::byte> file = readFile(path);
+  const auto name = [&](std::size_t at) { return std::string_view(reinterpret_cast<const char*>(file.data()) + at, 4); };
+  constexpr std::size_t kHeader = 8, kFirst = 12;
+  constexpr std::string_view kPrefix("Exif\0\0", 6);  // some writers put it before the TIFF
+  if (file.size() < kFirst || name(0) != "RIFF" || name(kHeader) != "WEBP") return 1;
+  for (std::size_t at = kFirst; at + kHeader <= file.size();) {
+    std::uint64_t size = 0;
+    for (std::size_t k = 4; k-- > 0;) size = size << 8 | std::to_integer<std::uint64_t>(file[at + 4 + k]);
+    const std::span chunk = std::span(file).subspan(at + kHeader);
+    if (size > chunk.size()) return 1;
+    if (name(at) == "EXIF") {
+      const std::string_view text(reinterpret_cast<const char*>(chunk.data()), size);
+      const std::size_t skipped = text.starts_with(kPrefix) ? kPrefix.size() : 0;
+      return exifOrientation(chunk.first(size).subspan(skipped));
+    }
+    at += kHeader + size + size % 2;
+  }
+  return 1;
 }
 
 int exifOrientation(std::span<const std::byte> exif) {

@@ -12,6 +12,10 @@ namespace glint::apps {
 /// @return nothing if there is no such tag, it is no number, or the file is no TIFF
 std::optional<double> geoTiffNoData(const std::string& path, int directory);
 
+/// Orientation of a WebP image from its chunk of Exif metadata, which OpenImageIO does not read.
+/// @return 1 if there is none, or the file is no WebP
+int webpOrientation(const std::string& path);
+
 /// Orientation of an image (1 to 8, tag 274) from Exif metadata, which have the form of a TIFF; 1 if they do not hold it.
 int exifOrientation(std::span<const std::byte> exif);
 

@@ -400,6 +400,7 @@ int Tool::work(const std::function<void()>& body) {
       throw Error(ErrorCode::usage, "cli.depfile", "", "--depfile", "nothing is made that could depend on anything",
                   "ask for an output file, or leave out --depfile");
     checkOutput(*this, s.depfile, OutputFormat::depfile);
+    (void)makeDepfile(s.outputs, readPaths());  // names that Make cannot express are refused before the work
   }
   for (const auto& check : s.late_checks) check();
   if (s.max_memory > 0) limitMemory(s.max_memory);

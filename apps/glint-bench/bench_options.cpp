@@ -89,6 +89,8 @@ void BenchOptions::check() {
   if (settings_.quick) {
     settings_.budget_s = 0.15;
     settings_.longest_run_s = 0.01;
+    settings_.picture_pixels = 48;
+    settings_.picture_sizes = 3;  // the exact pictures of wide footprints take longest
     if (!places_option_->given()) settings_.places = 4;
   }
   checkOutput(tool_, settings_.output, OutputFormat::results);

@@ -36,6 +36,11 @@ void readMeasurement(const Json& m) {
     set.at("sigma_texels").get<double>();
     set.at("seen").get<double>();
   }
+  if (!m.contains("pictures")) return;
+  for (const Json& picture : m.at("pictures")) {
+    for (const char* name : {"scene", "picture"}) picture.at(name).get<std::string>();
+    for (const char* name : {"sigma_texels", "rmse", "flip"}) picture.at(name).get<double>();
+  }
 }
 
 /// Whether a document has the members that the rest reads.
@@ -89,7 +94,8 @@ BenchResults BenchResults::read(const std::string& path, const BenchResults* sam
 bool BenchResults::has(const std::string& map_hash, const std::string& name) const {
   const Json& all = document_["measurements"];
   return std::any_of(all.begin(), all.end(), [&](const Json& measurement) {
-    return measurement["map"] == map_hash && measurement["name"] == name && measurement["status"] == "ok";
+    return measurement["map"] == map_hash && measurement["name"] == name && measurement["status"] == "ok" &&
+           measurement.contains("pictures");
   });
 }
 
@@ -110,12 +116,15 @@ void BenchResults::add(Json measurement) {
 
 bool BenchResults::hasMap(const std::string& hash) const {
   for (const Json& map : document_["maps"])
-    if (map["hash"] == hash) return true;
+    if (map["hash"] == hash) return map.contains("pictures");
   return false;
 }
 
 void BenchResults::addMap(Json map) {
-  if (!hasMap(map["hash"])) document_["maps"].push_back(std::move(map));
+  if (hasMap(map["hash"])) return;
+  Json& maps = document_["maps"];
+  std::erase_if(maps.get_ref<Json::array_t&>(), [&](const Json& other) { return other["hash"] == map["hash"]; });
+  maps.push_back(std::move(map));
 }
 
 void BenchResults::write(const std::string& path) const {
@@ -142,6 +151,16 @@ double densityTime(const Json& measurement, double sigma) {
 
 std::string percentText(double error) { return error > 10 ? "> 1000" : fmt::format("{:.1f}", 100 * error); }
 
+/// " 0.012 to 0.35": FLIP of all pictures; empty if there are none.
+std::string flipText(const Json& measurement) {
+  double low = 1, high = -1;
+  for (const Json& picture : measurement.value("pictures", Json::array())) {
+    low = std::min(low, picture["flip"].get<double>());
+    high = std::max(high, picture["flip"].get<double>());
+  }
+  return high < 0 ? "" : fmt::format("   {:.2g} to {:.2g}", low, high);
+}
+
 /// Seen error of round footprints of a size; below 0 if there is none.
 double seenAt(const Json& measurement, double sigma) {
   for (const Json& set : measurement["errors"])
@@ -162,9 +181,10 @@ std::string measurementLine(const Json& measurement) {
     quickest = std::min(quickest, time["ns"].get<double>());
     slowest = std::max(slowest, time["ns"].get<double>());
   }
-  return fmt::format("  {:<34} {:>8.2f} s {:>9.2f} MB {:>8.2f} to {:>9.2f} us   {}\n", measurement["name"].get<std::string>(),
-                     measurement["prepare"]["total_s"].get<double>(), 1e-6 * measurement["file_bytes"].get<double>(),
-                     1e-3 * quickest, 1e-3 * slowest, seen);
+  return fmt::format("  {:<34} {:>8.2f} s {:>9.2f} MB {:>8.2f} to {:>9.2f} us   {:<18}{}\n",
+                     measurement["name"].get<std::string>(), measurement["prepare"]["total_s"].get<double>(),
+                     1e-6 * measurement["file_bytes"].get<double>(), 1e-3 * quickest, 1e-3 * slowest, seen,
+                     flipText(measurement));
 }
 
 /// The quickest method within each of some errors, for one size of footprints. One that is no more than a tenth quicker than a
@@ -191,9 +211,9 @@ std::string benchText(const Json& document) {
   std::string text;
   for (const Json& map : document["maps"]) {
     const std::vector<const Json*> measurements = finishedMeasurements(document, map);
-    text += fmt::format("{}{}, {} x {} texels: time to prepare, file, density and seen error of round footprints\n",
-                        text.empty() ? "" : "\n", map["name"].get<std::string>(), map["width"].get<int>(),
-                        map["height"].get<int>());
+    text += fmt::format(
+        "{}{}, {} x {} texels: time to prepare, file, density and seen error of round footprints, FLIP of pictures\n",
+        text.empty() ? "" : "\n", map["name"].get<std::string>(), map["width"].get<int>(), map["height"].get<int>());
     for (const Json* measurement : measurements) text += measurementLine(*measurement);
     for (const Json& measurement : document["measurements"])
       if (measurement["map"] == map["hash"] && measurement["status"] != "ok")

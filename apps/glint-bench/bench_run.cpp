@@ -14,6 +14,7 @@
 #include "measure/bench_errors.h"
 #include "measure/bench_times.h"
 #include "measure/candidates.h"
+#include "measure/lit_picture.h"
 
 namespace glint::apps {
 namespace {
@@ -33,7 +34,11 @@ void checkKind(const std::string& path) {
 class BenchMap {
  public:
   BenchMap(const Tool& tool, const std::string& path, const BenchSettings& settings)
-      : path_(path), asset_(openInput(tool, path)), hash_(formats::hashFile(path)) {
+      : path_(path),
+        asset_(openInput(tool, path)),
+        hash_(formats::hashFile(path)),
+        picture_pixels_(settings.picture_pixels),
+        picture_sizes_(settings.picture_sizes) {
     constexpr int kQueries = 1 << 14, kOfSize = 1 << 12, kTruthsOfPlace = 4;
     sets_ = benchFootprints(map(), tool.seed(), settings.places, kTruthsOfPlace * settings.places);
     const std::vector<float> sizes = roundSizes(sets_);
@@ -55,13 +60,29 @@ class BenchMap {
     return truths_;
   }
 
-  /// {name, hash, width, height, truth}: with an image of each size of round footprints.
+  /// The exact pictures of a plane and a sphere, of every second size of round footprints; computed on the first call.
+  const std::vector<LitTruth>& pictures() {
+    if (!pictures_.empty()) return pictures_;
+    const std::vector<float> sizes = roundSizes(sets_);
+    std::vector<float> chosen;
+    for (std::size_t k = 0; k < sizes.size() && chosen.size() < picture_sizes_; k += 2) chosen.push_back(sizes[k]);
+    return pictures_ = litTruths(map(), chosen, picture_pixels_);
+  }
+
+  /// {name, hash, width, height, truth, pictures}: with an image of each size of round footprints.
   Json json() {
     Json images = Json::array();
     for (const SetTruth& truth : truths())
       if (truth.set().shape == FootprintShape::round)
         images.push_back({{"sigma_texels", truth.set().sigma_texels}, {"image", roundedImage(truth.firstImage())}});
-    return {{"name", name()}, {"hash", hash_}, {"width", map().width}, {"height", map().height}, {"truth", std::move(images)}};
+    Json pictures = Json::array();
+    for (const LitTruth& truth : this->pictures()) pictures.push_back(Json(truth.json()));
+    return {{"name", name()},
+            {"hash", hash_},
+            {"width", map().width},
+            {"height", map().height},
+            {"truth", std::move(images)},
+            {"pictures", std::move(pictures)}};
   }
 
  private:
@@ -72,6 +93,9 @@ class BenchMap {
   std::vector<BenchQuery> queries_;  ///< of all sizes
   std::vector<SizedQueries> sized_queries_;
   std::list<SetTruth> truths_;
+  int picture_pixels_;
+  std::size_t picture_sizes_;
+  std::vector<LitTruth> pictures_;
 };
 
 /// Measures the candidates of one map.
@@ -170,6 +194,7 @@ class MapBench {
     measurement["times"] = Json(benchTimes(ndf, map_.queries(), map_.sizedQueries(), settings_.longest_run_s));
     measurement["errors"] = Json::array();
     measurement["images"] = Json::array();
+    measurement["pictures"] = Json::array();
     if (candidate.tool.empty()) return;  // it is the truth
     for (const SetTruth& truth : map_.truths()) {
       std::vector<float> first;
@@ -177,6 +202,7 @@ class MapBench {
       if (truth.set().shape == FootprintShape::round)
         measurement["images"].push_back({{"sigma_texels", truth.set().sigma_texels}, {"image", roundedImage(first)}});
     }
+    for (const LitTruth& truth : map_.pictures()) measurement["pictures"].push_back(Json(truth.errorsOf(ndf)));
   }
 
   Tool& tool_;

@@ -14,11 +14,13 @@ struct BenchSettings {
   std::vector<std::string> maps;  ///< assets of kind normals
   std::vector<std::string> only;  ///< methods; empty: all
   bool quick = false;
-  int places = 12;              ///< footprints of a set
-  double budget_s = 1.5;        ///< for the errors of a set
-  double longest_run_s = 0.05;  ///< of one of the five runs of a time
-  std::string assets;           ///< folder for the assets
-  std::string output;           ///< file of the results, which is written after every measurement
+  int places = 12;                ///< footprints of a set
+  double budget_s = 1.5;          ///< for the errors of a set
+  double longest_run_s = 0.05;    ///< of one of the five runs of a time
+  int picture_pixels = 96;        ///< of a lit picture along each axis
+  std::size_t picture_sizes = 4;  ///< sizes of lit pictures at most, from the smallest on
+  std::string assets;             ///< folder for the assets
+  std::string output;             ///< file of the results, which is written after every measurement
 };
 
 /// Makes every measurement that the results do not have.

@@ -5,9 +5,9 @@ using namespace glint;
 int main(int argc, char** argv) {
   apps::Tool tool(
       {"glint-bench",
-       "Measures every method on maps of yours: error against brute force, time, bytes and time to prepare. Tests what methods "
-       "do "
-       "where they fail, repeats the figures of the papers, and shows results as a page with charts.",
+       "Measures every method on maps of yours: errors of NDFs and of pictures against brute force, time, bytes and time to "
+       "prepare. Tests what methods do where they fail, repeats the figures of the papers, and shows results as a page with "
+       "charts.",
        "glint-bench flakes.glint -o results.json --quick",
        "Results of maps are written after every measurement, one method at one setting on one map. The same command goes on "
        "where "

@@ -18,12 +18,20 @@ const char* typeName(CoefficientType type) {
   return type == CoefficientType::i8 ? "i8" : type == CoefficientType::f16 ? "f16" : "f32";
 }
 
+const char* methodName(CompressionMethod method) {
+  return method == CompressionMethod::tucker ? "tucker" : method == CompressionMethod::pca ? "pca" : "cp";
+}
+
 }  // namespace
 
 CompressOptions::CompressOptions(Tool& tool) {
   tool.choice("--method", values_.method,
-              {{"cp", CompressionMethod::cp}, {"tucker", CompressionMethod::tucker}, {"pca", CompressionMethod::pca}},
-              "decomposition of the blocks: canonical polyadic, Tucker-2 or principal components");
+              {{"auto", std::nullopt},
+               {"cp", CompressionMethod::cp},
+               {"tucker", CompressionMethod::tucker},
+               {"pca", CompressionMethod::pca}},
+              "decomposition of the blocks: canonical polyadic, Tucker-2 or principal components; auto: tucker, and pca where "
+              "tucker cannot meet a tolerance");
   const Option& rank = tool.option("--rank", values_.rank, "columns of every cluster").range(1, 256);
   tool.option(
           "--tolerance", values_.tolerance,
@@ -65,6 +73,7 @@ nlohmann::json compressionJson(const bake::CompressionReport& report) {
   for (const auto& l : report.levels) levels.push_back(level(l));
   return {{"total", level(report.total)},
           {"levels", levels},
+          {"method", methodName(report.method)},
           {"coefficient_type", typeName(report.coefficient_type)},
           {"basis_bytes", report.basis_bytes},
           {"coefficient_bytes", report.coefficient_bytes},
@@ -79,9 +88,10 @@ nlohmann::json compressionJson(const bake::CompressionReport& report) {
 }
 
 std::string compressionText(const bake::CompressionReport& report) {
-  std::string text = format("%.2f MB, 1 : %.1f of the pyramid as stored, 1 : %.1f of dense images; coefficients of type %s\n",
-                            static_cast<double>(report.total_bytes) / 1e6, report.ratio_to_stored, report.ratio_to_dense,
-                            typeName(report.coefficient_type));
+  std::string text =
+      format("%.2f MB, 1 : %.1f of the pyramid as stored, 1 : %.1f of dense images; %s, coefficients of type %s\n",
+             static_cast<double>(report.total_bytes) / 1e6, report.ratio_to_stored, report.ratio_to_dense,
+             methodName(report.method), typeName(report.coefficient_type));
   const auto errors = [](const bake::CompressionLevelReport& l) {
     return format("%llu slices, seen error %.4f (worst direction %.3f, bias %.4f), relative error %.4f\n",
                   static_cast<unsigned long long>(l.slices), l.seen.seen, l.seen.worst, l.seen.bias, l.rel_l2);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "glint-info/statistics.h"
+#include "glint/model/json_depth.h"
 
 namespace glint::apps {
 namespace {
@@ -122,8 +123,9 @@ ordered_json summarize(const formats::Asset& asset) {
                         {"long_name", dataset.long_name}});
   }
   // The command is JSON, but the file may hold anything: then it is shown as text.
-  ordered_json command = ordered_json::parse(info.provenance.command_json, nullptr, false);
-  if (command.is_discarded()) command = info.provenance.command_json;
+  const std::string& text = info.provenance.command_json;
+  ordered_json command = jsonDepth(text) > kMostJsonDepth ? ordered_json(text) : ordered_json::parse(text, nullptr, false);
+  if (command.is_discarded()) command = text;
   return {{"schema_version", kSummarySchemaVersion},
           {"kind", asset.kind()},
           {"format_version", std::to_string(info.format_major) + "." + std::to_string(info.format_minor)},

@@ -99,7 +99,7 @@ bake::IngestOptions IngestOptions::values(Tool& tool, const std::string& name, c
   p.seed = tool.seed();
   p.trust_channels = !image_.choice().channels.empty();
   p.no_data = no_data_ == "auto" ? image.no_data : parseNoData(no_data_);
-  p.refuse_sentinels = no_data_ == "auto";
+  p.refuse_sentinels = no_data_ != "none";
   if (height_scale_um_option_->given()) p.height_scale = height_scale_um_ / texel_size_um_;
   return p;
 }
@@ -110,8 +110,14 @@ Image IngestOptions::read(Tool& tool, const std::string& path) const {
   return readInputImage(tool, path, choice);
 }
 
+void IngestOptions::warnOfUnusedNumber(Tool& tool, const std::string& name, const bake::IngestReport& report) const {
+  const std::optional<double> number = parseNoData(no_data_);
+  if (number && report.no_data == 0) tool.warn(fmt::format("{}: no texel holds {}, the number of --nodata", name, *number));
+}
+
 bake::PixelArray pixelArray(const Image& image) {
   bake::PixelArray array{image.width, image.height, image.channels, {}, image.code_scale};
+  array.inverted = image.inverted;
   // Integers with a sign are read as floats, and so are integers that were divided by alpha.
   const bool floats = std::holds_alternative<std::vector<float>>(image.pixels);
   if (floats && !image.floating) array.step = static_cast<float>(1 / image.code_scale);
@@ -187,7 +193,10 @@ void warnAbout(Tool& tool, const std::string& name, const bake::IngestOptions& v
   }
   if (r.channels == bake::NormalChannels::ag)
     warn("red is constant: x was read from alpha, y from green, and z follows from them");
-  if (r.blue_ignored) warn("blue is constant and contradicts red and green: z was taken from them, as with --channels rg");
+  if (r.positive_blue)
+    warn("blue holds z from 0 to 1 rather than from -1 to 1: z was taken from red and green, as with --channels rg");
+  else if (r.blue_ignored)
+    warn("blue is constant and contradicts red and green: z was taken from them, as with --channels rg");
   if (r.non_unit > 0) {
     warn(counted(r.non_unit, {"vector was", "vectors were"}) +
          fmt::format(" not of unit length, of {} (half of all are off by more than {:.3f}): normalised", r.texels,

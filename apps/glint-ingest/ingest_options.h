@@ -20,6 +20,9 @@ class IngestOptions {
   /// Reads the image that the options choose.
   Image read(Tool& tool, const std::string& path) const;
 
+  /// Warns where --nodata names a number that no texel holds.
+  void warnOfUnusedNumber(Tool& tool, const std::string& name, const bake::IngestReport& report) const;
+
   bool readsHeights() const { return kind_ == Kind::height; }
   bool writesHeights() const { return to_ == To::heights; }
   float texelSize() const { return texel_size_um_; }

@@ -30,7 +30,6 @@ int main(int argc, char** argv) {
     if (textures.wanted()) textures.check(tool, SlopeMoments::chainLength(width, height));
     const formats::Provenance provenance = tool.provenance();
     const bake::SlopeMomentsData moments = apps::momentsOf(asset, values, tool.progress("moments"));
-    formats::writeAsset(output.path(), moments.view(), provenance, output.writeOptions());
     nlohmann::json result = apps::momentsJson(moments);
     std::string text = apps::momentsText(moments);
     if (textures.wanted()) {
@@ -38,6 +37,8 @@ int main(int argc, char** argv) {
       result["lobe_errors"] = apps::errorsJson(errors);
       text += apps::errorsText(errors);
     }
+    // Last, so that Make takes nothing for made when textures fail.
+    formats::writeAsset(output.path(), moments.view(), provenance, output.writeOptions());
     tool.setResult(result);
     tool.summary(text);
   });

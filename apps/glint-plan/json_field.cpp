@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/files.h"
+#include "common/json_file.h"
 #include "common/suggest.h"
 #include "glint/api/alternatives.h"
 #include "glint/model/error.h"
@@ -15,17 +15,10 @@ namespace glint::apps {
 using nlohmann::json;
 
 JsonField JsonField::read(const std::string& path) {
-  const std::vector<std::byte> bytes = readFile(path);
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
-  try {
-    const json document = json::parse(text, text + bytes.size());
-    if (!document.is_object())
-      throw Error(ErrorCode::invalid_input, "scene.json", path, "", "holds JSON, but no object", "begin it with {");
-    return {path, "", document};
-  } catch (const json::parse_error& error) {
-    throw Error(ErrorCode::invalid_input, "scene.json", path, fmt::format("byte {}", error.byte), "is not JSON from here on",
-                "mend the text there: a comma, a quote or a bracket is often missing");
-  }
+  const json document = readJsonFile(path, "scene.json");
+  if (!document.is_object())
+    throw Error(ErrorCode::invalid_input, "scene.json", path, "", "holds JSON, but no object", "begin it with {");
+  return {path, "", document};
 }
 
 void JsonField::refuse(const std::string& what, const std::string& remedy) const {

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "common/files.h"
+#include "common/json_file.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
@@ -18,9 +19,7 @@ ProbeCache::ProbeCache(const std::string& folder, const std::string& map_hash) {
                 "name another one with --cache");
   file_ = (fs::path(folder) / (map_hash + ".probe.json")).string();
   if (!fs::exists(file_)) return;
-  const std::vector<std::byte> bytes = readFile(file_);
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
-  nlohmann::json read = nlohmann::json::parse(text, text + bytes.size(), nullptr, false);
+  nlohmann::json read = readJsonOrNothing(file_);
   if (read.is_object()) values_ = std::move(read);
 }
 

@@ -7,8 +7,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "common/files.h"
 #include "common/image_input.h"
+#include "common/json_file.h"
 
 namespace glint::apps {
 namespace {
@@ -92,20 +92,8 @@ class LightReader {
   Tool& tool_;
 };
 
-json parsed(const std::string& path) {
-  const std::vector<std::byte> bytes = readFile(path);
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
-  try {
-    return json::parse(text, text + bytes.size());
-  } catch (const json::exception& e) {
-    const std::string reason = e.what();  // "[name of the exception] reason"
-    throw Error(ErrorCode::invalid_input, "light.json", path, "", "is no JSON: " + reason.substr(reason.find("] ") + 2),
-                "JSON has finite numbers only, and no comments");
-  }
-}
-
 bake::Environment readAreaLights(Tool& tool, const std::string& path, const AreaLightOptions& options) {
-  const json document = parsed(path);
+  const json document = readJsonFile(path, "light.json");
   if (!document.is_object() || !document.contains("lights") || !document["lights"].is_array() || document.size() != 1)
     throw Error(ErrorCode::invalid_input, "light.json", path, "", "is no JSON object with a list \"lights\" alone",
                 "write {\"lights\": [...]}");

@@ -28,6 +28,14 @@ SynthOptions::SynthOptions(Tool& tool) {
                {"scratches", SynthKind::scratches},
                {"leather", SynthKind::leather},
                {"weave", SynthKind::weave},
+               {"twill", SynthKind::twill},
+               {"silk", SynthKind::silk},
+               {"bumps", SynthKind::bumps},
+               {"scales", SynthKind::scales},
+               {"structured", SynthKind::structured},
+               {"relief", SynthKind::relief},
+               {"wood", SynthKind::wood},
+               {"anisotropic", SynthKind::anisotropic},
                {"sawtooth", SynthKind::sawtooth},
                {"flat", SynthKind::flat},
                {"grating", SynthKind::grating},
@@ -38,12 +46,15 @@ SynthOptions::SynthOptions(Tool& tool) {
   alpha_ = &tool.option("--alpha", p.alpha, "Beckmann roughness of the noise; GTR roughness of flakes").range(0, 2);
   gamma_ = &tool.option("--gamma", p.gamma, "exponent of the GTR distribution of flakes; 2: GGX").range(0.1, 20);
   correlation_ = &tool.option("--correlation", p.correlation_texels, "correlation length of the noise, texels").range(0, 65536);
-  streak_ = &tool.option("--streak", p.streak_texels, "length of the streaks of brushed, texels").range(0, 65536);
+  streak_ = &tool.option("--streak", p.streak_texels, "length of the streaks of brushed, anisotropic and wood, texels")
+                 .range(0, 65536);
   feature_ = &tool.option("--flake-size,--feature-size", p.feature_texels,
-                          "size of a flake, pebble, thread or tooth, period of a grating, or width of a scratch, texels")
+                          "size of a flake, pebble, thread, tooth, bump, scale, pyramid, island or ring, period of a grating, "
+                          "or width of a "
+                          "scratch, texels")
                   .range(1, 65536);
   density_ = &tool.option("--density", p.density, "scratches in 64x64 texels").range(1e-3, 64);
-  slope_ = &tool.option("--slope", p.slope, "steepest slope of scratches, leather, weave, sawtooth, grating").range(0, 10);
+  slope_ = &tool.option("--slope", p.slope, "steepest slope of a pattern; not of flakes and noise").range(0, 10);
   tool.choice("--profile", p.profile, {{"sine", bake::GratingProfile::sine}, {"blazed", bake::GratingProfile::blazed}},
               "shape of the grooves of a grating");
   flake_size_uv_ =
@@ -59,7 +70,7 @@ SynthOptions::SynthOptions(Tool& tool) {
       &tool.option("--depth-um", depth_um_, "from the lowest to the highest point, micrometres, instead of --slope and --alpha")
            .range(1e-6, 1e9)
            .needs(*texel_size_);
-  for (Option* option : {alpha_, correlation_, feature_, slope_}) option->defaultText(per_kind);
+  for (Option* option : {alpha_, correlation_, streak_, feature_, slope_}) option->defaultText(per_kind);
   tool.usesSeed();
 }
 

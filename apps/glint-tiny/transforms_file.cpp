@@ -4,11 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <nlohmann/json.hpp>
-#include <vector>
 
-#include "common/files.h"
+#include "common/json_file.h"
 #include "glint/math/gaussian.h"
 #include "glint/model/error.h"
 
@@ -22,15 +20,7 @@ constexpr const char* kForm = "see glint-tiny --help for the members of the file
 class TransformsReader {
  public:
   explicit TransformsReader(const std::string& path) : path_(path) {
-    const std::vector<std::byte> bytes = readFile(path);
-    const auto* text = reinterpret_cast<const char*>(bytes.data());
-    try {
-      document_ = json::parse(text, text + bytes.size());
-    } catch (const json::exception& e) {
-      const std::string reason = e.what();  // "[name of the exception] reason"
-      throw Error(ErrorCode::invalid_input, "tiny.transforms_file", path, "",
-                  "is no JSON: " + reason.substr(reason.find("] ") + 2), "JSON has finite numbers only, and no comments");
-    }
+    document_ = readJsonFile(path, "tiny.transforms_file");
     if (!document_.is_object()) fail("", "is no JSON object");
   }
 

@@ -156,6 +156,7 @@ double codeScale(const OIIO::ImageSpec& spec) {
 /// OpenImageIO inverts images in which 0 is white for up to 8 bits only.
 void invertWhiteZero(const OIIO::ImageSpec& spec, const std::string& path, Image& image) {
   if (image.format != "tiff" || spec.get_int_attribute("tiff:PhotometricInterpretation", 1) != 0) return;
+  image.inverted = true;
   if (spec.format == OIIO::TypeDesc::UINT8) return;
   auto* codes = std::get_if<std::vector<std::uint16_t>>(&image.pixels);
   if (!codes) {

@@ -148,6 +148,7 @@ const char* takeOptions(const glint_open_options* from, glint_open_options& to) 
     return "sigma_r is not in 1e-4 to 0.25; give 0 for 0.005";
   if (to.surface != GLINT_SURFACE_FLAT && to.surface != GLINT_SURFACE_SMOOTH) return "unknown surface";
   if (to.boundary != GLINT_BOUNDARY_WRAP && to.boundary != GLINT_BOUNDARY_CLAMP) return "unknown boundary";
+  if (!(to.alpha >= 0 && to.alpha <= 1)) return "alpha is not in 0 to 1; give 0 for the smallest of the asset";
   if (to.slant_tolerance != GLINT_SLANT_EXACT && !(to.slant_tolerance >= 0 && to.slant_tolerance <= 1))
     return "slant_tolerance is not in 0 to 1; give 0 for 0.06, or GLINT_SLANT_EXACT";
   if (to.gaussian_boxes != 0 && to.gaussian_boxes != 1 && to.gaussian_boxes != 3)

@@ -77,9 +77,12 @@ nb::dict reportDict(const bake::CompressionReport& r) {
 nb::dict compress(const BuildJob& job, const std::string& method, int rank, double tolerance, const std::string& metric,
                   const std::string& quantize, bool spots, int regions, double min_improvement, int max_iterations) {
   bake::CompressionOptions o;
-  o.method = choose<CompressionMethod>(
-      "method", method,
-      {{"cp", CompressionMethod::cp}, {"tucker", CompressionMethod::tucker}, {"pca", CompressionMethod::pca}});
+  using Method = std::optional<CompressionMethod>;
+  o.method = choose<Method>("method", method,
+                            {{"auto", std::nullopt},
+                             {"cp", CompressionMethod::cp},
+                             {"tucker", CompressionMethod::tucker},
+                             {"pca", CompressionMethod::pca}});
   o.rank = rank;
   o.tolerance = tolerance;
   o.metric = choose<bake::ErrorMetric>("metric", metric, {{"seen", bake::ErrorMetric::seen}, {"l2", bake::ErrorMetric::l2}});

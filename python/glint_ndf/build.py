@@ -110,7 +110,8 @@ def synth(kind: str, width: int = 512, height: int | None = None, *, seed: int =
     """Makes a periodic procedural map, as ``glint-synth``. Options that are None have values typical of the kind.
 
     Args:
-        kind: "isotropic", "brushed", "flakes", "scratches", "leather", "weave", "sawtooth", "flat", "grating" or "flake2d".
+        kind: "isotropic", "anisotropic", "brushed", "flakes", "scratches", "leather", "bumps", "scales", "relief", "structured",
+            "wood", "weave", "twill", "silk", "sawtooth", "grating", "flat" or "flake2d".
         heights: make an asset of kind heights instead of normals.
         alpha: Beckmann roughness of the noise, or roughness of the flakes.
         gamma: exponent of the distribution of flakes.
@@ -166,7 +167,7 @@ def wave_pyramid(heights: Asset, *, stride: float = 32.0, overlap: float = 2 ** 
     return _made("wave_pyramid", options, _expect(heights, "heights"), threads, progress)
 
 
-def compress(ndf_pyramid: Asset, *, method: str = "tucker", rank: int | None = None, tolerance: float | None = None,
+def compress(ndf_pyramid: Asset, *, method: str = "auto", rank: int | None = None, tolerance: float | None = None,
              metric: str = "seen", quantize: str = "auto", spots: bool = True, regions: int | str = "auto",
              min_improvement: float = 1e-4, max_iterations: int = 500, threads: int = 0,
              progress: Progress | None = None) -> Asset:
@@ -174,7 +175,7 @@ def compress(ndf_pyramid: Asset, *, method: str = "tucker", rank: int | None = N
 
     Args:
         ndf_pyramid: asset of kind ndf-pyramid.
-        method: "tucker", "pca" or "cp" (the paper's).
+        method: "tucker", "pca" or "cp" (the paper's); "auto": tucker, and pca where tucker cannot meet a tolerance.
         rank: columns of every cluster, 1 to 256; 16 unless there is a tolerance.
         tolerance: instead of `rank`: largest error in `metric`; columns and bits are chosen to meet it in the fewest bytes.
         metric: "seen": what a person sees towards each half vector, in every level; "l2": the error of all images together.

@@ -1,6 +1,7 @@
 """Writes docs/BENCHMARKS.md, its charts and docs/benchmarks.csv from the results of bench.py. Normally run by `make bench-report`.
 
-The page has a short table for each method; the CSV has every number.
+The page answers the questions that people bring, each with one chart and one table; then come the figures of each method, folded. The CSV has every
+number. What pictures show is read from docs/limits.csv, which `make limits` writes.
 """
 
 import argparse
@@ -9,21 +10,29 @@ import json
 import pathlib
 import re
 
-import matplotlib
+from charts import chart, light_error_chart, light_time_chart, preparation_chart, stride_chart
+from scenes import scene_section
+from words import percents, sizes, span, times
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt  # noqa: E402
-
-LABELS = {"pyramid": "pyramid", "cp16": "cp", "cp32": "cp", "tucker-tolerance": "tucker", "pca-tolerance": "pca"}
 PAGE = """# Measurements
 
-Written by `make bench-report`; do not edit. Every number is in [benchmarks.csv](benchmarks.csv).
+Written by `make bench-report`; do not edit. Every number, with its target and the figure of its paper, is a line of [benchmarks.csv](benchmarks.csv).
+`glint-bench map.glint -o results.json` measures the same on a map of yours, and `glint-bench --report results.json -o report.html` charts it.
 
-## What the numbers mean
+- [Which method for my scene?](#which-method-for-my-scene)
+- [How right, and how quick, is an answer?](#how-right-and-how-quick-is-an-answer)
+- [How small is an asset?](#how-small-is-an-asset)
+- [How long does an asset take to make?](#how-long-does-an-asset-take-to-make)
+- [What is not reached yet?](#what-is-not-reached-yet)
+- Every method by itself: {methods}
+- [How it was measured](#how-it-was-measured): read it before you quote a number
+"""
+CONDITIONS = """
+## How it was measured
 
 {machine}
-Maps are {size}^2 texels unless a line says otherwise, made by glint-synth and stored as 8-bit PNG (arguments:
-`tests/bench/bench.py`).
+Maps are {size}^2 texels unless a line says otherwise, made by glint-synth and stored as 8-bit PNG (arguments: `tests/bench/bench.py`). `make bench` measures,
+`make bench-report` writes this page; what pictures show is measured by `make limits`, on maps of 1024^2 texels: [LIMITS](LIMITS.md) says how.
 
 - **Time** of a command is the time of its whole process, reading and writing files included, {repeats}.
   Time of a query is of one thread. *Random* queries ask footprints of every size anywhere, so that most miss the caches;
@@ -31,7 +40,7 @@ Maps are {size}^2 texels unless a line says otherwise, made by glint-synth and s
 - **Error** is |D' - D| / |D| over the pixels of an NDF image: D' as the asset answers, D by brute force over the texels.
   *At centres*, the footprints are the ones that the asset stores. *At random*, they lie anywhere and have any size of an
   octave, so that the asset has to interpolate.
-- **Target** is the figure that this project aims for. Missed targets are listed below each table.
+- **Target** is the figure that this project aims for.
 - **Paper** is the figure of the method's paper, on its authors' machine and maps.
 - A span, such as 1 to 3 s, is over the maps unless the text above the table says otherwise.
 """
@@ -105,17 +114,6 @@ def missed(rows):
     return [row for row in judged(rows) if row["value"] > row["target"]]
 
 
-def digits(value):
-    """Three digits, without an exponent where the number is large."""
-    return f"{value:.3g}" if abs(value) < 1000 else f"{float(f'{value:.3g}'):,.0f}"
-
-
-def span(values, unit):
-    """The value, or the least and the greatest of several."""
-    low, high = digits(min(values)), digits(max(values))
-    return f"{low if low == high else f'{low} to {high}'} {unit}".strip()
-
-
 def limits(rows):
     return "<= " + span([row["target"] for row in rows], rows[0]["unit"])
 
@@ -144,26 +142,51 @@ def folded(title, lines):
 
 
 def target_notes(rows):
-    """Targets that cannot hold for the method, and a folded list of the missed ones."""
+    """Targets that cannot hold for the method."""
     text = ""
     for reason in dict.fromkeys(filter(None, map(cannot_hold, rows))):
         group = [row for row in rows if cannot_hold(row) == reason]
         figures = ", ".join(dict.fromkeys(f"*{row['figure'].rpartition(', ')[0]}*" for row in group))
         text += f"\nCannot hold here ({limits(group)}; measured {span([row['value'] for row in group], group[0]['unit'])}): {figures}. {reason}\n"
-    over = missed(rows)
-    return text + folded(f"{len(over)} of {len(judged(rows))} targets missed",
-                         [f"- {row['figure']}: {span([row['value']], row['unit'])}, target {limits([row])}" for row in over])
+    return text
 
 
-def method_sections(rows, charts):
-    """A section for each method that was measured, with its charts."""
-    text, rest = "", rows
+def by_method(rows):
+    """(title, what it is, its lines, its rows) of each method that was measured."""
+    rest = rows
     for title, belongs, what, lines in METHODS:
         own = [row for row in rest if re.fullmatch(belongs, f"{row['section']}: {row['figure']}")]
         rest = [row for row in rest if row not in own]
         if own:
-            text += f"\n## {title}\n\n{what}\n\n{method_table(own, lines)}\n{target_notes(own)}{charts.get(title, '')}"
+            yield title, what, lines, own
+
+
+def method_sections(rows, charts):
+    """A section for each method that was measured: its chart, and its figures, folded."""
+    text = "\n## Every method by itself\n"
+    for title, what, lines, own in by_method(rows):
+        met = len(judged(own)) - len(missed(own))
+        summary = "figures" + (f": {met} of {len(judged(own))} targets are met" if judged(own) else "")
+        text += f"\n### {title}\n\n{what}\n{charts.get(title, '')}{folded(summary, [method_table(own, lines), *target_notes(own).splitlines()])}"
     return text
+
+
+def targets_table(rows):
+    """Targets of each method, and the figure that is furthest from its own."""
+    text = ["| method | targets met | cannot hold | furthest from its target |", "|---|---|---|---|"]
+    for title, _, _, own in by_method(rows):
+        if not judged(own):
+            continue
+        worst = max(judged(own), key=lambda row: row["value"] / row["target"] if row["target"] else 0)
+        over = len(missed(own))
+        furthest = f"{worst['figure']}: {span([worst['value']], worst['unit'])}, target {limits([worst])}" if over else ""
+        text.append(f"| [{title}](#{anchor(title)}) | {len(judged(own)) - over} of {len(judged(own))} | {sum(1 for row in own if cannot_hold(row)) or ''} | {furthest} |")
+    return "\n".join(text)
+
+
+def anchor(title):
+    """Name of a heading in links."""
+    return re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-")
 
 
 def octave_rows(accuracy):
@@ -214,87 +237,113 @@ def points(accuracy, rows):
             for name, assets in accuracy.items() for asset in assets}
 
 
-def chart(data, column, label, path):
-    figure, axis = plt.subplots(figsize=(6, 4))
-    markers = {"pyramid": "s", "cp": "o", "tucker": "^", "pca": "D"}
-    names = sorted({name for name, _ in data})
-    for (name, kind), point in data.items():
-        if point[column] is None:
-            continue
-        axis.plot(point[column], point[1], markers[LABELS[kind]], color=f"C{names.index(name)}", markersize=7)
-    for k, name in enumerate(names):
-        axis.plot([], [], "-", color=f"C{k}", label=name, linewidth=4)
-    for method, marker in markers.items():
-        axis.plot([], [], marker, color="0.3", label=method)
-    finish(figure, axis, path, xlabel=label, ylabel="relative L2 error, mean over octaves")
+def named(rows, pattern, scale=1):
+    """Values of the rows whose figures have this form."""
+    return [scale * row["value"] for row in rows if re.fullmatch(pattern, row["figure"])]
 
 
-def finish(figure, axis, path, **labels):
-    axis.set(xscale="log", yscale="log", **labels)
-    axis.grid(True, which="both", color="0.92", linewidth=0.6)
-    axis.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1, 0.5))
-    figure.savefig(path, dpi=110, bbox_inches="tight", metadata={"Software": None})
-    plt.close(figure)
+def answers_table(rows):
+    """Times and errors of an answer, a line for each method."""
+    text = ["| method | density anywhere | the same again | mean over a range | half vector drawn | error, stored footprints | error, any footprints |",
+            "|---|---|---|---|---|---|---|"]
+    for title, kind in (("Pyramid", "pyramid"), ("Compressed pyramid: CP", r"cp\d+"), ("Compressed pyramid: Tucker", "tucker-tolerance"),
+                        ("Compressed pyramid: PCA", "pca-tolerance"), ("Moments", "moments")):
+        cells = [times(named(rows, rf"{figure}, \S+ {kind}")) for figure in ("density, random", "density, warm", "mean, random", "sample, random")]
+        cells += [percents(named(rows, rf"rel_l2 at {place}, worst octave, \S+ {kind}")) for place in ("centres", "random")]
+        text.append(line_of(title, cells))
+    us = 1e3
+    text.append(line_of("Bin map", [times(named(rows, r"bin map, density, .* 2K.*")), "", "", "", percents(named(rows, r"bin map, median error, .* 2K.*")), ""]))
+    near = r"flat, round, sigma (?:1|2|4)"
+    text.append(line_of("Texels", [times(named(rows, rf"from texels, density, random, .*, {near}", us)), "", times(named(rows, rf"from texels, mean, .*, {near}", us)), "",
+                                   percents(named(rows, rf"from texels, error, density, random, .*, {near}")), ""]))
+    text.append(line_of("Histograms", [times(named(rows, r"histogram of (?:64|256|1024)\^2, stride 8, .*", us)) + ", all directions", "", "", "", "", ""]))
+    text.append("| plain GGX, for comparison | " + " | ".join(times(named(rows, rf"{figure}, \S+ ggx")) for figure in (
+        "density, random", "density, warm", "mean, random", "sample, random")) + " | | |")
+    return "\n".join(text)
 
 
-def light_error_chart(light, path):
-    """Error of the product integral against the order, for every environment and roughness of the lobes."""
-    figure, axis = plt.subplots(figsize=(6, 4))
-    lights = list(dict.fromkeys(row["light"] for row in light["errors_by_order"]))
-    styles = dict(zip(sorted({row["sigma_r"] for row in light["errors_by_order"]}), (":", "-", "--")))
-    for k, name in enumerate(lights):
-        for sigma, style in styles.items():
-            rows = [row for row in light["errors_by_order"] if row["light"] == name and row["sigma_r"] == sigma and row["order"] >= 5]
-            axis.plot([row["order"] for row in rows], [row["none"] for row in rows], "o" + style, color=f"C{k}", markersize=4,
-                      label=f"{name.replace('_', ' ')}, roughness {sigma:.2g}")
-    finish(figure, axis, path, xlabel="order", ylabel="relative RMS error against quadrature")
-    return path.name
+def line_of(title, cells):
+    return f"| [{title}](#{anchor(title)}) | {' | '.join(cells)} |"
 
 
-def light_time_chart(light, path):
-    """Time of the product integral, and of Monte Carlo for the same error."""
-    figure, axis = plt.subplots(figsize=(6, 4))
-    lights = list(dict.fromkeys(row["light"] for row in light["times_at_equal_error"]))
-    for k, name in enumerate(lights):
-        rows = [row for row in light["times_at_equal_error"] if row["light"] == name]
-        errors = [row["nearest"]["error"] for row in rows]
-        label = name.replace("_", " ")
-        axis.plot(errors, [row["nearest"]["us"] for row in rows], "o-", color=f"C{k}", label=f"{label}, harmonics")
-        axis.plot(errors, [row["nearest"]["monte_carlo_us"] for row in rows], "x--", color=f"C{k}", label=f"{label}, Monte Carlo")
-        for row in rows:
-            axis.annotate(f"{row['order']}", (row["nearest"]["error"], row["nearest"]["us"]), textcoords="offset points", xytext=(5, 4), fontsize=7)
-    finish(figure, axis, path, xlabel="relative RMS error against quadrature", ylabel="microseconds of one shading point")
-    return path.name
+def megabytes_of(data, kind):
+    """MB of the assets of a kind."""
+    return [point[0] for (_, name), point in data.items() if re.fullmatch(kind, name)]
 
 
-def stride_chart(rows, path):
-    """Bytes of accumulated histograms against the time of a query, along the strides of their tables."""
-    figure, axis = plt.subplots(figsize=(6, 4))
-    values = {row["figure"]: row["value"] for row in rows}
-    strides = {int(match[1]) for figure_name in values if (match := re.fullmatch(r"bytes of histograms, stride (\d+), \S+", figure_name))}
-    names = sorted({figure_name.split(", ")[2] for figure_name in values if figure_name.startswith("bytes of histograms")})
-    for k, name in enumerate(names):
-        for size, style in ((64, "o:"), (256, "s-"), (1024, "^--")):
-            points = [(values[f"bytes of histograms, stride {s}, {name}"], values[f"histogram of {size}^2, stride {s}, {name}"], s) for s in sorted(strides)]
-            axis.plot([p[0] for p in points], [p[1] for p in points], style, color=f"C{k}", markersize=5, label=f"{name}, {size}$^2$ texels")
-            if size == 256:
-                for megabytes, us, stride in points:
-                    axis.annotate(f"{stride}", (megabytes, us), textcoords="offset points", xytext=(4, 4), fontsize=7)
-    finish(figure, axis, path, xlabel="MB (numbers: stride in texels)", ylabel="microseconds of a histogram")
-    return path.name
+def preparations(rows, data):
+    """(title, method, seconds, MB, paper) of each method."""
+    ms, mib = 1e-3, 1.048576
+    build = {"Pyramid": ("pyramid", r"pyramid, flat, .*", 1), "Compressed pyramid: CP": ("cp", r"compress, cp .*", 1),
+             "Compressed pyramid: Tucker": ("tucker", r"compress, tucker to the error of cp.*", 1), "Compressed pyramid: PCA": ("pca", r"compress, pca .*", 1),
+             "Bin map": ("bin map", r"bin map, build, .* 2K.*", ms), "Moments": ("moments", r"moments, \S+", 1),
+             "Histograms": ("histograms", r"histograms, stride 8, .*", 1), "Light": ("light", r"SH l.*, 65x128", 1),
+             "Displacement": ("displacement", r"displace, factor 16, .*, 1024\^2", 1)}
+    small = {"Bin map": named(rows, r"bin map, bytes, .* 2K.*", mib), "Moments": named(rows, r"bytes of moments, .*"),
+             "Histograms": named(rows, r"bytes of histograms, stride 8, .*"), "Displacement": named(rows, r"bytes of T and S.*", 1e-3)}
+    kinds = {"Pyramid": "pyramid", "Compressed pyramid: CP": r"cp\d+", "Compressed pyramid: Tucker": "tucker-tolerance", "Compressed pyramid: PCA": "pca-tolerance"}
+    for title, (method, pattern, scale) in build.items():
+        paper = "; ".join(dict.fromkeys(row["paper"] for row in rows if re.fullmatch(pattern, row["figure"]) and row["paper"]))
+        yield title, method, named(rows, pattern, scale), small.get(title) or megabytes_of(data, kinds.get(title, "")), paper
 
 
-def overview(data, rows, docs):
-    """Charts of error against bytes and time of every kind that answers densities."""
+def preparation_table(rows, data):
+    text = ["| method | time | in the paper |", "|---|---|---|"]
+    text += [line_of(title, [times([1e9 * value for value in seconds]), paper]) for title, _, seconds, _, paper in preparations(rows, data) if seconds]
+    return "\n".join(text)
+
+
+def bytes_table(rows, data):
+    papers = {"Compressed pyramid: CP": r"bytes, cp .*", "Bin map": r"bin map, bytes, .* 2K.*", "Histograms": r"bytes of histograms, stride 8, .*",
+              "Displacement": r"bytes of T and S.*"}
+    text = ["| method | asset | in the paper |", "|---|---|---|"]
+    for title, _, _, megabytes, _ in preparations(rows, data):
+        paper = "; ".join(dict.fromkeys(row["paper"] for row in rows if re.fullmatch(papers.get(title, ""), row["figure"]) and row["paper"]))
+        if megabytes:
+            text.append(line_of(title, [sizes(megabytes), paper]))
+    return "\n".join(text)
+
+
+def question_sections(data, rows, docs):
+    """The questions that people bring, each with a chart and a table."""
     chart(data, 0, "MB", docs / "error-bytes.png")
     chart(data, 2, "nanoseconds of a density query, random", docs / "error-time.png")
+    preparation_chart(preparations(rows, data), docs / "prepare-time.png")
     held, excused = judged(rows), sum(1 for row in rows if cannot_hold(row))
-    return f"""
-Every point is an asset: its error against its bytes, and against the time of a query. Down and to the left is better.
-{len(held) - len(missed(rows))} of {len(held)} targets are met; {excused} more cannot hold for their kind of asset, as its section says.
+    return f"""{scene_section(docs)}
+## How right, and how quick, is an answer?
+
+{answers_table(rows)}
+
+Errors are of the octave of footprint sizes in which they are largest. Moments are one smooth lobe, whatever the map: their error is that of a lobe. Bin maps of every
+roughness, with the median error of their own boxes; texels at footprints of 1 to 4 texels.
+
+![Error against time of a density](error-time.png)
+
+## How small is an asset?
+
+{bytes_table(rows, data)}
+
+CP has as many columns as its paper, Tucker and PCA have its error. `--tolerance` trades bytes for error. Histograms have a stride of 8. The tables of a
+displacement need the cells of its map, too.
 
 ![Error against bytes](error-bytes.png)
-![Error against time](error-time.png)
+
+## How long does an asset take to make?
+
+{preparation_table(rows, data)}
+
+Whole processes, from file to file. A compressed pyramid is made from a pyramid, whose time comes before. Light is 65 x 128 directions at order 60: its two tables.
+Displacement is of maps of 1024^2 texels.
+
+![Time to make an asset](prepare-time.png)
+
+## What is not reached yet?
+
+{len(held) - len(missed(rows))} of {len(held)} targets are met; {excused} more cannot hold for their kind of asset. Lines of [benchmarks.csv](benchmarks.csv) whose value is above the
+target are the missed ones.
+
+{targets_table(rows)}
 """
 
 
@@ -330,10 +379,10 @@ def main():
     docs.mkdir(exist_ok=True)
     machine = "{processor}, {cores} cores; load {load:.1f} before the run; revision {revision}.".format(**results["machine"])
     repeats = f"the median of {results['repeats']} runs" if results["repeats"] > 1 else "of one run"
-    text = PAGE.format(machine=machine, size=results["size_texels"], repeats=repeats)
-    if data := points(accuracy, rows):
-        text += overview(data, rows, docs)
-    text += method_sections(rows, method_charts(rows, light, docs))
+    data = points(accuracy, rows)
+    links = ", ".join(f"[{title}](#{anchor(title)})" for title, *_ in by_method(rows))
+    text = PAGE.format(methods=links) + question_sections(data, rows, docs) + method_sections(rows, method_charts(rows, light, docs))
+    text += CONDITIONS.format(machine=machine, size=results["size_texels"], repeats=repeats)
     (docs / "BENCHMARKS.md").write_text(text, encoding="utf-8")
     write_csv([*rows, *octave_rows(accuracy), *light_rows(light)], docs / "benchmarks.csv")
     print(f"wrote {docs}/BENCHMARKS.md, its charts and benchmarks.csv")

@@ -1,11 +1,16 @@
 """glint-bench: its results, going on after a stop, and its page in a browser without a window."""
 
+import base64
 import json
+import math
 import pathlib
 import re
 import shutil
+import struct
 import subprocess
+import sys
 import time
+from xml.etree import ElementTree
 
 import jsonschema
 import pytest
@@ -67,6 +72,70 @@ def test_images_are_of_the_footprints(results):
         for mine, right in zip(measurement["images"], truth):
             assert mine["sigma_texels"] == right["sigma_texels"]
             assert sum(mine["image"]) * 4 / 64**2 == pytest.approx(1, abs=0.03)
+
+
+# Pictures are kept in half precision, whose last place is 2^-11 of a number: rounding of all pixels averages out.
+OF_HALVES = 1e-3
+
+
+def radiance(picture):
+    """Pixels of a picture of the results, top row first."""
+    packed = base64.b64decode(picture["picture"])
+    return struct.unpack(f"<{len(packed) // 2}e", packed)
+
+
+def pairs(results):
+    """(measurement, its picture, the exact picture) of all pictures."""
+    truth = {(picture["scene"], picture["sigma_texels"]): picture for picture in results["maps"][0]["pictures"]}
+    assert set(truth) == {(scene, size) for scene in ("plane", "sphere") for size in (2, 8)}
+    for measurement in results["measurements"]:
+        assert len(measurement["pictures"]) == (0 if measurement["method"] == "brute force" else len(truth))
+        for picture in measurement["pictures"]:
+            yield measurement, picture, truth[picture["scene"], picture["sigma_texels"]]
+
+
+def test_pictures_err_as_they_say(results):
+    for _, picture, truth in pairs(results):
+        mine, right = radiance(picture), radiance(truth)
+        assert len(mine) == len(right) == truth["pixels"] ** 2 and max(right) > truth["white"] > 0
+        rmse = math.sqrt(sum((a - b) ** 2 for a, b in zip(mine, right)) / sum(b * b for b in right))
+        assert picture["rmse"] == pytest.approx(rmse, abs=OF_HALVES)
+
+
+def test_pictures_rank_methods_as_a_person_does(results):
+    flip = {(measurement["method"], picture["scene"], picture["sigma_texels"]): picture["flip"] for measurement, picture, _ in pairs(results)}
+    for scene in ("plane", "sphere"):
+        assert 0 < flip["pyramid", scene, 8] < flip["moments", scene, 8]  # one lobe has no sparkles
+        assert flip["pyramid", scene, 8] <= flip["tucker", scene, 8] + OF_HALVES
+    assert {measurement["method"] for measurement, picture, _ in pairs(results) if not picture["as_asked"]} == {"bin map", "histograms"}
+
+
+def test_flip_is_that_of_flip_evaluator(results):
+    numpy = pytest.importorskip("numpy")
+    flip_evaluator = pytest.importorskip("flip_evaluator")
+
+    def shown(picture, truth):
+        x = numpy.clip(numpy.array(radiance(picture)) / truth["white"], 0, 1).reshape(truth["pixels"], -1)
+        srgb = numpy.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+        return numpy.repeat(srgb[:, :, None], 3, axis=2).astype(numpy.float32)
+
+    for _, picture, truth in pairs(results):
+        expected = float(flip_evaluator.evaluate(shown(truth, truth), shown(picture, truth), "LDR")[1])
+        assert picture["flip"] == pytest.approx(expected, abs=OF_HALVES)
+
+
+def test_results_of_a_version_without_pictures_are_shown_and_completed(glint, copied):
+    document = json.loads((copied / "results.json").read_text())
+    for part in (*document["maps"], *document["measurements"]):
+        del part["pictures"]
+    (copied / "results.json").write_text(json.dumps(document, separators=(",", ":")))
+    process = glint("bench", "--report", "results.json", "-o", "some.html")
+    assert process.returncode == 0, process.stderr
+    process = glint("bench", "map.glint", "-o", "results.json", "--quick", "--only", "moments")
+    assert process.returncode == 0, process.stderr
+    after = json.loads((copied / "results.json").read_text())
+    assert len(after["maps"]) == 1 and after["maps"][0]["pictures"]
+    assert {measurement["method"] for measurement in after["measurements"] if "pictures" in measurement} == {"moments"}
 
 
 def test_summary_names_the_quickest_method(measured):
@@ -203,7 +272,17 @@ setTimeout(() => {
   const truth = picture();
   document.querySelector("input[name=view][value=error]").click();
   const error = picture();
-  shown.pictures = new Set([method, truth, error]).size;
+  document.querySelector("input[name=view][value=method]").click();
+  const subjects = ["sphere", "ndf", "plane"].map((subject) => { change("subject", subject); return picture(); });
+  shown.pictures = new Set([method, truth, error, ...subjects]).size;
+  shown.same = subjects[2] === method;
+  change("metric", "flip");
+  note("flip");
+  shown.shapes = [...document.getElementById("shape").options].map((option) => option.value);
+  shown.flipWithin = document.querySelectorAll("#cheapest tr").length;
+  change("shape", "sphere");
+  shown.followed = document.getElementById("subject").value;
+  change("metric", "seen");
   change("shape", "box");
   change("metric", "tv");
   note("box");
@@ -235,9 +314,34 @@ def test_the_page_draws_and_its_choices_work(measured, tmp_path, width):
     methods = 5  # all but brute force
     assert shown["round"][:3] == [methods] * 3 and shown["round"][3] >= 2 * methods
     assert shown["box"][:3] == [methods] * 3
-    assert shown["pictures"] == 3
-    assert shown["figures"] == 1 + methods + 1 and shown["strip"] == methods and shown["cheapest"] >= 3
+    assert shown["flip"][:3] == [methods] * 3 and shown["shapes"] == ["plane", "sphere"] and shown["flipWithin"] == 3
+    assert shown["followed"] == "sphere"
+    assert shown["pictures"] == 5 and shown["same"]  # the plane's method, truth and error, a sphere and an NDF
+    assert shown["figures"] == 1 + methods + 1 and shown["strip"] == methods + 1 and shown["cheapest"] >= 3
     assert shown["wide"], "the page is wider than the window"
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
+def test_charts_are_written_as_files(measured, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    script = ROOT / "pipelines/bench_charts.py"
+
+    def run(page, *choices):
+        return subprocess.run([sys.executable, script, page, "--out", tmp_path / "charts", *choices], capture_output=True, text=True, timeout=250)
+
+    process = run(measured / "report.html", "--metric", "flip", "--shape", "sphere", "--size", "8")
+    assert process.returncode == 0, process.stderr
+    assert sorted(path.name for path in (tmp_path / "charts").iterdir()) == sorted(f"{name}.{ending}" for name in ("time", "bytes", "prepare", "sizes") for ending in ("svg", "png"))
+    for name in ("time", "bytes", "prepare", "sizes"):
+        svg = ElementTree.parse(tmp_path / f"charts/{name}.svg").getroot()
+        texts = ["".join(text.itertext()) for text in svg.iter("{http://www.w3.org/2000/svg}text")]
+        assert "bin map" in texts and any("FLIP" in text for text in texts)  # the legend and the axis
+        with image.open(tmp_path / f"charts/{name}.png") as picture:
+            assert picture.size == (2 * int(svg.get("width")), 2 * int(svg.get("height")))
+            assert len(picture.convert("RGB").getcolors(1 << 20)) > 20, "is empty"
+    assert "is no file" in run(tmp_path / "missing.html").stderr
+    (tmp_path / "other.html").write_text("<p>no charts</p>")
+    assert "has no charts" in run(tmp_path / "other.html").stderr
 
 
 PAGE_ACT = """<script>

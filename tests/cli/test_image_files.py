@@ -50,13 +50,14 @@ TURNS = {
 
 
 @pytest.mark.parametrize("orientation", TURNS)
-@pytest.mark.parametrize("name", ["a.exr", "a.tif", "a.png", "a.jpg"])
+@pytest.mark.parametrize("name", ["a.exr", "a.tif", "a.png", "a.jpg", "a.webp"])
 def test_orientation_is_that_of_a_viewer(glint, name, orientation):
     stored, path = surface(), glint.folder / name
-    if name.endswith((".png", ".jpg")):
+    if name.endswith((".png", ".jpg", ".webp")):
         exif = Image.Exif()
         exif[274] = orientation
-        Image.fromarray(codes(stored)).save(path, exif=exif, **({"quality": 100, "subsampling": 0} if "jpg" in name else {}))
+        exact = {"a.jpg": {"quality": 100, "subsampling": 0}, "a.webp": {"lossless": True}}
+        Image.fromarray(codes(stored)).save(path, exif=exif, **exact.get(name, {}))
     else:
         write(path, unorm(stored), Orientation=orientation)
     ingest(glint, name)
@@ -97,6 +98,18 @@ def test_formats_that_are_multiplied_while_they_are_read_are_divided(glint):
     Image.fromarray(pixels).save(glint.folder / "a.webp", lossless=True)
     ingest(glint, "a.webp")
     assert data(glint) == pytest.approx(surface()[..., :2], abs=3 * CODE)
+
+
+def test_a_webp_whose_alpha_takes_bits_of_colours_is_refused(glint):
+    """OpenImageIO multiplies colours of a WebP by alpha in 8 bits: an alpha of 8 would leave five levels."""
+    alpha = numpy.ones((40, 48, 1))
+    alpha[3, 5] = 8 / 255
+    pixels = numpy.round(255 * with_alpha(unorm(surface()), alpha, multiply=False)).astype(numpy.uint8)
+    Image.fromarray(pixels).save(glint.folder / "a.webp", lossless=True, exact=True)
+    refused(glint, "a.webp", "1 pixel has an alpha below a half", "column 5, row 3 from the top", "PNG")
+    Image.fromarray(pixels).save(glint.folder / "a.png")
+    ingest(glint, "a.png")
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
 
 
 def test_transparent_pixels_are_refused_or_filled(glint):

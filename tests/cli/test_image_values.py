@@ -88,6 +88,20 @@ def test_a_few_texels_that_point_down_are_repaired_and_counted(glint):
     ingest(glint, "d.png", "--fix-invalid")
 
 
+def test_blue_that_holds_z_from_0_to_1_is_recognised(glint):
+    """x and y from -1 to 1, z from 0 to 1: a convention of some bakers."""
+    n = surface()
+    pixels = numpy.concatenate([unorm(n[..., :2]), n[..., 2:]], axis=-1)
+    for name, kind in (("b.png", "uint8"), ("b.exr", "float")):
+        write(glint.folder / name, pixels, kind)
+        assert "blue holds z from 0 to 1" in ingest(glint, name).stderr
+        assert data(glint) == pytest.approx(n[..., :2], abs=CODE)
+    flat = surface(steepness=0.05)
+    write(glint.folder / "f.png", unorm(flat), "uint8")
+    assert "blue" not in ingest(glint, "f.png").stderr
+    assert data(glint) == pytest.approx(flat[..., :2], abs=CODE)
+
+
 # --- heights
 
 
@@ -155,6 +169,32 @@ def test_the_tag_of_a_geotiff_names_its_holes(glint, kind, number, text):
     filled = data(glint, "heights") * full
     assert filled.min() > 19 and filled.max() < 121
     assert filled[6:] == pytest.approx(heights[6:], rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["uint8", "uint16"])
+@pytest.mark.parametrize("options", [(), ("--nodata", "0")], ids=["tag", "option"])
+def test_the_number_for_no_data_is_that_of_the_file_where_zero_is_white(glint, kind, options):
+    full = numpy.iinfo(kind).max
+    heights = numpy.random.default_rng(3).integers(20, 120, (24, 24)).astype(kind)
+    stored = full - heights
+    stored[2:5, 3:7] = 0
+    stored[10, 10] = full  # what 0 becomes when 0 is white
+    tiff(glint.folder / "g.tif", stored, photometric=0, extra=() if options else [(42113, "0")])
+    process = ingest(glint, "g.tif", "--kind", "height", "--to", "heights", *options)
+    assert "12 texels hold no data (0)" in process.stderr
+    filled = data(glint, "heights") * full
+    assert filled.max() < 121 and filled[10, 10] == 0
+
+
+def test_a_number_for_no_data_that_no_texel_holds_hides_no_other(glint):
+    heights = numpy.random.default_rng(3).random((24, 24, 1)).astype(numpy.float32)
+    options = ["--kind", "height", "--to", "heights", "--nodata", "-1"]
+    holed = heights.copy()
+    holed[:3, :4] = -32768
+    write(glint.folder / "holed.exr", holed)
+    refused(glint, "holed.exr", "-32768", "--nodata -32768", options=options)
+    write(glint.folder / "whole.exr", heights)
+    assert "no texel holds -1" in ingest(glint, "whole.exr", *options).stderr
 
 
 def test_the_tag_is_found_in_big_tiffs_of_either_byte_order(glint):

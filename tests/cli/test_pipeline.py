@@ -199,6 +199,19 @@ def test_two_images_of_one_name_are_an_error(folder, first, second):
     assert folder.made() == ["glint-ingest"] * 2
 
 
+@pytest.mark.parametrize("target", ["old\\ wood.sat", "old\\ wood.heights"])
+def test_an_image_named_as_an_asset_of_another_image_is_an_error(folder, target):
+    """old wood.sat.glint would be the histograms of "old wood", or the normals of "old wood.sat"."""
+    folder.image("old wood.png")
+    folder.image(f"{target.replace(chr(92), '')}.png")
+    folder.write(f"assets/{target}.glint")
+    process = folder.make()
+    assert process.returncode == 2
+    assert "maps/old wood and maps/" in process.stderr and "rename one of them" in process.stderr
+    (folder.path / "maps/old wood.png").unlink()
+    assert folder.made() == ["glint-ingest"]
+
+
 def test_types_may_be_in_capitals(folder):
     folder.image("a.png")
     (folder.path / "maps/a.png").rename(folder.path / "maps/a.PNG")

@@ -11,7 +11,7 @@ import OpenImageIO as oiio
 import pytest
 from conftest import BIN
 
-KINDS = ["isotropic", "brushed", "flakes", "scratches", "leather", "weave", "sawtooth", "flat", "grating", "flake2d"]
+KINDS = ["isotropic", "brushed", "flakes", "scratches", "leather", "weave", "twill", "silk", "bumps", "scales", "structured", "relief", "wood", "anisotropic", "sawtooth", "flat", "grating", "flake2d"]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -56,7 +56,7 @@ def roughness(image):
     return float(np.mean([np.median(np.abs(np.diff(grey, axis=k))) for k in (0, 1)]))
 
 
-@pytest.mark.parametrize("name", ["bent_quad", "kettle", "car_paint", "cutlery", "ball", "cloth", "diffraction"])
+@pytest.mark.parametrize("name", ["bent_quad", "kettle", "car_paint", "cutlery", "ball", "cloth", "diffraction", "plane", "environment"])
 def test_scenes_render_light(render, name):
     image = render(__import__(name), size=SIZE, spp=2)
     assert image.shape == (*SIZE[::-1], 3)

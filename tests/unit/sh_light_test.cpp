@@ -312,10 +312,40 @@ TEST(AreaLights, RectangleCoversItsSolidAngleFromTheFrontOnly) {
   EXPECT_EQ(flux(), 0);
 }
 
+/// Light of an environment from all directions.
+double fluxOf(const Environment& e) { return projectEnvironment(e, 0)[0] * std::sqrt(4 * kPi); }
+
+TEST(AreaLights, LightsOfAnySizeSendTheirLight) {
+  constexpr double kTolerance = 5e-3;
+  for (const float radius : {0.2f, 0.05f, 0.02f, 0.0047f, 1e-3f, 1e-5f}) {  // .0047: the sun
+    for (const Vec3 centre : {Vec3{0, 0, 1}, Vec3{0.3f, 0.1f, 0.9486833f}, Vec3{1e5f, 0, 1e5f}}) {
+      const float size = std::sqrt(dot(centre, centre));
+      const SphereLight light{centre, radius * size, {1, 1, 1}, 0, 0, {}};
+      const double solid_angle = 2 * kPi * radius * radius / (1 + std::sqrt(1 - radius * radius));
+      EXPECT_NEAR(fluxOf(renderAreaLights({}, {&light, 1}, 128, 4)) / solid_angle, 1, kTolerance) << radius;
+    }
+    // A strip as long as 2 and as wide as the diameter, at distance 1: 4 asin(a b / (sqrt(1 + a^2) sqrt(1 + b^2))).
+    const RectangleLight strip{{0.001f, 0, 1}, {1, 0, 0}, {0, -radius, 0}, {1, 1, 1}, 0, 0, {}};
+    const double solid_angle = 4 * std::asin(radius / (std::sqrt(2.0) * std::sqrt(1 + radius * radius)));
+    EXPECT_NEAR(fluxOf(renderAreaLights({&strip, 1}, {}, 128, 4)) / solid_angle, 1, kTolerance) << radius;
+  }
+}
+
+TEST(AreaLights, SmallAndLargeLightsHideEachOther) {
+  const SphereLight wall{{0, 0, 3}, 1, {1, 1, 1}, 0, 0, {}}, behind{{0, 0, 5}, 0.01f, {9, 0, 0}, 0, 0, {}};
+  const SphereLight hidden[] = {wall, behind};
+  EXPECT_EQ(fluxOf(renderAreaLights({}, hidden, 64, 4)), fluxOf(renderAreaLights({}, {&wall, 1}, 64, 4)));
+  const SphereLight before{{0, 0, 1}, 0.05f, {0, 0, 0}, 0, 0, {}};
+  const SphereLight seen[] = {wall, before};
+  const double dark = 2 * kPi * 0.05 * 0.05 / (1 + std::sqrt(1 - 0.05 * 0.05));
+  const double whole = fluxOf(renderAreaLights({}, {&wall, 1}, 128, 8));
+  EXPECT_NEAR(whole - fluxOf(renderAreaLights({}, seen, 128, 8)), dark, 0.05 * dark);
+}
+
 TEST(AreaLights, TextureLiesAlongTheAxes) {
   // Red along +u, green along +v.
   const RectangleLight light{{0, 0, 2}, {1, 0, 0}, {0, -1, 0}, {1, 1, 1}, 2, 2, {0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1}};
-  const Environment e = renderAreaLights({&light, 1}, {}, 64, 1);
+  const Environment e = renderAreaLights({&light, 1}, {}, 64, 2);
   const auto at = [&](float x, float y) { return e.at({x, y, 2}); };
   EXPECT_EQ(at(0.5f, 0.5f)[0], 1);
   EXPECT_EQ(at(-0.5f, 0.5f)[0], 0);
@@ -326,7 +356,7 @@ TEST(AreaLights, TextureLiesAlongTheAxes) {
 
 TEST(AreaLights, NearerLightsHideOthers) {
   const SphereLight spheres[] = {{{0, 0, 5}, 1, {1, 0, 0}, 0, 0, {}}, {{0, 0, 3}, 1, {0, 1, 0}, 0, 0, {}}};
-  const Environment e = renderAreaLights({}, spheres, 32, 2);
+  const Environment e = renderAreaLights({}, spheres, 64, 4);
   EXPECT_EQ(e.at({0, 0, 1})[0], 0);
   EXPECT_EQ(e.at({0, 0, 1})[1], 1);
 }

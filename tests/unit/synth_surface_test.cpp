@@ -14,9 +14,11 @@
 namespace glint::bake {
 namespace {
 
-constexpr SynthKind kAllKinds[] = {SynthKind::isotropic, SynthKind::brushed, SynthKind::flakes,   SynthKind::scratches,
-                                   SynthKind::leather,   SynthKind::weave,   SynthKind::sawtooth, SynthKind::flat,
-                                   SynthKind::grating,   SynthKind::flake2d};
+constexpr SynthKind kAllKinds[] = {SynthKind::isotropic, SynthKind::brushed,    SynthKind::flakes,     SynthKind::scratches,
+                                   SynthKind::leather,   SynthKind::weave,      SynthKind::sawtooth,   SynthKind::flat,
+                                   SynthKind::grating,   SynthKind::flake2d,    SynthKind::twill,      SynthKind::silk,
+                                   SynthKind::bumps,     SynthKind::scales,     SynthKind::structured, SynthKind::relief,
+                                   SynthKind::wood,      SynthKind::anisotropic};
 
 SynthOptions sized(SynthKind kind, int width, int height) {
   SynthOptions p = defaultSynthOptions(kind);
@@ -143,11 +145,81 @@ TEST(Synth, GratingsHaveTheirDepthAndProfile) {
 
 TEST(Synth, PatternsReachTheSlopeAskedFor) {
   for (const SynthKind kind :
-       {SynthKind::scratches, SynthKind::leather, SynthKind::weave, SynthKind::sawtooth, SynthKind::grating}) {
+       {SynthKind::scratches, SynthKind::leather, SynthKind::weave, SynthKind::sawtooth, SynthKind::grating, SynthKind::twill,
+        SynthKind::silk, SynthKind::bumps, SynthKind::scales, SynthKind::structured, SynthKind::relief, SynthKind::wood}) {
     SynthOptions p = sized(kind, 256, 192);
     p.alpha = 0;
     p.slope = 0.8f;
     EXPECT_NEAR(slopeVariances(256, 192, synthHeights(p)).steepest, 0.8f, 1e-4f) << static_cast<int>(kind);
+  }
+}
+
+/// Largest difference of heights and the same heights a number of threads away.
+float shiftedDifference(SynthKind kind, int threads_u, int threads_v) {
+  constexpr int kSize = 128, kThread = 8;
+  SynthOptions p = sized(kind, kSize, kSize);
+  p.alpha = 0;
+  p.feature_texels = kThread;
+  const std::vector<float> heights = synthHeights(p);
+  float most = 0;
+  for (int j = 0; j < kSize; ++j)
+    for (int i = 0; i < kSize; ++i) {
+      const int x = (i + kThread * threads_u) % kSize, y = (j + kThread * threads_v) % kSize;
+      most = std::max(
+          most, std::abs(heights[static_cast<std::size_t>(j * kSize + i)] - heights[static_cast<std::size_t>(y * kSize + x)]));
+    }
+  return most;
+}
+
+TEST(Synth, WeavesRepeatAsTheirDrafts) {
+  constexpr float kSame = 1e-4f, kOther = 0.5f;  // texels
+  EXPECT_LT(shiftedDifference(SynthKind::weave, 1, 1), kSame);
+  EXPECT_GT(shiftedDifference(SynthKind::weave, 1, 0), kOther);
+  EXPECT_LT(shiftedDifference(SynthKind::twill, 1, 1), kSame);
+  EXPECT_LT(shiftedDifference(SynthKind::twill, 4, 0), kSame);
+  EXPECT_GT(shiftedDifference(SynthKind::twill, 2, 0), kOther);
+  EXPECT_GT(shiftedDifference(SynthKind::twill, 1, 3), kOther) << "ridges run along one diagonal";
+  EXPECT_LT(shiftedDifference(SynthKind::silk, 3, 1), kSame);
+  EXPECT_GT(shiftedDifference(SynthKind::silk, 1, 1), kOther) << "no ridge along a diagonal";
+}
+
+/// Share of the texels whose normals fulfil a condition.
+template <class Holds>
+double shareOf(const SynthOptions& p, const Holds& holds) {
+  const auto normals = synthNormals(p);
+  return static_cast<double>(std::count_if(normals.begin(), normals.end(), holds)) / static_cast<double>(normals.size());
+}
+
+TEST(Synth, PatternsHaveTheNormalsOfTheirShapes) {
+  const auto plain = [](SynthKind kind) {
+    SynthOptions p = sized(kind, 256, 256);
+    p.alpha = 0;
+    return p;
+  };
+  const auto level = [](Vec2 n) { return dot(n, n) < 1e-8f; };
+  // A pyramid has four sides of one steepness; between them lie edges, one texel wide.
+  SynthOptions pyramids = plain(SynthKind::structured);
+  pyramids.slope = 0.75f;  // the normal leans by .6
+  const double sides = shareOf(pyramids, [](Vec2 n) {
+    return std::abs(std::max(std::abs(n.x), std::abs(n.y)) - 0.6f) < 1e-3f && std::min(std::abs(n.x), std::abs(n.y)) < 1e-3f;
+  });
+  EXPECT_GT(sides, 0.75);
+  // Discs of radii from a quarter to a half of their cell, one a cell, cover some two fifths of the ground.
+  const double ground = shareOf(plain(SynthKind::bumps), level);
+  EXPECT_GT(ground, 0.4);
+  EXPECT_LT(ground, 0.8);
+  // Noise is within a quarter of a deviation of its mean at a fifth of all places: these are walls.
+  EXPECT_NEAR(shareOf(plain(SynthKind::relief), level), 0.8, 0.1);
+  // Scales slope towards their tips, up where v falls.
+  EXPECT_GT(shareOf(plain(SynthKind::scales), [](Vec2 n) { return n.y > 0; }), 0.8);
+}
+
+TEST(Synth, GrainRunsAlongU) {
+  for (const SynthKind kind : {SynthKind::wood, SynthKind::anisotropic}) {
+    const auto normals = synthNormals(sized(kind, 512, 512));
+    const double along = slopeStats(normals, [](Vec2 n) { return n.x; }).variance;
+    const double across = slopeStats(normals, [](Vec2 n) { return n.y; }).variance;
+    EXPECT_LT(along, across / 8) << static_cast<int>(kind);
   }
 }
 
@@ -201,7 +273,8 @@ TEST(Synth, SameBytesForAnyNumberOfThreads) {
 
 TEST(Synth, SeedsDiffer) {
   for (const SynthKind kind :
-       {SynthKind::isotropic, SynthKind::flakes, SynthKind::scratches, SynthKind::leather, SynthKind::flake2d}) {
+       {SynthKind::isotropic, SynthKind::flakes, SynthKind::scratches, SynthKind::leather, SynthKind::flake2d, SynthKind::bumps,
+        SynthKind::relief, SynthKind::wood, SynthKind::anisotropic}) {
     SynthOptions p = sized(kind, 64, 64);
     const auto first = synthNormals(p);
     p.seed = 2;

@@ -2,16 +2,21 @@
 // The page of glint-bench. `results` is the document that glint-bench writes.
 const results = JSON.parse(document.getElementById("results").textContent);
 const element = (id) => document.getElementById(id);
-const state = { map: 0, shape: "round", size: null, metric: "seen", candidate: null, view: "method" };
+const hasPictures = results.maps.some((map) => map.pictures?.length);
+const state = { map: 0, shape: "round", size: null, metric: "seen", candidate: null, view: "method", subject: hasPictures ? "plane" : "ndf" };
 
 const METRICS = {
   seen: "seen error", seen_worst: "seen error, worst half vector", bias: "bias, worst half vector", rel_l2: "relative L2 distance",
-  tv: "total variation", energy: "energy too much or too little",
+  tv: "total variation", energy: "energy too much or too little", ...(hasPictures && { rmse: "picture RMSE", flip: "FLIP of the picture" }),
 };
+const SHAPES = { round: "round", stretched: "stretched, 8 to 1", box: "square, turned" };
+const SCENES = { plane: "lit plane", sphere: "lit sphere" };
+const isOfPictures = (metric) => metric === "rmse" || metric === "flip";
 const WITHIN = [0.01, 0.05, 0.1, 0.2];
-const SMALLEST = 1e-3, LARGEST = 10; // errors beyond are drawn there: a log axis has no 0, and beyond 1000 % nothing is right
-const inChart = (error) => Math.min(LARGEST, Math.max(SMALLEST, error));
-const PIXELS = 64; // of an image along each axis
+const LARGEST = 10; // beyond 1000 % nothing is right
+/** Least and largest error that charts show, which draw errors beyond there: a log axis has no 0. */
+const errorDomain = () => (state.metric === "flip" ? [1e-4, 1] : [1e-3, LARGEST]);
+const inChart = (error) => Math.min(errorDomain()[1], Math.max(errorDomain()[0], error));
 
 // Measurements and figures
 
@@ -19,7 +24,9 @@ const theMap = () => results.maps[state.map];
 const measurements = () => results.measurements.filter((measurement) => measurement.map === theMap().hash);
 const measured = () => measurements().filter((measurement) => measurement.status === "ok");
 const isTruth = (measurement) => measurement.errors.length === 0;
-const setOf = (measurement, shape, size) => measurement.errors.find((set) => set.shape === shape && set.sigma_texels === size);
+/** Errors of NDFs by shape of the footprint, and of pictures by scene. */
+const setsOf = (measurement) => [...measurement.errors, ...(measurement.pictures ?? []).map((picture) => ({ ...picture, shape: picture.scene }))];
+const setOf = (measurement, shape, size) => setsOf(measurement).find((set) => set.shape === shape && set.sigma_texels === size);
 const errorOf = (measurement, metric, shape, size) => {
   const error = setOf(measurement, shape, size)?.[metric];
   return error == null ? null : Math.abs(error);
@@ -31,11 +38,16 @@ const COSTS = {
   bytes: { of: (measurement) => measurement.file_bytes, label: "bytes" },
   prepare: { of: (measurement) => measurement.prepare.total_s, label: "seconds to prepare" },
 };
-const sizesOf = (shape) => shape === "round" ? theMap().truth.map((image) => image.sigma_texels) : [...new Set(measured().flatMap((measurement) => measurement.errors.filter((set) => set.shape === shape).map((set) => set.sigma_texels)))].sort((a, b) => a - b);
+function sizesOf(shape) {
+  if (shape === "round") return theMap().truth.map((image) => image.sigma_texels);
+  return [...new Set(measured().flatMap((measurement) => setsOf(measurement).filter((set) => set.shape === shape).map((set) => set.sigma_texels)))].sort((a, b) => a - b);
+}
 
 // Words
 
 const percent = (x) => (x == null ? "" : x > LARGEST ? "> 1000 %" : x < 0.0005 ? "< 0.1 %" : `${(100 * x).toPrecision(x < 0.1 ? 2 : 3)} %`);
+/** An error as text: FLIP has no unit, all others are relative. */
+const errorText = (metric, x) => (metric === "flip" && x != null ? Number(x.toPrecision(2)).toString() : percent(x));
 /** Three digits, without an exponent, in the largest of some units that gives at least 1: [[1e6, "MB"], [1e3, "kB"]]. */
 function inUnits(x, units) {
   const [scale, unit] = units.find(([scale]) => x >= 0.9995 * scale) ?? units.at(-1);
@@ -74,35 +86,37 @@ function paretoFront(points) {
 
 const methodColors = () => ({ domain: [...new Set(results.measurements.map((measurement) => measurement.method))], scheme: "tableau10" });
 const chartWidth = () => Math.min(620, element("charts").clientWidth);
-const errorAxis = () => ({ type: "log", domain: [SMALLEST, LARGEST], label: `↓ ${METRICS[state.metric]}`, tickFormat: (x) => (x >= 0.01 ? `${+(100 * x).toPrecision(2)} %` : `${+(100 * x).toPrecision(1)} %`), grid: true });
+const tickText = (x) => (state.metric === "flip" ? String(+x.toPrecision(1)) : x >= 0.01 ? `${+(100 * x).toPrecision(2)} %` : `${+(100 * x).toPrecision(1)} %`);
+const errorAxis = () => ({ type: "log", domain: errorDomain(), label: `↓ ${METRICS[state.metric]}`, tickFormat: tickText, grid: true });
 
 function drawCost(id) {
   const { of, label } = COSTS[id];
   const points = measured().filter((measurement) => !isTruth(measurement)).map((measurement) => ({ measurement, cost: of(measurement), error: errorOf(measurement, state.metric, state.shape, state.size) }))
     .filter((point) => point.error != null && point.cost > 0).map((point) => ({ ...point, shown: inChart(point.error) }));
+  const front = paretoFront(points);
   const truth = measured().filter((measurement) => isTruth(measurement) && of(measurement) > 0);
   const asked = (point) => (setOf(point.measurement, state.shape, state.size).as_asked ? "" : "\nanswers a footprint of the same second moments");
   const chart = Plot.plot({
     width: chartWidth(), height: 340, marginLeft: 56, marginRight: 20, marginBottom: 42,
     style: { background: "transparent", fontSize: "12px" },
     color: methodColors(),
-    x: { type: "log", label: `← ${label}`, grid: true, tickFormat: "~s", nice: true },
+    x: { type: "log", label: `← ${label}`, grid: true, tickFormat: "~s", nice: true, insetLeft: 32 },
     y: errorAxis(),
     marks: [
       Plot.ruleX(truth, { x: of, stroke: "currentColor", strokeDasharray: "3,3", strokeOpacity: 0.6 }),
       Plot.text(truth, { x: of, frameAnchor: "top-right", text: () => "brute force", rotate: -90, dx: -8, dy: 4, textAnchor: "end", fillOpacity: 0.7 }),
-      Plot.line(paretoFront(points), { x: "cost", y: "shown", stroke: "currentColor", strokeOpacity: 0.35, strokeWidth: 1.5 }),
+      Plot.line(front, { x: "cost", y: "shown", stroke: "currentColor", strokeOpacity: 0.35, strokeWidth: 1.5 }),
       Plot.dot(points, { x: "cost", y: "shown", fill: (point) => point.measurement.method, r: 5, stroke: "var(--paper)" }),
-      Plot.text(points, { x: "cost", y: "shown", text: (point) => point.measurement.setting, dy: -10, fontSize: 10, fillOpacity: 0.75 }),
+      Plot.text(front, { x: "cost", y: "shown", text: (point) => point.measurement.setting, dy: -10, fontSize: 10, fillOpacity: 0.75 }),
       Plot.tip(points, Plot.pointer({ x: "cost", y: "shown", fill: "var(--paper)",
-        title: (point) => `${point.measurement.name}\n${percent(point.error)} · ${nsText(COSTS.time.of(point.measurement))} · ${bytesText(point.measurement.file_bytes)} · ${secondsText(point.measurement.prepare.total_s)}\n${point.measurement.command}${asked(point)}` })),
+        title: (point) => `${point.measurement.name}\n${errorText(state.metric, point.error)} · ${nsText(COSTS.time.of(point.measurement))} · ${bytesText(point.measurement.file_bytes)} · ${secondsText(point.measurement.prepare.total_s)}\n${point.measurement.command}${asked(point)}` })),
     ],
   });
   element(id).replaceChildren(Plot.legend({ color: methodColors(), style: { background: "transparent" } }), chart);
 }
 
 function drawSizes() {
-  const points = measured().flatMap((measurement) => measurement.errors.filter((set) => set.shape === state.shape && set[state.metric] != null)
+  const points = measured().flatMap((measurement) => setsOf(measurement).filter((set) => set.shape === state.shape && set[state.metric] != null)
     .map((set) => ({ measurement, size: set.sigma_texels, error: Math.abs(set[state.metric]), shown: inChart(Math.abs(set[state.metric])) })));
   const chart = Plot.plot({
     width: chartWidth(), height: 340, marginLeft: 56, marginRight: 20, marginBottom: 42,
@@ -113,15 +127,36 @@ function drawSizes() {
     marks: [
       Plot.line(points, { x: "size", y: "shown", z: (point) => point.measurement.name, stroke: (point) => point.measurement.method }),
       Plot.dot(points, { x: "size", y: "shown", fill: (point) => point.measurement.method, r: 3 }),
-      Plot.tip(points, Plot.pointer({ x: "size", y: "shown", fill: "var(--paper)", title: (point) => `${point.measurement.name}\n${percent(point.error)} at ${point.size} texels` })),
+      Plot.tip(points, Plot.pointer({ x: "size", y: "shown", fill: "var(--paper)", title: (point) => `${point.measurement.name}\n${errorText(state.metric, point.error)} at ${point.size} texels` })),
     ],
   });
   element("sizes").replaceChildren(Plot.legend({ color: methodColors(), style: { background: "transparent" } }), chart);
 }
 
+/** Adds the methods and their colours above a chart, which has them beside it on the page. */
+function addLegend(chart, color) {
+  const width = Number(chart.getAttribute("width")), height = Number(chart.getAttribute("height")), line = 16, letter = 6.5;
+  let x = 6, row = 0;
+  const legend = d3.create("svg:g").attr("font-size", 11).attr("fill", "currentColor").attr("text-anchor", "start");
+  for (const method of color.domain) {
+    const needed = 26 + letter * method.length;
+    if (x + needed > width) { x = 6; row += 1; }
+    legend.append("circle").attr("cx", x + 5).attr("cy", line * row).attr("r", 5).attr("fill", color.apply(method));
+    legend.append("text").attr("x", x + 14).attr("y", line * row).attr("dy", "0.35em").text(method);
+    x += needed;
+  }
+  const above = line * (row + 1) + 8;
+  legend.attr("transform", `translate(0,${10 - above})`);
+  chart.append(legend.node());
+  chart.setAttribute("viewBox", `0 ${-above} ${width} ${height + above}`);
+  chart.setAttribute("height", height + above);
+}
+
 /** A chart as an SVG document of its own, with colours instead of the page's variables. */
 function svgText(id) {
-  const copy = element(id).querySelector("figure > svg, :scope > svg:last-of-type").cloneNode(true);
+  const chart = element(id).querySelector("figure > svg, :scope > svg:last-of-type");
+  const copy = chart.cloneNode(true);
+  addLegend(copy, chart.scale("color"));
   copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
   copy.style.background = "white";
   copy.style.color = "#24211b";
@@ -149,11 +184,16 @@ function savePng(id) {
 // Tables
 
 function drawCheapest() {
-  const head = node("tr", {}, node("th", {}, "footprint"), ...WITHIN.map((most) => node("th", {}, `within ${100 * most} %`)));
-  const rows = sizesOf("round").map((size) => {
+  // Errors of pictures where the reader chose them; else seen errors of round footprints, the measure that tolerances are given in.
+  const [metric, shape] = isOfPictures(state.metric) ? [state.metric, state.shape] : ["seen", "round"];
+  const within = (most) => (metric === "flip" ? `FLIP up to ${most}` : `within ${100 * most} %`);
+  element("cheapest-about").textContent = `${isOfPictures(metric) ? `${METRICS[metric]}, ${SCENES[shape]}` : "Seen error of round footprints"}, by size. ` +
+    "The time is of a density of round footprints of this size, asked anywhere on the map.";
+  const head = node("tr", {}, node("th", {}, "footprint"), ...WITHIN.map((most) => node("th", {}, within(most))));
+  const rows = sizesOf(shape).map((size) => {
     const row = node("tr", size === state.size ? { class: "chosen" } : {}, node("th", {}, `${size} texels`));
     for (const most of WITHIN) {
-      const able = measured().filter((measurement) => isTruth(measurement) || (errorOf(measurement, "seen", "round", size) ?? Infinity) <= most);
+      const able = measured().filter((measurement) => isTruth(measurement) || (errorOf(measurement, metric, shape, size) ?? Infinity) <= most);
       // One that is no more than a tenth quicker than a simpler one, which comes before it, counts as equal.
       const best = able.reduce((least, measurement) => (least == null || timeAt(measurement, size) < 0.9 * timeAt(least, size) ? measurement : least), null);
       row.append(best ? node("td", {}, best.name, node("br"), node("small", {}, `${nsText(timeAt(best, size))}, ${bytesText(best.file_bytes)}`)) : node("td", {}, "none"));
@@ -170,7 +210,7 @@ function drawFigures() {
     if (measurement.status !== "ok") return node("tr", {}, node("th", {}, measurement.name), node("td", { colspan: 10 }, measurement.message || measurement.status));
     const t = measurement.times;
     const figures = [secondsText(measurement.prepare.total_s), bytesText(measurement.prepare.peak_bytes), bytesText(measurement.file_bytes), nsText(t.density.cold.ns), nsText(t.density.warm.ns),
-      nsText(t.density.batch.ns), nsText(t.mean.cold.ns), nsText(t.sample.cold.ns), isTruth(measurement) ? "the truth" : percent(errorOf(measurement, state.metric, state.shape, state.size))];
+      nsText(t.density.batch.ns), nsText(t.mean.cold.ns), nsText(t.sample.cold.ns), isTruth(measurement) ? "the truth" : errorText(state.metric, errorOf(measurement, state.metric, state.shape, state.size))];
     return node("tr", {}, node("th", {}, measurement.name), ...figures.map((text) => node("td", { class: "number" }, text)), node("td", {}, node("code", {}, measurement.command)));
   });
   element("figures").replaceChildren(head, ...rows);
@@ -178,20 +218,41 @@ function drawFigures() {
 
 // Images
 
-const truthImage = () => theMap().truth.find((image) => image.sigma_texels === state.size)?.image;
-const methodImage = (measurement) => measurement.images.find((image) => image.sigma_texels === state.size)?.image;
+const decoded = new WeakMap();
+/** Radiance of a lit picture: base64 of little-endian numbers of half precision, none below 0. */
+function radianceOf(picture) {
+  if (!decoded.has(picture)) {
+    const bytes = atob(picture.picture);
+    decoded.set(picture, Float32Array.from({ length: bytes.length / 2 }, (_, k) => {
+      const half = bytes.charCodeAt(2 * k) | (bytes.charCodeAt(2 * k + 1) << 8), exponent = half >> 10, fraction = half & 1023;
+      return exponent === 0 ? fraction * 2 ** -24 : (1 + fraction / 1024) * 2 ** (exponent - 15);
+    }));
+  }
+  return decoded.get(picture);
+}
+
+/** The image of the chosen subject among those of a map or a measurement, of the size that is nearest to the chosen one: {size, pixels, up, values}. */
+function imageOf(lists) {
+  const isNdf = state.subject === "ndf";
+  const images = isNdf ? lists.truth ?? lists.images : (lists.pictures ?? []).filter((picture) => picture.scene === state.subject);
+  const image = d3.least(images, (image) => Math.abs(Math.log2(image.sigma_texels / state.size)));
+  if (!image) return null;
+  const values = isNdf ? image.image : radianceOf(image);
+  return { size: image.sigma_texels, pixels: Math.sqrt(values.length), rowsGoUp: isNdf, values, white: image.white ?? d3.max(values) };
+}
 const toSrgb = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
 
-/** Draws densities, bottom row first, or their difference from the truth. */
-function paint(canvas, image, truth, view, exposure, zoom) {
+/** Draws an image of a method, the truth, or their difference. */
+function paint(canvas, { values: image }, { values: truth, pixels: all, rowsGoUp, white: brightest }, view, exposure, zoom) {
   const context = canvas.getContext("2d");
-  const pixels = Math.max(2, Math.round(PIXELS / zoom));
-  const first = (PIXELS - pixels) >> 1;
+  const pixels = Math.max(2, Math.round(all / zoom));
+  const first = (all - pixels) >> 1;
   const data = new ImageData(pixels, pixels);
-  const white = d3.max(truth) / 2 ** exposure;
+  const white = brightest / 2 ** exposure;
   for (let j = 0; j < pixels; ++j) {
     for (let i = 0; i < pixels; ++i) {
-      const from = (PIXELS - 1 - first - j) * PIXELS + first + i, to = 4 * (j * pixels + i);
+      const row = rowsGoUp ? all - 1 - first - j : first + j;
+      const from = row * all + first + i, to = 4 * (j * pixels + i);
       let color;
       if (view === "error") {
         const e = (image[from] - truth[from]) / white, bright = toSrgb(Math.min(1, Math.abs(e)));
@@ -214,29 +275,37 @@ const drawn = () => measured().filter((measurement) => !isTruth(measurement));
 const chosenMeasurement = () => drawn().find((measurement) => measurement.name === state.candidate) || drawn()[0];
 
 function drawPicture(view = state.view) {
-  const measurement = chosenMeasurement(), truth = truthImage();
-  const image = measurement && methodImage(measurement);
+  const measurement = chosenMeasurement(), truth = imageOf(theMap());
+  const image = measurement && imageOf(measurement);
   if (!image || !truth) {
     element("picture").getContext("2d").clearRect(0, 0, element("picture").width, element("picture").height);
     element("caption").textContent = "Nothing was measured here.";
     return;
   }
   paint(element("picture"), image, truth, view, Number(element("exposure").value), Number(element("zoom").value));
-  const set = setOf(measurement, "round", state.size);
-  element("caption").textContent = `${view === "truth" ? "Truth" : measurement.name}: footprint of ${state.size} texels; seen error ${percent(set.seen)}, ` +
-    `relative L2 ${percent(set.rel_l2)} over ${set.places} places.`;
+  const set = setOf(measurement, state.subject === "ndf" ? "round" : state.subject, truth.size);
+  const errors = state.subject === "ndf" ? `seen error ${percent(set.seen)}, relative L2 ${percent(set.rel_l2)} over ${set.places} places`
+    : `FLIP ${errorText("flip", set.flip)}, RMSE ${percent(set.rmse)}${set.as_asked ? "" : "; it answers boxes of the same second moments"}`;
+  element("caption").textContent = `${view === "truth" ? "Truth" : measurement.name}: ${state.subject === "ndf" ? "footprint" : "footprint in the middle"} of ${truth.size} texels; ${errors}.`;
 }
 
 function drawStrip() {
-  const truth = truthImage();
-  element("strip").replaceChildren(...drawn().map((measurement) => {
-    const canvas = node("canvas", { width: 64, height: 64 });
-    const image = methodImage(measurement);
+  const truth = imageOf(theMap());
+  const tile = (image, name, isPressed, act) => {
+    const canvas = node("canvas", { width: 96, height: 96 });
     if (truth && image) paint(canvas, image, truth, "method", Number(element("exposure").value), Number(element("zoom").value));
-    const button = node("button", { "aria-pressed": String(measurement === chosenMeasurement()) }, canvas, measurement.name);
-    button.addEventListener("click", () => { state.candidate = measurement.name; drawImages(); });
+    const button = node("button", { "aria-pressed": String(isPressed) }, canvas, name);
+    button.addEventListener("click", act);
     return button;
-  }));
+  };
+  const show = (view) => document.querySelector(`input[name=view][value=${view}]`).click();
+  element("strip").replaceChildren(
+    tile(truth, "truth", state.view === "truth", () => show("truth")),
+    ...drawn().map((measurement) => tile(imageOf(measurement), measurement.name, state.view !== "truth" && measurement === chosenMeasurement(), () => {
+      state.candidate = measurement.name;
+      if (state.view === "truth") show("method");
+      drawImages();
+    })));
 }
 
 function drawImages() {
@@ -247,19 +316,43 @@ function drawImages() {
 
 // The page
 
-function chooseSize() {
+/** Shapes of the chosen error, and sizes of the chosen shape. */
+function chooseShapeAndSize() {
+  const shapes = isOfPictures(state.metric) ? SCENES : SHAPES;
+  if (!(state.shape in shapes)) [state.shape] = Object.keys(shapes);
+  fill(element("shape"), Object.entries(shapes), state.shape);
   const sizes = sizesOf(state.shape);
-  if (!sizes.includes(state.size)) state.size = sizes[sizes.length >> 1] ?? null;
+  const wanted = state.size ?? sizes[sizes.length >> 1];
+  state.size = d3.least(sizes, (size) => Math.abs(Math.log2(size / wanted))) ?? null;
   fill(element("size"), sizes.map((size) => [size, `${size} texels`]), state.size);
 }
 
+function chooseSubject(subject) {
+  state.subject = subject;
+  element("subject").value = subject;
+}
+
 function draw() {
-  chooseSize();
+  chooseShapeAndSize();
   for (const id of Object.keys(COSTS)) drawCost(id);
   drawSizes();
   drawCheapest();
   drawFigures();
   drawImages();
+}
+
+/** Choices of the address, "report.html#metric=flip&shape=sphere&size=32&map=flakes"; "charts=all" keeps the charts for pipelines/bench_charts.py. */
+function chooseFromAddress() {
+  const asked = new URLSearchParams(location.hash.slice(1));
+  const map = results.maps.findIndex((map) => map.name === asked.get("map"));
+  if (map >= 0) state.map = map;
+  if (asked.get("metric") in METRICS) state.metric = asked.get("metric");
+  const shape = asked.get("shape");
+  if (shape in SHAPES || shape in SCENES) state.shape = shape;
+  if (shape in SCENES && hasPictures) chooseSubject(shape);
+  if (Number(asked.get("size")) > 0) state.size = Number(asked.get("size"));
+  element("map").value = state.map;
+  element("metric").value = state.metric;
 }
 
 function start() {
@@ -273,18 +366,19 @@ function start() {
   element("machine").textContent = `${machine.processor}, ${machine.cores} cores, ${machine.system}; a plain microfacet lobe takes ${nsText(results.plain_lobe?.ns ?? NaN)} here. ` +
     `Seed ${results.seed}, ${results.places} places for each error. Densities are asked anywhere on the map, so that most miss the caches.`;
   fill(element("map"), results.maps.map((map, k) => [k, `${map.name} (${map.width} x ${map.height})`]), 0);
-  fill(element("shape"), [["round", "round"], ["stretched", "stretched, 8 to 1"], ["box", "square, turned"]], state.shape);
+  fill(element("subject"), Object.entries({ ...(hasPictures && SCENES), ndf: "NDF of a round footprint" }), state.subject);
   fill(element("metric"), Object.entries(METRICS), state.metric);
   const on = (id, event, act) => element(id).addEventListener(event, (e) => act(e.target.value));
   on("map", "change", (value) => { state.map = Number(value); draw(); });
-  on("shape", "change", (value) => { state.shape = value; draw(); });
+  on("shape", "change", (value) => { state.shape = value; if (value in SCENES) chooseSubject(value); draw(); });
   on("size", "change", (value) => { state.size = Number(value); draw(); });
   on("metric", "change", (value) => { state.metric = value; draw(); });
+  on("subject", "change", (value) => { state.subject = value; drawImages(); });
   on("candidate", "change", (value) => { state.candidate = value; drawImages(); });
   on("exposure", "input", drawImages);
   on("zoom", "input", drawImages);
   for (const radio of document.querySelectorAll("input[name=view]"))
-    radio.addEventListener("change", () => { state.view = radio.value; drawPicture(); });
+    radio.addEventListener("change", () => { state.view = radio.value; drawPicture(); drawStrip(); });
   const picture = element("picture");
   picture.addEventListener("pointerdown", () => drawPicture("truth"));
   for (const event of ["pointerup", "pointerleave"]) picture.addEventListener(event, () => drawPicture());
@@ -299,7 +393,9 @@ function start() {
   for (const button of document.querySelectorAll("[data-save-png]")) button.addEventListener("click", () => savePng(button.dataset.savePng));
   let width = chartWidth();
   addEventListener("resize", () => { if (chartWidth() !== width) { width = chartWidth(); draw(); } });
+  chooseFromAddress();
   draw();
+  if (location.hash.includes("charts=all")) document.body.dataset.charts = JSON.stringify(Object.fromEntries([...Object.keys(COSTS), "sizes"].map((id) => [id, svgText(id)])));
 }
 
 start();

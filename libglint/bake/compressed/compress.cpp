@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -62,26 +63,61 @@ void checkRegions(const NdfPyramid& pyramid, int regions) {
                 fmt::format("give --regions of at most {}", most));
 }
 
-/// How an attempt to meet a tolerance stores coefficients and scales blocks (ErrorWeights).
+/// How an attempt to meet a tolerance decomposes blocks, stores coefficients and scales blocks (ErrorWeights).
 struct Attempt {
+  CompressionMethod method;
   CoefficientType type;
   double scale_range;
 };
 
-/// Attempts in turn, from few bytes to many. A wide range is best for most maps; narrow ranges lose less to rounding. Blocks are
-/// scaled for the seen error alone.
-std::vector<Attempt> attemptsOf(const CompressionOptions& options) {
+/// Adds attempts with one method, from few bytes to many. A wide range is best for most maps; narrow ranges lose less to
+/// rounding. Blocks are scaled for the seen error alone.
+void addAttempts(const CompressionOptions& options, CompressionMethod method, std::vector<Attempt>& attempts) {
   constexpr double kWide = 1e6, kNarrow = 1e3, kNarrowest = 100;
   const bool scales = options.metric == ErrorMetric::seen;
-  std::vector<Attempt> attempts = {{options.coefficient_type.value_or(CoefficientType::i8), kWide}};
-  if (!(options.tolerance > 0)) return attempts;
-  if (scales) attempts.push_back({attempts[0].type, kNarrow});
-  if (options.coefficient_type) return attempts;
-  attempts.push_back({CoefficientType::f16, kNarrow});
-  if (scales) attempts.push_back({CoefficientType::f16, kNarrowest});
-  attempts.push_back({CoefficientType::f32, kNarrowest});
-  if (scales) attempts.push_back({CoefficientType::f32, 1});
+  const CoefficientType first = options.coefficient_type.value_or(CoefficientType::i8);
+  const auto add = [&](CoefficientType type, double scale_range) { attempts.push_back({method, type, scale_range}); };
+  add(first, kWide);
+  if (!(options.tolerance > 0)) return;
+  if (scales) add(first, kNarrow);
+  if (options.coefficient_type) return;
+  add(CoefficientType::f16, kNarrow);
+  if (scales) add(CoefficientType::f16, kNarrowest);
+  add(CoefficientType::f32, kNarrowest);
+  if (scales) add(CoefficientType::f32, 1);
+}
+
+/// Attempts in turn. Images of pca take more bytes than products of tucker, and lose less to rounding.
+std::vector<Attempt> attemptsOf(const CompressionOptions& options) {
+  std::vector<Attempt> attempts;
+  addAttempts(options, options.method.value_or(CompressionMethod::tucker), attempts);
+  if (!options.method && options.tolerance > 0) addAttempts(options, CompressionMethod::pca, attempts);
   return attempts;
+}
+
+/// The options of an attempt: its method is known.
+CompressionOptions optionsOf(const CompressionOptions& options, const Attempt& attempt) {
+  CompressionOptions result = options;
+  result.method = attempt.method;
+  return result;
+}
+
+/// @param least  smallest error of all attempts
+[[noreturn]] void rejectTolerance(const CompressionOptions& options, double least) {
+  // A search for a larger error ends a little above the smallest one, and the error is printed with few digits.
+  constexpr double kMore = 1.01;
+  const bool method = options.method.has_value(), type = options.coefficient_type.has_value();
+  const char* with = method && type ? " with this method and type of coefficients"
+                     : method       ? " with this method"
+                     : type         ? " with this type of coefficients"
+                                    : "";
+  const char* others = method && type ? "; --method auto and --quantize auto may reach less"
+                       : method       ? "; --method auto may reach less"
+                       : type         ? "; --quantize auto may reach less"
+                                      : "";
+  const std::string what = fmt::format("the tolerance {} cannot be reached{}", options.tolerance, with);
+  const std::string remedy = fmt::format("ask for at least {:.3g}{}", kMore * least, others);
+  throw Error(ErrorCode::failed, "compress.tolerance", "", "", what, remedy);
 }
 
 /// One run of compressPyramid(): its steps, and the data that they pass on.
@@ -89,9 +125,9 @@ class Compressor {
  public:
   Compressor(const NdfPyramid& pyramid, const CompressionOptions& options, const Attempt& attempt, ProgressCounter& progress)
       : pyramid_(pyramid),
-        options_(options),
+        options_(optionsOf(options, attempt)),
         type_(attempt.type),
-        index_(pyramid, regions(options), levelGroups(options), options.image_masses),
+        index_(pyramid, regions(options_), levelGroups(options_), options.image_masses),
         weights_(index_, options.metric, attempt.scale_range),
         groups_(index_.levelGroupCount()),
         progress_(progress),
@@ -121,17 +157,11 @@ class Compressor {
     return true;
   }
 
-  /// @throw Error failed, which names the smallest tolerance that can be met
-  [[noreturn]] void rejectTolerance() const {
-    double least = 0;
-    for (std::size_t g = 0; g < groups_.size(); ++g) least = std::max(least, groupError(g));
-    // A little more than what was measured, since the error is printed with few digits.
-    constexpr double kMore = 1.001;
-    const std::string type = options_.coefficient_type ? "; other types of coefficients (--quantize auto) may reach less" : "";
-    throw Error(ErrorCode::failed, "compress.tolerance", "", "",
-                fmt::format("the tolerance {} cannot be reached with this method", options_.tolerance) +
-                    (type.empty() ? "" : " and type of coefficient"),
-                fmt::format("ask for at least {:.4g}{}", kMore * least, type));
+  /// @return the largest error that a tolerance bounds
+  double error() const {
+    double most = 0;
+    for (std::size_t g = 0; g < groups_.size(); ++g) most = std::max(most, groupError(g));
+    return most;
   }
 
   NdfCpData result(CompressionReport* report) {
@@ -210,7 +240,7 @@ class Compressor {
     const bool keeps_bases = options_.method == CompressionMethod::cp;  // another decomposition would cost most of the time
     std::optional<ClusterBasis>& kept = bases_[c];
     if (choice != selection_[c] || !kept) kept = models_[c].basis(choice);
-    encoded_[c] = encodeCluster(index_, weights_, c, statistics_[c], *kept, options_.method, type_, groupOf(c).gain_per_byte,
+    encoded_[c] = encodeCluster(index_, weights_, c, statistics_[c], *kept, *options_.method, type_, groupOf(c).gain_per_byte,
                                 density_scales_);
     if (!keeps_bases) kept.reset();
   }
@@ -342,7 +372,7 @@ class Compressor {
   NdfCpData pack() {
     NdfCpData data;
     index_.describe(data);
-    data.header.method = options_.method;
+    data.header.method = *options_.method;
     data.header.coefficient_type = type_;
     for (std::size_t i = 0; i < index_.imageCount(); ++i) {
       data.image_scales.push_back(image_scales_[i] / index_.imageMass(i));
@@ -439,6 +469,7 @@ class Compressor {
 
   CompressionReport makeReport(const NdfCpData& data) const {
     CompressionReport report;
+    report.method = *options_.method;
     report.coefficient_type = type_;
     reportLevels(report);
     measureBytes(data, report);
@@ -495,7 +526,7 @@ class Compressor {
   }
 
   const NdfPyramid& pyramid_;
-  const CompressionOptions& options_;
+  CompressionOptions options_;  // with a method
   CoefficientType type_;
   SliceIndex index_;
   ErrorWeights weights_;
@@ -547,11 +578,13 @@ NdfCpData compressPyramid(const NdfPyramid& pyramid, const CompressionOptions& o
   checkRegions(pyramid, options.regions);
   const std::vector<Attempt> attempts = attemptsOf(options);
   ProgressCounter counter(progress, 0);
-  for (std::size_t k = 0;; ++k) {
-    Compressor compressor(pyramid, options, attempts[k], counter);
+  double least = std::numeric_limits<double>::infinity();
+  for (const Attempt& attempt : attempts) {
+    Compressor compressor(pyramid, options, attempt, counter);
     if (compressor.compress()) return compressor.result(report);
-    if (k + 1 == attempts.size()) compressor.rejectTolerance();
+    least = std::min(least, compressor.error());
   }
+  rejectTolerance(options, least);
 }
 
 }  // namespace glint::bake

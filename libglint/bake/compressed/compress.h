@@ -21,7 +21,8 @@ enum class ErrorMetric : std::uint8_t {
 
 /// How compressPyramid() compresses.
 struct CompressionOptions {
-  CompressionMethod method = CompressionMethod::tucker;
+  /// Without a value: tucker; where a tolerance cannot be met with tucker, as on small maps of few sharp facets, pca.
+  std::optional<CompressionMethod> method;
 
   /// Columns of every cluster, 1..256. A cluster that is exact with fewer columns has fewer. Not used with a tolerance.
   int rank = 16;
@@ -68,6 +69,7 @@ struct CompressionLevelReport {
 
 /// Errors and bytes that compressPyramid() reached. Bytes are sizes of arrays, without the overhead of a file.
 struct CompressionReport {
+  CompressionMethod method = CompressionMethod::tucker;
   CoefficientType coefficient_type = CoefficientType::i8;
   std::vector<CompressionLevelReport> levels;
   CompressionLevelReport total;

@@ -117,7 +117,7 @@ ClusterStatistics measureCluster(const SliceIndex& index, const ErrorWeights& we
 ClusterModel::ClusterModel(const SliceIndex& index, const ErrorWeights& weights, std::size_t cluster,
                            const ClusterStatistics& statistics, const CompressionOptions& options, CoefficientType type,
                            double negligible)
-    : method_(options.method),
+    : method_(*options.method),
       type_(type),
       cluster_(cluster),
       slice_count_(index.sliceCount(cluster)),

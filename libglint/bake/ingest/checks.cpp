@@ -297,6 +297,7 @@ VectorEvidence measureVectors(const PixelArray& image, const NormalLayout& layou
     const double length = std::sqrt(x * x + y * y + file_z * file_z);
     errors.push_back(std::abs(length - 1));
     e.off += std::abs(length - 1) > tolerance ? 1 : 0;
+    e.off_if_positive += lengthError(x, y, 0.5 + 0.5 * file_z) > tolerance ? 1 : 0;
     e.too_long += length - 1 > kTooLong + std::numbers::sqrt3 * rounding ? 1 : 0;
     if (const double r2 = x * x + y * y; r2 < 1) z.add(file_z, std::sqrt(1 - r2));
   }
@@ -305,11 +306,18 @@ VectorEvidence measureVectors(const PixelArray& image, const NormalLayout& layou
   std::nth_element(errors.begin(), middle, errors.end());
   e.median_error = *middle;
   e.off /= static_cast<double>(errors.size());
+  e.off_if_positive /= static_cast<double>(errors.size());
   e.too_long /= static_cast<double>(errors.size());
   e.correlation = z.correlation();
   e.spread = z.spread();
   e.distance = z.distance();
   return e;
+}
+
+bool holdsPositiveZ(const VectorEvidence& e) {
+  // Maps that are filtered or compressed have vectors off unit length, but these are farther off with the other z.
+  constexpr double kOftenOff = 0.02, kSeldomOff = 0.1;
+  return e.off > kOftenOff && e.off_if_positive < kSeldomOff * e.off;
 }
 
 void checkVectors(const VectorEvidence& e, const std::string& name) {

@@ -97,7 +97,8 @@ struct MapMeaning {
   NormalLayout layout;
   Encoding encoding = Encoding::unorm;
   PixelCodes codes;
-  VectorEvidence vectors;  ///< measures of x, y and z as the map has them
+  VectorEvidence vectors;      ///< measures of x, y and z as the map has them
+  bool positive_blue = false;  ///< blue holds z from 0 to 1
 };
 
 /// Finds channels, encoding and codes of a normal map.
@@ -124,8 +125,10 @@ MapMeaning findMeaning(const PixelArray& image, const IngestOptions& p) {
         },
         image.pixels);
     meaning.vectors = measureVectors(image, meaning.layout, meaning.encoding, rounding);
-    // A constant blue with which vectors are off unit length is not z: compute z from x and y.
-    if (!p.trust_channels && meaning.vectors.off > 0 && isConstant(image, 2)) {
+    // A constant blue with which vectors are off unit length is not z: compute z from x and y. Likewise where blue holds z from
+    // 0 to 1, which is coarser than z from x and y on flat ground and the same elsewhere.
+    meaning.positive_blue = meaning.encoding == Encoding::unorm && holdsPositiveZ(meaning.vectors);
+    if (!p.trust_channels && ((meaning.vectors.off > 0 && isConstant(image, 2)) || meaning.positive_blue)) {
       meaning.layout = {NormalChannels::rg, 0, 1, -1};
       meaning.vectors = {};
       weigh();
@@ -388,6 +391,7 @@ IngestedNormals ingestNormals(const PixelArray& image, const IngestOptions& p) {
   result.report.encoding = meaning.encoding;
   result.report.channels = meaning.layout.channels;
   result.report.blue_ignored = meaning.layout.channels == NormalChannels::rg && image.channels > 2;
+  result.report.positive_blue = result.report.blue_ignored && meaning.positive_blue;
   result.report.median_length_error = meaning.vectors.median_error;
   result.report.coarse_codes = meaning.codes.coarse;
   result.report.dequantized = noiseOf(meaning.codes, p.dequantize) > 0;

@@ -20,6 +20,7 @@ struct PixelArray {
   int channels = 0;
   std::variant<std::span<const std::uint8_t>, std::span<const std::uint16_t>, std::span<const float>> pixels;
   double code_scale = 1;  ///< number in the file that became a float of 1
+  bool inverted = false;  ///< the file held code_scale minus the code: 0 is white in it
   float step = 0;         ///< difference of neighbouring codes, if floats were computed from integer codes; 0: unknown
 };
 
@@ -77,8 +78,9 @@ struct IngestReport {
   std::size_t repaired = 0;    ///< texels that were replaced by the mean of their neighbours
   std::size_t cliffs = 0;      ///< normals of heights that are steeper than 89.9 degrees: moved to 89.9 degrees
   NormalChannels channels = NormalChannels::rgb;
-  bool blue_ignored = false;       ///< whether there is a blue channel that is constant and contradicts x and y
-  bool coarse_codes = false;       ///< whether pixels are codes of at most 8 bits, whatever type stores them
+  bool blue_ignored = false;   ///< whether there is a blue channel that contradicts x and y: it is constant, or positive_blue
+  bool positive_blue = false;  ///< whether blue holds z from 0 to 1 rather than from -1 to 1; z was taken from x and y
+  bool coarse_codes = false;   ///< whether pixels are codes of at most 8 bits, whatever type stores them
   double median_length_error = 0;  ///< median of |length - 1| of the vectors (x, y, z)
   Vec2 seam;                       ///< seamRoughness of heights
   Vec2 mean_normal;                ///< mean of (nx, ny)

@@ -133,6 +133,7 @@ PixelCodes findCodes(const PixelArray& image, std::span<const int> channels) {
 
 NoDataTest::NoDataTest(const PixelArray& image, std::optional<double> number) : used_(number.has_value()) {
   number_ = number.value_or(0);
+  if (image.inverted) number_ = image.code_scale - number_;
   if (std::holds_alternative<std::span<const float>>(image.pixels)) scale_ = image.code_scale;
 }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
+#include <vector>
 
 #include "glint/bake/sh/environment.h"
 #include "glint/model/error.h"
@@ -52,7 +54,8 @@ void intersect(const RectangleLight& light, Vec3 direction, Hit& hit) {
 
 void intersect(const SphereLight& light, Vec3 direction, Hit& hit) {
   const float along = dot(direction, light.centre);
-  const float inside = light.radius * light.radius - dot(light.centre, light.centre) + along * along;
+  const Vec3 across = light.centre - along * direction;
+  const float inside = light.radius * light.radius - dot(across, across);
   if (!(inside >= 0)) return;
   const float distance = along - std::sqrt(inside);
   if (!(distance > 0 && distance < hit.distance)) return;
@@ -69,6 +72,86 @@ void intersect(const SphereLight& light, Vec3 direction, Hit& hit) {
     texel = &light.texture[(static_cast<std::size_t>(j) * w + i) * 3];
   }
   setRadiance(hit, light.radiance, texel);
+}
+
+/// Solid angle of a pixel of an environment.
+double pixelSolidAngle(int height, int row) {
+  const double step = std::numbers::pi / height;
+  return step * (std::cos(std::numbers::pi - step * (row + 1)) - std::cos(std::numbers::pi - step * row));
+}
+
+/// A light is drawn from its own points where fewer rays than this lie across it.
+constexpr double kFewRays = 24;
+
+double angleBetween(Vec3 a, Vec3 b) {
+  const Vec3 normal = cross(a, b);
+  return std::atan2(std::sqrt(double{dot(normal, normal)}), double{dot(a, b)});
+}
+
+/// Angles that a light spans, radians.
+struct Extent {
+  double u, v;
+  double least() const { return std::min(u, v); }
+};
+
+Extent extentOf(const RectangleLight& light) {
+  return {angleBetween(light.centre - light.axis_u, light.centre + light.axis_u),
+          angleBetween(light.centre - light.axis_v, light.centre + light.axis_v)};
+}
+
+double sineOf(const SphereLight& light) { return light.radius / std::sqrt(double{dot(light.centre, light.centre)}); }
+
+Extent extentOf(const SphereLight& light) {
+  const double width = 2 * std::asin(sineOf(light));
+  return {width, width};
+}
+
+/// A place of a light as the origin sees it.
+struct LightPoint {
+  Vec3 direction;      ///< of unit length
+  float distance;      ///< less than that of all lights behind
+  double solid_angle;  ///< of the part of the light that the point stands for
+};
+
+/// Calls visit(point) for points all over a light, at most `spacing` apart.
+template <class Visit>
+void forEachPoint(const RectangleLight& light, double spacing, const Visit& visit) {
+  constexpr double kFewest = 8, kMost = 4096;
+  const auto count = [&](double width) { return static_cast<int>(std::clamp(std::ceil(width / spacing), kFewest, kMost)); };
+  const Extent extent = extentOf(light);
+  const int columns = count(extent.u), rows = count(extent.v);
+  const Vec3 normal = cross(light.axis_u, light.axis_v);
+  for (int j = 0; j < rows; ++j) {
+    for (int i = 0; i < columns; ++i) {
+      const auto u = static_cast<float>(2 * (i + 0.5) / columns - 1), v = static_cast<float>(2 * (j + 0.5) / rows - 1);
+      const Vec3 place = light.centre + u * light.axis_u + v * light.axis_v;
+      const double distance = std::sqrt(double{dot(place, place)});
+      const double area = -4.0 * dot(normal, place) / (distance * columns * rows);  // as it is seen
+      if (area > 0)
+        visit({static_cast<float>(1 / distance) * place, static_cast<float>(distance), area / (distance * distance)});
+    }
+  }
+}
+
+template <class Visit>
+void forEachPoint(const SphereLight& light, double /*spacing*/, const Visit& visit) {
+  constexpr int kRings = 32, kAround = 64;
+  const double distance = std::sqrt(double{dot(light.centre, light.centre)}), sine = sineOf(light);
+  const double depth = sine * sine / (1 + std::sqrt(1 - sine * sine));  // 1 - cosine, without loss for small lights
+  const double solid_angle = 2 * std::numbers::pi * depth / (kRings * kAround);
+  const Vec3 axis = static_cast<float>(1 / distance) * light.centre;
+  const Vec3 other = std::fabs(axis.z) < 0.9f ? Vec3{0, 0, 1} : Vec3{1, 0, 0};
+  const Vec3 sideways = cross(other, axis);
+  const Vec3 s = 1 / std::sqrt(dot(sideways, sideways)) * sideways, t = cross(axis, s);
+  for (int ring = 0; ring < kRings; ++ring) {
+    const double drop = depth * (ring + 0.5) / kRings, radius = std::sqrt(drop * (2 - drop));
+    for (int k = 0; k < kAround; ++k) {
+      const double phi = 2 * std::numbers::pi * (k + 0.5) / kAround;
+      const Vec3 direction = static_cast<float>(1 - drop) * axis + static_cast<float>(radius * std::cos(phi)) * s +
+                             static_cast<float>(radius * std::sin(phi)) * t;
+      visit({direction, static_cast<float>(distance) - light.radius, solid_angle});
+    }
+  }
 }
 
 void require(bool valid, const std::string& object, const char* what) {
@@ -98,7 +181,8 @@ void requireValid(std::span<const RectangleLight> rectangles, std::span<const Sp
     const std::string object = "sphere " + std::to_string(k);
     const float r = spheres[k].radius, distance2 = dot(spheres[k].centre, spheres[k].centre);
     require(std::isfinite(r) && r > 0 && std::isfinite(r * r), object, "has a radius that is not positive");
-    require(std::isfinite(distance2) && distance2 > r * r, object, "is around the shading point");
+    require(std::isfinite(distance2), object, "has a centre that is not finite, or too far away");
+    require(distance2 > r * r, object, "is around the shading point");
     requireRadiance(spheres[k], object);
   }
 }
@@ -106,6 +190,68 @@ void requireValid(std::span<const RectangleLight> rectangles, std::span<const Sp
 }  // namespace
 
 bool facesOrigin(const RectangleLight& light) { return dot(cross(light.axis_u, light.axis_v), light.centre) < 0; }
+
+namespace {
+
+/// All lights, and which of them are small: drawn from their own points.
+class Lights {
+ public:
+  Lights(std::span<const RectangleLight> rectangles, std::span<const SphereLight> spheres, double ray_spacing)
+      : rectangles_(rectangles), spheres_(spheres) {
+    const auto isSmall = [&](const auto& light) { return extentOf(light).least() < kFewRays * ray_spacing; };
+    for (const RectangleLight& light : rectangles) small_rectangles_.push_back(isSmall(light));
+    for (const SphereLight& light : spheres) small_spheres_.push_back(isSmall(light));
+  }
+
+  /// The nearest light in a direction.
+  /// @param is_small  whether it is a small one
+  Hit nearest(Vec3 direction, bool& is_small) const {
+    Hit hit;
+    const auto meet = [&](const auto& lights, const std::vector<bool>& small) {
+      for (std::size_t k = 0; k < lights.size(); ++k) {
+        const float before = hit.distance;
+        intersect(lights[k], direction, hit);
+        if (hit.distance < before) is_small = small[k];
+      }
+    };
+    meet(rectangles_, small_rectangles_);
+    meet(spheres_, small_spheres_);
+    return hit;
+  }
+
+  /// Calls visit(light) for the small ones.
+  template <class Visit>
+  void forEachSmall(const Visit& visit) const {
+    for (std::size_t k = 0; k < rectangles_.size(); ++k)
+      if (small_rectangles_[k]) visit(rectangles_[k]);
+    for (std::size_t k = 0; k < spheres_.size(); ++k)
+      if (small_spheres_[k]) visit(spheres_[k]);
+  }
+
+ private:
+  std::span<const RectangleLight> rectangles_;
+  std::span<const SphereLight> spheres_;
+  std::vector<bool> small_rectangles_, small_spheres_;
+};
+
+/// Adds a small light from its own points, where no other light stands before it.
+template <class Light>
+void addPoints(const Light& light, const Lights& lights, double spacing, Environment& environment) {
+  constexpr float kRounding = 1e-4f;  // of distances, so that a light does not hide itself
+  forEachPoint(light, spacing, [&](const LightPoint& point) {
+    bool is_small = false;
+    if (lights.nearest(point.direction, is_small).distance < (1 - kRounding) * point.distance) return;
+    Hit own;
+    intersect(light, point.direction, own);
+    if (own.distance == kFar) setRadiance(own, light.radiance, light.texture.empty() ? nullptr : light.texture.data());
+    const auto pixel = static_cast<std::size_t>(environment.at(point.direction) - environment.rgb.data());
+    const auto row = static_cast<int>(pixel / 3 / static_cast<std::size_t>(environment.width));
+    const double share = point.solid_angle / pixelSolidAngle(environment.height, row);
+    for (std::size_t c = 0; c < 3; ++c) environment.rgb[pixel + c] += static_cast<float>(share * own.radiance[c]);
+  });
+}
+
+}  // namespace
 
 Environment renderAreaLights(std::span<const RectangleLight> rectangles, std::span<const SphereLight> spheres, int height,
                              int samples) {
@@ -123,6 +269,8 @@ Environment renderAreaLights(std::span<const RectangleLight> rectangles, std::sp
   environment.height = height;
   environment.rgb.resize(static_cast<std::size_t>(environment.width) * height * 3);
   constexpr double kPi = std::numbers::pi;
+  const double ray_spacing = kPi / height / samples;
+  const Lights lights(rectangles, spheres, ray_spacing);
   tbb::parallel_for(0, height, [&](int j) {
     for (int i = 0; i < environment.width; ++i) {
       double sums[3] = {0, 0, 0};
@@ -130,20 +278,23 @@ Environment renderAreaLights(std::span<const RectangleLight> rectangles, std::sp
         // Rows of samples have equal shares of the pixel's solid angle: equal steps of cos(theta).
         const double low = std::cos(kPi * (1 - static_cast<double>(j) / height));
         const double high = std::cos(kPi * (1 - static_cast<double>(j + 1) / height));
-        const double z = low + (high - low) * (s / samples + 0.5) / samples;
+        // Neighbours around the axis are shifted against each other: else rings of rays would enter a light near the pole at once.
+        constexpr double kGoldenShare = 0.6180339887498949;
+        const double shift = std::fmod(kGoldenShare * (i * samples + s % samples), 1.0);
+        const double z = low + (high - low) * (s / samples + shift) / samples;
         const double phi = 2 * kPi * (i + (s % samples + 0.5) / samples) / environment.width;
         const double sine = std::sqrt(std::max(0.0, 1 - z * z));
         const Vec3 direction = {static_cast<float>(sine * std::cos(phi)), static_cast<float>(sine * std::sin(phi)),
                                 static_cast<float>(z)};
-        Hit hit;
-        for (const RectangleLight& light : rectangles) intersect(light, direction, hit);
-        for (const SphereLight& light : spheres) intersect(light, direction, hit);
-        for (int c = 0; c < 3; ++c) sums[c] += hit.radiance[c];
+        bool is_small = false;
+        const Hit hit = lights.nearest(direction, is_small);
+        for (int c = 0; c < 3 && !is_small; ++c) sums[c] += hit.radiance[c];
       }
       float* pixel = &environment.rgb[(static_cast<std::size_t>(j) * environment.width + i) * 3];
       for (int c = 0; c < 3; ++c) pixel[c] = static_cast<float>(sums[c] / (samples * samples));
     }
   });
+  lights.forEachSmall([&](const auto& light) { addPoints(light, lights, ray_spacing, environment); });
   return environment;
 }
 

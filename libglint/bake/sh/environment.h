@@ -61,7 +61,8 @@ struct SphereLight {
 };
 
 /// Draws area lights as a shading point at the origin sees them: the nearest light in each direction, averaged over
-/// samples x samples rays in each pixel. From inside, a sphere is not seen.
+/// samples x samples rays in each pixel. A light that few rays would meet is drawn from its own points instead, so that the light
+/// it sends is right however small it is. From inside, a sphere is not seen.
 /// @throws Error usage if a size is out of range; invalid_input if a light is degenerate
 Environment renderAreaLights(std::span<const RectangleLight> rectangles, std::span<const SphereLight> spheres, int height,
                              int samples);

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::uint64_t kSiteStream = 2;
 constexpr std::uint64_t kOrientationStream = 3;
+constexpr std::uint64_t kBumpStream = 6;
 
 /// A periodic grid with one random point (site) in each cell. Cells are as nearly square, and of the wanted size, as the map's
 /// size allows.
@@ -133,6 +134,29 @@ std::vector<Vec2> flakeNormals(const SynthOptions& p) {
     }
   });
   return normals;
+}
+
+std::vector<float> bumpHeights(const SynthOptions& p) {
+  const JitteredGrid grid(p, p.feature_texels);
+  std::vector<float> radii(grid.cellCount());
+  for (std::size_t cell = 0; cell < radii.size(); ++cell)
+    radii[cell] = p.feature_texels * (0.25f + 0.25f * randomPair(p.seed, kBumpStream, cell).x);
+  std::vector<float> heights(static_cast<std::size_t>(p.width) * p.height);
+  tbb::parallel_for(0, p.height, [&](int j) {
+    float* line = heights.data() + static_cast<std::size_t>(j) * p.width;
+    for (int i = 0; i < p.width; ++i) {
+      const Vec2 centre = {static_cast<float>(i) + 0.5f, static_cast<float>(j) + 0.5f};
+      float highest = 0;
+      grid.visitNear(centre, [&](const JitteredGrid::Site& site) {
+        const Vec2 d = site.position - centre;
+        const float radius = radii[static_cast<std::size_t>(site.cell)];
+        const float inside = std::max(0.0f, 1 - dot(d, d) / (radius * radius));
+        highest = std::max(highest, radius * inside * inside);
+      });
+      line[i] = highest;
+    }
+  });
+  return heights;
 }
 
 std::vector<float> leatherHeights(const SynthOptions& p) {

@@ -17,6 +17,13 @@ std::vector<float> flake2dPresence(const SynthOptions& options);
 std::vector<float> leatherHeights(const SynthOptions& options);
 std::vector<float> scratchHeights(const SynthOptions& options);
 std::vector<float> weaveHeights(const SynthOptions& options);
+std::vector<float> twillHeights(const SynthOptions& options);
+std::vector<float> silkHeights(const SynthOptions& options);
+std::vector<float> bumpHeights(const SynthOptions& options);
+std::vector<float> scaleHeights(const SynthOptions& options);
+std::vector<float> structuredHeights(const SynthOptions& options);
+std::vector<float> reliefHeights(const SynthOptions& options);
+std::vector<float> woodHeights(const SynthOptions& options);
 std::vector<float> sawtoothHeights(const SynthOptions& options);
 std::vector<float> gratingHeights(const SynthOptions& options);
 

@@ -85,26 +85,6 @@ void carve(const SynthOptions& p, Scratch scratch, int shift_x, int shift_y, int
   }
 }
 
-/// Nearest even number of threads (at least 2) that fill `size`. An even number keeps over and under alternating across the
-/// border of the map.
-int threadCount(int size, float thread_texels) {
-  return 2 * std::max(1, static_cast<int>(std::lround(static_cast<float>(size) / thread_texels / 2)));
-}
-
-/// Height of a thread.
-/// @param across    position across the thread, in [0, 1]
-/// @param along     position along the thread, in widths of the threads that cross it
-/// @param crossing  +1 where the thread lies on top, -1 where it lies below
-float threadHeight(float across, float along, float crossing) {
-  constexpr float kRoundness = 0.9f;  // below 1, so that the sides of a thread are steep but not vertical
-  constexpr float kFibreDepth = 0.02f;
-  constexpr float kFibres = 3;
-  const float side = 2 * across - 1;
-  const float body = std::sqrt(1 - kRoundness * side * side);
-  const float fibres = std::sin(2 * kPi * (kFibres * across + along));
-  return 0.35f * crossing + 0.5f * body + kFibreDepth * fibres;
-}
-
 }  // namespace
 
 std::vector<float> scratchHeights(const SynthOptions& p) {
@@ -124,25 +104,6 @@ std::vector<float> scratchHeights(const SynthOptions& p) {
           carve(p, scratch, x * p.width, y * p.height, first_row, last_row, heights);
         }
       }
-    }
-  });
-  return heights;
-}
-
-std::vector<float> weaveHeights(const SynthOptions& p) {
-  const float warp_width = static_cast<float>(p.width) / static_cast<float>(threadCount(p.width, p.feature_texels));
-  const float weft_width = static_cast<float>(p.height) / static_cast<float>(threadCount(p.height, p.feature_texels));
-  std::vector<float> heights(static_cast<std::size_t>(p.width) * p.height);
-  tbb::parallel_for(0, p.height, [&](int j) {
-    const float v = (static_cast<float>(j) + 0.5f) / weft_width;
-    const float row = std::floor(v);
-    float* line = heights.data() + static_cast<std::size_t>(j) * p.width;
-    for (int i = 0; i < p.width; ++i) {
-      const float u = (static_cast<float>(i) + 0.5f) / warp_width;
-      const float column = std::floor(u);
-      const float warp = threadHeight(u - column, v, std::cos(kPi * (v - 0.5f + column)));
-      const float weft = threadHeight(v - row, u, -std::cos(kPi * (u - 0.5f + row)));
-      line[i] = std::max(warp, weft);
     }
   });
   return heights;

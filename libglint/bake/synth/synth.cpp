@@ -58,12 +58,17 @@ void scale(std::vector<float>& heights, double factor) {
   for (float& h : heights) h = static_cast<float>(h * factor);
 }
 
+/// Whether the noise of a kind is stretched along u.
+bool hasStreaks(SynthKind kind) {
+  return kind == SynthKind::brushed || kind == SynthKind::anisotropic || kind == SynthKind::wood;
+}
+
 /// Makes noise whose slopes have the variance of the options. A map too small to have slopes (1 or 2 texels) is flat.
 std::vector<float> scaledNoise(const SynthOptions& p) {
-  const bool brushed = p.kind == SynthKind::brushed;
-  std::vector<float> heights = noiseHeights(p, brushed ? p.streak_texels : p.correlation_texels, p.correlation_texels);
+  const bool streaks = hasStreaks(p.kind);
+  std::vector<float> heights = noiseHeights(p, streaks ? p.streak_texels : p.correlation_texels, p.correlation_texels);
   const SlopeVariances moments = slopeVariances(p.width, p.height, heights);
-  const double variance = brushed ? moments.variance_y : 0.5 * (moments.variance_x + moments.variance_y);
+  const double variance = streaks ? moments.variance_y : 0.5 * (moments.variance_x + moments.variance_y);
   scale(heights, variance > 0 ? p.alpha / std::sqrt(2 * variance) : 0);
   return heights;
 }
@@ -83,6 +88,20 @@ std::vector<float> pattern(const SynthOptions& p) {
       return leatherHeights(p);
     case SynthKind::weave:
       return weaveHeights(p);
+    case SynthKind::twill:
+      return twillHeights(p);
+    case SynthKind::silk:
+      return silkHeights(p);
+    case SynthKind::bumps:
+      return bumpHeights(p);
+    case SynthKind::scales:
+      return scaleHeights(p);
+    case SynthKind::structured:
+      return structuredHeights(p);
+    case SynthKind::relief:
+      return reliefHeights(p);
+    case SynthKind::wood:
+      return woodHeights(p);
     case SynthKind::sawtooth:
       return sawtoothHeights(p);
     case SynthKind::grating:
@@ -127,6 +146,30 @@ SynthOptions defaultSynthOptions(SynthKind kind) {
     case SynthKind::weave:
       p.alpha = 0.03f, p.feature_texels = 32, p.slope = 2;
       break;
+    case SynthKind::twill:
+      p.alpha = 0.03f, p.feature_texels = 16, p.slope = 2;
+      break;
+    case SynthKind::silk:
+      p.alpha = 0.02f, p.feature_texels = 8, p.slope = 1;
+      break;
+    case SynthKind::bumps:
+      p.alpha = 0.02f, p.feature_texels = 32, p.slope = 1;
+      break;
+    case SynthKind::scales:
+      p.alpha = 0.02f, p.feature_texels = 48, p.slope = 2;
+      break;
+    case SynthKind::structured:
+      p.alpha = 0.02f, p.feature_texels = 32, p.slope = 0.6f;
+      break;
+    case SynthKind::relief:
+      p.alpha = 0.03f, p.feature_texels = 64, p.slope = 1;
+      break;
+    case SynthKind::wood:
+      p.alpha = 0.08f, p.correlation_texels = 2, p.feature_texels = 32, p.slope = 0.4f;
+      break;
+    case SynthKind::anisotropic:
+      p.alpha = 0.15f, p.streak_texels = 16;
+      break;
     case SynthKind::sawtooth:
       p.alpha = 0, p.feature_texels = 16;
       break;
@@ -147,7 +190,7 @@ std::vector<float> synthHeights(const SynthOptions& p) {
     throw Error(ErrorCode::unsupported, "synth.flakes_height", "", "",
                 "flakes are separate facets without a common height field", "make their normals instead, or another kind");
   }
-  const bool noise_alone = p.kind == SynthKind::isotropic || p.kind == SynthKind::brushed;
+  const bool noise_alone = p.kind == SynthKind::isotropic || p.kind == SynthKind::anisotropic || p.kind == SynthKind::brushed;
   std::vector<float> heights = noise_alone ? scaledNoise(p) : patternHeights(p);
   scaleToDepth(heights, p.depth_texels);
   return heights;

@@ -9,16 +9,24 @@ namespace glint::bake {
 
 /// The procedural surfaces. All are periodic, except flake2d in the sizes that flake2dTiles tells.
 enum class SynthKind : std::uint8_t {
-  isotropic,  ///< Gaussian random field with a Gaussian power spectrum; its NDF is Beckmann
-  brushed,    ///< a Gaussian random field, stretched along u into streaks
-  flakes,     ///< Voronoi cells of a jittered grid, each a facet with an orientation from a GTR distribution
-  scratches,  ///< bent grooves in all directions
-  leather,    ///< rounded pebbles with grooves between them
-  weave,      ///< plain weave of two thread directions, with fibres
-  sawtooth,   ///< ramps along u: three quarters of a period up, one quarter down
-  flat,       ///< constant
-  grating,    ///< grooves along v, one each period: sinusoidal or blazed
-  flake2d,    ///< the flakes of MaterialX's node flake2d (1.39.5), on a flat surface
+  isotropic,    ///< Gaussian random field with a Gaussian power spectrum; its NDF is Beckmann
+  brushed,      ///< a Gaussian random field, stretched along u into streaks
+  flakes,       ///< Voronoi cells of a jittered grid, each a facet with an orientation from a GTR distribution
+  scratches,    ///< bent grooves in all directions
+  leather,      ///< rounded pebbles with grooves between them
+  weave,        ///< plain weave of two thread directions, with fibres
+  twill,        ///< a twill of two over and two under: ridges of threads run diagonally
+  silk,         ///< a satin of eight: each warp thread lies over seven weft threads and under one
+  bumps,        ///< round bumps of different sizes on flat ground
+  scales,       ///< rows of scales, each over the next, as of a fish or a roof
+  structured,   ///< square pyramids side by side
+  relief,       ///< flat islands with steep walls on flat ground
+  wood,         ///< rings of wood along u, each denser towards its end, that wander; grain along them
+  anisotropic,  ///< a Gaussian random field, four times as long along u as across
+  sawtooth,     ///< ramps along u: three quarters of a period up, one quarter down
+  flat,         ///< constant
+  grating,      ///< grooves along v, one each period: sinusoidal or blazed
+  flake2d,      ///< the flakes of MaterialX's node flake2d (1.39.5), on a flat surface
 };
 
 /// The shape of a groove of a grating.
@@ -33,15 +41,16 @@ struct SynthOptions {
   int width = 512;
   int height = 512;
   std::uint64_t seed = 1;
-  /// isotropic, brushed: Beckmann roughness of the noise, across the streaks. scratches, leather, weave, sawtooth, grating: roughness of
-  /// the noise that is added to the pattern; 0: no noise. flakes: roughness of the GTR distribution.
+  /// isotropic, anisotropic, brushed: Beckmann roughness of the noise, across the streaks. flakes: roughness of the GTR
+  /// distribution. Of other patterns: roughness of the noise that is added to the pattern; 0: no noise.
   float alpha = 0.1f;
   float gamma = 2;               ///< exponent of the GTR distribution of flakes; 2 is GGX, larger exponents have a shorter tail
-  float correlation_texels = 4;  ///< distance at which the correlation of the noise is 1/e (brushed: across the streaks)
-  float streak_texels = 160;     ///< brushed: distance at which the correlation is 1/e along the streaks
-  float feature_texels = 8;      ///< size of a flake, pebble, thread, tooth or groove, or width of a scratch
-  float density = 1;             ///< number of scratches in each square of 64 x 64 texels
-  float slope = 0.5f;            ///< steepest slope of the pattern: scratches, leather, weave, sawtooth, grating
+  float correlation_texels = 4;  ///< distance at which the correlation of the noise is 1/e (with streaks: across them)
+  float streak_texels = 160;     ///< brushed, anisotropic, wood: distance at which the correlation is 1/e along the streaks
+  float feature_texels =
+      8;  ///< size of a flake, pebble, thread, tooth, groove, bump, scale, pyramid, island or ring; width of a scratch
+  float density = 1;   ///< number of scratches in each square of 64 x 64 texels
+  float slope = 0.5f;  ///< steepest slope of a pattern; not of flakes and of noise alone
   GratingProfile profile = GratingProfile::sine;
   float flake_size_uv = 0.01f;  ///< flake2d: the node's input size, in widths of the map
   float roughness = 0.1f;       ///< flake2d: the node's input; normals of flakes are distributed as GGX of alpha = roughness^2
@@ -53,7 +62,7 @@ struct SynthOptions {
 SynthOptions defaultSynthOptions(SynthKind kind);
 
 /// Makes the heights of a periodic procedural surface. Noise is scaled so that the variance of its central-difference slopes is
-/// alpha^2 / 2 along each axis (brushed: across the streaks). A pattern is scaled so that its steepest central-difference slope
+/// alpha^2 / 2 along each axis (with streaks: across them). A pattern is scaled so that its steepest central-difference slope
 /// is `slope`. The result does not depend on the number of threads.
 /// @return [height][width], texels, bottom row first
 /// @throws Error unsupported for flakes and flake2d, which have no common height field; usage if an option is out of range
