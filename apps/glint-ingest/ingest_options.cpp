@@ -110,11 +110,6 @@ Image IngestOptions::read(Tool& tool, const std::string& path) const {
   return readInputImage(tool, path, choice);
 }
 
-void IngestOptions::warnOfUnusedNumber(Tool& tool, const std::string& name, const bake::IngestReport& report) const {
-  const std::optional<double> number = parseNoData(no_data_);
-  if (number && report.no_data == 0) tool.warn(fmt::format("{}: no texel holds {}, the number of --nodata", name, *number));
-}
-
 bake::PixelArray pixelArray(const Image& image) {
   bake::PixelArray array{image.width, image.height, image.channels, {}, image.code_scale};
   array.inverted = image.inverted;
@@ -178,12 +173,15 @@ void warnOfSeam(const Warn& warn, Boundary boundary, Vec2 seam) {
 
 }  // namespace
 
-void warnAbout(Tool& tool, const std::string& name, const bake::IngestOptions& values, const bake::IngestReport& r) {
+void IngestOptions::warnAbout(Tool& tool, const std::string& name, const std::optional<double>& no_data,
+                              const bake::IngestReport& r) const {
   const auto warn = [&](const std::string& text) { tool.warn(name + ": " + text); };
   const auto replaced = [&](std::size_t count, const Subject& subject, const std::string& what) {
     if (count > 0) warn(counted(count, subject) + " " + what + ": replaced by the mean of the neighbours");
   };
-  if (r.no_data > 0) replaced(r.no_data, {"texel holds", "texels hold"}, fmt::format("no data ({})", *values.no_data));
+  if (r.no_data > 0) replaced(r.no_data, {"texel holds", "texels hold"}, fmt::format("no data ({})", *no_data));
+  if (const auto given = parseNoData(no_data_); given && r.no_data == 0)
+    warn(fmt::format("no texel holds {}, the number of --nodata", *given));
   replaced(r.downward, {"texel points", "texels point"}, fmt::format("below the surface, of {}", r.texels));
   replaced(r.non_finite, {"texel is", "texels are"}, "not finite");
   if (r.clipped > 0) warn(counted(r.clipped, {"texel was", "texels were"}) + " on the rim of the disk: moved just inside it");
@@ -202,7 +200,7 @@ void warnAbout(Tool& tool, const std::string& name, const bake::IngestOptions& v
          fmt::format(" not of unit length, of {} (half of all are off by more than {:.3f}): normalised", r.texels,
                      r.median_length_error));
   }
-  warnOfSeam(warn, values.boundary, r.seam);
+  warnOfSeam(warn, values_.boundary, r.seam);
   if (std::max(std::abs(r.mean_normal.x), std::abs(r.mean_normal.y)) > kSuspiciousMeanTilt) {
     tool.warn(fmt::format("{}: the mean normal ({:.2f}, {:.2f}) is far from up; is this a tangent-space map?", name,
                           r.mean_normal.x, r.mean_normal.y));

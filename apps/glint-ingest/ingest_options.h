@@ -20,8 +20,10 @@ class IngestOptions {
   /// Reads the image that the options choose.
   Image read(Tool& tool, const std::string& path) const;
 
-  /// Warns where --nodata names a number that no texel holds.
-  void warnOfUnusedNumber(Tool& tool, const std::string& name, const bake::IngestReport& report) const;
+  /// Warns of what was changed on the way in, and of a number of --nodata that no texel holds.
+  /// @param no_data  the number that marked texels without data, if any
+  void warnAbout(Tool& tool, const std::string& name, const std::optional<double>& no_data,
+                 const bake::IngestReport& report) const;
 
   bool readsHeights() const { return kind_ == Kind::height; }
   bool writesHeights() const { return to_ == To::heights; }
@@ -49,8 +51,5 @@ nlohmann::json reportJson(const bake::IngestReport& report);
 
 /// The report as a few lines, for --verbose.
 std::string reportText(const std::string& name, const Image& image, const bake::IngestReport& report);
-
-/// Warns of what was changed on the way in.
-void warnAbout(Tool& tool, const std::string& name, const bake::IngestOptions& values, const bake::IngestReport& report);
 
 }  // namespace glint::apps

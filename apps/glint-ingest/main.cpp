@@ -52,8 +52,7 @@ int main(int argc, char** argv) {
         writeNormals(output, image, options.texelSize(), normals, report.slopes, provenance);
       }
     }
-    options.warnOfUnusedNumber(tool, input.path(), report);
-    apps::warnAbout(tool, input.path(), values, report);
+    options.warnAbout(tool, input.path(), values.no_data, report);
     tool.setResult(apps::reportJson(report));
     tool.summary(apps::reportText(input.path(), image, report));
   });

@@ -66,7 +66,8 @@ class Kit:
 
     def run(self, tool, *arguments):
         """Runs a tool; a failure ends this program with the tool's own message."""
-        command = [str(self.bin / f"glint-{tool}"), *map(str, arguments), "--json", "--quiet"]
+        program, *subcommand = tool.split()
+        command = [str(self.bin / f"glint-{program}"), *subcommand, *map(str, arguments), "--json", "--quiet"]
         try:
             done = subprocess.run(command, stdout=subprocess.PIPE)
         except FileNotFoundError:
