@@ -67,10 +67,13 @@ glint_one = $(if $(word 2,$(3)),$(error $(GLINT_MAPS)/$(1).$(firstword $(3)) and
 # Refuses two images $(1) and $(1).$(2): the asset $(1).$(2).glint would be of either.
 glint_apart = $(if $(and $(call glint_types,$(1),$(GLINT_IMAGES)),$(call glint_types,$(1).$(2),$(GLINT_IMAGES))),$(error images \
   $(GLINT_MAPS)/$(1) and $(GLINT_MAPS)/$(1).$(2) would both make $(GLINT_OUT)/$(1).$(2).glint; rename one of them))
-# The same for an image $(1) whose name ends as those of assets do.
+# The same for an image $(1) whose name ends as those of assets do: its stem and its ending, taken apart by the shell.
 glint_endings := pyramid cp tucker pca binmap sat moments tiny wang heights displaced wave light lobes
-glint_apart_of = $(foreach ending,$(glint_endings),$(call glint_apart_at,$(shell printf '%s' $(call glint_quote,$(1)) | sed -n 's,\.$(ending)$$,,p'),$(ending)))
-glint_apart_at = $(if $(1),$(call glint_apart,$(1),$(2)))
+glint_bar := |
+glint_empty :=
+glint_any_ending := $(subst $(glint_empty) $(glint_empty),\$(glint_bar),$(glint_endings))
+glint_apart_of = $(if $(findstring .,$(1)),$(call glint_apart_at,$(shell printf '%s' $(call glint_quote,$(1)) | sed -n 's,\.\($(glint_any_ending)\)$$,,p'),$(1)))
+glint_apart_at = $(if $(1),$(call glint_apart,$(1),$(lastword $(subst ., ,$(2)))))
 # The file of a rule's name: the one that exists, or what Make thought of where a dry run has not made it.
 glint_source = $(call glint_source_of,$(1),$(call glint_types,$*,$($(1))))
 glint_source_of = $(call glint_one,$*,$(1),$(2))$(call glint_quote,$(if $(2),$(GLINT_MAPS)/$*.$(2),$<))
@@ -88,7 +91,7 @@ endef
 
 define glint_light_rule
 $(GLINT_OUT)/%.light.glint: $(GLINT_MAPS)/%.$(1) $(GLINT_SETTINGS) | $(GLINT_OUT)
-	$$(call glint_tool,glint-shlobes) --light $$(call glint_source,GLINT_LIGHTS) $$(glint_out) $$(call glint_flags,GLINT_LIGHT_FLAGS)
+	$$(call glint_apart,$$*,light)$$(call glint_tool,glint-shlobes) --light $$(call glint_source,GLINT_LIGHTS) $$(glint_out) $$(call glint_flags,GLINT_LIGHT_FLAGS)
 endef
 
 define glint_normals_rule
@@ -114,13 +117,14 @@ $(foreach type,$(GLINT_IMAGES),$(eval $(call glint_ingest_rule,$(type)))$(eval $
 $(foreach type,$(GLINT_LIGHTS),$(eval $(call glint_light_rule,$(type))))
 
 $(GLINT_OUT)/%.wave.glint: $(GLINT_OUT)/%.heights.glint $(GLINT_SETTINGS)
-	$(call glint_tool,glint-pyramid) $(call glint_quote,$<) $(glint_out) --optics wave $(call glint_flags,GLINT_WAVE_FLAGS)
+	$(call glint_apart,$*,wave)$(call glint_tool,glint-pyramid) $(call glint_quote,$<) $(glint_out) --optics wave $(call glint_flags,GLINT_WAVE_FLAGS)
 
 $(GLINT_OUT)/%.displaced.glint: $(GLINT_OUT)/%.heights.glint $(GLINT_SETTINGS)
-	$(call glint_tool,glint-displace) $(call glint_quote,$<) $(glint_out) $(call glint_flags,GLINT_DISPLACE_FLAGS)
+	$(call glint_apart,$*,displaced)$(call glint_tool,glint-displace) $(call glint_quote,$<) $(glint_out) $(call glint_flags,GLINT_DISPLACE_FLAGS)
 
 # Lobes come from a number alone, so they need no file of their name.
 $(GLINT_OUT)/%.lobes.glint: $(GLINT_SETTINGS) | $(GLINT_OUT)
+	$(if $(call glint_types,$*.lobes,$(GLINT_IMAGES)),$(error the image $(GLINT_MAPS)/$*.lobes would make $@ as well; rename it))\
 	$(call glint_tool,glint-shlobes) $(glint_out) $(call glint_flags,GLINT_LOBES_FLAGS)
 
 $(GLINT_OUT):

@@ -18,7 +18,7 @@ import kit as kits
 import pictures
 
 # In the order of the index. Each module has draw(gallery).
-SCENES = ("car_paint", "kettle", "cutlery", "bent_quad", "cloth", "diffraction", "plane", "environment", "planned", "zoom", "models", "animation")
+SCENES = ("car_paint", "kettle", "cutlery", "bent_quad", "cloth", "diffraction", "plane", "environment", "zoom", "models", "animation")
 QUICK_SCENES = ("car_paint", "kettle", "cutlery")  # of `make demo`
 PASSES = 8
 OUTLIER = 4.0  # times the median of the passes at a pixel, at which a pass is cut

@@ -66,8 +66,7 @@ class Kit:
 
     def run(self, tool, *arguments):
         """Runs a tool; a failure ends this program with the tool's own message."""
-        program, *subcommand = tool.split()
-        command = [str(self.bin / f"glint-{program}"), *subcommand, *map(str, arguments), "--json", "--quiet"]
+        command = [str(self.bin / f"glint-{tool}"), *map(str, arguments), "--json", "--quiet"]
         try:
             done = subprocess.run(command, stdout=subprocess.PIPE)
         except FileNotFoundError:

@@ -51,6 +51,16 @@ def test_small_maps_of_sharp_facets_meet_a_tolerance(glint, size):
     assert json.loads(process.stdout)["result"]["total"]["seen"] <= 0.1
 
 
+def test_many_images_take_more_regions(glint):
+    """Slots of images in a region are numbers of 16 bits."""
+    glint("synth", "isotropic", "--size", "1024", "-o", "n.exr")
+    glint("ingest", "n.exr", "-o", "n.glint")
+    glint("pyramid", "n.glint", "-o", "p.glint", "--stride", "5", "--levels", "1", "--resolution", "32", "--sigma-r", ".1")
+    process = glint("compress", "p.glint", "-o", "c.glint", "--rank", "2")
+    assert process.returncode == 0, process.stderr
+    assert glint("validate", "c.glint").returncode == 0
+
+
 def test_the_tolerance_that_an_error_names_can_be_met(glint):
     glint("synth", "flakes", "--size", "128", "-o", "f.png")
     glint("ingest", "f.png", "-o", "f.glint")

@@ -10,6 +10,7 @@ import pytest
 from image_writer import CODE, codes, data, ingest, refused, surface, tiff, unorm, write
 
 Image = pytest.importorskip("PIL.Image")
+oiio = pytest.importorskip("OpenImageIO")
 
 
 # --- codes
@@ -100,6 +101,19 @@ def test_blue_that_holds_z_from_0_to_1_is_recognised(glint):
     write(glint.folder / "f.png", unorm(flat), "uint8")
     assert "blue" not in ingest(glint, "f.png").stderr
     assert data(glint) == pytest.approx(flat[..., :2], abs=CODE)
+
+
+@pytest.mark.parametrize("kind, options, factor", [("isotropic", ["--alpha", ".25"], 8), ("twill", [], 8), ("silk", [], 4)])
+def test_the_blue_of_filtered_maps_is_z(glint, kind, options, factor):
+    """A box filter makes vectors shorter, as downscaled textures have them."""
+    size = 512
+    glint("synth", kind, "--size", size, *options, "-o", "n.exr")
+    n = oiio.ImageBuf(str(glint.folder / "n.exr")).get_pixels(oiio.FLOAT)[..., :3]
+    small = n.reshape(size // factor, factor, size // factor, factor, 3).mean(axis=(1, 3))
+    write(glint.folder / "s.png", small, "uint8")
+    assert "blue" not in ingest(glint, "s.png").stderr
+    vectors = 2 * small - 1
+    assert data(glint) == pytest.approx((vectors / numpy.linalg.norm(vectors, axis=-1, keepdims=True))[..., :2], abs=2 * CODE)
 
 
 # --- heights

@@ -199,17 +199,25 @@ def test_two_images_of_one_name_are_an_error(folder, first, second):
     assert folder.made() == ["glint-ingest"] * 2
 
 
-@pytest.mark.parametrize("target", ["old\\ wood.sat", "old\\ wood.heights"])
-def test_an_image_named_as_an_asset_of_another_image_is_an_error(folder, target):
+@pytest.mark.parametrize("ending", "pyramid cp tucker pca binmap sat moments tiny wang heights displaced wave light".split())
+def test_an_image_named_as_an_asset_of_another_image_is_an_error(folder, ending):
     """old wood.sat.glint would be the histograms of "old wood", or the normals of "old wood.sat"."""
     folder.image("old wood.png")
-    folder.image(f"{target.replace(chr(92), '')}.png")
-    folder.write(f"assets/{target}.glint")
+    folder.image(f"old wood.{ending}.png")
+    folder.write(f"assets/old\\ wood.{ending}.glint")
     process = folder.make()
     assert process.returncode == 2
     assert "maps/old wood and maps/" in process.stderr and "rename one of them" in process.stderr
     (folder.path / "maps/old wood.png").unlink()
     assert folder.made() == ["glint-ingest"]
+
+
+def test_an_image_named_as_lobes_is_an_error(folder):
+    """Lobes come from a number, so that the image would never be read."""
+    folder.image("a.lobes.png")
+    folder.write("assets/a.lobes.glint")
+    process = folder.make()
+    assert process.returncode == 2 and "maps/a.lobes" in process.stderr and "rename it" in process.stderr
 
 
 def test_types_may_be_in_capitals(folder):

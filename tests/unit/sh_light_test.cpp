@@ -331,6 +331,40 @@ TEST(AreaLights, LightsOfAnySizeSendTheirLight) {
   }
 }
 
+/// Flux of a rectangle, and of the same rectangle cut into so many pieces along its first axis.
+std::pair<double, double> wholeAndCut(const RectangleLight& light, int pieces) {
+  std::vector<RectangleLight> cut;
+  for (int k = 0; k < pieces; ++k) {
+    RectangleLight piece = light;
+    const float share = 1.0f / static_cast<float>(pieces);
+    piece.axis_u = share * light.axis_u;
+    piece.centre = light.centre + (share * (2 * static_cast<float>(k) + 1) - 1) * light.axis_u;
+    cut.push_back(piece);
+  }
+  return {fluxOf(renderAreaLights({&light, 1}, {}, 128, 4)), fluxOf(renderAreaLights(cut, {}, 128, 4))};
+}
+
+TEST(AreaLights, ThinLightsInPerspectiveAreTheSumOfTheirPieces) {
+  constexpr double kTolerance = 5e-3;
+  const RectangleLight window{{0, 0.02f, 2}, {0, 0, 1.5f}, {-0.5f, 0, 0}, {1, 1, 1}, 0, 0, {}};  // seen along its plane
+  const RectangleLight tube{{0, 0, 1}, {50, 0, 0}, {0, -0.02f, 0}, {1, 1, 1}, 0, 0, {}};
+  for (const RectangleLight& light : {window, tube}) {
+    const auto [whole, cut] = wholeAndCut(light, 50);
+    ASSERT_GT(whole, 0);
+    EXPECT_NEAR(whole / cut, 1, kTolerance);
+  }
+}
+
+TEST(AreaLights, SmallTexturesSendTheirMean) {
+  constexpr int kTexels = 16;
+  RectangleLight panel{{0, 0, 3}, {0.02f, 0, 0}, {0, -0.02f, 0}, {1, 1, 1}, 0, 0, {}};
+  const double plain = fluxOf(renderAreaLights({&panel, 1}, {}, 128, 4));
+  panel.texture_width = panel.texture_height = kTexels;
+  for (int j = 0; j < kTexels; ++j)
+    for (int i = 0; i < kTexels; ++i) panel.texture.insert(panel.texture.end(), 3, static_cast<float>((i + j) % 2));
+  EXPECT_NEAR(fluxOf(renderAreaLights({&panel, 1}, {}, 128, 4)) / plain, 0.5, 1e-3);
+}
+
 TEST(AreaLights, SmallAndLargeLightsHideEachOther) {
   const SphereLight wall{{0, 0, 3}, 1, {1, 1, 1}, 0, 0, {}}, behind{{0, 0, 5}, 0.01f, {9, 0, 0}, 0, 0, {}};
   const SphereLight hidden[] = {wall, behind};

@@ -214,6 +214,15 @@ TEST(Synth, PatternsHaveTheNormalsOfTheirShapes) {
   EXPECT_GT(shareOf(plain(SynthKind::scales), [](Vec2 n) { return n.y > 0; }), 0.8);
 }
 
+TEST(Synth, PatternsFinerThanTexelsAreFlat) {
+  for (const SynthKind kind : {SynthKind::weave, SynthKind::twill, SynthKind::silk}) {
+    SynthOptions p = sized(kind, 64, 64);
+    p.feature_texels = 1;
+    p.alpha = 0;
+    for (const float h : synthHeights(p)) ASSERT_LT(std::abs(h), 100) << static_cast<int>(kind);
+  }
+}
+
 TEST(Synth, GrainRunsAlongU) {
   for (const SynthKind kind : {SynthKind::wood, SynthKind::anisotropic}) {
     const auto normals = synthNormals(sized(kind, 512, 512));

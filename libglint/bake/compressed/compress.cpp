@@ -70,28 +70,33 @@ struct Attempt {
   double scale_range;
 };
 
-/// Adds attempts with one method, from few bytes to many. A wide range is best for most maps; narrow ranges lose less to
-/// rounding. Blocks are scaled for the seen error alone.
-void addAttempts(const CompressionOptions& options, CompressionMethod method, std::vector<Attempt>& attempts) {
+/// Adds attempts with one method, from few bytes to many: of i8, or the type that the options ask for, or of more bits. A wide
+/// range is best for most maps; narrow ranges lose less to rounding. Blocks are scaled for the seen error alone.
+void addAttempts(const CompressionOptions& options, CompressionMethod method, bool more_bits, std::vector<Attempt>& attempts) {
   constexpr double kWide = 1e6, kNarrow = 1e3, kNarrowest = 100;
   const bool scales = options.metric == ErrorMetric::seen;
-  const CoefficientType first = options.coefficient_type.value_or(CoefficientType::i8);
   const auto add = [&](CoefficientType type, double scale_range) { attempts.push_back({method, type, scale_range}); };
-  add(first, kWide);
-  if (!(options.tolerance > 0)) return;
-  if (scales) add(first, kNarrow);
-  if (options.coefficient_type) return;
+  if (!more_bits) {
+    const CoefficientType first = options.coefficient_type.value_or(CoefficientType::i8);
+    add(first, kWide);
+    if (scales && options.tolerance > 0) add(first, kNarrow);
+    return;
+  }
   add(CoefficientType::f16, kNarrow);
   if (scales) add(CoefficientType::f16, kNarrowest);
   add(CoefficientType::f32, kNarrowest);
   if (scales) add(CoefficientType::f32, 1);
 }
 
-/// Attempts in turn. Images of pca take more bytes than products of tucker, and lose less to rounding.
+/// Attempts in turn. With one type of coefficients, images of pca take more bytes than products of tucker, and lose less to
+/// rounding. More bits come last.
 std::vector<Attempt> attemptsOf(const CompressionOptions& options) {
+  std::vector<CompressionMethod> methods = {options.method.value_or(CompressionMethod::tucker)};
+  if (!options.method && options.tolerance > 0) methods.push_back(CompressionMethod::pca);
   std::vector<Attempt> attempts;
-  addAttempts(options, options.method.value_or(CompressionMethod::tucker), attempts);
-  if (!options.method && options.tolerance > 0) addAttempts(options, CompressionMethod::pca, attempts);
+  for (const CompressionMethod method : methods) addAttempts(options, method, false, attempts);
+  if (!(options.tolerance > 0) || options.coefficient_type) return attempts;
+  for (const CompressionMethod method : methods) addAttempts(options, method, true, attempts);
   return attempts;
 }
 
@@ -106,17 +111,13 @@ CompressionOptions optionsOf(const CompressionOptions& options, const Attempt& a
 [[noreturn]] void rejectTolerance(const CompressionOptions& options, double least) {
   // A search for a larger error ends a little above the smallest one, and the error is printed with few digits.
   constexpr double kMore = 1.01;
-  const bool method = options.method.has_value(), type = options.coefficient_type.has_value();
-  const char* with = method && type ? " with this method and type of coefficients"
-                     : method       ? " with this method"
-                     : type         ? " with this type of coefficients"
-                                    : "";
-  const char* others = method && type ? "; --method auto and --quantize auto may reach less"
-                       : method       ? "; --method auto may reach less"
-                       : type         ? "; --quantize auto may reach less"
-                                      : "";
+  std::vector<std::string> fixed, others;
+  if (options.method) fixed.push_back("method"), others.push_back("--method auto");
+  if (options.coefficient_type) fixed.push_back("type of coefficients"), others.push_back("--quantize auto");
+  const std::string with = fixed.empty() ? "" : fmt::format(" with this {}", fmt::join(fixed, " and "));
   const std::string what = fmt::format("the tolerance {} cannot be reached{}", options.tolerance, with);
-  const std::string remedy = fmt::format("ask for at least {:.3g}{}", kMore * least, others);
+  const std::string reach = others.empty() ? "" : fmt::format("; {} may reach less", fmt::join(others, " and "));
+  const std::string remedy = fmt::format("ask for at least {:.3g}{}", kMore * least, reach);
   throw Error(ErrorCode::failed, "compress.tolerance", "", "", what, remedy);
 }
 
@@ -127,7 +128,7 @@ class Compressor {
       : pyramid_(pyramid),
         options_(optionsOf(options, attempt)),
         type_(attempt.type),
-        index_(pyramid, regions(options_), levelGroups(options_), options.image_masses),
+        index_(pyramid, regions(options_, pyramid.shape), levelGroups(options_), options.image_masses),
         weights_(index_, options.metric, attempt.scale_range),
         groups_(index_.levelGroupCount()),
         progress_(progress),
@@ -191,9 +192,19 @@ class Compressor {
     return options_.tolerance * options_.tolerance * whole;
   }
 
-  static int regions(const CompressionOptions& options) {
+  /// Regions along each axis: as the options say, or as the method has them, and more where one would hold too many images.
+  static int regions(const CompressionOptions& options, const PyramidShape& shape) {
     if (options.regions > 0) return options.regions;
-    return options.method == CompressionMethod::cp ? 8 : 1;
+    int count = options.method == CompressionMethod::cp ? 8 : 1;
+    const PyramidGrid& finest = shape.levels[0];
+    const double all_levels =
+        levelGroups(options) > 1 ? 1 : 4.0 / 3;  // of a region, if the finest level has no group of its own
+    const auto held = [&](int pieces) {
+      const auto share = [&](int images) { return std::ceil(static_cast<double>(images) / pieces) + (pieces > 1 ? 1 : 0); };
+      return all_levels * share(finest.columns) * share(finest.rows);
+    };
+    while (count < 255 && held(count) > SliceIndex::kMostImages) ++count;
+    return count;
   }
 
   // The finest levels differ most from other levels and have most of the slices. Bases of tucker are small, so level groups can

@@ -91,9 +91,10 @@ void SliceIndex::assignImages() {
     first_image_.push_back(static_cast<std::uint32_t>(slots_.size()));
   }
   const std::uint32_t most = *std::max_element(region_slots_.begin(), region_slots_.end());
-  if (most > std::numeric_limits<std::uint16_t>::max() + 1u)
+  if (most > kMostImages)
     throw Error(ErrorCode::usage, "compress.regions", "", "",
-                "a region holds " + std::to_string(most) + " images, and 65536 is the limit", "ask for more regions");
+                "a region holds " + std::to_string(most) + " images, and " + std::to_string(kMostImages) + " is the limit",
+                "ask for more regions");
 }
 
 /// Sorts the blocks of all images by cluster.

@@ -20,10 +20,12 @@ inline constexpr int kPanelSlices = 256;
 /// cluster, so that floats neither overflow nor underflow.
 class SliceIndex {
  public:
+  static constexpr std::uint32_t kMostImages = 65536;  ///< of a region: slots are numbers of 16 bits
+
   /// @param regions       regions along each axis, 1..255
   /// @param level_groups  groups of levels with regions of their own, >= 1: each of the finest levels is a group, and the last
   ///                      group has all coarser levels
-  /// @throw Error usage if a region has more than 65536 images, invalid_input if the arrays of the pyramid do not fit its shape
+  /// @throw Error usage if a region has more than kMostImages images, invalid_input if the arrays of the pyramid do not fit its shape
   /// @param image_masses  [images]: what the pixels of each image are multiplied by; empty: 1. Must outlive the index
   SliceIndex(const NdfPyramid& pyramid, int regions, int level_groups, std::span<const float> image_masses = {});
 

@@ -82,6 +82,11 @@ class Covariances {
  public:
   void add(double a, double b) { n_ += 1, a_ += a, b_ += b, aa_ += a * a, ab_ += a * b, bb_ += b * b; }
   double spread() const { return n_ > 0 ? std::sqrt(std::max(0.0, bb_ / n_ - b_ / n_ * (b_ / n_))) : 0; }
+  /// Standard deviation of a over that of b; 1 where b does not vary.
+  double stretch() const {
+    const double aa = aa_ * n_ - a_ * a_, bb = bb_ * n_ - b_ * b_;
+    return bb > 0 ? std::sqrt(std::max(0.0, aa) / bb) : 1;
+  }
   double distance() const { return n_ > 0 ? std::sqrt(std::max(0.0, aa_ - 2 * ab_ + bb_) / n_) : 0; }
   /// Correlation of a and b. 1 if all b are the same, 0 if all a are the same but not all b.
   double correlation() const {
@@ -289,7 +294,7 @@ VectorEvidence measureVectors(const PixelArray& image, const NormalLayout& layou
   const double tolerance = kUnitTolerance + std::numbers::sqrt3 * rounding;
   std::vector<double> errors;
   VectorEvidence e;
-  Covariances z;
+  Covariances z, positive;
   for (std::size_t t = 0; t < texels; t += sampleStep(image)) {
     const auto component = [&](int channel) { return componentOf(image, t, channel, encoding); };
     const double x = component(layout.x), y = component(layout.y), file_z = component(layout.z);
@@ -297,27 +302,32 @@ VectorEvidence measureVectors(const PixelArray& image, const NormalLayout& layou
     const double length = std::sqrt(x * x + y * y + file_z * file_z);
     errors.push_back(std::abs(length - 1));
     e.off += std::abs(length - 1) > tolerance ? 1 : 0;
-    e.off_if_positive += lengthError(x, y, 0.5 + 0.5 * file_z) > tolerance ? 1 : 0;
     e.too_long += length - 1 > kTooLong + std::numbers::sqrt3 * rounding ? 1 : 0;
-    if (const double r2 = x * x + y * y; r2 < 1) z.add(file_z, std::sqrt(1 - r2));
+    if (const double r2 = x * x + y * y; r2 < 1) {
+      const double w = std::sqrt(1 - r2);
+      z.add(file_z, w);
+      positive.add(file_z, 2 * w - 1);
+    }
   }
   if (errors.empty()) return e;
   const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
   std::nth_element(errors.begin(), middle, errors.end());
   e.median_error = *middle;
   e.off /= static_cast<double>(errors.size());
-  e.off_if_positive /= static_cast<double>(errors.size());
   e.too_long /= static_cast<double>(errors.size());
   e.correlation = z.correlation();
   e.spread = z.spread();
   e.distance = z.distance();
+  e.stretch = z.stretch();
+  e.distance_if_positive = positive.distance();
   return e;
 }
 
-bool holdsPositiveZ(const VectorEvidence& e) {
-  // Maps that are filtered or compressed have vectors off unit length, but these are farther off with the other z.
-  constexpr double kOftenOff = 0.02, kSeldomOff = 0.1;
-  return e.off > kOftenOff && e.off_if_positive < kSeldomOff * e.off;
+bool holdsPositiveZ(const VectorEvidence& e, double rounding) {
+  // z = 2 w - 1 but for rounding. Filtering makes z smaller as well, but neither in step with w nor by this much.
+  constexpr double kOftenOff = 0.02, kInStep = 0.98, kStretch = 2, kMostDeviation = 0.1;
+  return e.off > kOftenOff && e.correlation > kInStep && std::abs(e.stretch - kStretch) < kMostDeviation &&
+         e.distance_if_positive < 2 * rounding + kUnitTolerance;
 }
 
 void checkVectors(const VectorEvidence& e, const std::string& name) {

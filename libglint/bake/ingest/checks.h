@@ -73,7 +73,8 @@ struct VectorEvidence {
   double correlation = 1;   ///< correlation of z and w
   double spread = 0;        ///< standard deviation of w
   double distance = 0;      ///< root mean square of z - w
-  double off_if_positive = 0;  ///< `off`, if blue held z from 0 to 1 rather than from -1 to 1
+  double stretch = 1;       ///< standard deviation of z over that of w
+  double distance_if_positive = 0;  ///< root mean square of z - (2 w - 1): what blue is decoded to if it holds w itself
 };
 
 /// Measures the vectors of a map.
@@ -81,7 +82,8 @@ struct VectorEvidence {
 VectorEvidence measureVectors(const PixelArray& image, const NormalLayout& layout, Encoding encoding, double rounding);
 
 /// Whether blue holds z from 0 to 1, as some tools write it, rather than from -1 to 1.
-bool holdsPositiveZ(const VectorEvidence& evidence);
+/// @param rounding  largest error of a component
+bool holdsPositiveZ(const VectorEvidence& evidence, double rounding);
 
 /// Throws if the vectors are far from unit length, or if blue does not agree with red and green.
 void checkVectors(const VectorEvidence& evidence, const std::string& name);

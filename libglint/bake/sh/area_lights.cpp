@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <numbers>
 #include <span>
@@ -52,6 +53,18 @@ void intersect(const RectangleLight& light, Vec3 direction, Hit& hit) {
   setRadiance(hit, light.radiance, texel);
 }
 
+/// Texel of a sphere at a normal of unit length; null without a texture.
+const float* texelOf(const SphereLight& light, Vec3 n) {
+  if (light.texture_width == 0) return nullptr;
+  const float theta = std::acos(std::clamp(n.z, -1.0f, 1.0f));
+  float phi = std::atan2(n.y, n.x);
+  if (phi < 0) phi += 2 * std::numbers::pi_v<float>;
+  const int w = light.texture_width, h = light.texture_height;
+  const int i = std::min(static_cast<int>(phi / (2 * std::numbers::pi_v<float>)*static_cast<float>(w)), w - 1);
+  const int j = std::clamp(static_cast<int>((1 - theta / std::numbers::pi_v<float>)*static_cast<float>(h)), 0, h - 1);
+  return &light.texture[(static_cast<std::size_t>(j) * w + i) * 3];
+}
+
 void intersect(const SphereLight& light, Vec3 direction, Hit& hit) {
   const float along = dot(direction, light.centre);
   const Vec3 across = light.centre - along * direction;
@@ -60,18 +73,7 @@ void intersect(const SphereLight& light, Vec3 direction, Hit& hit) {
   const float distance = along - std::sqrt(inside);
   if (!(distance > 0 && distance < hit.distance)) return;
   hit.distance = distance;
-  const float* texel = nullptr;
-  if (light.texture_width > 0) {
-    const Vec3 n = distance * direction - light.centre;
-    const float theta = std::acos(std::clamp(n.z / light.radius, -1.0f, 1.0f));
-    float phi = std::atan2(n.y, n.x);
-    if (phi < 0) phi += 2 * std::numbers::pi_v<float>;
-    const int w = light.texture_width, h = light.texture_height;
-    const int i = std::min(static_cast<int>(phi / (2 * std::numbers::pi_v<float>)*static_cast<float>(w)), w - 1);
-    const int j = std::clamp(static_cast<int>((1 - theta / std::numbers::pi_v<float>)*static_cast<float>(h)), 0, h - 1);
-    texel = &light.texture[(static_cast<std::size_t>(j) * w + i) * 3];
-  }
-  setRadiance(hit, light.radiance, texel);
+  setRadiance(hit, light.radiance, texelOf(light, 1 / light.radius * (distance * direction - light.centre)));
 }
 
 /// Solid angle of a pixel of an environment.
@@ -111,24 +113,69 @@ struct LightPoint {
   Vec3 direction;      ///< of unit length
   float distance;      ///< less than that of all lights behind
   double solid_angle;  ///< of the part of the light that the point stands for
+  Hit own;             ///< the light's radiance there
 };
+
+/// Numbers of parts of a rectangle along its axes, so that parts are at most `spacing` wide as the origin sees them.
+struct PartCounts {
+  int columns, rows;
+};
+
+PartCounts partsOf(const RectangleLight& light, double spacing) {
+  constexpr int kPlaces = 16;  // along each axis, among which the nearest is looked for
+  constexpr double kFewest = 8, kMost = 1 << 16;
+  constexpr std::int64_t kMostParts = 1 << 22;
+  double nearest2 = std::numeric_limits<double>::infinity();
+  for (int k = 0; k <= kPlaces * kPlaces; ++k) {
+    const auto u = static_cast<float>(2.0 * (k % kPlaces) / (kPlaces - 1) - 1);
+    const auto v = static_cast<float>(2.0 * (k / kPlaces % kPlaces) / (kPlaces - 1) - 1);
+    const Vec3 place = light.centre + u * light.axis_u + v * light.axis_v;
+    nearest2 = std::min(nearest2, double{dot(place, place)});
+  }
+  const auto count = [&](Vec3 axis) {
+    const double parts = 2 * std::sqrt(dot(axis, axis) / std::max(nearest2, 1e-30)) / spacing;
+    return static_cast<int>(std::clamp(std::ceil(parts), kFewest, kMost));
+  };
+  PartCounts parts = {count(light.axis_u), count(light.axis_v)};
+  while (std::int64_t{parts.columns} * parts.rows > kMostParts) (parts.columns > parts.rows ? parts.columns : parts.rows) /= 2;
+  return parts;
+}
+
+/// Mean of the texels of a part of a rectangle, times its radiance.
+Hit meanRadiance(const RectangleLight& light, const PartCounts& parts, int column, int row) {
+  Hit own;
+  float mean[3] = {1, 1, 1};
+  if (const int w = light.texture_width, h = light.texture_height; w > 0) {
+    const auto first = [](int part, int count, int texels) { return static_cast<int>(std::int64_t{part} * texels / count); };
+    const auto end = [](int part, int count, int texels) {
+      return static_cast<int>((std::int64_t{part + 1} * texels + count - 1) / count);
+    };
+    double sums[3] = {0, 0, 0}, texels = 0;
+    for (int j = first(row, parts.rows, h); j < end(row, parts.rows, h); ++j) {
+      for (int i = first(column, parts.columns, w); i < end(column, parts.columns, w); ++i, ++texels)
+        for (int c = 0; c < 3; ++c) sums[c] += light.texture[(static_cast<std::size_t>(j) * w + i) * 3 + c];
+    }
+    for (int c = 0; c < 3; ++c) mean[c] = static_cast<float>(sums[c] / texels);
+  }
+  setRadiance(own, light.radiance, mean);
+  return own;
+}
 
 /// Calls visit(point) for points all over a light, at most `spacing` apart.
 template <class Visit>
 void forEachPoint(const RectangleLight& light, double spacing, const Visit& visit) {
-  constexpr double kFewest = 8, kMost = 4096;
-  const auto count = [&](double width) { return static_cast<int>(std::clamp(std::ceil(width / spacing), kFewest, kMost)); };
-  const Extent extent = extentOf(light);
-  const int columns = count(extent.u), rows = count(extent.v);
+  const PartCounts parts = partsOf(light, spacing);
   const Vec3 normal = cross(light.axis_u, light.axis_v);
-  for (int j = 0; j < rows; ++j) {
-    for (int i = 0; i < columns; ++i) {
-      const auto u = static_cast<float>(2 * (i + 0.5) / columns - 1), v = static_cast<float>(2 * (j + 0.5) / rows - 1);
+  for (int j = 0; j < parts.rows; ++j) {
+    for (int i = 0; i < parts.columns; ++i) {
+      const auto u = static_cast<float>(2 * (i + 0.5) / parts.columns - 1),
+                 v = static_cast<float>(2 * (j + 0.5) / parts.rows - 1);
       const Vec3 place = light.centre + u * light.axis_u + v * light.axis_v;
       const double distance = std::sqrt(double{dot(place, place)});
-      const double area = -4.0 * dot(normal, place) / (distance * columns * rows);  // as it is seen
+      const double area = -4.0 * dot(normal, place) / (distance * parts.columns * parts.rows);  // as it is seen
       if (area > 0)
-        visit({static_cast<float>(1 / distance) * place, static_cast<float>(distance), area / (distance * distance)});
+        visit({static_cast<float>(1 / distance) * place, static_cast<float>(distance), area / (distance * distance),
+               meanRadiance(light, parts, i, j)});
     }
   }
 }
@@ -145,11 +192,16 @@ void forEachPoint(const SphereLight& light, double /*spacing*/, const Visit& vis
   const Vec3 s = 1 / std::sqrt(dot(sideways, sideways)) * sideways, t = cross(axis, s);
   for (int ring = 0; ring < kRings; ++ring) {
     const double drop = depth * (ring + 0.5) / kRings, radius = std::sqrt(drop * (2 - drop));
+    // A small sphere is seen as a disc: of its normals, this part points sideways.
+    const double outwards = std::sqrt((ring + 0.5) / kRings), inwards = std::sqrt(1 - outwards * outwards);
     for (int k = 0; k < kAround; ++k) {
       const double phi = 2 * std::numbers::pi * (k + 0.5) / kAround;
-      const Vec3 direction = static_cast<float>(1 - drop) * axis + static_cast<float>(radius * std::cos(phi)) * s +
-                             static_cast<float>(radius * std::sin(phi)) * t;
-      visit({direction, static_cast<float>(distance) - light.radius, solid_angle});
+      const Vec3 across = static_cast<float>(std::cos(phi)) * s + static_cast<float>(std::sin(phi)) * t;
+      const Vec3 normal = static_cast<float>(outwards) * across - static_cast<float>(inwards) * axis;
+      Hit own;
+      setRadiance(own, light.radiance, texelOf(light, normal));
+      visit({static_cast<float>(1 - drop) * axis + static_cast<float>(radius) * across,
+             static_cast<float>(distance) - light.radius, solid_angle, own});
     }
   }
 }
@@ -241,13 +293,10 @@ void addPoints(const Light& light, const Lights& lights, double spacing, Environ
   forEachPoint(light, spacing, [&](const LightPoint& point) {
     bool is_small = false;
     if (lights.nearest(point.direction, is_small).distance < (1 - kRounding) * point.distance) return;
-    Hit own;
-    intersect(light, point.direction, own);
-    if (own.distance == kFar) setRadiance(own, light.radiance, light.texture.empty() ? nullptr : light.texture.data());
     const auto pixel = static_cast<std::size_t>(environment.at(point.direction) - environment.rgb.data());
     const auto row = static_cast<int>(pixel / 3 / static_cast<std::size_t>(environment.width));
     const double share = point.solid_angle / pixelSolidAngle(environment.height, row);
-    for (std::size_t c = 0; c < 3; ++c) environment.rgb[pixel + c] += static_cast<float>(share * own.radiance[c]);
+    for (std::size_t c = 0; c < 3; ++c) environment.rgb[pixel + c] += static_cast<float>(share * point.own.radiance[c]);
   });
 }
 

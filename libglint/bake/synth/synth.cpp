@@ -115,7 +115,11 @@ std::vector<float> pattern(const SynthOptions& p) {
 std::vector<float> patternHeights(const SynthOptions& p) {
   std::vector<float> heights = pattern(p);
   const float steepest = slopeVariances(p.width, p.height, heights).steepest;
-  scale(heights, steepest > 0 ? p.slope / steepest : 0);
+  // A pattern that is finer than texels is the same at all of them, but for rounding.
+  constexpr float kRounding = 1e-5f;
+  const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
+  const bool flat = steepest <= kRounding * std::max(std::abs(*low), std::abs(*high));
+  scale(heights, flat ? 0 : p.slope / steepest);
   if (p.alpha > 0 && p.kind != SynthKind::flat) {
     const std::vector<float> noise = scaledNoise(p);
     for (std::size_t i = 0; i < heights.size(); ++i) heights[i] += noise[i];
