@@ -7,7 +7,6 @@
 
 #include "common/child_process.h"
 #include "common/files.h"
-#include "glint-farm/entry_lock.h"
 #include "glint/formats/atomic_file.h"
 #include "glint/model/error.h"
 
@@ -74,11 +73,12 @@ void makeFolderOf(const std::string& file) {
                 "check the permissions and the space of the disk");
 }
 
-/// Gives a file a second name, in place of what has it. Where file systems have no links, makes a copy.
+/// Gives a file a second name, in place of an asset that has it. Where file systems have no links, makes a copy.
 void makeLink(const std::string& file, const std::string& name) {
   std::error_code error;
   if (fs::equivalent(file, name, error)) return;
   makeFolderOf(name);
+  if (fs::exists(name, error)) checkReplaceable(name, name, OutputFormat::asset);
   const std::string temporary = (fs::path(name).parent_path() / ("." + fs::path(name).filename().string() + ".0.tmp")).string();
   fs::remove(temporary, error);
   fs::create_hard_link(file, temporary, error);
@@ -92,13 +92,17 @@ void makeLink(const std::string& file, const std::string& name) {
 }  // namespace
 
 bool EntryMaker::isKnown(const ManifestEntry& entry) {
-  return !recheck_ && records_.stateOf(entry) == EntryState::done && readsPlannedMaps(manifest_, entry, hashes_);
+  try {
+    return !recheck_ && records_.stateOf(entry) == EntryState::done && !changedMap(manifest_, entry, hashes_);
+  } catch (const Error&) {
+    return false;  // a map that cannot be read: make() says why
+  }
 }
 
 EntryTry EntryMaker::make(const ManifestEntry& entry) {
   try {
     makeFolderOf(manifest_.at(entry.output));
-    const std::optional<EntryLock> lock = EntryLock::take(manifest_.at(entry.output));
+    std::optional<EntryLock> lock = EntryLock::take(manifest_.at(entry.output));
     if (!lock) {
       EntryTry busy;
       busy.outcome = Outcome::busy;
@@ -110,13 +114,12 @@ EntryTry EntryMaker::make(const ManifestEntry& entry) {
       known.outcome = Outcome::known;
       return known;
     }
-    if (!readsPlannedMaps(manifest_, entry, hashes_))
-      throw Error(ErrorCode::invalid_input, "farm.map_changed", entry.inputs.front(), "",
-                  entry.twins.empty()
-                      ? "is not the map that was planned: its bytes have changed"
-                      : "and its twins, such as " + entry.twins.front() + ", are not the maps that were planned",
-                  "run glint-farm plan again");
-    return runLocked(entry, lock->file());
+    if (const auto map = changedMap(manifest_, entry, hashes_))
+      throw Error(ErrorCode::invalid_input, "farm.map_changed", *map, "",
+                  "is not the map that was planned: its bytes have changed", "run glint-farm plan again");
+    EntryTry result = runLocked(entry, lock->file());
+    if (result.outcome == Outcome::made || result.outcome == Outcome::unchanged) result.lock.emplace(std::move(*lock));
+    return result;
   } catch (const Error& error) {
     return failure(error);
   }
