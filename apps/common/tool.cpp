@@ -18,6 +18,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "common/error_json.h"
 #include "common/files.h"
 #include "common/help_formatter.h"
 #include "common/input_name.h"
@@ -73,24 +74,6 @@ template <class T>
 struct ElementOf<std::vector<T>> {
   using Type = T;
 };
-
-const char* codeName(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::usage:
-      return "usage";
-    case ErrorCode::io:
-      return "io";
-    case ErrorCode::invalid_input:
-      return "invalid_input";
-    case ErrorCode::failed:
-      return "failed";
-    case ErrorCode::unsupported:
-      return "unsupported";
-    case ErrorCode::differs:
-      return "differs";
-  }
-  return "failed";
-}
 
 /// Paths may hold any bytes; JSON must be UTF-8.
 std::string dump(const json& document) { return document.dump(2, ' ', false, json::error_handler_t::replace); }
@@ -472,18 +455,8 @@ int Tool::fail(const Error& error) {
 }
 
 void Tool::printFailure(const Error& error) const {
-  const json document = {{"schema", kJsonSchema},
-                         {"tool", state_->info.name},
-                         {"version", GLINT_VERSION},
-                         {"status", "error"},
-                         {"error",
-                          {{"code", codeName(error.code())},
-                           {"rule", error.rule()},
-                           {"path", error.path()},
-                           {"object", error.object()},
-                           {"message", error.what()},
-                           {"remedy", error.remedy()}}},
-                         {"warnings", state_->warnings}};
+  const json document = {{"schema", kJsonSchema}, {"tool", state_->info.name},       {"version", GLINT_VERSION},
+                         {"status", "error"},     {"error", json(errorJson(error))}, {"warnings", state_->warnings}};
   try {
     writeStdout(dump(document) + "\n");
     flushStdout();

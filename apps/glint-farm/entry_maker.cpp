@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
-#include <span>
+#include <fstream>
 
 #include "common/child_process.h"
+#include "common/error_json.h"
 #include "common/files.h"
 #include "glint/formats/atomic_file.h"
 #include "glint/model/error.h"
@@ -18,17 +19,6 @@ using Json = nlohmann::ordered_json;
 using Outcome = EntryTry::Outcome;
 
 constexpr int kSignalled = 128;  // exit codes above it are signals
-
-const char* codeName(ErrorCode code) {
-  if (code == ErrorCode::usage) return "usage";
-  if (code == ErrorCode::io) return "io";
-  return code == ErrorCode::invalid_input ? "invalid_input" : "failed";
-}
-
-Json errorJson(const Error& error) {
-  return {{"code", codeName(error.code())}, {"rule", error.rule()},    {"path", error.path()},
-          {"object", error.object()},       {"message", error.what()}, {"remedy", error.remedy()}};
-}
 
 EntryTry failure(const Error& error) {
   EntryTry result;
@@ -73,6 +63,22 @@ void makeFolderOf(const std::string& file) {
                 "check the permissions and the space of the disk");
 }
 
+/// Copies a file, whole or not at all, without holding all of it.
+void copyFile(const std::string& file, const std::string& name) {
+  std::ifstream from(file, std::ios::binary);
+  std::vector<char> piece(8 << 20);
+  formats::AtomicFile copy(name);
+  std::uint64_t size = 0;
+  while (from.read(piece.data(), static_cast<std::streamsize>(piece.size())), from.gcount() > 0) {
+    const auto count = static_cast<std::uint64_t>(from.gcount());
+    copy.write(piece.data(), count, size);
+    size += count;
+  }
+  if (!from.eof())
+    throw Error(ErrorCode::io, "file.readable", file, "", "cannot be read", "check its permissions and the disk");
+  copy.publish(true);
+}
+
 /// Gives a file a second name, in place of an asset that has it. Where file systems have no links, makes a copy.
 void makeLink(const std::string& file, const std::string& name) {
   std::error_code error;
@@ -85,8 +91,7 @@ void makeLink(const std::string& file, const std::string& name) {
   if (!error) fs::rename(temporary, name, error);
   if (!error) return;
   fs::remove(temporary, error);
-  const std::vector<std::byte> bytes = readFile(file);
-  formats::writeFile(name, bytes);
+  copyFile(file, name);
 }
 
 }  // namespace

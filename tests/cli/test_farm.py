@@ -574,6 +574,24 @@ def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(farm):
         subprocess.run(["umount", disk], check=True)
 
 
+def test_a_duplicate_on_another_disk_is_a_copy(farm):
+    """Needs root to mount a disk."""
+    disk = farm.folder / "assets/more"
+    disk.mkdir(parents=True)
+    (farm.folder / "maps/more").mkdir()
+    shutil.copy(farm.folder / "maps/a.png", farm.folder / "maps/more/twin.png")
+    if os.getuid() != 0 or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64m", "none", disk], capture_output=True).returncode != 0:
+        pytest.skip("needs to mount a disk")
+    try:
+        plan(farm, "normals")
+        assert run(farm)["made"] == 3
+        assert (disk / "twin.glint").read_bytes() == (farm.folder / "assets/a.glint").read_bytes()
+        assert not (disk / "twin.glint").samefile(farm.folder / "assets/a.glint") and not leftovers(farm.folder)
+        assert run(farm)["known"] == 3
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
 def test_records_that_cannot_be_written_end_the_run(farm):
     plan(farm, "normals")
     (farm.folder / "farm.json.log").symlink_to("/dev/full")
