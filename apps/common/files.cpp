@@ -117,19 +117,6 @@ bool isSameFile(const std::string& a, const std::string& b) {
   return place(a) == place(b);
 }
 
-void checkReplaceable(const std::string& path, const fs::path& target, OutputFormat format) {
-  struct stat existing {};
-  if (::stat(target.c_str(), &existing) != 0) throwIo("output.regular", path, systemError());
-  // A mode of 0444 is a decision of the owner, which holds for root too.
-  constexpr mode_t kAnyWrite = S_IWUSR | S_IWGRP | S_IWOTH;
-  if ((existing.st_mode & kAnyWrite) == 0 || ::access(target.c_str(), W_OK) != 0)
-    throwIo("output.read_only", path, "exists and is read-only", "name another file, or replace it with --force");
-  if (!mayReplace(target, format)) {
-    throw Error(ErrorCode::usage, "output.ours", path, "", "exists and is not a file of the kind that would replace it",
-                "name another file, or replace it with --force");
-  }
-}
-
 [[noreturn]] void refuseInDepfile(const std::string& name, const std::string& what) {
   throw Error(ErrorCode::usage, "depfile.name", name, "", "a name with " + what + " cannot stand in a depfile",
               "rename the file or leave out --depfile");
@@ -270,6 +257,19 @@ void checkApart(const Tool& tool, const std::string& path, std::size_t others) {
   }
 }
 
+void checkReplaceable(const std::string& path, const std::string& target, OutputFormat format) {
+  struct stat existing {};
+  if (::stat(target.c_str(), &existing) != 0) throwIo("output.regular", path, systemError());
+  // A mode of 0444 is a decision of the owner, which holds for root too.
+  constexpr mode_t kAnyWrite = S_IWUSR | S_IWGRP | S_IWOTH;
+  if ((existing.st_mode & kAnyWrite) == 0 || ::access(target.c_str(), W_OK) != 0)
+    throwIo("output.read_only", path, "exists and is read-only", "name another file, or replace it with --force");
+  if (!mayReplace(target, format)) {
+    throw Error(ErrorCode::usage, "output.ours", path, "", "exists and is not a file of the kind that would replace it",
+                "name another file, or replace it with --force");
+  }
+}
+
 void checkOutput(Tool& tool, const std::string& path, OutputFormat format) {
   if (path.empty()) throw Error(ErrorCode::usage, "output.name", "", "", "the name of the output is empty", "name a file");
   if (path == "-")
@@ -291,7 +291,12 @@ void checkOutput(Tool& tool, const std::string& path, OutputFormat format) {
     throwIo("output.folder", path, "the folder " + folder.string() + " cannot be written: " + systemError(),
             "check its permissions or name another folder");
   }
-  if (target.kind == formats::OutputTarget::Kind::file && !tool.force()) checkReplaceable(path, target.path, format);
+  if (target.kind != formats::OutputTarget::Kind::file || tool.force()) return;
+  const auto check = [path, file = std::string(target.path), format] { checkReplaceable(path, file, format); };
+  if (tool.skipUnchanged() && format == OutputFormat::asset)
+    tool.addReplaceCheck(check);
+  else
+    check();
 }
 
 }  // namespace glint::apps

@@ -52,9 +52,16 @@ enum class OutputFormat : unsigned char {
 /// The folder must exist and be writable; symbolic links are followed. Devices and pipes are written to; folders, disks and
 /// sockets are refused. Without --force an output replaces a file only if the file can be written (a mode of 0444 holds for root
 /// too), is no input, and holds an earlier result of the same format: an asset, an image of a known format, a table with the
-/// columns of answers or samples, a depfile. An empty file may always be replaced.
+/// columns of answers or samples, a depfile. An empty file may always be replaced. With --skip-unchanged an asset is judged so only
+/// when it is made again: a finished asset may be read-only.
 /// @throws Error io, usage
 void checkOutput(Tool& tool, const std::string& path, OutputFormat format);
+
+/// Checks that a file which is there may be replaced by an output, as checkOutput() does without --force.
+/// @param path    name of the output
+/// @param target  the file behind it
+/// @throws Error io, usage
+void checkReplaceable(const std::string& path, const std::string& target, OutputFormat format);
 
 /// Checks that an output is no other output of the run so far, and no input unless --force is given. For outputs whose names are
 /// known only when the work has begun; checkOutput() does so for the others.

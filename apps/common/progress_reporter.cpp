@@ -32,8 +32,11 @@ ProgressReporter::ProgressReporter(ProgressMode mode, std::string tool, std::str
   if (mode_ == ProgressMode::automatic && isatty(STDERR_FILENO) == 0) mode_ = ProgressMode::none;
 }
 
-ProgressReporter::~ProgressReporter() {
-  if (drawn_) writeStderr("\r\033[K");  // leaves the line to whatever is printed next
+ProgressReporter::~ProgressReporter() { clear(); }
+
+void ProgressReporter::clear() {
+  if (drawn_) writeStderr("\r\033[K");
+  drawn_ = false;
 }
 
 void ProgressReporter::update(std::size_t done, std::size_t total) {

@@ -23,6 +23,9 @@ class ProgressReporter {
 
   void update(std::size_t done, std::size_t total);
 
+  /// Leaves the line of the bar to what is printed next. The next update draws the bar again.
+  void clear();
+
  private:
   using Clock = std::chrono::steady_clock;
 

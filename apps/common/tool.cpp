@@ -18,8 +18,10 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "common/error_json.h"
 #include "common/files.h"
 #include "common/help_formatter.h"
+#include "common/input_name.h"
 #include "common/memory.h"
 #include "common/number_checks.h"
 #include "common/progress_reporter.h"
@@ -73,31 +75,6 @@ struct ElementOf<std::vector<T>> {
   using Type = T;
 };
 
-const char* codeName(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::usage:
-      return "usage";
-    case ErrorCode::io:
-      return "io";
-    case ErrorCode::invalid_input:
-      return "invalid_input";
-    case ErrorCode::failed:
-      return "failed";
-    case ErrorCode::unsupported:
-      return "unsupported";
-    case ErrorCode::differs:
-      return "differs";
-  }
-  return "failed";
-}
-
-/// Assets name their inputs in UTF-8, without control characters.
-void requireText(const std::string& path, const std::string& name) {
-  if (escapedText(name) == name) return;
-  throw Error(ErrorCode::io, "input.name", path, "", "its name is not UTF-8, or holds a control character",
-              "rename the file: assets record the names of their inputs");
-}
-
 /// Paths may hold any bytes; JSON must be UTF-8.
 std::string dump(const json& document) { return document.dump(2, ' ', false, json::error_handler_t::replace); }
 
@@ -122,6 +99,7 @@ struct Tool::State {
   std::vector<std::pair<std::string, std::function<json()>>> recorders;  // one for each option, same order
   std::vector<std::function<void()>> checks;
   std::vector<std::function<void()>> late_checks;
+  std::vector<std::function<void()>> replace_checks;
   std::vector<std::pair<std::string, std::vector<std::string>>> elsewhere;  // lines of other commands, and their options
   std::vector<std::string> inputs;
   std::vector<std::string> outputs;
@@ -129,6 +107,11 @@ struct Tool::State {
   json warnings = json::array();
   std::unique_ptr<ProgressReporter> reporter;
   std::optional<ErrorCode> exit_code;
+
+  /// Leaves the line of the bar to what is printed next. The reporter stays: functions of Tool::progress point to it.
+  void clearProgress() const {
+    if (reporter) reporter->clear();
+  }
 
   int threads = 0;
   std::uint64_t seed = 1;
@@ -261,6 +244,8 @@ void Tool::pointTo(const std::string& line, const std::vector<std::string>& opti
 void Tool::usesSeed() { state_->uses_seed = true; }
 void Tool::addCheck(std::function<void()> check) { state_->checks.push_back(std::move(check)); }
 void Tool::addLateCheck(std::function<void()> check) { state_->late_checks.push_back(std::move(check)); }
+void Tool::addReplaceCheck(std::function<void()> check) { state_->replace_checks.push_back(std::move(check)); }
+bool Tool::skipUnchanged() const { return state_->skip_unchanged; }
 const std::string& Tool::name() const { return state_->info.name; }
 bool Tool::quiet() const { return state_->quiet; }
 bool Tool::verbose() const { return state_->verbose; }
@@ -309,7 +294,7 @@ bake::ProgressFn Tool::progress(const std::string& stage) {
 
 void Tool::print(const std::string& text) {
   if (wantsJson()) return;
-  state_->reporter.reset();
+  state_->clearProgress();
   writeStdout(text);
 }
 
@@ -321,7 +306,7 @@ void Tool::warn(const std::string& text) {
   const std::string line = shownText(text, kMostWarning);
   state_->warnings.push_back(line);
   if (quiet()) return;
-  state_->reporter.reset();
+  state_->clearProgress();
   writeStderr(fmt::format("{}: warning: {}\n", name(), line));
 }
 
@@ -410,6 +395,7 @@ int Tool::work(const std::function<void()>& body) {
     reportUnchanged();
     return 0;
   }
+  for (const auto& check : s.replace_checks) check();
   body();
   s.reporter.reset();
   writeDepfile();
@@ -469,18 +455,8 @@ int Tool::fail(const Error& error) {
 }
 
 void Tool::printFailure(const Error& error) const {
-  const json document = {{"schema", kJsonSchema},
-                         {"tool", state_->info.name},
-                         {"version", GLINT_VERSION},
-                         {"status", "error"},
-                         {"error",
-                          {{"code", codeName(error.code())},
-                           {"rule", error.rule()},
-                           {"path", error.path()},
-                           {"object", error.object()},
-                           {"message", error.what()},
-                           {"remedy", error.remedy()}}},
-                         {"warnings", state_->warnings}};
+  const json document = {{"schema", kJsonSchema}, {"tool", state_->info.name},       {"version", GLINT_VERSION},
+                         {"status", "error"},     {"error", json(errorJson(error))}, {"warnings", state_->warnings}};
   try {
     writeStdout(dump(document) + "\n");
     flushStdout();

@@ -97,6 +97,10 @@ class Tool {
   /// Adds a check that runs when every other has run, so that all inputs and outputs are known.
   void addLateCheck(std::function<void()> check);
 
+  /// Adds a check that runs last, and only if the outputs are made: not where --skip-unchanged leaves them.
+  void addReplaceCheck(std::function<void()> check);
+  bool skipUnchanged() const;
+
   /// Parses, checks, works, writes the depfile and the JSON result; turns every exception into a message and an exit code.
   /// @return exit code: 0 ok, or the value of the ErrorCode
   int run(int argc, char** argv, const std::function<void()>& work);

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
-#include <span>
+#include <fstream>
 
 #include "common/child_process.h"
+#include "common/error_json.h"
 #include "common/files.h"
-#include "glint-farm/entry_lock.h"
 #include "glint/formats/atomic_file.h"
 #include "glint/model/error.h"
 
@@ -19,17 +19,6 @@ using Json = nlohmann::ordered_json;
 using Outcome = EntryTry::Outcome;
 
 constexpr int kSignalled = 128;  // exit codes above it are signals
-
-const char* codeName(ErrorCode code) {
-  if (code == ErrorCode::usage) return "usage";
-  if (code == ErrorCode::io) return "io";
-  return code == ErrorCode::invalid_input ? "invalid_input" : "failed";
-}
-
-Json errorJson(const Error& error) {
-  return {{"code", codeName(error.code())}, {"rule", error.rule()},    {"path", error.path()},
-          {"object", error.object()},       {"message", error.what()}, {"remedy", error.remedy()}};
-}
 
 EntryTry failure(const Error& error) {
   EntryTry result;
@@ -74,31 +63,51 @@ void makeFolderOf(const std::string& file) {
                 "check the permissions and the space of the disk");
 }
 
-/// Gives a file a second name, in place of what has it. Where file systems have no links, makes a copy.
+/// Copies a file, whole or not at all, without holding all of it.
+void copyFile(const std::string& file, const std::string& name) {
+  std::ifstream from(file, std::ios::binary);
+  std::vector<char> piece(8 << 20);
+  formats::AtomicFile copy(name);
+  std::uint64_t size = 0;
+  while (from.read(piece.data(), static_cast<std::streamsize>(piece.size())), from.gcount() > 0) {
+    const auto count = static_cast<std::uint64_t>(from.gcount());
+    copy.write(piece.data(), count, size);
+    size += count;
+  }
+  if (!from.eof())
+    throw Error(ErrorCode::io, "file.readable", file, "", "cannot be read", "check its permissions and the disk");
+  copy.publish(true);
+}
+
+/// Gives a file a second name, in place of an asset that has it. Where file systems have no links, makes a copy.
 void makeLink(const std::string& file, const std::string& name) {
   std::error_code error;
   if (fs::equivalent(file, name, error)) return;
   makeFolderOf(name);
+  if (fs::exists(name, error)) checkReplaceable(name, name, OutputFormat::asset);
   const std::string temporary = (fs::path(name).parent_path() / ("." + fs::path(name).filename().string() + ".0.tmp")).string();
   fs::remove(temporary, error);
   fs::create_hard_link(file, temporary, error);
   if (!error) fs::rename(temporary, name, error);
   if (!error) return;
   fs::remove(temporary, error);
-  const std::vector<std::byte> bytes = readFile(file);
-  formats::writeFile(name, bytes);
+  copyFile(file, name);
 }
 
 }  // namespace
 
 bool EntryMaker::isKnown(const ManifestEntry& entry) {
-  return !recheck_ && records_.stateOf(entry) == EntryState::done && readsPlannedMaps(manifest_, entry, hashes_);
+  try {
+    return !recheck_ && records_.stateOf(entry) == EntryState::done && !changedMap(manifest_, entry, hashes_);
+  } catch (const Error&) {
+    return false;  // a map that cannot be read: make() says why
+  }
 }
 
 EntryTry EntryMaker::make(const ManifestEntry& entry) {
   try {
     makeFolderOf(manifest_.at(entry.output));
-    const std::optional<EntryLock> lock = EntryLock::take(manifest_.at(entry.output));
+    std::optional<EntryLock> lock = EntryLock::take(manifest_.at(entry.output));
     if (!lock) {
       EntryTry busy;
       busy.outcome = Outcome::busy;
@@ -110,13 +119,12 @@ EntryTry EntryMaker::make(const ManifestEntry& entry) {
       known.outcome = Outcome::known;
       return known;
     }
-    if (!readsPlannedMaps(manifest_, entry, hashes_))
-      throw Error(ErrorCode::invalid_input, "farm.map_changed", entry.inputs.front(), "",
-                  entry.twins.empty()
-                      ? "is not the map that was planned: its bytes have changed"
-                      : "and its twins, such as " + entry.twins.front() + ", are not the maps that were planned",
-                  "run glint-farm plan again");
-    return runLocked(entry, lock->file());
+    if (const auto map = changedMap(manifest_, entry, hashes_))
+      throw Error(ErrorCode::invalid_input, "farm.map_changed", *map, "",
+                  "is not the map that was planned: its bytes have changed", "run glint-farm plan again");
+    EntryTry result = runLocked(entry, lock->file());
+    if (result.outcome == Outcome::made || result.outcome == Outcome::unchanged) result.lock.emplace(std::move(*lock));
+    return result;
   } catch (const Error& error) {
     return failure(error);
   }

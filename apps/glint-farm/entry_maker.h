@@ -1,9 +1,11 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "glint-farm/entry_lock.h"
 #include "manifest/entry_records.h"
 #include "manifest/hash_cache.h"
 #include "manifest/manifest.h"
@@ -25,7 +27,8 @@ struct EntryTry {
   int exit_code = 0;
   double wall_s = 0, cpu_s = 0;
   std::int64_t peak_bytes = 0;
-  nlohmann::ordered_json error;  ///< {"code", "rule", "path", "object", "message", "remedy"}, as --json has it
+  std::optional<EntryLock> lock;  ///< made or unchanged: held until the record is written
+  nlohmann::ordered_json error;   ///< {"code", "rule", "path", "object", "message", "remedy"}, as --json has it
 };
 
 /// Makes entries of a manifest by the programs of the package.

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "common/files.h"
+#include "common/json_file.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
@@ -34,7 +34,8 @@ void move(FarmJob& job, const fs::path& from, const fs::path& to) {
   std::vector<std::string*> names = {&job.output};
   for (std::string& input : job.inputs) names.push_back(&input);
   for (std::string* name : names) {
-    const std::string there = moved(*name);
+    std::string there = moved(*name);
+    if (there.starts_with('-')) there.insert(0, "./");  // or programs would take it for an option
     std::replace(job.command.begin(), job.command.end(), *name, there);
     *name = there;
   }
@@ -43,9 +44,7 @@ void move(FarmJob& job, const fs::path& from, const fs::path& to) {
 }  // namespace
 
 std::vector<FarmJob> readJobs(const std::string& path, const std::string& folder) {
-  const std::vector<std::byte> bytes = readFile(path);
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
-  const json document = json::parse(text, text + bytes.size(), nullptr, false);
+  const json document = readJsonOrNothing(path);
   const auto form = document.is_object() ? document.value("schema", json()) : json();
   if (form != "glint-plan plan 1" && form != "glint-plan jobs 1") refuse(path, "is neither a plan nor jobs of glint-plan");
   if (!document.contains("jobs")) refuse(path, "is a plan without jobs, of an earlier version");

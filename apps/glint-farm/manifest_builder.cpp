@@ -4,27 +4,11 @@
 
 #include <algorithm>
 #include <atomic>
-#include <filesystem>
 #include <mutex>
-#include <nlohmann/json.hpp>
 
-#include "glint/formats/hash.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
-namespace {
-
-using Json = nlohmann::ordered_json;
-
-/// Ending of a file's name, in small letters: some readers of images go by it.
-std::string endingOf(const std::string& file) {
-  std::string ending = std::filesystem::path(file).extension().string();
-  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return ending;
-}
-
-}  // namespace
-
 ManifestBuilder::ManifestBuilder(const Tool& tool, const std::string& path) : hashes_(path + ".hashes") {
   manifest_.path = path;
   manifest_.folder = manifestFolder(path);
@@ -49,23 +33,7 @@ void ManifestBuilder::hashMaps(const std::vector<std::string>& files, const bake
 std::string ManifestBuilder::sourceKey(const std::string& file) {
   if (const auto maker = maker_of_.find(file); maker != maker_of_.end()) return maker->second;
   maps_.insert(file);
-  return hashes_.hash(file, manifest_.at(file)) + endingOf(file);
-}
-
-std::string ManifestBuilder::keyOf(const FarmJob& job) {
-  // Files stand in the key as what they hold, not as how they are named.
-  Json words = Json::array({manifest_.generator});
-  for (const std::string& word : job.command) {
-    const auto input = std::find(job.inputs.begin(), job.inputs.end(), word);
-    if (word == job.output)
-      words.push_back({{"output", true}});
-    else if (input != job.inputs.end())
-      words.push_back({{"input", sourceKey(word)}});
-    else
-      words.push_back(word);
-  }
-  const std::string text = words.dump(-1, ' ', false, Json::error_handler_t::replace);
-  return formats::hashBytes(text.data(), text.size());
+  return sourceOfMap(file, hashes_.hash(file, manifest_.at(file)));
 }
 
 void ManifestBuilder::claim(const std::string& output, const std::string& key) {
@@ -84,19 +52,20 @@ void ManifestBuilder::add(FarmJob job) {
     std::replace(job.command.begin(), job.command.end(), input, first);
     input = first;
   }
-  const std::string key = keyOf(job);
+  ManifestEntry entry{"", job.output, {}, {}, job.command, job.inputs, {}};
+  const std::string key = keyOf(manifest_.generator, entry, [this](const std::string& file) { return sourceKey(file); });
+  entry.key = key;
   if (const auto known = maker_of_.find(job.output); known != maker_of_.end() && known->second == key) return;
   claim(job.output, key);
   if (const auto same = manifest_.entry_of_key.find(key); same != manifest_.entry_of_key.end()) {
-    ManifestEntry& entry = manifest_.entries[same->second];
-    entry.links.push_back(job.output);
+    ManifestEntry& first = manifest_.entries[same->second];
+    first.links.push_back(job.output);
     for (const std::string& input : job.inputs)
-      if (maps_.contains(input) && std::find(entry.inputs.begin(), entry.inputs.end(), input) == entry.inputs.end())
-        entry.twins.push_back(input);
+      if (maps_.contains(input) && std::find(first.inputs.begin(), first.inputs.end(), input) == first.inputs.end())
+        first.twins.push_back(input);
     ++duplicates_;
     return;
   }
-  ManifestEntry entry{key, job.output, {}, {}, job.command, job.inputs, {}};
   for (const std::string& input : job.inputs)
     if (const auto maker = maker_of_.find(input); maker != maker_of_.end()) entry.after.push_back(maker->second);
   manifest_.entry_of_key.emplace(key, manifest_.entries.size());

@@ -39,7 +39,6 @@ class ManifestBuilder {
   std::size_t hashedMaps() const { return hashes_.readFiles(); }
 
  private:
-  std::string keyOf(const FarmJob& job);
   std::string sourceKey(const std::string& file);
   void claim(const std::string& output, const std::string& key);
 

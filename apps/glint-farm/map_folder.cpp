@@ -5,6 +5,7 @@
 #include <map>
 #include <system_error>
 
+#include "common/files.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
@@ -19,8 +20,10 @@ bool isImage(const fs::path& file) {
   return std::find(imageTypes().begin(), imageTypes().end(), type.substr(1)) != imageTypes().end();
 }
 
+/// The name of a file in a folder. It is never one that programs take for an option.
 std::string join(const std::string& folder, const std::string& file) {
-  return (fs::path(folder) / file).lexically_normal().string();
+  const std::string name = (fs::path(folder) / file).lexically_normal().string();
+  return name.starts_with('-') ? "./" + name : name;
 }
 
 /// Puts the name of the image, without ending, in place of the first %, as pattern rules of Make do.
@@ -29,12 +32,12 @@ std::string withStem(const std::string& word, const std::string& stem) {
   return place == std::string::npos ? word : word.substr(0, place) + stem + word.substr(place + 1);
 }
 
-/// Adds the flags of a step. A flag that names a file is an input.
+/// Adds the flags of a step. Files that flags name are inputs, and words of their own.
 void addFlags(FarmJob& job, const RecipeStep& step, const std::string& stem, const std::string& here) {
-  std::error_code none;
-  for (const std::string& flag : step.flags) {
-    std::string word = withStem(flag, stem);
-    if (fs::is_regular_file(word, none)) {
+  for (const RecipeFlag& flag : step.flags) {
+    std::string word = withStem(flag.word, stem);
+    if (flag.names_file) {
+      checkRegular(word);
       if (!fs::path(word).is_absolute()) word = join(here, word);
       job.inputs.push_back(word);
     }

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "common/input_name.h"
 #include "glint-farm/jobs_file.h"
 #include "glint-farm/manifest_builder.h"
 #include "glint-farm/map_folder.h"
@@ -97,6 +98,8 @@ void FarmPlanCommand::run() {
       std::move(of_image.begin(), of_image.end(), std::back_inserter(jobs));
     }
   }
+  for (const FarmJob& job : jobs)
+    for (const std::string& word : job.command) requireText(word, word);  // manifests are UTF-8
   builder.hashMaps(maps, tool_.progress("maps"));
   for (FarmJob& job : jobs) builder.add(std::move(job));
   const Manifest manifest = builder.take();

@@ -4,10 +4,13 @@
 
 #include <CLI/StringTools.hpp>
 #include <algorithm>
+#include <cctype>
 #include <functional>
 #include <iterator>
+#include <span>
 #include <string_view>
 
+#include "common/numbers.h"
 #include "common/suggest.h"
 #include "glint/model/error.h"
 
@@ -46,6 +49,55 @@ std::size_t kindOf(std::string_view name) {
          (near.empty() ? "" : "did you mean " + near + "? ") + std::string("the kinds are ") + recipeKindNames());
 }
 
+/// Options of the programs that name files which these read.
+constexpr std::string_view kFileOptions[] = {"--base-color", "--base-roughness", "--config", "--roughness", "--transforms"};
+
+/// Options that the farm gives itself, whose files it could not keep track of, or with which programs make no asset.
+constexpr std::string_view kRefusedOptions[] = {"--threads",    "--progress", "--json",          "--quiet",  "--verbose",
+                                                "--max-memory", "--depfile",  "--textures",      "--output", "--help",
+                                                "--version",    "--trust",    "--skip-unchanged"};
+
+bool isOneOf(std::string_view word, std::span<const std::string_view> options) {
+  return std::find(options.begin(), options.end(), word) != options.end();
+}
+
+/// Refuses an option that --make cannot have. Of those of one letter only -f can, because letters may stand together, as in -qo.
+void refuseOption(std::string_view option, const std::string& kind) {
+  const bool is_short = option.size() > 1 && option[0] == '-' && std::isalpha(static_cast<unsigned char>(option[1]));
+  if (!isOneOf(option, kRefusedOptions) && (!is_short || option == "-f")) return;
+  refuse("flags of " + kind + " cannot hold " + std::string(option) +
+             ": glint-farm gives it itself, or could not keep track of what it does",
+         "leave it out; glint-farm run has --threads, --max-memory and --trust");
+}
+
+/// The words of flags, with --option=FILE as two words.
+std::vector<RecipeFlag> flagsOf(const std::vector<std::string>& words, const std::string& kind) {
+  std::vector<RecipeFlag> flags;
+  std::string_view file_option;  // whose file comes next
+  const auto addValue = [&](const std::string& value) {
+    double number = 0;
+    const bool is_number = file_option == "--roughness" && parseNumber(value, number).empty();
+    flags.push_back({value, !file_option.empty() && !is_number});
+    file_option = {};
+  };
+  for (const std::string& word : words) {
+    const std::size_t end = std::min(word.find('='), word.size());
+    const std::string option = word.substr(0, end);
+    if (!file_option.empty()) {
+      addValue(word);
+    } else if (refuseOption(option, kind); isOneOf(option, kFileOptions)) {
+      flags.push_back({option, false});
+      file_option = *std::find(std::begin(kFileOptions), std::end(kFileOptions), option);
+      if (end < word.size()) addValue(word.substr(end + 1));
+    } else {
+      flags.push_back({word, false});
+    }
+  }
+  if (!file_option.empty())
+    refuse("the file of " + std::string(file_option) + " is missing", "name it behind " + std::string(file_option));
+  return flags;
+}
+
 /// A step that is wanted, and the flags that were given for it.
 struct Wanted {
   bool wanted = false, given = false;
@@ -70,7 +122,7 @@ std::vector<RecipeStep> recipeOf(const std::vector<std::string>& asked) {
   for (std::size_t k = 0; k < std::size(kKinds); ++k) {
     if (!kinds[k].wanted) continue;
     if (kinds[k].flags.empty()) kinds[k].flags.assign(kKinds[k].default_flags.begin(), kKinds[k].default_flags.end());
-    steps.push_back({&kKinds[k], std::move(kinds[k].flags)});
+    steps.push_back({&kKinds[k], flagsOf(kinds[k].flags, kKinds[k].name)});
   }
   return steps;
 }

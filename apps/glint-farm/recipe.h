@@ -15,10 +15,16 @@ struct RecipeKind {
   std::initializer_list<const char*> default_flags;  ///< unless flags are given
 };
 
+/// One word of the flags of a step.
+struct RecipeFlag {
+  std::string word;
+  bool names_file;  ///< it is a file that the program reads
+};
+
 /// One step of a recipe.
 struct RecipeStep {
   const RecipeKind* kind;
-  std::vector<std::string> flags;
+  std::vector<RecipeFlag> flags;
 };
 
 /// What to make of every image: the kinds that are asked for, and those that they are made of, sources first.

@@ -1,12 +1,13 @@
 #include "glint-farm/run_command.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string_view>
 #include <system_error>
 
 #include "common/memory.h"
+#include "common/numbers.h"
 #include "common/signals.h"
 #include "glint-farm/farm.h"
 #include "glint-farm/shards.h"
@@ -58,8 +59,11 @@ void FarmRunCommand::check() {
     tool_.addOutput(log_);
   }
   if (shard_.empty()) return;
-  int index = 0, count = 0, end = 0;
-  const bool read = std::sscanf(shard_.c_str(), "%d/%d%n", &index, &count, &end) == 2 && end == static_cast<int>(shard_.size());
+  int index = 0, count = 0;
+  const std::size_t slash = shard_.find('/');
+  const std::string_view text = shard_;
+  const bool read = slash != std::string::npos && parseNumber(text.substr(0, slash), index).empty() &&
+                    parseNumber(text.substr(slash + 1), count).empty();
   if (!read || count < 1 || count > kMostShards || index < 1 || index > count) {
     throw Error(ErrorCode::usage, "cli.usage", "", "--shard", "\"" + shard_ + "\" is no part of a whole",
                 "give I/N with I from 1 to N, such as 1/4");
@@ -78,6 +82,7 @@ std::vector<std::string> FarmRunCommand::flags() const {
 void FarmRunCommand::run() {
   const Manifest manifest = readManifest(manifest_.path());
   requireOurVersion(manifest, tool_.generator());
+  requireKeys(manifest);
   std::error_code none;
   if (!log_.empty() &&
       std::filesystem::weakly_canonical(log_, none) == std::filesystem::weakly_canonical(manifest.logPath(), none)) {

@@ -42,7 +42,9 @@ void RunReport::add(const ManifestEntry& entry, const char* status, Json more, b
 void RunReport::known(const ManifestEntry& entry) { add(entry, "known", Json::object(), false, true); }
 
 void RunReport::made(const ManifestEntry& entry, const EntryTry& last, int tries) {
-  add(entry, last.outcome == EntryTry::Outcome::made ? "made" : "unchanged", lineOf(last, tries), true, true);
+  const bool is_made = last.outcome == EntryTry::Outcome::made;
+  // With --trust a program has not read what it left alone: a record would call damaged assets whole.
+  add(entry, is_made ? "made" : "unchanged", lineOf(last, tries), is_made || !tool_.trust(), true);
   const std::lock_guard lock(mutex_);
   program_s_ += last.wall_s, cpu_s_ += last.cpu_s;
   peak_bytes_ = std::max(peak_bytes_, last.peak_bytes);

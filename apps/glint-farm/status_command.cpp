@@ -6,7 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "glint-farm/entry_lock.h"
+#include "glint/model/error.h"
 #include "glint/model/memory_text.h"
+#include "glint/model/shown_text.h"
 #include "manifest/entry_records.h"
 #include "manifest/hash_cache.h"
 
@@ -37,6 +39,15 @@ struct FarmStatus {
                         {"message", error.value("message", std::string())}});
   }
 };
+
+/// Whether the maps of an entry are those that were planned; not so, if one of them cannot be read.
+bool readsPlannedMaps(const Manifest& manifest, const ManifestEntry& entry, HashCache& hashes) {
+  try {
+    return !changedMap(manifest, entry, hashes);
+  } catch (const Error&) {
+    return false;
+  }
+}
 
 void addEntry(FarmStatus& status, const Manifest& manifest, const EntryRecords& records, HashCache& hashes,
               const ManifestEntry& entry) {
@@ -73,8 +84,9 @@ std::string textOf(const FarmStatus& s) {
   text += fmt::format("\n{} in {:.1f} s of programs, {} of memory at most\n", memoryText(s.bytes), s.program_s,
                       memoryText(static_cast<double>(s.peak_bytes)));
   for (const json& failure : s.failures)
-    text += fmt::format("{}: [{}] {}\n", failure.at("output").get<std::string>(), failure.at("rule").get<std::string>(),
-                        failure.at("message").get<std::string>());
+    text +=
+        fmt::format("{}: [{}] {}\n", escapedText(failure.at("output").get<std::string>()),
+                    escapedText(failure.at("rule").get<std::string>()), escapedText(failure.at("message").get<std::string>()));
   return text;
 }
 
@@ -90,6 +102,7 @@ FarmStatusCommand::FarmStatusCommand(Tool& tool)
 
 void FarmStatusCommand::run() {
   const Manifest manifest = readManifest(manifest_.path());
+  requireKeys(manifest);
   const EntryRecords records(manifest);
   HashCache hashes(manifest.hashesPath());
   FarmStatus status;

@@ -21,10 +21,15 @@ using Json = nlohmann::ordered_json;
 /// A text as XML has it, in an attribute or an element. The four elements below need no library of XML: escapedText leaves UTF-8 without
 /// control characters, so that these five are all that has a meaning.
 std::string xmlText(const std::string& text) {
+  // The two characters of Unicode that XML refuses, and that escapedText leaves.
+  constexpr std::pair<std::string_view, std::string_view> kRefused[] = {{"\xef\xbf\xbe", "\\ufffe"},
+                                                                        {"\xef\xbf\xbf", "\\uffff"}};
   static const std::map<char, const char*> kNames = {
       {'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&apos;"}};
-  std::string escaped;
-  for (const char c : escapedText(text)) {
+  std::string shown = escapedText(text), escaped;
+  for (const auto& [character, name] : kRefused)
+    for (std::size_t k; (k = shown.find(character)) != std::string::npos;) shown.replace(k, character.size(), name);
+  for (const char c : shown) {
     const auto name = kNames.find(c);
     escaped += name == kNames.end() ? std::string(1, c) : name->second;
   }

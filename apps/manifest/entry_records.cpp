@@ -13,6 +13,14 @@ std::vector<std::string> filesOf(const ManifestEntry& entry) {
   return files;
 }
 
+/// Throws a Json::exception unless the members of a line that others read have their types.
+void requireForm(const Json& line) {
+  (void)line.value("status", std::string());
+  for (const char* number : {"wall_s", "cpu_s", "peak_bytes"}) (void)line.value(number, 0.0);
+  const Json error = line.value("error", Json::object());
+  for (const char* text : {"rule", "message"}) (void)error.value(text, std::string());
+}
+
 }  // namespace
 
 EntryRecords::EntryRecords(const Manifest& manifest) : manifest_(manifest), lines_(manifest.logPath()) { refresh(); }
@@ -24,9 +32,12 @@ void EntryRecords::refresh() {
 
 void EntryRecords::take(const Json& line) {
   try {
+    requireForm(line);
     const auto key = line.at("key").get<std::string>();
+    std::vector<std::pair<std::string, FileStamp>> files;
     for (const Json& file : line.value("files", Json::array()))
-      files_[file.at("file").get<std::string>()] = {key, stampOf(file)};
+      files.emplace_back(file.at("file").get<std::string>(), stampOf(file));
+    for (const auto& [file, stamp] : files) files_[file] = {key, stamp};
     last_[key] = line;
   } catch (const Json::exception&) {
     // A line of another form says nothing: the tool looks at the asset.

@@ -12,7 +12,7 @@ using Json = nlohmann::ordered_json;
 HashCache::HashCache(const std::string& path) : lines_(path) {
   for (const Json& line : lines_.readNew()) {
     try {
-      known_[line.at("file").get<std::string>()] = {stampOf(line), line.at("hash").get<std::string>()};
+      known_[line.at("file").get<std::string>()] = {mapStampOf(line), line.at("hash").get<std::string>()};
     } catch (const Json::exception&) {
       // A line of another form: the file is read again.
     }
@@ -21,7 +21,7 @@ HashCache::HashCache(const std::string& path) : lines_(path) {
 
 std::string HashCache::hash(const std::string& name, const std::string& file) {
   // The stamp comes first: a file that changes while it is read is read again next time.
-  const std::optional<FileStamp> stamp = stampOf(file);
+  const std::optional<MapStamp> stamp = mapStampOf(file);
   {
     const std::lock_guard lock(mutex_);
     const auto known = known_.find(name);
@@ -46,15 +46,18 @@ void HashCache::save() {
   unsaved_.clear();
 }
 
-bool readsPlannedMaps(const Manifest& manifest, const ManifestEntry& entry, HashCache& hashes) {
-  const auto is_planned = [&](const std::string& input) {
+std::optional<std::string> changedMap(const Manifest& manifest, const ManifestEntry& entry, HashCache& hashes) {
+  const auto has_changed = [&](const std::string& input) {
     const auto map = manifest.hash_of_map.find(input);
-    if (map == manifest.hash_of_map.end()) return true;
+    if (map == manifest.hash_of_map.end()) return false;
     const std::string file = manifest.at(input);
-    return !stampOf(file) || hashes.hash(input, file) == map->second;
+    return stampOf(file) && hashes.hash(input, file) != map->second;
   };
-  return std::all_of(entry.inputs.begin(), entry.inputs.end(), is_planned) &&
-         std::all_of(entry.twins.begin(), entry.twins.end(), is_planned);
+  for (const std::vector<std::string>* files : {&entry.inputs, &entry.twins}) {
+    const auto changed = std::find_if(files->begin(), files->end(), has_changed);
+    if (changed != files->end()) return *changed;
+  }
+  return {};
 }
 
 }  // namespace glint::apps

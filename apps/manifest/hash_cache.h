@@ -34,7 +34,7 @@ class HashCache {
 
  private:
   struct Known {
-    FileStamp stamp;
+    MapStamp stamp;
     std::string hash;
   };
 
@@ -45,8 +45,9 @@ class HashCache {
   std::size_t read_files_ = 0;
 };
 
-/// Whether the maps that an entry reads, and their twins, have the bytes that were planned. Maps that are missing do not count.
+/// The first of the maps that an entry reads, and of their twins, whose bytes are not those that were planned. Maps that are missing do not
+/// count.
 /// @throws Error io
-bool readsPlannedMaps(const Manifest& manifest, const ManifestEntry& entry, HashCache& hashes);
+std::optional<std::string> changedMap(const Manifest& manifest, const ManifestEntry& entry, HashCache& hashes);
 
 }  // namespace glint::apps

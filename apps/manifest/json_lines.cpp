@@ -11,6 +11,7 @@
 
 #include "glint/formats/descriptor.h"
 #include "glint/formats/system_error.h"
+#include "glint/model/json_depth.h"
 
 namespace glint::apps {
 namespace {
@@ -89,8 +90,9 @@ std::vector<Json> JsonLines::readNew() {
   std::vector<Json> lines;
   std::size_t begin = 0;
   for (std::size_t end; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1) {
-    Json line = Json::parse(text.begin() + static_cast<std::ptrdiff_t>(begin), text.begin() + static_cast<std::ptrdiff_t>(end),
-                            nullptr, false);
+    const std::string_view one = std::string_view(text).substr(begin, end - begin);
+    if (jsonDepth(one) > kMostJsonDepth) continue;
+    Json line = Json::parse(one, nullptr, false);
     if (line.is_object()) lines.push_back(std::move(line));
   }
   read_bytes_ += begin;

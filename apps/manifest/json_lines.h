@@ -17,7 +17,8 @@ class JsonLines {
   /// @throws Error io
   void append(const std::vector<nlohmann::ordered_json>& lines) const;
 
-  /// The lines that were added since the last call. Lines that are no JSON object are left out. No file: no lines.
+  /// The lines that were added since the last call. Lines that are no JSON object, or are nested
+  /// deeper than kMostJsonDepth, are left out. No file: no lines.
   /// @throws Error io
   std::vector<nlohmann::ordered_json> readNew();
 

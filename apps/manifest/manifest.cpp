@@ -4,8 +4,10 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string_view>
+#include <unordered_set>
 
-#include "common/files.h"
+#include "common/json_file.h"
+#include "glint/formats/hash.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
@@ -13,6 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+using Read = nlohmann::json;
 
 constexpr const char* kForm = "glint-farm manifest 1";
 
@@ -27,7 +30,7 @@ bool isProgram(std::string_view name) {
          std::all_of(name.begin() + kPrefix.size(), name.end(), [](char c) { return c >= 'a' && c <= 'z'; });
 }
 
-ManifestEntry entryOf(const Json& json) {
+ManifestEntry entryOf(const Read& json) {
   using Texts = std::vector<std::string>;
   return {json.at("key").get<std::string>(), json.at("output").get<std::string>(), json.at("links").get<Texts>(),
           json.at("twins").get<Texts>(),     json.at("command").get<Texts>(),      json.at("inputs").get<Texts>(),
@@ -39,10 +42,23 @@ Json entryJson(const ManifestEntry& entry) {
           {"command", entry.command}, {"inputs", entry.inputs}, {"after", entry.after}};
 }
 
-Json parse(const std::string& path) {
-  const std::vector<std::byte> bytes = readFile(path);
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
-  return Json::parse(text, text + bytes.size(), nullptr, false);
+/// Ending of a file's name, in small letters: some readers of images go by it.
+std::string endingOf(const std::string& file) {
+  std::string ending = fs::path(file).extension().string();
+  for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return ending;
+}
+
+/// Throws if two entries would make one file.
+void checkOutputs(const Manifest& manifest) {
+  std::unordered_set<std::string> names;
+  const auto claim = [&](const std::string& name) {
+    if (!names.insert(name).second) refuse(manifest.path, "two entries make " + name);
+  };
+  for (const ManifestEntry& entry : manifest.entries) {
+    claim(entry.output);
+    for (const std::string& link : entry.links) claim(link);
+  }
 }
 
 /// Throws unless every entry comes after those that it needs, so that there are no circles.
@@ -77,22 +93,59 @@ void Manifest::index() {
 }
 
 Manifest readManifest(const std::string& path) {
-  const Json json = parse(path);
-  if (!json.is_object() || json.value("schema", Json()) != kForm) refuse(path, std::string("is no \"") + kForm + "\"");
+  const Read json = readJsonOrNothing(path);
+  if (!json.is_object() || json.value("schema", Read()) != kForm) refuse(path, std::string("is no \"") + kForm + "\"");
   Manifest manifest;
   manifest.path = path;
   manifest.folder = manifestFolder(path);
   try {
     manifest.generator = json.at("generator").get<std::string>();
-    for (const Json& map : json.at("maps"))
+    for (const Read& map : json.at("maps"))
       manifest.maps.push_back({map.at("file").get<std::string>(), map.at("hash").get<std::string>()});
-    for (const Json& entry : json.at("entries")) manifest.entries.push_back(entryOf(entry));
-  } catch (const Json::exception&) {
+    for (const Read& entry : json.at("entries")) manifest.entries.push_back(entryOf(entry));
+  } catch (const Read::exception&) {
     refuse(path, "lacks a part of a manifest");
   }
   manifest.index();
   checkEntries(manifest);
+  checkOutputs(manifest);
   return manifest;
+}
+
+std::string keyOf(const std::string& generator, const ManifestEntry& entry,
+                  const std::function<std::string(const std::string&)>& source_of) {
+  // Files stand in the key as what they hold, not as how they are named.
+  Json words = Json::array({generator});
+  for (const std::string& word : entry.command) {
+    if (word == entry.output)
+      words.push_back({{"output", true}});
+    else if (std::find(entry.inputs.begin(), entry.inputs.end(), word) != entry.inputs.end())
+      words.push_back({{"input", source_of(word)}});
+    else
+      words.push_back(word);
+  }
+  const std::string text = words.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return formats::hashBytes(text.data(), text.size());
+}
+
+std::string sourceOfMap(const std::string& file, const std::string& hash) { return hash + endingOf(file); }
+
+void requireKeys(const Manifest& manifest) {
+  std::unordered_map<std::string, std::string> maker_of;  // output -> key
+  const auto source_of = [&](const std::string& file) {
+    if (const auto maker = maker_of.find(file); maker != maker_of.end()) return maker->second;
+    const auto map = manifest.hash_of_map.find(file);
+    return map == manifest.hash_of_map.end() ? std::string() : sourceOfMap(file, map->second);
+  };
+  for (const ManifestEntry& entry : manifest.entries) {
+    std::vector<std::string> after;
+    for (const std::string& input : entry.inputs)
+      if (const auto maker = maker_of.find(input); maker != maker_of.end()) after.push_back(maker->second);
+    const bool names_output = std::find(entry.command.begin(), entry.command.end(), entry.output) != entry.command.end();
+    if (!names_output || after != entry.after || keyOf(manifest.generator, entry, source_of) != entry.key)
+      refuse(manifest.path, "entry " + entry.key + " (" + entry.output + ") was changed by hand; plan again");
+    maker_of.emplace(entry.output, entry.key);
+  }
 }
 
 std::string manifestText(const Manifest& manifest) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -49,6 +50,19 @@ std::string manifestFolder(const std::string& path);
 
 /// @throws Error io; invalid_input if the file is no manifest of this form, or would run anything but programs of this package
 Manifest readManifest(const std::string& path);
+
+/// The key of an entry, from its command, inputs and output.
+/// @param generator  of the manifest
+/// @param source_of  what an input is: sourceOfMap, or the key of the entry that makes it
+std::string keyOf(const std::string& generator, const ManifestEntry& entry,
+                  const std::function<std::string(const std::string&)>& source_of);
+
+/// What a map is in a key: the hash of its bytes, and the ending of its name.
+std::string sourceOfMap(const std::string& file, const std::string& hash);
+
+/// Checks that entries are as glint-farm plan wrote them: an entry that was changed by hand would be recorded as what it is not.
+/// @throws Error invalid_input
+void requireKeys(const Manifest& manifest);
 
 /// The text of the file.
 std::string manifestText(const Manifest& manifest);

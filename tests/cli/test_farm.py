@@ -233,6 +233,95 @@ def test_a_manifest_that_was_changed_is_refused(farm, change, told):
     assert not (farm.folder / "assets").exists()
 
 
+def test_only_options_that_take_files_name_files(farm):
+    """A number is a number, also where a file has its name."""
+    for name in ("16", "0x0", "colour.png"):
+        shutil.copy(farm.folder / "maps/a.png", farm.folder / name)
+    plan(farm, "cp --rank 16", "displaced --base-color=colour.png --factor 16", "moments --roughness .5")
+    by_output = {entry["output"]: entry for entry in manifest(farm)["entries"]}
+    assert by_output["assets/a.cp.glint"]["inputs"] == ["assets/a.pyramid.glint"]
+    assert by_output["assets/a.cp.glint"]["command"][-2:] == ["--rank", "16"]
+    assert by_output["assets/a.moments.glint"]["inputs"] == ["assets/a.glint"]
+    displaced = by_output["assets/a.displaced.glint"]
+    assert displaced["inputs"] == ["assets/a.heights.glint", "colour.png"]
+    assert displaced["command"][-4:] == ["--base-color", "colour.png", "--factor", "16"]
+    plan(farm, "moments --roughness=colour.png")
+    assert next(entry for entry in manifest(farm)["entries"] if "moments" in entry["output"])["inputs"] == ["assets/a.glint", "colour.png"]
+
+
+@pytest.mark.parametrize("flags, told", [
+    *((flag, flag.split()[0].split("=")[0]) for flag in ("--threads 2", "--progress json", "--json", "--quiet", "-q", "-v", "--max-memory=1G",
+                                                        "--depfile d", "--textures .", "-o x.glint", "--output=x.glint", "-fq", "--help")),
+    ("--roughness none.png", "none.png"),
+    ("--config", "the file of --config is missing"),
+])
+def test_flags_that_the_farm_cannot_have_are_refused(farm, flags, told):
+    process = farm("plan", "maps", "-o", "m.json", "--make", f"moments {flags}")
+    assert process.returncode in (1, 2) and told in process.stderr and process.stderr.count("\n") == 1
+    assert "internal" not in process.stderr and not (farm.folder / "m.json").exists()
+
+
+@pytest.mark.parametrize("name", [b"\xff.png", b"a\nb.png", b"\xff/a.png"])
+def test_names_that_manifests_cannot_hold_are_refused(farm, name):
+    path = os.path.join(os.fsencode(farm.folder / "maps"), name)
+    os.makedirs(os.path.dirname(path), exist_ok=True)
+    shutil.copy(farm.folder / "maps/a.png", os.fsdecode(path))
+    process = farm("plan", "maps", "-o", "m.json", "--make", "normals")
+    assert process.returncode == 2 and "is not UTF-8, or holds a control character" in process.stderr
+    assert not (farm.folder / "m.json").exists()
+
+
+def test_a_map_may_have_the_name_of_an_option(farm):
+    shutil.copy(farm.folder / "maps/a.png", farm.folder / "--json.png")
+    shutil.rmtree(farm.folder / "maps")
+    plan(farm, "sat", source=(".", "--assets", "."))
+    assert {entry["output"] for entry in manifest(farm)["entries"]} == {"./--json.glint", "./--json.sat.glint"}
+    assert run(farm)["made"] == 2
+
+
+DEEP = "[" * 200_000 + "]" * 200_000
+
+
+def test_deep_json_is_no_manifest_and_no_plan(farm):
+    for name in ("farm.json", "jobs.json"):
+        (farm.folder / name).write_text('{"schema": ' + DEEP + "}")
+    for words in (("run", "farm.json"), ("status", "farm.json"), ("plan", "--from", "jobs.json", "-o", "m.json")):
+        assert farm(*words).returncode == 3
+
+
+def test_lines_of_another_form_are_left_out(farm):
+    plan(farm, "normals")
+    run(farm)
+    key = manifest(farm)["entries"][0]["key"]
+    lines = [DEEP, '{"key": ' + DEEP + "}", "null"]
+    lines += [json.dumps({"key": key, "output": "assets/a.glint", **odd}) for odd in (
+        {"status": 5}, {"wall_s": "long"}, {"peak_bytes": None}, {"status": "failed", "error": 5}, {"status": "failed", "error": {"rule": 5}},
+        {"files": 5}, {"files": [{"file": "assets/a.glint", "size_bytes": 1, "mtime_ns": 1, "inode": 1}, {}]})]
+    for name in ("farm.json.log", "farm.json.hashes"):
+        with open(farm.folder / name, "a") as file:
+            file.writelines(line + "\n" for line in lines)
+    assert result(farm("status", "farm.json", "--json"))["done"] == 3
+    assert run(farm)["known"] == 3
+    assert plan(farm, "normals")["hashed_maps"] == 0
+
+
+@pytest.mark.parametrize("change, told", [
+    (lambda entry, other: entry["command"].extend(["--convention", "directx"]), "was changed by hand"),
+    (lambda entry, other: entry["inputs"].clear(), "was changed by hand"),
+    (lambda entry, other: entry.__setitem__("output", "other.glint"), "was changed by hand"),
+    (lambda entry, other: entry.__setitem__("output", other["output"]), "two entries make"),
+    (lambda entry, other: entry["links"].append(other["output"]), "two entries make"),
+])
+def test_an_entry_that_was_changed_by_hand_is_refused(farm, change, told):
+    plan(farm, "normals")
+    document = manifest(farm)
+    change(document["entries"][0], document["entries"][1])
+    (farm.folder / "farm.json").write_text(json.dumps(document))
+    for command in ("run", "status"):
+        process = farm(command, "farm.json")
+        assert process.returncode == 3 and told in process.stderr
+
+
 # Runs.
 
 
@@ -282,7 +371,7 @@ def test_shards_are_the_whole_and_do_not_overlap(farm):
     assert not outputs[0] & outputs[1] and len(outputs[0] | outputs[1]) == 6
     assert run(farm)["known"] == 6
     assert run(farm, "--shard", "9/9")["entries"] == 0
-    for wrong in ("0/2", "3/2", "1", "1/2x", "-1/2", "1/0"):
+    for wrong in ("0/2", "3/2", "1", "1/2x", "-1/2", "1/0", "1/4294967297", "1/", "/2", "1/2/3", "1.0/2"):
         assert farm("run", "farm.json", "--shard", wrong).returncode == 1
 
 
@@ -346,6 +435,8 @@ def test_a_map_that_is_no_longer_the_twin_of_another_is_told(farm):
     shutil.copy(farm.folder / "maps/c.png", farm.folder / "maps/b.png")
     process = farm("run", "farm.json")
     assert process.returncode == 4 and "maps/b.png" in process.stderr and "run glint-farm plan again" in process.stderr
+    error = next(line["error"] for line in log(farm) if line["status"] == "failed")
+    assert (error["rule"], error["path"]) == ("farm.map_changed", "maps/b.png"), "the one that has changed, not the first"
 
 
 def test_a_damaged_asset_is_made_again(farm):
@@ -355,6 +446,84 @@ def test_a_damaged_asset_is_made_again(farm):
     damage(farm.folder / "assets/a.pyramid.glint")
     assert run(farm)["made"] == 1
     assert contents(farm.folder / "assets") == good
+
+
+@pytest.mark.parametrize("progress", [("--progress", "json"), ("-v",)])
+def test_progress_goes_on_after_warnings(farm, progress):
+    for path in (farm.folder / "maps").iterdir():
+        path.unlink()
+    for number in range(40):
+        (farm.folder / f"maps/{number}.png").write_text(f"no image {number}")
+    plan(farm, "normals")
+    process = farm("run", "farm.json", "--retries", 0, "--jobs", 2, *progress)
+    assert process.returncode == 4, process.stderr
+    assert process.stderr.count("was not made") == 40
+    if "json" in progress:
+        seen = [json.loads(line)["progress"]["done"] for line in process.stderr.splitlines() if line.startswith("{")]
+        assert seen[-1] == 40 and seen == sorted(seen)
+
+
+def test_a_map_that_is_overwritten_in_place_is_seen(farm):
+    """Size, time and inode stay."""
+    plan(farm, "normals")
+    run(farm)
+    path = farm.folder / "maps/a.png"
+    stamp = path.stat()
+    damage(path)
+    os.utime(path, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+    assert path.stat().st_ino == stamp.st_ino and path.stat().st_size == stamp.st_size
+    assert result(farm("status", "farm.json", "--json"))["changed"] == 1
+    assert run(farm, code=4)["failed"] == 1
+    assert plan(farm, "normals")["done"] == 2
+
+
+def test_a_map_that_cannot_be_read_is_the_fault_of_its_entry_alone(farm):
+    plan(farm, "normals")
+    run(farm)
+    (farm.folder / "maps/b.png").unlink()
+    (farm.folder / "maps/b.png").symlink_to("/proc/self/mem")
+    status = lambda: result(farm("status", "farm.json", "--json"))
+    assert (status()["done"], status()["changed"]) == (2, 1)
+    made = run(farm, "--retries", 0, code=4)
+    assert (made["known"], made["failed"]) == (2, 1) and "maps/b.png" in made["failures"][0]["message"]
+    assert (status()["done"], status()["failed"]) == (2, 1)
+
+
+def test_what_trust_leaves_alone_is_not_recorded(farm):
+    plan(farm, "normals")
+    run(farm)
+    (farm.folder / "farm.json.log").unlink()
+    path = farm.folder / "assets/a.glint"
+    good = path.read_bytes()
+    damage(path)
+    assert run(farm, "--trust", "--log", "run.jsonl")["unchanged"] == 3
+    assert len(log(farm, "run.jsonl")) == 3
+    trusted = run(farm)
+    assert (trusted["made"], trusted["unchanged"]) == (1, 2)
+    assert path.read_bytes() == good
+
+
+def test_a_duplicate_takes_no_name_of_another_file(farm):
+    shutil.copy(farm.folder / "maps/a.png", farm.folder / "maps/b.png")
+    plan(farm, "normals")
+    (farm.folder / "assets").mkdir()
+    (farm.folder / "assets/b.glint").write_text("mine")
+    process = farm("run", "farm.json", "--retries", 0)
+    assert process.returncode == 4 and "assets/b.glint" in process.stderr and "not a file of the kind" in process.stderr
+    assert (farm.folder / "assets/b.glint").read_text() == "mine"
+    (farm.folder / "assets/b.glint").unlink()
+    assert run(farm)["failed"] == 0
+
+
+def test_a_finished_asset_may_be_read_only(farm):
+    plan(farm, "normals", "sat")
+    run(farm)
+    for path in (farm.folder / "assets").glob("*.glint"):
+        path.chmod(0o444)
+    assert run(farm, "--check")["unchanged"] == 6
+    plan(farm, "normals", "sat --bins 6x20")
+    process = farm("run", "farm.json", "--retries", 0)
+    assert process.returncode == 4 and process.stderr.count("read-only") == 3, "other assets do not take their place"
 
 
 def test_a_damage_that_stamps_do_not_show_is_found_by_check(farm):
@@ -401,6 +570,24 @@ def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(farm):
         assert not leftovers(disk)
         subprocess.run(["mount", "-o", "remount,size=64m", disk], check=True)
         assert run(farm)["failed"] == 0 and len(contents(disk)) == 6
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+def test_a_duplicate_on_another_disk_is_a_copy(farm):
+    """Needs root to mount a disk."""
+    disk = farm.folder / "assets/more"
+    disk.mkdir(parents=True)
+    (farm.folder / "maps/more").mkdir()
+    shutil.copy(farm.folder / "maps/a.png", farm.folder / "maps/more/twin.png")
+    if os.getuid() != 0 or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64m", "none", disk], capture_output=True).returncode != 0:
+        pytest.skip("needs to mount a disk")
+    try:
+        plan(farm, "normals")
+        assert run(farm)["made"] == 3
+        assert (disk / "twin.glint").read_bytes() == (farm.folder / "assets/a.glint").read_bytes()
+        assert not (disk / "twin.glint").samefile(farm.folder / "assets/a.glint") and not leftovers(farm.folder)
+        assert run(farm)["known"] == 3
     finally:
         subprocess.run(["umount", disk], check=True)
 

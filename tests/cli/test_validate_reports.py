@@ -47,6 +47,15 @@ def test_junit_has_a_case_for_each_file_and_its_errors(glint, assets):
             assert len(failure.text.splitlines()) == file["errors"]
 
 
+def test_names_with_characters_that_xml_refuses_are_told_by_numbers(glint, assets):
+    names = ["a\ufffe.glint", "b\uffff\uffff.glint", "c\ufffd.glint"]
+    for name in names:
+        shutil.copy(glint.folder / "none.glint", glint.folder / name)
+    assert glint("validate", *names, "--junit", "report.xml").returncode == 3
+    suite = ElementTree.parse(glint.folder / "report.xml").getroot()[0]
+    assert [case.get("name") for case in suite] == ["a\\ufffe.glint", "b\\uffff\\uffff.glint", "c\ufffd.glint"]
+
+
 def test_warnings_fail_a_case_only_where_they_are_errors(glint):
     shutil.copy(FILES[0], glint.folder / "newer.glint")
     with h5py.File(glint.folder / "newer.glint", "r+") as file:
