@@ -1,6 +1,7 @@
 """glint-bench: its results, going on after a stop, and its page in a browser without a window."""
 
 import base64
+import importlib
 import json
 import math
 import pathlib
@@ -454,3 +455,36 @@ def test_the_page_asks_no_network(measured):
     assert not re.findall(r'<(?:script|link|img|iframe)[^>]+(?:src|href)=', page)
     assert "fetch(" not in (ROOT / "apps/glint-bench/page/report.js").read_text()
     assert "Permission to use, copy, modify" in page  # the licences of the libraries inside
+
+
+# The page of measurements
+
+@pytest.fixture
+def report_of_bench(monkeypatch):
+    pytest.importorskip("matplotlib")
+    monkeypatch.syspath_prepend(str(ROOT / "tests/bench"))
+    return importlib.import_module("report"), importlib.import_module("scenes")
+
+
+def test_a_figure_of_another_name_is_no_empty_cell(report_of_bench):
+    report, _ = report_of_bench
+    rows = [{"section": "moments", "figure": "moments, flakes", "value": 2.0}]
+    assert report.named(rows, r"moments, \S+") == [2.0]
+    assert report.named(rows, r"mean, random, \S+ ggx") == []  # of those that are not measured
+    with pytest.raises(SystemExit, match="no figure is named"):
+        report.named(rows, r"moment, \S+")
+    with pytest.raises(SystemExit, match="no figure is named"):
+        report.method_table(rows, [("build", r"moment, \S+")])
+
+
+def test_methods_without_a_figure_are_not_the_quickest(report_of_bench, tmp_path):
+    _, scenes = report_of_bench
+    lines = ["map,model,figure,value,distance,light", "flakes,pyramid,microseconds of a mean,4,8,", "flakes,moments,microseconds of a mean,1,8,",
+             "flakes,cp,flip,0.015,8,0.5", "flakes,histograms,flip,0.001,8,0.5", "flakes,bin map,bytes,7,,"]
+    (tmp_path / "limits.csv").write_text("\n".join(lines) + "\n")
+    pictures = scenes.Pictures(tmp_path / "limits.csv")
+    assert pictures.microseconds("flakes", "cp", "8") == 4  # answers as the pyramid does
+    assert pictures.microseconds("flakes", "histograms", "8") is None
+    assert scenes.quickest(pictures, "flakes", "8", 0.02) == (4, "cp", 0.015)
+    assert scenes.quickest(pictures, "flakes", "1", 0.02) is None
+    scenes.scene_chart(pictures, tmp_path / "chart.png")
