@@ -109,7 +109,7 @@ function drawCost(id) {
       Plot.ruleX(truth, { x: of, stroke: "currentColor", strokeDasharray: "3,3", strokeOpacity: 0.6 }),
       Plot.text(truth, { x: of, frameAnchor: "top-right", text: () => "brute force", rotate: -90, dx: -8, dy: 4, textAnchor: "end", fillOpacity: 0.7 }),
       Plot.ruleY(blacks, { stroke: "currentColor", strokeDasharray: "3,3", strokeOpacity: 0.6 }),
-      Plot.text(blacks, { y: (flip) => flip, frameAnchor: "left", text: () => "a black picture", textAnchor: "start", dx: 4, dy: -6, fillOpacity: 0.7 }),
+      Plot.text(blacks, { y: (flip) => flip, frameAnchor: "right", text: () => "a black picture", textAnchor: "end", dx: -4, dy: -6, fillOpacity: 0.7 }),
       Plot.line(front, { x: "cost", y: "shown", stroke: "currentColor", strokeOpacity: 0.35, strokeWidth: 1.5 }),
       Plot.dot(points, { x: "cost", y: "shown", fill: (point) => point.measurement.method, r: 5, stroke: "var(--paper)" }),
       Plot.text(front, { x: "cost", y: "shown", text: (point) => point.measurement.setting, dy: -10, fontSize: 10, fillOpacity: 0.75 }),
