@@ -38,13 +38,24 @@ def browse(program, profile, *arguments):
     return process.stdout
 
 
+def attribute(text, name):
+    """A document of JSON in an attribute of the page; nothing if it has none."""
+    found = re.search(rf'data-{name}="([^"]*)"', text)
+    return json.loads(html.unescape(found.group(1))) if found else None
+
+
 def charts_of(program, profile, page, choices):
-    """{name: SVG} of a page."""
+    """{name: SVG} of a page, which must show what was chosen."""
     address = f"{page.resolve().as_uri()}#{urllib.parse.urlencode(choices | {'charts': 'all'})}"
-    found = re.search(r'data-charts="([^"]*)"', browse(program, profile, "--dump-dom", address))
-    if not found:
+    text = browse(program, profile, "--dump-dom", address)
+    charts, state = attribute(text, "charts"), attribute(text, "choices")
+    if not charts or not state:
         sys.exit(f"bench_charts.py: error: {page}: has no charts of measurements; give a page of glint-bench --report RESULTS.json")
-    return json.loads(html.unescape(found.group(1)))
+    for name, choice in choices.items():
+        if choice != state["shown"][name]:
+            offered = ", ".join(f"{value:g}" if name == "size" else value for value in state["offered"][name])
+            sys.exit(f"bench_charts.py: error: --{name} {choice}: the page has no such {name} here; it has {offered}")
+    return charts
 
 
 def write(program, profile, svg, path):

@@ -5,8 +5,13 @@
 
 namespace glint::apps {
 
+namespace {
+
+constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+}  // namespace
+
 std::string base64(std::string_view bytes) {
-  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
   for (std::size_t k = 0; k < bytes.size(); k += 3) {
     const std::size_t count = std::min<std::size_t>(3, bytes.size() - k);
@@ -15,6 +20,14 @@ std::string base64(std::string_view bytes) {
     for (std::size_t i = 0; i < 4; ++i) text.push_back(i <= count ? kDigits[bits >> (18 - 6 * i) & 63] : '=');
   }
   return text;
+}
+
+bool isBase64(std::string_view text, std::size_t bytes) {
+  if (text.size() != (bytes + 2) / 3 * 4) return false;
+  const std::size_t padding = (3 - bytes % 3) % 3;
+  const std::string_view digits = text.substr(0, text.size() - padding);
+  return digits.find_first_not_of(kDigits) == std::string_view::npos &&
+         text.substr(digits.size()).find_first_not_of('=') == std::string_view::npos;
 }
 
 }  // namespace glint::apps

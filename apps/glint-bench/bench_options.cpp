@@ -89,6 +89,7 @@ void BenchOptions::check() {
   if (settings_.quick) {
     settings_.budget_s = 0.15;
     settings_.longest_run_s = 0.01;
+    settings_.picture_budget_s = 2;
     settings_.picture_pixels = 48;
     settings_.picture_sizes = 3;  // the exact pictures of wide footprints take longest
     if (!places_option_->given()) settings_.places = 4;

@@ -8,6 +8,8 @@
 
 #include "common/files.h"
 #include "glint-bench/machine.h"
+#include "glint-bench/result_checks.h"
+#include "glint-bench/result_file.h"
 #include "glint/model/error.h"
 #include "measure/candidates.h"
 
@@ -18,45 +20,6 @@ using Json = nlohmann::ordered_json;
 
 [[noreturn]] void refuse(const std::string& path, const std::string& what) {
   throw Error(ErrorCode::invalid_input, "bench.results", path, "", what, "name another file, or start again with --force");
-}
-
-/// Reads all that the rest of the program reads of a measurement.
-/// @throws nlohmann::json::exception if it is not there
-void readMeasurement(const Json& m) {
-  for (const char* name : {"map", "name", "method", "setting", "command", "status"}) m.at(name).get<std::string>();
-  if (m.at("status") != "ok") return;
-  m.at("prepare").at("total_s").get<double>();
-  m.at("file_bytes").get<double>();
-  for (const Json& time : m.at("times").at("density").at("sizes")) {
-    time.at("sigma_texels").get<double>();
-    time.at("ns").get<double>();
-  }
-  for (const Json& set : m.at("errors")) {
-    set.at("shape").get<std::string>();
-    set.at("sigma_texels").get<double>();
-    set.at("seen").get<double>();
-  }
-  if (!m.contains("pictures")) return;
-  for (const Json& picture : m.at("pictures")) {
-    for (const char* name : {"scene", "picture"}) picture.at(name).get<std::string>();
-    for (const char* name : {"sigma_texels", "rmse", "flip"}) picture.at(name).get<double>();
-  }
-}
-
-/// Whether a document has the members that the rest reads.
-bool isWhole(const Json& document) {
-  try {
-    for (const char* name : {"generator", "machine", "seed", "places", "quick"}) (void)document.at(name);
-    for (const Json& map : document.at("maps")) {
-      for (const char* name : {"name", "hash"}) map.at(name).get<std::string>();
-      for (const char* name : {"width", "height"}) map.at(name).get<int>();
-      for (const Json& truth : map.at("truth")) truth.at("sigma_texels").get<double>();
-    }
-    for (const Json& measurement : document.at("measurements")) readMeasurement(measurement);
-    return true;
-  } catch (const Json::exception&) {
-    return false;
-  }
 }
 
 }  // namespace
@@ -72,14 +35,12 @@ BenchResults::BenchResults(const std::string& generator, std::uint64_t seed, int
                  {"measurements", Json::array()}}) {}
 
 BenchResults BenchResults::read(const std::string& path, const BenchResults* same) {
-  const std::vector<std::byte> bytes = readFile(path);
   BenchResults results;
-  const auto* text = reinterpret_cast<const char*>(bytes.data());
-  results.document_ = Json::parse(text, text + bytes.size(), nullptr, false);
+  results.document_ = parseResultFile(path);
   if (results.document_.is_discarded()) refuse(path, "is no JSON document, or not whole");
   if (!results.document_.is_object() || results.document_.value("schema", Json()) != Json(kSchema))
     refuse(path, std::string("is not of the form \"") + kSchema + "\"");
-  if (!isWhole(results.document_)) refuse(path, "lacks a part of a bench's results");
+  if (const std::string fault = faultOf(results.document_); !fault.empty()) refuse(path, fault);
   if (same == nullptr) return results;
   for (const char* name : {"generator", "machine", "seed", "places", "quick"}) {
     if (results.document_[name] == same->document_[name]) continue;
@@ -94,8 +55,7 @@ BenchResults BenchResults::read(const std::string& path, const BenchResults* sam
 bool BenchResults::has(const std::string& map_hash, const std::string& name) const {
   const Json& all = document_["measurements"];
   return std::any_of(all.begin(), all.end(), [&](const Json& measurement) {
-    return measurement["map"] == map_hash && measurement["name"] == name && measurement["status"] == "ok" &&
-           measurement.contains("pictures");
+    return measurement["map"] == map_hash && measurement["name"] == name && measurement["status"] == "ok";
   });
 }
 
@@ -115,16 +75,12 @@ void BenchResults::add(Json measurement) {
 }
 
 bool BenchResults::hasMap(const std::string& hash) const {
-  for (const Json& map : document_["maps"])
-    if (map["hash"] == hash) return map.contains("pictures");
-  return false;
+  const Json& maps = document_["maps"];
+  return std::any_of(maps.begin(), maps.end(), [&](const Json& map) { return map["hash"] == hash; });
 }
 
 void BenchResults::addMap(Json map) {
-  if (hasMap(map["hash"])) return;
-  Json& maps = document_["maps"];
-  std::erase_if(maps.get_ref<Json::array_t&>(), [&](const Json& other) { return other["hash"] == map["hash"]; });
-  maps.push_back(std::move(map));
+  if (!hasMap(map["hash"])) document_["maps"].push_back(std::move(map));
 }
 
 void BenchResults::write(const std::string& path) const {
@@ -154,7 +110,8 @@ std::string percentText(double error) { return error > 10 ? "> 1000" : fmt::form
 /// " 0.012 to 0.35": FLIP of all pictures; empty if there are none.
 std::string flipText(const Json& measurement) {
   double low = 1, high = -1;
-  for (const Json& picture : measurement.value("pictures", Json::array())) {
+  for (const Json& picture : measurement["pictures"]) {
+    if (!picture.contains("flip")) continue;
     low = std::min(low, picture["flip"].get<double>());
     high = std::max(high, picture["flip"].get<double>());
   }

@@ -9,7 +9,7 @@ namespace glint::apps {
 /// map. docs/json/files/bench-results.schema.json describes it.
 class BenchResults {
  public:
-  static constexpr const char* kSchema = "glint-bench results 1";
+  static constexpr const char* kSchema = "glint-bench results 2";
 
   /// Starts anew.
   BenchResults(const std::string& generator, std::uint64_t seed, int places, bool quick);
@@ -19,13 +19,13 @@ class BenchResults {
   ///         or with another seed, number of places or --quick, and `same` is given
   static BenchResults read(const std::string& path, const BenchResults* same);
 
-  /// Whether a candidate was measured on the map of this hash, with its pictures. One that failed is tried again.
+  /// Whether a candidate was measured on the map of this hash. One that failed is tried again.
   bool has(const std::string& map_hash, const std::string& name) const;
   /// Adds a measurement, in the place of an earlier one. They are kept in the order of benchCandidates for each map.
   void add(nlohmann::ordered_json measurement);
   /// Adds a map, unless there is one of its hash.
   void addMap(nlohmann::ordered_json map);
-  /// Whether a map is there, with its pictures: results of a version that made none lack them, and are measured again.
+  /// Whether a map of this hash is there.
   bool hasMap(const std::string& hash) const;
   void setPlainLobe(nlohmann::ordered_json time) { document_["plain_lobe"] = std::move(time); }
 

@@ -202,7 +202,9 @@ class MapBench {
       if (truth.set().shape == FootprintShape::round)
         measurement["images"].push_back({{"sigma_texels", truth.set().sigma_texels}, {"image", roundedImage(first)}});
     }
-    for (const LitTruth& truth : map_.pictures()) measurement["pictures"].push_back(Json(truth.errorsOf(ndf)));
+    const auto density = [&](const Footprint& footprint, Vec2 half) { return ndf.model().density(footprint, half); };
+    for (const LitTruth& truth : map_.pictures())
+      measurement["pictures"].push_back(Json(truth.errorsOf(density, ndf.info().shapes.gaussians, settings_.picture_budget_s)));
   }
 
   Tool& tool_;

@@ -17,6 +17,7 @@ struct BenchSettings {
   int places = 12;                ///< footprints of a set
   double budget_s = 1.5;          ///< for the errors of a set
   double longest_run_s = 0.05;    ///< of one of the five runs of a time
+  double picture_budget_s = 5;    ///< for a lit picture of a method
   int picture_pixels = 96;        ///< of a lit picture along each axis
   std::size_t picture_sizes = 4;  ///< sizes of lit pictures at most, from the smallest on
   std::string assets;             ///< folder for the assets

@@ -3,7 +3,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -45,14 +49,20 @@ std::optional<LitPixel> litPixel(const NormalMap& map, const SmithMasking& maski
   return pixel;
 }
 
-/// Radiance of all pixels, whose densities are answered by ask(footprint, half).
+/// Radiance of all pixels, whose densities are answered by ask(footprint, half); nothing if that takes longer than `budget_s` seconds.
 template <class Ask>
-std::vector<float> radianceOf(const std::vector<LitPixel>& pixels, const Ask& ask) {
+std::optional<std::vector<float>> radianceOf(const std::vector<LitPixel>& pixels, const Ask& ask, double budget_s) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start = Clock::now();
+  std::atomic<bool> late = false;
   std::vector<float> radiance(pixels.size());
   tbb::parallel_for(std::size_t{0}, pixels.size(), [&](std::size_t k) {
     const LitPixel& pixel = pixels[k];
-    if (pixel.response > 0) radiance[k] = pixel.response * ask(pixel.footprint, pixel.half);
+    if (!(pixel.response > 0) || late) return;
+    radiance[k] = pixel.response * ask(pixel.footprint, pixel.half);
+    if (std::chrono::duration<double>(Clock::now() - start).count() > budget_s) late = true;
   });
+  if (late) return {};
   return radiance;
 }
 
@@ -88,20 +98,23 @@ std::vector<LitPixel> litPixels(const NormalMap& map, lit::Shape shape, float si
   return pixels;
 }
 
-LitTruth::LitTruth(const NormalMap& map, const NormalSearch& truth, lit::Shape shape, float sigma_texels, int size)
-    : shape_(shape), sigma_texels_(sigma_texels), size_(size), pixels_(litPixels(map, shape, sigma_texels, size)) {
-  radiance_ = radianceOf(pixels_, [&](const Footprint& p, Vec2 h) { return truth.density(p, h); });
+double screenWhite(std::vector<float> radiance) {
+  constexpr double kClipped = 0.2;  // of the light, at most
+  std::sort(radiance.begin(), radiance.end(), std::greater<>());
+  double all = 0, brighter = 0;
+  for (const float value : radiance) all += double{value};
+  for (const float value : radiance) {
+    brighter += double{value};
+    if (brighter > kClipped * all) return std::max(kDark, double{value});
+  }
+  return kDark;
 }
 
-double LitTruth::brightRadiance() const {
-  constexpr double kBright = 0.98;
-  std::vector<float> lit;
-  for (std::size_t k = 0; k < pixels_.size(); ++k)
-    if (pixels_[k].response > 0) lit.push_back(radiance_[k]);
-  if (lit.empty()) return 0;
-  const auto bright = lit.begin() + static_cast<std::ptrdiff_t>(kBright * static_cast<double>(lit.size() - 1));
-  std::nth_element(lit.begin(), bright, lit.end());
-  return double{*bright};
+LitTruth::LitTruth(const NormalMap& map, const NormalSearch& search, lit::Shape shape, float sigma_texels, int size)
+    : shape_(shape), sigma_texels_(sigma_texels), size_(size), pixels_(litPixels(map, shape, sigma_texels, size)) {
+  radiance_ = *radianceOf(
+      pixels_, [&](const Footprint& p, Vec2 h) { return search.density(p, h); }, std::numeric_limits<double>::infinity());
+  white_ = screenWhite(radiance_);
 }
 
 std::vector<float> LitTruth::shown(const std::vector<float>& radiance) const {
@@ -115,33 +128,33 @@ nlohmann::json LitTruth::json() const {
           {"sigma_texels", sigma_texels_},
           {"pixels", size_},
           {"white", white_},
+          {"black_flip", greyFlip(shown(radiance_), std::vector<float>(radiance_.size()), size_, size_)},
           {"picture", packed(radiance_)}};
 }
 
-nlohmann::json LitTruth::errorsOf(const api::OpenedNdf& ndf) const {
-  const std::vector<float> radiance =
-      radianceOf(pixels_, [&](const Footprint& p, Vec2 h) { return ndf.model().density(p, h); });
+nlohmann::json LitTruth::errorsOf(const Density& density, bool as_asked, double budget_s) const {
+  nlohmann::json errors = {{"scene", sceneName(shape_)}, {"sigma_texels", sigma_texels_}, {"as_asked", as_asked}};
+  const std::optional<std::vector<float>> radiance = radianceOf(pixels_, density, budget_s);
+  if (!radiance) {
+    errors["given_up_s"] = budget_s;
+    return errors;
+  }
   double squares = 0, truths = kDark * kDark;
-  for (std::size_t k = 0; k < radiance.size(); ++k) {
-    const double right = double{radiance_[k]}, error = double{radiance[k]} - right;
+  for (std::size_t k = 0; k < radiance->size(); ++k) {
+    const double right = double{radiance_[k]}, error = double{(*radiance)[k]} - right;
     squares += error * error, truths += right * right;
   }
-  return {{"scene", sceneName(shape_)},
-          {"sigma_texels", sigma_texels_},
-          {"as_asked", ndf.info().shapes.gaussians},
-          {"rmse", std::sqrt(squares / truths)},
-          {"flip", greyFlip(shown(radiance_), shown(radiance), size_, size_)},
-          {"picture", packed(radiance)}};
+  errors["rmse"] = std::sqrt(squares / truths);
+  errors["flip"] = greyFlip(shown(radiance_), shown(*radiance), size_, size_);
+  errors["picture"] = packed(*radiance);
+  return errors;
 }
 
 std::vector<LitTruth> litTruths(const NormalMap& map, const std::vector<float>& sizes, int pixels) {
   const NormalSearch search(map, kBenchSigmaR);
   std::vector<LitTruth> truths;
-  for (const lit::Shape shape : {lit::Shape::quad, lit::Shape::sphere}) {
-    const std::size_t first = truths.size();
+  for (const lit::Shape shape : {lit::Shape::quad, lit::Shape::sphere})
     for (const float sigma : sizes) truths.emplace_back(map, search, shape, sigma, pixels);
-    for (std::size_t k = first; k < truths.size(); ++k) truths[k].setWhite(std::max(kDark, truths.back().brightRadiance()));
-  }
   return truths;
 }
 

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string_view>
 #include <vector>
 
-#include "glint/api/any_ndf.h"
 #include "glint/model/footprint.h"
 #include "glint/model/normal_map.h"
 #include "measure/lit_scene.h"
@@ -29,24 +29,32 @@ std::vector<LitPixel> litPixels(const NormalMap& map, lit::Shape shape, float si
 /// "plane", "sphere"
 std::string_view sceneName(lit::Shape shape);
 
-/// The exact picture of a surface.
+/// Radiance that the screen shows as white: pixels that are brighter have at most a fifth of the light. So highlights are shown, however
+/// few pixels they have, and are compared.
+/// @param radiance  of all pixels of the exact picture, none below 0
+double screenWhite(std::vector<float> radiance);
+
+/// The exact picture of a surface, and its white, which is that of all methods.
 class LitTruth {
  public:
-  /// @param truth  of the map
-  LitTruth(const NormalMap& map, const NormalSearch& truth, lit::Shape shape, float sigma_texels, int size);
+  /// Answers the density of a footprint at a half vector. Thread-safe.
+  using Density = std::function<float(const Footprint&, Vec2)>;
+
+  /// @param search  answers the exact densities of the map
+  LitTruth(const NormalMap& map, const NormalSearch& search, lit::Shape shape, float sigma_texels, int size);
 
   lit::Shape shape() const { return shape_; }
   float sigmaTexels() const { return sigma_texels_; }
-  /// Radiance that one in fifty pixels of the surface exceeds.
-  double brightRadiance() const;
-  /// Radiance that the screen shows as white.
-  void setWhite(double radiance) { white_ = radiance; }
+  double white() const { return white_; }
+  const std::vector<float>& radiance() const { return radiance_; }
 
-  /// {scene, sigma_texels, pixels, white, picture}
+  /// {scene, sigma_texels, pixels, white, black_flip, picture}
   nlohmann::json json() const;
-  /// The picture of a model, for the same questions: {scene, sigma_texels, as_asked, rmse, flip, picture}. RMSE is of radiance, over that
-  /// of the truth.
-  nlohmann::json errorsOf(const api::OpenedNdf& ndf) const;
+  /// The picture of a method, for the same questions: {scene, sigma_texels, as_asked, rmse, flip, picture}. RMSE is of radiance, over that
+  /// of the truth. A picture that takes longer than its budget is given up: {scene, sigma_texels, as_asked, given_up_s}.
+  /// @param as_asked  whether the method weighs round footprints as they are
+  /// @param budget_s  seconds
+  nlohmann::json errorsOf(const Density& density, bool as_asked, double budget_s) const;
 
  private:
   std::vector<float> shown(const std::vector<float>& radiance) const;
@@ -54,13 +62,12 @@ class LitTruth {
   lit::Shape shape_;
   float sigma_texels_;
   int size_;
-  double white_ = 1;
   std::vector<LitPixel> pixels_;
   std::vector<float> radiance_;
+  double white_;
 };
 
-/// The exact pictures of a map, of a plane and a sphere at each size. A scene has the same white at all sizes: the
-/// bright radiance of its picture from furthest away, in which texels are averaged.
+/// The exact pictures of a map, of a plane and a sphere at each size.
 std::vector<LitTruth> litTruths(const NormalMap& map, const std::vector<float>& sizes, int pixels);
 
 }  // namespace glint::apps

@@ -20,8 +20,7 @@ struct Hit {
   float distance = 0;  ///< along the ray
   Vec3 position, normal;
   Vec2 uv;
-  Vec3 dpdu, dpdv;      ///< change of the position with uv
-  float curvature = 0;  ///< turn of the normal for a step on the surface, radians for each unit
+  Vec3 dpdu, dpdv;  ///< change of the position with uv
 };
 
 /// A ray, and the change of its unit direction from one pixel to the next.
@@ -65,7 +64,7 @@ struct Sphere {
     const float latitude = std::asin(n.x), longitude = std::atan2(n.y, n.z);
     const Vec3 dpdu = {std::cos(latitude), -n.x * std::sin(longitude), -n.x * std::cos(longitude)};
     const Vec3 dpdv = {0, n.z, -n.y};
-    return Hit{distance, centre + radius * n, n, {radius * latitude, radius * longitude}, dpdu, dpdv, 1 / radius};
+    return Hit{distance, centre + radius * n, n, {radius * latitude, radius * longitude}, dpdu, dpdv};
   }
 };
 
@@ -103,29 +102,24 @@ class Camera {
   Vec3 origin_, forward_, up_;
 };
 
-enum class Shape : std::uint8_t { quad, sphere, both };
+/// The square that fills the picture of a camera at a distance.
+inline Quad quadSeenFrom(float distance) { return {0.32f * distance}; }
+/// The ball that fills the picture of a camera at a distance.
+inline Sphere sphereSeenFrom(float distance) { return {{}, 0.26f * distance}; }
 
-/// A ball on a square, or one of them.
+enum class Shape : std::uint8_t { quad, sphere };
+
+/// A square or a ball.
 class Scene {
  public:
-  Scene(Shape shape, float distance)
-      : shape_(shape),
-        quad_{0.32f * distance},
-        sphere_{shape == Shape::sphere ? Vec3{} : distance * kBeside, distance * kRadius} {
-    if (shape == Shape::sphere) sphere_.radius = 0.26f * distance;
-  }
+  Scene(Shape shape, float distance) : shape_(shape), quad_(quadSeenFrom(distance)), sphere_(sphereSeenFrom(distance)) {}
 
   /// The nearest point of a ray.
   std::optional<Hit> intersect(const Ray& ray) const {
-    if (shape_ != Shape::quad)
-      if (const std::optional<Hit> hit = sphere_.intersect(ray)) return hit;  // nothing is in front of the ball
-    return shape_ == Shape::sphere ? std::nullopt : quad_.intersect(ray);
+    return shape_ == Shape::sphere ? sphere_.intersect(ray) : quad_.intersect(ray);
   }
 
  private:
-  static constexpr float kRadius = 0.13f;
-  static constexpr Vec3 kBeside = {-0.15f, 0.05f, kRadius};
-
   Shape shape_;
   Quad quad_;
   Sphere sphere_;

@@ -9,6 +9,7 @@ from words import times
 SURFACES = {"isotropic": "fine noise", "brushed": "brushed metal", "scratches": "scratches", "weave": "a weave", "flakes": "flakes"}
 SMALL_LIGHT = "0.5"
 DISTANCES = {"0.25": "2", "1": "8", "4": "32"}  # of the eye in map widths: deviations in the middle of the square, texels
+COMPRESSED = ("cp", "tucker", "pca")
 CLOSE, ROUGH = 0.02, 0.1  # FLIP of the methods in the table; 0 is equal pictures
 
 
@@ -28,14 +29,16 @@ class Pictures:
         return self.values.get((surface, model, "flip", distance, light))
 
     def microseconds(self, surface, model, distance):
-        """Of a mean over a range. Where a compressed pyramid answers as the pyramid does, that was timed."""
-        times = [self.values.get((surface, name, "microseconds of a mean", distance, "")) for name in (model, "pyramid")]
+        """Of a mean over a range; nothing if it was not timed. Where a compressed pyramid answers as the pyramid does, that was timed."""
+        timed = (model, "pyramid") if model in COMPRESSED else (model,)
+        times = [self.values.get((surface, name, "microseconds of a mean", distance, "")) for name in timed]
         return next((time for time in times if time is not None), None)
 
 
 def quickest(pictures, surface, distance, flip):
     """(microseconds, the quickest method whose picture has at most this FLIP, its FLIP); nothing if there is none."""
-    able = [(pictures.microseconds(surface, model, distance), model) for model in pictures.models() if pictures.flip(surface, model, distance) <= flip]
+    figures = [(pictures.microseconds(surface, model, distance), pictures.flip(surface, model, distance), model) for model in pictures.models()]
+    able = [(time, model) for time, of_model, model in figures if time is not None and of_model is not None and of_model <= flip]
     return (*min(able), pictures.flip(surface, min(able)[1], distance)) if able else None
 
 
@@ -61,7 +64,9 @@ def scene_chart(pictures, path):
     far = list(DISTANCES)[-1]
     for k, surface in enumerate(SURFACES):
         for model in pictures.models():
-            axis.plot(pictures.microseconds(surface, model, far), pictures.flip(surface, model, far), MARKERS[k], color=COLOURS[model], markersize=7)
+            point = pictures.microseconds(surface, model, far), pictures.flip(surface, model, far)
+            if None not in point:
+                axis.plot(*point, MARKERS[k], color=COLOURS[model], markersize=7)
     for flip in (CLOSE, ROUGH):
         axis.axhline(flip, color="0.5", linestyle=":")
     legend(axis, pictures.models(), SURFACES.values())

@@ -1,6 +1,7 @@
 """glint-bench: its results, going on after a stop, and its page in a browser without a window."""
 
 import base64
+import importlib
 import json
 import math
 import pathlib
@@ -97,7 +98,7 @@ def pairs(results):
 def test_pictures_err_as_they_say(results):
     for _, picture, truth in pairs(results):
         mine, right = radiance(picture), radiance(truth)
-        assert len(mine) == len(right) == truth["pixels"] ** 2 and max(right) > truth["white"] > 0
+        assert len(mine) == len(right) == truth["pixels"] ** 2 and max(right) * (1 + OF_HALVES) > truth["white"] > 0
         rmse = math.sqrt(sum((a - b) ** 2 for a, b in zip(mine, right)) / sum(b * b for b in right))
         assert picture["rmse"] == pytest.approx(rmse, abs=OF_HALVES)
 
@@ -124,18 +125,81 @@ def test_flip_is_that_of_flip_evaluator(results):
         assert picture["flip"] == pytest.approx(expected, abs=OF_HALVES)
 
 
-def test_results_of_a_version_without_pictures_are_shown_and_completed(glint, copied):
+def test_most_of_the_light_is_shown(results):
+    for truth in results["maps"][0]["pictures"]:
+        light = radiance(truth)
+        assert sum(value for value in light if value > truth["white"] * (1 + OF_HALVES)) <= sum(light) / 3
+
+
+def test_a_black_picture_is_the_scale_of_flip(results):
+    for measurement, picture, truth in pairs(results):
+        if measurement["method"] == "pyramid" and picture["sigma_texels"] == 8:
+            assert picture["flip"] < truth["black_flip"]
+    assert all(0 < truth["black_flip"] < 1 for truth in results["maps"][0]["pictures"])
+
+
+def test_results_of_another_white_are_refused(glint, copied):
     document = json.loads((copied / "results.json").read_text())
-    for part in (*document["maps"], *document["measurements"]):
-        del part["pictures"]
-    (copied / "results.json").write_text(json.dumps(document, separators=(",", ":")))
-    process = glint("bench", "--report", "results.json", "-o", "some.html")
+    (copied / "results.json").write_text(json.dumps(document | {"schema": "glint-bench results 1"}, separators=(",", ":")))
+    assert "not of the form" in refused(glint, 3, "--report", "results.json", "-o", "some.html")
+    message = refused(glint, 3, "map.glint", "-o", "results.json", "--quick", "--only", "moments")
+    assert "not of the form" in message and "--force" in message
+
+
+def spoil_each(document):
+    """(name, results with one part spoiled)."""
+    def spoil(name, change):
+        copy = json.loads(json.dumps(document))
+        change(copy["maps"][0], next(m for m in copy["measurements"] if m["pictures"]))
+        return name, copy
+
+    def first(part, **values):
+        return part[0].update(values)
+
+    yield spoil("no base64", lambda map_, m: first(map_["pictures"], picture="***"))
+    yield spoil("no base64", lambda map_, m: first(m["pictures"], picture="***" + m["pictures"][0]["picture"][3:]))
+    yield spoil("half a picture", lambda map_, m: first(m["pictures"], picture=m["pictures"][0]["picture"][:400]))
+    yield spoil("larger pictures", lambda map_, m: first(map_["pictures"], pixels=49))
+    yield spoil("huge pictures", lambda map_, m: first(map_["pictures"], pixels=1 << 30))
+    yield spoil("no white", lambda map_, m: map_["pictures"][0].pop("white"))
+    yield spoil("white is black", lambda map_, m: first(map_["pictures"], white=0))
+    yield spoil("another scene", lambda map_, m: first(map_["pictures"], scene="teapot"))
+    yield spoil("another size", lambda map_, m: first(m["pictures"], sigma_texels=3))
+    yield spoil("a picture less", lambda map_, m: m["pictures"].pop())
+    yield spoil("a truth less", lambda map_, m: map_["pictures"].pop())
+    yield spoil("no pictures", lambda map_, m: map_.pop("pictures"))
+    yield spoil("no list", lambda map_, m: m.update(pictures=None))
+    yield spoil("no FLIP", lambda map_, m: m["pictures"][0].pop("flip"))
+    yield spoil("an image less", lambda map_, m: m["images"].pop())
+    yield spoil("half an image", lambda map_, m: m["images"][0]["image"].pop())
+    yield spoil("an error less", lambda map_, m: m["errors"].pop(0))
+    yield spoil("no map", lambda map_, m: m.update(map="0" * 32))
+    yield spoil("no time", lambda map_, m: m["times"]["mean"].pop("cold"))
+
+
+def test_results_that_are_not_whole_are_refused(glint, copied):
+    document = json.loads((copied / "results.json").read_text())
+    for name, spoiled in spoil_each(document):
+        (copied / "spoiled.json").write_text(json.dumps(spoiled, separators=(",", ":")))
+        process = glint("bench", "--report", "spoiled.json", "-o", "some.html")
+        assert process.returncode == 3 and re.search("(map|measurement) [0-9]+ ", process.stderr), (name, process.stderr)
+    (copied / "deep.json").write_text('{"schema":"glint-bench results 2","maps":' + "[" * 100000 + "]" * 100000 + "}")
+    assert "nested deeper" in refused(glint, 3, "--report", "deep.json", "-o", "some.html")
+
+
+def test_pictures_that_were_given_up_are_shown_as_such(glint, copied):
+    document = json.loads((copied / "results.json").read_text())
+    for picture in next(m for m in document["measurements"] if m["pictures"])["pictures"]:
+        for name in ("rmse", "flip", "picture"):
+            del picture[name]
+        picture["given_up_s"] = 5
+    jsonschema.Draft202012Validator(SCHEMA).validate(document)
+    (copied / "slow.json").write_text(json.dumps(document, separators=(",", ":")))
+    process = glint("bench", "--report", "slow.json", "-o", "slow.html")
     assert process.returncode == 0, process.stderr
-    process = glint("bench", "map.glint", "-o", "results.json", "--quick", "--only", "moments")
-    assert process.returncode == 0, process.stderr
-    after = json.loads((copied / "results.json").read_text())
-    assert len(after["maps"]) == 1 and after["maps"][0]["pictures"]
-    assert {measurement["method"] for measurement in after["measurements"] if "pictures" in measurement} == {"moments"}
+    if CHROMIUM:
+        process = browse(copied, copied / "slow.html", 1280, "--dump-dom")
+        assert "Uncaught" not in process.stderr and "was given up after 5 s" in process.stdout, process.stderr
 
 
 def test_summary_names_the_quickest_method(measured):
@@ -223,7 +287,7 @@ def test_bad_input_is_named(glint, copied):
     assert "not whole" in refused(glint, 3, "--report", "half.json", "-o", "x.html")
     (copied / "other.json").write_text('{"schema":"glint-bench results 0"}')
     assert "not of the form" in refused(glint, 3, "--report", "other.json", "-o", "x.html")
-    (copied / "lacking.json").write_text('{"schema":"glint-bench results 1","measurements":[7]}')
+    (copied / "lacking.json").write_text('{"schema":"glint-bench results 2","measurements":[7]}')
     assert "lacks" in refused(glint, 3, "--report", "lacking.json", "-o", "x.html")
     (copied / "mine.json").write_text('{"mine": 1}')
     assert "--force" in refused(glint, 1, "map.glint", "-o", "mine.json", "--quick")
@@ -339,6 +403,9 @@ def test_charts_are_written_as_files(measured, tmp_path):
         with image.open(tmp_path / f"charts/{name}.png") as picture:
             assert picture.size == (2 * int(svg.get("width")), 2 * int(svg.get("height")))
             assert len(picture.convert("RGB").getcolors(1 << 20)) > 20, "is empty"
+    for choice in (("--metric", "flp"), ("--map", "nosuch"), ("--shape", "ball"), ("--size", "3"), ("--metric", "flip", "--shape", "round"), ("--metric", "toString")):
+        process = run(measured / "report.html", *choice)
+        assert process.returncode != 0 and "it has" in process.stderr, (choice, process.stderr)
     assert "is no file" in run(tmp_path / "missing.html").stderr
     (tmp_path / "other.html").write_text("<p>no charts</p>")
     assert "has no charts" in run(tmp_path / "other.html").stderr
@@ -388,3 +455,36 @@ def test_the_page_asks_no_network(measured):
     assert not re.findall(r'<(?:script|link|img|iframe)[^>]+(?:src|href)=', page)
     assert "fetch(" not in (ROOT / "apps/glint-bench/page/report.js").read_text()
     assert "Permission to use, copy, modify" in page  # the licences of the libraries inside
+
+
+# The page of measurements
+
+@pytest.fixture
+def report_of_bench(monkeypatch):
+    pytest.importorskip("matplotlib")
+    monkeypatch.syspath_prepend(str(ROOT / "tests/bench"))
+    return importlib.import_module("report"), importlib.import_module("scenes")
+
+
+def test_a_figure_of_another_name_is_no_empty_cell(report_of_bench):
+    report, _ = report_of_bench
+    rows = [{"section": "moments", "figure": "moments, flakes", "value": 2.0}]
+    assert report.named(rows, r"moments, \S+") == [2.0]
+    assert report.named(rows, r"mean, random, \S+ ggx") == []  # of those that are not measured
+    with pytest.raises(SystemExit, match="no figure is named"):
+        report.named(rows, r"moment, \S+")
+    with pytest.raises(SystemExit, match="no figure is named"):
+        report.method_table(rows, [("build", r"moment, \S+")])
+
+
+def test_methods_without_a_figure_are_not_the_quickest(report_of_bench, tmp_path):
+    _, scenes = report_of_bench
+    lines = ["map,model,figure,value,distance,light", "flakes,pyramid,microseconds of a mean,4,8,", "flakes,moments,microseconds of a mean,1,8,",
+             "flakes,cp,flip,0.015,8,0.5", "flakes,histograms,flip,0.001,8,0.5", "flakes,bin map,bytes,7,,"]
+    (tmp_path / "limits.csv").write_text("\n".join(lines) + "\n")
+    pictures = scenes.Pictures(tmp_path / "limits.csv")
+    assert pictures.microseconds("flakes", "cp", "8") == 4  # answers as the pyramid does
+    assert pictures.microseconds("flakes", "histograms", "8") is None
+    assert scenes.quickest(pictures, "flakes", "8", 0.02) == (4, "cp", 0.015)
+    assert scenes.quickest(pictures, "flakes", "1", 0.02) is None
+    scenes.scene_chart(pictures, tmp_path / "chart.png")

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
 
+#include "common/base64.h"
 #include "measure/grey_flip.h"
 #include "measure/workload.h"
 #include "support/test_maps.h"
@@ -57,6 +60,95 @@ TEST(LitPicture, MiddleOfThePlaneMirrorsTheLight) {
   const std::vector<LitPixel> pixels = litPixels(map.map(), lit::Shape::quad, 4, kSize);
   const Vec2 half = pixels[kSize * kSize / 2 + kSize / 2].half;
   EXPECT_LT(std::hypot(half.x, half.y), 0.05f);
+}
+
+/// A surface with a name, for messages.
+struct Surface {
+  const char* name;
+  std::vector<Vec2> normals;
+};
+
+constexpr int kTexels = 256;
+
+std::vector<Surface> sparklingSurfaces() {
+  return {{"flakes", test::synthesised(bake::SynthKind::flakes, kTexels, kTexels, 0.2f)},
+          {"scratches", test::synthesised(bake::SynthKind::scratches, kTexels, kTexels, 0.2f)},
+          {"almost a mirror", test::synthesised(bake::SynthKind::isotropic, kTexels, kTexels, 0.02f)}};
+}
+
+/// Calls test(truth, name) for the pictures of sparkling surfaces, from near and far.
+template <class Test>
+void forSparklingPictures(const Test& test) {
+  constexpr int kPixels = 48;
+  for (const Surface& surface : sparklingSurfaces()) {
+    const test::OwnedMap map(kTexels, kTexels, surface.normals);
+    for (const LitTruth& truth : litTruths(map.map(), {0.5f, 2, 8, 32}, kPixels)) {
+      const std::string name = std::string(surface.name) + ", " + std::string(sceneName(truth.shape())) + ", " +
+                               std::to_string(truth.sigmaTexels()) + " texels";
+      test(truth, map.map(), name);
+    }
+  }
+}
+
+TEST(LitPicture, ShowsMostOfTheLight) {
+  forSparklingPictures([](const LitTruth& truth, const NormalMap&, const std::string& name) {
+    double all = 0, clipped = 0;
+    for (const float value : truth.radiance()) {
+      all += double{value};
+      if (double{value} > truth.white()) clipped += double{value};
+    }
+    EXPECT_GT(all, 0) << name;
+    EXPECT_LE(clipped, all / 3) << name;
+  });
+}
+
+constexpr double kNoBudget = 1e6;
+
+TEST(LitPicture, FlipIsLargeWhereRmseIs) {
+  forSparklingPictures([](const LitTruth& truth, const NormalMap& map, const std::string& name) {
+    const NormalSearch search(map, kBenchSigmaR);
+    const auto flipOf = [&](float factor) {  // of all radiance; RMSE is |factor - 1|
+      const auto density = [&](const Footprint& p, Vec2 h) { return factor * search.density(p, h); };
+      return truth.errorsOf(density, true, kNoBudget).at("flip").get<double>();
+    };
+    const double black = truth.json().at("black_flip");
+    EXPECT_EQ(flipOf(0), black) << name;
+    EXPECT_EQ(flipOf(1), 0) << name;
+    // FLIP grows with the difference of lightness, more than in proportion near 0. Bounds leave room around the measured shares.
+    EXPECT_GT(flipOf(0.5f), 0.4 * black) << name;
+    EXPECT_LT(flipOf(0.95f), 0.15 * black) << name;
+    // Too bright: pixels near white are clipped. A highlight of a ball that is almost a mirror has few others.
+    EXPECT_GT(flipOf(2), 0.05 * black) << name;
+  });
+}
+
+TEST(LitPicture, WhiteOfADarkPictureIsNotZero) {
+  EXPECT_GT(screenWhite({}), 0);
+  EXPECT_GT(screenWhite(std::vector<float>(4, 0.0f)), 0);
+  EXPECT_EQ(screenWhite({0, 8, 1, 1}), 8) << "one pixel has most of the light";
+  EXPECT_EQ(screenWhite({1, 2, 1, 1, 1, 1, 1, 1, 1, 1}), 1) << "the brightest pixel has 2 of 11";
+}
+
+TEST(LitPicture, ASlowMethodIsGivenUp) {
+  const test::OwnedMap map = someMap();
+  const NormalSearch search(map.map(), kBenchSigmaR);
+  const LitTruth truth(map.map(), search, lit::Shape::quad, 2, kSize);
+  const auto density = [&](const Footprint& p, Vec2 h) { return search.density(p, h); };
+  const auto given_up = truth.errorsOf(density, true, 0);
+  EXPECT_EQ(given_up.at("given_up_s"), 0.0);
+  EXPECT_FALSE(given_up.contains("flip") || given_up.contains("rmse") || given_up.contains("picture"));
+  EXPECT_FALSE(truth.errorsOf(density, true, kNoBudget).contains("given_up_s"));
+}
+
+TEST(LitPicture, IsBase64OfItsPixels) {
+  for (const std::string bytes : {"", "a", "ab", "abc", "abcd"}) {
+    EXPECT_TRUE(isBase64(base64(bytes), bytes.size())) << bytes;
+    EXPECT_FALSE(isBase64(base64(bytes), bytes.size() + 3)) << bytes;
+  }
+  EXPECT_FALSE(isBase64("***", 2));
+  EXPECT_FALSE(isBase64("YW*=", 2));
+  EXPECT_FALSE(isBase64("YWIx", 2)) << "of three bytes";
+  EXPECT_FALSE(isBase64("YW==", 2)) << "of one byte";
 }
 
 TEST(GreyFlip, IsZeroForEqualPictures) {

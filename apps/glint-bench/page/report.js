@@ -2,7 +2,7 @@
 // The page of glint-bench. `results` is the document that glint-bench writes.
 const results = JSON.parse(document.getElementById("results").textContent);
 const element = (id) => document.getElementById(id);
-const hasPictures = results.maps.some((map) => map.pictures?.length);
+const hasPictures = results.maps.some((map) => map.pictures.length);
 const state = { map: 0, shape: "round", size: null, metric: "seen", candidate: null, view: "method", subject: hasPictures ? "plane" : "ndf" };
 
 const METRICS = {
@@ -16,6 +16,8 @@ const WITHIN = [0.01, 0.05, 0.1, 0.2];
 const LARGEST = 10; // beyond 1000 % nothing is right
 /** Least and largest error that charts show, which draw errors beyond there: a log axis has no 0. */
 const errorDomain = () => (state.metric === "flip" ? [1e-4, 1] : [1e-3, LARGEST]);
+/** FLIP of a black picture, the scale of the others; null where there is none. */
+const blackFlip = (shape, size) => theMap().pictures.find((picture) => picture.scene === shape && picture.sigma_texels === size)?.black_flip ?? null;
 const inChart = (error) => Math.min(errorDomain()[1], Math.max(errorDomain()[0], error));
 
 // Measurements and figures
@@ -25,7 +27,7 @@ const measurements = () => results.measurements.filter((measurement) => measurem
 const measured = () => measurements().filter((measurement) => measurement.status === "ok");
 const isTruth = (measurement) => measurement.errors.length === 0;
 /** Errors of NDFs by shape of the footprint, and of pictures by scene. */
-const setsOf = (measurement) => [...measurement.errors, ...(measurement.pictures ?? []).map((picture) => ({ ...picture, shape: picture.scene }))];
+const setsOf = (measurement) => [...measurement.errors, ...measurement.pictures.map((picture) => ({ ...picture, shape: picture.scene }))];
 const setOf = (measurement, shape, size) => setsOf(measurement).find((set) => set.shape === shape && set.sigma_texels === size);
 const errorOf = (measurement, metric, shape, size) => {
   const error = setOf(measurement, shape, size)?.[metric];
@@ -95,6 +97,7 @@ function drawCost(id) {
     .filter((point) => point.error != null && point.cost > 0).map((point) => ({ ...point, shown: inChart(point.error) }));
   const front = paretoFront(points);
   const truth = measured().filter((measurement) => isTruth(measurement) && of(measurement) > 0);
+  const blacks = state.metric === "flip" ? [blackFlip(state.shape, state.size)].filter((flip) => flip > 0).map(inChart) : [];
   const asked = (point) => (setOf(point.measurement, state.shape, state.size).as_asked ? "" : "\nanswers a footprint of the same second moments");
   const chart = Plot.plot({
     width: chartWidth(), height: 340, marginLeft: 56, marginRight: 20, marginBottom: 42,
@@ -105,6 +108,8 @@ function drawCost(id) {
     marks: [
       Plot.ruleX(truth, { x: of, stroke: "currentColor", strokeDasharray: "3,3", strokeOpacity: 0.6 }),
       Plot.text(truth, { x: of, frameAnchor: "top-right", text: () => "brute force", rotate: -90, dx: -8, dy: 4, textAnchor: "end", fillOpacity: 0.7 }),
+      Plot.ruleY(blacks, { stroke: "currentColor", strokeDasharray: "3,3", strokeOpacity: 0.6 }),
+      Plot.text(blacks, { y: (flip) => flip, frameAnchor: "right", text: () => "a black picture", textAnchor: "end", dx: -4, dy: -6, fillOpacity: 0.7 }),
       Plot.line(front, { x: "cost", y: "shown", stroke: "currentColor", strokeOpacity: 0.35, strokeWidth: 1.5 }),
       Plot.dot(points, { x: "cost", y: "shown", fill: (point) => point.measurement.method, r: 5, stroke: "var(--paper)" }),
       Plot.text(front, { x: "cost", y: "shown", text: (point) => point.measurement.setting, dy: -10, fontSize: 10, fillOpacity: 0.75 }),
@@ -186,14 +191,16 @@ function savePng(id) {
 function drawCheapest() {
   // Errors of pictures where the reader chose them; else seen errors of round footprints, the measure that tolerances are given in.
   const [metric, shape] = isOfPictures(state.metric) ? [state.metric, state.shape] : ["seen", "round"];
-  const within = (most) => (metric === "flip" ? `FLIP up to ${most}` : `within ${100 * most} %`);
+  const within = (most) => (metric === "flip" ? `FLIP up to ${100 * most} % of black's` : `within ${100 * most} %`);
+  const scaleOf = (size) => (metric === "flip" ? blackFlip(shape, size) ?? 1 : 1);
   element("cheapest-about").textContent = `${isOfPictures(metric) ? `${METRICS[metric]}, ${SCENES[shape]}` : "Seen error of round footprints"}, by size. ` +
+    (metric === "flip" ? "FLIP is a mean over the whole picture, and a few glints fill little of it: so a black picture is the scale. " : "") +
     "The time is of a density of round footprints of this size, asked anywhere on the map.";
   const head = node("tr", {}, node("th", {}, "footprint"), ...WITHIN.map((most) => node("th", {}, within(most))));
   const rows = sizesOf(shape).map((size) => {
     const row = node("tr", size === state.size ? { class: "chosen" } : {}, node("th", {}, `${size} texels`));
     for (const most of WITHIN) {
-      const able = measured().filter((measurement) => isTruth(measurement) || (errorOf(measurement, metric, shape, size) ?? Infinity) <= most);
+      const able = measured().filter((measurement) => isTruth(measurement) || (errorOf(measurement, metric, shape, size) ?? Infinity) <= most * scaleOf(size));
       // One that is no more than a tenth quicker than a simpler one, which comes before it, counts as equal.
       const best = able.reduce((least, measurement) => (least == null || timeAt(measurement, size) < 0.9 * timeAt(least, size) ? measurement : least), null);
       row.append(best ? node("td", {}, best.name, node("br"), node("small", {}, `${nsText(timeAt(best, size))}, ${bytesText(best.file_bytes)}`)) : node("td", {}, "none"));
@@ -234,7 +241,7 @@ function radianceOf(picture) {
 /** The image of the chosen subject among those of a map or a measurement, of the size that is nearest to the chosen one: {size, pixels, up, values}. */
 function imageOf(lists) {
   const isNdf = state.subject === "ndf";
-  const images = isNdf ? lists.truth ?? lists.images : (lists.pictures ?? []).filter((picture) => picture.scene === state.subject);
+  const images = isNdf ? lists.truth ?? lists.images : lists.pictures.filter((picture) => picture.scene === state.subject && picture.picture);
   const image = d3.least(images, (image) => Math.abs(Math.log2(image.sigma_texels / state.size)));
   if (!image) return null;
   const values = isNdf ? image.image : radianceOf(image);
@@ -276,16 +283,16 @@ const chosenMeasurement = () => drawn().find((measurement) => measurement.name =
 
 function drawPicture(view = state.view) {
   const measurement = chosenMeasurement(), truth = imageOf(theMap());
-  const image = measurement && imageOf(measurement);
-  if (!image || !truth) {
+  const set = measurement && truth && setOf(measurement, state.subject === "ndf" ? "round" : state.subject, truth.size);
+  const image = set && imageOf(measurement);
+  if (image?.size !== truth?.size || !image) {
     element("picture").getContext("2d").clearRect(0, 0, element("picture").width, element("picture").height);
-    element("caption").textContent = "Nothing was measured here.";
+    element("caption").textContent = set?.given_up_s == null ? "Nothing was measured here." : `${measurement.name} is slow here: its picture was given up after ${secondsText(set.given_up_s)}.`;
     return;
   }
   paint(element("picture"), image, truth, view, Number(element("exposure").value), Number(element("zoom").value));
-  const set = setOf(measurement, state.subject === "ndf" ? "round" : state.subject, truth.size);
   const errors = state.subject === "ndf" ? `seen error ${percent(set.seen)}, relative L2 ${percent(set.rel_l2)} over ${set.places} places`
-    : `FLIP ${errorText("flip", set.flip)}, RMSE ${percent(set.rmse)}${set.as_asked ? "" : "; it answers boxes of the same second moments"}`;
+    : `FLIP ${errorText("flip", set.flip)} (a black picture ${errorText("flip", blackFlip(state.subject, truth.size))}), RMSE ${percent(set.rmse)}${set.as_asked ? "" : "; it answers boxes of the same second moments"}`;
   element("caption").textContent = `${view === "truth" ? "Truth" : measurement.name}: ${state.subject === "ndf" ? "footprint" : "footprint in the middle"} of ${truth.size} texels; ${errors}.`;
 }
 
@@ -293,7 +300,7 @@ function drawStrip() {
   const truth = imageOf(theMap());
   const tile = (image, name, isPressed, act) => {
     const canvas = node("canvas", { width: 96, height: 96 });
-    if (truth && image) paint(canvas, image, truth, "method", Number(element("exposure").value), Number(element("zoom").value));
+    if (truth && image?.size === truth.size) paint(canvas, image, truth, "method", Number(element("exposure").value), Number(element("zoom").value));
     const button = node("button", { "aria-pressed": String(isPressed) }, canvas, name);
     button.addEventListener("click", act);
     return button;
@@ -319,7 +326,7 @@ function drawImages() {
 /** Shapes of the chosen error, and sizes of the chosen shape. */
 function chooseShapeAndSize() {
   const shapes = isOfPictures(state.metric) ? SCENES : SHAPES;
-  if (!(state.shape in shapes)) [state.shape] = Object.keys(shapes);
+  if (!Object.hasOwn(shapes, state.shape)) [state.shape] = Object.keys(shapes);
   fill(element("shape"), Object.entries(shapes), state.shape);
   const sizes = sizesOf(state.shape);
   const wanted = state.size ?? sizes[sizes.length >> 1];
@@ -346,10 +353,10 @@ function chooseFromAddress() {
   const asked = new URLSearchParams(location.hash.slice(1));
   const map = results.maps.findIndex((map) => map.name === asked.get("map"));
   if (map >= 0) state.map = map;
-  if (asked.get("metric") in METRICS) state.metric = asked.get("metric");
+  if (Object.hasOwn(METRICS, asked.get("metric"))) state.metric = asked.get("metric");
   const shape = asked.get("shape");
-  if (shape in SHAPES || shape in SCENES) state.shape = shape;
-  if (shape in SCENES && hasPictures) chooseSubject(shape);
+  if (Object.hasOwn(SHAPES, shape) || Object.hasOwn(SCENES, shape)) state.shape = shape;
+  if (Object.hasOwn(SCENES, shape) && hasPictures) chooseSubject(shape);
   if (Number(asked.get("size")) > 0) state.size = Number(asked.get("size"));
   element("map").value = state.map;
   element("metric").value = state.metric;
@@ -395,7 +402,11 @@ function start() {
   addEventListener("resize", () => { if (chartWidth() !== width) { width = chartWidth(); draw(); } });
   chooseFromAddress();
   draw();
-  if (location.hash.includes("charts=all")) document.body.dataset.charts = JSON.stringify(Object.fromEntries([...Object.keys(COSTS), "sizes"].map((id) => [id, svgText(id)])));
+  if (!location.hash.includes("charts=all")) return;
+  const shown = { map: theMap().name, metric: state.metric, shape: state.shape, size: state.size };
+  const offered = { map: results.maps.map((map) => map.name), metric: Object.keys(METRICS), shape: [...element("shape").options].map((option) => option.value), size: sizesOf(state.shape) };
+  document.body.dataset.choices = JSON.stringify({ shown, offered });
+  document.body.dataset.charts = JSON.stringify(Object.fromEntries([...Object.keys(COSTS), "sizes"].map((id) => [id, svgText(id)])));
 }
 
 start();
