@@ -51,7 +51,7 @@ CompressOptions::CompressOptions(Tool& tool) {
               "with --tolerance, tucker or pca, and i8: store slices of few facets as spots where that costs less");
   tool.option("--regions", values_.regions, "regions of the map along each axis")
       .range(1, 255)
-      .defaultText("8 for cp, otherwise 1");
+      .defaultText("8 for cp, otherwise 1, or more for more than 65536 images");
   tool.option("--min-improvement", values_.min_improvement, "cp: end when a sweep improves the relative error by less")
       .range(0, 0.99);
   tool.option("--max-iterations", values_.max_iterations, "cp: sweeps at most").range(1, 1e6);

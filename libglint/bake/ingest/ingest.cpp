@@ -125,8 +125,7 @@ MapMeaning findMeaning(const PixelArray& image, const IngestOptions& p) {
         },
         image.pixels);
     meaning.vectors = measureVectors(image, meaning.layout, meaning.encoding, rounding);
-    // A constant blue with which vectors are off unit length is not z: compute z from x and y. Likewise where blue holds z from
-    // 0 to 1, which is coarser than z from x and y on flat ground and the same elsewhere.
+    // A constant blue with which vectors are off unit length is not z, and blue may hold z from 0 to 1: compute z from x and y.
     meaning.positive_blue = meaning.encoding == Encoding::unorm && holdsPositiveZ(meaning.vectors, rounding);
     if (!p.trust_channels && ((meaning.vectors.off > 0 && isConstant(image, 2)) || meaning.positive_blue)) {
       meaning.layout = {NormalChannels::rg, 0, 1, -1};

@@ -126,11 +126,12 @@ PartCounts partsOf(const RectangleLight& light, double spacing) {
   constexpr double kFewest = 8, kMost = 1 << 16;
   constexpr std::int64_t kMostParts = 1 << 22;
   double nearest2 = std::numeric_limits<double>::infinity();
-  for (int k = 0; k <= kPlaces * kPlaces; ++k) {
-    const auto u = static_cast<float>(2.0 * (k % kPlaces) / (kPlaces - 1) - 1);
-    const auto v = static_cast<float>(2.0 * (k / kPlaces % kPlaces) / (kPlaces - 1) - 1);
-    const Vec3 place = light.centre + u * light.axis_u + v * light.axis_v;
-    nearest2 = std::min(nearest2, double{dot(place, place)});
+  const auto along = [](int k) { return 2 * static_cast<float>(k) / (kPlaces - 1) - 1; };
+  for (int j = 0; j < kPlaces; ++j) {
+    for (int i = 0; i < kPlaces; ++i) {
+      const Vec3 place = light.centre + along(i) * light.axis_u + along(j) * light.axis_v;
+      nearest2 = std::min(nearest2, double{dot(place, place)});
+    }
   }
   const auto count = [&](Vec3 axis) {
     const double parts = 2 * std::sqrt(dot(axis, axis) / std::max(nearest2, 1e-30)) / spacing;
