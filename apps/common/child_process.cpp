@@ -77,7 +77,7 @@ std::int64_t peakOf(const rusage& usage, std::int64_t seen) {
 }
 
 /// Reads what a process writes to two pipes, to the end of both. Looks at its memory now and then: a program that takes long is looked
-/// at less often, because a look takes 70 us.
+/// at less often, because the system adds up its pages for each look.
 void watch(pid_t process, std::array<std::pair<int, std::string*>, 2> pipes, std::int64_t& peak_bytes) {
   constexpr int kFewest_ms = 4, kMost_ms = 64, kLooks = 64;
   int looks = 0;
