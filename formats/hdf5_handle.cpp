@@ -42,7 +42,8 @@ Handle clusterType() {
   insert("narrow_columns", offsetof(NdfCluster, narrow_columns), H5T_STD_U16LE);
   insert("rank_x", offsetof(NdfCluster, rank_x), H5T_STD_U8LE);
   insert("rank_y", offsetof(NdfCluster, rank_y), H5T_STD_U8LE);
-  insert("reserved", offsetof(NdfCluster, reserved), H5T_STD_U16LE);
+  const Handle half = halfType();
+  insert("floor_unit", offsetof(NdfCluster, floor_unit), half);
   return type;
 }
 

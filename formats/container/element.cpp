@@ -114,7 +114,7 @@ constexpr std::array kClusterMembers = {
     Member{"narrow_columns", offsetof(NdfCluster, narrow_columns), Type::u16},
     Member{"rank_x", offsetof(NdfCluster, rank_x), Type::u8},
     Member{"rank_y", offsetof(NdfCluster, rank_y), Type::u8},
-    Member{"reserved", offsetof(NdfCluster, reserved), Type::u16},
+    Member{"floor_unit", offsetof(NdfCluster, floor_unit), Type::f16},
 };
 
 /// Name of a member, which a NUL ends, and in versions 1 and 2 NULs up to a multiple of 8 bytes.

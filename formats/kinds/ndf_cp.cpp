@@ -226,16 +226,29 @@ float coefficient(const NdfCp& ndf, const NdfCluster& cluster, std::uint64_t sli
 /// Sums over the pixels of a slice.
 struct SliceSums {
   double sum = 0;
-  double positive = 0;  ///< negative pixels taken as 0
+  double positive = 0;  ///< of pixels less their floors, negative ones taken as 0
 };
 
-SliceSums sumsOf(const float* pixels) {
+/// @param floors  [kBlockPixels]
+SliceSums sumsOf(const float* pixels, const float* floors) {
   SliceSums sums;
   for (int p = 0; p < kBlockPixels; ++p) {
     sums.sum += pixels[p];
-    sums.positive += std::max(0.0f, pixels[p]);
+    sums.positive += std::max(0.0f, pixels[p] - floors[p]);
   }
   return sums;
+}
+
+/// Floors of the pixels of cluster c, [kBlockPixels].
+std::vector<float> pixelFloors(const NdfCp& ndf, std::size_t c) {
+  std::vector<float> floors(kBlockPixels);
+  const float unit = ieeeHalfToFloat(ndf.clusters[c].floor_unit);
+  for (int p = 0; p < kBlockPixels; ++p) {
+    const auto cell = static_cast<std::size_t>(floorCell(p % kBlockSize, p / kBlockSize));
+    floors[static_cast<std::size_t>(p)] =
+        unit * ieeeHalfToFloat(static_cast<std::uint16_t>(ndf.floors[c * kFloorCells + cell] << 6));
+  }
+  return floors;
 }
 
 /// Adds the spots of a slice to its pixels.
@@ -254,7 +267,9 @@ void addSpots(const NdfCp& ndf, const NdfCluster& cluster, std::uint64_t first, 
 }
 
 /// Sums of all slices of a cluster.
-std::vector<SliceSums> clusterSums(const NdfCp& ndf, const NdfCluster& cluster) {
+std::vector<SliceSums> clusterSums(const NdfCp& ndf, std::size_t c) {
+  const NdfCluster& cluster = ndf.clusters[c];
+  const std::vector<float> floors = pixelFloors(ndf, c);
   std::vector<SliceSums> sums;
   const std::vector<float> images = basisImages(ndf, cluster);
   const std::uint8_t* counts =
@@ -270,11 +285,11 @@ std::vector<SliceSums> clusterSums(const NdfCp& ndf, const NdfCluster& cluster) 
       spots += static_cast<std::uint64_t>(count);
     }
     for (int k = 0; k < cluster.columns; ++k) {
-      const float c = coefficient(ndf, cluster, s, k);
+      const float weight = coefficient(ndf, cluster, s, k);
       const float* image = images.data() + k * kBlockPixels;
-      for (int p = 0; p < kBlockPixels; ++p) pixels[p] += c * image[p];
+      for (int p = 0; p < kBlockPixels; ++p) pixels[p] += weight * image[p];
     }
-    sums.push_back(sumsOf(pixels));
+    sums.push_back(sumsOf(pixels, floors.data()));
   }
   return sums;
 }
@@ -290,7 +305,7 @@ std::vector<SliceSums> sliceSums(const NdfCp& ndf, Findings& findings) {
   for (std::size_t c = 0; c < ndf.clusters.size(); ++c) {
     const NdfCluster& cluster = ndf.clusters[c];
     if (cluster.slice_count == 0) continue;
-    const std::vector<SliceSums> sums = clusterSums(ndf, cluster);
+    const std::vector<SliceSums> sums = clusterSums(ndf, c);
     const std::size_t place = c % places, region = c / places;
     const std::uint64_t bit = std::uint64_t{1} << (place % 64);
     std::size_t slice = 0;
@@ -342,7 +357,7 @@ void checkDensities(const NdfCp& ndf, Findings& findings) {
                  counted(bad_integrals, {"image does", "images do"}) + " not integrate to 1 (worst " + numberText(worst) + ")");
   if (bad_images > 0)
     findings.add("compressed.density_scales", "/density_scales",
-                 counted(bad_images, {"image does", "images do"}) + " not integrate to 1 without negative parts");
+                 counted(bad_images, {"image does", "images do"}) + " not integrate to 1 above the floors");
   if (bad_masses > 0)
     findings.add("compressed.block_masses", "/block_masses",
                  counted(bad_masses, {"mass is", "masses are"}) + " not a slice's share of its image, rounded up");
@@ -361,7 +376,7 @@ void describeImages(Fields auto& fields, auto& ndf) {
   fields.array("image_slots", ndf.image_slots, {"images"}, "1", "slot of an image in its region");
   fields.array("image_scales", ndf.image_scales, {"images"}, "1", "factor that makes an image integrate to 1");
   fields.array("density_scales", ndf.density_scales, {"images"}, "1",
-               "factor that makes an image without its negative parts integrate to 1");
+               "factor that makes an image, less its floors and without negative parts, integrate to 1");
   fields.array("block_places", ndf.block_places, {"blocks_per_image"}, "1", "place of a block; 65535: it occurs in no image");
   fields.array("place_blocks", ndf.place_blocks, {"places"}, "1", "block of a place");
   fields.array("block_masks", ndf.block_masks, {"images", "place_words"}, "1",
@@ -384,6 +399,8 @@ void describeClusters(Fields auto& fields, auto& ndf) {
               {"coefficient_count"}, "1", "coefficients of each cluster, a row for each slice; or its spots");
   fields.array("scales", ndf.scales, {"scale_count"}, "1", "scale of each column of each cluster");
   fields.array("core", ndf.core, {"core_count"}, "1", "tucker: a + 16 b of each column of each cluster");
+  fields.array("floors", ndf.floors, {"regions", "places", "16"}, "1",
+               "floor of each cell over the floor_unit of the cluster: bits 6 to 13 of a half-precision number");
   fields.array("spot_sums", ndf.spot_sums, {"spot_sum_count"}, "1", "share of a spot up to edges of pixels, or nothing");
 }
 
@@ -406,10 +423,11 @@ struct KindDescription<NdfCp> {
   }
   static std::vector<Rule> valueRules() {
     return {errorRule("compressed.image_scales", "image_scales are finite and positive"),
-            errorRule("compressed.density_scales", "density_scales make the positive parts of images integrate to 1"),
+            errorRule("compressed.density_scales", "density_scales make the parts of images above their floors integrate to 1"),
             errorRule("compressed.block_masks", "block_masks name the slices of the clusters"),
             errorRule("compressed.block_masses", "block_masses are the shares of the slices, rounded up"),
             errorRule("compressed.scales", "scales are finite"),
+            errorRule("compressed.floors", "units of floors are finite and not negative, and 0 for clusters of spots"),
             errorRule("compressed.factors", "coefficients are finite, and sums of spots between 0 and 1"),
             warningRule("compressed.integral", "every image integrates to 1 within 1e-3")};
   }
@@ -478,6 +496,14 @@ struct KindDescription<NdfCp> {
     reportUnless(
         ndf.spot_sums.size(), [&](std::size_t k) { return ndf.spot_sums[k] >= 0 && ndf.spot_sums[k] <= 1; },
         "compressed.factors", "/spot_sums", values, "not between 0 and 1", findings);
+    reportUnless(
+        ndf.clusters.size(),
+        [&](std::size_t k) {
+          const NdfCluster& cluster = ndf.clusters[k];
+          return cluster.floor_unit == 0 || (cluster.columns > 0 && cluster.floor_unit <= kLargestHalf);
+        },
+        "compressed.floors", "/clusters", {"unit of floors is", "units of floors are"},
+        "not finite and positive, or of a cluster of spots", findings);
     checkDensities(ndf, findings);
   }
 };

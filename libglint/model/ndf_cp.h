@@ -31,9 +31,15 @@ struct NdfCluster {
   std::uint16_t narrow_columns = 0;     ///< i8: columns of 4 bits
   std::uint8_t rank_x = 0;              ///< tucker: columns of U
   std::uint8_t rank_y = 0;              ///< tucker: columns of V
-  std::uint16_t reserved = 0;
+  std::uint16_t floor_unit = 0;         ///< density of a floor of 1, half precision, >= 0
 };
 static_assert(sizeof(NdfCluster) == 32);
+
+/// Pixels of a cell of floors along each axis, and the cells of a block.
+inline constexpr int kFloorPixels = 4;
+inline constexpr int kFloorCells = (kBlockSize / kFloorPixels) * (kBlockSize / kFloorPixels);
+/// Cell of a pixel of a block.
+GLINT_HD constexpr int floorCell(int x, int y) { return y / kFloorPixels * (kBlockSize / kFloorPixels) + x / kFloorPixels; }
 
 /// The blurred image of a facet in a slice: a Gaussian of variance sigma_r^2 around a point, times a weight.
 struct NdfSpot {
@@ -93,7 +99,8 @@ struct NdfCp {
   std::span<const std::uint16_t> image_regions;  ///< [images]
   std::span<const std::uint16_t> image_slots;    ///< [images]
   std::span<const float> image_scales;           ///< [images]: factor that makes the image integrate to 1
-  std::span<const float> density_scales;  ///< [images]: the factor if negative pixels count as 0; 0 if no pixel is positive
+  std::span<const float>
+      density_scales;  ///< [images]: the factor if pixels are less their floors, and negative ones count as 0; 0 if none is left
   std::span<const std::uint16_t> block_places;  ///< [blocksPerImage]: place of a block, or kNoBlockPlace
   std::span<const std::uint16_t> place_blocks;  ///< [places]: block of a place, rising
   std::span<const NdfCluster> clusters;         ///< [regions][places]
@@ -117,7 +124,10 @@ struct NdfCp {
   std::uint64_t coefficient_count = 0;
   std::span<const float> scales;       ///< [columns] of each cluster: density = sum of scale * basis * coefficient
   std::span<const std::uint8_t> core;  ///< tucker, indexed like `scales`: a + 16 b of each column
-  std::span<const float> spot_sums;    ///< [kSpotSums]: integral of a spot's profile up to a pixel edge; empty without spots
+  /// [regions][places][kFloorCells]: codes of block_mass.h. A code times NdfCluster::floor_unit is the floor of a cell: what is
+  /// taken off the pixels of a slice before negative pixels count as 0. Without it, small errors in the dark add up to a haze.
+  std::span<const std::uint8_t> floors;
+  std::span<const float> spot_sums;  ///< [kSpotSums]: integral of a spot's profile up to a pixel edge; empty without spots
 
   GLINT_HD constexpr int placeWords() const { return (places + 63) / 64; }
 };

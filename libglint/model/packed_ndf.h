@@ -39,7 +39,7 @@ static_assert(sizeof(PackedGrid) == 16);
 enum class PackedKind : std::uint32_t { normals = 0, pyramid = 1, compressed = 2, unknown = 0xffffffff };
 
 inline constexpr std::uint32_t kPackedMagic = 0x6e6c6721;  // "!gln"
-inline constexpr std::uint32_t kPackedVersion = 4;
+inline constexpr std::uint32_t kPackedVersion = 5;
 inline constexpr std::size_t kPackedAlignment = 64;
 /// Numbers of arrays of a level of a pyramid, and of a compressed pyramid. PackedHeader::arrays has room for either.
 inline constexpr int kPackedArrays = 4 * kMaxPyramidLevels;
@@ -75,7 +75,7 @@ struct PackedHeader {
   std::uint32_t reserved[11];                                //  852  0
   /// 896. Pyramid: masks, mask_ranks, block_means and pixels of level l at 4 l. Compressed: image_regions, image_slots,
   /// image_scales, clusters, masks, mask_ranks, basis, coefficients, scales, density_scales,
-  /// block_masks, first_block, block_masses, block_places, place_blocks, core, spot_sums.
+  /// block_masks, first_block, block_masses, block_places, place_blocks, core, spot_sums, floors.
   PackedArray arrays[kPackedArrays];
 };
 static_assert(offsetof(PackedHeader, size_bytes) == 8 && offsetof(PackedHeader, kind) == 16);

@@ -24,8 +24,8 @@ namespace glint {
 /// Chooses images as PyramidNdf does. A pixel is a sum of products of few factors. The sum over a box of pixels has the same
 /// form, with factors from prefix sums (Eq. 6 and 7). Slices of few facets are stored as spots and an even rest instead.
 ///
-/// Approximated pixels can be negative. `density` takes negative pixels as 0, and scales the image so that it then integrates to
-/// 1; between the half vectors of a pixel see Pixels. `mean` is a difference of prefix sums, which include negative pixels: over
+/// Approximated pixels can be negative. `density` takes floors off the pixels (NdfCp::floors), takes negative pixels as 0, and
+/// scales the image so that it then integrates to 1; between the half vectors of a pixel see Pixels. `mean` is a difference of prefix sums, which include negative pixels: over
 /// whole pixels it is the exact average of `signedDensity`, clamped at the end, and that of `density` where no pixel is negative.
 /// Thread-safe, allocates nothing; the arrays must outlive it.
 class CpNdf {
@@ -117,7 +117,7 @@ class CpNdf {
   GLINT_HD float imageMean(const PyramidSlices& chosen, const PixelPlace& place) const {
     return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
       return finitePositive(
-          sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<Reader>{reader, place}, Positive{}));
+          sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<Reader>{reader, place}, Positive{ndf_, place}));
     });
   }
   GLINT_HD HalfVectorSample imageSample(const Footprint& p, Vec2 xi) const;
@@ -126,15 +126,23 @@ class CpNdf {
     return std::size_t{ndf_.first_image[slice.level]} + slice.image;
   }
 
-  /// Keeps negative values of a slice.
+  /// Keeps the values of slices as they are, negative ones too.
   struct Signed {
+    GLINT_HD Signed in(const NdfCluster&) const { return {}; }
     GLINT_HD float operator()(float value) const { return value; }
     GLINT_HD Float4 operator()(Float4 values) const { return values; }
   };
-  /// Takes negative values of a slice as 0.
+  /// Takes the floor of the cluster off the values of slices, and takes negative values as 0.
+  struct AboveFloor {
+    float floor;
+    GLINT_HD float operator()(float value) const { return std::max(0.0f, value - floor); }
+    GLINT_HD Float4 operator()(Float4 values) const { return (values - Float4::all(floor)).positive(); }
+  };
+  /// AboveFloor, for one pixel of any cluster.
   struct Positive {
-    GLINT_HD float operator()(float value) const { return std::max(0.0f, value); }
-    GLINT_HD Float4 operator()(Float4 values) const { return values.positive(); }
+    const NdfCp& ndf;
+    PixelPlace place;
+    GLINT_HD AboveFloor in(const NdfCluster& cluster) const { return {PixelFloors(ndf, cluster).at(place.x, place.y)}; }
   };
 
   /// Asks a block for one pixel.
@@ -216,31 +224,32 @@ class CpNdf {
       const NdfCluster& cluster = ndf_.clusters.data()[at];
       if (ask.alone(cluster)) {
         left &= left - 1;
-        sum += places.weights[lowest] * part(ask.valueAlone(cluster, places.slices[lowest]));
+        sum += places.weights[lowest] * part.in(cluster)(ask.valueAlone(cluster, places.slices[lowest]));
         continue;
       }
       const auto shares = [&](int step) { return whereEqual(places.clusters + step, at, Float4::load(places.weights + step)); };
       const unsigned here = countedIn(places, at);
       left &= ~here;
       if (cluster.columns == 0) {
-        sum += addSpots(cluster, places, here, ask, part);
+        sum += addSpots(cluster, places, here, ask);
         continue;
       }
       const ColumnLayout layout(cluster);
       float projection[ColumnLayout::kMost];
       ask.project(cluster, layout, projection);
       const auto rows = ask.reader.rows(cluster, layout);
+      const auto kept = part.in(cluster);
       for (int step = 0; step < places.count; step += 4) {
         const unsigned lanes = here >> step & 15;
         if (lanes == 0) continue;
         const int first = step + lowestBit(lanes);
         if ((lanes & (lanes - 1)) == 0) {
-          sum += places.weights[first] * part(ask.reader.dot(projection, layout, rows(places.slices[first])));
+          sum += places.weights[first] * kept(ask.reader.dot(projection, layout, rows(places.slices[first])));
           continue;
         }
         // Four slices are read at once. Lanes of other clusters repeat a slice of this cluster, with weight 0.
         const auto lane = [&](int k) { return rows(places.slices[lanes >> k & 1 ? step + k : first]); };
-        sum += (shares(step) * part(ask.reader.dots(projection, layout, {lane(0), lane(1), lane(2), lane(3)}))).sum();
+        sum += (shares(step) * kept(ask.reader.dots(projection, layout, {lane(0), lane(1), lane(2), lane(3)}))).sum();
       }
     }
     return sum;
@@ -263,7 +272,7 @@ class CpNdf {
       if (places.weights[k] > 0) prefetch(reader.row(ndf_.clusters.data()[places.clusters[k]], places.slices[k]));
   }
 
-  /// Adds the part of a window that lies in a block. Negative pixels of a slice count as 0.
+  /// Adds the part of a window that lies in a block. Pixels of a slice are less their floors, and negative ones count as 0.
   /// @param x, y  column and row of the window's first pixel in the block, -2 to 15
   template <class Reader>
   GLINT_HD void addWindow(const Reader& reader, const SlicePlaces& places, int x, int y, WindowRows& window) const {
@@ -300,6 +309,9 @@ class CpNdf {
     constexpr int kRows = ColumnWindows::kRows;
     ColumnWindows columns;
     reader.window(cluster, x, y, columns);
+    const PixelFloors all_floors(ndf_, cluster);
+    Float4 floors[kRows];
+    for (int row = 0; row < kRows; ++row) floors[row] = all_floors.three(x, y + row);
     for (; here != 0; here &= here - 1) {
       const int slice = lowestBit(here);
       float scaled[kMaxColumns];
@@ -317,7 +329,8 @@ class CpNdf {
       if (k < cluster.columns)
         for (int row = 0; row < kRows; ++row) even[row] = even[row] + Float4::all(scaled[k]) * columns.row(k, row);
       for (int row = 0; row < kRows; ++row)
-        window.rows[row] = window.rows[row] + Float4::all(places.weights[slice]) * (even[row] + odd[row]).positive();
+        window.rows[row] =
+            window.rows[row] + Float4::all(places.weights[slice]) * (even[row] + odd[row] - floors[row]).positive();
     }
   }
 
@@ -347,14 +360,13 @@ class CpNdf {
 
   /// Weighted sum over slices of a cluster of spots.
   /// @param here  bit k: slice k of `places` is in the cluster
-  template <class Ask, class Part>
-  GLINT_HD float addSpots(const NdfCluster& cluster, const SlicePlaces& places, unsigned here, const Ask& ask,
-                          Part part) const {
+  template <class Ask>
+  GLINT_HD float addSpots(const NdfCluster& cluster, const SlicePlaces& places, unsigned here, const Ask& ask) const {
     const SpotProfile profile(ndf_);
     float sum = 0;
     for (; here != 0; here &= here - 1) {
       const int k = lowestBit(here);
-      sum += places.weights[k] * part(ask.spots(profile, spotsOf(ndf_, cluster, places.slices[k])));
+      sum += places.weights[k] * ask.spots(profile, spotsOf(ndf_, cluster, places.slices[k]));
     }
     return sum;
   }
@@ -379,11 +391,11 @@ class CpNdf {
         reader.sliceWeights(cluster_, reader.row(cluster_, at.slice), weights_);
     }
 
-    /// A lower bound of the mass of each row: its sum with negative pixels included.
+    /// A lower bound of the mass of each row: its sum with floors taken off and negative pixels included.
     GLINT_HD Float16 leastSums() const {
-      return cluster_.columns == 0 ? spotRowSums(profile_, spots_) : reader_.rowSums(cluster_, weights_).positive();
+      return cluster_.columns == 0 ? spotRowSums(profile_, spots_) : reader_.leastSums(cluster_, weights_);
     }
-    /// The mass of each row beyond `least`, with negative pixels taken as 0. Decodes all pixels.
+    /// The mass of each row beyond `least`. Decodes all pixels.
     GLINT_HD Float16 addedSums(const Float16& least) const {
       float pixels[kBlockPixels];
       if (cluster_.columns == 0)  // no pixel of spots is negative

@@ -94,6 +94,7 @@ class PackedNdfView {
     out.place_blocks = array<std::uint16_t>(arrays[14]);
     out.core = array<std::uint8_t>(arrays[15]);
     out.spot_sums = array<float>(arrays[16]);
+    out.floors = array<std::uint8_t>(arrays[17]);
     return out;
   }
 

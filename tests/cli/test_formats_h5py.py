@@ -124,6 +124,20 @@ def compressed_image(file, m):
     return image * file["image_scales"][m]
 
 
+def floors(file, m):
+    """What is taken off the pixels of an image, before its scale, where densities must not be negative."""
+    resolution = file.attrs["resolution"]
+    per_axis = resolution // 16
+    image = np.zeros((resolution, resolution))
+    region = int(file["image_regions"][m])
+    for place, b in enumerate(file["place_blocks"][...].astype(int)):
+        codes = file["floors"][region, place].reshape(4, 4).astype(np.uint16) * 64
+        block = np.kron(codes.view(np.float16).astype(np.float64), np.ones((4, 4)))
+        y, x = 16 * (b // per_axis), 16 * (b % per_axis)
+        image[y : y + 16, x : x + 16] = block * float(file["clusters"][region, place]["floor_unit"])
+    return image
+
+
 def block_shares(file, m):
     """Stored shares of the blocks of an image, by block."""
     blocks = (file.attrs["resolution"] // 16) ** 2
@@ -193,7 +207,7 @@ def test_compressed(name, values):
     images = [compressed_image(file, m) for m in range(len(file["image_regions"]))]
     for m, image in enumerate(images):
         assert abs(integral(image) - 1) < INTEGRAL_TOLERANCE
-        density = np.maximum(image, 0) / file["image_scales"][m] * file["density_scales"][m]
+        density = np.maximum(image / file["image_scales"][m] - floors(file, m), 0) * file["density_scales"][m]
         assert abs(integral(density) - 1) < INTEGRAL_TOLERANCE
         per_axis = len(image) // 16
         shares = density.reshape(per_axis, 16, per_axis, 16).sum(axis=(1, 3)).ravel() * (2 / len(image)) ** 2

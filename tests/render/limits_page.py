@@ -76,9 +76,8 @@ SEEN = {
     "pyramid": "The lobe of a facet is narrower than a pixel of the images (.64 pixels at the default --resolution), and the small light is as wide as one pixel. "
                "So where a footprint holds few facets or thin lines of directions, far scratches and brushed metal above all, pictures under the small light are "
                f"softer and lose a few percent of the light: glint-pyramid --resolution auto makes the pixels smaller than the lobe. {NEAR}",
-    "tucker": "It errs as the pyramid does, and by its tolerance, which holds for each half vector on average over places and not for each place. On flakes under the "
-              "small light, the dark between far sparkles is lit by a haze: even over a block of the images, and more in one block than in the next.",
-    "cp": "It errs as the pyramid does, and by its rank. Negative parts of low rank are cut, which leaves light where there should be none.",
+    "tucker": "It errs as the pyramid does, and by its tolerance, which holds for each half vector on average over places and not for each place.",
+    "cp": "It errs as the pyramid does, and by its rank. Negative parts of low rank are cut, and floors keep the mean light of each cell of half vectors.",
     "pca": "It errs as tucker does.",
     "bin map": "Its pictures are those of brute force over boxes. Boxes have hard edges, so sparkles appear and vanish at once as the picture moves, more than under "
                "Gaussians.",

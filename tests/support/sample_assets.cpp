@@ -272,9 +272,13 @@ void addCluster(SampleNdfCp& sample, const std::vector<const Image*>& slots, int
     cluster.columns = static_cast<std::uint16_t>(columnsOf(sample.ndf.method));
     cluster.narrow_columns = form == SampleForm::narrow ? 2 : 0;
     cluster.rank_x = cluster.rank_y = sample.ndf.method == CompressionMethod::tucker ? 2 : 0;
+    cluster.floor_unit = floatToHalf(0.25f);
     addBasis(sample);
     addCoefficients(sample, slices, cluster.narrow_columns);
   }
+  // Floors of 0.02 to 0.13 in clusters of columns.
+  for (int cell = 0; cell < kFloorCells; ++cell)
+    sample.floors.push_back(cluster.columns > 0 ? static_cast<std::uint8_t>(180 + 3 * cell) : 0);
   sample.clusters.push_back(cluster);
   sample.masks.push_back(mask);
   sample.mask_ranks.push_back(0);
@@ -297,6 +301,7 @@ void linkSpans(SampleNdfCp& sample) {
   ndf.block_places = sample.block_places;
   ndf.place_blocks = sample.place_blocks;
   ndf.spot_sums = sample.spot_sums;
+  ndf.floors = sample.floors;
   ndf.basis = sample.basis;
   ndf.coefficients = !sample.coefficients_i8.empty()    ? static_cast<const void*>(sample.coefficients_i8.data())
                      : !sample.coefficients_f16.empty() ? static_cast<const void*>(sample.coefficients_f16.data())
@@ -315,6 +320,13 @@ double coefficientElement(const NdfCp& ndf, std::uint64_t index) {
     default:
       return static_cast<const float*>(ndf.coefficients)[index];
   }
+}
+
+/// Cluster that has the pixel of an image.
+std::size_t clusterOf(const NdfCp& ndf, int image, int x, int y) {
+  const int block = y / kBlockSize * ndf.shape.blocksPerAxis() + x / kBlockSize;
+  return static_cast<std::size_t>(ndf.image_regions[static_cast<std::size_t>(image)] * ndf.places +
+                                  ndf.block_places[static_cast<std::size_t>(block)]);
 }
 
 /// Value of a column's basis image at a pixel of its block: differences of the prefix sums.
@@ -366,7 +378,7 @@ double spotValue(const NdfCp& ndf, const NdfCluster& cluster, std::uint64_t slic
          ndf.scales[cluster.first_scale + 1] * static_cast<double>(halfToFloat(static_cast<std::uint16_t>(code << 6)));
 }
 
-/// The share of each block in the positive part of its image, rounded up to a code: the first that is not below.
+/// The share of each block in the part of its image above the floors, rounded up to a code: the first that is not below.
 void addBlockMasses(SampleNdfCp& sample) {
   const NdfCp& ndf = sample.ndf;
   const int blocks = ndf.shape.blocksPerImage();
@@ -376,7 +388,8 @@ void addBlockMasses(SampleNdfCp& sample) {
     double total = 0;
     for (int p = 0; p < kResolution * kResolution; ++p) {
       const int x = p % kResolution, y = p / kResolution;
-      const double value = std::max(0.0f, ndfCpPixel(ndf, static_cast<int>(image), x, y)) / sample.image_scales[image];
+      const float pixel = ndfCpPixel(ndf, static_cast<int>(image), x, y) / sample.image_scales[image];
+      const double value = std::max(0.0f, pixel - ndfCpFloor(ndf, static_cast<int>(image), x, y));
       sums[static_cast<std::size_t>(y / kBlockSize * ndf.shape.blocksPerAxis() + x / kBlockSize)] += value;
       total += value;
     }
@@ -1066,12 +1079,17 @@ float pyramidPixel(const NdfPyramid& pyramid, int level, int image, int x, int y
   return pyramid.value_scale * stored;
 }
 
+float ndfCpFloor(const NdfCp& ndf, int image, int x, int y) {
+  const std::size_t c = clusterOf(ndf, image, x, y);
+  const auto cell =
+      static_cast<std::size_t>(y % kBlockSize / kFloorPixels * (kBlockSize / kFloorPixels) + x % kBlockSize / kFloorPixels);
+  return halfToFloat(ndf.clusters[c].floor_unit) *
+         halfToFloat(static_cast<std::uint16_t>(ndf.floors[c * kFloorCells + cell] << 6));
+}
+
 float ndfCpPixel(const NdfCp& ndf, int image, int x, int y) {
   const auto k = static_cast<std::size_t>(image);
-  const int block = y / kBlockSize * ndf.shape.blocksPerAxis() + x / kBlockSize;
-  const auto c =
-      static_cast<std::size_t>(ndf.image_regions[k] * ndf.places + ndf.block_places[static_cast<std::size_t>(block)]);
-  const NdfCluster& cluster = ndf.clusters[c];
+  const NdfCluster& cluster = ndf.clusters[clusterOf(ndf, image, x, y)];
   const int slot = ndf.image_slots[k];
   const std::size_t word = cluster.first_word + static_cast<std::size_t>(slot / 64);
   if ((ndf.masks[word] >> (slot % 64) & 1u) == 0) return 0;

@@ -80,6 +80,7 @@ struct SampleNdfCp {
   std::vector<std::uint16_t> block_places;
   std::vector<std::uint16_t> place_blocks;
   std::vector<float> spot_sums;
+  std::vector<std::uint8_t> floors;
   NdfCp ndf;
 };
 
@@ -206,5 +207,7 @@ float halfToFloat(std::uint16_t bits);
 /// Pixel (x, y) of an image, read as SPEC.md says.
 float pyramidPixel(const NdfPyramid& pyramid, int level, int image, int x, int y);
 float ndfCpPixel(const NdfCp& ndf, int image, int x, int y);
+/// What is taken off the pixel before negative pixels count as 0.
+float ndfCpFloor(const NdfCp& ndf, int image, int x, int y);
 
 }  // namespace glint::test

@@ -73,8 +73,8 @@ void expectReadersAgree(const NdfCp& ndf, const Reader& reader, Compared& compar
       expectEqual(avx2_scaled, scaled, cluster.columns, "coefficient");
       reader.sliceWeights(cluster, rows[1], weights);
       avx2.sliceWeights(cluster, rows[1], avx2_weights);
-      reader.rowSums(cluster, weights).store(sums);
-      avx2.rowSums(cluster, avx2_weights).store(avx2_sums);
+      reader.leastSums(cluster, weights).store(sums);
+      avx2.leastSums(cluster, avx2_weights).store(avx2_sums);
       expectEqual(avx2_sums, sums, kBlockSize, "sum of row");
       reader.rowPixels(cluster, weights, y).store(sums);
       avx2.rowPixels(cluster, avx2_weights, y).store(avx2_sums);

@@ -104,6 +104,40 @@ TEST(RankAllocator, NoSelectionOfFewerBytesHasAsSmallAnError) {
   EXPECT_GT(between, 100);
 }
 
+TEST(RankAllocator, KeepsTheBoundOfEveryCluster) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(0, 1);
+  int bound_clusters = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const Clusters clusters(random);
+    const auto spans = clusters.spans();
+    std::vector<double> bounds;
+    for (const auto& choices : spans) bounds.push_back(unit(random) * choices.front().error);
+    const RankAllocator free(spans), bound(spans, bounds);
+    for (const double share : {0.1, 0.5, 0.9, 2.0}) {
+      const double target = share * free.largestError();
+      const std::vector<int> chosen = bound.allocate(target), unbound = free.allocate(target);
+      EXPECT_LE(clusters.error(chosen), std::max(target, bound.smallestError()) * (1 + kRounding));
+      std::uint64_t fewest = clusters.bytes(clusters.last());
+      for (std::size_t c = 0; c < spans.size(); ++c) {
+        const auto at = static_cast<std::size_t>(chosen[c]);
+        EXPECT_TRUE(spans[c][at].error <= bounds[c] || at + 1 == spans[c].size());
+        bound_clusters += chosen[c] > unbound[c];
+      }
+      clusters.forEachSelection([&](const std::vector<int>& s) {
+        bool holds = clusters.error(s) <= target;
+        for (std::size_t c = 0; c < spans.size(); ++c) {
+          const auto at = static_cast<std::size_t>(s[c]);
+          holds = holds && (spans[c][at].error <= bounds[c] || at + 1 == spans[c].size());
+        }
+        if (holds) fewest = std::min(fewest, clusters.bytes(s));
+      });
+      EXPECT_LT(clusters.bytes(chosen), fewest + 40);  // the longest step
+    }
+  }
+  EXPECT_GT(bound_clusters, 100);
+}
+
 TEST(RankAllocator, TakesEverythingWhereNothingIsEnough) {
   std::mt19937 random(2);
   const Clusters clusters(random);

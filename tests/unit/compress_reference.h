@@ -101,6 +101,35 @@ inline std::vector<double> decodeImage(const NdfCp& c, std::uint32_t image) {
   return pixels;
 }
 
+/// Floors of the pixels of an image, in the units of decodeImage.
+inline std::vector<double> decodeFloors(const NdfCp& c, std::uint32_t image) {
+  const int n = c.shape.resolution, blocks = c.shape.blocksPerAxis();
+  std::vector<double> floors(static_cast<std::size_t>(n) * n, 0.0);
+  for (int place = 0; place < c.places; ++place) {
+    const int b = c.place_blocks[place];
+    const std::size_t cluster = static_cast<std::size_t>(c.image_regions[image]) * c.places + place;
+    const double unit = c.image_scales[image] * decodeHalf(c.clusters[cluster].floor_unit);
+    for (int y = 0; y < kBlockSize; ++y)
+      for (int x = 0; x < kBlockSize; ++x)
+        floors[(b / blocks * kBlockSize + y) * n + b % blocks * kBlockSize + x] =
+            unit * decodeHalf(static_cast<std::uint16_t>(c.floors[cluster * 16 + y / 4 * 4 + x / 4] << 6));
+  }
+  return floors;
+}
+
+/// Densities of an image as a reader shows them: less their floors, not negative, and of integral 1 unless all are 0.
+inline std::vector<double> decodeDensities(const NdfCp& c, std::uint32_t image) {
+  std::vector<double> pixels = decodeImage(c, image);
+  const std::vector<double> floors = decodeFloors(c, image);
+  double sum = 0;
+  for (std::size_t p = 0; p < pixels.size(); ++p) {
+    pixels[p] = std::max(0.0, pixels[p] - floors[p]);
+    sum += pixels[p] * 4 / static_cast<double>(pixels.size());
+  }
+  for (double& pixel : pixels) pixel = sum > 0 ? pixel / sum : 0;
+  return pixels;
+}
+
 /// The same from the pyramid itself (f32 pixels).
 inline std::vector<double> storedImage(const NdfPyramid& p, int level, std::size_t image) {
   const int n = p.shape.resolution;

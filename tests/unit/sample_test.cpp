@@ -253,7 +253,7 @@ void expectRowsAreThePixels(const NdfCp& ndf, const Reader& reader, SliceKinds& 
       reader.scaledCoefficients(cluster, row, scaled);
       reader.sliceWeights(cluster, row, weights);
       float sums[kBlockSize], pixels[kBlockPixels], largest = 0;
-      reader.rowSums(cluster, weights).store(sums);
+      reader.leastSums(cluster, weights).store(sums);
       for (int y = 0; y < kBlockSize; ++y) {
         for (int x = 0; x < kBlockSize; ++x) {
           float projection[ColumnLayout::kMost];
@@ -263,6 +263,8 @@ void expectRowsAreThePixels(const NdfCp& ndf, const Reader& reader, SliceKinds& 
             largest += std::abs(projection[placeOf(layout, k)] * scaled[k] / ndf.scales[cluster.first_scale + k]);
         }
       }
+      const PixelFloors floors(ndf, cluster);
+      for (int p = 0; p < kBlockPixels; ++p) pixels[p] -= floors.at(p % kBlockSize, p / kBlockSize);
       const float least = *std::min_element(pixels, pixels + kBlockPixels);
       ++(least < 0 ? kinds.with_negatives : kinds.without_negatives);
       for (int y = 0; y < kBlockSize; ++y) {
@@ -275,7 +277,7 @@ void expectRowsAreThePixels(const NdfCp& ndf, const Reader& reader, SliceKinds& 
           sum += pixel;
           positive += std::max(0.0f, pixel);
         }
-        ASSERT_NEAR(sums[y], sum, kRounding * largest) << y;
+        ASSERT_NEAR(sums[y], std::max(0.0, sum), kRounding * largest) << y;
         kinds.mass += positive;
         kinds.hidden += positive - std::max(0.0, sum);
       }
@@ -298,7 +300,7 @@ TEST(Sample, OfCompressedPyramidsFollowsTheDensity) {
                   kinds.with_negatives, 100 * kinds.hidden / kinds.mass);
       if (c->name != "flakes") continue;
       // Rows are chosen in both ways, the slow one often enough that the test notices when it is wrong.
-      EXPECT_GT(kinds.without_negatives, 15);
+      EXPECT_GT(kinds.without_negatives, 5);
       EXPECT_GT(kinds.with_negatives, 100);
       if (method != CompressionMethod::pca) {
         EXPECT_GT(kinds.hidden, 0.015 * kinds.mass);

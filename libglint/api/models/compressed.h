@@ -42,6 +42,7 @@ struct NdfTraits<AnisotropicNdf<CpNdf>> {
     header.arrays[14] = packer.add(ndf.place_blocks);
     header.arrays[15] = packer.add(ndf.core);
     header.arrays[16] = packer.add(ndf.spot_sums);
+    header.arrays[17] = packer.add(ndf.floors);
     if (source.normals != nullptr) packer.addNormals(*source.normals);
   }
 };

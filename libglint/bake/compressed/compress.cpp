@@ -27,6 +27,12 @@ namespace {
 constexpr double kLeastEnergy = 0.5;
 // Images of less mass hardly count in any answer, and are not reported when they are not scaled.
 constexpr double kLeastMass = 0.01;
+// Least share of the error of columns that floors and positive parts are taken to leave: larger shares were measured, and a
+// smaller one would be chance.
+constexpr double kLeastCorrection = 0.05;
+// Largest error of an angular block over the tolerance. Without it, blocks in which errors are cheap have small errors, and pay
+// for large ones in the block of sparse flakes that most lights show. Twice the tolerance takes a fifth more bytes there.
+constexpr double kWorstBlock = 2;
 
 void checkOptions(const CompressionOptions& options) {
   const auto require = [](bool valid, const char* rule, const std::string& what) {
@@ -236,6 +242,28 @@ class Compressor {
     });
     models_.reserve(models.size());
     for (auto& model : models) models_.push_back(std::move(*model));
+    if (options_.metric == ErrorMetric::seen && options_.tolerance > 0 && options_.method != CompressionMethod::cp)
+      correctModels();
+  }
+
+  /// Measures one choice of columns of each cluster as a reader sees it, and corrects the errors of all its choices by it. The
+  /// choice is one that the bound of its block would ask for.
+  void correctModels() {
+    progress_.grow(index_.clusterCount());
+    std::vector<double> bounds;
+    for (std::size_t g = 0; g < groups_.size(); ++g)
+      for (const double bound : blockBounds(g)) bounds.push_back(bound);
+    forEachCluster([&](std::size_t c) {
+      if (!models_[c].hasColumns() || !(bounds[c] > 0)) return;
+      double predicted = 0;
+      const ClusterBasis basis = models_[c].columnsNear(bounds[c], predicted);
+      const EncodedCluster encoded =
+          encodeCluster(index_, weights_, c, statistics_[c], basis, *options_.method, type_, 0, density_scales_);
+      double measured = 0;
+      for (const SliceError& slice : encoded.errors.slices) measured += slice.seen.error;
+      measured *= static_cast<double>(statistics_[c].peak) * statistics_[c].peak;
+      models_[c].correctColumns(std::clamp(measured / predicted, kLeastCorrection, 1.0));
+    });
   }
 
   /// Encodes every cluster, and scales the images.
@@ -251,9 +279,18 @@ class Compressor {
     const bool keeps_bases = options_.method == CompressionMethod::cp;  // another decomposition would cost most of the time
     std::optional<ClusterBasis>& kept = bases_[c];
     if (choice != selection_[c] || !kept) kept = models_[c].basis(choice);
-    encoded_[c] = encodeCluster(index_, weights_, c, statistics_[c], *kept, *options_.method, type_, groupOf(c).gain_per_byte,
+    encoded_[c] = encodeCluster(index_, weights_, c, statistics_[c], *kept, *options_.method, type_, gainPerByte(c, choice),
                                 density_scales_);
     if (!keeps_bases) kept.reset();
+  }
+
+  /// Weighted squared error that a byte of a cluster must remove to be worth storing: what the last byte of its group removes,
+  /// or the last byte of the cluster where its bound asks for more.
+  double gainPerByte(std::size_t c, int choice) {
+    const double group = groupOf(c).gain_per_byte;
+    if (choice == 0 || group == 0) return group;
+    const SizeChoice &last = models_[c].choices()[choice], &before = models_[c].choices()[choice - 1];
+    return std::min(group, (before.error - last.error) / static_cast<double>(last.bytes - before.bytes));
   }
 
   /// Finds the scale with which each image integrates to its mass.
@@ -344,6 +381,24 @@ class Compressor {
     return options_.metric == ErrorMetric::seen ? (endLevel(group) - firstLevel(group)) * most * most : sum;
   }
 
+  /// Weighted squared error that each cluster of a group may have, so that a light towards its half vectors shows no more than
+  /// kWorstBlock times the tolerance. Regions of a block share its bound by their energy.
+  std::vector<double> blockBounds(std::size_t group) const {
+    std::vector<double> bounds;
+    if (options_.metric != ErrorMetric::seen || options_.method == CompressionMethod::cp) return bounds;
+    const auto blocks = static_cast<std::size_t>(index_.blockCount());
+    const std::size_t first = group * clustersPerGroup(), end = first + clustersPerGroup();
+    std::vector<double> energies(blocks, 0.0);
+    for (std::size_t c = first; c < end; ++c) energies[c % blocks] += statistics_[c].energy;
+    for (std::size_t c = first; c < end; ++c) {
+      double lit = 0;
+      for (int level = firstLevel(group); level < endLevel(group); ++level) lit += weights_.litShare(level, c % blocks);
+      const double energy = energies[c % blocks], share = energy > 0 ? statistics_[c].energy / energy : 1;
+      bounds.push_back(kWorstBlock * kWorstBlock * options_.tolerance * options_.tolerance * lit * share);
+    }
+    return bounds;
+  }
+
   /// Searches the smallest choices of all clusters with which every group meets the tolerance, and encodes them.
   /// @return whether every group meets the tolerance
   bool meetTolerance() {
@@ -352,7 +407,7 @@ class Compressor {
       std::vector<std::span<const SizeChoice>> clusters;
       for (const ClusterModel& model : std::span(models_).subspan(g * clustersPerGroup(), clustersPerGroup()))
         clusters.emplace_back(model.choices());
-      searches.emplace_back(std::move(clusters), budget(g));
+      searches.emplace_back(std::move(clusters), budget(g), blockBounds(g));
     }
     const auto encodeChosen = [&] {
       std::vector<int> selection;
@@ -430,12 +485,14 @@ class Compressor {
     cluster.narrow_columns = static_cast<std::uint16_t>(e.narrow_columns);
     cluster.rank_x = static_cast<std::uint8_t>(e.rank_x);
     cluster.rank_y = static_cast<std::uint8_t>(e.rank_y);
+    cluster.floor_unit = e.floors.unit;
     data.clusters.push_back(cluster);
     const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
     append(data.basis, e.basis);
     append(data.coefficients, e.coefficients);
     append(data.scales, e.scales);
     append(data.core, e.core);
+    append(data.floors, e.floors.codes);
     // Mark the images of the region that have a slice in this cluster, and count them word by word.
     data.masks.resize(data.masks.size() + (index_.slotCount(region) + 63) / 64, 0);
     for (const std::uint32_t s : e.kept) {
@@ -522,7 +579,7 @@ class Compressor {
     report.index_bytes = bytes(data.image_regions) + bytes(data.image_slots) + bytes(data.image_scales) + bytes(data.clusters) +
                          bytes(data.masks) + bytes(data.mask_ranks) + bytes(data.density_scales) + bytes(data.block_masks) +
                          bytes(data.first_block) + bytes(data.block_masses) + bytes(data.block_places) +
-                         bytes(data.place_blocks) + bytes(data.core);
+                         bytes(data.place_blocks) + bytes(data.core) + bytes(data.floors);
     report.total_bytes = report.basis_bytes + report.coefficient_bytes + report.index_bytes;
     const double pixels = static_cast<double>(pyramid_.shape.resolution) * pyramid_.shape.resolution;
     const double dense = static_cast<double>(index_.imageCount()) * pixels * sizeof(float);
@@ -576,6 +633,7 @@ NdfCp NdfCpData::view() const {
   v.scales = scales;
   v.core = core;
   v.spot_sums = spot_sums;
+  v.floors = floors;
   return v;
 }
 

@@ -30,8 +30,9 @@ struct CompressionOptions {
   /// If > 0: chooses the columns of every cluster, and with i8 the bits of their coefficients (8 or 4; cp: 8), so that the error
   /// of the metric is at most this in as few bytes as possible. Below 1.
   ///
-  /// With ErrorMetric::seen, the seen error of every level is at most this. The bias is reported and not bounded: it is large
-  /// towards half vectors that few places reflect to, where the error of columns is a haze (its negative part is cut).
+  /// With ErrorMetric::seen, the seen error of every level is at most this. The sizes of clusters are chosen so that the error of
+  /// no angular block is above twice this, as far as it is known before coefficients are rounded. Floors (NdfCp::floors) keep the
+  /// bias of columns small; it is reported, and not bounded.
   /// With ErrorMetric::l2 the error of all images together is at most this; with tucker, the errors of level 0, of level 1, and
   /// of all coarser levels together each are. One bound for all levels would leave the error to levels in which a byte removes
   /// least of it, such as the coarse levels of flakes.
@@ -108,6 +109,7 @@ class NdfCpData {
   std::vector<float> scales;
   std::vector<std::uint8_t> core;
   std::vector<float> spot_sums;
+  std::vector<std::uint8_t> floors;
 
   /// @return spans over the arrays; valid while this object lives and is not changed
   NdfCp view() const;

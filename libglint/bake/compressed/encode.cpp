@@ -18,6 +18,9 @@ namespace {
 // densities that differ by a factor of 10,000, and the smallest need some digits, too.
 constexpr float kBasisPeak = 0x1p20f;
 
+// Least part of the squares of what spots leave that an even density must explain to be stored: it then stands for many facets.
+constexpr float kLeastEvenShare = 0.2f;
+
 // Ridge of the least squares for coefficients, relative to the mean square norm of a basis image. Without it, nearly parallel
 // columns of cp would get large coefficients of opposite signs, whose quantisation costs more accuracy than the ridge does.
 constexpr double kCpRidge = 1e-3;
@@ -242,9 +245,11 @@ std::vector<float> quantizeCoefficients(std::vector<float>& coefficients, int co
   return scales;
 }
 
-/// Decodes every slice and compares it with the original. A basis without columns decodes to zeros.
-void measureSlices(const SliceIndex& index, std::size_t cluster, const float* factors, const DecodedBasis& basis,
-                   const std::vector<float>& coefficients, SliceComparer& comparer) {
+/// Decodes all slices panel by panel. A basis without columns decodes to zeros.
+/// @param visit  called with each slice and its decoded form, [256] scaled pixels, in the order of slices
+template <class Visit>
+void forEachDecoded(const SliceIndex& index, std::size_t cluster, const float* factors, const DecodedBasis& basis,
+                    const std::vector<float>& coefficients, Visit visit) {
   const int count = index.sliceCount(cluster);
   const std::size_t panel_size = static_cast<std::size_t>(std::min(count, kPanelSlices)) * kSliceStride;
   std::vector<float> panel(panel_size, 0.0f);
@@ -254,21 +259,18 @@ void measureSlices(const SliceIndex& index, std::size_t cluster, const float* fa
     index.load(cluster, first, slices, factors, panel.data());
     multiply({coefficients.data() + static_cast<std::size_t>(first) * basis.stride, basis.stride, 1}, basis.images.data(),
              kBlockPixels, decoded.data(), kSliceStride, slices, kBlockPixels, basis.columns);
-    for (int s = 0; s < slices; ++s) comparer.add(panel.data() + s * kSliceStride, decoded.data() + s * kSliceStride);
+    for (int s = 0; s < slices; ++s) visit(panel.data() + s * kSliceStride, decoded.data() + s * kSliceStride);
   }
 }
 
-/// Density of the rest of a slice, >= 0: the even density that is nearest to what its spots leave.
+/// Density of the rest of a slice, >= 0: the even density that is nearest to what its spots leave, or 0 where few facets are
+/// left, which an even density would show as a haze in the dark.
 float restOf(const float* slice, const SliceSpots& spots, const SpotFinder& finder) {
-  float match = finder.evenMatch(slice);
-  for (const Spot& spot : spots) match -= spot.weight * finder.evenShare(spot);
-  return std::max(0.0f, match / finder.evenPower());
-}
-
-/// The code (see blockMassCode) whose mass is nearest.
-std::uint8_t nearestMassCode(float mass) {
-  const std::uint8_t above = blockMassCode(mass);
-  return above > 0 && mass - blockMass(above - 1) < blockMass(above) - mass ? above - 1 : above;
+  float match = finder.evenMatch(slice), left = 0;
+  for (int p = 0; p < kBlockPixels; ++p) left += slice[p] * slice[p];
+  for (const Spot& spot : spots) match -= spot.weight * finder.evenShare(spot), left -= spot.gain;
+  const bool hazes = match * match < kLeastEvenShare * left * finder.evenPower();
+  return hazes ? 0 : std::max(0.0f, match / finder.evenPower());
 }
 
 /// Quantises a cluster of spots, writes it as ndf_cp.h says, and compares its decoded slices with the originals.
@@ -373,7 +375,8 @@ EncodedCluster encodeCluster(const SliceIndex& index, const ErrorWeights& weight
     return out;
   }
   if (basis.columns.empty()) {
-    measureSlices(index, cluster, factors, {}, {}, comparer);
+    forEachDecoded(index, cluster, factors, {}, {},
+                   [&](const float* slice, const float* decoded) { comparer.add(slice, decoded); });
     out.errors = comparer.take();
     return out;
   }
@@ -396,9 +399,16 @@ EncodedCluster encodeCluster(const SliceIndex& index, const ErrorWeights& weight
   out.scales = quantizeCoefficients(coefficients, static_cast<int>(out.kept.size()), decoded.stride, basis.columns, type,
                                     out.coefficients);
   for (int k = 0; k < decoded.columns; ++k) out.scales[k] *= decoded.scales[k] * statistics.peak * index.unit();
-  // Measure the error as a reader sees it.
+  // Find the floors, and measure the error as a reader sees it.
   spreadRows(out.kept, count, decoded.stride, coefficients);
-  measureSlices(index, cluster, factors, decoded, coefficients, comparer);
+  const float density = statistics.peak * index.unit();
+  FloorFinder finder(weights.scale(cluster), density);
+  forEachDecoded(index, cluster, factors, decoded, coefficients,
+                 [&](const float* slice, const float* image) { finder.add(slice, image); });
+  out.floors = finder.find();
+  comparer.setFloors(out.floors, density);
+  forEachDecoded(index, cluster, factors, decoded, coefficients,
+                 [&](const float* slice, const float* image) { comparer.add(slice, image); });
   out.errors = comparer.take();
   return out;
 }

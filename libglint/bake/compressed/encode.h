@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "glint/bake/compressed/error_weights.h"
+#include "glint/bake/compressed/floors.h"
 #include "glint/bake/compressed/model.h"
 #include "glint/bake/compressed/slice_errors.h"
 
@@ -23,11 +24,12 @@ struct EncodedCluster {
   std::vector<std::uint8_t> core;
   std::vector<std::uint32_t> kept;  ///< numbers of the slices that are stored, ascending; other slices decode to 0
   std::uint64_t spots = 0;
+  ClusterFloors floors;  ///< none for clusters of spots
   ClusterErrors errors;
 };
 
 /// Quantises the basis of a cluster, solves the coefficients of every slice for the quantised basis by least squares, and
-/// quantises the coefficients. A basis of spots is quantised spot by spot.
+/// quantises the coefficients. Finds the floors of its decoded slices. A basis of spots is quantised spot by spot.
 /// @param per_byte        weighted energy that a slice must hold for each byte of its coefficients to be stored. A slice with a
 ///                        large part of its image's mass is always stored. Not used for spots
 /// @param density_scales  [images]: factors of the densities that errors are measured with (NdfCp::density_scales)

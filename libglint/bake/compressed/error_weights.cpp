@@ -49,6 +49,7 @@ ErrorWeights::ErrorWeights(const SliceIndex& index, ErrorMetric metric, double s
       cell_pixels_(seenCellPixels(index.resolution())),
       blocks_(static_cast<std::size_t>(index.blockCount())),
       cells_(blocks_ * levels_ * cellCount()),
+      lit_cells_(levels_, 0.0),
       level_weights_(levels_, 1.0),
       scales_(index.clusterCount()),
       slices_(index.clusterCount() * levels_, 1.0f),
@@ -78,7 +79,7 @@ void ErrorWeights::measureCells() {
   });
   for (int level = 0; level < levels_; ++level) {
     const double pixels = static_cast<double>(index_.levelImages(level)) * cell_pixels_ * cell_pixels_;
-    double lit = 0;
+    double& lit = lit_cells_[level];
     for (std::size_t k = 0; k < blocks_ * cellCount(); ++k) {
       CellDensity& cell = cells_[static_cast<std::size_t>(level) * blocks_ * cellCount() + k];
       cell.mean /= pixels;
@@ -87,6 +88,12 @@ void ErrorWeights::measureCells() {
     }
     if (metric_ == ErrorMetric::seen) level_weights_[level] = 1 / (std::max(1.0, lit) * pixels);
   }
+}
+
+double ErrorWeights::litShare(int level, std::size_t block) const {
+  const CellDensity* first = cells(level, block);
+  const auto lit = std::count_if(first, first + cellCount(), [](const CellDensity& cell) { return cell.lit; });
+  return static_cast<double>(lit) / std::max(1.0, lit_cells_[level]);
 }
 
 /// Weight of the squared error of a density.

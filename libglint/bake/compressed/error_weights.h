@@ -63,6 +63,8 @@ class ErrorWeights {
     const int side = kBlockSize / cell_pixels_;
     return pixel / kBlockSize / cell_pixels_ * side + pixel % kBlockSize / cell_pixels_;
   }
+  /// @return lit cells of a block over those of all blocks: what the weighted squares of its cells add up to
+  double litShare(int level, std::size_t block) const;
   /// @return densities of the cells of a block, [cells]
   const CellDensity* cells(int level, std::size_t block) const {
     return cells_.data() + (static_cast<std::size_t>(level) * blocks_ + block) * cellCount();
@@ -79,6 +81,7 @@ class ErrorWeights {
   int levels_, cell_pixels_;
   std::size_t blocks_;
   std::vector<CellDensity> cells_;     // [levels][blocks][cells]
+  std::vector<double> lit_cells_;      // [levels]: number
   std::vector<double> level_weights_;  // [levels]: weight of a pixel whose cell has the density 1
   std::vector<BlockScale> scales_;     // [clusters]
   std::vector<float> slices_;          // [clusters][levels]

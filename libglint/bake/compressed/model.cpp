@@ -141,7 +141,36 @@ ClusterModel::ClusterModel(const SliceIndex& index, const ErrorWeights& weights,
   if (method_ == CompressionMethod::cp) boundCpRanks(options, negligible / square);
   if (options.tolerance > 0 && options.spots && type_ == CoefficientType::i8 && method_ != CompressionMethod::cp)
     addSpots(negligible / square);
-  if (options.tolerance > 0) keepHull();
+  if (options.tolerance > 0) {
+    std::stable_sort(choices_.begin(), choices_.end(), [](const SizeChoice& a, const SizeChoice& b) {
+      return a.bytes != b.bytes ? a.bytes < b.bytes : a.error < b.error;
+    });
+    all_choices_ = std::move(choices_);
+    keepHull();
+  }
+}
+
+const SizeChoice* ClusterModel::nearestColumns(double error) const {
+  const SizeChoice* nearest = nullptr;
+  const auto distance = [&](const SizeChoice& choice) { return std::abs(std::log(choice.error / error)); };
+  for (const SizeChoice& choice : all_choices_)
+    if (!choice.spots && choice.count > 0 && choice.error > 0 && (!nearest || distance(choice) < distance(*nearest)))
+      nearest = &choice;
+  return nearest;
+}
+
+bool ClusterModel::hasColumns() const { return nearestColumns(1) != nullptr; }
+
+ClusterBasis ClusterModel::columnsNear(double error, double& predicted) const {
+  const SizeChoice& choice = *nearestColumns(error);
+  predicted = choice.error;
+  return basisOf(choice);
+}
+
+void ClusterModel::correctColumns(double factor) {
+  for (SizeChoice& choice : all_choices_)
+    if (!choice.spots && choice.count > 0) choice.error *= factor;
+  keepHull();
 }
 
 /// Loads the slices a panel at a time, and calls visit(panel, number of slices).
@@ -303,19 +332,17 @@ void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<float> r
 
 /// Keeps the choices on the lower convex hull of (bytes, error).
 void ClusterModel::keepHull() {
-  std::stable_sort(choices_.begin(), choices_.end(), [](const SizeChoice& a, const SizeChoice& b) {
-    return a.bytes != b.bytes ? a.bytes < b.bytes : a.error < b.error;
-  });
-  std::vector<SizeChoice> hull;
-  for (const SizeChoice& next : choices_) {
-    if (!hull.empty() && next.error >= hull.back().error) continue;
+  choices_.clear();
+  for (const SizeChoice& next : all_choices_) {
+    if (!choices_.empty() && next.error >= choices_.back().error) continue;
+    if (!choices_.empty() && next.bytes == choices_.back().bytes) choices_.pop_back();
     const auto gain = [](const SizeChoice& a, const SizeChoice& b) {
       return (a.error - b.error) / static_cast<double>(b.bytes - a.bytes);
     };
-    while (hull.size() > 1 && gain(hull[hull.size() - 2], hull.back()) <= gain(hull.back(), next)) hull.pop_back();
-    hull.push_back(next);
+    while (choices_.size() > 1 && gain(choices_[choices_.size() - 2], choices_.back()) <= gain(choices_.back(), next))
+      choices_.pop_back();
+    choices_.push_back(next);
   }
-  choices_ = std::move(hull);
 }
 
 TuckerAxes ClusterModel::analyseAxes() const {
@@ -442,8 +469,10 @@ CpFactors ClusterModel::decompose(int rank) const {
   return decomposeCp(tensor, axes_, {rank, min_improvement_, max_iterations_});
 }
 
-ClusterBasis ClusterModel::basis(int choice) const {
-  ClusterBasis basis = scaledBasis(choices_[choice]);
+ClusterBasis ClusterModel::basis(int choice) const { return basisOf(choices_[choice]); }
+
+ClusterBasis ClusterModel::basisOf(const SizeChoice& choice) const {
+  ClusterBasis basis = scaledBasis(choice);
   if (basis.columns.empty()) return basis;
   // The basis was found in the scaled domain.
   const bool images = method_ == CompressionMethod::pca;

@@ -56,6 +56,18 @@ class ClusterModel {
   ClusterModel(const SliceIndex& index, const ErrorWeights& weights, std::size_t cluster, const ClusterStatistics& statistics,
                const CompressionOptions& options, CoefficientType type, double negligible);
 
+  /// Whether another error of columns can be given with correctColumns().
+  bool hasColumns() const;
+
+  /// Basis of the columns whose error is nearest to the given one.
+  /// @param predicted  set to their error as choices() tell it
+  /// @pre hasColumns()
+  ClusterBasis columnsNear(double error, double& predicted) const;
+
+  /// Multiplies the errors of all choices of columns, where a measurement shows that a reader's answers have another error than
+  /// sums of columns: readers take floors off, and have no negative pixels. Choices are chosen anew.
+  void correctColumns(double factor);
+
   /// Choices from few bytes to many; at least one.
   const std::vector<SizeChoice>& choices() const { return choices_; }
 
@@ -78,10 +90,12 @@ class ClusterModel {
   void addSpotChoices(const SpotFinder& finder, std::vector<float> rests);
   std::vector<float> project(const std::vector<float>& images, int count) const;
   void keepHull();
+  const SizeChoice* nearestColumns(double error) const;
   void decomposeTucker(const CompressionOptions& options, double negligible);
   void decomposePca(const CompressionOptions& options, double negligible);
   void boundCpRanks(const CompressionOptions& options, double negligible);
   CpFactors decompose(int rank) const;
+  ClusterBasis basisOf(const SizeChoice& choice) const;
   ClusterBasis scaledBasis(const SizeChoice& choice) const;
   TuckerAxes analyseAxes() const;
   std::vector<float> gramMatrix() const;
@@ -101,12 +115,13 @@ class ClusterModel {
   std::vector<float> slice_weights_;  // [slices]: weights of their squared errors
   double min_improvement_;
   int max_iterations_;
-  std::vector<SizeChoice> choices_;
-  std::vector<Step> steps_;        // tucker, pca
-  std::vector<SliceSpots> spots_;  // [slices], the spots of a slice in the order of falling gains
-  std::vector<float> spot_gains_;  // gains of all spots, falling
-  TuckerAxes axes_;                // tucker, cp
-  std::vector<float> components_;  // pca: [K][256], orthonormal
+  std::vector<SizeChoice> all_choices_;  // with a tolerance: by bytes
+  std::vector<SizeChoice> choices_;      // those on the hull
+  std::vector<Step> steps_;              // tucker, pca
+  std::vector<SliceSpots> spots_;        // [slices], the spots of a slice in the order of falling gains
+  std::vector<float> spot_gains_;        // gains of all spots, falling
+  TuckerAxes axes_;                      // tucker, cp
+  std::vector<float> components_;        // pca: [K][256], orthonormal
 };
 
 }  // namespace glint::bake

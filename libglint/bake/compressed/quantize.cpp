@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "glint/query/detail/pyramid/block_mass.h"
+
 namespace glint::bake {
 namespace {
 
@@ -76,5 +78,10 @@ ColumnErrors roundingErrors(const float* coefficients, const float* weights, int
 }
 
 float narrowStep(const float* coefficients, int count, int stride) { return bestNarrowStep(coefficients, count, stride).step; }
+
+std::uint8_t nearestMassCode(float mass) {
+  const std::uint8_t above = blockMassCode(mass);
+  return above > 0 && mass - blockMass(above - 1) < blockMass(above) - mass ? above - 1 : above;
+}
 
 }  // namespace glint::bake

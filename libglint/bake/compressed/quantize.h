@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 namespace glint::bake {
 
 /// Largest integers of wide (8 bits) and of narrow (4 bits) coefficients.
@@ -22,5 +24,8 @@ ColumnErrors roundingErrors(const float* coefficients, const float* weights, int
 /// coefficients off is better than a step that reaches them.
 /// @param stride  floats between coefficients
 float narrowStep(const float* coefficients, int count, int stride);
+
+/// The code (see blockMassCode) whose mass is nearest.
+std::uint8_t nearestMassCode(float mass);
 
 }  // namespace glint::bake

@@ -12,7 +12,8 @@ constexpr int kMostCorrections = 16;
 
 }  // namespace
 
-RankAllocator::RankAllocator(std::vector<std::span<const SizeChoice>> clusters) : clusters_(std::move(clusters)) {
+RankAllocator::RankAllocator(std::vector<std::span<const SizeChoice>> clusters, std::span<const double> bounds)
+    : clusters_(std::move(clusters)) {
   double error = 0;
   for (std::size_t c = 0; c < clusters_.size(); ++c) {
     const auto& choices = clusters_[c];
@@ -20,12 +21,15 @@ RankAllocator::RankAllocator(std::vector<std::span<const SizeChoice>> clusters) 
     for (std::size_t i = 1; i < choices.size(); ++i) {
       const double gain = choices[i - 1].error - choices[i].error;
       const auto bytes = static_cast<double>(choices[i].bytes - choices[i - 1].bytes);
-      steps_.push_back({gain / bytes, static_cast<std::uint32_t>(c), static_cast<std::uint32_t>(i)});
+      const bool bound = !bounds.empty() && choices[i - 1].error > bounds[c];
+      bound_steps_ += bound;
+      steps_.push_back({bound, gain / bytes, static_cast<std::uint32_t>(c), static_cast<std::uint32_t>(i)});
     }
   }
-  // Gains per byte fall along a hull, so a stable sort keeps the steps of a cluster in order.
-  std::stable_sort(steps_.begin(), steps_.end(),
-                   [](const Step& a, const Step& b) { return a.gain_per_byte > b.gain_per_byte; });
+  // Gains per byte and errors fall along a hull, so a stable sort keeps the steps of a cluster in order.
+  std::stable_sort(steps_.begin(), steps_.end(), [](const Step& a, const Step& b) {
+    return a.bound != b.bound ? a.bound : a.gain_per_byte > b.gain_per_byte;
+  });
   errors_.push_back(error);
   for (const Step& step : steps_) {
     const auto& choices = clusters_[step.cluster];
@@ -36,14 +40,14 @@ RankAllocator::RankAllocator(std::vector<std::span<const SizeChoice>> clusters) 
 
 std::vector<int> RankAllocator::allocate(double squared_error) const {
   std::vector<int> selection(clusters_.size(), 0);
-  for (std::size_t i = 0; i < steps_.size() && errors_[i] > squared_error; ++i)
+  for (std::size_t i = 0; i < steps_.size() && (i < bound_steps_ || errors_[i] > squared_error); ++i)
     selection[steps_[i].cluster] = static_cast<int>(steps_[i].choice);
   return selection;
 }
 
 double RankAllocator::gainPerByte(double squared_error) const {
-  double gain = 0;
-  for (std::size_t i = 0; i < steps_.size() && errors_[i] > squared_error; ++i) gain = steps_[i].gain_per_byte;
+  double gain = bound_steps_ > 0 && bound_steps_ < steps_.size() ? steps_[bound_steps_].gain_per_byte : 0;
+  for (std::size_t i = bound_steps_; i < steps_.size() && errors_[i] > squared_error; ++i) gain = steps_[i].gain_per_byte;
   return gain;
 }
 
@@ -53,8 +57,9 @@ double RankAllocator::error(std::span<const int> selection) const {
   return sum;
 }
 
-ToleranceSearch::ToleranceSearch(std::vector<std::span<const SizeChoice>> clusters, double budget)
-    : allocator_(std::move(clusters)), budget_(budget), target_(budget), selection_(allocator_.allocate(budget)) {}
+ToleranceSearch::ToleranceSearch(std::vector<std::span<const SizeChoice>> clusters, double budget,
+                                 std::span<const double> bounds)
+    : allocator_(std::move(clusters), bounds), budget_(budget), target_(budget), selection_(allocator_.allocate(budget)) {}
 
 bool ToleranceSearch::next(double measured) {
   if (done_) return false;

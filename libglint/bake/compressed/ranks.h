@@ -15,33 +15,38 @@ namespace glint::bake {
 class RankAllocator {
  public:
   /// @param clusters  choices of each cluster, on a convex hull from few bytes to many; must outlive the allocator
-  explicit RankAllocator(std::vector<std::span<const SizeChoice>> clusters);
+  /// @param bounds    [clusters]: largest squared error of each cluster; empty: no bounds. A cluster that cannot meet its bound
+  ///                  takes its last choice
+  explicit RankAllocator(std::vector<std::span<const SizeChoice>> clusters, std::span<const double> bounds = {});
 
-  /// Selects the fewest bytes with at most this error.
+  /// Selects the fewest bytes with at most this error, and within the bounds.
   /// @return choice of each cluster; the last choice of every cluster if even these have a larger error
   std::vector<int> allocate(double squared_error) const;
 
-  /// Squared error per byte that the last step of allocate(squared_error) removes.
+  /// Squared error per byte that the last step of allocate(squared_error) removes, or where the bounds alone ask for steps, that
+  /// the next step would remove.
   double gainPerByte(double squared_error) const;
 
   /// Sum of the errors of a selection, before quantisation.
   double error(std::span<const int> selection) const;
 
-  /// Error without any step.
-  double largestError() const { return errors_.front(); }
+  /// Error with the steps that the bounds ask for, and no other.
+  double largestError() const { return errors_[bound_steps_]; }
 
   /// Error with all steps taken.
   double smallestError() const { return errors_.back(); }
 
  private:
   struct Step {
+    bool bound;  // whether a bound asks for it
     double gain_per_byte;
     std::uint32_t cluster;
     std::uint32_t choice;
   };
 
   std::vector<std::span<const SizeChoice>> clusters_;
-  std::vector<Step> steps_;
+  std::vector<Step> steps_;  // those that bounds ask for come first
+  std::size_t bound_steps_ = 0;
   std::vector<double> errors_;  // [steps + 1]: squared error after so many steps
 };
 
@@ -52,7 +57,8 @@ class RankAllocator {
 class ToleranceSearch {
  public:
   /// @param budget  largest squared error that is allowed; the search uses it up as far as single steps allow
-  ToleranceSearch(std::vector<std::span<const SizeChoice>> clusters, double budget);
+  /// @param bounds  as for RankAllocator
+  ToleranceSearch(std::vector<std::span<const SizeChoice>> clusters, double budget, std::span<const double> bounds = {});
 
   /// Choices to encode and measure next; once the search is done, the choices to keep.
   const std::vector<int>& selection() const { return selection_; }

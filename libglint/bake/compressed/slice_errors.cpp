@@ -42,6 +42,12 @@ SliceComparer::SliceComparer(const SliceIndex& index, const ErrorWeights& weight
   errors_.cell_errors.assign(cells, 0.0);
 }
 
+void SliceComparer::setFloors(const ClusterFloors& floors, float density) {
+  if (!(density > 0)) return;
+  for (int p = 0; p < kBlockPixels; ++p)
+    floors_[p] = floors.at(floorCell(p % kBlockSize, p / kBlockSize)) / density / unscale_[p];
+}
+
 const float* SliceComparer::pixelWeights(int level) {
   std::vector<float>& pixels = pixel_weights_[level];
   if (pixels.empty()) {
@@ -65,7 +71,7 @@ void SliceComparer::add(const float* slice, const float* decoded) {
     for (int y = row * cell_pixels; y < (row + 1) * cell_pixels; ++y) {
       for (int x = 0; x < kBlockSize; ++x) {
         const int p = y * kBlockSize + x;
-        const float unscale = unscale_[p], d = decoded[p], cut = std::max(0.0f, d), shown = density_scale * cut;
+        const float unscale = unscale_[p], d = decoded[p], cut = std::max(0.0f, d - floors_[p]), shown = density_scale * cut;
         plain.add(x, unscale * unscale, slice[p] - d, d);
         seen.add(x, pixel_weights[p], slice[p] - shown, shown);
         sums.lanes[x] += unscale * d;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "glint/bake/compressed/error_weights.h"
+#include "glint/bake/compressed/floors.h"
 #include "glint/bake/compressed/model.h"
 #include "glint/bake/compressed/slices.h"
 
@@ -29,7 +30,7 @@ struct SliceError {
   ScaledError seen;      ///< of densities, weighted (ErrorWeights::pixels)
   float seen_scale = 1;  ///< scale of the image with which these densities were decoded
   float sum = 0;         ///< sum of decoded pixels, which are not scaled
-  float positive = 0;    ///< the same, of positive pixels
+  float positive = 0;    ///< the same, of pixels less their floors where that is positive
 };
 
 /// Errors of a cluster.
@@ -42,9 +43,13 @@ struct ClusterErrors {
 /// Compares slices of a cluster with their decoded forms, one by one.
 class SliceComparer {
  public:
-  /// @param density_scales  [images]: factors of positive pixels
+  /// @param density_scales  [images]: factors of pixels less their floors where that is positive
   SliceComparer(const SliceIndex& index, const ErrorWeights& weights, std::size_t cluster, const ClusterStatistics& statistics,
                 std::span<const float> density_scales);
+
+  /// Takes floors off the pixels of all slices that are added from now on.
+  /// @param density  of a pixel of 1 in units of the peak of the cluster
+  void setFloors(const ClusterFloors& floors, float density);
 
   /// Adds the next slice. Slices are given in their order.
   /// @param slice, decoded  [256] scaled pixels
@@ -60,6 +65,7 @@ class SliceComparer {
   std::size_t cluster_;
   std::span<const float> density_scales_;
   float unscale_[kBlockPixels];                    // turns a scaled pixel into a pixel, both in units of the peak
+  float floors_[kBlockPixels] = {};                // scaled, in units of the peak
   double density_;                                 // density of a pixel of 1 in units of the peak
   std::vector<std::vector<float>> pixel_weights_;  // [levels], empty until a slice needs them
   ClusterErrors errors_;

@@ -51,14 +51,14 @@ class Avx2Reader : public ClusterReader<Basis, Coefficient> {
   GLINT_AVX2 void sliceWeights(const NdfCluster& cluster, Row c, float* weights) const {
     Base::sliceWeightsBy(*this, cluster, c, weights);
   }
-  GLINT_AVX2 Float16 rowSums(const NdfCluster& cluster, const float* weights) const {
-    return this->basisOf(cluster).rowSums(weights, Avx2Prefixes::Weigh());
+  GLINT_AVX2 Float16 leastSums(const NdfCluster& cluster, const float* weights) const {
+    return Base::leastSumsBy(Avx2Prefixes::Weigh(), cluster, weights);
   }
   GLINT_AVX2 Float16 rowPixels(const NdfCluster& cluster, const float* weights, int y) const {
-    return this->basisOf(cluster).rowPixels(weights, y, Avx2Prefixes::Weigh());
+    return Base::rowPixelsBy(Avx2Prefixes::Weigh(), cluster, weights, y);
   }
   GLINT_AVX2 void block(const NdfCluster& cluster, const float* weights, float* pixels) const {
-    this->basisOf(cluster).block(weights, pixels, Avx2Prefixes::Weigh());
+    Base::blockBy(Avx2Prefixes::Weigh(), cluster, weights, pixels);
   }
 };
 

@@ -4,6 +4,7 @@
 
 #include "glint/math/device.h"
 #include "glint/model/ndf_cp.h"
+#include "glint/query/detail/compressed/pixel_floors.h"
 
 namespace glint {
 
@@ -23,6 +24,7 @@ struct ClusterArrays {
   }
   GLINT_HD const float* scales() const { return ndf.scales.data() + cluster.first_scale; }     ///< [columns]
   GLINT_HD const std::uint8_t* core() const { return ndf.core.data() + cluster.first_scale; }  ///< [columns], tucker only
+  GLINT_HD PixelFloors floors() const { return PixelFloors(ndf, cluster); }
 };
 
 }  // namespace glint

@@ -109,18 +109,18 @@ class ClusterReader {
     sliceWeightsBy(*this, cluster, c, weights);
   }
 
-  /// Sum of each row of a slice, negative pixels included.
+  /// A lower bound of the sum of rowPixels, for each row: the sum of its pixels, less their floors.
   /// @param weights  from sliceWeights
-  GLINT_HD Float16 rowSums(const NdfCluster& cluster, const float* weights) const {
-    return basisOf(cluster).rowSums(weights, WeighPrefixes());
+  GLINT_HD Float16 leastSums(const NdfCluster& cluster, const float* weights) const {
+    return leastSumsBy(WeighPrefixes(), cluster, weights);
   }
-  /// Pixels of row y of a slice, negative pixels taken as 0. Costs as much as rowSums.
+  /// Pixels of row y of a slice, less their floors, negative pixels taken as 0. Costs as much as leastSums.
   GLINT_HD Float16 rowPixels(const NdfCluster& cluster, const float* weights, int y) const {
-    return basisOf(cluster).rowPixels(weights, y, WeighPrefixes());
+    return rowPixelsBy(WeighPrefixes(), cluster, weights, y);
   }
-  /// All pixels of a slice, [16][16], negative pixels taken as 0.
+  /// All pixels of a slice, [16][16], less their floors, negative pixels taken as 0.
   GLINT_HD void block(const NdfCluster& cluster, const float* weights, float* pixels) const {
-    basisOf(cluster).block(weights, pixels, WeighPrefixes());
+    blockBy(WeighPrefixes(), cluster, weights, pixels);
   }
 
  protected:
@@ -150,6 +150,24 @@ class ClusterReader {
     } else {
       reader.scaledCoefficients(cluster, c, weights);
     }
+  }
+
+  template <class Weigh>
+  GLINT_HD Float16 leastSumsBy(Weigh weigh, const NdfCluster& cluster, const float* weights) const {
+    const Basis basis = basisOf(cluster);
+    return (basis.rowSums(weights, weigh) - basis.floors().rowSums()).positive();
+  }
+  template <class Weigh>
+  GLINT_HD Float16 rowPixelsBy(Weigh weigh, const NdfCluster& cluster, const float* weights, int y) const {
+    const Basis basis = basisOf(cluster);
+    return (basis.rowPixels(weights, y, weigh) - basis.floors().row(y)).positive();
+  }
+  template <class Weigh>
+  GLINT_HD void blockBy(Weigh weigh, const NdfCluster& cluster, const float* weights, float* pixels) const {
+    const Basis basis = basisOf(cluster);
+    basis.block(weights, pixels, weigh);
+    for (int y = 0; y < kBlockSize; ++y)
+      (Float16::load(pixels + y * kBlockSize) - basis.floors().row(y)).positive().store(pixels + y * kBlockSize);
   }
 
  private:

@@ -71,17 +71,17 @@ struct CpBasis : ClusterArrays {
     return weigh(alongY(), count, count, in_rows, Stored()).differences();
   }
 
-  /// Pixels of row y of a slice, negative pixels taken as 0; O(16 rank).
+  /// Pixels of row y of a slice; O(16 rank).
   template <class Weigh>
   GLINT_DEVICE_CALL GLINT_HD Float16 rowPixels(const float* weights, int y, Weigh weigh) const {
     float in_row[kMaxColumns];  // weights of the functions of x
     const int count = columns();
     Axis(alongY(), count, y).store(in_row);
     for (int k = 0; k < count; ++k) in_row[k] *= weights[k];
-    return weigh(alongX(), count, count, in_row, Stored()).differences().positive();
+    return weigh(alongX(), count, count, in_row, Stored()).differences();
   }
 
-  /// All pixels of a slice, [16][16], negative pixels taken as 0; O(256 rank).
+  /// All pixels of a slice, [16][16]; O(256 rank).
   template <class Weigh>
   GLINT_DEVICE_CALL GLINT_HD void block(const float* weights, float* pixels, Weigh /*weigh*/) const {
     float x_values[kMaxColumns * kBlockSize], y_values[kMaxColumns * kBlockSize];

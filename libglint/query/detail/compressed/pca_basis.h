@@ -72,17 +72,17 @@ struct PcaBasis : ClusterArrays {
     return weigh(prefix() + (kBlockSize - 1) * count, kBlockSize * count, count, weights, Stored()).differences();
   }
 
-  /// Pixels of row y of a slice, negative pixels taken as 0; O(16 columns).
+  /// Pixels of row y of a slice; O(16 columns).
   template <class Weigh>
   GLINT_DEVICE_CALL GLINT_HD Float16 rowPixels(const float* weights, int y, Weigh weigh) const {
     const int count = columns(), row_elements = kBlockSize * count;
     const std::int32_t* row = prefix() + y * row_elements;
     const Float16 sums =
         y > 0 ? weigh(row, count, count, weights, LessAbove{row_elements}) : weigh(row, count, count, weights, Stored());
-    return sums.differences().positive();
+    return sums.differences();
   }
 
-  /// All pixels of a slice, [16][16], negative pixels taken as 0; O(256 columns). Weighs the prefix sums of all columns first,
+  /// All pixels of a slice, [16][16]; O(256 columns). Weighs the prefix sums of all columns first,
   /// and takes differences once.
   template <class Weigh>
   GLINT_DEVICE_CALL GLINT_HD void block(const float* weights, float* pixels, Weigh weigh) const {
@@ -91,7 +91,7 @@ struct PcaBasis : ClusterArrays {
     Float16 above = {{Float4::zero(), Float4::zero(), Float4::zero(), Float4::zero()}};
     for (int y = 0; y < kBlockSize; ++y, row += kBlockSize * count) {
       const Float16 here = weigh(row, count, count, weights, Stored()).differences();
-      (here - above).positive().store(pixels + y * kBlockSize);
+      (here - above).store(pixels + y * kBlockSize);
       above = here;
     }
   }

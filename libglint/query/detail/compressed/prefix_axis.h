@@ -75,7 +75,7 @@ inline GLINT_HD void valuesOfAxis(const std::int32_t* prefix, int columns, float
   }
 }
 
-/// pixels[y][x] = max(0, sum over k of in_rows[k][y] * column k at pixel x).
+/// pixels[y][x] = sum over k of in_rows[k][y] * column k at pixel x.
 /// @param along_x  valuesOfAxis of x, [columns][16]
 /// @param in_rows  weights of the columns in each row of the block, [columns][16]
 inline GLINT_HD void combineRows(const float* along_x, const float* in_rows, int columns, float* pixels) {
@@ -85,7 +85,7 @@ inline GLINT_HD void combineRows(const float* along_x, const float* in_rows, int
       const Float4 w = Float4::all(in_rows[k * kBlockSize + y]);
       for (int x = 0; x < 4; ++x) sums[x] = sums[x] + w * Float4::load(along_x + k * kBlockSize + 4 * x);
     }
-    for (int x = 0; x < 4; ++x) sums[x].positive().store(pixels + y * kBlockSize + 4 * x);
+    for (int x = 0; x < 4; ++x) sums[x].store(pixels + y * kBlockSize + 4 * x);
   }
 }
 

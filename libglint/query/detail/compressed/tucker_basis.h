@@ -69,16 +69,16 @@ struct TuckerBasis : ClusterArrays {
     return weigh(alongY(), rankY(), rankY(), in_rows, Stored()).differences();
   }
 
-  /// Pixels of row y of a slice, negative pixels taken as 0. Costs as much as rowSums.
+  /// Pixels of row y of a slice. Costs as much as rowSums.
   template <class Weigh>
   GLINT_DEVICE_CALL GLINT_HD Float16 rowPixels(const float* weights, int y, Weigh weigh) const {
     float at_y[kBlockSize], in_row[kBlockSize];  // in_row: weights of the functions of x
     Axis(alongY(), rankY(), y).store(at_y);
     weighMatrixColumns(weights, rankY(), at_y, in_row);
-    return weigh(alongX(), rankX(), rankX(), in_row, Stored()).differences().positive();
+    return weigh(alongX(), rankX(), rankX(), in_row, Stored()).differences();
   }
 
-  /// All pixels of a slice, [16][16], negative pixels taken as 0; O(16 rank_x (16 + rank_y)).
+  /// All pixels of a slice, [16][16]; O(16 rank_x (16 + rank_y)).
   template <class Weigh>
   GLINT_DEVICE_CALL GLINT_HD void block(const float* weights, float* pixels, Weigh /*weigh*/) const {
     float x_values[kBlockPixels], y_values[kBlockPixels], in_rows[kBlockPixels];
