@@ -309,9 +309,8 @@ class CpNdf {
     constexpr int kRows = ColumnWindows::kRows;
     ColumnWindows columns;
     reader.window(cluster, x, y, columns);
-    const PixelFloors all_floors(ndf_, cluster);
     Float4 floors[kRows];
-    for (int row = 0; row < kRows; ++row) floors[row] = all_floors.three(x, y + row);
+    PixelFloors(ndf_, cluster).window(x, y, floors);
     for (; here != 0; here &= here - 1) {
       const int slice = lowestBit(here);
       float scaled[kMaxColumns];

@@ -1,10 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 #include <vector>
 
 #include "glint/bake/compressed/floors.h"
+#include "glint/query/detail/compressed/pixel_floors.h"
 
 namespace glint::bake {
 namespace {
@@ -94,6 +96,41 @@ TEST(FloorFinder, TakesEverythingOffADarkCell) {
     const auto means = dark.meansOf(scale, cell, floors.at(cell));
     EXPECT_EQ(means.truth, 0);
     EXPECT_LT(means.shown, 1e-3 * dark.meansOf(scale, cell, 0).shown) << cell;
+  }
+}
+
+TEST(PixelFloors, AreThoseOfTheCellsThatPixelsLieIn) {
+  std::vector<NdfCluster> clusters(2);
+  clusters[1].floor_unit = 0x3c00;  // 1
+  std::vector<std::uint8_t> codes(2 * kFloorCells);
+  for (int cell = 0; cell < kFloorCells; ++cell)
+    codes[static_cast<std::size_t>(kFloorCells + cell)] = static_cast<std::uint8_t>(100 + cell);
+  NdfCp ndf;
+  ndf.clusters = clusters;
+  ndf.floors = codes;
+  const PixelFloors floors(ndf, clusters[1]);
+  const auto inside = [](int p) { return std::clamp(p, 0, kBlockSize - 1); };
+  for (int y = -2; y < kBlockSize; ++y) {
+    for (int x = -2; x < kBlockSize; ++x) {
+      Float4 rows[PixelWindow::kSize];
+      floors.window(x, y, rows);
+      for (int j = 0; j < PixelWindow::kSize; ++j) {
+        float lanes[4];
+        rows[j].store(lanes);
+        for (int i = 0; i < PixelWindow::kSize; ++i)
+          EXPECT_EQ(lanes[i], floors.at(inside(x + i), inside(y + j))) << x << ' ' << y;
+      }
+    }
+  }
+  for (int y = 0; y < kBlockSize; ++y) {
+    float row[kBlockSize], sums[kBlockSize], sum = 0;
+    floors.row(y).store(row);
+    floors.rowSums().store(sums);
+    for (int x = 0; x < kBlockSize; ++x) {
+      EXPECT_EQ(row[x], blockMass(static_cast<std::uint8_t>(100 + floorCell(x, y))));
+      sum += row[x];
+    }
+    EXPECT_FLOAT_EQ(sums[y], sum);
   }
 }
 

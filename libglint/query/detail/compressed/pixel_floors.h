@@ -8,6 +8,7 @@
 #include "glint/math/half.h"
 #include "glint/model/ndf_cp.h"
 #include "glint/query/detail/pyramid/block_mass.h"
+#include "glint/query/detail/pyramid/pixel_spline.h"
 
 namespace glint {
 
@@ -22,11 +23,21 @@ class PixelFloors {
   /// Floor of a pixel of the block.
   GLINT_HD float at(int x, int y) const { return unit_ * blockMass(codes_[floorCell(x, y)]); }
 
-  /// Floors of three neighbouring pixels of a row, in the first three lanes. Pixels outside the block have no density to lose.
+  /// Floors of the pixels of a window, a row in each element, in its first three lanes. Pixels outside the block have no density
+  /// to lose, and get a floor of the nearest cell.
   /// @param x, y  column and row of the first pixel, -2 to 15
-  GLINT_HD Float4 three(int x, int y) const {
+  GLINT_HD void window(int x, int y, Float4 (&rows)[PixelWindow::kSize]) const {
     const auto inside = [](int p) { return std::clamp(p, 0, kBlockSize - 1); };
-    return Float4::of(at(inside(x), inside(y)), at(inside(x + 1), inside(y)), at(inside(x + 2), inside(y)), 0);
+    const int left = inside(x), right = inside(x + 2), low = inside(y), high = inside(y + 2);
+    // The window meets one or two cells along each axis.
+    const bool middle_is_right = inside(x + 1) / kFloorPixels != left / kFloorPixels;
+    const auto row = [&](int at_y) {
+      const float first = at(left, at_y), last = at(right, at_y);
+      return Float4::of(first, middle_is_right ? last : first, last, 0);
+    };
+    rows[0] = row(low);
+    rows[2] = low / kFloorPixels == high / kFloorPixels ? rows[0] : row(high);
+    rows[1] = inside(y + 1) / kFloorPixels != low / kFloorPixels ? rows[2] : rows[0];
   }
 
   /// Floors of the pixels of a row.
