@@ -3,6 +3,7 @@
 #include "common/files.h"
 #include "common/memory_needs.h"
 #include "glint-ingest/ingest_options.h"
+#include "glint-ingest/udim_ingest.h"
 #include "glint/bake/common/slopes.h"
 #include "glint/bake/ingest/normal_bounds.h"
 #include "glint/formats/asset_writer.h"
@@ -26,12 +27,18 @@ void writeNormals(const apps::OutputFile& output, const apps::Image& image, floa
 int main(int argc, char** argv) {
   apps::Tool tool({"glint-ingest",
                    "Turns any image of normals or heights into an asset. Wrong inputs are refused, not clamped.",
-                   "glint-ingest flakes.png -o flakes.glint --convention directx"});
-  const apps::InputFile input(tool, "image of normals or heights", "IMAGE");
-  const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of normals or heights");
+                   "glint-ingest flakes.png -o flakes.glint --convention directx\n"
+                   "  glint-ingest 'rock.<UDIM>.exr' -o 'rock.<UDIM>.map.glint'"});
+  const apps::InputFile input(tool, "image of normals or heights, or those of a UDIM set: 'name.<UDIM>.exr'", "IMAGE",
+                              apps::UdimSets::taken);
+  const apps::OutputFile output(
+      tool, apps::OutputFormat::asset,
+      "asset (.glint) of normals or heights; of a UDIM set, one for each tile: 'name.<UDIM>.map.glint'", input);
   const apps::IngestOptions options(tool);
+  const apps::UdimIngest set(tool, input, output, options);
 
   return tool.run(argc, argv, [&] {
+    if (input.isSet()) return set.run();
     const apps::Image image = options.read(tool, input.path());
     apps::requireMemoryFor(tool, "a map of", image.width, image.height, apps::BytesPerTexel::kIngest, "scale the image down");
     const bake::IngestOptions values = options.values(tool, input.path(), image);
@@ -52,7 +59,7 @@ int main(int argc, char** argv) {
         writeNormals(output, image, options.texelSize(), normals, report.slopes, provenance);
       }
     }
-    options.warnAbout(tool, input.path(), values.no_data, report);
+    options.warnAbout(tool, input.path(), values.no_data, values.boundary, report);
     tool.setResult(apps::reportJson(report));
     tool.summary(apps::reportText(input.path(), image, report));
   });
