@@ -13,7 +13,7 @@ namespace {
 
 /// A tile answers alone where less than this share of a footprint lies beyond its map.
 constexpr double kLeastRest = 1e-3;
-/// Tiles with less of the footprint than this are left out.
+/// Tiles with less of the footprint than this, beside the part that the own tile's map covers, are left out.
 constexpr double kLeastShare = 1e-6;
 /// Wider footprints weigh all tiles evenly, and differences of their integrals would lose digits.
 constexpr double kWidest = 1e4;
@@ -146,7 +146,7 @@ void UdimNdf::forEachPart(const Footprint& p, Visit&& visit) const {
       const double whole = shareOf(whole_x, at.u, at.sigma_u) * shareOf(whole_y, at.v, at.sigma_v);
       const double part = whole > 0 ? shareOf(x, at.u, at.sigma_u) * shareOf(y, at.v, at.sigma_v) : 0;
       covered += part;
-      if (&tile == own || whole - part < kLeastShare) continue;
+      if (&tile == own || whole - part <= kLeastShare * inside) continue;
       const Interval rest_x = restOf(at.column, dx, x), rest_y = restOf(at.row, dy, y);
       take(tile, whole - part, std::clamp(at.u, rest_x.low, rest_x.high), std::clamp(at.v, rest_y.low, rest_y.high));
     }
