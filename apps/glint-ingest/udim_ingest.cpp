@@ -10,8 +10,8 @@
 #include <optional>
 
 #include "common/memory_needs.h"
+#include "glint-ingest/normals_output.h"
 #include "glint/bake/common/slopes.h"
-#include "glint/bake/ingest/normal_bounds.h"
 #include "glint/bake/ingest/tile_margins.h"
 
 namespace glint::apps {
@@ -180,13 +180,9 @@ void UdimIngest::run() const {
                           output_.writeOptions(place));
     } else {
       NormalMap map;
-      map.width = all_width, map.height = all_height;
-      map.texel_size_um = options_.texelSize();
-      map.normals = normals;
-      map.slopes = bake::mapSlopes(map);
-      const auto bounds = bake::buildNormalBounds(map.width, map.height, map.normals);
-      bake::attachBounds(map, bounds);
-      formats::writeAsset(files.output, map, files.provenance, output_.writeOptions(place));
+      map.width = all_width, map.height = all_height, map.normals = normals;
+      writeNormals({files.output, files.provenance, output_.writeOptions(place)}, all_width, all_height, options_.texelSize(),
+                   normals, bake::mapSlopes(map));
     }
     options_.warnAbout(tool_, files.input, own.no_data, Boundary::clamp, own.report);
     tool_.summary(reportText(files.input, own.image, own.report));

@@ -6,6 +6,11 @@
 
 namespace glint::apps {
 
+/// Texts of the help for the input and the output.
+inline constexpr const char* kUdimImages = "image of normals or heights, or those of a UDIM set: 'name.<UDIM>.exr'";
+inline constexpr const char* kUdimMaps =
+    "asset (.glint) of normals or heights; of a UDIM set, one for each tile: 'name.<UDIM>.map.glint'";
+
 /// Makes an asset of each tile of a UDIM set, with margins of texels of its neighbours.
 class UdimIngest {
  public:

@@ -3,8 +3,8 @@
 #include "common/files.h"
 #include "common/input_asset.h"
 #include "common/tool.h"
-#include "common/udim_loop.h"
 #include "glint-pyramid/pyramid_options.h"
+#include "glint-pyramid/udim_pyramids.h"
 #include "glint-pyramid/wave_options.h"
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/bake/wang/tile_pyramid.h"
@@ -13,7 +13,7 @@
 using namespace glint;
 
 namespace {
-constexpr auto kLessMemory = "give a larger --stride, or a smaller --resolution or --overlap";
+using apps::kLessMemory;
 
 /// Writes the images of all tiles of a plane.
 void makeWangPyramid(apps::Tool& tool, const WangTiles& tiles, const apps::PyramidOptions& options,
@@ -26,30 +26,6 @@ void makeWangPyramid(apps::Tool& tool, const WangTiles& tiles, const apps::Pyram
   tool.setResult(apps::pyramidJson(pyramid.images));
   tool.summary(apps::pyramidText(pyramid.images));
 }
-
-/// Writes the images of one tile of a UDIM set, margins included.
-nlohmann::json makeTile(apps::Tool& tool, const formats::Asset& asset, const apps::PyramidOptions& options,
-                        const apps::WaveOptions& wave, const apps::MapFiles& files, const apps::OutputFile& output) {
-  if (wave.optics() == apps::Optics::wave || asset.kind() == "wang-tiles")
-    apps::refuseUdim(files.input, "is a tile of a UDIM set, and pyramids of waves and of Wang tiles are not made of sets");
-  const auto& map = asset.get<NormalMap>();
-  const bake::PyramidOptions values = options.tileValues();
-  tool.requireMemory(bake::pyramidBytes(map, values, static_cast<double>(tool.maxMemory())), "the NDF images", kLessMemory);
-  const bake::NdfPyramidData pyramid = bake::buildPyramid(map, values, tool.progress("images"));
-  formats::writeAsset(files.output, pyramid.view(), files.provenance, output.writeOptions(asset.info().udim));
-  tool.summary(files.output + "\n" + apps::pyramidText(pyramid));
-  return apps::pyramidJson(pyramid);
-}
-
-/// Writes a pyramid for each tile of a UDIM set.
-void makeTiles(apps::Tool& tool, const apps::InputFile& input, const apps::PyramidOptions& options,
-               const apps::WaveOptions& wave, const apps::OutputFile& output) {
-  apps::forEachMap(tool, input, output, [&](const apps::MapFiles& files) {
-    const formats::Asset asset = apps::openInput(tool, files.input, apps::UdimSets::taken);
-    apps::requireTile(asset, files);
-    return makeTile(tool, asset, options, wave, files, output);
-  });
-}
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -59,22 +35,15 @@ int main(int argc, char** argv) {
        "glints, ready to be queried or compressed. With --optics wave it takes heights, and computes their diffraction.",
        "glint-pyramid flakes.glint -o flakes.pyramid.glint --stride 32 --sigma-r 0.005\n"
        "  glint-pyramid 'rock.<UDIM>.map.glint' -o 'rock.<UDIM>.p.glint'"});
-  const apps::InputFile input(tool,
-                              "asset of kind normals, or with --optics wave of kind heights, from glint-ingest; or of kind "
-                              "wang-tiles, from glint-wang; or the normals of a UDIM set, 'name.<UDIM>.map.glint'",
-                              "NORMALS", apps::UdimSets::taken);
-  const apps::OutputFile output(
-      tool, apps::OutputFormat::asset,
-      "asset (.glint) of kind ndf-pyramid, wang-pyramid or wave-pyramid; with <UDIM>, one for each tile", input);
+  const apps::InputFile input(tool, apps::kPyramidInput, "NORMALS", apps::UdimSets::taken);
+  const apps::OutputFile output(tool, apps::OutputFormat::asset, apps::kPyramidOutput, input);
   const apps::PyramidOptions options(tool);
   const apps::WaveOptions wave(tool, options);
 
   return tool.run(argc, argv, [&] {
-    if (input.isSet()) return makeTiles(tool, input, options, wave, output);
-    const formats::Asset asset = apps::openInput(tool, input.path(), apps::UdimSets::taken);
+    if (apps::makeUdimPyramids(tool, input, output, options, wave)) return;
+    const formats::Asset asset = apps::openInput(tool, input.path());
     const formats::Provenance provenance = tool.provenance();
-    if (asset.info().udim)
-      return tool.setResult(makeTile(tool, asset, options, wave, {input.path(), output.path(), provenance}, output));
     if (wave.optics() == apps::Optics::wave) return apps::makeWavePyramid(tool, asset, input, wave, provenance, output);
     if (asset.kind() == "wang-tiles") return makeWangPyramid(tool, asset.get<WangTiles>(), options, provenance, output);
     const auto& map = asset.get<NormalMap>();
