@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -13,6 +14,7 @@
 #include "glint/formats/kinds.h"
 #include "glint/formats/provenance.h"
 #include "glint/formats/schema.h"
+#include "glint/formats/udim.h"
 #include "glint/model/error.h"
 
 namespace glint::formats {
@@ -48,6 +50,7 @@ struct AssetInfo {
   int format_minor = 0;
   std::vector<std::string> required_features;
   Provenance provenance;
+  std::optional<UdimPlace> udim;  ///< tile of a UDIM set that the asset covers; nothing where it is a map of its own
   std::uint64_t file_bytes = 0;
   std::vector<AttributeInfo> attributes;  ///< of the kind, in the order of SPEC.md
   std::vector<DatasetInfo> datasets;      ///< by path

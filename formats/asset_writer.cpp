@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -60,17 +61,23 @@ void writeAttribute(hid_t object, const std::string& name, const AttributeValue&
 AttributeValue text(std::string value) { return {ElementType::text, true, {}, {std::move(value)}}; }
 
 /// Root attributes that every kind has.
-Attributes commonValues(std::string_view kind, const Provenance& provenance) {
+Attributes commonValues(std::string_view kind, const Provenance& provenance, const std::optional<UdimPlace>& udim) {
   std::vector<std::string> inputs;
   for (const InputRecord& input : provenance.inputs) inputs.push_back(input.hash_hex + "  " + input.name);
-  return {{"glint_format", text("glint")},
-          {"format_major", {ElementType::i32, true, {kFormatMajor}, {}}},
-          {"format_minor", {ElementType::i32, true, {kFormatMinor}, {}}},
-          {"required_features", {ElementType::text, false, {}, {}}},
-          {"kind", text(std::string(kind))},
-          {"generator", text(provenance.generator)},
-          {"command", text(provenance.command_json.empty() ? "{}" : provenance.command_json)},
-          {"inputs", {ElementType::text, false, {}, std::move(inputs)}}};
+  Attributes values = {{"glint_format", text("glint")},
+                       {"format_major", {ElementType::i32, true, {kFormatMajor}, {}}},
+                       {"format_minor", {ElementType::i32, true, {kFormatMinor}, {}}},
+                       {"required_features", {ElementType::text, false, {}, {}}},
+                       {"kind", text(std::string(kind))},
+                       {"generator", text(provenance.generator)},
+                       {"command", text(provenance.command_json.empty() ? "{}" : provenance.command_json)},
+                       {"inputs", {ElementType::text, false, {}, std::move(inputs)}}};
+  if (udim) {
+    values["required_features"].texts = {kUdimFeature};
+    values["udim"] = {ElementType::i32, true, {static_cast<double>(udim->tile)}, {}};
+    values["udim_margins"] = {ElementType::i32, false, {udim->margins.begin(), udim->margins.end()}, {}};
+  }
+  return values;
 }
 
 /// Attributes of a dataset.
@@ -87,10 +94,10 @@ std::set<std::string> groupsOf(const PackedAsset& packed) {
 }
 
 /// Attributes of the root, the digest of the whole asset included.
-Attributes rootAttributes(const PackedAsset& packed, const Provenance& provenance,
+Attributes rootAttributes(const PackedAsset& packed, const Provenance& provenance, const std::optional<UdimPlace>& udim,
                           const std::map<std::string, std::string>& hashes) {
   FileStructure file;
-  file.attributes = commonValues(packed.kind, provenance);
+  file.attributes = commonValues(packed.kind, provenance, udim);
   file.attributes.insert(packed.attributes.begin(), packed.attributes.end());
   for (const std::string& group : groupsOf(packed)) file.groups[group];
   for (const PackedArray& array : packed.arrays) {
@@ -114,13 +121,14 @@ class MetadataWriter {
   }
 
   /// @return offset of each dataset by path
-  std::map<std::string, std::uint64_t> write(const Provenance& provenance) {
+  std::map<std::string, std::uint64_t> write(const Provenance& provenance, const std::optional<UdimPlace>& udim) {
     const hdf5::LibraryScope scope;
     const hdf5::TypeTable types;
     {
       hdf5::Handle file = create();
       const hdf5::Handle root(H5Gopen2(file, "/", H5P_DEFAULT), "cannot be written", "/", ErrorCode::io);
-      for (const auto& [name, value] : rootAttributes(packed_, provenance, hashes_)) writeAttribute(root, name, value, types);
+      for (const auto& [name, value] : rootAttributes(packed_, provenance, udim, hashes_))
+        writeAttribute(root, name, value, types);
       createGroups(file);
       createDatasets(file, false, types);
       hdf5::check(file.close(), "cannot be written", {}, ErrorCode::io);
@@ -204,9 +212,10 @@ class MetadataWriter {
 
 /// Writes the metadata.
 /// @return offset of each dataset by path
-std::map<std::string, std::uint64_t> writeMetadata(AtomicFile& file, const PackedAsset& packed, const Provenance& provenance) {
+std::map<std::string, std::uint64_t> writeMetadata(AtomicFile& file, const PackedAsset& packed, const Provenance& provenance,
+                                                   const std::optional<UdimPlace>& udim) {
   try {
-    return MetadataWriter(file.path(), packed).write(provenance);
+    return MetadataWriter(file.path(), packed).write(provenance, udim);
   } catch (const Error& error) {
     // HDF5 forgets why a file could not grow.
     std::uint64_t size = kBigBytes;
@@ -233,7 +242,7 @@ void writePacked(const fs::path& path, const PackedAsset& packed, const Provenan
     throw Error(ErrorCode::io, "file.writable", path.string(), {}, "exists", "pass --force to replace it");
   }
   AtomicFile file(path);
-  const auto offsets = writeMetadata(file, packed, provenance);
+  const auto offsets = writeMetadata(file, packed, provenance, options.udim);
   for (const PackedArray& array : packed.arrays) {
     if (array.size_bytes > 0) file.write(array.data, array.size_bytes, offsets.at(array.path));
   }

@@ -1,15 +1,19 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "glint/formats/kinds.h"
 #include "glint/formats/provenance.h"
+#include "glint/formats/udim.h"
 #include "glint/model/error.h"
 
 namespace glint::formats {
 
 struct WriteOptions {
   bool overwrite = false;  ///< replace a file that exists
+  /// Tile of a UDIM set that the asset covers. The width and height of the asset are those with margins.
+  std::optional<UdimPlace> udim = {};
 };
 
 /// Writes an asset of any kind, e.g. writeAsset(path, normal_map, provenance). The file appears whole or not at all: it is written under a temporary name, read back and checked as a

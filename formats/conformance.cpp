@@ -6,6 +6,7 @@
 #include "glint/formats/choices.h"
 #include "glint/formats/number_text.h"
 #include "glint/formats/size_expression.h"
+#include "glint/formats/udim.h"
 
 namespace glint::formats {
 namespace {
@@ -75,6 +76,33 @@ void warnOfUnknown(const Attributes& attributes, const std::string& object, std:
   }
 }
 
+/// Checks that a tile of a UDIM set is described in full, and that its margins leave texels to the tile.
+bool checkUdim(const Attributes& root, const SizeScope& scope, Findings& findings) {
+  const auto features = root.find("required_features");
+  const bool named =
+      features != root.end() && std::count(features->second.texts.begin(), features->second.texts.end(), kUdimFeature) > 0;
+  const auto tile = root.find("udim"), margins = root.find("udim_margins");
+  if (!named && tile == root.end() && margins == root.end()) return true;
+  if (!named) {
+    findings.add("attribute.value", "/@required_features",
+                 "does not name the feature \"" + std::string(kUdimFeature) + "\", which the attributes of a tile require");
+    return false;
+  }
+  for (const char* wanted : {"udim", "udim_margins"}) {
+    if (root.contains(wanted)) continue;
+    findings.add("attribute.missing", "/@" + std::string(wanted), "is missing");
+    return false;
+  }
+  const std::vector<double>& m = margins->second.numbers;
+  for (const auto& [size, beside] : {std::pair{"width", m[0] + m[2]}, std::pair{"height", m[1] + m[3]}}) {
+    const auto found = scope.values.find(size);
+    if (found != scope.values.end() && found->second.size() == 1 && beside < static_cast<double>(found->second[0])) continue;
+    findings.add("attribute.value", "/@udim_margins", "leaves no texel of the " + std::string(size) + " to the tile");
+    return false;
+  }
+  return true;
+}
+
 /// Checks root attributes and derives the values that sizes are made of. Returns whether datasets can be checked.
 bool checkRoot(const FileStructure& structure, const KindSchema& schema, SizeScope& scope, Findings& findings) {
   bool usable = true;
@@ -95,6 +123,7 @@ bool checkRoot(const FileStructure& structure, const KindSchema& schema, SizeSco
     }
   }
   warnOfUnknown(structure.attributes, "/", commonAttributes(), schema.attributes, findings);
+  usable = usable && checkUdim(structure.attributes, scope, findings);
   for (const DerivedValue& derived : schema.derived) {
     if (!usable) break;
     scope.values[std::string(derived.name)] = {evaluateSize(derived.expression, scope).value_or(0)};
@@ -168,12 +197,14 @@ const KindSchema* checkHeader(const FileStructure& structure, Findings& findings
   }
   const AttributeValue* features = attribute("required_features");
   if (features == nullptr) return nullptr;
+  bool known = true;
   for (const std::string& feature : features->texts) {
-    // Version 1.0 has no optional features yet, so every name is unknown.
+    if (feature == kUdimFeature) continue;
     findings.add("format.feature", "/@required_features", "requires the unknown feature \"" + feature + "\"");
+    known = false;
   }
   const AttributeValue* kind = attribute("kind");
-  if (kind == nullptr || !features->texts.empty()) return nullptr;
+  if (kind == nullptr || !known) return nullptr;
   const KindSchema* schema = findKindSchema(kind->texts[0]);
   if (schema == nullptr)
     findings.add("format.kind", "/@kind", "is \"" + kind->texts[0] + "\", a kind that this reader does not know");

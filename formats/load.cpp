@@ -27,6 +27,17 @@ std::vector<std::string> textsOf(const Attributes& attributes, std::string_view 
   return found == attributes.end() ? std::vector<std::string>() : found->second.texts;
 }
 
+/// The tile of a UDIM set that the asset covers.
+std::optional<UdimPlace> placeOf(const Attributes& attributes) {
+  const auto margins = attributes.find("udim_margins");
+  UdimPlace place;
+  place.tile = numberOf(attributes, "udim");
+  if (place.tile < kFirstUdim || margins == attributes.end() || margins->second.numbers.size() != place.margins.size())
+    return {};
+  for (std::size_t k = 0; k < place.margins.size(); ++k) place.margins[k] = static_cast<int>(margins->second.numbers[k]);
+  return place;
+}
+
 /// Collects what the file says about itself, as far as it could be read.
 AssetInfo describe(const FileStructure& structure) {
   AssetInfo info;
@@ -40,6 +51,7 @@ AssetInfo describe(const FileStructure& structure) {
     const std::size_t gap = line.find("  ");
     info.provenance.inputs.push_back({gap == std::string::npos ? std::string() : line.substr(gap + 2), line.substr(0, gap)});
   }
+  info.udim = placeOf(structure.attributes);
   info.file_bytes = structure.bytes.size();
   for (const auto& [path, record] : structure.datasets) {
     info.datasets.push_back({"/" + path, record.known_type ? std::string(name(record.type)) : "unknown", record.dims,

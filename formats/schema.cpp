@@ -1,6 +1,7 @@
 #include "glint/formats/schema.h"
 
 #include "glint/formats/kinds/kind.h"
+#include "glint/formats/udim.h"
 #include "glint/model/ndf_cp.h"
 
 namespace glint::formats {
@@ -85,6 +86,21 @@ std::span<const AttributeSchema> commonAttributes() {
        .long_name = "digest of all attributes and sizes, 32 hexadecimal digits",
        .required = false},
       {"inputs", text, "*", "1", "hash, two spaces and name of every input", 0, 0},
+      {.name = "udim",
+       .type = i32,
+       .units = "1",
+       .long_name = "tile of a UDIM set that the asset covers: 1001 + column + 10 row",
+       .minimum = kFirstUdim,
+       .maximum = kLastUdim,
+       .required = false},
+      {.name = "udim_margins",
+       .type = i32,
+       .count = "4",
+       .units = "texels",
+       .long_name = "texels of the neighbouring tiles beyond the left, lower, right and upper border of the tile",
+       .minimum = 0,
+       .maximum = 65536,
+       .required = false},
   };
   return table;
 }

@@ -15,6 +15,7 @@
 #include "common/answer_columns.h"
 #include "glint/formats/atomic_file.h"
 #include "glint/formats/descriptor.h"
+#include "glint/formats/udim.h"
 
 namespace glint::apps {
 namespace {
@@ -160,18 +161,45 @@ std::string escapeTarget(const std::string& name) {
 
 }  // namespace
 
-InputFile::InputFile(Tool& tool, const std::string& help, const std::string& name) {
+void refuseUdim(const std::string& path, const std::string& what) {
+  throw Error(
+      ErrorCode::unsupported, "udim.unsupported", path, "", what,
+      "glint-ingest, glint-pyramid, glint-compress, glint-moments, glint-query, glint-info and glint-validate take UDIM "
+      "sets; for others ingest the image of one tile by its own name");
+}
+
+InputFile::InputFile(Tool& tool, const std::string& help, const std::string& name, UdimSets sets) {
   tool.option(name, path_, help).required().unrecorded();
-  tool.addCheck([this, &tool] {
-    checkRegular(path_);
-    tool.addInput(path_);
+  tool.addCheck([this, &tool, sets] {
+    if (!formats::isUdimPattern(path_)) {
+      checkRegular(path_);
+      tool.addInput(path_);
+      return;
+    }
+    if (sets == UdimSets::refused) refuseUdim(path_, "is a UDIM set, which " + tool.name() + " does not take");
+    tiles_ = formats::udimTiles(path_);
+    for (const int tile : tiles_) {
+      const std::string file = formats::udimFile(path_, tile);
+      checkRegular(file);
+      tool.addInput(file);
+    }
   });
 }
 
-InputFiles::InputFiles(Tool& tool, const std::string& help, const std::string& name, bool required) {
+InputFiles::InputFiles(Tool& tool, const std::string& help, const std::string& name, bool required, UdimSets sets) {
   CLI::Option* option = tool.parser().add_option(name, paths_, help);
   option->expected(required ? 1 : 0, CLI::detail::expected_max_vector_size)->required(required);
-  tool.addCheck([this, &tool] {
+  tool.addCheck([this, &tool, sets] {
+    std::vector<std::string> files;
+    for (const std::string& path : paths_) {
+      if (!formats::isUdimPattern(path)) {
+        files.push_back(path);
+        continue;
+      }
+      if (sets == UdimSets::refused) refuseUdim(path, "is a UDIM set, which " + tool.name() + " does not take");
+      for (const int tile : formats::udimTiles(path)) files.push_back(formats::udimFile(path, tile));
+    }
+    paths_ = files;
     for (const std::string& path : paths_) {
       checkRegular(path);
       tool.addInput(path);
@@ -181,10 +209,32 @@ InputFiles::InputFiles(Tool& tool, const std::string& help, const std::string& n
 
 OutputFile::OutputFile(Tool& tool, OutputFormat format, const std::string& help, const std::string& name) {
   tool.option(name, path_, help).required().unrecorded();
-  tool.addCheck([this, &tool, format] {
+  tool.addCheck([this, &tool, format] { check(tool, format, {}); });
+}
+
+OutputFile::OutputFile(Tool& tool, OutputFormat format, const std::string& help, const InputFile& input) {
+  tool.option("-o,--output", path_, help).required().unrecorded();
+  tool.addCheck([this, &tool, format, &input] { check(tool, format, input.tiles()); });
+}
+
+void OutputFile::check(Tool& tool, OutputFormat format, const std::vector<int>& tiles) const {
+  const bool pattern = formats::isUdimPattern(path_);
+  if (pattern != !tiles.empty())
+    throw Error(ErrorCode::usage, "udim.output", path_, "",
+                pattern ? "names a UDIM set, and the input is one file" : "names one file, and the input is a UDIM set",
+                pattern ? "name one file" : "put <UDIM> into the name of the output, such as name.<UDIM>.glint");
+  if (!pattern) {
     checkOutput(tool, path_, format);
     tool.addOutput(path_);
-  });
+    return;
+  }
+  formats::checkUdimPattern(path_);
+  tool.makesMore();  // forEachMap skips tile by tile
+  for (const int tile : tiles) {
+    const std::string file = formats::udimFile(path_, tile);
+    checkOutput(tool, file, format);
+    tool.addOutput(file);
+  }
 }
 
 std::vector<std::byte> readFile(const std::string& path) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,20 +12,33 @@
 
 namespace glint::apps {
 
-/// Mix-in: one positional input file, which must exist and be readable before the work starts.
+/// Whether a tool takes UDIM sets, whose files are named by one pattern, such as name.<UDIM>.exr.
+enum class UdimSets : unsigned char { refused, taken };
+
+/// Refuses the pattern of a UDIM set in a tool that does not take sets, or the asset of a tile in one that does not know margins.
+/// @throws Error unsupported, which names the tools that take sets
+[[noreturn]] void refuseUdim(const std::string& path, const std::string& what);
+
+/// Mix-in: one positional input file, which must exist and be readable before the work starts; or the files of a UDIM set.
 class InputFile {
  public:
-  InputFile(Tool& tool, const std::string& help, const std::string& name = "INPUT");
+  InputFile(Tool& tool, const std::string& help, const std::string& name = "INPUT", UdimSets sets = UdimSets::refused);
+  /// The file, or the pattern of a set.
   const std::string& path() const { return path_; }
+  /// Tiles of a set that have a file, ascending; none for a file.
+  const std::vector<int>& tiles() const { return tiles_; }
+  bool isSet() const { return !tiles_.empty(); }
 
  private:
   std::string path_;
+  std::vector<int> tiles_;
 };
 
 /// Mix-in: positional input files, one or more, or any number where they are not required.
 class InputFiles {
  public:
-  InputFiles(Tool& tool, const std::string& help, const std::string& name, bool required);
+  InputFiles(Tool& tool, const std::string& help, const std::string& name, bool required, UdimSets sets = UdimSets::refused);
+  /// The files; the pattern of a UDIM set stands for the files of its tiles.
   const std::vector<std::string>& paths() const { return paths_; }
 
  private:
@@ -70,14 +84,23 @@ void checkReplaceable(const std::string& path, const std::string& target, Output
 void checkApart(const Tool& tool, const std::string& path, std::size_t others);
 
 /// Mix-in: `-o OUTPUT` (required), written atomically and checked by checkOutput().
+///
+/// With the input of a set, the output is a pattern, too: one file for each tile of the input.
 class OutputFile {
  public:
   OutputFile(Tool& tool, OutputFormat format, const std::string& help, const std::string& name = "-o,--output");
+  /// @param input  declared before; lives as long as the output
+  OutputFile(Tool& tool, OutputFormat format, const std::string& help, const InputFile& input);
   const std::string& path() const { return path_; }
   /// Options for writeAsset. It may replace any file, because the check before the work has decided.
-  formats::WriteOptions writeOptions() const { return {.overwrite = true}; }
+  /// @param udim  tile that the asset covers
+  formats::WriteOptions writeOptions(const std::optional<formats::UdimPlace>& udim = {}) const {
+    return {.overwrite = true, .udim = udim};
+  }
 
  private:
+  void check(Tool& tool, OutputFormat format, const std::vector<int>& tiles) const;
+
   std::string path_;
 };
 

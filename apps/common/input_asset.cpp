@@ -4,6 +4,11 @@ namespace glint::apps {
 
 formats::OpenOptions inputChecks(const Tool& tool) { return {.verify_hashes = !tool.trust(), .check_values = !tool.trust()}; }
 
-formats::Asset openInput(const Tool& tool, const std::string& path) { return formats::Asset::open(path, inputChecks(tool)); }
+formats::Asset openInput(const Tool& tool, const std::string& path, UdimSets tiles) {
+  formats::Asset asset = formats::Asset::open(path, inputChecks(tool));
+  if (tiles == UdimSets::refused && asset.info().udim)
+    refuseUdim(path, "is a tile of a UDIM set, with margins of its neighbours, which " + tool.name() + " does not take");
+  return asset;
+}
 
 }  // namespace glint::apps

@@ -4,25 +4,45 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/files.h"
 #include "glint/api/alternatives.h"
+#include "glint/api/plane_position.h"
 #include "glint/bake/common/reference_image.h"
 
 namespace glint::apps {
+namespace {
+/// Deviation of the round footprint of the same mean square size, texels.
+float meanSigma(const Footprint& p) { return std::sqrt(0.5f * (p.covariance.xx + p.covariance.yy)); }
+}  // namespace
 
 NdfAsset::NdfAsset(Tool& tool, const AskedAssets& asked) : tool_(tool), asked_(asked) {
-  tool.option("ASSET", path_, "asset of kind " + api::alternatives(asked.kinds)).required();
+  tool.option("ASSET", path_,
+              "asset of kind " + api::alternatives(asked.kinds) +
+                  (asked.udim_sets ? "; 'name.<UDIM>.glint': a UDIM set, --uv counts tiles" : ""))
+      .required();
   if (asks({"ndf-pyramid", "ndf-cp", "wave-pyramid"})) addPyramidOptions();
   addNormalsOptions();
   addBinOptions();
-  tool.addCheck([this] {
-    checkRegular(path_);
-    tool_.addInput(path_);
-    if (normals_path_.empty()) return;
-    checkRegular(normals_path_);
-    tool_.addInput(normals_path_);
-  });
+  tool.addCheck([this] { check(); });
+}
+
+void NdfAsset::check() {
+  for (const std::string& path : {path_, normals_path_}) {
+    if (path.empty()) continue;
+    if (formats::isUdimPattern(path) && !asked_.udim_sets)
+      refuseUdim(path, "is a UDIM set, which " + tool_.name() + " does not take");
+    std::vector<std::string> files = {path};
+    if (formats::isUdimPattern(path)) {
+      files.clear();
+      for (const int tile : formats::udimTiles(path)) files.push_back(formats::udimFile(path, tile));
+    }
+    for (const std::string& file : files) {
+      checkRegular(file);
+      tool_.addInput(file);
+    }
+  }
 }
 
 void NdfAsset::addPyramidOptions() {
@@ -102,7 +122,12 @@ void NdfAsset::useOnly(std::initializer_list<std::string_view> kinds, const std:
 }
 
 void NdfAsset::refuseOtherKinds() const {
-  const std::string kind(formats::Asset::open(path_).kind());
+  const bool pattern = formats::isUdimPattern(path_);
+  const formats::Asset asset = formats::Asset::open(pattern ? formats::udimFile(path_, formats::udimTiles(path_).front())
+                                                            : std::filesystem::path(path_));
+  if (asset.info().udim && !asked_.udim_sets)
+    refuseUdim(path_, "is a tile of a UDIM set, with margins of its neighbours, which " + tool_.name() + " does not take");
+  const std::string kind(asset.kind());
   if (kind == "displacement")
     throw Error(
         ErrorCode::unsupported, "format.kind", path_, "", "is of kind displacement, which holds no distribution of normals",
@@ -153,7 +178,13 @@ std::optional<std::vector<float>> NdfAsset::colourImage(const Footprint& footpri
   return image;
 }
 
+bool NdfAsset::lacksTileAt(double u, double v) const {
+  const auto* set = std::get_if<api::UdimNdf>(&model());
+  return set != nullptr && set->tiles().at(api::planeCell(u), api::planeCell(v)) == nullptr;
+}
+
 bool NdfAsset::widens(const Footprint& footprint) const {
+  if (std::holds_alternative<api::UdimNdf>(model())) return meanSigma(footprint) < info().smallest_sigma_texels;
   return std::visit(
       [&](const auto& m) {
         if constexpr (requires { m.round().smallestSigma(); })
@@ -166,6 +197,12 @@ bool NdfAsset::widens(const Footprint& footprint) const {
 
 std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint) const {
   if (opened_->hasNormals()) return {};
+  if (std::holds_alternative<api::UdimNdf>(model())) {
+    const float sigma = meanSigma(footprint), finest = info().finest_sigma_texels;
+    if (sigma >= finest * 0.999f || opened_->asset().kind() == "slope-moments") return {};
+    return FootprintFault{fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
+                          "add --normals with the pattern of the assets that the pyramids were made from"};
+  }
   return std::visit(
       [&](const auto& m) -> std::optional<FootprintFault> {
         if constexpr (requires { m.round().shape(); }) {

@@ -18,6 +18,7 @@ using api::AnyNdf;
 struct AskedAssets {
   std::vector<std::string_view> kinds = api::ndfKinds();
   bool smooth_surfaces = true;  ///< whether normals may be asked as a smooth surface
+  bool udim_sets = false;       ///< whether tiles of a UDIM set may be asked, as a set
 };
 
 /// Mix-in: the asset that a tool asks, and the options of the kinds that it asks. Reference answers normals, with --surface,
@@ -56,7 +57,11 @@ class NdfAsset {
   /// Whether the asset answers a wider footprint, for want of --normals.
   bool widens(const Footprint& footprint) const;
 
+  /// Whether the asset is a UDIM set that has no tile at a place: answers are 0 there.
+  bool lacksTileAt(double u, double v) const;
+
  private:
+  void check();
   /// An option that only some kinds of assets use.
   struct KindOption {
     std::vector<std::string_view> kinds;

@@ -319,9 +319,11 @@ std::string Tool::commandJson() const {
   return command.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
 }
 
-formats::Provenance Tool::provenance() const {
+formats::Provenance Tool::provenance() const { return provenance(state_->inputs); }
+
+formats::Provenance Tool::provenance(const std::vector<std::string>& inputs) const {
   formats::Provenance provenance{generator(), commandJson(), {}};
-  for (const std::string& path : state_->inputs) {
+  for (const std::string& path : inputs) {
     const std::string name = std::filesystem::path(path).filename().string();
     requireText(path, name);
     provenance.inputs.push_back({name, formats::hashFile(path)});

@@ -160,6 +160,8 @@ class Tool {
   /// that outputs do not depend on where a build runs. Reads the inputs.
   /// @throws Error io if an input cannot be read
   formats::Provenance provenance() const;
+  /// The same for a part of the run that reads only these files.
+  formats::Provenance provenance(const std::vector<std::string>& inputs) const;
 
  private:
   struct State;

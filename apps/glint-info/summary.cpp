@@ -126,21 +126,26 @@ ordered_json summarize(const formats::Asset& asset) {
   const std::string& text = info.provenance.command_json;
   ordered_json command = jsonDepth(text) > kMostJsonDepth ? ordered_json(text) : ordered_json::parse(text, nullptr, false);
   if (command.is_discarded()) command = text;
-  return {{"schema_version", kSummarySchemaVersion},
-          {"kind", asset.kind()},
-          {"format_version", std::to_string(info.format_major) + "." + std::to_string(info.format_minor)},
-          {"file_bytes", info.file_bytes},
-          {"provenance",
-           {{"generator", info.provenance.generator}, {"command", std::move(command)}, {"inputs", std::move(inputs)}}},
-          {"properties", propertiesOf(info)},
-          {"statistics", statisticsOf(asset)},
-          {"datasets", std::move(datasets)}};
+  ordered_json summary = {
+      {"schema_version", kSummarySchemaVersion},
+      {"kind", asset.kind()},
+      {"format_version", std::to_string(info.format_major) + "." + std::to_string(info.format_minor)},
+      {"file_bytes", info.file_bytes},
+      {"provenance",
+       {{"generator", info.provenance.generator}, {"command", std::move(command)}, {"inputs", std::move(inputs)}}},
+      {"properties", propertiesOf(info)},
+      {"statistics", statisticsOf(asset)},
+      {"datasets", std::move(datasets)}};
+  if (info.udim) summary["udim"] = {{"tile", info.udim->tile}, {"margins_texels", info.udim->margins}};
+  return summary;
 }
 
 std::string summaryText(const std::string& path, const ordered_json& summary) {
   std::string text = path + "\n";
   text += row("kind", plain(summary["kind"])) + row("format_version", plain(summary["format_version"])) +
           row("file_bytes", plain(summary["file_bytes"]));
+  if (summary.contains("udim"))
+    text += row("udim", plain(summary["udim"]["tile"])) + row("udim margins", plain(summary["udim"]["margins_texels"]));
   text += section("properties", summary["properties"]) + section("statistics", summary["statistics"]);
   const ordered_json& provenance = summary["provenance"];
   text += "provenance\n" + row("generator", plain(provenance["generator"])) + row("command", provenance["command"].dump());

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/numbers.h"
+#include "common/udim_loop.h"
 #include "glint/model/counted.h"
 
 namespace glint::apps {
@@ -66,8 +67,9 @@ IngestOptions::IngestOptions(Tool& tool) {
                                  .range(-1e9, 1e9)
                                  .excludes(scale)
                                  .needs(texel_size);
-  tool.choice("--boundary", p.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
-              "normals of heights at the border. wrap: the map tiles; clamp: it ends there, differences are one-sided");
+  boundary_option_ =
+      &tool.choice("--boundary", p.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
+                   "normals of heights at the border. wrap: the map tiles; clamp: it ends there, differences are one-sided");
   image_.declare(tool);
   tool.option("--nodata", no_data_,
               "number that pixels without data hold: they are filled by their neighbours. auto: the one of a GeoTIFF's tag; "
@@ -101,6 +103,13 @@ bake::IngestOptions IngestOptions::values(Tool& tool, const std::string& name, c
   p.no_data = no_data_ == "auto" ? image.no_data : parseNoData(no_data_);
   p.refuse_sentinels = no_data_ != "none";
   if (height_scale_um_option_->given()) p.height_scale = height_scale_um_ / texel_size_um_;
+  return p;
+}
+
+bake::IngestOptions IngestOptions::tileValues(Tool& tool, const std::string& name, const Image& image) const {
+  bake::IngestOptions p = values(tool, name, image);
+  requireClamp(*boundary_option_, p.boundary);
+  p.boundary = Boundary::clamp;
   return p;
 }
 
@@ -173,7 +182,7 @@ void warnOfSeam(const Warn& warn, Boundary boundary, Vec2 seam) {
 
 }  // namespace
 
-void IngestOptions::warnAbout(Tool& tool, const std::string& name, const std::optional<double>& no_data,
+void IngestOptions::warnAbout(Tool& tool, const std::string& name, const std::optional<double>& no_data, Boundary boundary,
                               const bake::IngestReport& r) const {
   const auto warn = [&](const std::string& text) { tool.warn(name + ": " + text); };
   const auto replaced = [&](std::size_t count, const Subject& subject, const std::string& what) {
@@ -200,7 +209,7 @@ void IngestOptions::warnAbout(Tool& tool, const std::string& name, const std::op
          fmt::format(" not of unit length, of {} (half of all are off by more than {:.3f}): normalised", r.texels,
                      r.median_length_error));
   }
-  warnOfSeam(warn, values_.boundary, r.seam);
+  warnOfSeam(warn, boundary, r.seam);
   if (std::max(std::abs(r.mean_normal.x), std::abs(r.mean_normal.y)) > kSuspiciousMeanTilt) {
     tool.warn(fmt::format("{}: the mean normal ({:.2f}, {:.2f}) is far from up; is this a tangent-space map?", name,
                           r.mean_normal.x, r.mean_normal.y));

@@ -21,9 +21,14 @@ class IngestOptions {
   Image read(Tool& tool, const std::string& path) const;
 
   /// Warns of what was changed on the way in, and of a number of --nodata that no texel holds.
-  /// @param no_data  the number that marked texels without data, if any
-  void warnAbout(Tool& tool, const std::string& name, const std::optional<double>& no_data,
+  /// @param no_data   the number that marked texels without data, if any
+  /// @param boundary  of the heights
+  void warnAbout(Tool& tool, const std::string& name, const std::optional<double>& no_data, Boundary boundary,
                  const bake::IngestReport& report) const;
+
+  /// Makes the options those of a UDIM set, which ends where it has no tile.
+  /// @throws Error usage for --boundary wrap
+  bake::IngestOptions tileValues(Tool& tool, const std::string& name, const Image& image) const;
 
   bool readsHeights() const { return kind_ == Kind::height; }
   bool writesHeights() const { return to_ == To::heights; }
@@ -40,6 +45,7 @@ class IngestOptions {
   float texel_size_um_ = 0;
   std::string no_data_ = "auto";
   Option* height_scale_um_option_;
+  Option* boundary_option_;
   ImageOptions image_;
 };
 

@@ -9,6 +9,7 @@
 #include "common/files.h"
 #include "common/image_input.h"
 #include "common/numbers.h"
+#include "common/udim_loop.h"
 
 namespace glint::apps {
 namespace {
@@ -30,8 +31,8 @@ MomentsOptions::MomentsOptions(Tool& tool) : tool_(tool) {
                                 "first level that is kept; its texels cover 2^N texels of the map along an axis. Smaller "
                                 "footprints are answered as this level's: from 0.6 texels up at 0, 1.2 at 1, 2.3 at 2")
                         .range(0, SlopeMoments::kMaxLevels - 1);
-  tool.choice("--boundary", values_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
-              "beyond the border of the map");
+  boundary_option_ = &tool.choice("--boundary", values_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
+                                  "beyond the border of the map");
   tool.choice("--gradient", values_.gradient, {{"central", bake::Gradient::central}, {"sobel", bake::Gradient::sobel}},
               "slopes of heights: central differences, or Sobel's as maketx --bumpslopes has them, which are less steep");
   tool.option(
@@ -52,7 +53,14 @@ void MomentsOptions::readRoughness() {
   tool_.addInput(roughness_path_);
 }
 
-bake::SlopeMomentsOptions MomentsOptions::values(int width, int height) {
+bake::SlopeMomentsOptions MomentsOptions::values(int width, int height, bool of_tile) {
+  if (of_tile) {
+    requireClamp(*boundary_option_, values_.boundary);
+    values_.boundary = Boundary::clamp;
+    if (!roughness_path_.empty())
+      throw Error(ErrorCode::usage, "udim.roughness", roughness_path_, "--roughness",
+                  "is an image of one map, not of a UDIM set", "give a number");
+  }
   const int last = SlopeMoments::chainLength(width, height) - 1;
   if (finest_option_->given() && values_.finest_level > last) {
     throw Error(ErrorCode::usage, "option.range", {}, "--finest",

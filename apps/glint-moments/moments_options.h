@@ -18,7 +18,9 @@ class MomentsOptions {
 
   /// Options for the moments of an asset. They refer to memory of this object.
   /// @throws Error usage if the map has fewer levels; invalid_input for an image of roughness that does not fit the map
-  bake::SlopeMomentsOptions values(int width, int height);
+  /// @param of_tile  whether the map is a tile of a UDIM set, which ends at its margins. Then an error usage for --boundary wrap and for
+  ///                 an image of roughness
+  bake::SlopeMomentsOptions values(int width, int height, bool of_tile = false);
   /// Alpha of the material: root mean square over the map. Valid after values().
   float meanAlpha() const { return mean_alpha_; }
 
@@ -28,6 +30,7 @@ class MomentsOptions {
   Tool& tool_;
   bake::SlopeMomentsOptions values_;
   const Option* finest_option_ = nullptr;
+  const Option* boundary_option_ = nullptr;
   std::string roughness_ = "0";
   std::string roughness_path_;  ///< empty: roughness is a number
   double roughness_value_ = 0;

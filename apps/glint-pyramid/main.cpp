@@ -4,6 +4,7 @@
 #include "common/input_asset.h"
 #include "common/tool.h"
 #include "glint-pyramid/pyramid_options.h"
+#include "glint-pyramid/udim_pyramids.h"
 #include "glint-pyramid/wave_options.h"
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/bake/wang/tile_pyramid.h"
@@ -12,7 +13,7 @@
 using namespace glint;
 
 namespace {
-constexpr auto kLessMemory = "give a larger --stride, or a smaller --resolution or --overlap";
+using apps::kLessMemory;
 
 /// Writes the images of all tiles of a plane.
 void makeWangPyramid(apps::Tool& tool, const WangTiles& tiles, const apps::PyramidOptions& options,
@@ -32,17 +33,15 @@ int main(int argc, char** argv) {
       {"glint-pyramid",
        "Computes the NDF images of a normal map for footprints of every size and position: the level of detail of its "
        "glints, ready to be queried or compressed. With --optics wave it takes heights, and computes their diffraction.",
-       "glint-pyramid flakes.glint -o flakes.pyramid.glint --stride 32 --sigma-r 0.005"});
-  const apps::InputFile input(tool,
-                              "asset of kind normals, or with --optics wave of kind heights, from glint-ingest; or of kind "
-                              "wang-tiles, from glint-wang",
-                              "NORMALS");
-  const apps::OutputFile output(tool, apps::OutputFormat::asset,
-                                "asset (.glint) of kind ndf-pyramid, wang-pyramid or wave-pyramid");
+       "glint-pyramid flakes.glint -o flakes.pyramid.glint --stride 32 --sigma-r 0.005\n"
+       "  glint-pyramid 'rock.<UDIM>.map.glint' -o 'rock.<UDIM>.p.glint'"});
+  const apps::InputFile input(tool, apps::kPyramidInput, "NORMALS", apps::UdimSets::taken);
+  const apps::OutputFile output(tool, apps::OutputFormat::asset, apps::kPyramidOutput, input);
   const apps::PyramidOptions options(tool);
   const apps::WaveOptions wave(tool, options);
 
   return tool.run(argc, argv, [&] {
+    if (apps::makeUdimPyramids(tool, input, output, options, wave)) return;
     const formats::Asset asset = apps::openInput(tool, input.path());
     const formats::Provenance provenance = tool.provenance();
     if (wave.optics() == apps::Optics::wave) return apps::makeWavePyramid(tool, asset, input, wave, provenance, output);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/numbers.h"
+#include "common/udim_loop.h"
 #include "glint/bake/pyramid/asked_levels.h"
 
 namespace glint::apps {
@@ -44,6 +45,7 @@ PyramidOptions::PyramidOptions(Tool& tool) {
       .defaultText("none");
   tool.choice("--precision", values_.precision, {{"half", BlockPrecision::f16}, {"float", BlockPrecision::f32}},
               "of stored pixels");
+  boundary_ = &boundary;
   geometric_ = {{"--sigma-r", &sigma_r}, {"--surface", &surface}, {"--boundary", &boundary}};
 }
 
@@ -65,6 +67,13 @@ bake::PyramidOptions PyramidOptions::values() const {
   readUnlessAuto(levels_, "--levels", "levels", "give auto, or 1 or more", options.levels);
   if (coarsest_ > 0) options.levels = bake::levelsFor(coarsest_, double{options.stride});
   readUnlessAuto(resolution_, "--resolution", "pixels", "give auto, or a multiple of 16 from 32 to 1024", options.resolution);
+  return options;
+}
+
+bake::PyramidOptions PyramidOptions::tileValues() const {
+  bake::PyramidOptions options = values();
+  requireClamp(*boundary_, options.boundary);
+  options.boundary = Boundary::clamp;
   return options;
 }
 

@@ -17,6 +17,8 @@ class PyramidOptions {
 
   /// Valid after parsing. @throws Error usage if --levels or --resolution is neither `auto` nor a number
   bake::PyramidOptions values() const;
+  /// The same for a tile of a UDIM set, which ends at its margins. @throws Error usage for --boundary wrap
+  bake::PyramidOptions tileValues() const;
   /// Whether the resolution is to follow from the roughness.
   bool autoResolution() const { return resolution_ == "auto"; }
   /// The first of the options that was given and that only geometric optics has; empty: none.
@@ -26,6 +28,7 @@ class PyramidOptions {
   bake::PyramidOptions values_;
   double finest_ = 0, coarsest_ = 0;
   std::string levels_ = "auto", resolution_ = std::to_string(values_.resolution);
+  const Option* boundary_ = nullptr;
   std::vector<std::pair<std::string, const Option*>> geometric_;
 };
 

@@ -34,7 +34,7 @@ Query HalfVectorOptions::query(const Footprint& footprint) const {
 
 DistributionCommand::DistributionCommand(Tool& tool)
     : tool_(tool),
-      asset_(tool),
+      asset_(tool, {.udim_sets = true}),
       footprint_(tool),
       halves_(tool),
       picture_(tool),
@@ -66,6 +66,9 @@ void DistributionCommand::run() {
   if (const auto fault = asset_.unanswerable(footprint_.footprint()))
     throw Error(ErrorCode::usage, "query.footprint", asset_.path(), "", fault->what, fault->remedy);
   if (asset_.widens(footprint_.footprint())) warnOfWidening("the footprint is");
+  if (asset_.lacksTileAt(footprint_.u(), footprint_.v()))
+    tool_.warn(
+        fmt::format("{}: has no tile at uv {:g} {:g}: densities are 0 there", asset_.path(), footprint_.u(), footprint_.v()));
   if (picture_.given()) writePicture();
   if (table_.samples() > 0) writeSamples();
   if (halves_.given()) answerOne();

@@ -34,7 +34,9 @@ std::vector<std::string> assetsOf(const Manifest& manifest) {
 
 }  // namespace
 
-ValidateOptions::ValidateOptions(Tool& tool) : tool_(tool), files_(tool, "assets (.glint)", "FILE", false) {
+ValidateOptions::ValidateOptions(Tool& tool)
+    : tool_(tool),
+      files_(tool, "assets (.glint); 'name.<UDIM>.glint': all tiles of a UDIM set", "FILE", false, UdimSets::taken) {
   tool.flag("--warnings-as-errors", warnings_as_errors_, "exit with 3 if there are warnings");
   tool.flag("--quick", quick_, "check structure and indices only, not hashes and values");
   tool.option("--since", since_,

@@ -60,14 +60,113 @@ std::vector<std::string_view> ndfKinds() {
   return kinds;
 }
 
+struct OpenedNdf::Set {
+  Set(std::vector<OpenedNdf> opened, std::vector<UdimTile> models) : maps(std::move(opened)), tiles(std::move(models)) {}
+  std::vector<OpenedNdf> maps;  // one for each tile
+  UdimTiles tiles;              // points into maps
+};
+
+namespace {
+
+/// The options of one tile: it ends at its margins, and has a map of its own.
+NdfOptions tileOptions(NdfOptions options, int tile) {
+  options.boundary = Boundary::clamp;
+  if (!options.normals.empty()) options.normals = formats::udimFile(options.normals, tile);
+  return options;
+}
+
+formats::UdimPlace placeOf(const formats::Asset& asset, const std::filesystem::path& path) {
+  if (asset.info().udim) return *asset.info().udim;
+  throw Error(ErrorCode::invalid_input, "udim.tile", path.string(), "", "is no tile of a UDIM set, but a map of its own",
+              "make the tiles together, from the images on: glint-ingest 'name.<UDIM>.exr' -o 'name.<UDIM>.map.glint'");
+}
+
+/// Refuses a file whose name is that of another tile.
+void requireTile(const formats::Asset& asset, const std::filesystem::path& path, int tile) {
+  const formats::UdimPlace place = placeOf(asset, path);
+  if (place.tile == tile) return;
+  throw Error(ErrorCode::invalid_input, "udim.tile", path.string(), "",
+              "holds tile " + std::to_string(place.tile) + ", and its name says " + std::to_string(tile),
+              "give the file the name that it was made with, or make it again");
+}
+
+UdimModels::Any tileModel(const AnyNdf& any, const std::filesystem::path& path, std::string_view kind) {
+  return std::visit(
+      [&]<class Model>(const Model& model) -> UdimModels::Any {
+        if constexpr (std::is_constructible_v<UdimModels::Variant, Model>) return UdimModels::Any(model);
+        std::vector<std::string_view> kinds;
+        UdimModels::forEach([&]<class Other>(std::type_identity<Other>) { kinds.push_back(NdfTraits<Other>::kKind); });
+        throw Error(ErrorCode::unsupported, "udim.kind", path.string(), "",
+                    "is a tile of kind " + std::string(kind) + ", and no such tiles are answered as a set",
+                    "make tiles of kind " + alternatives(kinds));
+      },
+      any);
+}
+
+/// What a set is: as its first tile, with the sizes of the largest tile and the widest of the smallest footprints.
+NdfInfo setInfo(const UdimTiles& set, const std::vector<OpenedNdf>& maps) {
+  NdfInfo info = maps.front().info();
+  info.width = set.width(), info.height = set.height();
+  info.boundary = Boundary::clamp;
+  info.finest_sigma_texels = info.coarsest_sigma_texels = info.smallest_sigma_texels = 0;
+  for (std::size_t k = 0; k < maps.size(); ++k) {
+    const UdimTile& tile = set.tiles()[k];
+    const float scale = static_cast<float>(set.width()) / static_cast<float>(tile.place.tileWidth(tile.width));
+    const NdfInfo& one = maps[k].info();
+    info.finest_sigma_texels = std::max(info.finest_sigma_texels, scale * one.finest_sigma_texels);
+    info.coarsest_sigma_texels = std::max(info.coarsest_sigma_texels, scale * one.coarsest_sigma_texels);
+    info.smallest_sigma_texels = std::max(info.smallest_sigma_texels, scale * one.smallest_sigma_texels);
+  }
+  return info;
+}
+
+/// Moments of the slopes of several maps of one area.
+MapSlopes meanSlopes(const std::vector<OpenedNdf>& maps) {
+  double n = static_cast<double>(maps.size()), x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  for (const OpenedNdf& map : maps) {
+    const MapSlopes slopes = map.slopes();
+    const double mx = slopes.mean.x, my = slopes.mean.y;
+    x += mx / n, y += my / n;
+    xx += (slopes.covariance.xx + mx * mx) / n, xy += (slopes.covariance.xy + mx * my) / n;
+    yy += (slopes.covariance.yy + my * my) / n;
+  }
+  MapSlopes mean;
+  mean.mean = {static_cast<float>(x), static_cast<float>(y)};
+  mean.covariance = {static_cast<float>(std::max(0.0, xx - x * x)), static_cast<float>(xy - x * y),
+                     static_cast<float>(std::max(0.0, yy - y * y))};
+  return mean;
+}
+
+}  // namespace
+
 OpenedNdf OpenedNdf::open(const std::filesystem::path& path, const NdfOptions& options) {
-  return open(formats::Asset::open(path, options.checks), path, options);
+  if (!formats::isUdimPattern(path)) return open(formats::Asset::open(path, options.checks), path, options);
+  if (!options.normals.empty() && !formats::isUdimPattern(options.normals))
+    throw Error(ErrorCode::usage, "udim.normals", options.normals.string(), "", "is one map, and a set has one for each tile",
+                "name the maps by a pattern, too, such as name.<UDIM>.map.glint");
+  std::vector<OpenedNdf> maps;
+  for (const int tile : formats::udimTiles(path)) {
+    const std::filesystem::path file = formats::udimFile(path, tile);
+    formats::Asset asset = formats::Asset::open(file, options.checks);
+    requireTile(asset, file, tile);
+    maps.push_back(openMap(std::move(asset), file, tileOptions(options, tile)));
+  }
+  return openSet(std::move(maps), path, options);
 }
 
 OpenedNdf OpenedNdf::open(formats::Asset asset, const std::filesystem::path& path, const NdfOptions& options) {
-  OpenedNdf opened(std::move(asset), path, options);
+  if (!asset.info().udim) return openMap(std::move(asset), path, options);
+  const int tile = asset.info().udim->tile;
+  std::vector<OpenedNdf> maps;
+  maps.push_back(openMap(std::move(asset), path, tileOptions(options, tile)));
+  return openSet(std::move(maps), path, options);
+}
+
+OpenedNdf OpenedNdf::openMap(formats::Asset asset, const std::filesystem::path& path, const NdfOptions& options) {
+  OpenedNdf opened(path, options);
+  opened.asset_ = std::move(asset);
   if (!options.normals.empty()) opened.normals_ = formats::Asset::open(options.normals, options.checks);
-  const std::string_view kind = opened.asset_.kind();
+  const std::string_view kind = opened.asset_->kind();
   if (!answersNdf(kind)) refuseKind(kind, path);
   NdfModels::forEach([&]<class Model>(std::type_identity<Model>) {
     if (kind != NdfTraits<Model>::kKind) return;
@@ -75,12 +174,50 @@ OpenedNdf OpenedNdf::open(formats::Asset asset, const std::filesystem::path& pat
     opened.model_ = NdfTraits<Model>::open(source);
     opened.info_ = NdfTraits<Model>::info(source);
   });
-  if (opened.normals_) requireSameMap(opened.asset_, path, opened.info_, opened.normals_->get<NormalMap>(), options.normals);
+  if (opened.normals_) requireSameMap(*opened.asset_, path, opened.info_, opened.normals_->get<NormalMap>(), options.normals);
   return opened;
 }
 
+OpenedNdf OpenedNdf::openSet(std::vector<OpenedNdf> maps, const std::filesystem::path& path, const NdfOptions& options) {
+  std::vector<UdimTile> tiles;
+  for (const OpenedNdf& map : maps) {
+    const std::string_view kind = map.asset().kind();
+    if (kind != maps.front().asset().kind())
+      throw Error(
+          ErrorCode::invalid_input, "udim.kind", map.path().string(), "",
+          "is of kind " + std::string(kind) + ", and the first tile of kind " + std::string(maps.front().asset().kind()),
+          "make all tiles by the same tool");
+    tiles.push_back(
+        {placeOf(map.asset(), map.path()), map.info().width, map.info().height, tileModel(map.model(), map.path(), kind)});
+  }
+  OpenedNdf opened(path, options);
+  const auto set = std::make_shared<Set>(std::move(maps), std::move(tiles));
+  opened.model_ = UdimNdf(set->tiles);
+  opened.info_ = setInfo(set->tiles, set->maps);
+  opened.set_ = set;
+  return opened;
+}
+
+const formats::Asset& OpenedNdf::asset() const { return set_ ? set_->maps.front().asset() : *asset_; }
+
+std::uint64_t OpenedNdf::fileBytes() const {
+  if (!set_) return asset_->info().file_bytes;
+  std::uint64_t bytes = 0;
+  for (const OpenedNdf& map : set_->maps) bytes += map.fileBytes();
+  return bytes;
+}
+
+bool OpenedNdf::hasNormals() const { return set_ ? set_->maps.front().hasNormals() : normals_.has_value(); }
+
 MapSlopes OpenedNdf::slopes() const {
-  return std::visit([&]<class Model>(const Model&) { return NdfTraits<Model>::slopes(asset_.get<AssetOf<Model>>()); }, model_);
+  return std::visit(
+      [&]<class Model>(const Model&) {
+        if constexpr (std::is_same_v<Model, UdimNdf>)
+          return meanSlopes(set_->maps);
+        else
+          return NdfTraits<Model>::slopes(asset_->get<AssetOf<Model>>());
+      },
+      model_);
 }
 
 }  // namespace glint::api

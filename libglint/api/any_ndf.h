@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -26,7 +28,9 @@ std::vector<std::string_view> ndfKinds();
 /// An asset and the model that answers from it, of whichever kind it is.
 class OpenedNdf {
  public:
-  /// Opens an asset of a kind that answers an NDF.
+  /// Opens an asset of a kind that answers an NDF, or a UDIM set of them: `name.<UDIM>.glint` opens every tile that has a file, and
+  /// the model is a UdimNdf. So it is for the file of one tile, which is a set of this tile. `options.normals` of a set is a pattern,
+  /// too. A set answers as with Boundary::clamp.
   /// @throws Error  as formats::Asset::open; unsupported for other kinds; invalid_input if `options.normals` is not the map
   ///                that the asset was made from, by the hash that the asset names, or by size where it names none
   static OpenedNdf open(const std::filesystem::path& path, const NdfOptions& options = {});
@@ -38,11 +42,14 @@ class OpenedNdf {
   /// Points into the mapped asset: lives as long as this object, also when that is moved.
   const AnyNdf& model() const { return model_; }
   const NdfInfo& info() const { return info_; }
-  const formats::Asset& asset() const { return asset_; }
+  /// The asset; of a UDIM set, that of its first tile.
+  const formats::Asset& asset() const;
+  /// Bytes of the asset, or of all tiles.
+  std::uint64_t fileBytes() const;
   const std::filesystem::path& path() const { return path_; }
   /// Whether footprints below level 0 are answered from the texels.
-  bool hasNormals() const { return normals_.has_value(); }
-  /// The map that answers them; nullptr if there is none.
+  bool hasNormals() const;
+  /// The map that answers them; nullptr if there is none, and for UDIM sets, which have one for each tile.
   const NormalMap* normals() const { return normals_ ? &normals_->get<NormalMap>() : nullptr; }
   /// Moments of the map's slopes, for SmithMasking. Kind normals: sums over all texels; other kinds hold them.
   MapSlopes slopes() const;
@@ -52,16 +59,21 @@ class OpenedNdf {
   /// What the model was made from, for functions of its traits. Points into this object.
   template <class Model>
   NdfSource<AssetOf<Model>> source() const {
-    return {asset_.get<AssetOf<Model>>(), options_, normals(), path_};
+    return {asset().get<AssetOf<Model>>(), options_, normals(), path_};
   }
 
  private:
-  OpenedNdf(formats::Asset asset, std::filesystem::path path, const NdfOptions& options)
-      : path_(std::move(path)), options_(options), asset_(std::move(asset)) {}
+  /// The tiles of a UDIM set.
+  struct Set;
+
+  OpenedNdf(std::filesystem::path path, const NdfOptions& options) : path_(std::move(path)), options_(options) {}
+  static OpenedNdf openMap(formats::Asset asset, const std::filesystem::path& name, const NdfOptions& options);
+  static OpenedNdf openSet(std::vector<OpenedNdf> maps, const std::filesystem::path& name, const NdfOptions& options);
 
   std::filesystem::path path_;
   NdfOptions options_;
-  formats::Asset asset_;
+  std::optional<formats::Asset> asset_;  // nothing of a set
+  std::shared_ptr<const Set> set_;       // nothing but of a set
   std::optional<formats::Asset> normals_;
   AnyNdf model_;
   NdfInfo info_;

@@ -256,7 +256,9 @@ glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* info) {
   all.boundary = static_cast<int32_t>(from.boundary);
   all.has_normals = ndf->body().opened.hasNormals() ? 1 : 0;
   all.smallest_sigma_texels = from.smallest_sigma_texels;
-  all.file_bytes = ndf->body().opened.asset().info().file_bytes;
+  all.file_bytes = ndf->body().opened.fileBytes();
+  if (const auto* set = std::get_if<api::UdimNdf>(&ndf->body().opened.model()))
+    all.udim_tiles = static_cast<int32_t>(set->tiles().tiles().size());
   return giveSized(all, info) ? GLINT_OK : usage("glint_ndf_info", kWrongStructSize);
 }
 

@@ -127,6 +127,11 @@ typedef struct glint_open_options {
  *
  * The file is checked, then mapped; what queries read is not copied. Safe on untrusted files. A file must not be changed in
  * place while it is open (the tools never do: they replace files).
+ *
+ * A path with <UDIM> in the name of the file, such as "rock.<UDIM>.glint", opens every tile of a UDIM set that has a file, of kind
+ * normals, ndf-pyramid, ndf-cp or slope-moments: tile 1001 + floor(u) + 10 floor(v) holds uv. normals_path is then a pattern, too.
+ * Sizes of footprints are in texels of the largest tile. Where the set has no tile, densities and means are 0 and nothing is
+ * drawn; its weights in footprints that reach there count for nothing. The file of one tile opens as a set of this tile.
  * path: UTF-8, not null. options: null for the defaults. ndf: receives the handle, not null.
  * Returns GLINT_ERROR_USAGE for null path or ndf, or options out of range; IO, INVALID_INPUT and UNSUPPORTED as listed
  * above. */
@@ -175,6 +180,7 @@ typedef struct glint_ndf_info {
   uint64_t file_bytes;         /* size of the asset */
   float smallest_sigma_texels; /* smallest footprint that is answered as wide as it is asked for, deviation in texels; smaller
                                   ones are answered up to this wide. 0 where there are no levels, or the normals are given */
+  int32_t udim_tiles;          /* tiles of a UDIM set, whose kind is that of its tiles; 0: no set */
 } glint_ndf_info;
 
 /* Fills info. Returns GLINT_ERROR_USAGE for null arguments or a struct_size that does not reach beyond itself or is
@@ -199,7 +205,7 @@ enum { GLINT_FOOTPRINT_GAUSSIAN = 0, GLINT_FOOTPRINT_BOX = 1 };
 typedef struct glint_footprint {
   int32_t kind; /* GLINT_FOOTPRINT_*; other values count as Gaussian */
   double u, v;  /* centre, in maps: the whole parts count on planes without end (kind tiny-example, in sizes of the example;
-                   kinds wang-cp, wang-pyramid and wang-tiles, in tiles), for BRDFs as far as floats tell positions apart; maps repeat */
+                   kinds wang-cp, wang-pyramid and wang-tiles, and UDIM sets, in tiles), for BRDFs as far as floats tell positions apart; maps repeat */
   float m[4];   /* Gaussian: covariance xx, xy, yy in texels^2, and unused. Box: a parallelogram's half axes ax, ay, bx, by
                    in texels */
 } glint_footprint;

@@ -18,6 +18,9 @@ std::vector<std::byte> packed(const NdfSource<AssetOf<Model>>& source) {
 }
 
 [[noreturn]] void refuseKind(const OpenedNdf& opened) {
+  if (std::holds_alternative<UdimNdf>(opened.model()))
+    throw Error(ErrorCode::unsupported, "udim.pack", opened.path().string(), "", "is a UDIM set, which has no packed form",
+                "ask the set on the processor, or ingest the image of one tile as a map of its own");
   std::vector<std::string_view> packing;
   NdfModels::forEach([&]<class Model>(std::type_identity<Model>) {
     if (NdfTraits<Model>::kPacks) packing.push_back(NdfTraits<Model>::kKind);

@@ -79,7 +79,14 @@ auto unlocked(Work&& work) {
 
 /// The asset that a builder reads, with hashes and values checked.
 inline formats::Asset openInput(const BuildJob& job) {
-  return unlocked([&] { return formats::Asset::openForBuilding(job.input); });
+  return unlocked([&] {
+    formats::Asset asset = formats::Asset::openForBuilding(job.input);
+    if (asset.info().udim)
+      throw Error(ErrorCode::unsupported, "udim.unsupported", job.input, "",
+                  "is a tile of a UDIM set, with margins of its neighbours, which builders in Python do not take",
+                  "build sets with the tools, such as glint-pyramid 'name.<UDIM>.map.glint' -o 'name.<UDIM>.p.glint'");
+    return asset;
+  });
 }
 
 inline formats::Provenance provenanceOf(const BuildJob& job) {

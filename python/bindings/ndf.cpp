@@ -39,6 +39,7 @@ nb::dict infoDict(const Ndf& ndf) {
   d["coarsest_sigma"] = info.coarsest_sigma_texels;
   d["smallest_sigma"] = info.smallest_sigma_texels;
   d["file_bytes"] = info.file_bytes;
+  d["udim_tiles"] = info.udim_tiles;
   return d;
 }
 

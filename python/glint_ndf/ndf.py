@@ -65,7 +65,13 @@ class Ndf:
     finest_sigma: float  #: footprint of level 0, deviation in texels; 0 without levels
     coarsest_sigma: float  #: footprint of the last level, deviation in texels; 0 without levels
     smallest_sigma: float  #: smallest footprint that is answered as wide as it is asked for, deviation in texels
-    file_bytes: int  #: size of the asset
+    file_bytes: int  #: size of the asset, or of all tiles
+    udim_tiles: int  #: tiles of a UDIM set; 0: no set
+
+    @property
+    def endless(self) -> bool:
+        """Whether the whole parts of uv count: on planes without end, and in UDIM sets."""
+        return self.kind in ENDLESS_KINDS or self.udim_tiles > 0
 
     @property
     def channels(self) -> int:
@@ -180,7 +186,7 @@ class Brdf:
 
     def _footprints(self, uv, sigma, covariance, box) -> FootprintArrays:
         # On a plane without end the whole parts of uv count, and batches of doubles drop them.
-        return FootprintArrays(uv, sigma, covariance, box, keep_whole_parts=self.ndf.kind in ENDLESS_KINDS)
+        return FootprintArrays(uv, sigma, covariance, box, keep_whole_parts=self.ndf.endless)
 
     def evaluate(self, uv, wi, wo, *, sigma=None, covariance=None, box=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
         """The BRDF and the density of its samples.
@@ -262,9 +268,10 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
     """Opens an asset that holds a distribution of normals. The file is checked, and then mapped. Options of other kinds are ignored.
 
     Args:
-        source: a file, its bytes, or an `Asset`. Bytes go through a temporary file.
+        source: a file, its bytes, or an `Asset`. Bytes go through a temporary file. "rock.<UDIM>.glint" opens every tile of a UDIM
+            set that has a file: tile 1001 + floor(u) + 10 floor(v) holds uv. Densities are 0 where the set has no tile.
         normals: asset of kind normals that a pyramid was made from. It answers footprints below level 0, which the nearest level
-            answers without it.
+            answers without it. Of a UDIM set a pattern, too.
         surface, boundary: kind normals: "flat" or "smooth", "wrap" or "clamp".
         sigma_r: kinds normals and slope-moments: intrinsic roughness, disk units, 1e-4 to 0.25.
         alpha: kind bin-map: Beckmann roughness, in the range that the asset was made for; 0: the smallest.

@@ -72,6 +72,7 @@ MAKE = [
     "displace heights.glint -o colored.glint --base-color n.png --factor 8 --angular 3 --spatial 2",
     "displace flat.glint -o level.glint --factor 8 --angular 3 --spatial 2",
     "pyramid normals.glint -o pyramid.glint --resolution 64 --stride 8 --sigma-r .02 --skip-unchanged",
+    "ingest tile.<UDIM>.exr -o tile.<UDIM>.glint",
     "farm plan --from plan.json -o farm.json",
     "farm run farm.json",
     "farm status farm.json",
@@ -94,7 +95,7 @@ ASKED = [
     "query plane wang.glint --texel 1e12 -3.5 --sigma 4 --half 0 .1",
     "query reflectance displaced.glint --csv displaced.csv -o answers.csv",
 ]
-FOUND = [*(f"info {asset}.glint" for asset in ASSETS), "validate normals.glint pyramid.glint"]
+FOUND = [*(f"info {asset}.glint" for asset in (*ASSETS, "tile.1001", "tile.<UDIM>")), "validate normals.glint pyramid.glint"]
 REFUSED = [
     "farm run broken.json",
     "validate damaged.glint lights.json normals.glint",
@@ -124,6 +125,9 @@ def documents(tmp_path_factory):
         process = run(folder, command + " --json")
         assert (process.returncode == 0) == (command not in REFUSED), f"{command}\n{process.stderr}"
         found.append(("glint-" + command.split()[0], command, json.loads(process.stdout)))
+        if command == MAKE[0]:
+            for tile in (1001, 1002):
+                shutil.copy(folder / "n.exr", folder / f"tile.{tile}.exr")
         if command == MAKE[-1]:
             shutil.copy(folder / "heights.glint", folder / "damaged.glint")
             with h5py.File(folder / "damaged.glint", "r+") as file:
@@ -175,7 +179,8 @@ def test_documents_are_as_described(documents):
 
 
 def test_every_kind_is_asked(documents):
-    kinds = {document["result"]["kind"] for name, _, document in documents if name == "glint-info" and "result" in document}
+    results = [document["result"] for name, _, document in documents if name == "glint-info" and "result" in document]
+    kinds = {result["kind"] for result in results if "kind" in result}
     assert kinds == {kind["kind"] for kind in json.loads((ROOT / "formats/schema.json").read_text())["kinds"]}
 
 

@@ -54,12 +54,13 @@ class GlintLayer:
         self.kind = _opened(plugin, self.path, lambda: gn.load(self.path).kind)
         self._uv_check = UvCheck(plugin, self.path)
         self._threads = 0 if is_jit() else 1
+        self._udim_tiles = 0
         self._refuse_options_of_other_kinds(options)
         if self.kind == "displacement":
             self._open_displaced(options)
         else:
             self._open_ndf(options)
-        scale, endless = _scale_of(options, self.width, self.height), self.kind in ENDLESS_KINDS
+        scale, endless = _scale_of(options, self.width, self.height), self.kind in ENDLESS_KINDS or self._udim_tiles > 0
         self.placement = Placement(scale, options.number("rotation", 0.0), endless)
         factor, sigma = options.number("footprint_scale", 1.0, above=0), options.number("sigma", None, above=0)
         self._footprints = Footprints(plugin, self.path, self.width, self.height, factor, sigma, self._fallback)
@@ -95,6 +96,7 @@ class GlintLayer:
             self._files.append(AssetFile(self.plugin, given["normals"]))
         ndf = _opened(self.plugin, self.path, lambda: gn.open(self.path, **given))
         self.width, self.height = ndf.width, ndf.height
+        self._udim_tiles = ndf.udim_tiles
         self._fallback = max(ndf.smallest_sigma, _NARROWEST)
         self.lobe = _opened(self.plugin, self.path, lambda: self._lobe_of(ndf, facets))
 
