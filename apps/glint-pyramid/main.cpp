@@ -4,6 +4,7 @@
 #include "common/input_asset.h"
 #include "common/tool.h"
 #include "glint-pyramid/pyramid_options.h"
+#include "glint-pyramid/region_option.h"
 #include "glint-pyramid/wave_options.h"
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/bake/wang/tile_pyramid.h"
@@ -37,12 +38,15 @@ int main(int argc, char** argv) {
                               "asset of kind normals, or with --optics wave of kind heights, from glint-ingest; or of kind "
                               "wang-tiles, from glint-wang",
                               "NORMALS");
-  const apps::OutputFile output(tool, apps::OutputFormat::asset,
-                                "asset (.glint) of kind ndf-pyramid, wang-pyramid or wave-pyramid");
+  const apps::OutputFile output(
+      tool, apps::OutputFormat::asset,
+      "asset (.glint) of kind ndf-pyramid, wang-pyramid or wave-pyramid; with --region ndf-pyramid-shard");
   const apps::PyramidOptions options(tool);
   const apps::WaveOptions wave(tool, options);
+  const apps::RegionOption region(tool, wave);
 
   return tool.run(argc, argv, [&] {
+    if (region.given()) return apps::makeShard(tool, input, options, region, output);
     const formats::Asset asset = apps::openInput(tool, input.path());
     const formats::Provenance provenance = tool.provenance();
     if (wave.optics() == apps::Optics::wave) return apps::makeWavePyramid(tool, asset, input, wave, provenance, output);

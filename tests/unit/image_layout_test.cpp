@@ -25,7 +25,7 @@ StoredImage image(int width, int height, std::vector<std::uint8_t> from_top) {
 }
 
 std::vector<std::uint8_t> fromTop(const StoredImage& stored) {
-  const auto& pixels = std::get<std::vector<std::uint8_t>>(stored.image.pixels);
+  const auto& pixels = std::get<PixelVector<std::uint8_t>>(stored.image.pixels);
   std::vector<std::uint8_t> top;
   for (int j = stored.image.height - 1; j >= 0; --j)
     top.insert(top.end(), pixels.begin() + j * stored.image.width, pixels.begin() + (j + 1) * stored.image.width);
@@ -78,14 +78,14 @@ Image rgba(std::vector<float> pixels) {
 TEST(DivideByAlpha, GivesStraightColours) {
   Image half = rgba({0.25f, 0.1f, 0.5f, 0.5f, 0.2f, 0.3f, 0.4f, 1});
   divideByAlpha(half, {}, "a.exr");
-  EXPECT_EQ(std::get<std::vector<float>>(half.pixels), (std::vector<float>{0.5f, 0.2f, 1, 0.5f, 0.2f, 0.3f, 0.4f, 1}));
+  EXPECT_EQ(std::get<PixelVector<float>>(half.pixels), (PixelVector<float>{0.5f, 0.2f, 1, 0.5f, 0.2f, 0.3f, 0.4f, 1}));
 }
 
 TEST(DivideByAlpha, KeepsTheCodesOfOpaqueImages) {
   Image opaque = rgba({});
   opaque.pixels = std::vector<std::uint8_t>{1, 2, 3, 255};
   divideByAlpha(opaque, {}, "a.tif");
-  EXPECT_EQ(std::get<std::vector<std::uint8_t>>(opaque.pixels), (std::vector<std::uint8_t>{1, 2, 3, 255}));
+  EXPECT_EQ(std::get<PixelVector<std::uint8_t>>(opaque.pixels), (PixelVector<std::uint8_t>{1, 2, 3, 255}));
 }
 
 TEST(DivideByAlpha, RefusesCodesThatWereNotMultiplied) {
@@ -98,7 +98,7 @@ TEST(DivideByAlpha, TransparentPixelsAreHolesOnlyWhereWanted) {
   Image empty = rgba({0, 0, 0, 0, 0.2f, 0.3f, 0.4f, 1});
   EXPECT_THROW(divideByAlpha(empty, {}, "a.exr"), Error);
   divideByAlpha(empty, {.transparent_holes = true}, "a.exr");
-  EXPECT_TRUE(std::isnan(std::get<std::vector<float>>(empty.pixels)[0]));
+  EXPECT_TRUE(std::isnan(std::get<PixelVector<float>>(empty.pixels)[0]));
 }
 
 TEST(FindChannels, TakesNamesBeforePlaces) {
@@ -123,7 +123,7 @@ TEST(SelectLayer, KeepsTheChannelsOfOneLayer) {
   EXPECT_EQ(first.layers, (std::vector<std::string>{"a", "b"}));
   EXPECT_EQ(first.channel_names, (std::vector<std::string>{"a.X"}));
   selectLayer(image, "b", "l.exr");
-  EXPECT_EQ(std::get<std::vector<std::uint8_t>>(image.pixels), (std::vector<std::uint8_t>{2, 3}));
+  EXPECT_EQ(std::get<PixelVector<std::uint8_t>>(image.pixels), (PixelVector<std::uint8_t>{2, 3}));
 }
 
 TEST(ExifOrientation, IsOneUnlessTheMetadataSayMore) {

@@ -345,7 +345,7 @@ TEST(IngestHeights, ScalesToTexels) {
   IngestOptions p = plain();
   p.height_scale = 5;
   const auto result = ingestHeights({2, 2, 1, std::span<const std::uint16_t>(codes)}, p);
-  EXPECT_EQ(result.heights, (std::vector<float>{0, 5, 1, 0}));
+  EXPECT_EQ(result.heights, (std::pmr::vector<float>{0, 5, 1, 0}));
 }
 
 TEST(IngestHeights, RefusesColoursAndHoles) {
