@@ -18,7 +18,7 @@ namespace glint::apps {
 namespace {
 
 constexpr std::size_t kLargeBytes = 1 << 20;  // smaller arrays are always in memory
-constexpr std::chrono::milliseconds kWatchInterval{10};
+constexpr std::chrono::milliseconds kWatchInterval{1};
 
 /// Memory of the process, mapped files included.
 std::uint64_t residentBytes() {

@@ -11,7 +11,7 @@ from conftest import BIN
 
 GB = 1 << 30
 LARGE = 16384  # texels along either axis
-LIMIT = 700 << 20  # bytes, of --max-memory; the program and its libraries come to it
+LIMIT = 500 << 20  # bytes, of --max-memory; the program and its libraries come to it
 ROOM = 14 * GB  # on the disk: the image, arrays that do not fit, the asset
 
 

@@ -165,10 +165,14 @@ def test_images_larger_than_the_memory_give_the_same_asset(folder, image, flags)
 
 
 def test_ingest_keeps_to_the_limit(folder):
-    """Bytes of arrays that the limit moves into files do not stay in memory."""
-    free, bound = peak(folder, "ingest large.exr -o free.glint"), peak(folder, "ingest large.exr -o bound.glint", "--max-memory", "16M")
-    assert bound < WITH_IMAGES[1] + 32 * MB, f"takes {bound / MB:.0f} MB"
-    assert free > bound + 32 * MB, f"{free / MB:.0f} MB without a limit: this test cannot fail"
+    """Arrays of 400 MB are moved into files, and do not stay in memory. Before their pages are given up, more come, on a busy machine."""
+    most_between = 150 * MB
+    assert run(folder, "synth flakes --size 4096 -o huge.exr")[0] == 0
+    bound = peak(folder, "ingest huge.exr -o bound.glint", "--max-memory", "16M")
+    free = peak(folder, "ingest huge.exr -o bound.glint --force", "--max-memory", "4G")
+    assert bound < 16 * MB + WITH_IMAGES[1] + most_between < free, f"takes {bound / MB:.0f} MB, and {free / MB:.0f} MB without a limit"
+    for name in ("huge.exr", "bound.glint"):
+        (folder / name).unlink()
 
 
 def test_programs_that_the_bench_starts_keep_the_limit(folder):

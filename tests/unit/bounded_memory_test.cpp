@@ -49,8 +49,8 @@ TEST(BoundedMemory, GivesUpPagesOfFiles) {
   const test::TempFolder folder;
   BoundedMemory memory(4 * kMega, folder.path().string());
   const std::uint64_t before = residentBytes();
-  const std::pmr::vector<char> values(256 * kMega, 1, &memory);
-  // The watcher looks every 10 ms; this is ample under load.
+  const std::pmr::vector<char> values(128 * kMega, 1, &memory);
+  // The watcher looks every ms; this is ample under load.
   for (int k = 0; k < 500 && residentBytes() > before + 64 * kMega; ++k)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_LT(residentBytes(), before + 64 * kMega);
