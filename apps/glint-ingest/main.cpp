@@ -30,7 +30,6 @@ int main(int argc, char** argv) {
   const apps::InputFile input(tool, "image of normals or heights", "IMAGE");
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of normals or heights");
   const apps::IngestOptions options(tool);
-
   return tool.run(argc, argv, [&] {
     const apps::IngestMemory memory(tool, output.path());
     const apps::Image image = options.read(tool, input.path());

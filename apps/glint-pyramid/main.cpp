@@ -1,5 +1,3 @@
-#include <nlohmann/json.hpp>
-
 #include "common/files.h"
 #include "common/input_asset.h"
 #include "common/tool.h"
@@ -23,8 +21,7 @@ void makeWangPyramid(apps::Tool& tool, const WangTiles& tiles, const apps::Pyram
                      kLessMemory);
   const bake::WangPyramidData pyramid = bake::buildWangPyramid(tiles, values, tool.progress("images"));
   formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
-  tool.setResult(apps::pyramidJson(pyramid.images));
-  tool.summary(apps::pyramidText(pyramid.images));
+  apps::reportPyramid(tool, pyramid.images);
 }
 }  // namespace
 
@@ -56,7 +53,6 @@ int main(int argc, char** argv) {
     tool.requireMemory(bake::pyramidBytes(map, values, static_cast<double>(tool.maxMemory())), "the NDF images", kLessMemory);
     const bake::NdfPyramidData pyramid = bake::buildPyramid(map, values, tool.progress("images"));
     formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
-    tool.setResult(apps::pyramidJson(pyramid));
-    tool.summary(apps::pyramidText(pyramid));
+    apps::reportPyramid(tool, pyramid);
   });
 }

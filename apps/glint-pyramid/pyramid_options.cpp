@@ -113,4 +113,9 @@ std::string pyramidText(const bake::NdfPyramidData& pyramid, PyramidRegion regio
   return text;
 }
 
+void reportPyramid(Tool& tool, const bake::NdfPyramidData& pyramid, PyramidRegion region) {
+  tool.setResult(pyramidJson(pyramid, region));
+  tool.summary(pyramidText(pyramid, region));
+}
+
 }  // namespace glint::apps
