@@ -11,7 +11,7 @@ struct KindDescription<NdfPyramidShard> {
 
   static std::vector<Rule> indexRules() {
     return {errorRule("shard.region", "region_index is at most region_count"),
-            errorRule("shard.rows", "region_rows are the rows whose centres lie in the region")};
+            errorRule("shard.rows", "level_region_rows are the rows whose centres lie in the region")};
   }
   static std::vector<Rule> valueRules() { return {}; }
 
@@ -23,10 +23,10 @@ struct KindDescription<NdfPyramidShard> {
     fields.choice("level_choice", shard.level_choice, "given|agreeing",
                   "whether all levels stay, or those that agree are dropped when shards are joined");
     const auto rows = [&](int l) -> auto& { return shard.rows[l]; };
-    fields.levelIntegers("region_rows", shard.images.shape.level_count, rows, {0, kMaxMapSize}, "1",
+    fields.levelIntegers("level_region_rows", shard.images.shape.level_count, rows, {0, kMaxMapSize}, "1",
                          "rows of footprints of each level that are in the region");
     describePyramidLevels(fields, shard.images, [](int, std::uint64_t) {},
-                          {"region_rows[l]", "region_rows[l] * level_columns[l] * mask_words + 1"});
+                          {"level_region_rows[l]", "level_region_rows[l] * level_columns[l] * mask_words + 1"});
   }
 
   static void checkIndex(const NdfPyramidShard& shard, Findings& findings) {
@@ -38,7 +38,7 @@ struct KindDescription<NdfPyramidShard> {
     for (int l = 0; l < shape.level_count; ++l) {
       const int expected = regionRows(shape, l, shard.region).count();
       if (shard.rows[l] != expected)
-        findings.add("shard.rows", "/@region_rows",
+        findings.add("shard.rows", "/@level_region_rows",
                      "has " + std::to_string(shard.rows[l]) + " rows of level " + std::to_string(l) + ", not " +
                          std::to_string(expected));
     }

@@ -13,7 +13,7 @@ namespace {
 
 /// Pixels of one channel, given from the top.
 StoredImage image(int width, int height, std::vector<std::uint8_t> from_top) {
-  std::vector<std::uint8_t> pixels;
+  PixelVector<std::uint8_t> pixels;
   for (int j = height - 1; j >= 0; --j)
     pixels.insert(pixels.end(), from_top.begin() + j * width, from_top.begin() + (j + 1) * width);
   StoredImage stored;
@@ -66,7 +66,7 @@ TEST(CropToDisplay, CountsMissingPixels) {
   }
 }
 
-Image rgba(std::vector<float> pixels) {
+Image rgba(PixelVector<float> pixels) {
   Image image;
   image.width = std::max(1, static_cast<int>(pixels.size() / 4)), image.height = 1, image.channels = 4, image.alpha = 3;
   image.channel_names = {"R", "G", "B", "A"};
@@ -83,14 +83,14 @@ TEST(DivideByAlpha, GivesStraightColours) {
 
 TEST(DivideByAlpha, KeepsTheCodesOfOpaqueImages) {
   Image opaque = rgba({});
-  opaque.pixels = std::vector<std::uint8_t>{1, 2, 3, 255};
+  opaque.pixels = PixelVector<std::uint8_t>{1, 2, 3, 255};
   divideByAlpha(opaque, {}, "a.tif");
   EXPECT_EQ(std::get<PixelVector<std::uint8_t>>(opaque.pixels), (PixelVector<std::uint8_t>{1, 2, 3, 255}));
 }
 
 TEST(DivideByAlpha, RefusesCodesThatWereNotMultiplied) {
   Image straight = rgba({});
-  straight.pixels = std::vector<std::uint8_t>{200, 2, 3, 100};
+  straight.pixels = PixelVector<std::uint8_t>{200, 2, 3, 100};
   EXPECT_THROW(divideByAlpha(straight, {}, "a.tif"), Error);
 }
 
@@ -117,7 +117,7 @@ TEST(SelectLayer, KeepsTheChannelsOfOneLayer) {
   Image image;
   image.width = image.height = 1, image.channels = 3;
   image.channel_names = {"a.X", "b.X", "b.Y"};
-  image.pixels = std::vector<std::uint8_t>{1, 2, 3};
+  image.pixels = PixelVector<std::uint8_t>{1, 2, 3};
   Image first = image;
   selectLayer(first, "", "l.exr");
   EXPECT_EQ(first.layers, (std::vector<std::string>{"a", "b"}));
