@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <string_view>
 #include <system_error>
 
 #include "common/memory.h"
-#include "common/numbers.h"
 #include "common/part.h"
 #include "common/signals.h"
 #include "glint-farm/farm.h"
