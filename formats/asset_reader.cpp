@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "glint/formats/load.h"
+#include "glint/formats/rules.h"
 
 namespace glint::formats {
 
@@ -43,7 +44,10 @@ Asset Asset::checked(std::unique_ptr<State> state, const OpenOptions& options) {
   LoadedAsset& loaded = state->loaded;
   // Values first: they say which texel is wrong where a hash can only say which dataset.
   if (options.check_values && !findings.failed()) checkValues(loaded, findings);
-  if (options.verify_hashes && !findings.failed()) checkHashes(loaded, findings);
+  if (options.verify_hashes && !findings.failed()) {
+    const bool in_pieces = options.hash_in_pieces && !options.copy && loaded.structure.bytes.isMapped();
+    checkHashes(loaded, findings, in_pieces ? HashFrom::file : HashFrom::memory);
+  }
   findings.throwFirstError();
   for (const Finding& finding : findings.report().findings)
     loaded.info.warnings.push_back(finding.object + ": " + finding.message);
@@ -58,8 +62,10 @@ const AnyAsset& Asset::any() const { return *state_->loaded.asset; }
 
 void Asset::refuse(const AnyAsset& wanted) const {
   const std::string kind(kinds()[wanted.index()]->schema.name);
+  const bool shard = std::holds_alternative<NdfPyramidShard>(any());
   throw Error(ErrorCode::unsupported, "format.kind", state_->findings.path(), {},
-              "is of kind " + state_->loaded.info.kind + ", not " + kind, "pass an asset of kind " + kind);
+              "is of kind " + state_->loaded.info.kind + ", not " + kind,
+              shard ? std::string(kJoinShards) : "pass an asset of kind " + kind);
 }
 
 }  // namespace glint::formats

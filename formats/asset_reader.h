@@ -64,6 +64,9 @@ struct OpenOptions {
   /// Copy the bytes into memory instead of using them in place: for files that others may change or truncate while they are open,
   /// and for memory that does not stay.
   bool copy = false;
+  /// Read the file in pieces to compare hashes, instead of its map: for assets that are larger than memory, whose pages in the map
+  /// would all count as memory of the process.
+  bool hash_in_pieces = false;
 };
 
 /// Bytes of an asset that are neither a file nor in memory, for example a part of an archive.

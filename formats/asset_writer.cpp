@@ -11,6 +11,7 @@
 #include "glint/formats/hash.h"
 #include "glint/formats/hdf5_handle.h"
 #include "glint/formats/load.h"
+#include "glint/formats/streamed_writer.h"
 
 namespace glint::formats {
 namespace {
@@ -111,13 +112,33 @@ Attributes rootAttributes(const PackedAsset& packed, const Provenance& provenanc
   return std::move(file.attributes);
 }
 
+/// Visits the bytes of an array in order.
+/// @param visit  visit(bytes, offset): some bytes, and the number of bytes before them
+template <class Visit>
+void visitBytes(const PackedArray& array, const Visit& visit) {
+  if (!array.source) return visit(std::span(static_cast<const std::byte*>(array.data), array.size_bytes), std::uint64_t{0});
+  std::uint64_t done = 0;
+  array.source([&](std::span<const std::byte> bytes) {
+    if (done + bytes.size() <= array.size_bytes) visit(bytes, done);
+    done += bytes.size();
+  });
+  if (done != array.size_bytes)
+    throw Error(ErrorCode::failed, "dataset.storage", {}, "/" + array.path, "is given by a source of another size");
+}
+
+std::string hashOf(const PackedArray& array) {
+  ByteHasher hasher;
+  visitBytes(array, [&](std::span<const std::byte> bytes, std::uint64_t) { hasher.add(bytes.data(), bytes.size()); });
+  return hasher.hash();
+}
+
 /// Writes everything but the bytes of the datasets, and finds the places of these bytes in the file.
 ///
 /// HDF5 only reserves the space: the bytes are then written with plain calls, at the speed of the disk and with its errors.
 class MetadataWriter {
  public:
   MetadataWriter(const fs::path& path, const PackedAsset& packed) : path_(path), packed_(packed) {
-    for (const PackedArray& array : packed.arrays) hashes_[array.path] = hashBytes(array.data, array.size_bytes);
+    for (const PackedArray& array : packed.arrays) hashes_[array.path] = hashOf(array);
   }
 
   /// @return offset of each dataset by path
@@ -244,7 +265,11 @@ void writePacked(const fs::path& path, const PackedAsset& packed, const Provenan
   AtomicFile file(path);
   const auto offsets = writeMetadata(file, packed, provenance, options.udim);
   for (const PackedArray& array : packed.arrays) {
-    if (array.size_bytes > 0) file.write(array.data, array.size_bytes, offsets.at(array.path));
+    if (array.size_bytes == 0) continue;
+    const std::uint64_t start = offsets.at(array.path);
+    visitBytes(array, [&](std::span<const std::byte> bytes, std::uint64_t offset) {
+      file.write(bytes.data(), bytes.size(), start + offset);
+    });
   }
   checkWritten(file.path());
   file.publish(options.overwrite);
@@ -253,8 +278,16 @@ void writePacked(const fs::path& path, const PackedAsset& packed, const Provenan
 }  // namespace
 
 void writeAsset(const fs::path& path, const AnyAsset& asset, const Provenance& provenance, const WriteOptions& options) {
+  writeStreamedAsset(path, asset, provenance, {}, options);
+}
+
+void writeStreamedAsset(const fs::path& path, const AnyAsset& asset, const Provenance& provenance, const ByteSources& sources,
+                        const WriteOptions& options) {
   try {
-    writePacked(path, kinds()[asset.index()]->pack(asset), provenance, options);
+    PackedAsset packed = kinds()[asset.index()]->pack(asset);
+    for (PackedArray& array : packed.arrays)
+      if (const auto source = sources.find("/" + array.path); source != sources.end()) array.source = source->second;
+    writePacked(path, packed, provenance, options);
   } catch (const Error& error) {
     if (!error.path().empty()) throw;
     // Rules and HDF5 know the object only: name the file that was to be written.

@@ -1,13 +1,9 @@
 #include "glint/formats/hash.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <memory>
-#include <vector>
+#include <span>
 
-#include "glint/formats/system_error.h"
+#include "glint/formats/file_pieces.h"
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -30,22 +26,28 @@ std::string hex(XXH128_hash_t hash) {
 
 std::string hashBytes(const void* data, std::size_t size_bytes) { return hex(XXH3_128bits(data, size_bytes)); }
 
+struct ByteHasher::State {
+  std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> xxh{XXH3_createState(), &XXH3_freeState};
+};
+
+ByteHasher::ByteHasher() : state_(std::make_unique<State>()) { XXH3_128bits_reset(state_->xxh.get()); }
+ByteHasher::ByteHasher(ByteHasher&&) noexcept = default;
+ByteHasher::~ByteHasher() = default;
+
+void ByteHasher::add(const void* data, std::size_t size_bytes) { XXH3_128bits_update(state_->xxh.get(), data, size_bytes); }
+
+std::string ByteHasher::hash() const { return hex(XXH3_128bits_digest(state_->xxh.get())); }
+
 std::string hashFile(const std::filesystem::path& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) throwUnreadable(path, "cannot be read", errno);
-  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), &XXH3_freeState);
-  XXH3_128bits_reset(state.get());
-  std::vector<char> buffer(1 << 20);
-  ssize_t count = 0;
-  while ((count = ::read(file, buffer.data(), buffer.size())) != 0) {
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) break;
-    XXH3_128bits_update(state.get(), buffer.data(), static_cast<std::size_t>(count));
-  }
-  const int error = errno;
-  ::close(file);
-  if (count < 0) throwUnreadable(path, "cannot be read", error);
-  return hex(XXH3_128bits_digest(state.get()));
+  ByteHasher hasher;
+  readInPieces(path, 0, kToTheEnd, [&](std::span<const std::byte> piece) { hasher.add(piece.data(), piece.size()); });
+  return hasher.hash();
+}
+
+std::string hashOfFile(const std::filesystem::path& path, std::uint64_t offset, std::uint64_t size_bytes) {
+  ByteHasher hasher;
+  readInPieces(path, offset, size_bytes, [&](std::span<const std::byte> piece) { hasher.add(piece.data(), piece.size()); });
+  return hasher.hash();
 }
 
 }  // namespace glint::formats

@@ -8,6 +8,7 @@
 #include "glint/model/histogram_sat.h"
 #include "glint/model/ndf_cp.h"
 #include "glint/model/ndf_pyramid.h"
+#include "glint/model/ndf_pyramid_shard.h"
 #include "glint/model/normal_map.h"
 #include "glint/model/sh.h"
 #include "glint/model/slope_moments.h"
@@ -20,8 +21,8 @@ namespace glint::formats {
 
 /// The struct of any kind of asset: the one list of kinds, in the order of their names. To add a kind, add its struct and its
 /// name here, and describe the kind in a file of formats/kinds/.
-using AnyAsset = std::variant<BinMap, Displacement, HeightMap, HistogramSat, NdfCp, NdfPyramid, NormalMap, ShLight, ShLobes,
-                              SlopeMoments, TinyExample, WangCp, WangPyramid, WangTiles, WavePyramid>;
+using AnyAsset = std::variant<BinMap, Displacement, HeightMap, HistogramSat, NdfCp, NdfPyramid, NdfPyramidShard, NormalMap,
+                              ShLight, ShLobes, SlopeMoments, TinyExample, WangCp, WangPyramid, WangTiles, WavePyramid>;
 
 /// Name of the kind whose assets are of struct `Model`, as files and messages have it, e.g. "bin-map".
 template <class Model>
@@ -38,6 +39,8 @@ template <>
 inline constexpr std::string_view kKindName<NdfCp> = "ndf-cp";
 template <>
 inline constexpr std::string_view kKindName<NdfPyramid> = "ndf-pyramid";
+template <>
+inline constexpr std::string_view kKindName<NdfPyramidShard> = "ndf-pyramid-shard";
 template <>
 inline constexpr std::string_view kKindName<NormalMap> = "normals";
 template <>

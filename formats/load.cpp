@@ -135,13 +135,15 @@ void checkValues(const LoadedAsset& loaded, Findings& findings) {
   loaded.kind->check_values(*loaded.asset, findings);
 }
 
-void checkHashes(const LoadedAsset& loaded, Findings& findings) {
+void checkHashes(const LoadedAsset& loaded, Findings& findings, HashFrom from) {
   if (loaded.structure.extents.empty()) return;  // the structure could not be read
   checkDigest(loaded.structure, findings);
   checkPadding(loaded.structure, findings);
   for (const auto& [path, record] : loaded.structure.datasets) {
     const std::string stored = textOf(record.attributes, "xxh3_128");
-    const std::string actual = hashBytes(record.data, record.size_bytes);
+    const std::string actual = from == HashFrom::memory || record.size_bytes == 0
+                                   ? hashBytes(record.data, record.size_bytes)
+                                   : hashOfFile(findings.path(), record.offset, record.size_bytes);
     if (stored != actual) {
       findings.add("dataset.hash", "/" + path, "has bytes with hash " + actual + ", not " + (stored.empty() ? "none" : stored));
     }

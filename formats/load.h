@@ -2,6 +2,7 @@
 
 // Private to formats/: the one checker behind Asset::open and validateAsset.
 
+#include <cstdint>
 #include <optional>
 
 #include "glint/formats/asset_reader.h"
@@ -28,8 +29,11 @@ LoadedAsset loadFile(Findings& findings, bool copy = false);
 /// Checks the values of the kind, and the texts that all kinds have. Only for assets without a broken rule.
 void checkValues(const LoadedAsset& loaded, Findings& findings);
 
+/// Where checkHashes() reads the bytes of datasets: as they are in memory, or in pieces from the file.
+enum class HashFrom : std::uint8_t { memory, file };
+
 /// Compares the asset with its digest, every dataset with its hash, and the bytes between objects with 0: then every bit of the
 /// file is checked.
-void checkHashes(const LoadedAsset& loaded, Findings& findings);
+void checkHashes(const LoadedAsset& loaded, Findings& findings, HashFrom from = HashFrom::memory);
 
 }  // namespace glint::formats

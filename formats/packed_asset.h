@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "glint/formats/file_pieces.h"
 #include "glint/formats/structure.h"
 
 namespace glint::formats {
@@ -21,6 +22,7 @@ struct PackedArray {
   std::uint64_t size_bytes = 0;
   std::string_view units;
   std::string_view long_name;
+  ByteSource source = {};  ///< gives the bytes where they are not in memory; `data` is then not followed
 };
 
 /// An asset as attributes and arrays, in the order of the schema. Points into the struct that it was made from.

@@ -27,6 +27,9 @@ struct Rule {
 /// Remedy for what only the maker of a file can get wrong.
 inline constexpr std::string_view kMakeAgain = "make the file again from its inputs";
 
+/// Remedy where a shard is given and a whole asset is meant.
+inline constexpr std::string_view kJoinShards = "join it with the other shards by glint-merge";
+
 /// All rules, in the order in which they are checked.
 std::span<const Rule> rules();
 /// The rule with this id. The id must exist.

@@ -13,6 +13,9 @@
 #   environment (exr, hdr) or lights (json)  ->  NAME.light.glint
 #   no file, but GLINT_LOBES_FLAGS_NAME := --sigma-r 0.01  ->  NAME.lobes.glint
 #
+# Pyramids of large maps can be made in parts: with GLINT_SHARDS := 8, eight runs make NAME.pyramid.1of8.glint and so on, which `make -j`
+# runs at once, and glint-merge joins them. The pyramid is the same file. Make deletes the parts in the end.
+#
 # Assets are made again when an image, an asset they come from, or a file in GLINT_SETTINGS changes. Every tool writes
 # its inputs to a depfile beside the asset. Works with `make -j`; GLINT_THREADS limits what one tool takes.
 #
@@ -34,6 +37,8 @@ GLINT_SETTINGS ?= $(firstword $(MAKEFILE_LIST))
 # Of one map: the same name with _NAME behind it, for example GLINT_PYRAMID_FLAGS_flakes.
 GLINT_INGEST_FLAGS ?=
 GLINT_PYRAMID_FLAGS ?=
+# Parts in which each pyramid is made. Empty: one run.
+GLINT_SHARDS ?=
 GLINT_CP_FLAGS ?= --rank 16
 GLINT_TUCKER_FLAGS ?= --rank 25
 GLINT_PCA_FLAGS ?= --rank 16
@@ -104,7 +109,21 @@ $(GLINT_OUT)/%.$(1).glint: $(GLINT_OUT)/%.pyramid.glint $(GLINT_SETTINGS)
 	$$(call glint_apart,$$*,$(1))$$(call glint_tool,glint-compress) $$(call glint_quote,$$<) $$(glint_out) --method $(1) $$(call glint_flags,$(2))
 endef
 
+# Parts have no depfile: Make deletes a file only if nothing else names it.
+glint_part = $(GLINT_OUT)/$(1).pyramid.$(2)of$(GLINT_SHARDS).glint
+define glint_part_rule
+$(call glint_part,%,$(1)): $(GLINT_OUT)/%.glint $(GLINT_SETTINGS)
+	$$(call glint_apart,$$*,pyramid)$$(call glint_tool,glint-pyramid) $$(call glint_quote,$$<) -o $$(call glint_quote,$$@) --region $(1)/$(GLINT_SHARDS) \
+	  $$(call glint_flags,GLINT_PYRAMID_FLAGS)
+endef
+ifneq ($(GLINT_SHARDS),)
+glint_regions := $(shell seq $(GLINT_SHARDS))
+$(foreach region,$(glint_regions),$(eval $(call glint_part_rule,$(region))))
+$(GLINT_OUT)/%.pyramid.glint: $(foreach region,$(glint_regions),$(call glint_part,%,$(region))) $(GLINT_SETTINGS)
+	$(call glint_tool,glint-merge) $(foreach region,$(glint_regions),$(call glint_quote,$(call glint_part,$*,$(region)))) -o $(call glint_quote,$@)
+else
 $(eval $(call glint_normals_rule,pyramid,GLINT_PYRAMID_FLAGS))
+endif
 $(eval $(call glint_normals_rule,binmap,GLINT_BINMAP_FLAGS))
 $(eval $(call glint_normals_rule,sat,GLINT_SAT_FLAGS))
 $(eval $(call glint_normals_rule,moments,GLINT_MOMENTS_FLAGS))

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <new>
 
 #include "common/files.h"
@@ -53,7 +54,8 @@ void checkJpegComplete(const std::string& path) {
 Image readImage(const std::string& path, const ImageChoice& choice) {
   checkRegular(path);
   const bool png = isPng(path);
-  StoredImage stored = png ? readPng(path, availableMemory()) : imageFormats().read(path, choice.part, availableMemory());
+  const std::uint64_t most_bytes = choice.of_any_size ? std::numeric_limits<std::uint64_t>::max() : availableMemory();
+  StoredImage stored = png ? readPng(path, most_bytes) : imageFormats().read(path, choice.part, most_bytes);
   Image& image = stored.image;
   if (png) findPart(path, choice.part, image.parts);
   if (image.format == "jpeg") checkJpegComplete(path);

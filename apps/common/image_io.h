@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory_resource>
 #include <optional>
 #include <span>
 #include <string>
@@ -9,6 +10,10 @@
 #include <vector>
 
 namespace glint::apps {
+
+/// Pixels, in memory of the default resource: a tool that sets it to BoundedMemory (bounded_memory.h) reads images larger than memory.
+template <class T>
+using PixelVector = std::pmr::vector<T>;
 
 /// An image as its file holds it, but bottom row first.
 struct Image {
@@ -31,7 +36,7 @@ struct Image {
   std::vector<std::string> notes;   ///< what a reader of the file may not expect: clauses
   /// [height][width][channels]. Unsigned integers of up to 8 and 16 bits keep their codes (full range 255 and 65535);
   /// everything else becomes float (integers of more bits scaled to 0..1).
-  std::variant<std::vector<std::uint8_t>, std::vector<std::uint16_t>, std::vector<float>> pixels;
+  std::variant<PixelVector<std::uint8_t>, PixelVector<std::uint16_t>, PixelVector<float>> pixels;
 };
 
 /// Which pixels of a file are meant, and what they mean.
@@ -45,6 +50,7 @@ struct ImageChoice {
   Window window = Window::display;  ///< what the file shows, or what it stores
   Alpha alpha = Alpha::automatic;   ///< divide colours by alpha: if the file says that they were multiplied; always; never
   bool has_options = false;         ///< the tool has the options of ImageOptions, so that errors may point to them
+  bool of_any_size = false;         ///< pixels may take more than the memory that is there (PixelVector)
   bool transparent_holes = false;   ///< colours that alpha 0 destroyed become NaN; otherwise they are an error
 };
 

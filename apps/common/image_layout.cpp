@@ -82,7 +82,7 @@ float valueOf(T code) {
 
 /// Colours of a WebP are multiplied by alpha with 8 bits where they are read: under half an alpha a normal is off by more than a code.
 void checkAlphaBits(const Image& image, const std::string& path) {
-  const auto* pixels = std::get_if<std::vector<std::uint8_t>>(&image.pixels);
+  const auto* pixels = std::get_if<PixelVector<std::uint8_t>>(&image.pixels);
   if (image.format != "webp" || !pixels) return;
   constexpr std::uint8_t kLeast = 128;
   TexelTally thin(image.width, image.height);
@@ -100,10 +100,10 @@ void checkAlphaBits(const Image& image, const std::string& path) {
 
 /// The colours of all pixels divided by their alpha; NaN where alpha is 0.
 template <class T>
-std::vector<float> divided(const Image& image, const ImageChoice& choice, const std::vector<T>& pixels, TexelTally& lost,
+PixelVector<float> divided(const Image& image, const ImageChoice& choice, const PixelVector<T>& pixels, TexelTally& lost,
                            const std::string& path) {
   const auto channels = static_cast<std::size_t>(image.channels), alpha = static_cast<std::size_t>(image.alpha);
-  std::vector<float> values(pixels.size());
+  PixelVector<float> values(pixels.size());
   for (std::size_t k = 0; k < pixels.size(); k += channels) {
     const float a = valueOf(pixels[k + alpha]);
     if (!(a >= 0)) throwNotAssociated(image, choice, k / channels, "alpha is no number of 0 or more", path);
@@ -248,7 +248,7 @@ void divideByAlpha(Image& image, const ImageChoice& choice, const std::string& p
   image.associated = false;
   checkAlphaBits(image, path);
   TexelTally lost(image.width, image.height);
-  std::vector<float> values;
+  PixelVector<float> values;
   std::visit(
       [&](const auto& pixels) {
         const auto channels = static_cast<std::size_t>(image.channels);

@@ -93,9 +93,9 @@ struct PngReader {
 };
 
 template <class T>
-std::vector<T> readPixels(PngReader& reader, const Image& image, const std::string& path) {
+PixelVector<T> readPixels(PngReader& reader, const Image& image, const std::string& path) {
   const std::size_t row = static_cast<std::size_t>(image.width) * image.channels;
-  std::vector<T> pixels(row * image.height);
+  PixelVector<T> pixels(row * image.height);
   std::vector<png_bytep> rows(image.height);
   for (int j = 0; j < image.height; ++j) rows[j] = reinterpret_cast<png_bytep>(pixels.data() + row * (image.height - 1 - j));
   if (!reader.readRows(rows.data())) reader.throwFault(path);

@@ -12,7 +12,6 @@ namespace glint::apps {
 /// builder takes more. pyramidBytes() of the builder and the tables of others are estimates of their own.
 struct BytesPerTexel {
   static constexpr double kSynth = 96;            ///< normals or heights, the spectrum of noise, the encoded image
-  static constexpr double kIngest = 32;           ///< beside the pixels: normals or heights, bounds
   static constexpr double kBinMap = 32;           ///< texels sorted by bins, twice
   static constexpr double kMoments = 28;          ///< six moments of all levels
   static constexpr double kTextures = 160;        ///< the same, and pictures of them

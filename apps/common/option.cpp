@@ -39,6 +39,11 @@ Option& Option::unrecorded() {
   return *this;
 }
 
+Option& Option::recordedIfGiven() {
+  only_if_given_ = true;
+  return *this;
+}
+
 Option& Option::defaultText(const std::string& text) {
   option_->default_str(text);
   return *this;

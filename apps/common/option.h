@@ -20,6 +20,8 @@ class Option {
   Option& needs(const Option& other);
   /// Leaves the option out of the `command` record, because it does not change the result.
   Option& unrecorded();
+  /// Leaves the option out of the `command` record where it is not given.
+  Option& recordedIfGiven();
   /// Sets a text that the help shows instead of the default value, for defaults that depend on other options.
   Option& defaultText(const std::string& text);
   /// Whether the command line or the configuration file set it. Valid after parsing.
@@ -29,6 +31,7 @@ class Option {
   friend class Tool;
   CLI::Option* option_ = nullptr;
   bool recorded_ = true;
+  bool only_if_given_ = false;
 };
 
 }  // namespace glint::apps

@@ -122,6 +122,7 @@ struct Tool::State {
   bool force = false;
   bool skip_unchanged = false;
   bool makes_more = false;
+  std::function<formats::Provenance()> record;  // of an output that another run's record goes into
   bool trust = false;
   std::uint64_t max_memory = 0;
   ProgressMode progress_mode = ProgressMode::automatic;
@@ -257,6 +258,7 @@ void Tool::setResult(const nlohmann::json& result) { state_->result = result; }
 void Tool::setExitCode(ErrorCode code) { state_->exit_code = code; }
 void Tool::addInput(const std::string& path) { state_->inputs.push_back(path); }
 void Tool::addOutput(const std::string& path) { state_->outputs.push_back(path); }
+void Tool::setRecord(std::function<formats::Provenance()> record) { state_->record = std::move(record); }
 void Tool::makesMore() { state_->makes_more = true; }
 const std::vector<std::string>& Tool::outputPaths() const { return state_->outputs; }
 std::string Tool::generator() const { return state_->info.name + " " GLINT_VERSION; }
@@ -272,6 +274,8 @@ std::uint64_t Tool::seed() const {
   if (!state_->uses_seed) throw std::logic_error(name() + " takes a seed that it does not record");
   return state_->seed;
 }
+
+bool Tool::limitsMemory() const { return state_->max_memory > 0; }
 
 std::uint64_t Tool::maxMemory() const { return state_->max_memory > 0 ? state_->max_memory : availableMemory(); }
 
@@ -313,7 +317,9 @@ void Tool::warn(const std::string& text) {
 std::string Tool::commandJson() const {
   nlohmann::json command = nlohmann::json::object();
   for (std::size_t i = 0; i < state_->options.size(); ++i) {
-    if (state_->options[i].recorded_) command[state_->recorders[i].first] = state_->recorders[i].second();
+    const Option& option = state_->options[i];
+    if (option.recorded_ && (!option.only_if_given_ || option.given()))
+      command[state_->recorders[i].first] = state_->recorders[i].second();
   }
   if (state_->uses_seed) command["seed"] = state_->seed;
   return command.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
@@ -424,6 +430,13 @@ void Tool::writeDepfile() const {
 bool Tool::isUnchanged() const {
   const State& s = *state_;
   if (s.makes_more) return false;
+  if (s.record) {
+    const formats::Provenance record = s.record();
+    return std::all_of(s.outputs.begin(), s.outputs.end(), [&](const std::string& output) {
+      return isMadeBy(
+          output, record, [&] { return record; }, s.trust);
+    });
+  }
   const formats::Provenance run{generator(), commandJson(), {}};
   return std::all_of(s.outputs.begin(), s.outputs.end(), [&](const std::string& output) {
     return isMadeBy(

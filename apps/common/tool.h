@@ -116,6 +116,8 @@ class Tool {
   bool trust() const;
   /// Value of --max-memory in bytes, or the memory that the process may still take (memory.h).
   std::uint64_t maxMemory() const;
+  /// Whether --max-memory was given.
+  bool limitsMemory() const;
   /// Refuses work that needs more than maxMemory(); without --max-memory, work of up to 32 MB is always tried. Call it before the
   /// work, with an estimate that is no smaller than the need.
   /// @param what    "8192 NDF images"; the message says how much they take
@@ -147,6 +149,8 @@ class Tool {
   /// Declares that the run writes files that addOutput() does not name before the work, so that --skip-unchanged cannot tell whether
   /// they are there: nothing is skipped.
   void makesMore();
+  /// Declares that outputs have another record than provenance(), which --skip-unchanged is to look for.
+  void setRecord(std::function<formats::Provenance()> record);
   /// Files that the run reads: the inputs declared so far, and the configuration file.
   std::vector<std::string> readPaths() const;
   /// Outputs declared so far.

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <string_view>
 #include <system_error>
 
 #include "common/memory.h"
-#include "common/numbers.h"
+#include "common/part.h"
 #include "common/signals.h"
 #include "glint-farm/farm.h"
 #include "glint-farm/shards.h"
@@ -59,16 +58,8 @@ void FarmRunCommand::check() {
     tool_.addOutput(log_);
   }
   if (shard_.empty()) return;
-  int index = 0, count = 0;
-  const std::size_t slash = shard_.find('/');
-  const std::string_view text = shard_;
-  const bool read = slash != std::string::npos && parseNumber(text.substr(0, slash), index).empty() &&
-                    parseNumber(text.substr(slash + 1), count).empty();
-  if (!read || count < 1 || count > kMostShards || index < 1 || index > count) {
-    throw Error(ErrorCode::usage, "cli.usage", "", "--shard", "\"" + shard_ + "\" is no part of a whole",
-                "give I/N with I from 1 to N, such as 1/4");
-  }
-  shard_index_ = static_cast<std::size_t>(index - 1), shard_count_ = static_cast<std::size_t>(count);
+  const Part part = parsePart(shard_, "--shard", kMostShards);
+  shard_index_ = static_cast<std::size_t>(part.index - 1), shard_count_ = static_cast<std::size_t>(part.count);
 }
 
 std::vector<std::string> FarmRunCommand::flags() const {

@@ -46,6 +46,11 @@ ordered_json statisticsOf(const HeightMap& map, const formats::AssetInfo&) {
           {"deviation_texels", std::sqrt(std::max(0.0, squares / count - mean * mean))}};
 }
 
+/// 0 of nothing: a shard may have no images of a level.
+double shareOf(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
 ordered_json statisticsOf(const NdfPyramid& pyramid, const formats::AssetInfo&) {
   ordered_json levels = ordered_json::array();
   std::uint64_t blocks = 0;
@@ -54,14 +59,17 @@ ordered_json statisticsOf(const NdfPyramid& pyramid, const formats::AssetInfo&) 
     const PyramidGrid& grid = pyramid.shape.levels[l];
     const std::uint64_t level_blocks = pyramid.levels[l].block_means.size();
     const std::uint64_t level_places = grid.imageCount() * static_cast<std::uint64_t>(pyramid.shape.blocksPerImage());
-    levels.push_back(
-        {{"blocks", level_blocks}, {"occupied_share", static_cast<double>(level_blocks) / static_cast<double>(level_places)}});
+    levels.push_back({{"blocks", level_blocks}, {"occupied_share", shareOf(level_blocks, level_places)}});
     blocks += level_blocks;
     places += level_places;
   }
-  return {{"blocks", blocks},
-          {"occupied_share", static_cast<double>(blocks) / static_cast<double>(places)},
-          {"levels", std::move(levels)}};
+  return {{"blocks", blocks}, {"occupied_share", shareOf(blocks, places)}, {"levels", std::move(levels)}};
+}
+
+ordered_json statisticsOf(const NdfPyramidShard& shard, const formats::AssetInfo& info) {
+  NdfPyramid held = shard.images;  // whose levels are as large as their arrays
+  for (int l = 0; l < held.shape.level_count; ++l) held.shape.levels[l].rows = shard.rows[l];
+  return statisticsOf(held, info);
 }
 
 ordered_json statisticsOf(const WavePyramid& wave, const formats::AssetInfo& info) { return statisticsOf(wave.grey, info); }

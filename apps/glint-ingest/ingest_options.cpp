@@ -116,6 +116,7 @@ bake::IngestOptions IngestOptions::tileValues(Tool& tool, const std::string& nam
 Image IngestOptions::read(Tool& tool, const std::string& path) const {
   ImageChoice choice = image_.choice();
   choice.transparent_holes = values_.fix_invalid;
+  choice.of_any_size = true;
   return readInputImage(tool, path, choice);
 }
 
@@ -123,7 +124,7 @@ bake::PixelArray pixelArray(const Image& image) {
   bake::PixelArray array{image.width, image.height, image.channels, {}, image.code_scale};
   array.inverted = image.inverted;
   // Integers with a sign are read as floats, and so are integers that were divided by alpha.
-  const bool floats = std::holds_alternative<std::vector<float>>(image.pixels);
+  const bool floats = std::holds_alternative<PixelVector<float>>(image.pixels);
   if (floats && !image.floating) array.step = static_cast<float>(1 / image.code_scale);
   std::visit([&](const auto& pixels) { array.pixels = std::span(pixels); }, image.pixels);
   return array;

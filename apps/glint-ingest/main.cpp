@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/files.h"
-#include "common/memory_needs.h"
+#include "glint-ingest/ingest_memory.h"
 #include "glint-ingest/ingest_options.h"
 #include "glint-ingest/normals_output.h"
 #include "glint-ingest/udim_ingest.h"
@@ -22,8 +22,8 @@ int main(int argc, char** argv) {
 
   return tool.run(argc, argv, [&] {
     if (input.isSet()) return set.run();
+    const apps::IngestMemory memory(tool, output.path());
     const apps::Image image = options.read(tool, input.path());
-    apps::requireMemoryFor(tool, "a map of", image.width, image.height, apps::BytesPerTexel::kIngest, "scale the image down");
     const bake::IngestOptions values = options.values(tool, input.path(), image);
     const formats::Provenance provenance = tool.provenance();
     bake::IngestReport report;
@@ -42,7 +42,8 @@ int main(int argc, char** argv) {
         const HeightMap map{image.width, image.height, options.texelSize(), result.heights};
         formats::writeAsset(output.path(), map, provenance, output.writeOptions());
       } else {
-        const auto normals = bake::normalsFromHeights(image.width, image.height, result.heights, values.boundary);
+        std::pmr::vector<Vec2> normals(result.heights.size());
+        bake::normalsFromHeights(image.width, image.height, result.heights, normals, values.boundary);
         writeNormals(normals);
       }
     }

@@ -28,8 +28,8 @@ struct TileTexels {
   Image image;  ///< without its pixels
   bake::IngestReport report;
   std::optional<double> no_data;
-  std::vector<Vec2> normals;
-  std::vector<float> heights;
+  std::pmr::vector<Vec2> normals;
+  std::pmr::vector<float> heights;
 
   double bytes() const { return static_cast<double>(normals.size() * sizeof(Vec2) + heights.size() * sizeof(float)); }
 };
@@ -170,7 +170,10 @@ void UdimIngest::run() const {
       requireOneResolution(tiles, place, files.input);
       heights = withMargins<float>(
           tiles, place, [](const TileTexels& t) -> const auto& { return t.heights; });
-      if (!options_.writesHeights()) normals = bake::normalsFromHeights(all_width, all_height, heights, Boundary::clamp);
+      if (!options_.writesHeights()) {
+        normals.resize(heights.size());
+        bake::normalsFromHeights(all_width, all_height, heights, normals, Boundary::clamp);
+      }
     } else {
       normals = withMargins<Vec2>(
           tiles, place, [](const TileTexels& t) -> const auto& { return t.normals; });

@@ -1,9 +1,8 @@
-#include <nlohmann/json.hpp>
-
 #include "common/files.h"
 #include "common/input_asset.h"
 #include "common/tool.h"
 #include "glint-pyramid/pyramid_options.h"
+#include "glint-pyramid/region_option.h"
 #include "glint-pyramid/udim_pyramids.h"
 #include "glint-pyramid/wave_options.h"
 #include "glint/bake/pyramid/pyramid.h"
@@ -23,8 +22,7 @@ void makeWangPyramid(apps::Tool& tool, const WangTiles& tiles, const apps::Pyram
                      kLessMemory);
   const bake::WangPyramidData pyramid = bake::buildWangPyramid(tiles, values, tool.progress("images"));
   formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
-  tool.setResult(apps::pyramidJson(pyramid.images));
-  tool.summary(apps::pyramidText(pyramid.images));
+  apps::reportPyramid(tool, pyramid.images);
 }
 }  // namespace
 
@@ -39,8 +37,10 @@ int main(int argc, char** argv) {
   const apps::OutputFile output(tool, apps::OutputFormat::asset, apps::kPyramidOutput, input);
   const apps::PyramidOptions options(tool);
   const apps::WaveOptions wave(tool, options);
+  const apps::RegionOption region(tool, wave);
 
   return tool.run(argc, argv, [&] {
+    if (region.given()) return apps::makeShard(tool, input, options, region, output);
     if (apps::makeUdimPyramids(tool, input, output, options, wave)) return;
     const formats::Asset asset = apps::openInput(tool, input.path());
     const formats::Provenance provenance = tool.provenance();
@@ -51,7 +51,6 @@ int main(int argc, char** argv) {
     tool.requireMemory(bake::pyramidBytes(map, values, static_cast<double>(tool.maxMemory())), "the NDF images", kLessMemory);
     const bake::NdfPyramidData pyramid = bake::buildPyramid(map, values, tool.progress("images"));
     formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
-    tool.setResult(apps::pyramidJson(pyramid));
-    tool.summary(apps::pyramidText(pyramid));
+    apps::reportPyramid(tool, pyramid);
   });
 }

@@ -77,7 +77,7 @@ bake::PyramidOptions PyramidOptions::tileValues() const {
   return options;
 }
 
-nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid) {
+nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid, PyramidRegion region) {
   nlohmann::json levels = nlohmann::json::array();
   std::size_t bytes = 0;
   for (int l = 0; l < pyramid.shape.level_count; ++l) {
@@ -85,14 +85,15 @@ nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid) {
     const std::size_t blocks = pyramid.levels[l].block_means.size();
     const std::size_t level_bytes = blocks * kBlockPixels * (pyramid.precision == BlockPrecision::f16 ? 2 : 4);
     bytes += level_bytes;
-    levels.push_back(
-        {{"is_mean", l == pyramid.shape.footprintLevels()},
-         {"stride_texels", grid.stride},
-         {"columns", grid.columns},
-         {"rows", grid.rows},
-         {"blocks", blocks},
-         {"occupied", static_cast<double>(blocks) / (static_cast<double>(grid.imageCount()) * pyramid.shape.blocksPerImage())},
-         {"size_bytes", level_bytes}});
+    const int rows = regionRows(pyramid.shape, l, region).count();
+    const double places = static_cast<double>(rows) * grid.columns * pyramid.shape.blocksPerImage();
+    levels.push_back({{"is_mean", l == pyramid.shape.footprintLevels()},
+                      {"stride_texels", grid.stride},
+                      {"columns", grid.columns},
+                      {"rows", rows},
+                      {"blocks", blocks},
+                      {"occupied", places > 0 ? static_cast<double>(blocks) / places : 0},
+                      {"size_bytes", level_bytes}});
   }
   return {{"levels", levels},
           {"size_bytes", bytes},
@@ -102,10 +103,10 @@ nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid) {
           {"sigma_r_pixels", 0.5f * pyramid.shape.sigma_r * static_cast<float>(pyramid.shape.resolution)}};
 }
 
-std::string pyramidText(const bake::NdfPyramidData& pyramid) {
+std::string pyramidText(const bake::NdfPyramidData& pyramid, PyramidRegion region) {
   std::string text =
       fmt::format("{:>5} {:>8} {:>11} {:>9} {:>9} {:>9}\n", "level", "stride", "images", "blocks", "occupied", "MB");
-  const nlohmann::json json = pyramidJson(pyramid);
+  const nlohmann::json json = pyramidJson(pyramid, region);
   int l = 0;
   for (const auto& level : json["levels"]) {
     const std::string stride =
@@ -119,6 +120,11 @@ std::string pyramidText(const bake::NdfPyramidData& pyramid) {
     text += fmt::format("sigma_r is {:.2g} pixels of an image; for small lights give --resolution auto\n",
                         json["sigma_r_pixels"].get<double>());
   return text;
+}
+
+void reportPyramid(Tool& tool, const bake::NdfPyramidData& pyramid, PyramidRegion region) {
+  tool.setResult(pyramidJson(pyramid, region));
+  tool.summary(pyramidText(pyramid, region));
 }
 
 }  // namespace glint::apps

@@ -33,7 +33,10 @@ class PyramidOptions {
 };
 
 /// Levels with their images, stored blocks and bytes.
-nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid);
-std::string pyramidText(const bake::NdfPyramidData& pyramid);
+/// @param region  the part of the images that the arrays hold
+nlohmann::json pyramidJson(const bake::NdfPyramidData& pyramid, PyramidRegion region = {});
+std::string pyramidText(const bake::NdfPyramidData& pyramid, PyramidRegion region = {});
+/// Both as the result of a tool.
+void reportPyramid(Tool& tool, const bake::NdfPyramidData& pyramid, PyramidRegion region = {});
 
 }  // namespace glint::apps

@@ -10,10 +10,10 @@ namespace glint::apps {
 /// Texts of the help for the input and the output.
 inline constexpr const char* kPyramidInput =
     "asset of kind normals, or with --optics wave of kind heights, from glint-ingest; or of kind wang-tiles, from glint-wang; "
-    "or "
-    "the normals of a UDIM set, 'name.<UDIM>.map.glint'";
+    "or the normals of a UDIM set, 'name.<UDIM>.map.glint'";
 inline constexpr const char* kPyramidOutput =
-    "asset (.glint) of kind ndf-pyramid, wang-pyramid or wave-pyramid; with <UDIM>, one for each tile";
+    "asset (.glint) of kind ndf-pyramid, wang-pyramid or wave-pyramid; with <UDIM>, one for each tile; with --region "
+    "ndf-pyramid-shard";
 
 /// What to do where the images take too much memory.
 inline constexpr const char* kLessMemory = "give a larger --stride, or a smaller --resolution or --overlap";

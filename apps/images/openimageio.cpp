@@ -27,10 +27,10 @@ std::string trimmed(std::string text) {
 
 /// Reads all pixels bottom row first: a negative stride writes the file's first row into the array's last.
 template <class T>
-std::vector<T> readFlipped(OIIO::ImageInput& input, int part, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
+PixelVector<T> readFlipped(OIIO::ImageInput& input, int part, const OIIO::ImageSpec& spec, OIIO::TypeDesc type,
                            const std::string& path) {
   const std::size_t row = static_cast<std::size_t>(spec.width) * spec.nchannels;
-  std::vector<T> pixels(row * spec.height);
+  PixelVector<T> pixels(row * spec.height);
   const auto row_bytes = static_cast<OIIO::stride_t>(row * sizeof(T));
   T* last_row = pixels.data() + row * (spec.height - 1);
   errno = 0;
@@ -158,7 +158,7 @@ void invertWhiteZero(const OIIO::ImageSpec& spec, const std::string& path, Image
   if (image.format != "tiff" || spec.get_int_attribute("tiff:PhotometricInterpretation", 1) != 0) return;
   image.inverted = true;
   if (spec.format == OIIO::TypeDesc::UINT8) return;
-  auto* codes = std::get_if<std::vector<std::uint16_t>>(&image.pixels);
+  auto* codes = std::get_if<PixelVector<std::uint16_t>>(&image.pixels);
   if (!codes) {
     throw Error(ErrorCode::unsupported, "image.white_zero", path, "",
                 "0 is white in this image of signed or floating-point pixels",

@@ -35,6 +35,8 @@ class FileBytes {
   const std::byte* data() const { return bytes_.data(); }
   std::size_t size() const { return bytes_.size(); }
   std::span<const std::byte> span() const { return bytes_; }
+  /// Whether the bytes are those of the file itself.
+  bool isMapped() const { return mapped_; }
 
  private:
   struct Release {

@@ -18,14 +18,20 @@ void describePyramidAttributes(Fields auto& fields, auto& pyramid) {
   describePixels(fields, pyramid);
 }
 
+/// Expressions of the sizes of the arrays of a level.
+struct LevelDims {
+  std::string_view rows = "level_rows[l]";                                       ///< rows of images
+  std::string_view ranks = "level_rows[l] * level_columns[l] * mask_words + 1";  ///< elements of mask_ranks
+};
+
 /// Arrays of all levels: blocks and pixels, and what describe_more(l, blocks) adds, `blocks` being the number of stored blocks.
-void describePyramidLevels(Fields auto& fields, auto& pyramid, auto describe_more) {
+void describePyramidLevels(Fields auto& fields, auto& pyramid, auto describe_more, LevelDims dims = {}) {
   fields.derived("mask_words", "ceil_div(resolution * resolution, 16384)", "64-bit words of occupancy bits of an image");
   fields.levels("level_count", pyramid.shape.level_count, [&](int l) {
     auto& level = pyramid.levels[l];
-    fields.array("level_{l}/masks", level.masks, {"level_rows[l]", "level_columns[l]", "mask_words"}, "1",
+    fields.array("level_{l}/masks", level.masks, {dims.rows, "level_columns[l]", "mask_words"}, "1",
                  "bit b of word w: block 64 w + b of the image is stored");
-    fields.array("level_{l}/mask_ranks", level.mask_ranks, {"level_rows[l] * level_columns[l] * mask_words + 1"}, "1",
+    fields.array("level_{l}/mask_ranks", level.mask_ranks, {dims.ranks}, "1",
                  "stored blocks of the level before those of this word; the last value is their total");
     fields.array("level_{l}/block_means", level.block_means, {"stored_blocks"}, "1", "mean density of each stored block");
     // The pixels are a bare pointer: the running count is the only witness of how many there are.

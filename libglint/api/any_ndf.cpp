@@ -7,6 +7,7 @@
 
 #include "glint/api/alternatives.h"
 #include "glint/formats/hash.h"
+#include "glint/formats/rules.h"
 
 namespace glint::api {
 
@@ -43,8 +44,9 @@ void requireSameMap(const formats::Asset& asset, const std::filesystem::path& pa
 [[noreturn]] void refuseKind(std::string_view kind, const std::filesystem::path& path) {
   throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",
               "is of kind " + std::string(kind) + ", which holds no distribution of normals",
-              kind == "displacement" ? "ask for the light that it reflects, with DisplacedBrdf or glint_displaced_open"
-                                     : "pass an asset of kind " + alternatives(ndfKinds()));
+              kind == "ndf-pyramid-shard" ? std::string(formats::kJoinShards)
+              : kind == "displacement"    ? "ask for the light that it reflects, with DisplacedBrdf or glint_displaced_open"
+                                          : "pass an asset of kind " + alternatives(ndfKinds()));
 }
 
 }  // namespace

@@ -131,7 +131,7 @@ nb::dict ingest(const BuildJob& job, const Pixels& image, const std::string& kin
   if (!of_heights) {
     bake::IngestedNormals made = unlocked([&] { return bake::ingestNormals(array, o); });
     report = made.report;
-    writeNormals(std::move(made.normals));
+    writeNormals({made.normals.begin(), made.normals.end()});
   } else {
     bake::IngestedHeights made = unlocked([&] { return bake::ingestHeights(array, o); });
     report = made.report;
@@ -139,7 +139,7 @@ nb::dict ingest(const BuildJob& job, const Pixels& image, const std::string& kin
       writeNormals(unlocked([&] { return bake::normalsFromHeights(array.width, array.height, made.heights, o.boundary); }));
     } else {
       run(job, provenanceOf(job), [&](const bake::ProgressFn&) {
-        return HeightMapData{array.width, array.height, texel_size_um, std::move(made.heights)};
+        return HeightMapData{array.width, array.height, texel_size_um, {made.heights.begin(), made.heights.end()}};
       });
     }
   }

@@ -5,7 +5,7 @@ import struct
 import h5py
 import numpy
 import pytest
-from image_writer import CODE, HALF, codes, data, ingest, refused, surface, unorm, write, write_parts
+from image_writer import CODE, HALF, codes, data, ingest, oiio, refused, surface, unorm, write, write_parts
 
 Image = pytest.importorskip("PIL.Image")
 
@@ -286,3 +286,19 @@ def test_vectors_of_filtered_maps_are_normalised(glint):
     write(glint.folder / "v.exr", 0.92 * surface().astype(numpy.float32))
     process = ingest(glint, "v.exr", "--encoding", "snorm")
     assert "off by more than 0.080" in process.stderr
+
+
+@pytest.mark.parametrize("name", ["tiled.exr", "tiled.tif"])
+def test_tiled_images_larger_than_the_memory_are_read(glint, name):
+    """Pixels, normals and bounds take 25 MB, and the limit is 16."""
+    pixels = numpy.ascontiguousarray(unorm(surface(1024, 1000)), numpy.float32)
+    write(glint.folder / "rows.exr", pixels)
+    spec = oiio.ImageSpec(1024, 1000, 3, "float")
+    spec.tile_width = spec.tile_height = 64
+    output = oiio.ImageOutput.create(str(glint.folder / name))
+    assert output.open(str(glint.folder / name), spec) and output.write_image(pixels), output.geterror()
+    output.close()
+    ingest(glint, "rows.exr")
+    rows = data(glint)
+    ingest(glint, name, "--force", "--max-memory", "16M")
+    assert numpy.array_equal(data(glint), rows)

@@ -18,7 +18,6 @@ MOST_EXCESS, SMALL = 3, 16 * MB  # an estimate is at most so many times what the
 # Command line; the same with a remedy of its message that needs less; an amount of memory that is too little.
 RUNS = {
     "synth": ("synth isotropic --size 1024 -o out.exr", "synth isotropic --size 128 -o out.exr", "2M"),
-    "ingest": ("ingest large.exr -o out.glint", "ingest map.exr -o out.glint", "60M"),  # the pixels of the image alone take 48 MB
     "pyramid": ("pyramid map.glint -o out.glint --stride 8", "pyramid map.glint -o out.glint --stride 64", "2M"),
     "smooth": ("pyramid map.glint -o out.glint --stride 16 --surface smooth", "pyramid map.glint -o out.glint --stride 64 --surface smooth", "2M"),
     "wave": ("pyramid small-heights.glint -o out.glint --optics wave --stride 4 --resolution 64 --wavelengths 2 --coherence-um 6",
@@ -40,7 +39,7 @@ RUNS = {
     "picture": ("query map.glint --uv .5 .5 --sigma 4 --image out.exr --image-size 512",
                 "query map.glint --uv .5 .5 --sigma 4 --image out.exr --image-size 64", "2M"),
 }
-IMAGES = {"synth", "ingest", "textures", "picture"}  # these load OpenImageIO
+IMAGES = {"synth", "textures", "picture"}  # these load OpenImageIO
 MAKE = [
     "synth isotropic --size 64 -o small.exr", "ingest small.exr -o small.glint",
     "synth isotropic --size 512 -o map.exr", "ingest map.exr -o map.glint",
@@ -147,10 +146,33 @@ def test_images_that_declare_more_than_they_hold_are_refused(folder, header, nam
     assert not (folder / "out.glint").exists()
 
 
-def test_pixels_that_need_more_than_may_be_used_are_refused(folder):
+def test_less_memory_than_any_image_takes_is_refused(folder):
     code, error = run(folder, "ingest large.exr -o out2.glint", "--max-memory", "1M")
     assert code == 4 and "--max-memory" in error
     assert not (folder / "out2.glint").exists()
+
+
+@pytest.mark.parametrize("image, flags", [("large.exr", ""), ("large.png", ""), ("heights.exr", "--kind height"), ("heights.exr", "--kind height --to heights")])
+def test_images_larger_than_the_memory_give_the_same_asset(folder, image, flags):
+    """Pixels, normals and bounds of the first take 100 MB."""
+    if image == "large.png":
+        assert run(folder, "synth flakes --size 2048 -o large.png --force")[0] == 0
+    for name, more in (("fits.glint", []), ("filed.glint", ["--max-memory", "16M"])):
+        code, error = run(folder, f"ingest {image} -o {name} --force {flags}", *more)
+        assert code == 0, error
+    assert (folder / "fits.glint").read_bytes() == (folder / "filed.glint").read_bytes()
+    assert not [name for name in os.listdir(folder) if name.startswith(".glint")], "temporary files are gone"
+
+
+def test_ingest_keeps_to_the_limit(folder):
+    """Arrays of 400 MB are moved into files, and do not stay in memory. Before their pages are given up, more come, on a busy machine."""
+    most_between = 150 * MB
+    assert run(folder, "synth flakes --size 4096 -o huge.exr")[0] == 0
+    bound = peak(folder, "ingest huge.exr -o bound.glint", "--max-memory", "16M")
+    free = peak(folder, "ingest huge.exr -o bound.glint --force", "--max-memory", "4G")
+    assert bound < 16 * MB + WITH_IMAGES[1] + most_between < free, f"takes {bound / MB:.0f} MB, and {free / MB:.0f} MB without a limit"
+    for name in ("huge.exr", "bound.glint"):
+        (folder / name).unlink()
 
 
 def test_programs_that_the_bench_starts_keep_the_limit(folder):

@@ -73,6 +73,17 @@ NAMES = ["two words", "100%", "brick (1)", "$cheap", "C#", "a:b", "back\\slash",
 NAMES_FOR_MAKE = ["salt & pepper", "rock 'n' roll", 'say "hi"', "star*", "why?", "<x>", "`tick`", "x^2"]
 
 
+def test_pyramids_in_parts_are_the_same_and_parts_are_deleted(project):
+    target = "assets/flakes.pyramid.glint"
+    project(target)
+    whole = (project.folder / target).read_bytes()
+    (project.folder / target).unlink()
+    assert tools(project("-j2", target, "GLINT_SHARDS=3")) == ["glint-merge"] + ["glint-pyramid"] * 3
+    assert (project.folder / target).read_bytes() == whole
+    assert {p.name for p in (project.folder / "assets").glob("*.glint")} == {"flakes.glint", "flakes.pyramid.glint"}
+    assert tools(project(target, "GLINT_SHARDS=3")) == [], "parts that Make deleted are not made again"
+
+
 def make_name(name):
     """A name as a Makefile holds it."""
     for sign, escaped in (("$", "$$"), (" ", "\\ "), ("#", "\\#"), (":", "\\:")):

@@ -537,6 +537,23 @@ SamplePyramid samplePyramid(int size, BlockPrecision precision) {
   return sample;
 }
 
+SamplePyramidShard samplePyramidShard(int size) {
+  SamplePyramidShard sample = {samplePyramid(size, BlockPrecision::f16), {}};
+  NdfPyramidShard& shard = sample.shard;
+  shard.region = {1, 2};
+  shard.level_choice = LevelChoice::agreeing;
+  shard.images = sample.whole.pyramid;
+  for (int l = 0; l < shard.images.shape.level_count; ++l) {
+    shard.rows[l] = shard.images.shape.levels[l].rows / 2;
+    PyramidLevel& level = shard.images.levels[l];
+    const auto images = static_cast<std::size_t>(shard.rows[l] * shard.images.shape.levels[l].columns);  // of one word each
+    level.masks = level.masks.first(images);
+    level.mask_ranks = level.mask_ranks.first(images + 1);
+    level.block_means = level.block_means.first(level.mask_ranks.back());
+  }
+  return sample;
+}
+
 SampleTinyExample sampleTinyExample(int size, TinyMode mode) {
   SampleTinyExample sample;
   sample.normals = sampleNormals(size, size, false).normals;
@@ -1026,6 +1043,7 @@ std::vector<SampleAsset> sampleAssets() {
       {"ndf-cp-spots-i8", ownedNdfCp<tucker, i8, SampleForm::spots>},
       {"ndf-cp-cp-f32", ownedNdfCp<cp, f32>},
       {"ndf-pyramid", [] { return owned(samplePyramid(64, BlockPrecision::f16), &SamplePyramid::pyramid); }},
+      {"ndf-pyramid-shard", [] { return owned(samplePyramidShard(64), &SamplePyramidShard::shard); }},
       {"normals", [] { return owned(sampleNormals(64, 48), &SampleNormals::map); }},
       {"sh-light", [] { return owned(sampleShLight(), &SampleShLight::light); }},
       {"sh-lobes", [] { return owned(sampleShLobes(), &SampleShLobes::lobes); }},

@@ -51,6 +51,11 @@ struct SamplePyramid {
   NdfPyramid pyramid;
 };
 
+struct SamplePyramidShard {
+  SamplePyramid whole;
+  NdfPyramidShard shard;
+};
+
 struct SampleWavePyramid {
   SamplePyramid grey;
   std::vector<float> wavelengths_um;
@@ -156,6 +161,8 @@ SampleHeights sampleHeights(int width, int height);
 SampleDisplacement sampleDisplacement(int size, bool colored = false);
 /// NDF images of sampleNormals(size, size) at strides size/4, size/2 and size, 64^2 pixels, sigma_r 0.05.
 SamplePyramid samplePyramid(int size, BlockPrecision precision);
+/// The first of two regions of samplePyramid, which has no image of the last level.
+SamplePyramidShard samplePyramidShard(int size);
 /// The same images, each block approximated by a constant and slopes; two regions.
 SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type, SampleForm form = SampleForm::wide);
 

@@ -37,14 +37,14 @@ TEST_F(ImageFile, FloatsComeBackBottomRowFirst) {
   EXPECT_EQ(image.width, 3);
   EXPECT_EQ(image.height, 2);
   EXPECT_TRUE(image.floating);
-  EXPECT_EQ(std::get<std::vector<float>>(image.pixels), pixels_);
+  EXPECT_EQ(std::get<PixelVector<float>>(image.pixels), PixelVector<float>(pixels_.begin(), pixels_.end()));
 }
 
 TEST_F(ImageFile, IntegersKeepTheirCodes) {
   writeImage(path("a.png"), 3, 2, 3, pixels_, PixelFormat::u8);
   writeImage(path("b.png"), 3, 2, 3, pixels_, PixelFormat::u16);
-  EXPECT_EQ(std::get<std::vector<std::uint8_t>>(readImage(path("a.png")).pixels)[3], 51);
-  EXPECT_EQ(std::get<std::vector<std::uint16_t>>(readImage(path("b.png")).pixels)[3], 13107);
+  EXPECT_EQ(std::get<PixelVector<std::uint8_t>>(readImage(path("a.png")).pixels)[3], 51);
+  EXPECT_EQ(std::get<PixelVector<std::uint16_t>>(readImage(path("b.png")).pixels)[3], 13107);
   EXPECT_EQ(readImage(path("b.png")).bits, 16);
 }
 

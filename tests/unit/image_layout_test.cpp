@@ -13,7 +13,7 @@ namespace {
 
 /// Pixels of one channel, given from the top.
 StoredImage image(int width, int height, std::vector<std::uint8_t> from_top) {
-  std::vector<std::uint8_t> pixels;
+  PixelVector<std::uint8_t> pixels;
   for (int j = height - 1; j >= 0; --j)
     pixels.insert(pixels.end(), from_top.begin() + j * width, from_top.begin() + (j + 1) * width);
   StoredImage stored;
@@ -25,7 +25,7 @@ StoredImage image(int width, int height, std::vector<std::uint8_t> from_top) {
 }
 
 std::vector<std::uint8_t> fromTop(const StoredImage& stored) {
-  const auto& pixels = std::get<std::vector<std::uint8_t>>(stored.image.pixels);
+  const auto& pixels = std::get<PixelVector<std::uint8_t>>(stored.image.pixels);
   std::vector<std::uint8_t> top;
   for (int j = stored.image.height - 1; j >= 0; --j)
     top.insert(top.end(), pixels.begin() + j * stored.image.width, pixels.begin() + (j + 1) * stored.image.width);
@@ -66,7 +66,7 @@ TEST(CropToDisplay, CountsMissingPixels) {
   }
 }
 
-Image rgba(std::vector<float> pixels) {
+Image rgba(PixelVector<float> pixels) {
   Image image;
   image.width = std::max(1, static_cast<int>(pixels.size() / 4)), image.height = 1, image.channels = 4, image.alpha = 3;
   image.channel_names = {"R", "G", "B", "A"};
@@ -78,19 +78,19 @@ Image rgba(std::vector<float> pixels) {
 TEST(DivideByAlpha, GivesStraightColours) {
   Image half = rgba({0.25f, 0.1f, 0.5f, 0.5f, 0.2f, 0.3f, 0.4f, 1});
   divideByAlpha(half, {}, "a.exr");
-  EXPECT_EQ(std::get<std::vector<float>>(half.pixels), (std::vector<float>{0.5f, 0.2f, 1, 0.5f, 0.2f, 0.3f, 0.4f, 1}));
+  EXPECT_EQ(std::get<PixelVector<float>>(half.pixels), (PixelVector<float>{0.5f, 0.2f, 1, 0.5f, 0.2f, 0.3f, 0.4f, 1}));
 }
 
 TEST(DivideByAlpha, KeepsTheCodesOfOpaqueImages) {
   Image opaque = rgba({});
-  opaque.pixels = std::vector<std::uint8_t>{1, 2, 3, 255};
+  opaque.pixels = PixelVector<std::uint8_t>{1, 2, 3, 255};
   divideByAlpha(opaque, {}, "a.tif");
-  EXPECT_EQ(std::get<std::vector<std::uint8_t>>(opaque.pixels), (std::vector<std::uint8_t>{1, 2, 3, 255}));
+  EXPECT_EQ(std::get<PixelVector<std::uint8_t>>(opaque.pixels), (PixelVector<std::uint8_t>{1, 2, 3, 255}));
 }
 
 TEST(DivideByAlpha, RefusesCodesThatWereNotMultiplied) {
   Image straight = rgba({});
-  straight.pixels = std::vector<std::uint8_t>{200, 2, 3, 100};
+  straight.pixels = PixelVector<std::uint8_t>{200, 2, 3, 100};
   EXPECT_THROW(divideByAlpha(straight, {}, "a.tif"), Error);
 }
 
@@ -98,7 +98,7 @@ TEST(DivideByAlpha, TransparentPixelsAreHolesOnlyWhereWanted) {
   Image empty = rgba({0, 0, 0, 0, 0.2f, 0.3f, 0.4f, 1});
   EXPECT_THROW(divideByAlpha(empty, {}, "a.exr"), Error);
   divideByAlpha(empty, {.transparent_holes = true}, "a.exr");
-  EXPECT_TRUE(std::isnan(std::get<std::vector<float>>(empty.pixels)[0]));
+  EXPECT_TRUE(std::isnan(std::get<PixelVector<float>>(empty.pixels)[0]));
 }
 
 TEST(FindChannels, TakesNamesBeforePlaces) {
@@ -117,13 +117,13 @@ TEST(SelectLayer, KeepsTheChannelsOfOneLayer) {
   Image image;
   image.width = image.height = 1, image.channels = 3;
   image.channel_names = {"a.X", "b.X", "b.Y"};
-  image.pixels = std::vector<std::uint8_t>{1, 2, 3};
+  image.pixels = PixelVector<std::uint8_t>{1, 2, 3};
   Image first = image;
   selectLayer(first, "", "l.exr");
   EXPECT_EQ(first.layers, (std::vector<std::string>{"a", "b"}));
   EXPECT_EQ(first.channel_names, (std::vector<std::string>{"a.X"}));
   selectLayer(image, "b", "l.exr");
-  EXPECT_EQ(std::get<std::vector<std::uint8_t>>(image.pixels), (std::vector<std::uint8_t>{2, 3}));
+  EXPECT_EQ(std::get<PixelVector<std::uint8_t>>(image.pixels), (PixelVector<std::uint8_t>{2, 3}));
 }
 
 TEST(ExifOrientation, IsOneUnlessTheMetadataSayMore) {

@@ -296,7 +296,7 @@ TEST(Dequantize, FillsTheCombWithoutMovingTheMean) {
   EXPECT_TRUE(dithered.report.dequantized);
 
   // The comb: the share of slopes in the even halves of code steps. Codes put x near (c - 127.5) * 2 / 255.
-  const auto onTeeth = [](const std::vector<Vec2>& normals) {
+  const auto onTeeth = [](std::span<const Vec2> normals) {
     double on = 0;
     for (const Vec2 n : normals) {
       const double code = n.x * 127.5 + 127.5;
@@ -345,7 +345,7 @@ TEST(IngestHeights, ScalesToTexels) {
   IngestOptions p = plain();
   p.height_scale = 5;
   const auto result = ingestHeights({2, 2, 1, std::span<const std::uint16_t>(codes)}, p);
-  EXPECT_EQ(result.heights, (std::vector<float>{0, 5, 1, 0}));
+  EXPECT_EQ(result.heights, (std::pmr::vector<float>{0, 5, 1, 0}));
 }
 
 TEST(IngestHeights, RefusesColoursAndHoles) {

@@ -67,7 +67,8 @@ std::vector<Vec2> throughEightBits(const NormalMap& map, bake::Dequantize dequan
       codes.push_back(static_cast<std::uint8_t>(std::lround(127.5f * (c + 1))));
   bake::IngestOptions options;
   options.name = "8 bits", options.dequantize = dequantize, options.allow_constant = true, options.seed = seed;
-  return bake::ingestNormals({map.width, map.height, 3, std::span<const std::uint8_t>(codes)}, options).normals;
+  const auto made = bake::ingestNormals({map.width, map.height, 3, std::span<const std::uint8_t>(codes)}, options);
+  return {made.normals.begin(), made.normals.end()};
 }
 
 /// Brute force over the stored texels against brute force over the original ones.

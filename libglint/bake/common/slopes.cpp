@@ -73,6 +73,12 @@ Vec2 normalFromSlopes(float dh_dx, float dh_dy) {
 std::vector<Vec2> normalsFromHeights(int width, int height, std::span<const float> heights, Boundary boundary,
                                      std::size_t* cliffs, Gradient gradient) {
   std::vector<Vec2> normals(heights.size());
+  normalsFromHeights(width, height, heights, normals, boundary, cliffs, gradient);
+  return normals;
+}
+
+void normalsFromHeights(int width, int height, std::span<const float> heights, std::span<Vec2> normals, Boundary boundary,
+                        std::size_t* cliffs, Gradient gradient) {
   std::vector<std::size_t> row_cliffs(static_cast<std::size_t>(height));
   tbb::parallel_for(0, height, [&](int j) {
     Vec2* line = normals.data() + static_cast<std::size_t>(j) * width;
@@ -84,7 +90,6 @@ std::vector<Vec2> normalsFromHeights(int width, int height, std::span<const floa
     row_cliffs[static_cast<std::size_t>(j)] = steep;
   });
   if (cliffs) *cliffs = std::accumulate(row_cliffs.begin(), row_cliffs.end(), std::size_t{0});
-  return normals;
 }
 
 void rowSlopes(int width, int height, std::span<const float> heights, int j, Boundary boundary, Gradient gradient,

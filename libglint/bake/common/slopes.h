@@ -33,6 +33,12 @@ enum class Gradient : std::uint8_t {
 std::vector<Vec2> normalsFromHeights(int width, int height, std::span<const float> heights, Boundary boundary = Boundary::wrap,
                                      std::size_t* cliffs = nullptr, Gradient gradient = Gradient::central);
 
+/// The same, into an array.
+/// @param normals  [height][width]
+void normalsFromHeights(int width, int height, std::span<const float> heights, std::span<Vec2> normals,
+                        Boundary boundary = Boundary::wrap, std::size_t* cliffs = nullptr,
+                        Gradient gradient = Gradient::central);
+
 /// Computes the slopes (dh/dx, dh/dy) of row j of a height field. Heights beyond the border are wrapped, or under `clamp` those of
 /// the border; central differences are one-sided there.
 /// @param heights  [height][width], texels, bottom row first

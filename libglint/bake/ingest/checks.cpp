@@ -120,7 +120,7 @@ void visitNeighbours(int width, int height, Boundary boundary, std::size_t texel
 }
 
 template <class T>
-std::size_t fillHolesOf(int width, int height, std::vector<T>& values, Boundary boundary, const std::string& name) {
+std::size_t fillHolesOf(int width, int height, std::span<T> values, Boundary boundary, const std::string& name) {
   // Find the rim: holes that have a finite neighbour.
   std::vector<std::size_t> rim;
   std::size_t count = 0;
@@ -348,10 +348,10 @@ void checkVectors(const VectorEvidence& e, const std::string& name) {
   }
 }
 
-std::size_t fillHoles(int width, int height, std::vector<Vec2>& values, Boundary boundary, const std::string& name) {
+std::size_t fillHoles(int width, int height, std::span<Vec2> values, Boundary boundary, const std::string& name) {
   return fillHolesOf(width, height, values, boundary, name);
 }
-std::size_t fillHoles(int width, int height, std::vector<float>& values, Boundary boundary, const std::string& name) {
+std::size_t fillHoles(int width, int height, std::span<float> values, Boundary boundary, const std::string& name) {
   return fillHolesOf(width, height, values, boundary, name);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -95,7 +96,7 @@ inline constexpr double kUnitTolerance = 0.01;
 /// of a hole inwards. O(texels)
 /// @return number of texels that were replaced
 /// @throws Error invalid_input if more than half of the map is not finite
-std::size_t fillHoles(int width, int height, std::vector<Vec2>& values, Boundary boundary, const std::string& name);
-std::size_t fillHoles(int width, int height, std::vector<float>& values, Boundary boundary, const std::string& name);
+std::size_t fillHoles(int width, int height, std::span<Vec2> values, Boundary boundary, const std::string& name);
+std::size_t fillHoles(int width, int height, std::span<float> values, Boundary boundary, const std::string& name);
 
 }  // namespace glint::bake

@@ -216,10 +216,10 @@ struct NormalDecoder {
 
 /// Decodes all texels of a map, and adds up their faults.
 template <class T>
-std::vector<Vec2> decodeNormals(const PixelArray& image, const IngestOptions& p, const NormalDecoder<T>& decoder,
-                                Faults& faults) {
+std::pmr::vector<Vec2> decodeNormals(const PixelArray& image, const IngestOptions& p, const NormalDecoder<T>& decoder,
+                                     Faults& faults) {
   const float green = p.convention == Convention::directx ? -1.0f : 1.0f;
-  std::vector<Vec2> normals(static_cast<std::size_t>(image.width) * image.height);
+  std::pmr::vector<Vec2> normals(static_cast<std::size_t>(image.width) * image.height);
   std::vector<Faults> rows(static_cast<std::size_t>(image.height));
   tbb::parallel_for(0, image.height, [&](int j) {
     const std::size_t first = static_cast<std::size_t>(j) * image.width;
@@ -272,12 +272,12 @@ void refuseSentinel(const PixelArray& image, const std::optional<double>& no_dat
 
 /// Decodes the heights of all texels, and counts faults. Unusable texels become NaN.
 template <class T>
-std::vector<float> decodeHeights(const PixelArray& image, const IngestOptions& p, float noise_width, Faults& faults) {
+std::pmr::vector<float> decodeHeights(const PixelArray& image, const IngestOptions& p, float noise_width, Faults& faults) {
   const auto pixels = std::get<std::span<const T>>(image.pixels);
   const float scale = p.height_scale / kCodes<T>;
   const NoDataTest holds_nothing(image, p.no_data);
   std::vector<std::size_t> no_data(static_cast<std::size_t>(image.height));
-  std::vector<float> heights(static_cast<std::size_t>(image.width) * image.height);
+  std::pmr::vector<float> heights(static_cast<std::size_t>(image.width) * image.height);
   tbb::parallel_for(0, image.height, [&](int j) {
     const std::size_t first = static_cast<std::size_t>(j) * image.width;
     for (std::size_t t = first; t < first + static_cast<std::size_t>(image.width); ++t) {
@@ -427,7 +427,8 @@ IngestedHeights ingestHeights(const PixelArray& image, const IngestOptions& p) {
   if (repaired > 0 && !p.allow_constant)
     checkNotConstant({image.width, image.height, 1, std::span<const float>(result.heights)}, {0}, p.name);
   std::size_t cliffs = 0;
-  const std::vector<Vec2> normals = normalsFromHeights(image.width, image.height, result.heights, p.boundary, &cliffs);
+  std::pmr::vector<Vec2> normals(result.heights.size());
+  normalsFromHeights(image.width, image.height, result.heights, normals, p.boundary, &cliffs);
   result.report = describeNormals(image.width, image.height, normals);
   result.report.coarse_codes = codes.coarse;
   result.report.dequantized = noise > 0;

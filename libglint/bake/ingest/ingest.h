@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory_resource>
 #include <optional>
 #include <span>
 #include <string>
@@ -89,14 +90,15 @@ struct IngestReport {
   float steepest_tilt_deg = 0;
 };
 
+/// Arrays are in memory of the default resource (std::pmr::get_default_resource), so that a program can say where.
 struct IngestedNormals {
-  std::vector<Vec2> normals;  ///< [height][width]
+  std::pmr::vector<Vec2> normals;  ///< [height][width]
   IngestReport report;
 };
 
 struct IngestedHeights {
-  std::vector<float> heights;  ///< [height][width], texels
-  IngestReport report;         ///< with moments of the normals of these heights
+  std::pmr::vector<float> heights;  ///< [height][width], texels
+  IngestReport report;              ///< with moments of the normals of these heights
 };
 
 /// Reads the normals of a normal map. The first channels are x, y and z, and (x, y, z) is normalised. With two channels, z is

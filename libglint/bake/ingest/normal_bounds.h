@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory_resource>
 #include <span>
 #include <vector>
 
@@ -11,7 +12,7 @@ namespace glint::bake {
 struct NormalBoundsStorage {
   int columns = 0;
   int rows = 0;
-  std::vector<NormalBounds> nodes;  ///< [rows][columns]
+  std::pmr::vector<NormalBounds> nodes;  ///< [rows][columns], in memory of the default resource
 };
 
 /// Builds the min-max pyramid of a normal map, from nodes of 2x2 texels up to one node for the map. Node (i, j) of level

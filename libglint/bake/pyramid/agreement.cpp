@@ -12,20 +12,6 @@
 namespace glint::bake {
 namespace {
 
-/// Decodes all pixels of an image, block by block; pixels of blocks that are not stored are 0.
-void decodeImage(const NdfPyramid& pyramid, int l, std::size_t image, std::vector<float>& pixels) {
-  const PyramidLevel& level = pyramid.levels[l];
-  const int words = pyramid.shape.maskWords();
-  pixels.assign(static_cast<std::size_t>(pyramid.shape.blocksPerImage()) * kBlockPixels, 0.0f);
-  std::size_t stored = level.mask_ranks[image * words];
-  for (int w = 0; w < words; ++w) {
-    for (std::uint64_t mask = level.masks[image * words + w]; mask; mask &= mask - 1) {
-      float* block = pixels.data() + static_cast<std::size_t>(64 * w + std::countr_zero(mask)) * kBlockPixels;
-      loadStoredBlock(pyramid, level, stored++, block);
-    }
-  }
-}
-
 double squaredDistance(const std::vector<float>& a, const std::vector<float>& b) {
   double sum = 0;
   for (std::size_t k = 0; k < a.size(); ++k) sum += double{a[k] - b[k]} * (a[k] - b[k]);
@@ -45,10 +31,41 @@ int nearestAlong(int finer, float finer_gap, float gap, int count) {
 
 }  // namespace
 
+void decodeImage(const NdfPyramid& pyramid, int l, std::size_t image, std::vector<float>& pixels) {
+  const PyramidLevel& level = pyramid.levels[l];
+  const int words = pyramid.shape.maskWords();
+  pixels.assign(static_cast<std::size_t>(pyramid.shape.blocksPerImage()) * kBlockPixels, 0.0f);
+  std::size_t stored = level.mask_ranks[image * words];
+  for (int w = 0; w < words; ++w) {
+    for (std::uint64_t mask = level.masks[image * words + w]; mask; mask &= mask - 1) {
+      float* block = pixels.data() + static_cast<std::size_t>(64 * w + std::countr_zero(mask)) * kBlockPixels;
+      loadStoredBlock(pyramid, level, stored++, block);
+    }
+  }
+}
+
+int disagreeingLevels(const PyramidShape& shape, const DecodeFn& decode) {
+  int kept = shape.footprintLevels();
+  while (kept > 1 && levelDisagreement(shape, kept - 2, decode) < kAgreement) --kept;
+  return kept;
+}
+
+void keepLevels(PyramidShape& shape, int kept) {
+  for (int l = kept; l < shape.level_count; ++l) shape.levels[l] = {};
+  shape.levels[kept] = {2 * shape.levels[kept - 1].stride, 1, 1};
+  shape.level_count = kept + 1;
+}
+
 double levelDisagreement(const NdfPyramid& pyramid, int level) {
-  const PyramidGrid& fine = pyramid.shape.levels[level];
-  const PyramidGrid& coarse = pyramid.shape.levels[level + 1];
-  const Vec2 gap = pyramid.shape.spacing(level), coarse_gap = pyramid.shape.spacing(level + 1);
+  return levelDisagreement(pyramid.shape, level, [&](int l, std::size_t image, std::vector<float>& pixels) {
+    decodeImage(pyramid, l, image, pixels);
+  });
+}
+
+double levelDisagreement(const PyramidShape& shape, int level, const DecodeFn& decode) {
+  const PyramidGrid& fine = shape.levels[level];
+  const PyramidGrid& coarse = shape.levels[level + 1];
+  const Vec2 gap = shape.spacing(level), coarse_gap = shape.spacing(level + 1);
   struct Sums {
     double difference = 0, norm = 0;
   };
@@ -56,13 +73,13 @@ double levelDisagreement(const NdfPyramid& pyramid, int level) {
   tbb::parallel_for(std::size_t{0}, sums.size(), [&](std::size_t image) {
     const int i = static_cast<int>(image) % coarse.columns, j = static_cast<int>(image) / coarse.columns;
     std::vector<float> parent, child;
-    decodeImage(pyramid, level + 1, image, parent);
+    decode(level + 1, image, parent);
     const double norm = squaredNorm(parent);
     for (int y = 0; y < fine.rows; ++y) {
       if (nearestAlong(y, gap.y, coarse_gap.y, coarse.rows) != j) continue;
       for (int x = 0; x < fine.columns; ++x) {
         if (nearestAlong(x, gap.x, coarse_gap.x, coarse.columns) != i) continue;
-        decodeImage(pyramid, level, static_cast<std::size_t>(y) * fine.columns + x, child);
+        decode(level, static_cast<std::size_t>(y) * fine.columns + x, child);
         sums[image].difference += squaredDistance(child, parent);
         sums[image].norm += norm;
       }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "glint/bake/common/slopes.h"
 #include "glint/bake/pyramid/agreement.h"
@@ -17,6 +18,7 @@
 #include "glint/bake/pyramid/image_packer.h"
 #include "glint/bake/pyramid/smooth_scatter.h"
 #include "glint/model/error.h"
+#include "glint/query/detail/common/footprint_weights.h"
 
 namespace glint::bake {
 namespace {
@@ -60,20 +62,31 @@ PackedImage flatImage(const NormalMap& map, const PyramidShape& shape, int level
   return packed;
 }
 
+/// The images of a level that a region has.
+struct RegionImages {
+  std::size_t first, count;
+};
+RegionImages imagesOf(const PyramidShape& shape, int level, PyramidRegion region) {
+  const ImageRows rows = regionRows(shape, level, region);
+  const auto columns = static_cast<std::size_t>(shape.levels[level].columns);
+  return {static_cast<std::size_t>(rows.first) * columns, static_cast<std::size_t>(rows.count()) * columns};
+}
+
 /// Makes the images of all levels of a flat surface.
 /// @return [levels][images]
-std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const PyramidShape& shape, const ImagePacker& packer,
-                                                const PixelFilter& filter, const ProgressFn& progress) {
+std::vector<std::vector<PackedImage>> buildFlat(const NormalMap& map, const PyramidShape& shape, PyramidRegion region,
+                                                const ImagePacker& packer, const PixelFilter& filter,
+                                                const ProgressFn& progress) {
   std::size_t total = 0;
-  for (int l = 0; l < shape.level_count; ++l) total += shape.levels[l].imageCount();
+  for (int l = 0; l < shape.level_count; ++l) total += imagesOf(shape, l, region).count;
   ProgressCounter counter(progress, total);
   tbb::enumerable_thread_specific<Scratch> scratch([&] { return Scratch(shape.resolution, filter); });
   std::vector<std::vector<PackedImage>> images(shape.level_count);
   for (int l = 0; l < shape.level_count; ++l) {
-    const PyramidGrid& grid = shape.levels[l];
-    images[l].resize(grid.imageCount());
-    tbb::parallel_for(std::size_t{0}, grid.imageCount(), [&](std::size_t k) {
-      images[l][k] = flatImage(map, shape, l, k, packer, filter, scratch.local());
+    const RegionImages part = imagesOf(shape, l, region);
+    images[l].resize(part.count);
+    tbb::parallel_for(std::size_t{0}, part.count, [&](std::size_t k) {
+      images[l][k] = flatImage(map, shape, l, part.first + k, packer, filter, scratch.local());
       counter.advance();
     });
   }
@@ -98,8 +111,8 @@ void unpackBins(const BlockBins& sparse, const DirectionTiles::Grid& grid, Direc
 
 /// Makes the images of all levels of a smooth surface, from a fine and a coarse grid of bins.
 /// @return [levels][images]
-std::vector<std::vector<PackedImage>> buildSmooth(const NormalMap& map, const PyramidShape& shape, const ImagePacker& packer,
-                                                  const ProgressFn& progress) {
+std::vector<std::vector<PackedImage>> buildSmooth(const NormalMap& map, const PyramidShape& shape, PyramidRegion region,
+                                                  const ImagePacker& packer, const ProgressFn& progress) {
   const float sigma_pixels = 0.5f * shape.sigma_r * static_cast<float>(shape.resolution);
   // The coarse grid has half the bins along each axis.
   const int subdivision = 2 * ((subdivisionFor(sigma_pixels) + 1) / 2);
@@ -114,15 +127,15 @@ std::vector<std::vector<PackedImage>> buildSmooth(const NormalMap& map, const Py
                    DirectionBins(shape.resolution, subdivision / 2, coarse_filter.margin())};
   });
   std::vector<std::vector<PackedImage>> images(shape.level_count);
-  for (int l = 0; l < shape.level_count; ++l) images[l].resize(shape.levels[l].imageCount());
+  for (int l = 0; l < shape.level_count; ++l) images[l].resize(imagesOf(shape, l, region).count);
   scatterSmooth(
-      map, shape, tiles,
+      map, shape, region, tiles,
       [&](int level, int i, int j, const BlockBins& sparse) {
         auto& [fine, coarse] = scratch.local();
         unpackBins(sparse, tiles.fine, fine);
         unpackBins(sparse, tiles.coarse, coarse);
         const Layer layers[] = {{&fine, &fine_filter}, {&coarse, &coarse_filter}};
-        images[level][static_cast<std::size_t>(j) * shape.levels[level].columns + i] =
+        images[level][static_cast<std::size_t>(j) * shape.levels[level].columns + i - imagesOf(shape, level, region).first] =
             packer.pack(layers, static_cast<float>(1 / sparse.sum()));
         fine.clear();
         coarse.clear();
@@ -133,13 +146,12 @@ std::vector<std::vector<PackedImage>> buildSmooth(const NormalMap& map, const Py
 
 /// Drops the coarsest level of footprints while the next finer level agrees with it. The mean of the map stays the last level.
 void dropAgreeingLevels(NdfPyramidData& pyramid) {
-  PyramidShape& shape = pyramid.shape;
-  int kept = shape.footprintLevels();
-  while (kept > 1 && levelDisagreement(pyramid.view(), kept - 2) < kAgreement) --kept;
+  const NdfPyramid view = pyramid.view();
+  const int kept = disagreeingLevels(pyramid.shape, [&](int level, std::size_t image, std::vector<float>& pixels) {
+    decodeImage(view, level, image, pixels);
+  });
   pyramid.levels.erase(pyramid.levels.begin() + kept, pyramid.levels.end() - 1);
-  for (int l = kept; l < shape.level_count; ++l) shape.levels[l] = {};
-  shape.level_count = kept;
-  appendMean(shape);
+  keepLevels(pyramid.shape, kept);
 }
 
 }  // namespace
@@ -198,7 +210,7 @@ void checkPyramidOptions(const PyramidOptions& o) {
   require(o.levels >= 0 && o.levels <= kMaxFootprintLevels, "--levels", "auto or 1 to " + std::to_string(kMaxFootprintLevels));
 }
 
-double pyramidBytes(const NormalMap& map, const PyramidOptions& options, double most_bytes) {
+double pyramidBytes(const NormalMap& map, const PyramidOptions& options, double most_bytes, PyramidRegion region) {
   // Triangles of smooth surfaces lie between the blocks of their corners.
   const double spread = options.surface == Surface::smooth ? 4 : 1;
   checkPyramidOptions(options);
@@ -210,25 +222,64 @@ double pyramidBytes(const NormalMap& map, const PyramidOptions& options, double 
   return imageBytes(
       shape, options.precision, most_bytes,
       [&](int level, std::size_t image) { return flatImage(map, shape, level, image, packer, filter, scratch).means.size(); },
-      spread);
+      spread, region);
 }
 
 NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options, const ProgressFn& progress) {
+  NdfPyramidShardData whole = buildPyramidShard(map, options, {}, progress);
+  if (whole.level_choice == LevelChoice::agreeing) dropAgreeingLevels(whole.images);
+  return std::move(whole.images);
+}
+
+NdfPyramidShardData buildPyramidShard(const NormalMap& map, const PyramidOptions& options, PyramidRegion region,
+                                      const ProgressFn& progress) {
   checkPyramidOptions(options);
   checkTexels(map);
-  NdfPyramidData pyramid;
+  NdfPyramidShardData shard = {{}, region, options.levels == 0 ? LevelChoice::agreeing : LevelChoice::given};
+  NdfPyramidData& pyramid = shard.images;
   pyramid.shape = pyramidShape(map.width, map.height, options);
   pyramid.shape.slopes = mapSlopes(map);
   pyramid.precision = options.precision;
   pyramid.value_scale = valueScaleFor(options.resolution);
   const ImagePacker packer(pyramid.shape, options.precision, pyramid.value_scale);
-  auto images = options.surface == Surface::flat ? buildFlat(map, pyramid.shape, packer, flatFilter(options), progress)
-                                                 : buildSmooth(map, pyramid.shape, packer, progress);
+  auto images = options.surface == Surface::flat ? buildFlat(map, pyramid.shape, region, packer, flatFilter(options), progress)
+                                                 : buildSmooth(map, pyramid.shape, region, packer, progress);
   pyramid.levels.resize(images.size());
   tbb::parallel_for(std::size_t{0}, images.size(),
                     [&](std::size_t l) { pyramid.levels[l] = packLevel(images[l], options.precision); });
-  if (options.levels == 0) dropAgreeingLevels(pyramid);
-  return pyramid;
+  return shard;
+}
+
+NdfPyramidShard NdfPyramidShardData::view() const {
+  NdfPyramidShard v;
+  v.region = region;
+  v.level_choice = level_choice;
+  for (int l = 0; l < images.shape.level_count; ++l) v.rows[l] = regionRows(images.shape, l, region).count();
+  v.images = images.view();
+  return v;
+}
+
+std::vector<std::uint8_t> rowsReached(const PyramidShape& shape, PyramidRegion region) {
+  const bool smooth = shape.surface == Surface::smooth;
+  // A smooth surface that is wider than high is turned as a whole.
+  const bool all = smooth && shape.width > shape.height;
+  std::vector<std::uint8_t> reached(static_cast<std::size_t>(shape.height), all ? 1 : 0);
+  for (int l = 0; l < shape.level_count && !all; ++l) {
+    const float stride = shape.levels[l].stride;
+    // Smooth: two cells of an eighth of a stride, and the neighbours of their outermost texels.
+    const float reach = kPyramidReach * kFootprintPerStride * stride + (smooth ? 2 * stride / 8 + 2 : 0);
+    const ImageRows rows = regionRows(shape, l, region);
+    for (int j = rows.first; j < rows.end; ++j) {
+      const float centre = shape.centre(l, 0, j).y;
+      int first = static_cast<int>(std::floor(centre - reach)), end = static_cast<int>(std::ceil(centre + reach)) + 1;
+      if (l >= shape.footprintLevels() || end - first >= shape.height) first = 0, end = shape.height;
+      for (int y = first; y < end; ++y) {
+        if (shape.boundary == Boundary::clamp && (y < 0 || y >= shape.height)) continue;
+        reached[static_cast<std::size_t>(wrapIndex(y, shape.height))] = 1;
+      }
+    }
+  }
+  return reached;
 }
 
 }  // namespace glint::bake

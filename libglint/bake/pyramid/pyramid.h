@@ -5,6 +5,7 @@
 
 #include "glint/bake/common/progress.h"
 #include "glint/model/ndf_pyramid.h"
+#include "glint/model/ndf_pyramid_shard.h"
 
 namespace glint::bake {
 
@@ -32,10 +33,6 @@ struct PyramidOptions {
 /// The smallest resolution, within the limits, at which sigma_r has 1.5 pixels: densities within a pixel then err by 4 % (PixelSpline).
 /// @param sigma_r  intrinsic roughness, disk units, > 0
 int resolutionFor(float sigma_r);
-
-/// With automatic levels, the coarsest level of footprints is dropped while its `levelDisagreement` with the next finer level
-/// is less than this.
-inline constexpr double kAgreement = 0.01;
 
 /// A block that has less than this share of the mass of its image is not stored.
 inline constexpr float kBlockMassThreshold = 1e-6f;
@@ -67,10 +64,10 @@ PyramidShape pyramidShape(int width, int height, const PyramidOptions& options);
 /// @throws Error (usage) for options out of range
 void checkPyramidOptions(const PyramidOptions& options);
 
-/// The memory that buildPyramid takes at its peak, bytes: images before and after they are packed. Where every block of every image
+/// The memory that buildPyramid or buildPyramidShard takes at its peak, bytes: images before and after they are packed. Where every block of every image
 /// would fit into `most_bytes`, it is the bytes of all blocks; otherwise blocks are counted on a few images of each level.
 /// @throws Error usage for options out of range
-double pyramidBytes(const NormalMap& map, const PyramidOptions& options, double most_bytes);
+double pyramidBytes(const NormalMap& map, const PyramidOptions& options, double most_bytes, PyramidRegion region = {});
 
 /// Builds the NDF images of every level (Deng 2022, section 4.1).
 ///
@@ -78,5 +75,23 @@ double pyramidBytes(const NormalMap& map, const PyramidOptions& options, double 
 /// image turns bins into pixel means of the blurred density. Gaussian footprints end at kPyramidReach deviations.
 /// @throws Error (usage) for options out of range
 NdfPyramidData buildPyramid(const NormalMap& map, const PyramidOptions& options, const ProgressFn& progress = {});
+
+/// An NdfPyramidShard that owns its arrays.
+struct NdfPyramidShardData {
+  NdfPyramidData images;  ///< of the shape of the whole pyramid; arrays hold the rows of the region
+  PyramidRegion region;
+  LevelChoice level_choice = LevelChoice::given;
+
+  NdfPyramidShard view() const;
+};
+
+/// Builds the images of one region. The images are the same as those of buildPyramid, bit by bit: joinShards (join.h) joins them.
+/// Reads the texels of rowsReached() only, and with a map that does not say its slopes, all others once.
+NdfPyramidShardData buildPyramidShard(const NormalMap& map, const PyramidOptions& options, PyramidRegion region,
+                                      const ProgressFn& progress = {});
+
+/// The rows of texels that the footprints of a region reach. Of smooth surfaces a few more.
+/// @return [height]: 1 where a row is reached
+std::vector<std::uint8_t> rowsReached(const PyramidShape& shape, PyramidRegion region);
 
 }  // namespace glint::bake

@@ -122,18 +122,21 @@ class AxisWeights {
   };
 
   /// Weights of Gaussian footprints.
+  /// @param wanted   images that get weights; the others have none
   /// @param spacing  distance between neighbouring centres, texels
-  AxisWeights(const Axis& axis, int images, float spacing, float sigma) : images_of_(axis.cells), cells_of_(images) {
-    for (int i = 0; i < images; ++i) {
+  AxisWeights(const Axis& axis, int images, ImageRows wanted, float spacing, float sigma)
+      : images_of_(axis.cells), cells_of_(images) {
+    for (int i = wanted.first; i < wanted.end; ++i) {
       const float centre = (static_cast<float>(i) + 0.5f) * spacing;
       for (const int c : axis.cellsWithin(centre, kPyramidReach * sigma)) add(i, c, axis.weight(c, centre, sigma));
     }
   }
 
   /// Equal weights of all cells, for a single image.
-  static AxisWeights even(const Axis& axis) {
+  /// @param wanted  whether the image gets weights
+  static AxisWeights even(const Axis& axis, bool wanted) {
     AxisWeights weights(axis);
-    for (int c = 0; c < axis.cells; ++c) weights.add(0, c, {1, 0});
+    for (int c = 0; c < axis.cells && wanted; ++c) weights.add(0, c, {1, 0});
     return weights;
   }
 
@@ -152,16 +155,23 @@ class AxisWeights {
   std::vector<std::vector<Entry>> images_of_, cells_of_;
 };
 
+/// The images of a level that are wanted, along either axis.
+struct Wanted {
+  ImageRows columns, rows;
+};
+
 /// The images of one level. An image is in memory from its first row of cells to its last.
 class Level {
  public:
-  Level(const PyramidShape& shape, int level, const Axis& x, const Axis& y, std::size_t tiles, const ImageSink& sink)
+  Level(const PyramidShape& shape, int level, const Wanted& wanted, const Axis& x, const Axis& y, std::size_t tiles,
+        const ImageSink& sink)
       : level_(level),
         columns_(shape.levels[level].columns),
+        wanted_columns_(wanted.columns),
         axis_x_(x),
         axis_y_(y),
-        x_(weightsOf(shape, level, x, columns_, shape.spacing(level).x)),
-        y_(weightsOf(shape, level, y, shape.levels[level].rows, shape.spacing(level).y)),
+        x_(weightsOf(shape, level, x, columns_, wanted.columns, shape.spacing(level).x)),
+        y_(weightsOf(shape, level, y, shape.levels[level].rows, wanted.rows, shape.spacing(level).y)),
         sink_(sink),
         image_rows_(shape.levels[level].rows),
         spare_images_(columns_, tiles, 1),
@@ -170,8 +180,14 @@ class Level {
   const Axis& axisX() const { return axis_x_; }
   const Axis& axisY() const { return axis_y_; }
 
+  /// Whether a wanted image has a weight in a column or row of cells.
+  bool usesColumn(int c) const { return !x_.imagesOf(c).empty(); }
+  bool usesRow(int r) const { return !y_.imagesOf(r).empty(); }
+
   RowSums takeSums() { return spare_sums_.take(); }
-  void giveSums(RowSums& sums) { spare_sums_.give(sums); }
+  void giveSums(RowSums& sums) {
+    if (!sums.empty()) spare_sums_.give(sums);
+  }
 
   /// Adds cell c of a row to the sums of every image that the cell has a weight in.
   void addCell(int c, const BlockBins& cell, RowSums& sums) const {
@@ -181,7 +197,7 @@ class Level {
   /// Sums a whole row of cells for every column of images.
   RowSums sumsOf(const CellRow& row) {
     RowSums sums = takeSums();
-    tbb::parallel_for(0, columns_, [&](int i) {
+    tbb::parallel_for(wanted_columns_.first, wanted_columns_.end, [&](int i) {
       for (const auto& [c, weight] : x_.cellsOf(i)) addAlongX(row[c], weight, sums[i]);
     });
     return sums;
@@ -193,7 +209,7 @@ class Level {
       std::vector<BlockBins>& images = image_rows_[j];
       if (images.empty()) images = spare_images_.take();
       const bool complete = y_.cellsOf(j).back().index == r;
-      tbb::parallel_for(0, columns_, [&, j = j, weight = weight](int i) {
+      tbb::parallel_for(wanted_columns_.first, wanted_columns_.end, [&, j = j, weight = weight](int i) {
         addAlongY(sums[i], weight, images[i]);
         if (complete) sink_(level_, i, j, images[i]);
       });
@@ -202,13 +218,16 @@ class Level {
   }
 
  private:
-  static AxisWeights weightsOf(const PyramidShape& shape, int level, const Axis& axis, int images, float spacing) {
+  static AxisWeights weightsOf(const PyramidShape& shape, int level, const Axis& axis, int images, ImageRows wanted,
+                               float spacing) {
     const float sigma = kFootprintPerStride * shape.levels[level].stride;
-    return level < shape.footprintLevels() ? AxisWeights(axis, images, spacing, sigma) : AxisWeights::even(axis);
+    return level < shape.footprintLevels() ? AxisWeights(axis, images, wanted, spacing, sigma)
+                                           : AxisWeights::even(axis, wanted.count() > 0);
   }
 
   int level_;
   int columns_;
+  ImageRows wanted_columns_;
   Axis axis_x_, axis_y_;
   AxisWeights x_, y_;
   const ImageSink& sink_;
@@ -270,16 +289,37 @@ void addParts(const CellRow& row, const Axis& x, CellPart y, CellRow& coarser) {
   });
 }
 
+/// Cells of the lattice of each level that images need, along one axis: of their own level, or as parts of cells of coarser levels.
+/// @param axisOf   axisOf(level)
+/// @param usesCell  usesCell(level, cell): whether images of the level have a weight there
+/// @return [levels][cells]
+template <class AxisOf, class UsesCell>
+std::vector<std::vector<bool>> neededCells(const std::deque<Level>& levels, const AxisOf& axisOf, const UsesCell& usesCell) {
+  std::vector<std::vector<bool>> needed(levels.size());
+  for (std::size_t l = levels.size(); l-- > 0;) {
+    const Axis& axis = axisOf(levels[l]);
+    for (int c = 0; c < axis.cells; ++c)
+      needed[l].push_back(usesCell(levels[l], c) ||
+                          (l + 1 < levels.size() && needed[l + 1][static_cast<std::size_t>(axis.parent(c))]));
+  }
+  return needed;
+}
+
 /// All levels but the finest. Rows of cells come in order, and every two rows make a row of the next level.
 class CoarseLevels {
  public:
-  CoarseLevels(std::deque<Level>& levels, std::size_t tiles) : levels_(levels), tiles_(tiles), halves_(levels.size()) {}
+  /// @param needed  [levels][rows]: rows of cells that images need
+  CoarseLevels(std::deque<Level>& levels, const std::vector<std::vector<bool>>& needed, std::size_t tiles)
+      : levels_(levels), needed_(needed), tiles_(tiles), halves_(levels.size()) {}
 
   void addRow(std::size_t level, int r, const CellRow& row) {
-    RowSums sums = levels_[level].sumsOf(row);
-    levels_[level].addRow(r, sums);
-    levels_[level].giveSums(sums);
+    if (levels_[level].usesRow(r)) {
+      RowSums sums = levels_[level].sumsOf(row);
+      levels_[level].addRow(r, sums);
+      levels_[level].giveSums(sums);
+    }
     if (level + 1 == levels_.size()) return;
+    if (!needed_[level + 1][static_cast<std::size_t>(levels_[level].axisY().parent(r))]) return;
     const Axis &x = levels_[level].axisX(), &y = levels_[level].axisY();
     CellRow& coarser = halves_[level];
     if (coarser.empty()) coarser.assign(x.coarser().cells, BlockBins(tiles_, kMoments));
@@ -291,6 +331,7 @@ class CoarseLevels {
 
  private:
   std::deque<Level>& levels_;
+  const std::vector<std::vector<bool>>& needed_;
   std::size_t tiles_;
   std::vector<CellRow> halves_;  // [levels]: row of the next level that is not complete yet
 };
@@ -319,8 +360,9 @@ PyramidShape transposed(PyramidShape shape) {
 }
 
 /// Computes all images, with whole rows of cells in memory: the caller makes rows the shorter side.
-void scatterByRows(const NormalMap& map, const PyramidShape& shape, const DirectionTiles& direction_tiles,
-                   const ImageSink& sink, const ProgressFn& progress) {
+/// @param wanted  [levels]
+void scatterByRows(const NormalMap& map, const PyramidShape& shape, const std::vector<Wanted>& wanted,
+                   const DirectionTiles& direction_tiles, const ImageSink& sink, const ProgressFn& progress) {
   const bool wrap = shape.boundary == Boundary::wrap;
   const Axis finest_x = finestAxis(map.width, shape.levels[0].stride, shape.level_count, wrap);
   const Axis finest_y = finestAxis(map.height, shape.levels[0].stride, shape.level_count, wrap);
@@ -331,8 +373,14 @@ void scatterByRows(const NormalMap& map, const PyramidShape& shape, const Direct
   std::deque<Level> levels;  // a deque, since a level cannot be moved
   Axis x = finest_x, y = finest_y;
   for (int l = 0; l < shape.level_count; ++l, x = x.coarser(), y = y.coarser())
-    levels.emplace_back(shape, l, x, y, tiles, sink);
-  CoarseLevels coarse(levels, tiles);
+    levels.emplace_back(shape, l, wanted[static_cast<std::size_t>(l)], x, y, tiles, sink);
+  const auto columns = neededCells(
+      levels, [](const Level& level) -> const Axis& { return level.axisX(); },
+      [](const Level& level, int c) { return level.usesColumn(c); });
+  const auto rows = neededCells(
+      levels, [](const Level& level) -> const Axis& { return level.axisY(); },
+      [](const Level& level, int r) { return level.usesRow(r); });
+  CoarseLevels coarse(levels, rows, tiles);
   const bool has_coarser = shape.level_count > 1;
   SpareRows spare_cells(finest_x.coarser().cells, tiles, kMoments);
 
@@ -340,14 +388,20 @@ void scatterByRows(const NormalMap& map, const PyramidShape& shape, const Direct
   tbb::enumerable_thread_specific<BlockBins> scratch([=] { return BlockBins(tiles, kMoments); });
   const auto makeBand = [&](int index) {
     Band band = {index, {}, {}};
-    if (has_coarser) band.coarser = spare_cells.take();
+    const auto coarser_row = static_cast<std::size_t>(finest_y.parent(2 * index));
+    const bool adds_parts = has_coarser && rows[1][coarser_row];
+    if (adds_parts) band.coarser = spare_cells.take();
     for (int upper = 0; upper < 2 && 2 * index + upper < finest_y.cells; ++upper) {
-      band.sums[upper] = levels[0].takeSums();
+      const int r = 2 * index + upper;
+      const bool adds_sums = levels[0].usesRow(r);
+      if (!adds_sums && !adds_parts) continue;
+      if (adds_sums) band.sums[upper] = levels[0].takeSums();
       for (int a = 0; a < finest_x.cells; ++a) {
+        if (!columns[0][static_cast<std::size_t>(a)]) continue;
         BlockBins& cell = scratch.local();
-        rasteriser.addCell(a, 2 * index + upper, cell);
-        levels[0].addCell(a, cell, band.sums[upper]);
-        if (has_coarser) addPart(cell, finest_x.partOf(a), finest_y.partOf(upper), band.coarser[finest_x.parent(a)]);
+        rasteriser.addCell(a, r, cell);
+        if (adds_sums) levels[0].addCell(a, cell, band.sums[upper]);
+        if (adds_parts) addPart(cell, finest_x.partOf(a), finest_y.partOf(upper), band.coarser[finest_x.parent(a)]);
         cell.clear();
       }
     }
@@ -359,7 +413,7 @@ void scatterByRows(const NormalMap& map, const PyramidShape& shape, const Direct
       levels[0].addRow(2 * band.index + upper, band.sums[upper]);
       levels[0].giveSums(band.sums[upper]);
     }
-    if (has_coarser) {
+    if (!band.coarser.empty()) {
       coarse.addRow(1, band.index, band.coarser);
       spare_cells.give(band.coarser);
     }
@@ -381,9 +435,15 @@ void scatterByRows(const NormalMap& map, const PyramidShape& shape, const Direct
 
 }  // namespace
 
-void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const DirectionTiles& direction_tiles,
+void scatterSmooth(const NormalMap& map, const PyramidShape& shape, PyramidRegion region, const DirectionTiles& direction_tiles,
                    const ImageSink& sink, const ProgressFn& progress) {
-  if (map.width <= map.height) return scatterByRows(map, shape, direction_tiles, sink, progress);
+  const bool turn = map.width > map.height;
+  std::vector<Wanted> wanted;
+  for (int l = 0; l < shape.level_count; ++l) {
+    const ImageRows columns = {0, shape.levels[l].columns}, rows = regionRows(shape, l, region);
+    wanted.push_back(turn ? Wanted{rows, columns} : Wanted{columns, rows});
+  }
+  if (!turn) return scatterByRows(map, shape, wanted, direction_tiles, sink, progress);
   // Memory grows with the length of a row, so rows must be the shorter side. The diagonal that cuts squares into triangles is
   // the same after rows and columns are exchanged.
   const std::vector<Vec2> normals = transposed(map);
@@ -392,7 +452,7 @@ void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const Direct
   turned.height = map.width;
   turned.normals = normals;
   const ImageSink turned_sink = [&](int level, int i, int j, const BlockBins& bins) { sink(level, j, i, bins); };
-  scatterByRows(turned, transposed(shape), direction_tiles, turned_sink, progress);
+  scatterByRows(turned, transposed(shape), wanted, direction_tiles, turned_sink, progress);
 }
 
 }  // namespace glint::bake

@@ -5,7 +5,7 @@
 #include "glint/bake/common/progress.h"
 #include "glint/bake/pyramid/block_bins.h"
 #include "glint/bake/pyramid/triangle_splat.h"
-#include "glint/model/ndf_pyramid.h"
+#include "glint/model/ndf_pyramid_shard.h"
 
 namespace glint::bake {
 
@@ -22,8 +22,9 @@ using ImageSink = std::function<void(int level, int i, int j, const BlockBins& b
 /// parts.
 ///
 /// Rows of cells are made one after the other. In memory are only images whose footprint has begun and not ended.
+/// Only the images of a region are made, and only cells that they need.
 /// Cost: O(area of the triangles on the disk) + O(tiles in use) for each cell.
-void scatterSmooth(const NormalMap& map, const PyramidShape& shape, const DirectionTiles& direction_tiles,
+void scatterSmooth(const NormalMap& map, const PyramidShape& shape, PyramidRegion region, const DirectionTiles& direction_tiles,
                    const ImageSink& sink, const ProgressFn& progress);
 
 }  // namespace glint::bake
