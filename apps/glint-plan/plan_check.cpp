@@ -28,9 +28,8 @@ class MapCheck {
     const double cap = std::max(question_.footprints.smallest, kWidest * std::min(normals.width, normals.height));
     sizes_ = question_.sizes(kQuestionSizes, cap);
     const std::uint64_t other_places = tool.seed() + 1;
-    for (std::size_t k = 0; k < sizes_.size(); ++k) {
-      truths_.emplace_back(normals, questionFootprints(other_places, k, sizes_[k]), question_.sigma_r, question_.light_deg);
-    }
+    for (std::size_t k = 0; k < sizes_.size(); ++k)
+      truths_.push_back(questionTruth(normals, question_, other_places, k, sizes_[k]));
     queries_ = benchQueries(normals, other_places, kCheckedQueries, sizes_);
   }
 
