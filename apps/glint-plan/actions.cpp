@@ -102,7 +102,7 @@ void checkScene(Tool& tool, const PlanOptions& options) {
   checkMaps(tool, plan.scene, maps);
   const AssetFolder folder(options.assets(), options.removesAssets());
   measureEnvironments(tool, folder, plan.scene, maps);
-  const std::vector<CheckedMaterial> checked = checkPlan(tool, folder, plan, maps, options.sweeps());
+  const std::vector<CheckedMaterial> checked = checkPlan(tool, folder, plan, maps, options.sweeps(), options.asksPaper());
   tool.setResult(checkJson(plan, checked));
   tool.print(checkText(plan, checked));
   const bool holds = std::all_of(checked.begin(), checked.end(), [](const CheckedMaterial& m) { return m.holds(); });

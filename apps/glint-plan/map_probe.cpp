@@ -19,7 +19,7 @@
 namespace glint::apps {
 namespace {
 
-constexpr int kVersion = 2;  // of the way in which probes measure: other versions' measurements are not used
+constexpr int kVersion = 3;  // of the way in which probes measure: other versions' measurements are not used
 constexpr int kQueries = 512;
 constexpr double kLongestErrors_s = 3, kLongestTime_s = 0.004;
 /// Places after which errors are looked at: candidates that are clearly good or clearly bad are asked no more.
@@ -143,8 +143,7 @@ PlaceErrors MapProbe::errorsOf(std::size_t candidate, std::size_t size, double t
       Part& asked = part(true);
       while (asked.truths.size() <= size) {
         const std::size_t next = asked.truths.size();
-        asked.truths.emplace_back(asked.asset->get<NormalMap>(), questionFootprints(tool_.seed(), next, sizes_[next]),
-                                  question_.sigma_r, question_.light_deg);
+        asked.truths.push_back(questionTruth(asked.asset->get<NormalMap>(), question_, tool_.seed(), next, sizes_[next]));
       }
       ndf.emplace(asked.maker->open(asked.maker->all()[candidate]));
       sample.emplace(*std::next(asked.truths.begin(), static_cast<std::ptrdiff_t>(size)), *ndf);

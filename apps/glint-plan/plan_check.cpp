@@ -28,9 +28,8 @@ class MapCheck {
     const double cap = std::max(question_.footprints.smallest, kWidest * std::min(normals.width, normals.height));
     sizes_ = question_.sizes(kQuestionSizes, cap);
     const std::uint64_t other_places = tool.seed() + 1;
-    for (std::size_t k = 0; k < sizes_.size(); ++k) {
-      truths_.emplace_back(normals, questionFootprints(other_places, k, sizes_[k]), question_.sigma_r, question_.light_deg);
-    }
+    for (std::size_t k = 0; k < sizes_.size(); ++k)
+      truths_.push_back(questionTruth(normals, question_, other_places, k, sizes_[k]));
     queries_ = benchQueries(normals, other_places, kCheckedQueries, sizes_);
   }
 
@@ -56,7 +55,12 @@ class MapCheck {
     return largest;
   }
 
-  const std::vector<Candidate>& all() const { return maker_.all(); }
+  /// What a candidate costs, and its errors.
+  CheckedOption measured(const Candidate& candidate) {
+    CheckedOption option = costOf(candidate);
+    option.errors = errorsOf(candidate);
+    return option;
+  }
 
  private:
   const PlanMap& map_;
@@ -76,7 +80,7 @@ nlohmann::json costsJson(const Costs& costs, const PlaceErrors& errors) {
 }
 
 std::string line(const std::string& what, const PlaceErrors& errors, const Costs& costs) {
-  return fmt::format("  {:<10} {:>8.3g} {:>8.3g} {:>14} {:>10.3g} {:>12}\n", what, errors.seen, errors.bias,
+  return fmt::format("  {:<11} {:>8.3g} {:>8.3g} {:>14} {:>10.3g} {:>12}\n", what, errors.seen, errors.bias,
                      sizeText(costs.bytes), costs.preparation_s, queryTimeText(costs.query_ns));
 }
 
@@ -91,10 +95,11 @@ double CheckedMaterial::overCheapest(Goal goal) const {
 
 namespace {
 
-void sweepCandidates(MapCheck& check, Goal goal, CheckedMaterial& material, std::vector<std::string>& warnings) {
+void sweepCandidates(MapCheck& check, const std::vector<Candidate>& all, Goal goal, CheckedMaterial& material,
+                     std::vector<std::string>& warnings) {
   const double planned = costOf(material.actual.costs, goal);
   std::string done;  // method and pyramid that need no finer setting
-  for (const Candidate& candidate : check.all()) {
+  for (const Candidate& candidate : all) {
     const std::string ladder = candidate.method + " of " + candidate.source;
     if (!candidate.source.empty() && ladder == done) continue;
     try {
@@ -112,7 +117,7 @@ void sweepCandidates(MapCheck& check, Goal goal, CheckedMaterial& material, std:
 }  // namespace
 
 std::vector<CheckedMaterial> checkPlan(Tool& tool, const AssetFolder& folder, const PlanFile& plan, const std::string& maps,
-                                       bool sweep) {
+                                       bool sweep, bool paper) {
   std::vector<CheckedMaterial> checked;
   std::vector<std::string> warnings;  // a warning ends the progress, so warnings come last
   const bake::ProgressFn progress = tool.progress("materials");
@@ -123,11 +128,15 @@ std::vector<CheckedMaterial> checkPlan(Tool& tool, const AssetFolder& folder, co
       throw Error(ErrorCode::differs, "plan.map", map.image, "", "is not the map that was planned", "make the plan again");
     }
     const MapQuestion question = questionOf(plan.scene, material, map.normals());
-    MapCheck check(tool, folder, map, question, planCandidates(question, map.normals().width, map.normals().height));
-    CheckedOption actual = check.costOf(planned.candidate);
-    actual.errors = check.errorsOf(planned.candidate);
-    checked.push_back({&planned, std::move(actual), material.tolerance, {}});
-    if (sweep) sweepCandidates(check, plan.scene.goal, checked.back(), warnings);
+    const std::vector<Candidate> all = planCandidates(question, map.normals().width, map.normals().height);
+    const std::vector<Candidate> of_paper = paperCandidates(question);
+    std::vector<Candidate> known = all;
+    known.insert(known.end(), of_paper.begin(), of_paper.end());
+    MapCheck check(tool, folder, map, question, std::move(known));
+    CheckedOption actual = check.measured(planned.candidate);
+    checked.push_back({&planned, std::move(actual), material.tolerance, {}, {}});
+    if (paper) checked.back().paper = check.measured(of_paper.back());
+    if (sweep) sweepCandidates(check, all, plan.scene.goal, checked.back(), warnings);
     if (progress) progress(checked.size(), plan.materials.size());
   }
   for (const std::string& warning : warnings) tool.warn(warning);
@@ -138,12 +147,13 @@ std::string checkText(const PlanFile& plan, const std::vector<CheckedMaterial>& 
   std::string text;
   for (const CheckedMaterial& material : checked) {
     text +=
-        fmt::format("{}: {}\n  {:<10} {:>8} {:>8} {:>14} {:>10} {:>12}\n", plan.scene.materials[material.planned->index].name,
+        fmt::format("{}: {}\n  {:<11} {:>8} {:>8} {:>14} {:>10} {:>12}\n", plan.scene.materials[material.planned->index].name,
                     material.actual.name, "", "seen", "bias", "size", "prepare, s", "query");
     text += line("predicted", material.planned->errors, material.planned->costs) +
             line("actual", material.actual.errors, material.actual.costs);
     text += fmt::format("  The tolerance of {:g}, of which {:.3g} may be bias, is {}.\n", material.tolerance,
                         kBiasShare * material.tolerance, material.holds() ? "met" : "NOT met");
+    if (material.paper) text += line("as in paper", material.paper->errors, material.paper->costs);
     if (!material.sweep.empty()) {
       text += fmt::format("  It takes {:.3g} times the {} of the cheapest candidate that meets the tolerance.\n",
                           material.overCheapest(plan.scene.goal), goalName(plan.scene.goal));
@@ -161,6 +171,10 @@ nlohmann::json checkJson(const PlanFile& plan, const std::vector<CheckedMaterial
                             {"holds", material.holds()},
                             {"predicted", costsJson(material.planned->costs, material.planned->errors)},
                             {"actual", costsJson(material.actual.costs, material.actual.errors)}};
+    if (material.paper) {
+      entry["paper"] = costsJson(material.paper->costs, material.paper->errors);
+      entry["paper"]["name"] = material.paper->name;
+    }
     if (!material.sweep.empty()) {
       entry["over_cheapest"] = material.overCheapest(plan.scene.goal);
       entry["sweep"] = nlohmann::json::array();

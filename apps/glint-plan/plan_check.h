@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,7 +22,8 @@ struct CheckedMaterial {
   const PlannedMaterial* planned = nullptr;
   CheckedOption actual;
   double tolerance = 0;
-  std::vector<CheckedOption> sweep;  ///< candidates that could be cheaper than the planned one; empty: not asked for
+  std::optional<CheckedOption> paper;  ///< the setting of Deng 2022; nothing: not asked for
+  std::vector<CheckedOption> sweep;    ///< candidates that could be cheaper than the planned one; empty: not asked for
 
   /// Whether the seen error is within the tolerance, and the bias within its share of it.
   bool holds() const { return holds(actual); }
@@ -36,9 +38,10 @@ struct CheckedMaterial {
 /// @param maps   folder of the maps
 /// @param sweep  builds every candidate, too, and measures those that cost no more than the plan. The settings of a compression end
 ///               at the first that holds: finer ones take more
+/// @param paper  builds and measures the setting of Deng 2022, too
 /// @throws Error as openMap; differs if a map is not the one that was planned; failed if an asset cannot be made
 std::vector<CheckedMaterial> checkPlan(Tool& tool, const AssetFolder& folder, const PlanFile& plan, const std::string& maps,
-                                       bool sweep);
+                                       bool sweep, bool paper);
 
 /// Predicted against actual, in words.
 std::string checkText(const PlanFile& plan, const std::vector<CheckedMaterial>& checked);

@@ -32,6 +32,8 @@ PlanOptions::PlanOptions(Tool& tool) : tool_(tool) {
   tool.flag(
       "--sweep", sweep_,
       "with --check: build every candidate, measure those that take no more, and say how far the plan is from the cheapest");
+  tool.flag("--paper", paper_,
+            "with --check: build and measure the setting of Deng 2022, too: stride 32, all levels, CP of rank 16");
   assets_option_ =
       &tool.option("--assets", assets_, "folder in which assets stay").defaultText("none: they are removed").unrecorded();
   tool.usesSeed();
@@ -48,6 +50,8 @@ void PlanOptions::checkFiles() {
   }
   if (sweep_ && check_.empty())
     refuse("--sweep", "only a check of a plan can sweep", "give --check PLAN.json, or leave out --sweep");
+  if (paper_ && check_.empty())
+    refuse("--paper", "only a check of a plan builds assets", "give --check PLAN.json, or leave out --paper");
   if (!check_.empty() && !(output_.empty() && rules_.empty() && jobs_.empty() && cache_.empty() && !explain_))
     refuse("--check", "a check makes no plan", "leave out -o, --make, --jobs, --cache and --explain");
   const std::string& input = scene_.empty() ? check_ : scene_;

@@ -19,6 +19,7 @@ class PlanOptions {
   const std::string& cache() const { return cache_; }
   bool explains() const { return explain_; }
   bool sweeps() const { return sweep_; }
+  bool asksPaper() const { return paper_; }
   /// The folder of maps: the one that was given, or else this one.
   std::string maps(const std::string& other) const { return maps_.empty() ? other : maps_; }
   /// The folder for assets, which is removed unless it was given.
@@ -30,7 +31,7 @@ class PlanOptions {
 
   Tool& tool_;
   std::string scene_, check_, output_, rules_, jobs_, cache_, maps_, assets_;
-  bool explain_ = false, sweep_ = false;
+  bool explain_ = false, sweep_ = false, paper_ = false;
   Option* assets_option_ = nullptr;
 };
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "glint/bake/common/counter_random.h"
+#include "measure/place_light.h"
 
 namespace glint::apps {
 
@@ -24,12 +25,15 @@ std::string MapQuestion::key() const {
                      sigma_r, light_deg);
 }
 
-std::vector<Footprint> questionFootprints(std::uint64_t seed, std::size_t number, float sigma_texels) {
+PlaceTruth questionTruth(const NormalMap& map, const MapQuestion& question, std::uint64_t seed, std::size_t number,
+                         float sigma_texels) {
   constexpr std::uint64_t kStream = 3000;
+  const std::size_t places =
+      lightPlaces(sigma_texels, question.sigma_r, question.light_deg, PlaceTruth::kResolution, kQuestionPlaces);
   std::vector<Footprint> footprints;
-  for (std::uint64_t k = 0; k < kQuestionPlaces; ++k)
+  for (std::uint64_t k = 0; k < places; ++k)
     footprints.push_back(Footprint::isotropic(bake::randomPair(seed, kStream + number, k), sigma_texels));
-  return footprints;
+  return {map, std::move(footprints), kQuestionPlaces, question.sigma_r, question.light_deg};
 }
 
 }  // namespace glint::apps

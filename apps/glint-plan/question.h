@@ -4,7 +4,8 @@
 #include <vector>
 
 #include "glint-plan/scene.h"
-#include "glint/model/footprint.h"
+#include "glint/model/normal_map.h"
+#include "measure/place_errors.h"
 
 namespace glint::apps {
 
@@ -27,8 +28,9 @@ inline constexpr int kQuestionSizes = 5;
 /// Places at which the error of a plan is measured.
 inline constexpr int kQuestionPlaces = 96;
 
-/// Round footprints of one size at random places of a map.
+/// The truth about round footprints of one size at random places of a map.
 /// @param number  of the size: each has other places
-std::vector<Footprint> questionFootprints(std::uint64_t seed, std::size_t number, float sigma_texels);
+PlaceTruth questionTruth(const NormalMap& map, const MapQuestion& question, std::uint64_t seed, std::size_t number,
+                         float sigma_texels);
 
 }  // namespace glint::apps

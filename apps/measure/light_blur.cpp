@@ -29,11 +29,16 @@ void blurLine(float* first, std::size_t step, int count, double width, std::vect
 
 double halfVectorsOfLight(double light_deg) { return light_deg * std::numbers::pi / 180 / 2; }
 
-void blurByLight(std::vector<float>& image, int resolution, double light_deg) {
+double lightWidth(double light_deg, int resolution) {
   // A disk of radius r has the variance r^2 / 4 along an axis, a square of side w has w^2 / 12.
   const double side = std::numbers::sqrt3 * halfVectorsOfLight(light_deg) / 2;
   const double width = side * resolution / 2;
-  if (width < 1) return;
+  return width < 1 ? 0 : width;
+}
+
+void blurByLight(std::vector<float>& image, int resolution, double light_deg) {
+  const double width = lightWidth(light_deg, resolution);
+  if (width == 0) return;
   std::vector<double> sums;
   const auto row = static_cast<std::size_t>(resolution);
   for (std::size_t j = 0; j < row; ++j) blurLine(image.data() + j * row, 1, resolution, width, sums);

@@ -9,6 +9,9 @@ namespace glint::apps {
 /// @param light_deg  angular diameter of the light, degrees
 double halfVectorsOfLight(double light_deg);
 
+/// Side of the square that stands for a light in blurByLight, pixels; 0: the light changes nothing.
+double lightWidth(double light_deg, int resolution);
+
 /// Blurs an NDF image as a round light does, which shows every half vector of a disk at once. A square of the same second moments
 /// stands for the disk. Lights whose square is less than a pixel wide change nothing: the image has pixel means.
 /// @param image      [resolution][resolution] densities over [-1, 1]^2; 0 beyond

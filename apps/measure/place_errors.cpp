@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <span>
 
 #include "common/ndf_image.h"
 #include "glint/bake/common/reference_image.h"
 #include "glint/bake/common/seen_error.h"
 #include "measure/light_blur.h"
+#include "measure/place_light.h"
 
 namespace glint::apps {
 namespace {
@@ -22,8 +24,6 @@ std::size_t cellOf(int x, int y) {
   return static_cast<std::size_t>(y / pixels) * static_cast<std::size_t>(kPixels / pixels) +
          static_cast<std::size_t>(x / pixels);
 }
-
-std::size_t cellCount() { return cellOf(kPixels - 1, kPixels - 1) + 1; }
 
 double pixelShare() {
   const double pixels = bake::seenCellPixels(kPixels);
@@ -41,24 +41,30 @@ void eachPixel(const Visit& visit) {
 
 }  // namespace
 
-PlaceTruth::PlaceTruth(const NormalMap& map, std::vector<Footprint> footprints, float sigma_r, double light_deg)
-    : footprints_(std::move(footprints)),
-      light_deg_(light_deg),
-      images_(footprints_.size()),
-      light2_(cellCount(), 0.0),
-      lit_(cellCount(), 0) {
+PlaceTruth::PlaceTruth(const NormalMap& map, std::vector<Footprint> footprints, std::size_t asked, float sigma_r,
+                       double light_deg)
+    : footprints_(std::move(footprints)), light_deg_(light_deg), images_(asked) {
+  const std::span<const Footprint> others = std::span<const Footprint>(footprints_).subspan(asked);
+  PlaceLight light = placeLight(map, others, sigma_r, light_deg, kPixels);
+  light2_ = std::move(light.squares), lit_ = std::move(light.lit);
   tbb::parallel_for(std::size_t{0}, images_.size(), [&](std::size_t k) {
     images_[k] = bake::referenceImage(map, sigma_r, Surface::flat, Boundary::wrap, footprints_[k], kPixels);
     blurByLight(images_[k], kPixels, light_deg_);
   });
-  const double share = pixelShare() / static_cast<double>(images_.size());
+  const double share = pixelShare();
   for (const std::vector<float>& image : images_) {
     eachPixel([&](std::size_t cell, std::size_t pixel) {
       light2_[cell] += share * double{image[pixel]} * image[pixel];
       if (image[pixel] > kDarkest) lit_[cell] = 1;
     });
   }
-  for (double& light2 : light2_) light2 = std::max(light2, kDarkest * kDarkest);
+  const auto places = static_cast<double>(footprints_.size());
+  const Covariance shape = footprints_.front().covariance;
+  const float sigma = std::sqrt(std::sqrt(shape.xx * shape.yy - shape.xy * shape.xy));
+  const std::vector<double> least = leastLight(map, sigma, sigma_r, light_deg, kPixels);
+  for (std::size_t cell = 0; cell < least.size(); ++cell)
+    light2_[cell] = std::max({light2_[cell] / places, least[cell], kDarkest * kDarkest});
+  footprints_.resize(asked);
 }
 
 PlaceErrors PlaceSample::ask(int places, double longest_s) {

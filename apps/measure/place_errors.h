@@ -16,14 +16,17 @@ struct PlaceErrors {
   int places = 0;
 };
 
-/// The exact NDF images of a map at some places.
+/// The exact NDF images of a map at some places, and its light at more of them.
 class PlaceTruth {
  public:
   /// Pixels of an image along each axis.
   static constexpr int kResolution = 128;
 
-  /// @param light_deg  angular diameter of the light under which errors are seen, degrees: images are blurred by it
-  PlaceTruth(const NormalMap& map, std::vector<Footprint> footprints, float sigma_r, double light_deg);
+  /// @param footprints  those at which models are asked, and after them more of the same size, of which only the light counts: few
+  ///                    places do not tell what the map reflects to half vectors that few places show
+  /// @param asked       footprints of the first kind
+  /// @param light_deg   angular diameter of the light under which errors are seen, degrees: images are blurred by it
+  PlaceTruth(const NormalMap& map, std::vector<Footprint> footprints, std::size_t asked, float sigma_r, double light_deg);
 
   int places() const { return static_cast<int>(footprints_.size()); }
 

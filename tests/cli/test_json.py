@@ -69,7 +69,7 @@ MAKE = [
     "bench --preset xing2024 -o paper.json --quick",
     "plan scene.json -o plan.json",
     "plan scene.json --explain",
-    "plan --check plan.json --sweep",
+    "plan --check plan.json --sweep --paper",
     "displace heights.glint -o displaced.glint --factors 4,16 --angular 3 --spatial 2",
     "displace heights.glint -o rough.glint --base ggx:.3:1,2 --factor 8 --angular 3 --spatial 2",
     "displace heights.glint -o colored.glint --base-color n.png --factor 8 --angular 3 --spatial 2",

@@ -270,7 +270,7 @@ def test_impossible_total_names_the_sum(plan):
 
 
 @pytest.mark.parametrize("arguments, text", [
-    ([], "there is nothing to plan"), (["scene.json", "--check", "scene.json"], "exclude"), (["scene.json", "--sweep"], "--sweep"),
+    ([], "there is nothing to plan"), (["scene.json", "--check", "scene.json"], "exclude"), (["scene.json", "--sweep"], "--sweep"), (["scene.json", "--paper"], "--paper"),
     (["--check", "scene.json"], "is not known here")])
 def test_wrong_use_is_refused(glint, arguments, text):
     (glint.folder / "scene.json").write_text(json.dumps(scene(material())))

@@ -35,7 +35,7 @@ class PlaceErrorsTest : public testing::Test {
     std::uniform_real_distribution<float> uv(0, 1);
     std::vector<Footprint> footprints;
     for (int k = 0; k < places; ++k) footprints.push_back(Footprint::isotropic({uv(random), uv(random)}, kFootprint));
-    const PlaceTruth truth(map.map(), footprints, kSigmaR, 0);
+    const PlaceTruth truth(map.map(), footprints, footprints.size(), kSigmaR, 0);
     constexpr double kUnlimited_s = 1e9;
     return PlaceSample(truth, ndf).ask(places, kUnlimited_s);
   }
@@ -58,8 +58,9 @@ TEST_F(PlaceErrorsTest, OfOtherTexelsOfTheSameDistributionAreNoBias) {
 
 TEST_F(PlaceErrorsTest, OfAnotherDistributionAreBias) {
   const PlaceErrors same = errorsOf(randomMap(kRadius, 2), randomMap(kRadius, 1));
+  constexpr double kMostOfIt = 0.4;  // the rest is that texels are others
   const PlaceErrors other = errorsOf(randomMap(kRadius / 2, 2), randomMap(kRadius, 1));
-  EXPECT_GT(other.bias, other.seen / 2);
+  EXPECT_GT(other.bias, kMostOfIt * other.seen);
   EXPECT_LE(other.bias, other.seen);
   EXPECT_GT(other.bias, 3 * same.bias);
 }
