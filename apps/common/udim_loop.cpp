@@ -8,6 +8,14 @@
 namespace glint::apps {
 namespace {
 
+/// The record of a tile of a set: it is clamped, whatever the default is, and says which tile it is.
+std::string tileCommand(const std::string& command, int tile) {
+  nlohmann::json parameters = nlohmann::json::parse(command);
+  if (parameters.contains("boundary")) parameters["boundary"] = "clamp";
+  parameters["udim"] = tile;
+  return parameters.dump();
+}
+
 nlohmann::json tileResult(Tool& tool, const MapFiles& files, const std::function<nlohmann::json(const MapFiles&)>& work) {
   try {
     if (tool.skipUnchanged() && isMadeBy(
@@ -48,6 +56,7 @@ void forEachMap(Tool& tool, const InputFile& input, const OutputFile& output,
     if (readBy)
       for (const std::string& other : readBy(tile)) read.push_back(other);
     files.provenance = tool.provenance(read);
+    files.provenance.command_json = tileCommand(files.provenance.command_json, tile);
     nlohmann::json result = tileResult(tool, files, work);
     result["tile"] = tile;
     result["path"] = files.output;

@@ -19,9 +19,12 @@ namespace {
 
 using formats::UdimPlace;
 
-/// Margins by themselves: a sixteenth of the tile, and 64 texels or more. Footprints of up to a third of it are answered by one tile.
-constexpr int kMarginParts = 16;
+/// Margins by themselves: a sixteenth of the tile, 64 texels or more, and at most a quarter of the tile. Footprints of up to a third
+/// of it are answered by one tile.
+constexpr int kMarginParts = 16, kMostMarginParts = 4;
 constexpr int kLeastMargin = 64;
+/// Memory of a tile beside its pixels: normals or heights, bounds. Sets are in memory as a whole, tile by tile.
+constexpr double kBytesPerTexel = 32;
 
 /// The texels of one image, of normals or of heights.
 struct TileTexels {
@@ -64,7 +67,7 @@ class TileReader {
     TileTexels texels;
     texels.image = options_.read(tool_, path);
     const Image& image = texels.image;
-    requireMemoryFor(tool_, "a tile of", image.width, image.height, BytesPerTexel::kIngest, "scale the images down");
+    requireMemoryFor(tool_, "a tile of", image.width, image.height, kBytesPerTexel, "scale the images down");
     const bake::IngestOptions values = options_.tileValues(tool_, path, image);
     texels.no_data = values.no_data;
     if (options_.readsHeights()) {
@@ -140,7 +143,7 @@ UdimIngest::UdimIngest(Tool& tool, const InputFile& input, const OutputFile& out
           "--udim-margin", margin_,
           "UDIM sets: texels of the neighbours that each tile gets; footprints of up to a third of it are answered by one tile")
       .range(8, 4096)
-      .defaultText("a sixteenth of the tile, and 64 or more");
+      .defaultText("a sixteenth of the tile, 64 or more, at most a quarter");
 }
 
 void UdimIngest::run() const {
@@ -155,15 +158,14 @@ void UdimIngest::run() const {
   };
   const auto make = [&](const MapFiles& files) -> nlohmann::json {
     const TileTexels& own = tiles.at(files.tile);
-    const int width = own.image.width, height = own.image.height;
-    const int automatic = std::max(kLeastMargin, std::max(width, height) / kMarginParts);
-    const int margin = std::min(margin_ > 0 ? margin_ : automatic, std::min(width, height));
+    const int width = own.image.width, height = own.image.height, least = std::min(width, height);
+    const int automatic = std::min(std::max(kLeastMargin, std::max(width, height) / kMarginParts), least / kMostMarginParts);
+    const int margin = std::min(margin_ > 0 ? margin_ : std::max(automatic, 1), least);
     const UdimPlace place = placeOf(tiles, files.tile, margin);
     const int all_width = width + place.margins[0] + place.margins[2],
               all_height = height + place.margins[1] + place.margins[3];
     // The tile, its neighbours, and the map that is made of them.
-    requireMemoryFor(tool_, "nine tiles of", all_width, all_height, BytesPerTexel::kIngest + 9 * sizeof(Vec2),
-                     "scale the images down");
+    requireMemoryFor(tool_, "nine tiles of", all_width, all_height, kBytesPerTexel + 9 * sizeof(Vec2), "scale the images down");
     std::vector<Vec2> normals;
     std::vector<float> heights;
     if (options_.readsHeights()) {

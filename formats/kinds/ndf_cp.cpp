@@ -500,7 +500,7 @@ struct KindDescription<NdfCp> {
         ndf.clusters.size(),
         [&](std::size_t k) {
           const NdfCluster& cluster = ndf.clusters[k];
-          return cluster.floor_unit == 0 || (cluster.columns > 0 && cluster.floor_unit <= kLargestHalf);
+          return cluster.slice_count == 0 || cluster.floor_unit <= (cluster.columns > 0 ? kLargestHalf : 0);
         },
         "compressed.floors", "/clusters", {"unit of floors is", "units of floors are"},
         "not finite and positive, or of a cluster of spots", findings);

@@ -270,8 +270,8 @@ GLINT_API glint_status glint_density_spectrum(const glint_ndf* ndf, const glint_
 
 /* Mean density over the box [x0, x1] x [y0, y1] of half vectors, as a light or a pixel of an NDF image asks for it.
  *
- * The average of glint_density, but for kind ndf-cp: there the density is what the compression leaves above zero, and the mean
- * counts what lies below, so that they differ by up to the error of the compression.
+ * The average of glint_density, but for kind ndf-cp: there the density is what the compression leaves above its floors, and the
+ * mean counts what lies below, so that they differ by up to the error of the compression.
  * Counts 0 outside the square [-1, 1]^2; 0 for a box that is empty or not finite. Footprints and status as for
  * glint_density. */
 GLINT_API glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, float x0, float y0, float x1,

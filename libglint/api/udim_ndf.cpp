@@ -13,7 +13,7 @@ namespace {
 
 /// A tile answers alone where less than this share of a footprint lies beyond its map.
 constexpr double kLeastRest = 1e-3;
-/// Tiles with less of the footprint than this, beside the part that the own tile's map covers, are left out.
+/// Tiles with less of the footprint than this, beside the part in the map of the own tile, are left out.
 constexpr double kLeastShare = 1e-6;
 /// Wider footprints weigh all tiles evenly, and differences of their integrals would lose digits.
 constexpr double kWidest = 1e4;
@@ -53,7 +53,7 @@ Interval restOf(std::int64_t own, std::int64_t steps, Interval covered) {
 
 double deviation(float variance_texels2, int texels) {
   const float least = kNarrowest_texels * kNarrowest_texels;
-  const double variance = std::isfinite(variance_texels2) ? std::max(variance_texels2, least) : least;
+  const double variance = variance_texels2 > least ? variance_texels2 : least;
   return std::min(std::sqrt(variance) / texels, kWidest);
 }
 
@@ -135,9 +135,8 @@ void UdimNdf::forEachPart(const Footprint& p, Visit&& visit) const {
   const Footprint here = placed(p, *tiles_, *own, at.u, at.v);
   if (inside >= 1 - kLeastRest || tiles_->tiles().size() == 1) return visit(own->model, here, 1.0f);
 
-  // Shares of the tiles: what the own map covers, and what is left to the others.
-  const auto eachRest = [&](auto&& take) {
-    double covered = 0;
+  // Shares of the tiles, and of their parts that the own map covers.
+  const auto eachTile = [&](auto&& take) {
     for (const UdimTile& tile : tiles_->tiles()) {
       const std::int64_t dx = tile.place.column() - at.column, dy = tile.place.row() - at.row;
       const Interval x = coveredOf(at.column, dx, left, right), y = coveredOf(at.row, dy, below, above);
@@ -145,20 +144,23 @@ void UdimNdf::forEachPart(const Footprint& p, Visit&& visit) const {
       const Interval whole_y = {static_cast<double>(tile.place.row()), static_cast<double>(tile.place.row() + 1)};
       const double whole = shareOf(whole_x, at.u, at.sigma_u) * shareOf(whole_y, at.v, at.sigma_v);
       const double part = whole > 0 ? shareOf(x, at.u, at.sigma_u) * shareOf(y, at.v, at.sigma_v) : 0;
-      covered += part;
-      if (&tile == own || whole - part <= kLeastShare * inside) continue;
+      if (&tile != own && whole <= kLeastShare * inside) continue;
       const Interval rest_x = restOf(at.column, dx, x), rest_y = restOf(at.row, dy, y);
-      take(tile, whole - part, std::clamp(at.u, rest_x.low, rest_x.high), std::clamp(at.v, rest_y.low, rest_y.high));
+      take(tile, whole, part, std::clamp(at.u, rest_x.low, rest_x.high), std::clamp(at.v, rest_y.low, rest_y.high));
     }
-    return covered;
   };
-  double rest = 0;
-  const double covered = eachRest([&](const UdimTile&, double share, double, double) { rest += share; });
-  if (rest < kLeastRest * covered) return visit(own->model, here, 1.0f);
-  const double scale = 1 / (covered + rest);
-  visit(own->model, here, static_cast<float>(covered * scale));
-  eachRest([&](const UdimTile& tile, double share, double u, double v) {
-    visit(tile.model, placed(p, *tiles_, tile, u, v), static_cast<float>(share * scale));
+  double all = 0, covered = 0, of_own = 0;
+  eachTile([&](const UdimTile& tile, double whole, double part, double, double) {
+    all += whole, covered += part;
+    if (&tile == own) of_own = whole;
+  });
+  if (all - covered < kLeastRest * covered) return visit(own->model, here, 1.0f);
+  // The own map stands for the covered parts of other tiles as far as it covers what lies outside its own. A footprint much larger
+  // than the margins so weighs all tiles by their own shares, from whichever tile it is asked.
+  const double credit = all > of_own ? (covered - of_own) / (all - of_own) : 1;
+  visit(own->model, here, static_cast<float>((of_own + credit * (covered - of_own)) / all));
+  eachTile([&](const UdimTile& tile, double whole, double part, double u, double v) {
+    if (&tile != own) visit(tile.model, placed(p, *tiles_, tile, u, v), static_cast<float>((whole - credit * part) / all));
   });
 }
 

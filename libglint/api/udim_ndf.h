@@ -45,9 +45,10 @@ class UdimTiles {
 
 /// The NDF of a UDIM set: uv counts tiles, tile = 1001 + floor(u) + 10 floor(v).
 ///
-/// The tile that holds the centre of a footprint answers for all that its map covers: the tile and its margins. Other tiles answer
-/// for the rest of the footprint, each from its place nearest to the centre, with the share of the footprint's weight in it as its
-/// weight. So the far field is the mean of the tiles. Weights where the set has no tile count for nothing, and the rest is
+/// The tile that holds the centre of a footprint answers for all that its map covers, the tile and its margins, where that is most of
+/// the footprint. Other tiles answer for the rest, each from its place nearest to the centre. Footprints much larger than the margins
+/// weigh every tile by the share of the footprint in it. So the far field is the mean of the tiles' maps, which hold their margins:
+/// tiles with margins count parts of others again. Weights where the set has no tile count for nothing, and the rest is
 /// normalised. Shares are those of the Gaussian of the same variances along u and v. Centres where the set has no tile: density and
 /// mean are 0, and nothing is drawn.
 ///

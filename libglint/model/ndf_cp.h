@@ -62,7 +62,7 @@ inline constexpr int kSpotSums = 2 * (kBlockSize + kSpotReach) * kSpotSteps + 1;
 //
 //   u32 before[ceil(n / 16)]  spots of the slices before slice 16 k
 //   u8 counts[n]              spots of each slice
-//   u8 rests[n]               mass of each slice that is in no spot, spread evenly over the block; codes of block_mass.h
+//   u8 rests[n]               even density of each slice besides its spots; codes of block_mass.h
 //   u8 zeros[]                up to a multiple of 4 bytes
 //   NdfSpot spots[]           spots of all slices in turn
 //
@@ -99,8 +99,8 @@ struct NdfCp {
   std::span<const std::uint16_t> image_regions;  ///< [images]
   std::span<const std::uint16_t> image_slots;    ///< [images]
   std::span<const float> image_scales;           ///< [images]: factor that makes the image integrate to 1
-  std::span<const float>
-      density_scales;  ///< [images]: the factor if pixels are less their floors, and negative ones count as 0; 0 if none is left
+  /// [images]: the factor if floors are taken off the pixels, and negative ones then count as 0; 0 if no pixel is left.
+  std::span<const float> density_scales;
   std::span<const std::uint16_t> block_places;  ///< [blocksPerImage]: place of a block, or kNoBlockPlace
   std::span<const std::uint16_t> place_blocks;  ///< [places]: block of a place, rising
   std::span<const NdfCluster> clusters;         ///< [regions][places]

@@ -25,8 +25,9 @@ namespace glint {
 /// form, with factors from prefix sums (Eq. 6 and 7). Slices of few facets are stored as spots and an even rest instead.
 ///
 /// Approximated pixels can be negative. `density` takes floors off the pixels (NdfCp::floors), takes negative pixels as 0, and
-/// scales the image so that it then integrates to 1; between the half vectors of a pixel see Pixels. `mean` is a difference of prefix sums, which include negative pixels: over
-/// whole pixels it is the exact average of `signedDensity`, clamped at the end, and that of `density` where no pixel is negative.
+/// scales the image so that it then integrates to 1; between the half vectors of a pixel see Pixels. `mean` is a difference of
+/// prefix sums, which include negative pixels and take no floors off: over whole pixels it is the exact average of
+/// `signedDensity`, clamped at the end, and that of `density` where no floor is above 0 and no pixel is negative.
 /// Thread-safe, allocates nothing; the arrays must outlive it.
 class CpNdf {
   static constexpr int kMostBlocks = 64 * 64;  // blocks of the largest image, 1024^2 pixels
@@ -68,7 +69,7 @@ class CpNdf {
   ///
   /// Stored masses are rounded up, by at most a sixteenth. Where `xi` falls into the excess, another block is drawn with the
   /// digits of `xi` that are left: one time in forty on average. O(16 columns). O(256 columns) where `xi` falls into the excess
-  /// or into mass that negative pixels of the same row hide.
+  /// or into mass that pixels of the same row hide which are negative or below their floors.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     return below_.sample(
         p, xi, [&](Vec2 x) { return imageSample(p, x); }, [&](Vec2 h) { return insideSquare(h) ? imageDensity(p, h) : 0.0f; });
@@ -117,7 +118,7 @@ class CpNdf {
   GLINT_HD float imageMean(const PyramidSlices& chosen, const PixelPlace& place) const {
     return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
       return finitePositive(
-          sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<Reader>{reader, place}, Positive{ndf_, place}));
+          sumSlices(chosen, place.block, ndf_.density_scales.data(), PixelOf<Reader>{reader, place}, AboveFloors{ndf_, place}));
     });
   }
   GLINT_HD HalfVectorSample imageSample(const Footprint& p, Vec2 xi) const;
@@ -139,7 +140,7 @@ class CpNdf {
     GLINT_HD Float4 operator()(Float4 values) const { return (values - Float4::all(floor)).positive(); }
   };
   /// AboveFloor, for one pixel of any cluster.
-  struct Positive {
+  struct AboveFloors {
     const NdfCp& ndf;
     PixelPlace place;
     GLINT_HD AboveFloor in(const NdfCluster& cluster) const { return {PixelFloors(ndf, cluster).at(place.x, place.y)}; }
@@ -190,7 +191,7 @@ class CpNdf {
   /// Weighted sum over the chosen images. Prefetches all slices first, so that their cache misses overlap.
   /// @param scales  factors of images, [images]
   /// @param ask     PixelOf or BoxOf
-  /// @param part    Signed or Positive
+  /// @param part    Signed or AboveFloors
   template <class Ask, class Part>
   GLINT_HD float sumSlices(const PyramidSlices& chosen, int block, const float* scales, const Ask& ask, Part part) const {
     const SlicePlaces places = findSlices(ndf_, chosen, block, scales);
@@ -420,7 +421,7 @@ class CpNdf {
   ///
   /// The stored mass of the block has three parts, and xi.y falls into one of them:
   ///  1. Lower bounds of the rows (leastSums). They are cheap, and choose the row.
-  ///  2. The rest of the rows' mass, which negative pixels hide (addedSums). Chooses the row after decoding all pixels.
+  ///  2. The rest of the rows' mass, which pixels below their floors hide (addedSums). Chooses the row after decoding all pixels.
   ///  3. The excess from rounding the stored mass up. No pixel is chosen.
   /// @param last_try  whether this is the last block that is tried (one in a million); then lower bounds alone choose the row
   /// @return false in case 3: the caller draws another block with the digits of xi that are left
@@ -450,7 +451,7 @@ inline GLINT_HD CpNdf::Draw CpNdf::chooseImage(const PyramidSlices& chosen, Vec2
   Draw draw;
   draw.xi = clampUnit(xi);
   float weights[PyramidSlices::kMost];
-  for (int k = 0; k < chosen.count; ++k) {  // images without a positive pixel have no density
+  for (int k = 0; k < chosen.count; ++k) {  // images without a pixel above its floor have no density
     weights[k] = ndf_.density_scales.data()[imageOf(chosen[k])] > 0 ? chosen.weights[k] : 0.0f;
     draw.total += weights[k];
   }

@@ -177,7 +177,7 @@ def compress(ndf_pyramid: Asset, *, method: str = "auto", rank: int | None = Non
         ndf_pyramid: asset of kind ndf-pyramid.
         method: "tucker", "pca" or "cp" (the paper's); "auto": tucker, and pca where tucker cannot meet a tolerance.
         rank: columns of every cluster, 1 to 256; 16 unless there is a tolerance.
-        tolerance: instead of `rank`: largest error in `metric`; columns and bits are chosen to meet it in the fewest bytes.
+        tolerance: instead of `rank`: largest error in `metric`; columns and bits are chosen to meet it in few bytes.
         metric: "seen": what a person sees towards each half vector, in every level; "l2": the error of all images together.
 
     Returns:

@@ -113,7 +113,9 @@ TEST(RankAllocator, KeepsTheBoundOfEveryCluster) {
     const auto spans = clusters.spans();
     std::vector<double> bounds;
     for (const auto& choices : spans) bounds.push_back(unit(random) * choices.front().error);
-    const RankAllocator free(spans), bound(spans, bounds);
+    const RankAllocator free(spans);
+    RankAllocator bound(spans);
+    bound.setBounds(bounds);
     for (const double share : {0.1, 0.5, 0.9, 2.0}) {
       const double target = share * free.largestError();
       const std::vector<int> chosen = bound.allocate(target), unbound = free.allocate(target);
@@ -134,6 +136,8 @@ TEST(RankAllocator, KeepsTheBoundOfEveryCluster) {
       });
       EXPECT_LT(clusters.bytes(chosen), fewest + 40);  // the longest step
     }
+    bound.setBounds({});
+    EXPECT_EQ(bound.allocate(0.5 * free.largestError()), free.allocate(0.5 * free.largestError()));
   }
   EXPECT_GT(bound_clusters, 100);
 }
@@ -226,6 +230,31 @@ TEST(ToleranceSearch, TakesNothingWhereNothingIsNeeded) {
     EXPECT_EQ(run(search, clusters, [](double e) { return e; }), 1);
     EXPECT_EQ(search.selection(), std::vector<int>(5, 0));
   }
+}
+
+TEST(ToleranceSearch, KeepsBoundsThatAreSetOnTheWay) {
+  std::mt19937 random(5);
+  int raised = 0;
+  for (int trial = 0; trial < 50; ++trial) {
+    const Clusters clusters(random);
+    const auto spans = clusters.spans();
+    const double budget = 0.7 * RankAllocator(spans).largestError();
+    ToleranceSearch search(spans, budget);
+    const auto exact = [](double error) { return error; };
+    run(search, clusters, exact);
+    const std::vector<int> before = search.selection();
+    std::vector<double> bounds;
+    for (const auto& choices : spans) bounds.push_back(0.5 * choices.front().error);
+    search.setBounds(bounds);
+    run(search, clusters, exact);
+    EXPECT_LE(clusters.error(search.selection()), std::max(budget, clusters.error(clusters.last())) * (1 + kRounding));
+    for (std::size_t c = 0; c < spans.size(); ++c) {
+      const auto at = static_cast<std::size_t>(search.selection()[c]);
+      EXPECT_TRUE(spans[c][at].error <= bounds[c] || at + 1 == spans[c].size());
+      raised += search.selection()[c] > before[c];
+    }
+  }
+  EXPECT_GT(raised, 10);
 }
 
 TEST(ToleranceSearch, KeepsTheBudgetWhereMeasuresAreNotMonotonic) {

@@ -321,7 +321,7 @@ ErrorSteps errorSteps(const NdfPyramid& pyramid, const NdfCp& compressed) {
   return {std::sqrt(sums[0] / counts[0]), std::sqrt(sums[1] / counts[1])};
 }
 
-TEST(Compress, KeepsTheMeanLightOfEveryHalfVector) {
+TEST(Compress, FloorsLowerTheBias) {
   // Cells of half vectors are two pixels wide here, and floors are for four: some bias is left.
   constexpr double kMost = 0.6;  // of the bias without floors
   PyramidShape shape = test::makeShape(256, 128, 16, 1);
@@ -340,9 +340,56 @@ TEST(Compress, KeepsTheMeanLightOfEveryHalfVector) {
   }
 }
 
+/// Largest seen error of an angular block of level 0, over its lit cells, by the slow decoder.
+double worstBlock(const NdfPyramid& pyramid, const NdfCp& compressed) {
+  SeenError error(pyramid.shape.resolution);
+  for (std::size_t i = 0; i < pyramid.shape.levels[0].imageCount(); ++i) {
+    const auto expected = test::storedImage(pyramid, 0, i);
+    const auto decoded = test::decodeDensities(compressed, compressed.first_image[0] + static_cast<std::uint32_t>(i));
+    const std::vector<float> truth(expected.begin(), expected.end()), shown(decoded.begin(), decoded.end());
+    error.add(shown.data(), truth.data());
+  }
+  const std::vector<double> errors = error.errors();
+  const int cells = static_cast<int>(std::lround(std::sqrt(static_cast<double>(errors.size())))),
+            side = cells / pyramid.shape.blocksPerAxis();
+  double worst = 0;
+  for (int block = 0; block < pyramid.shape.blocksPerImage(); ++block) {
+    double sum = 0, lit = 0;
+    for (int k = 0; k < side * side; ++k) {
+      const int x = block % pyramid.shape.blocksPerAxis() * side + k % side,
+                y = block / pyramid.shape.blocksPerAxis() * side + k / side;
+      const double e = errors[static_cast<std::size_t>(y * cells + x)];
+      sum += e * e, lit += e > 0;
+    }
+    worst = std::max(worst, lit > 0 ? std::sqrt(sum / lit) : 0.0);
+  }
+  return worst;
+}
+
+TEST(Compress, BoundsTheErrorOfEveryBlock) {
+  // Cells that only the decoded images light count here, and not in the bound.
+  constexpr double kMost = 2.2;  // times the tolerance
+  PyramidShape shape = test::makeShape(256, 128, 16, 1);
+  shape.sigma_r = 0.02f;  // 1.3 pixels
+  const TestPyramid flakes = test::makePyramid(test::flakes(256, 6, 2000, 2), shape),
+                    noise = test::makePyramid(test::isotropicNoise(256, 0.2f, 1), shape);
+  for (const TestPyramid* pyramid : {&flakes, &noise}) {
+    for (const auto method : {CompressionMethod::tucker, CompressionMethod::pca}) {
+      auto o = options(method, CoefficientType::i8, 16, 1);
+      o.metric = ErrorMetric::seen;
+      o.tolerance = 0.2;
+      const double worst = worstBlock(pyramid->view(), compressPyramid(pyramid->view(), o).view());
+      std::printf("method %d: worst block %.3f\n", static_cast<int>(method), worst);
+      EXPECT_LT(worst, kMost * o.tolerance);
+    }
+  }
+}
+
 TEST(Compress, ErrsAcrossBordersOfBlocksAsIndependentErrorsDo) {
   // Blocks are compressed apart, so errors on both sides of a border are independent, and steps there are sqrt(2) times the
   // error. Inside of blocks errors of neighbours resemble each other, and steps are smaller.
+  constexpr double kAboveMean = 1.2;   // error at borders over that of all pixels: bases fit a block worst at its edges
+  constexpr double kOverInside = 1.9;  // the largest that was measured is 1.83, of pca
   PyramidShape shape = test::makeShape(128, 64, 16, 1);
   shape.sigma_r = 0.03f;
   const TestPyramid pyramid = test::makePyramid(test::isotropicNoise(128, 0.2f, 1), shape);
@@ -355,8 +402,8 @@ TEST(Compress, ErrsAcrossBordersOfBlocksAsIndependentErrorsDo) {
     const ErrorSteps steps = errorSteps(pyramid.view(), data.view());
     std::printf("method %d: steps of the error %.3f at borders, %.3f inside of blocks\n", static_cast<int>(method),
                 steps.at_borders, steps.inside);
-    EXPECT_LT(steps.at_borders, 1.2 * std::sqrt(2.0) * o.tolerance);
-    EXPECT_LT(steps.at_borders, 1.9 * steps.inside);
+    EXPECT_LT(steps.at_borders, kAboveMean * std::sqrt(2.0) * o.tolerance);
+    EXPECT_LT(steps.at_borders, kOverInside * steps.inside);
   }
 }
 
@@ -396,7 +443,7 @@ TEST(Compress, StoresFlakesAsSpotsInHalfTheBytesOfColumns) {
   auto o = options(CompressionMethod::tucker, CoefficientType::i8, 16, 1);
   o.tolerance = 0.25;
   const auto data = compressPyramid(pyramid.view(), o, &spots);
-  EXPECT_GT(spots.spot_slices, spots.total.slices / 2);
+  EXPECT_GT(spots.spot_slices, spots.total.slices / 3);
   const Measured measured = measure(pyramid.view(), data.view());
   EXPECT_NEAR(measured.total, spots.total.rel_l2, 1e-3 * measured.total);
   EXPECT_LT(measured.worst_integral, 1e-3);

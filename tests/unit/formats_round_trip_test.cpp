@@ -253,6 +253,7 @@ TEST(AssetRoundTrip, CompressedPyramidsOfEveryMethodAndTypeComeBackBitExact) {
       expectSame(ndf.image_slots, sample.ndf.image_slots);
       expectSame(ndf.image_scales, sample.ndf.image_scales);
       expectSame(ndf.density_scales, sample.ndf.density_scales);
+      expectSame(ndf.floors, sample.ndf.floors);
       expectSame(ndf.block_places, sample.ndf.block_places);
       expectSame(ndf.place_blocks, sample.ndf.place_blocks);
       expectSame(ndf.core, sample.ndf.core);

@@ -35,6 +35,7 @@ enum class Base {
   normals,
   heights,
   pyramid,
+  shard,
   compressed,
   compressed_f32,
   spots,
@@ -52,10 +53,11 @@ enum class Base {
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,    Base::heights,    Base::pyramid,      Base::compressed,      Base::compressed_f32,
-                           Base::spots,      Base::bin_map,    Base::histograms,   Base::moments,         Base::tiny_scattered,
-                           Base::tiny_tiled, Base::wang_tiles, Base::wang_pyramid, Base::wang_cp,         Base::wave,
-                           Base::sh_lobes,   Base::sh_light,   Base::displacement, Base::displacement_rgb};
+constexpr Base kBases[] = {Base::normals,    Base::heights,        Base::pyramid,        Base::shard,
+                           Base::compressed, Base::compressed_f32, Base::spots,          Base::bin_map,
+                           Base::histograms, Base::moments,        Base::tiny_scattered, Base::tiny_tiled,
+                           Base::wang_tiles, Base::wang_pyramid,   Base::wang_cp,        Base::wave,
+                           Base::sh_lobes,   Base::sh_light,       Base::displacement,   Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -66,6 +68,8 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleHeights(16, 16).map, provenance);
     case Base::pyramid:
       return writeAsset(path, test::samplePyramid(32, BlockPrecision::f32).pyramid, provenance);
+    case Base::shard:
+      return writeAsset(path, test::samplePyramidShard(32).shard, provenance);
     case Base::compressed:
       return writeAsset(path, test::sampleNdfCp(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
     case Base::displacement:
@@ -703,6 +707,18 @@ std::vector<Fixture> dataFixtures() {
           "compressed.scales", Base::compressed,
           [](const Patch& patch) { patch.change<float>("scales", 3, [](float& scale) { scale = kNan; }); }, true),
       patched(
+          "compressed.floors", Base::compressed,
+          [](const Patch& patch) {
+            patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.floor_unit = 0x7c00; });
+          },
+          true),
+      patched(
+          "compressed.floors", Base::compressed,
+          [](const Patch& patch) {
+            patch.change<NdfCluster>("clusters", 5, [](auto& cluster) { cluster.floor_unit = 0x8001; });
+          },
+          true),
+      patched(
           "compressed.factors", Base::compressed_f32,
           [](const Patch& patch) { patch.change<float>("coefficients", 3, [](float& c) { c = INFINITY; }); }, true),
       patched(
@@ -796,6 +812,13 @@ std::vector<Fixture> momentsFixtures() {
       changed("moments.covariance", "level_01/moments", 2, -0.1f),
       changed("moments.covariance", "level_00/moments", 8, 0.4f),
       changed("moments.top", "level_02/moments", 0, 0.1f),
+  };
+}
+
+std::vector<Fixture> shardFixtures() {
+  return {
+      patched("shard.region", Base::shard, [](const Patch& patch) { patch.setInteger("region_index", 3); }),
+      patched("shard.rows", Base::shard, [](const Patch& patch) { patch.setInteger("region_count", 4); }),
   };
 }
 
@@ -932,7 +955,7 @@ std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
   for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), storageFixtures(), datasetFixtures(),
                     pyramidFixtures(), ndfCpFixtures(), dataFixtures(), histogramFixtures(), momentsFixtures(), tinyFixtures(),
-                    wangFixtures(), waveFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
+                    shardFixtures(), wangFixtures(), waveFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
@@ -1115,7 +1138,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 22u);
+  EXPECT_EQ(count, 23u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {

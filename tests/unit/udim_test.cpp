@@ -307,6 +307,19 @@ TEST(Udim, TheFarFieldIsTheMeanOfTheTiles) {
   }
 }
 
+TEST(Udim, TheFarFieldIsTheSameFromEveryTile) {
+  const Tiles tiles({1001, 1002, 1011, 1012}, kNarrowMargin);
+  const auto opened = api::OpenedNdf::open(tiles.writePyramids());
+  constexpr double kSame = 1e-3;
+  const Footprint p = Footprint::isotropic({}, 1e5f);
+  for (const Vec2 h : {Vec2{0, 0}, Vec2{0.1f, -0.1f}, Vec2{-0.2f, 0.05f}}) {
+    const float here = api::densityAt(opened.model(), 0.2, 0.3, p, h);
+    ASSERT_GT(here, 0);
+    for (const auto& [u, v] : {std::pair{1.5, 0.5}, {0.1, 1.9}, {1.99, 1.01}})
+      EXPECT_NEAR(api::densityAt(opened.model(), u, v, p, h), here, kSame * here) << u << " " << v;
+  }
+}
+
 TEST(Udim, WeightsOfAMissingTileCountForNothing) {
   const Tiles tiles({1001, 1002, 1011});  // 1012 is missing: the set has a re-entrant corner at uv (1, 1)
   api::NdfOptions options;

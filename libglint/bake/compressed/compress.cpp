@@ -27,12 +27,14 @@ namespace {
 constexpr double kLeastEnergy = 0.5;
 // Images of less mass hardly count in any answer, and are not reported when they are not scaled.
 constexpr double kLeastMass = 0.01;
-// Least share of the error of columns that floors and positive parts are taken to leave: larger shares were measured, and a
-// smaller one would be chance.
-constexpr double kLeastCorrection = 0.05;
+// Limits of the measured error of columns over the predicted one. Floors and positive parts leave less of it; weights that differ
+// from pixel to pixel, more.
+constexpr double kLeastCorrection = 0.05, kMostCorrection = 16;
 // Largest error of an angular block over the tolerance. Without it, blocks in which errors are cheap have small errors, and pay
-// for large ones in the block of sparse flakes that most lights show. Twice the tolerance takes a fifth more bytes there.
+// for large ones in the block of sparse flakes that most lights show.
 constexpr double kWorstBlock = 2;
+// Searches for sizes with which all blocks keep their bounds.
+constexpr int kMostRounds = 4;
 
 void checkOptions(const CompressionOptions& options) {
   const auto require = [](bool valid, const char* rule, const std::string& what) {
@@ -142,6 +144,7 @@ class Compressor {
         bases_(index_.clusterCount()),
         encoded_(index_.clusterCount()),
         selection_(index_.clusterCount(), -1),
+        bounds_(index_.clusterCount(), std::numeric_limits<double>::infinity()),
         image_scales_(index_.imageCount(), 1.0f),
         density_scales_(index_.imageCount(), 1.0f) {
     progress_.grow(2 * index_.clusterCount());
@@ -160,7 +163,8 @@ class Compressor {
     decompose();
     if (options_.tolerance > 0) return meetTolerance();
     // The first pass finds the scales of images, and the second measures errors with them.
-    for (int pass = 0; pass < 2; ++pass) encode(std::vector<int>(index_.clusterCount(), 0));
+    const std::vector<char> all(groups_.size(), 1);
+    for (int pass = 0; pass < 2; ++pass) encode(std::vector<int>(index_.clusterCount(), 0), all);
     return true;
   }
 
@@ -242,35 +246,33 @@ class Compressor {
     });
     models_.reserve(models.size());
     for (auto& model : models) models_.push_back(std::move(*model));
-    if (options_.metric == ErrorMetric::seen && options_.tolerance > 0 && options_.method != CompressionMethod::cp)
-      correctModels();
+    if (hasBounds()) correctModels();
   }
 
   /// Measures one choice of columns of each cluster as a reader sees it, and corrects the errors of all its choices by it. The
   /// choice is one that the bound of its block would ask for.
   void correctModels() {
     progress_.grow(index_.clusterCount());
-    std::vector<double> bounds;
-    for (std::size_t g = 0; g < groups_.size(); ++g)
-      for (const double bound : blockBounds(g)) bounds.push_back(bound);
+    for (std::size_t g = 0; g < groups_.size(); ++g) boundBlocks(g);
     forEachCluster([&](std::size_t c) {
-      if (!models_[c].hasColumns() || !(bounds[c] > 0)) return;
+      if (!models_[c].hasColumns() || !std::isfinite(bounds_[c])) return;
       double predicted = 0;
-      const ClusterBasis basis = models_[c].columnsNear(bounds[c], predicted);
+      const ClusterBasis basis = models_[c].columnsNear(bounds_[c], predicted);
       const EncodedCluster encoded =
           encodeCluster(index_, weights_, c, statistics_[c], basis, *options_.method, type_, 0, density_scales_);
       double measured = 0;
       for (const SliceError& slice : encoded.errors.slices) measured += slice.seen.error;
       measured *= static_cast<double>(statistics_[c].peak) * statistics_[c].peak;
-      models_[c].correctColumns(std::clamp(measured / predicted, kLeastCorrection, 1.0));
+      models_[c].correctColumns(std::clamp(measured / predicted, kLeastCorrection, kMostCorrection));
     });
   }
 
-  /// Encodes every cluster, and scales the images.
-  void encode(const std::vector<int>& selection) {
+  /// Encodes the clusters of some groups, and scales the images. Groups have images of their own, so that others stay as they are.
+  void encode(const std::vector<int>& selection, const std::vector<char>& groups) {
     progress_.grow(index_.clusterCount());
-    forEachCluster([&](std::size_t c) { encodeOne(c, selection[c]); });
-    selection_ = selection;
+    forEachCluster([&](std::size_t c) {
+      if (groups[c / clustersPerGroup()]) encodeOne(c, selection[c]);
+    });
     scaleImages();
     measureLevels();
   }
@@ -282,6 +284,7 @@ class Compressor {
     encoded_[c] = encodeCluster(index_, weights_, c, statistics_[c], *kept, *options_.method, type_, gainPerByte(c, choice),
                                 density_scales_);
     if (!keeps_bases) kept.reset();
+    selection_[c] = choice;
   }
 
   /// Weighted squared error that a byte of a cluster must remove to be worth storing: what the last byte of its group removes,
@@ -345,28 +348,37 @@ class Compressor {
     }
   }
 
-  /// Measures the bias and the worst error of the cells of a level; with ErrorMetric::l2 the seen error, too.
-  void measureCells(int level) {
+  /// Calls visit(truth, mean of the decoded density, mean of its squared error) for the lit cells of a block of a level.
+  template <class Visit>
+  void forEachLitCell(int level, std::size_t block, Visit visit) const {
     const auto blocks = static_cast<std::size_t>(index_.blockCount());
     const int cells = weights_.cellCount();
     const double pixels = static_cast<double>(index_.levelImages(level)) * weights_.cellPixels() * weights_.cellPixels();
+    for (int k = 0; k < cells; ++k) {
+      const CellDensity& truth = weights_.cells(level, block)[k];
+      if (!truth.lit) continue;
+      double sum = 0, error = 0;
+      for (std::size_t c = block; c < index_.clusterCount(); c += blocks) {
+        sum += encoded_[c].errors.cell_sums[static_cast<std::size_t>(level) * cells + k];
+        error += encoded_[c].errors.cell_errors[static_cast<std::size_t>(level) * cells + k];
+      }
+      visit(truth, sum / pixels, error / pixels);
+    }
+  }
+
+  /// Measures the bias and the worst error of the cells of a level; with ErrorMetric::l2 the seen error, too.
+  void measureCells(int level) {
+    const auto blocks = static_cast<std::size_t>(index_.blockCount());
     SeenSummary& seen = level_errors_[level].seen;
     double squares = 0, lit = 0;
     for (std::size_t block = 0; block < blocks; ++block) {
-      for (int k = 0; k < cells; ++k) {
-        const CellDensity& truth = weights_.cells(level, block)[k];
-        if (!truth.lit) continue;
-        double sum = 0, error = 0;
-        for (std::size_t c = block; c < index_.clusterCount(); c += blocks) {
-          sum += encoded_[c].errors.cell_sums[static_cast<std::size_t>(level) * cells + k];
-          error += encoded_[c].errors.cell_errors[static_cast<std::size_t>(level) * cells + k];
-        }
-        const double e2 = error / pixels / truth.seenSquare();
+      forEachLitCell(level, block, [&](const CellDensity& truth, double mean, double error2) {
+        const double e2 = error2 / truth.seenSquare();
         ++lit;
         squares += e2;
         seen.worst = std::max(seen.worst, std::sqrt(e2));
-        seen.bias = std::max(seen.bias, std::abs(sum / pixels - truth.mean) / truth.seenMean());
-      }
+        seen.bias = std::max(seen.bias, std::abs(mean - truth.mean) / truth.seenMean());
+      });
     }
     seen.seen = lit > 0 ? std::sqrt(squares / lit) : 0;
   }
@@ -381,11 +393,9 @@ class Compressor {
     return options_.metric == ErrorMetric::seen ? (endLevel(group) - firstLevel(group)) * most * most : sum;
   }
 
-  /// Weighted squared error that each cluster of a group may have, so that a light towards its half vectors shows no more than
-  /// kWorstBlock times the tolerance. Regions of a block share its bound by their energy.
-  std::vector<double> blockBounds(std::size_t group) const {
-    std::vector<double> bounds;
-    if (options_.metric != ErrorMetric::seen || options_.method == CompressionMethod::cp) return bounds;
+  /// Sets the weighted squared errors that the clusters of a group may have, so that a light towards the half vectors of a block
+  /// shows no more than kWorstBlock times the tolerance. Regions of a block share its bound by their energy.
+  void boundBlocks(std::size_t group) {
     const auto blocks = static_cast<std::size_t>(index_.blockCount());
     const std::size_t first = group * clustersPerGroup(), end = first + clustersPerGroup();
     std::vector<double> energies(blocks, 0.0);
@@ -394,12 +404,46 @@ class Compressor {
       double lit = 0;
       for (int level = firstLevel(group); level < endLevel(group); ++level) lit += weights_.litShare(level, c % blocks);
       const double energy = energies[c % blocks], share = energy > 0 ? statistics_[c].energy / energy : 1;
-      bounds.push_back(kWorstBlock * kWorstBlock * options_.tolerance * options_.tolerance * lit * share);
+      if (lit * share > 0) bounds_[c] = worstBlock2() * lit * share;
     }
-    return bounds;
   }
 
-  /// Searches the smallest choices of all clusters with which every group meets the tolerance, and encodes them.
+  /// Largest squared error of an angular block.
+  double worstBlock2() const { return kWorstBlock * kWorstBlock * options_.tolerance * options_.tolerance; }
+
+  /// Squared error of a block of a level, over its lit cells.
+  double blockError2(int level, std::size_t block) const {
+    double sum = 0, lit = 0;
+    forEachLitCell(level, block, [&](const CellDensity& truth, double /*sum*/, double error2) {
+      sum += error2 / truth.seenSquare();
+      ++lit;
+    });
+    return lit > 0 ? sum / lit : 0;
+  }
+
+  /// Lowers the bounds of clusters whose blocks err by more than they may, by how much they do.
+  /// @return whether a bound of the group was lowered that a larger choice can meet
+  bool tightenBounds(std::size_t group) {
+    constexpr double kSlack = 1.02, kSafety = 0.9;
+    if (!hasBounds()) return false;
+    const auto blocks = static_cast<std::size_t>(index_.blockCount());
+    bool tightened = false;
+    for (std::size_t k = 0; k < clustersPerGroup(); ++k) {
+      const std::size_t c = group * clustersPerGroup() + k;
+      const auto choice = static_cast<std::size_t>(selection_[c]);
+      if (choice + 1 >= models_[c].choices().size()) continue;
+      double excess = 0;
+      for (int level = firstLevel(group); level < endLevel(group); ++level)
+        excess = std::max(excess, blockError2(level, k % blocks) / worstBlock2());
+      if (excess <= kSlack) continue;
+      bounds_[c] = kSafety * std::min(bounds_[c], models_[c].choices()[choice].error) / excess;
+      tightened = true;
+    }
+    return tightened;
+  }
+
+  /// Searches the smallest choices of all clusters with which every group meets the tolerance and blocks keep their bounds, and
+  /// encodes them. Where measured errors of blocks are above their bounds, the bounds are lowered, and the search goes on.
   /// @return whether every group meets the tolerance
   bool meetTolerance() {
     std::vector<ToleranceSearch> searches;
@@ -407,25 +451,45 @@ class Compressor {
       std::vector<std::span<const SizeChoice>> clusters;
       for (const ClusterModel& model : std::span(models_).subspan(g * clustersPerGroup(), clustersPerGroup()))
         clusters.emplace_back(model.choices());
-      searches.emplace_back(std::move(clusters), budget(g), blockBounds(g));
+      searches.emplace_back(std::move(clusters), budget(g));
+      if (hasBounds()) searches[g].setBounds(boundsOf(g));
     }
-    const auto encodeChosen = [&] {
+    std::vector<char> searched(groups_.size(), 1);
+    for (int round = 1; std::any_of(searched.begin(), searched.end(), [](char s) { return s; }); ++round) {
+      search(searches, searched);
+      for (std::size_t g = 0; g < groups_.size(); ++g) {
+        searched[g] = searched[g] && round < kMostRounds && tightenBounds(g);
+        if (searched[g]) searches[g].setBounds(boundsOf(g));
+      }
+    }
+    bool met = true;
+    for (std::size_t g = 0; g < groups_.size(); ++g) met &= measuredError(g) <= budget(g);
+    return met;
+  }
+
+  /// Runs the searches of some groups to their ends, and encodes what they found.
+  void search(std::vector<ToleranceSearch>& searches, const std::vector<char>& groups) {
+    const auto encodeChosen = [&](const std::vector<char>& which) {
       std::vector<int> selection;
       for (std::size_t g = 0; g < groups_.size(); ++g) {
         selection.insert(selection.end(), searches[g].selection().begin(), searches[g].selection().end());
         if (options_.method != CompressionMethod::cp) groups_[g].gain_per_byte = searches[g].gainPerByte();
       }
-      encode(selection);
+      encode(selection, which);
     };
-    for (bool searching = true; searching;) {
-      encodeChosen();
-      searching = false;
-      for (std::size_t g = 0; g < groups_.size(); ++g) searching |= searches[g].next(measuredError(g));
+    for (std::vector<char> active = groups; std::any_of(active.begin(), active.end(), [](char a) { return a; });) {
+      encodeChosen(active);
+      for (std::size_t g = 0; g < groups_.size(); ++g) active[g] = active[g] && searches[g].next(measuredError(g));
     }
-    encodeChosen();
-    bool met = true;
-    for (std::size_t g = 0; g < groups_.size(); ++g) met &= measuredError(g) <= budget(g);
-    return met;
+    encodeChosen(groups);
+  }
+
+  /// Whether the errors of blocks are bounded. Other ranks of cp are other decompositions, which cost most of the time.
+  bool hasBounds() const {
+    return options_.metric == ErrorMetric::seen && options_.tolerance > 0 && options_.method != CompressionMethod::cp;
+  }
+  std::span<const double> boundsOf(std::size_t group) const {
+    return std::span(bounds_).subspan(group * clustersPerGroup(), clustersPerGroup());
   }
 
   /// Error of a group that the tolerance bounds.
@@ -606,6 +670,7 @@ class Compressor {
   std::vector<EncodedCluster> encoded_;
   std::vector<LevelErrors> level_errors_;
   std::vector<int> selection_;
+  std::vector<double> bounds_;  // [clusters]: weighted squared error that each may have
   std::vector<float> image_scales_;
   std::vector<float> density_scales_;
   std::uint64_t unscaled_images_ = 0;

@@ -28,11 +28,12 @@ struct CompressionOptions {
   int rank = 16;
 
   /// If > 0: chooses the columns of every cluster, and with i8 the bits of their coefficients (8 or 4; cp: 8), so that the error
-  /// of the metric is at most this in as few bytes as possible. Below 1.
+  /// of the metric is at most this in few bytes. Below 1.
   ///
-  /// With ErrorMetric::seen, the seen error of every level is at most this. The sizes of clusters are chosen so that the error of
-  /// no angular block is above twice this, as far as it is known before coefficients are rounded. Floors (NdfCp::floors) keep the
-  /// bias of columns small; it is reported, and not bounded.
+  /// With ErrorMetric::seen, the seen error of every level is at most this. With tucker and pca, sizes are chosen so that no
+  /// angular block errs by more than twice this, over its lit cells; blocks that cannot meet it, or do not after a few searches,
+  /// err by more. Floors (NdfCp::floors) take off the light that errors of columns add to the dark. The bias is reported, and not
+  /// bounded.
   /// With ErrorMetric::l2 the error of all images together is at most this; with tucker, the errors of level 0, of level 1, and
   /// of all coarser levels together each are. One bound for all levels would leave the error to levels in which a byte removes
   /// least of it, such as the coarse levels of flakes.

@@ -18,9 +18,6 @@ namespace {
 // densities that differ by a factor of 10,000, and the smallest need some digits, too.
 constexpr float kBasisPeak = 0x1p20f;
 
-// Least part of the squares of what spots leave that an even density must explain to be stored: it then stands for many facets.
-constexpr float kLeastEvenShare = 0.2f;
-
 // Ridge of the least squares for coefficients, relative to the mean square norm of a basis image. Without it, nearly parallel
 // columns of cp would get large coefficients of opposite signs, whose quantisation costs more accuracy than the ridge does.
 constexpr double kCpRidge = 1e-3;
@@ -263,14 +260,12 @@ void forEachDecoded(const SliceIndex& index, std::size_t cluster, const float* f
   }
 }
 
-/// Density of the rest of a slice, >= 0: the even density that is nearest to what its spots leave, or 0 where few facets are
-/// left, which an even density would show as a haze in the dark.
+/// Density of the rest of a slice.
 float restOf(const float* slice, const SliceSpots& spots, const SpotFinder& finder) {
   float match = finder.evenMatch(slice), left = 0;
   for (int p = 0; p < kBlockPixels; ++p) left += slice[p] * slice[p];
   for (const Spot& spot : spots) match -= spot.weight * finder.evenShare(spot), left -= spot.gain;
-  const bool hazes = match * match < kLeastEvenShare * left * finder.evenPower();
-  return hazes ? 0 : std::max(0.0f, match / finder.evenPower());
+  return finder.restDensity(match, left);
 }
 
 /// Quantises a cluster of spots, writes it as ndf_cp.h says, and compares its decoded slices with the originals.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 
-#include "glint/bake/compressed/quantize.h"
 #include "glint/math/half.h"
 #include "glint/query/detail/pyramid/block_mass.h"
 

@@ -283,19 +283,20 @@ void ClusterModel::addSpots(double negligible) {
                                     [&](const SizeChoice& c) { return c.error <= share * energy_ * peak_ * peak_; });
   if (as_good != choices_.end() && static_cast<double>(as_good->bytes) < kProbeMargin * spot_bytes) return;
   // Search all slices.
-  std::vector<float> sums(slice_count_, 0.0f);
+  std::vector<SliceRest> rests;
   for (int s = 0; s < slice_count_; ++s) {
     index_->load(cluster_, s, 1, statistics_->factors.data(), slice.data());
-    sums[s] = finder.evenMatch(slice.data());
+    rests.push_back({finder.evenMatch(slice.data()), static_cast<float>(energyOf())});
     spots_.push_back(finder.find(slice.data(), kMostSpots, least / slice_weights_[s]));
   }
-  addSpotChoices(finder, std::move(sums));
+  addSpotChoices(finder, std::move(rests));
 }
 
 /// Adds choices with the spots of all slices that gain most, from few spots to all.
-/// @param rests  SpotFinder::evenMatch of each slice
-void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<float> rests) {
+/// @param rests  each slice without spots
+void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<SliceRest> rests) {
   struct Candidate {
+    float weighted_gain;
     float gain;
     float share;
     int slice;
@@ -303,14 +304,14 @@ void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<float> r
   std::vector<Candidate> candidates;
   for (int s = 0; s < slice_count_; ++s)
     for (const Spot& spot : spots_[s])
-      candidates.push_back({spot.gain * slice_weights_[s], spot.weight * finder.evenShare(spot), s});
+      candidates.push_back({spot.gain * slice_weights_[s], spot.gain, spot.weight * finder.evenShare(spot), s});
   std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
-  for (const Candidate& c : candidates) spot_gains_.push_back(c.gain);
-  // An even rest lowers the squared error of its slice by the square of the match over the power of an even density.
+                   [](const Candidate& a, const Candidate& b) { return a.weighted_gain > b.weighted_gain; });
+  for (const Candidate& c : candidates) spot_gains_.push_back(c.weighted_gain);
+  // The nearest even density lowers the squared error of its slice by its match.
   const auto evened = [&](int slice) {
-    const float match = rests[slice];
-    return match > 0 ? slice_weights_[slice] * (static_cast<double>(match) * match / finder.evenPower()) : 0.0;
+    const SliceRest& rest = rests[slice];
+    return slice_weights_[slice] * static_cast<double>(rest.match) * finder.restDensity(rest.match, rest.energy);
   };
   double error = energy_;
   for (int s = 0; s < slice_count_; ++s) error -= evened(s);
@@ -319,12 +320,13 @@ void ClusterModel::addSpotChoices(const SpotFinder& finder, std::vector<float> r
   const double slice_bytes = (kSpotSliceBytes + kSliceBytes) * slice_count_ + 2 * sizeof(float);
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     const int slice = candidates[k].slice;
-    error += evened(slice) - candidates[k].gain;
-    rests[slice] -= candidates[k].share;
+    error += evened(slice) - candidates[k].weighted_gain;
+    rests[slice].match -= candidates[k].share;
+    rests[slice].energy -= candidates[k].gain;
     error -= evened(slice);
     // A choice is known by its smallest gain, so spots of equal gain are in it together.
     const bool last = k + 1 == candidates.size();
-    if ((k % stride == stride - 1 || last) && (last || candidates[k + 1].gain < candidates[k].gain))
+    if ((k % stride == stride - 1 || last) && (last || candidates[k + 1].weighted_gain < candidates[k].weighted_gain))
       choices_.push_back({true, static_cast<int>(k) + 1, std::max(0.0, error) * peak_ * peak_,
                           static_cast<std::uint64_t>(slice_bytes) + sizeof(NdfSpot) * (k + 1)});
   }

@@ -76,6 +76,11 @@ class ClusterModel {
   ClusterBasis basis(int choice) const;
 
  private:
+  /// What spots leave of a slice: its dot product with an even density of 1, and the sum of its squares.
+  struct SliceRest {
+    float match, energy;
+  };
+
   /// One step of a growing cluster: a new column, or more bits for the coefficients of a column.
   struct Step {
     int column;
@@ -87,7 +92,7 @@ class ClusterModel {
   void addColumnSteps(int column, const float* coefficients, double basis_bytes);
   void addStepChoices(double error);
   void addSpots(double negligible);
-  void addSpotChoices(const SpotFinder& finder, std::vector<float> rests);
+  void addSpotChoices(const SpotFinder& finder, std::vector<SliceRest> rests);
   std::vector<float> project(const std::vector<float>& images, int count) const;
   void keepHull();
   const SizeChoice* nearestColumns(double error) const;

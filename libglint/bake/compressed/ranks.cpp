@@ -12,25 +12,31 @@ constexpr int kMostCorrections = 16;
 
 }  // namespace
 
-RankAllocator::RankAllocator(std::vector<std::span<const SizeChoice>> clusters, std::span<const double> bounds)
-    : clusters_(std::move(clusters)) {
-  double error = 0;
+RankAllocator::RankAllocator(std::vector<std::span<const SizeChoice>> clusters) : clusters_(std::move(clusters)) {
   for (std::size_t c = 0; c < clusters_.size(); ++c) {
     const auto& choices = clusters_[c];
-    error += choices[0].error;
     for (std::size_t i = 1; i < choices.size(); ++i) {
       const double gain = choices[i - 1].error - choices[i].error;
       const auto bytes = static_cast<double>(choices[i].bytes - choices[i - 1].bytes);
-      const bool bound = !bounds.empty() && choices[i - 1].error > bounds[c];
-      bound_steps_ += bound;
-      steps_.push_back({bound, gain / bytes, static_cast<std::uint32_t>(c), static_cast<std::uint32_t>(i)});
+      steps_.push_back({gain / bytes, static_cast<std::uint32_t>(c), static_cast<std::uint32_t>(i), false});
     }
+  }
+  setBounds({});
+}
+
+void RankAllocator::setBounds(std::span<const double> bounds) {
+  bound_steps_ = 0;
+  for (Step& step : steps_) {
+    step.bound = !bounds.empty() && clusters_[step.cluster][step.choice - 1].error > bounds[step.cluster];
+    bound_steps_ += step.bound;
   }
   // Gains per byte and errors fall along a hull, so a stable sort keeps the steps of a cluster in order.
   std::stable_sort(steps_.begin(), steps_.end(), [](const Step& a, const Step& b) {
     return a.bound != b.bound ? a.bound : a.gain_per_byte > b.gain_per_byte;
   });
-  errors_.push_back(error);
+  double error = 0;
+  for (const auto& choices : clusters_) error += choices[0].error;
+  errors_ = {error};
   for (const Step& step : steps_) {
     const auto& choices = clusters_[step.cluster];
     error -= choices[step.choice - 1].error - choices[step.choice].error;
@@ -57,9 +63,16 @@ double RankAllocator::error(std::span<const int> selection) const {
   return sum;
 }
 
-ToleranceSearch::ToleranceSearch(std::vector<std::span<const SizeChoice>> clusters, double budget,
-                                 std::span<const double> bounds)
-    : allocator_(std::move(clusters), bounds), budget_(budget), target_(budget), selection_(allocator_.allocate(budget)) {}
+ToleranceSearch::ToleranceSearch(std::vector<std::span<const SizeChoice>> clusters, double budget)
+    : allocator_(std::move(clusters)), budget_(budget), target_(budget), selection_(allocator_.allocate(budget)) {}
+
+void ToleranceSearch::setBounds(std::span<const double> bounds) {
+  allocator_.setBounds(bounds);
+  met_ = failed_ = 0;
+  corrections_ = 0;
+  done_ = false;
+  selection_ = allocator_.allocate(target_);
+}
 
 bool ToleranceSearch::next(double measured) {
   if (done_) return false;

@@ -15,9 +15,11 @@ namespace glint::bake {
 class RankAllocator {
  public:
   /// @param clusters  choices of each cluster, on a convex hull from few bytes to many; must outlive the allocator
-  /// @param bounds    [clusters]: largest squared error of each cluster; empty: no bounds. A cluster that cannot meet its bound
-  ///                  takes its last choice
-  explicit RankAllocator(std::vector<std::span<const SizeChoice>> clusters, std::span<const double> bounds = {});
+  explicit RankAllocator(std::vector<std::span<const SizeChoice>> clusters);
+
+  /// Bounds the errors of clusters. A cluster that cannot meet its bound takes its last choice.
+  /// @param bounds  [clusters]: largest squared error of each cluster; empty: no bounds
+  void setBounds(std::span<const double> bounds);
 
   /// Selects the fewest bytes with at most this error, and within the bounds.
   /// @return choice of each cluster; the last choice of every cluster if even these have a larger error
@@ -38,10 +40,10 @@ class RankAllocator {
 
  private:
   struct Step {
-    bool bound;  // whether a bound asks for it
     double gain_per_byte;
     std::uint32_t cluster;
     std::uint32_t choice;
+    bool bound;  // whether a bound asks for it
   };
 
   std::vector<std::span<const SizeChoice>> clusters_;
@@ -56,9 +58,11 @@ class RankAllocator {
 /// the interval between a target that met the budget and a target that failed.
 class ToleranceSearch {
  public:
-  /// @param budget  largest squared error that is allowed; the search uses it up as far as single steps allow
-  /// @param bounds  as for RankAllocator
-  ToleranceSearch(std::vector<std::span<const SizeChoice>> clusters, double budget, std::span<const double> bounds = {});
+  /// @param budget  largest squared error that is allowed; the search uses it up as far as single steps and bounds allow
+  ToleranceSearch(std::vector<std::span<const SizeChoice>> clusters, double budget);
+
+  /// Bounds the errors of clusters, as RankAllocator does, and searches anew from where the search is.
+  void setBounds(std::span<const double> bounds);
 
   /// Choices to encode and measure next; once the search is done, the choices to keep.
   const std::vector<int>& selection() const { return selection_; }

@@ -53,6 +53,12 @@ SpotFinder::SpotFinder(float sigma_pixels, const BlockScale& scale)
       even_power_(powerOf(scale.x) * powerOf(scale.y)),
       reach_(static_cast<int>(std::ceil(3 * sigma_pixels)) + 1) {}
 
+float SpotFinder::restDensity(float match, float left) const {
+  // Least part of the squares that an even density must explain: it then stands for many facets.
+  constexpr float kLeastPart = 0.2f;
+  return match > 0 && match * match >= kLeastPart * left * even_power_ ? match / even_power_ : 0;
+}
+
 float SpotFinder::evenMatch(const float* slice) const {
   float sum = 0;
   for (int j = 0; j < kBlockSize; ++j) {

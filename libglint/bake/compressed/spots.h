@@ -49,6 +49,11 @@ class SpotFinder {
   float evenMatch(const float* slice) const;
   /// Dot product of a spot of weight 1 with an even density of 1.
   float evenShare(const Spot& spot) const { return x_.even[spot.x] * y_.even[spot.y]; }
+  /// Even density, >= 0, that stands for what spots leave of a slice: the nearest one, or 0 where it would explain little of it, as
+  /// where few facets are left. An even density would show these as a haze in the dark.
+  /// @param match  evenMatch() of what is left
+  /// @param left   sum of its squares
+  float restDensity(float match, float left) const;
   /// Writes an even density to the scaled pixels of a block.
   void setEven(float density, float* pixels) const;
 

@@ -103,7 +103,7 @@ class ClusterReader {
     Rows::scale(scalesOf(cluster), ColumnLayout(cluster), c, scaled);
   }
 
-  /// Writes the weights that rowSums, rowPixels and block ask for: scaledCoefficients, or the matrix of TuckerBasis.
+  /// Writes the weights that leastSums, rowPixels and block ask for: scaledCoefficients, or the matrix of TuckerBasis.
   /// @param weights  [kBlockPixels]
   GLINT_DEVICE_CALL GLINT_HD void sliceWeights(const NdfCluster& cluster, Row c, float* weights) const {
     sliceWeightsBy(*this, cluster, c, weights);
