@@ -135,14 +135,20 @@ std::string hashOf(const PackedArray& array) {
 /// Writes everything but the bytes of the datasets, and finds the places of these bytes in the file.
 ///
 /// HDF5 only reserves the space: the bytes are then written with plain calls, at the speed of the disk and with its errors.
+/// Where the bytes of a dataset go, and the hash that the metadata has of them.
+struct WrittenDataset {
+  std::uint64_t offset = 0;
+  std::string hash;
+};
+
 class MetadataWriter {
  public:
   MetadataWriter(const fs::path& path, const PackedAsset& packed) : path_(path), packed_(packed) {
     for (const PackedArray& array : packed.arrays) hashes_[array.path] = hashOf(array);
   }
 
-  /// @return offset of each dataset by path
-  std::map<std::string, std::uint64_t> write(const Provenance& provenance, const std::optional<UdimPlace>& udim) {
+  /// @return place and hash of each dataset by path
+  std::map<std::string, WrittenDataset> write(const Provenance& provenance, const std::optional<UdimPlace>& udim) {
     const hdf5::LibraryScope scope;
     const hdf5::TypeTable types;
     {
@@ -157,7 +163,7 @@ class MetadataWriter {
     hdf5::Handle file(H5Fopen(path_.c_str(), H5F_ACC_RDWR, access(kPageBytes)), "cannot be written", {}, ErrorCode::io);
     createDatasets(file, true, types);
     hdf5::check(file.close(), "cannot be written", {}, ErrorCode::io);
-    return std::move(offsets_);
+    return std::move(datasets_);
   }
 
  private:
@@ -222,19 +228,19 @@ class MetadataWriter {
     if (array.size_bytes == 0) return;
     const haddr_t offset = H5Dget_offset(dataset);
     if (offset == HADDR_UNDEF) hdf5::fail("has no place in the file", object, kIo);
-    offsets_[array.path] = offset;
+    datasets_[array.path] = {offset, hashes_.at(array.path)};
   }
 
   fs::path path_;
   const PackedAsset& packed_;
   std::map<std::string, std::string> hashes_;
-  std::map<std::string, std::uint64_t> offsets_;
+  std::map<std::string, WrittenDataset> datasets_;
 };
 
 /// Writes the metadata.
-/// @return offset of each dataset by path
-std::map<std::string, std::uint64_t> writeMetadata(AtomicFile& file, const PackedAsset& packed, const Provenance& provenance,
-                                                   const std::optional<UdimPlace>& udim) {
+/// @return place and hash of each dataset by path
+std::map<std::string, WrittenDataset> writeMetadata(AtomicFile& file, const PackedAsset& packed, const Provenance& provenance,
+                                                    const std::optional<UdimPlace>& udim) {
   try {
     return MetadataWriter(file.path(), packed).write(provenance, udim);
   } catch (const Error& error) {
@@ -263,13 +269,19 @@ void writePacked(const fs::path& path, const PackedAsset& packed, const Provenan
     throw Error(ErrorCode::io, "file.writable", path.string(), {}, "exists", "pass --force to replace it");
   }
   AtomicFile file(path);
-  const auto offsets = writeMetadata(file, packed, provenance, options.udim);
+  const auto datasets = writeMetadata(file, packed, provenance, options.udim);
   for (const PackedArray& array : packed.arrays) {
     if (array.size_bytes == 0) continue;
-    const std::uint64_t start = offsets.at(array.path);
-    visitBytes(array, [&](std::span<const std::byte> bytes, std::uint64_t offset) {
-      file.write(bytes.data(), bytes.size(), start + offset);
+    const auto& [start, hash] = datasets.at(array.path);
+    // A source is read twice, and may have changed: arrays in memory have not.
+    ByteHasher hasher;
+    visitBytes(array, [&, first = start](std::span<const std::byte> bytes, std::uint64_t offset) {
+      if (array.source) hasher.add(bytes.data(), bytes.size());
+      file.write(bytes.data(), bytes.size(), first + offset);
     });
+    if (array.source && hasher.hash() != hash)
+      throw Error(ErrorCode::failed, "dataset.hash", {}, "/" + array.path, "is read from a file that has changed meanwhile",
+                  "run the program again");
   }
   checkWritten(file.path());
   file.publish(options.overwrite);

@@ -113,10 +113,10 @@ bake::IngestOptions IngestOptions::tileValues(Tool& tool, const std::string& nam
   return p;
 }
 
-Image IngestOptions::read(Tool& tool, const std::string& path) const {
+Image IngestOptions::read(Tool& tool, const std::string& path, bool of_any_size) const {
   ImageChoice choice = image_.choice();
   choice.transparent_holes = values_.fix_invalid;
-  choice.of_any_size = true;
+  choice.of_any_size = of_any_size;
   return readInputImage(tool, path, choice);
 }
 

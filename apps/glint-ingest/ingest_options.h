@@ -18,7 +18,8 @@ class IngestOptions {
   bake::IngestOptions values(Tool& tool, const std::string& name, const Image& image) const;
 
   /// Reads the image that the options choose.
-  Image read(Tool& tool, const std::string& path) const;
+  /// @param of_any_size  whether pixels may take more than the memory that is there (IngestMemory)
+  Image read(Tool& tool, const std::string& path, bool of_any_size) const;
 
   /// Warns of what was changed on the way in, and of a number of --nodata that no texel holds.
   /// @param no_data   the number that marked texels without data, if any

@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
   return tool.run(argc, argv, [&] {
     if (input.isSet()) return set.run();
     const apps::IngestMemory memory(tool, output.path());
-    const apps::Image image = options.read(tool, input.path());
+    const apps::Image image = options.read(tool, input.path(), true);
     const bake::IngestOptions values = options.values(tool, input.path(), image);
     const formats::Provenance provenance = tool.provenance();
     bake::IngestReport report;

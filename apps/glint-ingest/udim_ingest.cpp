@@ -65,7 +65,7 @@ class TileReader {
   TileTexels read(int tile) const {
     const std::string path = formats::udimFile(input_.path(), tile);
     TileTexels texels;
-    texels.image = options_.read(tool_, path);
+    texels.image = options_.read(tool_, path, false);
     const Image& image = texels.image;
     requireMemoryFor(tool_, "a tile of", image.width, image.height, kBytesPerTexel, "scale the images down");
     const bake::IngestOptions values = options_.tileValues(tool_, path, image);

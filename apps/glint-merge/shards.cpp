@@ -8,6 +8,7 @@
 
 #include "common/input_asset.h"
 #include "glint/bake/pyramid/join.h"
+#include "glint/formats/hash.h"
 #include "glint/formats/streamed_writer.h"
 
 namespace glint::apps {
@@ -135,18 +136,27 @@ namespace {
 /// The bytes of an array of a level of all shards, one after the other, read from their files.
 formats::ByteSource joinedArray(const Shards& shards, int level, const std::string& name) {
   struct Piece {
-    std::string path;
+    std::string path, hash;
     std::uint64_t offset, size_bytes;
   };
+  const std::string object = fmt::format("/level_{:02}/{}", level, name);
   std::vector<Piece> pieces;
   for (std::size_t k = 0; k < shards.views().size(); ++k) {
     const std::vector<formats::DatasetInfo>& datasets = shards.info(k).datasets;
-    const std::string path = fmt::format("/level_{:02}/{}", level, name);
-    const auto found = std::find_if(datasets.begin(), datasets.end(), [&](const auto& d) { return d.path == path; });
-    if (found->size_bytes > 0) pieces.push_back({shards.path(k), found->offset, found->size_bytes});
+    const auto found = std::find_if(datasets.begin(), datasets.end(), [&](const auto& d) { return d.path == object; });
+    if (found->size_bytes > 0) pieces.push_back({shards.path(k), found->hash_hex, found->offset, found->size_bytes});
   }
-  return [pieces](const formats::ByteSink& sink) {
-    for (const Piece& piece : pieces) formats::readInPieces(piece.path, piece.offset, piece.size_bytes, sink);
+  return [pieces, object](const formats::ByteSink& sink) {
+    for (const Piece& piece : pieces) {
+      formats::ByteHasher hasher;
+      formats::readInPieces(piece.path, piece.offset, piece.size_bytes, [&](std::span<const std::byte> bytes) {
+        hasher.add(bytes.data(), bytes.size());
+        sink(bytes);
+      });
+      if (hasher.hash() != piece.hash)
+        throw Error(ErrorCode::invalid_input, "dataset.hash", piece.path, object,
+                    "has other bytes than its hash says, or has changed while shards were joined", "make the shard again");
+    }
   };
 }
 

@@ -11,6 +11,7 @@ struct KindDescription<NdfPyramidShard> {
 
   static std::vector<Rule> indexRules() {
     return {errorRule("shard.region", "region_index is at most region_count"),
+            errorRule("shard.mean", "the last level is the mean of the map"),
             errorRule("shard.rows", "level_region_rows are the rows whose centres lie in the region")};
   }
   static std::vector<Rule> valueRules() { return {}; }
@@ -35,6 +36,8 @@ struct KindDescription<NdfPyramidShard> {
       return findings.add(
           "shard.region", "/@region_index",
           "is " + std::to_string(shard.region.index) + " of " + std::to_string(shard.region.count) + " regions");
+    if (shape.levels[shape.level_count - 1].imageCount() != 1)
+      return findings.add("shard.mean", "/@level_columns", "has more than one image in the last level, which must be the mean");
     for (int l = 0; l < shape.level_count; ++l) {
       const int expected = regionRows(shape, l, shard.region).count();
       if (shard.rows[l] != expected)
