@@ -13,13 +13,13 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/glint-config.cmake.in ${
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/glint-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/glint-config.cmake ${PROJECT_BINARY_DIR}/glint-config-version.cmake DESTINATION ${package_dir})
 
-# Headers keep their rooms. Those that say that they are private stay here, and so does the writer's, whose library is not installed.
+# Headers keep their rooms. Those that say that they are private stay here, and so do those of the writer, whose library is not installed.
 foreach(room libglint/math libglint/model libglint/query libglint/api formats)
   file(GLOB_RECURSE headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${room}/*.h)
   get_filename_component(room_name ${room} NAME)
   foreach(header IN LISTS headers)
     file(STRINGS ${header} private REGEX "^// Private to ")
-    if(NOT private AND NOT header MATCHES "/(glint|asset_writer)\\.h$")
+    if(NOT private AND NOT header MATCHES "/(glint|asset_writer|streamed_writer)\\.h$")
       file(RELATIVE_PATH name ${PROJECT_SOURCE_DIR}/${room} ${header})
       get_filename_component(folder ${name} DIRECTORY)
       install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/glint/${room_name}/${folder})

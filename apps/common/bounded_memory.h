@@ -9,13 +9,16 @@
 #include <string>
 #include <thread>
 
+#include "glint/formats/descriptor.h"
+
 namespace glint::apps {
 
 /// Memory of at most so many bytes: large arrays that do not fit any more are maps of temporary files.
 ///
-/// The files have no name, so that nothing is left of them, whatever happens. The system writes their pages to the disk and takes the memory
-/// back when it needs it. Pages also count as memory of this process (RSS) from their first use on; as soon as the process has
-/// more than its share, a thread gives them up, and the next use takes them from the cache of files or from the disk.
+/// The files have no name, so that nothing is left of them, whatever happens. The system writes their pages to the disk and
+/// takes the memory back when it needs it. Pages also count as memory of this process (RSS) from their first use on; as soon as
+/// the process has more than its share, a thread gives them up, and the next use takes them from the cache of files or from
+/// the disk. Where no thread can be started, the pages stay until the system takes them.
 ///
 /// Code that works on such arrays in the order of their elements runs at the speed of the disk or better.
 class BoundedMemory : public std::pmr::memory_resource {
@@ -37,11 +40,13 @@ class BoundedMemory : public std::pmr::memory_resource {
 
   /// @throws Error io  no temporary file, or no room on the disk
   void* mapFile(std::size_t bytes);
-  void giveUpPages();
-  void watch();
+  void startWatcher();
+  void giveUpPages() noexcept;
+  void watch() noexcept;
 
   std::uint64_t most_bytes_;
   std::string folder_;
+  formats::Descriptor statm_;  ///< /proc/self/statm
   std::uint64_t start_bytes_;  ///< memory of the process when this was made
   std::atomic<std::uint64_t> held_bytes_ = 0, filed_bytes_ = 0;
   std::mutex mutex_;

@@ -48,6 +48,7 @@ int main(int argc, char** argv) {
       }
     }
     options.warnAbout(tool, input.path(), values.no_data, values.boundary, report);
+    memory.warnAbout(tool);
     tool.setResult(apps::reportJson(report));
     tool.summary(apps::reportText(input.path(), image, report));
   });

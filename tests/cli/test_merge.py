@@ -144,15 +144,28 @@ def test_regions_are_of_maps_under_geometric_optics(maps):
     assert process.returncode == 5 and "--region" in process.stderr
 
 
-def test_texels_that_are_no_normals_are_found_where_they_count(maps):
+@pytest.mark.parametrize("rule, normal", [("normals.finite", (float("inf"), 0)), ("normals.finite", (0, float("nan"))), ("normals.disk", (0.8, 0.7))])
+def test_texels_that_are_no_normals_are_found_where_they_count(maps, rule, normal):
+    """The hashes of the map are those of the wrong texel, so that only the check of normals can find it."""
     h5py = pytest.importorskip("h5py")
+    numpy = pytest.importorskip("numpy")
+    from test_digest import digest, xxh3_128
+
     with h5py.File(maps.folder / "map.glint", "r+") as file:
-        offset = file["normals"].id.get_offset()
-    data = bytearray((maps.folder / "map.glint").read_bytes())
-    data[offset:offset + 4] = b"\x00\x00\x80\x7f"  # infinity, with the hash of another number
-    (maps.folder / "map.glint").write_bytes(data)
-    process = maps("pyramid", "map.glint", "-o", "out.glint", "--region", "1/2", *SMALL.split())
-    assert process.returncode == 3 and "map.glint" in process.stderr
+        normals = file["normals"][...]
+        normals[144, 100] = normal  # in the middle of the second of two regions
+        file["normals"][...] = normals
+        file["normals"].attrs.modify("xxh3_128", numpy.bytes_(xxh3_128(normals.tobytes())))
+        file.attrs.modify("digest", numpy.bytes_(digest(file)))
+    flags = "--resolution 32 --sigma-r 0.05 --stride 16 --levels 1".split()
+    process = maps("pyramid", "map.glint", "-o", "out.glint", "--region", "2/2", *flags, "--json")
+    error = json.loads(process.stdout)["error"]
+    assert process.returncode == 3 and error["rule"] == rule and error["path"] == "map.glint", error
+    assert "column 100, row 47 from the top" in error["message"] and not (maps.folder / "out.glint").exists()
+    process = maps("pyramid", "map.glint", "-o", "out.glint", "--region", "1/2", *flags)
+    assert process.returncode == 0, process.stderr
+    process = maps("pyramid", "map.glint", "-o", "whole.glint", *flags, "--json")
+    assert process.returncode == 3 and json.loads(process.stdout)["error"]["rule"] == rule
 
 
 def test_unchanged_parts_and_wholes_are_left_alone(maps):

@@ -17,8 +17,8 @@ inline constexpr int kLeastResolution = 32, kMostResolution = 1024;
 
 struct PyramidOptions {
   float stride = 32;  ///< of level 0, texels; >= 2. Footprints have a deviation of kFootprintPerStride strides
-  /// Footprints in a stride along each axis, 1 to kMostOverlap. The default is the knee of error against bytes; 1 is the grid of
-  /// Deng 2022.
+  /// Footprints in a stride along each axis, 1 to kMostOverlap. The default is the knee of error against bytes; 1 is the grid
+  /// of Deng 2022.
   float overlap = kDefaultOverlap;
   int resolution = 256;    ///< pixels of an NDF image along each axis: a multiple of 16 in [kLeastResolution, kMostResolution]
   float sigma_r = 0.005f;  ///< intrinsic roughness, disk units: at least 0.1 pixel of an NDF image, at most 0.25
@@ -30,7 +30,8 @@ struct PyramidOptions {
   BlockPrecision precision = BlockPrecision::f16;
 };
 
-/// The smallest resolution, within the limits, at which sigma_r has 1.5 pixels: densities within a pixel then err by 4 % (PixelSpline).
+/// The smallest resolution, within the limits, at which sigma_r has 1.5 pixels: densities within a pixel then err by 4 %
+/// (PixelSpline).
 /// @param sigma_r  intrinsic roughness, disk units, > 0
 int resolutionFor(float sigma_r);
 
@@ -64,8 +65,9 @@ PyramidShape pyramidShape(int width, int height, const PyramidOptions& options);
 /// @throws Error (usage) for options out of range
 void checkPyramidOptions(const PyramidOptions& options);
 
-/// The memory that buildPyramid or buildPyramidShard takes at its peak, bytes: images before and after they are packed. Where every block of every image
-/// would fit into `most_bytes`, it is the bytes of all blocks; otherwise blocks are counted on a few images of each level.
+/// The memory that buildPyramid or buildPyramidShard takes at its peak, bytes: images before and after they are packed. Where
+/// every block of every image would fit into `most_bytes`, it is the bytes of all blocks; otherwise blocks are counted on a few
+/// images of each level.
 /// @throws Error usage for options out of range
 double pyramidBytes(const NormalMap& map, const PyramidOptions& options, double most_bytes, PyramidRegion region = {});
 
@@ -85,8 +87,9 @@ struct NdfPyramidShardData {
   NdfPyramidShard view() const;
 };
 
-/// Builds the images of one region. The images are the same as those of buildPyramid, bit by bit: joinShards (join.h) joins them.
-/// Reads the texels of rowsReached() only, and with a map that does not say its slopes, all others once.
+/// Builds the images of one region. The images are the same as those of buildPyramid, bit by bit: joinedShape and joinedRanks
+/// (join.h) say how shards are joined. Reads the texels of rowsReached() only, and with a map that does not say its slopes, all
+/// others once.
 NdfPyramidShardData buildPyramidShard(const NormalMap& map, const PyramidOptions& options, PyramidRegion region,
                                       const ProgressFn& progress = {});
 
