@@ -74,7 +74,7 @@ def relative(values, truth):
 
 def test_texels_of_a_set_answer_as_the_large_map(glint):
     make_images(glint.folder, large_normals())
-    run_all(glint, "ingest n.exr -o n.glint --boundary clamp", "ingest n.<UDIM>.exr -o n.<UDIM>.glint")
+    run_all(glint, "ingest n.exr -o n.glint --boundary clamp", "ingest n.<UDIM>.exr -o n.<UDIM>.glint --udim-margin 64")
     uv = places()
     for sigma in (1, 6, 19):
         truth = densities(glint, "n.glint", uv / 2, sigma, "--boundary", "clamp", "--sigma-r", "0.05")
@@ -106,7 +106,7 @@ def compressed(glint):
     make_images(glint.folder, large_normals(), tiles=(1001, 1002, 1011))
     run_all(
         glint,
-        "ingest n.<UDIM>.exr -o n.<UDIM>.map.glint --depfile n.d",
+        "ingest n.<UDIM>.exr -o n.<UDIM>.map.glint --udim-margin 64 --depfile n.d",
         "pyramid n.<UDIM>.map.glint -o n.<UDIM>.p.glint --stride 8 --resolution 64 --sigma-r 0.05 --depfile p.d",
         "compress n.<UDIM>.p.glint -o n.<UDIM>.cp.glint --tolerance 0.1",
         "moments n.<UDIM>.map.glint -o n.<UDIM>.m.glint",
@@ -197,7 +197,7 @@ def test_a_damaged_tile_is_named_and_leaves_no_asset(glint):
 
 def test_wrong_uses_say_what_to_do(glint):
     make_images(glint.folder, large_normals(), tiles=(1001, 1002))
-    run_all(glint, "ingest n.<UDIM>.exr -o n.<UDIM>.glint", "ingest n.exr -o n.glint")
+    run_all(glint, "ingest n.<UDIM>.exr -o n.<UDIM>.glint --udim-margin 64", "ingest n.exr -o n.glint")
 
     def refused(code, text, *command):
         process = glint(*command)
