@@ -132,15 +132,15 @@ std::string hashOf(const PackedArray& array) {
   return hasher.hash();
 }
 
-/// Writes everything but the bytes of the datasets, and finds the places of these bytes in the file.
-///
-/// HDF5 only reserves the space: the bytes are then written with plain calls, at the speed of the disk and with its errors.
 /// Where the bytes of a dataset go, and the hash that the metadata has of them.
 struct WrittenDataset {
   std::uint64_t offset = 0;
   std::string hash;
 };
 
+/// Writes everything but the bytes of the datasets, and finds the places of these bytes in the file.
+///
+/// HDF5 only reserves the space: the bytes are then written with plain calls, at the speed of the disk and with its errors.
 class MetadataWriter {
  public:
   MetadataWriter(const fs::path& path, const PackedAsset& packed) : path_(path), packed_(packed) {

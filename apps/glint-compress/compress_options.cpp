@@ -36,7 +36,7 @@ CompressOptions::CompressOptions(Tool& tool) {
   tool.option(
           "--tolerance", values_.tolerance,
           "instead of --rank: largest error, in the metric below; columns and bits of every cluster are chosen to meet it in "
-          "few bytes, and with the methods tucker and pca so that no block errs by more than twice it, if a block can")
+          "few bytes; tucker and pca with --metric seen also aim at twice it at most for every block")
       .range(1e-6, 0.99)
       .excludes(rank)
       .defaultText("none");

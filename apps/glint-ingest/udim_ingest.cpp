@@ -19,11 +19,11 @@ namespace {
 
 using formats::UdimPlace;
 
-/// Margins by themselves: a sixteenth of the tile, 64 texels or more, and at most a quarter of the tile. Footprints of up to a third
-/// of it are answered by one tile.
+/// Margins by themselves: a sixteenth of the tile, 64 texels or more, and at most a quarter of the tile. Footprints of up to .3 of it
+/// are answered by one tile.
 constexpr int kMarginParts = 16, kMostMarginParts = 4;
 constexpr int kLeastMargin = 64;
-/// Memory of a tile beside its pixels: normals or heights, bounds. Sets are in memory as a whole, tile by tile.
+/// Memory of a tile beside its pixels: normals or heights, bounds. Tiles do not go into temporary files.
 constexpr double kBytesPerTexel = 32;
 
 /// The texels of one image, of normals or of heights.
@@ -141,7 +141,7 @@ UdimIngest::UdimIngest(Tool& tool, const InputFile& input, const OutputFile& out
     : tool_(tool), input_(input), output_(output), options_(options) {
   tool.option(
           "--udim-margin", margin_,
-          "UDIM sets: texels of the neighbours that each tile gets; footprints of up to a third of it are answered by one tile")
+          "UDIM sets: texels of the neighbours that each tile gets; footprints of up to .3 of it are answered by one tile")
       .range(8, 4096)
       .defaultText("a sixteenth of the tile, 64 or more, at most a quarter");
 }

@@ -106,13 +106,13 @@ std::vector<Candidate> planCandidates(const MapQuestion& question, int width, in
 std::vector<Candidate> paperCandidates(const MapQuestion& question) {
   constexpr int kStride = 32;
   const bool needs_texels = question.footprints.smallest < double{kFootprintPerStride} * kStride;
-  const Candidate pyramid = {
-      "pyramid",
-      "as in the paper",
-      "glint-pyramid",
-      {"--stride", std::to_string(kStride), "--resolution", "256", "--sigma-r", fmt::format("{:.9g}", question.sigma_r)},
-      "",
-      needs_texels};
+  const Candidate pyramid = {"pyramid",
+                             "as in the paper",
+                             "glint-pyramid",
+                             {"--stride", std::to_string(kStride), "--overlap", "1", "--resolution", "256", "--sigma-r",
+                              fmt::format("{:.9g}", question.sigma_r)},
+                             "",
+                             needs_texels};
   return {
       pyramid,
       {"cp", "rank 16, as in the paper", "glint-compress", {"--method", "cp", "--rank", "16"}, pyramid.name(), needs_texels}};

@@ -12,7 +12,7 @@ namespace glint::apps {
 /// does not ask for are left out. The names of candidates do not depend on the size of the map.
 std::vector<Candidate> planCandidates(const MapQuestion& question, int width, int height);
 
-/// The setting of Deng 2022: images of 256 x 256 pixels every 32 texels in all levels, compressed by CP of rank 16. The pyramid first.
+/// The setting of Deng 2022: images of 256 x 256 pixels every 32 texels, compressed by CP of rank 16. The pyramid comes first.
 std::vector<Candidate> paperCandidates(const MapQuestion& question);
 
 /// The candidate whose asset is the input of another; nullptr: the map.

@@ -33,7 +33,7 @@ PlanOptions::PlanOptions(Tool& tool) : tool_(tool) {
       "--sweep", sweep_,
       "with --check: build every candidate, measure those that take no more, and say how far the plan is from the cheapest");
   tool.flag("--paper", paper_,
-            "with --check: build and measure the setting of Deng 2022, too: stride 32, all levels, CP of rank 16");
+            "with --check: build and measure the setting of Deng 2022, too: stride 32, overlap 1, CP of rank 16");
   assets_option_ =
       &tool.option("--assets", assets_, "folder in which assets stay").defaultText("none: they are removed").unrecorded();
   tool.usesSeed();

@@ -503,7 +503,7 @@ struct KindDescription<NdfCp> {
           return cluster.slice_count == 0 || cluster.floor_unit <= (cluster.columns > 0 ? kLargestHalf : 0);
         },
         "compressed.floors", "/clusters", {"unit of floors is", "units of floors are"},
-        "not finite and positive, or of a cluster of spots", findings);
+        "negative or not finite, or not 0 for a cluster of spots", findings);
     checkDensities(ndf, findings);
   }
 };

@@ -10,7 +10,7 @@ import OpenImageIO as oiio
 import pytest
 from conftest import BIN, run_all
 
-WIDTH, HEIGHT, MARGIN = 96, 72, 64  # of a tile; the least margin that ingest takes by itself
+WIDTH, HEIGHT, MARGIN = 96, 72, 64  # of a tile; the margin that tests ask for
 CUT_TAIL = 2e-3  # a tile answers alone where a thousandth of a footprint lies beyond its margins
 TILES = {1001: (0, 0), 1002: (1, 0), 1011: (0, 1), 1012: (1, 1)}
 

@@ -280,7 +280,7 @@ TEST(Udim, PyramidsWithNormalsAnswerSmallFootprintsAcrossBorders) {
   EXPECT_LT(errors.borders, 0.01);
 }
 
-/// Margins of a fifth of the tile, so that footprints are beyond them before the set ends.
+/// Margins so narrow that footprints reach beyond them before the set ends.
 constexpr int kNarrowMargin = 16;
 
 /// Other tiles answer for what lies beyond the margins from their nearest places, which misplaces a part of the footprint.

@@ -20,8 +20,8 @@ struct ClusterFloors {
 
 /// Finds the floors of a cluster.
 ///
-/// A sum of few columns is a little off where the image is dark, and cutting its negative part leaves a haze: on maps of sparse
-/// facets the haze is as bright, on average over all places, as the light itself. A floor is what a reader takes off the pixels
+/// A sum of few columns is a little off where the image is dark, and cutting its negative part leaves a haze, on maps of
+/// sparse facets above all. A floor is what a reader takes off the pixels
 /// of a cell before it cuts them. It is chosen so that the pixels that are left have the mean of the cell, or a little less, over
 /// all slices. Light that columns lose stays lost.
 class FloorFinder {
