@@ -168,21 +168,31 @@ void refuseUdim(const std::string& path, const std::string& what) {
       "sets; for others ingest the image of one tile by its own name");
 }
 
+void refuseTile(const Tool& tool, const std::string& path) {
+  refuseUdim(path, "is a tile of a UDIM set, with margins of its neighbours, which " + tool.name() + " does not take");
+}
+
+std::vector<std::string> addInputs(Tool& tool, const std::string& path, UdimSets sets) {
+  std::vector<std::string> files;
+  if (!formats::isUdimPattern(path)) {
+    files.push_back(path);
+  } else if (sets == UdimSets::refused) {
+    refuseUdim(path, "is a UDIM set, which " + tool.name() + " does not take");
+  } else {
+    for (const int tile : formats::udimTiles(path)) files.push_back(formats::udimFile(path, tile));
+  }
+  for (const std::string& file : files) {
+    checkRegular(file);
+    tool.addInput(file);
+  }
+  return files;
+}
+
 InputFile::InputFile(Tool& tool, const std::string& help, const std::string& name, UdimSets sets) {
   tool.option(name, path_, help).required().unrecorded();
   tool.addCheck([this, &tool, sets] {
-    if (!formats::isUdimPattern(path_)) {
-      checkRegular(path_);
-      tool.addInput(path_);
-      return;
-    }
-    if (sets == UdimSets::refused) refuseUdim(path_, "is a UDIM set, which " + tool.name() + " does not take");
-    tiles_ = formats::udimTiles(path_);
-    for (const int tile : tiles_) {
-      const std::string file = formats::udimFile(path_, tile);
-      checkRegular(file);
-      tool.addInput(file);
-    }
+    addInputs(tool, path_, sets);
+    if (formats::isUdimPattern(path_)) tiles_ = formats::udimTiles(path_);
   });
 }
 
@@ -191,19 +201,9 @@ InputFiles::InputFiles(Tool& tool, const std::string& help, const std::string& n
   option->expected(required ? 1 : 0, CLI::detail::expected_max_vector_size)->required(required);
   tool.addCheck([this, &tool, sets] {
     std::vector<std::string> files;
-    for (const std::string& path : paths_) {
-      if (!formats::isUdimPattern(path)) {
-        files.push_back(path);
-        continue;
-      }
-      if (sets == UdimSets::refused) refuseUdim(path, "is a UDIM set, which " + tool.name() + " does not take");
-      for (const int tile : formats::udimTiles(path)) files.push_back(formats::udimFile(path, tile));
-    }
+    for (const std::string& path : paths_)
+      for (const std::string& file : addInputs(tool, path, sets)) files.push_back(file);
     paths_ = files;
-    for (const std::string& path : paths_) {
-      checkRegular(path);
-      tool.addInput(path);
-    }
   });
 }
 

@@ -19,6 +19,14 @@ enum class UdimSets : unsigned char { refused, taken };
 /// @throws Error unsupported, which names the tools that take sets
 [[noreturn]] void refuseUdim(const std::string& path, const std::string& what);
 
+/// Refuses the asset of a tile of a UDIM set, in a tool that does not know its margins.
+/// @throws Error unsupported
+[[noreturn]] void refuseTile(const Tool& tool, const std::string& path);
+
+/// The files that a path stands for: itself, or those of the tiles of a set. They are readable, and inputs of the tool from now on.
+/// @throws Error unsupported: a set, where sets are refused; as checkRegular and formats::udimTiles
+std::vector<std::string> addInputs(Tool& tool, const std::string& path, UdimSets sets);
+
 /// Mix-in: one positional input file, which must exist and be readable before the work starts; or the files of a UDIM set.
 class InputFile {
  public:

@@ -6,8 +6,7 @@ formats::OpenOptions inputChecks(const Tool& tool) { return {.verify_hashes = !t
 
 formats::Asset openInput(const Tool& tool, const std::string& path, UdimSets tiles) {
   formats::Asset asset = formats::Asset::open(path, inputChecks(tool));
-  if (tiles == UdimSets::refused && asset.info().udim)
-    refuseUdim(path, "is a tile of a UDIM set, with margins of its neighbours, which " + tool.name() + " does not take");
+  if (tiles == UdimSets::refused && asset.info().udim) refuseTile(tool, path);
   return asset;
 }
 

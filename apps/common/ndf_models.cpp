@@ -29,20 +29,9 @@ NdfAsset::NdfAsset(Tool& tool, const AskedAssets& asked) : tool_(tool), asked_(a
 }
 
 void NdfAsset::check() {
-  for (const std::string& path : {path_, normals_path_}) {
-    if (path.empty()) continue;
-    if (formats::isUdimPattern(path) && !asked_.udim_sets)
-      refuseUdim(path, "is a UDIM set, which " + tool_.name() + " does not take");
-    std::vector<std::string> files = {path};
-    if (formats::isUdimPattern(path)) {
-      files.clear();
-      for (const int tile : formats::udimTiles(path)) files.push_back(formats::udimFile(path, tile));
-    }
-    for (const std::string& file : files) {
-      checkRegular(file);
-      tool_.addInput(file);
-    }
-  }
+  const UdimSets sets = asked_.udim_sets ? UdimSets::taken : UdimSets::refused;
+  for (const std::string& path : {path_, normals_path_})
+    if (!path.empty()) addInputs(tool_, path, sets);
 }
 
 void NdfAsset::addPyramidOptions() {
@@ -125,8 +114,7 @@ void NdfAsset::refuseOtherKinds() const {
   const bool pattern = formats::isUdimPattern(path_);
   const formats::Asset asset = formats::Asset::open(pattern ? formats::udimFile(path_, formats::udimTiles(path_).front())
                                                             : std::filesystem::path(path_));
-  if (asset.info().udim && !asked_.udim_sets)
-    refuseUdim(path_, "is a tile of a UDIM set, with margins of its neighbours, which " + tool_.name() + " does not take");
+  if (asset.info().udim && !asked_.udim_sets) refuseTile(tool_, path_);
   const std::string kind(asset.kind());
   if (kind == "displacement")
     throw Error(

@@ -77,7 +77,7 @@ SEEN = {
                "So where a footprint holds few facets or thin lines of directions, far scratches and brushed metal above all, pictures under the small light are "
                f"softer and lose a few percent of the light: glint-pyramid --resolution auto makes the pixels smaller than the lobe. {NEAR}",
     "tucker": "It errs as the pyramid does, and by its tolerance, which holds for each half vector on average over places and not for each place.",
-    "cp": "It errs as the pyramid does, and by its rank. Negative parts of low rank are cut, after floors took off the haze that they would leave.",
+    "cp": "It errs as the pyramid does, and by its rank. Negative parts of low rank are cut, which leaves light where there should be none.",
     "pca": "It errs as tucker does.",
     "bin map": "Its pictures are those of brute force over boxes. Boxes have hard edges, so sparkles appear and vanish at once as the picture moves, more than under "
                "Gaussians.",

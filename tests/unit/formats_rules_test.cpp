@@ -680,6 +680,11 @@ std::vector<Fixture> dataFixtures() {
       patched(
           "pyramid.integral", Base::pyramid,
           [](const Patch& patch) { patch.change<float>("level_00/pixels", 99, [](float& d) { d += 100; }); }, true),
+  };
+}
+
+std::vector<Fixture> compressedDataFixtures() {
+  return {
       patched(
           "compressed.image_scales", Base::compressed,
           [](const Patch& patch) { patch.change<float>("image_scales", 3, [](float& scale) { scale = 0; }); }, true),
@@ -953,9 +958,10 @@ std::vector<Fixture> shFixtures() {
 
 std::vector<Fixture> allFixtures() {
   std::vector<Fixture> all;
-  for (auto list : {fileFixtures(), linkFixtures(), attributeFixtures(), storageFixtures(), datasetFixtures(),
-                    pyramidFixtures(), ndfCpFixtures(), dataFixtures(), histogramFixtures(), momentsFixtures(), tinyFixtures(),
-                    shardFixtures(), wangFixtures(), waveFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
+  for (auto list :
+       {fileFixtures(), linkFixtures(), attributeFixtures(), storageFixtures(), datasetFixtures(), pyramidFixtures(),
+        ndfCpFixtures(), dataFixtures(), compressedDataFixtures(), histogramFixtures(), momentsFixtures(), tinyFixtures(),
+        shardFixtures(), wangFixtures(), waveFixtures(), binMapFixtures(), shFixtures(), displacementFixtures()}) {
     all.insert(all.end(), list.begin(), list.end());
   }
   return all;
