@@ -139,9 +139,8 @@ void requireOneResolution(TileReader& tiles, const UdimPlace& place, const std::
 
 UdimIngest::UdimIngest(Tool& tool, const InputFile& input, const OutputFile& output, const IngestOptions& options)
     : tool_(tool), input_(input), output_(output), options_(options) {
-  tool.option(
-          "--udim-margin", margin_,
-          "UDIM sets: texels of the neighbours that each tile gets; footprints of up to .3 of it are answered by one tile")
+  tool.option("--udim-margin", margin_,
+              "UDIM sets: texels of the neighbours that each tile gets; footprints of up to .3 of it are answered by one tile")
       .range(8, 4096)
       .defaultText("a sixteenth of the tile, 64 or more, at most a quarter");
 }
