@@ -26,17 +26,21 @@ std::string hex(XXH128_hash_t hash) {
 
 std::string hashBytes(const void* data, std::size_t size_bytes) { return hex(XXH3_128bits(data, size_bytes)); }
 
+/// Not of XXH3_createState(), which gives none without a sign where memory runs out.
 struct ByteHasher::State {
-  std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> xxh{XXH3_createState(), &XXH3_freeState};
+  XXH3_state_t xxh;
 };
 
-ByteHasher::ByteHasher() : state_(std::make_unique<State>()) { XXH3_128bits_reset(state_->xxh.get()); }
+ByteHasher::ByteHasher() : state_(std::make_unique<State>()) {
+  XXH3_INITSTATE(&state_->xxh);
+  XXH3_128bits_reset(&state_->xxh);
+}
 ByteHasher::ByteHasher(ByteHasher&&) noexcept = default;
 ByteHasher::~ByteHasher() = default;
 
-void ByteHasher::add(const void* data, std::size_t size_bytes) { XXH3_128bits_update(state_->xxh.get(), data, size_bytes); }
+void ByteHasher::add(const void* data, std::size_t size_bytes) { XXH3_128bits_update(&state_->xxh, data, size_bytes); }
 
-std::string ByteHasher::hash() const { return hex(XXH3_128bits_digest(state_->xxh.get())); }
+std::string ByteHasher::hash() const { return hex(XXH3_128bits_digest(&state_->xxh)); }
 
 std::string hashFile(const std::filesystem::path& path) {
   ByteHasher hasher;

@@ -89,6 +89,12 @@ struct ConfigFile : CLI::ConfigBase {
   }
 };
 
+/// Limits the threads of the process to its end: the end of a limit starts threads that have no work, and may fail at it.
+void limitThreads(int threads) {
+  [[maybe_unused]] static const auto* const limit =
+      new tbb::global_control(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+}
+
 }  // namespace
 
 struct Tool::State {
@@ -397,7 +403,7 @@ int Tool::work(const std::function<void()>& body) {
   }
   for (const auto& check : s.late_checks) check();
   if (s.max_memory > 0) limitMemory(s.max_memory);
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads()));
+  limitThreads(threads());
   if (s.skip_unchanged && isUnchanged()) {
     writeDepfile();
     reportUnchanged();

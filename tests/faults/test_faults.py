@@ -124,7 +124,7 @@ class Walk:
     def check(self, outcome, codes, reasons):
         after = contents(self.folder)
         left = set(after) - set(self.before) - set(self.outputs)
-        assert not left, "leaves nothing"
+        assert not left, f"status {outcome.status}, leaves {sorted(left)}: {outcome.stderr}"
         for name in self.outputs:
             assert after.get(name, self.results[name]) == self.results[name], f"{name} is whole, or not there"
         if outcome.status == 0:
