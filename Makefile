@@ -43,7 +43,7 @@ test: build python  ## build and run the tests, except slow ones
 	ctest --preset release --parallel $(JOBS) --label-exclude '^slow$$' --no-label-summary
 
 .PHONY: test-all
-test-all: build python  ## the same with the slow ones: fuzzing, large maps
+test-all: benchmarks python  ## the same with the slow ones: fuzzing, large maps
 	ctest --preset release --parallel $(JOBS) --no-label-summary
 
 # A file that breaks something lands in build-fuzz/. Put it, made small by -minimize_crash=1, into tests/fuzz/corpus.
@@ -56,7 +56,7 @@ fuzz: | packages  ## fuzz the reader, the validator and all queries for SECONDS=
 	cd build-fuzz && bin/glint-fuzz -max_total_time=$(SECONDS) -timeout=10 -rss_limit_mb=2048 -print_final_stats=1 corpus ../tests/fuzz/corpus ../tests/golden/v1.0
 
 .PHONY: bench
-bench: build  ## time whole commands and queries on 2K^2 maps; writes build/bench/results.json
+bench: benchmarks  ## time whole commands and queries on 2K^2 maps; writes build/bench/results.json
 	@$(PYTHON) tests/bench/bench.py --bin build/bin --out build/bench
 
 .PHONY: bench-report
@@ -64,7 +64,7 @@ bench-report: bench  ## the same, and write docs/BENCHMARKS.md, its charts and d
 	@$(PYTHON) tests/bench/report.py build/bench/results.json --docs docs
 
 .PHONY: limits
-limits: build  ## draw with every method, compare with brute force; writes docs/LIMITS.md and its pictures
+limits: benchmarks  ## draw with every method, compare with brute force; writes docs/LIMITS.md and its pictures
 	@$(PYTHON) tests/render/compare.py --bin build/bin --out build/limits --docs docs
 
 .PHONY: gallery
@@ -109,6 +109,11 @@ man:  ## manual pages of the tools from their --help, in build/man
 .PHONY: build
 build: build/build.ninja  ## the optimised build, in build/
 	cmake --build --preset release --parallel $(JOBS)
+
+# They take minutes to compile, and make test needs none.
+.PHONY: benchmarks
+benchmarks: build  ## build the programs of make bench and make limits
+	cmake --build --preset release --parallel $(JOBS) --target glint_benchmarks
 
 .PHONY: debug
 debug: build-debug/build.ninja  ## a debug build, in build-debug/

@@ -77,37 +77,34 @@ function(glint_add_library room)
   set_target_properties(glint_${room} PROPERTIES EXPORT_NAME ${room} CXX_EXTENSIONS OFF)
 endfunction()
 
-# Large headers are parsed once. Not where ccache is: it does not keep objects that were compiled with precompiled headers.
+# For whoever builds once: large headers are parsed once, and sources that agree on names are compiled together. Off where ccache is,
+# which keeps no objects that were compiled with precompiled headers, and wherever sources change: a change then compiles its group.
 if(CCACHE_PROGRAM)
-  set(precompile OFF)
+  set(fast_full_build OFF)
 else()
-  set(precompile ON)
+  set(fast_full_build ON)
 endif()
-option(GLINT_PRECOMPILE_HEADERS "Precompile headers" ${precompile})
-
-# For full builds: sources of a target that agree on names are compiled together, and headers precompiled with ccache, too. Off by
-# default, because a change of one source then compiles all of them.
-option(GLINT_FAST_FULL_BUILD "Precompile headers and compile sources together" OFF)
+option(GLINT_FAST_FULL_BUILD "Precompile headers and compile sources together" ${fast_full_build})
 
 # Of headers that make each source that does not need them slower (CLI11, nlohmann-json): only where most sources do.
 function(glint_precompile_headers owner)
-  if(GLINT_PRECOMPILE_HEADERS OR GLINT_FAST_FULL_BUILD)
+  if(GLINT_FAST_FULL_BUILD)
     target_precompile_headers(${owner} PRIVATE ${ARGN})
   endif()
 endfunction()
 
 # Targets use the precompiled headers of the first one. They must be compiled with all of its definitions.
 function(glint_share_precompiled_headers owner)
-  if(GLINT_PRECOMPILE_HEADERS OR GLINT_FAST_FULL_BUILD)
+  if(GLINT_FAST_FULL_BUILD)
     foreach(target IN LISTS ARGN)
       target_precompile_headers(${target} REUSE_FROM ${owner})
     endforeach()
   endif()
 endfunction()
 
-# All sources of a target become one, but for those with options of their own.
-function(glint_compile_together)
+# Sources of the targets are compiled in groups of so many (0: all as one), but for those with options of their own.
+function(glint_compile_together group_size)
   if(GLINT_FAST_FULL_BUILD)
-    set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 0)
+    set_target_properties(${ARGN} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${group_size})
   endif()
 endfunction()

@@ -13,7 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-[[noreturn]] void refuse(const std::string& path, const std::string& what) {
+[[noreturn]] void refuseJobs(const std::string& path, const std::string& what) {
   throw Error(ErrorCode::invalid_input, "farm.jobs", path, "", what,
               "make it with glint-plan SCENE -o FILE, or with glint-plan SCENE --jobs FILE");
 }
@@ -21,7 +21,7 @@ using nlohmann::json;
 FarmJob jobOf(const json& value, const std::string& path) {
   FarmJob job{value.at("command").get<std::vector<std::string>>(), value.at("inputs").get<std::vector<std::string>>(), {}};
   const auto outputs = value.at("outputs").get<std::vector<std::string>>();
-  if (outputs.size() != 1) refuse(path, "has a job that does not make exactly one file");
+  if (outputs.size() != 1) refuseJobs(path, "has a job that does not make exactly one file");
   job.output = outputs.front();
   return job;
 }
@@ -46,8 +46,8 @@ void move(FarmJob& job, const fs::path& from, const fs::path& to) {
 std::vector<FarmJob> readJobs(const std::string& path, const std::string& folder) {
   const json document = readJsonOrNothing(path);
   const auto form = document.is_object() ? document.value("schema", json()) : json();
-  if (form != "glint-plan plan 1" && form != "glint-plan jobs 1") refuse(path, "is neither a plan nor jobs of glint-plan");
-  if (!document.contains("jobs")) refuse(path, "is a plan without jobs, of an earlier version");
+  if (form != "glint-plan plan 1" && form != "glint-plan jobs 1") refuseJobs(path, "is neither a plan nor jobs of glint-plan");
+  if (!document.contains("jobs")) refuseJobs(path, "is a plan without jobs, of an earlier version");
   const fs::path from = fs::weakly_canonical(fs::absolute(manifestFolder(path))),
                  to = fs::weakly_canonical(fs::absolute(folder));
   std::vector<FarmJob> jobs;
@@ -57,7 +57,7 @@ std::vector<FarmJob> readJobs(const std::string& path, const std::string& folder
       move(jobs.back(), from, to);
     }
   } catch (const json::exception&) {
-    refuse(path, "has a job that lacks a part");
+    refuseJobs(path, "has a job that lacks a part");
   }
   return jobs;
 }

@@ -34,7 +34,7 @@ const RecipeKind kKinds[] = {
     {"displaced", ".displaced", "heights", {"glint-displace"}, {"--factor", "16"}},
 };
 
-[[noreturn]] void refuse(const std::string& what, const std::string& remedy) {
+[[noreturn]] void refuseMake(const std::string& what, const std::string& remedy) {
   throw Error(ErrorCode::usage, "farm.make", "", "--make", what, remedy);
 }
 
@@ -45,8 +45,8 @@ std::size_t kindOf(std::string_view name) {
     names.emplace_back(kKinds[k].name);
   }
   const std::string near = nearestName(std::string(name), names);
-  refuse("there is no kind \"" + std::string(name) + "\"",
-         (near.empty() ? "" : "did you mean " + near + "? ") + std::string("the kinds are ") + recipeKindNames());
+  refuseMake("there is no kind \"" + std::string(name) + "\"",
+             (near.empty() ? "" : "did you mean " + near + "? ") + std::string("the kinds are ") + recipeKindNames());
 }
 
 /// Options of the programs that name files which these read.
@@ -65,9 +65,9 @@ bool isOneOf(std::string_view word, std::span<const std::string_view> options) {
 void refuseOption(std::string_view option, const std::string& kind) {
   const bool is_short = option.size() > 1 && option[0] == '-' && std::isalpha(static_cast<unsigned char>(option[1]));
   if (!isOneOf(option, kRefusedOptions) && (!is_short || option == "-f")) return;
-  refuse("flags of " + kind + " cannot hold " + std::string(option) +
-             ": glint-farm gives it itself, or could not keep track of what it does",
-         "leave it out; glint-farm run has --threads, --max-memory and --trust");
+  refuseMake("flags of " + kind + " cannot hold " + std::string(option) +
+                 ": glint-farm gives it itself, or could not keep track of what it does",
+             "leave it out; glint-farm run has --threads, --max-memory and --trust");
 }
 
 /// The words of flags, with --option=FILE as two words.
@@ -94,7 +94,7 @@ std::vector<RecipeFlag> flagsOf(const std::vector<std::string>& words, const std
     }
   }
   if (!file_option.empty())
-    refuse("the file of " + std::string(file_option) + " is missing", "name it behind " + std::string(file_option));
+    refuseMake("the file of " + std::string(file_option) + " is missing", "name it behind " + std::string(file_option));
   return flags;
 }
 
@@ -110,9 +110,10 @@ std::vector<RecipeStep> recipeOf(const std::vector<std::string>& asked) {
   Wanted kinds[std::size(kKinds)];
   for (const std::string& text : asked) {
     std::vector<std::string> words = CLI::detail::split_up(text);
-    if (words.empty()) refuse("the name of a kind is missing", "the kinds are " + recipeKindNames());
+    if (words.empty()) refuseMake("the name of a kind is missing", "the kinds are " + recipeKindNames());
     Wanted& kind = kinds[kindOf(words.front())];
-    if (kind.given) refuse("two of them are for " + words.front(), "write all flags of " + words.front() + " in one --make");
+    if (kind.given)
+      refuseMake("two of them are for " + words.front(), "write all flags of " + words.front() + " in one --make");
     kind = {true, true, {words.begin() + 1, words.end()}};
   }
   // Backwards, because sources of sources are wanted too.

@@ -8,6 +8,7 @@
 
 #include "glint/formats/validate.h"
 #include "support/hdf5_bytes.h"
+#include "support/source_folder.h"
 
 namespace glint {
 namespace {
@@ -17,8 +18,7 @@ namespace fs = std::filesystem;
 TEST(GoldenFiles, FlippedBitsAreFound) {
   constexpr std::size_t kFlips = 100000;  // of each file
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(fs::path(GLINT_SOURCE_DIR) / "tests/golden/v1.0"))
-    files.push_back(entry.path());
+  for (const auto& entry : fs::directory_iterator(test::goldenFolder())) files.push_back(entry.path());
   ASSERT_GE(files.size(), 20u);
   std::atomic<std::size_t> missed = 0;
   tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t f) {

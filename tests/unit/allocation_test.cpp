@@ -30,7 +30,7 @@ void* operator new(std::size_t size) {
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
-namespace glint {
+namespace glint::allocation_test {
 namespace {
 
 template <class Model>
@@ -101,6 +101,6 @@ TEST(CApi, QueriesAllocateNothing) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::allocation_test
 
 #endif

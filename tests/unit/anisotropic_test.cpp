@@ -14,7 +14,7 @@
 #include "support/directions.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::anisotropic_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -332,4 +332,4 @@ TEST(AnisotropicNdf, DegenerateFootprintsHaveFiniteAnswers) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::anisotropic_test

@@ -13,7 +13,7 @@
 #include "support/c_api.h"
 #include "support/directions.h"
 
-namespace glint {
+namespace glint::any_brdf_test {
 namespace {
 
 using api::AnyBrdf;
@@ -140,4 +140,4 @@ TEST(AnyBrdf, BatchesAnswerAsSingleQueries) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::any_brdf_test

@@ -14,7 +14,7 @@
 #include "glint/model/error.h"
 #include "support/temp_folder.h"
 
-namespace glint::formats {
+namespace glint::formats::atomic_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -191,4 +191,4 @@ TEST(OutputTarget, HasRoomForTheLongestName) {
 }
 
 }  // namespace
-}  // namespace glint::formats
+}  // namespace glint::formats::atomic_file_test

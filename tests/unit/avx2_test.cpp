@@ -19,7 +19,7 @@
 
 #ifdef GLINT_AVX2
 
-namespace glint {
+namespace glint::avx2_test {
 namespace {
 
 struct Compared {
@@ -235,6 +235,6 @@ TEST(Avx2Reader, MakesNumbersOfWhatIsNone) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::avx2_test
 
 #endif

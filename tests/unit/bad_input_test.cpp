@@ -22,7 +22,7 @@
 #include "support/c_api.h"
 #include "support/sample_assets.h"
 
-namespace glint {
+namespace glint::bad_input_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -216,4 +216,4 @@ TEST(BadInput, EveryModelLightsASurfaceFromAnyDirection) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::bad_input_test

@@ -13,7 +13,7 @@
 #include "support/small_pyramid.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::batch_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -173,4 +173,4 @@ TEST(Batch, FootprintsBelowTheFinestLevelAreAnsweredFromTheTexels) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::batch_test

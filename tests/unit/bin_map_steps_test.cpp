@@ -11,7 +11,7 @@
 #include "glint/bake/bin_map/texel_lists.h"
 #include "support/test_maps.h"
 
-namespace glint::bake {
+namespace glint::bake::bin_map_steps_test {
 namespace {
 
 /// A map whose width is no power of two, with its bins.
@@ -81,4 +81,4 @@ TEST(TexelLists, CellsFollowEachOther) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::bin_map_steps_test

@@ -15,7 +15,7 @@
 #include "support/bin_weights.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::bin_map_test {
 namespace {
 
 using test::expectWeights;
@@ -646,4 +646,4 @@ TEST(BinMapNdf, SamplesFollowTheDensity) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::bin_map_test

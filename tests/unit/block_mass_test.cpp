@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-namespace glint {
+namespace glint::block_mass_test {
 namespace {
 
 TEST(BlockMass, CodesAreTheSmallestNotBelow) {
@@ -48,4 +48,4 @@ TEST(BlockMasses, GroupsReadNothingBehindTheLast) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::block_mass_test

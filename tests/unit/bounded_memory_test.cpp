@@ -12,7 +12,7 @@
 #include "glint/model/error.h"
 #include "support/temp_folder.h"
 
-namespace glint::apps {
+namespace glint::apps::bounded_memory_test {
 namespace {
 
 constexpr std::uint64_t kMega = 1 << 20;
@@ -69,4 +69,4 @@ TEST(BoundedMemory, SaysWhereThereIsNoRoom) {
 }
 
 }  // namespace
-}  // namespace glint::apps
+}  // namespace glint::apps::bounded_memory_test

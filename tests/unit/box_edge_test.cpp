@@ -13,7 +13,7 @@
 #include "glint/query/pyramid_ndf.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::box_edge_test {
 namespace {
 
 /// Sums of whole pixels of one axis of a block, 0 to 16 of them.
@@ -204,4 +204,4 @@ TEST(BoxEdge, MeansOfSmallBoxesErrLessWithSmoothPixels) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::box_edge_test

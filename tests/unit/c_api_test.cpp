@@ -14,8 +14,9 @@
 #include "glint/query/manifold_ndf.h"
 #include "glint/query/ray_footprint.h"
 #include "support/hdf5_bytes.h"
+#include "support/source_folder.h"
 
-namespace glint {
+namespace glint::c_api_test {
 namespace {
 
 using namespace test;
@@ -504,7 +505,7 @@ TEST(CApi, FailedOpeningSaysWhy) {
   EXPECT_NE(std::string(glint_error_message()).find("/no/such.glint"), std::string::npos);
   EXPECT_EQ(glint_ndf_open(assets().path("heights").c_str(), nullptr, &ndf), GLINT_ERROR_UNSUPPORTED);
   EXPECT_STREQ(glint_error_rule(), "format.kind");
-  EXPECT_EQ(glint_ndf_open(GLINT_SOURCE_DIR "/README.md", nullptr, &ndf), GLINT_ERROR_INVALID_INPUT);
+  EXPECT_EQ(glint_ndf_open((test::sourceFolder() / "README.md").c_str(), nullptr, &ndf), GLINT_ERROR_INVALID_INPUT);
   const std::string endless(100000, 'x');  // the message is cut, not lost
   EXPECT_EQ(glint_ndf_open(endless.c_str(), nullptr, &ndf), GLINT_ERROR_IO);
   EXPECT_GT(std::strlen(glint_error_message()), 300u);
@@ -542,4 +543,4 @@ TEST(CApi, EightThreadsGetTheAnswersOfOne) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::c_api_test

@@ -18,7 +18,7 @@
 #include "support/directions.h"
 #include "support/hdf5_bytes.h"
 
-namespace glint {
+namespace glint::c_brdf_test {
 namespace {
 
 using namespace test;
@@ -509,4 +509,4 @@ TEST(CDisplaced, OtherKindsAndMissingArgumentsAreRefused) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::c_brdf_test

@@ -14,9 +14,10 @@
 #include "glint/api/any_ndf.h"
 #include "glint/formats/asset_reader.h"
 #include "support/hdf5_bytes.h"
+#include "support/source_folder.h"
 #include "support/temp_folder.h"
 
-namespace glint {
+namespace glint::c_damage_test {
 namespace {
 
 constexpr int kFilesOfKind = 60;  // of each golden file, each with other damage: enough that damage of a 20th of files shows
@@ -65,8 +66,7 @@ TEST(CDamage, AnswersAreFiniteWhateverTheArraysHold) {
   std::mt19937 random(23);
   int opened = 0;
   std::vector<std::filesystem::path> paths;
-  for (const auto& entry : std::filesystem::directory_iterator(GLINT_SOURCE_DIR "/tests/golden/v1.0"))
-    paths.push_back(entry.path());
+  for (const auto& entry : std::filesystem::directory_iterator(test::goldenFolder())) paths.push_back(entry.path());
   std::sort(paths.begin(), paths.end());  // the damage of each file depends on those before it
   for (const std::filesystem::path& golden : paths) {
     const formats::Asset asset = formats::Asset::open(golden);
@@ -86,4 +86,4 @@ TEST(CDamage, AnswersAreFiniteWhateverTheArraysHold) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::c_damage_test

@@ -14,7 +14,7 @@
 #include "support/c_api.h"
 #include "support/directions.h"
 
-namespace glint {
+namespace glint::c_handles_test {
 namespace {
 
 using namespace test;
@@ -251,4 +251,4 @@ TEST(CApi, PositionsFarOutAreThoseOfTheMap) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::c_handles_test

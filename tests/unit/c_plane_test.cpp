@@ -3,7 +3,7 @@
 #include "glint/query/tiny_example_ndf.h"
 #include "support/c_api.h"
 
-namespace glint {
+namespace glint::c_plane_test {
 namespace {
 
 /// A plane of scattered examples, in a file and in memory.
@@ -72,4 +72,4 @@ TEST(CPlane, BatchesAnswerAsSingleQueriesDo) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::c_plane_test

@@ -7,7 +7,7 @@
 #include "glint/query/ray_footprint.h"
 #include "measure/light_blur.h"
 
-namespace glint::apps {
+namespace glint::apps::camera_footprints_test {
 namespace {
 
 constexpr double kRounding = 1e-6;  // of floats in the comparison
@@ -67,4 +67,4 @@ TEST(LightBlur, OfASharpLightChangesNothing) {
 }
 
 }  // namespace
-}  // namespace glint::apps
+}  // namespace glint::apps::camera_footprints_test

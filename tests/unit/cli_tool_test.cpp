@@ -11,7 +11,7 @@
 #include "common/suggest.h"
 #include "common/tool.h"
 
-namespace glint::apps {
+namespace glint::apps::cli_tool_test {
 namespace {
 
 using nlohmann::json;
@@ -286,4 +286,4 @@ TEST(Suggest, KeepsQuietWhenNothingIsNear) {
 }
 
 }  // namespace
-}  // namespace glint::apps
+}  // namespace glint::apps::cli_tool_test

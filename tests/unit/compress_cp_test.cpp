@@ -8,7 +8,7 @@
 #include "unit/compress_fixture.h"
 #include "unit/compress_reference.h"
 
-namespace glint::bake {
+namespace glint::bake::compress_cp_test {
 namespace {
 
 struct Tensor {
@@ -189,4 +189,4 @@ TEST(TuckerAnalysis, GivesOrthonormalAxesThatHoldAllEnergy) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::compress_cp_test

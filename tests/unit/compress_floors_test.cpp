@@ -8,7 +8,7 @@
 #include "glint/bake/compressed/floors.h"
 #include "glint/query/detail/compressed/pixel_floors.h"
 
-namespace glint::bake {
+namespace glint::bake::compress_floors_test {
 namespace {
 
 constexpr float kDensity = 30;  // of a pixel of 1
@@ -135,4 +135,4 @@ TEST(PixelFloors, AreThoseOfTheCellsThatPixelsLieIn) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::compress_floors_test

@@ -6,7 +6,7 @@
 
 #include "glint/bake/compressed/ranks.h"
 
-namespace glint::bake {
+namespace glint::bake::compress_ranks_test {
 namespace {
 
 /// Sums of some ten doubles.
@@ -274,4 +274,4 @@ TEST(ToleranceSearch, KeepsTheBudgetWhereMeasuresAreNotMonotonic) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::compress_ranks_test

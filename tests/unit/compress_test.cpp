@@ -15,7 +15,7 @@
 #include "unit/compress_fixture.h"
 #include "unit/compress_reference.h"
 
-namespace glint::bake {
+namespace glint::bake::compress_test {
 namespace {
 
 using test::TestPyramid;
@@ -694,4 +694,4 @@ TEST(Compress, RefusesPyramidsThatContradictThemselves) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::compress_test

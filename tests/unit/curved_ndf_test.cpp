@@ -9,7 +9,7 @@
 #include "glint/query/reference.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::curved_ndf_test {
 namespace {
 
 constexpr float kSigmaR = 0.02f;
@@ -128,4 +128,4 @@ TEST(CurvedNdf, HalfVectorsTurnAsTheyDoFromOnePixelToTheNext) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::curved_ndf_test

@@ -6,7 +6,7 @@
 #include "glint/query/brdf/base_brdf.h"
 #include "support/test_heights.h"
 
-namespace glint::bake {
+namespace glint::bake::displace_brdf_test {
 namespace {
 
 using test::OwnedSurface;
@@ -163,4 +163,4 @@ TEST(EffectiveBrdf, PatchesAddUpToTheMap) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::displace_brdf_test

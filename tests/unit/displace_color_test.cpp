@@ -9,7 +9,7 @@
 #include "support/path_tracer.h"
 #include "support/test_heights.h"
 
-namespace glint::bake {
+namespace glint::bake::displace_color_test {
 namespace {
 
 using test::OwnedSurface;
@@ -207,4 +207,4 @@ TEST(DisplacedColours, RoughnessOfLobesIsThatOfTheirNormals) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::displace_color_test

@@ -6,7 +6,7 @@
 #include "glint/bake/displace/downsample_heights.h"
 #include "support/test_heights.h"
 
-namespace glint::bake {
+namespace glint::bake::displace_heights_test {
 namespace {
 
 /// Rounding of a transform and of the dense solver of the same problem, relative to heights of order 1.
@@ -85,4 +85,4 @@ TEST(DownsampledHeights, KeepSmoothReliefAndItsMean) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::displace_heights_test

@@ -7,7 +7,7 @@
 #include "glint/math/concentric_map.h"
 #include "glint/query/brdf/vmf_lobe.h"
 
-namespace glint::bake {
+namespace glint::bake::displace_lobes_test {
 namespace {
 
 Vec3 unit(Vec3 v) { return (1 / std::sqrt(dot(v, v))) * v; }
@@ -142,4 +142,4 @@ TEST(VmfLobe, GgxOfOneNormalIsTheBase) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::displace_lobes_test

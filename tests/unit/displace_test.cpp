@@ -13,7 +13,7 @@
 #include "glint/query/brdf/displaced_brdf.h"
 #include "support/test_heights.h"
 
-namespace glint::bake {
+namespace glint::bake::displace_test {
 namespace {
 
 using test::OwnedSurface;
@@ -390,4 +390,4 @@ TEST(DisplacedBrdf, OneBeckmannLobeIsRightForAGaussianSurface) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::displace_test

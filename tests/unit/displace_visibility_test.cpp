@@ -8,7 +8,7 @@
 #include "support/test_heights.h"
 #include "support/traced_surface.h"
 
-namespace glint::bake {
+namespace glint::bake::displace_visibility_test {
 namespace {
 
 using test::OwnedSurface;
@@ -138,4 +138,4 @@ TEST(HeightTracer, RaysAlongAFlatSurfaceEnd) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::displace_visibility_test

@@ -13,7 +13,7 @@
 #include "support/directions.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::environment_test {
 namespace {
 
 using test::BeckmannNdf;
@@ -344,4 +344,4 @@ TEST(Environment, BadInputHasDocumentedAnswers) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::environment_test

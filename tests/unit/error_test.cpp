@@ -5,7 +5,7 @@
 
 #include <string>
 
-namespace glint {
+namespace glint::error_test {
 namespace {
 
 using ::testing::EndsWith;
@@ -53,4 +53,4 @@ TEST(ErrorText, IsOneShortLineWhateverComesIn) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::error_test

@@ -14,7 +14,7 @@
 #include "glint/query/pyramid_ndf.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::far_field_test {
 namespace {
 
 using test::OwnedMap;
@@ -218,4 +218,4 @@ TEST(ThinMaps, RoundFootprintsKeepTheirSizeAlongTheMap) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::far_field_test

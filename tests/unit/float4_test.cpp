@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-namespace glint {
+namespace glint::float4_test {
 namespace {
 
 struct Lanes {
@@ -131,4 +131,4 @@ TEST(Float4, HalfPrecisionNumbers) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::float4_test

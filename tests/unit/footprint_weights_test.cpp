@@ -10,7 +10,7 @@
 #include "glint/query/anisotropic_ndf.h"
 #include "glint/query/detail/bin_map/texel_cover.h"
 
-namespace glint {
+namespace glint::footprint_weights_test {
 namespace {
 
 constexpr int kSize = 2048;
@@ -96,4 +96,4 @@ TEST(FootprintWeights, CentresCloseBelow0AreAtTheEndOfTheMap) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::footprint_weights_test

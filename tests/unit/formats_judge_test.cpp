@@ -14,9 +14,10 @@
 #include "glint/formats/hdf5_handle.h"
 #include "glint/formats/structure.h"
 #include "support/sample_assets.h"
+#include "support/source_folder.h"
 #include "support/temp_folder.h"
 
-namespace glint::formats {
+namespace glint::formats::formats_judge_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -134,7 +135,7 @@ TEST(Judge, Hdf5ReadsTheSameOfEverySample) {
 
 TEST(Judge, Hdf5ReadsTheSameOfEveryGoldenFile) {
   std::size_t count = 0;
-  for (const auto& entry : fs::directory_iterator(fs::path(GLINT_SOURCE_DIR) / "tests/golden/v1.0")) {
+  for (const auto& entry : fs::directory_iterator(test::goldenFolder())) {
     judge(entry.path());
     ++count;
   }
@@ -142,4 +143,4 @@ TEST(Judge, Hdf5ReadsTheSameOfEveryGoldenFile) {
 }
 
 }  // namespace
-}  // namespace glint::formats
+}  // namespace glint::formats::formats_judge_test

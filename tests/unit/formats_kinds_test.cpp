@@ -14,9 +14,10 @@
 #include "glint/formats/kinds/kind.h"
 #include "glint/formats/validate.h"
 #include "support/sample_assets.h"
+#include "support/source_folder.h"
 #include "support/temp_folder.h"
 
-namespace glint::formats {
+namespace glint::formats::formats_kinds_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -126,7 +127,7 @@ TEST(Kinds, OptionalValuesNeedAllOfTheirAttributes) {
 }
 
 TEST_P(EveryKind, IsWrittenAsItsGoldenFile) {
-  const fs::path golden = fs::path(GLINT_SOURCE_DIR) / "tests/golden/v1.0" / (std::string(GetParam().name) + ".glint");
+  const fs::path golden = test::goldenFolder() / (std::string(GetParam().name) + ".glint");
   EXPECT_EQ(bytesOf(path_), bytesOf(golden)) << golden;
 }
 
@@ -233,4 +234,4 @@ TEST_P(EveryKind, WarnsOfWhatItsSchemaDoesNotHave) {
 }
 
 }  // namespace
-}  // namespace glint::formats
+}  // namespace glint::formats::formats_kinds_test

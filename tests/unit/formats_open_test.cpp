@@ -13,7 +13,7 @@
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 
-namespace glint::formats {
+namespace glint::formats::formats_open_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -154,4 +154,4 @@ TEST_F(OpenTest, ManyThreadsOpenAtOnce) {
 }
 
 }  // namespace
-}  // namespace glint::formats
+}  // namespace glint::formats::formats_open_test

@@ -19,7 +19,7 @@
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 
-namespace glint::formats {
+namespace glint::formats::formats_round_trip_test {
 namespace {
 
 using test::TempFolder;
@@ -564,4 +564,4 @@ TEST(DamagedAsset, AFlippedBitOfDataIsFoundWhenHashesAreVerified) {
 }
 
 }  // namespace
-}  // namespace glint::formats
+}  // namespace glint::formats::formats_round_trip_test

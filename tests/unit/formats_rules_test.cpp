@@ -22,10 +22,11 @@
 #include "glint/query/detail/bin_map/bin_blocks.h"
 #include "support/hdf5_bytes.h"
 #include "support/sample_assets.h"
+#include "support/source_folder.h"
 #include "support/temp_folder.h"
 #include "support/test_maps.h"
 
-namespace glint::formats {
+namespace glint::formats::formats_rules_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -1151,7 +1152,7 @@ TEST(FormatVersions, ANewerMajorIsRefusedNamingBothVersions) {
 }
 
 TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
-  const fs::path folder = fs::path(GLINT_SOURCE_DIR) / "tests/golden/v1.0";
+  const fs::path folder = test::goldenFolder();
   std::size_t count = 0;
   for (const auto& entry : fs::directory_iterator(folder)) {
     EXPECT_TRUE(validateAsset(entry.path()).findings.empty()) << entry.path();
@@ -1162,7 +1163,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
-  const fs::path folder = fs::path(GLINT_SOURCE_DIR) / "tests/golden/v1.0";
+  const fs::path folder = test::goldenFolder();
   const Asset normals = Asset::open(folder / "normals.glint");
   EXPECT_EQ(normals.get<NormalMap>().at(5, 3).x, 0.194547504f);
   EXPECT_EQ(normals.get<NormalMap>().at(63, 47).y, -0.139912933f);
@@ -1226,4 +1227,4 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
 }
 
 }  // namespace
-}  // namespace glint::formats
+}  // namespace glint::formats::formats_rules_test

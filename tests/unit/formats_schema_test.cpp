@@ -7,18 +7,19 @@
 #include "glint/formats/rules.h"
 #include "glint/formats/schema.h"
 #include "glint/formats/size_expression.h"
+#include "support/source_folder.h"
 
-namespace glint::formats {
+namespace glint::formats::formats_schema_test {
 namespace {
 
 std::string readText(const std::string& path) {
-  std::ifstream file(std::string(GLINT_SOURCE_DIR) + "/" + path);
+  std::ifstream file(test::sourceFolder() / path);
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
 TEST(Schema, CommittedJsonIsTheTable) {
   if (const char* update = std::getenv("GLINT_UPDATE_SCHEMA"); update != nullptr) {
-    std::ofstream(std::string(GLINT_SOURCE_DIR) + "/formats/schema.json") << apps::schemaText();
+    std::ofstream(test::sourceFolder() / "formats/schema.json") << apps::schemaText();
   }
   EXPECT_EQ(readText("formats/schema.json"), apps::schemaText()) << "run this test with GLINT_UPDATE_SCHEMA=1 to write it anew";
 }
@@ -65,4 +66,4 @@ TEST(Schema, SizeExpressionsThatCannotBeEvaluatedGiveNothing) {
 }
 
 }  // namespace
-}  // namespace glint::formats
+}  // namespace glint::formats::formats_schema_test

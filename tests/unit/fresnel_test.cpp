@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-namespace glint {
+namespace glint::fresnel_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -75,4 +75,4 @@ TEST(Fresnel, IsAShareWhateverItIsAsked) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::fresnel_test

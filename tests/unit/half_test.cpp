@@ -9,7 +9,7 @@
 
 #include "unit/compress_reference.h"
 
-namespace glint {
+namespace glint::half_test {
 namespace {
 
 constexpr int kFiniteHalves = 0x7c00;  // bit patterns below this are the finite magnitudes, in order
@@ -98,4 +98,4 @@ TEST(Half, RoundsToTheNearestAndTiesToEven) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::half_test

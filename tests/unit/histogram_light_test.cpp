@@ -18,7 +18,7 @@
 #include "support/light_reference.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::histogram_light_test {
 namespace {
 
 using test::TestLight;
@@ -168,4 +168,4 @@ TEST(HistogramLight, FresnelAndMaskingAreThoseOfTheMirrorDirection) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::histogram_light_test

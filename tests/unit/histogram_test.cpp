@@ -15,7 +15,7 @@
 #include "glint/query/reference.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::histogram_test {
 namespace {
 
 using Counts = std::map<int, std::int64_t>;
@@ -541,4 +541,4 @@ TEST(HistogramNdf, SamplesKeepStrata) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::histogram_test

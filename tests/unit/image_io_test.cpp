@@ -11,7 +11,7 @@
 #include "glint/formats/atomic_file.h"
 #include "glint/model/error.h"
 
-namespace glint::apps {
+namespace glint::apps::image_io_test {
 namespace {
 
 constexpr std::uint64_t kPlenty = std::uint64_t{1} << 40;  // bytes: more than any image of these tests takes
@@ -146,4 +146,4 @@ TEST(NormalImage, ChecksBitsAgainstTheFormat) {
 }
 
 }  // namespace
-}  // namespace glint::apps
+}  // namespace glint::apps::image_io_test

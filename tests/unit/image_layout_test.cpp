@@ -8,7 +8,7 @@
 #include "common/tiff_tags.h"
 #include "glint/model/error.h"
 
-namespace glint::apps {
+namespace glint::apps::image_layout_test {
 namespace {
 
 /// Pixels of one channel, given from the top.
@@ -136,4 +136,4 @@ TEST(ExifOrientation, IsOneUnlessTheMetadataSayMore) {
 }
 
 }  // namespace
-}  // namespace glint::apps
+}  // namespace glint::apps::image_layout_test

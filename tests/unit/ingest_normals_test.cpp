@@ -13,7 +13,7 @@
 #include "glint/bake/synth/synth.h"
 #include "glint/model/error.h"
 
-namespace glint::bake {
+namespace glint::bake::ingest_normals_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -423,4 +423,4 @@ TEST(NormalBounds, HoldTheirBlockAndOneMoreRowAndColumn) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::ingest_normals_test

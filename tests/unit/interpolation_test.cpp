@@ -18,7 +18,7 @@
 #include "glint/query/reference.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::interpolation_test {
 namespace {
 
 using bake::SynthKind;
@@ -354,4 +354,4 @@ TEST(Interpolation, AnswersAMapThatEndsNearItsBorder) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::interpolation_test

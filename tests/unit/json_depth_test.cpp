@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace glint {
+namespace glint::json_depth_test {
 namespace {
 
 static_assert(jsonDepth("") == 0);
@@ -19,4 +19,4 @@ TEST(JsonDepth, LongTextsAreCountedWhole) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::json_depth_test

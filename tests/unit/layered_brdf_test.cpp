@@ -5,7 +5,7 @@
 #include "support/beckmann_ndf.h"
 #include "support/directions.h"
 
-namespace glint {
+namespace glint::layered_brdf_test {
 namespace {
 
 using test::BeckmannNdf;
@@ -82,4 +82,4 @@ TEST(LayeredBrdf, SamplesHaveTheirPdfAndTheIntegralOfTheBrdf) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::layered_brdf_test

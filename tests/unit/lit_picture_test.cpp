@@ -12,7 +12,7 @@
 #include "measure/workload.h"
 #include "support/test_maps.h"
 
-namespace glint::apps {
+namespace glint::apps::lit_picture_test {
 namespace {
 
 constexpr int kEdge = 64, kSize = 24;
@@ -189,4 +189,4 @@ TEST(GreyFlip, AMovedEdgeCountsMoreThanADimmerSurface) {
 }
 
 }  // namespace
-}  // namespace glint::apps
+}  // namespace glint::apps::lit_picture_test

@@ -16,7 +16,7 @@
 #include "support/bin_weights.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::long_footprints_test {
 namespace {
 
 /// Shares of a footprint that the texels of a map have, [height][width].
@@ -502,4 +502,4 @@ TEST(LongFootprints, SeeOnlyTheMapWhereItEnds) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::long_footprints_test

@@ -7,7 +7,7 @@
 
 #include "common/signals.h"
 
-namespace glint::apps {
+namespace glint::apps::memory_test {
 namespace {
 
 TEST(Memory, TextsAreRoundedUp) {
@@ -29,4 +29,4 @@ TEST(Memory, AllocationsThatMayFailAreNoReasonOfALaterError) {
 }
 
 }  // namespace
-}  // namespace glint::apps
+}  // namespace glint::apps::memory_test

@@ -15,7 +15,7 @@
 #include "support/directions.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::microfacet_brdf_test {
 namespace {
 
 using test::BeckmannNdf;
@@ -425,4 +425,4 @@ TEST(MicrofacetBrdf, BadInputHasDocumentedAnswers) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::microfacet_brdf_test

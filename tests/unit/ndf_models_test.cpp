@@ -18,7 +18,7 @@
 #include "glint/query/reference.h"
 #include "support/c_api.h"
 
-namespace glint {
+namespace glint::ndf_models_test {
 namespace {
 
 /// A model of colours, as a model of waves has them.
@@ -56,8 +56,11 @@ struct ToyPlaneAsset {
 struct ToyWithoutTraits : ToyColours {};
 
 }  // namespace
+}  // namespace glint::ndf_models_test
 
-namespace api {
+namespace glint::api {
+
+using ndf_models_test::ToyColours, ndf_models_test::ToyMixed, ndf_models_test::ToyPlane, ndf_models_test::ToyPlaneAsset;
 
 template <>
 struct NdfTraits<ToyColours> {
@@ -91,8 +94,9 @@ struct NdfTraits<ToyPlane> {
   static constexpr bool kPacks = false;
 };
 
-}  // namespace api
+}  // namespace glint::api
 
+namespace glint::ndf_models_test {
 namespace {
 
 static_assert(NdfModel<ToyColours> && std::same_as<NdfValueOf<ToyColours>, Rgb>);
@@ -200,4 +204,4 @@ TYPED_TEST(EveryNdfModel, HasTheSlopesOfItsAsset) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::ndf_models_test

@@ -7,7 +7,7 @@
 
 #include "glint/formats/number_text.h"
 
-namespace glint::apps {
+namespace glint::apps::numbers_test {
 namespace {
 
 TEST(Numbers, MayHaveASignZerosInFrontAndBlanksAround) {
@@ -74,4 +74,4 @@ TEST(Numbers, InPairsAreJoinedByAnX) {
 }
 
 }  // namespace
-}  // namespace glint::apps
+}  // namespace glint::apps::numbers_test

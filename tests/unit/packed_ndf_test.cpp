@@ -14,7 +14,7 @@
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 
-namespace glint {
+namespace glint::packed_ndf_test {
 namespace {
 
 constexpr int kSize = 64;
@@ -190,4 +190,4 @@ TEST(PackedNdf, LayoutIsAsDocumented) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::packed_ndf_test

@@ -8,7 +8,7 @@
 
 #include "glint/bake/common/counter_random.h"
 
-namespace glint::bake {
+namespace glint::bake::pixel_codes_test {
 namespace {
 
 constexpr std::array kBoth = {0, 1};
@@ -118,4 +118,4 @@ TEST(Sentinel, IsFarFromAllHeights) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::pixel_codes_test

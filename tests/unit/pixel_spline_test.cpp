@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-namespace glint {
+namespace glint::pixel_spline_test {
 namespace {
 
 constexpr int kSteps = 64;  // of integrals along each axis of a pixel
@@ -170,4 +170,4 @@ TEST(PixelSpline, ErrsLessThanConstantPixels) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::pixel_spline_test

@@ -9,7 +9,7 @@
 #include "support/temp_folder.h"
 #include "support/test_maps.h"
 
-namespace glint::apps {
+namespace glint::apps::place_errors_test {
 namespace {
 
 constexpr int kEdge = 48;
@@ -81,4 +81,4 @@ TEST_F(PlaceErrorsTest, DeviateBetweenChoicesOfPlacesAsTheySay) {
 }
 
 }  // namespace
-}  // namespace glint::apps
+}  // namespace glint::apps::place_errors_test

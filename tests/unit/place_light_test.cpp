@@ -10,7 +10,7 @@
 #include "measure/light_blur.h"
 #include "support/test_maps.h"
 
-namespace glint::apps {
+namespace glint::apps::place_light_test {
 namespace {
 
 constexpr int kEdge = 64, kResolution = 128, kCellPixels = 2;
@@ -111,4 +111,4 @@ TEST(PlaceLight, AsksFewerPlacesWhereFootprintsAreLarge) {
 }
 
 }  // namespace
-}  // namespace glint::apps
+}  // namespace glint::apps::place_light_test

@@ -11,7 +11,7 @@
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 
-namespace glint::formats {
+namespace glint::formats::provenance_test {
 namespace {
 
 TEST(Provenance, ChainedInputsNameTheInputTheyBelongTo) {
@@ -55,4 +55,4 @@ TEST(Provenance, NormalsOfAnotherMapAreRefusedForCompressedPyramidsToo) {
 }
 
 }  // namespace
-}  // namespace glint::formats
+}  // namespace glint::formats::provenance_test

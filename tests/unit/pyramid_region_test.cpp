@@ -7,7 +7,7 @@
 #include "glint/bake/pyramid/pyramid.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::pyramid_region_test {
 namespace {
 
 bake::PyramidOptions smallImages(Surface surface, float stride) {
@@ -124,4 +124,4 @@ TEST(PyramidRegion, TexelsThatAreNotReachedAreNotRead) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::pyramid_region_test

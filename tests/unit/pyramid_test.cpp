@@ -15,7 +15,7 @@
 #include "glint/query/reference.h"
 #include "support/test_maps.h"
 
-namespace glint::bake {
+namespace glint::bake::pyramid_test {
 namespace {
 
 using test::OwnedMap;
@@ -440,4 +440,4 @@ TEST(Pyramid, SmallestMapsAndFootprintsLargerThanTheMapWork) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::pyramid_test

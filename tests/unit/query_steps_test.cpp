@@ -15,7 +15,7 @@
 #include "glint/query/detail/compressed/column_layout.h"
 #include "glint/query/detail/pyramid/pyramid_slices.h"
 
-namespace glint {
+namespace glint::query_steps_test {
 namespace {
 
 TEST(LevelPlace, IsTheLogarithmToBase4) {
@@ -102,4 +102,4 @@ TEST(ColumnLayout, FillsTheGroupsThatProductsRead) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::query_steps_test

@@ -15,7 +15,7 @@
 #include "support/test_maps.h"
 #include "unit/compress_reference.h"
 
-namespace glint {
+namespace glint::query_test {
 namespace {
 
 using bake::NdfCpData;
@@ -535,4 +535,4 @@ TEST(PyramidNdf, BoxesInTheOuterHalfTexelOfAClampedSmoothSurfaceAreAnsweredFromI
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::query_test

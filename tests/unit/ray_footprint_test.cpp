@@ -8,7 +8,7 @@
 
 #include "glint/query/detail/common/footprint_weights.h"
 
-namespace glint {
+namespace glint::ray_footprint_test {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -92,4 +92,4 @@ TEST(RayCone, MakesAFootprintStretchedAlongTheRay) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::ray_footprint_test

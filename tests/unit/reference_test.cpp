@@ -11,7 +11,7 @@
 #include "glint/bake/common/reference_image.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::reference_test {
 namespace {
 
 using test::OwnedMap;
@@ -487,4 +487,4 @@ TEST(Reference, SmallestMapsWork) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::reference_test

@@ -23,7 +23,7 @@
 #include "glint/query/reference.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::sample_test {
 namespace {
 
 using bake::NdfCpData;
@@ -394,7 +394,7 @@ TEST(Sample, OfReferenceFollowsTheMean) {
 TEST(Sample, OfReferenceOnSmoothSurfacesFollowsTheMean) {
   for (const Boundary boundary : {Boundary::wrap, Boundary::clamp}) {
     const Reference model(cases()[0]->map.map(), 0.05f, Surface::smooth, boundary, Reference::Search::pruned);
-    expectSamplesFollowTheMean(model, "smooth", mixedFootprints(0.25f), 2000);
+    expectSamplesFollowTheMean(model, "smooth", mixedFootprints(0.25f), 800);
   }
 }
 
@@ -558,4 +558,4 @@ TEST(Sample, BelowTheFinestLevelTheTexelsAreSampled) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::sample_test

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace glint::bake {
+namespace glint::bake::seen_error_test {
 namespace {
 
 constexpr int kResolution = 256, kCell = 4;
@@ -146,4 +146,4 @@ TEST(SeenError, RelatesToTheLightOfAllPlacesThatAreKnown) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::seen_error_test

@@ -13,7 +13,7 @@
 #include "glint/model/error.h"
 #include "glint/query/light/sh_lobe_table.h"
 
-namespace glint {
+namespace glint::sh_basis_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -293,4 +293,4 @@ TEST(ShLobes, RefusesWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::sh_basis_test

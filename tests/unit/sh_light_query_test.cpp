@@ -11,7 +11,7 @@
 #include "glint/query/light/sh_transfer.h"
 #include "support/light_reference.h"
 
-namespace glint {
+namespace glint::sh_light_query_test {
 namespace {
 
 using test::FixedHistogram;
@@ -265,4 +265,4 @@ TEST(RatioEstimator, TendsToShadowedLight) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::sh_light_query_test

@@ -13,7 +13,7 @@
 #include "glint/model/error.h"
 #include "glint/query/light/sh_basis.h"
 
-namespace glint::bake {
+namespace glint::bake::sh_light_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -406,4 +406,4 @@ TEST(AreaLights, DegenerateLightsAreRefused) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::sh_light_test

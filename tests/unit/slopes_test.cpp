@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-namespace glint::bake {
+namespace glint::bake::slopes_test {
 namespace {
 
 TEST(NormalFromSlopes, StaysInsideTheDiskHoweverSteep) {
@@ -62,4 +62,4 @@ TEST(SeamRoughness, ComparesTheSeamWithTheRoughestPlaceInside) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::slopes_test

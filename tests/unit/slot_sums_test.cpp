@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace glint {
+namespace glint::slot_sums_test {
 namespace {
 
 /// What of a list of texels counts: ranges of columns and rows may be empty, one number, reach beyond the cell, or hold all.
@@ -222,4 +222,4 @@ TEST(SlotSums, AreTheSameToTheBitByEightAndByOne) {
 #endif
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::slot_sums_test

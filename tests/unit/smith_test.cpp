@@ -13,7 +13,7 @@
 #include "support/directions.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::smith_test {
 namespace {
 
 using test::BeckmannNdf;
@@ -166,4 +166,4 @@ TEST(MapSlopes, ReachThePyramidAndWhatIsCompressedFromIt) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::smith_test

@@ -11,7 +11,7 @@
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 
-namespace glint {
+namespace glint::streamed_writer_test {
 namespace {
 
 std::string bytesOf(const std::filesystem::path& path) {
@@ -78,4 +78,4 @@ TEST_F(StreamedWriter, HashesInPiecesFindDamage) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::streamed_writer_test

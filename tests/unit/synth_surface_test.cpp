@@ -11,7 +11,7 @@
 #include "glint/bake/synth/synth.h"
 #include "glint/model/error.h"
 
-namespace glint::bake {
+namespace glint::bake::synth_surface_test {
 namespace {
 
 constexpr SynthKind kAllKinds[] = {SynthKind::isotropic, SynthKind::brushed,    SynthKind::flakes,     SynthKind::scratches,
@@ -367,4 +367,4 @@ TEST(Slopes, AreTheCentralDifferencesOfAPeriodicField) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::synth_surface_test

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace glint {
+namespace glint::texel_filter_test {
 namespace {
 
 /// A code, ranges for its fields, and texels; many of the ranges are empty, one number, or hold all.
@@ -84,4 +84,4 @@ TEST(TexelFilter, VisitsTheTexelsThatMatchInOrder) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::texel_filter_test

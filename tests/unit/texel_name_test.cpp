@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace glint {
+namespace glint::texel_name_test {
 namespace {
 
 TEST(TexelName, CountsRowsFromTheTop) {
@@ -19,4 +19,4 @@ TEST(TexelTally, RemembersTheFirstFromTheTop) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::texel_name_test

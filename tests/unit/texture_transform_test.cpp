@@ -13,7 +13,7 @@
 #include "support/directions.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::texture_transform_test {
 namespace {
 
 static_assert(NdfModel<PlacedNdf<Reference>>);
@@ -275,4 +275,4 @@ TEST(TextureTransform, KeepsTexelsFarOut) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::texture_transform_test

@@ -18,7 +18,7 @@
 #include "glint/query/tiny_example_ndf.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::tiny_test {
 namespace {
 
 constexpr int kSize = 16;
@@ -664,4 +664,4 @@ TEST(TinyExample, RefusesWhatCannotBe) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::tiny_test

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-namespace glint {
+namespace glint::triangle_lobe_test {
 namespace {
 
 /// Gauss-Legendre panels no longer than one deviation (triangleDensity) and Radon's rule on pieces of about a deviation
@@ -231,4 +231,4 @@ TEST(TriangleLobe, MassOfATinyBoxIsTheDensityTimesItsArea) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::triangle_lobe_test

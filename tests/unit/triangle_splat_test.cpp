@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace glint::bake {
+namespace glint::bake::triangle_splat_test {
 namespace {
 
 constexpr int kBins = 128;  // of the fine grid along each axis
@@ -98,4 +98,4 @@ TEST(TriangleSplatter, TrianglesAlongTheAxesKeepMassMeanAndSpread) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::triangle_splat_test

@@ -28,7 +28,7 @@
 #include "glint/query/reference.h"
 #include "support/temp_folder.h"
 
-namespace glint {
+namespace glint::udim_test {
 namespace {
 
 constexpr int kWidth = 112, kHeight = 88, kMargin = 64;  // of a tile
@@ -533,4 +533,4 @@ TEST(Udim, TilesAreValidAssetsAndBadPlacesAreNot) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::udim_test

@@ -17,7 +17,7 @@
 #include "glint/query/wang_reference.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::wang_plane_test {
 namespace {
 
 constexpr int kSize = 64, kResolution = 64;
@@ -332,4 +332,4 @@ TEST(WangPyramid, RefusesSmoothSurfaces) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::wang_plane_test

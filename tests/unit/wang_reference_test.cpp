@@ -14,7 +14,7 @@
 #include "glint/query/reference.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::wang_reference_test {
 namespace {
 
 constexpr float kSigmaR = 0.05f;
@@ -267,4 +267,4 @@ TEST(WangReference, AnswersAreFiniteWhateverIsAsked) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::wang_reference_test

@@ -18,7 +18,7 @@
 #include "glint/query/wang_layout.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::wang_test {
 namespace {
 
 using bake::SeamSide;
@@ -384,4 +384,4 @@ TEST(ExplicitPlane, PartsFitTogether) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::wang_test

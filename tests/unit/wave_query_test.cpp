@@ -15,7 +15,7 @@
 #include "support/sample_assets.h"
 #include "support/temp_folder.h"
 
-namespace glint {
+namespace glint::wave_query_test {
 namespace {
 
 constexpr int kSize = 64;
@@ -251,4 +251,4 @@ TEST_F(WaveAsset, AnswersColoursThroughTheCInterface) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::wave_query_test

@@ -17,7 +17,7 @@
 #include "glint/query/pyramid_ndf.h"
 #include "support/wave_reference.h"
 
-namespace glint {
+namespace glint::wave_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -392,4 +392,4 @@ TEST(WavePyramid, RefusesWhatItCannotAnswer) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::wave_test

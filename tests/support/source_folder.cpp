@@ -1,0 +1,7 @@
+#include "support/source_folder.h"
+
+namespace glint::test {
+
+std::filesystem::path sourceFolder() { return GLINT_SOURCE_DIR; }
+
+}  // namespace glint::test
