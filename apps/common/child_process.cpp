@@ -96,6 +96,23 @@ std::string lastLine(std::string text) {
   return line == std::string::npos ? text : text.substr(line + 1);
 }
 
+/// The signals that a program holds back.
+class SpawnAttributes {
+ public:
+  explicit SpawnAttributes(const sigset_t& mask) {
+    posix_spawnattr_init(&attributes_);
+    posix_spawnattr_setsigmask(&attributes_, &mask);
+    posix_spawnattr_setflags(&attributes_, POSIX_SPAWN_SETSIGMASK);
+  }
+  SpawnAttributes(const SpawnAttributes&) = delete;
+  SpawnAttributes& operator=(const SpawnAttributes&) = delete;
+  ~SpawnAttributes() { posix_spawnattr_destroy(&attributes_); }
+  const posix_spawnattr_t* get() const { return &attributes_; }
+
+ private:
+  posix_spawnattr_t attributes_;
+};
+
 /// What a program gets of this process.
 class FileActions {
  public:
@@ -120,6 +137,24 @@ class FileActions {
   posix_spawn_file_actions_t actions_;
 };
 
+/// Starts a program.
+/// @param words  its arguments, from its name on
+/// @return its number. Throws Error (failed)
+pid_t start(const std::string& program, const std::vector<std::string>& words, const FileActions& actions,
+            const sigset_t& mask) {
+  std::vector<char*> argv;
+  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.push_back(nullptr);
+  const SpawnAttributes attributes(mask);
+  pid_t child = 0;
+  if (const int failure = ::posix_spawn(&child, program.c_str(), actions.get(), attributes.get(), argv.data(), environ);
+      failure != 0) {
+    throw Error(ErrorCode::failed, "process.start", program, "", std::string("cannot be started: ") + std::strerror(failure),
+                "install the whole package: programs of one folder call each other");
+  }
+  return child;
+}
+
 double seconds(const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); }
 
 }  // namespace
@@ -134,20 +169,14 @@ std::vector<std::string> childFlags(const Tool& tool) {
 ChildRun runProgram(const std::vector<std::string>& words, const ChildOptions& options) {
   const std::string folder = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
   const std::string program = folder + "/" + words.front();
-  std::vector<char*> argv;
-  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
-  argv.push_back(nullptr);
   Pipe output, errors;
-  const FileActions actions(output, errors, options);
-  const auto start = std::chrono::steady_clock::now();
+  const auto begin = std::chrono::steady_clock::now();
   pid_t child = 0;
-  if (const int failure = ::posix_spawn(&child, program.c_str(), actions.get(), nullptr, argv.data(), environ); failure != 0) {
-    throw Error(ErrorCode::failed, "process.start", program, "", std::string("cannot be started: ") + std::strerror(failure),
-                "install the whole package: programs of one folder call each other");
-  }
   ChildRun run;
   {
-    const ChildScope ends_with_us(child);
+    const ChildScope ends_with_us(
+        [&](const sigset_t& mask) { return start(program, words, FileActions(output, errors, options), mask); });
+    child = ends_with_us.process();
     output.closeWrite(), errors.closeWrite();
     watch(child, {std::pair{output.read, &run.output}, std::pair{errors.read, &run.message}}, run.peak_bytes);
     siginfo_t ended{};  // still a process of ours: its number belongs to nobody else before the scope ends
@@ -162,7 +191,7 @@ ChildRun runProgram(const std::vector<std::string>& words, const ChildOptions& o
       throw Error(ErrorCode::failed, "process.start", program, "",
                   std::string("cannot be waited for: ") + std::strerror(errno));
   }
-  run.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  run.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   run.exit_code = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
   run.peak_bytes = peakOf(usage, run.peak_bytes);
   run.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);

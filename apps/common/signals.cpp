@@ -1,6 +1,7 @@
 #include "common/signals.h"
 
 #include <errno.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -23,7 +24,13 @@ static_assert(std::atomic<pid_t>::is_always_lock_free, "a handler of signals rea
 std::atomic<int> stop_signal = 0;
 static_assert(std::atomic<int>::is_always_lock_free, "a handler of signals sets it");
 
+std::atomic<int> children_without_slot = 0;  // being started
+static_assert(std::atomic<int>::is_always_lock_free, "a handler of signals reads it");
+
 void endChildren() {
+  // By other threads only: who starts a child holds signals back. Starting takes milliseconds.
+  constexpr int kMostWait_ms = 1000;
+  for (int k = 0; k < kMostWait_ms && children_without_slot > 0; ++k) ::poll(nullptr, 0, 1);
   for (const std::atomic<pid_t>& child : running_children)
     if (const pid_t process = child; process > 0) ::kill(process, SIGTERM);
 }
@@ -81,6 +88,29 @@ void stopBy(int signal) {
   throw std::bad_alloc();
 }
 
+/// While a child is started, signals that end the process wait in this thread, and their handlers wait in others.
+class HeldSignals {
+ public:
+  HeldSignals() {
+    ++children_without_slot;
+    sigset_t ending;
+    ::sigemptyset(&ending);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) ::sigaddset(&ending, signal);
+    ::pthread_sigmask(SIG_BLOCK, &ending, &mask_);
+  }
+  ~HeldSignals() {
+    --children_without_slot;
+    ::pthread_sigmask(SIG_SETMASK, &mask_, nullptr);
+  }
+  HeldSignals(const HeldSignals&) = delete;
+  HeldSignals& operator=(const HeldSignals&) = delete;
+  /// The mask before.
+  const sigset_t& mask() const { return mask_; }
+
+ private:
+  sigset_t mask_ = {};
+};
+
 /// Set before main() takes memory.
 [[maybe_unused]] const std::terminate_handler handler_before = std::set_terminate(onTerminate);
 [[maybe_unused]] const std::new_handler new_handler_before = std::set_new_handler(onNoMemory);
@@ -104,13 +134,15 @@ SignalScope::~SignalScope() {
   pipe_ended_process = false;
 }
 
-ChildScope::ChildScope(pid_t child) : slot_(0) {
+ChildScope::ChildScope(const std::function<pid_t(const sigset_t& mask)>& start) {
+  const HeldSignals held;
+  process_ = start(held.mask());
   for (; slot_ < running_children.size(); ++slot_) {
     pid_t none = 0;
-    if (running_children[slot_].compare_exchange_strong(none, child)) break;
+    if (running_children[slot_].compare_exchange_strong(none, process_)) break;
   }
   if (slot_ == running_children.size()) throw std::logic_error("too many children");
-  if (stop_signal != 0) ::kill(child, SIGTERM);  // the signal came before the child had its slot
+  if (stop_signal != 0) ::kill(process_, SIGTERM);  // the signal came before this child was started
 }
 
 ChildScope::~ChildScope() { running_children[slot_] = 0; }

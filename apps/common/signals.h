@@ -5,6 +5,7 @@
 #include <array>
 #include <csignal>
 #include <cstddef>
+#include <functional>
 
 namespace glint::apps {
 
@@ -31,14 +32,17 @@ class SignalScope {
 /// A process that ends with this one: as long as the scope lives, a signal that ends this process is sent to it as TERM.
 class ChildScope {
  public:
-  /// @param child  a process that this one has started, and has not waited for before the end of the scope
-  explicit ChildScope(pid_t child);
+  /// @param start  starts a process that gets this mask of signals, and returns its number; nobody waits for the process before the
+  ///               end of the scope. Signals that end this process are held back meanwhile: no process is missed.
+  explicit ChildScope(const std::function<pid_t(const sigset_t& mask)>& start);
   ChildScope(const ChildScope&) = delete;
   ChildScope& operator=(const ChildScope&) = delete;
   ~ChildScope();
+  pid_t process() const { return process_; }
 
  private:
-  std::size_t slot_;
+  std::size_t slot_ = 0;
+  pid_t process_ = 0;
 };
 /// Most processes that end with this one.
 inline constexpr std::size_t kMostChildren = 256;
