@@ -57,6 +57,19 @@ def ask(glint, *arguments):
     return json.loads(process.stdout)["result"]
 
 
+def test_bands_that_the_normals_do_not_have_are_left_out(glint, folder):
+    """Gamboa 2018, section 4.2: a broad, even distribution of normals has few bands, a single facet all of its lobe's."""
+    write_exr(folder / "env.exr", np.random.default_rng(1).uniform(0, 3, (HEIGHT, 2 * HEIGHT, 3)))
+    glint("shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 40, "--grid", "5x8")
+    glint("synth", "isotropic", "--size", 64, "--alpha", 0.4, "-o", "n.exr")
+    glint("ingest", "n.exr", "-o", "n.glint")
+    asked = ["n.glint", "--light", "light.glint", "--sigma-r", 0.1, "--wo", 0.2, 0.1, 1, "--uv", 0.4, 0.6]
+    whole, few = (ask(glint, *asked, "--sigma", 12, *more) for more in ([], ["--ndf-epsilon", 1e-2]))
+    assert whole["order"] == 40 and few["order"] < 30
+    assert few["radiance"] == pytest.approx(whole["radiance"], rel=0.02)
+    assert ask(glint, *asked, "--sigma", 0.3, "--ndf-epsilon", 1e-6)["order"] == 40
+
+
 def test_flat_mirror_under_constant_light_reflects_it(glint, folder):
     """A flat map with F = G = 1 reflects constant light L as L cos / cos: the half vectors' 4 (wo . h) over 4 cos(wo)."""
     write_exr(folder / "env.exr", constant(2))
