@@ -51,6 +51,26 @@ def test_same_bytes_with_any_number_of_threads(glint, folder):
         assert (folder / f"{name}1.glint").read_bytes() == (folder / f"{name}2.glint").read_bytes()
 
 
+def test_gaussians_are_fitted_to_the_light(glint, folder):
+    """Deng 2022, section 5.4: three lobes come back from the image of their light."""
+    rows, columns = np.meshgrid(np.arange(64), np.arange(128), indexing="ij")
+    theta, phi = math.pi * (rows + 0.5) / 64, 2 * math.pi * (columns + 0.5) / 128  # top row first
+    w = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    lobes = [((0.6, 0, 0.8), 40, (5, 4, 3)), ((0, -0.8, 0.6), 15, (1, 2, 6))]
+    write_exr(folder / "env.exr", sum(np.exp(s * (w @ np.array(a) - 1))[..., None] * np.array(c) for a, s, c in lobes))
+    arguments = ["--light", "env.exr", "--order", 4, "--grid", "5x8", "--gaussians", 2, "--json"]
+    process = glint("shlobes", *arguments, "-o", "light.glint")
+    assert process.returncode == 0, process.stderr
+    fit = json.loads(process.stdout)["result"]["gaussians"]
+    assert fit["error"] < 0.03
+    for axis, sharpness, amplitude in lobes:
+        found = max(fit["lobes"], key=lambda lobe: np.dot(lobe["axis"], axis))
+        assert np.dot(found["axis"], axis) > 0.9995
+        assert found["sharpness"] == pytest.approx(sharpness, rel=0.06)
+        assert found["amplitude"] == pytest.approx(amplitude, rel=0.06)
+    assert "add --light" in glint("shlobes", "--sigma-r", 0.1, "--gaussians", 2, "-o", "l.glint").stderr
+
+
 def ask(glint, *arguments):
     process = glint("query", "light", *arguments, "--json")
     assert process.returncode == 0, process.stderr
