@@ -21,7 +21,7 @@ struct GtrDistribution {
 
   /// The constant c, with which D integrates to 1 over the disk.
   GLINT_HD double scale() const {
-    const double a2 = double{alpha} * alpha, g = double{gamma} - 1;
+    const double a2 = double{alpha} * double{alpha}, g = double{gamma} - 1;
     const double mass = std::fabs(g) < 1e-4 ? -std::log(a2) : (std::pow(a2, -g) - 1) / g;
     return (1 - a2) / (3.14159265358979323846 * mass);
   }
@@ -30,13 +30,13 @@ struct GtrDistribution {
   GLINT_HD float density(Vec2 h) const {
     const double sine2 = dot(h, h);
     if (!(sine2 < 1)) return 0;
-    const double a2 = double{alpha} * alpha;
+    const double a2 = double{alpha} * double{alpha};
     return static_cast<float>(scale() / std::pow(a2 + (1 - a2) * sine2, double{gamma}));
   }
 
   /// Density of the slopes r, for each unit of area of the plane of slopes.
   GLINT_HD double slopeDensity(double r) const {
-    const double a2 = double{alpha} * alpha, r2 = r * r;
+    const double a2 = double{alpha} * double{alpha}, r2 = r * r;
     return scale() * std::pow(1 + r2, double{gamma} - 2) / std::pow(a2 + r2, double{gamma});
   }
 };
@@ -55,8 +55,8 @@ class GtrMasking {
   /// @param flakes  parameters out of range are clamped; NaN counts as the smallest
   GLINT_HD explicit GtrMasking(GtrDistribution flakes) : flakes_(inRange(flakes)) {
     for (int k = 0; k < kNodes; ++k) {
-      const double m = flakes_.alpha * std::expm1(kStep * k);
-      logs_[k] = static_cast<float>(std::log(excess(m) * (m + flakes_.alpha)));
+      const double m = double{flakes_.alpha} * std::expm1(kStep * k);
+      logs_[k] = static_cast<float>(std::log(excess(m) * (m + double{flakes_.alpha})));
     }
   }
 
@@ -86,7 +86,7 @@ class GtrMasking {
   /// r^2 = m^2 + y^2, summed over even steps of log y.
   GLINT_HD double excess(double m) const {
     constexpr double kLogStep = 0.05, kLeast = 1e-5, kMost = 1e7;
-    const double first = std::log(kLeast * flakes_.alpha);
+    const double first = std::log(kLeast * double{flakes_.alpha});
     const int count = static_cast<int>((std::log(kMost) - first) / kLogStep);
     double sum = 0;
     for (int k = 0; k <= count; ++k) {

@@ -124,7 +124,7 @@ inline GLINT_HD void powerShares(const SphericalGaussians& lights, float* shares
     total += double{shares[k]};
   }
   for (std::size_t k = 0; k < lights.count; ++k)
-    shares[k] = total > 0 && std::isfinite(total) ? static_cast<float>(shares[k] / total) : 0.0f;
+    shares[k] = total > 0 && std::isfinite(total) ? static_cast<float>(double{shares[k]} / total) : 0.0f;
 }
 
 /// Radiance from one lobe that is chosen by its power, over its probability: the estimator of Deng 2022, section 5.4. Its mean is
