@@ -1,7 +1,7 @@
 // Light integrals by spherical harmonics against quadrature, and against Monte Carlo at equal error:
 //   glint-sh-bench [--quick] [--band-limit]
-// --band-limit: only what the band limit of the footprint's normals saves. Prints one JSON object. Errors are RMS over outgoing directions and colours, relative to the RMS of the truth. Times are
-// thread CPU time, medians.
+// --band-limit: only what the band limit of the footprint's normals saves. Prints one JSON object. Errors are RMS over
+// outgoing directions and colours, relative to the RMS of the truth. Times are thread CPU time, medians.
 
 #include <time.h>
 
@@ -213,8 +213,8 @@ json errorsByGrid(bool quick) {
   return rows;
 }
 
-/// Cost against error as bands are left out that the footprint's own normals do not have (Gamboa 2018, section 4.2): three footprints,
-/// from glints to a smooth pixel.
+/// Cost against error as bands are left out that the footprint's own normals do not have (Gamboa 2018, section 4.2): three
+/// footprints, from glints to a smooth pixel.
 json timesByBandLimit(bool quick) {
   constexpr float kSigma = 0.05f;
   const int order = quick ? 30 : 60;

@@ -29,8 +29,8 @@ double imagesOf(const PyramidShape& shape) {
   return count;
 }
 
-/// Images of the paper's grid: one at each of the (N + 1)^2 corners of the N^2 squares of a level, with N halved from level to level
-/// down to one square, and one more.
+/// Images of the paper's grid: one at each of the (N + 1)^2 corners of the N^2 squares of a level, with N halved from level
+/// to level down to one square, and one more.
 double cornerImages(int texels, int stride) {
   double count = 1;
   for (int squares = texels / stride; squares >= 1; squares /= 2) count += (squares + 1.0) * (squares + 1.0);

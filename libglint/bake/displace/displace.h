@@ -60,7 +60,8 @@ class DisplacementData {
 /// The original surface is the periodic triangulation of the heights (HeightSurface). On a flat map T = S = 1.
 /// @throws Error usage if an option is out of range; invalid_input if heights are not finite, a facet is steeper than 80
 ///         degrees, a factor is larger than the map, or the texture is not of the map's size or out of range
-/// @note memory: about 85 bytes for each texel of the map with 15^2 directions, and N^4 times 16 bytes a patch and channel. The result does not depend on the number of threads
+/// @note memory: about 85 bytes for each texel of the map with 15^2 directions, and N^4 times 16 bytes a patch and channel.
+///         The result does not depend on the number of threads
 DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, const ProgressFn& progress = {});
 
 /// Fits lobes to the normals of every cell of a coarser grid, and fills the lobes, their colours and roughness, the slope

@@ -12,8 +12,8 @@ namespace glint::bake {
 inline constexpr double kLaplacianWeight = 0.01;
 
 /// Mean slopes of the surface over each cell of a coarser grid (Wu 2019, Eq. 1). Cell (I, J) covers cells (i, j) of the surface
-/// with firstColumn(I) <= i < firstColumn(I + 1) and firstRow(J) <= j < firstRow(J + 1). Exact for triangles and for bilinear patches: the
-/// integral of a slope over an area is the integral of the height difference between opposite sides.
+/// with firstColumn(I) <= i < firstColumn(I + 1) and firstRow(J) <= j < firstRow(J + 1). Exact for triangles and for bilinear
+/// patches: the integral of a slope over an area is the integral of the height difference between opposite sides.
 /// @param heights  [grid.height][grid.width]
 /// @return [grid.rows][grid.columns]
 std::vector<Vec2> meanSlopes(std::span<const float> heights, const CellGrid& grid);

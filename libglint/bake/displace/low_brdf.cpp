@@ -104,8 +104,8 @@ void fillDiffuseRows(const DirectionTable& directions, std::span<const VmfLobe> 
   }
 }
 
-/// Directions in a space where the cells of a grid are squares of the length `factor`. Which facets a direction sees, and on which
-/// side of them it is, are the same there.
+/// Directions in a space where the cells of a grid are squares of the length `factor`. Which facets a direction sees, and on
+/// which side of them it is, are the same there.
 std::vector<Vec3> squared(std::span<const Vec3> directions, const PatchGrid& grid) {
   std::vector<Vec3> out(directions.begin(), directions.end());
   const float across = static_cast<float>(grid.factor) / grid.cells().cellWidth(),

@@ -11,8 +11,8 @@ namespace glint::bake {
 /// Memory that the sums of chunks take before they are added, bytes.
 inline constexpr std::size_t kOrderedSumBytes = std::size_t{1} << 28;
 
-/// Computes the sums of chunks in parallel, and adds them in the order of the chunks, so that results do not depend on threads. As
-/// many sums as fit into kOrderedSumBytes are held at a time, and at least four.
+/// Computes the sums of chunks in parallel, and adds them in the order of the chunks, so that results do not depend on
+/// threads. As many sums as fit into kOrderedSumBytes are held at a time, and at least four.
 /// @param bytes  size of one sum
 /// @param make   make(chunk) returns the sum of a chunk
 /// @param add    add(chunk, sum)

@@ -32,9 +32,9 @@ struct ScalingFactors {
 /// and the denominators), so that the effective BRDF of the whole map equals the original's exactly.
 ///
 /// If the residual of T S is above the tolerance, terms are added until it is not. Their spatial factors are the left singular
-/// vectors of the part of R - T S across T, the largest first. For each pair of directions the angular factors of all terms are those of the least
-/// squared error, weighted by the light of the denominators, among those with which the whole map still reflects what the
-/// original does.
+/// vectors of the part of R - T S across T, the largest first. For each pair of directions the angular factors of all terms
+/// are those of the least squared error, weighted by the light of the denominators, among those with which the whole map
+/// still reflects what the original does.
 /// @param tolerance  largest residual; with 0 there is one term
 /// @return as many terms as the tolerance needs, at most kMostScaleTerms and the number of patches
 ScalingFactors factorScaling(const EffectiveBrdf& original, const EffectiveBrdf& low, std::span<const Vec3> directions,

@@ -8,7 +8,8 @@
 
 namespace glint {
 
-/// The GTR distribution of normals (Burley 2012), which Atanasov 2021 draw metallic flakes from (Fig. 1: gamma 1.5, alpha .002).
+/// The GTR distribution of normals (Burley 2012), which Atanasov 2021 draw metallic flakes from (Fig. 1: gamma 1.5, alpha
+/// .002).
 ///
 ///   D(h) = c / (alpha^2 cos^2 + sin^2)^gamma,  gamma 2 is GGX
 ///
@@ -41,13 +42,13 @@ struct GtrDistribution {
   }
 };
 
-/// Shadowing and masking of a surface whose normals follow a GTR distribution: G_x of Atanasov 2021, section 6, where Smith's term is
-/// that of the flakes' distribution (Dimov 2015). Has what SmithMasking has, and takes its place in BasicBinMapBrdf.
+/// Shadowing and masking of a surface whose normals follow a GTR distribution: G_x of Atanasov 2021, section 6, where Smith's
+/// term is that of the flakes' distribution (Dimov 2015). Has what SmithMasking has, and takes its place in BasicBinMapBrdf.
 ///
-/// GTR slopes have so long a tail that their variance is infinite: a normal distribution of the same variance, which SmithMasking
-/// takes, shadows far more than flakes do. The area that facets turn towards w is A(w) = cos + sin T(cot), with
-/// T(m) = E[max(0, q - m)] over slopes q along the azimuth. T is computed once, by quadrature, at kNodes values of m that are even in
-/// log(1 + m / alpha); between these its logarithm is a cubic: within 2e-3 of the quadrature.
+/// GTR slopes have so long a tail that their variance is infinite: a normal distribution of the same variance, which
+/// SmithMasking takes, shadows far more than flakes do. The area that facets turn towards w is A(w) = cos + sin T(cot), with
+/// T(m) = E[max(0, q - m)] over slopes q along the azimuth. T is computed once, by quadrature, at kNodes values of m that are
+/// even in log(1 + m / alpha); between these its logarithm is a cubic: within 2e-3 of the quadrature.
 ///
 /// Directions are unit vectors with w.z > 0. Allocates nothing; 516 bytes.
 class GtrMasking {
@@ -82,8 +83,8 @@ class GtrMasking {
     return 0.25f / (projectedArea(wi) * wo.z + projectedArea(wo) * wi.z - wi.z * wo.z);
   }
 
-  /// T(m) by quadrature, exact to 1e-5 of it: E[max(0, q - m)] is the integral of 2 y p(r) (y - m atan(y / m)) dy over the slopes
-  /// r^2 = m^2 + y^2, summed over even steps of log y.
+  /// T(m) by quadrature, exact to 1e-5 of it: E[max(0, q - m)] is the integral of 2 y p(r) (y - m atan(y / m)) dy over the
+  /// slopes r^2 = m^2 + y^2, summed over even steps of log y.
   GLINT_HD double excess(double m) const {
     constexpr double kLogStep = 0.05, kLeast = 1e-5, kMost = 1e7;
     const double first = std::log(kLeast * double{flakes_.alpha});

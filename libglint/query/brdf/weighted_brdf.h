@@ -6,12 +6,12 @@
 
 namespace glint {
 
-/// A diffuse and a specular part with weights of their own: f = diffuse / pi + specular f_s (Gamboa 2018, Eq. 1, where rho_d stands
-/// for diffuse / pi).
+/// A diffuse and a specular part with weights of their own: f = diffuse / pi + specular f_s (Gamboa 2018, Eq. 1, where rho_d
+/// stands for diffuse / pi).
 ///
 /// Reciprocal as f_s is. With diffuse + specular <= 1 in each channel it reflects no more than all light wherever f_s does so.
-/// Samples come from the parts in proportion to their mean weights. Holds a copy of the specular BRDF, whose model must outlive it.
-/// Thread-safe, allocates nothing.
+/// Samples come from the parts in proportion to their mean weights. Holds a copy of the specular BRDF, whose model must
+/// outlive it. Thread-safe, allocates nothing.
 /// @tparam Specular  evaluateWithPdf(wi, wo) -> BrdfValue and sample(wo, xi) -> BrdfSample: MicrofacetBrdf, LayeredBrdf
 template <class Specular>
 class WeightedBrdf {

@@ -113,8 +113,8 @@ GLINT_HD Rgb prefilteredRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const S
   return sum;
 }
 
-/// Fills the probability of each lobe by its power: its integral times the luminance of its amplitude, over that of all. Lobes that
-/// are not usable, or darker than black, have 0; all have 0 where there is no light.
+/// Fills the probability of each lobe by its power: its integral times the luminance of its amplitude, over that of all.
+/// Lobes that are not usable, or darker than black, have 0; all have 0 where there is no light.
 /// @param shares  room for lights.count numbers
 inline GLINT_HD void powerShares(const SphericalGaussians& lights, float* shares) {
   double total = 0;
@@ -127,9 +127,10 @@ inline GLINT_HD void powerShares(const SphericalGaussians& lights, float* shares
     shares[k] = total > 0 && std::isfinite(total) ? static_cast<float>(double{shares[k]} / total) : 0.0f;
 }
 
-/// Radiance from one lobe that is chosen by its power, over its probability: the estimator of Deng 2022, section 5.4. Its mean is
-/// the sum over all lobes with the same range, at the cost of one lobe; its noise is that of the choice. prefilteredRadiance of all
-/// lobes has no noise, and costs as many ranges as there are lobes (tests/unit/one_lobe_test.cpp compares them at equal cost).
+/// Radiance from one lobe that is chosen by its power, over its probability: the estimator of Deng 2022, section 5.4. Its
+/// mean is the sum over all lobes with the same range, at the cost of one lobe; its noise is that of the choice.
+/// prefilteredRadiance of all lobes has no noise, and costs as many ranges as there are lobes (tests/unit/one_lobe_test.cpp
+/// compares them at equal cost).
 /// @param shares  of powerShares
 /// @param xi      in [0, 1)
 template <NdfModel M>

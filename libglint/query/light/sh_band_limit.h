@@ -13,10 +13,10 @@ namespace glint {
 /// The band limit of a sum of turned lobes, without its coefficients (Gamboa 2018, section 4.2): the norm of band l is
 ///   |D_l| = zonalFactor(l, f_l) |Y_l|,  |Y_l|^2 = sum over m of (sum over b of w_b y_l^m(n_b))^2.
 ///
-/// By the addition theorem |Y_l|^2 is (2l + 1)^2 / (4 pi) times the mean over all axes a of (sum over b of w_b P_l(a . n_b))^2. The
-/// mean is taken over kAxes axes, spread evenly over a hemisphere: a single sum of Legendre polynomials for each axis and bin, so
-/// O(kAxes * order) for each bin instead of the O(order^2) of its harmonics. The estimate scatters by about 30 %; `last` allows for
-/// kSafety times that.
+/// By the addition theorem |Y_l|^2 is (2l + 1)^2 / (4 pi) times the mean over all axes a of (sum over b of w_b P_l(a .
+/// n_b))^2. The mean is taken over kAxes axes, spread evenly over a hemisphere: a single sum of Legendre polynomials for each
+/// axis and bin, so O(kAxes * order) for each bin instead of the O(order^2) of its harmonics. The estimate scatters by about
+/// 30 %; `last` allows for kSafety times that.
 ///
 /// Works in double, because the norms that matter are 1e-6 of the whole. Allocates nothing; takes 25 KB.
 class ShBandLimit {
@@ -66,8 +66,8 @@ class ShBandLimit {
     return (2 * l + 1) * std::sqrt(squares / (4 * std::numbers::pi * kAxes));
   }
 
-  /// Last band whose norm, by kSafety times its estimate, is above epsilon times the norm of band 0: every coefficient of the bands
-  /// beyond is smaller.
+  /// Last band whose norm, by kSafety times its estimate, is above epsilon times the norm of band 0: every coefficient of the
+  /// bands beyond is smaller.
   /// @param zonal  f_l of the lobe, at least order() + 1 numbers
   GLINT_HD int last(std::span<const float> zonal, double epsilon) const {
     const double least = epsilon * zonalFactor(0, zonal.data()[0]) * norm(0);

@@ -32,9 +32,9 @@ struct ShLightOptions {
   /// The sum ends where all later bands together cannot change the result by more than this times the mean of the light over
   /// all half vectors: the effective band limit of light and NDF together (Gamboa 2018, section 4.2).
   float tolerance = 0;
-  /// The sum ends where every later coefficient of the footprint's NDF is at most this times the coefficient of band 0: the effective
-  /// band limit of the queried NDF (section 4.2, with 1e-6), found by ShBandLimit. 0: not looked for. Footprints whose normals lie
-  /// far apart and near together have many bands; those of broad, even distributions have few, and cost less.
+  /// The sum ends where every later coefficient of the footprint's NDF is at most this times the coefficient of band 0: the
+  /// effective band limit of the queried NDF (section 4.2, with 1e-6), found by ShBandLimit. 0: not looked for. Footprints
+  /// whose normals lie far apart and near together have many bands; those of broad, even distributions have few, and cost less.
   float ndf_epsilon = 0;
   bool nearest =
       false;  ///< take the nearest outgoing direction of the table; else blend the four around it, at four times the cost

@@ -77,9 +77,9 @@ class RatioEstimator {
 /// Shadowed light from an exact unshadowed one by a control variate: unshadowed - mean(sampled light that is hidden), colour by
 /// colour (Gamboa 2018, Eq. 13). It takes the samples that RatioEstimator takes.
 ///
-/// Unbiased at any number of samples, where RatioEstimator has a bias of O(1 / samples). Its noise is that of the hidden light, with
-/// the full variance of the contributions: so it suits small shadows and samples that follow the light, and a result may be below
-/// 0. In deep shadow the ratio has far less noise (tests/unit/shadow_estimators_test.cpp measures both).
+/// Unbiased at any number of samples, where RatioEstimator has a bias of O(1 / samples). Its noise is that of the hidden
+/// light, with the full variance of the contributions: so it suits small shadows and samples that follow the light, and a
+/// result may be below 0. In deep shadow the ratio has far less noise (tests/unit/shadow_estimators_test.cpp measures both).
 class ControlVariateEstimator {
  public:
   /// @param contribution  R, G, B of a sample over its pdf, >= 0, without visibility. Unlike in a ratio, samples of 0 count too
