@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "common/memory_needs.h"
 #include "common/numbers.h"
 
 namespace glint::apps {
@@ -32,8 +33,11 @@ double meanFitError(const bake::DisplacementData::Level& level) {
 }  // namespace
 
 DisplaceOptions::DisplaceOptions(Tool& tool) : images_(tool) {
-  const Option& factor =
-      tool.option("--factor", factor_, "texels of the map along a side of a downsampled cell").range(2, 65536);
+  const Option& factor = tool.option("--factor", factor_,
+                                     "texels of the map along a side of a downsampled cell; where it does not divide the map, "
+                                     "cells are as near to it as "
+                                     "whole numbers of cells allow")
+                             .range(2, 65536);
   factors_given_ =
       &tool.option("--factors", factors_, "several levels of detail, e.g. 4,16,64").range(2, 65536).excludes(factor);
   base_given_ =
@@ -41,8 +45,11 @@ DisplaceOptions::DisplaceOptions(Tool& tool) : images_(tool) {
                    "reflectance of the surface: diffuse:RHO (albedo above 0, at most 1), ggx:ALPHA (0.05 to 1; reflects "
                    "all light) or ggx:ALPHA:ETA,K (a conductor)");
   tool.option("--lobes", values_.lobes, "lobes of normals in each cell").range(1, kMaxLobes);
-  tool.option("--angular", values_.angular, "directions of light and view: the square of this").range(3, 25);
+  tool.option("--angular", values_.angular, "directions of light and view: the square of this").range(3, kMostAngular);
   tool.option("--spatial", values_.spatial, "patches of the spatial factor along each axis").range(1, 16);
+  tool.option("--scale-tolerance", values_.scale_tolerance,
+              "terms are added to the scaling T S until they miss at most this part of it; 0: T S alone")
+      .range(0, 1);
   tool.option("--bounces", bounces_,
               "reflections of a light path at most; 1: shadowing and masking only; auto: until it escapes");
   tool.usesSeed();
@@ -82,14 +89,32 @@ bake::DisplaceOptions DisplaceOptions::values(const HeightMap& map) const {
   return options;
 }
 
+void requireDisplaceMemory(const Tool& tool, const HeightMap& map, const bake::DisplaceOptions& options) {
+  constexpr double kUsual = 15.0 * 15.0;        // directions that BytesPerTexel counts
+  constexpr double kOfPatch = 16, kOfAll = 64;  // bytes of a pair of directions: sums and results of a patch, tables and chunks
+  const bool fine = options.factors.front()<kFineFactor, many = options.angular> 15;
+  const double directions = std::max(kUsual, static_cast<double>(options.angular) * options.angular);
+  const double masks = 4 * (directions - kUsual) / 16;
+  const double pairs = options.texture.channels * (directions * directions - kUsual * kUsual) *
+                       (kOfPatch * options.spatial * options.spatial + kOfAll);
+  const double texels = static_cast<double>(map.width) * map.height;
+  tool.requireMemory(texels * ((fine ? BytesPerTexel::kDisplaceFinely : BytesPerTexel::kDisplace) + masks) + pairs,
+                     fmt::format("a displacement of {} x {} texels in {:.0f} directions", map.width, map.height, directions),
+                     many   ? "give a smaller --angular or --spatial, or take a smaller map"
+                     : fine ? "give a larger --factor, or take a smaller map"
+                            : "take a smaller map");
+}
+
 void warnAbout(Tool& tool, const bake::DisplacementData& data) {
   for (std::size_t l = 0; l < data.levels.size(); ++l) {
     const DisplacementLevel& level = data.shape.levels[l];
     const auto warn = [&](const std::string& what) { tool.warn(fmt::format("factor {}: {}", level.factor, what)); };
-    if (level.rank1_residual > kResidual)
-      warn(fmt::format(
-          "the scaling differs between parts of the map: T S leaves {:.0f} % of it (the best product would leave {:.0f} %)",
-          100 * level.rank1_residual, 100 * std::sqrt(1 - level.rank1_energy)));
+    if (level.scale_residual > kResidual)
+      warn(
+          fmt::format("the scaling differs between parts of the map: {} {:.0f} % of it (the best product T S would leave "
+                      "{:.0f} %); --scale-tolerance adds terms",
+                      data.shape.more_terms > 0 ? "the terms miss" : "T S misses", 100 * level.scale_residual,
+                      100 * std::sqrt(1 - level.rank1_energy)));
     if (level.distant_share > kDistant)
       warn(
           fmt::format("{:.1f} % of the reflected light hops farther than a cell; it is kept in the mean but not in its place. "
@@ -113,27 +138,33 @@ nlohmann::json displacementJson(const bake::DisplacementData& data) {
                       {"spatial_scale", level.spatial_scale},
                       {"rank1_residual", shape.rank1_residual},
                       {"rank1_energy", shape.rank1_energy},
+                      {"singular_shares", level.singular_shares},
+                      {"scale_terms", data.shape.more_terms + 1},
+                      {"scale_residual", shape.scale_residual},
                       {"interreflected_share", shape.interreflected_share},
                       {"distant_share", shape.distant_share},
                       {"height_bytes", level.heights.size() * sizeof(float)},
                       {"lobe_bytes", level.lobes.size() * sizeof(VmfLobe) +
                                          (level.lobe_colors.size() + level.lobe_alphas.size()) * sizeof(float)},
-                      {"scale_bytes", level.spatial_scale.size() * sizeof(float) + level.angular_scale.size() * 2}});
+                      {"scale_bytes", (level.spatial_scale.size() + level.spatial_terms.size()) * sizeof(float) +
+                                          (level.angular_scale.size() + level.angular_terms.size()) * 2}});
   }
   return {{"levels", levels}};
 }
 
 std::string displacementText(const bake::DisplacementData& data) {
-  std::string text = fmt::format("{:>6} {:>11} {:>9} {:>9} {:>9} {:>14} {:>8} {:>9} {:>9}\n", "factor", "cells", "lobe fit",
-                                 "T S fit", "rank 1", "interreflected", "distant", "lobe KB", "scale KB");
+  std::string text =
+      fmt::format("{:>6} {:>11} {:>9} {:>9} {:>9} {:>6} {:>9} {:>14} {:>8} {:>9} {:>9}\n", "factor", "cells", "lobe fit",
+                  "T S fit", "rank 1", "terms", "terms fit", "interreflected", "distant", "lobe KB", "scale KB");
   const nlohmann::json json = displacementJson(data);
   for (const auto& level : json["levels"])
-    text += fmt::format("{:>6} {:>5} x {:<3} {:>8.1f}% {:>8.1f}% {:>8.2f}% {:>13.1f}% {:>7.2f}% {:>9.1f} {:>9.1f}\n",
-                        level["factor"].get<int>(), level["columns"].get<int>(), level["rows"].get<int>(),
-                        100 * level["mean_fit_error"].get<double>(), 100 * level["rank1_residual"].get<double>(),
-                        100 * level["rank1_energy"].get<double>(), 100 * level["interreflected_share"].get<double>(),
-                        100 * level["distant_share"].get<double>(), 1e-3 * level["lobe_bytes"].get<double>(),
-                        1e-3 * level["scale_bytes"].get<double>());
+    text += fmt::format(
+        "{:>6} {:>5} x {:<3} {:>8.1f}% {:>8.1f}% {:>8.2f}% {:>6} {:>8.1f}% {:>13.1f}% {:>7.2f}% {:>9.1f} {:>9.1f}\n",
+        level["factor"].get<int>(), level["columns"].get<int>(), level["rows"].get<int>(),
+        100 * level["mean_fit_error"].get<double>(), 100 * level["rank1_residual"].get<double>(),
+        100 * level["rank1_energy"].get<double>(), level["scale_terms"].get<int>(), 100 * level["scale_residual"].get<double>(),
+        100 * level["interreflected_share"].get<double>(), 100 * level["distant_share"].get<double>(),
+        1e-3 * level["lobe_bytes"].get<double>(), 1e-3 * level["scale_bytes"].get<double>());
   return text;
 }
 

@@ -34,6 +34,10 @@ class DisplaceOptions {
 /// @throws Error usage if it is none of these, or an albedo or roughness is out of range
 BaseBrdf parseBase(const std::string& text);
 
+/// Refuses work that takes more than --max-memory.
+/// @throws Error failed
+void requireDisplaceMemory(const Tool& tool, const HeightMap& map, const bake::DisplaceOptions& options);
+
 /// Warns where the model's assumptions do not hold: T S is not R, light hops between cells, or lobes do not fit.
 void warnAbout(Tool& tool, const bake::DisplacementData& data);
 

@@ -2,7 +2,6 @@
 
 #include "common/files.h"
 #include "common/input_asset.h"
-#include "common/memory_needs.h"
 #include "common/tool.h"
 #include "glint-displace/displace_options.h"
 #include "glint/formats/asset_writer.h"
@@ -22,10 +21,7 @@ int main(int argc, char** argv) {
     const formats::Asset asset = apps::openInput(tool, input.path());
     const auto& map = asset.get<HeightMap>();
     bake::DisplaceOptions values = options.values(map);
-    const bool fine = !values.factors.empty() && values.factors.front() < apps::kFineFactor;
-    apps::requireMemoryFor(tool, "a displacement of", map.width, map.height,
-                           fine ? apps::BytesPerTexel::kDisplaceFinely : apps::BytesPerTexel::kDisplace,
-                           fine ? "give a larger --factor, or take a smaller map" : "take a smaller map");
+    apps::requireDisplaceMemory(tool, map, values);
     values.seed = tool.seed();
     const formats::Provenance provenance = tool.provenance();
     const bake::DisplacementData data = bake::displace(map, values, tool.progress("levels"));

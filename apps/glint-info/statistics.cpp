@@ -172,7 +172,11 @@ ordered_json statisticsOf(const Displacement& d, const formats::AssetInfo&) {
     levels.push_back({{"mean_fit_error", error / static_cast<double>(level.fit_errors.size())},
                       {"min_T", *low},
                       {"max_T", *high},
-                      {"scale_bytes", level.spatial_scale.size_bytes() + level.angular_scale.size_bytes()}});
+                      {"singular_shares", std::vector<float>(level.singular_shares.begin(), level.singular_shares.end())},
+                      {"scale_terms", d.more_terms + 1},
+                      {"scale_residual", level.scale_residual},
+                      {"scale_bytes", level.spatial_scale.size_bytes() + level.angular_scale.size_bytes() +
+                                          level.spatial_terms.size_bytes() + level.angular_terms.size_bytes()}});
   }
   return {{"reliable_within_deg", 75}, {"levels", std::move(levels)}};
 }

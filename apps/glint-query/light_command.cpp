@@ -74,6 +74,10 @@ LightCommand::LightCommand(Tool& tool)
               "weights of the bands: none is sharpest, the others ring less around bright light");
   tool.option("--tolerance", options_.tolerance, "leave out bands that change less than this share of the mean light")
       .range(0, 1);
+  tool.option("--ndf-epsilon", options_.ndf_epsilon,
+              "leave out bands in which all coefficients of the footprint's normals are at most this share of their mean; e.g. "
+              "1e-6")
+      .range(0, 1);
   addReflectance();
   for (const CommandForm& form : {kDistributionForm, kReflectanceForm}) tool.pointTo(form.line, form.options);
   tool.addCheck([this] { check(); });

@@ -28,6 +28,8 @@ int main(int argc, char** argv) {
       const bake::ShLightData light = bake::buildShLight(environment, options.lightOptions(), tool.progress("directions"));
       formats::writeAsset(output.path(), light.view(), provenance, output.writeOptions());
       result = apps::lightJson(light.view());
+      if (options.gaussians() > 0)
+        result["gaussians"] = apps::gaussiansJson(bake::fitGaussians(environment, {.lobes = options.gaussians()}));
     }
     tool.setResult(result);
     tool.summary(apps::tableText(result));

@@ -28,6 +28,9 @@ ShLobesOptions::ShLobesOptions(Tool& tool) {
               "or area lights (.json)")
       .excludes(*sigma_option_)
       .defaultText("none");
+  tool.option("--gaussians", gaussians_,
+              "--light: fits so many spherical Gaussians to the light as well, and prints them with --json; 0: none")
+      .range(0, bake::kMostGaussians);
   tool.option("--order", order_, "highest band of the spherical harmonics").range(0, kMaxShOrder);
   tool.option("--grid", grid_, "directions, ROWSxCOLUMNS; lobes: none for no table").defaultText("65x128; --light: 17x32");
   tool.choice("--precision", precision_, {{"f16", ShPrecision::f16}, {"f32", ShPrecision::f32}}, "type of the coefficients");
@@ -47,6 +50,8 @@ void ShLobesOptions::check(Tool& tool) {
   if (light_.empty()) {
     if (!sigma_option_->given())
       throw Error(ErrorCode::usage, "arguments", "", "", "nothing was asked for", "add --sigma-r S for lobes, or --light FILE");
+    if (gaussians_ > 0)
+      throw Error(ErrorCode::usage, "arguments", "", "--gaussians", "fits light, and there is none", "add --light FILE");
     return;
   }
   checkRegular(light_);
@@ -94,10 +99,22 @@ nlohmann::json lightJson(const ShLight& light) {
           {"table_bytes", coefficients * (light.precision == ShPrecision::f16 ? 2 : 4)}};
 }
 
+nlohmann::json gaussiansJson(const bake::GaussianFit& fit) {
+  nlohmann::json lobes = nlohmann::json::array();
+  for (const SphericalGaussian& g : fit.lobes)
+    lobes.push_back({{"axis", {g.axis.x, g.axis.y, g.axis.z}},
+                     {"sharpness", g.sharpness},
+                     {"amplitude", {g.amplitude.r, g.amplitude.g, g.amplitude.b}}});
+  return {{"error", fit.error}, {"lobes", lobes}};
+}
+
 std::string tableText(const nlohmann::json& table) {
   std::string text = fmt::format("{} of order {}, {} x {} directions, {:.1f} MB\n", table["kind"].get<std::string>(),
                                  table["order"].get<int>(), table["grid_rows"].get<int>(), table["grid_columns"].get<int>(),
                                  table["table_bytes"].get<double>() / 1e6);
+  if (table.contains("gaussians"))
+    text += fmt::format("{} spherical Gaussians miss {:.3g} % of the light; --json prints them\n",
+                        table["gaussians"]["lobes"].size(), 100 * table["gaussians"]["error"].get<double>());
   if (table.contains("last_band_relative"))
     text += fmt::format("the last band has {:.3g} of the first: where this is not small, light that is sharper rings\n",
                         table["last_band_relative"].get<double>());

@@ -6,6 +6,7 @@
 
 #include "common/tool.h"
 #include "glint-shlobes/light_file.h"
+#include "glint/bake/sh/gaussian_fit.h"
 #include "glint/bake/sh/light.h"
 #include "glint/bake/sh/lobes.h"
 
@@ -21,6 +22,8 @@ class ShLobesOptions {
   const AreaLightOptions& areaLights() const { return area_lights_; }
   bake::ShLobesOptions lobesOptions() const;
   bake::ShLightOptions lightOptions() const;
+  /// Number of spherical Gaussians that the light is fitted with as well; 0: none.
+  int gaussians() const { return gaussians_; }
 
  private:
   void check(Tool& tool);
@@ -28,7 +31,7 @@ class ShLobesOptions {
 
   std::string light_, grid_;
   float sigma_r_ = 0;
-  int order_ = 60, band_limit_ = 0;
+  int order_ = 60, band_limit_ = 0, gaussians_ = 0;
   std::uint64_t max_bytes_ = 0;
   ShPrecision precision_ = ShPrecision::f16;
   AreaLightOptions area_lights_;
@@ -37,6 +40,8 @@ class ShLobesOptions {
 
 nlohmann::json lobesJson(const ShLobes& lobes);
 nlohmann::json lightJson(const ShLight& light);
+/// Axes, sharpness and amplitudes of spherical Gaussians, and the error of the fit.
+nlohmann::json gaussiansJson(const bake::GaussianFit& fit);
 /// The result of a function above for people, in one line.
 std::string tableText(const nlohmann::json& table);
 

@@ -7,6 +7,8 @@
 namespace glint::formats {
 namespace {
 
+static_assert(kMostScaleTerms == 8);  // sizes of arrays below
+
 void describeBase(Fields auto& fields, auto& base) {
   fields.choice("base", base.kind, "diffuse|ggx", "reflectance of a facet of the original surface");
   fields.real("albedo", base.albedo, {0, 1}, "1", "diffuse: albedo; ggx: 1");
@@ -31,6 +33,7 @@ void describeLevelSizes(Fields auto& fields, auto& d) {
   integers("level_spatial_columns", &Level::spatial_columns, {1, 16}, "1", "patches of the spatial scale along u");
   integers("level_spatial_rows", &Level::spatial_rows, {1, 16}, "1", "patches of the spatial scale along v");
   reals("level_rank1_residuals", &Level::rank1_residual, {0, FLT_MAX}, "norm of R - T S over that of R");
+  reals("level_scale_residuals", &Level::scale_residual, {0, FLT_MAX}, "the same of all terms");
   reals("level_rank1_energies", &Level::rank1_energy, {0, 1}, "share of the largest singular value's square of R");
   reals("level_interreflected", &Level::interreflected_share, {0, 1},
         "share of the reflected light that was scattered more than once");
@@ -49,6 +52,16 @@ void describeLevel(Fields auto& fields, auto& level) {
                {"level_spatial_rows[l]", "level_spatial_columns[l]", "channels"}, "1", "T: factors of each patch");
   fields.halves("level_{l}/angular_scale", level.angular_scale, {"angular_pairs", "channels"}, "1",
                 "S: factors of each pair of directions i <= o at o (o + 1) / 2 + i");
+  fields.array("level_{l}/singular_shares", level.singular_shares, {"8"}, "1",
+               "squares of the largest singular values of R, over the sum of all");
+}
+
+void describeTerms(Fields auto& fields, auto& level) {
+  fields.array("level_{l}/spatial_terms", level.spatial_terms,
+               {"more_terms", "level_spatial_rows[l]", "level_spatial_columns[l]", "channels"}, "1",
+               "factors of each patch, of the further terms");
+  fields.halves("level_{l}/angular_terms", level.angular_terms, {"more_terms", "angular_pairs", "channels"}, "1",
+                "factors of each pair of directions, of the further terms");
 }
 
 bool isProper(const VmfLobe& lobe) {
@@ -79,6 +92,11 @@ void checkLevel(const DisplacementLevel& level, int l, Findings& findings) {
   check("displacement.moments", "fit_errors", level.fit_errors, {"error is", "errors are"}, "not finite", finite);
   check("displacement.scales", "spatial_scale", level.spatial_scale, factors, "negative or not finite",
         [](float x) { return std::isfinite(x) && x >= 0; });
+  check("displacement.terms", "spatial_terms", level.spatial_terms, factors, "not finite", finite);
+  check("displacement.terms", "angular_terms", level.angular_terms, factors, "not finite",
+        [](std::uint16_t half) { return (half & 0x7c00) != 0x7c00; });
+  check("displacement.singular_values", "singular_shares", level.singular_shares, {"share is", "shares are"}, "outside 0 to 1",
+        [](float x) { return x >= 0 && x <= 1; });
   check("displacement.scales", "angular_scale", level.angular_scale, factors, "negative or not finite",
         [](std::uint16_t half) { return (half & 0x7c00) != 0x7c00 && (half & 0x8000) == 0; });
 }
@@ -90,13 +108,16 @@ struct KindDescription<Displacement> {
   static constexpr std::string_view kTitle = "Downsampled displacement map that keeps its appearance";
 
   static std::vector<Rule> indexRules() {
-    return {errorRule("displacement.levels", "factors ascend, and each divides the map into the level's cells")};
+    return {
+        errorRule("displacement.levels", "factors ascend, are at most the map's sides, and give the level's numbers of cells")};
   }
   static std::vector<Rule> valueRules() {
     return {errorRule("displacement.heights", "downsampled heights are finite"),
             errorRule("displacement.lobes", "lobes have centres in the disk, bandwidths up to 1e6 and amplitudes of 0 or more"),
             errorRule("displacement.bases", "colours of lobes are 0 to 1, and their alphas above 0 and at most 1"),
             errorRule("displacement.scales", "scaling functions are finite and not negative"),
+            errorRule("displacement.terms", "further terms of the scaling functions are finite"),
+            errorRule("displacement.singular_values", "shares of singular values are 0 to 1"),
             errorRule("displacement.moments", "slope moments and fit errors are finite")};
   }
 
@@ -109,12 +130,16 @@ struct KindDescription<Displacement> {
     fields.integer("lobe_count", d.lobe_count, {1, kMaxLobes}, "1", "lobes of a cell");
     fields.integer("has_lobe_colors", has_colors, {0, 1}, "1", "1 if lobes have colours of their own");
     fields.integer("has_lobe_alphas", has_alphas, {0, 1}, "1", "1 if lobes have a roughness of their own");
-    fields.integer("angular", d.angular, {3, 25}, "1", "cells of the concentric map along each axis, for either direction");
+    fields.integer("angular", d.angular, {3, kMostAngular}, "1",
+                   "cells of the concentric map along each axis, for either direction");
+    fields.integer("more_terms", d.more_terms, {0, kMostScaleTerms - 1}, "1", "terms of the scaling function beyond T S");
     fields.integer("level_count", d.level_count, {1, kMaxDisplacementLevels}, "1", "levels of detail");
     describeLevelSizes(fields, d);
     fields.derived("angular_pairs", "ceil_div(angular * angular * (angular * angular + 1), 2)", "pairs of directions");
     fields.derived("channels", "2 * rgb + 1", "numbers of a colour, of T and of S");
     fields.levels("level_count", d.level_count, [&](int l) { describeLevel(fields, d.levels[l]); });
+    fields.levels("level_count * ceil_div(more_terms, 7)", d.more_terms > 0 ? d.level_count : 0,
+                  [&](int l) { describeTerms(fields, d.levels[l]); });
     fields.levels("level_count * has_lobe_colors", d.level_count * has_colors, [&](int l) {
       fields.array("level_{l}/lobe_colors", d.levels[l].lobe_colors,
                    {"level_rows[l]", "level_columns[l]", "lobe_count", "channels"}, "1",
@@ -129,7 +154,9 @@ struct KindDescription<Displacement> {
   static void checkIndex(const Displacement& displacement, Findings& findings) {
     for (int l = 0; l < displacement.level_count; ++l) {
       const DisplacementLevel& level = displacement.levels[l];
-      const auto covers = [&](int cells, int texels) { return static_cast<std::int64_t>(cells) * level.factor == texels; };
+      const auto covers = [&](int cells, int texels) {
+        return level.factor <= texels && cells == displacementCells(texels, level.factor);
+      };
       if (covers(level.columns, displacement.width) && covers(level.rows, displacement.height) &&
           (l == 0 || level.factor > displacement.levels[l - 1].factor))
         continue;

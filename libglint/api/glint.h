@@ -490,8 +490,8 @@ typedef struct glint_displaced_info {
 GLINT_API glint_status glint_displaced_get_info(const glint_displaced* displaced, glint_displaced_info* info);
 
 /* The coarse surface of one level, on which its reflectance is asked: heights in texels of the original, [rows][columns],
- * bottom row first, periodic. Vertex (i, j) lies over the centre of texel (i factor, j factor); the cell above and to the right
- * of it is two triangles that meet along the diagonal from vertex (i + 1, j) to (i, j + 1).
+ * bottom row first, periodic. Vertex (i, j) lies over texel (i width / columns, j height / rows), counted between centres of
+ * texels; the cell above and to the right of it is two triangles that meet along the diagonal from vertex (i + 1, j) to (i, j + 1).
  *
  * heights: receives a pointer into the file, which lives as long as the handle. Returns GLINT_ERROR_USAGE for null arguments or
  * a level that is not there. */

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -13,6 +14,14 @@ namespace glint {
 inline constexpr int kMaxDisplacementLevels = 8;
 /// Most lobes of a cell.
 inline constexpr int kMaxLobes = 6;
+/// Most directions along an axis of the angular grid.
+inline constexpr int kMostAngular = 45;
+/// Most terms T S of a scaling function, and the number of its singular values that an asset tells.
+inline constexpr int kMostScaleTerms = 8;
+
+/// Cells along an axis of a level: the nearest number to texels / factor, at least 1. A cell is texels / cells long.
+constexpr int displacementCells(int texels, int factor) { return std::max(1, (2 * texels + factor) / (2 * factor)); }
+
 /// Bandwidth of a lobe around normals that are all the same.
 inline constexpr float kMaxKappa = 1e6f;
 
@@ -41,11 +50,12 @@ static_assert(sizeof(MapSlopes) == 20);
 
 /// One level of detail.
 ///
-/// Vertex (I, J) lies over texel (I factor, J factor) of the original; cell (I, J) is the square between vertices (I, J) and
-/// (I + 1, J + 1), wrapped. All arrays have J slowest.
+/// Vertex (I, J) lies over texel (I width / columns, J height / rows) of the original; cell (I, J) is the rectangle between
+/// vertices (I, J) and (I + 1, J + 1), wrapped. Its sides are `factor` texels where this divides the map, and else as near to
+/// `factor` as whole numbers of cells allow. All arrays have J slowest.
 struct DisplacementLevel {
   int factor = 0;           ///< texels of the original along a side of a cell
-  int columns = 0;          ///< width / factor
+  int columns = 0;          ///< displacementCells(width, factor)
   int rows = 0;             ///< height / factor
   int spatial_columns = 0;  ///< columns of T, at most `columns`
   int spatial_rows = 0;
@@ -58,16 +68,23 @@ struct DisplacementLevel {
   std::span<const float> fit_errors;     ///< [rows][columns]: relative error of the lobes, both sides blurred by 8 degrees
   std::span<const float> spatial_scale;  ///< T [spatial_rows][spatial_columns][channels], mean 1 over the cells
   std::span<const std::uint16_t> angular_scale;  ///< S [][channels], half precision: pair i <= o is at o (o + 1) / 2 + i
+  /// Further terms of the scaling function, of either sign: [more_terms] times as spatial_scale and angular_scale.
+  std::span<const float> spatial_terms;
+  std::span<const std::uint16_t> angular_terms;
+  /// Shares of the kMostScaleTerms largest singular values' squares of R, largest first; 0 where R has fewer.
+  std::span<const float> singular_shares;
 
   // Errors of the factorisation and its assumptions, for directions below 75 degrees; worst channel or mean of channels.
   float rank1_residual = 0;  ///< |R - T S| / |R| of the scaling function R before it was factorised
+  float scale_residual = 0;  ///< the same of all terms
   float rank1_energy = 1;    ///< share of the largest squared singular value: the energy that the best factorisation keeps
   float interreflected_share = 0;  ///< share of interreflection in the reflected light
   float distant_share = 0;         ///< share that comes over hops longer than a cell, which T and S cannot represent
 };
 
 /// A displacement map downsampled to several levels of detail, with scaling functions that keep its appearance (asset kind
-/// `displacement`, Wu 2019): f_low(x, wi, wo) = T(x) S(wi, wo) f'_low(x, wi, wo).
+/// `displacement`, Wu 2019): f_low(x, wi, wo) = T(x) S(wi, wo) f'_low(x, wi, wo). Where one product is not enough, the sum of
+/// several products T_k S_k takes its place.
 struct Displacement {
   int width = 0;   ///< of the original, texels
   int height = 0;  ///< of the original, texels
@@ -76,6 +93,7 @@ struct Displacement {
   int channels = 1;    ///< of colours, T and S: 1, or 3 for linear red, green and blue
   int lobe_count = 0;  ///< lobes of each cell, 1 to kMaxLobes
   int angular = 0;     ///< N: S has N^2 directions of either kind, the cells of concentric_map.h
+  int more_terms = 0;  ///< terms of the scaling function beyond T S, 0 to kMostScaleTerms - 1
   int level_count = 0;
   DisplacementLevel levels[kMaxDisplacementLevels];
 };

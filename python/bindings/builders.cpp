@@ -130,7 +130,7 @@ void moments(const BuildJob& job, int finest_level, const std::string& boundary,
 }
 
 void displace(const BuildJob& job, const std::vector<int>& factors, const std::string& base, float albedo, float alpha,
-              float eta, float k, int lobes, int angular, int spatial, int bounces, std::uint64_t seed) {
+              float eta, float k, int lobes, int angular, int spatial, float scale_tolerance, int bounces, std::uint64_t seed) {
   bake::DisplaceOptions o;
   o.factors = factors;
   o.base.kind = choose<BaseBrdf::Kind>("base", base, {{"diffuse", BaseBrdf::Kind::diffuse}, {"ggx", BaseBrdf::Kind::ggx}});
@@ -141,6 +141,7 @@ void displace(const BuildJob& job, const std::vector<int>& factors, const std::s
   o.lobes = lobes;
   o.angular = angular;
   o.spatial = spatial;
+  o.scale_tolerance = scale_tolerance;
   o.bounces = bounces;
   o.seed = seed;
   const formats::Asset input = openInput(job);
@@ -177,7 +178,7 @@ void bindBuilders(nb::module_& m) {
   m.def("moments", &moments, nb::arg("job"), words_only, nb::arg("finest_level"), nb::arg("boundary"), nb::arg("gradient"));
   m.def("displace", &displace, nb::arg("job"), words_only, nb::arg("factors"), nb::arg("base"), nb::arg("albedo"),
         nb::arg("alpha"), nb::arg("eta"), nb::arg("k"), nb::arg("lobes"), nb::arg("angular"), nb::arg("spatial"),
-        nb::arg("bounces"), nb::arg("seed"));
+        nb::arg("scale_tolerance"), nb::arg("bounces"), nb::arg("seed"));
   m.def("even_wavelengths", [](int count) {
     if (count < 1 || count > kMostWaveChannels)
       throw Error(ErrorCode::usage, "option.range", "", "wavelengths", std::to_string(count) + " wavelengths",

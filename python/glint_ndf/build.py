@@ -221,17 +221,18 @@ def moments(map: Asset, *, finest_level: int = 1, boundary: str = "wrap", gradie
 
 
 def displace(heights: Asset, *, factors: Sequence[int] = (16,), base: str = "diffuse", albedo: float = 0.8, alpha: float = 0.0,
-             eta: float = 1.0, k: float = 0.0, lobes: int = 6, angular: int = 15, spatial: int = 4, bounces: int = 64,
+             eta: float = 1.0, k: float = 0.0, lobes: int = 6, angular: int = 15, spatial: int = 4, scale_tolerance: float = 0.0, bounces: int = 64,
              seed: int = 1, threads: int = 0, progress: Progress | None = None) -> Asset:
     """Downsamples a displacement map so that it looks the same from afar (Wu 2019), as ``glint-displace``.
 
     Args:
         heights: asset of kind heights.
-        factors: texels along a side of a cell of each level: rising, dividing both sizes of the map.
+        factors: texels along a side of a cell of each level: rising, at most the shorter side of the map.
         base: "diffuse" with `albedo`, or "ggx" with roughness `alpha` and a conductor's `eta` and `k`.
+        scale_tolerance: terms are added to the scaling T S until they miss at most this part of it; 0: T S alone.
     """
     options = dict(factors=list(factors), base=base, albedo=albedo, alpha=alpha, eta=eta, k=k, lobes=lobes, angular=angular,
-                   spatial=spatial, bounces=bounces, seed=seed)
+                   spatial=spatial, scale_tolerance=scale_tolerance, bounces=bounces, seed=seed)
     return _made("displace", options, _expect(heights, "heights"), threads, progress)
 
 

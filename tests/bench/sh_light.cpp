@@ -1,7 +1,7 @@
 // Light integrals by spherical harmonics against quadrature, and against Monte Carlo at equal error:
-//   glint-sh-bench [--quick]
-// Prints one JSON object. Errors are RMS over outgoing directions and colours, relative to the RMS of the truth. Times are
-// thread CPU time, medians.
+//   glint-sh-bench [--quick] [--band-limit]
+// --band-limit: only what the band limit of the footprint's normals saves. Prints one JSON object. Errors are RMS over
+// outgoing directions and colours, relative to the RMS of the truth. Times are thread CPU time, medians.
 
 #include <time.h>
 
@@ -61,6 +61,24 @@ FixedHistogram randomHistogram(int bins) {
     histogram.normals.push_back({scale * x, scale * y});
     histogram.weights.push_back(1.0f / static_cast<float>(bins));
   }
+  return histogram;
+}
+
+/// A Gaussian of normals without gaps.
+FixedHistogram smoothHistogram(float deviation) {
+  FixedHistogram histogram;
+  constexpr float kStep = 0.04f;
+  const float reach = std::min(0.85f, 5 * deviation);
+  float total = 0;
+  for (float y = -reach; y <= reach; y += kStep) {
+    for (float x = -reach; x <= reach; x += kStep) {
+      if (x * x + y * y > reach * reach) continue;
+      histogram.normals.push_back({x, y});
+      histogram.weights.push_back(std::exp(-0.5f * (x * x + y * y) / (deviation * deviation)));
+      total += histogram.weights.back();
+    }
+  }
+  for (float& w : histogram.weights) w /= total;
   return histogram;
 }
 
@@ -195,6 +213,43 @@ json errorsByGrid(bool quick) {
   return rows;
 }
 
+/// Cost against error as bands are left out that the footprint's own normals do not have (Gamboa 2018, section 4.2): three
+/// footprints, from glints to a smooth pixel.
+json timesByBandLimit(bool quick) {
+  constexpr float kSigma = 0.05f;
+  const int order = quick ? 30 : 60;
+  const bake::ShLightData table =
+      bake::buildShLight(test::testEnvironment(TestLight::studio, kEnvironmentHeight), {.order = order, .grid = {9, 16}});
+  Query query(table, kSigma);
+  json rows = json::array();
+  const std::vector<Vec3> directions = outgoingDirections();
+  for (const auto& [name, histogram] : {std::pair{"24 facets", randomHistogram(24)},
+                                        {"288 facets", randomHistogram(288)},
+                                        {"smooth, 0.15", smoothHistogram(0.15f)},
+                                        {"smooth, 0.25", smoothHistogram(0.25f)}}) {
+    for (const float epsilon : {0.0f, 1e-6f, 1e-4f, 1e-2f}) {
+      double error = 0, norm = 0, bands = 0;
+      for (const Vec3 wo : directions) {
+        const ShLightIntegral whole = query(histogram, wo, {}), part = query(histogram, wo, {.ndf_epsilon = epsilon});
+        for (int c = 0; c < 3; ++c)
+          error += std::pow(part.signed_value[c] - whole.signed_value[c], 2), norm += std::pow(whole.signed_value[c], 2);
+        bands += part.order / static_cast<double>(directions.size());
+      }
+      volatile float sink = 0;
+      const double seconds = secondsOf(32, [&](int k) {
+        sink = query(histogram, directions[static_cast<std::size_t>(k) % 16], {.ndf_epsilon = epsilon}).value[1];
+      });
+      rows.push_back({{"footprint", name},
+                      {"bins", histogram.normals.size()},
+                      {"epsilon", epsilon},
+                      {"bands", bands},
+                      {"us", 1e6 * seconds},
+                      {"error", std::sqrt(error / norm)}});
+    }
+  }
+  return rows;
+}
+
 /// Microseconds of summing turned lobes, exactly and from the table.
 json lobeTimes(int order) {
   const bake::ShLobesData lobes = bake::buildShLobes({.sigma_r = 0.05f, .order = order, .grid = {65, 128}});
@@ -260,10 +315,18 @@ json timesAtEqualError(bool quick) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool quick = argc > 1 && std::strcmp(argv[1], "--quick") == 0;
+  const auto given = [&](const char* flag) {
+    return std::any_of(argv + 1, argv + argc, [&](const char* argument) { return std::strcmp(argument, flag) == 0; });
+  };
+  const bool quick = given("--quick");
+  if (given("--band-limit")) {
+    std::printf("%s\n", timesByBandLimit(quick).dump(1).c_str());
+    return 0;
+  }
   const json result = {{"errors_by_order", errorsByOrder(quick)},
                        {"errors_by_grid", errorsByGrid(quick)},
                        {"times_at_equal_error", timesAtEqualError(quick)},
+                       {"times_by_band_limit", timesByBandLimit(quick)},
                        {"lobe_times", {{"30", lobeTimes(30)}, {"60", lobeTimes(60)}}}};
   std::printf("%s\n", result.dump(1).c_str());
 }

@@ -77,7 +77,9 @@ def test_warns_of_distant_interreflections(glint):
 @pytest.mark.parametrize(
     "options, code, message",
     [
-        (["--factor", "5"], 3, "does not divide 64 x 96"),
+        (["--factor", "65"], 3, "is larger than the map of 64 x 96"),
+        (["--angular", "46"], 1, ""),
+        (["--scale-tolerance", "2"], 1, ""),
         (["--factor", "1"], 1, ""),
         (["--factors", "16,4"], 1, "--factors: is not 2 or more and ascending"),
         (["--factor", "4", "--factors", "4,8"], 1, ""),
@@ -331,10 +333,34 @@ def test_questions_without_the_command_are_shown_how_to_ask(glint, displaced, ar
     assert "glint-query reflectance" in process.stderr and "--wi X Y Z --wo X Y Z" in process.stderr
 
 
-def test_factors_that_do_not_divide_the_map_name_the_nearest_that_do(glint, heights):
-    process = glint("displace", heights, "-o", "d.glint", "--factor", "10")
-    assert process.returncode == 3
-    assert "8 or 16" in process.stderr
+def test_factors_need_not_divide_the_map(glint, heights):
+    process = glint("displace", heights, "-o", "d.glint", "--factors", "10,50", "--json", *QUICK)
+    assert process.returncode == 0, process.stderr
+    levels = json.loads(process.stdout)["result"]["levels"]
+    assert [(level["columns"], level["rows"]) for level in levels] == [(6, 10), (1, 2)]
+    assert glint("validate", "d.glint").returncode == 0
+
+
+def test_terms_are_added_to_a_tolerance_and_singular_values_told(glint):
+    """Fig. 6 and 10: relief in one half of the map, which no single product T S can follow."""
+    glint("synth", "sawtooth", "--size", "64", "--feature-size", "8", "--slope", "1.5", "-o", "saw.exr", "--height")
+    glint("synth", "isotropic", "--size", "64", "--alpha", "0.2", "-o", "noise.exr", "--height")
+    halves = []
+    for name in ("saw", "noise"):
+        glint("ingest", f"{name}.exr", "--kind", "height", "--to", "heights", "-o", f"{name}.glint")
+        with h5py.File(glint.folder / f"{name}.glint") as file:
+            halves.append(file["heights"][...][:, :32, None])
+    write_image(glint.folder / "both.exr", numpy.hstack(halves), "float")
+    glint("ingest", "both.exr", "--kind", "height", "--to", "heights", "-o", "both.glint")
+    quick = ["--factor", "8", "--angular", "7", "--spatial", "2", "--bounces", "1", "--json"]
+    one = json.loads(glint("displace", "both.glint", "-o", "one.glint", *quick).stdout)["result"]["levels"][0]
+    more = json.loads(glint("displace", "both.glint", "-o", "more.glint", "--scale-tolerance", "0.01", *quick).stdout)["result"]["levels"][0]
+    assert one["scale_terms"] == 1 and more["scale_terms"] > 1
+    assert more["scale_residual"] <= 0.01 < one["scale_residual"] == one["rank1_residual"]
+    assert one["singular_shares"][0] == one["rank1_energy"] and one["singular_shares"] == sorted(one["singular_shares"], reverse=True)
+    assert more["scale_bytes"] == more["scale_terms"] * one["scale_bytes"]
+    info = json.loads(glint("info", "more.glint", "--json").stdout)
+    assert info["result"]["statistics"]["levels"][0]["singular_shares"] == more["singular_shares"]
 
 
 def test_slopes_beyond_80_degrees_are_refused(glint):

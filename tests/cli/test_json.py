@@ -63,7 +63,7 @@ MAKE = [
     "pyramid grating.glint -o wave.glint --optics wave --coherence-um 4 --wavelengths 3 --resolution 64 --stride 8",
     "shlobes -o lobes.glint --sigma-r .1 --order 6 --grid 5x8 --precision f32",
     "shlobes -o zonal.glint --sigma-r .1 --order 6 --grid none",
-    "shlobes --light lights.json -o light.glint --order 6 --grid 5x8",
+    "shlobes --light lights.json -o light.glint --order 6 --grid 5x8 --gaussians 2",
     "bench normals.glint -o bench.json --quick --only moments,histograms",
     "bench --stability -o stability.json --quick --only one-direction",
     "bench --preset xing2024 -o paper.json --quick",

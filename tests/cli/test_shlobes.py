@@ -51,10 +51,43 @@ def test_same_bytes_with_any_number_of_threads(glint, folder):
         assert (folder / f"{name}1.glint").read_bytes() == (folder / f"{name}2.glint").read_bytes()
 
 
+def test_gaussians_are_fitted_to_the_light(glint, folder):
+    """Deng 2022, section 5.4: three lobes come back from the image of their light."""
+    rows, columns = np.meshgrid(np.arange(64), np.arange(128), indexing="ij")
+    theta, phi = math.pi * (rows + 0.5) / 64, 2 * math.pi * (columns + 0.5) / 128  # top row first
+    w = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    lobes = [((0.6, 0, 0.8), 40, (5, 4, 3)), ((0, -0.8, 0.6), 15, (1, 2, 6))]
+    write_exr(folder / "env.exr", sum(np.exp(s * (w @ np.array(a) - 1))[..., None] * np.array(c) for a, s, c in lobes))
+    arguments = ["--light", "env.exr", "--order", 4, "--grid", "5x8", "--gaussians", 2, "--json"]
+    process = glint("shlobes", *arguments, "-o", "light.glint")
+    assert process.returncode == 0, process.stderr
+    fit = json.loads(process.stdout)["result"]["gaussians"]
+    assert fit["error"] < 0.03
+    for axis, sharpness, amplitude in lobes:
+        found = max(fit["lobes"], key=lambda lobe: np.dot(lobe["axis"], axis))
+        assert np.dot(found["axis"], axis) > 0.9995
+        assert found["sharpness"] == pytest.approx(sharpness, rel=0.06)
+        assert found["amplitude"] == pytest.approx(amplitude, rel=0.06)
+    assert "add --light" in glint("shlobes", "--sigma-r", 0.1, "--gaussians", 2, "-o", "l.glint").stderr
+
+
 def ask(glint, *arguments):
     process = glint("query", "light", *arguments, "--json")
     assert process.returncode == 0, process.stderr
     return json.loads(process.stdout)["result"]
+
+
+def test_bands_that_the_normals_do_not_have_are_left_out(glint, folder):
+    """Gamboa 2018, section 4.2: a broad, even distribution of normals has few bands, a single facet all of its lobe's."""
+    write_exr(folder / "env.exr", np.random.default_rng(1).uniform(0, 3, (HEIGHT, 2 * HEIGHT, 3)))
+    glint("shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 40, "--grid", "5x8")
+    glint("synth", "isotropic", "--size", 64, "--alpha", 0.4, "-o", "n.exr")
+    glint("ingest", "n.exr", "-o", "n.glint")
+    asked = ["n.glint", "--light", "light.glint", "--sigma-r", 0.1, "--wo", 0.2, 0.1, 1, "--uv", 0.4, 0.6]
+    whole, few = (ask(glint, *asked, "--sigma", 12, *more) for more in ([], ["--ndf-epsilon", 1e-2]))
+    assert whole["order"] == 40 and few["order"] < 30
+    assert few["radiance"] == pytest.approx(whole["radiance"], rel=0.02)
+    assert ask(glint, *asked, "--sigma", 0.3, "--ndf-epsilon", 1e-6)["order"] == 40
 
 
 def test_flat_mirror_under_constant_light_reflects_it(glint, folder):

@@ -465,14 +465,15 @@ SampleDisplacement sampleDisplacement(int size, bool colored) {
   Displacement& d = sample.displacement;
   d.width = size, d.height = size / 2, d.texel_size_um = 2.5f;
   d.base = {BaseBrdf::Kind::ggx, 1, 0.25f, 1.5f, 3};
-  d.channels = colored ? 3 : 1, d.lobe_count = 2, d.angular = 3, d.level_count = 2;
+  d.channels = colored ? 3 : 1, d.lobe_count = 2, d.angular = 3, d.level_count = 2, d.more_terms = colored ? 2 : 0;
   sample.levels.resize(2);
   for (int l = 0; l < 2; ++l) {
     SampleDisplacement::Level& from = sample.levels[static_cast<std::size_t>(l)];
     DisplacementLevel& to = d.levels[l];
     to.factor = 4 << l, to.columns = d.width / to.factor, to.rows = d.height / to.factor;
     to.spatial_columns = 2, to.spatial_rows = 1;
-    to.rank1_residual = 0.125f, to.rank1_energy = 0.75f, to.interreflected_share = 0.25f, to.distant_share = 0.0625f;
+    to.rank1_residual = 0.125f, to.scale_residual = colored ? 0.03125f : 0.125f, to.rank1_energy = 0.75f,
+    to.interreflected_share = 0.25f, to.distant_share = 0.0625f;
     for (int j = 0; j < to.rows; ++j) {
       for (int i = 0; i < to.columns; ++i) {
         const auto bump = static_cast<float>(noise(i, j + 100 * l) - 0.5);
@@ -489,6 +490,14 @@ SampleDisplacement sampleDisplacement(int size, bool colored) {
       from.spatial_scale.insert(from.spatial_scale.end(), static_cast<std::size_t>(d.channels), t);
     for (int k = 0; k < 45 * d.channels; ++k)
       from.angular_scale.push_back(floatToHalf(0.5f + 0.03125f * static_cast<float>(k / d.channels)));
+    for (int t = 0; t < d.more_terms; ++t) {
+      for (const float s : {-0.25f, 0.25f})
+        from.spatial_terms.insert(from.spatial_terms.end(), static_cast<std::size_t>(d.channels), s);
+      for (int k = 0; k < 45 * d.channels; ++k)
+        from.angular_terms.push_back(floatToHalf(0.125f - 0.03125f * static_cast<float>(k % 7)));
+    }
+    from.singular_shares = {0.75f, 0.125f, 0.0625f, 0, 0, 0, 0, 0};
+    to.spatial_terms = from.spatial_terms, to.angular_terms = from.angular_terms, to.singular_shares = from.singular_shares;
     to.heights = from.heights, to.lobes = from.lobes, to.slopes = from.slopes, to.fit_errors = from.fit_errors;
     to.spatial_scale = from.spatial_scale, to.angular_scale = from.angular_scale;
     to.lobe_colors = from.lobe_colors, to.lobe_alphas = from.lobe_alphas;

@@ -34,6 +34,9 @@ struct SampleDisplacement {
     std::vector<float> fit_errors;
     std::vector<float> spatial_scale;
     std::vector<std::uint16_t> angular_scale;
+    std::vector<float> spatial_terms;
+    std::vector<std::uint16_t> angular_terms;
+    std::vector<float> singular_shares;
   };
   std::vector<Level> levels;
   Displacement displacement;

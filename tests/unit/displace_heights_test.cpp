@@ -50,7 +50,7 @@ TEST(DownsampledHeights, MeanSlopesAreThoseOfTheFacets) {
   const test::OwnedSurface map = test::synthSurface(SynthKind::isotropic, 24, 16);
   const auto surface = map.surface();
   const int factor = 4;
-  const auto slopes = meanSlopes(24, 16, map.heights, factor);
+  const auto slopes = meanSlopes(map.heights, CellGrid::of(24, 16, factor));
   ASSERT_EQ(slopes.size(), 24u);
   for (int row = 0; row < 4; ++row) {
     for (int column = 0; column < 6; ++column) {
@@ -66,13 +66,38 @@ TEST(DownsampledHeights, MeanSlopesAreThoseOfTheFacets) {
   }
 }
 
+TEST(DownsampledHeights, MeanSlopesOfUnevenCellsAreThoseOfTheirFacets) {
+  const test::OwnedSurface map = test::synthSurface(SynthKind::isotropic, 22, 13);
+  const auto surface = map.surface();
+  const CellGrid grid = CellGrid::of(22, 13, 4);
+  ASSERT_EQ(grid.columns, 6);  // 5.5, rounded up
+  ASSERT_EQ(grid.rows, 3);     // 3.25
+  const auto slopes = meanSlopes(map.heights, grid);
+  std::size_t covered = 0;
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      Vec2 sum;
+      float facets = 0;
+      for (int j = grid.firstRow(row); j < grid.firstRow(row + 1); ++j)
+        for (int i = grid.firstColumn(column); i < grid.firstColumn(column + 1); ++i)
+          for (std::size_t half = 0; half < 2; ++half, ++facets)
+            sum = sum + surface.slope(2 * static_cast<std::size_t>(j * 22 + i) + half);
+      covered += static_cast<std::size_t>(facets);
+      const std::size_t cell = static_cast<std::size_t>(row * grid.columns + column);
+      EXPECT_NEAR(slopes[cell].x, sum.x / facets, 1e-5);  // float rounding of sums of 40
+      EXPECT_NEAR(slopes[cell].y, sum.y / facets, 1e-5);
+    }
+  }
+  EXPECT_EQ(covered, surface.facetCount());
+}
+
 TEST(DownsampledHeights, KeepSmoothReliefAndItsMean) {
   // A wave of 64 texels is hardly touched by cells of 4: the Laplacian's share of the objective is w k^2 = 0.0015.
   const int size = 64;
   std::vector<float> heights;
   for (int j = 0; j < size; ++j)
     for (int i = 0; i < size; ++i) heights.push_back(2 + 3 * std::sin(2 * 3.14159265f * static_cast<float>(i + j) / size));
-  auto slopes = meanSlopes(size, size, heights, 4);
+  auto slopes = meanSlopes(heights, CellGrid::of(size, size, 4));
   const auto low = heightsFromSlopes(16, 16, slopes, 0.5);
   double mean = 0;
   for (int j = 0; j < 16; ++j) {

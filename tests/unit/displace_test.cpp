@@ -9,6 +9,7 @@
 #include <numbers>
 #include <random>
 
+#include "glint/bake/displace/low_brdf.h"
 #include "glint/model/error.h"
 #include "glint/query/brdf/displaced_brdf.h"
 #include "support/test_heights.h"
@@ -70,9 +71,9 @@ Rgb meanOfQueries(const DisplacedBrdf& brdf, int level, Vec3 wi, Vec3 wo) {
   for (int j = 0; j < l.rows; ++j) {
     for (int i = 0; i < l.columns; ++i) {
       for (const float inside : {0.25f, 0.75f}) {  // one point of each triangle
-        const auto f = static_cast<float>(l.factor);
-        const Vec2 uv = {((static_cast<float>(i) + inside) * f + 0.5f) / static_cast<float>(brdf.asset().width),
-                         ((static_cast<float>(j) + inside) * f + 0.5f) / static_cast<float>(brdf.asset().height)};
+        const Vec2 uv = {
+            (static_cast<float>(i) + inside) / static_cast<float>(l.columns) + 0.5f / static_cast<float>(brdf.asset().width),
+            (static_cast<float>(j) + inside) / static_cast<float>(l.rows) + 0.5f / static_cast<float>(brdf.asset().height)};
         const Vec3 n = brdf.normal(level, uv);
         sum = sum + dot(n, wi) * dot(n, wo) / n.z * brdf.evaluate(level, uv, wi, wo);
       }
@@ -81,26 +82,63 @@ Rgb meanOfQueries(const DisplacedBrdf& brdf, int level, Vec3 wi, Vec3 wo) {
   return 0.5f / static_cast<float>(l.columns * l.rows) * sum;
 }
 
+/// Expects the asset's answers, added up over a map, to be the light that facets of the original reflect by brute force.
+void expectQueriesAddUp(const OwnedSurface& map, const BaseBrdf& base, DisplaceOptions options) {
+  options.base = base, options.spatial = 1;
+  const Built built(map, options);
+  const DisplacedBrdf brdf(built.asset);
+  const auto surface = map.surface();
+  const auto directions = angularDirections(options.angular);
+  const VisibilityMasks masks(surface, directions);
+  const EffectiveBrdf original =
+      effectiveBrdf(surface, masks, directions, {1, 1, map.width, map.height, 1}, {base, kAllBounces, options.seed, {}, 0, 0});
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    for (std::size_t o = 0; o < directions.size(); ++o) {
+      if (directions[i].z < 0.6f || directions[o].z < 0.6f) continue;  // where cells of the weave begin to hide each other
+      const double wanted = original.values[i * directions.size() + o];
+      EXPECT_NEAR(meanOfQueries(brdf, 0, directions[i], directions[o]).r, wanted, 0.01 * wanted) << i << " " << o;
+    }
+  }
+}
+
 TEST(Displace, QueriesAddUpToTheEffectiveBrdfOfTheOriginal) {
-  for (const BaseBrdf& base : {BaseBrdf{BaseBrdf::Kind::diffuse, 0.8f, 0, 1, 0}, ggx(0.4f)}) {
-    for (const SynthKind kind : {SynthKind::isotropic, SynthKind::weave}) {
-      const OwnedSurface map = test::synthSurface(kind, 128, 64);
-      DisplaceOptions options = quick({8}, base);
-      options.spatial = 1;
-      const Built built(map, options);
-      const DisplacedBrdf brdf(built.asset);
-      const auto surface = map.surface();
-      const auto directions = angularDirections(options.angular);
-      const VisibilityMasks masks(surface, directions);
-      const EffectiveBrdf original =
-          effectiveBrdf(surface, masks, directions, {1, 1, 16, 8, 8}, {base, kAllBounces, options.seed, {}, 0, 0});
-      for (std::size_t i = 0; i < directions.size(); ++i) {
-        for (std::size_t o = 0; o < directions.size(); ++o) {
-          if (directions[i].z < 0.6f || directions[o].z < 0.6f) continue;  // where cells of the weave begin to hide each other
-          const double wanted = original.values[i * directions.size() + o];
-          EXPECT_NEAR(meanOfQueries(brdf, 0, directions[i], directions[o]).r, wanted, 0.01 * wanted) << i << " " << o;
-        }
-      }
+  for (const BaseBrdf& base : {BaseBrdf{BaseBrdf::Kind::diffuse, 0.8f, 0, 1, 0}, ggx(0.4f)})
+    for (const SynthKind kind : {SynthKind::isotropic, SynthKind::weave})
+      expectQueriesAddUp(test::synthSurface(kind, 128, 64), base, quick({8}));
+}
+
+TEST(Displace, QueriesAddUpOnMapsThatTheFactorDoesNotDivide) {
+  // 7.5 and 4.6 cells: 8 x 5, of 11.25 x 11 texels.
+  expectQueriesAddUp(test::synthSurface(SynthKind::isotropic, 90, 55), {BaseBrdf::Kind::diffuse, 0.8f, 0, 1, 0}, quick({12}));
+  // A strip of one texel in height, as thin as a map may be.
+  expectQueriesAddUp(test::synthSurface(SynthKind::isotropic, 101, 9), ggx(0.4f), quick({8}));
+}
+
+TEST(Displace, CellsThatDoNotDivideTheMapLieOverTheReliefThatTheyStandFor) {
+  // One wave across the map: the vertices of 8 x 7 cells follow it at (I 100 / 8, J 72 / 7), and normals lean as the wave does.
+  const int width = 100, height = 72;
+  OwnedSurface map{width, height, {}};
+  const auto phase = [&](float x, float y) {
+    return 2 * std::numbers::pi_v<float> * (x / static_cast<float>(width) + y / static_cast<float>(height));
+  };
+  for (int j = 0; j < height; ++j)
+    for (int i = 0; i < width; ++i) map.heights.push_back(3 * std::sin(phase(static_cast<float>(i), static_cast<float>(j))));
+  const Built built(map, quick({5}));
+  const DisplacementLevel& level = built.asset.levels[0];
+  ASSERT_EQ(level.columns, 20);
+  ASSERT_EQ(level.rows, 14);  // 14.4
+  const DisplacedBrdf brdf(built.asset);
+  for (int j = 0; j < level.rows; ++j) {
+    for (int i = 0; i < level.columns; ++i) {
+      const float x = static_cast<float>(i) * 100 / 20, y = static_cast<float>(j) * 72 / 14;
+      // The Laplacian's weight lowers the wave by 1 %; borders rounded to texels move it by half a texel at most.
+      EXPECT_NEAR(level.heights[static_cast<std::size_t>(j * 20 + i)], 3 * std::sin(phase(x, y)), 0.09f) << i << " " << j;
+      // The mean slope of the two triangles of the cell.
+      const Vec3 low = brdf.normal(0, {(x + 1.5f) / width, (y + 1.5f) / height}),
+                 high = brdf.normal(0, {(x + 4.5f) / width, (y + 4.5f) / height});
+      const float slope = 3 * std::cos(phase(x + 2.5f, y + 2.5f)) * 2 * std::numbers::pi_v<float>;
+      EXPECT_NEAR(-0.5f * (low.x / low.z + high.x / high.z), slope / width, 0.01f);
+      EXPECT_NEAR(-0.5f * (low.y / low.z + high.y / high.z), slope / height, 0.01f);
     }
   }
 }
@@ -147,6 +185,78 @@ TEST(Displace, SpatialScaleFollowsTheReliefAndTheResidualSaysWhenItCannot) {
   EXPECT_LT(Built(map, options).asset.levels[0].rank1_residual, 1e-3f);
 }
 
+/// Root mean square of the error of the light that each patch reflects, over that of the light.
+double patchError(const Built& built, const EffectiveBrdf& original, const EffectiveBrdf& low) {
+  const Displacement& d = built.asset;
+  const DisplacementLevel& l = d.levels[0];
+  const auto directions = angularDirections(d.angular);
+  double error = 0, all = 0;
+  for (std::size_t p = 0; p < original.patches; ++p) {
+    for (std::size_t o = 0; o < directions.size(); ++o) {
+      for (std::size_t i = 0; i <= o; ++i) {
+        if (directions[i].z < kGrazingCosine || directions[o].z < kGrazingCosine) continue;
+        const std::size_t pair = o * (o + 1) / 2 + i, k = i * directions.size() + o;
+        float scale = l.spatial_scale[p] * halfToFloat(l.angular_scale[pair]);
+        for (std::size_t t = 0; t < static_cast<std::size_t>(d.more_terms); ++t)
+          scale += l.spatial_terms[t * original.patches + p] * halfToFloat(l.angular_terms[t * l.angular_scale.size() + pair]);
+        const double wanted = original.patch(p)[k], got = scale * low.patch(p)[k];
+        error += (got - wanted) * (got - wanted), all += wanted * wanted;
+      }
+    }
+  }
+  return std::sqrt(error / all);
+}
+
+TEST(Displace, MoreTermsKeepMapsWhoseScalingDiffersFromPlaceToPlace) {
+  // Four kinds of relief, one in each quarter: deep grooves along x, along y, noise, and nothing.
+  OwnedSurface map{64, 64, std::vector<float>(64 * 64)};
+  const OwnedSurface noise = test::synthSurface(SynthKind::isotropic, 64, 64);
+  for (int j = 0; j < 64; ++j) {
+    for (int i = 0; i < 64; ++i) {
+      float& h = map.heights[static_cast<std::size_t>(j) * 64 + i];
+      if (j < 32) h = 1.2f * std::abs(static_cast<float>(i < 32 ? i % 4 : j % 4) - 2);
+      if (j >= 32 && i < 32) h = noise.heights[static_cast<std::size_t>(j) * 64 + i];
+    }
+  }
+  DisplaceOptions options = quick({8});
+  options.bounces = 1;
+  const Built one(map, options);
+  options.scale_tolerance = 0.02f;
+  const Built more(map, options);
+  const DisplacementLevel &a = one.asset.levels[0], &b = more.asset.levels[0];
+  EXPECT_EQ(one.asset.more_terms, 0);
+  EXPECT_GT(more.asset.more_terms, 0);
+  EXPECT_GT(a.rank1_residual, 0.1f);
+  EXPECT_EQ(a.scale_residual, a.rank1_residual);
+  EXPECT_EQ(b.rank1_residual, a.rank1_residual);
+  EXPECT_LE(b.scale_residual, 0.02f);
+  ASSERT_EQ(b.singular_shares.size(), 8u);
+  EXPECT_EQ(b.singular_shares[0], b.rank1_energy);
+  EXPECT_GT(b.singular_shares[1], 0.001f);
+  EXPECT_NEAR(b.singular_shares[0] + b.singular_shares[1] + b.singular_shares[2] + b.singular_shares[3], 1, 1e-4f);
+  EXPECT_EQ(b.singular_shares[4], 0);  // four patches have four singular values
+  // The same by brute force: light of each patch.
+  const auto surface = map.surface();
+  const auto directions = angularDirections(options.angular);
+  const VisibilityMasks masks(surface, directions);
+  const PatchGrid grid{2, 2, 8, 8, 8};
+  const EffectiveBrdf original = effectiveBrdf(surface, masks, directions, grid, {options.base, 1, options.seed, {}, 0, 0});
+  std::vector<float> cells;
+  for (const float h : b.heights) cells.push_back(h / 8);
+  const LobeField field{options.base, static_cast<std::size_t>(options.lobes), 1, b.lobes, {}, {}};
+  const EffectiveBrdf low = lowBrdf(cells, field, directions, grid);
+  EXPECT_GT(patchError(one, original, low), 3 * patchError(more, original, low));
+  EXPECT_LT(patchError(more, original, low), 0.03);
+  // Queries use them.
+  const DisplacedBrdf brdf(more.asset);
+  const Vec3 wi = towards(50, 0.2f), wo = towards(40, 2);
+  const Vec2 uv = {0.25f + 0.5f / 64, 0.25f + 0.5f / 64};
+  Rgb sum;
+  for (int t = 0; t <= more.asset.more_terms; ++t) sum = sum + brdf.spatialScale(0, uv, t) * brdf.angularScale(0, wi, wo, t);
+  EXPECT_EQ(brdf.scale(0, uv, wi, wo), sum);
+  EXPECT_NE(sum, brdf.spatialScale(0, uv) * brdf.angularScale(0, wi, wo));
+}
+
 TEST(Displace, SmallLevelsHaveFewerPatches) {
   const Built built(test::synthSurface(SynthKind::isotropic, 32, 16), quick({16}));
   EXPECT_EQ(built.asset.levels[0].spatial_columns, 2);
@@ -179,7 +289,11 @@ TEST(Displace, RefusesWhatItCannotUse) {
     return std::string("accepted");
   };
   EXPECT_EQ(refused(good, quick({8})), "accepted");
-  EXPECT_EQ(refused(good, quick({5})), "displace.factor");
+  EXPECT_EQ(refused(good, quick({5})), "accepted");
+  EXPECT_EQ(refused(good, quick({33})), "displace.factor");
+  DisplaceOptions many = quick({8});
+  many.angular = kMostAngular + 1;
+  EXPECT_EQ(refused(good, many), "displace.range");
   EXPECT_EQ(refused(good, quick({16, 8})), "displace.range");
   EXPECT_EQ(refused(good, quick({1})), "displace.range");
   EXPECT_EQ(refused(good, quick({8}, {BaseBrdf::Kind::diffuse, 1.1f, 0, 1, 0})), "displace.range");

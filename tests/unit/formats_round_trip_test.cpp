@@ -169,6 +169,10 @@ TEST(AssetRoundTrip, DisplacementsComeBackBitExact) {
       expectSame(level.fit_errors, wanted.fit_errors);
       expectSame(level.spatial_scale, wanted.spatial_scale);
       expectSame(level.angular_scale, wanted.angular_scale);
+      expectSame(level.spatial_terms, wanted.spatial_terms);
+      expectSame(level.angular_terms, wanted.angular_terms);
+      expectSame(level.singular_shares, wanted.singular_shares);
+      EXPECT_EQ(level.scale_residual, wanted.scale_residual);
       expectSame(level.lobe_colors, wanted.lobe_colors);
       expectSame(level.lobe_alphas, wanted.lobe_alphas);
       EXPECT_EQ(level.lobe_alphas.empty(), !colored);

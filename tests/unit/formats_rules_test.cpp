@@ -599,7 +599,9 @@ std::vector<Fixture> ndfCpFixtures() {
 std::vector<Fixture> displacementFixtures() {
   const auto nan = [](float& value) { value = kNan; };
   return {
-      patched("displacement.levels", Base::displacement, [](const Patch& patch) { patch.setInteger("width", 33); }),
+      patched("displacement.levels", Base::displacement, [](const Patch& patch) { patch.setInteger("width", 36); }),
+      patched("displacement.levels", Base::displacement, [](const Patch& patch) { patch.setInteger("width", 3); }),
+      patched("dataset.missing", Base::displacement, [](const Patch& patch) { patch.setInteger("more_terms", 1); }),
       patched("displacement.levels", Base::displacement,
               [](const Patch& patch) {
                 const int factors[2] = {4, 4};
@@ -621,6 +623,18 @@ std::vector<Fixture> displacementFixtures() {
       patched(
           "displacement.lobes", Base::displacement,
           [](const Patch& patch) { patch.change<float>("level_00/lobes", 7, [](float& amplitude) { amplitude = -1; }); }, true),
+      patched(
+          "displacement.terms", Base::displacement_rgb,
+          [nan](const Patch& patch) { patch.change<float>("level_01/spatial_terms", 3, nan); }, true),
+      patched(
+          "displacement.terms", Base::displacement_rgb,
+          [](const Patch& patch) {
+            patch.change<std::uint16_t>("level_00/angular_terms", 44, [](std::uint16_t& s) { s = 0xfc00; });
+          },
+          true),
+      patched(
+          "displacement.singular_values", Base::displacement,
+          [](const Patch& patch) { patch.change<float>("level_00/singular_shares", 0, [](float& x) { x = 1.5f; }); }, true),
       patched(
           "displacement.moments", Base::displacement,
           [nan](const Patch& patch) { patch.change<float>("level_00/slopes", 8, nan); }, true),

@@ -24,6 +24,11 @@ ChunkSums emptySums(const BrdfScene& scene) {
   return {std::vector<float>(scene.channels() * padded * padded), std::vector<float>(padded)};
 }
 
+std::size_t chunkBytes(const BrdfScene& scene) {
+  const std::size_t padded = scene.directions.padded;
+  return (scene.channels() * padded + 1) * padded * sizeof(float);
+}
+
 BrdfSums::BrdfSums(const BrdfScene& scene)
     : patches_(static_cast<std::size_t>(scene.grid.count())),
       directions_(scene.directions.count),

@@ -28,6 +28,9 @@ struct ChunkSums {
 /// Sums of no samples.
 ChunkSums emptySums(const BrdfScene& scene);
 
+/// Size of the sums of a chunk.
+std::size_t chunkBytes(const BrdfScene& scene);
+
 /// Amounts of light on the paths that an estimator followed.
 /// `all`: all light. `interreflected`: light that was scattered more than once. `distant[k]`: light whose path has a hop longer
 /// than distant_cells[k] of the options.

@@ -1,7 +1,5 @@
 #include "glint/bake/displace/diffuse_estimator.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -10,6 +8,7 @@
 #include "glint/bake/common/counter_random.h"
 #include "glint/bake/displace/brdf_sums.h"
 #include "glint/bake/displace/effective_kernels.h"
+#include "glint/bake/displace/ordered_sums.h"
 
 namespace glint::bake {
 namespace {
@@ -84,23 +83,21 @@ void addSamples(const BrdfScene& scene, const PatchFacets& facets, const SampleC
 EffectiveBrdf estimateDiffuse(const BrdfScene& scene, const ProgressFn& progress) {
   const std::vector<PatchFacets> patches = scene.patches(scene.options.walks > 0 ? scene.options.walks : kWalks);
   const std::vector<SampleChunk> chunks = makeChunks(patches);
-  std::vector<ChunkSums> chunk_sums(chunks.size());
   std::vector<LightShares> shares(chunks.size());
   ProgressCounter counter(progress, chunks.size());
-  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
-    chunk_sums[c] = emptySums(scene);
-    addSamples(scene, patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], chunk_sums[c], shares[c]);
+  const auto sumOf = [&](std::size_t c) {
+    ChunkSums sums = emptySums(scene);
+    addSamples(scene, patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], sums, shares[c]);
     counter.advance();
-  });
-
-  // Add in the order of the chunks, so that sums do not depend on threads.
+    return sums;
+  };
   BrdfSums sums(scene);
   LightShares total;
-  for (std::size_t c = 0; c < chunks.size(); ++c) {
+  addInOrder(chunks.size(), chunkBytes(scene), sumOf, [&](std::size_t c, const ChunkSums& of_chunk) {
     const auto samples = static_cast<double>(patches[static_cast<std::size_t>(chunks[c].patch)].samples());
-    sums.addChunk(scene, chunks[c], chunk_sums[c], samples, scene.options.base.albedo / kPi);
+    sums.addChunk(scene, chunks[c], of_chunk, samples, scene.options.base.albedo / kPi);
     total.add(shares[c]);
-  }
+  });
   return sums.finish(scene, total);
 }
 

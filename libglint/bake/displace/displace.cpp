@@ -31,8 +31,9 @@ void checkOptions(const DisplaceOptions& o) {
   for (std::size_t k = 0; k < o.factors.size(); ++k)
     require(o.factors[k] >= 2 && (k == 0 || o.factors[k] > o.factors[k - 1]), "--factors", "2 or more and ascending");
   require(o.lobes >= 1 && o.lobes <= kMaxLobes, "--lobes", "1 to 6");
-  require(o.angular >= 3 && o.angular <= 25, "--angular", "3 to 25");
+  require(o.angular >= 3 && o.angular <= kMostAngular, "--angular", "3 to 45");
   require(o.spatial >= 1 && o.spatial <= 16, "--spatial", "1 to 16");
+  require(o.scale_tolerance >= 0 && o.scale_tolerance <= 1, "--scale-tolerance", "0 to 1");
   require(o.bounces >= 1 && o.bounces <= kAllBounces, "--bounces", "1 to 64");
   if (o.base.kind == BaseBrdf::Kind::diffuse) {
     require(o.base.albedo > 0 && o.base.albedo <= 1, "--base",
@@ -88,19 +89,6 @@ void checkTexture(const HeightMap& map, const DisplaceOptions& options) {
                 });
 }
 
-/// Names, for an error message, the next smaller and larger factors that divide both sides of a map.
-std::string nearestFactors(const HeightMap& map, int factor) {
-  const auto divides = [&](int f) { return map.width % f == 0 && map.height % f == 0; };
-  const int most = std::min(map.width, map.height);
-  int below = std::min(factor, most), above = factor;
-  while (below >= 2 && !divides(below)) --below;
-  while (above <= most && !divides(above)) ++above;
-  if (below < 2 && above > most) return "another map: no factor divides both sides of this one";
-  return below < 2      ? std::to_string(above)
-         : above > most ? std::to_string(below)
-                        : std::to_string(below) + " or " + std::to_string(above);
-}
-
 void checkMap(const HeightMap& map, const DisplaceOptions& options) {
   for (std::size_t k = 0; k < map.heights.size(); ++k) {
     if (std::isfinite(map.heights[k])) continue;
@@ -109,10 +97,10 @@ void checkMap(const HeightMap& map, const DisplaceOptions& options) {
                 "make the map again with glint-ingest --fix-invalid");
   }
   for (const int factor : options.factors) {
-    if (map.width % factor == 0 && map.height % factor == 0) continue;
+    if (factor <= std::min(map.width, map.height)) continue;
     throw Error(ErrorCode::invalid_input, "displace.factor", "", "factor " + std::to_string(factor),
-                "does not divide " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels",
-                "take " + nearestFactors(map, factor) + ", or crop or resample the map");
+                "is larger than the map of " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels",
+                "take a factor of 2 to " + std::to_string(std::min(map.width, map.height)));
   }
   const HeightSurface surface(map.width, map.height, map.heights);
   TexelTally steep(map.width, map.height);
@@ -136,13 +124,15 @@ struct CellFacets {
 };
 
 /// Collects the facets of one cell, and computes the moments of their slopes.
-void collectCell(const HeightSurface& surface, const FacetBase& base, int factor, int column, int row, CellFacets& facets,
-                 MapSlopes& moments) {
+void collectCell(const HeightSurface& surface, const FacetBase& base, const CellGrid& grid, int column, int row,
+                 CellFacets& facets, MapSlopes& moments) {
   facets.normals.clear(), facets.colors.clear(), facets.widths.clear();
-  const float share = 0.5f / (static_cast<float>(factor) * static_cast<float>(factor));
+  const int i0 = grid.firstColumn(column), i1 = grid.firstColumn(column + 1), j0 = grid.firstRow(row),
+            j1 = grid.firstRow(row + 1);
+  const float share = 0.5f / (static_cast<float>(i1 - i0) * static_cast<float>(j1 - j0));
   double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-  for (int j = row * factor; j < (row + 1) * factor; ++j) {
-    for (int i = column * factor; i < (column + 1) * factor; ++i) {
+  for (int j = j0; j < j1; ++j) {
+    for (int i = i0; i < i1; ++i) {
       for (std::size_t half = 0; half < 2; ++half) {
         const std::size_t facet = 2 * (static_cast<std::size_t>(j) * surface.width() + static_cast<std::size_t>(i)) + half;
         const Vec2 s = surface.slope(facet);
@@ -165,19 +155,28 @@ void collectCell(const HeightSurface& surface, const FacetBase& base, int factor
 }
 
 /// Downsamples the heights.
-/// @return heights in the cells of the downsampled map
-std::vector<float> lowHeights(const HeightMap& map, int factor) {
+/// @return heights in units of `factor` texels
+std::vector<float> lowHeights(const HeightMap& map, const CellGrid& grid, int factor) {
   double mean = 0;
   for (const float h : map.heights) mean += h;
   mean /= static_cast<double>(map.heights.size()) * factor;
-  const auto heights =
-      heightsFromSlopes(map.width / factor, map.height / factor, meanSlopes(map.width, map.height, map.heights, factor), mean);
+  // What the heights should rise by over a cell.
+  std::vector<Vec2> rises = meanSlopes(map.heights, grid);
+  const float across = grid.cellWidth() / static_cast<float>(factor), up = grid.cellHeight() / static_cast<float>(factor);
+  for (Vec2& rise : rises) rise = {across * rise.x, up * rise.y};
+  const auto heights = heightsFromSlopes(grid.columns, grid.rows, rises, mean);
   return {heights.begin(), heights.end()};
 }
 
 PatchGrid patchGrid(const HeightMap& map, int factor, int spatial) {
-  const int columns = map.width / factor, rows = map.height / factor;
-  return {std::min(spatial, columns), std::min(spatial, rows), columns, rows, factor};
+  const CellGrid cells = CellGrid::of(map.width, map.height, factor);
+  return {std::min(spatial, cells.columns),
+          std::min(spatial, cells.rows),
+          cells.columns,
+          cells.rows,
+          factor,
+          map.width,
+          map.height};
 }
 
 /// Whether two grids cut the map along the same lines.
@@ -190,38 +189,60 @@ bool samePatches(const PatchGrid& a, const PatchGrid& b) {
   return true;
 }
 
-/// Computes T and S of all channels. The measures of the level are those of the worst channel.
-void factorChannels(const EffectiveBrdf& original, const EffectiveBrdf& low, std::span<const Vec3> directions,
-                    const PatchGrid& grid, DisplacementLevel& shape, DisplacementData::Level& level) {
+/// Appends a term of all channels, with zeros for channels that do not have it.
+void appendTerm(std::span<const ScalingFactors> factors, std::size_t term, std::vector<float>& spatial,
+                std::vector<std::uint16_t>& angular) {
+  const auto append = [&](auto member, std::size_t count, auto push) {
+    for (std::size_t k = 0; k < count; ++k)
+      for (const ScalingFactors& f : factors) push(term < f.terms.size() ? (f.terms[term].*member)[k] : 0.0f);
+  };
+  append(&ScalingTerm::spatial, factors[0].terms[0].spatial.size(), [&](float t) { spatial.push_back(t); });
+  append(&ScalingTerm::angular, factors[0].terms[0].angular.size(), [&](float s) { angular.push_back(floatToHalf(s)); });
+}
+
+/// Computes the scaling functions of all channels. The measures of the level are those of the worst channel.
+/// @return number of terms
+std::size_t factorChannels(const EffectiveBrdf& original, const EffectiveBrdf& low, std::span<const Vec3> directions,
+                           const PatchGrid& grid, float tolerance, DisplacementLevel& shape, DisplacementData::Level& level) {
   std::vector<ScalingFactors> factors;
-  for (std::size_t c = 0; c < original.channels; ++c) factors.push_back(factorScaling(original, low, directions, grid, c));
-  for (std::size_t p = 0; p < factors[0].spatial.size(); ++p)
-    for (const ScalingFactors& f : factors) level.spatial_scale.push_back(f.spatial[p]);
-  for (std::size_t k = 0; k < factors[0].angular.size(); ++k)
-    for (const ScalingFactors& f : factors) level.angular_scale.push_back(floatToHalf(f.angular[k]));
-  shape.rank1_residual = 0, shape.rank1_energy = 1;
+  std::size_t terms = 1;
+  for (std::size_t c = 0; c < original.channels; ++c) {
+    factors.push_back(factorScaling(original, low, directions, grid, c, tolerance));
+    terms = std::max(terms, factors.back().terms.size());
+  }
+  appendTerm(factors, 0, level.spatial_scale, level.angular_scale);
+  for (std::size_t t = 1; t < terms; ++t) appendTerm(factors, t, level.spatial_terms, level.angular_terms);
+  shape.rank1_residual = 0, shape.scale_residual = 0, shape.rank1_energy = 1;
+  level.singular_shares.assign(factors[0].singular_shares.begin(), factors[0].singular_shares.end());
   for (const ScalingFactors& f : factors) {
     shape.rank1_residual = std::max(shape.rank1_residual, f.rank1_residual);
-    shape.rank1_energy = std::min(shape.rank1_energy, f.rank1_energy);
+    shape.scale_residual = std::max(shape.scale_residual, f.residual);
+    if (f.rank1_energy >= shape.rank1_energy) continue;
+    shape.rank1_energy = f.rank1_energy;
+    level.singular_shares.assign(f.singular_shares.begin(), f.singular_shares.end());
   }
+  return terms;
 }
 
 /// Builds one level: heights, lobes, and scaling functions.
 /// @param original  effective BRDFs of the original surface, on the same patches
-void buildLevel(const HeightMap& map, const DisplaceOptions& options, const PatchGrid& grid, const EffectiveBrdf& original,
-                std::span<const Vec3> directions, DisplacementLevel& shape, DisplacementData::Level& level) {
+/// @return terms of the scaling function
+std::size_t buildLevel(const HeightMap& map, const DisplaceOptions& options, const PatchGrid& grid,
+                       const EffectiveBrdf& original, std::span<const Vec3> directions, DisplacementLevel& shape,
+                       DisplacementData::Level& level) {
   const HeightSurface surface(map.width, map.height, map.heights);
-  const std::vector<float> heights = lowHeights(map, grid.factor);
+  const std::vector<float> heights = lowHeights(map, grid.cells(), grid.factor);
   for (const float h : heights) level.heights.push_back(h * static_cast<float>(grid.factor));
-  fitCells(surface, FacetBase(surface, options.base, options.texture), grid.factor, options.lobes, level);
+  fitCells(surface, FacetBase(surface, options.base, options.texture), grid.cells(), options.lobes, level);
   const LobeField field{options.base,      static_cast<std::size_t>(options.lobes),
                         original.channels, level.lobes,
                         level.lobe_colors, level.lobe_alphas};
   const EffectiveBrdf low = lowBrdf(heights, field, directions, grid);
-  factorChannels(original, low, directions, grid, shape, level);
+  const std::size_t terms = factorChannels(original, low, directions, grid, options.scale_tolerance, shape, level);
   shape.factor = grid.factor;
   shape.columns = grid.coarse_x, shape.rows = grid.coarse_y;
   shape.spatial_columns = grid.columns, shape.spatial_rows = grid.rows;
+  return terms;
 }
 
 }  // namespace
@@ -233,13 +254,15 @@ Displacement DisplacementData::view() const {
     const Level& from = levels[l];
     to.heights = from.heights, to.lobes = from.lobes, to.slopes = from.slopes;
     to.lobe_colors = from.lobe_colors, to.lobe_alphas = from.lobe_alphas;
+    to.spatial_terms = from.spatial_terms, to.angular_terms = from.angular_terms, to.singular_shares = from.singular_shares;
     to.fit_errors = from.fit_errors, to.spatial_scale = from.spatial_scale, to.angular_scale = from.angular_scale;
   }
   return out;
 }
 
-void fitCells(const HeightSurface& surface, const FacetBase& base, int factor, int lobe_count, DisplacementData::Level& level) {
-  const int columns = surface.width() / factor, rows = surface.height() / factor;
+void fitCells(const HeightSurface& surface, const FacetBase& base, const CellGrid& grid, int lobe_count,
+              DisplacementData::Level& level) {
+  const int columns = grid.columns, rows = grid.rows;
   const std::size_t cells = static_cast<std::size_t>(columns) * rows;
   const auto lobes = static_cast<std::size_t>(lobe_count), channels = static_cast<std::size_t>(base.channels());
   level.lobes.resize(cells * lobes);
@@ -251,7 +274,7 @@ void fitCells(const HeightSurface& surface, const FacetBase& base, int factor, i
     CellFacets facets;
     for (int column = 0; column < columns; ++column) {
       const std::size_t cell = static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column);
-      collectCell(surface, base, factor, column, row, facets, level.slopes[cell]);
+      collectCell(surface, base, grid, column, row, facets, level.slopes[cell]);
       const std::span<VmfLobe> out(&level.lobes[cell * lobes], lobes);
       fitLobes(facets.normals, out);
       level.fit_errors[cell] = lobeError(facets.normals, out);
@@ -284,6 +307,7 @@ DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, 
   EffectiveOptions effective{options.base, options.bounces, options.seed, {}, 0, 0, options.texture};
   for (const int factor : options.factors) effective.distant_cells.push_back(static_cast<float>(factor));
   const std::size_t total = kProgressUnits * options.factors.size();
+  std::size_t terms = 1;
   EffectiveBrdf original;
   PatchGrid cut;
   for (std::size_t l = 0; l < options.factors.size(); ++l) {
@@ -299,8 +323,14 @@ DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, 
     DisplacementLevel& shape = data.shape.levels[l];
     shape.interreflected_share = static_cast<float>(original.interreflected);
     shape.distant_share = static_cast<float>(original.distant[l]);
-    buildLevel(map, options, grid, original, directions, shape, data.levels[l]);
+    terms = std::max(terms, buildLevel(map, options, grid, original, directions, shape, data.levels[l]));
     if (progress) progress((l + 1) * kProgressUnits, total);
+  }
+  // All levels have as many terms as the level that needs most of them.
+  data.shape.more_terms = static_cast<int>(terms) - 1;
+  for (DisplacementData::Level& level : data.levels) {
+    level.spatial_terms.resize((terms - 1) * level.spatial_scale.size());
+    level.angular_terms.resize((terms - 1) * level.angular_scale.size());
   }
   return data;
 }

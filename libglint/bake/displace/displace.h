@@ -11,12 +11,13 @@
 namespace glint::bake {
 
 struct DisplaceOptions {
-  std::vector<int> factors = {16};  ///< factor of each level: ascending, dividing both sizes of the map
+  std::vector<int> factors = {16};  ///< factor of each level: ascending, at most the shorter side of the map
   BaseBrdf base;
   BaseTexture texture;        ///< how the base varies over the map
   int lobes = kMaxLobes;      ///< lobes of each cell, 1 to kMaxLobes
-  int angular = 15;           ///< N: N^2 directions, 3 to 25
+  int angular = 15;           ///< N: N^2 directions, 3 to kMostAngular
   int spatial = 4;            ///< M: T has M^2 patches, 1 to 16; fewer where a level has fewer cells
+  float scale_tolerance = 0;  ///< terms are added to T S until |R - sum| / |R| is at most this; 0: T S alone
   int bounces = kAllBounces;  ///< most scattering events of a light path; 1: shadowing and masking only
   std::uint64_t seed = 1;
 };
@@ -36,6 +37,9 @@ class DisplacementData {
     std::vector<float> fit_errors;
     std::vector<float> spatial_scale;
     std::vector<std::uint16_t> angular_scale;
+    std::vector<float> spatial_terms;
+    std::vector<std::uint16_t> angular_terms;
+    std::vector<float> singular_shares;
   };
 
   Displacement shape;  ///< sizes and parameters; its spans are empty
@@ -51,14 +55,18 @@ class DisplacementData {
 /// Where the base varies, every lobe has the mean colour and roughness of its normals, and each channel its own T and S. So the
 /// result keeps the correlation of colours and normals (Fig. 14).
 ///
+/// Cells of a factor that does not divide the map are as near to it as whole numbers of cells allow: CellGrid.
+///
 /// The original surface is the periodic triangulation of the heights (HeightSurface). On a flat map T = S = 1.
 /// @throws Error usage if an option is out of range; invalid_input if heights are not finite, a facet is steeper than 80
-///         degrees, a factor does not divide the map, or the texture is not of the map's size or out of range
-/// @note memory: about 85 bytes for each texel of the map. The result does not depend on the number of threads
+///         degrees, a factor is larger than the map, or the texture is not of the map's size or out of range
+/// @note memory: about 85 bytes for each texel of the map with 15^2 directions, and N^4 times 16 bytes a patch and channel.
+///         The result does not depend on the number of threads
 DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, const ProgressFn& progress = {});
 
 /// Fits lobes to the normals of every cell of a coarser grid, and fills the lobes, their colours and roughness, the slope
 /// moments and the errors of the fit in `level`.
-void fitCells(const HeightSurface& surface, const FacetBase& base, int factor, int lobe_count, DisplacementData::Level& level);
+void fitCells(const HeightSurface& surface, const FacetBase& base, const CellGrid& grid, int lobe_count,
+              DisplacementData::Level& level);
 
 }  // namespace glint::bake

@@ -41,22 +41,22 @@ class Spectrum {
 
 }  // namespace
 
-std::vector<Vec2> meanSlopes(int width, int height, std::span<const float> heights, int factor) {
-  const int columns = width / factor, rows = height / factor;
+std::vector<Vec2> meanSlopes(std::span<const float> heights, const CellGrid& grid) {
+  const int columns = grid.columns, rows = grid.rows;
   const auto at = [&](int i, int j) {
-    return static_cast<double>(heights[static_cast<std::size_t>(j % height) * width + static_cast<std::size_t>(i % width)]);
+    return static_cast<double>(
+        heights[static_cast<std::size_t>(j % grid.height) * grid.width + static_cast<std::size_t>(i % grid.width)]);
   };
+  const auto trapezoid = [](int k, int last) { return k == 0 || k == last ? 0.5 : 1.0; };  // heights are linear along the sides
   std::vector<Vec2> slopes(static_cast<std::size_t>(columns) * rows);
   tbb::parallel_for(0, rows, [&](int row) {
     for (int column = 0; column < columns; ++column) {
-      const int i0 = column * factor, j0 = row * factor;
+      const int i0 = grid.firstColumn(column), j0 = grid.firstRow(row);
+      const int wide = grid.firstColumn(column + 1) - i0, high = grid.firstRow(row + 1) - j0;
       double x = 0, y = 0;
-      for (int k = 0; k <= factor; ++k) {  // trapezoids: heights are linear along the sides
-        const double weight = k == 0 || k == factor ? 0.5 : 1;
-        x += weight * (at(i0 + factor, j0 + k) - at(i0, j0 + k));
-        y += weight * (at(i0 + k, j0 + factor) - at(i0 + k, j0));
-      }
-      const double area = static_cast<double>(factor) * factor;
+      for (int k = 0; k <= high; ++k) x += trapezoid(k, high) * (at(i0 + wide, j0 + k) - at(i0, j0 + k));
+      for (int k = 0; k <= wide; ++k) y += trapezoid(k, wide) * (at(i0 + k, j0 + high) - at(i0 + k, j0));
+      const double area = static_cast<double>(wide) * high;
       slopes[static_cast<std::size_t>(row) * columns + column] = {static_cast<float>(x / area), static_cast<float>(y / area)};
     }
   });

@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "glint/bake/displace/cell_grid.h"
 #include "glint/math/vec.h"
 
 namespace glint::bake {
@@ -11,11 +12,11 @@ namespace glint::bake {
 inline constexpr double kLaplacianWeight = 0.01;
 
 /// Mean slopes of the surface over each cell of a coarser grid (Wu 2019, Eq. 1). Cell (I, J) covers cells (i, j) of the surface
-/// with I factor <= i < (I + 1) factor and J factor <= j < (J + 1) factor. Exact for triangles and for bilinear patches: the
-/// integral of a slope over an area is the integral of the height difference between opposite sides.
-/// @param factor  divides width and height
-/// @return [height / factor][width / factor]
-std::vector<Vec2> meanSlopes(int width, int height, std::span<const float> heights, int factor);
+/// with firstColumn(I) <= i < firstColumn(I + 1) and firstRow(J) <= j < firstRow(J + 1). Exact for triangles and for bilinear
+/// patches: the integral of a slope over an area is the integral of the height difference between opposite sides.
+/// @param heights  [grid.height][grid.width]
+/// @return [grid.rows][grid.columns]
+std::vector<Vec2> meanSlopes(std::span<const float> heights, const CellGrid& grid);
 
 /// The periodic height field whose bilinear patches have slopes as close as possible to the given ones (Wu 2019, Eq. 9 and 10):
 /// minimises the sum of |slope - slope*|^2 + kLaplacianWeight |Laplacian h|^2, with the Laplacian of five points. Lengths are

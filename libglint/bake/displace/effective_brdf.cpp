@@ -16,7 +16,7 @@ std::vector<Vec3> angularDirections(int angular) {
 double PatchGrid::share(int patch) const {
   const int c = patch % columns, r = patch / columns;
   return static_cast<double>(firstColumn(c + 1) - firstColumn(c)) * (firstRow(r + 1) - firstRow(r)) /
-         (static_cast<double>(coarse_x) * coarse_y * factor * factor);
+         (static_cast<double>(width()) * height());
 }
 
 std::vector<double> EffectiveBrdf::mean(const PatchGrid& grid, std::size_t channel) const {

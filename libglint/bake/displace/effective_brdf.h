@@ -6,6 +6,7 @@
 
 #include "glint/bake/common/progress.h"
 #include "glint/bake/displace/base_texture.h"
+#include "glint/bake/displace/cell_grid.h"
 #include "glint/bake/displace/height_surface.h"
 #include "glint/bake/displace/visibility_masks.h"
 #include "glint/model/displacement.h"
@@ -16,17 +17,24 @@ namespace glint::bake {
 struct PatchGrid {
   int columns = 1;
   int rows = 1;
-  int coarse_x = 0;  ///< columns of cells of the coarser grid
-  int coarse_y = 0;  ///< rows of cells of the coarser grid
-  int factor = 1;    ///< cells of the map along a side of a coarser cell
+  int coarse_x = 0;   ///< columns of cells of the coarser grid
+  int coarse_y = 0;   ///< rows of cells of the coarser grid
+  int factor = 1;     ///< cells of the map along a side of a coarser cell
+  int map_width = 0;  ///< cells of the map along each axis; 0: the factor divides them
+  int map_height = 0;
 
   int count() const { return columns * rows; }
-  int width() const { return coarse_x * factor; }
-  /// First cell of the map in a column of patches, or in a row of patches.
-  int firstColumn(int c) const {
-    return factor * static_cast<int>((static_cast<std::int64_t>(c) * coarse_x + columns - 1) / columns);
+  int width() const { return map_width > 0 ? map_width : coarse_x * factor; }
+  int height() const { return map_height > 0 ? map_height : coarse_y * factor; }
+  CellGrid cells() const { return {width(), height(), coarse_x, coarse_y}; }
+  /// First coarser cell in a column of patches, or in a row of patches.
+  int firstCellColumn(int c) const {
+    return static_cast<int>((static_cast<std::int64_t>(c) * coarse_x + columns - 1) / columns);
   }
-  int firstRow(int r) const { return factor * static_cast<int>((static_cast<std::int64_t>(r) * coarse_y + rows - 1) / rows); }
+  int firstCellRow(int r) const { return static_cast<int>((static_cast<std::int64_t>(r) * coarse_y + rows - 1) / rows); }
+  /// First cell of the map in a column of patches, or in a row of patches.
+  int firstColumn(int c) const { return cells().firstColumn(firstCellColumn(c)); }
+  int firstRow(int r) const { return cells().firstRow(firstCellRow(r)); }
   /// Share of the map's cells that a patch has.
   double share(int patch) const;
   friend bool operator==(const PatchGrid&, const PatchGrid&) = default;

@@ -11,6 +11,7 @@
 #include "glint/bake/common/counter_random.h"
 #include "glint/bake/displace/brdf_sums.h"
 #include "glint/bake/displace/effective_kernels.h"
+#include "glint/bake/displace/ordered_sums.h"
 #include "glint/query/brdf/base_brdf.h"
 
 namespace glint::bake {
@@ -183,15 +184,16 @@ std::vector<Vec3> halfVectors(const DirectionTable& directions) {
 void addSingleReflections(const BrdfScene& scene, const std::vector<PatchFacets>& patches,
                           const std::vector<SampleChunk>& chunks, ProgressCounter& counter, BrdfSums& sums) {
   const std::vector<Vec3> half = halfVectors(scene.directions);
-  std::vector<ChunkSums> chunk_sums(chunks.size());
-  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
-    chunk_sums[c] = emptySums(scene);
-    addSamples(scene, patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], half, chunk_sums[c]);
+  const auto sumOf = [&](std::size_t c) {
+    ChunkSums of_chunk = emptySums(scene);
+    addSamples(scene, patches[static_cast<std::size_t>(chunks[c].patch)], chunks[c], half, of_chunk);
     counter.advance();
+    return of_chunk;
+  };
+  addInOrder(chunks.size(), chunkBytes(scene), sumOf, [&](std::size_t c, const ChunkSums& of_chunk) {
+    sums.addChunk(scene, chunks[c], of_chunk, static_cast<double>(patches[static_cast<std::size_t>(chunks[c].patch)].samples()),
+                  1 / (4 * kPi));
   });
-  for (std::size_t c = 0; c < chunks.size(); ++c)
-    sums.addChunk(scene, chunks[c], chunk_sums[c],
-                  static_cast<double>(patches[static_cast<std::size_t>(chunks[c].patch)].samples()), 1 / (4 * kPi));
   completePairs(scene, sums);
 }
 

@@ -9,6 +9,7 @@
 
 #include "glint/bake/common/simd.h"
 #include "glint/bake/displace/effective_kernels.h"
+#include "glint/bake/displace/ordered_sums.h"
 #include "glint/query/brdf/vmf_lobe.h"
 
 namespace glint::bake {
@@ -103,6 +104,20 @@ void fillDiffuseRows(const DirectionTable& directions, std::span<const VmfLobe> 
   }
 }
 
+/// Directions in a space where the cells of a grid are squares of the length `factor`. Which facets a direction sees, and on
+/// which side of them it is, are the same there.
+std::vector<Vec3> squared(std::span<const Vec3> directions, const PatchGrid& grid) {
+  std::vector<Vec3> out(directions.begin(), directions.end());
+  const float across = static_cast<float>(grid.factor) / grid.cells().cellWidth(),
+              up = static_cast<float>(grid.factor) / grid.cells().cellHeight();
+  if (across == 1 && up == 1) return out;
+  for (Vec3& w : out) {
+    const Vec3 stretched = {across * w.x, up * w.y, w.z};
+    w = (1 / std::sqrt(dot(stretched, stretched))) * stretched;
+  }
+  return out;
+}
+
 /// Sums the light that the cells of a downsampled surface reflect.
 class LowEstimator {
  public:
@@ -116,7 +131,8 @@ class LowEstimator {
                                                    : 1),
         heights_(refined(grid.coarse_x, grid.coarse_y, heights, parts_)),
         surface_(grid.coarse_x * parts_, grid.coarse_y * parts_, heights_),
-        masks_(surface_, directions) {}
+        seen_(squared(directions, grid)),
+        masks_(surface_, squared(directions, grid)) {}
 
   EffectiveBrdf sum() const {
     // Zeros for all patches.
@@ -138,23 +154,23 @@ class LowEstimator {
       for (std::size_t c = 0; c < cells.back().size(); c += kChunkCells)
         chunks.push_back({p, c, std::min(c + kChunkCells, cells.back().size())});
     }
-    std::vector<std::vector<float>> sums(chunks.size());
-    tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
+    const auto sumOf = [&](std::size_t c) {
       const Chunk& chunk = chunks[c];
-      sums[c].resize(field_.channels * n * n);
+      std::vector<float> sums(field_.channels * n * n);
       addCells(std::span(cells[static_cast<std::size_t>(chunk.patch)]).subspan(chunk.first, chunk.last - chunk.first),
-               sums[c].data());
-    });
-    // Add the chunks in order, so that sums do not depend on threads. Pairs i > o are the same as o < i.
-    for (std::size_t c = 0; c < chunks.size(); ++c) {
+               sums.data());
+      return sums;
+    };
+    // Pairs i > o are the same as o < i.
+    addInOrder(chunks.size(), field_.channels * n * n * sizeof(float), sumOf, [&](std::size_t c, const auto& sums) {
       const auto patch = static_cast<std::size_t>(chunks[c].patch);
       const float scale = 1 / static_cast<float>(cells[patch].size());
       for (std::size_t channel = 0; channel < field_.channels; ++channel)
         for (std::size_t i = 0; i < n; ++i)
           for (std::size_t o = 0; o < n; ++o)
             result.values[((channel * result.patches + patch) * n + i) * n + o] +=
-                scale * sums[c][(channel * n + std::min(i, o)) * n + std::max(i, o)];
-    }
+                scale * sums[(channel * n + std::min(i, o)) * n + std::max(i, o)];
+    });
     return result;
   }
 
@@ -163,8 +179,8 @@ class LowEstimator {
   std::vector<std::size_t> cellsOf(int patch) const {
     const int c = patch % grid_.columns, r = patch / grid_.columns;
     std::vector<std::size_t> all;
-    for (int j = grid_.firstRow(r) / grid_.factor; j < grid_.firstRow(r + 1) / grid_.factor; ++j)
-      for (int i = grid_.firstColumn(c) / grid_.factor; i < grid_.firstColumn(c + 1) / grid_.factor; ++i)
+    for (int j = grid_.firstCellRow(r); j < grid_.firstCellRow(r + 1); ++j)
+      for (int i = grid_.firstCellColumn(c); i < grid_.firstCellColumn(c + 1); ++i)
         all.push_back(static_cast<std::size_t>(j) * grid_.coarse_x + static_cast<std::size_t>(i));
     const std::size_t most = std::max<std::size_t>(1, kMostCells / static_cast<std::size_t>(grid_.count()));
     if (all.size() <= most) return all;
@@ -184,7 +200,7 @@ class LowEstimator {
       for (std::size_t x = 0; x < 2 * parts; ++x, ++bit) {
         const std::size_t facet = 2 * ((j * parts + y) * static_cast<std::size_t>(surface_.width()) + i * parts) + x;
         masks_.expand(facet, row.data());
-        multiplyCosines(directions_, surface_.normal(facet), row.data());
+        multiplyCosines(seen_, surface_.normal(facet), row.data());
         for (std::size_t d = 0; d < directions_.count; ++d) bits[d] |= std::uint64_t{row[d] > 0} << bit;
       }
     }
@@ -260,6 +276,7 @@ class LowEstimator {
   int parts_;  ///< smaller cells along a side of a cell, so that a cell can be shadowed in part
   std::vector<float> heights_;
   HeightSurface surface_;
+  DirectionTable seen_;  ///< the directions as the surface of square cells sees them
   VisibilityMasks masks_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 
 #include "glint/query/bin_map_ndf.h"
 #include "glint/query/brdf/microfacet_brdf.h"
@@ -29,17 +30,20 @@ namespace glint {
 /// turns towards wo over that which masks it, as in MicrofacetBrdf: at most 1 on average over a map so far as its slopes are
 /// normal. Directions below the horizon (or within kHorizon of it), longer than 1, or not finite get 0 from everything here.
 /// Thread-safe, allocates nothing.
-class BinMapBrdf {
+/// @tparam Masking  G_x: SmithMasking, or GtrMasking for flakes of a GTR distribution
+template <class Masking = SmithMasking>
+class BasicBinMapBrdf {
  public:
   /// Takes the masking from the slopes of the whole map, which the bin map stores.
-  GLINT_HD BinMapBrdf(const BinMapNdf& ndf, const Footprint& footprint, const Fresnel& fresnel)
-      : BinMapBrdf(ndf, footprint, SmithMasking(ndf.map().slopes, 0), fresnel) {}
+  GLINT_HD BasicBinMapBrdf(const BinMapNdf& ndf, const Footprint& footprint,
+                           const Fresnel& fresnel) requires std::same_as<Masking, SmithMasking>
+      : BasicBinMapBrdf(ndf, footprint, SmithMasking(ndf.map().slopes, 0), fresnel) {}
   /// @param masking  masking by the map without roughness, since each facet adds its own
-  GLINT_HD BinMapBrdf(const BinMapNdf& ndf, const Footprint& footprint, const SmithMasking& masking, const Fresnel& fresnel)
+  GLINT_HD BasicBinMapBrdf(const BinMapNdf& ndf, const Footprint& footprint, const Masking& masking, const Fresnel& fresnel)
       : ndf_(ndf), footprint_(footprint), masking_(masking), fresnel_(fresnel) {}
 
   GLINT_HD const BinMapNdf& ndf() const { return ndf_; }
-  GLINT_HD const SmithMasking& masking() const { return masking_; }
+  GLINT_HD const Masking& masking() const { return masking_; }
 
   /// The BRDF f, 1/sr, each channel >= 0; without the cosine wi.z. Costs a density, and two error functions for each facet in
   /// reach.
@@ -167,8 +171,11 @@ class BinMapBrdf {
 
   BinMapNdf ndf_;
   Footprint footprint_;
-  SmithMasking masking_;
+  Masking masking_;
   Fresnel fresnel_;
 };
+
+/// With the masking of a map whose slopes are normally distributed.
+using BinMapBrdf = BasicBinMapBrdf<SmithMasking>;
 
 }  // namespace glint

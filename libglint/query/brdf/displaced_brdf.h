@@ -84,9 +84,10 @@ class DisplacedBrdf {
     const int i1 = p.i + 1 == l.columns ? 0 : p.i + 1, j1 = p.j + 1 == l.rows ? 0 : p.j + 1;
     const auto height = [&](int i, int j) { return l.heights[rowMajorIndex(i, j, l.columns)]; };
     const float h00 = height(p.i, p.j), h10 = height(i1, p.j), h01 = height(p.i, j1), h11 = height(i1, j1);
-    const float scale = 1 / static_cast<float>(l.factor);
+    const float along_x = static_cast<float>(l.columns) / static_cast<float>(asset_.width),
+                along_y = static_cast<float>(l.rows) / static_cast<float>(asset_.height);
     const bool lower = p.x + p.y < 1;
-    const float sx = scale * (lower ? h10 - h00 : h11 - h01), sy = scale * (lower ? h01 - h00 : h11 - h10);
+    const float sx = along_x * (lower ? h10 - h00 : h11 - h01), sy = along_y * (lower ? h01 - h00 : h11 - h10);
     const float square = 1 + sx * sx + sy * sy;
     // Heights of a file are not checked: where they are NaN or too large, the surface counts as flat.
     if (!(square <= std::numeric_limits<float>::max())) return {0, 0, 1};
@@ -104,8 +105,7 @@ class DisplacedBrdf {
     const float facet = n.z / (ci * co);
     if (variant == DisplacedVariant::single) return finitePositive(facet * singleLobe(l, cell, wi, wo));
     const Rgb reflected = facet * timesCosines(l, cell, wi, wo);
-    return finitePositive(variant == DisplacedVariant::full ? spatialScale(level, uv) * angularScale(level, wi, wo) * reflected
-                                                            : reflected);
+    return finitePositive(variant == DisplacedVariant::full ? scale(level, uv, wi, wo) * reflected : reflected);
   }
 
   /// Light reflected from wi to wo (BRDF times cosine), blended between levels. Each level uses the facet of its own surface.
@@ -202,9 +202,20 @@ class DisplacedBrdf {
     return finitePositive(density);
   }
 
+  /// The scaling function R: T S, and the further terms where the asset has them. Not negative.
+  GLINT_HD Rgb scale(int level, Vec2 uv, Vec3 wi, Vec3 wo) const {
+    Rgb sum = spatialScale(level, uv) * angularScale(level, wi, wo);
+    for (int term = 1; term <= asset_.more_terms; ++term)
+      sum = sum + spatialScale(level, uv, term) * angularScale(level, wi, wo, term);
+    return {std::max(0.0f, sum.r), std::max(0.0f, sum.g), std::max(0.0f, sum.b)};
+  }
+
   /// T, linear between the centres of its patches; periodic.
-  GLINT_HD Rgb spatialScale(int level, Vec2 uv) const {
+  /// @param term  0: T; 1 to more_terms: the spatial factor of a further term
+  GLINT_HD Rgb spatialScale(int level, Vec2 uv, int term = 0) const {
     const DisplacementLevel& l = asset_.levels[level];
+    const float* values = term == 0 ? l.spatial_scale.data()
+                                    : l.spatial_terms.data() + static_cast<std::size_t>(term - 1) * l.spatial_scale.size();
     const auto axis = [](float coordinate, int n, int& low, int& high) {
       const float x = wrapUnit(coordinate) * static_cast<float>(n) - 0.5f;
       const float whole = std::floor(x);
@@ -215,13 +226,17 @@ class DisplacedBrdf {
     int i0, i1, j0, j1;
     const float fx = axis(uv.x - 0.5f / static_cast<float>(asset_.width), l.spatial_columns, i0, i1);
     const float fy = axis(uv.y - 0.5f / static_cast<float>(asset_.height), l.spatial_rows, j0, j1);
-    const auto at = [&](int i, int j) { return color(l.spatial_scale.data(), rowMajorIndex(i, j, l.spatial_columns)); };
+    const auto at = [&](int i, int j) { return color(values, rowMajorIndex(i, j, l.spatial_columns)); };
     return (1 - fy) * ((1 - fx) * at(i0, j0) + fx * at(i1, j0)) + fy * ((1 - fx) * at(i0, j1) + fx * at(i1, j1));
   }
 
   /// S, linear in both directions on the concentric map.
-  GLINT_HD Rgb angularScale(int level, Vec3 wi, Vec3 wo) const {
+  /// @param term  0: S; 1 to more_terms: the angular factor of a further term
+  GLINT_HD Rgb angularScale(int level, Vec3 wi, Vec3 wo, int term = 0) const {
     const DisplacementLevel& l = asset_.levels[level];
+    const std::uint16_t* scales = term == 0
+                                      ? l.angular_scale.data()
+                                      : l.angular_terms.data() + static_cast<std::size_t>(term - 1) * l.angular_scale.size();
     const GridPlace a = gridPlace(wi, asset_.angular), b = gridPlace(wo, asset_.angular);
     const auto channels = static_cast<std::size_t>(asset_.channels);
     float sum[3] = {};
@@ -229,7 +244,7 @@ class DisplacedBrdf {
       for (int o = 0; o < 4; ++o) {
         const auto low = static_cast<std::size_t>(std::min(a.cell[i], b.cell[o]));
         const auto high = static_cast<std::size_t>(std::max(a.cell[i], b.cell[o]));
-        const std::uint16_t* values = &l.angular_scale[(high * (high + 1) / 2 + low) * channels];
+        const std::uint16_t* values = &scales[(high * (high + 1) / 2 + low) * channels];
         for (std::size_t c = 0; c < channels; ++c) sum[c] += a.weight[i] * b.weight[o] * halfToFloat(values[c]);
       }
     }

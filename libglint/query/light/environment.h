@@ -10,7 +10,9 @@ namespace glint {
 /// Methods to find the range of half vectors of a lobe.
 enum class LobeRange : std::uint8_t {
   moments,  ///< the box that has the second moments of the lobe's half vectors seen from wo
-  support,  ///< a square of side 2 theta / pi around the axis's half vector (Deng 2022, Eq. 8 and 9)
+  support,  ///< a square of side 2 theta / pi around the axis's half vector (Deng 2022, Eq. 8 and 9), of a lobe of amplitude 1
+  /// the same with the lobe's own amplitude A in Eq. 8: lobes below epsilon, .3 in the unit of radiance, are asked as points
+  support_of_amplitude,
 };
 
 /// Most cells along each axis of a lobe.
@@ -55,11 +57,12 @@ GLINT_HD Rgb cellRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const Spherica
 }
 
 /// Radiance towards wo with the paper's range: a square around the half vector of the lobe's axis.
+/// @param amplitude  A of Eq. 8
 template <NdfModel M>
-GLINT_HD Rgb supportRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const SphericalGaussian& light) {
+GLINT_HD Rgb supportRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const SphericalGaussian& light, float amplitude = 1) {
   if (!aboveHorizon(light.axis)) return {};
   const HalfVector h = halfVectorOf(light.axis, wo);
-  const float side = supportSide(compactSupport(1, light.sharpness));
+  const float side = supportSide(compactSupport(amplitude, light.sharpness));
   return meanAround(brdf, h.disk, side, side) * light.axis.z * brdf.response(light.axis, wo, h);
 }
 
@@ -74,7 +77,7 @@ GLINT_HD Rgb supportRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const Spher
 /// NDFs of few facets err more, because the lobe is even inside each cell: on metallic flakes and for lobes of sharpness 100 to
 /// 1000 the root mean square error is 6 to 10 % with the default cells, and 2 % with kMostLobeCells (same test). The relative
 /// error of a view that reflects little of the light can be far larger. Give more cells there, or sample the lobe.
-/// @param cells  1 to kMostLobeCells; LobeRange::support has one
+/// @param cells  1 to kMostLobeCells; the ranges by support have one
 /// @return 0 for wo below the horizon and for lobes that are not usable (isUsable)
 template <NdfModel M>
 GLINT_HD Rgb prefilteredRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const SphericalGaussian& light, int cells = kLobeCells,
@@ -82,6 +85,7 @@ GLINT_HD Rgb prefilteredRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const S
   if (!aboveHorizon(wo) || !isUsable(light)) return {};
   const Rgb flux = integralOf(light) * light.amplitude;
   if (range == LobeRange::support) return flux * supportRadiance(brdf, wo, light);
+  if (range == LobeRange::support_of_amplitude) return flux * supportRadiance(brdf, wo, light, luminance(light.amplitude));
   const int n = std::clamp(cells, 1, int{kMostLobeCells});
   const float sigma = 1 / std::sqrt(light.sharpness), extent = std::min(lobeExtent(n), 1.41421356f / sigma);
   const float step = 2 * extent / static_cast<float>(n), side = sigma * step;
@@ -107,6 +111,41 @@ GLINT_HD Rgb prefilteredRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const S
   Rgb sum;
   for (std::size_t k = 0; k < lights.count; ++k) sum = sum + prefilteredRadiance(brdf, wo, lights.lobes[k], cells);
   return sum;
+}
+
+/// Fills the probability of each lobe by its power: its integral times the luminance of its amplitude, over that of all.
+/// Lobes that are not usable, or darker than black, have 0; all have 0 where there is no light.
+/// @param shares  room for lights.count numbers
+inline GLINT_HD void powerShares(const SphericalGaussians& lights, float* shares) {
+  double total = 0;
+  for (std::size_t k = 0; k < lights.count; ++k) {
+    const SphericalGaussian& light = lights.lobes[k];
+    shares[k] = isUsable(light) ? std::max(0.0f, integralOf(light) * luminance(light.amplitude)) : 0.0f;
+    total += double{shares[k]};
+  }
+  for (std::size_t k = 0; k < lights.count; ++k)
+    shares[k] = total > 0 && std::isfinite(total) ? static_cast<float>(double{shares[k]} / total) : 0.0f;
+}
+
+/// Radiance from one lobe that is chosen by its power, over its probability: the estimator of Deng 2022, section 5.4. Its
+/// mean is the sum over all lobes with the same range, at the cost of one lobe; its noise is that of the choice.
+/// prefilteredRadiance of all lobes has no noise, and costs as many ranges as there are lobes (tests/unit/one_lobe_test.cpp
+/// compares them at equal cost).
+/// @param shares  of powerShares
+/// @param xi      in [0, 1)
+template <NdfModel M>
+GLINT_HD Rgb oneLobeRadiance(const MicrofacetBrdf<M>& brdf, Vec3 wo, const SphericalGaussians& lights, const float* shares,
+                             float xi, int cells = 1, LobeRange range = LobeRange::support) {
+  float left = xi > 0 ? xi : 0;
+  std::size_t chosen = lights.count;
+  for (std::size_t k = 0; k < lights.count; ++k) {
+    if (!(shares[k] > 0)) continue;
+    if (chosen != lights.count) left -= shares[chosen];
+    chosen = k;  // if rounding leaves a rest, the last lobe with light gets it
+    if (left < shares[k]) break;
+  }
+  if (chosen == lights.count) return {};
+  return (1 / shares[chosen]) * prefilteredRadiance(brdf, wo, lights.lobes[chosen], cells, range);
 }
 
 /// A direction drawn towards the lights.

@@ -10,6 +10,7 @@
 #include "glint/math/vec.h"
 #include "glint/model/footprint.h"
 #include "glint/model/sh.h"
+#include "glint/query/light/sh_band_limit.h"
 #include "glint/query/light/sh_basis.h"
 #include "glint/query/light/sh_window.h"
 
@@ -31,6 +32,10 @@ struct ShLightOptions {
   /// The sum ends where all later bands together cannot change the result by more than this times the mean of the light over
   /// all half vectors: the effective band limit of light and NDF together (Gamboa 2018, section 4.2).
   float tolerance = 0;
+  /// The sum ends where every later coefficient of the footprint's NDF is at most this times the coefficient of band 0: the
+  /// effective band limit of the queried NDF (section 4.2, with 1e-6), found by ShBandLimit. 0: not looked for. Footprints
+  /// whose normals lie far apart and near together have many bands; those of broad, even distributions have few, and cost less.
+  float ndf_epsilon = 0;
   bool nearest =
       false;  ///< take the nearest outgoing direction of the table; else blend the four around it, at four times the cost
 };
@@ -89,6 +94,8 @@ class ShLightQuery {
     const int highest = std::clamp(options.order, 0, order());
     for (int k = 0; k < count; ++k)
       result.order = std::max(result.order, effectiveOrder(corners[k].index, highest, options.tolerance));
+    if (options.ndf_epsilon > 0 && result.order <= ShBandLimit::kMostOrder)
+      result.order = ndfOrder(histogram, p, frame, wo, result.order, options.ndf_epsilon);
     sumBins(histogram, p, frame, wo, {corners, static_cast<std::size_t>(count)}, result.order, scratch);
     double sums[3] = {0, 0, 0};
     for (int k = 0; k < count; ++k)
@@ -100,6 +107,17 @@ class ShLightQuery {
       result.clamped |= sums[c] < 0;
     }
     return result;
+  }
+
+  /// Last band of the footprint's NDF that counts, at most `highest`.
+  /// @param highest  at most ShBandLimit::kMostOrder
+  /// O(bins * ShBandLimit::kAxes * highest)
+  template <class Histogram>
+  GLINT_HD int ndfOrder(const Histogram& histogram, const Footprint& p, const ShadingFrame& frame, Vec3 wo, int highest,
+                        float epsilon) const {
+    ShBandLimit limit(highest);
+    forEachFacet(histogram, p, frame, wo, [&](const Facet& facet) { limit.add(facet.h, facet.amount); });
+    return limit.last(zonal_, epsilon);
   }
 
   /// Smallest band after which the rest of the product with any NDF is below tolerance * |band 0|: the norms of the light's
@@ -171,6 +189,31 @@ class ShLightQuery {
     return deviation > 0 ? 0.5f * std::erfc(-height / (deviation * std::numbers::sqrt2_v<float>)) : height > 0 ? 1.0f : 0.0f;
   }
 
+  /// A bin that reflects light from above the surface towards wo.
+  struct Facet {
+    Vec3 h, wi;        ///< normal, and direction of the light
+    float ho = 0;      ///< dot(h, wo), > 0
+    float amount = 0;  ///< of D: D is per projected area, and a facet covers 1 / nz of its share of the surface
+  };
+
+  template <class Histogram, class Visit>
+  GLINT_HD void forEachFacet(const Histogram& histogram, const Footprint& p, const ShadingFrame& frame, Vec3 wo,
+                             Visit&& visit) const {
+    histogram.forEachBin(p, [&](int bin, float weight) {
+      const Vec2 n = histogram.binNormal(bin);
+      const float nz = std::sqrt(std::max(0.0f, 1 - dot(n, n)));
+      Facet facet;
+      facet.h = frame.toWorld({n.x, n.y, nz});
+      facet.ho = dot(facet.h, wo);
+      if (!(facet.ho > 0)) return;
+      facet.wi = 2 * facet.ho * facet.h - wo;
+      const float share = shareAbove(frame.normal, wo, facet.h, dot(facet.wi, frame.normal));
+      if (!(share > 0)) return;
+      facet.amount = weight * share / std::max(nz, float{kSteepest});
+      visit(facet);
+    });
+  }
+
   /// Sums the bins' harmonics for every corner, one after the other in `scratch`.
   template <class Histogram>
   GLINT_HD void sumBins(const Histogram& histogram, const Footprint& p, const ShadingFrame& frame, Vec3 wo,
@@ -183,25 +226,15 @@ class ShLightQuery {
     };
     ShAccumulator<T> sums[kCorners] = {place(0), place(corners.size() > 1 ? 1 : 0), place(corners.size() > 2 ? 2 : 0),
                                        place(corners.size() > 3 ? 3 : 0)};
-    histogram.forEachBin(p, [&](int bin, float weight) {
-      const Vec2 n = histogram.binNormal(bin);
-      const float nz = std::sqrt(std::max(0.0f, 1 - dot(n, n)));
-      const Vec3 h = frame.toWorld({n.x, n.y, nz});
-      const float ho = dot(h, wo);
-      if (!(ho > 0)) return;
-      const Vec3 wi = 2 * ho * h - wo;
-      const float share = shareAbove(frame.normal, wo, h, dot(wi, frame.normal));
-      if (!(share > 0)) return;
-      // D is per projected area: a facet covers 1 / nz of its share of the surface.
-      const float amount = weight * share / std::max(nz, float{kSteepest});
+    forEachFacet(histogram, p, frame, wo, [&](const Facet& facet) {
       for (std::size_t k = 0; k < corners.size(); ++k) {
         const Corner& c = corners[k];
-        const Vec3 middle = wi + c.z;
+        const Vec3 middle = facet.wi + c.z;
         const Vec3 local = {dot(middle, c.x), dot(middle, c.y), dot(middle, c.z)};
         const float cosine = local.z / std::sqrt(dot(local, local));
         // Light straight from behind the tabulated direction: its ring of half vectors has no middle.
         if (!(cosine > kSteepest)) continue;
-        sums[k].add(local, amount * ho / cosine);
+        sums[k].add(local, facet.amount * facet.ho / cosine);
       }
     });
     for (std::size_t k = 0; k < corners.size(); ++k) sums[k].flush();

@@ -74,6 +74,33 @@ class RatioEstimator {
   int count_ = 0;
 };
 
+/// Shadowed light from an exact unshadowed one by a control variate: unshadowed - mean(sampled light that is hidden), colour by
+/// colour (Gamboa 2018, Eq. 13). It takes the samples that RatioEstimator takes.
+///
+/// Unbiased at any number of samples, where RatioEstimator has a bias of O(1 / samples). Its noise is that of the hidden
+/// light, with the full variance of the contributions: so it suits small shadows and samples that follow the light, and a
+/// result may be below 0. In deep shadow the ratio has far less noise (tests/unit/shadow_estimators_test.cpp measures both).
+class ControlVariateEstimator {
+ public:
+  /// @param contribution  R, G, B of a sample over its pdf, >= 0, without visibility. Unlike in a ratio, samples of 0 count too
+  /// @param visibility    in [0, 1]
+  GLINT_HD void add(const float contribution[3], float visibility) {
+    for (int c = 0; c < 3; ++c) hidden_[c] += double{contribution[c]} * (1 - double{visibility});
+    ++count_;
+  }
+
+  /// Mean light of a channel that is hidden; 0 without samples.
+  GLINT_HD float hidden(int channel) const { return count_ > 0 ? static_cast<float>(hidden_[channel] / count_) : 0.0f; }
+
+  /// @param unshadowed  the channel's radiance without shadows, >= 0
+  /// @return may be negative: images that average over many pixels or frames need the negative values
+  GLINT_HD float shadowed(int channel, float unshadowed) const { return unshadowed - hidden(channel); }
+
+ private:
+  double hidden_[3] = {0, 0, 0};
+  int count_ = 0;
+};
+
 /// Shadowed light integral of all channels: draws `samples` light directions and asks the renderer's visibility.
 /// @param unshadowed   R, G, B, e.g. ShLightIntegral::value
 /// @param draw         draw(int k, float contribution[3]) -> Vec3: direction of sample k towards the light, and its radiance
