@@ -5,7 +5,7 @@
 
 #include "glint/bake/displace/scaling_function.h"
 
-namespace glint::bake {
+namespace glint::bake::displace_scaling_test {
 namespace {
 
 /// Effective BRDFs whose ratio is a sum of `rank` known products, on 4 x 2 patches of unequal size.
@@ -111,4 +111,4 @@ TEST(ScalingFunction, TheWholeMapReflectsWhatTheOriginalDoesHoweverManyTerms) {
 }
 
 }  // namespace
-}  // namespace glint::bake
+}  // namespace glint::bake::displace_scaling_test

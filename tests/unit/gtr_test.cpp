@@ -15,7 +15,7 @@
 #include "support/directions.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::gtr_test {
 namespace {
 
 using test::direction;
@@ -160,4 +160,4 @@ TEST(Gtr, ParametersOutOfRangeAreClamped) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::gtr_test

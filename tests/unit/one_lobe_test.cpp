@@ -18,7 +18,7 @@
 #include "support/directions.h"
 #include "support/light_reference.h"
 
-namespace glint {
+namespace glint::one_lobe_test {
 namespace {
 
 using test::BeckmannNdf;
@@ -180,4 +180,4 @@ TEST_F(OneLobe, WithoutLightThereIsNothing) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::one_lobe_test

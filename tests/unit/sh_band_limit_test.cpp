@@ -11,7 +11,7 @@
 #include "glint/query/light/sh_light_query.h"
 #include "support/light_reference.h"
 
-namespace glint {
+namespace glint::sh_band_limit_test {
 namespace {
 
 using test::FixedHistogram;
@@ -147,4 +147,4 @@ TEST(ShBandLimit, SmoothPixelsSumFewerBandsAndAnswerTheSame) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::sh_band_limit_test

@@ -10,7 +10,7 @@
 #include "glint/math/vec.h"
 #include "glint/query/light/sh_transfer.h"
 
-namespace glint {
+namespace glint::shadow_estimators_test {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
@@ -98,4 +98,4 @@ TEST(ShadowEstimators, WithoutSamplesNothingIsHidden) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::shadow_estimators_test

@@ -6,7 +6,7 @@
 #include "support/beckmann_ndf.h"
 #include "support/directions.h"
 
-namespace glint {
+namespace glint::weighted_brdf_test {
 namespace {
 
 using test::BeckmannNdf;
@@ -87,4 +87,4 @@ TEST(WeightedBrdf, SamplesHaveTheirPdfAndTheIntegralOfTheBrdf) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::weighted_brdf_test
