@@ -36,8 +36,10 @@ void NdfAsset::check() {
 
 void NdfAsset::addPyramidOptions() {
   useOnly({"ndf-pyramid", "ndf-cp"}, "--normals",
-          tool_.option("--normals", normals_path_,
-                       "asset of kind normals that the pyramid was made from, for footprints below its finest level"));
+          tool_.option(
+              "--normals", normals_path_,
+              "asset of kind normals that the pyramid was made from, for footprints below its finest level; instead of the "
+              "normals that the pyramid keeps, if it does"));
   useOnly({"ndf-pyramid", "ndf-cp", "slope-moments", "wang-cp", "wang-pyramid", "wave-pyramid"}, "--parts",
           tool_
               .option("--parts", options_.footprint_parts,
@@ -200,7 +202,7 @@ std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint)
               fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
               opened_->asset().kind() == "wave-pyramid"
                   ? "make the pyramid again with a smaller --stride: without their neighbours texels do not diffract"
-                  : "add --normals with the asset that the pyramid was made from"};
+                  : "add --normals with the asset that the pyramid was made from, or make the pyramid with --keep-normals"};
         } else {
           return {};
         }

@@ -94,9 +94,11 @@ enum {
  * have to be in range. Members are added at the end; a library that does not know one accepts 0 there. */
 typedef struct glint_open_options {
   size_t struct_size;       /* sizeof(glint_open_options) */
-  const char* normals_path; /* asset of kind normals that the pyramid was made from: it answers footprints below level 0,
-                               which the nearest level answers without it. Null: none */
-  float sigma_r;            /* kinds normals and slope-moments: intrinsic roughness, disk units, 1e-4 to 0.25; 0: 0.005 */
+  const char* normals_path; /* asset of kind normals that the pyramid was made from: it answers footprints below level 0. Null:
+                               the normals that the pyramid keeps answer them (glint-pyramid --keep-normals), and the nearest
+                               level where it keeps none */
+  float sigma_r;            /* kinds normals, slope-moments and histogram-sat: intrinsic roughness, disk units, 1e-4 to 0.25; 0:
+                               0.005 */
   int32_t surface;          /* kind normals: GLINT_SURFACE_* */
   int32_t boundary;         /* kind normals: GLINT_BOUNDARY_* */
   int32_t verify_hashes;    /* not 0: compare datasets with their hashes, and bytes between objects with 0; reads all */
@@ -179,7 +181,8 @@ typedef struct glint_ndf_info {
                                   there are no levels */
   uint64_t file_bytes;         /* size of the asset */
   float smallest_sigma_texels; /* smallest footprint that is answered as wide as it is asked for, deviation in texels; smaller
-                                  ones are answered up to this wide. 0 where there are no levels, or the normals are given */
+                                  ones are answered up to this wide. 0 where there are no levels, or the normals are given or
+                                  kept */
   int32_t udim_tiles;          /* tiles of a UDIM set, whose kind is that of its tiles; 0: no set */
 } glint_ndf_info;
 
@@ -191,7 +194,7 @@ GLINT_API glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* 
  * may read all texels. Returns GLINT_ERROR_USAGE for null arguments, else GLINT_OK. */
 GLINT_API glint_status glint_ndf_slopes(const glint_ndf* ndf, float mean[2], float covariance[3]);
 
-/* Packs the model, and the normals that it was opened with, into one buffer without addresses, for a GPU or another process: the
+/* Packs the model, and the normals that it was opened with or keeps, into one buffer without addresses, for a GPU or another process: the
  * layout of glint/model/packed_ndf.h, which glint/query/packed_ndf_view.h reads.
  *
  * buffer: receives the bytes; null to ask for the size only, which costs as much. capacity: bytes of the buffer. size: receives

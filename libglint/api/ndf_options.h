@@ -13,7 +13,8 @@ namespace glint::api {
 
 /// How an asset is asked, where the asset does not say so itself. Options for other kinds are ignored.
 struct NdfOptions {
-  std::filesystem::path normals;       ///< asset that the pyramid was made from, for footprints below level 0; empty: none
+  /// Asset that the pyramid was made from, for footprints below level 0; empty: the normals that the pyramid keeps, if it does.
+  std::filesystem::path normals;
   Surface surface = Surface::flat;     ///< kind normals: how they behave between texels
   Boundary boundary = Boundary::wrap;  ///< kind normals: beyond the border of the map
   float sigma_r = 0.005f;              ///< kinds normals and slope-moments: intrinsic roughness, disk units

@@ -2,6 +2,8 @@
 
 #include <nanobind/stl/optional.h>
 
+#include <array>
+
 #include "glint/query/ray_footprint.h"
 #include "parallel.h"
 
@@ -18,7 +20,7 @@ void set(const Answers& covariances, std::size_t k, const Covariance& c) {
 void bindFootprints(nb::module_& m) {
   nb::class_<Footprints>(m, "Footprints")
       .def(nb::init<std::optional<Rows>, std::optional<DoubleRows>, std::optional<Rows>, std::optional<Rows>,
-                    std::optional<Rows>>(),
+                    std::optional<Rows>, std::optional<Rows>>(),
            nb::arg("uv").none(), nb::arg("precise_uv").none(), nb::arg("sigma").none(), nb::arg("covariance").none(),
            nb::arg("box").none());
 

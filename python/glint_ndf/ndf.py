@@ -270,8 +270,8 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
     Args:
         source: a file, its bytes, or an `Asset`. Bytes go through a temporary file. "rock.<UDIM>.glint" opens every tile of a UDIM
             set that has a file: tile 1001 + floor(u) + 10 floor(v) holds uv. Densities are 0 where the set has no tile.
-        normals: asset of kind normals that a pyramid was made from. It answers footprints below level 0, which the nearest level
-            answers without it. Of a UDIM set a pattern, too.
+        normals: asset of kind normals that a pyramid was made from. It answers footprints below level 0. Without it, the normals
+            that the pyramid keeps do, and the nearest level where it keeps none. Of a UDIM set a pattern, too.
         surface, boundary: kind normals: "flat" or "smooth", "wrap" or "clamp".
         sigma_r: kinds normals and slope-moments: intrinsic roughness, disk units, 1e-4 to 0.25.
         alpha: kind bin-map: Beckmann roughness, in the range that the asset was made for; 0: the smallest.

@@ -46,6 +46,8 @@ MAKE = [
     "compress pyramid.glint -o cp.glint --method cp --rank 8",
     "compress pyramid.glint -o tucker.glint --method tucker --tolerance .1",
     "compress pyramid.glint -o pca.glint --method pca --rank 4 --quantize f32",
+    "pyramid normals.glint -o kept.glint --resolution 64 --stride 8 --sigma-r .02 --keep-normals i16",
+    "compress kept.glint -o kept.cp.glint --method cp --rank 4",
     "binmap normals.glint -o bins.glint --alpha .05",
     "binmap normals.glint -o range.glint --alpha .02:.1",
     "sat normals.glint -o sat.glint --bins 6x20",
