@@ -10,6 +10,7 @@
 #include "glint/api/pack.h"
 #include "glint/api/plane_position.h"
 #include "glint/api/wave_colours.h"
+#include "glint/query/curved_ndf.h"
 #include "glint/query/ray_footprint.h"
 
 namespace {
@@ -81,6 +82,8 @@ const char* faultOf(const glint_displaced* displaced) {
 const char* missingIn(const glint_footprints& p) {
   const bool precise = p.precise_u.data != nullptr && p.precise_v.data != nullptr;
   if (!precise && (p.u.data == nullptr || p.v.data == nullptr)) return "u and v of the footprints must be given";
+  if ((p.spread_x.data == nullptr) != (p.spread_y.data == nullptr))
+    return "spread_x and spread_y of the footprints must be given together";
   const bool gaussian = p.xx.data != nullptr && p.yy.data != nullptr;
   const bool box = p.ax.data != nullptr && p.ay.data != nullptr && p.bx.data != nullptr && p.by.data != nullptr;
   if (p.sigma.data != nullptr || gaussian || box) return nullptr;
@@ -105,6 +108,8 @@ FootprintArrays arraysOf(const glint_footprints& p) {
   out.ay = arrayOf(p.ay);
   out.bx = arrayOf(p.bx);
   out.by = arrayOf(p.by);
+  out.spread_x = arrayOf(p.spread_x);
+  out.spread_y = arrayOf(p.spread_y);
   return out;
 }
 
@@ -187,7 +192,7 @@ glint_ndf* handleOf(api::OpenedNdf opened) {
 }
 
 glint_footprint gaussianAt(double u, double v, const Covariance& c) {
-  return {GLINT_FOOTPRINT_GAUSSIAN, u, v, {c.xx, c.xy, c.yy, 0}};
+  return {GLINT_FOOTPRINT_GAUSSIAN, u, v, {c.xx, c.xy, c.yy, 0}, {0, 0}};
 }
 
 /// The fault of the arguments that all batches have; null if there is none.
@@ -267,7 +272,7 @@ glint_footprint glint_footprint_isotropic(double u, double v, float sigma_texels
 }
 
 glint_footprint glint_footprint_box(double u, double v, float ax, float ay, float bx, float by) {
-  return {GLINT_FOOTPRINT_BOX, u, v, {ax, ay, bx, by}};
+  return {GLINT_FOOTPRINT_BOX, u, v, {ax, ay, bx, by}, {0, 0}};
 }
 
 glint_footprint glint_footprint_from_differentials(double u, double v, float dudx, float dvdx, float dudy, float dvdy,
@@ -289,6 +294,22 @@ glint_footprint glint_footprint_from_cone(glint_ray_cone cone, double u, double 
                                           float texels_per_unit) {
   const Vec3 towards = direction == nullptr ? Vec3{0, 0, 1} : vectorOf(direction);
   return gaussianAt(u, v, footprintOfCone({cone.width, cone.spread}, {}, towards, texels_per_unit).covariance);
+}
+
+glint_status glint_footprint_set_spread(glint_footprint* footprint, const float wi[3], const float wo[3], const float dndx[3],
+                                        const float dndy[3], const float dwodx[3], const float dwody[3], float filter_sigma) {
+  if (footprint == nullptr || wi == nullptr || wo == nullptr || dndx == nullptr || dndy == nullptr)
+    return badArgument("glint_footprint_set_spread",
+                       {{footprint, "footprint"}, {wi, "wi"}, {wo, "wo"}, {dndx, "dndx"}, {dndy, "dndy"}});
+  const HalfVector h = halfVectorOf(vectorOf(wi), vectorOf(wo));
+  const auto turn = [&](const float* dn, const float* dwo) {
+    return halfVectorDifferential(h, vectorOf(dn), dwo == nullptr ? Vec3{0, 0, 0} : vectorOf(dwo));
+  };
+  const Vec2 spread = halfVectorSpread(turn(dndx, dwodx), turn(dndy, dwody), filter_sigma);
+  const auto usable = [](float x) { return x > 0 ? x : 0; };  // NaN, below the horizon, counts as 0
+  footprint->spread[0] = usable(spread.x);
+  footprint->spread[1] = usable(spread.y);
+  return GLINT_OK;
 }
 
 glint_status glint_ndf_slopes(const glint_ndf* ndf, float mean[2], float covariance[3]) {
@@ -316,7 +337,8 @@ glint_status glint_ndf_pack(const glint_ndf* ndf, void* buffer, size_t capacity,
 glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy, float* density) {
   if (!isOpen(ndf) || footprint == nullptr || density == nullptr)
     return badArgument("glint_density", {{ndf, "ndf"}, {footprint, "footprint"}, {density, "density"}});
-  *density = api::densityAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {hx, hy});
+  *density = api::densityAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {hx, hy},
+                            spreadOf(*footprint));
   return GLINT_OK;
 }
 
@@ -349,7 +371,8 @@ glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, 
                         float* mean) {
   if (!isOpen(ndf) || footprint == nullptr || mean == nullptr)
     return badArgument("glint_mean", {{ndf, "ndf"}, {footprint, "footprint"}, {mean, "mean"}});
-  *mean = api::meanAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {{x0, y0}, {x1, y1}});
+  *mean = api::meanAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {{x0, y0}, {x1, y1}},
+                      spreadOf(*footprint));
   return GLINT_OK;
 }
 
@@ -357,8 +380,8 @@ glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint
                           float* pdf) {
   if (!isOpen(ndf) || footprint == nullptr || hx == nullptr || hy == nullptr || pdf == nullptr)
     return badArgument("glint_sample", {{ndf, "ndf"}, {footprint, "footprint"}, {hx, "hx"}, {hy, "hy"}, {pdf, "pdf"}});
-  const HalfVectorSample drawn =
-      api::sampleAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {xi1, xi2});
+  const HalfVectorSample drawn = api::sampleAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint),
+                                               {xi1, xi2}, spreadOf(*footprint));
   *hx = drawn.h.x;
   *hy = drawn.h.y;
   *pdf = drawn.pdf;

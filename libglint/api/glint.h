@@ -31,7 +31,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define GLINT_ABI_VERSION 1
+#define GLINT_ABI_VERSION 2
 
 #if defined(__GNUC__)
 #define GLINT_API __attribute__((visibility("default")))
@@ -211,6 +211,11 @@ typedef struct glint_footprint {
                    kinds wang-cp, wang-pyramid and wang-tiles, and UDIM sets, in tiles), for BRDFs as far as floats tell positions apart; maps repeat */
   float m[4];   /* Gaussian: covariance xx, xy, yy in texels^2, and unused. Box: a parallelogram's half axes ax, ay, bx, by
                    in texels */
+  /* On a curved surface, half widths of the box of half vectors that the pixel sees, since the surface's normal turns under it:
+     glint_footprint_set_spread. Densities, means, samples and BRDFs are averaged over the box, at the cost of a mean, so that
+     narrow highlights do not alias. 0, and what is not above 0: flat. Colours of kind wave-pyramid and Beckmann facets leave it
+     out. */
+  float spread[2];
 } glint_footprint;
 
 /* Isotropic Gaussian of deviation sigma, texels. */
@@ -242,6 +247,16 @@ GLINT_API glint_ray_cone glint_ray_cone_bounced(glint_ray_cone cone, float slope
  * origin; null: straight above. texels_per_unit: texels in a scene unit, > 0. What is not a number counts as 0. */
 GLINT_API glint_footprint glint_footprint_from_cone(glint_ray_cone cone, double u, double v, const float direction[3],
                                                     float texels_per_unit);
+
+/* Sets the spread of a footprint on a curved surface, for light from wi that is seen from wo.
+ *
+ * wi, wo: unit vectors of the tangent frame. dndx, dndy: change of the surface's unit normal, without the map, from one pixel to
+ * the next along x and along y, in the tangent frame. dwodx, dwody: change of wo, minus that of the ray; null: none. filter_sigma:
+ * deviation of the pixel filter, pixels: 0.5, or for one of n samples of a pixel 0.5 / sqrt(n).
+ * What is not a number gives a spread of 0. Returns GLINT_ERROR_USAGE for a null argument, else GLINT_OK. */
+GLINT_API glint_status glint_footprint_set_spread(glint_footprint* footprint, const float wi[3], const float wo[3],
+                                                  const float dndx[3], const float dndy[3], const float dwodx[3],
+                                                  const float dwody[3], float filter_sigma);
 
 /* Density towards one half vector.
  *
@@ -312,6 +327,7 @@ typedef struct glint_footprints {
   glint_floats ax, ay, bx, by;        /* boxes: half axes, texels */
   glint_doubles precise_u, precise_v; /* centres as doubles: for positions far out. Where given, u and v are not read. For
                                          BRDFs of planes without end give u and v: here the whole parts do not count */
+  glint_floats spread_x, spread_y;    /* on curved surfaces, spread of each glint_footprint; null, both: flat */
 } glint_footprints;
 
 /* densities[k] = glint_density of query k, k < count, to 1e-6 of its size; densities is contiguous.

@@ -82,16 +82,18 @@ class Ndf:
         """Mean (x, y) and covariance (xx, xy, yy) of the slopes of the whole map, from which masking follows."""
         return self._handle.slopes()
 
-    def density(self, uv, h, *, sigma=None, covariance=None, box=None, threads: int = 0) -> np.ndarray:
+    def density(self, uv, h, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0) -> np.ndarray:
         """Density of normals towards half vectors, per unit projected area.
 
         Args:
             h: [..., 2] half vectors on the unit disk.
+            spread: [..., 2] on a curved surface, half widths of the box of half vectors that each pixel sees
+                (`footprint.half_vector_spread`). Answers are averaged over it, so that narrow highlights do not alias.
 
         Returns:
             [...] float32, >= 0.
         """
-        p, half = FootprintArrays(uv, sigma, covariance, box), members(h, 2, "h")
+        p, half = FootprintArrays(uv, sigma, covariance, box, spread), members(h, 2, "h")
         batch = Batch(half, *p.arrays())
         out = batch.answers()
         self._handle.density(p.of(batch), batch.rows(half), out, threads)
@@ -117,19 +119,19 @@ class Ndf:
         self._handle.density_spectrum(p.of(batch), batch.rows(towards), out, threads)
         return out.reshape(batch.shape + (self.channels,))
 
-    def mean(self, uv, ranges, *, sigma=None, covariance=None, box=None, threads: int = 0) -> np.ndarray:
+    def mean(self, uv, ranges, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0) -> np.ndarray:
         """Mean density over boxes of half vectors, as a light asks for it.
 
         Args:
             ranges: [..., 4] x0, y0, x1 and y1.
         """
-        p, boxes = FootprintArrays(uv, sigma, covariance, box), members(ranges, 4, "ranges")
+        p, boxes = FootprintArrays(uv, sigma, covariance, box, spread), members(ranges, 4, "ranges")
         batch = Batch(boxes, *p.arrays())
         out = batch.answers()
         self._handle.mean(p.of(batch), batch.rows(boxes), out, threads)
         return batch.shaped(out)
 
-    def sample(self, uv, xi, *, sigma=None, covariance=None, box=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    def sample(self, uv, xi, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
         """Draws half vectors in proportion to the density.
 
         Args:
@@ -139,7 +141,7 @@ class Ndf:
             h: [..., 2] half vectors. They may lie outside the disk, where facets near the horizon blur to.
             pdf: [...] per unit projected area; 0 if nothing can be drawn.
         """
-        p, random = FootprintArrays(uv, sigma, covariance, box), members(xi, 2, "xi")
+        p, random = FootprintArrays(uv, sigma, covariance, box, spread), members(xi, 2, "xi")
         batch = Batch(random, *p.arrays())
         x, y, pdf = batch.answers(), batch.answers(), batch.answers()
         self._handle.sample(p.of(batch), batch.rows(random), x, y, pdf, threads)
@@ -184,25 +186,25 @@ class Brdf:
         self._handle = handle
         self.ndf = ndf  #: the distribution
 
-    def _footprints(self, uv, sigma, covariance, box) -> FootprintArrays:
+    def _footprints(self, uv, sigma, covariance, box, spread=None) -> FootprintArrays:
         # On a plane without end the whole parts of uv count, and batches of doubles drop them.
-        return FootprintArrays(uv, sigma, covariance, box, keep_whole_parts=self.ndf.endless)
+        return FootprintArrays(uv, sigma, covariance, box, spread, keep_whole_parts=self.ndf.endless)
 
-    def evaluate(self, uv, wi, wo, *, sigma=None, covariance=None, box=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    def evaluate(self, uv, wi, wo, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
         """The BRDF and the density of its samples.
 
         Returns:
             f: [..., 3] red, green and blue, 1/sr, without the cosine of wi.
             pdf: [...] density with which `sample` draws wi, per unit solid angle.
         """
-        p = self._footprints(uv, sigma, covariance, box)
+        p = self._footprints(uv, sigma, covariance, box, spread)
         inward, outward = members(wi, 3, "wi"), members(wo, 3, "wo")
         batch = Batch(inward, outward, *p.arrays())
         f, pdf = batch.answers(3), batch.answers()
         self._handle.evaluate(p.of(batch), batch.rows(inward), batch.rows(outward), f, pdf, threads)
         return batch.shaped(f), batch.shaped(pdf)
 
-    def sample(self, uv, wo, xi, *, sigma=None, covariance=None, box=None,
+    def sample(self, uv, wo, xi, *, sigma=None, covariance=None, box=None, spread=None,
                threads: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Draws wi for views wo.
 
@@ -211,7 +213,7 @@ class Brdf:
             weight: [..., 3] f wi.z / pdf.
             pdf: [...] per unit solid angle; 0 where nothing was drawn.
         """
-        p = self._footprints(uv, sigma, covariance, box)
+        p = self._footprints(uv, sigma, covariance, box, spread)
         outward, random = members(wo, 3, "wo"), members(xi, 2, "xi")
         batch = Batch(outward, random, *p.arrays())
         wi, weight, pdf = batch.answers(3), batch.answers(3), batch.answers()
