@@ -141,7 +141,7 @@ using namespace glint::api::c;
 constexpr float kLeastSigmaR = 1e-4f, kMostSigmaR = 0.25f;
 /// Size of the options in the first version of the struct.
 constexpr std::size_t kFirstOptionsSize = offsetof(glint_open_options, verify_hashes) + sizeof(int32_t);
-static_assert(offsetof(glint_open_options, estimator) + sizeof(int32_t) == sizeof(glint_open_options),
+static_assert(offsetof(glint_open_options, reserved) + sizeof(int32_t) == sizeof(glint_open_options),
               "padding at the end would be read as a member by a later library");
 
 /// @return null if the options can be used, else the fault
@@ -163,6 +163,8 @@ const char* takeOptions(const glint_open_options* from, glint_open_options& to) 
   if (to.interpolation != GLINT_INTERPOLATION_FOOTPRINT && to.interpolation != GLINT_INTERPOLATION_TRILINEAR)
     return "unknown interpolation";
   if (to.pixels != GLINT_PIXELS_SMOOTH && to.pixels != GLINT_PIXELS_CONSTANT) return "unknown pixels";
+  if (to.bins != GLINT_BINS_LOBES && to.bins != GLINT_BINS_EVEN) return "unknown bins";
+  if (to.reserved != 0) return "reserved is not 0";
   if (to.estimator != GLINT_ESTIMATOR_EXACT && to.estimator != GLINT_ESTIMATOR_PUBLISHED) return "unknown estimator";
   return nullptr;
 }
@@ -177,6 +179,7 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   options.checks.copy = o.copy != 0;
   options.alpha = o.alpha;
   options.estimator = static_cast<BinEstimator>(o.estimator);
+  options.histogram_bins = static_cast<HistogramBins>(o.bins);
   if (o.slant_tolerance != 0) options.slant_tolerance = std::max(0.0f, o.slant_tolerance);
   if (o.footprint_parts != 0) options.footprint_parts = o.footprint_parts;
   options.interpolation = static_cast<Interpolation>(o.interpolation);

@@ -86,6 +86,11 @@ enum {
   GLINT_ESTIMATOR_PUBLISHED = 1 /* by the centres of 21 bins around the half vector: quicker, and less exact */
 };
 
+enum {
+  GLINT_BINS_LOBES = 0, /* a lobe with the mean and the spread of the bin's normals over the whole map, continuous */
+  GLINT_BINS_EVEN = 1   /* even over the bin: quicker, and lights smaller than a bin show its borders */
+};
+
 /* Structs that start with a struct_size may grow: it says which version of the struct the caller has. A size that is smaller
  * than the first version's or above this is no size of a struct, and GLINT_ERROR_USAGE. */
 #define GLINT_MOST_STRUCT_SIZE 4096
@@ -116,12 +121,14 @@ typedef struct glint_open_options {
   int32_t copy;      /* not 0: copy the bytes of the asset into memory of its own. For files that others may truncate while
                                they are open, which would end the program with SIGBUS, and for memory that does not stay */
   int32_t estimator; /* kind bin-map: GLINT_ESTIMATOR_*, how densities are made of the texels; means and samples are exact */
+  int32_t bins;      /* kind histogram-sat: GLINT_BINS_*, where the normals of a bin are */
+  int32_t reserved;  /* 0 */
 } glint_open_options;
 
 #define GLINT_SLANT_EXACT (-1.0f)
 
 /* clang-format off */
-#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f, 0.0f, 0, 0, 0, 0, 0, 0 }
+#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f, 0.0f, 0, 0, 0, 0, 0, 0, 0, 0 }
 /* clang-format on */
 
 /* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat,
@@ -172,7 +179,8 @@ typedef struct glint_ndf_info {
   int32_t height;              /* of the normal map, texels */
   int32_t resolution;          /* pixels along each axis of a stored NDF image; 256 where there are none */
   int32_t level_count;         /* footprint sizes that are stored; 0: all sizes are answered from the texels */
-  float sigma_r;               /* intrinsic roughness, disk units; bin-map: alpha / sqrt(2); histogram-sat: 0, it has none */
+  float sigma_r;               /* intrinsic roughness, disk units; bin-map: alpha / sqrt(2); even bins of
+                                  histogram-sat: 0, they have none */
   float finest_sigma_texels;   /* footprint of level 0, deviation in texels; 0 where there are no levels */
   int32_t surface;             /* GLINT_SURFACE_* */
   int32_t boundary;            /* GLINT_BOUNDARY_* */

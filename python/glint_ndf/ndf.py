@@ -20,6 +20,7 @@ _PIXELS = {"smooth": 0, "constant": 1}
 _FRESNELS = {"mirror": 0, "dielectric": 1, "conductor": 2}
 _FACETS = {"distribution": 0, "beckmann": 1}
 _ESTIMATORS = {"exact": 0, "published": 1}
+_BINS = {"lobes": 0, "even": 1}
 _SLANT_EXACT = -1.0
 
 #: Kinds of planes without end: the whole parts of uv count.
@@ -266,7 +267,7 @@ def _lobe_members(axes: np.ndarray, sharpness, amplitudes: np.ndarray) -> list[n
 def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: PathLike | Asset | None = None, *,
          surface: str = "flat", boundary: str = "wrap", sigma_r: float = 0.005, alpha: float = 0.0,
          slant_tolerance: float = 0.06, gaussian_boxes: int = 1, footprint_parts: int = 32, interpolation: str = "footprint",
-         pixels: str = "smooth", estimator: str = "exact", verify_hashes: bool = False) -> Ndf:
+         pixels: str = "smooth", estimator: str = "exact", bins: str = "lobes", verify_hashes: bool = False) -> Ndf:
     """Opens an asset that holds a distribution of normals. The file is checked, and then mapped. Options of other kinds are ignored.
 
     Args:
@@ -275,7 +276,7 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
         normals: asset of kind normals that a pyramid was made from. It answers footprints below level 0. Without it, the normals
             that the pyramid keeps do, and the nearest level where it keeps none. Of a UDIM set a pattern, too.
         surface, boundary: kind normals: "flat" or "smooth", "wrap" or "clamp".
-        sigma_r: kinds normals and slope-moments: intrinsic roughness, disk units, 1e-4 to 0.25.
+        sigma_r: kinds normals, slope-moments and histogram-sat: intrinsic roughness, disk units, 1e-4 to 0.25.
         alpha: kind bin-map: Beckmann roughness, in the range that the asset was made for; 0: the smallest.
         slant_tolerance: kind histogram-sat: share of a footprint with slanted sides that may be counted in a wrong place; 0: none.
         gaussian_boxes: kind histogram-sat: boxes that stand for a Gaussian footprint, 1 or 3.
@@ -283,6 +284,8 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
         interpolation: kinds with levels: "footprint", or "trilinear" (quicker, and answers a wider footprint).
         pixels: kinds with levels: "smooth", or "constant" (quicker; small lights show the borders of pixels).
         estimator: kind bin-map: "exact", or "published" (densities by the centres of 21 bins: quicker, and less exact).
+        bins: kind histogram-sat: where the normals of a bin are: "lobes" (with their mean and spread over the map), or "even" over the
+            bin (quicker; small lights show the borders of bins).
         verify_hashes: compare all arrays with their hashes.
 
     Raises:
@@ -296,7 +299,7 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
         alpha=alpha, slant_tolerance=_SLANT_EXACT if slant_tolerance == 0 else slant_tolerance, gaussian_boxes=gaussian_boxes,
         footprint_parts=footprint_parts, interpolation=_word("interpolation", interpolation, _INTERPOLATIONS),
         pixels=_word("pixels", pixels, _PIXELS), estimator=_word("estimator", estimator, _ESTIMATORS),
-        verify_hashes=verify_hashes)
+        bins=_word("bins", bins, _BINS), verify_hashes=verify_hashes)
     of_texels = None if normals is None else normals.path if isinstance(normals, Asset) else os.fspath(normals)
     return Ndf(_glint.open_ndf(path, of_texels, **options), asset, path)
 

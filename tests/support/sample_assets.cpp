@@ -877,19 +877,28 @@ SampleHistograms sampleHistograms(int width, int height) {
   sat.slopes = {{0.125f, -0.0625f}, {0.25f, 0.03125f, 0.5f}};
   sample.texels.resize(static_cast<std::size_t>(sat.tileRows()) * sat.tileColumns() * 64);
   for (int id = 0; id < kRings * kSectors; ++id) {
-    double x = 0, y = 0;
+    double x = 0, y = 0, p = 0, q = 0, pp = 0, pq = 0, qq = 0;
     std::uint64_t count = 0;
     for (int j = 0; j < height; ++j) {
       for (int i = 0; i < width; ++i) {
         if (direction(map.map.at(i, j)) != id) continue;
         sample.texels[sat.texelIndex(i, j)] = static_cast<std::uint16_t>(sample.bin_ids.size());
-        x += map.map.at(i, j).x, y += map.map.at(i, j).y, ++count;
+        const Vec2 n = map.map.at(i, j);
+        x += n.x, y += n.y, ++count;
+        const double nz = std::sqrt(1 - double{n.x} * n.x - double{n.y} * n.y), sp = -n.x / nz, sq = -n.y / nz;
+        p += sp, q += sq, pp += sp * sp, pq += sp * sq, qq += sq * sq;
       }
     }
     if (count == 0) continue;
     sample.bin_ids.push_back(static_cast<std::uint16_t>(id));
     const auto texels = static_cast<double>(count);
     sample.bin_normals.push_back({static_cast<float>(x / texels), static_cast<float>(y / texels)});
+    p /= texels, q /= texels;
+    const double xx = std::max(0.0, pp / texels - p * p), yy = std::max(0.0, qq / texels - q * q);
+    const double most = 0.999 * std::sqrt(xx * yy);
+    sample.bin_slopes.push_back(
+        {{static_cast<float>(p), static_cast<float>(q)},
+         {static_cast<float>(xx), static_cast<float>(std::clamp(pq / texels - p * q, -most, most)), static_cast<float>(yy)}});
     sample.bin_totals.push_back(count);
   }
   sat.bin_count = static_cast<int>(sample.bin_ids.size());
@@ -910,7 +919,8 @@ SampleHistograms sampleHistograms(int width, int height) {
     for (int a = 0; a < sat.pointsX(16); ++a) count(sample.row_sums, 0, j, std::min(a * 16, width), j + 1);
   for (int i = 0; i < width; ++i)
     for (int b = 0; b < sat.pointsY(16); ++b) count(sample.column_sums, i, 0, i + 1, std::min(b * 16, height));
-  sat.bin_ids = sample.bin_ids, sat.bin_normals = sample.bin_normals, sat.bin_totals = sample.bin_totals;
+  sat.bin_ids = sample.bin_ids, sat.bin_normals = sample.bin_normals, sat.bin_slopes = sample.bin_slopes,
+  sat.bin_totals = sample.bin_totals;
   sat.texels = sample.texels, sat.sums = sample.sums, sat.coarse_sums = sample.coarse_sums;
   sat.row_sums = sample.row_sums, sat.column_sums = sample.column_sums;
   return sample;

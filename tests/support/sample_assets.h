@@ -117,6 +117,7 @@ struct SampleBinMap {
 struct SampleHistograms {
   std::vector<std::uint16_t> bin_ids;
   std::vector<Vec2> bin_normals;
+  std::vector<MapSlopes> bin_slopes;
   std::vector<std::uint64_t> bin_totals;
   std::vector<std::uint16_t> texels, sums, row_sums, column_sums;
   std::vector<std::uint32_t> coarse_sums;

@@ -55,11 +55,11 @@ enum class Base {
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,    Base::heights,        Base::pyramid,        Base::shard,
-                           Base::compressed, Base::compressed_f32, Base::spots,          Base::bin_map,
-                           Base::histograms, Base::moments,        Base::tiny_scattered, Base::tiny_tiled,
-                           Base::wang_tiles, Base::wang_pyramid,   Base::wang_cp,        Base::wave,
-                           Base::sh_lobes,   Base::sh_light,       Base::displacement,   Base::displacement_rgb};
+constexpr Base kBases[] = {
+    Base::pyramid_normals, Base::compressed_normals, Base::normals,      Base::heights,         Base::pyramid,    Base::shard,
+    Base::compressed,      Base::compressed_f32,     Base::spots,        Base::bin_map,         Base::histograms, Base::moments,
+    Base::tiny_scattered,  Base::tiny_tiled,         Base::wang_tiles,   Base::wang_pyramid,    Base::wang_cp,    Base::wave,
+    Base::sh_lobes,        Base::sh_light,           Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -792,6 +792,13 @@ std::vector<Fixture> histogramFixtures() {
               }),
       patched("histogram.texels", Base::histograms,
               [](const Patch& patch) { patch.change<std::uint16_t>("texels", 70, [](auto& bin) { bin = 60000; }); }),
+      patched(
+          "histogram.bin_slopes", Base::histograms,
+          [](const Patch& patch) { patch.change<MapSlopes>("bin_slopes", 1, [](MapSlopes& s) { s.covariance.xx = -1; }); },
+          true),
+      patched(
+          "histogram.bin_slopes", Base::histograms,
+          [](const Patch& patch) { patch.change<MapSlopes>("bin_slopes", 0, [](MapSlopes& s) { s.mean.y = kNan; }); }, true),
       patched(
           "histogram.bin_normals", Base::histograms,
           [](const Patch& patch) { patch.change<Vec2>("bin_normals", 1, [](Vec2& n) { n.x = kNan; }); }, true),
