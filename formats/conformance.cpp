@@ -61,7 +61,8 @@ bool checkAttribute(const Attributes& attributes, const std::string& object, con
                     const SizeScope& scope, int minor, Findings& findings) {
   const auto found = attributes.find(schema.name);
   if (found != attributes.end()) return checkValue(found->second, object, schema, scope, findings);
-  if (!schema.required || schema.since > minor) return true;
+  const bool wanted = schema.needs.empty() ? schema.required : attributes.contains(schema.needs);
+  if (!wanted || schema.since > minor) return true;
   findings.add("attribute.missing", object + "@" + std::string(schema.name), "is missing");
   return false;
 }
@@ -227,12 +228,13 @@ void checkConformance(const FileStructure& structure, const KindSchema& schema, 
       SizeScope& use = first.repeat.empty() ? scope : level_scope;
       for (std::size_t k = place; k < end; ++k) {
         const DatasetSchema& dataset = schema.datasets[k];
+        if (!dataset.needs.empty() && !structure.attributes.contains(dataset.needs)) continue;
         const std::string path = levelPath(dataset.path, static_cast<int>(level));
         known.insert(path);
         const auto found = structure.datasets.find(path);
         if (found != structure.datasets.end()) {
           checkDataset(found->second, path, dataset, structure.attributes, use, findings);
-        } else if (dataset.required && dataset.since <= minorOf(structure.attributes)) {
+        } else if ((dataset.required || !dataset.needs.empty()) && dataset.since <= minorOf(structure.attributes)) {
           findings.add("dataset.missing", "/" + path, "is missing");
         }
       }

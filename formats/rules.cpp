@@ -74,6 +74,9 @@ constexpr std::array kIndexRules = {
     Rule{"shape.slopes", error, invalid_input, "slope_covariance is a covariance", kMakeAgain},
     Rule{"shape.grid", error, invalid_input, "a level's grid is ceil(size overlap / stride), or 1 x 1 of the last level",
          kMakeAgain},
+    Rule{"near.step", error, invalid_input, "near_step is 1 for f32, and a power of two up to 2^-15 for i16", kMakeAgain},
+    Rule{"near.bounds_levels", error, invalid_input, "the coarsest level of the bounds of kept normals is one node",
+         kMakeAgain},
     Rule{"sh.grid", error, invalid_input, "a grid is 0 x 0 (lobes only) or has at least 2 rows and 3 columns", kMakeAgain},
 };
 
@@ -84,6 +87,8 @@ constexpr std::array kValueRules = {
     Rule{"file.digest", error, invalid_input, "attributes, sizes and hashes have the digest of root attribute digest",
          kDamaged},
     Rule{"dataset.hash", error, invalid_input, "a dataset's bytes have the hash of its attribute xxh3_128", kDamaged},
+    Rule{"near.disk", error, invalid_input, "kept normals lie inside the unit disk", kMakeAgain},
+    Rule{"near.bounds", error, invalid_input, "bounds of kept normals hold the normals that they cover", kMakeAgain},
     Rule{"sh.finite", error, invalid_input, "coefficients, scales and norms are finite, the latter two not negative",
          kMakeAgain},
 };

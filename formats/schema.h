@@ -37,6 +37,7 @@ struct AttributeSchema {
   std::string_view values = {};  ///< valid texts, separated by '|'; empty for any
   int since = 0;                 ///< minor version of the format that added it: files of older ones need not have it
   bool required = true;
+  std::string_view needs = {};  ///< attribute without which there is none, and with which it must be there; empty: none
 };
 
 /// The type of a dataset when all of `when` hold: "a=x|y & b=z" of text attributes; empty always holds.
@@ -54,7 +55,8 @@ struct DatasetSchema {
   std::string_view units;
   std::string_view long_name;
   bool required = true;
-  int since = 0;  ///< minor version of the format that added it: files of older ones need not have it
+  int since = 0;                ///< minor version of the format that added it: files of older ones need not have it
+  std::string_view needs = {};  ///< attribute without which there is none, and with which it must be there; empty: none
 };
 
 /// A size that follows from attributes.

@@ -78,6 +78,8 @@ def version(schema, entry):
 
 def presence(entry):
     """What follows the name of an attribute or dataset that files may lack."""
+    if "needs" in entry:
+        return f" (with {code(entry['needs'])})"
     return "" if entry.get("required", True) else " (MAY be absent)"
 
 

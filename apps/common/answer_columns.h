@@ -14,6 +14,7 @@ inline constexpr std::array kCovariance = {"sxx", "sxy", "syy"};
 inline constexpr std::array kBox = {"ax", "ay", "bx", "by"};
 inline constexpr std::array kLevel = {"level"};
 inline constexpr std::array kHalf = {"hx", "hy"};
+inline constexpr std::array kSpread = {"spread_x", "spread_y"};
 inline constexpr std::array kRange = {"x0", "y0", "x1", "y1"};
 inline constexpr std::array kLight = {"wix", "wiy", "wiz"};
 inline constexpr std::array kView = {"wox", "woy", "woz"};

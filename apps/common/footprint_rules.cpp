@@ -54,6 +54,13 @@ std::optional<FootprintFault> sigmaFault(float sigma_texels) {
                         sizeRemedy()};
 }
 
+std::optional<FootprintFault> spreadFault(Vec2 spread) {
+  const auto holds = [](double x) { return x >= 0 && x <= kMostSpread; };
+  if (holds(spread.x) && holds(spread.y)) return {};
+  return FootprintFault{fmt::format("{:g} {:g} is not in the range 0 to {:g}", spread.x, spread.y, kMostSpread),
+                        "give half widths of the box of half vectors that a pixel sees"};
+}
+
 std::optional<FootprintFault> rangeFault(const Box2& range) {
   if (range.width() > 0 && range.height() > 0) return {};
   return FootprintFault{

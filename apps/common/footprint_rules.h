@@ -28,4 +28,9 @@ std::optional<FootprintFault> sigmaFault(float sigma_texels);
 /// Checks a box of half vectors that a mean is taken over: it has an area.
 std::optional<FootprintFault> rangeFault(const Box2& range);
 
+/// Largest half width of the box of half vectors that a pixel sees.
+inline constexpr double kMostSpread = 0.5;
+/// Checks half widths of a box of half vectors: each is 0 to kMostSpread.
+std::optional<FootprintFault> spreadFault(Vec2 spread);
+
 }  // namespace glint::apps

@@ -36,8 +36,10 @@ void NdfAsset::check() {
 
 void NdfAsset::addPyramidOptions() {
   useOnly({"ndf-pyramid", "ndf-cp"}, "--normals",
-          tool_.option("--normals", normals_path_,
-                       "asset of kind normals that the pyramid was made from, for footprints below its finest level"));
+          tool_.option(
+              "--normals", normals_path_,
+              "asset of kind normals that the pyramid was made from, for footprints below its finest level; instead of the "
+              "normals that the pyramid keeps, if it does"));
   useOnly({"ndf-pyramid", "ndf-cp", "slope-moments", "wang-cp", "wang-pyramid", "wave-pyramid"}, "--parts",
           tool_
               .option("--parts", options_.footprint_parts,
@@ -69,13 +71,11 @@ void NdfAsset::addNormalsOptions() {
   useOnly({"normals"}, "--boundary",
           tool_.choice("--boundary", options_.boundary, {{"wrap", Boundary::wrap}, {"clamp", Boundary::clamp}},
                        "beyond the border of the map (kind normals)"));
-  useOnly(
-      {"normals", "histogram-sat", "slope-moments", "wang-tiles"}, "--sigma-r",
-      tool_
-          .option(
-              "--sigma-r", options_.sigma_r,
-              "intrinsic roughness, disk units (kinds normals, slope-moments and wang-tiles; the light of kind histogram-sat)")
-          .range(1e-4, 0.25));
+  useOnly({"normals", "histogram-sat", "slope-moments", "wang-tiles"}, "--sigma-r",
+          tool_
+              .option("--sigma-r", options_.sigma_r,
+                      "intrinsic roughness, disk units (kinds normals, slope-moments, wang-tiles and histogram-sat)")
+              .range(1e-4, 0.25));
 }
 
 void NdfAsset::addBinOptions() {
@@ -91,6 +91,10 @@ void NdfAsset::addBinOptions() {
                 "and less exact (kind bin-map)"));
   }
   if (!asks({"histogram-sat"})) return;
+  useOnly({"histogram-sat"}, "--bins",
+          tool_.choice("--bins", options_.histogram_bins, {{"lobes", HistogramBins::lobes}, {"even", HistogramBins::even}},
+                       "where the normals of a bin are: in a lobe with their mean and spread over the map, or even over the "
+                       "bin, which is quicker and shows borders of bins under small lights (kind histogram-sat)"));
   useOnly({"histogram-sat"}, "--gaussian-boxes",
           tool_.choice("--gaussian-boxes", options_.gaussian_boxes, {{"1", GaussianBoxes::one}, {"3", GaussianBoxes::three}},
                        "boxes that stand for a Gaussian footprint (kind histogram-sat)"));
@@ -200,7 +204,7 @@ std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint)
               fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
               opened_->asset().kind() == "wave-pyramid"
                   ? "make the pyramid again with a smaller --stride: without their neighbours texels do not diffract"
-                  : "add --normals with the asset that the pyramid was made from"};
+                  : "add --normals with the asset that the pyramid was made from, or make the pyramid with --keep-normals"};
         } else {
           return {};
         }

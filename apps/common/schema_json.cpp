@@ -16,6 +16,7 @@ ordered_json attributeJson(const AttributeSchema& attribute) {
   if (attribute.type != ElementType::text) json["range"] = {attribute.minimum, attribute.maximum};
   if (!attribute.values.empty()) json["values"] = attribute.values;
   if (!attribute.required) json["required"] = false;
+  if (!attribute.needs.empty()) json["needs"] = attribute.needs;
   if (attribute.since > 0) json["since_minor"] = attribute.since;
   json["units"] = attribute.units;
   json["long_name"] = attribute.long_name;
@@ -41,6 +42,7 @@ ordered_json datasetJson(const DatasetSchema& dataset) {
   json["types"] = std::move(types);
   json["dims"] = dataset.dims;
   json["required"] = dataset.required;
+  if (!dataset.needs.empty()) json["needs"] = dataset.needs;
   if (dataset.since > 0) json["since_minor"] = dataset.since;
   json["units"] = dataset.units;
   json["long_name"] = dataset.long_name;

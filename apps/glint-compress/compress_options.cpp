@@ -4,6 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "common/input_asset.h"
+#include "glint/api/any_ndf.h"
+#include "glint/formats/udim.h"
+
 namespace glint::apps {
 namespace {
 
@@ -24,7 +28,7 @@ const char* methodName(CompressionMethod method) {
 
 }  // namespace
 
-CompressOptions::CompressOptions(Tool& tool) {
+CompressOptions::CompressOptions(Tool& tool) : tool_(tool) {
   tool.choice("--method", values_.method,
               {{"auto", std::nullopt},
                {"cp", CompressionMethod::cp},
@@ -55,6 +59,62 @@ CompressOptions::CompressOptions(Tool& tool) {
   tool.option("--min-improvement", values_.min_improvement, "cp: end when a sweep improves the relative error by less")
       .range(0, 0.99);
   tool.option("--max-iterations", values_.max_iterations, "cp: sweeps at most").range(1, 1e6);
+  tool.choice(
+          "--keep-normals", keep_,
+          {{"auto", KeepNormals::as_input}, {"none", KeepNormals::none}, {"i16", KeepNormals::i16}, {"f32", KeepNormals::f32}},
+          "normals of the map in the asset, for footprints below the finest level; auto: those that the pyramid keeps, or "
+          "those of --normals in 16 bits")
+      .recordedIfGiven();
+  tool.option("--normals", normals_,
+              "asset of kind normals that the pyramid was made from, to keep its normals where the pyramid keeps none")
+      .recordedIfGiven();
+  tool.addCheck([this] {
+    if (normals_.empty()) return;
+    if (keep_ == KeepNormals::none)
+      throw Error(ErrorCode::usage, "cli.usage", "", "--normals", "gives normals, and --keep-normals none keeps none",
+                  "leave one of them out");
+    addInputs(tool_, normals_, UdimSets::taken);
+  });
+}
+
+std::string CompressOptions::normalsOf(int tile) const {
+  if (normals_.empty() || tile == 0) return normals_;
+  if (!formats::isUdimPattern(normals_))
+    throw Error(ErrorCode::usage, "udim.normals", normals_, "", "is one map, and a set has one for each tile",
+                "name the maps by a pattern, too, such as name.<UDIM>.map.glint");
+  return formats::udimFile(normals_, tile).string();
+}
+
+std::optional<formats::Asset> CompressOptions::openNormals(int tile) const {
+  if (normals_.empty()) return {};
+  return openInput(tool_, normalsOf(tile), UdimSets::taken);
+}
+
+std::optional<bake::NearNormalsData> CompressOptions::kept(const formats::Asset& asset, const std::string& path, int tile,
+                                                           const std::optional<formats::Asset>& normals) const {
+  if (asset.kind() != "ndf-pyramid") {
+    if (keep_ == KeepNormals::i16 || keep_ == KeepNormals::f32 || normals)
+      throw Error(ErrorCode::usage, "cli.usage", path, "",
+                  "is of kind " + std::string(asset.kind()) + ", which keeps no normals",
+                  "leave --keep-normals and --normals out");
+    return {};
+  }
+  const auto& pyramid = asset.get<NdfPyramid>();
+  if (normals) {
+    const auto& map = normals->get<NormalMap>();
+    api::requireSameMap(asset, path, pyramid.shape.width, pyramid.shape.height, map, normalsOf(tile));
+    return keptNormals(tool_, map, keep_ == KeepNormals::as_input ? KeepNormals::i16 : keep_);
+  }
+  if (pyramid.near_normals) {
+    if (keep_ == KeepNormals::f32 && pyramid.near_normals->coded())
+      throw Error(ErrorCode::usage, "cli.usage", path, "", "keeps normals in 16 bits, and --keep-normals f32 asks for more",
+                  "add --normals with the asset that the pyramid was made from");
+    return keptNormals(tool_, *pyramid.near_normals, keep_);
+  }
+  if (keep_ == KeepNormals::i16 || keep_ == KeepNormals::f32)
+    throw Error(ErrorCode::usage, "cli.usage", path, "", "keeps no normals",
+                "add --normals with the asset that the pyramid was made from");
+  return {};
 }
 
 bake::NdfCpData compress(const NdfPyramid& pyramid, const std::vector<float>& masses, const CompressOptions& options,

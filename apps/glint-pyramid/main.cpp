@@ -1,11 +1,12 @@
+#include <nlohmann/json.hpp>
+
 #include "common/files.h"
 #include "common/input_asset.h"
 #include "common/tool.h"
-#include "glint-pyramid/pyramid_options.h"
+#include "glint-pyramid/make_pyramid.h"
 #include "glint-pyramid/region_option.h"
 #include "glint-pyramid/udim_pyramids.h"
 #include "glint-pyramid/wave_options.h"
-#include "glint/bake/pyramid/pyramid.h"
 #include "glint/bake/wang/tile_pyramid.h"
 #include "glint/formats/asset_writer.h"
 
@@ -17,6 +18,7 @@ using apps::kLessMemory;
 /// Writes the images of all tiles of a plane.
 void makeWangPyramid(apps::Tool& tool, const WangTiles& tiles, const apps::PyramidOptions& options,
                      const formats::Provenance& provenance, const apps::OutputFile& output) {
+  options.refuseKeeping("the images of Wang tiles");
   const bake::PyramidOptions values = options.values();
   tool.requireMemory(bake::wangPyramidBytes(tiles, values, static_cast<double>(tool.maxMemory())), "the NDF images",
                      kLessMemory);
@@ -46,11 +48,9 @@ int main(int argc, char** argv) {
     const formats::Provenance provenance = tool.provenance();
     if (wave.optics() == apps::Optics::wave) return apps::makeWavePyramid(tool, asset, input, wave, provenance, output);
     if (asset.kind() == "wang-tiles") return makeWangPyramid(tool, asset.get<WangTiles>(), options, provenance, output);
-    const auto& map = asset.get<NormalMap>();
-    const bake::PyramidOptions values = options.values();
-    tool.requireMemory(bake::pyramidBytes(map, values, static_cast<double>(tool.maxMemory())), "the NDF images", kLessMemory);
-    const bake::NdfPyramidData pyramid = bake::buildPyramid(map, values, tool.progress("images"));
-    formats::writeAsset(output.path(), pyramid.view(), provenance, output.writeOptions());
-    apps::reportPyramid(tool, pyramid);
+    const auto report = apps::makePyramid(tool, asset.get<NormalMap>(), options.values(), options.keep(), output.path(),
+                                          provenance, output.writeOptions());
+    tool.setResult(report.json);
+    tool.summary(report.text);
   });
 }

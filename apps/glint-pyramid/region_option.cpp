@@ -62,6 +62,7 @@ RegionOption::RegionOption(Tool& tool, const WaveOptions& wave) {
 
 void makeShard(Tool& tool, const InputFile& input, const PyramidOptions& options, const RegionOption& option,
                const OutputFile& output) {
+  options.refuseKeeping("shards", "leave it out here, and give glint-compress --normals and --keep-normals");
   if (input.isSet()) refuseUdim(input.path(), "is a UDIM set, and --region divides one map");
   const formats::Asset asset = formats::Asset::open(input.path(), {.verify_hashes = !tool.trust(), .hash_in_pieces = true});
   if (asset.info().udim) refuseUdim(input.path(), "is a tile of a UDIM set, and --region divides maps without margins");

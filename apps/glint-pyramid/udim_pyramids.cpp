@@ -4,6 +4,7 @@
 
 #include "common/input_asset.h"
 #include "common/udim_loop.h"
+#include "glint-pyramid/make_pyramid.h"
 
 namespace glint::apps {
 
@@ -15,13 +16,10 @@ bool makeUdimPyramids(Tool& tool, const InputFile& input, const OutputFile& outp
     requireTile(asset, files);
     if (wave.optics() == Optics::wave)
       refuseUdim(files.input, "is a tile of a UDIM set, and pyramids of waves are not made of sets");
-    const auto& map = asset.get<NormalMap>();
-    const bake::PyramidOptions values = options.tileValues();
-    tool.requireMemory(bake::pyramidBytes(map, values, static_cast<double>(tool.maxMemory())), "the NDF images", kLessMemory);
-    const bake::NdfPyramidData pyramid = bake::buildPyramid(map, values, tool.progress("images"));
-    formats::writeAsset(files.output, pyramid.view(), files.provenance, output.writeOptions(asset.info().udim));
-    tool.summary(files.output + "\n" + pyramidText(pyramid));
-    return pyramidJson(pyramid);
+    const PyramidReport report = makePyramid(tool, asset.get<NormalMap>(), options.tileValues(), options.keep(), files.output,
+                                             files.provenance, output.writeOptions(asset.info().udim));
+    tool.summary(files.output + "\n" + report.text);
+    return report.json;
   });
   return true;
 }

@@ -15,9 +15,6 @@ inline constexpr const char* kPyramidOutput =
     "asset (.glint) of kind ndf-pyramid, wang-pyramid or wave-pyramid; with <UDIM>, one for each tile; with --region "
     "ndf-pyramid-shard";
 
-/// What to do where the images take too much memory.
-inline constexpr const char* kLessMemory = "give a larger --stride, or a smaller --resolution or --overlap";
-
 /// Makes a pyramid of each tile of a UDIM set, margins included, or of the file of one tile.
 /// @return false for an input that is neither, of which nothing is made
 /// @throws Error unsupported for waves

@@ -16,10 +16,18 @@ HalfVectorOptions::HalfVectorOptions(Tool& tool) {
   half_option_ = &tool.option("--half", half_, "ask for the density towards a half vector HX HY").count(2);
   range_option_ = &tool.option("--range", range_, "ask for the mean density over a box X0 Y0 X1 Y1 of half vectors").count(4);
   half_option_->excludes(*range_option_);
+  spread_option_ =
+      &tool.option("--spread", spread_,
+                   "on a curved surface: half widths SX SY of the box of half vectors that the pixel sees; answers "
+                   "are averaged over it (CurvedNdf)")
+           .count(2);
   tool.addCheck([this] { check(); });
 }
 
+Vec2 HalfVectorOptions::spread() const { return spread_option_->given() ? Vec2{spread_[0], spread_[1]} : Vec2{}; }
+
 void HalfVectorOptions::check() const {
+  if (const auto fault = spreadFault(spread())) throwUsage("--spread " + fault->what, fault->remedy);
   if (!range_option_->given()) return;
   if (const auto fault = rangeFault(*query({}).range)) throwUsage("--range " + fault->what, fault->remedy);
 }
@@ -27,6 +35,7 @@ void HalfVectorOptions::check() const {
 Query HalfVectorOptions::query(const Footprint& footprint) const {
   Query query;
   query.footprint = footprint;
+  query.spread = spread();
   if (range_option_->given()) query.range = Box2{{range_[0], range_[1]}, {range_[2], range_[3]}};
   if (half_option_->given()) query.half = Vec2{half_[0], half_[1]};
   return query;
@@ -38,14 +47,18 @@ DistributionCommand::DistributionCommand(Tool& tool)
       footprint_(tool),
       halves_(tool),
       picture_(tool),
-      table_(tool, "answer a table of queries; its header names u,v; sigma or sxx,sxy,syy or ax,ay,bx,by; hx,hy or x0,y0,x1,y1",
+      table_(tool,
+             "answer a table of queries; its header names u,v; sigma or sxx,sxy,syy or ax,ay,bx,by; hx,hy or x0,y0,x1,y1; "
+             "and may name spread_x,spread_y",
              "draw half vectors in proportion to the density: a table of hx,hy,pdf") {
   tool.option("--repeat", repeat_, "time the query: nanoseconds, median of 15 runs of N / 15").range(1, 1000000000);
   table_.csvOption()
       .excludes(footprint_.centreOption())
       .excludes(halves_.halfOption())
       .excludes(halves_.rangeOption())
+      .excludes(halves_.spreadOption())
       .excludes(picture_.option());
+  halves_.spreadOption().excludes(picture_.option());
   tool.usesSeed();
   for (const CommandForm& form : {kLightForm, kReflectanceForm, kPlaneForm}) tool.pointTo(form.line, form.options);
   tool.pointTo(kLightForm.line + ", or " + kReflectanceForm.line, {"--wo"});
@@ -76,7 +89,8 @@ void DistributionCommand::run() {
 
 void DistributionCommand::warnOfWidening(const std::string& which) {
   tool_.warn(
-      fmt::format("{}: {} answered up to {:.3g} texels wide; add --normals with the asset that the pyramid was made from",
+      fmt::format("{}: {} answered up to {:.3g} texels wide; add --normals with the asset that the pyramid was made from, or "
+                  "make the pyramid with --keep-normals",
                   asset_.path(), which, asset_.info().smallest_sigma_texels));
 }
 
@@ -95,8 +109,9 @@ void DistributionCommand::answerTable() {
 }
 
 void DistributionCommand::writeSamples() {
-  const std::vector<HalfVectorSample> samples = drawSamples(api::movedTo(asset_.model(), footprint_.u(), footprint_.v()),
-                                                            footprint_.footprint(), table_.samples(), tool_.seed());
+  const std::vector<HalfVectorSample> samples =
+      drawSamples(api::movedTo(asset_.model(), footprint_.u(), footprint_.v()), footprint_.footprint(), halves_.spread(),
+                  table_.samples(), tool_.seed());
   table_.write(sampleTable(samples));
   tool_.setResult({{"samples", samples.size()}});
 }
@@ -104,7 +119,11 @@ void DistributionCommand::writeSamples() {
 void DistributionCommand::answerOne() {
   Query q = halves_.query(footprint_.footprint());
   q.u = footprint_.u(), q.v = footprint_.v();
-  if (q.half && std::holds_alternative<AnisotropicNdf<WaveNdf>>(asset_.model())) return answerColour(q);
+  if (q.half && std::holds_alternative<AnisotropicNdf<WaveNdf>>(asset_.model())) {
+    if (halves_.spreadOption().given())
+      throwUsage("--spread with --half: colours of a wave-pyramid have no averages", "give --range, or leave --spread out");
+    return answerColour(q);
+  }
   const float value = answer(asset_.model(), q);
   tool_.print(fmt::format("{:.9g}\n", value));
   reportTimed(tool_, {{q.range ? "mean" : "density", value}, {"widened", asset_.widens(q.footprint)}}, repeat_,

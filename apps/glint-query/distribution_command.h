@@ -20,12 +20,15 @@ class HalfVectorOptions {
   bool given() const { return half_option_->given() || range_option_->given(); }
 
   Query query(const Footprint& footprint) const;
+  /// Value of --spread.
+  Vec2 spread() const;
+  Option& spreadOption() { return *spread_option_; }
 
  private:
   void check() const;
 
-  std::vector<float> half_, range_;
-  Option *half_option_, *range_option_;
+  std::vector<float> half_, range_, spread_;
+  Option *half_option_, *range_option_, *spread_option_;
 };
 
 /// `glint-query ASSET`: a density of a distribution of normals, a mean of it, a table of them, samples, or a picture.

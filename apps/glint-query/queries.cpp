@@ -9,12 +9,13 @@
 #include "common/answer_columns.h"
 #include "glint/api/plane_position.h"
 #include "glint/bake/common/counter_random.h"
+#include "glint/query/curved_ndf.h"
 
 namespace glint::apps {
 
 float answer(const AnyNdf& model, const Query& query) {
-  return query.range ? api::meanAt(model, query.u, query.v, query.footprint, *query.range)
-                     : api::densityAt(model, query.u, query.v, query.footprint, *query.half);
+  return query.range ? api::meanAt(model, query.u, query.v, query.footprint, *query.range, query.spread)
+                     : api::densityAt(model, query.u, query.v, query.footprint, *query.half, query.spread);
 }
 
 std::vector<float> answerAll(const AnyNdf& model, std::span<const Query> queries) {
@@ -31,7 +32,9 @@ void setResult(Tool& tool, nlohmann::json result, std::optional<double> nanoseco
   tool.setResult(result);
 }
 
-std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& footprint, int count, std::uint64_t seed) {
+std::vector<HalfVectorSample> drawSamples(const AnyNdf& any, const Footprint& footprint, Vec2 spread, int count,
+                                          std::uint64_t seed) {
+  const CurvedNdf model(any, spread);
   std::vector<HalfVectorSample> samples(static_cast<std::size_t>(count));
   const int rows = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(count))));
   const auto rowBegin = [&](int row) { return static_cast<std::size_t>(count) * static_cast<std::size_t>(row) / rows; };

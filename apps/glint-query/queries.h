@@ -22,6 +22,7 @@ struct Query {
   double u = 0, v = 0;  ///< centre of the footprint, in maps; on a plane without end the whole part counts
   std::optional<Vec2> half;
   std::optional<Box2> range;
+  Vec2 spread;  ///< on a curved surface: half widths of the box of half vectors that the pixel sees
 };
 
 /// Answer of a model to one query.
@@ -59,8 +60,8 @@ void reportTimed(Tool& tool, const nlohmann::json& result, int repeats, const As
   setResult(tool, result, repeats > 0 ? std::optional(medianNanoseconds(repeats, ask)) : std::nullopt);
 }
 
-/// A table of queries: the header names columns u, v; sigma or sxx, sxy, syy or ax, ay, bx, by; hx, hy or x0, y0, x1, y1.
-/// Further columns are kept.
+/// A table of queries: the header names columns u, v; sigma or sxx, sxy, syy or ax, ay, bx, by; hx, hy or x0, y0, x1, y1;
+/// and may name spread_x, spread_y. Further columns are kept.
 class QueryTable {
  public:
   /// @throws Error io; invalid_input that names the row, by the rules of the options
@@ -80,7 +81,9 @@ class QueryTable {
 
 /// Draws half vectors from the distribution inside a footprint. The random numbers are stratified: the unit square has `count`
 /// cells of equal area, and each has one pair of numbers, which depends only on the seed and the cell.
-std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& footprint, int count, std::uint64_t seed);
+/// @param spread  as Query::spread
+std::vector<HalfVectorSample> drawSamples(const AnyNdf& model, const Footprint& footprint, Vec2 spread, int count,
+                                          std::uint64_t seed);
 
 /// Samples as a CSV table with the columns hx, hy and pdf.
 std::string sampleTable(std::span<const HalfVectorSample> samples);

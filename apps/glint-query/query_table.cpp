@@ -42,6 +42,12 @@ Query readQuery(const CsvTable& columns, std::size_t row) {
     query.range = Box2{{x0, y0}, {x1, y1}};
     if (const auto fault = rangeFault(*query.range)) columns.fail("csv.range", row, "the range " + fault->what, fault->remedy);
   }
+  if (columns.has(kSpread)) {
+    const auto [x, y] = columns.numbers(kSpread, row);
+    query.spread = {x, y};
+    if (const auto fault = spreadFault(query.spread))
+      columns.fail("csv.spread", row, "the spread " + fault->what, fault->remedy);
+  }
   return query;
 }
 

@@ -38,7 +38,7 @@ def columns(array):
 
 
 class Footprints(ctypes.Structure):
-    _fields_ = [(name, Floats) for name in ("u", "v", "sigma", "xx", "xy", "yy", "ax", "ay", "bx", "by")]
+    _fields_ = [(name, Floats) for name in ("u", "v", "sigma", "xx", "xy", "yy", "ax", "ay", "bx", "by", "precise_u", "precise_v", "spread_x", "spread_y")]
 
 
 class Directions(ctypes.Structure):

@@ -108,6 +108,14 @@ class SchemaFields {
     required_ = true;
   }
 
+  /// Attributes and arrays that a file has only with the attribute `key`, the first of them.
+  template <class T, class Body>
+  void together(std::string_view key, const std::optional<T>&, Body body) {
+    key_ = key;
+    body(T());
+    key_ = {};
+  }
+
   void derived(std::string_view name, std::string_view expression, std::string_view long_name) {
     schema_.derived.push_back({name, expression, long_name});
   }
@@ -134,15 +142,16 @@ class SchemaFields {
 
  private:
   void add(AttributeSchema attribute) {
-    attribute.required = required_;
+    attribute.required = required_ && key_.empty();
+    if (attribute.name != key_) attribute.needs = key_;
     schema_.attributes.push_back(attribute);
   }
   void add(std::string_view path, Types types, Dims dims, std::string_view units, std::string_view long_name, int since) {
-    schema_.datasets.push_back({path, repeat_, types, dims, units, long_name, true, since});
+    schema_.datasets.push_back({path, repeat_, types, dims, units, long_name, key_.empty(), since, key_});
   }
 
   KindSchema& schema_;
-  std::string_view repeat_;
+  std::string_view repeat_, key_;
   bool required_ = true;
 };
 
@@ -180,6 +189,10 @@ class PackFields {
   void set(const T&, const U&) {}
   template <class T, class Body>
   void optional(const std::optional<T>& value, Body body) {
+    if (value) body(*value);
+  }
+  template <class T, class Body>
+  void together(std::string_view, const std::optional<T>& value, Body body) {
     if (value) body(*value);
   }
 
@@ -266,6 +279,13 @@ class ReadFields {
     if (!missing_) value = read;
   }
 
+  template <class T, class Body>
+  void together(std::string_view key, std::optional<T>& value, Body body) {
+    if (!file_.attributes.contains(key)) return;
+    if (!value) value.emplace();
+    body(*value);
+  }
+
   void derived(std::string_view, std::string_view, std::string_view) {}
   template <class Body>
   void levels(std::string_view, int count, Body body) {
@@ -306,7 +326,8 @@ class ReadFields {
 /// constant for classes that only look at it.
 ///
 /// Attributes: integer, real, choice, reals (several numbers), levelIntegers and levelReals (a number for each level; get(l) is
-/// the member of level l). optional() describes attributes that a file may lack, all or none. set() stores a value that follows
+/// the member of level l). optional() describes attributes that a file may lack, all or none; together()
+/// attributes and arrays that a file has only with the first of them. set() stores a value that follows
 /// from others. Sizes: derived. Arrays: array, halves (half precision), data (a bare pointer to elements of one of several
 /// types); levels() repeats them.
 template <class F>
@@ -322,6 +343,7 @@ concept Fields = requires(F& fields, int& integer, float& real, BlockPrecision& 
   fields.levelIntegers(text, integer, integer_of, range, text, text);
   fields.levelReals(text, integer, real_of, range, text, text);
   fields.optional(slopes, describe_slopes);
+  fields.together(text, slopes, describe_slopes);
   fields.set(integer, integer);
   fields.derived(text, text, text);
   fields.array(text, array, dims, text, text, since);

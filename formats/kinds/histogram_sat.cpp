@@ -101,6 +101,7 @@ struct KindDescription<HistogramSat> {
   }
   static std::vector<Rule> valueRules() {
     return {errorRule("histogram.bin_normals", "the mean normals of bins lie inside the unit disk"),
+            errorRule("histogram.bin_slopes", "slopes of bins are finite, and their covariances positive semi-definite"),
             errorRule("histogram.totals", "bin_totals are the numbers of texels of each bin, above 0"),
             errorRule("histogram.sums", "the tables of sums count the texels of each bin")};
   }
@@ -119,6 +120,8 @@ struct KindDescription<HistogramSat> {
     fields.derived("row_length", "ceil_div(bin_count, 16) * 16", "counters of a point");
     fields.array("bin_ids", sat.bin_ids, {"bin_count"}, "1", "ring * phi_bins + sector of each bin that occurs, increasing");
     fields.array("bin_normals", sat.bin_normals, {"bin_count", "2"}, "1", "mean (nx, ny) of the texels of each bin");
+    fields.array("bin_slopes", sat.bin_slopes, {"bin_count", "5"}, "1",
+                 "slopes of the texels of each bin: mean along u and v, then uu, uv, vv of their covariance");
     fields.array("bin_totals", sat.bin_totals, {"bin_count"}, "1", "texels of each bin");
     fields.array("texels", sat.texels, {"ceil_div(height, 8)", "ceil_div(width, 8)", "8", "8"}, "1",
                  "bin of each texel, in tiles");
@@ -158,6 +161,11 @@ struct KindDescription<HistogramSat> {
     const auto inside = [](Vec2 n) { return dot(n, n) < 1; };
     if (!std::all_of(sat.bin_normals.begin(), sat.bin_normals.end(), inside))
       findings.add("histogram.bin_normals", "/bin_normals", "are not all inside the unit disk");
+    const auto usable = [](const MapSlopes& s) {
+      return std::isfinite(s.mean.x) && std::isfinite(s.mean.y) && isCovariance(s.covariance);
+    };
+    if (!std::all_of(sat.bin_slopes.begin(), sat.bin_slopes.end(), usable))
+      findings.add("histogram.bin_slopes", "/bin_slopes", "are not all finite means and covariances");
     if (!totalsCount(sat)) findings.add("histogram.totals", "/bin_totals", "are not the numbers of texels, all above 0");
     const auto check = [&](bool counts, const char* object) {
       if (!counts) findings.add("histogram.sums", object, "do not count the texels");

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "glint/formats/kinds/description.h"
+#include "glint/formats/kinds/near_fields.h"
 #include "glint/formats/kinds/shared_fields.h"
 #include "glint/formats/kinds/tally.h"
 #include "glint/formats/kinds/wang_fields.h"
@@ -434,7 +435,9 @@ struct KindDescription<NdfCp> {
 
   static void describe(Fields auto& fields, auto& ndf) {
     describeShape(fields, ndf.shape);
+    describeNearNormals(fields, ndf);
     describeCompression(fields, ndf);
+    describeNearArrays(fields, ndf);
   }
   /// Everything but the shape.
   static void describeCompression(Fields auto& fields, auto& ndf) {
@@ -450,6 +453,7 @@ struct KindDescription<NdfCp> {
 
   static void checkIndex(const NdfCp& ndf, Findings& findings) {
     checkShape(ndf.shape, findings);
+    checkNearIndex(ndf.near_normals, findings);
     checkFactorIndex(ndf, findings);
   }
   /// Everything but the shape.
@@ -505,6 +509,7 @@ struct KindDescription<NdfCp> {
         "compressed.floors", "/clusters", {"unit of floors is", "units of floors are"},
         "negative or not finite, or not 0 for a cluster of spots", findings);
     checkDensities(ndf, findings);
+    checkNearValues(ndf.near_normals, findings);
   }
 };
 

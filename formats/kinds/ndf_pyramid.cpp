@@ -1,4 +1,5 @@
 #include "glint/formats/kinds/description.h"
+#include "glint/formats/kinds/near_fields.h"
 #include "glint/formats/kinds/pyramid_fields.h"
 
 namespace glint::formats {
@@ -19,12 +20,20 @@ struct KindDescription<NdfPyramid> {
 
   static void describe(Fields auto& fields, auto& pyramid) {
     describePyramidAttributes(fields, pyramid);
+    describeNearNormals(fields, pyramid);
     describePyramidLevels(fields, pyramid, [](int, std::uint64_t) {});
+    describeNearArrays(fields, pyramid);
   }
 
-  static void checkIndex(const NdfPyramid& pyramid, Findings& findings) { checkPyramidIndex(pyramid, findings); }
+  static void checkIndex(const NdfPyramid& pyramid, Findings& findings) {
+    checkPyramidIndex(pyramid, findings);
+    checkNearIndex(pyramid.near_normals, findings);
+  }
 
-  static void checkValues(const NdfPyramid& pyramid, Findings& findings) { checkPyramidValues(pyramid, findings); }
+  static void checkValues(const NdfPyramid& pyramid, Findings& findings) {
+    checkPyramidValues(pyramid, findings);
+    checkNearValues(pyramid.near_normals, findings);
+  }
 };
 
 template const Kind& kindOf<NdfPyramid>();

@@ -2,54 +2,13 @@
 #include <cmath>
 
 #include "glint/formats/kinds/description.h"
+#include "glint/formats/kinds/near_fields.h"
 #include "glint/formats/kinds/shared_fields.h"
 #include "glint/formats/kinds/tally.h"
 #include "glint/model/slope_sums.h"
 
 namespace glint::formats {
 namespace {
-
-/// Nodes of level l of the bounds along an axis of so many texels.
-int nodesAlong(int texels, int l) { return static_cast<int>((std::int64_t{texels} + (std::int64_t{2} << l) - 1) >> (l + 1)); }
-
-bool holds(const NormalBounds& b, float x, float y) { return b.low_x <= x && x <= b.high_x && b.low_y <= y && y <= b.high_y; }
-
-/// Whether a node of the finest level holds its 2x2 texels and one more row and column, wrapped.
-bool holdsTexels(const NormalMap& map, const NormalBounds& node, int i, int j) {
-  for (int y = 2 * j; y <= std::min(2 * j + 2, map.height); ++y) {
-    for (int x = 2 * i; x <= std::min(2 * i + 2, map.width); ++x) {
-      const Vec2 n = map.at(x % map.width, y % map.height);
-      if (!holds(node, n.x, n.y)) return false;
-    }
-  }
-  return true;
-}
-
-bool holdsChildren(const NormalBoundsLevel& children, const NormalBounds& node, int i, int j) {
-  for (int y = 2 * j; y < std::min(2 * j + 2, children.rows); ++y) {
-    for (int x = 2 * i; x < std::min(2 * i + 2, children.columns); ++x) {
-      const NormalBounds& child = children.nodes[static_cast<std::size_t>(y) * children.columns + x];
-      if (!holds(node, child.low_x, child.low_y) || !holds(node, child.high_x, child.high_y)) return false;
-    }
-  }
-  return true;
-}
-
-void checkBounds(const NormalMap& map, Findings& findings) {
-  for (int k = 0; k < map.bounds_level_count; ++k) {
-    const NormalBoundsLevel& level = map.bounds[k];
-    TexelTally loose(level.columns, level.rows);
-    for (int j = 0; j < level.rows; ++j) {
-      for (int i = 0; i < level.columns; ++i) {
-        const std::size_t index = static_cast<std::size_t>(j) * level.columns + i;
-        const NormalBounds& node = level.nodes[index];
-        if (!(k == 0 ? holdsTexels(map, node, i, j) : holdsChildren(map.bounds[k - 1], node, i, j))) loose.add(index);
-      }
-    }
-    report(loose, "normals.bounds", "/" + levelPath("bounds/level_{l}", k), {"node does", "nodes do"},
-           "not hold all texels below", findings);
-  }
-}
 
 /// Compares the stored slopes with the normals'.
 void checkStoredSlopes(const NormalMap& map, Findings& findings) {
@@ -121,7 +80,7 @@ struct KindDescription<NormalMap> {
     }
     report(infinite, "normals.finite", "/normals", {"texel is", "texels are"}, "not finite", findings);
     report(outside, "normals.disk", "/normals", {"normal is", "normals are"}, "not inside the unit disk", findings);
-    checkBounds(map, findings);
+    checkBounds(map, "normals.bounds", "bounds/level_{l}", findings);
     if (map.slopes && infinite.count() == 0 && outside.count() == 0) checkStoredSlopes(map, findings);
   }
 };

@@ -8,6 +8,7 @@
 #include "glint/query/brdf/bin_map_brdf.h"
 #include "glint/query/brdf/microfacet_brdf.h"
 #include "glint/query/brdf/wave_brdf.h"
+#include "glint/query/curved_ndf.h"
 #include "glint/query/detail/common/sampling.h"
 
 namespace glint::api {
@@ -43,6 +44,15 @@ class AnyBrdf {
     if (facets_ == BrdfFacets::waves)
       return ask(WaveBrdf(std::get<AnisotropicNdf<WaveNdf>>(model_), footprint, masking_, fresnel_));
     return ask(MicrofacetBrdf(model_, footprint, masking_, fresnel_));
+  }
+
+  /// The same on a curved surface, whose pixel sees a box of half vectors: the BRDF of a CurvedNdf.
+  /// @param spread  half widths of the box, from halfVectorSpread. Beckmann facets and waves have no means, and leave it out
+  template <class Ask>
+  auto at(const Footprint& footprint, Vec2 spread, Ask&& ask) const {
+    if (!(spread.x > 0 || spread.y > 0) || facets_ != BrdfFacets::distribution) return at(footprint, ask);
+    const CurvedNdf<AnyNdf> averaged(model_, spread);
+    return ask(MicrofacetBrdf(averaged, footprint, masking_, fresnel_));
   }
 
   /// The BRDF f, 1/sr, each channel >= 0; without the cosine wi.z.

@@ -25,22 +25,6 @@ std::vector<formats::InputRecord> mapsOf(const formats::Asset& asset) {
   return maps;
 }
 
-/// Where an asset names no map, only the sizes can be compared.
-void requireSameMap(const formats::Asset& asset, const std::filesystem::path& path, const NdfInfo& info, const NormalMap& map,
-                    const std::filesystem::path& normals_path) {
-  const std::vector<formats::InputRecord> maps = mapsOf(asset);
-  const std::string hash = maps.empty() ? std::string() : formats::hashFile(normals_path);
-  const bool named =
-      maps.empty() || std::any_of(maps.begin(), maps.end(), [&](const auto& input) { return input.hash_hex == hash; });
-  if (named && map.width == info.width && map.height == info.height) return;
-  std::string remedy = "give the asset that glint-pyramid read";
-  if (!maps.empty())
-    remedy += ", " + maps.front().name.substr(maps.front().name.rfind('/') + 1) + ", as it was then (hash " +
-              maps.front().hash_hex + "), or make the pyramid again from this one";
-  throw Error(ErrorCode::invalid_input, "query.normals", normals_path.string(), "",
-              "this is not the map that " + path.string() + " was made from", remedy);
-}
-
 [[noreturn]] void refuseKind(std::string_view kind, const std::filesystem::path& path) {
   throw Error(ErrorCode::unsupported, "format.kind", path.string(), "",
               "is of kind " + std::string(kind) + ", which holds no distribution of normals",
@@ -50,6 +34,21 @@ void requireSameMap(const formats::Asset& asset, const std::filesystem::path& pa
 }
 
 }  // namespace
+
+void requireSameMap(const formats::Asset& asset, const std::filesystem::path& path, int width, int height, const NormalMap& map,
+                    const std::filesystem::path& normals_path) {
+  const std::vector<formats::InputRecord> maps = mapsOf(asset);
+  const std::string hash = maps.empty() ? std::string() : formats::hashFile(normals_path);
+  const bool named =
+      maps.empty() || std::any_of(maps.begin(), maps.end(), [&](const auto& input) { return input.hash_hex == hash; });
+  if (named && map.width == width && map.height == height) return;
+  std::string remedy = "give the asset that glint-pyramid read";
+  if (!maps.empty())
+    remedy += ", " + maps.front().name.substr(maps.front().name.rfind('/') + 1) + ", as it was then (hash " +
+              maps.front().hash_hex + "), or make the pyramid again from this one";
+  throw Error(ErrorCode::invalid_input, "query.normals", normals_path.string(), "",
+              "this is not the map that " + path.string() + " was made from", remedy);
+}
 
 bool answersNdf(std::string_view kind) {
   const std::vector<std::string_view> kinds = ndfKinds();
@@ -176,7 +175,9 @@ OpenedNdf OpenedNdf::openMap(formats::Asset asset, const std::filesystem::path& 
     opened.model_ = NdfTraits<Model>::open(source);
     opened.info_ = NdfTraits<Model>::info(source);
   });
-  if (opened.normals_) requireSameMap(*opened.asset_, path, opened.info_, opened.normals_->get<NormalMap>(), options.normals);
+  if (opened.normals_)
+    requireSameMap(*opened.asset_, path, opened.info_.width, opened.info_.height, opened.normals_->get<NormalMap>(),
+                   options.normals);
   return opened;
 }
 
@@ -209,7 +210,18 @@ std::uint64_t OpenedNdf::fileBytes() const {
   return bytes;
 }
 
-bool OpenedNdf::hasNormals() const { return set_ ? set_->maps.front().hasNormals() : normals_.has_value(); }
+bool OpenedNdf::hasNormals() const {
+  if (set_) return std::all_of(set_->maps.begin(), set_->maps.end(), [](const OpenedNdf& map) { return map.hasNormals(); });
+  if (normals_) return true;
+  return std::visit(
+      [](const auto& model) {
+        if constexpr (requires { model.round().hasNormals(); })
+          return model.round().hasNormals();
+        else
+          return false;
+      },
+      model_);
+}
 
 MapSlopes OpenedNdf::slopes() const {
   return std::visit(

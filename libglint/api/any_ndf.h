@@ -25,6 +25,15 @@ bool answersNdf(std::string_view kind);
 /// The kinds of assets that answer an NDF.
 std::vector<std::string_view> ndfKinds();
 
+/// Refuses a map that a pyramid was not made from, by the hash that the pyramid names. Where it names no map, only the sizes can be
+/// compared.
+/// @param asset, path            the pyramid, compressed or not
+/// @param width, height          of its map, texels
+/// @param map, normals_path      the map that is given, and its file
+/// @throws Error invalid_input
+void requireSameMap(const formats::Asset& asset, const std::filesystem::path& path, int width, int height, const NormalMap& map,
+                    const std::filesystem::path& normals_path);
+
 /// An asset and the model that answers from it, of whichever kind it is.
 class OpenedNdf {
  public:
@@ -47,9 +56,9 @@ class OpenedNdf {
   /// Bytes of the asset, or of all tiles.
   std::uint64_t fileBytes() const;
   const std::filesystem::path& path() const { return path_; }
-  /// Whether footprints below level 0 are answered from the texels.
+  /// Whether footprints below level 0 are answered from the texels: of `options.normals`, or of the normals that the asset keeps.
   bool hasNormals() const;
-  /// The map that answers them; nullptr if there is none, and for UDIM sets, which have one for each tile.
+  /// The map of `options.normals`; nullptr if there is none, and for UDIM sets, which have one for each tile.
   const NormalMap* normals() const { return normals_ ? &normals_->get<NormalMap>() : nullptr; }
   /// Moments of the map's slopes, for SmithMasking. Kind normals: sums over all texels; other kinds hold them.
   MapSlopes slopes() const;

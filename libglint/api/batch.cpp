@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "glint/api/plane_position.h"
+#include "glint/query/curved_ndf.h"
 #include "glint/query/detail/pyramid/pyramid_reader.h"
 
 namespace glint::api {
@@ -158,19 +159,40 @@ void askModel(const AnyNdf& any, std::size_t count, const FootprintArrays& footp
   std::visit(ask, any);
 }
 
+/// Calls ask(k, model) with the model of each query, averaged over the half vectors of its pixel.
+template <class Ask>
+void askCurved(const AnyNdf& any, std::size_t count, const FootprintArrays& footprints, Ask&& ask) {
+  const auto each = [&](const auto& model) {
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto& at = modelAt(model, footprints, k);
+      ask(k, CurvedNdf(at, footprints.spread(k)));
+    }
+  };
+  std::visit(each, any);
+}
+
 }  // namespace
 
 void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                float* out) {
+  if (footprints.curved())
+    return askCurved(model, count, footprints,
+                     [&](std::size_t k, const auto& m) { out[k] = m.density(footprints[k], halves[k]); });
   askModel(model, count, footprints, [&](const auto& m) { modelDensities(m, count, footprints, halves, out); });
 }
 
 void means(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges, float* out) {
+  if (footprints.curved())
+    return askCurved(model, count, footprints,
+                     [&](std::size_t k, const auto& m) { out[k] = m.mean(footprints[k], ranges[k]); });
   askModel(model, count, footprints, [&](const auto& m) { modelMeans(m, count, footprints, ranges, out); });
 }
 
 void samples(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
              const SampleArrays& out) {
+  if (footprints.curved())
+    return askCurved(model, count, footprints,
+                     [&](std::size_t k, const auto& m) { out.set(k, m.sample(footprints[k], xi[k])); });
   askModel(model, count, footprints, [&](const auto& m) { modelSamples(m, count, footprints, xi, out); });
 }
 

@@ -41,6 +41,11 @@ struct FootprintArrays {
   StridedFloats ax, ay, bx, by;  ///< boxes: half axes, texels
   /// Centres as doubles, for positions far out in a tiled texture. Where given, they count instead of u and v.
   StridedDoubles precise_u = {}, precise_v = {};
+  /// On curved surfaces, half widths of the box of half vectors that each pixel sees: halfVectorSpread. Both or neither.
+  StridedFloats spread_x = {}, spread_y = {};
+
+  bool curved() const { return spread_x.data != nullptr; }
+  Vec2 spread(std::size_t k) const { return curved() ? Vec2{spread_x[k], spread_y[k]} : Vec2{}; }
 
   Footprint operator[](std::size_t k) const {
     const Vec2 centre = precise_u.data ? wrappedUv(precise_u[k], precise_v[k]) : Vec2{u[k], v[k]};
@@ -79,6 +84,7 @@ struct SampleArrays {
 /// Pyramids with constant pixels overlap the cache misses of many queries if all footprints of the batch are round. If one
 /// footprint is split into parts, all queries are asked one by one. All else gains only the cost of the calls: each query has
 /// enough work to hide its own misses.
+/// Footprints with a spread are answered by CurvedNdf, one query at a time.
 /// @note thread-safe, allocates nothing; split a batch over threads as you like
 void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                float* out);

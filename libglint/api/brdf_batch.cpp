@@ -21,6 +21,8 @@ FootprintArrays from(const FootprintArrays& p, std::size_t first) {
        {&FootprintArrays::u, &FootprintArrays::v, &FootprintArrays::sigma, &FootprintArrays::xx, &FootprintArrays::xy,
         &FootprintArrays::yy, &FootprintArrays::ax, &FootprintArrays::ay, &FootprintArrays::bx, &FootprintArrays::by})
     rest.*member = from(p.*member, first);
+  rest.spread_x = from(p.spread_x, first);
+  rest.spread_y = from(p.spread_y, first);
   rest.precise_u = from(p.precise_u, first);
   rest.precise_v = from(p.precise_v, first);
   return rest;
@@ -73,7 +75,8 @@ void sampleByHalfVectors(const AnyBrdf& b, std::size_t count, const FootprintArr
       const Vec3 o = wo[first + k];
       const Vec2 at = clampUnit(xi[first + k]);
       const bool drawn = aboveHorizon(o) && !(at.x < Brdf::uniformShare(o));
-      out.set(first + k, b.at(drawn ? Footprint{} : footprints[first + k], [&](const auto& brdf) {
+      const Footprint footprint = drawn ? Footprint{} : footprints[first + k];
+      out.set(first + k, b.at(footprint, drawn ? Vec2{} : footprints.spread(first + k), [&](const auto& brdf) {
         if constexpr (requires { brdf.sampleOf(o, HalfVectorSample{}); })
           if (drawn) return brdf.sampleOf(o, {{x[k], y[k]}, pdfs[k]});
         return brdf.sample(o, at);

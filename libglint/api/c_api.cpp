@@ -10,6 +10,7 @@
 #include "glint/api/pack.h"
 #include "glint/api/plane_position.h"
 #include "glint/api/wave_colours.h"
+#include "glint/query/curved_ndf.h"
 #include "glint/query/ray_footprint.h"
 
 namespace {
@@ -81,6 +82,8 @@ const char* faultOf(const glint_displaced* displaced) {
 const char* missingIn(const glint_footprints& p) {
   const bool precise = p.precise_u.data != nullptr && p.precise_v.data != nullptr;
   if (!precise && (p.u.data == nullptr || p.v.data == nullptr)) return "u and v of the footprints must be given";
+  if ((p.spread_x.data == nullptr) != (p.spread_y.data == nullptr))
+    return "spread_x and spread_y of the footprints must be given together";
   const bool gaussian = p.xx.data != nullptr && p.yy.data != nullptr;
   const bool box = p.ax.data != nullptr && p.ay.data != nullptr && p.bx.data != nullptr && p.by.data != nullptr;
   if (p.sigma.data != nullptr || gaussian || box) return nullptr;
@@ -105,6 +108,8 @@ FootprintArrays arraysOf(const glint_footprints& p) {
   out.ay = arrayOf(p.ay);
   out.bx = arrayOf(p.bx);
   out.by = arrayOf(p.by);
+  out.spread_x = arrayOf(p.spread_x);
+  out.spread_y = arrayOf(p.spread_y);
   return out;
 }
 
@@ -136,7 +141,7 @@ using namespace glint::api::c;
 constexpr float kLeastSigmaR = 1e-4f, kMostSigmaR = 0.25f;
 /// Size of the options in the first version of the struct.
 constexpr std::size_t kFirstOptionsSize = offsetof(glint_open_options, verify_hashes) + sizeof(int32_t);
-static_assert(offsetof(glint_open_options, estimator) + sizeof(int32_t) == sizeof(glint_open_options),
+static_assert(offsetof(glint_open_options, reserved) + sizeof(int32_t) == sizeof(glint_open_options),
               "padding at the end would be read as a member by a later library");
 
 /// @return null if the options can be used, else the fault
@@ -158,6 +163,8 @@ const char* takeOptions(const glint_open_options* from, glint_open_options& to) 
   if (to.interpolation != GLINT_INTERPOLATION_FOOTPRINT && to.interpolation != GLINT_INTERPOLATION_TRILINEAR)
     return "unknown interpolation";
   if (to.pixels != GLINT_PIXELS_SMOOTH && to.pixels != GLINT_PIXELS_CONSTANT) return "unknown pixels";
+  if (to.bins != GLINT_BINS_LOBES && to.bins != GLINT_BINS_EVEN) return "unknown bins";
+  if (to.reserved != 0) return "reserved is not 0";
   if (to.estimator != GLINT_ESTIMATOR_EXACT && to.estimator != GLINT_ESTIMATOR_PUBLISHED) return "unknown estimator";
   return nullptr;
 }
@@ -172,6 +179,7 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   options.checks.copy = o.copy != 0;
   options.alpha = o.alpha;
   options.estimator = static_cast<BinEstimator>(o.estimator);
+  options.histogram_bins = static_cast<HistogramBins>(o.bins);
   if (o.slant_tolerance != 0) options.slant_tolerance = std::max(0.0f, o.slant_tolerance);
   if (o.footprint_parts != 0) options.footprint_parts = o.footprint_parts;
   options.interpolation = static_cast<Interpolation>(o.interpolation);
@@ -187,7 +195,7 @@ glint_ndf* handleOf(api::OpenedNdf opened) {
 }
 
 glint_footprint gaussianAt(double u, double v, const Covariance& c) {
-  return {GLINT_FOOTPRINT_GAUSSIAN, u, v, {c.xx, c.xy, c.yy, 0}};
+  return {GLINT_FOOTPRINT_GAUSSIAN, u, v, {c.xx, c.xy, c.yy, 0}, {0, 0}};
 }
 
 /// The fault of the arguments that all batches have; null if there is none.
@@ -267,7 +275,7 @@ glint_footprint glint_footprint_isotropic(double u, double v, float sigma_texels
 }
 
 glint_footprint glint_footprint_box(double u, double v, float ax, float ay, float bx, float by) {
-  return {GLINT_FOOTPRINT_BOX, u, v, {ax, ay, bx, by}};
+  return {GLINT_FOOTPRINT_BOX, u, v, {ax, ay, bx, by}, {0, 0}};
 }
 
 glint_footprint glint_footprint_from_differentials(double u, double v, float dudx, float dvdx, float dudy, float dvdy,
@@ -289,6 +297,22 @@ glint_footprint glint_footprint_from_cone(glint_ray_cone cone, double u, double 
                                           float texels_per_unit) {
   const Vec3 towards = direction == nullptr ? Vec3{0, 0, 1} : vectorOf(direction);
   return gaussianAt(u, v, footprintOfCone({cone.width, cone.spread}, {}, towards, texels_per_unit).covariance);
+}
+
+glint_status glint_footprint_set_spread(glint_footprint* footprint, const float wi[3], const float wo[3], const float dndx[3],
+                                        const float dndy[3], const float dwodx[3], const float dwody[3], float filter_sigma) {
+  if (footprint == nullptr || wi == nullptr || wo == nullptr || dndx == nullptr || dndy == nullptr)
+    return badArgument("glint_footprint_set_spread",
+                       {{footprint, "footprint"}, {wi, "wi"}, {wo, "wo"}, {dndx, "dndx"}, {dndy, "dndy"}});
+  const HalfVector h = halfVectorOf(vectorOf(wi), vectorOf(wo));
+  const auto turn = [&](const float* dn, const float* dwo) {
+    return halfVectorDifferential(h, vectorOf(dn), dwo == nullptr ? Vec3{0, 0, 0} : vectorOf(dwo));
+  };
+  const Vec2 spread = halfVectorSpread(turn(dndx, dwodx), turn(dndy, dwody), filter_sigma);
+  const auto usable = [](float x) { return x > 0 ? x : 0; };  // NaN, below the horizon, counts as 0
+  footprint->spread[0] = usable(spread.x);
+  footprint->spread[1] = usable(spread.y);
+  return GLINT_OK;
 }
 
 glint_status glint_ndf_slopes(const glint_ndf* ndf, float mean[2], float covariance[3]) {
@@ -316,7 +340,8 @@ glint_status glint_ndf_pack(const glint_ndf* ndf, void* buffer, size_t capacity,
 glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy, float* density) {
   if (!isOpen(ndf) || footprint == nullptr || density == nullptr)
     return badArgument("glint_density", {{ndf, "ndf"}, {footprint, "footprint"}, {density, "density"}});
-  *density = api::densityAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {hx, hy});
+  *density = api::densityAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {hx, hy},
+                            spreadOf(*footprint));
   return GLINT_OK;
 }
 
@@ -349,7 +374,8 @@ glint_status glint_mean(const glint_ndf* ndf, const glint_footprint* footprint, 
                         float* mean) {
   if (!isOpen(ndf) || footprint == nullptr || mean == nullptr)
     return badArgument("glint_mean", {{ndf, "ndf"}, {footprint, "footprint"}, {mean, "mean"}});
-  *mean = api::meanAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {{x0, y0}, {x1, y1}});
+  *mean = api::meanAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {{x0, y0}, {x1, y1}},
+                      spreadOf(*footprint));
   return GLINT_OK;
 }
 
@@ -357,8 +383,8 @@ glint_status glint_sample(const glint_ndf* ndf, const glint_footprint* footprint
                           float* pdf) {
   if (!isOpen(ndf) || footprint == nullptr || hx == nullptr || hy == nullptr || pdf == nullptr)
     return badArgument("glint_sample", {{ndf, "ndf"}, {footprint, "footprint"}, {hx, "hx"}, {hy, "hy"}, {pdf, "pdf"}});
-  const HalfVectorSample drawn =
-      api::sampleAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint), {xi1, xi2});
+  const HalfVectorSample drawn = api::sampleAt(ndf->body().opened.model(), footprint->u, footprint->v, footprintOf(*footprint),
+                                               {xi1, xi2}, spreadOf(*footprint));
   *hx = drawn.h.x;
   *hy = drawn.h.y;
   *pdf = drawn.pdf;

@@ -93,7 +93,9 @@ glint_status glint_brdf_evaluate(const glint_brdf* brdf, const glint_footprint* 
     return badArgument("glint_brdf_evaluate", {{brdf, "brdf"}, {footprint, "footprint"}, {wi, "wi"}, {wo, "wo"}});
   if (f == nullptr && pdf == nullptr) return usage("glint_brdf_evaluate", "f and pdf are null");
   const api::BrdfValueArrays out = {f, pdf};
-  out.set(0, brdf->body().brdf.evaluateWithPdf(footprintFor(brdf->body().brdf, *footprint), vectorOf(wi), vectorOf(wo)));
+  const api::AnyBrdf& any = brdf->body().brdf;
+  out.set(0, any.at(footprintFor(any, *footprint), spreadOf(*footprint),
+                    [&](const auto& b) { return b.evaluateWithPdf(vectorOf(wi), vectorOf(wo)); }));
   return GLINT_OK;
 }
 
@@ -103,7 +105,10 @@ glint_status glint_brdf_sample(const glint_brdf* brdf, const glint_footprint* fo
     return badArgument("glint_brdf_sample",
                        {{brdf, "brdf"}, {footprint, "footprint"}, {wo, "wo"}, {wi, "wi"}, {weight, "weight"}, {pdf, "pdf"}});
   const api::BrdfSampleArrays out = {wi, weight, pdf};
-  out.set(0, brdf->body().brdf.sample(footprintFor(brdf->body().brdf, *footprint), vectorOf(wo), {xi1, xi2}));
+  const api::AnyBrdf& any = brdf->body().brdf;
+  out.set(0, any.at(footprintFor(any, *footprint), spreadOf(*footprint), [&](const auto& b) {
+    return b.sample(vectorOf(wo), clampUnit(Vec2{xi1, xi2}));
+  }));
   return GLINT_OK;
 }
 
@@ -150,7 +155,7 @@ glint_status askMicrofacets(const char* where, const glint_brdf* brdf, const gli
     return usage(where, "Beckmann facets have no averages over half vectors; make the BRDF with GLINT_FACETS_OF_DISTRIBUTION");
   if (any.facets() == api::BrdfFacets::waves)
     return usage(where, "colours of a wave-pyramid have no averages over half vectors; take glint_brdf_evaluate and _sample");
-  any.at(footprintFor(any, footprint), [&](const auto& b) {
+  any.at(footprintFor(any, footprint), spreadOf(footprint), [&](const auto& b) {
     if constexpr (requires { b.valueOf(Vec3{}, Vec3{}, HalfVector{}, 0.0f); }) ask(b);
   });
   return GLINT_OK;

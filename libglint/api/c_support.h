@@ -123,6 +123,8 @@ inline Footprint footprintOf(const glint_footprint& p) {
   return Footprint::gaussian(centre, {p.m[0], p.m[1], p.m[2]});
 }
 
+inline Vec2 spreadOf(const glint_footprint& p) { return {p.spread[0], p.spread[1]}; }
+
 inline StridedFloats arrayOf(const glint_floats& a) { return {a.data, a.stride}; }
 inline StridedDoubles arrayOf(const glint_doubles& a) { return {a.data, a.stride}; }
 

@@ -31,7 +31,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define GLINT_ABI_VERSION 1
+#define GLINT_ABI_VERSION 2
 
 #if defined(__GNUC__)
 #define GLINT_API __attribute__((visibility("default")))
@@ -86,6 +86,11 @@ enum {
   GLINT_ESTIMATOR_PUBLISHED = 1 /* by the centres of 21 bins around the half vector: quicker, and less exact */
 };
 
+enum {
+  GLINT_BINS_LOBES = 0, /* a lobe with the mean and the spread of the bin's normals over the whole map, continuous */
+  GLINT_BINS_EVEN = 1   /* even over the bin: quicker, and lights smaller than a bin show its borders */
+};
+
 /* Structs that start with a struct_size may grow: it says which version of the struct the caller has. A size that is smaller
  * than the first version's or above this is no size of a struct, and GLINT_ERROR_USAGE. */
 #define GLINT_MOST_STRUCT_SIZE 4096
@@ -94,9 +99,11 @@ enum {
  * have to be in range. Members are added at the end; a library that does not know one accepts 0 there. */
 typedef struct glint_open_options {
   size_t struct_size;       /* sizeof(glint_open_options) */
-  const char* normals_path; /* asset of kind normals that the pyramid was made from: it answers footprints below level 0,
-                               which the nearest level answers without it. Null: none */
-  float sigma_r;            /* kinds normals and slope-moments: intrinsic roughness, disk units, 1e-4 to 0.25; 0: 0.005 */
+  const char* normals_path; /* asset of kind normals that the pyramid was made from: it answers footprints below level 0. Null:
+                               the normals that the pyramid keeps answer them (glint-pyramid --keep-normals), and the nearest
+                               level where it keeps none */
+  float sigma_r;            /* kinds normals, slope-moments and histogram-sat: intrinsic roughness, disk units, 1e-4 to 0.25; 0:
+                               0.005 */
   int32_t surface;          /* kind normals: GLINT_SURFACE_* */
   int32_t boundary;         /* kind normals: GLINT_BOUNDARY_* */
   int32_t verify_hashes;    /* not 0: compare datasets with their hashes, and bytes between objects with 0; reads all */
@@ -114,12 +121,14 @@ typedef struct glint_open_options {
   int32_t copy;      /* not 0: copy the bytes of the asset into memory of its own. For files that others may truncate while
                                they are open, which would end the program with SIGBUS, and for memory that does not stay */
   int32_t estimator; /* kind bin-map: GLINT_ESTIMATOR_*, how densities are made of the texels; means and samples are exact */
+  int32_t bins;      /* kind histogram-sat: GLINT_BINS_*, where the normals of a bin are */
+  int32_t reserved;  /* 0 */
 } glint_open_options;
 
 #define GLINT_SLANT_EXACT (-1.0f)
 
 /* clang-format off */
-#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f, 0.0f, 0, 0, 0, 0, 0, 0 }
+#define GLINT_OPEN_OPTIONS_INIT { sizeof(glint_open_options), NULL, 0.0f, 0, 0, 0, 0.0f, 0.0f, 0, 0, 0, 0, 0, 0, 0, 0 }
 /* clang-format on */
 
 /* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat,
@@ -170,7 +179,8 @@ typedef struct glint_ndf_info {
   int32_t height;              /* of the normal map, texels */
   int32_t resolution;          /* pixels along each axis of a stored NDF image; 256 where there are none */
   int32_t level_count;         /* footprint sizes that are stored; 0: all sizes are answered from the texels */
-  float sigma_r;               /* intrinsic roughness, disk units; bin-map: alpha / sqrt(2); histogram-sat: 0, it has none */
+  float sigma_r;               /* intrinsic roughness, disk units; bin-map: alpha / sqrt(2); even bins of
+                                  histogram-sat: 0, they have none */
   float finest_sigma_texels;   /* footprint of level 0, deviation in texels; 0 where there are no levels */
   int32_t surface;             /* GLINT_SURFACE_* */
   int32_t boundary;            /* GLINT_BOUNDARY_* */
@@ -179,7 +189,8 @@ typedef struct glint_ndf_info {
                                   there are no levels */
   uint64_t file_bytes;         /* size of the asset */
   float smallest_sigma_texels; /* smallest footprint that is answered as wide as it is asked for, deviation in texels; smaller
-                                  ones are answered up to this wide. 0 where there are no levels, or the normals are given */
+                                  ones are answered up to this wide. 0 where there are no levels, or the normals are given or
+                                  kept */
   int32_t udim_tiles;          /* tiles of a UDIM set, whose kind is that of its tiles; 0: no set */
 } glint_ndf_info;
 
@@ -191,7 +202,7 @@ GLINT_API glint_status glint_ndf_get_info(const glint_ndf* ndf, glint_ndf_info* 
  * may read all texels. Returns GLINT_ERROR_USAGE for null arguments, else GLINT_OK. */
 GLINT_API glint_status glint_ndf_slopes(const glint_ndf* ndf, float mean[2], float covariance[3]);
 
-/* Packs the model, and the normals that it was opened with, into one buffer without addresses, for a GPU or another process: the
+/* Packs the model, and the normals that it was opened with or keeps, into one buffer without addresses, for a GPU or another process: the
  * layout of glint/model/packed_ndf.h, which glint/query/packed_ndf_view.h reads.
  *
  * buffer: receives the bytes; null to ask for the size only, which costs as much. capacity: bytes of the buffer. size: receives
@@ -208,6 +219,11 @@ typedef struct glint_footprint {
                    kinds wang-cp, wang-pyramid and wang-tiles, and UDIM sets, in tiles), for BRDFs as far as floats tell positions apart; maps repeat */
   float m[4];   /* Gaussian: covariance xx, xy, yy in texels^2, and unused. Box: a parallelogram's half axes ax, ay, bx, by
                    in texels */
+  /* On a curved surface, half widths of the box of half vectors that the pixel sees, since the surface's normal turns under it:
+     glint_footprint_set_spread. Densities, means, samples and BRDFs are averaged over the box, at the cost of a mean, so that
+     narrow highlights do not alias. 0, and what is not above 0: flat. Colours of kind wave-pyramid and Beckmann facets leave it
+     out. */
+  float spread[2];
 } glint_footprint;
 
 /* Isotropic Gaussian of deviation sigma, texels. */
@@ -239,6 +255,16 @@ GLINT_API glint_ray_cone glint_ray_cone_bounced(glint_ray_cone cone, float slope
  * origin; null: straight above. texels_per_unit: texels in a scene unit, > 0. What is not a number counts as 0. */
 GLINT_API glint_footprint glint_footprint_from_cone(glint_ray_cone cone, double u, double v, const float direction[3],
                                                     float texels_per_unit);
+
+/* Sets the spread of a footprint on a curved surface, for light from wi that is seen from wo.
+ *
+ * wi, wo: unit vectors of the tangent frame. dndx, dndy: change of the surface's unit normal, without the map, from one pixel to
+ * the next along x and along y, in the tangent frame. dwodx, dwody: change of wo, minus that of the ray; null: none. filter_sigma:
+ * deviation of the pixel filter, pixels: 0.5, or for one of n samples of a pixel 0.5 / sqrt(n).
+ * What is not a number gives a spread of 0. Returns GLINT_ERROR_USAGE for a null argument, else GLINT_OK. */
+GLINT_API glint_status glint_footprint_set_spread(glint_footprint* footprint, const float wi[3], const float wo[3],
+                                                  const float dndx[3], const float dndy[3], const float dwodx[3],
+                                                  const float dwody[3], float filter_sigma);
 
 /* Density towards one half vector.
  *
@@ -309,6 +335,7 @@ typedef struct glint_footprints {
   glint_floats ax, ay, bx, by;        /* boxes: half axes, texels */
   glint_doubles precise_u, precise_v; /* centres as doubles: for positions far out. Where given, u and v are not read. For
                                          BRDFs of planes without end give u and v: here the whole parts do not count */
+  glint_floats spread_x, spread_y;    /* on curved surfaces, spread of each glint_footprint; null, both: flat */
 } glint_footprints;
 
 /* densities[k] = glint_density of query k, k < count, to 1e-6 of its size; densities is contiguous.

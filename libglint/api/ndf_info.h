@@ -27,7 +27,7 @@ struct NdfInfo {
   /// Deviation of the footprints of the last level; larger ones tend to the mean of the map. 0 where there are no levels.
   float coarsest_sigma_texels = 0;
   /// Deviation of the smallest footprint that is answered as wide as it is asked for; smaller ones are answered up to this wide. 0
-  /// where there are no levels, or the normals are given.
+  /// where there are no levels, or the normals are given or kept.
   float smallest_sigma_texels = 0;
 };
 

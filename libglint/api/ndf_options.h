@@ -13,13 +13,15 @@ namespace glint::api {
 
 /// How an asset is asked, where the asset does not say so itself. Options for other kinds are ignored.
 struct NdfOptions {
-  std::filesystem::path normals;       ///< asset that the pyramid was made from, for footprints below level 0; empty: none
+  /// Asset that the pyramid was made from, for footprints below level 0; empty: the normals that the pyramid keeps, if it does.
+  std::filesystem::path normals;
   Surface surface = Surface::flat;     ///< kind normals: how they behave between texels
   Boundary boundary = Boundary::wrap;  ///< kind normals: beyond the border of the map
-  float sigma_r = 0.005f;              ///< kinds normals and slope-moments: intrinsic roughness, disk units
+  float sigma_r = 0.005f;              ///< kinds normals, slope-moments and histogram-sat: intrinsic roughness, disk units
   float alpha = 0;                     ///< kind bin-map: Beckmann roughness, in the range of the asset; 0: the smallest
-  BinEstimator estimator = BinEstimator::exact;       ///< kind bin-map: how densities are made of the texels
-  GaussianBoxes gaussian_boxes = GaussianBoxes::one;  ///< kind histogram-sat: boxes that stand for a Gaussian footprint
+  BinEstimator estimator = BinEstimator::exact;         ///< kind bin-map: how densities are made of the texels
+  GaussianBoxes gaussian_boxes = GaussianBoxes::one;    ///< kind histogram-sat: boxes that stand for a Gaussian footprint
+  HistogramBins histogram_bins = HistogramBins::lobes;  ///< kind histogram-sat: where the normals of a bin are
   float slant_tolerance = kSlantTolerance;  ///< kind histogram-sat: share of a slanted footprint that may be misplaced
   int footprint_parts =
       IsotropicParts::kMost;  ///< kinds ndf-pyramid, ndf-cp and slope-moments: most round footprints that stand

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstring>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -61,13 +62,15 @@ class Packer {
     header_.width = map.width;
     header_.height = map.height;
     header_.texel_size_um = map.texel_size_um;
-    header_.normals = add(map.normals);
-    header_.bounds_level_count = map.bounds_level_count;
-    for (int k = 0; k < map.bounds_level_count; ++k) {
-      header_.bounds_columns[k] = map.bounds[k].columns;
-      header_.bounds_rows[k] = map.bounds[k].rows;
-      header_.bounds[k] = add(map.bounds[k].nodes);
-    }
+    addNearNormals(map);
+  }
+
+  /// Appends the normals for footprints below level 0, if there are any: those that were given, or else those that the asset keeps.
+  void addNormalsOf(const NormalMap* given, const std::optional<NearNormals>& kept) {
+    if (given != nullptr)
+      addNormals(*given);
+    else if (kept)
+      addNearNormals(*kept);
   }
 
   /// The buffer. Ends the use of the packer.
@@ -78,6 +81,19 @@ class Packer {
   }
 
  private:
+  void addNearNormals(const NearNormals& near) {
+    header_.near_type = static_cast<std::uint32_t>(near.type);
+    header_.near_step = near.step;
+    const auto texels = static_cast<std::size_t>(near.width) * static_cast<std::size_t>(near.height);
+    header_.normals = addBytes(near.texels, texels, normalBytes(near.type));
+    header_.bounds_level_count = near.bounds_level_count;
+    for (int k = 0; k < near.bounds_level_count; ++k) {
+      header_.bounds_columns[k] = near.bounds[k].columns;
+      header_.bounds_rows[k] = near.bounds[k].rows;
+      header_.bounds[k] = addBytes(near.bounds[k].nodes, near.bounds[k].size(), boundsBytes(near.type));
+    }
+  }
+
   PackedHeader header_ = {};
   std::vector<std::byte> bytes_;
 };

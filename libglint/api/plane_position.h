@@ -33,9 +33,10 @@ inline bool isEndless(const NdfModels::Any& model) {
 NdfModels::Any movedTo(const NdfModels::Any& model, double u, double v);
 
 /// Answers to one question at a position, of the model that movedTo gives.
-float densityAt(const NdfModels::Any& model, double u, double v, const Footprint& p, Vec2 h);
-float meanAt(const NdfModels::Any& model, double u, double v, const Footprint& p, const Box2& range);
-HalfVectorSample sampleAt(const NdfModels::Any& model, double u, double v, const Footprint& p, Vec2 xi);
+/// @param spread  on a curved surface, half widths of the box of half vectors that the pixel sees (CurvedNdf)
+float densityAt(const NdfModels::Any& model, double u, double v, const Footprint& p, Vec2 h, Vec2 spread = {});
+float meanAt(const NdfModels::Any& model, double u, double v, const Footprint& p, const Box2& range, Vec2 spread = {});
+HalfVectorSample sampleAt(const NdfModels::Any& model, double u, double v, const Footprint& p, Vec2 xi, Vec2 spread = {});
 
 /// The model for query k of a batch: a plane without end is moved to the cell of a centre that is given precisely.
 template <class Model>

@@ -42,6 +42,7 @@ struct HistogramSat {
 
   std::span<const std::uint16_t> bin_ids;      ///< [bin_count]: ring * phi_bins + sector, increasing
   std::span<const Vec2> bin_normals;           ///< [bin_count]: mean of (nx, ny) over the texels of a bin
+  std::span<const MapSlopes> bin_slopes;       ///< [bin_count]: moments of the slopes of the texels of a bin
   std::span<const std::uint64_t> bin_totals;   ///< [bin_count]: texels of the map in a bin
   std::span<const std::uint16_t> texels;       ///< [tile rows][tile columns][8][8]: bin of each texel; 0 beyond the map
   std::span<const std::uint16_t> sums;         ///< [pointsY(stride)][pointsX(stride)][rowLength]

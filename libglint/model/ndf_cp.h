@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "glint/model/ndf_pyramid.h"
@@ -128,6 +129,8 @@ struct NdfCp {
   /// taken off the pixels of a slice before negative pixels count as 0. Without it, small errors in the dark add up to a haze.
   std::span<const std::uint8_t> floors;
   std::span<const float> spot_sums;  ///< [kSpotSums]: integral of a spot's profile up to a pixel edge; empty without spots
+  /// The normals of the map, for footprints below level 0; nothing where the asset keeps none. Only kind ndf-cp stores them.
+  std::optional<NearNormals> near_normals;
 
   GLINT_HD constexpr int placeWords() const { return (places + 63) / 64; }
 };

@@ -3,9 +3,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "glint/model/map_slopes.h"
+#include "glint/model/near_normals.h"
 #include "glint/model/normal_map.h"
 
 namespace glint {
@@ -95,6 +97,8 @@ struct NdfPyramid {
   BlockPrecision precision = BlockPrecision::f16;
   float value_scale = 1;  ///< density = value_scale * stored pixel
   PyramidLevel levels[kMaxPyramidLevels];
+  /// The normals of the map, for footprints below level 0; nothing where the asset keeps none. Only kind ndf-pyramid stores them.
+  std::optional<NearNormals> near_normals;
 };
 
 }  // namespace glint

@@ -39,7 +39,7 @@ static_assert(sizeof(PackedGrid) == 16);
 enum class PackedKind : std::uint32_t { normals = 0, pyramid = 1, compressed = 2, unknown = 0xffffffff };
 
 inline constexpr std::uint32_t kPackedMagic = 0x6e6c6721;  // "!gln"
-inline constexpr std::uint32_t kPackedVersion = 5;
+inline constexpr std::uint32_t kPackedVersion = 6;
 inline constexpr std::size_t kPackedAlignment = 64;
 /// Numbers of arrays of a level of a pyramid, and of a compressed pyramid. PackedHeader::arrays has room for either.
 inline constexpr int kPackedArrays = 4 * kMaxPyramidLevels;
@@ -68,11 +68,13 @@ struct PackedHeader {
   PackedGrid levels[kMaxPyramidLevels];                      //   80
   std::int32_t bounds_columns[NormalMap::kMaxBoundsLevels];  //  336
   std::int32_t bounds_rows[NormalMap::kMaxBoundsLevels];     //  416
-  PackedArray normals;                                       //  496  Vec2; kind normals, or for footprints below level 0
-  PackedArray bounds[NormalMap::kMaxBoundsLevels];           //  512  NormalBounds
-  float slope_mean[2];                                       //  832  of the map's texels, as MapSlopes
-  float slope_covariance[3];                                 //  840  xx, xy, yy
-  std::uint32_t reserved[11];                                //  852  0
+  PackedArray normals;                              //  496  kind normals, or for footprints below level 0; see near_type
+  PackedArray bounds[NormalMap::kMaxBoundsLevels];  //  512  see near_type
+  float slope_mean[2];                              //  832  of the map's texels, as MapSlopes
+  float slope_covariance[3];                        //  840  xx, xy, yy
+  std::uint32_t near_type;                          //  852  NearType of normals and bounds; kind normals: f32
+  float near_step;                                  //  856  NearNormals::step
+  std::uint32_t reserved[9];                        //  860  0
   /// 896. Pyramid: masks, mask_ranks, block_means and pixels of level l at 4 l. Compressed: image_regions, image_slots,
   /// image_scales, clusters, masks, mask_ranks, basis, coefficients, scales, density_scales,
   /// block_masks, first_block, block_masses, block_places, place_blocks, core, spot_sums, floors.

@@ -35,8 +35,9 @@ class CpNdf {
  public:
   GLINT_HD explicit CpNdf(const NdfCp& ndf, Interpolation interpolation = Interpolation::footprint,
                           Pixels pixels = Pixels::smooth)
-      : ndf_(ndf), chooser_(ndf.shape, interpolation), pixels_(pixels) {}
-  GLINT_HD CpNdf(const NdfCp& ndf, const NormalMap& normals, Interpolation interpolation = Interpolation::footprint,
+      : ndf_(ndf), chooser_(ndf.shape, interpolation), pixels_(pixels), below_(ndf.shape, ndf.near_normals) {}
+  /// @param normals  a NormalMap or NearNormals; instead of those that the asset keeps
+  GLINT_HD CpNdf(const NdfCp& ndf, const NearNormals& normals, Interpolation interpolation = Interpolation::footprint,
                  Pixels pixels = Pixels::smooth)
       : ndf_(ndf), chooser_(ndf.shape, interpolation), pixels_(pixels), below_(ndf.shape, normals) {}
 

@@ -12,6 +12,7 @@
 #include "glint/query/detail/histogram/parallelogram_sums.h"
 #include "glint/query/detail/histogram/rectangle_sums.h"
 #include "glint/query/detail/histogram/spherical_bins.h"
+#include "glint/query/detail/moments/slope_lobe.h"
 #include "glint/query/ndf_model.h"
 
 namespace glint {
@@ -20,6 +21,14 @@ namespace glint {
 enum class GaussianBoxes : std::uint8_t {
   one = 1,    ///< the box of the same second moments
   three = 3,  ///< three boxes that together have the same second moments and the least squared difference from the Gaussian
+};
+
+/// Where the normals of a bin are, between the borders of the bin.
+enum class HistogramBins : std::uint8_t {
+  /// A lobe of slopes with the mean and the spread that the texels of the bin have over the whole map, blurred by the lobe of a
+  /// facet. Continuous in the half vector.
+  lobes,
+  even,  ///< spread evenly over the bin, as a histogram is drawn. Lights smaller than a bin show its borders
 };
 
 /// Share of a footprint with slanted sides that HistogramNdf may count in a wrong place, unless it is told otherwise.
@@ -32,17 +41,29 @@ inline constexpr float kSlantTolerance = 0.06f;
 ///  - Boxes at an angle are cut into strips that misplace at most a given share of the footprint. The share bounds the total
 ///    variation from the exact histogram. Small or thin boxes are exact, and all boxes with a tolerance of 0.
 ///  - A Gaussian is answered as the parallelogram of the same covariance, or as three of them.
-/// The density is constant over the area of a bin on the disk. Bins are some ten degrees wide, far wider than the intrinsic
-/// roughness, so there is no further blur, and the density integrates to 1 over the disk.
+/// Counts say which bins the normals of a footprint are in, and HistogramBins where they are in a bin. With lobes, the density is a
+/// mixture of a lobe for each bin (SlopeLobe). With even bins it is constant over the area of a bin on the disk, without further blur:
+/// bins are some ten degrees wide. Both integrate to 1 over the disk, and a bin has the mass of its count.
+/// A histogram knows directions to a bin. It is meant for lights of six degrees and more (deviation of .1 on the disk); under smaller
+/// ones the light of a footprint may be that of the bin's normals elsewhere on the map.
 /// Cost of an axis-aligned box: four rows of counters, and a few texels for each texel along a border of up to some hundred
 /// texels. Cost at an angle: the same for each of about 1 / tolerance strips, or O(stride * border) for an exact answer.
 /// Thread-safe, allocates nothing; the arrays must outlive it.
 class HistogramNdf {
+  static constexpr float kHistogramRoughness = 0.005f;
+
  public:
   /// @param slant_tolerance  share of a footprint with slanted sides that may be misplaced, >= 0; 0: none, all boxes are exact
+  /// @param sigma_r          with lobes: intrinsic roughness of the facets, disk units
   GLINT_HD explicit HistogramNdf(const HistogramSat& sat, GaussianBoxes gaussian = GaussianBoxes::one,
-                                 float slant_tolerance = kSlantTolerance)
-      : sat_(sat), bins_(sat.theta_bins, sat.phi_bins), gaussian_(gaussian), slant_tolerance_(slant_tolerance) {}
+                                 float slant_tolerance = kSlantTolerance, HistogramBins shape = HistogramBins::lobes,
+                                 float sigma_r = kHistogramRoughness)
+      : sat_(sat),
+        bins_(sat.theta_bins, sat.phi_bins),
+        gaussian_(gaussian),
+        slant_tolerance_(slant_tolerance),
+        shape_(shape),
+        sigma_r_(sigma_r) {}
 
   GLINT_HD const HistogramSat& sat() const { return sat_; }
   GLINT_HD const SphericalBins& bins() const { return bins_; }
@@ -76,9 +97,15 @@ class HistogramNdf {
       if (counts.totals[bin] > 0) visitor(bin, static_cast<std::int64_t>(counts.totals[bin]));
   }
 
-  /// Density towards h, >= 0: the share of its bin over the bin's area; 0 outside the unit disk.
+  /// Density towards h, >= 0; 0 outside the unit disk. Even bins: the share of its bin over the bin's area, from the counters of one
+  /// bin. Lobes: O(bins).
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
     if (!(dot(h, h) <= 1)) return 0;
+    if (shape_ == HistogramBins::lobes) {
+      BinCounts counts;
+      const double total = histogram(p, counts);
+      return lobeDensity(counts, total, h);
+    }
     const int id = bins_.find(h), bin = binOf(id);
     if (bin < 0) return 0;
     OneBin sum(sat_, bin);
@@ -86,7 +113,8 @@ class HistogramNdf {
     return static_cast<float>(sum.count() / (area * bins_.area(id)));
   }
 
-  /// Average density over a box of half vectors, the exact average of `density`; 0 if the box is empty.
+  /// Average density over a box of half vectors, the average of `density`: exact with even bins, to 1e-3 with lobes (SlopeLobe::mass);
+  /// 0 if the box is empty.
   GLINT_HD float mean(const Footprint& p, const Box2& range) const {
     const Box2 box = insideSquare(range);
     if (!(box.width() > 0 && box.height() > 0)) return 0;
@@ -95,18 +123,22 @@ class HistogramNdf {
     double mass = 0;
     for (int bin = 0; bin < sat_.bin_count; ++bin) {
       if (counts.totals[bin] <= 0) continue;
+      if (shape_ == HistogramBins::lobes) {
+        mass += counts.totals[bin] * double{lobe(bin).mass(box)};
+        continue;
+      }
       const int id = sat_.bin_ids.data()[bin];
       mass += counts.totals[bin] * (bins_.areaInside(id, box) / bins_.area(id));
     }
     return static_cast<float>(mass / (total * double{range.area()}));
   }
 
-  /// Half vector with probability density `density`, which is its pdf: xi.x chooses the bin and what is left of it the azimuth
-  /// in the bin, xi.y the radius, so that even xi stay even within bins.
+  /// Half vector with probability density `density`, which is its pdf. xi.x chooses the bin; what is left of it and xi.y choose the
+  /// azimuth and the radius in the bin, or the slopes of its lobe, so that even xi stay even within bins.
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     xi = clampUnit(xi);
     BinCounts counts;
-    histogram(p, counts);
+    const double area = histogram(p, counts);
     double total = 0;
     for (int bin = 0; bin < sat_.bin_count; ++bin) total += counts.totals[bin];
     if (!(total > 0)) return {};
@@ -120,10 +152,22 @@ class HistogramNdf {
     }
     const int id = sat_.bin_ids.data()[chosen];
     const auto within = clampUnit(static_cast<float>(rest / counts.totals[chosen]));
+    if (shape_ == HistogramBins::lobes) {
+      const HalfVectorSample drawn = lobe(chosen).sample({within, xi.y});
+      return drawn.pdf > 0 ? drawnAt(drawn.h, lobeDensity(counts, area, drawn.h)) : HalfVectorSample{};
+    }
     return {bins_.point(id, {within, xi.y}), static_cast<float>(counts.totals[chosen] / (total * bins_.area(id)))};
   }
 
  private:
+  GLINT_HD SlopeLobe lobe(int bin) const { return {sat_.bin_slopes.data()[bin], sigma_r_}; }
+  GLINT_HD float lobeDensity(const BinCounts& counts, double total, Vec2 h) const {
+    double sum = 0;
+    for (int bin = 0; bin < sat_.bin_count; ++bin)
+      if (counts.totals[bin] > 0) sum += counts.totals[bin] * double{lobe(bin).density(h)};
+    return finitePositive(static_cast<float>(sum / total));
+  }
+
   /// Sums the texels of all bins. Returns the total: the area that was counted, texels^2.
   GLINT_HD double histogram(const Footprint& p, BinCounts& counts) const {
     AllBins sum(sat_, counts);
@@ -201,6 +245,8 @@ class HistogramNdf {
   SphericalBins bins_;
   GaussianBoxes gaussian_;
   float slant_tolerance_;
+  HistogramBins shape_;
+  float sigma_r_;
 };
 
 static_assert(NdfModel<HistogramNdf>);

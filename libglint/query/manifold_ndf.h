@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "glint/model/normal_map.h"
+#include "glint/model/near_normals.h"
 #include "glint/query/detail/common/footprint_weights.h"
 #include "glint/query/detail/common/half_vector_draw.h"
 #include "glint/query/detail/common/sampling.h"
@@ -23,7 +23,7 @@ namespace glint {
 /// size, over that of the density). Towards half vectors farther than the ball from all normals the density is 0.
 ///
 /// The min-max pyramid of the map makes the cost of a query follow the number of facets near the half vector; maps without it are
-/// answered too, more slowly. Gaussian and box footprints, flat and smooth surfaces. Stores nothing. Thread-safe, allocates nothing; the
+/// answered too, more slowly. Takes a NormalMap, or the normals that an asset keeps. Gaussian and box footprints, flat and smooth surfaces. Stores nothing. Thread-safe, allocates nothing; the
 /// map must outlive it.
 class ManifoldNdf {
  public:
@@ -32,8 +32,8 @@ class ManifoldNdf {
   /// Without a map: only `hasMap` may be called.
   ManifoldNdf() = default;
   /// @param loss  largest share of the light that answers leave out, 1e-4 to .1; the functions of a lane err by about 1e-4 anyway
-  GLINT_HD ManifoldNdf(const NormalMap& map, float sigma_r, Surface surface = Surface::flat, Boundary boundary = Boundary::wrap,
-                       float loss = kLoss)
+  GLINT_HD ManifoldNdf(const NearNormals& map, float sigma_r, Surface surface = Surface::flat,
+                       Boundary boundary = Boundary::wrap, float loss = kLoss)
       : s_{map, sigma_r, surface, boundary, squaredRadius(loss)} {}
 
   GLINT_HD bool hasMap() const { return s_.map.width > 0; }

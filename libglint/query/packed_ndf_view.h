@@ -34,14 +34,29 @@ class PackedNdfView {
   }
   /// Kind pyramid, with its normals if they were packed.
   GLINT_HD PyramidNdf pyramidNdf(Interpolation interpolation = Interpolation::footprint, Pixels pixels = Pixels::smooth) const {
-    return hasNormals() ? PyramidNdf(pyramid(), normalMap(), interpolation, pixels)
+    return hasNormals() ? PyramidNdf(pyramid(), nearNormals(), interpolation, pixels)
                         : PyramidNdf(pyramid(), interpolation, pixels);
   }
   /// Kind compressed, with its normals if they were packed.
   GLINT_HD CpNdf cpNdf(Interpolation interpolation = Interpolation::footprint, Pixels pixels = Pixels::smooth) const {
-    return hasNormals() ? CpNdf(ndfCp(), normalMap(), interpolation, pixels) : CpNdf(ndfCp(), interpolation, pixels);
+    return hasNormals() ? CpNdf(ndfCp(), nearNormals(), interpolation, pixels) : CpNdf(ndfCp(), interpolation, pixels);
   }
 
+  /// The normals for footprints below level 0.
+  GLINT_HD NearNormals nearNormals() const {
+    NearNormals near;
+    near.width = header_.width;
+    near.height = header_.height;
+    near.type = static_cast<NearType>(header_.near_type);
+    near.step = header_.near_step;
+    near.texels = base_ + header_.normals.offset;
+    near.bounds_level_count = header_.bounds_level_count;
+    for (int k = 0; k < header_.bounds_level_count; ++k)
+      near.bounds[k] = {header_.bounds_columns[k], header_.bounds_rows[k], base_ + header_.bounds[k].offset};
+    return near;
+  }
+
+  /// Kind normals.
   GLINT_HD NormalMap normalMap() const {
     NormalMap map;
     map.width = header_.width;

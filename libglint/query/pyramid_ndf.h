@@ -16,16 +16,20 @@ namespace glint {
 /// The NDF from a pyramid of images.
 ///
 /// Footprints are answered as isotropic Gaussians of the same mean square size. Between the centres and the sizes of the images
-/// see Interpolation. ManifoldNdf answers footprints below level 0 if the normals are given, blended with the images up to a fifth
-/// above it (TexelBlend). Without normals level 0 answers them, too wide (smallestSigma). Answers of footprints larger than the
+/// see Interpolation. ManifoldNdf answers footprints below level 0 from the normals of the map, given or kept in the asset, blended
+/// with the images up to a fifth above it (TexelBlend). Without normals level 0 answers them, too wide (smallestSigma). Answers of footprints larger than the
 /// map tend to its mean (SliceChooser). Between the half vectors of a pixel see Pixels. Thread-safe, allocates nothing; the arrays
 /// must outlive it.
 class PyramidNdf {
  public:
   GLINT_HD explicit PyramidNdf(const NdfPyramid& pyramid, Interpolation interpolation = Interpolation::footprint,
                                Pixels pixels = Pixels::smooth)
-      : reader_(pyramid), chooser_(pyramid.shape, interpolation), pixels_(pixels) {}
-  GLINT_HD PyramidNdf(const NdfPyramid& pyramid, const NormalMap& normals,
+      : reader_(pyramid),
+        chooser_(pyramid.shape, interpolation),
+        pixels_(pixels),
+        below_(pyramid.shape, pyramid.near_normals) {}
+  /// @param normals  a NormalMap or NearNormals; instead of those that the asset keeps
+  GLINT_HD PyramidNdf(const NdfPyramid& pyramid, const NearNormals& normals,
                       Interpolation interpolation = Interpolation::footprint, Pixels pixels = Pixels::smooth)
       : reader_(pyramid), chooser_(pyramid.shape, interpolation), pixels_(pixels), below_(pyramid.shape, normals) {}
 

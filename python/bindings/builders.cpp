@@ -11,6 +11,7 @@
 #include "glint/bake/compressed/compress.h"
 #include "glint/bake/displace/displace.h"
 #include "glint/bake/histogram/histogram_sat.h"
+#include "glint/bake/ingest/near_normals.h"
 #include "glint/bake/moments/slope_moments.h"
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/bake/wave/colour_weights.h"
@@ -31,8 +32,26 @@ BlockPrecision precisionOf(const std::string& word) {
   return choose<BlockPrecision>("precision", word, {{"half", BlockPrecision::f16}, {"float", BlockPrecision::f32}});
 }
 
+/// A pyramid, compressed or not, with the normals that it keeps.
+template <class Data>
+struct WithNormals {
+  Data images;
+  std::optional<bake::NearNormalsData> kept;
+
+  auto view() const {
+    auto asset = images.view();
+    if (kept) asset.near_normals = kept->view();
+    return asset;
+  }
+};
+
+std::optional<bake::NearNormalsData> kept(const NearNormals& normals, std::optional<NearType> type) {
+  if (!type) return {};
+  return bake::keepNormals(normals, *type);
+}
+
 void pyramid(const BuildJob& job, float stride, float overlap, int resolution, float sigma_r, const std::string& surface,
-             const std::string& boundary, int levels, const std::string& precision) {
+             const std::string& boundary, int levels, const std::string& precision, const std::string& keep_normals) {
   bake::PyramidOptions o;
   o.stride = stride;
   o.overlap = overlap;
@@ -42,9 +61,14 @@ void pyramid(const BuildJob& job, float stride, float overlap, int resolution, f
   o.boundary = boundaryOf(boundary);
   o.levels = levels;
   o.precision = precisionOf(precision);
+  using Type = std::optional<NearType>;
+  const auto type =
+      choose<Type>("keep_normals", keep_normals, {{"none", std::nullopt}, {"i16", NearType::i16}, {"f32", NearType::f32}});
   const formats::Asset input = openInput(job);
   const NormalMap& map = input.get<NormalMap>();
-  run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::buildPyramid(map, o, progress); });
+  run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) {
+    return WithNormals<bake::NdfPyramidData>{bake::buildPyramid(map, o, progress), kept(map, type)};
+  });
 }
 
 void wavePyramid(const BuildJob& job, float stride, float overlap, int resolution, int levels, const std::string& precision,
@@ -97,8 +121,11 @@ nb::dict compress(const BuildJob& job, const std::string& method, int rank, doub
   const formats::Asset input = openInput(job);
   const NdfPyramid& from = input.get<NdfPyramid>();
   bake::CompressionReport report;
-  run(job, formats::chained(provenanceOf(job), input.info().provenance),
-      [&](const bake::ProgressFn& progress) { return bake::compressPyramid(from, o, &report, progress); });
+  run(job, formats::chained(provenanceOf(job), input.info().provenance), [&](const bake::ProgressFn& progress) {
+    WithNormals<bake::NdfCpData> made{bake::compressPyramid(from, o, &report, progress), {}};
+    if (from.near_normals) made.kept = kept(*from.near_normals, from.near_normals->type);
+    return made;
+  });
   return reportDict(report);
 }
 
@@ -167,7 +194,8 @@ void bindBuilders(nb::module_& m) {
           nb::arg("threads"), nb::arg("progress").none());
   const nb::kw_only words_only;
   m.def("pyramid", &pyramid, nb::arg("job"), words_only, nb::arg("stride"), nb::arg("overlap"), nb::arg("resolution"),
-        nb::arg("sigma_r"), nb::arg("surface"), nb::arg("boundary"), nb::arg("levels"), nb::arg("precision"));
+        nb::arg("sigma_r"), nb::arg("surface"), nb::arg("boundary"), nb::arg("levels"), nb::arg("precision"),
+        nb::arg("keep_normals"));
   m.def("wave_pyramid", &wavePyramid, nb::arg("job"), words_only, nb::arg("stride"), nb::arg("overlap"), nb::arg("resolution"),
         nb::arg("levels"), nb::arg("precision"), nb::arg("coherence_um"), nb::arg("wavelengths_um"), nb::arg("spectral"));
   m.def("compress", &compress, nb::arg("job"), words_only, nb::arg("method"), nb::arg("rank"), nb::arg("tolerance"),

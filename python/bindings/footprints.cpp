@@ -2,6 +2,8 @@
 
 #include <nanobind/stl/optional.h>
 
+#include <array>
+
 #include "glint/query/ray_footprint.h"
 #include "parallel.h"
 
@@ -18,9 +20,9 @@ void set(const Answers& covariances, std::size_t k, const Covariance& c) {
 void bindFootprints(nb::module_& m) {
   nb::class_<Footprints>(m, "Footprints")
       .def(nb::init<std::optional<Rows>, std::optional<DoubleRows>, std::optional<Rows>, std::optional<Rows>,
-                    std::optional<Rows>>(),
+                    std::optional<Rows>, std::optional<Rows>>(),
            nb::arg("uv").none(), nb::arg("precise_uv").none(), nb::arg("sigma").none(), nb::arg("covariance").none(),
-           nb::arg("box").none());
+           nb::arg("box").none(), nb::arg("spread").none());
 
   m.def("from_differentials",
         [](const Rows& dx, const Rows& dy, int width, int height, float filter_sigma, const Answers& out) {
@@ -31,6 +33,17 @@ void bindFootprints(nb::module_& m) {
             set(out, k, p.covariance);
           });
         });
+  m.def("spread_of", [](const Rows& wi, const Rows& wo, const Rows& dndx, const Rows& dndy, const Rows& dwodx,
+                        const Rows& dwody, float filter_sigma, const Answers& out) {
+    const nb::gil_scoped_release others_may_run;
+    forEachQuery(out.shape(0), [&](std::size_t k) {
+      const auto vector = [&](const Rows& rows) { return std::array<float, 3>{rows(k, 0), rows(k, 1), rows(k, 2)}; };
+      glint_footprint p = {};
+      glint_footprint_set_spread(&p, vector(wi).data(), vector(wo).data(), vector(dndx).data(), vector(dndy).data(),
+                                 vector(dwodx).data(), vector(dwody).data(), filter_sigma);
+      from(out, k)[0] = p.spread[0], from(out, k)[1] = p.spread[1];
+    });
+  });
   m.def("bounced", [](const Rows& spreads, const Rows& slope_sigmas, const Answers& out) {
     const nb::gil_scoped_release others_may_run;
     forEachQuery(out.shape(0), [&](std::size_t k) { *from(out, k) = bounced({0, spreads(k, 0)}, slope_sigmas(k, 0)).spread; });

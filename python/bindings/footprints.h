@@ -10,12 +10,13 @@ namespace glint::python {
 class Footprints {
  public:
   Footprints(std::optional<Rows> uv, std::optional<DoubleRows> precise_uv, std::optional<Rows> sigma,
-             std::optional<Rows> covariance, std::optional<Rows> box)
+             std::optional<Rows> covariance, std::optional<Rows> box, std::optional<Rows> spread)
       : uv_(std::move(uv)),
         precise_uv_(std::move(precise_uv)),
         sigma_(std::move(sigma)),
         covariance_(std::move(covariance)),
-        box_(std::move(box)) {}
+        box_(std::move(box)),
+        spread_(std::move(spread)) {}
 
   std::size_t count() const { return uv_ ? uv_->shape(0) : precise_uv_->shape(0); }
 
@@ -31,6 +32,7 @@ class Footprints {
       p.ax = member(*box_, 0, first), p.ay = member(*box_, 1, first);
       p.bx = member(*box_, 2, first), p.by = member(*box_, 3, first);
     }
+    if (spread_) p.spread_x = member(*spread_, 0, first), p.spread_y = member(*spread_, 1, first);
     return p;
   }
 
@@ -48,13 +50,14 @@ class Footprints {
     } else {
       one = glint_footprint_box(one.u, one.v, *p.ax.data, *p.ay.data, *p.bx.data, *p.by.data);
     }
+    if (spread_) one.spread[0] = *p.spread_x.data, one.spread[1] = *p.spread_y.data;
     return one;
   }
 
  private:
   std::optional<Rows> uv_;
   std::optional<DoubleRows> precise_uv_;
-  std::optional<Rows> sigma_, covariance_, box_;
+  std::optional<Rows> sigma_, covariance_, box_, spread_;
 };
 
 void bindFootprints(nb::module_& m);

@@ -55,7 +55,7 @@ class Batch:
 class FootprintArrays:
     """Centres and sizes of footprints, as the user gave them."""
 
-    def __init__(self, uv, sigma, covariance, box, keep_whole_parts: bool = False):
+    def __init__(self, uv, sigma, covariance, box, spread=None, keep_whole_parts: bool = False):
         given = [name for name, v in (("sigma", sigma), ("covariance", covariance), ("box", box)) if v is not None]
         if len(given) != 1:
             raise ArgumentError(f"give one of sigma, covariance and box; given: {', '.join(given) or 'none'}")
@@ -65,9 +65,10 @@ class FootprintArrays:
         self.sigma = None if sigma is None else members(sigma, 1, "sigma")
         self.covariance = None if covariance is None else members(covariance, 3, "covariance")
         self.box = None if box is None else _half_axes(box)
+        self.spread = None if spread is None else members(spread, 2, "spread")
 
     def arrays(self) -> Sequence[np.ndarray]:
-        return [a for a in (self.uv, self.sigma, self.covariance, self.box) if a is not None]
+        return [a for a in (self.uv, self.sigma, self.covariance, self.box, self.spread) if a is not None]
 
     def of(self, batch: Batch) -> _glint.Footprints:
         uv = batch.rows(self.uv)
@@ -77,6 +78,7 @@ class FootprintArrays:
             batch.rows(self.sigma),
             batch.rows(self.covariance),
             batch.rows(self.box),
+            batch.rows(self.spread),
         )
 
 

@@ -132,7 +132,7 @@ def synth(kind: str, width: int = 512, height: int | None = None, *, seed: int =
 
 def pyramid(normals: Asset, *, stride: float = 32.0, overlap: float = 2 ** 0.5, resolution: int | str = 256,
             sigma_r: float = 0.005, surface: str = "flat", boundary: str = "wrap", levels: int | str = "auto",
-            precision: str = "half", threads: int = 0, progress: Progress | None = None) -> Asset:
+            precision: str = "half", keep_normals: str = "none", threads: int = 0, progress: Progress | None = None) -> Asset:
     """Computes the NDF images of footprints of every size and position (Deng 2022, section 4.1), as ``glint-pyramid``.
 
     Args:
@@ -143,9 +143,11 @@ def pyramid(normals: Asset, *, stride: float = 32.0, overlap: float = 2 ** 0.5, 
         sigma_r: intrinsic roughness, disk units.
         levels: levels besides the mean of the map, or "auto".
         precision: "half" or "float", of stored pixels.
+        keep_normals: "i16" or "f32": the asset keeps the normals of the map, which answer footprints below the finest level;
+            "none": it does not. `compress` keeps what its pyramid keeps.
     """
     options = dict(stride=stride, overlap=overlap, resolution=_auto("resolution", resolution), sigma_r=sigma_r, surface=surface,
-                   boundary=boundary, levels=_auto("levels", levels), precision=precision)
+                   boundary=boundary, levels=_auto("levels", levels), precision=precision, keep_normals=keep_normals)
     return _made("pyramid", options, _expect(normals, "normals"), threads, progress)
 
 

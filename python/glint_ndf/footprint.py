@@ -56,6 +56,28 @@ def from_cone(width, direction, texels_per_unit) -> np.ndarray:
     return batch.shaped(out)
 
 
+def half_vector_spread(wi, wo, dn_dx, dn_dy, dwo_dx=(0, 0, 0), dwo_dy=(0, 0, 0),
+                       filter_sigma: float = PIXEL_FILTER_SIGMA) -> np.ndarray:
+    """Half widths of the box of half vectors that a pixel sees where the surface's own normal turns under it.
+
+    Args:
+        wi, wo: [..., 3] unit vectors of the tangent frame, towards the light and the eye.
+        dn_dx, dn_dy: [..., 3] change of the surface's unit normal, without the map, from one pixel to the next along x and y, in the
+            tangent frame.
+        dwo_dx, dwo_dy: [..., 3] change of wo.
+        filter_sigma: deviation of the pixel filter, pixels.
+
+    Returns:
+        [..., 2] float32, for the argument `spread` of queries; 0 where directions are below the horizon.
+    """
+    vectors = [members(v, 3, name) for v, name in ((wi, "wi"), (wo, "wo"), (dn_dx, "dn_dx"), (dn_dy, "dn_dy"), (dwo_dx, "dwo_dx"),
+                                                   (dwo_dy, "dwo_dy"))]
+    batch = Batch(*vectors)
+    out = batch.answers(2)
+    _glint.spread_of(*(batch.rows(v) for v in vectors), float(filter_sigma), out)
+    return batch.shaped(out)
+
+
 def bounced_spread(spread, slope_sigma) -> np.ndarray:
     """Spread of a beam, radians, after facets whose slopes deviate by `slope_sigma` have reflected it: at most 0.75."""
     spreads, slopes = members(spread, 1, "spread"), members(slope_sigma, 1, "slope_sigma")

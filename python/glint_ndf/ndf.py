@@ -20,6 +20,7 @@ _PIXELS = {"smooth": 0, "constant": 1}
 _FRESNELS = {"mirror": 0, "dielectric": 1, "conductor": 2}
 _FACETS = {"distribution": 0, "beckmann": 1}
 _ESTIMATORS = {"exact": 0, "published": 1}
+_BINS = {"lobes": 0, "even": 1}
 _SLANT_EXACT = -1.0
 
 #: Kinds of planes without end: the whole parts of uv count.
@@ -82,16 +83,18 @@ class Ndf:
         """Mean (x, y) and covariance (xx, xy, yy) of the slopes of the whole map, from which masking follows."""
         return self._handle.slopes()
 
-    def density(self, uv, h, *, sigma=None, covariance=None, box=None, threads: int = 0) -> np.ndarray:
+    def density(self, uv, h, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0) -> np.ndarray:
         """Density of normals towards half vectors, per unit projected area.
 
         Args:
             h: [..., 2] half vectors on the unit disk.
+            spread: [..., 2] on a curved surface, half widths of the box of half vectors that each pixel sees
+                (`footprint.half_vector_spread`). Answers are averaged over it, so that narrow highlights do not alias.
 
         Returns:
             [...] float32, >= 0.
         """
-        p, half = FootprintArrays(uv, sigma, covariance, box), members(h, 2, "h")
+        p, half = FootprintArrays(uv, sigma, covariance, box, spread), members(h, 2, "h")
         batch = Batch(half, *p.arrays())
         out = batch.answers()
         self._handle.density(p.of(batch), batch.rows(half), out, threads)
@@ -117,19 +120,19 @@ class Ndf:
         self._handle.density_spectrum(p.of(batch), batch.rows(towards), out, threads)
         return out.reshape(batch.shape + (self.channels,))
 
-    def mean(self, uv, ranges, *, sigma=None, covariance=None, box=None, threads: int = 0) -> np.ndarray:
+    def mean(self, uv, ranges, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0) -> np.ndarray:
         """Mean density over boxes of half vectors, as a light asks for it.
 
         Args:
             ranges: [..., 4] x0, y0, x1 and y1.
         """
-        p, boxes = FootprintArrays(uv, sigma, covariance, box), members(ranges, 4, "ranges")
+        p, boxes = FootprintArrays(uv, sigma, covariance, box, spread), members(ranges, 4, "ranges")
         batch = Batch(boxes, *p.arrays())
         out = batch.answers()
         self._handle.mean(p.of(batch), batch.rows(boxes), out, threads)
         return batch.shaped(out)
 
-    def sample(self, uv, xi, *, sigma=None, covariance=None, box=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    def sample(self, uv, xi, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
         """Draws half vectors in proportion to the density.
 
         Args:
@@ -139,7 +142,7 @@ class Ndf:
             h: [..., 2] half vectors. They may lie outside the disk, where facets near the horizon blur to.
             pdf: [...] per unit projected area; 0 if nothing can be drawn.
         """
-        p, random = FootprintArrays(uv, sigma, covariance, box), members(xi, 2, "xi")
+        p, random = FootprintArrays(uv, sigma, covariance, box, spread), members(xi, 2, "xi")
         batch = Batch(random, *p.arrays())
         x, y, pdf = batch.answers(), batch.answers(), batch.answers()
         self._handle.sample(p.of(batch), batch.rows(random), x, y, pdf, threads)
@@ -184,25 +187,25 @@ class Brdf:
         self._handle = handle
         self.ndf = ndf  #: the distribution
 
-    def _footprints(self, uv, sigma, covariance, box) -> FootprintArrays:
+    def _footprints(self, uv, sigma, covariance, box, spread=None) -> FootprintArrays:
         # On a plane without end the whole parts of uv count, and batches of doubles drop them.
-        return FootprintArrays(uv, sigma, covariance, box, keep_whole_parts=self.ndf.endless)
+        return FootprintArrays(uv, sigma, covariance, box, spread, keep_whole_parts=self.ndf.endless)
 
-    def evaluate(self, uv, wi, wo, *, sigma=None, covariance=None, box=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    def evaluate(self, uv, wi, wo, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
         """The BRDF and the density of its samples.
 
         Returns:
             f: [..., 3] red, green and blue, 1/sr, without the cosine of wi.
             pdf: [...] density with which `sample` draws wi, per unit solid angle.
         """
-        p = self._footprints(uv, sigma, covariance, box)
+        p = self._footprints(uv, sigma, covariance, box, spread)
         inward, outward = members(wi, 3, "wi"), members(wo, 3, "wo")
         batch = Batch(inward, outward, *p.arrays())
         f, pdf = batch.answers(3), batch.answers()
         self._handle.evaluate(p.of(batch), batch.rows(inward), batch.rows(outward), f, pdf, threads)
         return batch.shaped(f), batch.shaped(pdf)
 
-    def sample(self, uv, wo, xi, *, sigma=None, covariance=None, box=None,
+    def sample(self, uv, wo, xi, *, sigma=None, covariance=None, box=None, spread=None,
                threads: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Draws wi for views wo.
 
@@ -211,7 +214,7 @@ class Brdf:
             weight: [..., 3] f wi.z / pdf.
             pdf: [...] per unit solid angle; 0 where nothing was drawn.
         """
-        p = self._footprints(uv, sigma, covariance, box)
+        p = self._footprints(uv, sigma, covariance, box, spread)
         outward, random = members(wo, 3, "wo"), members(xi, 2, "xi")
         batch = Batch(outward, random, *p.arrays())
         wi, weight, pdf = batch.answers(3), batch.answers(3), batch.answers()
@@ -264,16 +267,16 @@ def _lobe_members(axes: np.ndarray, sharpness, amplitudes: np.ndarray) -> list[n
 def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: PathLike | Asset | None = None, *,
          surface: str = "flat", boundary: str = "wrap", sigma_r: float = 0.005, alpha: float = 0.0,
          slant_tolerance: float = 0.06, gaussian_boxes: int = 1, footprint_parts: int = 32, interpolation: str = "footprint",
-         pixels: str = "smooth", estimator: str = "exact", verify_hashes: bool = False) -> Ndf:
+         pixels: str = "smooth", estimator: str = "exact", bins: str = "lobes", verify_hashes: bool = False) -> Ndf:
     """Opens an asset that holds a distribution of normals. The file is checked, and then mapped. Options of other kinds are ignored.
 
     Args:
         source: a file, its bytes, or an `Asset`. Bytes go through a temporary file. "rock.<UDIM>.glint" opens every tile of a UDIM
             set that has a file: tile 1001 + floor(u) + 10 floor(v) holds uv. Densities are 0 where the set has no tile.
-        normals: asset of kind normals that a pyramid was made from. It answers footprints below level 0, which the nearest level
-            answers without it. Of a UDIM set a pattern, too.
+        normals: asset of kind normals that a pyramid was made from. It answers footprints below level 0. Without it, the normals
+            that the pyramid keeps do, and the nearest level where it keeps none. Of a UDIM set a pattern, too.
         surface, boundary: kind normals: "flat" or "smooth", "wrap" or "clamp".
-        sigma_r: kinds normals and slope-moments: intrinsic roughness, disk units, 1e-4 to 0.25.
+        sigma_r: kinds normals, slope-moments and histogram-sat: intrinsic roughness, disk units, 1e-4 to 0.25.
         alpha: kind bin-map: Beckmann roughness, in the range that the asset was made for; 0: the smallest.
         slant_tolerance: kind histogram-sat: share of a footprint with slanted sides that may be counted in a wrong place; 0: none.
         gaussian_boxes: kind histogram-sat: boxes that stand for a Gaussian footprint, 1 or 3.
@@ -281,6 +284,8 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
         interpolation: kinds with levels: "footprint", or "trilinear" (quicker, and answers a wider footprint).
         pixels: kinds with levels: "smooth", or "constant" (quicker; small lights show the borders of pixels).
         estimator: kind bin-map: "exact", or "published" (densities by the centres of 21 bins: quicker, and less exact).
+        bins: kind histogram-sat: where the normals of a bin are: "lobes" (with their mean and spread over the map), or "even" over the
+            bin (quicker; small lights show the borders of bins).
         verify_hashes: compare all arrays with their hashes.
 
     Raises:
@@ -294,7 +299,7 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
         alpha=alpha, slant_tolerance=_SLANT_EXACT if slant_tolerance == 0 else slant_tolerance, gaussian_boxes=gaussian_boxes,
         footprint_parts=footprint_parts, interpolation=_word("interpolation", interpolation, _INTERPOLATIONS),
         pixels=_word("pixels", pixels, _PIXELS), estimator=_word("estimator", estimator, _ESTIMATORS),
-        verify_hashes=verify_hashes)
+        bins=_word("bins", bins, _BINS), verify_hashes=verify_hashes)
     of_texels = None if normals is None else normals.path if isinstance(normals, Asset) else os.fspath(normals)
     return Ndf(_glint.open_ndf(path, of_texels, **options), asset, path)
 

@@ -26,7 +26,7 @@ class Floats(ctypes.Structure):
 
 
 class Footprints(ctypes.Structure):
-    _fields_ = [(name, Floats) for name in ("u", "v", "sigma", "xx", "xy", "yy", "ax", "ay", "bx", "by", "precise_u", "precise_v")]
+    _fields_ = [(name, Floats) for name in ("u", "v", "sigma", "xx", "xy", "yy", "ax", "ay", "bx", "by", "precise_u", "precise_v", "spread_x", "spread_y")]
 
 
 def column(array, member):

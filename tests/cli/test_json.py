@@ -24,7 +24,7 @@ LIGHTS = {"lights": [{"type": "sphere", "centre": [1, 0, 3], "radius": 0.5, "rad
 SCENE = {"schema": "glint-plan scene 1", "lights": [{"type": "environment", "band_limit_deg": 60}],
          "materials": [{"map": "n.png", "footprints": {"smallest_texels": 4, "largest_texels": 4}, "sigma_r": 0.1, "tolerance": 9}]}
 QUERIES = {"half.csv": "u,v,sigma,hx,hy\n.3,.3,4,0,0\n.1,.2,5,.1,0\n", "displaced.csv": "u,v,level,hx,hy\n.3,.3,0,0,0\n"}
-ASSETS = ("normals", "smooth", "heights", "flat", "damaged", "pyramid", "shard", "cp", "tucker", "pca", "bins", "range", "sat", "moments", "tiny", "wang", "wangpyramid", "wangcp", "wave", "lobes", "zonal", "light",
+ASSETS = ("kept", "kept.cp", "normals", "smooth", "heights", "flat", "damaged", "pyramid", "shard", "cp", "tucker", "pca", "bins", "range", "sat", "moments", "tiny", "wang", "wangpyramid", "wangcp", "wave", "lobes", "zonal", "light",
           "displaced", "rough", "colored")
 
 # Commands in the order that they run: each may read what the commands before it wrote.
@@ -46,6 +46,8 @@ MAKE = [
     "compress pyramid.glint -o cp.glint --method cp --rank 8",
     "compress pyramid.glint -o tucker.glint --method tucker --tolerance .1",
     "compress pyramid.glint -o pca.glint --method pca --rank 4 --quantize f32",
+    "pyramid normals.glint -o kept.glint --resolution 64 --stride 8 --sigma-r .02 --keep-normals i16",
+    "compress kept.glint -o kept.cp.glint --method cp --rank 4",
     "binmap normals.glint -o bins.glint --alpha .05",
     "binmap normals.glint -o range.glint --alpha .02:.1",
     "sat normals.glint -o sat.glint --bins 6x20",

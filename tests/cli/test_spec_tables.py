@@ -48,8 +48,10 @@ def test_every_entry_of_the_schema_has_a_row_with_its_meaning():
     schema, spec = json.loads((FORMATS / "schema.json").read_text()), (FORMATS / "SPEC.md").read_text()
 
     def check(table, entries, key):
-        absent = {True: "", False: " (MAY be absent)"}
-        expected = [(entry[key].replace("{l}", "LL") + absent[entry.get("required", True)], entry["long_name"]) for entry in entries]
+        def presence(entry):
+            return f" (with {entry['needs']})" if "needs" in entry else "" if entry.get("required", True) else " (MAY be absent)"
+
+        expected = [(entry[key].replace("{l}", "LL") + presence(entry), entry["long_name"]) for entry in entries]
         assert [(row[0], row[-1]) for row in rows_of(spec, table)] == expected, table
 
     check("root attributes", schema["root_attributes"], "name")

@@ -151,7 +151,8 @@ def test_c_programs_open_a_set(compressed):
     library = ctypes.CDLL(BIN.parent / "libglint" / "libglint.so")
 
     class Footprint(ctypes.Structure):
-        _fields_ = [("kind", ctypes.c_int32), ("u", ctypes.c_double), ("v", ctypes.c_double), ("m", ctypes.c_float * 4)]
+        _fields_ = [("kind", ctypes.c_int32), ("u", ctypes.c_double), ("v", ctypes.c_double), ("m", ctypes.c_float * 4),
+                    ("spread", ctypes.c_float * 2)]
 
     library.glint_footprint_isotropic.restype = Footprint
     library.glint_footprint_isotropic.argtypes = [ctypes.c_double, ctypes.c_double, ctypes.c_float]

@@ -221,6 +221,20 @@ static void check_light(const glint_ndf* ndf) {
   check(glint_lobes_reflected(brdf, &p, wo, lamps, 2, 0, light) == GLINT_ERROR_USAGE, "a destroyed BRDF is an error");
 }
 
+static void check_curved(const glint_ndf* ndf) {
+  glint_footprint p = glint_footprint_isotropic(0.3, 0.7, 40);
+  const float up[3] = {0, 0, 1}, turn_x[3] = {0.04f, 0, 0}, turn_y[3] = {0, 0.02f, 0};
+  float density = -1, mean = -1;
+  check(p.spread[0] == 0 && p.spread[1] == 0, "a footprint is flat");
+  check(glint_footprint_set_spread(&p, up, up, turn_x, turn_y, NULL, NULL, 0.5f) == GLINT_OK, "a surface turns");
+  check(fabsf(p.spread[0] - 0.04f) < 1e-6f && fabsf(p.spread[1] - 0.02f) < 1e-6f, "the half vector turns with it");
+  glint_density(ndf, &p, 0, 0, &density);
+  p.spread[0] = p.spread[1] = 0;
+  glint_mean(ndf, &p, -0.04f, -0.02f, 0.04f, 0.02f, &mean);
+  check(fabsf(density - mean) <= 1e-4f * (1 + mean), "a curved pixel sees the mean over its half vectors");
+  check(glint_footprint_set_spread(NULL, up, up, turn_x, turn_y, NULL, NULL, 0.5f) == GLINT_ERROR_USAGE, "null is an error");
+}
+
 static void check_packing(const glint_ndf* ndf) {
   size_t size = 0;
   const glint_status status = glint_ndf_pack(ndf, NULL, 0, &size);
@@ -270,6 +284,7 @@ int main(int argc, char** argv) {
   check_batches(ndf);
   check_brdf(ndf);
   check_light(ndf);
+  check_curved(ndf);
   check_packing(ndf);
   check_closed(argv[1]);
   check_displaced(argv[2]);

@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   glint_ndf* ndf = NULL;
   glint_status status = glint_ndf_open(argv[1], NULL, &ndf);
   if (status != GLINT_OK) return fail(status);
-  const glint_footprint footprint = {GLINT_FOOTPRINT_GAUSSIAN, 0.3f, 0.6f, {9, 0, 9, 0}};
+  const glint_footprint footprint = {GLINT_FOOTPRINT_GAUSSIAN, 0.3f, 0.6f, {9, 0, 9, 0}, {0, 0}};
   float density = 0;
   status = glint_density(ndf, &footprint, 0.1f, -0.05f, &density);
   if (status != GLINT_OK) return fail(status);

@@ -408,6 +408,32 @@ void addBlockMasses(SampleNdfCp& sample) {
   }
 }
 
+/// Nodes of all levels of the bounds of a map, in the shortest way that is right.
+std::vector<std::vector<NormalBounds>> boundsOf(const NormalMap& map) {
+  std::vector<std::vector<NormalBounds>> levels;
+  for (int k = 1;; ++k) {
+    const int block = 1 << k;
+    const int columns = (map.width + block - 1) / block;
+    const int rows = (map.height + block - 1) / block;
+    std::vector<NormalBounds> nodes;
+    for (int j = 0; j < rows; ++j) {
+      for (int i = 0; i < columns; ++i) {
+        NormalBounds node{2, 2, -2, -2};
+        for (int y = j * block; y <= std::min((j + 1) * block, map.height); ++y) {
+          for (int x = i * block; x <= std::min((i + 1) * block, map.width); ++x) {
+            const Vec2 n = map.at(x % map.width, y % map.height);
+            node = {std::min(node.low_x, n.x), std::min(node.low_y, n.y), std::max(node.high_x, n.x),
+                    std::max(node.high_y, n.y)};
+          }
+        }
+        nodes.push_back(node);
+      }
+    }
+    levels.push_back(std::move(nodes));
+    if (columns == 1 && rows == 1) return levels;
+  }
+}
+
 }  // namespace
 
 SampleNormals sampleNormals(int width, int height, bool with_bounds) {
@@ -424,29 +450,57 @@ SampleNormals sampleNormals(int width, int height, bool with_bounds) {
   sample.map.texel_size_um = 2.5f;
   sample.map.normals = sample.normals;
   if (!with_bounds) return sample;
-  sample.bounds.reserve(NormalMap::kMaxBoundsLevels);
-  for (int k = 1;; ++k) {
-    const int block = 1 << k;
-    const int columns = (width + block - 1) / block;
-    const int rows = (height + block - 1) / block;
-    std::vector<NormalBounds> nodes;
-    for (int j = 0; j < rows; ++j) {
-      for (int i = 0; i < columns; ++i) {
-        NormalBounds node{2, 2, -2, -2};
-        for (int y = j * block; y <= std::min((j + 1) * block, height); ++y) {
-          for (int x = i * block; x <= std::min((i + 1) * block, width); ++x) {
-            const Vec2 n = sample.map.at(x % width, y % height);
-            node = {std::min(node.low_x, n.x), std::min(node.low_y, n.y), std::max(node.high_x, n.x),
-                    std::max(node.high_y, n.y)};
-          }
-        }
-        nodes.push_back(node);
-      }
-    }
-    sample.bounds.push_back(std::move(nodes));
-    sample.map.bounds[sample.map.bounds_level_count++] = {columns, rows, sample.bounds.back()};
-    if (columns == 1 && rows == 1) return sample;
+  sample.bounds = boundsOf(sample.map);
+  for (const std::vector<NormalBounds>& nodes : sample.bounds) {
+    const int block = 2 << sample.map.bounds_level_count;
+    sample.map.bounds[sample.map.bounds_level_count++] = {(width + block - 1) / block, (height + block - 1) / block, nodes};
   }
+  return sample;
+}
+
+SampleNearNormals sampleNearNormals(int size, NearType type) {
+  constexpr float kStep = 0x1p-15f;
+  SampleNearNormals sample;
+  sample.normals = sampleNormals(size, size, false).normals;
+  const auto codeOf = [](float x) { return static_cast<std::int16_t>(std::lrint(x / kStep)); };
+  if (type == NearType::i16) {
+    for (Vec2& n : sample.normals) {
+      const NormalCode code = {codeOf(n.x), codeOf(n.y)};
+      sample.codes.push_back(code);
+      n = {kStep * static_cast<float>(code.x), kStep * static_cast<float>(code.y)};
+    }
+  }
+  NormalMap map;
+  map.width = map.height = size;
+  map.normals = sample.normals;
+  sample.bounds = boundsOf(map);
+  NearNormals& near = sample.near;
+  near.width = near.height = size;
+  near.type = type;
+  near.step = type == NearType::i16 ? kStep : 1;
+  near.texels = type == NearType::i16 ? static_cast<const void*>(sample.codes.data()) : sample.normals.data();
+  for (const std::vector<NormalBounds>& nodes : sample.bounds) {
+    std::vector<CodeBounds>& codes = sample.code_bounds.emplace_back();
+    for (const NormalBounds& b : nodes) codes.push_back({codeOf(b.low_x), codeOf(b.low_y), codeOf(b.high_x), codeOf(b.high_y)});
+    const int block = 2 << near.bounds_level_count, along = (size + block - 1) / block;
+    near.bounds[near.bounds_level_count++] = {along, along,
+                                              type == NearType::i16 ? static_cast<const void*>(codes.data()) : nodes.data()};
+  }
+  return sample;
+}
+
+SamplePyramid samplePyramidWithNormals(int size, NearType type) {
+  SamplePyramid sample = samplePyramid(size, BlockPrecision::f16);
+  sample.kept = sampleNearNormals(size, type);
+  sample.pyramid.near_normals = sample.kept.near;
+  return sample;
+}
+
+SampleNdfCp sampleNdfCpWithNormals(int size, NearType type) {
+  SampleNdfCp sample = sampleNdfCp(size, CompressionMethod::tucker, CoefficientType::i8);
+  sample.kept = sampleNearNormals(size, type);
+  sample.ndf.near_normals = sample.kept.near;
+  return sample;
 }
 
 SampleHeights sampleHeights(int width, int height) {
@@ -832,19 +886,28 @@ SampleHistograms sampleHistograms(int width, int height) {
   sat.slopes = {{0.125f, -0.0625f}, {0.25f, 0.03125f, 0.5f}};
   sample.texels.resize(static_cast<std::size_t>(sat.tileRows()) * sat.tileColumns() * 64);
   for (int id = 0; id < kRings * kSectors; ++id) {
-    double x = 0, y = 0;
+    double x = 0, y = 0, p = 0, q = 0, pp = 0, pq = 0, qq = 0;
     std::uint64_t count = 0;
     for (int j = 0; j < height; ++j) {
       for (int i = 0; i < width; ++i) {
         if (direction(map.map.at(i, j)) != id) continue;
         sample.texels[sat.texelIndex(i, j)] = static_cast<std::uint16_t>(sample.bin_ids.size());
-        x += map.map.at(i, j).x, y += map.map.at(i, j).y, ++count;
+        const Vec2 n = map.map.at(i, j);
+        x += n.x, y += n.y, ++count;
+        const double nz = std::sqrt(1 - double{n.x} * n.x - double{n.y} * n.y), sp = -n.x / nz, sq = -n.y / nz;
+        p += sp, q += sq, pp += sp * sp, pq += sp * sq, qq += sq * sq;
       }
     }
     if (count == 0) continue;
     sample.bin_ids.push_back(static_cast<std::uint16_t>(id));
     const auto texels = static_cast<double>(count);
     sample.bin_normals.push_back({static_cast<float>(x / texels), static_cast<float>(y / texels)});
+    p /= texels, q /= texels;
+    const double xx = std::max(0.0, pp / texels - p * p), yy = std::max(0.0, qq / texels - q * q);
+    const double most = 0.999 * std::sqrt(xx * yy);
+    sample.bin_slopes.push_back(
+        {{static_cast<float>(p), static_cast<float>(q)},
+         {static_cast<float>(xx), static_cast<float>(std::clamp(pq / texels - p * q, -most, most)), static_cast<float>(yy)}});
     sample.bin_totals.push_back(count);
   }
   sat.bin_count = static_cast<int>(sample.bin_ids.size());
@@ -865,7 +928,8 @@ SampleHistograms sampleHistograms(int width, int height) {
     for (int a = 0; a < sat.pointsX(16); ++a) count(sample.row_sums, 0, j, std::min(a * 16, width), j + 1);
   for (int i = 0; i < width; ++i)
     for (int b = 0; b < sat.pointsY(16); ++b) count(sample.column_sums, i, 0, i + 1, std::min(b * 16, height));
-  sat.bin_ids = sample.bin_ids, sat.bin_normals = sample.bin_normals, sat.bin_totals = sample.bin_totals;
+  sat.bin_ids = sample.bin_ids, sat.bin_normals = sample.bin_normals, sat.bin_slopes = sample.bin_slopes,
+  sat.bin_totals = sample.bin_totals;
   sat.texels = sample.texels, sat.sums = sample.sums, sat.coarse_sums = sample.coarse_sums;
   sat.row_sums = sample.row_sums, sat.column_sums = sample.column_sums;
   return sample;
@@ -1052,6 +1116,8 @@ std::vector<SampleAsset> sampleAssets() {
       {"ndf-cp-spots-i8", ownedNdfCp<tucker, i8, SampleForm::spots>},
       {"ndf-cp-cp-f32", ownedNdfCp<cp, f32>},
       {"ndf-pyramid", [] { return owned(samplePyramid(64, BlockPrecision::f16), &SamplePyramid::pyramid); }},
+      {"ndf-cp-normals-f32", [] { return owned(sampleNdfCpWithNormals(32, NearType::f32), &SampleNdfCp::ndf); }},
+      {"ndf-pyramid-normals-i16", [] { return owned(samplePyramidWithNormals(32, NearType::i16), &SamplePyramid::pyramid); }},
       {"ndf-pyramid-shard", [] { return owned(samplePyramidShard(64), &SamplePyramidShard::shard); }},
       {"normals", [] { return owned(sampleNormals(64, 48), &SampleNormals::map); }},
       {"sh-light", [] { return owned(sampleShLight(), &SampleShLight::light); }},

@@ -42,6 +42,15 @@ struct SampleDisplacement {
   Displacement displacement;
 };
 
+/// Normals that an asset keeps, and the memory behind them.
+struct SampleNearNormals {
+  std::vector<Vec2> normals;
+  std::vector<NormalCode> codes;
+  std::vector<std::vector<NormalBounds>> bounds;
+  std::vector<std::vector<CodeBounds>> code_bounds;
+  NearNormals near;
+};
+
 struct SamplePyramid {
   struct Level {
     std::vector<std::uint64_t> masks;
@@ -51,6 +60,7 @@ struct SamplePyramid {
     std::vector<float> floats;
   };
   std::vector<Level> levels;
+  SampleNearNormals kept;
   NdfPyramid pyramid;
 };
 
@@ -89,6 +99,7 @@ struct SampleNdfCp {
   std::vector<std::uint16_t> place_blocks;
   std::vector<float> spot_sums;
   std::vector<std::uint8_t> floors;
+  SampleNearNormals kept;
   NdfCp ndf;
 };
 
@@ -109,6 +120,7 @@ struct SampleBinMap {
 struct SampleHistograms {
   std::vector<std::uint16_t> bin_ids;
   std::vector<Vec2> bin_normals;
+  std::vector<MapSlopes> bin_slopes;
   std::vector<std::uint64_t> bin_totals;
   std::vector<std::uint16_t> texels, sums, row_sums, column_sums;
   std::vector<std::uint32_t> coarse_sums;
@@ -164,6 +176,11 @@ SampleHeights sampleHeights(int width, int height);
 SampleDisplacement sampleDisplacement(int size, bool colored = false);
 /// NDF images of sampleNormals(size, size) at strides size/4, size/2 and size, 64^2 pixels, sigma_r 0.05.
 SamplePyramid samplePyramid(int size, BlockPrecision precision);
+/// The normals of sampleNormals(size, size), in 16 bits with a step of 2^-15 or as they are.
+SampleNearNormals sampleNearNormals(int size, NearType type);
+/// samplePyramid and sampleNdfCp that keep these normals.
+SamplePyramid samplePyramidWithNormals(int size, NearType type);
+SampleNdfCp sampleNdfCpWithNormals(int size, NearType type);
 /// The first of two regions of samplePyramid, which has no image of the last level.
 SamplePyramidShard samplePyramidShard(int size);
 /// The same images, each block approximated by a constant and slopes; two regions.

@@ -37,7 +37,7 @@ TEST(CApi, AnswersAsTheModelsDo) {
     int positive = 0;
     for (std::size_t k = 0; k < q.u.size(); ++k) {
       const glint_footprint p = glint_footprint_isotropic(q.u[k], q.v[k], q.sigma[k]);
-      const glint_footprint box = {GLINT_FOOTPRINT_BOX, q.u[k], q.v[k], {q.sigma[k], 1, -1, q.sigma[k]}};
+      const glint_footprint box = {GLINT_FOOTPRINT_BOX, q.u[k], q.v[k], {q.sigma[k], 1, -1, q.sigma[k]}, {0, 0}};
       const auto expected = [&](auto&& ask) { return std::visit(ask, opened.model()); };
       float density = -1, mean = -1, in_box = -1;
       ASSERT_EQ(glint_density(ndf.get(), &p, q.hx[k], q.hy[k], &density), GLINT_OK);
@@ -147,13 +147,13 @@ TEST(CApi, BatchesTakeCovariancesBoxesAndAnyStride) {
     for (std::size_t k = 0; k < rows.size(); ++k) {
       float one = -1;
       const glint_footprint gaussian = {
-          GLINT_FOOTPRINT_GAUSSIAN, rows[k].u, rows[k].v, {rows[k].xx, rows[k].xy, rows[k].yy, 0}};
+          GLINT_FOOTPRINT_GAUSSIAN, rows[k].u, rows[k].v, {rows[k].xx, rows[k].xy, rows[k].yy, 0}, {0, 0}};
       glint_density(ndf.get(), &gaussian, q.hx[k], q.hy[k], &one);
       expectSame(gaussians[k], one, k);
-      const glint_footprint straight = {GLINT_FOOTPRINT_GAUSSIAN, rows[k].u, rows[k].v, {rows[k].xx, 0, rows[k].yy, 0}};
+      const glint_footprint straight = {GLINT_FOOTPRINT_GAUSSIAN, rows[k].u, rows[k].v, {rows[k].xx, 0, rows[k].yy, 0}, {0, 0}};
       glint_density(ndf.get(), &straight, q.hx[k], q.hy[k], &one);
       expectSame(backwards[rows.size() - 1 - k], one, k);
-      const glint_footprint square = {GLINT_FOOTPRINT_BOX, rows[k].u, rows[k].v, {9, 0, 0, 9}};
+      const glint_footprint square = {GLINT_FOOTPRINT_BOX, rows[k].u, rows[k].v, {9, 0, 0, 9}, {0, 0}};
       glint_density(ndf.get(), &square, q.hx[k], q.hy[k], &one);
       expectSame(boxes[k], one, k);
     }
@@ -410,7 +410,7 @@ TEST(CApi, EstimatorsOfBinMapsReachTheModel) {
 
 TEST(CApi, OptionsOfHistogramsReachTheModel) {
   const Footprint slanted = Footprint::box({0.4f, 0.6f}, {14, 5}, {-5, 14}), round = Footprint::isotropic({0.4f, 0.6f}, 9);
-  const glint_footprint c_slanted = {GLINT_FOOTPRINT_BOX, 0.4f, 0.6f, {14, 5, -5, 14}};
+  const glint_footprint c_slanted = {GLINT_FOOTPRINT_BOX, 0.4f, 0.6f, {14, 5, -5, 14}, {0, 0}};
   const glint_footprint c_round = glint_footprint_isotropic(0.4f, 0.6f, 9);
   const auto histograms = test::sampleHistograms(kSize, kSize);
   std::vector<float> slanted_answers, round_answers;
@@ -444,7 +444,7 @@ TEST(CApi, StretchedFootprintsAreAskedAsSeveralRoundOnes) {
   const Queries q(50);
   for (std::size_t k = 0; k < q.u.size(); ++k) {
     const Footprint p = Footprint::gaussian({q.u[k], q.v[k]}, {400, 30, 9});
-    const glint_footprint given = {GLINT_FOOTPRINT_GAUSSIAN, q.u[k], q.v[k], {400, 30, 9, 0}};
+    const glint_footprint given = {GLINT_FOOTPRINT_GAUSSIAN, q.u[k], q.v[k], {400, 30, 9, 0}, {0, 0}};
     float answer = -1, batch = -1;
     glint_density(several.get(), &given, q.hx[k], q.hy[k], &answer);
     EXPECT_EQ(answer, stretched.density(p, {q.hx[k], q.hy[k]}));

@@ -36,6 +36,8 @@ enum class Base {
   normals,
   heights,
   pyramid,
+  pyramid_normals,
+  compressed_normals,
   shard,
   compressed,
   compressed_f32,
@@ -54,11 +56,11 @@ enum class Base {
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {Base::normals,    Base::heights,        Base::pyramid,        Base::shard,
-                           Base::compressed, Base::compressed_f32, Base::spots,          Base::bin_map,
-                           Base::histograms, Base::moments,        Base::tiny_scattered, Base::tiny_tiled,
-                           Base::wang_tiles, Base::wang_pyramid,   Base::wang_cp,        Base::wave,
-                           Base::sh_lobes,   Base::sh_light,       Base::displacement,   Base::displacement_rgb};
+constexpr Base kBases[] = {
+    Base::pyramid_normals, Base::compressed_normals, Base::normals,      Base::heights,         Base::pyramid,    Base::shard,
+    Base::compressed,      Base::compressed_f32,     Base::spots,        Base::bin_map,         Base::histograms, Base::moments,
+    Base::tiny_scattered,  Base::tiny_tiled,         Base::wang_tiles,   Base::wang_pyramid,    Base::wang_cp,    Base::wave,
+    Base::sh_lobes,        Base::sh_light,           Base::displacement, Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -69,6 +71,10 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleHeights(16, 16).map, provenance);
     case Base::pyramid:
       return writeAsset(path, test::samplePyramid(32, BlockPrecision::f32).pyramid, provenance);
+    case Base::pyramid_normals:
+      return writeAsset(path, test::samplePyramidWithNormals(32, NearType::i16).pyramid, provenance);
+    case Base::compressed_normals:
+      return writeAsset(path, test::sampleNdfCpWithNormals(32, NearType::f32).ndf, provenance);
     case Base::shard:
       return writeAsset(path, test::samplePyramidShard(32).shard, provenance);
     case Base::compressed:
@@ -449,6 +455,15 @@ std::vector<Fixture> datasetFixtures() {
           "dataset.unknown", Base::heights, [](const Patch& patch) { patch.replace("extra", H5T_IEEE_F32LE, {kSize}, true); },
           true),
       patched("dataset.missing", Base::heights, [](const Patch& patch) { H5Ldelete(patch.file(), "heights", 0); }),
+      patched("dataset.missing", Base::pyramid_normals, [](const Patch& patch) { H5Ldelete(patch.file(), "near/normals", 0); }),
+      patched("dataset.missing", Base::compressed_normals,
+              [](const Patch& patch) { H5Ldelete(patch.file(), "near/bounds/level_02", 0); }),
+      patched("attribute.missing", Base::pyramid_normals, [](const Patch& patch) { patch.remove("/", "near_step"); }),
+      patched("attribute.missing", Base::pyramid_normals,
+              [](const Patch& patch) { patch.remove("/", "near_bounds_level_count"); }),
+      patched(
+          "dataset.unknown", Base::pyramid_normals, [](const Patch& patch) { patch.remove("/", "near_normals"); }, true),
+      patched("dataset.type", Base::pyramid_normals, [](const Patch& patch) { patch.setText("near_normals", "f32"); }),
       patched("dataset.missing", Base::pyramid, [](const Patch& patch) { H5Ldelete(patch.file(), "level_01/masks", 0); }),
       patched("dataset.type", Base::heights,
               [](const Patch& patch) {
@@ -512,6 +527,14 @@ std::vector<Fixture> pyramidFixtures() {
               [](const Patch& patch) {
                 patch.setInteger("bounds_level_count", 4);
                 H5Ldelete(patch.file(), "bounds/level_04", 0);
+              }),
+      patched("near.step", Base::pyramid_normals, [](const Patch& patch) { patch.setReal("near_step", 0x1p-14f); }),
+      patched("near.step", Base::pyramid_normals, [](const Patch& patch) { patch.setReal("near_step", 2e-5f); }),
+      patched("near.step", Base::compressed_normals, [](const Patch& patch) { patch.setReal("near_step", 0.5f); }),
+      patched("near.bounds_levels", Base::pyramid_normals,
+              [](const Patch& patch) {
+                patch.setInteger("near_bounds_level_count", 4);
+                H5Ldelete(patch.file(), "near/bounds/level_04", 0);
               }),
       patched(
           "pyramid.masks", Base::pyramid,
@@ -673,6 +696,21 @@ std::vector<Fixture> dataFixtures() {
           [](const Patch& patch) { patch.change<NormalBounds>("bounds/level_02", 3, [](auto& node) { node.high_x = -1; }); },
           true),
       patched(
+          "near.disk", Base::compressed_normals,
+          [](const Patch& patch) { patch.change<Vec2>("near/normals", 7, [](Vec2& n) { n.y = kNan; }); }, true),
+      patched(
+          "near.disk", Base::pyramid_normals,
+          [](const Patch& patch) { patch.change<NormalCode>("near/normals", 7, [](NormalCode& n) {
+                                     n = {30000, 20000};
+                                   }); },
+          true),
+      patched(
+          "near.bounds", Base::pyramid_normals,
+          [](const Patch& patch) {
+            patch.change<CodeBounds>("near/bounds/level_02", 3, [](auto& node) { node.high_x = -32768; });
+          },
+          true),
+      patched(
           "normals.slopes", Base::normals,
           [](const Patch& patch) {
             const float mean[] = {0, 0}, covariance[] = {4, 0, 4};
@@ -769,6 +807,13 @@ std::vector<Fixture> histogramFixtures() {
               }),
       patched("histogram.texels", Base::histograms,
               [](const Patch& patch) { patch.change<std::uint16_t>("texels", 70, [](auto& bin) { bin = 60000; }); }),
+      patched(
+          "histogram.bin_slopes", Base::histograms,
+          [](const Patch& patch) { patch.change<MapSlopes>("bin_slopes", 1, [](MapSlopes& s) { s.covariance.xx = -1; }); },
+          true),
+      patched(
+          "histogram.bin_slopes", Base::histograms,
+          [](const Patch& patch) { patch.change<MapSlopes>("bin_slopes", 0, [](MapSlopes& s) { s.mean.y = kNan; }); }, true),
       patched(
           "histogram.bin_normals", Base::histograms,
           [](const Patch& patch) { patch.change<Vec2>("bin_normals", 1, [](Vec2& n) { n.x = kNan; }); }, true),
@@ -1173,7 +1218,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 23u);
+  EXPECT_EQ(count, 25u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {

@@ -52,7 +52,7 @@ struct BuiltMap {
   BuiltMap(int width, int height, std::vector<Vec2> normals, bake::HistogramSatOptions options = {})
       : map(width, height, std::move(normals)),
         data(bake::buildHistogramSat(map.map(), options)),
-        ndf(data.view(), GaussianBoxes::one, 0) {
+        ndf(data.view(), GaussianBoxes::one, 0, HistogramBins::even) {
     for (const Vec2 n : map.normals()) ids.push_back(ndf.bins().find(n));
   }
   test::OwnedMap map;

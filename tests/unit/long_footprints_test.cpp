@@ -335,7 +335,7 @@ TEST(LongFootprints, HaveTheSameAnswersFromAllThatSumTexels) {
     const bake::BinMapData bins = bake::buildBinMap(map.map(), {kAlpha, 8});
     const BinMapNdf ndf(bins.view());
     const bake::HistogramSatData sat = bake::buildHistogramSat(map.map(), {});
-    const HistogramNdf histogram(sat.view(), GaussianBoxes::one, 0);
+    const HistogramNdf histogram(sat.view(), GaussianBoxes::one, 0, HistogramBins::even);
     const Reference all(map.map(), ndf.sigma());
     const Reference pruned(map.map(), ndf.sigma(), Surface::flat, Boundary::wrap, Reference::Search::pruned);
     const ManifoldNdf near(map.map(), ndf.sigma());
@@ -368,8 +368,8 @@ struct Models {
         bins(bake::buildBinMap(map.map(), {kAlpha, 8})),
         sat(bake::buildHistogramSat(map.map(), {})),
         bin_map(bins.view()),
-        histogram(sat.view(), GaussianBoxes::one, 0),
-        three(sat.view(), GaussianBoxes::three, 0),
+        histogram(sat.view(), GaussianBoxes::one, 0, HistogramBins::even),
+        three(sat.view(), GaussianBoxes::three, 0, HistogramBins::even),
         reference(map.map(), bin_map.sigma(), Surface::flat, Boundary::wrap, Reference::Search::pruned),
         near(map.map(), bin_map.sigma()) {}
   double nearTolerance() const { return kNearOfPeak * gaussianDensity({}, bin_map.sigma()); }

@@ -11,7 +11,7 @@ struct NdfTraits<AnisotropicNdf<CpNdf>> {
   static constexpr std::string_view kKind = formats::kKindName<Asset>;
 
   static AnisotropicNdf<CpNdf> open(const NdfSource<NdfCp>& source) { return openLevels<CpNdf>(source); }
-  static NdfInfo info(const NdfSource<NdfCp>& source) { return levelsInfo(source.asset.shape, source.normals != nullptr); }
+  static NdfInfo info(const NdfSource<NdfCp>& source) { return levelsInfo(source.asset.shape, hasNormals(source)); }
   static MapSlopes slopes(const NdfCp& ndf) { return ndf.shape.slopes; }
 
   static constexpr bool kPacks = true;
@@ -43,7 +43,7 @@ struct NdfTraits<AnisotropicNdf<CpNdf>> {
     header.arrays[15] = packer.add(ndf.core);
     header.arrays[16] = packer.add(ndf.spot_sums);
     header.arrays[17] = packer.add(ndf.floors);
-    if (source.normals != nullptr) packer.addNormals(*source.normals);
+    packer.addNormalsOf(source.normals, ndf.near_normals);
   }
 };
 

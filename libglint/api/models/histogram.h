@@ -11,7 +11,8 @@ struct NdfTraits<HistogramNdf> {
   static constexpr std::string_view kKind = formats::kKindName<Asset>;
 
   static HistogramNdf open(const NdfSource<HistogramSat>& source) {
-    return HistogramNdf(source.asset, source.options.gaussian_boxes, source.options.slant_tolerance);
+    const NdfOptions& options = source.options;
+    return HistogramNdf(source.asset, options.gaussian_boxes, options.slant_tolerance, options.histogram_bins, options.sigma_r);
   }
 
   static NdfInfo info(const NdfSource<HistogramSat>& source) {
@@ -19,6 +20,7 @@ struct NdfTraits<HistogramNdf> {
     info.width = source.asset.width;
     info.height = source.asset.height;
     info.resolution = kDefaultResolution;
+    if (source.options.histogram_bins == HistogramBins::lobes) info.sigma_r = source.options.sigma_r;
     info.shapes = {.boxes = true};
     return info;
   }

@@ -21,6 +21,12 @@ AnisotropicNdf<Round> openLevels(const NdfSource<Asset>& source) {
   return {round, source.options.footprint_parts};
 }
 
+/// Whether the normals of the map are given, or kept in the asset.
+template <class Asset>
+bool hasNormals(const NdfSource<Asset>& source) {
+  return source.normals != nullptr || source.asset.near_normals.has_value();
+}
+
 /// @param has_normals  whether footprints below level 0 are answered from the texels
 inline NdfInfo levelsInfo(const PyramidShape& shape, bool has_normals) {
   NdfInfo info;

@@ -11,7 +11,7 @@ struct NdfTraits<AnisotropicNdf<PyramidNdf>> {
   static constexpr std::string_view kKind = formats::kKindName<Asset>;
 
   static AnisotropicNdf<PyramidNdf> open(const NdfSource<NdfPyramid>& source) { return openLevels<PyramidNdf>(source); }
-  static NdfInfo info(const NdfSource<NdfPyramid>& source) { return levelsInfo(source.asset.shape, source.normals != nullptr); }
+  static NdfInfo info(const NdfSource<NdfPyramid>& source) { return levelsInfo(source.asset.shape, hasNormals(source)); }
   static MapSlopes slopes(const NdfPyramid& pyramid) { return pyramid.shape.slopes; }
 
   static constexpr bool kPacks = true;
@@ -30,7 +30,7 @@ struct NdfTraits<AnisotropicNdf<PyramidNdf>> {
       arrays[2] = packer.add(level.block_means);
       arrays[3] = packer.addBytes(level.pixels, level.block_means.size() * kBlockPixels, pixelBytes(pyramid.precision));
     }
-    if (source.normals != nullptr) packer.addNormals(*source.normals);
+    packer.addNormalsOf(source.normals, pyramid.near_normals);
   }
 };
 

@@ -10,6 +10,7 @@
 
 #include "glint/bake/common/slopes.h"
 #include "glint/model/error.h"
+#include "glint/model/slope_sums.h"
 #include "glint/model/texel_name.h"
 #include "glint/query/detail/histogram/spherical_bins.h"
 
@@ -67,22 +68,27 @@ void forEachPart(int count, Visitor&& visitor) {
   });
 }
 
-/// Number of texels of each bin of directions, and sums of their normals.
+/// Number of texels of each bin of directions, and sums of their normals and slopes.
 struct BinStatistics {
   std::vector<std::uint64_t> counts;
   std::vector<double> sums_x, sums_y;
+  std::vector<SlopeSums> slopes;
 
-  explicit BinStatistics(int bins) : counts(bins), sums_x(bins), sums_y(bins) {}
+  explicit BinStatistics(int bins) : counts(bins), sums_x(bins), sums_y(bins), slopes(bins) {}
   void add(int bin, Vec2 n) {
     ++counts[bin];
     sums_x[bin] += n.x;
     sums_y[bin] += n.y;
+    const Vec2 s = slopeOf(n);
+    const double p = s.x, q = s.y;
+    slopes[bin].add({p, q, p * p, p * q, q * q});
   }
   void add(const BinStatistics& other) {
     for (std::size_t k = 0; k < counts.size(); ++k) {
       counts[k] += other.counts[k];
       sums_x[k] += other.sums_x[k];
       sums_y[k] += other.sums_y[k];
+      slopes[k].add(other.slopes[k]);
     }
   }
 };
@@ -124,6 +130,7 @@ void keepOccurring(const BinStatistics& statistics, HistogramSatData& sat) {
     const auto texels = static_cast<double>(count);
     sat.bin_normals.push_back(
         {static_cast<float>(statistics.sums_x[id] / texels), static_cast<float>(statistics.sums_y[id] / texels)});
+    sat.bin_slopes.push_back(statistics.slopes[id].moments(texels));
   }
   sat.shape.bin_count = static_cast<int>(sat.bin_ids.size());
   forEachPart(sat.shape.tileRows(), [&](int, int begin, int end) {
@@ -205,6 +212,7 @@ HistogramSat HistogramSatData::view() const {
   HistogramSat sat = shape;
   sat.bin_ids = bin_ids;
   sat.bin_normals = bin_normals;
+  sat.bin_slopes = bin_slopes;
   sat.bin_totals = bin_totals;
   sat.texels = texels.view();
   sat.sums = sums.view();
@@ -216,8 +224,9 @@ HistogramSat HistogramSatData::view() const {
 
 std::size_t HistogramSatData::sizeBytes() const {
   const HistogramSat sat = view();
-  return sat.bin_ids.size_bytes() + sat.bin_normals.size_bytes() + sat.bin_totals.size_bytes() + sat.texels.size_bytes() +
-         sat.sums.size_bytes() + sat.coarse_sums.size_bytes() + sat.row_sums.size_bytes() + sat.column_sums.size_bytes();
+  return sat.bin_ids.size_bytes() + sat.bin_normals.size_bytes() + sat.bin_slopes.size_bytes() + sat.bin_totals.size_bytes() +
+         sat.texels.size_bytes() + sat.sums.size_bytes() + sat.coarse_sums.size_bytes() + sat.row_sums.size_bytes() +
+         sat.column_sums.size_bytes();
 }
 
 double histogramSatBytes(const NormalMap& map, const HistogramSatOptions& options) {

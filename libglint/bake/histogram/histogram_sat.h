@@ -38,6 +38,7 @@ class HistogramSatData {
   HistogramSat shape;  ///< sizes, strides and slopes; its spans are empty
   std::vector<std::uint16_t> bin_ids;
   std::vector<Vec2> bin_normals;
+  std::vector<MapSlopes> bin_slopes;
   std::vector<std::uint64_t> bin_totals;
   CounterArray<std::uint16_t> texels, sums, row_sums, column_sums;
   CounterArray<std::uint32_t> coarse_sums;

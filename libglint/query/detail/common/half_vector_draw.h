@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "glint/math/gaussian.h"
-#include "glint/model/normal_map.h"
 #include "glint/query/detail/common/texel_choice.h"
 
 namespace glint {
@@ -16,8 +15,10 @@ struct DrawnHalfVector {
 
 /// Draws a texel (or triangle) by its weight in the footprint, one of its normals, and a point of the lobe around the normal. Each choice
 /// uses up the leading digits of `xi` that are left.
-inline GLINT_HD DrawnHalfVector drawHalfVector(const NormalMap& map, const TexelGrid& grid, const FootprintWeights& weights,
-                                               float sigma_r, Vec2 xi) {
+/// @tparam Map  NormalMap or NearNormals
+template <class Map>
+GLINT_HD DrawnHalfVector drawHalfVector(const Map& map, const TexelGrid& grid, const FootprintWeights& weights, float sigma_r,
+                                        Vec2 xi) {
   const TexelChoice texel = chooseTexel(weights, grid, xi);
   if (!texel.found) return {};
   const auto normal = [&](int i, int j) { return map.at(wrapIndex(i, grid.width), wrapIndex(j, grid.height)); };

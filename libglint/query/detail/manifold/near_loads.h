@@ -1,6 +1,6 @@
 #pragma once
 
-#include "glint/model/normal_map.h"
+#include "glint/model/near_normals.h"
 #include "glint/query/detail/manifold/triangle_lanes.h"
 
 namespace glint {
@@ -49,6 +49,20 @@ GLINT_LANE void loadNodes(const NormalBounds* p, NodeBounds<Lanes4x2>& out) {
   transpose(p + 4, out.low_x.high, out.low_y.high, out.high_x.high, out.high_y.high);
 }
 #endif
+
+/// Decodes nodes, four numbers each. The products are exact.
+/// @param out  [count]
+GLINT_LANE void decodeNodes(const CodeBounds* p, int count, float step, NormalBounds* out) {
+  const auto* codes = reinterpret_cast<const std::int16_t*>(p);
+  auto* numbers = reinterpret_cast<float*>(out);
+  for (int k = 0; k < 4 * count; ++k) numbers[k] = step * static_cast<float>(codes[k]);
+}
+/// Decodes four normals.
+GLINT_LANE void decodeFour(const NormalCode* p, float step, Vec2* out) {
+  const auto* codes = reinterpret_cast<const std::int16_t*>(p);
+  auto* numbers = reinterpret_cast<float*>(out);
+  for (int k = 0; k < 8; ++k) numbers[k] = step * static_cast<float>(codes[k]);
+}
 
 /// Loads the corners of triangles of 2x2 cells in units of the lobe's deviation: cells in reading order, for each the lower right
 /// triangle and the upper left one.

@@ -5,7 +5,7 @@
 
 #include "glint/math/avx2.h"
 #include "glint/math/bits.h"
-#include "glint/model/normal_map.h"
+#include "glint/model/near_normals.h"
 #include "glint/query/detail/common/footprint_weights.h"
 #include "glint/query/detail/common/texel_choice.h"
 #include "glint/query/detail/manifold/near_loads.h"
@@ -15,7 +15,7 @@ namespace glint {
 
 /// A surface whose normals are asked for.
 struct NearSurface {
-  NormalMap map;
+  NearNormals map;
   float sigma_r = 0;
   Surface surface = Surface::flat;
   Boundary boundary = Boundary::wrap;
@@ -175,12 +175,13 @@ class NearSum {
     const float half = 0.5f * size - (smooth_ ? 1.0f / 3 : 0.5f), middle = 0.5f * (smooth_ ? size + 1 : size);
     const Vec2 c = w_.centre();
     alignas(32) constexpr float kLane[8] = {0, 1, 2, 3, 4, 5, 6, 7};
-    const NormalBoundsLevel& nodes = s_.map.bounds[level];
+    const NearBoundsLevel& nodes = s_.map.bounds[level];
+    const std::size_t node_bytes = boundsBytes(s_.map.type);
     if (bounded)
       for (int j = j0; j <= j1; ++j) {
-        const NormalBounds* row = nodes.nodes.data() + rowMajorIndex(i0, j, nodes.columns);
-        for (int i = i0; i <= i1; i += 4) prefetch(row + (i - i0));
-        prefetch(row + (i1 - i0));
+        const char* row = static_cast<const char*>(nodes.nodes) + node_bytes * rowMajorIndex(i0, j, nodes.columns);
+        for (int i = i0; i <= i1; i += 4) prefetch(row + node_bytes * static_cast<std::size_t>(i - i0));
+        prefetch(row + node_bytes * static_cast<std::size_t>(i1 - i0));
       }
     for (int j = j0; j <= j1; ++j) {
       const float dy = static_cast<float>(offset_y_) + static_cast<float>(j) * size + middle - c.y;
@@ -208,14 +209,18 @@ class NearSum {
 
   /// Squared distance in deviations of the bounds of nodes i to i + lanes - 1 of row j from the lobe.
   GLINT_LANE V squaredNormal(int level, int i, int j, int lanes) const {
-    const NormalBoundsLevel& bounds = s_.map.bounds[level];
+    const NearBoundsLevel& bounds = s_.map.bounds[level];
     const std::size_t first = rowMajorIndex(i, j, bounds.columns);
     NodeBounds<V> n;
-    if (first + V::kCount <= bounds.nodes.size()) {
-      loadNodes(bounds.nodes.data() + first, n);
+    const bool all = first + V::kCount <= bounds.size();
+    if (all && !s_.map.coded()) {
+      loadNodes(static_cast<const NormalBounds*>(bounds.nodes) + first, n);
     } else {
       NormalBounds copy[V::kCount] = {};
-      for (int k = 0; k < lanes; ++k) copy[k] = bounds.nodes.data()[first + static_cast<std::size_t>(k)];
+      if (all)
+        decodeNodes(static_cast<const CodeBounds*>(bounds.nodes) + first, V::kCount, s_.map.step, copy);
+      else
+        for (int k = 0; k < lanes; ++k) copy[k] = s_.map.node(level, first + static_cast<std::size_t>(k));
       loadNodes(copy, n);
     }
     const V zero = V::all(0);
@@ -228,7 +233,8 @@ class NearSum {
   GLINT_LANE void queue(int i, int j) {
     const int height = s_.map.height, width = s_.map.width;
     for (int y = j; y < j + (smooth_ ? 3 : 2); ++y)
-      prefetch(s_.map.normals.data() + rowMajorIndex(i, y < height ? y : y - height, width));
+      prefetch(static_cast<const char*>(s_.map.texels) +
+               normalBytes(s_.map.type) * rowMajorIndex(i, y < height ? y : y - height, width));
     leaves_[leaf_count_++] = {0, i, j};
     if (leaf_count_ == kLeaves) visitLeaves();
   }
@@ -244,7 +250,7 @@ class NearSum {
   }
 
   GLINT_LANE Vec2 relative(int i, int j) const {
-    const Vec2& n = s_.map.normals.data()[rowMajorIndex(i, j, s_.map.width)];
+    const Vec2 n = s_.map.at(i, j);
     return {(n.x - lobe_.origin().x) * inverse_sigma_, (n.y - lobe_.origin().y) * inverse_sigma_};
   }
 
@@ -273,7 +279,11 @@ class NearSum {
     const Vec2* row[3];
     Vec2 copy[3][4];
     if (i + 3 < width && j + 2 < height) {
-      for (int y = 0; y < 3; ++y) row[y] = s_.map.normals.data() + rowMajorIndex(i, j + y, width);
+      for (int y = 0; y < 3; ++y) {
+        const std::size_t first = rowMajorIndex(i, j + y, width);
+        if (s_.map.coded()) decodeFour(s_.map.codes() + first, s_.map.step, copy[y]);
+        row[y] = s_.map.coded() ? copy[y] : s_.map.normals() + first;
+      }
     } else {
       for (int y = 0; y < 3; ++y) {
         for (int x = 0; x < 4; ++x) copy[y][x] = s_.map.at((i + x) % width, (j + y) % height);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 
 #include "glint/model/ndf_pyramid.h"
 #include "glint/query/detail/common/sampling.h"
@@ -25,7 +26,7 @@ class TexelBlend {
  public:
   /// Without normals: images answer everything.
   TexelBlend() = default;
-  GLINT_HD TexelBlend(const PyramidShape& shape, const NormalMap& normals)
+  GLINT_HD TexelBlend(const PyramidShape& shape, const NearNormals& normals)
       : texels_(normals, shape.sigma_r, shape.surface, shape.boundary) {
     const float finest = finestSigma(shape);
     const auto width = static_cast<float>(shape.width), height = static_cast<float>(shape.height);
@@ -34,6 +35,10 @@ class TexelBlend {
     end_ = smallestSeenVariance(shape);
     per_range_ = 1 / (end_ - finest * finest);
   }
+
+  /// The normals that an asset keeps, if there are any.
+  GLINT_HD TexelBlend(const PyramidShape& shape, const std::optional<NearNormals>& kept)
+      : TexelBlend(kept ? TexelBlend(shape, *kept) : TexelBlend()) {}
 
   GLINT_HD bool hasNormals() const { return texels_.hasMap(); }
 
