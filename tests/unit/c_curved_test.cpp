@@ -13,7 +13,7 @@
 #include "support/c_api.h"
 #include "support/directions.h"
 
-namespace glint {
+namespace glint::c_curved_test {
 namespace {
 
 using namespace test;
@@ -167,4 +167,4 @@ TEST(CCurved, SpreadsAreThoseOfTheDifferentials) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::c_curved_test

@@ -13,7 +13,7 @@
 #include "glint/query/reference.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::histogram_lobes_test {
 namespace {
 
 constexpr int kSide = 256;
@@ -179,4 +179,4 @@ TEST(HistogramLobes, SamplesFollowTheDensity) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::histogram_lobes_test

@@ -17,7 +17,7 @@
 #include "support/temp_folder.h"
 #include "support/test_maps.h"
 
-namespace glint {
+namespace glint::near_normals_test {
 namespace {
 
 using bake::keepNormals;
@@ -257,4 +257,4 @@ TEST(NearNormals, NormalsOfAnotherSizeAreNotWritten) {
 }
 
 }  // namespace
-}  // namespace glint
+}  // namespace glint::near_normals_test
