@@ -14,6 +14,7 @@ from conftest import BIN, run_all
 ROOT = pathlib.Path(__file__).parents[2]
 SCHEMAS = ROOT / "docs/json/files"
 SAMPLE = ROOT / "data-samples/plan_scene.json"
+PLANNED = [ROOT / f"data-samples/plan_{name}.json" for name in ("car", "ring", "cloth")]  # of pipelines/scenes/planned.py
 POINT = [{"type": "point"}]
 SKY = [{"type": "environment", "band_limit_deg": 40}]
 # The question that most tests ask of noise and of brushed metal, so that it is measured once. Bias decides which tolerances moments meet.
@@ -76,7 +77,8 @@ def test_different_questions_have_different_methods(plan):
     methods = point["materials"][0]["asset"]["method"], sky["materials"][0]["asset"]["method"]
     assert methods[0] in {"brute force", "bin map"}, "flakes of two texels under a point light are asked exactly"
     assert methods[1] == "moments", "rough noise under a sky is one lobe"
-    check_schema(json.loads((ROOT / SAMPLE).read_text()), "scene")
+    for sample in SAMPLE, *PLANNED:
+        check_schema(json.loads(sample.read_text()), "scene")
     for document in point, sky:
         check_schema(document, "plan")
         check_schema(document["scene"], "scene")
