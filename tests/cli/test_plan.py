@@ -262,6 +262,17 @@ def test_impossible_plan_names_the_budget_and_the_way_out(plan):
         assert f"allow {budget} of" in process.stderr
 
 
+def test_what_is_over_a_budget_is_not_blamed_for_its_bias(plan):
+    noise = scene(material("noise64.png", tolerance=MOMENTS_ARE_BIASED, **ROUGH), lights=SKY)
+    least = plan(noise)[1]["materials"][0]
+    quickest = plan(noise | {"minimise": "query_ns"})[1]["materials"][0]["asset"]["method"]
+    assert least["asset"]["method"] != quickest
+    process, made = plan(noise | {"minimise": "query_ns", "budgets": {"bytes": 1.01 * least["predicted"]["bytes"]}})
+    assert process.returncode == 0, process.stderr
+    (reason,) = [reason for reason in made["materials"][0]["reasons"] if reason.startswith(quickest)]
+    assert "would be over a budget" in reason and "bias" not in reason
+
+
 def test_impossible_total_names_the_sum(plan):
     noise, brushed = (material(name, tolerance=MOMENTS_HOLD, **ROUGH) for name in ("noise64.png", "brushed64.png"))
     process, alone = plan(scene(noise, lights=SKY))
