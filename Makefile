@@ -71,6 +71,10 @@ limits: benchmarks  ## draw with every method, compare with brute force; writes 
 gallery: build python  ## pictures rendered by Mitsuba 3, in gallery/ (GALLERY_FLAGS='--only kettle', '--quick', or '--docs docs' for docs/GALLERY.md)
 	@$(venv)/bin/python pipelines/scenes/gallery.py --bin build/bin --out gallery $(GALLERY_FLAGS)
 
+.PHONY: planned
+planned: build python  ## plan, build, check and render three scenes, in planned/ (PLANNED_FLAGS='--only ring', '--no-pictures', or '--docs docs' for docs/PLANS.md)
+	@$(venv)/bin/python pipelines/scenes/planned.py --bin build/bin --out planned $(PLANNED_FLAGS)
+
 .PHONY: stability
 stability: build  ## test every method where it fails; writes docs/stability.json, its chart and its section of docs/LIMITS.md
 	@mkdir -p build/stability
@@ -141,4 +145,4 @@ packages:  ## install what is missing of packages.txt
 
 .PHONY: clean
 clean:  ## remove everything that was built
-	rm -rf build build-* demo gallery
+	rm -rf build build-* demo gallery planned

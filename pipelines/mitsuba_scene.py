@@ -58,7 +58,7 @@ def uv_scale_of(mesh, mi):
 
 def camera_of(sensor, mi):
     params = mi.traverse(sensor)
-    film = sensor.film().crop_size()
+    film = sensor.film().size()  # a part of a picture has the pixels of the whole one
     to_world = np.array(sensor.world_transform().matrix).reshape(4, 4)
     return {"origin": to_world[:3, 3], "axis": to_world[:3, 2], "fov": float(np.array(params["x_fov"]).ravel()[0]), "columns": int(film[0]),
             "samples": int(sensor.sampler().sample_count())}
@@ -78,7 +78,7 @@ def light_of(emitter, mi):
     kind = emitter.class_().name().lower() if hasattr(emitter, "class_") else emitter.class_name().lower()
     if any(name in kind for name in SHARP):
         return {"type": "directional" if "directional" in kind else "point"}
-    if "envmap" in kind:
+    if "envmap" in kind or "environmentmap" in kind:
         # Two columns of pixels, which is the finest wave that an image can hold.
         return {"type": "environment", "band_limit_deg": min(180.0, 360 / max(1, int(mi.traverse(emitter)["data"].shape[1]) // 2))}
     if "constant" in kind:

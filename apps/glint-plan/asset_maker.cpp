@@ -1,6 +1,7 @@
 #include "glint-plan/asset_maker.h"
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "common/child_process.h"
 #include "glint-plan/plan_candidates.h"
@@ -32,13 +33,16 @@ const MadeAsset& AssetMaker::make(const Candidate& candidate) {
   words.insert(words.end(), candidate.flags.begin(), candidate.flags.end());
   words.insert(words.end(), {"--force", "--quiet"});
   for (const std::string& flag : childFlags(tool_)) words.push_back(flag);
-  const ChildRun run = runProgram(words);
+  const bool compresses = source != nullptr;
+  if (compresses) words.push_back("--json");
+  const ChildRun run = runProgram(words, {compresses});
   if (run.exit_code != 0) {
     failed_[name] = run.message;
     throw Error(ErrorCode::failed, "plan.candidate", "", "", run.message);
   }
   made.bytes = bytesOf(made.file);
   made.seconds = input.seconds + run.wall_s;
+  if (compresses) made.reached = nlohmann::json::parse(run.output).at("result").at("total").at("seen").get<double>();
   return made_[name] = made;
 }
 

@@ -16,6 +16,7 @@ struct MadeAsset {
   std::string file;
   double bytes = 0;    ///< of the asset alone
   double seconds = 0;  ///< with the asset that it is made from
+  double reached = 0;  ///< seen error that its compression says to have; 0: it is not compressed
 };
 
 /// Makes the assets of one map by the programs of the package.

@@ -19,7 +19,7 @@
 namespace glint::apps {
 namespace {
 
-constexpr int kVersion = 3;  // of the way in which probes measure: other versions' measurements are not used
+constexpr int kVersion = 4;  // of the way in which probes measure: other versions' measurements are not used
 constexpr int kQueries = 512;
 constexpr double kLongestErrors_s = 3, kLongestTime_s = 0.004;
 /// Places after which errors are looked at: candidates that are clearly good or clearly bad are asked no more.
@@ -135,6 +135,15 @@ Costs MapProbe::costs(std::size_t candidate) {
   return costs;
 }
 
+double MapProbe::compressionFactor(std::size_t candidate) {
+  constexpr double kMost = 1.15;  // a compression that falls so short of its tolerance cannot err as much as it may
+  const double given = toleranceOf(all_[candidate]);
+  if (edge_ == 0 || given == 0) return 1;
+  const double reached = kept(fmt::format("{} reached", all_[candidate].name()),
+                              [&] { return part(true).maker->make(part(true).maker->all()[candidate]).reached; });
+  return std::clamp(given / std::max(reached, 1e-9), 1.0, kMost);
+}
+
 PlaceErrors MapProbe::errorsOf(std::size_t candidate, std::size_t size, double tolerance) {
   std::optional<api::OpenedNdf> ndf;
   std::optional<PlaceSample> sample;
@@ -150,6 +159,7 @@ PlaceErrors MapProbe::errorsOf(std::size_t candidate, std::size_t size, double t
     }
     return sample->ask(places, kLongestErrors_s);
   };
+  const double factor = compressionFactor(candidate);
   PlaceErrors errors;
   for (const int places : kSteps) {
     const std::string key = fmt::format("{} at {:.6g}, {} places: ", all_[candidate].name(), sizes_[size], places);
@@ -157,9 +167,8 @@ PlaceErrors MapProbe::errorsOf(std::size_t candidate, std::size_t size, double t
     errors.deviation = kept(key + "deviation", [&] { return measured(places).deviation; });
     errors.bias = kept(key + "bias", [&] { return measured(places).bias; });
     errors.places = static_cast<int>(kept(key + "count", [&] { return double(measured(places).places); }));
-    // Far beyond a tolerance no more places bring an error back to it.
-    constexpr double kHopeless = 4;
-    if (errors.seen - kHopeless * errors.deviation > tolerance || surelyWithin(errors, tolerance)) break;
+    errors.seen *= factor, errors.deviation *= factor, errors.bias *= factor;
+    if (isHopeless(errors, tolerance) || surelyWithin(errors, tolerance)) break;
   }
   return errors;
 }

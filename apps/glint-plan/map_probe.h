@@ -42,6 +42,12 @@ inline bool surelyWithin(const PlaceErrors& errors, double tolerance) {
   return surelySeen(errors) <= tolerance && errors.bias <= kBiasShare * tolerance;
 }
 
+/// Whether more places do not bring an error back to a tolerance.
+inline bool isHopeless(const PlaceErrors& errors, double tolerance) {
+  constexpr double kDeviations = 4;
+  return errors.seen - kDeviations * errors.deviation > tolerance;
+}
+
 /// Measures candidates on small maps that stand for a large one, and predicts what they cost and err on it.
 class MapProbe {
  public:
@@ -69,6 +75,9 @@ class MapProbe {
   Part& part(bool large);
   Costs costsOf(bool large, std::size_t candidate);
   PlaceErrors errorsOf(std::size_t candidate, std::size_t size, double tolerance);
+  /// How many times as large errors of a compression are on the whole map: it has more blocks there to choose from, and comes nearer
+  /// to the tolerance that it was given.
+  double compressionFactor(std::size_t candidate);
   /// The value of a key in the cache, or that of a measurement.
   template <class Measure>
   double kept(const std::string& key, const Measure& measure);

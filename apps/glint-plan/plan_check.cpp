@@ -43,14 +43,19 @@ class MapCheck {
     return option;
   }
 
-  PlaceErrors errorsOf(const Candidate& candidate) {
+  /// @param enough  a tolerance: measuring ends at the first size that does not meet it
+  PlaceErrors errorsOf(const Candidate& candidate, double enough = std::numeric_limits<double>::infinity()) {
     PlaceErrors largest;
     if (candidate.tool.empty()) return largest;  // the texels themselves
     const api::OpenedNdf ndf = maker_.open(candidate);
-    for (const PlaceTruth& truth : truths_) {
-      const PlaceErrors errors = PlaceSample(truth, ndf).ask(truth.places(), kCheckLongestErrors_s);
+    for (PlaceTruth& truth : truths_) {
+      PlaceSample sample(truth, ndf);
+      PlaceErrors errors = sample.ask(std::min(kUsualPlaces, truth.places()), kCheckLongestErrors_s);
+      const bool hopeless = isHopeless(errors, enough);
+      if (!hopeless) errors = sample.ask(truth.places(), kCheckLongestErrors_s);
       largest.bias = std::max(largest.bias, errors.bias);
       if (errors.seen > largest.seen) largest.seen = errors.seen, largest.deviation = errors.deviation;
+      if (hopeless || largest.seen > enough || largest.bias > kBiasShare * enough) break;
     }
     return largest;
   }
@@ -105,7 +110,7 @@ void sweepCandidates(MapCheck& check, const std::vector<Candidate>& all, Goal go
     try {
       CheckedOption option = check.costOf(candidate);
       const bool dear = costOf(option.costs, goal) > planned;
-      if (!dear) option.errors = check.errorsOf(candidate);
+      if (!dear) option.errors = check.errorsOf(candidate, material.tolerance);
       if (dear || material.holds(option)) done = ladder;
       if (!dear) material.sweep.push_back(std::move(option));
     } catch (const Error& error) {

@@ -41,7 +41,7 @@ const Candidate* pyramidOf(const MaterialPlan& plan) {
 /// Why an option that is cheaper than the choice is not chosen.
 std::string objectionTo(const PlanOption& option, double tolerance) {
   const std::string name = option.candidate.name();
-  if (!option.errors)
+  if (!option.errors || surelyWithin(*option.errors, tolerance))
     return fmt::format("{} would be over a budget: {}, {:.2g} s to prepare, {} for a density.", name,
                        sizeText(option.costs.bytes), option.costs.preparation_s, queryTimeText(option.costs.query_ns));
   if (surelySeen(*option.errors) <= tolerance)

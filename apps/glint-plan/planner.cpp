@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -181,19 +182,41 @@ std::size_t Planner::measureLadder(Work& work, const std::vector<PlanOption*>& l
   std::size_t k = first;
   bool good = isGood(k);
   // Coarser settings while this one is too dear, then finer ones until one is good enough, and again coarser ones while they are.
-  while (!good && isDear(k) && k > 0) good = isGood(--k);
+  // Where it is far too dear, the coarsest one tells whether any is not.
+  constexpr double kFar = 2;
+  while (!good && isDear(k) && k > 0) {
+    const bool far = ladder[k]->cost(scene_.goal) > kFar * work.plan.choice().cost(scene_.goal);
+    k = far ? 0 : k - 1;
+    good = isGood(k);
+  }
   while (!good && !isDear(k) && k + 1 < ladder.size()) good = isGood(++k);
   while (good && k > 0 && isGood(k - 1)) --k;
   if (good) choose(work);
   return k;
 }
 
+bool Planner::isClosed(const Work& work, const std::vector<PlanOption*>& ladder, std::size_t last, double own) const {
+  const SceneMaterial& material = *work.plan.material;
+  const bool times_count =
+      scene_.goal == Goal::query_ns || limitOf(material.budgets.query_ns, scene_.budgets.query_ns) < kNoLimit;
+  const PlanOption& option = *ladder[last];
+  if (times_count || !option.costed) return false;
+  const bool good = option.errors && !option.at_least;
+  if (last == 0) return good || (work.found && option.cost(scene_.goal) >= work.plan.choice().cost(scene_.goal));
+  // Independent errors add up as squares: without that of the pyramid the coarser setting would be too coarse still.
+  const std::optional<PlaceErrors>& coarser = ladder[last - 1]->errors;
+  return good && coarser && coarser->seen * coarser->seen - own * own > material.tolerance * material.tolerance;
+}
+
 void Planner::measureCompressed(Work& work, bool all) {
   std::map<std::string, std::size_t> last;  // setting that the ladder of a method ended with, on images of fewer pixels
+  std::set<std::string> closed;             // methods that more pixels do not help
   for (PlanOption& pyramid : work.plan.options) {
     if (pyramid.candidate.tool != "glint-pyramid") continue;
-    const bool usable = meets(work, pyramid);
-    for (const std::vector<PlanOption*>& ladder : laddersOf(work.plan, pyramid)) {
+    std::vector<std::vector<PlanOption*>> ladders = laddersOf(work.plan, pyramid);
+    std::erase_if(ladders, [&](const auto& ladder) { return closed.contains(ladder.front()->candidate.method); });
+    const bool usable = !ladders.empty() && meets(work, pyramid);
+    for (const std::vector<PlanOption*>& ladder : ladders) {
       if (!usable) {
         for (PlanOption* option : ladder) option->failure = failureOfPyramid(pyramid);
         continue;
@@ -203,6 +226,7 @@ void Planner::measureCompressed(Work& work, bool all) {
       const std::size_t first =
           known == last.end() ? firstGuess(ladder, pyramid.errors->seen, work.plan.material->tolerance) : known->second;
       last[method] = measureLadder(work, ladder, first, all);
+      if (!all && isClosed(work, ladder, last[method], pyramid.errors->seen)) closed.insert(method);
     }
   }
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -20,17 +21,25 @@ constexpr std::size_t kWarm = 16;
 /// Keeps an answer, so that the compiler cannot leave out the question.
 void keep(float answer) { asm volatile("" : : "x"(answer) : "memory"); }
 
+double wallSeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+/// Time that this thread has had of a processor.
+double threadSeconds() {
+  std::timespec time{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
 /// Times ask(k) for k < count. Runs of slow questions end early, those of quick ones go round.
+/// @param now  a clock, seconds
 template <class Ask>
-nlohmann::json timeOf(std::size_t count, double longest_s, const Ask& ask) {
-  using Clock = std::chrono::steady_clock;
-  const auto since = [](Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); };
+nlohmann::json timeOf(std::size_t count, double longest_s, const Ask& ask, double (*now)() = wallSeconds) {
   std::array<double, kRuns> ns{};
   std::size_t next = 0;
   for (int run = -1; run < kRuns; ++run) {  // the first warms up
-    constexpr double kQuick_s = 2e-6;       // questions of which the clock would take a share
-    constexpr std::size_t kBetweenLooks = 16;
-    const Clock::time_point start = Clock::now();
+    constexpr double kQuick_s = 5e-6;       // questions of which the clock would take a share
+    constexpr std::size_t kBetweenLooks = 64;
+    const double start = now();
     std::size_t asked = 0;
     double seconds = 0;
     do {
@@ -39,7 +48,7 @@ nlohmann::json timeOf(std::size_t count, double longest_s, const Ask& ask) {
         ask(next);
         next = next + 1 < count ? next + 1 : 0;
       }
-      seconds = since(start);
+      seconds = now() - start;
     } while (seconds < longest_s && (asked < count || seconds < kShortestRun_s));
     if (run >= 0) ns[static_cast<std::size_t>(run)] = 1e9 * seconds / static_cast<double>(asked);
   }
@@ -103,8 +112,9 @@ nlohmann::json benchTimes(const api::OpenedNdf& ndf, std::span<const BenchQuery>
 }
 
 double densityTime(const api::OpenedNdf& ndf, std::span<const BenchQuery> queries, double longest_s) {
-  const nlohmann::json time = timeOf(queries.size(), longest_s,
-                                     [&](std::size_t k) { keep(ndf.model().density(queries[k].footprint, queries[k].half)); });
+  const nlohmann::json time = timeOf(
+      queries.size(), longest_s, [&](std::size_t k) { keep(ndf.model().density(queries[k].footprint, queries[k].half)); },
+      threadSeconds);
   return time["ns"].get<double>();
 }
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
-#include <span>
 
 #include "common/ndf_image.h"
 #include "glint/bake/common/reference_image.h"
@@ -43,21 +42,9 @@ void eachPixel(const Visit& visit) {
 
 PlaceTruth::PlaceTruth(const NormalMap& map, std::vector<Footprint> footprints, std::size_t asked, float sigma_r,
                        double light_deg)
-    : footprints_(std::move(footprints)), light_deg_(light_deg), images_(asked) {
-  const std::span<const Footprint> others = std::span<const Footprint>(footprints_).subspan(asked);
-  PlaceLight light = placeLight(map, others, sigma_r, light_deg, kPixels);
+    : map_(map), sigma_r_(sigma_r), footprints_(std::move(footprints)), light_deg_(light_deg) {
+  PlaceLight light = placeLight(map, footprints_, sigma_r, light_deg, kPixels);
   light2_ = std::move(light.squares), lit_ = std::move(light.lit);
-  tbb::parallel_for(std::size_t{0}, images_.size(), [&](std::size_t k) {
-    images_[k] = bake::referenceImage(map, sigma_r, Surface::flat, Boundary::wrap, footprints_[k], kPixels);
-    blurByLight(images_[k], kPixels, light_deg_);
-  });
-  const double share = pixelShare();
-  for (const std::vector<float>& image : images_) {
-    eachPixel([&](std::size_t cell, std::size_t pixel) {
-      light2_[cell] += share * double{image[pixel]} * image[pixel];
-      if (image[pixel] > kDarkest) lit_[cell] = 1;
-    });
-  }
   const auto places = static_cast<double>(footprints_.size());
   const Covariance shape = footprints_.front().covariance;
   const float sigma = std::sqrt(std::sqrt(shape.xx * shape.yy - shape.xy * shape.xy));
@@ -67,10 +54,22 @@ PlaceTruth::PlaceTruth(const NormalMap& map, std::vector<Footprint> footprints, 
   footprints_.resize(asked);
 }
 
+void PlaceTruth::makeImages(std::size_t places) {
+  const std::size_t known = images_.size();
+  if (places <= known) return;
+  images_.resize(places);
+  tbb::parallel_for(known, places, [&](std::size_t k) {
+    images_[k] = bake::referenceImage(map_, sigma_r_, Surface::flat, Boundary::wrap, footprints_[k], kPixels);
+    blurByLight(images_[k], kPixels, light_deg_);
+  });
+}
+
 PlaceErrors PlaceSample::ask(int places, double longest_s) {
   // Time of the processors, so that a busy machine measures as much as an idle one.
   const auto used = [] { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; };
-  while (static_cast<int>(squares_.size()) < std::min(places, truth_.places())) {
+  const int wanted = std::min(places, truth_.places());
+  truth_.makeImages(static_cast<std::size_t>(wanted));
+  while (static_cast<int>(squares_.size()) < wanted) {
     if (seconds_ > longest_s && static_cast<int>(squares_.size()) >= kFewest) break;
     const double start = used();
     askNext();

@@ -16,12 +16,13 @@ struct PlaceErrors {
   int places = 0;
 };
 
-/// The exact NDF images of a map at some places, and its light at more of them.
+/// The exact NDF images of a map at some places, made when they are asked for, and its light at more of them.
 class PlaceTruth {
  public:
   /// Pixels of an image along each axis.
   static constexpr int kResolution = 128;
 
+  /// @param map         must outlive this object
   /// @param footprints  those at which models are asked, and after them more of the same size, of which only the light counts: few
   ///                    places do not tell what the map reflects to half vectors that few places show
   /// @param asked       footprints of the first kind
@@ -32,18 +33,23 @@ class PlaceTruth {
 
  private:
   friend class PlaceSample;
+  /// Makes the images of the first places, unless they are known.
+  void makeImages(std::size_t places);
+
+  NormalMap map_;
+  float sigma_r_;
   std::vector<Footprint> footprints_;
   double light_deg_;
-  std::vector<std::vector<float>> images_;
-  std::vector<double> light2_;      // [cells] mean square density, at least that of the darkest light that is seen
-  std::vector<unsigned char> lit_;  // [cells] whether light is seen there
+  std::vector<std::vector<float>> images_;  // of the first places
+  std::vector<double> light2_;              // [cells] mean square density, at least that of the darkest light that is seen
+  std::vector<unsigned char> lit_;          // [cells] whether light is seen there
 };
 
 /// The errors of one model at the first places of a truth.
 class PlaceSample {
  public:
   /// @param truth, ndf  must outlive this object
-  PlaceSample(const PlaceTruth& truth, const api::OpenedNdf& ndf) : truth_(truth), ndf_(ndf), lit_(truth.lit_) {}
+  PlaceSample(PlaceTruth& truth, const api::OpenedNdf& ndf) : truth_(truth), ndf_(ndf), lit_(truth.lit_) {}
 
   /// Errors over the first places; those that were asked before are kept.
   /// @param places     at least 2, at most those of the truth
@@ -56,7 +62,7 @@ class PlaceSample {
   void askNext();
   PlaceErrors errors() const;
 
-  const PlaceTruth& truth_;
+  PlaceTruth& truth_;
   const api::OpenedNdf& ndf_;
   std::vector<unsigned char> lit_;
   std::vector<std::vector<double>> squares_, differences_;  // [place][cell] means over the cell's pixels

@@ -12,6 +12,7 @@ import re
 import sys
 
 from charts import chart, light_error_chart, light_time_chart, preparation_chart, stride_chart
+from plan_calibration import calibration_section
 from scenes import scene_section
 from words import percents, sizes, span, times
 
@@ -21,7 +22,7 @@ Written by `make bench-report`; do not edit. Every number, with its target and t
 `glint-bench map.glint -o results.json` measures the same on a map of yours, and `glint-bench --report results.json -o report.html` charts it.
 
 - [Which method for my scene?](#which-method-for-my-scene)
-- [How right, and how quick, is an answer?](#how-right-and-how-quick-is-an-answer)
+{calibration}- [How right, and how quick, is an answer?](#how-right-and-how-quick-is-an-answer)
 - [How small is an asset?](#how-small-is-an-asset)
 - [How long does an asset take to make?](#how-long-does-an-asset-take-to-make)
 - [What is not reached yet?](#what-is-not-reached-yet)
@@ -326,7 +327,7 @@ def question_sections(data, rows, docs):
     chart(data, 2, "nanoseconds of a density query, random", docs / "error-time.png")
     preparation_chart(preparations(rows, data), docs / "prepare-time.png")
     held, excused = judged(rows), sum(1 for row in rows if cannot_hold(row))
-    return f"""{scene_section(docs)}
+    return f"""{scene_section(docs)}{calibration_section(docs)}
 ## How right, and how quick, is an answer?
 
 {answers_table(rows)}
@@ -397,7 +398,8 @@ def main():
     repeats = f"the median of {results['repeats']} runs" if results["repeats"] > 1 else "of one run"
     data = points(accuracy, rows)
     links = ", ".join(f"[{title}](#{anchor(title)})" for title, *_ in by_method(rows))
-    text = PAGE.format(methods=links) + question_sections(data, rows, docs) + method_sections(rows, method_charts(rows, light, docs))
+    calibration = "- [Do plans hold?](#do-plans-hold)\n" if (docs / "plan-calibration.csv").exists() else ""
+    text = PAGE.format(methods=links, calibration=calibration) + question_sections(data, rows, docs) + method_sections(rows, method_charts(rows, light, docs))
     text += CONDITIONS.format(machine=machine, size=results["size_texels"], repeats=repeats)
     (docs / "BENCHMARKS.md").write_text(text, encoding="utf-8")
     write_csv([*rows, *octave_rows(accuracy), *light_rows(light)], docs / "benchmarks.csv")

@@ -35,7 +35,7 @@ class PlaceErrorsTest : public testing::Test {
     std::uniform_real_distribution<float> uv(0, 1);
     std::vector<Footprint> footprints;
     for (int k = 0; k < places; ++k) footprints.push_back(Footprint::isotropic({uv(random), uv(random)}, kFootprint));
-    const PlaceTruth truth(map.map(), footprints, footprints.size(), kSigmaR, 0);
+    PlaceTruth truth(map.map(), footprints, footprints.size(), kSigmaR, 0);
     constexpr double kUnlimited_s = 1e9;
     return PlaceSample(truth, ndf).ask(places, kUnlimited_s);
   }

@@ -28,12 +28,12 @@ XML = """<scene version="3.0.0">
 </scene>"""
 
 
-def dictionary(distance, asset):
+def dictionary(distance, asset, **film):
     place = np.eye(4)
     place[2, 3] = -distance
     return {
         "type": "scene",
-        "camera": {"type": "perspective", "fov": 40, "to_world": place.tolist(), "film": {"type": "hdrfilm", "width": 800, "height": 600},
+        "camera": {"type": "perspective", "fov": 40, "to_world": place.tolist(), "film": {"type": "hdrfilm", "width": 800, "height": 600, **film},
                    "sampler": {"type": "independent", "sample_count": 16}},
         "panel": {"type": "ply", "filename": "quad.ply",
                   "bsdf": {"type": "twosided", "bsdf": {"type": "glint", "asset": str(asset), "sigma_r": 0.02, "uv_scale": COPIES_OF_A_UV}}},
@@ -79,6 +79,29 @@ def test_frames_of_a_path_give_the_distances(write_scene, run_tool, tmp_path):
     scene["unit_m"] = 0.01
     (tmp_path / "out.json").write_text(json.dumps(scene))
     assert "footprints of" in run_tool("glint-plan", tmp_path / "out.json", "--explain"), "glint-plan reads the scene"
+
+
+def test_a_part_of_a_picture_has_the_pixels_of_the_whole(write_scene, tmp_path):
+    part = {"crop_offset_x": 300, "crop_offset_y": 200, "crop_width": 100, "crop_height": 100}
+    (tmp_path / "part.json").write_text(json.dumps(dictionary(8, tmp_path / "flakes.glint", **part)))
+    done, scene = write_scene("part.json")
+    assert done.returncode == 0, done.stderr
+    assert (scene["camera"]["columns"], scene["camera"]["field_of_view_deg"]) == (800, pytest.approx(40, rel=NEARLY))
+
+
+@pytest.mark.parametrize("emitter, light", [
+    ({"type": "envmap", "filename": "sky.hdr"}, {"type": "environment", "band_limit_deg": 45}), ({"type": "constant"}, {"type": "environment", "band_limit_deg": 180}),
+    ({"type": "directional"}, {"type": "directional"}), ({"type": "spot"}, {"type": "point"})])
+def test_lights_are_told_apart(write_scene, tmp_path, emitter, light):
+    (tmp_path / "sky.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n" + 8 * 16 * bytes([128, 128, 128, 129]))
+    scene = dictionary(8, tmp_path / "flakes.glint")
+    (tmp_path / "lit.json").write_text(json.dumps(scene | {"lamp": emitter}))
+    done, asked = write_scene("lit.json")
+    assert done.returncode == 0, done.stderr
+    (found,) = asked["lights"]
+    assert found["type"] == light["type"]
+    # Mitsuba adds columns to the image.
+    assert found.get("band_limit_deg") == (pytest.approx(light["band_limit_deg"], rel=0.15) if "band_limit_deg" in light else None)
 
 
 def test_xml_is_read_too(write_scene):
