@@ -89,8 +89,16 @@ def attribute_table(schema, attributes):
     for attribute in attributes:
         count = f"[{attribute['count']}]" if "count" in attribute else ""
         units = "" if attribute["type"] == "text" else attribute["units"]
-        rows.append([code(attribute["name"]) + presence(attribute), code(attribute["type"] + count), valid_values(attribute), units, attribute["long_name"],
-                     version(schema, attribute)])
+        rows.append(
+            [
+                code(attribute["name"]) + presence(attribute),
+                code(attribute["type"] + count),
+                valid_values(attribute),
+                units,
+                attribute["long_name"],
+                version(schema, attribute),
+            ]
+        )
     return table(["attribute", "type", "value", "units", "meaning", "since"], rows)
 
 
@@ -114,9 +122,11 @@ def dataset_tables(schema, datasets):
 
 def schema_tables(schema):
     """All tables by name."""
-    tables = {"kinds": table(["kind", "what it is"], [[code(kind["kind"]), kind["title"]] for kind in schema["kinds"]]),
-              "root attributes": attribute_table(schema, schema["root_attributes"]),
-              "dataset attributes": attribute_table(schema, schema["dataset_attributes"])}
+    tables = {
+        "kinds": table(["kind", "what it is"], [[code(kind["kind"]), kind["title"]] for kind in schema["kinds"]]),
+        "root attributes": attribute_table(schema, schema["root_attributes"]),
+        "dataset attributes": attribute_table(schema, schema["dataset_attributes"]),
+    }
     for kind in schema["kinds"]:
         tables[f"attributes of {kind['kind']}"] = attribute_table(schema, kind["attributes"])
         if kind["derived"]:
@@ -128,9 +138,11 @@ def schema_tables(schema):
 
 def misplaced(names, tables):
     """What is wrong with the names of the tables between markers."""
-    return ([f"has no table '{name}': add its two marker lines" for name in tables if name not in names]
-            + [f"has a table '{name}' that the schema does not have: remove it" for name in names if name not in tables]
-            + [f"has the table '{name}' twice: remove one" for name in sorted(set(names)) if names.count(name) > 1])
+    return (
+        [f"has no table '{name}': add its two marker lines" for name in tables if name not in names]
+        + [f"has a table '{name}' that the schema does not have: remove it" for name in names if name not in tables]
+        + [f"has the table '{name}' twice: remove one" for name in sorted(set(names)) if names.count(name) > 1]
+    )
 
 
 def main():
@@ -146,8 +158,11 @@ def main():
     wanted = {name: BLOCK.format(name=name, table=text) for name, text in tables.items()}
     problems = misplaced([match[1] for match in TABLE.finditer(spec)], tables)
     if options.check:
-        problems += [f"has a table '{name}' that differs from the schema: run formats/spec_tables.py" for name in wanted
-                     if name in found and found[name] != wanted[name]]
+        problems += [
+            f"has a table '{name}' that differs from the schema: run formats/spec_tables.py"
+            for name in wanted
+            if name in found and found[name] != wanted[name]
+        ]
     elif not problems:
         options.spec.write_text(TABLE.sub(lambda match: wanted[match[1]], spec), encoding="utf-8")
     for problem in problems:

@@ -30,8 +30,18 @@ def browser():
 
 
 def browse(program, profile, *arguments):
-    command = [program, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--hide-scrollbars", "--virtual-time-budget=4000", "--window-size=1280,1400",
-               f"--user-data-dir={profile}", *arguments]  # of a repeated flag the last counts
+    command = [
+        program,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-dev-shm-usage",
+        "--hide-scrollbars",
+        "--virtual-time-budget=4000",
+        "--window-size=1280,1400",
+        f"--user-data-dir={profile}",
+        *arguments,
+    ]  # of a repeated flag the last counts
     process = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     if process.returncode != 0:
         sys.exit(f"bench_charts.py: error: {program} failed: {process.stderr.strip()[-500:]}")
@@ -50,7 +60,9 @@ def charts_of(program, profile, page, choices):
     text = browse(program, profile, "--dump-dom", address)
     charts, state = attribute(text, "charts"), attribute(text, "choices")
     if not charts or not state:
-        sys.exit(f"bench_charts.py: error: {page}: has no charts of measurements; give a page of glint-bench --report RESULTS.json")
+        sys.exit(
+            f"bench_charts.py: error: {page}: has no charts of measurements; give a page of glint-bench --report RESULTS.json"
+        )
     for name, choice in choices.items():
         if choice != state["shown"][name]:
             offered = ", ".join(f"{value:g}" if name == "size" else value for value in state["offered"][name])
@@ -63,8 +75,14 @@ def write(program, profile, svg, path):
     file = path.with_suffix(".svg")
     file.write_text(svg, encoding="utf-8")
     width, height = (re.search(rf'<svg[^>]* {side}="([\d.]+)"', svg).group(1) for side in ("width", "height"))
-    browse(program, profile, f"--window-size={width},{height}", f"--force-device-scale-factor={SCALE}", f"--screenshot={path.with_suffix('.png').resolve()}",
-           file.resolve().as_uri())
+    browse(
+        program,
+        profile,
+        f"--window-size={width},{height}",
+        f"--force-device-scale-factor={SCALE}",
+        f"--screenshot={path.with_suffix('.png').resolve()}",
+        file.resolve().as_uri(),
+    )
 
 
 def main():

@@ -60,8 +60,13 @@ def camera_of(sensor, mi):
     params = mi.traverse(sensor)
     film = sensor.film().size()  # a part of a picture has the pixels of the whole one
     to_world = np.array(sensor.world_transform().matrix).reshape(4, 4)
-    return {"origin": to_world[:3, 3], "axis": to_world[:3, 2], "fov": float(np.array(params["x_fov"]).ravel()[0]), "columns": int(film[0]),
-            "samples": int(sensor.sampler().sample_count())}
+    return {
+        "origin": to_world[:3, 3],
+        "axis": to_world[:3, 2],
+        "fov": float(np.array(params["x_fov"]).ravel()[0]),
+        "columns": int(film[0]),
+        "samples": int(sensor.sampler().sample_count()),
+    }
 
 
 def distances(shape, camera):
@@ -80,7 +85,10 @@ def light_of(emitter, mi):
         return {"type": "directional" if "directional" in kind else "point"}
     if "envmap" in kind or "environmentmap" in kind:
         # Two columns of pixels, which is the finest wave that an image can hold.
-        return {"type": "environment", "band_limit_deg": min(180.0, 360 / max(1, int(mi.traverse(emitter)["data"].shape[1]) // 2))}
+        return {
+            "type": "environment",
+            "band_limit_deg": min(180.0, 360 / max(1, int(mi.traverse(emitter)["data"].shape[1]) // 2)),
+        }
     if "constant" in kind:
         return {"type": "environment", "band_limit_deg": 180}
     return None  # an area light: its shape says how large it looks
@@ -97,15 +105,23 @@ def area_light(shape, target):
 
 def glints_of_dictionary(document):
     """{id of a shape: parameters of its BSDF `glint`}"""
+
     def inside(value):
         if isinstance(value, dict):
             if value.get("type") == "glint":
                 return value
-            found = (inside(v if not (isinstance(v, dict) and v.get("type") == "ref") else document.get(v["id"])) for v in value.values())
+            found = (
+                inside(v if not (isinstance(v, dict) and v.get("type") == "ref") else document.get(v["id"]))
+                for v in value.values()
+            )
             return next((g for g in found if g), None)
         return None
 
-    return {name: inside(value) for name, value in document.items() if isinstance(value, dict) and "filename" in value and inside(value)}
+    return {
+        name: inside(value)
+        for name, value in document.items()
+        if isinstance(value, dict) and "filename" in value and inside(value)
+    }
 
 
 def glints_of_xml(path):
@@ -173,21 +189,35 @@ def plan_scene(scenes, mi, tolerance, unit_m, maps, glints):
         materials.append(material_of(name, glint, shape, file, tolerance, mi))
     seen = [pair for pair in ranges if pair]
     if not seen:
-        sys.exit("all shapes with the BSDF glint are behind the camera; turn the camera, because distances are those in front of it")
-    return {"schema": "glint-plan scene 1", "unit_m": unit_m,
-            "camera": {"nearest": min(near for near, _ in seen), "farthest": max(far for _, far in seen),
-                       "field_of_view_deg": min(c["fov"] for c in cameras), "columns": max(c["columns"] for c in cameras),
-                       "samples_per_pixel": cameras[0]["samples"]},
-            "lights": lights_of(scenes[0], np.mean(centres, axis=0), mi), "materials": materials}
+        sys.exit(
+            "all shapes with the BSDF glint are behind the camera; turn the camera, because distances are those in front of it"
+        )
+    return {
+        "schema": "glint-plan scene 1",
+        "unit_m": unit_m,
+        "camera": {
+            "nearest": min(near for near, _ in seen),
+            "farthest": max(far for _, far in seen),
+            "field_of_view_deg": min(c["fov"] for c in cameras),
+            "columns": max(c["columns"] for c in cameras),
+            "samples_per_pixel": cameras[0]["samples"],
+        },
+        "lights": lights_of(scenes[0], np.mean(centres, axis=0), mi),
+        "materials": materials,
+    }
 
 
 def main():
     parser = argparse.ArgumentParser(description="Writes the scene of glint-plan from a scene of Mitsuba 3.")
-    parser.add_argument("scenes", nargs="+", type=pathlib.Path, help="XML, or JSON with the dictionary of load_dict; several: frames of a path")
+    parser.add_argument(
+        "scenes", nargs="+", type=pathlib.Path, help="XML, or JSON with the dictionary of load_dict; several: frames of a path"
+    )
     parser.add_argument("-o", "--output", type=pathlib.Path, required=True, help="scene of glint-plan (.json)")
     parser.add_argument("--tolerance", type=float, required=True, help="largest seen error")
     parser.add_argument("--unit-m", type=float, default=1.0, help="metres in a scene unit")
-    parser.add_argument("--map", action="append", default=[], metavar="ID=FILE", help="map of the shape with this id, instead of its asset")
+    parser.add_argument(
+        "--map", action="append", default=[], metavar="ID=FILE", help="map of the shape with this id, instead of its asset"
+    )
     arguments = parser.parse_args()
     for path in arguments.scenes:
         if not path.is_file():

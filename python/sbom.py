@@ -76,9 +76,15 @@ def python_component(folder):
     classifiers = [c.split(" :: ")[-1] for c in fields.get_all("Classifier", []) if c.startswith("License")]
     licences = [fields[f] for f in ("License-Expression", "License") if fields[f]] or classifiers
     purl = f"pkg:pypi/{fields['Name']}@{fields['Version']}"
-    return {"type": "library", "bom-ref": purl, "name": fields["Name"], "version": fields["Version"], "purl": purl,
-            "licenses": [{"license": {"name": name.splitlines()[0]}} for name in licences[:1]],
-            "properties": [{"name": "glint:how", "value": "linked into the module"}]}
+    return {
+        "type": "library",
+        "bom-ref": purl,
+        "name": fields["Name"],
+        "version": fields["Version"],
+        "purl": purl,
+        "licenses": [{"license": {"name": name.splitlines()[0]}} for name in licences[:1]],
+        "properties": [{"name": "glint:how", "value": "linked into the module"}],
+    }
 
 
 def shipped(wheel):
@@ -100,8 +106,15 @@ def other_component(name, properties):
     stem, _, version = soname.partition(".so")
     version = version.lstrip(".") or "unknown"
     purl = f"pkg:generic/{stem}@{version}"
-    return {"type": "library", "bom-ref": purl, "name": stem, "version": version, "purl": purl,
-            "licenses": [{"license": {"name": "unknown"}}], "properties": [{"name": "glint:source", "value": "unknown"}, *properties]}
+    return {
+        "type": "library",
+        "bom-ref": purl,
+        "name": stem,
+        "version": version,
+        "purl": purl,
+        "licenses": [{"license": {"name": "unknown"}}],
+        "properties": [{"name": "glint:source", "value": "unknown"}, *properties],
+    }
 
 
 def document(wheel, builds):
@@ -141,7 +154,9 @@ def document(wheel, builds):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("wheel", type=pathlib.Path)
-    parser.add_argument("--build", action="append", type=pathlib.Path, required=True, help="folder of the build; give it once for each")
+    parser.add_argument(
+        "--build", action="append", type=pathlib.Path, required=True, help="folder of the build; give it once for each"
+    )
     parser.add_argument("-o", "--output", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
     arguments.output.write_text(json.dumps(document(arguments.wheel, arguments.build), indent=1) + "\n")

@@ -39,9 +39,18 @@ def property_schema(attribute):
 
 def closed_object(description, attributes, names):
     """An object of these attributes and of no others. Attributes of later minor versions may be missing, and those that files may lack."""
-    required = [name for name, attribute in zip(names, attributes) if attribute.get("required", True) and attribute.get("since_minor", 0) == 0]
-    return {"description": description, "type": "object", "properties": dict(zip(names, map(property_schema, attributes))), "required": required,
-            "additionalProperties": False}
+    required = [
+        name
+        for name, attribute in zip(names, attributes)
+        if attribute.get("required", True) and attribute.get("since_minor", 0) == 0
+    ]
+    return {
+        "description": description,
+        "type": "object",
+        "properties": dict(zip(names, map(property_schema, attributes))),
+        "required": required,
+        "additionalProperties": False,
+    }
 
 
 def kind_schema(kind):
@@ -52,19 +61,33 @@ def kind_schema(kind):
     if of_levels:
         most = next(int(attribute["range"][1]) for attribute in single if attribute["name"] == "level_count")
         row = closed_object("One level.", of_levels, [attribute["name"].removeprefix("level_") for attribute in of_levels])
-        schema["properties"]["levels"] = {"description": "Each level.", "type": "array", "items": row, "minItems": 1, "maxItems": most}
+        schema["properties"]["levels"] = {
+            "description": "Each level.",
+            "type": "array",
+            "items": row,
+            "minItems": 1,
+            "maxItems": most,
+        }
         schema["required"].append("levels")
     return schema
 
 
 def properties_schema(kinds):
     """The schema of an object whose `kind` says what its `properties` are."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Properties of an asset, by kind",
-            "description": "Made by properties.py from formats/schema.json.",
-            "properties": {"kind": {"enum": [kind["kind"] for kind in kinds]}},
-            "allOf": [{"if": {"properties": {"kind": {"const": kind["kind"]}}},
-                       "then": {"properties": {"properties": {"$ref": f"#/$defs/{kind['kind']}"}}}} for kind in kinds],
-            "$defs": {kind["kind"]: kind_schema(kind) for kind in kinds}}
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Properties of an asset, by kind",
+        "description": "Made by properties.py from formats/schema.json.",
+        "properties": {"kind": {"enum": [kind["kind"] for kind in kinds]}},
+        "allOf": [
+            {
+                "if": {"properties": {"kind": {"const": kind["kind"]}}},
+                "then": {"properties": {"properties": {"$ref": f"#/$defs/{kind['kind']}"}}},
+            }
+            for kind in kinds
+        ],
+        "$defs": {kind["kind"]: kind_schema(kind) for kind in kinds},
+    }
 
 
 def main():

@@ -21,7 +21,11 @@ SIZE = 250  # pixels of a ball's picture
 MAP = 1024  # texels
 REPEATS = (18, 9)  # of the map round the ball and from pole to pole
 PIXEL_FILTER = 0.5  # deviation, pixels
-LIGHTS = [((-0.5, 0.6, 0.62), 2.6), ((0.75, 0.25, 0.6), 1.2), ((0.1, -0.5, 0.86), 0.7)]  # direction (x right, y up, z to the eye), strength
+LIGHTS = [
+    ((-0.5, 0.6, 0.62), 2.6),
+    ((0.75, 0.25, 0.6), 1.2),
+    ((0.1, -0.5, 0.86), 0.7),
+]  # direction (x right, y up, z to the eye), strength
 ETA, K = (0.20, 0.92, 1.10), (3.91, 2.45, 2.14)  # copper
 BASE = np.array([0.09, 0.02, 0.012])  # paint under the flakes
 SPECKS = 0.35  # share of the ball that is flakes
@@ -38,7 +42,25 @@ def columns(array):
 
 
 class Footprints(ctypes.Structure):
-    _fields_ = [(name, Floats) for name in ("u", "v", "sigma", "xx", "xy", "yy", "ax", "ay", "bx", "by", "precise_u", "precise_v", "spread_x", "spread_y")]
+    _fields_ = [
+        (name, Floats)
+        for name in (
+            "u",
+            "v",
+            "sigma",
+            "xx",
+            "xy",
+            "yy",
+            "ax",
+            "ay",
+            "bx",
+            "by",
+            "precise_u",
+            "precise_v",
+            "spread_x",
+            "spread_y",
+        )
+    ]
 
 
 class Directions(ctypes.Structure):
@@ -50,8 +72,13 @@ class OpenOptions(ctypes.Structure):
 
 
 class BrdfOptions(ctypes.Structure):
-    _fields_ = [("struct_size", ctypes.c_size_t), ("fresnel", ctypes.c_int32), ("facets", ctypes.c_int32), ("eta", ctypes.c_float * 3),
-                ("k", ctypes.c_float * 3)]
+    _fields_ = [
+        ("struct_size", ctypes.c_size_t),
+        ("fresnel", ctypes.c_int32),
+        ("facets", ctypes.c_int32),
+        ("eta", ctypes.c_float * 3),
+        ("k", ctypes.c_float * 3),
+    ]
 
 
 class Brdf:
@@ -75,9 +102,17 @@ class Brdf:
         f = np.zeros((len(uv), 3), np.float32)
         arrays, floats = zip(*map(columns, (uv, covariance, wi, wo)))
         footprints = Footprints(u=floats[0][0], v=floats[0][1], xx=floats[1][0], xy=floats[1][1], yy=floats[1][2])
-        self.check(self.library.glint_brdf_evaluate_batch(
-            self.brdf, ctypes.c_size_t(len(arrays[0])), ctypes.byref(footprints), ctypes.byref(Directions(*floats[2])),
-            ctypes.byref(Directions(*floats[3])), ctypes.c_void_p(f.ctypes.data), None))
+        self.check(
+            self.library.glint_brdf_evaluate_batch(
+                self.brdf,
+                ctypes.c_size_t(len(arrays[0])),
+                ctypes.byref(footprints),
+                ctypes.byref(Directions(*floats[2])),
+                ctypes.byref(Directions(*floats[3])),
+                ctypes.c_void_p(f.ctypes.data),
+                None,
+            )
+        )
         return f
 
 
@@ -87,7 +122,9 @@ def ball():
     x, y = np.meshgrid(ticks, -ticks)
     seen = x**2 + y**2 < 0.995
     n = np.stack([x[seen], y[seen], np.sqrt(1 - x[seen] ** 2 - y[seen] ** 2)], axis=1)
-    along = np.stack([n[:, 2], np.zeros(len(n)), -n[:, 0]], axis=1) / np.hypot(n[:, 0], n[:, 2])[:, None]  # growing azimuth round y
+    along = (
+        np.stack([n[:, 2], np.zeros(len(n)), -n[:, 0]], axis=1) / np.hypot(n[:, 0], n[:, 2])[:, None]
+    )  # growing azimuth round y
     up = np.cross(n, along)
     azimuth, height = np.arctan2(n[:, 0], n[:, 2]), np.arcsin(n[:, 1])
     uv = np.stack([azimuth / (2 * np.pi) * REPEATS[0], height / np.pi * REPEATS[1]], axis=1)
@@ -95,12 +132,16 @@ def ball():
     radius = np.hypot(n[:, 0], n[:, 2])
     changes = []
     for axis in (np.array([1.0, 0, 0]), np.array([0, -1.0, 0])):
-        step = pixel * (axis - np.array([0, 0, 1.0]) * (n @ axis)[:, None] / n[:, 2:3])  # along the ball, for a step in the picture
+        step = pixel * (
+            axis - np.array([0, 0, 1.0]) * (n @ axis)[:, None] / n[:, 2:3]
+        )  # along the ball, for a step in the picture
         du = np.einsum("ij,ij->i", step, along) / radius / (2 * np.pi) * REPEATS[0]
         dv = np.einsum("ij,ij->i", step, up) / np.pi * REPEATS[1]
         changes.append(PIXEL_FILTER * MAP * np.stack([du, dv], axis=1))
     a, b = changes
-    covariance = np.stack([a[:, 0] ** 2 + b[:, 0] ** 2, a[:, 0] * a[:, 1] + b[:, 0] * b[:, 1], a[:, 1] ** 2 + b[:, 1] ** 2], axis=1)
+    covariance = np.stack(
+        [a[:, 0] ** 2 + b[:, 0] ** 2, a[:, 0] * a[:, 1] + b[:, 0] * b[:, 1], a[:, 1] ** 2 + b[:, 1] ** 2], axis=1
+    )
     return seen, n, along, up, uv, covariance
 
 
@@ -139,8 +180,12 @@ def main():
         whole = np.tile([4.0 * MAP**2, 0, 4.0 * MAP**2], (len(covariance), 1))
         normals, blurred = Brdf(library, path("map.glint")), Brdf(library, path("map.blurred.glint"))
         answers = Brdf(library, path("map.cp.glint"), path("map.glint"))
-        pictures = {"one texel for each pixel": picture(normals, scene, texel), "one roughness for all": picture(blurred, scene, whole),
-                    "glint": picture(answers, scene, covariance), "all texels under each pixel": picture(normals, scene, covariance)}
+        pictures = {
+            "one texel for each pixel": picture(normals, scene, texel),
+            "one roughness for all": picture(blurred, scene, whole),
+            "glint": picture(answers, scene, covariance),
+            "all texels under each pixel": picture(normals, scene, covariance),
+        }
     figure, axes = plt.subplots(1, len(pictures), figsize=(len(pictures) * SIZE / 100, SIZE / 100 + 0.3), dpi=100)
     for axis, (title, image) in zip(axes, pictures.items()):
         axis.imshow(image, interpolation="nearest")

@@ -32,7 +32,9 @@ GAP = 8  # pixels between pictures
 def blender(folder, textures, power, turn_deg=0):
     """Light of a picture [SIZE][SIZE][3], bottom row first."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene.square_scene(scene.moments_material("moments", folder / textures, LEVEL), HEIGHT, 0, power, SIZE, SAMPLES, math.radians(turn_deg))
+    scene.square_scene(
+        scene.moments_material("moments", folder / textures, LEVEL), HEIGHT, 0, power, SIZE, SAMPLES, math.radians(turn_deg)
+    )
     scene.render(folder / "picture.exr")
     image = bpy.data.images.load(str(folder / "picture.exr"))
     return np.array(image.pixels[:]).reshape(SIZE, SIZE, -1)[..., :3]
@@ -64,8 +66,25 @@ def main():
             (folder / short).mkdir()
             run("synth", kind, "--size", TEXELS, *options, "-o", f"{short}.exr")
             run("ingest", f"{short}.exr", "-o", f"{short}.glint")
-            run("moments", f"{short}.glint", "-o", f"{short}.moments.glint", "--roughness", math.sqrt(ALPHA), "--lobe", "materialx", "--bits", 16, "--textures", short)
-        pictures = [blender(folder, "brushed", POWER, turn_deg=30), blender(folder, "flakes", POWER), brute_force(run, folder, POWER)]
+            run(
+                "moments",
+                f"{short}.glint",
+                "-o",
+                f"{short}.moments.glint",
+                "--roughness",
+                math.sqrt(ALPHA),
+                "--lobe",
+                "materialx",
+                "--bits",
+                16,
+                "--textures",
+                short,
+            )
+        pictures = [
+            blender(folder, "brushed", POWER, turn_deg=30),
+            blender(folder, "flakes", POWER),
+            brute_force(run, folder, POWER),
+        ]
         print("mean light of flakes, Cycles and brute force:", *(float(picture.mean()) for picture in pictures[1:]))
     gap = np.ones((SIZE, GAP, 3))
     row = np.concatenate([pictures[0], gap, pictures[1], gap, pictures[2]], 1)
@@ -74,7 +93,6 @@ def main():
     settings = bpy.context.scene.render.image_settings
     settings.file_format, settings.color_mode, settings.color_depth, settings.compression = "PNG", "BW", "8", 100
     image.save_render(str(ROOT / "docs/pictures/blender.png"), scene=bpy.context.scene)
-
 
 
 if __name__ == "__main__":

@@ -13,8 +13,26 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 HERE = pathlib.Path(__file__).parent
-KINDS = ["isotropic", "anisotropic", "brushed", "flakes", "scratches", "leather", "bumps", "scales", "relief", "structured", "wood", "weave", "twill", "silk",
-         "sawtooth", "grating", "flake2d", "flat"]
+KINDS = [
+    "isotropic",
+    "anisotropic",
+    "brushed",
+    "flakes",
+    "scratches",
+    "leather",
+    "bumps",
+    "scales",
+    "relief",
+    "structured",
+    "wood",
+    "weave",
+    "twill",
+    "silk",
+    "sawtooth",
+    "grating",
+    "flake2d",
+    "flat",
+]
 SIZE, COLUMNS = 256, 6
 LIGHT = np.array([-0.35, 0.55, 0.76])
 BINS, WIDEST = 96, 0.8  # of the distribution: bins, and the largest component shown
@@ -33,7 +51,9 @@ def normals(bin, kind, folder):
 def main():
     bin = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else "build/bin")
     rows = -(-len(KINDS) // COLUMNS)
-    figure, axes = plt.subplots(2 * rows, COLUMNS, figsize=(2 * COLUMNS, 4 * rows), gridspec_kw={"hspace": 0.03, "wspace": 0.03})
+    figure, axes = plt.subplots(
+        2 * rows, COLUMNS, figsize=(2 * COLUMNS, 4 * rows), gridspec_kw={"hspace": 0.03, "wspace": 0.03}
+    )
     with tempfile.TemporaryDirectory() as folder:
         for k, kind in enumerate(KINDS):
             n = normals(bin, kind, pathlib.Path(folder))

@@ -51,8 +51,17 @@ def bare(axis):
 
 
 def pointed(axis, text, at, where, colour="black", **options):
-    axis.annotate(text, at, where, color=colour, fontsize=10, ha="center", va="center",
-                  arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.8}, **options)
+    axis.annotate(
+        text,
+        at,
+        where,
+        color=colour,
+        fontsize=10,
+        ha="center",
+        va="center",
+        arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.8},
+        **options,
+    )
 
 
 def draw_map(axis, texels, sigma):
@@ -63,7 +72,9 @@ def draw_map(axis, texels, sigma):
     ticks = (np.arange(size // STRIDE) + 0.5) * STRIDE
     axis.plot(*(g.ravel() for g in np.meshgrid(ticks, ticks)), "k.", markersize=4)
     for deviations in (1, 2):
-        axis.add_patch(patches.Circle(CENTRE, deviations * sigma, fill=False, linewidth=1.6, linestyle="-" if deviations == 1 else ":"))
+        axis.add_patch(
+            patches.Circle(CENTRE, deviations * sigma, fill=False, linewidth=1.6, linestyle="-" if deviations == 1 else ":")
+        )
     axis.plot([208, 240], [16, 16], "k-", linewidth=2)
     axis.text(224, 19, "stride", ha="center", va="bottom", fontsize=9)
     bare(axis)
@@ -98,7 +109,9 @@ def draw_levels(axis):
         count = 2 ** (LEVELS - 1 - level)
         base = level * 0.92
         corner = lambda x, y: (x + 0.45 * y, base + 0.45 * y)
-        axis.add_patch(patches.Polygon([corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)], facecolor="0.92", edgecolor="0.4"))
+        axis.add_patch(
+            patches.Polygon([corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)], facecolor="0.92", edgecolor="0.4")
+        )
         for j in range(count):
             for i in range(count):
                 axis.plot(*corner((i + 0.5) / count, (j + 0.5) / count), "k.", markersize=3 + 2.5 * level)
@@ -148,9 +161,14 @@ def main():
     draw_levels(figure.add_subplot(top[2]))
     bottom = figure.add_gridspec(1, SHOWN_SLICES + 1 + COLUMNS, left=0.02, right=0.98, top=0.215, bottom=0.035, wspace=0.35)
     draw_cluster([figure.add_subplot(cell) for cell in bottom], slices)
-    figure.text(0.02, 0.265, "a cluster: the same block (here the cyan one) of every image of a region. Each such block is a slice. Compression "
-                "keeps a few basis images of\nthe cluster, and for each slice one coefficient a column: a slice is then the sum of coefficient "
-                "times basis image.", fontsize=9)
+    figure.text(
+        0.02,
+        0.265,
+        "a cluster: the same block (here the cyan one) of every image of a region. Each such block is a slice. Compression "
+        "keeps a few basis images of\nthe cluster, and for each slice one coefficient a column: a slice is then the sum of coefficient "
+        "times basis image.",
+        fontsize=9,
+    )
     path = HERE / "terms.png"
     figure.savefig(path)
     PIL.Image.open(path).convert("RGB").save(path, optimize=True)

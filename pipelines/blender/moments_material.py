@@ -74,7 +74,10 @@ def moments_material(name, folder, level=0, uv_map="UVMap", repeats=1, base_colo
     tangent.direction_type = "UV_MAP"
     tangent.uv_map = uv_map
     link(tangent.outputs["Tangent"], surface.inputs["Tangent"])
-    link(texture_of(nodes, folder, "rotation", level, mapping, "Closest").outputs["Color"], surface.inputs["Anisotropic Rotation"])
+    link(
+        texture_of(nodes, folder, "rotation", level, mapping, "Closest").outputs["Color"],
+        surface.inputs["Anisotropic Rotation"],
+    )
     return material
 
 
@@ -139,7 +142,15 @@ def main(arguments):
         material = moments_material("moments", options.textures, options.level, repeats=options.repeats)
     except FileNotFoundError as error:
         sys.exit(f"moments_material.py: error: {error}")
-    square_scene(material, options.height, options.lamp_radius, options.power, options.resolution, options.samples, math.radians(options.turn_deg))
+    square_scene(
+        material,
+        options.height,
+        options.lamp_radius,
+        options.power,
+        options.resolution,
+        options.samples,
+        math.radians(options.turn_deg),
+    )
     render(options.output)
 
 

@@ -24,7 +24,14 @@ IMAGES_PER_REGION = 8
 PICTURE_LEVELS = (0, 1, 3)
 # Columns of the picture of all models -> kind in the file's name, in groups that answer the same footprint exactly. Bin maps and histograms
 # know boxes; they are asked for the box that has the second moments of the Gaussian.
-GAUSSIAN_MODELS = {"Reference, Gaussian": "", "pyramid": "pyramid", "cp, rank 16": "cp", "tucker, 10 %": "tucker10", "pca, rank 16": "pca", "moments": "moments"}
+GAUSSIAN_MODELS = {
+    "Reference, Gaussian": "",
+    "pyramid": "pyramid",
+    "cp, rank 16": "cp",
+    "tucker, 10 %": "tucker10",
+    "pca, rank 16": "pca",
+    "moments": "moments",
+}
 BOX_MODELS = {"Reference, box": "", "bin map": "binmap", "histograms": "sat"}
 ASKED_SIGMA_R = {"", "moments"}  # kinds that have no roughness of their own
 NOT_DRAWN = {"flakes_256"}  # flakes_1k is
@@ -82,7 +89,16 @@ class Chain:
         cp = self.compress("cp", "cp, rank 16", "--method", "cp", "--rank", 16, "--regions", regions)
         self.compress("tucker", "tucker, rank 25", "--method", "tucker", "--rank", 25)
         self.compress("pca", "pca, rank 16", "--method", "pca", "--rank", 16)
-        self.compress("tolerance", "tucker, error of cp", "--method", "tucker", "--metric", "l2", "--tolerance", cp.result["total"]["rel_l2"])
+        self.compress(
+            "tolerance",
+            "tucker, error of cp",
+            "--method",
+            "tucker",
+            "--metric",
+            "l2",
+            "--tolerance",
+            cp.result["total"]["rel_l2"],
+        )
         self.compress("tucker10", "tucker, seen error 10 %", "--method", "tucker", "--tolerance", 0.1)
         self.make("bin map", "binmap", "--alpha", self.sigma_r * 2**0.5)
         self.make("histograms", "sat")
@@ -109,7 +125,18 @@ class Chain:
         best = None
         for _ in range(searches):
             middle = (low * high) ** 0.5
-            run = self.tools.run("compress", self.path("pyramid"), "-o", self.path("try"), "--method", method, "--metric", "l2", "--tolerance", middle)
+            run = self.tools.run(
+                "compress",
+                self.path("pyramid"),
+                "-o",
+                self.path("try"),
+                "--method",
+                method,
+                "--metric",
+                "l2",
+                "--tolerance",
+                middle,
+            )
             if self.path("try").stat().st_size <= budget:
                 high = middle
                 self.path("try").replace(self.path(kind))
@@ -149,7 +176,14 @@ class Chain:
 
     def error(self, kind):
         """Against the Reference, mean over two sizes above those of the two finest levels."""
-        return float(np.mean([picture.relative(self.ndf(kind, p), self.ndf("", p)) for p in map(self.footprint, range(min(2, len(self.levels))))]))
+        return float(
+            np.mean(
+                [
+                    picture.relative(self.ndf(kind, p), self.ndf("", p))
+                    for p in map(self.footprint, range(min(2, len(self.levels))))
+                ]
+            )
+        )
 
 
 def brightest(image):
@@ -181,7 +215,11 @@ def draw_footprints(chain, path):
     chain.compress_to_bytes_of("tucker-same", "cp", "tucker")
     levels = sorted({min(level, len(chain.levels) - 1) for level in PICTURE_LEVELS})
     footprints = [chain.footprint(level) for level in levels]
-    sizes = {kind: readable_bytes(chain.path(kind).stat().st_size) for kind in ("pyramid", "cp", "tucker-same") if chain.path(kind).exists()}
+    sizes = {
+        kind: readable_bytes(chain.path(kind).stat().st_size)
+        for kind in ("pyramid", "cp", "tucker-same")
+        if chain.path(kind).exists()
+    }
     titles = {"": "Reference", "pyramid": f"Pyramid\n{sizes['pyramid']}", "cp": f"CP, rank 16\n{sizes['cp']}"}
     if "tucker-same" in sizes:
         titles["tucker-same"] = f"Tucker and spots\n{sizes['tucker-same']}"
@@ -195,14 +233,18 @@ def draw_models(chains, path):
     for chain in chains:
         gaussian = chain.footprint(0)
         half = brightest(chain.ndf("", gaussian))
-        maps[chain.name.replace("_", "\n")] = [answers(chain, models, footprint, half) for models, footprint in (
-            (GAUSSIAN_MODELS, gaussian), (BOX_MODELS, dataclasses.replace(gaussian, is_box=True)))]
+        maps[chain.name.replace("_", "\n")] = [
+            answers(chain, models, footprint, half)
+            for models, footprint in ((GAUSSIAN_MODELS, gaussian), (BOX_MODELS, dataclasses.replace(gaussian, is_box=True)))
+        ]
     picture.draw_models(maps, path)
 
 
 def answers(chain, models, footprint, half):
     """Title of a column -> (image, bytes and time of a query)."""
-    note = lambda kind: f"{readable_bytes(chain.path(kind).stat().st_size)}, {readable_time(chain.nanoseconds(kind, footprint, half))}"
+    note = (
+        lambda kind: f"{readable_bytes(chain.path(kind).stat().st_size)}, {readable_time(chain.nanoseconds(kind, footprint, half))}"
+    )
     return {title: (chain.ndf(kind, footprint), note(kind)) for title, kind in models.items()}
 
 
@@ -235,7 +277,9 @@ def main():
     text = table_text(rows)
     (arguments.out / "table.txt").write_text(text)
     (arguments.out / "table.json").write_text(json.dumps([dataclasses.asdict(row) for row in rows], indent=1) + "\n")
-    print(f"\n{text}\nassets: {assets}/   table: {arguments.out}/table.txt, .json   pictures: {arguments.out}/ndf-before-after.png, ndf-models.png, planes-and-waves.png")
+    print(
+        f"\n{text}\nassets: {assets}/   table: {arguments.out}/table.txt, .json   pictures: {arguments.out}/ndf-before-after.png, ndf-models.png, planes-and-waves.png"
+    )
 
 
 if __name__ == "__main__":

@@ -32,24 +32,47 @@ def relative(image, truth):
 def show(axis, image, truth, margin, note=""):
     """An image without its margin, in the colours of the truth's densities."""
     size = truth.shape[0]
-    axis.imshow(np.log1p(image[margin : size - margin, margin : size - margin]), cmap="inferno", vmin=0, vmax=np.log1p(truth.max()),
-                interpolation="nearest")
+    axis.imshow(
+        np.log1p(image[margin : size - margin, margin : size - margin]),
+        cmap="inferno",
+        vmin=0,
+        vmax=np.log1p(truth.max()),
+        interpolation="nearest",
+    )
     axis.set_xticks([])
     axis.set_yticks([])
     axis.spines[:].set_visible(False)
-    axis.text(0.97, 0.03, note, transform=axis.transAxes, ha="right", va="bottom", fontsize=8, color="white", linespacing=1.3,
-              path_effects=[patheffects.withStroke(linewidth=2, foreground="black")])
+    axis.text(
+        0.97,
+        0.03,
+        note,
+        transform=axis.transAxes,
+        ha="right",
+        va="bottom",
+        fontsize=8,
+        color="white",
+        linespacing=1.3,
+        path_effects=[patheffects.withStroke(linewidth=2, foreground="black")],
+    )
 
 
 def grid(rows, columns, left=0.2):
     """Axes of a grid of images, titles of rows at the left and of columns above."""
-    figure, axes = plt.subplots(len(rows), len(columns), squeeze=False, figsize=(CELL_INCHES * len(columns) + 1.35, CELL_INCHES * len(rows) + 0.5))
+    figure, axes = plt.subplots(
+        len(rows), len(columns), squeeze=False, figsize=(CELL_INCHES * len(columns) + 1.35, CELL_INCHES * len(rows) + 0.5)
+    )
     for c, title in enumerate(columns):
         axes[0, c].set_title(title, fontsize=10)
     for r, title in enumerate(rows):
         axes[r, 0].set_ylabel(title, fontsize=10, rotation=0, ha="right", va="center", labelpad=8)
-    figure.subplots_adjust(left=left, right=0.995, top=1 - 0.28 / figure.get_figheight(), bottom=0.25 / figure.get_figheight(), wspace=0.03,
-                           hspace=0.03)
+    figure.subplots_adjust(
+        left=left,
+        right=0.995,
+        top=1 - 0.28 / figure.get_figheight(),
+        bottom=0.25 / figure.get_figheight(),
+        wspace=0.03,
+        hspace=0.03,
+    )
     return figure, axes
 
 
@@ -92,5 +115,9 @@ def draw_models(maps, path):
             truth = next(iter(group.values()))[0]
             for c, (image, note) in enumerate(group.values()):
                 show(next(columns), image, truth, margin, f"error {100 * relative(image, truth):.1f} %\n{note}" if c else note)
-    save(figure, "log(1 + density) over half vectors inside one Gaussian footprint, or inside the box of its second moments; "
-         "error: relative L2 from the reference of the same footprint; bytes of the file; time of a density query", path)
+    save(
+        figure,
+        "log(1 + density) over half vectors inside one Gaussian footprint, or inside the box of its second moments; "
+        "error: relative L2 from the reference of the same footprint; bytes of the file; time of a density query",
+        path,
+    )

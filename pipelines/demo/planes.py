@@ -49,7 +49,18 @@ def planes(tools, folder):
 
     def part(title, tool, source, asset, origin, *flags):
         tools.run(tool, path(source), "-o", path(asset), *flags)
-        tools.run(tool, path(asset), "--explicit", PLANE_TEXELS, PLANE_TEXELS, "--origin", *origin, "-o", path("part.glint"), "--force")
+        tools.run(
+            tool,
+            path(asset),
+            "--explicit",
+            PLANE_TEXELS,
+            PLANE_TEXELS,
+            "--origin",
+            *origin,
+            "-o",
+            path("part.glint"),
+            "--force",
+        )
         pictures[title] = shaded(normals_of(path("part.glint")))
 
     for kind, flags in (("scratches", ("--density", 2, "--feature-size", 3, "--seed", 4)), ("leather", ("--feature-size", 20))):
@@ -59,8 +70,24 @@ def planes(tools, folder):
     pictures = {f"a map of {MAP_TEXELS} texels": shaded(read(path("scratches.exr")))}
     wang = ("--size", 128, "--tiles", 32, "--boundary", "wrap")
     part(f"Wang tiles of it, {PLANE_TEXELS} texels, 2^40 away", "wang", "scratches.glint", "wang.glint", (FAR, 0), *wang)
-    part("32 texels of it, scattered", "tiny", "scratches.glint", "tiny.glint", (FAR // 1024, 0), "--cut", 32, "--at", 100, 120, "--mode", "scattered", "--density", 2,
-         "--transforms", path("turns.json"))
+    part(
+        "32 texels of it, scattered",
+        "tiny",
+        "scratches.glint",
+        "tiny.glint",
+        (FAR // 1024, 0),
+        "--cut",
+        32,
+        "--at",
+        100,
+        120,
+        "--mode",
+        "scattered",
+        "--density",
+        2,
+        "--transforms",
+        path("turns.json"),
+    )
     part("Wang tiles of leather", "wang", "leather.glint", "leather.wang.glint", (FAR, 0), *wang)
     return pictures
 
@@ -68,12 +95,39 @@ def planes(tools, folder):
 def diffraction(tools, folder):
     """Title -> NDF image of heights as mirrors and as waves."""
     pictures = {}
-    for kind, title, flags in (("grating", "a grating", ("--feature-size", 8, "--depth-um", 0.25)), ("brushed", "brushed metal", ("--depth-um", 0.4))):
+    for kind, title, flags in (
+        ("grating", "a grating", ("--feature-size", 8, "--depth-um", 0.25)),
+        ("brushed", "brushed metal", ("--depth-um", 0.4)),
+    ):
         path = lambda name: folder / f"waves.{kind}.{name}"
         tools.run("synth", kind, "-o", path("exr"), "--height", "--size", 128, "--texel-size-um", 1, *flags)
         for to, asset in (("heights", "heights.glint"), ("normals", "glint")):
-            tools.run("ingest", path("exr"), "-o", path(asset), "--kind", "height", "--to", to, "--height-scale-um", 1, "--texel-size-um", 1)
-        tools.run("pyramid", path("heights.glint"), "-o", path("wave.glint"), "--optics", "wave", "--coherence-um", 16, "--wavelengths", 24)
+            tools.run(
+                "ingest",
+                path("exr"),
+                "-o",
+                path(asset),
+                "--kind",
+                "height",
+                "--to",
+                to,
+                "--height-scale-um",
+                1,
+                "--texel-size-um",
+                1,
+            )
+        tools.run(
+            "pyramid",
+            path("heights.glint"),
+            "-o",
+            path("wave.glint"),
+            "--optics",
+            "wave",
+            "--coherence-um",
+            16,
+            "--wavelengths",
+            24,
+        )
         for asset, name in (("glint", "mirrors"), ("wave.glint", "waves, 24 wavelengths")):
             image = path(f"{asset}.exr")  # one name for each: reads are cached
             roughness = ("--sigma-r", 0.01) if asset == "glint" else ()

@@ -43,14 +43,23 @@ def one_texel(of):
     """The map as a renderer takes it without filtering: one texel for each sample."""
     import mitsuba as mi
 
-    texture = {"type": "bitmap", "filename": str(of.image), "raw": True, "filter_type": "nearest", "to_uv": mi.ScalarTransform4f().scale([1 / of.cm, 1 / of.cm, 1])}
+    texture = {
+        "type": "bitmap",
+        "filename": str(of.image),
+        "raw": True,
+        "filter_type": "nearest",
+        "to_uv": mi.ScalarTransform4f().scale([1 / of.cm, 1 / of.cm, 1]),
+    }
     facet = {"type": "roughconductor", "material": "Cu", "distribution": "beckmann", "alpha": 2**0.5 * of.sigma_r}
     return {"type": "normalmap", "normalmap": texture, "bsdf": facet}
 
 
 def frames_of(gallery, label, which, count, size, spp, **how):
     width = widths(count)
-    return [gallery.render(f"{label}, frame {k + 1} of {count}", ball.scene(gallery.kit, width[k], size, spp, **how), quiet=True) for k in which]
+    return [
+        gallery.render(f"{label}, frame {k + 1} of {count}", ball.scene(gallery.kit, width[k], size, spp, **how), quiet=True)
+        for k in which
+    ]
 
 
 def measured(gallery):
@@ -58,9 +67,14 @@ def measured(gallery):
     size, spp, count = (96, 96), 4, 6
     factor = (TO_CM / FROM_CM) ** (1 / 23)
     width = size[0] * TEXELS_A_PIXEL * ball.TEXEL_UM * 1e-4 * factor ** np.arange(count)
-    frames = lambda **how: [gallery.render("flicker", ball.scene(gallery.kit, w, size, spp, max_depth=2, **how), quiet=True).linear for w in width]
-    return {"the pyramid": flicker(frames(), factor), "Reference": flicker(frames(asset=lambda of: of.normals), factor),
-            "one texel for each sample": flicker(frames(bsdf=one_texel), factor)}
+    frames = lambda **how: [
+        gallery.render("flicker", ball.scene(gallery.kit, w, size, spp, max_depth=2, **how), quiet=True).linear for w in width
+    ]
+    return {
+        "the pyramid": flicker(frames(), factor),
+        "Reference": flicker(frames(asset=lambda of: of.normals), factor),
+        "one texel for each sample": flicker(frames(bsdf=one_texel), factor),
+    }
 
 
 def draw(gallery):
@@ -71,10 +85,19 @@ def draw(gallery):
     steps = [flicker([a.linear, b.linear], factor) for a, b in zip(frames, frames[1:])]
     file = gallery.out / "animation.gif"
     pictures.animation([p.srgb() for p in frames + frames[-2:0:-1]], file)
-    gallery.enter("animation", file, {
-        "title": "A zoom without flicker", "alt": "An animated zoom from a patch of flakes to the whole ball and back", "method": "pyramid",
-        "text": "Frames differ by their zoom alone. Flicker is the mean difference of a frame from the one before, brought to its scale, over the mean of the "
-        "frames. Six small frames flicker by " + ", ".join(f"{100 * value:.1f} % with {name}" for name, value in measured(gallery).items())
-        + f": what Reference shows is the noise of samples and the error of bringing frames to scale. Nothing pops: from frame to frame of this zoom the difference is {100 * np.median(steps):.0f} %, "
-        f"at most {100 * max(steps):.0f} %."},
-        spp=frames[0].spp, seconds=sum(p.seconds for p in frames))
+    gallery.enter(
+        "animation",
+        file,
+        {
+            "title": "A zoom without flicker",
+            "alt": "An animated zoom from a patch of flakes to the whole ball and back",
+            "method": "pyramid",
+            "text": "Frames differ by their zoom alone. Flicker is the mean difference of a frame from the one before, brought to its scale, over the mean of the "
+            "frames. Six small frames flicker by "
+            + ", ".join(f"{100 * value:.1f} % with {name}" for name, value in measured(gallery).items())
+            + f": what Reference shows is the noise of samples and the error of bringing frames to scale. Nothing pops: from frame to frame of this zoom the difference is {100 * np.median(steps):.0f} %, "
+            f"at most {100 * max(steps):.0f} %.",
+        },
+        spp=frames[0].spp,
+        seconds=sum(p.seconds for p in frames),
+    )

@@ -38,7 +38,15 @@ def sheet(kit, of, asset, size, spp, crop=None, fov=36.0):
 def draw(gallery):
     pictures = {}
     for name, (_, title) in MAPS.items():
-        pictures[title] = gallery.render(f"bent quad, {title}", scene(gallery.kit, name, *gallery.scaled((400, 290), 16)), exposure=EXPOSURES.get(name, 1.0))
-    gallery.sheet("bent-quad", pictures, columns=2, title="A bent sheet under one small light",
-                  alt="A bent sheet, four times: isotropic noise, flakes, brushed metal and scratches under a lamp",
-                  text="Four maps of 2048 x 2048 texels of 10 um, each repeated ten times along the sheet.", method="pyramid")
+        pictures[title] = gallery.render(
+            f"bent quad, {title}", scene(gallery.kit, name, *gallery.scaled((400, 290), 16)), exposure=EXPOSURES.get(name, 1.0)
+        )
+    gallery.sheet(
+        "bent-quad",
+        pictures,
+        columns=2,
+        title="A bent sheet under one small light",
+        alt="A bent sheet, four times: isotropic noise, flakes, brushed metal and scratches under a lamp",
+        text="Four maps of 2048 x 2048 texels of 10 um, each repeated ten times along the sheet.",
+        method="pyramid",
+    )

@@ -46,11 +46,38 @@ def colours(size):
 def asset(kit):
     """The displacement asset and the length of its side."""
     size = SIZE // 4 if kit.quick else SIZE
-    image = kit.make("weave", "synth", None, "weave", "--height", "--size", size, "--texel-size-um", TEXEL_UM, "--feature-size", THREAD_TEXELS, suffix=".exr")
-    heights = kit.make("weave", "ingest", image, "--kind", "height", "--to", "heights", "--height-scale-um", 1, "--texel-size-um", TEXEL_UM)
+    image = kit.make(
+        "weave",
+        "synth",
+        None,
+        "weave",
+        "--height",
+        "--size",
+        size,
+        "--texel-size-um",
+        TEXEL_UM,
+        "--feature-size",
+        THREAD_TEXELS,
+        suffix=".exr",
+    )
+    heights = kit.make(
+        "weave", "ingest", image, "--kind", "height", "--to", "heights", "--height-scale-um", 1, "--texel-size-um", TEXEL_UM
+    )
     check = kit.folder / f"check.{size}.png"
     PIL.Image.fromarray(np.round(255 * colours(size)).astype(np.uint8)).save(check)
-    displaced = kit.make("weave.displaced", "displace", heights, "--factors", "8,16,64", "--base", "diffuse:0.85", "--base-color", check, "--angular", 11)
+    displaced = kit.make(
+        "weave.displaced",
+        "displace",
+        heights,
+        "--factors",
+        "8,16,64",
+        "--base",
+        "diffuse:0.85",
+        "--base-color",
+        check,
+        "--angular",
+        11,
+    )
     return displaced, size * TEXEL_UM * 1e-4
 
 
@@ -76,9 +103,19 @@ def scene(kit, width_cm=34.0, size=(480, 360), spp=64):
 def draw(gallery):
     size, spp = gallery.scaled((340, 280), 24)
     pixel = lambda width: width / size[0] / (TEXEL_UM * 1e-4)
-    sheet = {f"{width:g} cm wide: {pixel(width):.2g} texels a pixel": gallery.render(f"cloth, {width:g} cm", scene(gallery.kit, width, size, spp))
-             for width in WIDTHS_CM}
-    gallery.sheet("cloth", sheet, columns=3, title="A woven cloth at three distances", method="displacement, factors 8, 16 and 64, on a coarse mesh",
-                  alt="A checked table cloth: threads from near, checks in the middle, folds from afar",
-                  text="The weave is heights of 1024 x 1024 texels of 15 um. The mesh knows nothing of it: lobes of normals, shadows between the threads and light "
-                       "that goes from thread to thread are prefiltered, and each pixel takes the level of its footprint.")
+    sheet = {
+        f"{width:g} cm wide: {pixel(width):.2g} texels a pixel": gallery.render(
+            f"cloth, {width:g} cm", scene(gallery.kit, width, size, spp)
+        )
+        for width in WIDTHS_CM
+    }
+    gallery.sheet(
+        "cloth",
+        sheet,
+        columns=3,
+        title="A woven cloth at three distances",
+        method="displacement, factors 8, 16 and 64, on a coarse mesh",
+        alt="A checked table cloth: threads from near, checks in the middle, folds from afar",
+        text="The weave is heights of 1024 x 1024 texels of 15 um. The mesh knows nothing of it: lobes of normals, shadows between the threads and light "
+        "that goes from thread to thread are prefiltered, and each pixel takes the level of its footprint.",
+    )

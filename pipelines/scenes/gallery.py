@@ -18,7 +18,19 @@ import kit as kits
 import pictures
 
 # In the order of the index. Each module has draw(gallery).
-SCENES = ("car_paint", "kettle", "cutlery", "bent_quad", "cloth", "diffraction", "plane", "environment", "zoom", "models", "animation")
+SCENES = (
+    "car_paint",
+    "kettle",
+    "cutlery",
+    "bent_quad",
+    "cloth",
+    "diffraction",
+    "plane",
+    "environment",
+    "zoom",
+    "models",
+    "animation",
+)
 QUICK_SCENES = ("car_paint", "kettle", "cutlery")  # of `make demo`
 PASSES = 8
 OUTLIER = 4.0  # times the median of the passes at a pixel, at which a pass is cut
@@ -111,7 +123,12 @@ class Gallery:
         """Writes pictures with titles as one. @param sheet  title -> Picture or sRGB array"""
         file = self.out / f"{name}.png"
         rendered = [p for p in sheet.values() if isinstance(p, Picture)]
-        pictures.save(pictures.sheet({title: p.srgb() if isinstance(p, Picture) else p for title, p in sheet.items()}, columns, notes or {}), file)
+        pictures.save(
+            pictures.sheet(
+                {title: p.srgb() if isinstance(p, Picture) else p for title, p in sheet.items()}, columns, notes or {}
+            ),
+            file,
+        )
         self.enter(name, file, seen, spp=max(p.spp for p in rendered), seconds=sum(p.seconds for p in rendered))
         return file
 
@@ -120,7 +137,14 @@ def index_text(entries, pictures_folder=""):
     """The entries as Markdown."""
     lines = []
     for entry in entries:
-        lines += [f"## {entry['title']}", "", f"![{entry['alt']}]({pictures_folder}{entry['file']})", "", textwrap.fill(entry["text"], WIDTH), ""]
+        lines += [
+            f"## {entry['title']}",
+            "",
+            f"![{entry['alt']}]({pictures_folder}{entry['file']})",
+            "",
+            textwrap.fill(entry["text"], WIDTH),
+            "",
+        ]
         if entry.get("table"):
             lines += [*entry["table"], ""]
         lines += [f"*{entry['method']}; {entry['spp']} samples a pixel; {entry['seconds']:.0f} s of processor time.*", ""]

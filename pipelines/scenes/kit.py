@@ -94,7 +94,10 @@ class Kit:
     def metal(self, of, asset, material="Al", **parameters):
         """A BSDF of a prepared map on a mesh whose uv are centimetres. With `smooth`, Mitsuba's own metal of the same mean roughness."""
         if self.smooth:
-            return {"type": "twosided", "bsdf": {"type": "roughconductor", "material": material, "distribution": "beckmann", "alpha": of.alpha()}}
+            return {
+                "type": "twosided",
+                "bsdf": {"type": "roughconductor", "material": material, "distribution": "beckmann", "alpha": of.alpha()},
+            }
         import glint_ndf
 
         # Some kinds have no roughness of their own; pyramids take the normals for footprints below level 0.
@@ -122,13 +125,25 @@ def look_at(origin, target, fov, size, spp, up=(0, 0, 1), crop=None):
     """
     import mitsuba as mi
 
-    film = {"type": "hdrfilm", "width": size[0], "height": size[1], "pixel_format": "rgb", "component_format": "float32",
-            "rfilter": {"type": "gaussian", "stddev": 0.4}}
+    film = {
+        "type": "hdrfilm",
+        "width": size[0],
+        "height": size[1],
+        "pixel_format": "rgb",
+        "component_format": "float32",
+        "rfilter": {"type": "gaussian", "stddev": 0.4},
+    }
     if crop:
         film |= dict(zip(("crop_offset_x", "crop_offset_y", "crop_width", "crop_height"), crop))
-    return {"type": "perspective", "fov": fov, "near_clip": 0.1, "far_clip": 10000,
-            "to_world": mi.ScalarTransform4f().look_at(origin=list(origin), target=list(target), up=list(up)),
-            "film": film, "sampler": {"type": "independent", "sample_count": spp}}
+    return {
+        "type": "perspective",
+        "fov": fov,
+        "near_clip": 0.1,
+        "far_clip": 10000,
+        "to_world": mi.ScalarTransform4f().look_at(origin=list(origin), target=list(target), up=list(up)),
+        "film": film,
+        "sampler": {"type": "independent", "sample_count": spp},
+    }
 
 
 def rgb(*value):
@@ -145,8 +160,13 @@ def softbox(centre, target, size, radiance, colour=(1, 1, 1)):
 
     t = mi.ScalarTransform4f
     up = (0, 0, 1) if abs(np.asarray(target) - centre)[:2].sum() > 1e-6 else (0, 1, 0)
-    return {"type": "rectangle", "to_world": t().look_at(origin=list(centre), target=list(target), up=list(up)) @ t().scale([size[0] / 2, size[1] / 2, 1]),
-            "emitter": {"type": "area", "radiance": rgb(*(radiance * c for c in colour))}, "bsdf": {"type": "diffuse", "reflectance": rgb(0)}}
+    return {
+        "type": "rectangle",
+        "to_world": t().look_at(origin=list(centre), target=list(target), up=list(up))
+        @ t().scale([size[0] / 2, size[1] / 2, 1]),
+        "emitter": {"type": "area", "radiance": rgb(*(radiance * c for c in colour))},
+        "bsdf": {"type": "diffuse", "reflectance": rgb(0)},
+    }
 
 
 def studio(boxes, floor=0.06, ceiling=0.25, width=1024):
@@ -158,7 +178,9 @@ def studio(boxes, floor=0.06, ceiling=0.25, width=1024):
     azimuth = 90 - (np.arange(width) + 0.5) / width * 360  # Mitsuba's images run from -z to x, which `envmap` turns to y and x
     elevation = 90 - (np.arange(height) + 0.5) / height * 180
     up = np.clip(elevation / 90, -1, 1)[:, None, None]
-    image = np.ones((1, width, 3)) * np.where(up > 0, floor + (ceiling - floor) * np.maximum(up, 0) ** 0.8, floor * (1 + 0.6 * up))
+    image = np.ones((1, width, 3)) * np.where(
+        up > 0, floor + (ceiling - floor) * np.maximum(up, 0) ** 0.8, floor * (1 + 0.6 * up)
+    )
     for at, above, half_width, half_height, radiance, colour in boxes:
         across = np.abs((azimuth - at + 180) % 360 - 180)
         edge = lambda distance, half: np.clip(0.5 + (half - distance) / 3, 0, 1)  # soft over 3 degrees
@@ -172,8 +194,12 @@ def envmap(image, scale=1.0, turn=0.0):
     import mitsuba as mi
 
     t = mi.ScalarTransform4f
-    return {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(image)), "scale": scale,
-            "to_world": t().rotate([0, 0, 1], turn) @ t().rotate([1, 0, 0], 90)}
+    return {
+        "type": "envmap",
+        "bitmap": mi.Bitmap(np.ascontiguousarray(image)),
+        "scale": scale,
+        "to_world": t().rotate([0, 0, 1], turn) @ t().rotate([1, 0, 0], 90),
+    }
 
 
 def tone(linear, exposure=1.0):

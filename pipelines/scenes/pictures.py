@@ -40,8 +40,16 @@ def sheet(titled, columns, notes):
         draw.text((x + width / 2, y + strip / 2), title, INK, font(), anchor="mm")
         page.paste(image, (x, y + strip))
         if title in notes:
-            draw.multiline_text((x + width - 6, y + strip + height - 6), notes[title], (255, 255, 255), font(13), anchor="rd", align="right",
-                                stroke_width=2, stroke_fill=(0, 0, 0))
+            draw.multiline_text(
+                (x + width - 6, y + strip + height - 6),
+                notes[title],
+                (255, 255, 255),
+                font(13),
+                anchor="rd",
+                align="right",
+                stroke_width=2,
+                stroke_fill=(0, 0, 0),
+            )
     return page
 
 
@@ -54,7 +62,10 @@ def with_inset(pixels, detail, frame, corner):
     page, piece = to_image(pixels), to_image(detail)
     draw = PIL.ImageDraw.Draw(page)
     margin = 12
-    x, y = ((room - margin if side else margin) for room, side in zip((page.width - piece.width, page.height - piece.height), corner))
+    x, y = (
+        (room - margin if side else margin)
+        for room, side in zip((page.width - piece.width, page.height - piece.height), corner)
+    )
     left, top, width, height = frame
     draw.rectangle((left, top, left + width, top + height), outline=(255, 255, 255), width=2)
     draw.rectangle((x - 2, y - 2, x + piece.width + 1, y + piece.height + 1), fill=(255, 255, 255))

@@ -72,7 +72,9 @@ class Run:
 
     def tool(self, name, *arguments, expected=(0,)):
         """The result of a program. Another exit code than those expected ends this one."""
-        done = subprocess.run([str(self.bin / f"glint-{name}"), *map(str, arguments), "--json", "--quiet"], stdout=subprocess.PIPE)
+        done = subprocess.run(
+            [str(self.bin / f"glint-{name}"), *map(str, arguments), "--json", "--quiet"], stdout=subprocess.PIPE
+        )
         if done.returncode not in expected:
             sys.exit(f"{self.scene.name}: glint-{name} ended with {done.returncode}")
         return json.loads(done.stdout)["result"] if done.stdout else {}
@@ -89,10 +91,20 @@ class Run:
         path = self.folder / "scene.json"
         path.write_text(json.dumps(asked, indent=1) + "\n")
         start = children_seconds()
-        self.tool("plan", path, "--maps", self.maps, "-o", self.folder / "plan.json", "--make", self.folder / "plan.mk", "--force")
+        self.tool(
+            "plan", path, "--maps", self.maps, "-o", self.folder / "plan.json", "--make", self.folder / "plan.mk", "--force"
+        )
         planned = children_seconds()
         subprocess.run(["rm", "-rf", self.folder / "assets"], check=True)
-        make = ["make", "-s", "-f", self.folder / "plan.mk", f"GLINT_BIN={self.bin}", f"GLINT_MK={ROOT}/pipelines/glint.mk", f"GLINT_OUT={self.folder}/assets"]
+        make = [
+            "make",
+            "-s",
+            "-f",
+            self.folder / "plan.mk",
+            f"GLINT_BIN={self.bin}",
+            f"GLINT_MK={ROOT}/pipelines/glint.mk",
+            f"GLINT_OUT={self.folder}/assets",
+        ]
         subprocess.run(make, check=True)
         return json.loads((self.folder / "plan.json").read_text()), planned - start, children_seconds() - planned
 
@@ -129,7 +141,10 @@ def write_radiance(image, path):
     fraction, exponent = np.frexp(image.max(axis=-1, keepdims=True))
     scale = 256 * fraction / np.maximum(image.max(axis=-1, keepdims=True), 1e-30)
     pixels = np.concatenate([image * scale, exponent + 128], -1)
-    path.write_bytes(f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {image.shape[0]} +X {image.shape[1]}\n".encode() + np.clip(pixels, 0, 255).astype(np.uint8).tobytes())
+    path.write_bytes(
+        f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {image.shape[0]} +X {image.shape[1]}\n".encode()
+        + np.clip(pixels, 0, 255).astype(np.uint8).tobytes()
+    )
 
 
 def render(run, gallery, plan, paper):
@@ -144,7 +159,9 @@ def render(run, gallery, plan, paper):
         drawn = {}
         for title, file in (("planned", asset), ("as in the paper", paper), ("exact", normals)):
             bsdf = scene.bsdf(run.kit, of, file)
-            drawn[title] = gallery.render(f"{scene.name}, {view}, {title}", scene.description(run.kit, view, bsdf, SPP), scene.exposure)
+            drawn[title] = gallery.render(
+                f"{scene.name}, {view}, {title}", scene.description(run.kit, view, bsdf, SPP), scene.exposure
+            )
         for title, picture in drawn.items():
             key = f"{view}: {title}" if len(scene.views) > 1 else title
             error = flip(drawn["exact"].srgb(), picture.srgb())
@@ -165,7 +182,10 @@ def time_text(nanoseconds):
     return f"{nanoseconds / 1e3:.3g} µs" if nanoseconds >= 1e3 else f"{nanoseconds:.3g} ns"
 
 
-TABLE_HEAD = ["| scene | what | error: asked | predicted | actual | file | to prepare | a density |", "|---|---|---|---|---|---|---|---|"]
+TABLE_HEAD = [
+    "| scene | what | error: asked | predicted | actual | file | to prepare | a density |",
+    "|---|---|---|---|---|---|---|---|",
+]
 
 
 def rows_of(entry):
@@ -174,10 +194,12 @@ def rows_of(entry):
     planned, actual, paper = checked["predicted"], checked["actual"], checked["paper"]
     costs = lambda c, made_s: f"{size_text(c['bytes'])} | {made_s:.2g} s | {time_text(c['query_ns'])}"
     times = lambda theirs, ours: f"{theirs / ours:.2g} x" if theirs < 100 * ours else f"{theirs / ours:.0f} x"
-    return [f"| {title} | {checked['asset']} | {checked['tolerance']:g} | {planned['seen']:.2g} | {actual['seen']:.2g} | {costs(actual, entry['make_s'])} |",
-            f"| | as in the paper | | | {paper['seen']:.2g} | {costs(paper, entry['paper_s'])} |",
-            f"| | **saved** | | | | {times(paper['bytes'], actual['bytes'])} | {times(entry['paper_s'], entry['make_s'])} | "
-            f"{times(paper['query_ns'], actual['query_ns'])} |"]
+    return [
+        f"| {title} | {checked['asset']} | {checked['tolerance']:g} | {planned['seen']:.2g} | {actual['seen']:.2g} | {costs(actual, entry['make_s'])} |",
+        f"| | as in the paper | | | {paper['seen']:.2g} | {costs(paper, entry['paper_s'])} |",
+        f"| | **saved** | | | | {times(paper['bytes'], actual['bytes'])} | {times(entry['paper_s'], entry['make_s'])} | "
+        f"{times(paper['query_ns'], actual['query_ns'])} |",
+    ]
 
 
 HEAD = """# Plans of three scenes
@@ -203,10 +225,15 @@ def page(entries, machine, folder=""):
             lines += [f"![{entry['title']}: by the plan, by the paper's setting, and exactly]({folder}{entry['picture']})", ""]
         plan = entry["plan"]["materials"][0]
         asked = plan["question"]
-        lines += [textwrap.fill(f"Footprints of {asked['smallest_texels']:.3g} to {asked['largest_texels']:.3g} texels, the least "
-                                f"{ {'bytes': 'bytes', 'query_ns': 'time of a density', 'preparation_s': 'time to prepare'}[entry['minimise']] }. "
-                                + " ".join(plan["reasons"] + ["Left out: " + text[0].lower() + text[1:] for text in plan["left_out"]])
-                                + f" The plan took {entry['plan_s']:.0f} s of processor time.", WIDTH)]
+        lines += [
+            textwrap.fill(
+                f"Footprints of {asked['smallest_texels']:.3g} to {asked['largest_texels']:.3g} texels, the least "
+                f"{ {'bytes': 'bytes', 'query_ns': 'time of a density', 'preparation_s': 'time to prepare'}[entry['minimise']] }. "
+                + " ".join(plan["reasons"] + ["Left out: " + text[0].lower() + text[1:] for text in plan["left_out"]])
+                + f" The plan took {entry['plan_s']:.0f} s of processor time.",
+                WIDTH,
+            )
+        ]
     return "\n".join(lines) + "\n"
 
 
@@ -223,8 +250,16 @@ def run_scene(scene, arguments, gallery):
         sample_of(scene).write_text(json.dumps(asked, indent=1) + "\n")
     plan, plan_s, make_s = run.plan(asked)
     paper, paper_s = run.make_paper()
-    entry = {"name": scene.name, "title": scene.title, "minimise": scene.minimise, "plan": plan, "plan_s": plan_s, "make_s": make_s, "paper_s": paper_s,
-             "check": run.check()}
+    entry = {
+        "name": scene.name,
+        "title": scene.title,
+        "minimise": scene.minimise,
+        "plan": plan,
+        "plan_s": plan_s,
+        "make_s": make_s,
+        "paper_s": paper_s,
+        "check": run.check(),
+    }
     print("\n".join([*TABLE_HEAD, *rows_of(entry)]), flush=True)
     if gallery:
         picture, entry["flip"] = render(run, gallery, plan, paper)
@@ -244,9 +279,16 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bin", type=pathlib.Path, default="build/bin", help="folder of the programs")
     parser.add_argument("--out", type=pathlib.Path, default="planned", help="folder to make")
-    parser.add_argument("--only", action="append", choices=[scene().name for scene in planned_scenes.SCENES], help="this scene; may be given again")
+    parser.add_argument(
+        "--only",
+        action="append",
+        choices=[scene().name for scene in planned_scenes.SCENES],
+        help="this scene; may be given again",
+    )
     parser.add_argument("--no-pictures", action="store_true", help="without Mitsuba: plans, assets and figures alone")
-    parser.add_argument("--docs", type=pathlib.Path, help="also write DOCS/PLANS.md; with pictures also DOCS/pictures/plans and data-samples/")
+    parser.add_argument(
+        "--docs", type=pathlib.Path, help="also write DOCS/PLANS.md; with pictures also DOCS/pictures/plans and data-samples/"
+    )
     parser.add_argument("--variant", default="llvm_ad_rgb", help="of Mitsuba")
     arguments = parser.parse_args()
     gallery = None

@@ -41,7 +41,12 @@ class PlannedScene:
         parts = self.surroundings(kit)
         parts[self.shape] = parts[self.shape] | {"bsdf": bsdf}
         origin, target, degrees = self.views[view]
-        return {"type": "scene", "integrator": kit.integrator(2), "camera": look_at(origin, target, degrees, size, spp), **parts}
+        return {
+            "type": "scene",
+            "integrator": kit.integrator(2),
+            "camera": look_at(origin, target, degrees, size, spp),
+            **parts,
+        }
 
 
 def along(target, direction, distance):
@@ -58,16 +63,34 @@ CAR_REACH = 56.0  # of the bonnet from the target towards the eye
 def car():
     mesh = car_paint.panel()
     mesh.points, mesh.uvs = [CAR * p for p in mesh.points], [CAR * uv for uv in mesh.uvs]
-    paint = lambda kit, of, asset: kit.metal(of, asset, material="Cu", coat=1.5, coat_alpha=0.007,
-                                             base={"type": "diffuse", "reflectance": rgb(0.45, 0.012, 0.010)}, transparency=0.8)
+    paint = lambda kit, of, asset: kit.metal(
+        of,
+        asset,
+        material="Cu",
+        coat=1.5,
+        coat_alpha=0.007,
+        base={"type": "diffuse", "reflectance": rgb(0.45, 0.012, 0.010)},
+        transparency=0.8,
+    )
     surroundings = lambda kit: {
         "bonnet": kit.mesh("planned-bonnet", mesh),
         "sun": {"type": "directional", "direction": [-0.15, -0.55, -0.82], "irradiance": rgb(2.2, 2.1, 1.95)},
         "sky": envmap(car_paint.ROOM),
     }
     views = {f"{metres} m": (along(CAR_TARGET, CAR_EYE, 100 * metres + CAR_REACH), CAR_TARGET, 5.2) for metres in (20, 2)}
-    return PlannedScene("car", "A car from 20 m to 2 m", "bonnet", ["flakes", "--alpha", 0.16, "--flake-size", 5], 20, 0.02, 0.3, "bytes", views,
-                        surroundings, paint)
+    return PlannedScene(
+        "car",
+        "A car from 20 m to 2 m",
+        "bonnet",
+        ["flakes", "--alpha", 0.16, "--flake-size", 5],
+        20,
+        0.02,
+        0.3,
+        "bytes",
+        views,
+        surroundings,
+        paint,
+    )
 
 
 def ring_band(radius=0.95, thickness=0.10, half_width=0.27):
@@ -80,18 +103,38 @@ def ring_band(radius=0.95, thickness=0.10, half_width=0.27):
 def ring():
     texel_um, size = 5, 2048
     band = lambda kit: kit.mesh("planned-ring", shapes.lathe(ring_band(), size * texel_um * 1e-4, columns=1200))
-    room = studio([(100, 50, 25, 14, 2.0, (1, 1, 1)), (-60, 35, 18, 25, 1.2, (1, 0.95, 0.9)), (200, 30, 14, 30, 1.0, (0.9, 0.95, 1))], floor=0.04, ceiling=0.15)
+    room = studio(
+        [(100, 50, 25, 14, 2.0, (1, 1, 1)), (-60, 35, 18, 25, 1.2, (1, 0.95, 0.9)), (200, 30, 14, 30, 1.0, (0.9, 0.95, 1))],
+        floor=0.04,
+        ceiling=0.15,
+    )
     surroundings = lambda kit: {
         "ring": band(kit),
-        "table": {"type": "rectangle", "to_world": scaled(60), "bsdf": {"type": "diffuse", "reflectance": rgb(0.06, 0.065, 0.075)}},
+        "table": {
+            "type": "rectangle",
+            "to_world": scaled(60),
+            "bsdf": {"type": "diffuse", "reflectance": rgb(0.06, 0.065, 0.075)},
+        },
         "lamp": point_light((-9, 14, 22), 350, (1, 0.97, 0.92)),
         "room": envmap(room),
     }
     gold = lambda kit, of, asset: kit.metal(of, asset, material="Au")
     target = (0.0, -0.15, 0.25)
     views = {"close-up": (along(target, (-0.25, -0.75, 0.62), 14), target, 10)}
-    return PlannedScene("ring", "A ring in close-up", "ring", ["scratches", "--density", 2, "--feature-size", 4, "--slope", 0.3], texel_um, 0.02, 0.2,
-                        "query_ns", views, surroundings, gold, budgets={"bytes": 60e6})
+    return PlannedScene(
+        "ring",
+        "A ring in close-up",
+        "ring",
+        ["scratches", "--density", 2, "--feature-size", 4, "--slope", 0.3],
+        texel_um,
+        0.02,
+        0.2,
+        "query_ns",
+        views,
+        surroundings,
+        gold,
+        budgets={"bytes": 60e6},
+    )
 
 
 def scaled(factor):
@@ -111,11 +154,30 @@ def silk():
         "floor": kit.mesh("backdrop", shapes.backdrop()) | {"bsdf": {"type": "diffuse", "reflectance": rgb(0.3)}},
         "sky": envmap(sky_image()),
     }
-    thread = lambda kit, of, asset: kit.metal(of, asset, material="none", specular_reflectance=rgb(0.55, 0.16, 0.20),
-                                              base={"type": "diffuse", "reflectance": rgb(0.30, 0.03, 0.05)}, transparency=0.4)
+    thread = lambda kit, of, asset: kit.metal(
+        of,
+        asset,
+        material="none",
+        specular_reflectance=rgb(0.55, 0.16, 0.20),
+        base={"type": "diffuse", "reflectance": rgb(0.30, 0.03, 0.05)},
+        transparency=0.4,
+    )
     views = {"a cloth": (along(cloth.TARGET, cloth.TOWARDS, cloth.DISTANCE), cloth.TARGET, 26)}
-    return PlannedScene("cloth", "Silk under a sky", "cloth", ["silk", "--feature-size", 16], 15, 0.05, 0.2, "bytes", views, surroundings, thread,
-                        exposure=1.5, sky=True)
+    return PlannedScene(
+        "cloth",
+        "Silk under a sky",
+        "cloth",
+        ["silk", "--feature-size", 16],
+        15,
+        0.05,
+        0.2,
+        "bytes",
+        views,
+        surroundings,
+        thread,
+        exposure=1.5,
+        sky=True,
+    )
 
 
 SCENES = (car, ring, silk)

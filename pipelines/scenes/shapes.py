@@ -81,8 +81,10 @@ class Mesh:
         table = np.empty(len(faces), [("n", "u1"), ("i", "<i4", 3)])
         table["n"], table["i"] = 3, faces
         names = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz", "u", "v"))
-        header = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n{names}"
-                  f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n")
+        header = (
+            f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n{names}"
+            f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+        )
         path.write_bytes(header.encode() + vertices.tobytes() + table.tobytes())
         return path
 
@@ -94,7 +96,9 @@ def lathe(profile, map_cm, columns=384, mesh=None):
     """
     profile = np.asarray(profile, float)
     angle = np.linspace(0, 2 * np.pi, columns)
-    points = np.stack([profile[:, :1] * np.cos(angle), profile[:, :1] * np.sin(angle), np.repeat(profile[:, 1:], columns, 1)], -1)
+    points = np.stack(
+        [profile[:, :1] * np.cos(angle), profile[:, :1] * np.sin(angle), np.repeat(profile[:, 1:], columns, 1)], -1
+    )
     round_cm = max(1, round(2 * np.pi * np.quantile(profile[:, 0], 0.75) / map_cm)) * map_cm
     uv = np.stack(np.broadcast_arrays(angle / (2 * np.pi) * round_cm, arc_length(profile)[:, None]), -1)
     return (mesh or Mesh()).grid(points, uv, closed=True)
@@ -111,7 +115,11 @@ def tube(centres, radii, columns=64, mesh=None, up=(0, 1, 0)):
     side = unit(np.cross(tangent, np.broadcast_to(np.asarray(up, float), tangent.shape)))
     top = np.cross(side, tangent)
     angle = np.linspace(0, 2 * np.pi, columns)
-    points = (centres[:, None] + side[:, None] * (radii[:, :1] * np.cos(angle))[..., None] + top[:, None] * (radii[:, 1:] * np.sin(angle))[..., None])
+    points = (
+        centres[:, None]
+        + side[:, None] * (radii[:, :1] * np.cos(angle))[..., None]
+        + top[:, None] * (radii[:, 1:] * np.sin(angle))[..., None]
+    )
     # The section turns from side to top, against du x dv out of the tube.
     return (mesh or Mesh()).grid(points, closed=True, flip=bool(np.sum(np.cross(side, top) * tangent) < 0))
 
@@ -148,7 +156,9 @@ def bent_quad(width=20.0, depth=14.0, bend=5.0, rows=400, columns=400):
 def backdrop(half=120.0, radius=40.0, height=120.0, front=120.0):
     """A floor that bends into a wall behind, without an edge."""
     angle = np.linspace(-np.pi / 2, 0, 48)
-    profile = np.vstack([[-front, 0], np.stack([half - radius + radius * np.cos(angle), radius + radius * np.sin(angle)], 1), [half, height]])
+    profile = np.vstack(
+        [[-front, 0], np.stack([half - radius + radius * np.cos(angle), radius + radius * np.sin(angle)], 1), [half, height]]
+    )
     x = np.linspace(-4 * half, 4 * half, 8)
     points = np.stack(np.broadcast_arrays(x, profile[:, :1], profile[:, 1:]), -1)
     return Mesh().grid(points)

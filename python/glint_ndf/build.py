@@ -18,8 +18,14 @@ from .errors import ArgumentError
 Progress = Callable[[int, int], None]
 
 
-def _made(function: str, options: dict[str, Any], source: Asset | np.ndarray | None, threads: int, progress: Progress | None,
-          *arrays: np.ndarray) -> Asset:
+def _made(
+    function: str,
+    options: dict[str, Any],
+    source: Asset | np.ndarray | None,
+    threads: int,
+    progress: Progress | None,
+    *arrays: np.ndarray,
+) -> Asset:
     """Runs a builder of the extension module into a temporary file."""
     options = {name: _checked(name, value) for name, value in options.items()}
     threads = _checked("threads", threads, least=0)
@@ -41,7 +47,7 @@ def _made(function: str, options: dict[str, Any], source: Asset | np.ndarray | N
     return asset
 
 
-def _checked(name: str, value: Any, least: int = -2**31) -> Any:
+def _checked(name: str, value: Any, least: int = -(2**31)) -> Any:
     """A number as Python has it. Whole numbers must fit the library's: 32 bits, seeds 64."""
     if isinstance(value, np.generic):
         value = value.item()
@@ -54,14 +60,29 @@ def _checked(name: str, value: Any, least: int = -2**31) -> Any:
 
 def _expect(asset: Asset, name: str) -> Asset:
     if not isinstance(asset, Asset):
-        raise ArgumentError(f"{name}: is of type {type(asset).__name__}; give an Asset, from a builder or from glint_ndf.load(path)")
+        raise ArgumentError(
+            f"{name}: is of type {type(asset).__name__}; give an Asset, from a builder or from glint_ndf.load(path)"
+        )
     return asset
 
 
-def ingest(image, *, kind: str = "normal", to: str = "normals", convention: str = "opengl", encoding: str = "auto",
-           dequantize: str = "auto", boundary: str = "wrap", fix_invalid: bool = False, allow_constant: bool = False,
-           height_scale: float = 1.0, no_data: float | None = None, texel_size_um: float = 0.0, seed: int = 1,
-           bottom_row_first: bool = False) -> Asset:
+def ingest(
+    image,
+    *,
+    kind: str = "normal",
+    to: str = "normals",
+    convention: str = "opengl",
+    encoding: str = "auto",
+    dequantize: str = "auto",
+    boundary: str = "wrap",
+    fix_invalid: bool = False,
+    allow_constant: bool = False,
+    height_scale: float = 1.0,
+    no_data: float | None = None,
+    texel_size_um: float = 0.0,
+    seed: int = 1,
+    bottom_row_first: bool = False,
+) -> Asset:
     """Makes an asset of kind normals or heights of an image in memory, as ``glint-ingest`` does of a file.
 
     Args:
@@ -96,17 +117,44 @@ def ingest(image, *, kind: str = "normal", to: str = "normals", convention: str 
             raise ArgumentError(f"image: of type {pixels.dtype}; give uint8, uint16 or floats")
         pixels = pixels.astype(np.float32, copy=False)
     pixels = np.ascontiguousarray(pixels if bottom_row_first else pixels[::-1])
-    options = dict(kind=kind, to=to, convention=convention, encoding=encoding, dequantize=dequantize, boundary=boundary,
-                   fix_invalid=fix_invalid, allow_constant=allow_constant, height_scale=height_scale, no_data=no_data, seed=seed,
-                   texel_size_um=texel_size_um)
+    options = dict(
+        kind=kind,
+        to=to,
+        convention=convention,
+        encoding=encoding,
+        dequantize=dequantize,
+        boundary=boundary,
+        fix_invalid=fix_invalid,
+        allow_constant=allow_constant,
+        height_scale=height_scale,
+        no_data=no_data,
+        seed=seed,
+        texel_size_um=texel_size_um,
+    )
     return _made("ingest", options, pixels, 0, None, pixels)
 
 
-def synth(kind: str, width: int = 512, height: int | None = None, *, seed: int = 1, heights: bool = False,
-          texel_size_um: float = 0.0, alpha: float | None = None, gamma: float | None = None, correlation: float | None = None,
-          streak: float | None = None, feature: float | None = None, density: float | None = None, slope: float | None = None,
-          depth: float | None = None, profile: str | None = None, flake_size_uv: float | None = None,
-          roughness: float | None = None, coverage: float | None = None) -> Asset:
+def synth(
+    kind: str,
+    width: int = 512,
+    height: int | None = None,
+    *,
+    seed: int = 1,
+    heights: bool = False,
+    texel_size_um: float = 0.0,
+    alpha: float | None = None,
+    gamma: float | None = None,
+    correlation: float | None = None,
+    streak: float | None = None,
+    feature: float | None = None,
+    density: float | None = None,
+    slope: float | None = None,
+    depth: float | None = None,
+    profile: str | None = None,
+    flake_size_uv: float | None = None,
+    roughness: float | None = None,
+    coverage: float | None = None,
+) -> Asset:
     """Makes a periodic procedural map, as ``glint-synth``. Options that are None have values typical of the kind.
 
     Args:
@@ -120,19 +168,49 @@ def synth(kind: str, width: int = 512, height: int | None = None, *, seed: int =
         profile: of a grating, "sine" or "blazed".
         flake_size_uv, roughness, coverage: of flake2d, as MaterialX's node has them; the size in widths of the map.
     """
-    numbers = dict(alpha=alpha, gamma=gamma, correlation=correlation, streak=streak, feature=feature, density=density, slope=slope,
-                   depth=depth, flake_size_uv=flake_size_uv, roughness=roughness, coverage=coverage)
+    numbers = dict(
+        alpha=alpha,
+        gamma=gamma,
+        correlation=correlation,
+        streak=streak,
+        feature=feature,
+        density=density,
+        slope=slope,
+        depth=depth,
+        flake_size_uv=flake_size_uv,
+        roughness=roughness,
+        coverage=coverage,
+    )
     given = {name: _number(name, value) for name, value in numbers.items() if value is not None}
     if profile is not None:
         given["profile"] = profile
-    options = dict(kind=kind, width=width, height=width if height is None else height, seed=seed, heights=heights,
-                   texel_size_um=texel_size_um, given=given)
+    options = dict(
+        kind=kind,
+        width=width,
+        height=width if height is None else height,
+        seed=seed,
+        heights=heights,
+        texel_size_um=texel_size_um,
+        given=given,
+    )
     return _made("synth", options, None, 0, None)
 
 
-def pyramid(normals: Asset, *, stride: float = 32.0, overlap: float = 2 ** 0.5, resolution: int | str = 256,
-            sigma_r: float = 0.005, surface: str = "flat", boundary: str = "wrap", levels: int | str = "auto",
-            precision: str = "half", keep_normals: str = "none", threads: int = 0, progress: Progress | None = None) -> Asset:
+def pyramid(
+    normals: Asset,
+    *,
+    stride: float = 32.0,
+    overlap: float = 2**0.5,
+    resolution: int | str = 256,
+    sigma_r: float = 0.005,
+    surface: str = "flat",
+    boundary: str = "wrap",
+    levels: int | str = "auto",
+    precision: str = "half",
+    keep_normals: str = "none",
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> Asset:
     """Computes the NDF images of footprints of every size and position (Deng 2022, section 4.1), as ``glint-pyramid``.
 
     Args:
@@ -146,15 +224,34 @@ def pyramid(normals: Asset, *, stride: float = 32.0, overlap: float = 2 ** 0.5, 
         keep_normals: "i16" or "f32": the asset keeps the normals of the map, which answer footprints below the finest level;
             "none": it does not. `compress` keeps what its pyramid keeps.
     """
-    options = dict(stride=stride, overlap=overlap, resolution=_auto("resolution", resolution), sigma_r=sigma_r, surface=surface,
-                   boundary=boundary, levels=_auto("levels", levels), precision=precision, keep_normals=keep_normals)
+    options = dict(
+        stride=stride,
+        overlap=overlap,
+        resolution=_auto("resolution", resolution),
+        sigma_r=sigma_r,
+        surface=surface,
+        boundary=boundary,
+        levels=_auto("levels", levels),
+        precision=precision,
+        keep_normals=keep_normals,
+    )
     return _made("pyramid", options, _expect(normals, "normals"), threads, progress)
 
 
-def wave_pyramid(heights: Asset, *, stride: float = 32.0, overlap: float = 2 ** 0.5, resolution: int = 256, levels: int | str = "auto",
-                 precision: str = "half", coherence_um: float = 10.0,
-                 wavelengths: int | Sequence[float] = 8, spectral: bool = False,
-                 threads: int = 0, progress: Progress | None = None) -> Asset:
+def wave_pyramid(
+    heights: Asset,
+    *,
+    stride: float = 32.0,
+    overlap: float = 2**0.5,
+    resolution: int = 256,
+    levels: int | str = "auto",
+    precision: str = "half",
+    coherence_um: float = 10.0,
+    wavelengths: int | Sequence[float] = 8,
+    spectral: bool = False,
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> Asset:
     """Computes NDF images under wave optics (Deng 2022, Eq. 3 and 4), as ``glint-pyramid --optics wave``.
 
     Args:
@@ -163,16 +260,37 @@ def wave_pyramid(heights: Asset, *, stride: float = 32.0, overlap: float = 2 ** 
         wavelengths: a number of wavelengths over the visible range, or a rising list of them in micrometres.
         spectral: a channel for each wavelength instead of X, Y and Z.
     """
-    waves = _glint.even_wavelengths(wavelengths) if isinstance(wavelengths, (int, np.integer)) else [float(w) for w in wavelengths]
-    options = dict(stride=stride, overlap=overlap, resolution=resolution, levels=_auto("levels", levels), precision=precision,
-                   coherence_um=coherence_um, wavelengths_um=waves, spectral=spectral)
+    waves = (
+        _glint.even_wavelengths(wavelengths) if isinstance(wavelengths, (int, np.integer)) else [float(w) for w in wavelengths]
+    )
+    options = dict(
+        stride=stride,
+        overlap=overlap,
+        resolution=resolution,
+        levels=_auto("levels", levels),
+        precision=precision,
+        coherence_um=coherence_um,
+        wavelengths_um=waves,
+        spectral=spectral,
+    )
     return _made("wave_pyramid", options, _expect(heights, "heights"), threads, progress)
 
 
-def compress(ndf_pyramid: Asset, *, method: str = "auto", rank: int | None = None, tolerance: float | None = None,
-             metric: str = "seen", quantize: str = "auto", spots: bool = True, regions: int | str = "auto",
-             min_improvement: float = 1e-4, max_iterations: int = 500, threads: int = 0,
-             progress: Progress | None = None) -> Asset:
+def compress(
+    ndf_pyramid: Asset,
+    *,
+    method: str = "auto",
+    rank: int | None = None,
+    tolerance: float | None = None,
+    metric: str = "seen",
+    quantize: str = "auto",
+    spots: bool = True,
+    regions: int | str = "auto",
+    min_improvement: float = 1e-4,
+    max_iterations: int = 500,
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> Asset:
     """Compresses a pyramid (Deng 2022, section 4.2), as ``glint-compress``.
 
     Args:
@@ -190,14 +308,29 @@ def compress(ndf_pyramid: Asset, *, method: str = "auto", rank: int | None = Non
     """
     if rank is not None and tolerance is not None:
         raise ArgumentError("rank and tolerance: both are given; give one of them")
-    options = dict(method=method, rank=16 if rank is None else rank, tolerance=0.0 if tolerance is None else tolerance, metric=metric,
-                   quantize=quantize, spots=spots, regions=_auto("regions", regions), min_improvement=min_improvement,
-                   max_iterations=max_iterations)
+    options = dict(
+        method=method,
+        rank=16 if rank is None else rank,
+        tolerance=0.0 if tolerance is None else tolerance,
+        metric=metric,
+        quantize=quantize,
+        spots=spots,
+        regions=_auto("regions", regions),
+        min_improvement=min_improvement,
+        max_iterations=max_iterations,
+    )
     return _made("compress", options, _expect(ndf_pyramid, "ndf_pyramid"), threads, progress)
 
 
-def bin_map(normals: Asset, *, alpha: float = 0.0070710678, alpha_max: float = 0.0, leaf_size: int = 16, threads: int = 0,
-            progress: Progress | None = None) -> Asset:
+def bin_map(
+    normals: Asset,
+    *,
+    alpha: float = 0.0070710678,
+    alpha_max: float = 0.0,
+    leaf_size: int = 16,
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> Asset:
     """Lists the texels of a map by the direction of their normals (Atanasov 2021), as ``glint-binmap``.
 
     Args:
@@ -208,23 +341,52 @@ def bin_map(normals: Asset, *, alpha: float = 0.0070710678, alpha_max: float = 0
     return _made("bin_map", options, _expect(normals, "normals"), threads, progress)
 
 
-def histogram(normals: Asset, *, theta_bins: int = 9, phi_bins: int = 32, stride: int = 8, threads: int = 0,
-              progress: Progress | None = None) -> Asset:
+def histogram(
+    normals: Asset,
+    *,
+    theta_bins: int = 9,
+    phi_bins: int = 32,
+    stride: int = 8,
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> Asset:
     """Accumulates histograms of normals (Gamboa 2018, section 4.1), as ``glint-sat``."""
     options = dict(theta_bins=theta_bins, phi_bins=phi_bins, stride=stride)
     return _made("histogram", options, _expect(normals, "normals"), threads, progress)
 
 
-def moments(map: Asset, *, finest_level: int = 1, boundary: str = "wrap", gradient: str = "central", threads: int = 0,
-            progress: Progress | None = None) -> Asset:
+def moments(
+    map: Asset,
+    *,
+    finest_level: int = 1,
+    boundary: str = "wrap",
+    gradient: str = "central",
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> Asset:
     """Filters the moments of the slopes of a map of normals or heights (LEAN mapping), as ``glint-moments``."""
     options = dict(finest_level=finest_level, boundary=boundary, gradient=gradient)
     return _made("moments", options, _expect(map, "map"), threads, progress)
 
 
-def displace(heights: Asset, *, factors: Sequence[int] = (16,), base: str = "diffuse", albedo: float = 0.8, alpha: float = 0.0,
-             eta: float = 1.0, k: float = 0.0, lobes: int = 6, angular: int = 15, spatial: int = 4, scale_tolerance: float = 0.0, bounces: int = 64,
-             seed: int = 1, threads: int = 0, progress: Progress | None = None) -> Asset:
+def displace(
+    heights: Asset,
+    *,
+    factors: Sequence[int] = (16,),
+    base: str = "diffuse",
+    albedo: float = 0.8,
+    alpha: float = 0.0,
+    eta: float = 1.0,
+    k: float = 0.0,
+    lobes: int = 6,
+    angular: int = 15,
+    spatial: int = 4,
+    scale_tolerance: float = 0.0,
+    bounces: int = 64,
+    seed: int = 1,
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> Asset:
     """Downsamples a displacement map so that it looks the same from afar (Wu 2019), as ``glint-displace``.
 
     Args:
@@ -233,8 +395,20 @@ def displace(heights: Asset, *, factors: Sequence[int] = (16,), base: str = "dif
         base: "diffuse" with `albedo`, or "ggx" with roughness `alpha` and a conductor's `eta` and `k`.
         scale_tolerance: terms are added to the scaling T S until they miss at most this part of it; 0: T S alone.
     """
-    options = dict(factors=list(factors), base=base, albedo=albedo, alpha=alpha, eta=eta, k=k, lobes=lobes, angular=angular,
-                   spatial=spatial, scale_tolerance=scale_tolerance, bounces=bounces, seed=seed)
+    options = dict(
+        factors=list(factors),
+        base=base,
+        albedo=albedo,
+        alpha=alpha,
+        eta=eta,
+        k=k,
+        lobes=lobes,
+        angular=angular,
+        spatial=spatial,
+        scale_tolerance=scale_tolerance,
+        bounces=bounces,
+        seed=seed,
+    )
     return _made("displace", options, _expect(heights, "heights"), threads, progress)
 
 

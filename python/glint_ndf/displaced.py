@@ -61,11 +61,21 @@ class Displaced:
         inward, outward = members(wi, 3, "wi"), members(wo, 3, "wo")
         batch = Batch(levels, centre, inward, outward)
         reflected, pdf = batch.answers(3), batch.answers()
-        self._handle.evaluate(_word("variant", variant, _VARIANTS), batch.rows(levels), batch.rows(centre), batch.rows(inward),
-                              batch.rows(outward), reflected, pdf, threads)
+        self._handle.evaluate(
+            _word("variant", variant, _VARIANTS),
+            batch.rows(levels),
+            batch.rows(centre),
+            batch.rows(inward),
+            batch.rows(outward),
+            reflected,
+            pdf,
+            threads,
+        )
         return batch.shaped(reflected), batch.shaped(pdf)
 
-    def sample(self, level, uv, wo, xi, *, variant: str = "full", threads: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def sample(
+        self, level, uv, wo, xi, *, variant: str = "full", threads: int = 0
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Draws wi for views wo.
 
         Returns:
@@ -75,8 +85,17 @@ class Displaced:
         outward, random = members(wo, 3, "wo"), members(xi, 2, "xi")
         batch = Batch(levels, centre, outward, random)
         wi, weight, pdf = batch.answers(3), batch.answers(3), batch.answers()
-        self._handle.sample(_word("variant", variant, _VARIANTS), batch.rows(levels), batch.rows(centre), batch.rows(outward),
-                            batch.rows(random), wi, weight, pdf, threads)
+        self._handle.sample(
+            _word("variant", variant, _VARIANTS),
+            batch.rows(levels),
+            batch.rows(centre),
+            batch.rows(outward),
+            batch.rows(random),
+            wi,
+            weight,
+            pdf,
+            threads,
+        )
         return batch.shaped(wi), batch.shaped(weight), batch.shaped(pdf)
 
     def __repr__(self) -> str:

@@ -59,6 +59,6 @@ def error_of(code: int, rule: str, path: str, message: str) -> GlintError:
     The library's messages name options of the tools, as --sigma-r or glint-ingest --fix-invalid: here they are arguments.
     """
     named = message.startswith(f"{path}: ") if path else False
-    head, text = (path, message[len(path):]) if named else ("", message)
+    head, text = (path, message[len(path) :]) if named else ("", message)
     text = re.sub(r"(^|(?<=[\s(]))(glint-[a-z]+ )?--([a-z][a-z-]*)", lambda option: option[3].replace("-", "_"), text)
     return _CLASSES.get(code, GlintError)(head + text, rule, path)

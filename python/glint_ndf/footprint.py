@@ -56,8 +56,9 @@ def from_cone(width, direction, texels_per_unit) -> np.ndarray:
     return batch.shaped(out)
 
 
-def half_vector_spread(wi, wo, dn_dx, dn_dy, dwo_dx=(0, 0, 0), dwo_dy=(0, 0, 0),
-                       filter_sigma: float = PIXEL_FILTER_SIGMA) -> np.ndarray:
+def half_vector_spread(
+    wi, wo, dn_dx, dn_dy, dwo_dx=(0, 0, 0), dwo_dy=(0, 0, 0), filter_sigma: float = PIXEL_FILTER_SIGMA
+) -> np.ndarray:
     """Half widths of the box of half vectors that a pixel sees where the surface's own normal turns under it.
 
     Args:
@@ -70,8 +71,10 @@ def half_vector_spread(wi, wo, dn_dx, dn_dy, dwo_dx=(0, 0, 0), dwo_dy=(0, 0, 0),
     Returns:
         [..., 2] float32, for the argument `spread` of queries; 0 where directions are below the horizon.
     """
-    vectors = [members(v, 3, name) for v, name in ((wi, "wi"), (wo, "wo"), (dn_dx, "dn_dx"), (dn_dy, "dn_dy"), (dwo_dx, "dwo_dx"),
-                                                   (dwo_dy, "dwo_dy"))]
+    vectors = [
+        members(v, 3, name)
+        for v, name in ((wi, "wi"), (wo, "wo"), (dn_dx, "dn_dx"), (dn_dy, "dn_dy"), (dwo_dx, "dwo_dx"), (dwo_dy, "dwo_dy"))
+    ]
     batch = Batch(*vectors)
     out = batch.answers(2)
     _glint.spread_of(*(batch.rows(v) for v in vectors), float(filter_sigma), out)

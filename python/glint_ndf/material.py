@@ -163,7 +163,11 @@ def _check_members(value: dict[str, Any], rule: dict[str, Any], root: dict[str, 
                 _refuse(name, where or "the description", f"has '{member}' and lacks '{other}'")
     excluded = rule.get("not", {}).get("required", ())
     if excluded and all(member in value for member in excluded):
-        _refuse(name, where or "the description", f"has {' and '.join(map(repr, excluded))}, which exclude each other; give one of them")
+        _refuse(
+            name,
+            where or "the description",
+            f"has {' and '.join(map(repr, excluded))}, which exclude each other; give one of them",
+        )
     for member, content in value.items():
         if member not in known:
             if rule.get("additionalProperties", True):

@@ -132,7 +132,9 @@ class Ndf:
         self._handle.mean(p.of(batch), batch.rows(boxes), out, threads)
         return batch.shaped(out)
 
-    def sample(self, uv, xi, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    def sample(
+        self, uv, xi, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Draws half vectors in proportion to the density.
 
         Args:
@@ -160,8 +162,10 @@ class Ndf:
         wants = {"mirror": (), "dielectric": ("eta",), "conductor": ("eta", "k")}[fresnel]
         for name, value in (("eta", eta), ("k", k)):
             if (value is not None) != (name in wants):
-                raise ArgumentError(f"{name}: {'missing' if value is None else 'given'}, with fresnel=\"{fresnel}\", which takes "
-                                    f"{' and '.join(wants) or 'neither eta nor k'}")
+                raise ArgumentError(
+                    f"{name}: {'missing' if value is None else 'given'}, with fresnel=\"{fresnel}\", which takes "
+                    f"{' and '.join(wants) or 'neither eta nor k'}"
+                )
         handle = _glint.make_brdf(self._handle, model, _three("eta", eta), _three("k", k), _word("facets", facets, _FACETS))
         return Brdf(handle, self)
 
@@ -191,7 +195,9 @@ class Brdf:
         # On a plane without end the whole parts of uv count, and batches of doubles drop them.
         return FootprintArrays(uv, sigma, covariance, box, spread, keep_whole_parts=self.ndf.endless)
 
-    def evaluate(self, uv, wi, wo, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    def evaluate(
+        self, uv, wi, wo, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The BRDF and the density of its samples.
 
         Returns:
@@ -205,8 +211,9 @@ class Brdf:
         self._handle.evaluate(p.of(batch), batch.rows(inward), batch.rows(outward), f, pdf, threads)
         return batch.shaped(f), batch.shaped(pdf)
 
-    def sample(self, uv, wo, xi, *, sigma=None, covariance=None, box=None, spread=None,
-               threads: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def sample(
+        self, uv, wo, xi, *, sigma=None, covariance=None, box=None, spread=None, threads: int = 0
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Draws wi for views wo.
 
         Returns:
@@ -221,8 +228,9 @@ class Brdf:
         self._handle.sample(p.of(batch), batch.rows(outward), batch.rows(random), wi, weight, pdf, threads)
         return batch.shaped(wi), batch.shaped(weight), batch.shaped(pdf)
 
-    def lobes(self, uv, wo, axes, sharpness, amplitudes, *, sigma=None, covariance=None, box=None, cells: int = 3,
-              threads: int = 0) -> np.ndarray:
+    def lobes(
+        self, uv, wo, axes, sharpness, amplitudes, *, sigma=None, covariance=None, box=None, cells: int = 3, threads: int = 0
+    ) -> np.ndarray:
         """Radiance towards wo from lobes of light, without sampling: D is averaged over the half vectors of each lobe.
 
         A lobe is a spherical Gaussian, amplitude exp(sharpness (w . axis - 1)) from each direction w (Deng 2022, section 5.4).
@@ -257,17 +265,31 @@ def _lobe_members(axes: np.ndarray, sharpness, amplitudes: np.ndarray) -> list[n
     try:
         shape = np.broadcast_shapes(axes.shape[:-1], sharp.shape[:-1], amplitudes.shape[:-1])
     except ValueError:
-        raise ArgumentError(f"axes, sharpness and amplitudes do not broadcast: {axes.shape}, {sharp.shape[:-1]} and "
-                            f"{amplitudes.shape}") from None
+        raise ArgumentError(
+            f"axes, sharpness and amplitudes do not broadcast: {axes.shape}, {sharp.shape[:-1]} and " f"{amplitudes.shape}"
+        ) from None
     if not shape:
         raise ArgumentError("axes, sharpness and amplitudes: one of them must have a dimension of lobes, [..., lobes, 3]")
     return [np.broadcast_to(a, shape + a.shape[-1:]) for a in (axes, sharp, amplitudes)]
 
 
-def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: PathLike | Asset | None = None, *,
-         surface: str = "flat", boundary: str = "wrap", sigma_r: float = 0.005, alpha: float = 0.0,
-         slant_tolerance: float = 0.06, gaussian_boxes: int = 1, footprint_parts: int = 32, interpolation: str = "footprint",
-         pixels: str = "smooth", estimator: str = "exact", bins: str = "lobes", verify_hashes: bool = False) -> Ndf:
+def open(
+    source: PathLike | bytes | bytearray | memoryview | Asset,
+    normals: PathLike | Asset | None = None,
+    *,
+    surface: str = "flat",
+    boundary: str = "wrap",
+    sigma_r: float = 0.005,
+    alpha: float = 0.0,
+    slant_tolerance: float = 0.06,
+    gaussian_boxes: int = 1,
+    footprint_parts: int = 32,
+    interpolation: str = "footprint",
+    pixels: str = "smooth",
+    estimator: str = "exact",
+    bins: str = "lobes",
+    verify_hashes: bool = False,
+) -> Ndf:
     """Opens an asset that holds a distribution of normals. The file is checked, and then mapped. Options of other kinds are ignored.
 
     Args:
@@ -295,11 +317,19 @@ def open(source: PathLike | bytes | bytearray | memoryview | Asset, normals: Pat
     asset = source if isinstance(source, Asset) else _asset_of_bytes(source)
     path = asset.path if asset is not None else os.fspath(source)
     options: dict[str, Any] = dict(
-        sigma_r=sigma_r, surface=_word("surface", surface, _SURFACES), boundary=_word("boundary", boundary, _BOUNDARIES),
-        alpha=alpha, slant_tolerance=_SLANT_EXACT if slant_tolerance == 0 else slant_tolerance, gaussian_boxes=gaussian_boxes,
-        footprint_parts=footprint_parts, interpolation=_word("interpolation", interpolation, _INTERPOLATIONS),
-        pixels=_word("pixels", pixels, _PIXELS), estimator=_word("estimator", estimator, _ESTIMATORS),
-        bins=_word("bins", bins, _BINS), verify_hashes=verify_hashes)
+        sigma_r=sigma_r,
+        surface=_word("surface", surface, _SURFACES),
+        boundary=_word("boundary", boundary, _BOUNDARIES),
+        alpha=alpha,
+        slant_tolerance=_SLANT_EXACT if slant_tolerance == 0 else slant_tolerance,
+        gaussian_boxes=gaussian_boxes,
+        footprint_parts=footprint_parts,
+        interpolation=_word("interpolation", interpolation, _INTERPOLATIONS),
+        pixels=_word("pixels", pixels, _PIXELS),
+        estimator=_word("estimator", estimator, _ESTIMATORS),
+        bins=_word("bins", bins, _BINS),
+        verify_hashes=verify_hashes,
+    )
     of_texels = None if normals is None else normals.path if isinstance(normals, Asset) else os.fspath(normals)
     return Ndf(_glint.open_ndf(path, of_texels, **options), asset, path)
 

@@ -7,10 +7,27 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-LABELS = {"pyramid": "pyramid", "cp16": "cp", "cp32": "cp", "tucker-tolerance": "tucker", "pca-tolerance": "pca", "moments": "moments"}
+LABELS = {
+    "pyramid": "pyramid",
+    "cp16": "cp",
+    "cp32": "cp",
+    "tucker-tolerance": "tucker",
+    "pca-tolerance": "pca",
+    "moments": "moments",
+}
 # Of methods, the same in every chart.
-COLOURS = {"pyramid": "C0", "cp": "C1", "tucker": "C2", "pca": "C3", "bin map": "C4", "histograms": "C5", "moments": "C6", "brute force": "0.5", "light": "C8",
-           "displacement": "C9"}
+COLOURS = {
+    "pyramid": "C0",
+    "cp": "C1",
+    "tucker": "C2",
+    "pca": "C3",
+    "bin map": "C4",
+    "histograms": "C5",
+    "moments": "C6",
+    "brute force": "0.5",
+    "light": "C8",
+    "displacement": "C9",
+}
 MARKERS = ("o", "s", "^", "D", "v")  # of maps
 
 
@@ -58,9 +75,19 @@ def light_error_chart(light, path):
     styles = dict(zip(sorted({row["sigma_r"] for row in light["errors_by_order"]}), (":", "-", "--")))
     for k, name in enumerate(lights):
         for sigma, style in styles.items():
-            rows = [row for row in light["errors_by_order"] if row["light"] == name and row["sigma_r"] == sigma and row["order"] >= 5]
-            axis.plot([row["order"] for row in rows], [row["none"] for row in rows], "o" + style, color=f"C{k}", markersize=4,
-                      label=f"{name.replace('_', ' ')}, roughness {sigma:.2g}")
+            rows = [
+                row
+                for row in light["errors_by_order"]
+                if row["light"] == name and row["sigma_r"] == sigma and row["order"] >= 5
+            ]
+            axis.plot(
+                [row["order"] for row in rows],
+                [row["none"] for row in rows],
+                "o" + style,
+                color=f"C{k}",
+                markersize=4,
+                label=f"{name.replace('_', ' ')}, roughness {sigma:.2g}",
+            )
     finish(figure, axis, path, xlabel="order", ylabel="relative RMS error against quadrature")
     return path.name
 
@@ -74,9 +101,17 @@ def light_time_chart(light, path):
         errors = [row["nearest"]["error"] for row in rows]
         label = name.replace("_", " ")
         axis.plot(errors, [row["nearest"]["us"] for row in rows], "o-", color=f"C{k}", label=f"{label}, harmonics")
-        axis.plot(errors, [row["nearest"]["monte_carlo_us"] for row in rows], "x--", color=f"C{k}", label=f"{label}, Monte Carlo")
+        axis.plot(
+            errors, [row["nearest"]["monte_carlo_us"] for row in rows], "x--", color=f"C{k}", label=f"{label}, Monte Carlo"
+        )
         for row in rows:
-            axis.annotate(f"{row['order']}", (row["nearest"]["error"], row["nearest"]["us"]), textcoords="offset points", xytext=(5, 4), fontsize=7)
+            axis.annotate(
+                f"{row['order']}",
+                (row["nearest"]["error"], row["nearest"]["us"]),
+                textcoords="offset points",
+                xytext=(5, 4),
+                fontsize=7,
+            )
     finish(figure, axis, path, xlabel="relative RMS error against quadrature", ylabel="microseconds of one shading point")
     return path.name
 
@@ -85,12 +120,26 @@ def stride_chart(rows, path):
     """Bytes of accumulated histograms against the time of a query, along the strides of their tables."""
     figure, axis = plt.subplots(figsize=(6, 4))
     values = {row["figure"]: row["value"] for row in rows}
-    strides = {int(match[1]) for figure_name in values if (match := re.fullmatch(r"bytes of histograms, stride (\d+), \S+", figure_name))}
+    strides = {
+        int(match[1])
+        for figure_name in values
+        if (match := re.fullmatch(r"bytes of histograms, stride (\d+), \S+", figure_name))
+    }
     names = sorted({figure_name.split(", ")[2] for figure_name in values if figure_name.startswith("bytes of histograms")})
     for k, name in enumerate(names):
         for size, style in ((64, "o:"), (256, "s-"), (1024, "^--")):
-            points = [(values[f"bytes of histograms, stride {s}, {name}"], values[f"histogram of {size}^2, stride {s}, {name}"], s) for s in sorted(strides)]
-            axis.plot([p[0] for p in points], [p[1] for p in points], style, color=f"C{k}", markersize=5, label=f"{name}, {size}$^2$ texels")
+            points = [
+                (values[f"bytes of histograms, stride {s}, {name}"], values[f"histogram of {size}^2, stride {s}, {name}"], s)
+                for s in sorted(strides)
+            ]
+            axis.plot(
+                [p[0] for p in points],
+                [p[1] for p in points],
+                style,
+                color=f"C{k}",
+                markersize=5,
+                label=f"{name}, {size}$^2$ texels",
+            )
             if size == 256:
                 for megabytes, us, stride in points:
                     axis.annotate(f"{stride}", (megabytes, us), textcoords="offset points", xytext=(4, 4), fontsize=7)
@@ -100,7 +149,9 @@ def stride_chart(rows, path):
 
 def paper_seconds(text):
     """The shortest time that a paper's figure names, "22 to 36 min, 6 cores"; nothing if it names none."""
-    found = [float(match[1]) * {"s": 1, "min": 60}[match[2]] for match in re.finditer(r"([\d.]+)(?: to [\d.]+)? (s|min)\b", text)]
+    found = [
+        float(match[1]) * {"s": 1, "min": 60}[match[2]] for match in re.finditer(r"([\d.]+)(?: to [\d.]+)? (s|min)\b", text)
+    ]
     return min(found) if found else None
 
 

@@ -9,6 +9,7 @@ difference of both on the plane, averaged over places.
 The kernel has one polynomial for d in [0, 1] and one for d - 1 in [0, 1]. It is not negative, its slope is continuous, and the
 weights of the four centres around a place sum to 1.
 """
+
 import numpy as np
 from scipy.optimize import minimize
 

@@ -32,19 +32,21 @@ INTEGRATORS = {
 
 
 def scene_of(mi, question, bsdf, size, spp):
-    return mi.load_dict({
-        "type": "scene",
-        "integrator": INTEGRATORS[question],
-        "sensor": {
-            "type": "perspective",
-            "fov": 30,
-            "to_world": mi.ScalarTransform4f().look_at([0, -3, 2], [0, 0, 0], [0, 0, 1]),
-            "film": {"type": "hdrfilm", "width": size, "height": size},
-            "sampler": {"type": "independent", "sample_count": spp},
-        },
-        "light": LIGHTS[question],
-        "plane": {"type": "rectangle", "bsdf": bsdf},
-    })
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": INTEGRATORS[question],
+            "sensor": {
+                "type": "perspective",
+                "fov": 30,
+                "to_world": mi.ScalarTransform4f().look_at([0, -3, 2], [0, 0, 0], [0, 0, 1]),
+                "film": {"type": "hdrfilm", "width": size, "height": size},
+                "sampler": {"type": "independent", "sample_count": spp},
+            },
+            "light": LIGHTS[question],
+            "plane": {"type": "rectangle", "bsdf": bsdf},
+        }
+    )
 
 
 def timed(mi, scene):

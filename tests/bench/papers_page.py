@@ -29,7 +29,9 @@ def table(rows):
     lines = ["| of the paper | subject | figure | paper | ours | x | |", "|---|---|---|---|---|---|---|"]
     for row in rows:
         figure = f"{row['figure']}, {row['unit']}" if row["unit"] else row["figure"]
-        lines.append(f"| {row['source']} | {row['subject']} | {figure} | {number(row.get('paper'))} | {number(row.get('ours'))} | {ratio(row)} | {row.get('note', '')} |")
+        lines.append(
+            f"| {row['source']} | {row['subject']} | {figure} | {number(row.get('paper'))} | {number(row.get('ours'))} | {ratio(row)} | {row.get('note', '')} |"
+        )
     return "\n".join(lines)
 
 

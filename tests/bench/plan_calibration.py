@@ -19,8 +19,24 @@ MAPS = [("flakes", "flakes", 3), ("isotropic", "noise", 4), ("brushed", "brushed
 POINT = {"type": "point"}
 # Goals of the planner: the share of plans that hold, the median and the largest factor over the cheapest candidate that holds.
 GOALS = {"held": 0.95, "median": 1.2, "worst": 1.5}
-COLUMNS = ("seed", "map", "smallest_texels", "largest_texels", "sigma_r", "light_deg", "tolerance", "method", "asset", "holds", "predicted_seen", "actual_seen",
-           "predicted_bias", "actual_bias", "over_cheapest", "cheapest")
+COLUMNS = (
+    "seed",
+    "map",
+    "smallest_texels",
+    "largest_texels",
+    "sigma_r",
+    "light_deg",
+    "tolerance",
+    "method",
+    "asset",
+    "holds",
+    "predicted_seen",
+    "actual_seen",
+    "predicted_bias",
+    "actual_bias",
+    "over_cheapest",
+    "cheapest",
+)
 
 
 def random_scene(seed):
@@ -28,9 +44,12 @@ def random_scene(seed):
     chance = random.Random(seed)
     smallest = 2 ** chance.uniform(1, 4)
     light = {"type": "environment", "band_limit_deg": chance.choice([5, 20, 60])} if chance.random() < 0.7 else POINT
-    material = {"map": chance.choice(["flakes.png", "noise.png", "brushed.png"]),
-                "footprints": {"smallest_texels": smallest, "largest_texels": smallest * 2 ** chance.uniform(0, 2)},
-                "tolerance": chance.choice([0.1, 0.2, 0.4]), "sigma_r": chance.choice([0.01, 0.03, 0.1])}
+    material = {
+        "map": chance.choice(["flakes.png", "noise.png", "brushed.png"]),
+        "footprints": {"smallest_texels": smallest, "largest_texels": smallest * 2 ** chance.uniform(0, 2)},
+        "tolerance": chance.choice([0.1, 0.2, 0.4]),
+        "sigma_r": chance.choice([0.01, 0.03, 0.1]),
+    }
     return {"schema": "glint-plan scene 1", "lights": [light], "materials": [material]}
 
 
@@ -39,7 +58,9 @@ def make_maps(programs, folder, size):
     for kind, name, seed in MAPS:
         image = folder / f"{name}.png"
         if not image.exists():
-            subprocess.run([programs / "glint-synth", kind, "--size", str(size), "--seed", str(seed), "-o", image, "--quiet"], check=True)
+            subprocess.run(
+                [programs / "glint-synth", kind, "--size", str(size), "--seed", str(seed), "-o", image, "--quiet"], check=True
+            )
 
 
 def measured(programs, folder, seed):
@@ -53,15 +74,27 @@ def measured(programs, folder, seed):
     planned = json.loads((folder / "plan.json").read_text())["materials"][0]
     (material,), (light,) = scene["materials"], scene["lights"]
     good = [o for o in found["sweep"] if o["seen"] <= material["tolerance"] and o["bias"] <= material["tolerance"] / 3]
-    return {"seed": seed, "map": material["map"].removesuffix(".png"), **material["footprints"], "sigma_r": material["sigma_r"],
-            "light_deg": light.get("band_limit_deg", 0), "tolerance": material["tolerance"], "method": planned["asset"]["method"], "asset": found["asset"],
-            "holds": int(found["holds"]), **{f"{when}_{what}": found[when][what] for what in ("seen", "bias") for when in ("predicted", "actual")},
-            "over_cheapest": found["over_cheapest"], "cheapest": min(good, key=lambda o: o["bytes"])["name"] if good else ""}
+    return {
+        "seed": seed,
+        "map": material["map"].removesuffix(".png"),
+        **material["footprints"],
+        "sigma_r": material["sigma_r"],
+        "light_deg": light.get("band_limit_deg", 0),
+        "tolerance": material["tolerance"],
+        "method": planned["asset"]["method"],
+        "asset": found["asset"],
+        "holds": int(found["holds"]),
+        **{f"{when}_{what}": found[when][what] for what in ("seen", "bias") for when in ("predicted", "actual")},
+        "over_cheapest": found["over_cheapest"],
+        "cheapest": min(good, key=lambda o: o["bytes"])["name"] if good else "",
+    }
 
 
 def summary(rows):
     """The figures that GOALS names, and how many plans hold."""
-    factors = [float(row["over_cheapest"]) for row in rows if float(row["over_cheapest"]) > 0]  # 0: nothing that is as cheap holds
+    factors = [
+        float(row["over_cheapest"]) for row in rows if float(row["over_cheapest"]) > 0
+    ]  # 0: nothing that is as cheap holds
     count = sum(int(row["holds"]) for row in rows)
     return {"count": count, "held": count / len(rows), "median": statistics.median(factors), "worst": max(factors)}
 
@@ -75,7 +108,9 @@ def write_rows(rows, path):
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
-        writer.writerows({key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()} for row in rows)
+        writer.writerows(
+            {key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()} for row in rows
+        )
 
 
 def chart(rows, path):
@@ -138,10 +173,16 @@ def main():
         rows.append(measured(programs, arguments.out, seed))
         record.write_text(json.dumps(rows, indent=1) + "\n")
         row = rows[-1]
-        print(f"{seed}: {row['map']}, {row['asset']}: {'holds' if row['holds'] else 'DOES NOT HOLD'}, seen {row['predicted_seen']:.3g} predicted, {row['actual_seen']:.3g} "
-              f"actual, of {row['tolerance']}; {row['over_cheapest']:.3g} times the cheapest ({row['cheapest']})", flush=True)
+        print(
+            f"{seed}: {row['map']}, {row['asset']}: {'holds' if row['holds'] else 'DOES NOT HOLD'}, seen {row['predicted_seen']:.3g} predicted, {row['actual_seen']:.3g} "
+            f"actual, of {row['tolerance']}; {row['over_cheapest']:.3g} times the cheapest ({row['cheapest']})",
+            flush=True,
+        )
     figures = summary(rows)
-    print(f"{figures['count']} of {len(rows)} plans hold; {figures['median']:.3g} (median) and {figures['worst']:.3g} (worst) times the cheapest", file=sys.stderr)
+    print(
+        f"{figures['count']} of {len(rows)} plans hold; {figures['median']:.3g} (median) and {figures['worst']:.3g} (worst) times the cheapest",
+        file=sys.stderr,
+    )
     if arguments.docs:
         write_rows(rows, arguments.docs / "plan-calibration.csv")
         chart(rows, arguments.docs / "plan-calibration.png")

@@ -26,7 +26,25 @@ class Floats(ctypes.Structure):
 
 
 class Footprints(ctypes.Structure):
-    _fields_ = [(name, Floats) for name in ("u", "v", "sigma", "xx", "xy", "yy", "ax", "ay", "bx", "by", "precise_u", "precise_v", "spread_x", "spread_y")]
+    _fields_ = [
+        (name, Floats)
+        for name in (
+            "u",
+            "v",
+            "sigma",
+            "xx",
+            "xy",
+            "yy",
+            "ax",
+            "ay",
+            "bx",
+            "by",
+            "precise_u",
+            "precise_v",
+            "spread_x",
+            "spread_y",
+        )
+    ]
 
 
 def column(array, member):
@@ -41,8 +59,14 @@ def batch_of_c(library, path):
 
     def ask(uv, h, sigma, out):
         footprints = Footprints(u=column(uv, 0), v=column(uv, 1), sigma=Floats(sigma.ctypes.data, 4))
-        lib.glint_density_batch(ndf, ctypes.c_size_t(len(out)), ctypes.byref(footprints), column(h, 0), column(h, 1),
-                                out.ctypes.data_as(ctypes.c_void_p))
+        lib.glint_density_batch(
+            ndf,
+            ctypes.c_size_t(len(out)),
+            ctypes.byref(footprints),
+            column(h, 0),
+            column(h, 1),
+            out.ctypes.data_as(ctypes.c_void_p),
+        )
 
     return ask
 
@@ -71,7 +95,9 @@ def main():
             c.append(seconds(lambda: of_c(uv, h, sigma, out)))
             python.append(seconds(lambda: ndf.density(uv, h, sigma=sigma, threads=1)))
     ratio = statistics.median(p / q for p, q in zip(python, c))
-    print(f"C {statistics.median(c):.3f} s, Python {statistics.median(python):.3f} s, ratio {ratio:.3f} for {QUERIES} densities")
+    print(
+        f"C {statistics.median(c):.3f} s, Python {statistics.median(python):.3f} s, ratio {ratio:.3f} for {QUERIES} densities"
+    )
 
 
 if __name__ == "__main__":

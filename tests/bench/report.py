@@ -51,54 +51,150 @@ Maps are {size}^2 texels unless a line says otherwise, made by glint-synth and s
 def query_lines(kind):
     """Lines of the table of an asset kind that answers densities: what it says, and the figures it spans."""
     asked = {"density": "density", "mean": "mean over a range", "sample": "half vector drawn"}
-    return [*((f"{words}, {how}", rf"{what}, {how}, \S+ {kind}") for what, words in asked.items() for how in ("random", "warm")),
-            ("density in a batch over alone, random", rf"density, random, in a batch over alone, \S+ {kind}"),
-            ("density over plain GGX, warm", rf"density, warm over plain GGX, \S+ {kind}"),
-            ("error at centres, worst octave", rf"rel_l2 at centres, worst octave, \S+ {kind}"),
-            ("error at random, worst octave", rf"rel_l2 at random, worst octave, \S+ {kind}")]
+    return [
+        *((f"{words}, {how}", rf"{what}, {how}, \S+ {kind}") for what, words in asked.items() for how in ("random", "warm")),
+        ("density in a batch over alone, random", rf"density, random, in a batch over alone, \S+ {kind}"),
+        ("density over plain GGX, warm", rf"density, warm over plain GGX, \S+ {kind}"),
+        ("error at centres, worst octave", rf"rel_l2 at centres, worst octave, \S+ {kind}"),
+        ("error at random, worst octave", rf"rel_l2 at random, worst octave, \S+ {kind}"),
+    ]
 
 
 # Methods: title, rows "section: figure" that belong to it (the first that fits counts), what it is, and lines of its table.
 METHODS = [
-    ("Pyramid", r"pyramids: .*|(queries|accuracy): .* pyramid\b.*", "NDF images at every footprint size, by glint-pyramid.",
-     [("build, flat facets", r"pyramid, flat, .*"), ("build, smooth surface", r"pyramid, smooth, .*"), ("peak memory", r"peak memory of the pyramids"),
-      *query_lines("pyramid")]),
-    ("Compressed pyramid: CP", r"compressions: (?!.*\b(tucker|pca)\b).*|(queries|accuracy): .* cp\d+\b.*|query_command: .*",
-     "Canonical polyadic decomposition of the pyramid's blocks, by glint-compress: 16 columns, flakes 32.",
-     [("build", r"compress, cp .*"), ("bytes", r"bytes, cp .*"), *query_lines(r"cp\d+")]),
-    ("Compressed pyramid: Tucker", r"(compressions|queries|accuracy): .*\btucker\b.*", "Tucker-2 of the pyramid's blocks, to the error of CP.",
-     [("build", r"compress, tucker .*"), ("bytes over those of CP", r"bytes over those of .*, tucker, .*"), *query_lines("tucker-tolerance")]),
-    ("Compressed pyramid: PCA", r"(compressions|queries|accuracy): .*\bpca\b.*", "Principal components of the pyramid's blocks, to the error of CP.",
-     [("build", r"compress, pca .*"), ("bytes over those of CP", r"bytes over those of .*, pca, .*"), *query_lines("pca-tolerance")]),
-    ("Bin map", r"bin_maps: .*", "Texels sorted by direction, by glint-binmap; 21 weights are one query. Spans are over maps and roughnesses.",
-     [("build, 2K maps", r"bin map, build, .* 2K.*"), ("bytes, 2K maps", r"bin map, bytes, .* 2K.*"),
-      *((f"weights of {side}^2 texels", rf"bin map, weights, .*, {side}\^2") for side in (4, 64, 1024)),
-      *((f"density of {side}^2 texels", rf"bin map, density, .*, {side}\^2") for side in (4, 64, 1024)),
-      *((f"density of {side}^2 texels, as published", rf"bin map, published density, .*, {side}\^2") for side in (4, 64, 1024)),
-      ("median error", r"bin map, median error, .*"), ("median error, as published", r"bin map, median error as published, .*"), ("energy", r"bin map, energy, .*")]),
-    ("Texels", r"below_level_0: .*", "Footprints of a deviation of .5 to 8 texels, answered from the texels by `ManifoldNdf`, beside `Reference` in one run. Spans are over maps and sizes.",
-     [line for surface in ("smooth", "flat") for shape in ("round", "box") for line in (
-         (f"density, {surface}, {shape} footprints", rf"from texels, density, random, .*, {surface}, {shape}, .*"),
-         (f"mean over a range, {surface}, {shape} footprints", rf"from texels, mean, .*, {surface}, {shape}, .*"),
-         (f"time over that of Reference, {surface}, {shape} footprints", rf"from texels over Reference, .*, {surface}, {shape}, .*"),
-         (f"error, {surface}, {shape} footprints", rf"from texels, error, .*, {surface}, {shape}, .*"))]),
-    ("Moments", r"moments: .*|queries: .* moments\b.*", "Moments of slopes, by glint-moments: one lobe for each footprint. What pictures of them lack is in [LIMITS](LIMITS.md).",
-     [("build", r"moments, \S+"), ("bytes", r"bytes of moments, .*"), *query_lines("moments")[:-2]]),
-    ("Histograms", r"histograms: .*", "Accumulated histograms of 9 x 32 directions, by glint-sat.",
-     [*((f"{what}, stride {stride}", rf"{figure}, stride {stride}, .*") for stride in (4, 16)
-        for what, figure in (("build", "histograms"), ("bytes", "bytes of histograms"), ("histogram of 64^2 texels", r"histogram of 64\^2"),
-                             ("histogram of 1024^2 texels", r"histogram of 1024\^2"))),
-      ("variation of turned boxes from exact", r"mean variation of .*")]),
-    ("Light", r"light: .*", "Tables of spherical harmonics, by glint-shlobes, and the light that a histogram of 24 normals reflects.",
-     [("build, lobes", r"SH lobes, .*"), ("build, light, 65 x 128 directions", r"SH light, .*, 65x128"), ("error, order 60", r"light, error, .*, order 60"),
-      ("product integral, order 60", r"light, product integral, .*, order 60"),
-      ("Monte Carlo at the same error", r"light, Monte Carlo at equal error, .*, order 60")]),
-    ("Displacement", r"displacements: .*", "Downsampled displacement maps, by glint-displace; the span is over bases.",
-     [("build, factor 16, 1024^2", r"displace, factor 16, .*, 1024\^2"), ("build, factor 16, 4096^2", r"displace, factor 16, .*, 4096\^2"),
-      ("peak memory", r"peak memory, displace .*"), ("bytes of T and S", r"bytes of T and S.*"), ("reflected light, warm", r"light reflected by .*")]),
-    ("Maps, and a plain model", r".*", "Synthesis, ingest, and a plain microfacet model (GGX) for comparison.",
-     [("synthesis", r"synth .*"), ("ingest", r"ingest .*"),
-      ("GGX, density, warm", r"density, warm, \S+ ggx"), ("GGX, half vector drawn, warm", r"sample, warm, \S+ ggx")]),
+    (
+        "Pyramid",
+        r"pyramids: .*|(queries|accuracy): .* pyramid\b.*",
+        "NDF images at every footprint size, by glint-pyramid.",
+        [
+            ("build, flat facets", r"pyramid, flat, .*"),
+            ("build, smooth surface", r"pyramid, smooth, .*"),
+            ("peak memory", r"peak memory of the pyramids"),
+            *query_lines("pyramid"),
+        ],
+    ),
+    (
+        "Compressed pyramid: CP",
+        r"compressions: (?!.*\b(tucker|pca)\b).*|(queries|accuracy): .* cp\d+\b.*|query_command: .*",
+        "Canonical polyadic decomposition of the pyramid's blocks, by glint-compress: 16 columns, flakes 32.",
+        [("build", r"compress, cp .*"), ("bytes", r"bytes, cp .*"), *query_lines(r"cp\d+")],
+    ),
+    (
+        "Compressed pyramid: Tucker",
+        r"(compressions|queries|accuracy): .*\btucker\b.*",
+        "Tucker-2 of the pyramid's blocks, to the error of CP.",
+        [
+            ("build", r"compress, tucker .*"),
+            ("bytes over those of CP", r"bytes over those of .*, tucker, .*"),
+            *query_lines("tucker-tolerance"),
+        ],
+    ),
+    (
+        "Compressed pyramid: PCA",
+        r"(compressions|queries|accuracy): .*\bpca\b.*",
+        "Principal components of the pyramid's blocks, to the error of CP.",
+        [
+            ("build", r"compress, pca .*"),
+            ("bytes over those of CP", r"bytes over those of .*, pca, .*"),
+            *query_lines("pca-tolerance"),
+        ],
+    ),
+    (
+        "Bin map",
+        r"bin_maps: .*",
+        "Texels sorted by direction, by glint-binmap; 21 weights are one query. Spans are over maps and roughnesses.",
+        [
+            ("build, 2K maps", r"bin map, build, .* 2K.*"),
+            ("bytes, 2K maps", r"bin map, bytes, .* 2K.*"),
+            *((f"weights of {side}^2 texels", rf"bin map, weights, .*, {side}\^2") for side in (4, 64, 1024)),
+            *((f"density of {side}^2 texels", rf"bin map, density, .*, {side}\^2") for side in (4, 64, 1024)),
+            *(
+                (f"density of {side}^2 texels, as published", rf"bin map, published density, .*, {side}\^2")
+                for side in (4, 64, 1024)
+            ),
+            ("median error", r"bin map, median error, .*"),
+            ("median error, as published", r"bin map, median error as published, .*"),
+            ("energy", r"bin map, energy, .*"),
+        ],
+    ),
+    (
+        "Texels",
+        r"below_level_0: .*",
+        "Footprints of a deviation of .5 to 8 texels, answered from the texels by `ManifoldNdf`, beside `Reference` in one run. Spans are over maps and sizes.",
+        [
+            line
+            for surface in ("smooth", "flat")
+            for shape in ("round", "box")
+            for line in (
+                (f"density, {surface}, {shape} footprints", rf"from texels, density, random, .*, {surface}, {shape}, .*"),
+                (f"mean over a range, {surface}, {shape} footprints", rf"from texels, mean, .*, {surface}, {shape}, .*"),
+                (
+                    f"time over that of Reference, {surface}, {shape} footprints",
+                    rf"from texels over Reference, .*, {surface}, {shape}, .*",
+                ),
+                (f"error, {surface}, {shape} footprints", rf"from texels, error, .*, {surface}, {shape}, .*"),
+            )
+        ],
+    ),
+    (
+        "Moments",
+        r"moments: .*|queries: .* moments\b.*",
+        "Moments of slopes, by glint-moments: one lobe for each footprint. What pictures of them lack is in [LIMITS](LIMITS.md).",
+        [("build", r"moments, \S+"), ("bytes", r"bytes of moments, .*"), *query_lines("moments")[:-2]],
+    ),
+    (
+        "Histograms",
+        r"histograms: .*",
+        "Accumulated histograms of 9 x 32 directions, by glint-sat.",
+        [
+            *(
+                (f"{what}, stride {stride}", rf"{figure}, stride {stride}, .*")
+                for stride in (4, 16)
+                for what, figure in (
+                    ("build", "histograms"),
+                    ("bytes", "bytes of histograms"),
+                    ("histogram of 64^2 texels", r"histogram of 64\^2"),
+                    ("histogram of 1024^2 texels", r"histogram of 1024\^2"),
+                )
+            ),
+            ("variation of turned boxes from exact", r"mean variation of .*"),
+        ],
+    ),
+    (
+        "Light",
+        r"light: .*",
+        "Tables of spherical harmonics, by glint-shlobes, and the light that a histogram of 24 normals reflects.",
+        [
+            ("build, lobes", r"SH lobes, .*"),
+            ("build, light, 65 x 128 directions", r"SH light, .*, 65x128"),
+            ("error, order 60", r"light, error, .*, order 60"),
+            ("product integral, order 60", r"light, product integral, .*, order 60"),
+            ("Monte Carlo at the same error", r"light, Monte Carlo at equal error, .*, order 60"),
+        ],
+    ),
+    (
+        "Displacement",
+        r"displacements: .*",
+        "Downsampled displacement maps, by glint-displace; the span is over bases.",
+        [
+            ("build, factor 16, 1024^2", r"displace, factor 16, .*, 1024\^2"),
+            ("build, factor 16, 4096^2", r"displace, factor 16, .*, 4096\^2"),
+            ("peak memory", r"peak memory, displace .*"),
+            ("bytes of T and S", r"bytes of T and S.*"),
+            ("reflected light, warm", r"light reflected by .*"),
+        ],
+    ),
+    (
+        "Maps, and a plain model",
+        r".*",
+        "Synthesis, ingest, and a plain microfacet model (GGX) for comparison.",
+        [
+            ("synthesis", r"synth .*"),
+            ("ingest", r"ingest .*"),
+            ("GGX, density, warm", r"density, warm, \S+ ggx"),
+            ("GGX, half vector drawn, warm", r"sample, warm, \S+ ggx"),
+        ],
+    ),
 ]
 
 
@@ -140,7 +236,9 @@ def matching(rows, pattern):
     """Rows whose figures have this form. It is an error if there are none: the figure has another name now, and its line would be lost."""
     found = [row for row in rows if re.fullmatch(pattern, row["figure"])]
     if not found and pattern not in NOT_MEASURED:
-        sys.exit(f"report.py: error: no figure is named {pattern}; correct the form, measure it again, or add it to NOT_MEASURED")
+        sys.exit(
+            f"report.py: error: no figure is named {pattern}; correct the form, measure it again, or add it to NOT_MEASURED"
+        )
     return found
 
 
@@ -150,7 +248,9 @@ def method_table(rows, lines):
     for label, pattern in lines:
         if found := matching(rows, pattern):
             papers = "; ".join(dict.fromkeys(row["paper"] for row in found if row["paper"])) if len(found) < 8 else ""
-            text.append(f"| {label} | {span([row['value'] for row in found], found[0]['unit'])} | {verdict(found)} | {papers} |")
+            text.append(
+                f"| {label} | {span([row['value'] for row in found], found[0]['unit'])} | {verdict(found)} | {papers} |"
+            )
     return "\n".join(text)
 
 
@@ -197,7 +297,9 @@ def targets_table(rows):
         worst = max(judged(own), key=lambda row: row["value"] / row["target"] if row["target"] else 0)
         over = len(missed(own))
         furthest = f"{worst['figure']}: {span([worst['value']], worst['unit'])}, target {limits([worst])}" if over else ""
-        text.append(f"| [{title}](#{anchor(title)}) | {len(judged(own)) - over} of {len(judged(own))} | {sum(1 for row in own if cannot_hold(row)) or ''} | {furthest} |")
+        text.append(
+            f"| [{title}](#{anchor(title)}) | {len(judged(own)) - over} of {len(judged(own))} | {sum(1 for row in own if cannot_hold(row)) or ''} | {furthest} |"
+        )
     return "\n".join(text)
 
 
@@ -213,8 +315,12 @@ def octave_rows(accuracy):
             for level in asset["levels"]:
                 for place in ("centres", "random"):
                     for figure, value in level.get(place, {}).items():
-                        yield {"section": "octaves", "value": value, "unit": "",
-                               "figure": f"{figure} at {place}, {level['sigma_texels']:.0f} texels, {name} {kind_of(asset['asset'], name)}"}
+                        yield {
+                            "section": "octaves",
+                            "value": value,
+                            "unit": "",
+                            "figure": f"{figure} at {place}, {level['sigma_texels']:.0f} texels, {name} {kind_of(asset['asset'], name)}",
+                        }
 
 
 def light_rows(light):
@@ -227,12 +333,22 @@ def light_rows(light):
 def write_csv(rows, path):
     """Every number, a line each."""
     with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, ["section", "figure", "value", "unit", "target", "cannot_hold", "paper", "design", "details"], extrasaction="ignore",
-                                lineterminator="\n")
+        writer = csv.DictWriter(
+            file,
+            ["section", "figure", "value", "unit", "target", "cannot_hold", "paper", "design", "details"],
+            extrasaction="ignore",
+            lineterminator="\n",
+        )
         writer.writeheader()
         for row in rows:
             details = {name: value for name, value in row.get("details", {}).items() if isinstance(value, (int, float))}
-            writer.writerow(row | {"value": f"{row['value']:.6g}", "details": "; ".join(f"{name} {value:.6g}" for name, value in details.items())})
+            writer.writerow(
+                row
+                | {
+                    "value": f"{row['value']:.6g}",
+                    "details": "; ".join(f"{name} {value:.6g}" for name, value in details.items()),
+                }
+            )
 
 
 def kind_of(path, name):
@@ -250,8 +366,15 @@ def points(accuracy, rows):
     for row in rows:
         if match := re.fullmatch(r"density, random, (\S+) (\S+)", row["figure"]):
             nanoseconds[match[1], match[2]] = row["value"]
-    return {(name, kind_of(asset["asset"], name)): (asset["size_bytes"] / 1e6, mean_error(asset), nanoseconds.get((name, kind_of(asset["asset"], name))))
-            for name, assets in accuracy.items() for asset in assets}
+    return {
+        (name, kind_of(asset["asset"], name)): (
+            asset["size_bytes"] / 1e6,
+            mean_error(asset),
+            nanoseconds.get((name, kind_of(asset["asset"], name))),
+        )
+        for name, assets in accuracy.items()
+        for asset in assets
+    }
 
 
 def named(rows, pattern, scale=1):
@@ -261,21 +384,65 @@ def named(rows, pattern, scale=1):
 
 def answers_table(rows):
     """Times and errors of an answer, a line for each method."""
-    text = ["| method | density anywhere | the same again | mean over a range | half vector drawn | error, stored footprints | error, any footprints |",
-            "|---|---|---|---|---|---|---|"]
-    for title, kind in (("Pyramid", "pyramid"), ("Compressed pyramid: CP", r"cp\d+"), ("Compressed pyramid: Tucker", "tucker-tolerance"),
-                        ("Compressed pyramid: PCA", "pca-tolerance"), ("Moments", "moments")):
-        cells = [times(named(rows, rf"{figure}, \S+ {kind}")) for figure in ("density, random", "density, warm", "mean, random", "sample, random")]
+    text = [
+        "| method | density anywhere | the same again | mean over a range | half vector drawn | error, stored footprints | error, any footprints |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for title, kind in (
+        ("Pyramid", "pyramid"),
+        ("Compressed pyramid: CP", r"cp\d+"),
+        ("Compressed pyramid: Tucker", "tucker-tolerance"),
+        ("Compressed pyramid: PCA", "pca-tolerance"),
+        ("Moments", "moments"),
+    ):
+        cells = [
+            times(named(rows, rf"{figure}, \S+ {kind}"))
+            for figure in ("density, random", "density, warm", "mean, random", "sample, random")
+        ]
         cells += [percents(named(rows, rf"rel_l2 at {place}, worst octave, \S+ {kind}")) for place in ("centres", "random")]
         text.append(line_of(title, cells))
     us = 1e3
-    text.append(line_of("Bin map", [times(named(rows, r"bin map, density, .* 2K.*")), "", "", "", percents(named(rows, r"bin map, median error, .* 2K.*")), ""]))
+    text.append(
+        line_of(
+            "Bin map",
+            [
+                times(named(rows, r"bin map, density, .* 2K.*")),
+                "",
+                "",
+                "",
+                percents(named(rows, r"bin map, median error, .* 2K.*")),
+                "",
+            ],
+        )
+    )
     near = r"flat, round, sigma (?:1|2|4)"
-    text.append(line_of("Texels", [times(named(rows, rf"from texels, density, random, .*, {near}", us)), "", times(named(rows, rf"from texels, mean, .*, {near}", us)), "",
-                                   percents(named(rows, rf"from texels, error, density, random, .*, {near}")), ""]))
-    text.append(line_of("Histograms", [times(named(rows, r"histogram of (?:64|256|1024)\^2, stride 8, .*", us)) + ", all directions", "", "", "", "", ""]))
-    text.append("| plain GGX, for comparison | " + " | ".join(times(named(rows, rf"{figure}, \S+ ggx")) for figure in (
-        "density, random", "density, warm", "mean, random", "sample, random")) + " | | |")
+    text.append(
+        line_of(
+            "Texels",
+            [
+                times(named(rows, rf"from texels, density, random, .*, {near}", us)),
+                "",
+                times(named(rows, rf"from texels, mean, .*, {near}", us)),
+                "",
+                percents(named(rows, rf"from texels, error, density, random, .*, {near}")),
+                "",
+            ],
+        )
+    )
+    text.append(
+        line_of(
+            "Histograms",
+            [times(named(rows, r"histogram of (?:64|256|1024)\^2, stride 8, .*", us)) + ", all directions", "", "", "", "", ""],
+        )
+    )
+    text.append(
+        "| plain GGX, for comparison | "
+        + " | ".join(
+            times(named(rows, rf"{figure}, \S+ ggx"))
+            for figure in ("density, random", "density, warm", "mean, random", "sample, random")
+        )
+        + " | | |"
+    )
     return "\n".join(text)
 
 
@@ -291,14 +458,29 @@ def megabytes_of(data, kind):
 def preparations(rows, data):
     """(title, method, seconds, MB, paper) of each method."""
     ms, mib = 1e-3, 1.048576
-    build = {"Pyramid": ("pyramid", r"pyramid, flat, .*", 1), "Compressed pyramid: CP": ("cp", r"compress, cp .*", 1),
-             "Compressed pyramid: Tucker": ("tucker", r"compress, tucker to the error of cp.*", 1), "Compressed pyramid: PCA": ("pca", r"compress, pca .*", 1),
-             "Bin map": ("bin map", r"bin map, build, .* 2K.*", ms), "Moments": ("moments", r"moments, \S+", 1),
-             "Histograms": ("histograms", r"histograms, stride 8, .*", 1), "Light": ("light", r"SH l.*, 65x128", 1),
-             "Displacement": ("displacement", r"displace, factor 16, .*, 1024\^2", 1)}
-    small = {"Bin map": named(rows, r"bin map, bytes, .* 2K.*", mib), "Moments": named(rows, r"bytes of moments, .*"),
-             "Histograms": named(rows, r"bytes of histograms, stride 8, .*"), "Displacement": named(rows, r"bytes of T and S.*", 1e-3)}
-    kinds = {"Pyramid": "pyramid", "Compressed pyramid: CP": r"cp\d+", "Compressed pyramid: Tucker": "tucker-tolerance", "Compressed pyramid: PCA": "pca-tolerance"}
+    build = {
+        "Pyramid": ("pyramid", r"pyramid, flat, .*", 1),
+        "Compressed pyramid: CP": ("cp", r"compress, cp .*", 1),
+        "Compressed pyramid: Tucker": ("tucker", r"compress, tucker to the error of cp.*", 1),
+        "Compressed pyramid: PCA": ("pca", r"compress, pca .*", 1),
+        "Bin map": ("bin map", r"bin map, build, .* 2K.*", ms),
+        "Moments": ("moments", r"moments, \S+", 1),
+        "Histograms": ("histograms", r"histograms, stride 8, .*", 1),
+        "Light": ("light", r"SH l.*, 65x128", 1),
+        "Displacement": ("displacement", r"displace, factor 16, .*, 1024\^2", 1),
+    }
+    small = {
+        "Bin map": named(rows, r"bin map, bytes, .* 2K.*", mib),
+        "Moments": named(rows, r"bytes of moments, .*"),
+        "Histograms": named(rows, r"bytes of histograms, stride 8, .*"),
+        "Displacement": named(rows, r"bytes of T and S.*", 1e-3),
+    }
+    kinds = {
+        "Pyramid": "pyramid",
+        "Compressed pyramid: CP": r"cp\d+",
+        "Compressed pyramid: Tucker": "tucker-tolerance",
+        "Compressed pyramid: PCA": "pca-tolerance",
+    }
     for title, (method, pattern, scale) in build.items():
         paper = "; ".join(dict.fromkeys(row["paper"] for row in matching(rows, pattern) if row["paper"]))
         yield title, method, named(rows, pattern, scale), small.get(title) or megabytes_of(data, kinds.get(title, "")), paper
@@ -306,16 +488,26 @@ def preparations(rows, data):
 
 def preparation_table(rows, data):
     text = ["| method | time | in the paper |", "|---|---|---|"]
-    text += [line_of(title, [times([1e9 * value for value in seconds]), paper]) for title, _, seconds, _, paper in preparations(rows, data) if seconds]
+    text += [
+        line_of(title, [times([1e9 * value for value in seconds]), paper])
+        for title, _, seconds, _, paper in preparations(rows, data)
+        if seconds
+    ]
     return "\n".join(text)
 
 
 def bytes_table(rows, data):
-    papers = {"Compressed pyramid: CP": r"bytes, cp .*", "Bin map": r"bin map, bytes, .* 2K.*", "Histograms": r"bytes of histograms, stride 8, .*",
-              "Displacement": r"bytes of T and S.*"}
+    papers = {
+        "Compressed pyramid: CP": r"bytes, cp .*",
+        "Bin map": r"bin map, bytes, .* 2K.*",
+        "Histograms": r"bytes of histograms, stride 8, .*",
+        "Displacement": r"bytes of T and S.*",
+    }
     text = ["| method | asset | in the paper |", "|---|---|---|"]
     for title, _, _, megabytes, _ in preparations(rows, data):
-        paper = "; ".join(dict.fromkeys(row["paper"] for row in (matching(rows, papers[title]) if title in papers else []) if row["paper"]))
+        paper = "; ".join(
+            dict.fromkeys(row["paper"] for row in (matching(rows, papers[title]) if title in papers else []) if row["paper"])
+        )
         if megabytes:
             text.append(line_of(title, [sizes(megabytes), paper]))
     return "\n".join(text)
@@ -369,7 +561,9 @@ def method_charts(rows, light, docs):
     charts = {}
     if any(row["figure"].startswith("bytes of histograms") for row in rows):
         name = stride_chart(rows, docs / "histogram-stride.png")
-        charts["Histograms"] = f"\nBytes against time, for boxes along the axes anywhere on the map:\n\n![Bytes against time]({name})\n"
+        charts["Histograms"] = (
+            f"\nBytes against time, for boxes along the axes anywhere on the map:\n\n![Bytes against time]({name})\n"
+        )
     if light:
         error, time = light_error_chart(light, docs / "light-error.png"), light_time_chart(light, docs / "light-time.png")
         charts["Light"] = f"""
@@ -399,7 +593,11 @@ def main():
     data = points(accuracy, rows)
     links = ", ".join(f"[{title}](#{anchor(title)})" for title, *_ in by_method(rows))
     calibration = "- [Do plans hold?](#do-plans-hold)\n" if (docs / "plan-calibration.csv").exists() else ""
-    text = PAGE.format(methods=links, calibration=calibration) + question_sections(data, rows, docs) + method_sections(rows, method_charts(rows, light, docs))
+    text = (
+        PAGE.format(methods=links, calibration=calibration)
+        + question_sections(data, rows, docs)
+        + method_sections(rows, method_charts(rows, light, docs))
+    )
     text += CONDITIONS.format(machine=machine, size=results["size_texels"], repeats=repeats)
     (docs / "BENCHMARKS.md").write_text(text, encoding="utf-8")
     write_csv([*rows, *octave_rows(accuracy), *light_rows(light)], docs / "benchmarks.csv")

@@ -6,7 +6,13 @@ import matplotlib.pyplot as plt
 from charts import COLOURS, MARKERS, finish, legend
 from words import times
 
-SURFACES = {"isotropic": "fine noise", "brushed": "brushed metal", "scratches": "scratches", "weave": "a weave", "flakes": "flakes"}
+SURFACES = {
+    "isotropic": "fine noise",
+    "brushed": "brushed metal",
+    "scratches": "scratches",
+    "weave": "a weave",
+    "flakes": "flakes",
+}
 SMALL_LIGHT = "0.5"
 DISTANCES = {"0.25": "2", "1": "8", "4": "32"}  # of the eye in map widths: deviations in the middle of the square, texels
 COMPRESSED = ("cp", "tucker", "pca")
@@ -37,22 +43,33 @@ class Pictures:
 
 def quickest(pictures, surface, distance, flip):
     """(microseconds, the quickest method whose picture has at most this FLIP, its FLIP); nothing if there is none."""
-    figures = [(pictures.microseconds(surface, model, distance), pictures.flip(surface, model, distance), model) for model in pictures.models()]
-    able = [(time, model) for time, of_model, model in figures if time is not None and of_model is not None and of_model <= flip]
+    figures = [
+        (pictures.microseconds(surface, model, distance), pictures.flip(surface, model, distance), model)
+        for model in pictures.models()
+    ]
+    able = [
+        (time, model) for time, of_model, model in figures if time is not None and of_model is not None and of_model <= flip
+    ]
     return (*min(able), pictures.flip(surface, min(able)[1], distance)) if able else None
 
 
 def scene_cell(pictures, surface, distance):
     """The quickest close method, and a rough one that takes at most half its time."""
     close, rough = (quickest(pictures, surface, distance, flip) for flip in (CLOSE, ROUGH))
-    words = [f"{title}**{found[1]}**, {times([1e3 * found[0]])} ({found[2]:.2g})"
-             for title, found in (("", close), ("rough: ", rough if close is None or rough[0] <= 0.5 * close[0] else None)) if found]
+    words = [
+        f"{title}**{found[1]}**, {times([1e3 * found[0]])} ({found[2]:.2g})"
+        for title, found in (("", close), ("rough: ", rough if close is None or rough[0] <= 0.5 * close[0] else None))
+        if found
+    ]
     return "; ".join(words) or "none"
 
 
 def scene_table(pictures):
     """The quickest method whose picture is close, or roughly right, for each surface and distance."""
-    text = [f"| surface | {' | '.join(f'pixels of {texels} texels' for texels in DISTANCES.values())} |", "|---" * (1 + len(DISTANCES)) + "|"]
+    text = [
+        f"| surface | {' | '.join(f'pixels of {texels} texels' for texels in DISTANCES.values())} |",
+        "|---" * (1 + len(DISTANCES)) + "|",
+    ]
     for surface, words in SURFACES.items():
         text.append(f"| {words} | {' | '.join(scene_cell(pictures, surface, distance) for distance in DISTANCES)} |")
     return "\n".join(text)

@@ -94,8 +94,18 @@ def tiff(path, pixels, photometric=1, sample_format=1, extra=()):
     height, width = pixels.shape
     bits = pixels.dtype.itemsize * 8
     body = pixels.tobytes()
-    tags = {256: (4, width), 257: (4, height), 258: (3, bits), 259: (3, 1), 262: (3, photometric), 273: (4, 8), 277: (3, 1),
-            278: (4, height), 279: (4, len(body)), 339: (3, sample_format)}
+    tags = {
+        256: (4, width),
+        257: (4, height),
+        258: (3, bits),
+        259: (3, 1),
+        262: (3, photometric),
+        273: (4, 8),
+        277: (3, 1),
+        278: (4, height),
+        279: (4, len(body)),
+        339: (3, sample_format),
+    }
     tags.update({number: (2, text.encode() + b"\0") for number, text in extra})
     entries, values = b"", b""
     after = 8 + len(body) + 2 + 12 * len(tags) + 4
@@ -106,5 +116,9 @@ def tiff(path, pixels, photometric=1, sample_format=1, extra=()):
             entries += struct.pack("<HHI", number, kind, len(value)) + place
             values += value if len(value) > 4 else b""
         else:
-            entries += struct.pack("<HHI", number, kind, 1) + struct.pack("<HH" if kind == 3 else "<I", *([value, 0] if kind == 3 else [value]))
-    path.write_bytes(b"II*\0" + struct.pack("<I", 8 + len(body)) + body + struct.pack("<H", len(tags)) + entries + bytes(4) + values)
+            entries += struct.pack("<HHI", number, kind, 1) + struct.pack(
+                "<HH" if kind == 3 else "<I", *([value, 0] if kind == 3 else [value])
+            )
+    path.write_bytes(
+        b"II*\0" + struct.pack("<I", 8 + len(body)) + body + struct.pack("<H", len(tags)) + entries + bytes(4) + values
+    )

@@ -30,12 +30,20 @@ def made(tmp_path_factory):
     ]
     runs += [
         ("ingest", "heights.exr", "--kind", "height", "--to", "heights", "--texel-size-um", "1", "-o", "waves.glint"),
-        ("pyramid", "waves.glint", "-o", "wave-pyramid.glint", *"--optics wave --stride 32 --resolution 64 --wavelengths 3".split()),
+        (
+            "pyramid",
+            "waves.glint",
+            "-o",
+            "wave-pyramid.glint",
+            *"--optics wave --stride 32 --resolution 64 --wavelengths 3".split(),
+        ),
         ("shlobes", "--light", "lights.json", "-o", "light.glint", "--order", "4"),
         ("shlobes", "--sigma-r", "0.1", "-o", "lobes.glint", "--order", "4"),
         ("wang", "normals.glint", "-o", "tiles.glint", "--size", "16"),
     ]
-    (folder / "lights.json").write_text('{"lights": [{"type": "sphere", "centre": [0, 0, 5], "radius": 1, "radiance": [1, 1, 1]}]}')
+    (folder / "lights.json").write_text(
+        '{"lights": [{"type": "sphere", "centre": [0, 0, 5], "radius": 1, "radiance": [1, 1, 1]}]}'
+    )
     for tool, *arguments in runs:
         subprocess.run([BIN / f"glint-{tool}", *map(str, arguments)], cwd=folder, check=True, timeout=120)
     return folder
@@ -190,13 +198,21 @@ READERS = [
 ]
 
 
-@pytest.mark.parametrize("source, line", READERS, ids=[f"{line.split()[0]}-{source}-{k}" for k, (source, line) in enumerate(READERS)])
+@pytest.mark.parametrize(
+    "source, line", READERS, ids=[f"{line.split()[0]}-{source}-{k}" for k, (source, line) in enumerate(READERS)]
+)
 def test_flipped_bits_are_refused_unless_they_are_trusted(glint, assets, source, line):
     """The lowest bit of a float is a value like any other: only the hash can tell."""
     path = assets / f"{source}.glint"
     with h5py.File(path, "r") as file:
         arrays = []
-        file.visititems(lambda _, thing: arrays.append(thing.id.get_offset()) if isinstance(thing, h5py.Dataset) and thing.dtype in ("<f4", "<f2") else None)
+        file.visititems(
+            lambda _, thing: (
+                arrays.append(thing.id.get_offset())
+                if isinstance(thing, h5py.Dataset) and thing.dtype in ("<f4", "<f2")
+                else None
+            )
+        )
     data = bytearray(path.read_bytes())
     data[arrays[0] + (INSIDE_TILE if source == "tiles" else 0)] ^= 1
     command = line.split()

@@ -27,8 +27,12 @@ SIZE = 64
 def measured(tmp_path_factory):
     """A folder with a map, results of all methods, and their page."""
     folder = tmp_path_factory.mktemp("bench")
-    for command in (f"synth flakes --size {SIZE} --flake-size 4 -o map.exr", "ingest map.exr -o map.glint", "bench map.glint -o results.json --quick",
-                    "bench --report results.json -o report.html"):
+    for command in (
+        f"synth flakes --size {SIZE} --flake-size 4 -o map.exr",
+        "ingest map.exr -o map.glint",
+        "bench map.glint -o results.json --quick",
+        "bench --report results.json -o report.html",
+    ):
         tool, *words = command.split()
         process = subprocess.run([BIN / f"glint-{tool}", *words], cwd=folder, capture_output=True, text=True, timeout=250)
         assert process.returncode == 0, process.stderr
@@ -52,17 +56,32 @@ def copied(glint, measured):
 def test_results_are_as_described(results):
     jsonschema.Draft202012Validator(SCHEMA).validate(results)
     assert [measurement["name"] for measurement in results["measurements"] if measurement["status"] != "ok"] == []
-    assert {measurement["method"] for measurement in results["measurements"]} == {"brute force", "moments", "bin map", "histograms", "pyramid", "tucker"}
+    assert {measurement["method"] for measurement in results["measurements"]} == {
+        "brute force",
+        "moments",
+        "bin map",
+        "histograms",
+        "pyramid",
+        "tucker",
+    }
 
 
 def test_errors_are_those_of_the_methods(results):
-    errors = {measurement["method"]: {set_["sigma_texels"]: set_ for set_ in measurement["errors"] if set_["shape"] == "round"} for measurement in results["measurements"]}
+    errors = {
+        measurement["method"]: {set_["sigma_texels"]: set_ for set_ in measurement["errors"] if set_["shape"] == "round"}
+        for measurement in results["measurements"]
+    }
     widest = SIZE / 8
     assert errors["brute force"] == {}
     assert errors["pyramid"][widest]["rel_l2"] < 0.1 < errors["moments"][widest]["rel_l2"]
     assert errors["pyramid"][widest]["seen"] <= errors["tucker"][widest]["seen"] + 0.02
     # A bin map is asked for Gaussians and answers boxes, and is right where it is asked for boxes.
-    bins = {set_["shape"]: set_ for measurement in results["measurements"] if measurement["method"] == "bin map" for set_ in measurement["errors"]}
+    bins = {
+        set_["shape"]: set_
+        for measurement in results["measurements"]
+        if measurement["method"] == "bin map"
+        for set_ in measurement["errors"]
+    }
     assert bins["box"]["as_asked"] and not bins["round"]["as_asked"]
     assert bins["box"]["rel_l2"] < 0.05 < bins["round"]["rel_l2"]
 
@@ -104,11 +123,17 @@ def test_pictures_err_as_they_say(results):
 
 
 def test_pictures_rank_methods_as_a_person_does(results):
-    flip = {(measurement["method"], picture["scene"], picture["sigma_texels"]): picture["flip"] for measurement, picture, _ in pairs(results)}
+    flip = {
+        (measurement["method"], picture["scene"], picture["sigma_texels"]): picture["flip"]
+        for measurement, picture, _ in pairs(results)
+    }
     for scene in ("plane", "sphere"):
         assert 0 < flip["pyramid", scene, 8] < flip["moments", scene, 8]  # one lobe has no sparkles
         assert flip["pyramid", scene, 8] <= flip["tucker", scene, 8] + OF_HALVES
-    assert {measurement["method"] for measurement, picture, _ in pairs(results) if not picture["as_asked"]} == {"bin map", "histograms"}
+    assert {measurement["method"] for measurement, picture, _ in pairs(results) if not picture["as_asked"]} == {
+        "bin map",
+        "histograms",
+    }
 
 
 def test_flip_is_that_of_flip_evaluator(results):
@@ -148,6 +173,7 @@ def test_results_of_another_white_are_refused(glint, copied):
 
 def spoil_each(document):
     """(name, results with one part spoiled)."""
+
     def spoil(name, change):
         copy = json.loads(json.dumps(document))
         change(copy["maps"][0], next(m for m in copy["measurements"] if m["pictures"]))
@@ -221,7 +247,12 @@ def test_measurements_that_are_there_are_not_measured_again(glint, copied):
 
 def test_a_stopped_run_leaves_whole_results(glint, copied):
     (copied / "results.json").unlink()
-    process = subprocess.Popen([BIN / "glint-bench", "map.glint", "-o", "results.json", "--quick"], cwd=copied, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = subprocess.Popen(
+        [BIN / "glint-bench", "map.glint", "-o", "results.json", "--quick"],
+        cwd=copied,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
     for _ in range(1000):
         time.sleep(0.02)
         if (copied / "results.json").exists():
@@ -243,7 +274,13 @@ def test_a_method_that_fails_says_so_and_the_rest_goes_on(copied):
         (programs / f"glint-{tool}").symlink_to(BIN / f"glint-{tool}")
     (programs / "glint-pyramid").write_text("#!/bin/sh\necho no memory left >&2\nexit 4\n")
     (programs / "glint-pyramid").chmod(0o755)
-    process = subprocess.run([programs / "glint-bench", "map.glint", "-o", "some.json", "--quick"], cwd=copied, capture_output=True, text=True, timeout=120)
+    process = subprocess.run(
+        [programs / "glint-bench", "map.glint", "-o", "some.json", "--quick"],
+        cwd=copied,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert process.returncode == 0, process.stderr
     document = json.loads((copied / "some.json").read_text())
     jsonschema.Draft202012Validator(SCHEMA).validate(document)
@@ -253,7 +290,13 @@ def test_a_method_that_fails_says_so_and_the_rest_goes_on(copied):
     assert "pyramid, stride 32, which it is made from, failed" in messages["tucker"]
     assert "no memory left" in process.stdout
     # Where the programs are there, what failed is measured after all.
-    process = subprocess.run([BIN / "glint-bench", "map.glint", "-o", "some.json", "--quick"], cwd=copied, capture_output=True, text=True, timeout=120)
+    process = subprocess.run(
+        [BIN / "glint-bench", "map.glint", "-o", "some.json", "--quick"],
+        cwd=copied,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
     assert process.returncode == 0, process.stderr
     assert {m["status"] for m in json.loads((copied / "some.json").read_text())["measurements"]} == {"ok"}
 
@@ -307,6 +350,7 @@ def test_other_files_beside_the_results_are_not_removed(glint, copied):
 
 # Tests of stability are run by tests/stability; here are their page and the presets.
 
+
 def test_a_preset_has_figures_beside_those_of_the_paper(glint):
     process = glint("bench", "--preset", "atanasov2021", "--quick", "-o", "paper.json")
     assert process.returncode == 0, process.stderr
@@ -316,7 +360,11 @@ def test_a_preset_has_figures_beside_those_of_the_paper(glint):
     assert not [row for row in rows if "failed" in row.get("note", "")]
     bins = {row["subject"]: row for row in rows if row["figure"] == "bins along an axis"}
     assert len(bins) == 4 and all(row["ours"] == row["paper"] for row in bins.values())  # Eq. 16 of the paper
-    assert all(row["ours"] == pytest.approx(1, abs=0.03) for row in rows if row["figure"] == "integral of D" and "0.25" not in row["subject"])
+    assert all(
+        row["ours"] == pytest.approx(1, abs=0.03)
+        for row in rows
+        if row["figure"] == "integral of D" and "0.25" not in row["subject"]
+    )
     assert "x1 " in process.stdout and "Table 4" in process.stdout
     assert not list(glint.folder.glob("*.assets"))
 
@@ -360,8 +408,19 @@ setTimeout(() => {
 
 
 def browse(folder, page, width, *flags):
-    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--enable-logging=stderr", f"--window-size={width},1400",
-               "--virtual-time-budget=4000", f"--user-data-dir={folder / 'profile'}", *flags, f"file://{page}"]
+    command = [
+        CHROMIUM,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-dev-shm-usage",
+        "--enable-logging=stderr",
+        f"--window-size={width},1400",
+        "--virtual-time-budget=4000",
+        f"--user-data-dir={folder / 'profile'}",
+        *flags,
+        f"file://{page}",
+    ]
     return subprocess.run(command, capture_output=True, text=True, timeout=120)
 
 
@@ -391,11 +450,15 @@ def test_charts_are_written_as_files(measured, tmp_path):
     script = ROOT / "pipelines/bench_charts.py"
 
     def run(page, *choices):
-        return subprocess.run([sys.executable, script, page, "--out", tmp_path / "charts", *choices], capture_output=True, text=True, timeout=250)
+        return subprocess.run(
+            [sys.executable, script, page, "--out", tmp_path / "charts", *choices], capture_output=True, text=True, timeout=250
+        )
 
     process = run(measured / "report.html", "--metric", "flip", "--shape", "sphere", "--size", "8")
     assert process.returncode == 0, process.stderr
-    assert sorted(path.name for path in (tmp_path / "charts").iterdir()) == sorted(f"{name}.{ending}" for name in ("time", "bytes", "prepare", "sizes") for ending in ("svg", "png"))
+    assert sorted(path.name for path in (tmp_path / "charts").iterdir()) == sorted(
+        f"{name}.{ending}" for name in ("time", "bytes", "prepare", "sizes") for ending in ("svg", "png")
+    )
     for name in ("time", "bytes", "prepare", "sizes"):
         svg = ElementTree.parse(tmp_path / f"charts/{name}.svg").getroot()
         texts = ["".join(text.itertext()) for text in svg.iter("{http://www.w3.org/2000/svg}text")]
@@ -403,7 +466,14 @@ def test_charts_are_written_as_files(measured, tmp_path):
         with image.open(tmp_path / f"charts/{name}.png") as picture:
             assert picture.size == (2 * int(svg.get("width")), 2 * int(svg.get("height")))
             assert len(picture.convert("RGB").getcolors(1 << 20)) > 20, "is empty"
-    for choice in (("--metric", "flp"), ("--map", "nosuch"), ("--shape", "ball"), ("--size", "3"), ("--metric", "flip", "--shape", "round"), ("--metric", "toString")):
+    for choice in (
+        ("--metric", "flp"),
+        ("--map", "nosuch"),
+        ("--shape", "ball"),
+        ("--size", "3"),
+        ("--metric", "flip", "--shape", "round"),
+        ("--metric", "toString"),
+    ):
         process = run(measured / "report.html", *choice)
         assert process.returncode != 0 and "it has" in process.stderr, (choice, process.stderr)
     assert "is no file" in run(tmp_path / "missing.html").stderr
@@ -432,9 +502,20 @@ def test_the_other_pages_draw(glint, tmp_path, form, width):
     else:
         results = tmp_path / "paper.json"
         row = {"source": "Table 2", "subject": "flakes <b>", "figure": "bytes", "unit": "MB"}
-        results.write_text(json.dumps({"schema": "glint-bench preset 1", "generator": "glint-bench", "machine": {"processor": "p", "cores": 2, "system": "s"}, "seed": 1,
-                                       "quick": True, "preset": "deng2022", "paper": "Deng et al. 2022",
-                                       "rows": [row | {"paper": 2, "ours": 1}, row | {"ours": 3}, row | {"note": "not repeated </script>"}]}))
+        results.write_text(
+            json.dumps(
+                {
+                    "schema": "glint-bench preset 1",
+                    "generator": "glint-bench",
+                    "machine": {"processor": "p", "cores": 2, "system": "s"},
+                    "seed": 1,
+                    "quick": True,
+                    "preset": "deng2022",
+                    "paper": "Deng et al. 2022",
+                    "rows": [row | {"paper": 2, "ours": 1}, row | {"ours": 3}, row | {"note": "not repeated </script>"}],
+                }
+            )
+        )
     process = glint("bench", "--report", str(results), "-o", str(tmp_path / "some.html"))
     assert process.returncode == 0, process.stderr
     page = tmp_path / "page.html"
@@ -452,12 +533,13 @@ def test_the_other_pages_draw(glint, tmp_path, form, width):
 
 def test_the_page_asks_no_network(measured):
     page = (measured / "report.html").read_text()
-    assert not re.findall(r'<(?:script|link|img|iframe)[^>]+(?:src|href)=', page)
+    assert not re.findall(r"<(?:script|link|img|iframe)[^>]+(?:src|href)=", page)
     assert "fetch(" not in (ROOT / "apps/glint-bench/page/report.js").read_text()
     assert "Permission to use, copy, modify" in page  # the licences of the libraries inside
 
 
 # The page of measurements
+
 
 @pytest.fixture
 def report_of_bench(monkeypatch):
@@ -479,8 +561,14 @@ def test_a_figure_of_another_name_is_no_empty_cell(report_of_bench):
 
 def test_methods_without_a_figure_are_not_the_quickest(report_of_bench, tmp_path):
     _, scenes = report_of_bench
-    lines = ["map,model,figure,value,distance,light", "flakes,pyramid,microseconds of a mean,4,8,", "flakes,moments,microseconds of a mean,1,8,",
-             "flakes,cp,flip,0.015,8,0.5", "flakes,histograms,flip,0.001,8,0.5", "flakes,bin map,bytes,7,,"]
+    lines = [
+        "map,model,figure,value,distance,light",
+        "flakes,pyramid,microseconds of a mean,4,8,",
+        "flakes,moments,microseconds of a mean,1,8,",
+        "flakes,cp,flip,0.015,8,0.5",
+        "flakes,histograms,flip,0.001,8,0.5",
+        "flakes,bin map,bytes,7,,",
+    ]
     (tmp_path / "limits.csv").write_text("\n".join(lines) + "\n")
     pictures = scenes.Pictures(tmp_path / "limits.csv")
     assert pictures.microseconds("flakes", "cp", "8") == 4  # answers as the pyramid does

@@ -8,7 +8,12 @@ import pytest
 ALPHA = 0.05
 # Normals are kept to 1/256 of a bin at this size.
 DENSITY_TOLERANCE = 0.01
-BOXES = [["--box", "12", "3", "-4", "9"], ["--box", "40", "0", "0", "25"], ["--box", "0.4", "0", "0", "0.3"], ["--box", "300", "0", "20", "200"]]
+BOXES = [
+    ["--box", "12", "3", "-4", "9"],
+    ["--box", "40", "0", "0", "25"],
+    ["--box", "0.4", "0", "0", "0.3"],
+    ["--box", "300", "0", "20", "200"],
+]
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +49,9 @@ def test_answers_are_those_of_brute_force(glint, assets, box, question):
 
 def test_large_footprints_see_their_own_normals_where_these_vary_over_the_map(glint):
     alpha, merged_error = 0.22, 0.015
-    assert glint("synth", "sawtooth", "--size", "512", "--feature-size", "256", "--slope", "0.08", "-o", "s.exr").returncode == 0
+    assert (
+        glint("synth", "sawtooth", "--size", "512", "--feature-size", "256", "--slope", "0.08", "-o", "s.exr").returncode == 0
+    )
     assert glint("ingest", "s.exr", "-o", "s.glint").returncode == 0
     assert glint("binmap", "s.glint", "-o", "b.glint", "--alpha", alpha).returncode == 0
     question = ["--uv", "0.45", "0.5", "--box", "16", "0", "0", "16", "--half", "-0.0267", "0"]
@@ -110,7 +117,14 @@ def test_bad_ranges_are_usage_errors(glint, assets, alpha):
 
 @pytest.mark.parametrize(
     "options",
-    [["--alpha", ""], ["--alpha", "0"], ["--alpha", "-0.1"], ["--alpha", "1e9"], ["--alpha", "nan"], ["--alpha", "0.1", "--leaf-size", "0"]],
+    [
+        ["--alpha", ""],
+        ["--alpha", "0"],
+        ["--alpha", "-0.1"],
+        ["--alpha", "1e9"],
+        ["--alpha", "nan"],
+        ["--alpha", "0.1", "--leaf-size", "0"],
+    ],
     ids=" ".join,
 )
 def test_options_out_of_range_are_usage_errors(glint, assets, options):

@@ -15,7 +15,19 @@ SAMPLES = pathlib.Path(__file__).parents[2] / "data-samples"
 def test_every_level_meets_a_tolerance_of_the_relative_error(glint, sample, tolerance):
     glint("ingest", SAMPLES / f"{sample}.png", "-o", "map.glint")
     glint("pyramid", "map.glint", "-o", "map.pyramid.glint")
-    process = glint("compress", "map.pyramid.glint", "-o", "map.cp.glint", "--method", "tucker", "--tolerance", tolerance, "--metric", "l2", "--json")
+    process = glint(
+        "compress",
+        "map.pyramid.glint",
+        "-o",
+        "map.cp.glint",
+        "--method",
+        "tucker",
+        "--tolerance",
+        tolerance,
+        "--metric",
+        "l2",
+        "--json",
+    )
     assert process.returncode == 0, process.stderr
     result = json.loads(process.stdout)["result"]
     assert 0.97 * tolerance <= result["total"]["rel_l2"] <= tolerance

@@ -82,7 +82,8 @@ def changed(path, tmp_path, change):
 
 
 CHANGES = {
-    "value": lambda file: file.attrs.modify("width", np.int32(file.attrs["width"])) or file.attrs.modify("texel_size_um", np.float32(9)),
+    "value": lambda file: file.attrs.modify("width", np.int32(file.attrs["width"]))
+    or file.attrs.modify("texel_size_um", np.float32(9)),
     "generator": lambda file: file.attrs.modify("generator", np.bytes_("sample_assets 1.1")),
     "long_name": lambda file: file["heights"].attrs.modify("long_name", np.bytes_("depths")),
     "group": lambda file: file.create_group("hidden") and None,
@@ -98,4 +99,7 @@ def test_validate_finds_what_the_digest_is_not_of(glint, tmp_path, change):
 
 
 def test_a_file_without_a_digest_is_valid(glint, tmp_path):
-    assert glint("validate", changed(GOLDEN / "heights.glint", tmp_path, lambda file: file.attrs.__delitem__("digest"))).returncode == 0
+    assert (
+        glint("validate", changed(GOLDEN / "heights.glint", tmp_path, lambda file: file.attrs.__delitem__("digest"))).returncode
+        == 0
+    )

@@ -47,7 +47,9 @@ def test_specification_is_enough_to_read_the_model(glint, heights):
             h = source["heights"][...].astype(float)
         right, up = numpy.roll(h, -1, 1), numpy.roll(h, -1, 0)
         both = numpy.roll(right, -1, 0)
-        area = numpy.mean(0.5 * (numpy.hypot(1, numpy.hypot(right - h, up - h)) + numpy.hypot(1, numpy.hypot(both - up, both - right))))
+        area = numpy.mean(
+            0.5 * (numpy.hypot(1, numpy.hypot(right - h, up - h)) + numpy.hypot(1, numpy.hypot(both - up, both - right)))
+        )
         assert lobes[..., 3].sum(axis=-1).mean() == pytest.approx(area, rel=1e-4)
         assert level["angular_scale"].shape == (25 * 26 // 2, 1)
         assert level["heights"][...].mean() == pytest.approx(h.mean(), abs=1e-3)
@@ -115,8 +117,11 @@ def write_image(path, pixels, kind="uint8"):
 @pytest.fixture
 def two_colours(glint):
     """A sawtooth, red (sRGB) where it falls towards +u, blue where it rises."""
-    run_once(glint, "synth sawtooth --size 64x32 --feature-size 16 --slope 1 -o s.exr --height",
-             "ingest s.exr --kind height --to heights -o s.glint")
+    run_once(
+        glint,
+        "synth sawtooth --size 64x32 --feature-size 16 --slope 1 -o s.exr --height",
+        "ingest s.exr --kind height --to heights -o s.glint",
+    )
     with h5py.File(glint.folder / "s.glint") as file:
         h = file["heights"][...]
     falls = (numpy.roll(h, -1, 1) < h)[::-1]
@@ -148,7 +153,9 @@ def test_colours_of_the_base_follow_the_normals(glint, two_colours):
     assert (info["result"]["properties"]["rgb"], info["result"]["properties"]["has_lobe_colors"]) == (1, 1)
 
     def reflected(x):
-        run = glint("query", "reflectance", "d.glint", "--uv", 0.3, 0.6, "--level", 0, "--wi", x, 0, 1, "--wo", x, 0, 1, "--json")
+        run = glint(
+            "query", "reflectance", "d.glint", "--uv", 0.3, 0.6, "--level", 0, "--wi", x, 0, 1, "--wo", x, 0, 1, "--json"
+        )
         assert run.returncode == 0, run.stderr
         return json.loads(run.stdout)["result"]["reflected"]
 
@@ -159,7 +166,19 @@ def test_colours_of_the_base_follow_the_normals(glint, two_colours):
 def test_grey_images_keep_one_channel_and_linear_ones_their_values(glint, heights):
     for value, space, wanted in ((128, "auto", 0.2158605), (128, "linear", 128 / 255)):
         write_image(glint.folder / "grey.png", numpy.full((96, 64, 3), value, numpy.uint8))
-        process = glint("displace", heights, "-o", "d.glint", "--base-color", "grey.png", "--color-space", space, "--base", "diffuse:0.5", *QUICK)
+        process = glint(
+            "displace",
+            heights,
+            "-o",
+            "d.glint",
+            "--base-color",
+            "grey.png",
+            "--color-space",
+            space,
+            "--base",
+            "diffuse:0.5",
+            *QUICK,
+        )
         assert process.returncode == 0, process.stderr
         with h5py.File(glint.folder / "d.glint") as file:
             assert file.attrs["rgb"] == 0 and file.attrs["albedo"] == 0.5
@@ -174,7 +193,9 @@ def test_roughness_of_the_base_is_that_of_the_image(glint, heights):
     roughness = numpy.full((96, 64, 1), 0.25, numpy.float32)
     roughness[:48] = 0.75
     write_image(glint.folder / "r.exr", roughness, "float")
-    process = glint("displace", heights, "-o", "d.glint", "--factor", "8", "--base", "ggx:0.8", "--base-roughness", "r.exr", *QUICK)
+    process = glint(
+        "displace", heights, "-o", "d.glint", "--factor", "8", "--base", "ggx:0.8", "--base-roughness", "r.exr", *QUICK
+    )
     assert process.returncode == 0, process.stderr
     assert glint("validate", "d.glint").returncode == 0
     with h5py.File(glint.folder / "d.glint") as file:
@@ -234,11 +255,16 @@ LIGHT = ["--wi", 0.3, 0.1, 1, "--wo", -0.4, 0, 1]
 def test_query_reflects_light(glint, displaced):
     process = glint("query", "reflectance", displaced, *POINT, "--level", 0, *LIGHT)
     assert process.returncode == 0, process.stderr
-    values = {variant: reflected(glint, *POINT, "--level", 0, *LIGHT, "--variant", variant)["reflected"][0] for variant in ("full", "lobes", "single")}
+    values = {
+        variant: reflected(glint, *POINT, "--level", 0, *LIGHT, "--variant", variant)["reflected"][0]
+        for variant in ("full", "lobes", "single")
+    }
     assert float(process.stdout) == pytest.approx(values["full"], rel=1e-6)
     assert len(set(values.values())) == 3 and min(values.values()) > 0
     # Directions of any length are the same.
-    assert reflected(glint, *POINT, "--level", 0, "--wi", 0.6, 0.2, 2, "--wo", -4, 0, 10)["reflected"][0] == pytest.approx(values["full"], rel=1e-5)
+    assert reflected(glint, *POINT, "--level", 0, "--wi", 0.6, 0.2, 2, "--wo", -4, 0, 10)["reflected"][0] == pytest.approx(
+        values["full"], rel=1e-5
+    )
     assert "ns per query" in glint("query", "reflectance", displaced, *POINT, "--level", 0, *LIGHT, "--repeat", 300).stdout
 
 
@@ -250,13 +276,17 @@ def test_query_blends_levels_by_the_footprint(glint, displaced):
 
 
 def test_query_tables_and_samples_of_a_displacement(glint, displaced):
-    (glint.folder / "q.csv").write_text("u,v,level,wix,wiy,wiz,wox,woy,woz,name\n0.3,0.7,0,0.3,0.1,1,-0.4,0,1,a\n0.3,0.7,1,0.3,0.1,1,-0.4,0,1,b\n")
+    (glint.folder / "q.csv").write_text(
+        "u,v,level,wix,wiy,wiz,wox,woy,woz,name\n0.3,0.7,0,0.3,0.1,1,-0.4,0,1,a\n0.3,0.7,1,0.3,0.1,1,-0.4,0,1,b\n"
+    )
     process = glint("query", "reflectance", displaced, "--csv", "q.csv", "-o", "-")
     assert process.returncode == 0, process.stderr
     rows = process.stdout.splitlines()
     assert rows[0].endswith("name,reflected")
     for level in (0, 1):
-        assert float(rows[1 + level].split(",")[-1]) == pytest.approx(reflected(glint, *POINT, "--level", level, *LIGHT)["reflected"][0], rel=1e-6)
+        assert float(rows[1 + level].split(",")[-1]) == pytest.approx(
+            reflected(glint, *POINT, "--level", level, *LIGHT)["reflected"][0], rel=1e-6
+        )
     for footprint in (["--level", 0], ["--sigma", 2]):  # one level, and between two
         process = glint("query", "reflectance", displaced, *POINT, *footprint, "--wo", -0.4, 0, 1, "--samples", 50, "-o", "-")
         table = numpy.array([[float(field) for field in row.split(",")] for row in process.stdout.splitlines()[1:]])
@@ -267,7 +297,9 @@ def test_query_tables_and_samples_of_a_displacement(glint, displaced):
         assert first["pdf"] == pytest.approx(drawn[0, 3], rel=1e-3)
     told = glint("query", "reflectance", displaced, "--csv", "q.csv", "-o", "a.csv", "--json")
     assert json.loads(told.stdout)["result"] == {"queries": 2}
-    told = glint("query", "reflectance", displaced, *POINT, "--level", 0, "--wo", 0, 0, 1, "--samples", 7, "-o", "s.csv", "--json")
+    told = glint(
+        "query", "reflectance", displaced, *POINT, "--level", 0, "--wo", 0, 0, 1, "--samples", 7, "-o", "s.csv", "--json"
+    )
     assert json.loads(told.stdout)["result"] == {"samples": 7}
 
 
@@ -280,8 +312,14 @@ def test_query_normals_of_a_displacement_integrate_to_one(glint, displaced):
     assert process.returncode == 0, process.stderr
     densities = [float(row.split(",")[-1]) for row in process.stdout.splitlines()[1:]]
     assert sum(densities) * (2 / n) ** 2 == pytest.approx(1, abs=0.05)  # 24 x 24 points of broad lobes
-    assert glint("query", "reflectance", displaced, *POINT, "--level", 1, "--half", *grid[40]).stdout.strip() == f"{densities[40]:.9g}"
-    assert glint("query", "reflectance", displaced, *POINT, "--level", 1, "--image", "lobes.png", "--image-size", 64).returncode == 0
+    assert (
+        glint("query", "reflectance", displaced, *POINT, "--level", 1, "--half", *grid[40]).stdout.strip()
+        == f"{densities[40]:.9g}"
+    )
+    assert (
+        glint("query", "reflectance", displaced, *POINT, "--level", 1, "--image", "lobes.png", "--image-size", 64).returncode
+        == 0
+    )
     assert (glint.folder / "lobes.png").stat().st_size > 500
 
 
@@ -354,10 +392,14 @@ def test_terms_are_added_to_a_tolerance_and_singular_values_told(glint):
     glint("ingest", "both.exr", "--kind", "height", "--to", "heights", "-o", "both.glint")
     quick = ["--factor", "8", "--angular", "7", "--spatial", "2", "--bounces", "1", "--json"]
     one = json.loads(glint("displace", "both.glint", "-o", "one.glint", *quick).stdout)["result"]["levels"][0]
-    more = json.loads(glint("displace", "both.glint", "-o", "more.glint", "--scale-tolerance", "0.01", *quick).stdout)["result"]["levels"][0]
+    more = json.loads(glint("displace", "both.glint", "-o", "more.glint", "--scale-tolerance", "0.01", *quick).stdout)[
+        "result"
+    ]["levels"][0]
     assert one["scale_terms"] == 1 and more["scale_terms"] > 1
     assert more["scale_residual"] <= 0.01 < one["scale_residual"] == one["rank1_residual"]
-    assert one["singular_shares"][0] == one["rank1_energy"] and one["singular_shares"] == sorted(one["singular_shares"], reverse=True)
+    assert one["singular_shares"][0] == one["rank1_energy"] and one["singular_shares"] == sorted(
+        one["singular_shares"], reverse=True
+    )
     assert more["scale_bytes"] == more["scale_terms"] * one["scale_bytes"]
     info = json.loads(glint("info", "more.glint", "--json").stdout)
     assert info["result"]["statistics"]["levels"][0]["singular_shares"] == more["singular_shares"]

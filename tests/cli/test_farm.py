@@ -72,7 +72,11 @@ def run(farm, *arguments, code=0):
 
 
 def contents(folder):
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file() and path.suffix == ".glint"}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.suffix == ".glint"
+    }
 
 
 def leftovers(folder):
@@ -92,13 +96,28 @@ def damage(path):
 
 
 def test_a_plan_has_every_asset_once_and_what_it_is_made_of(farm):
-    assert plan(farm, PYRAMID, "cp", "sat --bins 6x20") == {"maps": 3, "hashed_maps": 3, "entries": 12, "duplicates": 0, "done": 0}
+    assert plan(farm, PYRAMID, "cp", "sat --bins 6x20") == {
+        "maps": 3,
+        "hashed_maps": 3,
+        "entries": 12,
+        "duplicates": 0,
+        "done": 0,
+    }
     document = manifest(farm)
     check_schema(document, "farm-manifest")
     by_output = {entry["output"]: entry for entry in document["entries"]}
     assert set(by_output) == {f"assets/{name}{kind}.glint" for name in "abc" for kind in ("", ".pyramid", ".cp", ".sat")}
     compressed = by_output["assets/a.cp.glint"]
-    assert compressed["command"] == ["glint-compress", "assets/a.pyramid.glint", "-o", "assets/a.cp.glint", "--method", "cp", "--rank", "16"]
+    assert compressed["command"] == [
+        "glint-compress",
+        "assets/a.pyramid.glint",
+        "-o",
+        "assets/a.cp.glint",
+        "--method",
+        "cp",
+        "--rank",
+        "16",
+    ]
     assert compressed["after"] == [by_output["assets/a.pyramid.glint"]["key"]]
     assert by_output["assets/a.glint"]["inputs"] == ["maps/a.png"]
 
@@ -145,17 +164,28 @@ def test_flags_and_names_are_those_of_the_rules_for_make(farm):
     plan(farm, *kinds)
     makefile = f"GLINT_MAPS := maps\nGLINT_OUT := assets\ninclude {ROOT}/pipelines/glint.mk\nall: {' '.join(f'assets/a.{kind}.glint' for kind in kinds)}\n"
     (farm.folder / "Makefile").write_text(makefile)
-    dry = subprocess.run(["make", "-n", "all"], cwd=farm.folder, capture_output=True, text=True, check=True).stdout.replace("\\\n", "")
+    dry = subprocess.run(["make", "-n", "all"], cwd=farm.folder, capture_output=True, text=True, check=True).stdout.replace(
+        "\\\n", ""
+    )
     words = lambda line: {word for word in line.replace("'", "").split() if word != "--quiet"} - {"--depfile"}
-    rules = [{word for word in words(line) if not word.endswith(".glint.d")} for line in dry.splitlines() if line.startswith("glint-")]
+    rules = [
+        {word for word in words(line) if not word.endswith(".glint.d")}
+        for line in dry.splitlines()
+        if line.startswith("glint-")
+    ]
     planned = [set(entry["command"]) for entry in manifest(farm)["entries"] if entry["output"].startswith("assets/a.")]
     key = lambda words: sorted(words)
     assert sorted(planned, key=key) == sorted(rules, key=key)
 
 
 def test_a_plan_of_glint_plan_and_its_jobs_are_the_same_entries(farm):
-    scene = {"schema": "glint-plan scene 1", "lights": [{"type": "environment", "band_limit_deg": 60}],
-             "materials": [{"map": "a.png", "footprints": {"smallest_texels": 4, "largest_texels": 4}, "sigma_r": 0.1, "tolerance": 9}]}
+    scene = {
+        "schema": "glint-plan scene 1",
+        "lights": [{"type": "environment", "band_limit_deg": 60}],
+        "materials": [
+            {"map": "a.png", "footprints": {"smallest_texels": 4, "largest_texels": 4}, "sigma_r": 0.1, "tolerance": 9}
+        ],
+    }
     (farm.folder / "maps/scene.json").write_text(json.dumps(scene))
     command = [BIN / "glint-plan", "maps/scene.json", "-o", "plans.json", "--jobs", "jobs.json"]
     subprocess.run(command, cwd=farm.folder, check=True)
@@ -186,20 +216,24 @@ def test_percent_stands_for_the_map_and_files_in_flags_are_inputs(farm):
     assert changed["key"] != entry["key"]
 
 
-@pytest.mark.parametrize("words, told", [
-    (["plan", "-o", "m.json"], "nothing to plan"),
-    (["plan", "maps", "-o", "m.json"], "--make pyramid"),
-    (["plan", "maps", "-o", "m.json", "--make", "pyramyd"], "did you mean pyramid?"),
-    (["plan", "maps", "-o", "m.json", "--make", "cp", "--make", "cp --rank 4"], "in one --make"),
-    (["plan", "maps", "--from", "maps/a.png", "-o", "m.json"], "exclude each other"),
-    (["plan", "--from", "maps/a.png", "-o", "m.json", "--make", "cp"], "leave out --make"),
-    (["plan", "--from", "maps/a.png", "-o", "m.json"], "glint-plan SCENE"),
-    (["plan", ".", "-o", "maps/a.png", "--make", "cp"], "--force"),
-    (["run", "maps/a.png"], "glint-farm plan"),
-    (["run", "none.json"], "No such file"),
-    (["status", "none.json"], "No such file"),
-    ([], "give plan, run or status"),
-], ids=lambda value: " ".join(value) if isinstance(value, list) else "")
+@pytest.mark.parametrize(
+    "words, told",
+    [
+        (["plan", "-o", "m.json"], "nothing to plan"),
+        (["plan", "maps", "-o", "m.json"], "--make pyramid"),
+        (["plan", "maps", "-o", "m.json", "--make", "pyramyd"], "did you mean pyramid?"),
+        (["plan", "maps", "-o", "m.json", "--make", "cp", "--make", "cp --rank 4"], "in one --make"),
+        (["plan", "maps", "--from", "maps/a.png", "-o", "m.json"], "exclude each other"),
+        (["plan", "--from", "maps/a.png", "-o", "m.json", "--make", "cp"], "leave out --make"),
+        (["plan", "--from", "maps/a.png", "-o", "m.json"], "glint-plan SCENE"),
+        (["plan", ".", "-o", "maps/a.png", "--make", "cp"], "--force"),
+        (["run", "maps/a.png"], "glint-farm plan"),
+        (["run", "none.json"], "No such file"),
+        (["status", "none.json"], "No such file"),
+        ([], "give plan, run or status"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
 def test_mistakes_are_told_with_what_to_do(farm, words, told):
     process = farm(*words)
     assert process.returncode in (1, 2, 3)
@@ -216,13 +250,16 @@ def test_a_folder_without_images_and_twins_are_errors(farm):
     assert process.returncode == 1 and "a.png" in process.stderr and "a.tif" in process.stderr
 
 
-@pytest.mark.parametrize("change, told", [
-    (lambda m: m["entries"][0]["command"].__setitem__(0, "../../bin/sh"), "runs no program of glint"),
-    (lambda m: m["entries"][0]["after"].append(m["entries"][0]["key"]), "does not come before it"),
-    (lambda m: m["entries"].append(m["entries"][0]), "two entries have the key"),
-    (lambda m: m["entries"][0].pop("links"), "lacks a part"),
-    (lambda m: m.__setitem__("generator", "glint-farm 0.0.1"), "planned for version 0.0.1"),
-])
+@pytest.mark.parametrize(
+    "change, told",
+    [
+        (lambda m: m["entries"][0]["command"].__setitem__(0, "../../bin/sh"), "runs no program of glint"),
+        (lambda m: m["entries"][0]["after"].append(m["entries"][0]["key"]), "does not come before it"),
+        (lambda m: m["entries"].append(m["entries"][0]), "two entries have the key"),
+        (lambda m: m["entries"][0].pop("links"), "lacks a part"),
+        (lambda m: m.__setitem__("generator", "glint-farm 0.0.1"), "planned for version 0.0.1"),
+    ],
+)
 def test_a_manifest_that_was_changed_is_refused(farm, change, told):
     plan(farm, "normals")
     document = manifest(farm)
@@ -246,15 +283,37 @@ def test_only_options_that_take_files_name_files(farm):
     assert displaced["inputs"] == ["assets/a.heights.glint", "colour.png"]
     assert displaced["command"][-4:] == ["--base-color", "colour.png", "--factor", "16"]
     plan(farm, "moments --roughness=colour.png")
-    assert next(entry for entry in manifest(farm)["entries"] if "moments" in entry["output"])["inputs"] == ["assets/a.glint", "colour.png"]
+    assert next(entry for entry in manifest(farm)["entries"] if "moments" in entry["output"])["inputs"] == [
+        "assets/a.glint",
+        "colour.png",
+    ]
 
 
-@pytest.mark.parametrize("flags, told", [
-    *((flag, flag.split()[0].split("=")[0]) for flag in ("--threads 2", "--progress json", "--json", "--quiet", "-q", "-v", "--max-memory=1G",
-                                                        "--depfile d", "--textures .", "-o x.glint", "--output=x.glint", "-fq", "--help")),
-    ("--roughness none.png", "none.png"),
-    ("--config", "the file of --config is missing"),
-])
+@pytest.mark.parametrize(
+    "flags, told",
+    [
+        *(
+            (flag, flag.split()[0].split("=")[0])
+            for flag in (
+                "--threads 2",
+                "--progress json",
+                "--json",
+                "--quiet",
+                "-q",
+                "-v",
+                "--max-memory=1G",
+                "--depfile d",
+                "--textures .",
+                "-o x.glint",
+                "--output=x.glint",
+                "-fq",
+                "--help",
+            )
+        ),
+        ("--roughness none.png", "none.png"),
+        ("--config", "the file of --config is missing"),
+    ],
+)
 def test_flags_that_the_farm_cannot_have_are_refused(farm, flags, told):
     process = farm("plan", "maps", "-o", "m.json", "--make", f"moments {flags}")
     assert process.returncode in (1, 2) and told in process.stderr and process.stderr.count("\n") == 1
@@ -294,9 +353,18 @@ def test_lines_of_another_form_are_left_out(farm):
     run(farm)
     key = manifest(farm)["entries"][0]["key"]
     lines = [DEEP, '{"key": ' + DEEP + "}", "null"]
-    lines += [json.dumps({"key": key, "output": "assets/a.glint", **odd}) for odd in (
-        {"status": 5}, {"wall_s": "long"}, {"peak_bytes": None}, {"status": "failed", "error": 5}, {"status": "failed", "error": {"rule": 5}},
-        {"files": 5}, {"files": [{"file": "assets/a.glint", "size_bytes": 1, "mtime_ns": 1, "inode": 1}, {}]})]
+    lines += [
+        json.dumps({"key": key, "output": "assets/a.glint", **odd})
+        for odd in (
+            {"status": 5},
+            {"wall_s": "long"},
+            {"peak_bytes": None},
+            {"status": "failed", "error": 5},
+            {"status": "failed", "error": {"rule": 5}},
+            {"files": 5},
+            {"files": [{"file": "assets/a.glint", "size_bytes": 1, "mtime_ns": 1, "inode": 1}, {}]},
+        )
+    ]
     for name in ("farm.json.log", "farm.json.hashes"):
         with open(farm.folder / name, "a") as file:
             file.writelines(line + "\n" for line in lines)
@@ -305,13 +373,16 @@ def test_lines_of_another_form_are_left_out(farm):
     assert plan(farm, "normals")["hashed_maps"] == 0
 
 
-@pytest.mark.parametrize("change, told", [
-    (lambda entry, other: entry["command"].extend(["--convention", "directx"]), "was changed by hand"),
-    (lambda entry, other: entry["inputs"].clear(), "was changed by hand"),
-    (lambda entry, other: entry.__setitem__("output", "other.glint"), "was changed by hand"),
-    (lambda entry, other: entry.__setitem__("output", other["output"]), "two entries make"),
-    (lambda entry, other: entry["links"].append(other["output"]), "two entries make"),
-])
+@pytest.mark.parametrize(
+    "change, told",
+    [
+        (lambda entry, other: entry["command"].extend(["--convention", "directx"]), "was changed by hand"),
+        (lambda entry, other: entry["inputs"].clear(), "was changed by hand"),
+        (lambda entry, other: entry.__setitem__("output", "other.glint"), "was changed by hand"),
+        (lambda entry, other: entry.__setitem__("output", other["output"]), "two entries make"),
+        (lambda entry, other: entry["links"].append(other["output"]), "two entries make"),
+    ],
+)
 def test_an_entry_that_was_changed_by_hand_is_refused(farm, change, told):
     plan(farm, "normals")
     document = manifest(farm)
@@ -561,7 +632,10 @@ def test_a_full_disk_is_told_and_the_run_goes_on_when_there_is_room(farm):
     """Writes through links to a small disk; needs root to mount one."""
     disk = farm.folder / "assets"
     disk.mkdir()
-    if os.getuid() != 0 or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "none", disk], capture_output=True).returncode != 0:
+    if (
+        os.getuid() != 0
+        or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "none", disk], capture_output=True).returncode != 0
+    ):
         pytest.skip("needs to mount a small disk")
     try:
         plan(farm, PYRAMID)
@@ -580,7 +654,10 @@ def test_a_duplicate_on_another_disk_is_a_copy(farm):
     disk.mkdir(parents=True)
     (farm.folder / "maps/more").mkdir()
     shutil.copy(farm.folder / "maps/a.png", farm.folder / "maps/more/twin.png")
-    if os.getuid() != 0 or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64m", "none", disk], capture_output=True).returncode != 0:
+    if (
+        os.getuid() != 0
+        or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64m", "none", disk], capture_output=True).returncode != 0
+    ):
         pytest.skip("needs to mount a disk")
     try:
         plan(farm, "normals")
@@ -620,8 +697,13 @@ class Running:
         self.start(farm, *arguments)
 
     def start(self, farm, *arguments):
-        self.process = subprocess.Popen([BIN / "glint-farm", "run", "farm.json", "--json", *map(str, arguments)], cwd=farm.folder,
-                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(
+            [BIN / "glint-farm", "run", "farm.json", "--json", *map(str, arguments)],
+            cwd=farm.folder,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
 
     def child(self, name="glint-pyramid"):
         """Waits for a program of the large map and returns its number."""
@@ -707,7 +789,9 @@ def test_a_program_that_is_killed_each_time_is_a_failure_with_its_signal(farm, m
     code, output, _ = running.wait()
     assert code == 4 and json.loads(output)["result"]["failed"] == 1
     line = next(line for line in log(farm) if line["status"] == "failed")
-    assert (line["exit_code"], line["error"]["rule"]) == (KILLED, "process.signal") and "--max-memory" in line["error"]["remedy"]
+    assert (line["exit_code"], line["error"]["rule"]) == (KILLED, "process.signal") and "--max-memory" in line["error"][
+        "remedy"
+    ]
 
 
 def test_two_farms_make_each_asset_once(farm, maps, whole):
@@ -758,7 +842,11 @@ def test_an_unchanged_asset_is_left_alone(glint, maps):
 
 def test_an_asset_of_assets_is_unchanged_if_they_are(glint, maps):
     shutil.copy(maps / "a.png", glint.folder)
-    steps = ["ingest a.png -o n.glint", "pyramid n.glint -o p.glint --resolution 64 --sigma-r .02", "compress p.glint -o c.glint --rank 4"]
+    steps = [
+        "ingest a.png -o n.glint",
+        "pyramid n.glint -o p.glint --resolution 64 --sigma-r .02",
+        "compress p.glint -o c.glint --rank 4",
+    ]
     for step in steps:
         assert glint(*step.split()).returncode == 0
     for step in steps:

@@ -12,7 +12,10 @@ ROOT = pathlib.Path(__file__).parents[2]
 def test_shards_by_make_are_the_whole(glint):
     (glint.folder / "maps").mkdir()
     for seed in range(3):
-        subprocess.run([BIN / "glint-synth", "flakes", "--size", "32", "--seed", str(seed), "-o", glint.folder / f"maps/{seed}.png"], check=True)
+        subprocess.run(
+            [BIN / "glint-synth", "flakes", "--size", "32", "--seed", str(seed), "-o", glint.folder / f"maps/{seed}.png"],
+            check=True,
+        )
     assert glint("farm", "plan", "maps", "-o", "farm.json", "--make", "sat").returncode == 0
     make = ["make", "-f", ROOT / "pipelines/farm/shards.mk", "-j2", "SHARDS=2", f"GLINT_BIN={BIN}"]
     process = subprocess.run([*make, "MANIFEST=farm.json"], cwd=glint.folder, capture_output=True, text=True)
@@ -25,7 +28,11 @@ def test_shards_by_make_are_the_whole(glint):
 
 def test_a_map_in_shards_by_slurm_is_the_whole(glint):
     """The tasks of an array, as Slurm starts them: with its variables and the programs on the path."""
-    for command in ("synth flakes --size 64 -o flakes.png", "ingest flakes.png -o flakes.glint", "pyramid flakes.glint -o whole.glint --resolution 64 --sigma-r 0.02"):
+    for command in (
+        "synth flakes --size 64 -o flakes.png",
+        "ingest flakes.png -o flakes.glint",
+        "pyramid flakes.glint -o whole.glint --resolution 64 --sigma-r 0.02",
+    ):
         assert glint(*command.split()).returncode == 0
     for task in (2, 1, 3):
         environment = {"PATH": f"{BIN}:/usr/bin:/bin", "SLURM_ARRAY_TASK_ID": str(task), "SLURM_ARRAY_TASK_COUNT": "3"}

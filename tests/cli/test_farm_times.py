@@ -51,11 +51,19 @@ def test_ten_thousand_maps_are_planned_and_found_quickly(tmp_path):
     plan = ["plan", "maps", "-o", "farm.json", "--make", "normals"]
     first_s = cpu_s(lambda: farm(tmp_path, *plan))
     plan_s = cpu_s(lambda: farm(tmp_path, *plan))
-    assert json.loads(farm(tmp_path, *plan, "--json"))["result"] == {"maps": MAPS, "hashed_maps": 0, "entries": MAPS, "duplicates": 0, "done": 0}
+    assert json.loads(farm(tmp_path, *plan, "--json"))["result"] == {
+        "maps": MAPS,
+        "hashed_maps": 0,
+        "entries": MAPS,
+        "duplicates": 0,
+        "done": 0,
+    }
     pretend_made(tmp_path)
     rerun_s = cpu_s(lambda: farm(tmp_path, "run", "farm.json"))
     assert json.loads(farm(tmp_path, "run", "farm.json", "--json"))["result"]["known"] == MAPS
-    print(f"\n{MAPS} maps: plan {plan_s:.2f} s with known hashes ({first_s:.2f} s with tiny files to read), rerun with nothing to do {rerun_s:.2f} s")
+    print(
+        f"\n{MAPS} maps: plan {plan_s:.2f} s with known hashes ({first_s:.2f} s with tiny files to read), rerun with nothing to do {rerun_s:.2f} s"
+    )
     assert plan_s <= MOST_PLAN_S
     assert rerun_s <= MOST_RERUN_S
 
@@ -63,14 +71,22 @@ def test_ten_thousand_maps_are_planned_and_found_quickly(tmp_path):
 def test_a_farm_takes_little_beside_the_programs(tmp_path):
     """ingest, pyramid and bin map of a 2K map: what the farm takes itself, and for a look the same commands by hand."""
     (tmp_path / "maps").mkdir()
-    subprocess.run([BIN / "glint-synth", "flakes", "--size", str(SIZE), "--bits", "16", "-o", tmp_path / "maps/map.png"], check=True)
+    subprocess.run(
+        [BIN / "glint-synth", "flakes", "--size", str(SIZE), "--bits", "16", "-o", tmp_path / "maps/map.png"], check=True
+    )
     farm(tmp_path, "plan", "maps", "-o", "farm.json", "--make", "pyramid", "--make", "binmap")
     together = cpu_s(lambda: farm(tmp_path, "run", "farm.json", "--threads", "1"))
     lines = [json.loads(line) for line in (tmp_path / "farm.json.log").read_text().splitlines()]
     programs = sum(line["cpu_s"] for line in lines)
     commands = [entry["command"] for entry in json.loads((tmp_path / "farm.json").read_text())["entries"]]
-    by_hand = cpu_s(lambda: [subprocess.run([BIN / program, *words, "--threads", "1"], cwd=tmp_path, check=True) for program, *words in commands])
-    print(f"\n{len(lines)} programs on a map of {SIZE}^2: {programs:.2f} s in a farm, which takes {together - programs:.3f} s beside them "
-          f"({together / programs - 1:.1%}); {by_hand:.2f} s by hand")
+    by_hand = cpu_s(
+        lambda: [
+            subprocess.run([BIN / program, *words, "--threads", "1"], cwd=tmp_path, check=True) for program, *words in commands
+        ]
+    )
+    print(
+        f"\n{len(lines)} programs on a map of {SIZE}^2: {programs:.2f} s in a farm, which takes {together - programs:.3f} s beside them "
+        f"({together / programs - 1:.1%}); {by_hand:.2f} s by hand"
+    )
     assert len(lines) == len(commands) == 3
     assert together - programs <= MOST_OVERHEAD * programs

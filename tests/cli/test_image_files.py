@@ -77,8 +77,10 @@ def varying_alpha(width=48, height=40):
     return 0.55 + 0.45 * numpy.linspace(0, 1, width * height).reshape(height, width, 1)
 
 
-@pytest.mark.parametrize("name, kind, error", [("a.exr", "float", HALF), ("a.exr", "half", 4e-3), ("a.tif", "uint16", HALF),
-                                               ("a.tif", "uint8", 3 * CODE)])
+@pytest.mark.parametrize(
+    "name, kind, error",
+    [("a.exr", "float", HALF), ("a.exr", "half", 4e-3), ("a.tif", "uint16", HALF), ("a.tif", "uint8", 3 * CODE)],
+)
 def test_colours_are_divided_by_associated_alpha(glint, name, kind, error):
     write(glint.folder / name, with_alpha(unorm(surface()), varying_alpha()), kind)
     ingest(glint, name)

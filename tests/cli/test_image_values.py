@@ -168,8 +168,14 @@ def test_numbers_that_stand_for_no_data_are_refused_with_a_remedy(glint, number)
 
 @pytest.mark.parametrize(
     "kind, number, text",
-    [("float32", -9999, "-9999"), ("int16", -32768, "-32768"), ("uint8", 0, "0"), ("uint16", 7, "7 "), ("float32", numpy.nan, "nan"),
-     ("float64", -1.7976931348623157e308, "-1.7976931348623157e+308")],
+    [
+        ("float32", -9999, "-9999"),
+        ("int16", -32768, "-32768"),
+        ("uint8", 0, "0"),
+        ("uint16", 7, "7 "),
+        ("float32", numpy.nan, "nan"),
+        ("float64", -1.7976931348623157e308, "-1.7976931348623157e+308"),
+    ],
 )
 def test_the_tag_of_a_geotiff_names_its_holes(glint, kind, number, text):
     rng = numpy.random.default_rng(3)
@@ -215,10 +221,22 @@ def test_the_tag_is_found_in_big_tiffs_of_either_byte_order(glint):
     heights = numpy.linspace(0, 50, 24 * 24, dtype=numpy.float32).reshape(24, 24)
     heights[2:5, 3:7] = -1000
     body = heights.astype(">f4").tobytes()
-    tags = {256: (4, 24), 257: (4, 24), 258: (3, 32), 259: (3, 1), 262: (3, 1), 273: (4, 16), 277: (3, 1), 278: (4, 24),
-            279: (4, len(body)), 339: (3, 3)}
-    entries = b"".join(struct.pack(">HHQ", n, kind, 1) + (struct.pack(">HHI", v, 0, 0) if kind == 3 else struct.pack(">II", v, 0))
-                       for n, (kind, v) in sorted(tags.items()))
+    tags = {
+        256: (4, 24),
+        257: (4, 24),
+        258: (3, 32),
+        259: (3, 1),
+        262: (3, 1),
+        273: (4, 16),
+        277: (3, 1),
+        278: (4, 24),
+        279: (4, len(body)),
+        339: (3, 3),
+    }
+    entries = b"".join(
+        struct.pack(">HHQ", n, kind, 1) + (struct.pack(">HHI", v, 0, 0) if kind == 3 else struct.pack(">II", v, 0))
+        for n, (kind, v) in sorted(tags.items())
+    )
     entries += struct.pack(">HHQ", 42113, 2, 6) + b"-1000\0\0\0"
     header = b"MM\0\x2b\0\x08\0\0" + struct.pack(">Q", 16 + len(body))
     (glint.folder / "g.tif").write_bytes(header + body + struct.pack(">Q", len(tags) + 1) + entries + bytes(8))
@@ -231,7 +249,9 @@ def test_heights_that_do_not_tile_are_warned_of_and_clamped(glint):
     heights = numpy.repeat(numpy.arange(32, dtype=numpy.float32)[None, :, None], 32, axis=0)
     write(glint.folder / "r.exr", heights)
     process = ingest(glint, "r.exr", "--kind", "height")
-    assert "left and right borders" in process.stderr and "31.0 times" in process.stderr and "--boundary clamp" in process.stderr
+    assert (
+        "left and right borders" in process.stderr and "31.0 times" in process.stderr and "--boundary clamp" in process.stderr
+    )
     assert "upper and lower" not in process.stderr
     assert "borders" not in ingest(glint, "r.exr", "--kind", "height", "--boundary", "clamp").stderr
     assert data(glint)[..., 0] == pytest.approx(-numpy.sqrt(0.5), abs=1e-6)  # a slope of 1 everywhere

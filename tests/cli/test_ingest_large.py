@@ -27,7 +27,11 @@ def write_exr(path, size):
     header += attribute(b"channels", b"chlist", channels) + attribute(b"compression", b"compression", b"\0")
     header += attribute(b"dataWindow", b"box2i", window) + attribute(b"displayWindow", b"box2i", window)
     header += attribute(b"lineOrder", b"lineOrder", b"\0") + attribute(b"pixelAspectRatio", b"float", struct.pack("<f", 1))
-    header += attribute(b"screenWindowCenter", b"v2f", struct.pack("<ff", 0, 0)) + attribute(b"screenWindowWidth", b"float", struct.pack("<f", 1)) + b"\0"
+    header += (
+        attribute(b"screenWindowCenter", b"v2f", struct.pack("<ff", 0, 0))
+        + attribute(b"screenWindowWidth", b"float", struct.pack("<f", 1))
+        + b"\0"
+    )
     row_bytes = 2 * 2 * size
     first = len(header) + 8 * size
     x = numpy.arange(size)
@@ -42,7 +46,9 @@ def write_exr(path, size):
 def ingest(folder, *flags, data_limit=None):
     """Runs the program. Returns its peak of memory, mapped files included, and its processor time in seconds."""
     limit = (lambda: resource.setrlimit(resource.RLIMIT_DATA, (data_limit, data_limit))) if data_limit else None
-    process = subprocess.Popen([BIN / "glint-ingest", *flags, "--threads", "2"], cwd=folder, stderr=subprocess.PIPE, preexec_fn=limit)
+    process = subprocess.Popen(
+        [BIN / "glint-ingest", *flags, "--threads", "2"], cwd=folder, stderr=subprocess.PIPE, preexec_fn=limit
+    )
     error = process.stderr.read().decode()
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)

@@ -13,8 +13,14 @@ LIMIT = "16M"  # less than the pixels and normals of the map
 
 
 def ingest(glint, output, temporary, stdout=None):
-    return subprocess.run([BIN / "glint-ingest", "map.exr", "-o", output, "--max-memory", LIMIT, "--threads", "2"], cwd=glint.folder,
-                          env={**os.environ, "TMPDIR": str(temporary)}, stdout=stdout, stderr=subprocess.PIPE, text=True)
+    return subprocess.run(
+        [BIN / "glint-ingest", "map.exr", "-o", output, "--max-memory", LIMIT, "--threads", "2"],
+        cwd=glint.folder,
+        env={**os.environ, "TMPDIR": str(temporary)},
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
 
 
 @pytest.fixture

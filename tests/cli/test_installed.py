@@ -43,7 +43,9 @@ def run_for_warnings(source, prefix, flags):
     return [line for line in process.stderr.splitlines() if "warning:" in line]
 
 
-pytestmark = pytest.mark.skipif(instrumented("thread"), reason="programs with AddressSanitizer cannot link a library for ThreadSanitizer")
+pytestmark = pytest.mark.skipif(
+    instrumented("thread"), reason="programs with AddressSanitizer cannot link a library for ThreadSanitizer"
+)
 
 
 @pytest.fixture(scope="module")
@@ -68,8 +70,18 @@ def programs(prefix, tmp_path_factory):
     sanitize = " ".join(SANITIZE)
     # Static programs in C++ share templates with the library, so they are instrumented only where it is.
     flags = cache("CMAKE_CXX_FLAGS")
-    run("cmake", "-S", CONSUMER, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}", "-DCMAKE_BUILD_TYPE=Debug", f"-DCMAKE_C_FLAGS={sanitize}",
-        f"-DCMAKE_CXX_FLAGS={flags}", f"-DCMAKE_EXE_LINKER_FLAGS={sanitize}")
+    run(
+        "cmake",
+        "-S",
+        CONSUMER,
+        "-B",
+        build,
+        f"-DCMAKE_PREFIX_PATH={prefix}",
+        "-DCMAKE_BUILD_TYPE=Debug",
+        f"-DCMAKE_C_FLAGS={sanitize}",
+        f"-DCMAKE_CXX_FLAGS={flags}",
+        f"-DCMAKE_EXE_LINKER_FLAGS={sanitize}",
+    )
     run("cmake", "--build", build)
     return build
 
@@ -82,11 +94,21 @@ def test_programs_of_an_installed_package_get_what_the_header_promises(programs,
 
 
 def test_example_of_the_readme_answers(programs):
-    assert re.fullmatch(r"density \S+\nmean over a light \S+\nreflected \S+ \S+ \S+\n", run(programs / "app", GOLDEN / "ndf-cp-cp-i8.glint"))
+    assert re.fullmatch(
+        r"density \S+\nmean over a light \S+\nreflected \S+ \S+ \S+\n", run(programs / "app", GOLDEN / "ndf-cp-cp-i8.glint")
+    )
 
 
 def test_a_project_in_c_alone_links_the_static_library(prefix, tmp_path):
-    run("cmake", "-S", ROOT / "tests/consumer_c", "-B", tmp_path, f"-DCMAKE_PREFIX_PATH={prefix}", f"-DCMAKE_C_FLAGS={cache('CMAKE_C_FLAGS')}")
+    run(
+        "cmake",
+        "-S",
+        ROOT / "tests/consumer_c",
+        "-B",
+        tmp_path,
+        f"-DCMAKE_PREFIX_PATH={prefix}",
+        f"-DCMAKE_C_FLAGS={cache('CMAKE_C_FLAGS')}",
+    )
     run("cmake", "--build", tmp_path)
     assert "mean over a light" in run(tmp_path / "app", GOLDEN / "ndf-cp-cp-i8.glint")
 
@@ -103,7 +125,20 @@ def test_a_plain_compiler_and_pkg_config_are_enough(prefix, library_dir, tmp_pat
     environment = {**os.environ, "PKG_CONFIG_PATH": str(library_dir / "pkgconfig")}
     flags = run("pkg-config", "--cflags", "--libs", package, env=environment).split()
     program = tmp_path / "check"
-    run("cc", "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *SANITIZE, CONSUMER / "check.c", "-o", program, *flags, "-lm")
+    run(
+        "cc",
+        "-std=c99",
+        "-Wall",
+        "-Wextra",
+        "-Wpedantic",
+        "-Werror",
+        *SANITIZE,
+        CONSUMER / "check.c",
+        "-o",
+        program,
+        *flags,
+        "-lm",
+    )
     loaded = {**os.environ, "LD_LIBRARY_PATH": str(library_dir)} if package == "glint" else None
     for asset in KINDS:
         run(program, GOLDEN / asset, DISPLACEMENT, env=loaded)
@@ -112,7 +147,9 @@ def test_a_plain_compiler_and_pkg_config_are_enough(prefix, library_dir, tmp_pat
 def test_shared_library_shows_the_c_interface_and_nothing_else(prefix, library_dir):
     header = (prefix / "include/glint.h").read_text()
     declared = set(re.findall(r"\b(glint_\w+)\(", re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL)))
-    symbols = [line.split()[-1].split("@")[0] for line in run("nm", "-D", "--defined-only", library_dir / "libglint.so").splitlines()]
+    symbols = [
+        line.split()[-1].split("@")[0] for line in run("nm", "-D", "--defined-only", library_dir / "libglint.so").splitlines()
+    ]
     version = re.search(r"#define GLINT_ABI_VERSION (\d+)", header)[1]
     assert {name for name in symbols if name != f"GLINT_{version}"} == declared
 
@@ -151,8 +188,11 @@ def test_older_standards_get_one_error_that_says_what_to_do(prefix, tmp_path):
     refused = 0
     for header in installed_headers(prefix):
         source.write_text(f'#include "{header}"\n')
-        process = subprocess.run(["c++", "-std=c++17", "-fsyntax-only", "-Wfatal-errors", "-I", prefix / "include", source],
-                                 capture_output=True, text=True)
+        process = subprocess.run(
+            ["c++", "-std=c++17", "-fsyntax-only", "-Wfatal-errors", "-I", prefix / "include", source],
+            capture_output=True,
+            text=True,
+        )
         errors = [line for line in process.stderr.splitlines() if "error:" in line]
         assert not errors or "glint needs C++20" in errors[0], header
         refused += bool(errors)

@@ -17,15 +17,47 @@ from conftest import BIN
 ROOT = pathlib.Path(__file__).parents[2]
 FOLDER = ROOT / "docs/json"
 TOOLS = sorted(path.parent.name for path in (ROOT / "apps").glob("glint-*/main.cpp"))
-SCHEMAS = {path.name.removesuffix(".schema.json"): json.loads(path.read_text()) for path in sorted(FOLDER.glob("*.schema.json"))}
+SCHEMAS = {
+    path.name.removesuffix(".schema.json"): json.loads(path.read_text()) for path in sorted(FOLDER.glob("*.schema.json"))
+}
 
 LIGHTS = {"lights": [{"type": "sphere", "centre": [1, 0, 3], "radius": 0.5, "radiance": [3, 2, 1]}]}
 # A map this small, asked at one size.
-SCENE = {"schema": "glint-plan scene 1", "lights": [{"type": "environment", "band_limit_deg": 60}],
-         "materials": [{"map": "n.png", "footprints": {"smallest_texels": 4, "largest_texels": 4}, "sigma_r": 0.1, "tolerance": 9}]}
+SCENE = {
+    "schema": "glint-plan scene 1",
+    "lights": [{"type": "environment", "band_limit_deg": 60}],
+    "materials": [{"map": "n.png", "footprints": {"smallest_texels": 4, "largest_texels": 4}, "sigma_r": 0.1, "tolerance": 9}],
+}
 QUERIES = {"half.csv": "u,v,sigma,hx,hy\n.3,.3,4,0,0\n.1,.2,5,.1,0\n", "displaced.csv": "u,v,level,hx,hy\n.3,.3,0,0,0\n"}
-ASSETS = ("kept", "kept.cp", "normals", "smooth", "heights", "flat", "damaged", "pyramid", "shard", "cp", "tucker", "pca", "bins", "range", "sat", "moments", "tiny", "wang", "wangpyramid", "wangcp", "wave", "lobes", "zonal", "light",
-          "displaced", "rough", "colored")
+ASSETS = (
+    "kept",
+    "kept.cp",
+    "normals",
+    "smooth",
+    "heights",
+    "flat",
+    "damaged",
+    "pyramid",
+    "shard",
+    "cp",
+    "tucker",
+    "pca",
+    "bins",
+    "range",
+    "sat",
+    "moments",
+    "tiny",
+    "wang",
+    "wangpyramid",
+    "wangcp",
+    "wave",
+    "lobes",
+    "zonal",
+    "light",
+    "displaced",
+    "rough",
+    "colored",
+)
 
 # Commands in the order that they run: each may read what the commands before it wrote.
 MAKE = [
@@ -85,7 +117,10 @@ MAKE = [
 ]
 QUERY = "query {asset}.glint --uv .3 .6 --sigma 4 {asked}"
 ASKED = [
-    *(QUERY.format(asset=asset, asked="--half 0 .1") for asset in ("normals", "pyramid", "cp", "bins", "sat", "moments", "tiny", "wave", "reflectance displaced")),
+    *(
+        QUERY.format(asset=asset, asked="--half 0 .1")
+        for asset in ("normals", "pyramid", "cp", "bins", "sat", "moments", "tiny", "wave", "reflectance displaced")
+    ),
     *(QUERY.format(asset=asset, asked="--half .1 0 --repeat 15") for asset in ("pyramid", "reflectance displaced")),
     *(QUERY.format(asset=asset, asked="--image ndf.png --image-size 16") for asset in ("tucker", "reflectance displaced")),
     *(QUERY.format(asset=asset, asked="--range -1 -1 1 1 --repeat 15") for asset in ("normals", "sat")),
@@ -178,8 +213,11 @@ def test_schema_is_valid_closed_and_described(name):
 
 
 def test_documents_are_as_described(documents):
-    problems = [f"{command}: {error.message} at {list(error.absolute_path)}" for name, command, document in documents
-                for error in validator(name).iter_errors(document)]
+    problems = [
+        f"{command}: {error.message} at {list(error.absolute_path)}"
+        for name, command, document in documents
+        for error in validator(name).iter_errors(document)
+    ]
     assert problems == []
 
 
@@ -215,7 +253,11 @@ def test_other_properties_are_found(tmp_path):
     schema = json.loads((ROOT / "formats/schema.json").read_text())
     schema["kinds"][0]["attributes"].pop()
     (tmp_path / "schema.json").write_text(json.dumps(schema))
-    process = subprocess.run([sys.executable, FOLDER / "properties.py", "--check", "--schema", tmp_path / "schema.json"], capture_output=True, timeout=60)
+    process = subprocess.run(
+        [sys.executable, FOLDER / "properties.py", "--check", "--schema", tmp_path / "schema.json"],
+        capture_output=True,
+        timeout=60,
+    )
     assert process.returncode == 1
 
 

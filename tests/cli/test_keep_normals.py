@@ -6,9 +6,13 @@ import pytest
 from conftest import run_all, run_once
 
 PYRAMID = "--stride 16 --resolution 64 --sigma-r .02 --levels 2"
-MAKE = ("synth flakes --size 130x66 -o map.exr", "ingest map.exr -o map.glint",
-        f"pyramid map.glint -o plain.glint {PYRAMID}", f"pyramid map.glint -o i16.glint {PYRAMID} --keep-normals i16",
-        f"pyramid map.glint -o f32.glint {PYRAMID} --keep-normals f32")
+MAKE = (
+    "synth flakes --size 130x66 -o map.exr",
+    "ingest map.exr -o map.glint",
+    f"pyramid map.glint -o plain.glint {PYRAMID}",
+    f"pyramid map.glint -o i16.glint {PYRAMID} --keep-normals i16",
+    f"pyramid map.glint -o f32.glint {PYRAMID} --keep-normals f32",
+)
 SMALL = ("--uv", ".3", ".7", "--sigma", "1.5")
 CODES = 2e-3  # 16 bits: the lobe of .02 against half a step of 1.5e-5
 
@@ -47,9 +51,15 @@ def test_kept_normals_answer_as_the_map_does(made):
 
 def test_compressed_pyramids_keep_what_their_pyramids_keep(made):
     half = ("--half", *peak(made))
-    run_all(made, "compress f32.glint -o c.glint --rank 4", "compress i16.glint -o c16.glint --rank 4",
-            "compress plain.glint -o given.glint --rank 4 --normals map.glint", "compress f32.glint -o none.glint --rank 4 --keep-normals none",
-            "compress f32.glint -o to16.glint --rank 4 --keep-normals i16", "compress plain.glint -o plain.cp.glint --rank 4")
+    run_all(
+        made,
+        "compress f32.glint -o c.glint --rank 4",
+        "compress i16.glint -o c16.glint --rank 4",
+        "compress plain.glint -o given.glint --rank 4 --normals map.glint",
+        "compress f32.glint -o none.glint --rank 4 --keep-normals none",
+        "compress f32.glint -o to16.glint --rank 4 --keep-normals i16",
+        "compress plain.glint -o plain.cp.glint --rank 4",
+    )
     given = ask(made, "plain.cp.glint", *half, "--normals", "map.glint")
     assert ask(made, "c.glint", *half) == given
     for name in ("c16.glint", "given.glint", "to16.glint"):
@@ -84,19 +94,32 @@ def test_results_do_not_depend_on_threads(made):
     assert (made.folder / "one.glint").read_bytes() == (made.folder / "i16.glint").read_bytes()
 
 
-@pytest.mark.parametrize("command, code, text", [
-    ("compress plain.glint -o c.glint --keep-normals i16", 1, "add --normals with the asset that the pyramid was made from"),
-    ("compress i16.glint -o c.glint --keep-normals f32", 1, "keeps normals in 16 bits"),
-    ("compress plain.glint -o c.glint --keep-normals none --normals map.glint", 1, "leave one of them out"),
-    ("compress plain.glint -o c.glint --normals other.glint", 3, "this is not the map that plain.glint was made from"),
-    (f"pyramid map.glint -o s.glint {PYRAMID} --keep-normals i16 --region 1/2", 1, "glint-compress --normals"),
-    (f"pyramid w.glint -o s.glint --stride 8 --resolution 64 --sigma-r .02 --keep-normals i16", 1, "keep no normals"),
-    ("pyramid h.glint -o s.glint --optics wave --keep-normals i16", 1, "--keep-normals"),
-])
+@pytest.mark.parametrize(
+    "command, code, text",
+    [
+        (
+            "compress plain.glint -o c.glint --keep-normals i16",
+            1,
+            "add --normals with the asset that the pyramid was made from",
+        ),
+        ("compress i16.glint -o c.glint --keep-normals f32", 1, "keeps normals in 16 bits"),
+        ("compress plain.glint -o c.glint --keep-normals none --normals map.glint", 1, "leave one of them out"),
+        ("compress plain.glint -o c.glint --normals other.glint", 3, "this is not the map that plain.glint was made from"),
+        (f"pyramid map.glint -o s.glint {PYRAMID} --keep-normals i16 --region 1/2", 1, "glint-compress --normals"),
+        (f"pyramid w.glint -o s.glint --stride 8 --resolution 64 --sigma-r .02 --keep-normals i16", 1, "keep no normals"),
+        ("pyramid h.glint -o s.glint --optics wave --keep-normals i16", 1, "--keep-normals"),
+    ],
+)
 def test_wrong_use_is_refused(made, command, code, text):
-    run_once(made, *MAKE, "synth flakes --size 130x66 --seed 4 -o other.exr", "ingest other.exr -o other.glint",
-             "wang map.glint -o w.glint --size 16", "synth weave --size 32 -o h.exr --height",
-             "ingest h.exr --kind height --to heights -o h.glint --texel-size-um 1")
+    run_once(
+        made,
+        *MAKE,
+        "synth flakes --size 130x66 --seed 4 -o other.exr",
+        "ingest other.exr -o other.glint",
+        "wang map.glint -o w.glint --size 16",
+        "synth weave --size 32 -o h.exr --height",
+        "ingest h.exr --kind height --to heights -o h.glint --texel-size-um 1",
+    )
     process = made(*command.split())
     assert process.returncode == code and text in process.stderr, process.stderr
     assert process.stderr.count("\n") == 1
@@ -104,10 +127,12 @@ def test_wrong_use_is_refused(made, command, code, text):
 
 def test_tiles_of_a_set_keep_theirs(made):
     run_all(made, "synth flakes --size 64 -o n.1001.exr", "synth flakes --size 64 --seed 5 -o n.1002.exr")
-    for command in (["ingest", "n.<UDIM>.exr", "-o", "n.<UDIM>.map.glint", "--udim-margin", "8"],
-                    ["pyramid", "n.<UDIM>.map.glint", "-o", "n.<UDIM>.p.glint", *PYRAMID.split(), "--keep-normals", "f32"],
-                    ["pyramid", "n.<UDIM>.map.glint", "-o", "plain.<UDIM>.p.glint", *PYRAMID.split()],
-                    ["compress", "plain.<UDIM>.p.glint", "-o", "n.<UDIM>.cp.glint", "--rank", "4", "--normals", "n.<UDIM>.map.glint"]):
+    for command in (
+        ["ingest", "n.<UDIM>.exr", "-o", "n.<UDIM>.map.glint", "--udim-margin", "8"],
+        ["pyramid", "n.<UDIM>.map.glint", "-o", "n.<UDIM>.p.glint", *PYRAMID.split(), "--keep-normals", "f32"],
+        ["pyramid", "n.<UDIM>.map.glint", "-o", "plain.<UDIM>.p.glint", *PYRAMID.split()],
+        ["compress", "plain.<UDIM>.p.glint", "-o", "n.<UDIM>.cp.glint", "--rank", "4", "--normals", "n.<UDIM>.map.glint"],
+    ):
         process = made(*command)
         assert process.returncode == 0, process.stderr
     question = ("--uv", "1.002", ".5", "--sigma", "1.2", "--range", "-.1", "-.1", ".1", ".1", "--json")
@@ -120,7 +145,7 @@ def test_tiles_of_a_set_keep_theirs(made):
 def test_curved_pixels_average_over_their_half_vectors(made):
     """--spread: the density is the mean over the box of half vectors that the pixel sees."""
     x, y = map(float, peak(made))
-    box = ("--range", x - .03, y - .02, x + .03, y + .02)
+    box = ("--range", x - 0.03, y - 0.02, x + 0.03, y + 0.02)
     curved = ask(made, "f32.glint", "--half", x, y, "--spread", ".03", ".02")
     assert curved["density"] == pytest.approx(ask(made, "f32.glint", *box)["mean"], rel=1e-4)
     assert curved["density"] != pytest.approx(ask(made, "f32.glint", "--half", x, y)["density"], rel=1e-3)

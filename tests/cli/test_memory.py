@@ -19,36 +19,67 @@ MOST_EXCESS, SMALL = 3, 16 * MB  # an estimate is at most so many times what the
 RUNS = {
     "synth": ("synth isotropic --size 1024 -o out.exr", "synth isotropic --size 128 -o out.exr", "2M"),
     "pyramid": ("pyramid map.glint -o out.glint --stride 8", "pyramid map.glint -o out.glint --stride 64", "2M"),
-    "smooth": ("pyramid map.glint -o out.glint --stride 16 --surface smooth", "pyramid map.glint -o out.glint --stride 64 --surface smooth", "2M"),
-    "wave": ("pyramid small-heights.glint -o out.glint --optics wave --stride 4 --resolution 64 --wavelengths 2 --coherence-um 6",
-             "pyramid small-heights.glint -o out.glint --optics wave --stride 32 --resolution 64 --wavelengths 2 --coherence-um 6", "2M"),
+    "smooth": (
+        "pyramid map.glint -o out.glint --stride 16 --surface smooth",
+        "pyramid map.glint -o out.glint --stride 64 --surface smooth",
+        "2M",
+    ),
+    "wave": (
+        "pyramid small-heights.glint -o out.glint --optics wave --stride 4 --resolution 64 --wavelengths 2 --coherence-um 6",
+        "pyramid small-heights.glint -o out.glint --optics wave --stride 32 --resolution 64 --wavelengths 2 --coherence-um 6",
+        "2M",
+    ),
     "compress": ("compress pyramid.glint -o out.glint --rank 4", "compress coarse.glint -o out.glint --rank 4", "2M"),
     "binmap": ("binmap large.glint -o out.glint", "binmap map.glint -o out.glint", "2M"),
-    "sat": ("sat middle.glint -o out.glint --bins 64x32 --stride 4", "sat middle.glint -o out.glint --bins 9x16 --stride 64", "2M"),
+    "sat": (
+        "sat middle.glint -o out.glint --bins 64x32 --stride 4",
+        "sat middle.glint -o out.glint --bins 9x16 --stride 64",
+        "2M",
+    ),
     "moments": ("moments large.glint -o out.glint", "moments map.glint -o out.glint", "2M"),
-    "textures": ("moments map.glint -o out.glint --textures textures", "moments small.glint -o out.glint --textures textures", "2M"),
+    "textures": (
+        "moments map.glint -o out.glint --textures textures",
+        "moments small.glint -o out.glint --textures textures",
+        "2M",
+    ),
     "tiny": ("tiny middle.glint -o out.glint --cut 256", "tiny middle.glint -o out.glint --cut 16", "2M"),
     "explicit": ("wang tiles.glint -o out.glint --explicit 2048 2048", "wang tiles.glint -o out.glint --explicit 64 64", "2M"),
     "wang": ("wang middle.glint -o out.glint --size 256", "wang middle.glint -o out.glint --size 32", "2M"),
     "colours": ("wang middle.glint -o out.glint --size 64 --colors 5", "wang middle.glint -o out.glint --size 64", "2M"),
     "displace": ("displace heights.glint -o out.glint --factor 32 --base diffuse:0.8", None, "2M"),
-    "finely": ("displace heights.glint -o out.glint --factor 4 --base diffuse:0.8",
-               "displace heights.glint -o out.glint --factor 32 --base diffuse:0.8", "2M"),
+    "finely": (
+        "displace heights.glint -o out.glint --factor 4 --base diffuse:0.8",
+        "displace heights.glint -o out.glint --factor 32 --base diffuse:0.8",
+        "2M",
+    ),
     "shlobes": ("shlobes --sigma-r 0.05 --order 120 -o out.glint", "shlobes --sigma-r 0.05 --order 20 -o out.glint", "8M"),
-    "light": ("shlobes --light lights.json --order 90 --grid 5x8 -o out.glint", "shlobes --light lights.json --order 20 --grid 5x8 -o out.glint", "2M"),
-    "picture": ("query map.glint --uv .5 .5 --sigma 4 --image out.exr --image-size 512",
-                "query map.glint --uv .5 .5 --sigma 4 --image out.exr --image-size 64", "2M"),
+    "light": (
+        "shlobes --light lights.json --order 90 --grid 5x8 -o out.glint",
+        "shlobes --light lights.json --order 20 --grid 5x8 -o out.glint",
+        "2M",
+    ),
+    "picture": (
+        "query map.glint --uv .5 .5 --sigma 4 --image out.exr --image-size 512",
+        "query map.glint --uv .5 .5 --sigma 4 --image out.exr --image-size 64",
+        "2M",
+    ),
 }
 IMAGES = {"synth", "textures", "picture"}  # these load OpenImageIO
 MAKE = [
-    "synth isotropic --size 64 -o small.exr", "ingest small.exr -o small.glint",
-    "synth isotropic --size 512 -o map.exr", "ingest map.exr -o map.glint",
-    "synth isotropic --size 1024 -o middle.exr", "ingest middle.exr -o middle.glint",
-    "synth flakes --size 2048 -o large.exr", "ingest large.exr -o large.glint",
-    "synth isotropic --height --size 512 -o heights.exr", "ingest heights.exr --kind height --to heights -o heights.glint",
+    "synth isotropic --size 64 -o small.exr",
+    "ingest small.exr -o small.glint",
+    "synth isotropic --size 512 -o map.exr",
+    "ingest map.exr -o map.glint",
+    "synth isotropic --size 1024 -o middle.exr",
+    "ingest middle.exr -o middle.glint",
+    "synth flakes --size 2048 -o large.exr",
+    "ingest large.exr -o large.glint",
+    "synth isotropic --height --size 512 -o heights.exr",
+    "ingest heights.exr --kind height --to heights -o heights.glint",
     "synth isotropic --height --size 128 -o small-heights.exr",
     "ingest small-heights.exr --kind height --to heights --texel-size-um 1 -o small-heights.glint",
-    "pyramid map.glint -o pyramid.glint --stride 16", "pyramid map.glint -o coarse.glint --stride 128",
+    "pyramid map.glint -o pyramid.glint --stride 16",
+    "pyramid map.glint -o coarse.glint --stride 128",
     "wang map.glint -o tiles.glint --size 32",
 ]
 LIGHTS = '{"lights": [{"type": "sphere", "centre": [0, 0, 5], "radius": 1, "radiance": [1, 1, 1]}]}'
@@ -134,13 +165,27 @@ RUN_LENGTHS = 10  # type of a TGA
 TGA = struct.pack("<BBBHHBHHHHBB", 0, 0, RUN_LENGTHS, 0, 0, 0, 0, 0, 17800, 17800, 24, 0)
 
 
-@pytest.mark.parametrize("header, name", [(b"PF\n16000 16000\n-1.0\n", "a.pfm"), (b"P6\n30000 30000\n255\n", "a.ppm"), (b"Pf\n30000 9000\n-1.0\n", "b.pfm"),
-                                          (BMP, "a.bmp"), (TGA, "a.tga")], ids=["rgb.pfm", "ppm", "grey.pfm", "bmp", "tga"])
+@pytest.mark.parametrize(
+    "header, name",
+    [
+        (b"PF\n16000 16000\n-1.0\n", "a.pfm"),
+        (b"P6\n30000 30000\n255\n", "a.ppm"),
+        (b"Pf\n30000 9000\n-1.0\n", "b.pfm"),
+        (BMP, "a.bmp"),
+        (TGA, "a.tga"),
+    ],
+    ids=["rgb.pfm", "ppm", "grey.pfm", "bmp", "tga"],
+)
 def test_images_that_declare_more_than_they_hold_are_refused(folder, header, name):
     (folder / name).write_bytes(header.ljust(120, b"\0"))
     (folder / "out.glint").unlink(missing_ok=True)
-    monitor = subprocess.run(["bash", "-c", f"ulimit -v 2000000; {BIN}/glint-ingest {name} -o out.glint --threads 1"], cwd=folder,
-                             capture_output=True, text=True, timeout=60)
+    monitor = subprocess.run(
+        ["bash", "-c", f"ulimit -v 2000000; {BIN}/glint-ingest {name} -o out.glint --threads 1"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
     assert monitor.returncode == 3, monitor.stderr
     assert "declares more pixels than the file can hold" in monitor.stderr
     assert not (folder / "out.glint").exists()
@@ -152,7 +197,10 @@ def test_less_memory_than_any_image_takes_is_refused(folder):
     assert not (folder / "out2.glint").exists()
 
 
-@pytest.mark.parametrize("image, flags", [("large.exr", ""), ("large.png", ""), ("heights.exr", "--kind height"), ("heights.exr", "--kind height --to heights")])
+@pytest.mark.parametrize(
+    "image, flags",
+    [("large.exr", ""), ("large.png", ""), ("heights.exr", "--kind height"), ("heights.exr", "--kind height --to heights")],
+)
 def test_images_larger_than_the_memory_give_the_same_asset(folder, image, flags):
     """Pixels, normals and bounds of the first take 100 MB."""
     if image == "large.png":
@@ -170,7 +218,9 @@ def test_ingest_keeps_to_the_limit(folder):
     assert run(folder, "synth flakes --size 4096 -o huge.exr")[0] == 0
     bound = peak(folder, "ingest huge.exr -o bound.glint", "--max-memory", "16M")
     free = peak(folder, "ingest huge.exr -o bound.glint --force", "--max-memory", "4G")
-    assert bound < 16 * MB + WITH_IMAGES[1] + most_between < free, f"takes {bound / MB:.0f} MB, and {free / MB:.0f} MB without a limit"
+    assert (
+        bound < 16 * MB + WITH_IMAGES[1] + most_between < free
+    ), f"takes {bound / MB:.0f} MB, and {free / MB:.0f} MB without a limit"
     for name in ("huge.exr", "bound.glint"):
         (folder / name).unlink()
 

@@ -29,20 +29,25 @@ def maps(glint):
     return glint
 
 
-@pytest.mark.parametrize("flags", [
-    SMALL,
-    SMALL + " --overlap 1 --levels 2",
-    SMALL + " --boundary clamp --precision float",
-    SMALL + " --surface smooth",
-    "--resolution 32 --sigma-r 0.05 --stride 4 --surface smooth --boundary clamp",
-    "--resolution 288 --sigma-r 0.004 --stride 32",  # several words of a mask for each image
-])
+@pytest.mark.parametrize(
+    "flags",
+    [
+        SMALL,
+        SMALL + " --overlap 1 --levels 2",
+        SMALL + " --boundary clamp --precision float",
+        SMALL + " --surface smooth",
+        "--resolution 32 --sigma-r 0.05 --stride 4 --surface smooth --boundary clamp",
+        "--resolution 288 --sigma-r 0.004 --stride 32",  # several words of a mask for each image
+    ],
+)
 def test_parts_are_the_whole(maps, flags):
     shards = make_shards(maps, flags)
     assert_same(maps, reversed(shards), flags)
 
 
-@pytest.mark.parametrize("size, flags", [("200x77", ""), ("77x200", ""), ("200x77", " --surface smooth"), ("77x200", " --surface smooth")])
+@pytest.mark.parametrize(
+    "size, flags", [("200x77", ""), ("77x200", ""), ("200x77", " --surface smooth"), ("77x200", " --surface smooth")]
+)
 def test_maps_need_not_be_square(glint, size, flags):
     run_once(glint, f"synth isotropic --size {size} -o map.png", "ingest map.png -o map.glint")
     flags = "--resolution 32 --sigma-r 0.05 --stride 4" + flags
@@ -102,10 +107,16 @@ def test_missing_and_double_regions_are_refused(maps):
 
 def test_shards_of_other_runs_are_refused(maps):
     first, second, third = make_shards(maps)
-    run_all(maps, f"pyramid map.glint -o other.glint --region 2/3 {SMALL} --boundary clamp", f"pyramid map.glint -o four.glint --region 2/4 {SMALL}",
-            "synth scratches --size 192 -o scratches.png", "ingest scratches.png -o scratches.glint",
-            f"pyramid scratches.glint -o scratched.glint --region 2/3 {SMALL}", f"pyramid map.glint -o whole.glint {SMALL}")
-    assert "--boundary is \"clamp\", not \"wrap\"" in fails(maps, "merge.different", "other.glint", first, "other.glint", third)
+    run_all(
+        maps,
+        f"pyramid map.glint -o other.glint --region 2/3 {SMALL} --boundary clamp",
+        f"pyramid map.glint -o four.glint --region 2/4 {SMALL}",
+        "synth scratches --size 192 -o scratches.png",
+        "ingest scratches.png -o scratches.glint",
+        f"pyramid scratches.glint -o scratched.glint --region 2/3 {SMALL}",
+        f"pyramid map.glint -o whole.glint {SMALL}",
+    )
+    assert '--boundary is "clamp", not "wrap"' in fails(maps, "merge.different", "other.glint", first, "other.glint", third)
     assert "one of 4 regions" in fails(maps, "merge.different", "four.glint", first, "four.glint", third)
     assert "another map" in fails(maps, "merge.different", "scratched.glint", first, "scratched.glint", third)
     assert "whole pyramid" in fails(maps, "merge.kind", "whole.glint", first, "whole.glint", third)
@@ -144,7 +155,9 @@ def test_regions_are_of_maps_under_geometric_optics(maps):
     assert process.returncode == 5 and "--region" in process.stderr
 
 
-@pytest.mark.parametrize("rule, normal", [("normals.finite", (float("inf"), 0)), ("normals.finite", (0, float("nan"))), ("normals.disk", (0.8, 0.7))])
+@pytest.mark.parametrize(
+    "rule, normal", [("normals.finite", (float("inf"), 0)), ("normals.finite", (0, float("nan"))), ("normals.disk", (0.8, 0.7))]
+)
 def test_texels_that_are_no_normals_are_found_where_they_count(maps, rule, normal):
     """The hashes of the map are those of the wrong texel, so that only the check of normals can find it."""
     h5py = pytest.importorskip("h5py")
@@ -183,7 +196,14 @@ def test_unchanged_parts_and_wholes_are_left_alone(maps):
 def limited(glint, name, *arguments, megabytes):
     """Runs a program that may take so much memory of its own. Maps of files do not count: the system takes their pages back."""
     limit = lambda: resource.setrlimit(resource.RLIMIT_DATA, (megabytes << 20, megabytes << 20))
-    return subprocess.run([glint.bin / f"glint-{name}", *arguments], cwd=glint.folder, capture_output=True, text=True, timeout=120, preexec_fn=limit)
+    return subprocess.run(
+        [glint.bin / f"glint-{name}", *arguments],
+        cwd=glint.folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        preexec_fn=limit,
+    )
 
 
 def test_parts_need_less_memory_than_the_whole(glint):

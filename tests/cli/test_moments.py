@@ -32,7 +32,9 @@ def heights(glint):
 
 def write(path, image):
     output = oiio.ImageOutput.create(str(path))
-    assert output.open(str(path), oiio.ImageSpec(image.shape[1], image.shape[0], 1 if image.ndim == 2 else image.shape[2], "float"))
+    assert output.open(
+        str(path), oiio.ImageSpec(image.shape[1], image.shape[0], 1 if image.ndim == 2 else image.shape[2], "float")
+    )
     output.write_image(np.ascontiguousarray(image.reshape(*image.shape[:2], -1), np.float32))
     output.close()
 
@@ -104,17 +106,29 @@ def test_smooth_footprints_are_told_that_they_are_too_small(glint, normals):
 
 
 def test_heights_give_the_moments_of_their_normals(glint, heights):
-    run_all(glint, "ingest h.exr --kind height --boundary clamp -o n.glint", "moments n.glint --boundary clamp -o a.glint", "moments h.glint --boundary clamp -o b.glint")
+    run_all(
+        glint,
+        "ingest h.exr --kind height --boundary clamp -o n.glint",
+        "moments n.glint --boundary clamp -o a.glint",
+        "moments h.glint --boundary clamp -o b.glint",
+    )
     with h5py.File(glint.folder / "a.glint") as a, h5py.File(glint.folder / "b.glint") as b:
         for level in range(a.attrs["level_count"]):
-            assert np.array(a[f"level_{level:02}/moments"]) == pytest.approx(np.array(b[f"level_{level:02}/moments"]), rel=1e-4, abs=1e-6)
+            assert np.array(a[f"level_{level:02}/moments"]) == pytest.approx(
+                np.array(b[f"level_{level:02}/moments"]), rel=1e-4, abs=1e-6
+            )
 
 
 def test_lean_textures_are_those_of_maketx(glint, heights):
     """maketx clamps slopes at the border. It filters levels of odd sizes in another way, so these are not compared."""
     (glint.folder / "t").mkdir()
     run_all(glint, "moments h.glint --boundary clamp --gradient sobel -o m.glint --textures t")
-    subprocess.run(["maketx", "--bumpslopes", "--bumpformat", "height", "-d", "float", "h.exr", "-o", "maketx.exr"], cwd=glint.folder, check=True, capture_output=True)
+    subprocess.run(
+        ["maketx", "--bumpslopes", "--bumpformat", "height", "-d", "float", "h.exr", "-o", "maketx.exr"],
+        cwd=glint.folder,
+        check=True,
+        capture_output=True,
+    )
     compared = 0
     for level, side in enumerate(((80, 56), (40, 28), (20, 14), (10, 7))):
         ours, names = read(glint.folder / "t/lean.exr", level)
@@ -129,7 +143,9 @@ def test_lean_textures_are_those_of_maketx(glint, heights):
 
 def lobes_of(moments, extra):
     """Larger and smaller alpha, and the angle of the larger."""
-    matrix = np.stack([moments[..., 2] + extra, moments[..., 3], moments[..., 3], moments[..., 4] + extra], -1).reshape(*moments.shape[:2], 2, 2)
+    matrix = np.stack([moments[..., 2] + extra, moments[..., 3], moments[..., 3], moments[..., 4] + extra], -1).reshape(
+        *moments.shape[:2], 2, 2
+    )
     values, vectors = np.linalg.eigh(matrix.astype(np.float64))
     alphas = np.minimum(1, np.sqrt(2 * np.maximum(values, 0)))
     return alphas[..., 1], alphas[..., 0], np.arctan2(vectors[..., 1, 1], vectors[..., 0, 1])
@@ -202,7 +218,11 @@ def test_errors_of_lobes_tell_where_one_lobe_is_not_enough(glint, normals):
     (glint.folder / "t").mkdir()
     errors = {}
     for name in "nw":
-        result = json.loads(glint("moments", f"{name}.glint", "-o", "m.glint", "--force", "--textures", "t", "--roughness", ".3", "--json").stdout)["result"]
+        result = json.loads(
+            glint(
+                "moments", f"{name}.glint", "-o", "m.glint", "--force", "--textures", "t", "--roughness", ".3", "--json"
+            ).stdout
+        )["result"]
         errors[name] = [level["variation"] for level in result["lobe_errors"]]
     assert errors["n"][0] < 0.05 and errors["w"][0] < 0.12  # a texel is a facet; steep ones have lobes of another shape
     assert errors["n"][-1] < 0.5 * errors["w"][-1]  # noise has normal slopes, threads have several lobes

@@ -50,20 +50,55 @@ def test_a_number_with_zeros_in_front_is_decimal(glint):
     assert pixels[0] == pixels[1] == pixels[2]
 
 
-@pytest.mark.parametrize("option", [["--seed", "18446744073709551616"], ["--seed", "-1"], ["--seed=-1"], ["--seed", "0x10"], ["--threads", "-1"],
-                                    ["--threads", "4294967298"], ["--size", "4294967312"], ["--size", "16x4294967312"], ["--bits", "4294967304"]])
+@pytest.mark.parametrize(
+    "option",
+    [
+        ["--seed", "18446744073709551616"],
+        ["--seed", "-1"],
+        ["--seed=-1"],
+        ["--seed", "0x10"],
+        ["--threads", "-1"],
+        ["--threads", "4294967298"],
+        ["--size", "4294967312"],
+        ["--size", "16x4294967312"],
+        ["--bits", "4294967304"],
+    ],
+)
 def test_whole_numbers_that_do_not_fit_are_usage_errors(glint, option):
-    process = glint("synth", "flat", "--size", "16", "-o", "a.exr", *option) if "--size" not in option else glint("synth", "flat", "-o", "a.exr", *option)
+    process = (
+        glint("synth", "flat", "--size", "16", "-o", "a.exr", *option)
+        if "--size" not in option
+        else glint("synth", "flat", "-o", "a.exr", *option)
+    )
     assert process.returncode == 1, process.stderr
     assert option[0].split("=")[0] in process.stderr
     assert not (glint.folder / "a.exr").exists()
 
 
 # What is no footprint: refused alike as an option and as a row, by every model.
-@pytest.mark.parametrize("form, values", [
-    ("--sigma", "-4"), ("--sigma", "0"), ("--sigma", "1e-9"), ("--sigma", "2e9"), ("--sigma", "nan"), ("--sigma", "inf"), ("--sigma", "1e39"),
-    ("--cov", "16 40 16"), ("--cov", "-16 0 16"), ("--cov", "16 0 -16"), ("--cov", "0 0 0"), ("--cov", "16 nan 16"), ("--cov", "1e30 0 1e30"),
-    ("--box", "0 0 0 0"), ("--box", "8 0 8 0"), ("--box", "8 4 -16 -8"), ("--box", "1e30 0 0 1"), ("--box", "8 0 0 inf")])
+@pytest.mark.parametrize(
+    "form, values",
+    [
+        ("--sigma", "-4"),
+        ("--sigma", "0"),
+        ("--sigma", "1e-9"),
+        ("--sigma", "2e9"),
+        ("--sigma", "nan"),
+        ("--sigma", "inf"),
+        ("--sigma", "1e39"),
+        ("--cov", "16 40 16"),
+        ("--cov", "-16 0 16"),
+        ("--cov", "16 0 -16"),
+        ("--cov", "0 0 0"),
+        ("--cov", "16 nan 16"),
+        ("--cov", "1e30 0 1e30"),
+        ("--box", "0 0 0 0"),
+        ("--box", "8 0 8 0"),
+        ("--box", "8 4 -16 -8"),
+        ("--box", "1e30 0 0 1"),
+        ("--box", "8 0 0 inf"),
+    ],
+)
 def test_what_is_no_footprint_is_refused_as_an_option_and_as_a_row(glint, assets, form, values):
     words = values.split()
     for kind in KINDS:
@@ -87,8 +122,17 @@ def test_a_range_without_area_is_refused_as_an_option_and_as_a_row(glint, assets
 
 
 # Footprints without a width are footprints: rounding makes them of thin ones.
-@pytest.mark.parametrize("form, values", [("--cov", "400 400 400"), ("--cov", "400 0 0"), ("--cov", "0 0 400"), ("--cov", "400 400.0001 400"),
-                                          ("--sigma", "20"), ("--box", "20 0 0 20")])
+@pytest.mark.parametrize(
+    "form, values",
+    [
+        ("--cov", "400 400 400"),
+        ("--cov", "400 0 0"),
+        ("--cov", "0 0 400"),
+        ("--cov", "400 400.0001 400"),
+        ("--sigma", "20"),
+        ("--box", "20 0 0 20"),
+    ],
+)
 def test_a_footprint_is_answered_alike_as_an_option_and_as_a_row(glint, assets, form, values):
     for kind in KINDS:
         normals = ["--normals", assets["normals"]] if kind in ("pyramid", "compressed") else []
@@ -106,7 +150,7 @@ def test_a_row_below_the_finest_level_is_named(glint, assets):
     assert "q.csv: row 2: " in process.stderr and "--normals" in process.stderr
 
 
-@pytest.mark.parametrize("start", ["\ufeff", "\ufeff\"", ""])
+@pytest.mark.parametrize("start", ["\ufeff", '\ufeff"', ""])
 def test_headers_survive_a_byte_order_mark_blanks_and_capitals(glint, assets, start):
     first = 'U"' if start.endswith('"') else "U"
     process = ask_table(glint, assets["normals"], f"{start}{first}, V,Sigma ,\tHX, hY\r\n 0.3 ,0.7,\t+020,.02, -0.03\r\n")
@@ -131,9 +175,15 @@ def test_cells_that_are_no_numbers_are_refused_by_row_and_column(glint, assets, 
     assert "q.csv: row 2: column hx: " in process.stderr
 
 
-@pytest.mark.parametrize("table", ["u,v,sigma,hx,hy\n.5,.5,2,0,0\n.5,.5,-2,0,0\n", "u,v,level,hx,hy\n.5,.5,0,0,0\n.5,.5,0.5,0,0\n",
-                                   "u,v,level,hx,hy\n.5,.5,1,0,0\n.5,.5,2,0,0\n",
-                                   "u,v,level,wix,wiy,wiz,wox,woy,woz\n.5,.5,0,0,0,1,0,0,1\n.5,.5,0,0,0,0,0,0,1\n"])
+@pytest.mark.parametrize(
+    "table",
+    [
+        "u,v,sigma,hx,hy\n.5,.5,2,0,0\n.5,.5,-2,0,0\n",
+        "u,v,level,hx,hy\n.5,.5,0,0,0\n.5,.5,0.5,0,0\n",
+        "u,v,level,hx,hy\n.5,.5,1,0,0\n.5,.5,2,0,0\n",
+        "u,v,level,wix,wiy,wiz,wox,woy,woz\n.5,.5,0,0,0,1,0,0,1\n.5,.5,0,0,0,0,0,0,1\n",
+    ],
+)
 def test_rows_that_ask_a_displacement_are_checked_like_options(glint, assets, table):
     process = ask_table(glint, assets["displaced"], table, "reflectance")
     assert process.returncode == 3, process.stdout
@@ -161,7 +211,10 @@ def test_a_bin_map_has_the_roughness_of_the_other_tools_by_default(glint, assets
 
 def test_messages_print_small_numbers_as_they_are(glint, assets):
     question = [*PLACE, "--sigma", "20", *HALF]
-    assert "roughnesses of 0.0070710676 to 0.0070710676, not 0.00015" in glint("query", assets["bins"], *question, "--alpha", "0.00015").stderr
+    assert (
+        "roughnesses of 0.0070710676 to 0.0070710676, not 0.00015"
+        in glint("query", assets["bins"], *question, "--alpha", "0.00015").stderr
+    )
     process = glint("pyramid", assets["normals"], "-o", "p.glint", "--resolution", "1024", "--sigma-r", "1e-7")
     assert process.returncode == 1
     assert "give 0.0001953 (a tenth of a pixel" in process.stderr

@@ -192,7 +192,9 @@ def test_the_configuration_file_is_an_input_too(shell):
 # Devices, pipes and stdout.
 
 
-@pytest.mark.parametrize("make", ["glint-ingest t.png -o", "glint-query a.glint --csv t.csv -o", "glint-ingest t.png -o b.glint --depfile"])
+@pytest.mark.parametrize(
+    "make", ["glint-ingest t.png -o", "glint-query a.glint --csv t.csv -o", "glint-ingest t.png -o b.glint --depfile"]
+)
 def test_devices_are_written_to_and_stay_devices(shell, make):
     full, null = os.stat("/dev/full"), os.stat("/dev/null")
     process = shell(f"{make} /dev/full")
@@ -240,7 +242,9 @@ def test_a_full_stdout_is_an_error(shell, count):
     assert b"stdout cannot be written: No space left on device" in process.stderr
 
 
-@pytest.mark.parametrize("command", ["glint-info a.glint", "glint-info --help", "glint-info --version", "glint-validate a.glint -v"])
+@pytest.mark.parametrize(
+    "command", ["glint-info a.glint", "glint-info --help", "glint-info --version", "glint-validate a.glint -v"]
+)
 @pytest.mark.parametrize("target", ["> /dev/full", ">&-"])
 def test_results_that_nobody_gets_are_an_error(shell, command, target):
     assert shell(f"{command} {target}").returncode == 2
@@ -275,7 +279,9 @@ def test_what_cannot_be_written_is_refused(shell, name):
 # Names.
 
 
-@pytest.mark.parametrize("make", ["glint-ingest t.png -o", "glint-query a.glint --csv t.csv -o", "glint-ingest t.png -o b.glint --depfile"])
+@pytest.mark.parametrize(
+    "make", ["glint-ingest t.png -o", "glint-query a.glint --csv t.csv -o", "glint-ingest t.png -o b.glint --depfile"]
+)
 @pytest.mark.parametrize("name", [b"\xe9.glint", b"a\nb", b"n" * LONGEST_NAME, "ü".encode() * 127])
 def test_any_name_that_a_file_can_have_works(shell, make, name):
     command = make.split() + [os.fsencode(name)]
@@ -298,7 +304,9 @@ def test_a_name_that_no_file_can_have_is_named(shell):
 
 
 def test_errors_show_names_that_are_no_text(shell):
-    process = subprocess.run([BIN / "glint-ingest", "t.png", "-o", b"no\x1b[2J\xe9/x.glint"], cwd=shell.folder, capture_output=True)
+    process = subprocess.run(
+        [BIN / "glint-ingest", "t.png", "-o", b"no\x1b[2J\xe9/x.glint"], cwd=shell.folder, capture_output=True
+    )
     assert process.returncode == 2
     assert b"no\\x1b[2J\\xe9/x.glint" in process.stderr
     assert_one_line(process)
@@ -310,7 +318,10 @@ def test_errors_show_names_that_are_no_text(shell):
 @pytest.mark.parametrize("kilobytes", [1, 4, 50, 100])
 def test_a_limit_on_the_size_of_files_leaves_nothing(shell, kilobytes):
     before = names(shell.folder)
-    for make in ["glint-pyramid a.glint -o p.glint --stride 8", "glint-query a.glint --uv .5 .5 --sigma 9 --samples 20000 -o s.csv"]:
+    for make in [
+        "glint-pyramid a.glint -o p.glint --stride 8",
+        "glint-query a.glint --uv .5 .5 --sigma 9 --samples 20000 -o s.csv",
+    ]:
         process = shell(f"ulimit -f {kilobytes}; {make}")
         assert process.returncode == 2
         assert b"File too large" in process.stderr
@@ -340,7 +351,9 @@ def start_long_write(folder, output):
     os.mkfifo(folder / "pipe")
     environment = {**os.environ, "TMPDIR": str(folder / "temporary")}
     (folder / "temporary").mkdir()
-    process = subprocess.Popen([BIN / "glint-ingest", "t.png", "-o", output], cwd=folder, env=environment, stderr=subprocess.PIPE)
+    process = subprocess.Popen(
+        [BIN / "glint-ingest", "t.png", "-o", output], cwd=folder, env=environment, stderr=subprocess.PIPE
+    )
     deadline = time.monotonic() + 60
     while not names(folder / "temporary") and time.monotonic() < deadline:
         time.sleep(0.01)
@@ -431,7 +444,9 @@ def covered(raw, address):
 
 
 def test_bytes_between_objects_are_zero(shell):
-    shell("glint-pyramid a.glint -o p.glint --stride 8; glint-compress p.glint -o c.glint; glint-binmap a.glint -o m.glint --alpha .05")
+    shell(
+        "glint-pyramid a.glint -o p.glint --stride 8; glint-compress p.glint -o c.glint; glint-binmap a.glint -o m.glint --alpha .05"
+    )
     shell("glint-sat a.glint -o s.glint")
     for name in ["a.glint", "p.glint", "c.glint", "m.glint", "s.glint"]:
         raw = (shell.folder / name).read_bytes()

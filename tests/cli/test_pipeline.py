@@ -32,8 +32,14 @@ def project(tmp_path):
     (tmp_path / "Makefile").write_text(MAKEFILE.format(bin=BIN, root=ROOT))
 
     def make(*arguments):
-        process = subprocess.run(["make", *arguments], cwd=tmp_path, capture_output=True, text=True, timeout=250,
-                                 env={key: value for key, value in os.environ.items() if not key.startswith("MAKE")})
+        process = subprocess.run(
+            ["make", *arguments],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=250,
+            env={key: value for key, value in os.environ.items() if not key.startswith("MAKE")},
+        )
         assert process.returncode == 0, process.stdout + process.stderr
         return process.stdout
 
@@ -42,7 +48,11 @@ def project(tmp_path):
 
 
 def tools(output):
-    return sorted(pathlib.Path(line.split()[0].strip("'")).name for line in output.splitlines() if line.split()[0].strip("'").startswith(str(BIN)))
+    return sorted(
+        pathlib.Path(line.split()[0].strip("'")).name
+        for line in output.splitlines()
+        if line.split()[0].strip("'").startswith(str(BIN))
+    )
 
 
 def later(path):
@@ -53,16 +63,44 @@ def later(path):
 
 def test_images_become_assets_and_only_changes_are_made_again(project):
     first = tools(project("-j2"))
-    assert first == ["glint-binmap"] + ["glint-compress"] * 4 + ["glint-displace"] + ["glint-ingest"] * 3 + ["glint-moments"] + ["glint-pyramid"] * 3 + ["glint-sat", "glint-tiny", "glint-wang"]
+    assert first == ["glint-binmap"] + ["glint-compress"] * 4 + ["glint-displace"] + ["glint-ingest"] * 3 + [
+        "glint-moments"
+    ] + ["glint-pyramid"] * 3 + ["glint-sat", "glint-tiny", "glint-wang"]
     made = {p.name for p in (project.folder / "assets").glob("*.glint")}
-    assert made == {f"{n}.glint" for n in ("flakes", "flakes.pyramid", "flakes.cp", "flakes.tucker", "flakes.pca", "flakes.binmap",
-                                                 "flakes.sat", "flakes.moments", "flakes.tiny", "flakes.wang", "dunes", "dunes.pyramid", "dunes.pca", "dunes.heights", "dunes.displaced", "dunes.wave")}
+    assert made == {
+        f"{n}.glint"
+        for n in (
+            "flakes",
+            "flakes.pyramid",
+            "flakes.cp",
+            "flakes.tucker",
+            "flakes.pca",
+            "flakes.binmap",
+            "flakes.sat",
+            "flakes.moments",
+            "flakes.tiny",
+            "flakes.wang",
+            "dunes",
+            "dunes.pyramid",
+            "dunes.pca",
+            "dunes.heights",
+            "dunes.displaced",
+            "dunes.wave",
+        )
+    }
     assert subprocess.run([BIN / "glint-validate", *(project.folder / "assets").glob("*.glint")]).returncode == 0
 
     assert tools(project("-j2")) == []
 
     later(project.folder / "maps/dunes.exr")
-    assert tools(project("-j2")) == ["glint-compress", "glint-displace", "glint-ingest", "glint-ingest", "glint-pyramid", "glint-pyramid"]
+    assert tools(project("-j2")) == [
+        "glint-compress",
+        "glint-displace",
+        "glint-ingest",
+        "glint-ingest",
+        "glint-pyramid",
+        "glint-pyramid",
+    ]
 
     later(project.folder / "Makefile")
     assert tools(project("--dry-run")) == first
@@ -102,12 +140,21 @@ class Folder:
         subprocess.run([BIN / "glint-synth", pattern, "--size", size, "-o", self.path / "maps" / name, "--force"], check=True)
 
     def write(self, targets, *lines):
-        text = ["GLINT_MAPS := maps", "GLINT_OUT := assets", f"GLINT_BIN := {BIN}", *lines, f"include {ROOT}/pipelines/glint.mk", f"all: {targets}"]
+        text = [
+            "GLINT_MAPS := maps",
+            "GLINT_OUT := assets",
+            f"GLINT_BIN := {BIN}",
+            *lines,
+            f"include {ROOT}/pipelines/glint.mk",
+            f"all: {targets}",
+        ]
         (self.path / "Makefile").write_text("\n".join(text) + "\n")
 
     def make(self, *arguments):
         environment = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
-        return subprocess.run(["make", *arguments, "all"], cwd=self.path, capture_output=True, text=True, timeout=250, env=environment)
+        return subprocess.run(
+            ["make", *arguments, "all"], cwd=self.path, capture_output=True, text=True, timeout=250, env=environment
+        )
 
     def made(self):
         process = self.make("-j2")
@@ -142,8 +189,11 @@ def test_depfiles_of_odd_names_are_included(folder):
     for name in names:
         folder.image(f"{name}.png")
         (folder.path / f"{name}.toml").write_text("texel-size-um = 2\n")
-    folder.write(" ".join(f"assets/{make_name(name)}.glint" for name in names), "GLINT_SETTINGS :=",
-                 "GLINT_INGEST_FLAGS = --config $(call glint_quote,$*.toml)")
+    folder.write(
+        " ".join(f"assets/{make_name(name)}.glint" for name in names),
+        "GLINT_SETTINGS :=",
+        "GLINT_INGEST_FLAGS = --config $(call glint_quote,$*.toml)",
+    )
     assert folder.made() == ["glint-ingest"] * len(names)
     assert folder.made() == []
     for name in names:
@@ -167,7 +217,12 @@ def test_names_that_make_cannot_hold_are_an_error_that_names_the_image(folder, n
     process = folder.make()
     assert process.returncode == 2
     assert f"maps/{name}: targets of Make cannot have names" in process.stderr
-    process = subprocess.run([BIN / "glint-ingest", f"maps/{name}.png", "-o", "a.glint", "--depfile", "a.d"], cwd=folder.path, capture_output=True, text=True)
+    process = subprocess.run(
+        [BIN / "glint-ingest", f"maps/{name}.png", "-o", "a.glint", "--depfile", "a.d"],
+        cwd=folder.path,
+        capture_output=True,
+        text=True,
+    )
     assert process.returncode == 1
     assert f"maps/{name}.png: a name with '{name[1]}' cannot stand in a depfile" in process.stderr
 
@@ -188,7 +243,10 @@ def test_an_image_may_be_replaced_by_one_of_another_type(folder, name, before, a
     (folder.path / "maps" / f"{name}.{before}").unlink()
     folder.image(f"{name}.{after}", "scratches")
     assert folder.made() == ["glint-ingest", "glint-sat"]
-    assert f"{name}.{after}" in subprocess.run([BIN / "glint-info", folder.path / "assets" / f"{name}.glint"], capture_output=True, text=True).stdout
+    assert (
+        f"{name}.{after}"
+        in subprocess.run([BIN / "glint-info", folder.path / "assets" / f"{name}.glint"], capture_output=True, text=True).stdout
+    )
     assert folder.made() == []
 
 
@@ -248,14 +306,21 @@ def test_light_and_lobes_have_rules(folder):
     image.open(str(folder.path / "maps/studio.exr"), oiio.ImageSpec(32, 16, 3, "float"))
     image.write_image(numpy.ones((16, 32, 3), numpy.float32))
     image.close()
-    (folder.path / "maps/desk.json").write_text('{"lights": [{"type": "sphere", "centre": [0, 0, 5], "radius": 1, "radiance": [1, 1, 1]}]}')
-    folder.write("assets/studio.light.glint assets/desk.light.glint assets/rough.lobes.glint", "GLINT_LIGHT_FLAGS := --order 4 --grid 3x4",
-                 "GLINT_LOBES_FLAGS_rough := --sigma-r 0.1 --order 8 --grid none")
+    (folder.path / "maps/desk.json").write_text(
+        '{"lights": [{"type": "sphere", "centre": [0, 0, 5], "radius": 1, "radiance": [1, 1, 1]}]}'
+    )
+    folder.write(
+        "assets/studio.light.glint assets/desk.light.glint assets/rough.lobes.glint",
+        "GLINT_LIGHT_FLAGS := --order 4 --grid 3x4",
+        "GLINT_LOBES_FLAGS_rough := --sigma-r 0.1 --order 8 --grid none",
+    )
     assert folder.made() == ["glint-shlobes"] * 3
     assert folder.made() == []
     os.utime(folder.path / "maps/desk.json")
     assert folder.made() == ["glint-shlobes"]
-    validate = subprocess.run([BIN / "glint-validate", *(folder.path / "assets").glob("*.glint")], capture_output=True, text=True)
+    validate = subprocess.run(
+        [BIN / "glint-validate", *(folder.path / "assets").glob("*.glint")], capture_output=True, text=True
+    )
     assert validate.returncode == 0, validate.stdout
 
 

@@ -36,8 +36,13 @@ def check_schema(document, name):
 
 
 # kind, size, name, seed
-MAPS = [("flakes", 128, "flakes", 3), ("isotropic", 128, "noise", 4), ("brushed", 128, "brushed", 5), ("isotropic", 64, "noise64", 4),
-        ("brushed", 64, "brushed64", 5)]
+MAPS = [
+    ("flakes", 128, "flakes", 3),
+    ("isotropic", 128, "noise", 4),
+    ("brushed", 128, "brushed", 5),
+    ("isotropic", 64, "noise64", 4),
+    ("brushed", 64, "brushed64", 5),
+]
 # Flakes under a light that shows each of them.
 SHARP = scene(material("flakes.png", 2, 2, 0.1, sigma_r=0.01))
 
@@ -47,7 +52,11 @@ def shared(tmp_path_factory):
     """A folder with small maps, in which measurements of maps are kept: tests that ask the same question share them."""
     folder = tmp_path_factory.mktemp("shared")
     for kind, size, name, seed in MAPS:
-        subprocess.run([BIN / "glint-synth", kind, "--size", str(size), "-o", folder / f"{name}.png", "--seed", str(seed)], check=True, capture_output=True)
+        subprocess.run(
+            [BIN / "glint-synth", kind, "--size", str(size), "-o", folder / f"{name}.png", "--seed", str(seed)],
+            check=True,
+            capture_output=True,
+        )
     return folder
 
 
@@ -102,11 +111,17 @@ def test_order_of_harmonics_is_the_smaller_band_limit(plan):
     _, sharp = plan(SHARP)
     question = sharp["materials"][0]["question"]
     weight = lambda band: math.exp(-((band * question["sigma_r"]) ** 2) / 2)
-    assert weight(question["sh_order"]) <= 0.01 < weight(question["sh_order"] - 1), "that of the facets, whose lobe weighs finer bands by a hundredth"
+    assert (
+        weight(question["sh_order"]) <= 0.01 < weight(question["sh_order"] - 1)
+    ), "that of the facets, whose lobe weighs finer bands by a hundredth"
 
 
 def test_plan_holds_and_is_checked(plan, glint):
-    document = scene(material("noise64.png", tolerance=MOMENTS_ARE_BIASED, **ROUGH), material("brushed64.png", tolerance=MOMENTS_ARE_BIASED, **ROUGH), lights=SKY)
+    document = scene(
+        material("noise64.png", tolerance=MOMENTS_ARE_BIASED, **ROUGH),
+        material("brushed64.png", tolerance=MOMENTS_ARE_BIASED, **ROUGH),
+        lights=SKY,
+    )
     process, made = plan(document)
     assert process.returncode == 0, process.stderr
     process = glint("plan", "--check", "plan.json", "--json")
@@ -119,7 +134,9 @@ def test_plan_holds_and_is_checked(plan, glint):
     assert list(glint.folder.glob("*.assets*")) == []
 
 
-@pytest.mark.parametrize("tolerance, text", [(0.001, "The tolerance of 0.001"), (MOMENTS_ARE_BIASED, "may be bias, is NOT met")])
+@pytest.mark.parametrize(
+    "tolerance, text", [(0.001, "The tolerance of 0.001"), (MOMENTS_ARE_BIASED, "may be bias, is NOT met")]
+)
 def test_a_plan_that_does_not_hold_ends_with_7(plan, glint, tolerance, text):
     _, made = plan(scene(material("noise64.png", tolerance=MOMENTS_HOLD, **ROUGH), lights=SKY))
     assert made["materials"][0]["asset"]["method"] == "moments"
@@ -146,7 +163,9 @@ def test_rules_build_exactly_the_plan(plan, glint):
     assert built.returncode == 0, built.stderr
     asset = made["materials"][0]["asset"]
     assert asset["method"] == "moments"
-    assert (glint.folder / "assets/noise64.moments.glint").stat().st_size == pytest.approx(made["materials"][0]["predicted"]["bytes"], rel=0.02)
+    assert (glint.folder / "assets/noise64.moments.glint").stat().st_size == pytest.approx(
+        made["materials"][0]["predicted"]["bytes"], rel=0.02
+    )
     info = json.loads(glint("info", "assets/noise64.moments.glint", "--json").stdout)
     assert str(info["result"]["properties"]["finest_level"]) == asset["flags"][asset["flags"].index("--finest") + 1]
 
@@ -207,14 +226,18 @@ def test_measurements_are_kept(plan, glint, shared):
     name = first["materials"][0]["map"]["hash"] + ".probe.json"
     values = json.loads((shared / "probes" / name).read_text())
     (glint.folder / "probes").mkdir()
-    (glint.folder / "probes" / name).write_text(json.dumps({key: 0.25 if key.endswith(": seen") else value for key, value in values.items()}))
+    (glint.folder / "probes" / name).write_text(
+        json.dumps({key: 0.25 if key.endswith(": seen") else value for key, value in values.items()})
+    )
     _, second = plan(document, "--cache", "probes")
     assert second["materials"][0]["predicted"]["seen"] == 0.25, "the kept measurement is used"
 
 
 def test_explanation_is_in_words(plan, glint):
     camera = {"nearest": 2, "farthest": 4, "field_of_view_deg": 40, "columns": 1000}
-    (glint.folder / "scene.json").write_text(json.dumps(scene({"map": "noise.png", "texel_size_um": 100, "tolerance": 0.2}, camera=camera)))
+    (glint.folder / "scene.json").write_text(
+        json.dumps(scene({"map": "noise.png", "texel_size_um": 100, "tolerance": 0.2}, camera=camera))
+    )
     process = glint("plan", "scene.json", "--explain")
     assert process.returncode == 0, process.stderr
     # 0.5 * 2 * 2 m * tan(20 deg) / 1000 / 100 um
@@ -225,28 +248,34 @@ def test_explanation_is_in_words(plan, glint):
 CAMERA = {"nearest": 2, "farthest": 4, "field_of_view_deg": 40, "columns": 1000}
 
 
-@pytest.mark.parametrize("document, field", [
-    (scene(material(tolerance=0)), "materials[0].tolerance"),
-    (scene(material(tolerance="small")), "materials[0].tolerance"),
-    (scene({"map": "flakes.png", "tolerance": 0.1}), "materials[0].footprints"),
-    (scene({"map": "flakes.png", "tolerance": 0.1}, camera=CAMERA), "materials[0].texel_size_um"),
-    (scene({"map": "flakes.png", "tolerance": 0.1, "texel_size_um": 1e6}, camera=CAMERA), "materials[0].texel_size_um"),
-    (scene({"map": "flakes.png", "tolerance": 0.1, "uv_size": 128}, camera=CAMERA), "materials[0].uv_size"),
-    (scene(material(), material("missing.png")), "materials[1].map"),
-    (scene(material(), material()), "materials[1]"),
-    (scene(material(tolerence=0.1)), "materials[0].tolerence"),
-    (scene(material(smallest=9, largest=8)), "materials[0].footprints.largest_texels"),
-    (scene(material(), lights=[]), "lights"),
-    (scene(material(), lights=[{"type": "environment"}]), "lights[0].band_limit_deg"),
-    (scene(material(), lights=[{"type": "environment", "image": "missing.exr"}]), "lights[0].image"),
-    (scene(material(), lights=[{"type": "environment", "image": "flakes.png"}]), "lights[0].image"),
-    (scene(material(), lights=[{"type": "environment", "image": "sky.exr", "band_limit_deg": 5}]), "lights[0].band_limit_deg"),
-    (scene(material(), camera=CAMERA | {"farthest": 1}), "camera.farthest"),
-    (scene(material(budgets={"bytes": -1})), "materials[0].budgets.bytes"),
-    (scene(material(), minimise="beauty"), "minimise"),
-    (scene(material({"file": "flakes.png", "height_scale": 2})), "materials[0].map.height_scale"),
-    (scene(), "materials"),
-])
+@pytest.mark.parametrize(
+    "document, field",
+    [
+        (scene(material(tolerance=0)), "materials[0].tolerance"),
+        (scene(material(tolerance="small")), "materials[0].tolerance"),
+        (scene({"map": "flakes.png", "tolerance": 0.1}), "materials[0].footprints"),
+        (scene({"map": "flakes.png", "tolerance": 0.1}, camera=CAMERA), "materials[0].texel_size_um"),
+        (scene({"map": "flakes.png", "tolerance": 0.1, "texel_size_um": 1e6}, camera=CAMERA), "materials[0].texel_size_um"),
+        (scene({"map": "flakes.png", "tolerance": 0.1, "uv_size": 128}, camera=CAMERA), "materials[0].uv_size"),
+        (scene(material(), material("missing.png")), "materials[1].map"),
+        (scene(material(), material()), "materials[1]"),
+        (scene(material(tolerence=0.1)), "materials[0].tolerence"),
+        (scene(material(smallest=9, largest=8)), "materials[0].footprints.largest_texels"),
+        (scene(material(), lights=[]), "lights"),
+        (scene(material(), lights=[{"type": "environment"}]), "lights[0].band_limit_deg"),
+        (scene(material(), lights=[{"type": "environment", "image": "missing.exr"}]), "lights[0].image"),
+        (scene(material(), lights=[{"type": "environment", "image": "flakes.png"}]), "lights[0].image"),
+        (
+            scene(material(), lights=[{"type": "environment", "image": "sky.exr", "band_limit_deg": 5}]),
+            "lights[0].band_limit_deg",
+        ),
+        (scene(material(), camera=CAMERA | {"farthest": 1}), "camera.farthest"),
+        (scene(material(budgets={"bytes": -1})), "materials[0].budgets.bytes"),
+        (scene(material(), minimise="beauty"), "minimise"),
+        (scene(material({"file": "flakes.png", "height_scale": 2})), "materials[0].map.height_scale"),
+        (scene(), "materials"),
+    ],
+)
 def test_errors_name_the_field(plan, document, field):
     process, made = plan(document)
     assert process.returncode in (2, 3), process.stderr
@@ -256,7 +285,9 @@ def test_errors_name_the_field(plan, document, field):
 
 def test_impossible_plan_names_the_budget_and_the_way_out(plan):
     for budget, most in ("bytes", 100), ("query_ns", 0.01), ("preparation_s", 1e-6):
-        process, made = plan(scene(material("noise64.png", tolerance=MOMENTS_HOLD, budgets={budget: most}, **ROUGH), lights=SKY))
+        process, made = plan(
+            scene(material("noise64.png", tolerance=MOMENTS_HOLD, budgets={budget: most}, **ROUGH), lights=SKY)
+        )
         assert process.returncode == 4 and made is None
         assert f"materials[0].budgets.{budget}" in process.stderr
         assert f"allow {budget} of" in process.stderr
@@ -282,9 +313,16 @@ def test_impossible_total_names_the_sum(plan):
     assert "budgets" in process.stderr and "together" in process.stderr
 
 
-@pytest.mark.parametrize("arguments, text", [
-    ([], "there is nothing to plan"), (["scene.json", "--check", "scene.json"], "exclude"), (["scene.json", "--sweep"], "--sweep"), (["scene.json", "--paper"], "--paper"),
-    (["--check", "scene.json"], "is not known here")])
+@pytest.mark.parametrize(
+    "arguments, text",
+    [
+        ([], "there is nothing to plan"),
+        (["scene.json", "--check", "scene.json"], "exclude"),
+        (["scene.json", "--sweep"], "--sweep"),
+        (["scene.json", "--paper"], "--paper"),
+        (["--check", "scene.json"], "is not known here"),
+    ],
+)
 def test_wrong_use_is_refused(glint, arguments, text):
     (glint.folder / "scene.json").write_text(json.dumps(scene(material())))
     process = glint("plan", *arguments)

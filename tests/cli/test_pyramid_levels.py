@@ -10,7 +10,9 @@ SMALLEST_OVER_LEVEL, LARGEST_OVER_LEVEL = 1.2, 1.9  # sizes that a level answers
 
 
 def levels_of(glint, *flags):
-    process = glint("pyramid", "map.glint", "-o", "pyramid.glint", "--resolution", "32", "--sigma-r", "0.05", "--force", "--json", *flags)
+    process = glint(
+        "pyramid", "map.glint", "-o", "pyramid.glint", "--resolution", "32", "--sigma-r", "0.05", "--force", "--json", *flags
+    )
     assert process.returncode == 0, process.stderr
     return json.loads(process.stdout)["result"]["levels"]
 
@@ -24,8 +26,12 @@ def map_glint(glint):
 def test_levels_are_those_of_the_footprints(map_glint):
     levels = [level for level in levels_of(map_glint, "--finest", "8", "--coarsest", "20") if not level["is_mean"]]
     sizes = [FOOTPRINT_PER_STRIDE * level["stride_texels"] for level in levels]
-    assert SMALLEST_OVER_LEVEL * sizes[0] <= 8 < 2 * SMALLEST_OVER_LEVEL * sizes[0], "level 0 answers the smallest footprint, and no finer level does"
-    assert LARGEST_OVER_LEVEL * sizes[-1] >= 20 > LARGEST_OVER_LEVEL * sizes[-1] / 2, "the last level answers the largest footprint, and is needed"
+    assert (
+        SMALLEST_OVER_LEVEL * sizes[0] <= 8 < 2 * SMALLEST_OVER_LEVEL * sizes[0]
+    ), "level 0 answers the smallest footprint, and no finer level does"
+    assert (
+        LARGEST_OVER_LEVEL * sizes[-1] >= 20 > LARGEST_OVER_LEVEL * sizes[-1] / 2
+    ), "the last level answers the largest footprint, and is needed"
 
 
 def test_fewer_levels_take_fewer_bytes(map_glint):
@@ -34,8 +40,14 @@ def test_fewer_levels_take_fewer_bytes(map_glint):
     assert size("--finest", "4", "--coarsest", "4") < size("--finest", "4", "--coarsest", "40")
 
 
-@pytest.mark.parametrize("flags, text", [(["--finest", "8", "--stride", "16"], "excludes"), (["--coarsest", "8", "--levels", "2"], "excludes"),
-                                         (["--finest", "0"], "--finest")])
+@pytest.mark.parametrize(
+    "flags, text",
+    [
+        (["--finest", "8", "--stride", "16"], "excludes"),
+        (["--coarsest", "8", "--levels", "2"], "excludes"),
+        (["--finest", "0"], "--finest"),
+    ],
+)
 def test_wrong_use_is_refused(map_glint, flags, text):
     process = map_glint("pyramid", "map.glint", "-o", "pyramid.glint", *flags)
     assert process.returncode == 1 and text in process.stderr
@@ -43,7 +55,9 @@ def test_wrong_use_is_refused(map_glint, flags, text):
 
 def test_footprints_below_the_finest_level_need_the_map(map_glint):
     levels = levels_of(map_glint, "--finest", "8")
-    ask = lambda sigma, *more: map_glint("query", "pyramid.glint", "--uv", ".4", ".6", "--sigma", sigma, "--half", ".1", ".1", "--json", *more)
+    ask = lambda sigma, *more: map_glint(
+        "query", "pyramid.glint", "--uv", ".4", ".6", "--sigma", sigma, "--half", ".1", ".1", "--json", *more
+    )
     refused = json.loads(ask("2").stdout)["error"]
     assert f"below the finest level, {FOOTPRINT_PER_STRIDE * levels[0]['stride_texels']:.2g} texels" in refused["message"]
     assert "--normals" in refused["remedy"]

@@ -10,7 +10,9 @@ from conftest import BIN
 
 # Shell answers are printed with nine digits.
 PRINTED = 1e-6
-LEFT_OUT = 2e-3  # texels answer below level 0: up to a thousandth of the light is left out, and a single density may lose twice that
+LEFT_OUT = (
+    2e-3  # texels answer below level 0: up to a thousandth of the light is left out, and a single density may lose twice that
+)
 FOOTPRINT = ["--uv", "0.3", "0.7", "--sigma", "20"]
 
 
@@ -27,7 +29,20 @@ def assets(tmp_path_factory):
 
     run("synth", "isotropic", "--size", "256", "-o", "map.exr")
     run("ingest", "map.exr", "-o", "normals.glint")
-    run("pyramid", "normals.glint", "-o", "pyramid.glint", "--stride", "32", "--resolution", "64", "--sigma-r", "0.02", "--levels", "3")
+    run(
+        "pyramid",
+        "normals.glint",
+        "-o",
+        "pyramid.glint",
+        "--stride",
+        "32",
+        "--resolution",
+        "64",
+        "--sigma-r",
+        "0.02",
+        "--levels",
+        "3",
+    )
     run("synth", "isotropic", "--size", "256", "--seed", "9", "-o", "other.exr")
     run("ingest", "other.exr", "-o", "other.glint")
     kinds = {"normals": folder / "normals.glint", "other": folder / "other.glint", "pyramid": folder / "pyramid.glint"}
@@ -408,12 +423,19 @@ def test_json_of_a_pyramid_lists_its_levels(glint, assets):
 
 
 def test_resolution_is_chosen_by_sigma_r(glint, assets):
-    for sigma_r, resolution in (("0.02", 160), ("0.2", 32), ("0.001", 1024)):  # sigma_r has 1.5 pixels or a little more, within the limits
+    for sigma_r, resolution in (
+        ("0.02", 160),
+        ("0.2", 32),
+        ("0.001", 1024),
+    ):  # sigma_r has 1.5 pixels or a little more, within the limits
         options = ["--resolution", "auto", "--sigma-r", sigma_r, "--levels", "1", "--stride", "128", "--json", "--force"]
         result = json.loads(glint("pyramid", assets["normals"], "-o", "p.glint", *options).stdout)["result"]
         assert result["resolution"] == resolution
         assert result["sigma_r_pixels"] == pytest.approx(float(sigma_r) * resolution / 2)
-    for options, told in (([], True), (["--resolution", "auto", "--sigma-r", "0.001", "--stride", "128"], False)):  # as fine as it gets
+    for options, told in (
+        ([], True),
+        (["--resolution", "auto", "--sigma-r", "0.001", "--stride", "128"], False),
+    ):  # as fine as it gets
         process = glint("pyramid", assets["normals"], "-o", "p.glint", "--force", "--verbose", "--levels", "1", *options)
         assert ("give --resolution auto" in process.stdout + process.stderr) == told
 
@@ -445,7 +467,9 @@ def test_covariances_are_checked(ask):
 
 def test_depfile_names_what_a_table_comes_from(ask, assets):
     (ask.folder / "in.csv").write_text("u,v,sigma,hx,hy\n0.3,0.7,20,0,0\n")
-    assert ask("pyramid", "--csv", "in.csv", "-o", "out.csv", "--normals", assets["normals"], "--depfile", "out.d").returncode == 0
+    assert (
+        ask("pyramid", "--csv", "in.csv", "-o", "out.csv", "--normals", assets["normals"], "--depfile", "out.d").returncode == 0
+    )
     rule = (ask.folder / "out.d").read_text()
     assert rule.startswith("out.csv:")
     for name in ("in.csv", "pyramid.glint", "normals.glint"):
@@ -462,7 +486,9 @@ def test_options_of_other_kinds_are_warned_of(ask):
 BETWEEN_CENTRES = 0.02  # of a mean over some thousands of texels: what interpolation between images costs
 
 
-@pytest.mark.parametrize("size, uv", [("1024x128", (0.3, 0.1)), ("512x50", (0.3, 0.1)), ("1000x200", (0.3, 0.2)), ("64x700", (0.7, 0.9))])
+@pytest.mark.parametrize(
+    "size, uv", [("1024x128", (0.3, 0.1)), ("512x50", (0.3, 0.1)), ("1000x200", (0.3, 0.2)), ("64x700", (0.7, 0.9))]
+)
 def test_thin_maps_are_answered_as_their_texels_are(glint, tmp_path, size, uv):
     """A footprint that is wider than the map, in every form of the pyramid."""
     path = lambda kind: tmp_path / f"{kind}.glint"
@@ -473,7 +499,9 @@ def test_thin_maps_are_answered_as_their_texels_are(glint, tmp_path, size, uv):
         assert glint("compress", path("pyramid"), "-o", path(method), "--method", method, "--rank", "32").returncode == 0
 
     def ask(kind):
-        process = glint("query", path(kind), "--uv", *map(str, uv), "--sigma", "300", "--range", "-0.125", "-0.125", "0.125", "0.125")
+        process = glint(
+            "query", path(kind), "--uv", *map(str, uv), "--sigma", "300", "--range", "-0.125", "-0.125", "0.125", "0.125"
+        )
         assert process.returncode == 0, process.stderr
         return float(process.stdout)
 

@@ -10,7 +10,12 @@ import pytest
 ROOT = pathlib.Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
 LINKING = (ROOT / "docs/LINKING.md").read_text()
-DOCUMENTS = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md")))]
+DOCUMENTS = [
+    "README.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md"))),
+]
 # Sums in another order, as another processor's vectors give, and the digits that were printed.
 TOLERANCE = 5e-3
 # One screen and a half.
@@ -94,7 +99,10 @@ def test_links_lead_somewhere(document):
         assert not anchor or anchor in anchors(linked.read_text()), target
 
 
-@pytest.mark.parametrize("document", ["docs/ARCHITECTURE.md", "docs/METHODS.md", "docs/FORMAT.md", "docs/TOOLS.md", "docs/LINKING.md", "docs/INTEGRATIONS.md"])
+@pytest.mark.parametrize(
+    "document",
+    ["docs/ARCHITECTURE.md", "docs/METHODS.md", "docs/FORMAT.md", "docs/TOOLS.md", "docs/LINKING.md", "docs/INTEGRATIONS.md"],
+)
 def test_files_that_are_named_exist(document):
     rooms = r"(?:libglint|formats|apps|tests|pipelines)/"
     named = set(re.findall(rf"`({rooms}[\w./-]+)`", (ROOT / document).read_text()))
@@ -111,7 +119,9 @@ def test_headers_that_are_named_exist():
 def test_every_tool_and_kind_is_in_a_table():
     tools = {path.parent.name for path in (ROOT / "apps").glob("glint-*/main.cpp")}
     assert set(re.findall(r"^\| `(glint-\w+)` \|", (ROOT / "docs/TOOLS.md").read_text(), re.MULTILINE)) == tools
-    kinds = set(re.findall(r"^## \d+\. Kinds? `([a-z-]+)`(?: and `([a-z-]+)`)?", (ROOT / "formats/SPEC.md").read_text(), re.MULTILINE))
+    kinds = set(
+        re.findall(r"^## \d+\. Kinds? `([a-z-]+)`(?: and `([a-z-]+)`)?", (ROOT / "formats/SPEC.md").read_text(), re.MULTILINE)
+    )
     named = {kind for pair in kinds for kind in pair if kind}
     assert {"normals", "ndf-pyramid"} <= named
     assert set(re.findall(r"^\| `([a-z-]+)` \|", (ROOT / "docs/FORMAT.md").read_text(), re.MULTILINE)) == named

@@ -30,12 +30,17 @@ def rewrite(source, path, compact=True, **dataset_options):
         creation.set_attr_phase_change(64, 0)
     access.set_libver_bounds(h5py.h5f.LIBVER_V18, h5py.h5f.LIBVER_V110)
     access.set_alignment(1, 64)
-    with h5py.File(source, "r") as old, h5py.File(h5py.h5f.create(str(path).encode(), h5py.h5f.ACC_TRUNC, creation, access)) as new:
+    with (
+        h5py.File(source, "r") as old,
+        h5py.File(h5py.h5f.create(str(path).encode(), h5py.h5f.ACC_TRUNC, creation, access)) as new,
+    ):
         copy_attributes(old, new)
 
         def copy(name, item):
             if isinstance(item, h5py.Dataset):
-                copied = new.create_dataset(name, data=item[...], dtype=item.dtype, **(dataset_options if item.size > 64 else {}))
+                copied = new.create_dataset(
+                    name, data=item[...], dtype=item.dtype, **(dataset_options if item.size > 64 else {})
+                )
             else:
                 copied = new.create_group(name)
             copy_attributes(item, copied)
@@ -45,7 +50,9 @@ def rewrite(source, path, compact=True, **dataset_options):
 
 def rule_of(process):
     output = process.stdout + process.stderr
-    return next((rule for rule in ("object.heap", "dataset.alignment", "dataset.layout", "file.superblock") if rule in output), output)
+    return next(
+        (rule for rule in ("object.heap", "dataset.alignment", "dataset.layout", "file.superblock") if rule in output), output
+    )
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

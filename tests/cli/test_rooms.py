@@ -25,12 +25,33 @@ MAY_USE = {
 
 # The folders inside the rooms, and which of them each may include besides itself. A method has the same name in every room.
 FOLDERS = {
-    "bake": {"common": set(), "ingest": {"common"}, "synth": {"common"}, "pyramid": {"common"}, "compressed": {"common"},
-             "bin_map": {"common"}, "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"}, "sh": {"common"}, "displace": {"common"},
-             "wang": {"common", "pyramid"}, "wave": {"common", "pyramid"}},
-    "query/detail": {"common": set(), "manifold": {"common"}, "pyramid": {"common"}, "compressed": {"common", "pyramid"}, "bin_map": {"common"},
-                     "histogram": {"common"}, "moments": {"common"}, "tiny": {"common", "pyramid"},
-                     "wang": {"common", "pyramid"}, "wave": {"common", "pyramid"}},
+    "bake": {
+        "common": set(),
+        "ingest": {"common"},
+        "synth": {"common"},
+        "pyramid": {"common"},
+        "compressed": {"common"},
+        "bin_map": {"common"},
+        "histogram": {"common"},
+        "moments": {"common"},
+        "tiny": {"common", "pyramid"},
+        "sh": {"common"},
+        "displace": {"common"},
+        "wang": {"common", "pyramid"},
+        "wave": {"common", "pyramid"},
+    },
+    "query/detail": {
+        "common": set(),
+        "manifold": {"common"},
+        "pyramid": {"common"},
+        "compressed": {"common", "pyramid"},
+        "bin_map": {"common"},
+        "histogram": {"common"},
+        "moments": {"common"},
+        "tiny": {"common", "pyramid"},
+        "wang": {"common", "pyramid"},
+        "wave": {"common", "pyramid"},
+    },
 }
 
 # Headers of others that are kept in few places: pattern -> folders, relative to the root.
@@ -153,7 +174,12 @@ def test_only_the_writer_uses_hdf5():
 def test_the_container_knows_nothing_of_assets():
     """It reads a part of HDF5; what the objects mean is the business of the rest of formats/."""
     allowed = {"container", "findings.h", "schema.h", "plain_text.h", "descriptor.h", "system_error.h"}
-    used = {match[1] for p in sources(ROOMS["formats"] / "container") for _, name in includes(p) if (match := re.match(r"glint/formats/([^/]+)", name))}
+    used = {
+        match[1]
+        for p in sources(ROOMS["formats"] / "container")
+        for _, name in includes(p)
+        if (match := re.match(r"glint/formats/([^/]+)", name))
+    }
     assert used <= allowed
 
 
@@ -184,7 +210,9 @@ def test_main_is_short(path):
 def test_reading_the_graph_sees_what_it_should(tmp_path):
     """A guard against a parser that finds nothing and so passes everything."""
     file = tmp_path / "x.h"
-    file.write_text('#include "glint/bake/a.h"\n  #  include <hdf5.h>\n// #include <no>\n/* #include "no.h"\n*/\n#include <Eigen/Core>  // x\n')
+    file.write_text(
+        '#include "glint/bake/a.h"\n  #  include <hdf5.h>\n// #include <no>\n/* #include "no.h"\n*/\n#include <Eigen/Core>  // x\n'
+    )
     assert includes(file) == [('"', "glint/bake/a.h"), ("<", "hdf5.h"), ("<", "Eigen/Core")]
     assert room_of(file, "glint/bake/a.h") == "bake"
     assert room_of(ROOMS["query"] / "x.h", "../bake/ingest/ingest.h") == "bake"

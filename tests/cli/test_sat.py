@@ -55,7 +55,9 @@ def test_answers_are_those_of_the_texels(glint, normals, sat):
 def test_strides_do_not_change_answers(glint, normals, sat):
     assert glint("sat", normals, "-o", "coarse.glint", "--stride", "37").returncode == 0
     question = [*BOX, "--half", "0.05", "0.08"]
-    assert number(glint("query", sat, *question)) == pytest.approx(number(glint("query", "coarse.glint", *question)), rel=PRINTED)
+    assert number(glint("query", sat, *question)) == pytest.approx(
+        number(glint("query", "coarse.glint", *question)), rel=PRINTED
+    )
 
 
 def test_gaussian_boxes_change_gaussian_footprints_only(glint, sat):
@@ -90,8 +92,21 @@ def test_extreme_bins_work(glint, normals, bins):
 
 
 @pytest.mark.parametrize(
-    "flags", [["--bins", "9"], ["--bins", "9x"], ["--bins", "x32"], ["--bins", "0x32"], ["--bins", "9x257"], ["--bins", "64x64"],
-              ["--bins", "9x32x1"], ["--bins", "-9x32"], ["--stride", "0"], ["--stride", "129"], ["--stride", "4.5"]])
+    "flags",
+    [
+        ["--bins", "9"],
+        ["--bins", "9x"],
+        ["--bins", "x32"],
+        ["--bins", "0x32"],
+        ["--bins", "9x257"],
+        ["--bins", "64x64"],
+        ["--bins", "9x32x1"],
+        ["--bins", "-9x32"],
+        ["--stride", "0"],
+        ["--stride", "129"],
+        ["--stride", "4.5"],
+    ],
+)
 def test_bad_options_are_usage_errors(glint, normals, flags):
     process = glint("sat", normals, "-o", "s.glint", *flags)
     assert process.returncode == 1

@@ -10,8 +10,30 @@ from conftest import BIN
 
 APPS = pathlib.Path(__file__).parents[2] / "apps"
 TOOLS = sorted(path.parent.name.removeprefix("glint-") for path in APPS.glob("glint-*/main.cpp"))
-COMMANDS = [*TOOLS, "farm plan", "farm run", "farm status", "query light", "query plane", "query reflectance"]  # programs, and their commands
-SHARED = ["--threads", "--max-memory", "--trust", "--seed", "--json", "--progress", "--quiet", "--force", "--skip-unchanged", "--depfile", "--config", "--version", "--help"]
+COMMANDS = [
+    *TOOLS,
+    "farm plan",
+    "farm run",
+    "farm status",
+    "query light",
+    "query plane",
+    "query reflectance",
+]  # programs, and their commands
+SHARED = [
+    "--threads",
+    "--max-memory",
+    "--trust",
+    "--seed",
+    "--json",
+    "--progress",
+    "--quiet",
+    "--force",
+    "--skip-unchanged",
+    "--depfile",
+    "--config",
+    "--version",
+    "--help",
+]
 
 
 def test_there_are_tools():
@@ -152,9 +174,26 @@ def test_shared_flags_work_behind_a_command(glint):
     (glint.folder / "ask.toml").write_text("uv = [0.3, 0.7]\nsigma = 8\nwi = [0.5, 0, 1]\nwo = [-0.2, 0.1, 1]\n")
     asked = glint(*command, "rock.displaced.glint", "--config", "ask.toml", "--json")
     assert json.loads(asked.stdout)["result"] == document["result"]
-    sampled = ["rock.displaced.glint", "--uv", "0.3", "0.7", "--level", "0", "--wo", "0", "0", "1", "--samples", "4", "-o", "s.csv"]
+    sampled = [
+        "rock.displaced.glint",
+        "--uv",
+        "0.3",
+        "0.7",
+        "--level",
+        "0",
+        "--wo",
+        "0",
+        "0",
+        "1",
+        "--samples",
+        "4",
+        "-o",
+        "s.csv",
+    ]
     assert glint(*command, *sampled, "--seed", "3", "--depfile", "s.d").returncode == 0
     first = (glint.folder / "s.csv").read_text()
-    assert (glint.folder / "s.d").read_text().startswith("s.csv:") and "rock.displaced.glint" in (glint.folder / "s.d").read_text()
+    assert (glint.folder / "s.d").read_text().startswith("s.csv:") and "rock.displaced.glint" in (
+        glint.folder / "s.d"
+    ).read_text()
     assert glint(*command, *sampled, "--seed", "4").returncode == 0
     assert (glint.folder / "s.csv").read_text() != first

@@ -46,7 +46,10 @@ def test_same_bytes_with_any_number_of_threads(glint, folder):
     write_exr(folder / "env.exr", np.random.default_rng(1).uniform(0, 3, (HEIGHT, 2 * HEIGHT, 3)))
     for threads in (1, 2):
         for name, arguments in {"light": ["--light", "env.exr", "--grid", "5x8"], "lobes": ["--sigma-r", 0.05]}.items():
-            assert glint("shlobes", *arguments, "--order", 10, "--threads", threads, "-o", f"{name}{threads}.glint").returncode == 0
+            assert (
+                glint("shlobes", *arguments, "--order", 10, "--threads", threads, "-o", f"{name}{threads}.glint").returncode
+                == 0
+            )
     for name in ("light", "lobes"):
         assert (folder / f"{name}1.glint").read_bytes() == (folder / f"{name}2.glint").read_bytes()
 
@@ -127,7 +130,9 @@ def light_by_quadrature(facets, weights, sigma, wo, light, steps=64):
         m = np.array([x, y, math.sqrt(1 - x * x - y * y)])
         u = np.cross(m, [0, 1, 0])
         u /= np.linalg.norm(u)
-        h = np.cos(theta)[:, None, None] * m + sine[:, None, None] * (np.cos(phi)[:, None] * u + np.sin(phi)[:, None] * np.cross(m, u))
+        h = np.cos(theta)[:, None, None] * m + sine[:, None, None] * (
+            np.cos(phi)[:, None] * u + np.sin(phi)[:, None] * np.cross(m, u)
+        )
         ho = h @ wo
         wi = 2 * ho[..., None] * h - wo
         above = (ho > 0) & (wi[..., 2] > 0)
@@ -146,9 +151,12 @@ def test_histograms_reflect_what_a_quadrature_over_their_normals_does(glint, fol
     random = np.random.default_rng(5)
     env = random.uniform(0.2, 1, (32, 64, 3)) + 20 * (random.uniform(size=(32, 64, 1)) > 0.97)
     write_exr(folder / "env.exr", env)
-    for command in (["synth", "isotropic", "--size", 64, "--alpha", 0.3, "-o", "map.exr"], ["ingest", "map.exr", "-o", "n.glint"],
-                    ["sat", "n.glint", "-o", "s.glint", "--stride", 4],
-                    ["shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 50, "--grid", "17x32"]):
+    for command in (
+        ["synth", "isotropic", "--size", 64, "--alpha", 0.3, "-o", "map.exr"],
+        ["ingest", "map.exr", "-o", "n.glint"],
+        ["sat", "n.glint", "-o", "s.glint", "--stride", 4],
+        ["shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 50, "--grid", "17x32"],
+    ):
         assert glint(*command).returncode == 0
     with h5py.File(folder / "n.glint") as file:
         normals = file["normals"][...].astype(float)
@@ -158,27 +166,51 @@ def test_histograms_reflect_what_a_quadrature_over_their_normals_does(glint, fol
     seen = np.flatnonzero(counts)
     means = [normals[ids == b].mean(axis=0) for b in seen]
     expected = light_by_quadrature(means, counts[seen] / counts.sum(), sigma, wo, env)
-    arguments = ["s.glint", "--uv", 25 / 64, 18 / 64, "--box", 15, 0, 0, 11, "--sigma-r", sigma, "--light", "light.glint", "--wo", *wo]
+    arguments = [
+        "s.glint",
+        "--uv",
+        25 / 64,
+        18 / 64,
+        "--box",
+        15,
+        0,
+        0,
+        11,
+        "--sigma-r",
+        sigma,
+        "--light",
+        "light.glint",
+        "--wo",
+        *wo,
+    ]
     result = ask(glint, *arguments)
     # Order 50 of lobes of 4.6 degrees, and the blend between outgoing directions.
     assert result["light_integral"] == pytest.approx(expected, rel=0.03)
     assert result["light_integral"][0] != pytest.approx(env[..., 0].mean() * 4 * wo[2], rel=0.03)
     lobes = ["shlobes", "--sigma-r", sigma, "--order", 50, "--grid", "none", "-o", "lobes.glint"]
     assert glint(*lobes).returncode == 0
-    assert ask(glint, *arguments[:9], *arguments[11:], "--lobes", "lobes.glint")["light_integral"] == pytest.approx(result["light_integral"], rel=1e-5)
+    assert ask(glint, *arguments[:9], *arguments[11:], "--lobes", "lobes.glint")["light_integral"] == pytest.approx(
+        result["light_integral"], rel=1e-5
+    )
 
 
 def test_optics_of_the_surface(glint, folder):
     """--ior, --eta with --k, and --smith are Fresnel and G of the mirror direction; 4 % at normal incidence for 1.5."""
     write_exr(folder / "env.exr", constant(1))
-    for command in (["synth", "isotropic", "--size", 32, "--alpha", 0.4, "-o", "map.exr"], ["ingest", "map.exr", "-o", "n.glint"],
-                    ["sat", "n.glint", "-o", "s.glint"], ["shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 10, "--grid", "5x8"]):
+    for command in (
+        ["synth", "isotropic", "--size", 32, "--alpha", 0.4, "-o", "map.exr"],
+        ["ingest", "map.exr", "-o", "n.glint"],
+        ["sat", "n.glint", "-o", "s.glint"],
+        ["shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 10, "--grid", "5x8"],
+    ):
         assert glint(*command).returncode == 0
     common = ["--uv", 0.5, 0.5, "--box", 16, 0, 0, 16, "--sigma-r", 0.1, "--light", "light.glint"]
     up, slanted = ["--wo", 0, 0, 1], ["--wo", 0.8, 0, 0.6]
     assert ask(glint, "s.glint", *common, *up, "--ior", 1.5)["transfer"] == pytest.approx([0.04 / 4] * 3, rel=1e-5)
     metal = ask(glint, "s.glint", *common, *up, "--eta", 0.2, 0.4, 1.4, "--k", 3, 2, 1)["transfer"]
-    assert metal == pytest.approx([((n - 1) ** 2 + k**2) / ((n + 1) ** 2 + k**2) / 4 for n, k in ((0.2, 3), (0.4, 2), (1.4, 1))], rel=1e-5)
+    assert metal == pytest.approx(
+        [((n - 1) ** 2 + k**2) / ((n + 1) ** 2 + k**2) / 4 for n, k in ((0.2, 3), (0.4, 2), (1.4, 1))], rel=1e-5
+    )
     smith = ask(glint, "s.glint", *common, *slanted, "--smith")["transfer"]
     assert 0.5 / (4 * 0.6) < smith[0] < 0.999 / (4 * 0.6)
     # The map's slopes are the same, stored or taken from the texels.
@@ -191,13 +223,17 @@ def test_optics_of_the_surface(glint, folder):
 def test_light_comes_from_where_the_image_says(glint, folder):
     """Bright towards +x (first column), seen by a facet that mirrors it from -x."""
     pixels = constant(0)
-    pixels[HEIGHT // 4 : HEIGHT // 2, 0, :] = pixels[HEIGHT // 4 : HEIGHT // 2, -1, :] = 100  # image rows from the top: upper half
+    pixels[HEIGHT // 4 : HEIGHT // 2, 0, :] = pixels[HEIGHT // 4 : HEIGHT // 2, -1, :] = (
+        100  # image rows from the top: upper half
+    )
     write_exr(folder / "env.exr", pixels)
     glint("synth", "flat", "-o", "flat.png", "--size", 16)
     glint("ingest", "flat.png", "-o", "flat.glint", "--allow-constant")
     assert glint("shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 30, "--grid", "17x32").returncode == 0
     values = [
-        ask(glint, "flat.glint", "--uv", 0.5, 0.5, "--sigma", 2, "--sigma-r", 0.1, "--light", "light.glint", "--wo", x, y, 0.5)["radiance"][0]
+        ask(glint, "flat.glint", "--uv", 0.5, 0.5, "--sigma", 2, "--sigma-r", 0.1, "--light", "light.glint", "--wo", x, y, 0.5)[
+            "radiance"
+        ][0]
         for x, y in ((-0.8, 0), (0.8, 0), (0, 0.8), (0, -0.8))
     ]
     assert values[0] > 5
@@ -213,12 +249,30 @@ def test_clamped_light_says_so(glint, folder):
     glint("shlobes", "--light", "env.exr", "-o", "light.glint", "--order", 20, "--grid", "9x16")
     clamped = 0
     for tilt in np.linspace(0.2, 1.2, 8):
-        process = glint("query", "light", "flat.glint", "--uv", 0.5, 0.5, "--sigma", 2, "--light", "light.glint", "--wo", math.sin(tilt), 0, math.cos(tilt), "--json")
+        process = glint(
+            "query",
+            "light",
+            "flat.glint",
+            "--uv",
+            0.5,
+            0.5,
+            "--sigma",
+            2,
+            "--light",
+            "light.glint",
+            "--wo",
+            math.sin(tilt),
+            0,
+            math.cos(tilt),
+            "--json",
+        )
         document = json.loads(process.stdout)
         result = document["result"]
         assert result["clamped"] == ("clamped" in process.stderr)
         assert min(result["light_integral"]) >= 0
-        assert result["clamped"] == (min(result["signed_light_integral"]) < 0) == any("clamped" in w for w in document["warnings"])
+        assert (
+            result["clamped"] == (min(result["signed_light_integral"]) < 0) == any("clamped" in w for w in document["warnings"])
+        )
         clamped += result["clamped"]
     assert clamped > 0
 
@@ -227,12 +281,21 @@ def test_area_lights(glint, folder):
     write_exr(folder / "checks.exr", np.ones((2, 2, 3)))
     lights = {
         "lights": [
-            {"type": "rectangle", "centre": [0, 0, 2], "axis_u": [1, 0, 0], "axis_v": [0, -1, 0], "radiance": [4, 4, 4], "texture": "checks.exr"},
+            {
+                "type": "rectangle",
+                "centre": [0, 0, 2],
+                "axis_u": [1, 0, 0],
+                "axis_v": [0, -1, 0],
+                "radiance": [4, 4, 4],
+                "texture": "checks.exr",
+            },
             {"type": "sphere", "centre": [3, 0, 1], "radius": 0.5, "radiance": [9, 0, 0]},
         ]
     }
     (folder / "lights.json").write_text(json.dumps(lights))
-    process = glint("shlobes", "--light", "lights.json", "-o", "light.glint", "--order", 20, "--grid", "9x16", "--depfile", "light.d")
+    process = glint(
+        "shlobes", "--light", "lights.json", "-o", "light.glint", "--order", 20, "--grid", "9x16", "--depfile", "light.d"
+    )
     assert process.returncode == 0, process.stderr
     assert "checks.exr" in (folder / "light.d").read_text()
     glint("synth", "flat", "-o", "flat.png", "--size", 16)
@@ -292,7 +355,9 @@ def test_a_black_environment_is_warned_of(glint, folder):
     assert process.returncode == 0 and "no light comes from above" in process.stderr
 
 
-@pytest.mark.parametrize(("text", "words"), [('{"lights": [{"radius": 1e400}]}', "1e400"), ('{"lights": [{"radius": NaN}]}', "line 1, column 24")])
+@pytest.mark.parametrize(
+    ("text", "words"), [('{"lights": [{"radius": 1e400}]}', "1e400"), ('{"lights": [{"radius": NaN}]}', "line 1, column 24")]
+)
 def test_files_of_lights_that_are_no_json_say_where(glint, folder, text, words):
     (folder / "bad.json").write_text(text)
     process = glint("shlobes", "--light", "bad.json", "-o", "x.glint")
@@ -376,7 +441,11 @@ def test_lowest_orders(glint, folder, order):
     assert glint("shlobes", "--sigma-r", 0.1, "--order", order, "-o", "lobes.glint").returncode == 0
     assert glint("shlobes", "--light", "env.exr", "--order", order, "-o", "light.glint").returncode == 0
     assert glint("validate", "lobes.glint", "light.glint").returncode == 0
-    for command in (["synth", "isotropic", "--size", 32, "-o", "map.exr"], ["ingest", "map.exr", "-o", "n.glint"], ["sat", "n.glint", "-o", "s.glint"]):
+    for command in (
+        ["synth", "isotropic", "--size", 32, "-o", "map.exr"],
+        ["ingest", "map.exr", "-o", "n.glint"],
+        ["sat", "n.glint", "-o", "s.glint"],
+    ):
         assert glint(*command).returncode == 0
     asked = ["s.glint", "--uv", 0.5, 0.5, "--sigma", 4, "--light", "light.glint", "--lobes", "lobes.glint", "--wo", 0.2, 0, 0.9]
     result = ask(glint, *asked)
@@ -399,7 +468,11 @@ def test_light_of_other_models_and_kinds_is_refused(glint, folder):
     assert glint("query", "light", "flakes.glint", *asked[:-4]).returncode == 1
     assert "glint-query ASSET --uv" in glint("query", "light", "flakes.glint", *asked, "--half", 0, 0).stderr
     # The command is a word of its own: without it, options of light are shown where they belong.
-    for command in (["flakes.glint", *asked], ["flakes.glint", *asked[:5], "--wo", 0, 0, 1], ["--json", "light", "flakes.glint", *asked]):
+    for command in (
+        ["flakes.glint", *asked],
+        ["flakes.glint", *asked[:5], "--wo", 0, 0, 1],
+        ["--json", "light", "flakes.glint", *asked],
+    ):
         process = glint("query", *command)
         assert process.returncode == 1
         assert "glint-query light ASSET --light TABLE" in process.stderr

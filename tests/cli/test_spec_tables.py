@@ -13,7 +13,15 @@ FORMATS = pathlib.Path(__file__).parents[2] / "formats"
 
 
 def run(folder, *arguments):
-    command = [sys.executable, FORMATS / "spec_tables.py", "--schema", folder / "schema.json", "--spec", folder / "SPEC.md", *arguments]
+    command = [
+        sys.executable,
+        FORMATS / "spec_tables.py",
+        "--schema",
+        folder / "schema.json",
+        "--spec",
+        folder / "SPEC.md",
+        *arguments,
+    ]
     return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
 
@@ -49,7 +57,9 @@ def test_every_entry_of_the_schema_has_a_row_with_its_meaning():
 
     def check(table, entries, key):
         def presence(entry):
-            return f" (with {entry['needs']})" if "needs" in entry else "" if entry.get("required", True) else " (MAY be absent)"
+            return (
+                f" (with {entry['needs']})" if "needs" in entry else "" if entry.get("required", True) else " (MAY be absent)"
+            )
 
         expected = [(entry[key].replace("{l}", "LL") + presence(entry), entry["long_name"]) for entry in entries]
         assert [(row[0], row[-1]) for row in rows_of(spec, table)] == expected, table
@@ -73,7 +83,11 @@ def test_tables_say_types_values_sizes_and_conditions():
     assert row("attributes of ndf-pyramid", "level_strides") == ["f32[level_count]", "> 0, at most 2^20", "texel"]
     assert row("attributes of ndf-pyramid", "value_scale") == ["f32", "> 0, finite", "1"]
     assert row("attributes of ndf-cp", "method") == ["text", "cp, tucker or pca", ""]
-    assert row("datasets of ndf-pyramid", "level_LL/pixels") == ["f16 or f32, named by precision", "[stored_blocks][16][16]", "1"]
+    assert row("datasets of ndf-pyramid", "level_LL/pixels") == [
+        "f16 or f32, named by precision",
+        "[stored_blocks][16][16]",
+        "1",
+    ]
     coefficients = "i8 if coefficient_type is i8; else f16 if coefficient_type is f16; else f32 if coefficient_type is f32"
     assert row("datasets of ndf-cp", "coefficients")[0] in (coefficients, "i8, f16 or f32, named by coefficient_type")
     assert "For every l with 0 <= l < `level_count * has_lobe_colors`:\n\n| dataset |" in spec

@@ -11,7 +11,26 @@ import OpenImageIO as oiio
 import pytest
 from conftest import BIN
 
-KINDS = ["isotropic", "brushed", "flakes", "scratches", "leather", "weave", "twill", "silk", "bumps", "scales", "structured", "relief", "wood", "anisotropic", "sawtooth", "flat", "grating", "flake2d"]
+KINDS = [
+    "isotropic",
+    "brushed",
+    "flakes",
+    "scratches",
+    "leather",
+    "weave",
+    "twill",
+    "silk",
+    "bumps",
+    "scales",
+    "structured",
+    "relief",
+    "wood",
+    "anisotropic",
+    "sawtooth",
+    "flat",
+    "grating",
+    "flake2d",
+]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -96,7 +115,9 @@ class Flake2d:
         self.presence = np.zeros((height, width), f)
         owner = np.zeros((height, width, 3), np.int64)
         x = np.float64(coverage)
-        probability = (-26.19771808 * x * x + 26.39663835 * x) / (85.53857017 * x**3 - 102.35069432 * x * x - 101.42634862 * x + 118.45082288)
+        probability = (-26.19771808 * x * x + 26.39663835 * x) / (
+            85.53857017 * x**3 - 102.35069432 * x * x - 101.42634862 * x + 118.45082288
+        )
         half_edge = 1.5 / np.sqrt(3)
         for offset in np.ndindex(3, 3, 3):
             cell = self.cells + np.array(offset) - 1
@@ -155,15 +176,30 @@ def read(path):
     return np.flipud(pixels)
 
 
-@pytest.mark.parametrize("width, height, size, roughness, coverage, seed", [
-    (256, 256, 0.03, 0.3, 0.5, 1),
-    (200, 120, 0.0613, 0.5, 0.9, 1),
-    (128, 192, 0.011, 0.2, 0.2, 8),
-])
+@pytest.mark.parametrize(
+    "width, height, size, roughness, coverage, seed",
+    [
+        (256, 256, 0.03, 0.3, 0.5, 1),
+        (200, 120, 0.0613, 0.5, 0.9, 1),
+        (128, 192, 0.011, 0.2, 0.2, 8),
+    ],
+)
 def test_flake2d_is_the_node_of_materialx(glint, width, height, size, roughness, coverage, seed):
     """Sizes that do not tile: every texel is the node's."""
     node = Flake2d(width, height, size, roughness, coverage, plane=seed - 1)
-    arguments = ["flake2d", "--size", f"{width}x{height}", "--flake-size-uv", size, "--roughness", roughness, "--coverage", coverage, "--seed", seed]
+    arguments = [
+        "flake2d",
+        "--size",
+        f"{width}x{height}",
+        "--flake-size-uv",
+        size,
+        "--roughness",
+        roughness,
+        "--coverage",
+        coverage,
+        "--seed",
+        seed,
+    ]
     process = glint("synth", *arguments, "-o", "n.exr")
     assert process.returncode == 0 and "does not tile" in process.stderr
     assert glint("synth", *arguments, "--presence", "-o", "p.exr").returncode == 0
@@ -177,7 +213,20 @@ def test_flake2d_is_the_node_of_materialx(glint, width, height, size, roughness,
 
 def test_flake2d_that_tiles_is_the_node_except_at_the_border(glint):
     node = Flake2d(256, 128, 1 / 16, 0.4, 0.6)
-    process = glint("synth", "flake2d", "--size", "256x128", "--flake-size-uv", 1 / 16, "--roughness", ".4", "--coverage", ".6", "-o", "n.exr")
+    process = glint(
+        "synth",
+        "flake2d",
+        "--size",
+        "256x128",
+        "--flake-size-uv",
+        1 / 16,
+        "--roughness",
+        ".4",
+        "--coverage",
+        ".6",
+        "-o",
+        "n.exr",
+    )
     assert (process.returncode, process.stderr) == (0, "")
     differs = (np.abs(read(glint.folder / "n.exr")[..., :2] * 2 - 1 - node.normals) > NORMAL_ROUNDING).any(-1)
     assert differs[16:-16, 16:-16].mean() < EDGE_SHARE  # a cell is 16 texels

@@ -12,7 +12,14 @@ SIZE = 64
 EXAMPLE = 16
 MASK = (1 << 64) - 1
 STEP = 0x9E3779B97F4A7C15
-TURNS = {"rotation_deg": [0, 360], "scale": [0.6, 1.3], "stretch": [1, 1.2], "shear": [-0.2, 0.1], "mirror": 0.5, "heights": [0.8, 1.25]}
+TURNS = {
+    "rotation_deg": [0, 360],
+    "scale": [0.6, 1.3],
+    "stretch": [1, 1.2],
+    "shear": [-0.2, 0.1],
+    "mirror": 0.5,
+    "heights": [0.8, 1.25],
+}
 SCATTERED = "--mode scattered --density 1.5 --transforms turns.json --seed 5 --resolution 64 --sigma-r .03"
 
 
@@ -63,7 +70,10 @@ class Plane:
         key = mix((mix((mix((int(self.attributes["seed"]) + STEP) & MASK) + i * STEP) & MASK) + j * STEP) & MASK)
         bits = mix(key) >> 32
         for k in range(sum(bits > threshold for threshold in self.thresholds)):
-            a, b, c = ([(mix((key + STEP * (3 * k + s + 1)) & MASK) >> (21 * u + 1)) % 2**21 / 2**21 for u in range(3)] for s in range(3))
+            a, b, c = (
+                [(mix((key + STEP * (3 * k + s + 1)) & MASK) >> (21 * u + 1)) % 2**21 / 2**21 for u in range(3)]
+                for s in range(3)
+            )
             t, e, w = (self.drawn(name, xi) for name, xi in zip(("scale", "stretch", "shear"), b))
             angle, f = self.drawn("rotation", c[0]), self.drawn("heights", c[1])
             side = -1 if c[2] < float(self.attributes["mirror"]) else 1
@@ -79,7 +89,9 @@ class Plane:
             for x in range(i - 2, i + 3):
                 for centre, matrix, f in self.examples(x, y):
                     local = np.linalg.solve(matrix, p - centre) + self.n / 2
-                    doubtful |= bool(np.any(np.minimum(np.abs(local), np.abs(local - self.n)) < 1e-3)) or bool(np.any(np.abs(local - np.round(local)) < 1e-3))
+                    doubtful |= bool(np.any(np.minimum(np.abs(local), np.abs(local - self.n)) < 1e-3)) or bool(
+                        np.any(np.abs(local - np.round(local)) < 1e-3)
+                    )
                     if np.all((local >= 0) & (local < self.n)):
                         covering.append((centre, matrix, f, local))
         if not covering:
@@ -102,7 +114,11 @@ class Plane:
 @pytest.mark.parametrize("overlap", ["quarters", "nearest"])
 def test_the_plane_is_that_of_the_specification(glint, normals, overlap):
     x0, y0, width, height = 999_983, -77, 40, 24
-    run_all(glint, f"tiny n.glint -o t.glint --cut {EXAMPLE} --at 9 20 {SCATTERED} --overlap {overlap}", f"tiny t.glint -o e.glint --explicit {width} {height} --origin {x0} {y0}")
+    run_all(
+        glint,
+        f"tiny n.glint -o t.glint --cut {EXAMPLE} --at 9 20 {SCATTERED} --overlap {overlap}",
+        f"tiny t.glint -o e.glint --explicit {width} {height} --origin {x0} {y0}",
+    )
     plane, written = Plane(glint.folder / "t.glint"), stored(glint.folder / "e.glint").reshape(height, width, 2)
     assert np.array_equal(plane.normals, normals[20 : 20 + EXAMPLE, 9 : 9 + EXAMPLE])
     compared = 0
@@ -119,7 +135,11 @@ def test_the_plane_is_that_of_the_specification(glint, normals, overlap):
 def test_a_tiled_plane_is_moved_and_turned(glint, normals):
     transform = {"matrix": [[2, 0.5], [0, 1]], "offset": [3, -2], "heights": 1.5}
     (glint.folder / "m.json").write_text(json.dumps(transform))
-    run_all(glint, f"tiny n.glint -o t.glint --cut {EXAMPLE} --transforms m.json --resolution 64 --sigma-r .03", "tiny t.glint -o e.glint --explicit 40 30 --origin -7 1099511627776")
+    run_all(
+        glint,
+        f"tiny n.glint -o t.glint --cut {EXAMPLE} --transforms m.json --resolution 64 --sigma-r .03",
+        "tiny t.glint -o e.glint --explicit 40 30 --origin -7 1099511627776",
+    )
     written = stored(glint.folder / "e.glint").reshape(30, 40, 2)
     matrix = np.array(transform["matrix"])
     for j in range(30):
@@ -136,7 +156,11 @@ def test_a_tiled_plane_is_moved_and_turned(glint, normals):
 
 
 def test_answers_are_those_of_the_explicit_map(glint, normals):
-    run_all(glint, f"tiny n.glint -o t.glint --cut {EXAMPLE} {SCATTERED}", "tiny t.glint -o e.glint --explicit 192 192 --per-texel 3")
+    run_all(
+        glint,
+        f"tiny n.glint -o t.glint --cut {EXAMPLE} {SCATTERED}",
+        "tiny t.glint -o e.glint --explicit 192 192 --per-texel 3",
+    )
     differences, total = 0, 0
     for u, v in [(1.3, 2.2), (2.7, 1.4), (1.9, 2.9)]:
         for box in ["0 0 .5 .5", "-.25 -.25 .25 .25", "-.5 0 0 .5"]:
@@ -191,8 +215,17 @@ def test_the_same_bytes_on_any_number_of_threads(glint, normals):
 )
 def test_bad_input_is_named(glint, options, code, text):
     run_all(glint, "synth isotropic --size 64x48 -o map.exr", "ingest map.exr -o n.glint")
-    files = {"singular": '{"matrix": [[1, 2], [2, 4]]}', "inside_out": '{"heights": -1}', "range": '{"scale": [1, 2]}', "unknown": '{"twist": 1}', "text": "{scale: 1}",
-             "swapped": '{"scale": [2, 1]}', "large": '{"scale": [1, 5]}', "vast": '{"scale": 2, "stretch": 40}', "dwarf": '{"matrix": [[1e-4, 0], [0, 1e-4]]}'}
+    files = {
+        "singular": '{"matrix": [[1, 2], [2, 4]]}',
+        "inside_out": '{"heights": -1}',
+        "range": '{"scale": [1, 2]}',
+        "unknown": '{"twist": 1}',
+        "text": "{scale: 1}",
+        "swapped": '{"scale": [2, 1]}',
+        "large": '{"scale": [1, 5]}',
+        "vast": '{"scale": 2, "stretch": 40}',
+        "dwarf": '{"matrix": [[1e-4, 0], [0, 1e-4]]}',
+    }
     for name, content in files.items():
         (glint.folder / f"{name}.json").write_text(content)
     process = glint(*f"tiny n.glint -o t.glint {options}".split())

@@ -37,8 +37,13 @@ def outputs(folder, tmp_path_factory):
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(text)
     script = "set -e\n" + "".join(f"{command}\nprintf '{END_OF_OUTPUT}'\n" for command, _ in session_of(TUTORIAL))
-    environment = {**os.environ, "GLINT": str(home), "PATH": f"{BIN}:{os.environ['PATH']}", "CFLAGS": cache("CMAKE_C_FLAGS"),
-                   "CXXFLAGS": cache("CMAKE_CXX_FLAGS")}
+    environment = {
+        **os.environ,
+        "GLINT": str(home),
+        "PATH": f"{BIN}:{os.environ['PATH']}",
+        "CFLAGS": cache("CMAKE_C_FLAGS"),
+        "CXXFLAGS": cache("CMAKE_CXX_FLAGS"),
+    }
     process = subprocess.run(["bash", "-c", script], cwd=folder, env=environment, capture_output=True, text=True, timeout=240)
     assert process.returncode == 0, f"{process.stdout}\n{process.stderr}"
     return process.stdout.split(END_OF_OUTPUT)[:-1]
@@ -53,9 +58,13 @@ def test_commands_print_what_the_page_says(outputs):
 
 def test_programs_answer_what_the_shell_does(outputs):
     answers = {command: output for (command, _), output in zip(session_of(TUTORIAL), outputs)}
-    shell = [float(output) for command, output in answers.items() if command.startswith("glint-query flakes.cp.glint") and output]
+    shell = [
+        float(output) for command, output in answers.items() if command.startswith("glint-query flakes.cp.glint") and output
+    ]
     for program in ("ask", "ask_c"):
-        numbers = re.findall(r"^(?:density|mean over a light) (\S+)$", answers[f"app/build/{program} flakes.cp.glint"], re.MULTILINE)
+        numbers = re.findall(
+            r"^(?:density|mean over a light) (\S+)$", answers[f"app/build/{program} flakes.cp.glint"], re.MULTILINE
+        )
         assert [float(number) for number in numbers] == pytest.approx(shell, rel=1e-5)  # printed with six digits
 
 

@@ -151,8 +151,13 @@ def test_c_programs_open_a_set(compressed):
     library = ctypes.CDLL(BIN.parent / "libglint" / "libglint.so")
 
     class Footprint(ctypes.Structure):
-        _fields_ = [("kind", ctypes.c_int32), ("u", ctypes.c_double), ("v", ctypes.c_double), ("m", ctypes.c_float * 4),
-                    ("spread", ctypes.c_float * 2)]
+        _fields_ = [
+            ("kind", ctypes.c_int32),
+            ("u", ctypes.c_double),
+            ("v", ctypes.c_double),
+            ("m", ctypes.c_float * 4),
+            ("spread", ctypes.c_float * 2),
+        ]
 
     library.glint_footprint_isotropic.restype = Footprint
     library.glint_footprint_isotropic.argtypes = [ctypes.c_double, ctypes.c_double, ctypes.c_float]
@@ -164,8 +169,12 @@ def test_c_programs_open_a_set(compressed):
     answers = []
     for u, v in uv:
         footprint, density = library.glint_footprint_isotropic(u, v, 8), ctypes.c_float()
-        assert library.glint_density(ndf, ctypes.byref(footprint), ctypes.c_float(0.1), ctypes.c_float(-0.05),
-                                     ctypes.byref(density)) == 0
+        assert (
+            library.glint_density(
+                ndf, ctypes.byref(footprint), ctypes.c_float(0.1), ctypes.c_float(-0.05), ctypes.byref(density)
+            )
+            == 0
+        )
         answers.append(density.value)
     library.glint_ndf_close(ndf)
     assert np.allclose(answers, densities(glint, "n.<UDIM>.cp.glint", uv, 8), rtol=1e-6)
@@ -213,7 +222,9 @@ def test_wrong_uses_say_what_to_do(glint):
     refused(1, "does not repeat", "pyramid", "n.<UDIM>.glint", "-o", "x.<UDIM>.glint", "--boundary", "wrap")
     refused(5, "glint-pyramid", "binmap", "n.<UDIM>.glint", "-o", "x.<UDIM>.glint")
     refused(5, "glint-pyramid", "sat", "n.1001.glint", "-o", "x.glint")
-    refused(5, "not made of sets", "pyramid", "n.<UDIM>.glint", "-o", "x.<UDIM>.glint", "--optics", "wave", "--coherence-um", "10")
+    refused(
+        5, "not made of sets", "pyramid", "n.<UDIM>.glint", "-o", "x.<UDIM>.glint", "--optics", "wave", "--coherence-um", "10"
+    )
     (glint.folder / "own.1001.glint").write_bytes((glint.folder / "n.glint").read_bytes())
     refused(3, "map of its own", "pyramid", "own.<UDIM>.glint", "-o", "x.<UDIM>.glint")
     refused(3, "map of its own", "query", "own.<UDIM>.glint", "--uv", "0", "0", "--sigma", "3", "--half", "0", "0")

@@ -43,7 +43,9 @@ def test_junit_has_a_case_for_each_file_and_its_errors(glint, assets):
         failures = case.findall("failure")
         assert len(failures) == (0 if file["valid"] else 1)
         for failure in failures:
-            assert failure.get("type") == file["findings"][0]["rule"] and failure.get("message") == file["findings"][0]["message"]
+            assert (
+                failure.get("type") == file["findings"][0]["rule"] and failure.get("message") == file["findings"][0]["message"]
+            )
             assert len(failure.text.splitlines()) == file["errors"]
 
 
@@ -83,7 +85,9 @@ def test_sarif_has_a_result_for_each_finding(glint, assets):
         assert rule["shortDescription"]["text"] and rule["help"]["text"] and rule["defaultConfiguration"]["level"] in RULES
     expected = [(file["path"], finding["rule"], finding["severity"]) for file in files for finding in file["findings"]]
     assert len(expected) >= 2
-    assert [(result["ruleId"], result["level"]) for result in run["results"]] == [(rule, severity) for _, rule, severity in expected]
+    assert [(result["ruleId"], result["level"]) for result in run["results"]] == [
+        (rule, severity) for _, rule, severity in expected
+    ]
     for result, (path, rule, _) in zip(run["results"], expected):
         assert ids[result["ruleIndex"]] == rule and result["message"]["text"]
         uri = result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
@@ -115,7 +119,10 @@ def checked(glint, *arguments, code=0):
 def test_since_checks_what_is_new_or_changed(glint, assets):
     (glint.folder / "maps").mkdir()
     for name in ("a.png", "b.png"):
-        subprocess.run([BIN / "glint-synth", "flakes", "--size", "32", "--seed", str(ord(name[0])), "-o", glint.folder / "maps" / name], check=True)
+        subprocess.run(
+            [BIN / "glint-synth", "flakes", "--size", "32", "--seed", str(ord(name[0])), "-o", glint.folder / "maps" / name],
+            check=True,
+        )
     for words in ("plan maps -o farm.json --make sat", "run farm.json"):
         assert glint("farm", *words.split()).returncode == 0
     assert checked(glint, "--since", "farm.json") == []
@@ -132,7 +139,12 @@ def test_since_checks_what_is_new_or_changed(glint, assets):
 
 
 def test_the_hook_refuses_damaged_assets(glint, assets):
-    environment = {**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}", "GIT_CONFIG_GLOBAL": "/dev/null", "GIT_CONFIG_SYSTEM": "/dev/null"}
+    environment = {
+        **os.environ,
+        "PATH": f"{BIN}:{os.environ['PATH']}",
+        "GIT_CONFIG_GLOBAL": "/dev/null",
+        "GIT_CONFIG_SYSTEM": "/dev/null",
+    }
 
     def git(*words):
         command = ["git", "-c", "user.name=a", "-c", "user.email=a@example.org", *words]

@@ -70,7 +70,9 @@ class Plane:
         return out
 
 
-@pytest.mark.parametrize("flags", ["--scheme corner", "--scheme edge", "--scheme edge --colors 2,3 --tiles 72", "--colors 2 --tiles 48"])
+@pytest.mark.parametrize(
+    "flags", ["--scheme corner", "--scheme edge", "--scheme edge --colors 2,3 --tiles 72", "--colors 2 --tiles 48"]
+)
 def test_a_part_of_the_plane_is_what_the_specification_says(glint, normals, flags):
     run_all(glint, f"wang n.glint -o w.glint --size 20 --seed 5 {flags}")
     assert glint("validate", "w.glint").returncode == 0
@@ -155,7 +157,9 @@ def test_what_cannot_be_is_refused(glint, normals, flags):
 
 
 def test_tiny_maps_and_other_kinds_are_refused(glint, normals):
-    run_all(glint, "synth isotropic --size 15x200 -o tiny.exr", "ingest tiny.exr -o tiny.glint", "wang n.glint -o w.glint --size 24")
+    run_all(
+        glint, "synth isotropic --size 15x200 -o tiny.exr", "ingest tiny.exr -o tiny.glint", "wang n.glint -o w.glint --size 24"
+    )
     process = glint("wang", "tiny.glint", "-o", "out.glint", "--size", 16)
     assert process.returncode == 3 and "tiny.glint" in process.stderr and "16 x 16" in process.stderr
     process = glint("wang", "w.glint", "-o", "out.glint")
@@ -167,7 +171,11 @@ def test_tiny_maps_and_other_kinds_are_refused(glint, normals):
 
 def test_damaged_sides_and_texels_are_found(glint, normals):
     run_all(glint, "wang n.glint -o w.glint --size 24")
-    for place, value, rule in (((3, 0, 5, 0), 0.5, "wang.sides"), ((2, 9, 9, 1), float("nan"), "wang.disk"), ((5, 8, 8), (0.98, 0), "wang.slopes")):
+    for place, value, rule in (
+        ((3, 0, 5, 0), 0.5, "wang.sides"),
+        ((2, 9, 9, 1), float("nan"), "wang.disk"),
+        ((5, 8, 8), (0.98, 0), "wang.slopes"),
+    ):
         shutil.copy(glint.folder / "w.glint", glint.folder / "bad.glint")
         with h5py.File(glint.folder / "bad.glint", "r+") as file:
             file["normals"][place] = value
@@ -187,7 +195,20 @@ def test_the_plane_answers_as_a_map_of_it_does(glint, normals, size, surface):
         at = f"--uv {(x - left) / (2 * half)} {(y - low) / (2 * half)} {size} --surface {surface} --sigma-r .05"
         for asked in ("--half .1 -.05", "--range -.2 -.1 .1 .3"):
             expected = float(glint("query", "part.glint", *at.split(), *asked.split(), "--boundary", "clamp").stdout)
-            process = glint("query", "plane", "w.glint", "--texel", x, y, *size.split(), "--surface", surface, "--sigma-r", ".05", *asked.split())
+            process = glint(
+                "query",
+                "plane",
+                "w.glint",
+                "--texel",
+                x,
+                y,
+                *size.split(),
+                "--surface",
+                surface,
+                "--sigma-r",
+                ".05",
+                *asked.split(),
+            )
             assert float(process.stdout) == pytest.approx(expected, rel=1e-3), process.stderr
 
 
@@ -225,7 +246,11 @@ def test_a_plane_of_images_has_no_smooth_surface(glint, normals):
 
 
 def test_pictures_of_the_plane(glint, normals):
-    run_all(glint, "wang n.glint -o w.glint --size 24", "query plane w.glint --texel 5 5 --sigma 4 --image ndf.exr --image-size 32 --sigma-r .05")
+    run_all(
+        glint,
+        "wang n.glint -o w.glint --size 24",
+        "query plane w.glint --texel 5 5 --sigma 4 --image ndf.exr --image-size 32 --sigma-r .05",
+    )
     assert (glint.folder / "ndf.exr").exists()
 
 

@@ -15,14 +15,29 @@ HALVES = 2e-3  # both sides are rounded to half precision
 
 @pytest.fixture
 def grating(glint):
-    run_once(glint, f"synth grating --height --texel-size-um 1 --depth-um {DEPTH_UM} --feature-size {PERIOD} --size {SIZE} -o g.exr",
-             "ingest g.exr -o g.glint --kind height --to heights --height-scale-um 1 --texel-size-um 1")
+    run_once(
+        glint,
+        f"synth grating --height --texel-size-um 1 --depth-um {DEPTH_UM} --feature-size {PERIOD} --size {SIZE} -o g.exr",
+        "ingest g.exr -o g.glint --kind height --to heights --height-scale-um 1 --texel-size-um 1",
+    )
     return glint.folder / "g.glint"
 
 
 def pyramid(glint, name, options=""):
-    process = glint("pyramid", "g.glint", "-o", name, "--optics", "wave", "--coherence-um", "10", *options.split(),
-                    *([] if "--stride" in options else ["--stride", STRIDE]), *([] if "--resolution" in options else ["--resolution", RESOLUTION]), "--json")
+    process = glint(
+        "pyramid",
+        "g.glint",
+        "-o",
+        name,
+        "--optics",
+        "wave",
+        "--coherence-um",
+        "10",
+        *options.split(),
+        *([] if "--stride" in options else ["--stride", STRIDE]),
+        *([] if "--resolution" in options else ["--resolution", RESOLUTION]),
+        "--json",
+    )
     assert process.returncode == 0, process.stderr
     return json.loads(process.stdout)
 
@@ -36,7 +51,11 @@ def images(path, level=0):
         pixels = group["channel_pixels"][()].astype(np.float64) * scale
         grey = group["pixels"][()].astype(np.float64) * scale
     blocks = resolution // 16
-    out, greys, stored = np.zeros((len(masks), channels, resolution, resolution)), np.zeros((len(masks), resolution, resolution)), 0
+    out, greys, stored = (
+        np.zeros((len(masks), channels, resolution, resolution)),
+        np.zeros((len(masks), resolution, resolution)),
+        0,
+    )
     for image, words in enumerate(masks):
         for block in range(blocks * blocks):
             if not int(words[block // 64]) >> (block % 64) & 1:
@@ -75,11 +94,28 @@ def test_query_prints_the_colour_of_a_pixel(glint, grating):
     for image, (y, x) in [(0, (64, 64)), (4, (64, 65)), (7, (63, 62))]:
         u, v = (image % columns + 0.5) / columns, (image // columns + 0.5) / columns
         psi = [2 * (pixel + 0.5) / RESOLUTION - 1 for pixel in (x, y)]
-        process = glint("query", "w.glint", "--uv", u, v, "--sigma", sigma, "--half", *psi, "--pixels", "constant", "--interpolation", "trilinear", "--json")
+        process = glint(
+            "query",
+            "w.glint",
+            "--uv",
+            u,
+            v,
+            "--sigma",
+            sigma,
+            "--half",
+            *psi,
+            "--pixels",
+            "constant",
+            "--interpolation",
+            "trilinear",
+            "--json",
+        )
         assert process.returncode == 0, process.stderr
         result = json.loads(process.stdout)["result"]
         assert np.allclose(result["channels"], densities[image, :, y, x], rtol=HALVES, atol=1e-4)
-        assert np.allclose(result["rgb"], densities[image, :, y, x] @ rgb, rtol=HALVES, atol=HALVES * densities[image, :, y, x].max())
+        assert np.allclose(
+            result["rgb"], densities[image, :, y, x] @ rgb, rtol=HALVES, atol=HALVES * densities[image, :, y, x].max()
+        )
         assert np.isclose(result["density"], grey[image, y, x], rtol=HALVES, atol=1e-4)
     process = glint("query", "w.glint", "--uv", ".5", ".5", "--sigma", 20, "--half", 0, 0)
     assert len(process.stdout.split()) == 3
@@ -142,7 +178,12 @@ def test_options_that_have_no_answer_are_refused(glint, grating, options, code, 
 
 
 def test_inputs_that_have_no_answer_are_refused(glint, grating):
-    run_all(glint, "synth flakes --size 64 -o n.exr", "ingest n.exr -o n.glint", "ingest g.exr -o unknown.glint --kind height --to heights")
+    run_all(
+        glint,
+        "synth flakes --size 64 -o n.exr",
+        "ingest n.exr -o n.glint",
+        "ingest g.exr -o unknown.glint --kind height --to heights",
+    )
     process = glint("pyramid", "n.glint", "-o", "w.glint", "--optics", "wave")
     assert process.returncode == 5 and "kind normals" in process.stderr and "--to heights" in process.stderr
     process = glint("pyramid", "unknown.glint", "-o", "w.glint", "--optics", "wave")
@@ -153,7 +194,9 @@ def test_inputs_that_have_no_answer_are_refused(glint, grating):
     # Texels of a millimetre, and a coherence area of 10 um.
     run_all(glint, "ingest g.exr -o wide.glint --kind height --to heights --texel-size-um 100000")
     process = glint("pyramid", "wide.glint", "-o", "w.glint", "--optics", "wave")
-    assert process.returncode == 1 and "coherent images" in process.stderr and "--coherence-um" in process.stderr, process.stderr
+    assert (
+        process.returncode == 1 and "coherent images" in process.stderr and "--coherence-um" in process.stderr
+    ), process.stderr
     # A coherence area of centimetres asks for more samples than fit.
     process = glint("pyramid", "wide.glint", "-o", "w.glint", "--optics", "wave", "--coherence-um", "10000")
     assert process.returncode == 1 and "samples of the surface" in process.stderr, process.stderr
@@ -186,6 +229,8 @@ def test_colours_of_a_grating_converge_with_wavelengths(glint, grating):
     truth = profiles[64]
     white = truth[1].max()
     seen = truth[1] > 0.01 * white
-    errors = {count: np.linalg.norm(lab(profiles[count], white) - lab(truth, white), axis=0)[seen].mean() for count in (8, 16, 32)}
+    errors = {
+        count: np.linalg.norm(lab(profiles[count], white) - lab(truth, white), axis=0)[seen].mean() for count in (8, 16, 32)
+    }
     assert errors[8] < 12 and errors[16] < 5 and errors[32] < 1.5, errors
     assert errors[32] < errors[16] < errors[8]

@@ -33,9 +33,16 @@ class FaultRunner:
             os.dup2(answers, ANSWERS)
 
         environment = {**os.environ, "LD_PRELOAD": str(library), "TMPDIR": str(folder)}
-        self._process = subprocess.Popen([str(word) for word in command], cwd=folder, env=environment, preexec_fn=connect,
-                                         close_fds=False,
-                                         stdin=subprocess.DEVNULL, stdout=self._texts[0], stderr=self._texts[1])
+        self._process = subprocess.Popen(
+            [str(word) for word in command],
+            cwd=folder,
+            env=environment,
+            preexec_fn=connect,
+            close_fds=False,
+            stdin=subprocess.DEVNULL,
+            stdout=self._texts[0],
+            stderr=self._texts[1],
+        )
         os.close(requests)
         os.close(answers)
         self._lines = os.fdopen(self._answers)

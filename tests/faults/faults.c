@@ -42,7 +42,7 @@ static int fault_error = 0;
 enum { MOST_PARTS = 16 };
 static struct { uintptr_t begin, end; } library_parts[MOST_PARTS];  // machine code of kLibraries
 static int part_count = 0;
-static const char* const kLibraries[] = {"/libhdf5", "/libfftw3", "/libgomp"};
+static const char* const kLibraries[] = {"/libhdf5", "/libfftw3", "/libgomp", "/libglib-2"};
 
 /// Counts a call, and says whether it is the one that fails. Sets errno.
 static int fails(enum Class class) {

@@ -35,7 +35,20 @@ def folder(inputs, tmp_path):
 def writers():
     """Command lines that write each sort of file."""
     return {
-        "asset": ["glint-pyramid", "map.glint", "-o", "out.glint", "--stride", "4", "--resolution", "64", "--sigma-r", "0.02", "--depfile", "out.d"],
+        "asset": [
+            "glint-pyramid",
+            "map.glint",
+            "-o",
+            "out.glint",
+            "--stride",
+            "4",
+            "--resolution",
+            "64",
+            "--sigma-r",
+            "0.02",
+            "--depfile",
+            "out.d",
+        ],
         "table": ["glint-query", "map.glint", "--uv", ".5", ".5", "--sigma", "4", "--samples", "20000", "-o", "out.csv"],
         "image": ["glint-synth", "isotropic", "--size", "64", "-o", "out.exr"],
     }
@@ -165,10 +178,19 @@ def test_a_signal_to_the_bench_ends_the_program_that_it_has_started(folder):
         process.communicate(timeout=60)
 
 
-@pytest.mark.parametrize("words", [["glint-query", "map.glint", "--uv", ".5", ".5", "--sigma", "4", "--half", "0", "0"],
-                                   ["glint-query", "map.glint", "--csv", "q.csv", "-o", "-"],
-                                   ["glint-info", "map.glint"], ["glint-info", "map.glint", "--json"], ["glint-validate", "map.glint", "--json"],
-                                   ["glint-validate", "--help"], ["glint-validate", "--version"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["glint-query", "map.glint", "--uv", ".5", ".5", "--sigma", "4", "--half", "0", "0"],
+        ["glint-query", "map.glint", "--csv", "q.csv", "-o", "-"],
+        ["glint-info", "map.glint"],
+        ["glint-info", "map.glint", "--json"],
+        ["glint-validate", "map.glint", "--json"],
+        ["glint-validate", "--help"],
+        ["glint-validate", "--version"],
+    ],
+    ids=" ".join,
+)
 def test_results_that_nobody_gets_are_an_error(folder, words):
     (folder / "q.csv").write_text("u,v,sigma,hx,hy\n.5,.5,4,.1,.1\n")
     command = [BIN / words[0], *words[1:]]
@@ -183,18 +205,27 @@ def test_results_that_nobody_gets_are_an_error(folder, words):
 
 @pytest.mark.parametrize("stderr", ["2>/dev/full", "2>&-", "2>/dev/full 0<&-"])
 def test_errors_have_their_code_where_the_message_cannot_be_written(folder, stderr):
-    for line, code in (("glint-info none.glint", 2), ("glint-info map.exr", 3), ("glint-info --nonsense", 1), ("glint-info map.glint >/dev/null", 0)):
+    for line, code in (
+        ("glint-info none.glint", 2),
+        ("glint-info map.exr", 3),
+        ("glint-info --nonsense", 1),
+        ("glint-info map.glint >/dev/null", 0),
+    ):
         tool, rest = line.split(" ", 1)
         process = subprocess.run(["bash", "-c", f"{BIN}/{tool} {rest} {stderr}"], cwd=folder, capture_output=True, timeout=60)
         assert process.returncode == code, line
-    made = subprocess.run(["bash", "-c", f"{BIN}/glint-sat map.glint -o out.glint --progress json {stderr}"], cwd=folder, timeout=60)
+    made = subprocess.run(
+        ["bash", "-c", f"{BIN}/glint-sat map.glint -o out.glint --progress json {stderr}"], cwd=folder, timeout=60
+    )
     assert made.returncode == 0 and run(folder, ["glint-validate", "out.glint"]).returncode == 0
 
 
 def test_a_limit_of_the_size_of_files_is_an_error(folder):
     for words in writers().values():
         before = contents(folder)
-        process = subprocess.run(["bash", "-c", 'ulimit -f 1; "$@"', "bash", BIN / words[0], *words[1:]], cwd=folder, capture_output=True, timeout=60)
+        process = subprocess.run(
+            ["bash", "-c", 'ulimit -f 1; "$@"', "bash", BIN / words[0], *words[1:]], cwd=folder, capture_output=True, timeout=60
+        )
         assert process.returncode == 2 and b"File too large" in process.stderr
         assert contents(folder) == before
 

@@ -19,18 +19,37 @@ def arrays_of(asset):
     return {d["path"]: d["hash"] for d in gn.info(asset)["datasets"]}
 
 
-@pytest.mark.parametrize("made, tool, options", [
-    (lambda n: gn.pyramid(n), "glint-pyramid", []),
-    (lambda n: gn.pyramid(n, surface="smooth", stride=16, sigma_r=0.02, levels=2, precision="float", resolution="auto"),
-     "glint-pyramid", ["--surface", "smooth", "--stride", "16", "--sigma-r", "0.02", "--levels", "2", "--precision", "float",
-                       "--resolution", "auto"]),
-    (lambda n: gn.bin_map(n, alpha=0.02, alpha_max=0.1), "glint-binmap", ["--alpha", "0.02:0.1"]),
-    (lambda n: gn.bin_map(n), "glint-binmap", []),
-    (lambda n: gn.histogram(n), "glint-sat", []),
-    (lambda n: gn.moments(n), "glint-moments", []),
-    (lambda n: gn.compress(gn.pyramid(n), tolerance=0.3), "glint-compress", ["--tolerance", "0.3"]),
-    (lambda n: gn.compress(gn.pyramid(n), method="cp", rank=4), "glint-compress", ["--method", "cp", "--rank", "4"]),
-], ids=["pyramid", "pyramid-smooth", "bin-map-range", "bin-map", "histogram", "moments", "compress", "compress-cp"])
+@pytest.mark.parametrize(
+    "made, tool, options",
+    [
+        (lambda n: gn.pyramid(n), "glint-pyramid", []),
+        (
+            lambda n: gn.pyramid(n, surface="smooth", stride=16, sigma_r=0.02, levels=2, precision="float", resolution="auto"),
+            "glint-pyramid",
+            [
+                "--surface",
+                "smooth",
+                "--stride",
+                "16",
+                "--sigma-r",
+                "0.02",
+                "--levels",
+                "2",
+                "--precision",
+                "float",
+                "--resolution",
+                "auto",
+            ],
+        ),
+        (lambda n: gn.bin_map(n, alpha=0.02, alpha_max=0.1), "glint-binmap", ["--alpha", "0.02:0.1"]),
+        (lambda n: gn.bin_map(n), "glint-binmap", []),
+        (lambda n: gn.histogram(n), "glint-sat", []),
+        (lambda n: gn.moments(n), "glint-moments", []),
+        (lambda n: gn.compress(gn.pyramid(n), tolerance=0.3), "glint-compress", ["--tolerance", "0.3"]),
+        (lambda n: gn.compress(gn.pyramid(n), method="cp", rank=4), "glint-compress", ["--method", "cp", "--rank", "4"]),
+    ],
+    ids=["pyramid", "pyramid-smooth", "bin-map-range", "bin-map", "histogram", "moments", "compress", "compress-cp"],
+)
 def test_builders_make_the_arrays_of_the_tools(made, tool, options, noise, run_tool, tmp_path):
     noise.save(tmp_path / "n.glint")
     source = tmp_path / "n.glint"
@@ -48,8 +67,18 @@ def test_displaced_and_waves_are_those_of_the_tools(run_tool, tmp_path):
     heights.save(tmp_path / "h.glint")
     run_tool("glint-displace", tmp_path / "h.glint", "-o", tmp_path / "d.glint", "--factor", "8", "--base", "diffuse:0.5")
     assert arrays_of(gn.displace(heights, factors=[8], albedo=0.5)) == arrays_of(tmp_path / "d.glint")
-    run_tool("glint-pyramid", tmp_path / "h.glint", "-o", tmp_path / "w.glint", "--optics", "wave", "--coherence-um", "5",
-             "--stride", "16")
+    run_tool(
+        "glint-pyramid",
+        tmp_path / "h.glint",
+        "-o",
+        tmp_path / "w.glint",
+        "--optics",
+        "wave",
+        "--coherence-um",
+        "5",
+        "--stride",
+        "16",
+    )
     assert arrays_of(gn.wave_pyramid(heights, stride=16, coherence_um=5)) == arrays_of(tmp_path / "w.glint")
 
 
@@ -70,7 +99,7 @@ def test_images_have_their_top_row_first():
 
 
 def test_codes_and_heights_are_read(random):
-    codes = (random.integers(120, 136, (16, 16, 3), dtype=np.uint8))
+    codes = random.integers(120, 136, (16, 16, 3), dtype=np.uint8)
     codes[..., 2] = 255
     assert gn.ingest(codes, dequantize="none").report["dequantized"] is False
     heights = random.random((16, 16)).astype(np.float64)
@@ -131,7 +160,8 @@ def test_files_appear_whole_or_not_at_all(noise, tmp_path):
     with pytest.raises(gn.FileError):
         noise.save(tmp_path / "no" / "n.glint")
     assert gn.open(target.read_bytes(), sigma_r=0.02).density([0.3, 0.3], [0, 0], sigma=4.0) == gn.open(
-        target, sigma_r=0.02).density([0.3, 0.3], [0, 0], sigma=4.0)
+        target, sigma_r=0.02
+    ).density([0.3, 0.3], [0, 0], sigma=4.0)
 
 
 def current_umask():
@@ -140,41 +170,48 @@ def current_umask():
     return mask
 
 
-@pytest.mark.parametrize("call, error, words", [
-    (lambda n: gn.open("/nowhere.glint"), gn.FileError, "nowhere"),
-    (lambda n: gn.open(__file__), gn.InvalidInputError, "not an HDF5 file"),
-    (lambda n: gn.open(b"nothing"), gn.InvalidInputError, "not an HDF5 file"),
-    (lambda n: gn.open(gn.synth("weave", 32, heights=True)), gn.UnsupportedError, "heights"),
-    (lambda n: gn.open(n, sigma_r=9), gn.ArgumentError, "sigma_r"),
-    (lambda n: gn.open(n, surface="round"), gn.ArgumentError, "flat, smooth"),
-    (lambda n: gn.open(n, estimator="best"), gn.ArgumentError, "exact, published"),
-    (lambda n: n.open().density([0, 0], [0, 0]), gn.ArgumentError, "sigma, covariance and box"),
-    (lambda n: n.open().density([0, 0], [0, 0], sigma=1, box=[[1, 0], [0, 1]]), gn.ArgumentError, "sigma, box"),
-    (lambda n: n.open().density([0, 0, 0], [0, 0], sigma=1), gn.ArgumentError, "uv"),
-    (lambda n: n.open().density(np.zeros((3, 2)), np.zeros((4, 2)), sigma=1), gn.ArgumentError, "broadcast"),
-    (lambda n: n.open().brdf("conductor", eta=1.0), gn.ArgumentError, "k: missing"),
-    (lambda n: n.open().brdf(facets="beckmann"), gn.UnsupportedError, "bin-map"),
-    (lambda n: gn.pyramid(n, sigma_r=5), gn.ArgumentError, "sigma_r: out of range"),
-    (lambda n: gn.pyramid("n.glint"), gn.ArgumentError, "glint_ndf.load"),
-    (lambda n: gn.pyramid(gn.pyramid(n)), gn.UnsupportedError, "normals"),
-    (lambda n: gn.compress(gn.pyramid(n), rank=2, tolerance=0.1), gn.ArgumentError, "both are given"),
-    (lambda n: gn.bin_map(n, alpha=2.0), gn.ArgumentError, "alpha"),
-    (lambda n: gn.ingest(np.zeros((4, 4, 3), dtype=np.int64)), gn.ArgumentError, "int64"),
-    (lambda n: gn.ingest(np.zeros((0, 4, 3), dtype=np.uint8)), gn.ArgumentError, "shape"),
-    (lambda n: gn.ingest(np.zeros((8, 8, 3), dtype=np.uint8)), gn.InvalidInputError, ""),
-    (lambda n: gn.synth("velvet"), gn.ArgumentError, "isotropic"),
-    (lambda n: gn.open_displaced(n), gn.UnsupportedError, "displacement"),
-    (lambda n: gn.ingest(np.full((8, 8, 3), np.nan, dtype=np.float32)), gn.InvalidInputError, "fix_invalid"),
-    (lambda n: gn.synth("flakes", 64.5), gn.ArgumentError, "width"),
-    (lambda n: gn.synth("flakes", 64, seed=-1), gn.ArgumentError, "seed"),
-    (lambda n: gn.pyramid(n, levels=2**40), gn.ArgumentError, "levels"),
-    (lambda n: gn.pyramid(n, levels=True), gn.ArgumentError, "levels"),
-    (lambda n: gn.pyramid(n, threads=-1), gn.ArgumentError, "threads"),
-    (lambda n: n.open().brdf("dielectric", eta=[1.5, 1.4]), gn.ArgumentError, "eta"),
-    (lambda n: n.open().brdf().lobes([0, 0], [0, 0, 1], [0, 0, 1], 5.0, [1, 1, 1], sigma=3), gn.ArgumentError, "lobes"),
-    (lambda n: n.open().brdf().lobes([0, 0], [0, 0, 1], [[0, 0, 1]] * 2, [5.0] * 3, [[1, 1, 1]], sigma=3), gn.ArgumentError, "broadcast"),
-    (lambda n: n.open().density("here", [0, 0], sigma=1), gn.ArgumentError, "uv"),
-])
+@pytest.mark.parametrize(
+    "call, error, words",
+    [
+        (lambda n: gn.open("/nowhere.glint"), gn.FileError, "nowhere"),
+        (lambda n: gn.open(__file__), gn.InvalidInputError, "not an HDF5 file"),
+        (lambda n: gn.open(b"nothing"), gn.InvalidInputError, "not an HDF5 file"),
+        (lambda n: gn.open(gn.synth("weave", 32, heights=True)), gn.UnsupportedError, "heights"),
+        (lambda n: gn.open(n, sigma_r=9), gn.ArgumentError, "sigma_r"),
+        (lambda n: gn.open(n, surface="round"), gn.ArgumentError, "flat, smooth"),
+        (lambda n: gn.open(n, estimator="best"), gn.ArgumentError, "exact, published"),
+        (lambda n: n.open().density([0, 0], [0, 0]), gn.ArgumentError, "sigma, covariance and box"),
+        (lambda n: n.open().density([0, 0], [0, 0], sigma=1, box=[[1, 0], [0, 1]]), gn.ArgumentError, "sigma, box"),
+        (lambda n: n.open().density([0, 0, 0], [0, 0], sigma=1), gn.ArgumentError, "uv"),
+        (lambda n: n.open().density(np.zeros((3, 2)), np.zeros((4, 2)), sigma=1), gn.ArgumentError, "broadcast"),
+        (lambda n: n.open().brdf("conductor", eta=1.0), gn.ArgumentError, "k: missing"),
+        (lambda n: n.open().brdf(facets="beckmann"), gn.UnsupportedError, "bin-map"),
+        (lambda n: gn.pyramid(n, sigma_r=5), gn.ArgumentError, "sigma_r: out of range"),
+        (lambda n: gn.pyramid("n.glint"), gn.ArgumentError, "glint_ndf.load"),
+        (lambda n: gn.pyramid(gn.pyramid(n)), gn.UnsupportedError, "normals"),
+        (lambda n: gn.compress(gn.pyramid(n), rank=2, tolerance=0.1), gn.ArgumentError, "both are given"),
+        (lambda n: gn.bin_map(n, alpha=2.0), gn.ArgumentError, "alpha"),
+        (lambda n: gn.ingest(np.zeros((4, 4, 3), dtype=np.int64)), gn.ArgumentError, "int64"),
+        (lambda n: gn.ingest(np.zeros((0, 4, 3), dtype=np.uint8)), gn.ArgumentError, "shape"),
+        (lambda n: gn.ingest(np.zeros((8, 8, 3), dtype=np.uint8)), gn.InvalidInputError, ""),
+        (lambda n: gn.synth("velvet"), gn.ArgumentError, "isotropic"),
+        (lambda n: gn.open_displaced(n), gn.UnsupportedError, "displacement"),
+        (lambda n: gn.ingest(np.full((8, 8, 3), np.nan, dtype=np.float32)), gn.InvalidInputError, "fix_invalid"),
+        (lambda n: gn.synth("flakes", 64.5), gn.ArgumentError, "width"),
+        (lambda n: gn.synth("flakes", 64, seed=-1), gn.ArgumentError, "seed"),
+        (lambda n: gn.pyramid(n, levels=2**40), gn.ArgumentError, "levels"),
+        (lambda n: gn.pyramid(n, levels=True), gn.ArgumentError, "levels"),
+        (lambda n: gn.pyramid(n, threads=-1), gn.ArgumentError, "threads"),
+        (lambda n: n.open().brdf("dielectric", eta=[1.5, 1.4]), gn.ArgumentError, "eta"),
+        (lambda n: n.open().brdf().lobes([0, 0], [0, 0, 1], [0, 0, 1], 5.0, [1, 1, 1], sigma=3), gn.ArgumentError, "lobes"),
+        (
+            lambda n: n.open().brdf().lobes([0, 0], [0, 0, 1], [[0, 0, 1]] * 2, [5.0] * 3, [[1, 1, 1]], sigma=3),
+            gn.ArgumentError,
+            "broadcast",
+        ),
+        (lambda n: n.open().density("here", [0, 0], sigma=1), gn.ArgumentError, "uv"),
+    ],
+)
 def test_errors_say_what_is_wrong_in_words_of_python(call, error, words, noise):
     with pytest.raises(error) as raised:
         call(noise)
@@ -231,7 +268,9 @@ def test_the_package_stays_apart_from_another_hdf5():
     """The module shows no symbol of its HDF5, so that h5py and others keep theirs."""
     from glint_ndf import _glint
 
-    symbols = subprocess.run(["nm", "--dynamic", "--defined-only", _glint.__file__], capture_output=True, text=True, check=True).stdout
+    symbols = subprocess.run(
+        ["nm", "--dynamic", "--defined-only", _glint.__file__], capture_output=True, text=True, check=True
+    ).stdout
     assert "PyInit__glint" in symbols
     assert " H5" not in symbols
 

@@ -56,7 +56,9 @@ def roughness(image):
     return float(np.mean([np.median(np.abs(np.diff(grey, axis=k))) for k in (0, 1)]))
 
 
-@pytest.mark.parametrize("name", ["bent_quad", "kettle", "car_paint", "cutlery", "ball", "cloth", "diffraction", "plane", "environment"])
+@pytest.mark.parametrize(
+    "name", ["bent_quad", "kettle", "car_paint", "cutlery", "ball", "cloth", "diffraction", "plane", "environment"]
+)
 def test_scenes_render_light(render, name):
     image = render(__import__(name), size=SIZE, spp=2)
     assert image.shape == (*SIZE[::-1], 3)
@@ -81,7 +83,11 @@ def test_a_zoom_does_not_flicker(render):
     # From 16 texels a pixel: footprints are just above the finest level of the pyramid, and the exact answer is quick.
     widths = 32 * 16 * 1e-4 * ball.TEXEL_UM * 1.1 ** np.arange(4)
     flicker = {}
-    for title, how in {"exact": {"asset": lambda of: of.normals}, "pyramid": {}, "naive": {"bsdf": animation.one_texel}}.items():
+    for title, how in {
+        "exact": {"asset": lambda of: of.normals},
+        "pyramid": {},
+        "naive": {"bsdf": animation.one_texel},
+    }.items():
         frames = [render(ball, width_cm=width, size=SIZE, spp=4, max_depth=2, **how) for width in widths]
         flicker[title] = animation.flicker(frames, 1.1)
     print(flicker)
@@ -145,8 +151,23 @@ def test_a_glint_stays_and_a_rare_flash_is_cut():
 def test_the_index_says_how_each_picture_was_made():
     import gallery
 
-    entry = {"name": "kettle", "file": "kettle.png", "title": "A kettle", "alt": "A kettle on a table", "text": "It is of steel.", "method": "pyramid",
-             "spp": 48, "seconds": 12.3, "table": ["| a |", "|---|"]}
+    entry = {
+        "name": "kettle",
+        "file": "kettle.png",
+        "title": "A kettle",
+        "alt": "A kettle on a table",
+        "text": "It is of steel.",
+        "method": "pyramid",
+        "spp": 48,
+        "seconds": 12.3,
+        "table": ["| a |", "|---|"],
+    }
     text = gallery.index_text([entry], "pictures/")
-    for part in ("## A kettle", "![A kettle on a table](pictures/kettle.png)", "It is of steel.", "| a |\n|---|", "*pyramid; 48 samples a pixel; 12 s of processor time.*"):
+    for part in (
+        "## A kettle",
+        "![A kettle on a table](pictures/kettle.png)",
+        "It is of steel.",
+        "| a |\n|---|",
+        "*pyramid; 48 samples a pixel; 12 s of processor time.*",
+    ):
         assert part in text

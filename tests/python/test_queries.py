@@ -67,7 +67,9 @@ def test_three_forms_of_a_footprint_agree(noise):
 def test_doubles_keep_texels_far_out(noise):
     ndf = noise.open(sigma_r=0.02)
     here, far = np.array([0.37, 0.21]), np.array([0.37 + 2.0**30, 0.21 - 2.0**30])
-    assert ndf.density(far, [0.02, 0.03], sigma=2.0) == pytest.approx(float(ndf.density(here, [0.02, 0.03], sigma=2.0)), rel=1e-2)
+    assert ndf.density(far, [0.02, 0.03], sigma=2.0) == pytest.approx(
+        float(ndf.density(here, [0.02, 0.03], sigma=2.0)), rel=1e-2
+    )
 
 
 def test_any_number_of_threads_answers_the_same(pyramid, random):

@@ -17,8 +17,18 @@ def folder(run_tool, tmp_path_factory):
     for tile, seed in ((1001, 1), (1002, 2), (1011, 3)):
         run_tool("glint-synth", "isotropic", "--size", 96, "--seed", seed, "-o", folder / f"n.{tile}.exr")
     run_tool("glint-ingest", folder / "n.<UDIM>.exr", "-o", folder / "n.<UDIM>.map.glint")
-    run_tool("glint-pyramid", folder / "n.<UDIM>.map.glint", "-o", folder / "n.<UDIM>.p.glint", "--stride", 8, "--sigma-r", 0.05,
-             "--resolution", 64)
+    run_tool(
+        "glint-pyramid",
+        folder / "n.<UDIM>.map.glint",
+        "-o",
+        folder / "n.<UDIM>.p.glint",
+        "--stride",
+        8,
+        "--sigma-r",
+        0.05,
+        "--resolution",
+        64,
+    )
     return folder
 
 
@@ -30,7 +40,10 @@ def test_a_set_answers_as_glint_query(run_tool, folder, precision):
     ndf = gn.open(folder / "n.<UDIM>.p.glint")
     assert (ndf.udim_tiles, ndf.kind, ndf.width, ndf.boundary, ndf.endless) == (3, "ndf-pyramid", 96, "clamp", True)
     density = ndf.density(UV.astype(precision), [0.1, -0.05], sigma=8)
-    asked = [float(run_tool("glint-query", folder / "n.<UDIM>.p.glint", "--uv", *uv, "--sigma", 8, "--half", 0.1, -0.05)) for uv in UV]
+    asked = [
+        float(run_tool("glint-query", folder / "n.<UDIM>.p.glint", "--uv", *uv, "--sigma", 8, "--half", 0.1, -0.05))
+        for uv in UV
+    ]
     rounding = 1e-3 if precision == np.float32 else PRINTED  # a float of uv is a part of a texel off
     assert np.allclose(density, asked, rtol=rounding)
     assert density[4] == 0 < density[:4].min()

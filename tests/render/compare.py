@@ -57,7 +57,12 @@ class Comparison:
                 picture = self.answered_by_texels(model, distance)
                 if picture is None:
                     picture = self.gallery.draw(model, distance, self.lights)
-                    self.add(model, "microseconds of a mean", 1e6 * picture.result["cpu_seconds"] / picture.result["means"], distance=distance)
+                    self.add(
+                        model,
+                        "microseconds of a mean",
+                        1e6 * picture.result["cpu_seconds"] / picture.result["means"],
+                        distance=distance,
+                    )
                 self.pictures[model, distance] = picture
 
     def answered_by_texels(self, model, distance):
@@ -105,9 +110,26 @@ class Comparison:
         for model in [*self.references, *self.models]:
             for scale in HAND_OVERS:
                 sigma = scale * LEVEL_0_TEXELS
-                pair = [self.gallery.draw(model, distance, [light], "--shape", "quad", "--sigma", sigma * (1 + step * SIZE_CHANGE), size=HAND_OVER_SIZE)
-                        for step in (-0.5, 0.5)]
-                self.add(model, "change with size", measures.change(*(picture.radiance[0] for picture in pair)), sigma=sigma, light=light)
+                pair = [
+                    self.gallery.draw(
+                        model,
+                        distance,
+                        [light],
+                        "--shape",
+                        "quad",
+                        "--sigma",
+                        sigma * (1 + step * SIZE_CHANGE),
+                        size=HAND_OVER_SIZE,
+                    )
+                    for step in (-0.5, 0.5)
+                ]
+                self.add(
+                    model,
+                    "change with size",
+                    measures.change(*(picture.radiance[0] for picture in pair)),
+                    sigma=sigma,
+                    light=light,
+                )
 
     def borders(self):
         """Steps of the error across borders of blocks over steps beside them, of all distances together, as a screen shows them: else only
@@ -140,7 +162,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bin", type=pathlib.Path, default="build/bin", help="folder of the programs")
     parser.add_argument("--out", type=pathlib.Path, default="build/limits", help="folder for assets and results")
-    parser.add_argument("--docs", type=pathlib.Path, help="folder for LIMITS.md, limits.csv and the pictures; none are written without it")
+    parser.add_argument(
+        "--docs", type=pathlib.Path, help="folder for LIMITS.md, limits.csv and the pictures; none are written without it"
+    )
     parser.add_argument("--texels", type=int, default=TEXELS, help="of the maps along each axis")
     parser.add_argument("--size", type=int, default=SIZE, help="pixels of the pictures along each axis")
     parser.add_argument("--maps", nargs="+", choices=MAPS, default=list(MAPS), metavar="MAP")
@@ -159,7 +183,13 @@ def main():
         comparison = Comparison(gallery, arguments.models, arguments.distances, LIGHTS).run(flicker_distances)
         contact_sheet(comparison, (arguments.docs or arguments.out) / f"limits-{name}.png")
         rows += comparison.rows
-        results = {"machine": before, "texels": arguments.texels, "size": arguments.size, "level_0_texels": LEVEL_0_TEXELS, "rows": rows}
+        results = {
+            "machine": before,
+            "texels": arguments.texels,
+            "size": arguments.size,
+            "level_0_texels": LEVEL_0_TEXELS,
+            "rows": rows,
+        }
         # What was measured stays when a later map is stopped.
         (arguments.out / "results.json").write_text(json.dumps(results, indent=1) + "\n")
         print(f"{name}: {time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)

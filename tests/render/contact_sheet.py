@@ -32,12 +32,21 @@ def contact_sheet(comparison, path):
     draw = ImageDraw.Draw(sheet)
     for c, (light, distance) in enumerate(columns):
         left = LABELS + c * (side + GAP)
-        draw.text((left + side // 2, 2), f"light {light:g}°\ndistance {distance:g}", fill=0, font=FONT, anchor="ma", align="center")
+        draw.text(
+            (left + side // 2, 2), f"light {light:g}°\ndistance {distance:g}", fill=0, font=FONT, anchor="ma", align="center"
+        )
         exposure = comparison.exposure(light)
         for r, model in enumerate(models):
             picture = comparison.pictures[model, distance]
             tile = grey(picture.radiance[comparison.lights.index(light)], picture.covered, exposure)
             sheet.paste(tile, (left, TITLES + r * (side + GAP)))
     for r, model in enumerate(models):
-        draw.text((LABELS - 6, TITLES + r * (side + GAP) + side // 2), model.replace(", ", ",\n"), fill=0, font=FONT, anchor="rm", align="right")
+        draw.text(
+            (LABELS - 6, TITLES + r * (side + GAP) + side // 2),
+            model.replace(", ", ",\n"),
+            fill=0,
+            font=FONT,
+            anchor="rm",
+            align="right",
+        )
     sheet.quantize(GREYS).save(path, optimize=True)

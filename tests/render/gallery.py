@@ -107,12 +107,28 @@ class Gallery:
         how = REFERENCES.get(model) or MODELS[model]
         output = self.folder / "picture.exr"
         normals = ["--normals", self.path()] if how.takes_normals else []
-        command = [self.tools.folder / "glint-render-test", self.path(model), "-o", output, *normals, "--filter", how.filter, "--size", size or self.size,
-                   "--distance", distance, "--light", *lights, *options]
+        command = [
+            self.tools.folder / "glint-render-test",
+            self.path(model),
+            "-o",
+            output,
+            *normals,
+            "--filter",
+            how.filter,
+            "--size",
+            size or self.size,
+            "--distance",
+            distance,
+            "--light",
+            *lights,
+            *options,
+        ]
         process = subprocess.run([*map(str, command)], capture_output=True, text=True)
         if process.returncode != 0:
             sys.exit(f"failed with exit code {process.returncode}: {' '.join(map(str, command))}\n{process.stderr}")
         channels = read(output)
         output.unlink()
         radiance = [channels[f"radiance.{k}"] for k in range(len(lights))]
-        return Picture(radiance, np.stack([channels["half.x"], channels["half.y"]], axis=2), channels["sigma"], json.loads(process.stdout))
+        return Picture(
+            radiance, np.stack([channels["half.x"], channels["half.y"]], axis=2), channels["sigma"], json.loads(process.stdout)
+        )

@@ -74,18 +74,18 @@ each half.
 NEAR = "Near pictures come from the texels: they are right, and slow."
 SEEN = {
     "pyramid": "The lobe of a facet is narrower than a pixel of the images (.64 pixels at the default --resolution), and the small light is as wide as one pixel. "
-               "So where a footprint holds few facets or thin lines of directions, far scratches and brushed metal above all, pictures under the small light are "
-               f"softer and lose a few percent of the light: glint-pyramid --resolution auto makes the pixels smaller than the lobe. {NEAR}",
+    "So where a footprint holds few facets or thin lines of directions, far scratches and brushed metal above all, pictures under the small light are "
+    f"softer and lose a few percent of the light: glint-pyramid --resolution auto makes the pixels smaller than the lobe. {NEAR}",
     "tucker": "It errs as the pyramid does, and by its tolerance, which holds for each half vector on average over places and not for each place.",
     "cp": "It errs as the pyramid does, and by its rank. Negative parts of low rank are cut, which leaves light where there should be none.",
     "pca": "It errs as tucker does.",
     "bin map": "Its pictures are those of brute force over boxes. Boxes have hard edges, so sparkles appear and vanish at once as the picture moves, more than under "
-               "Gaussians.",
+    "Gaussians.",
     "histograms": "Directions are known to ten degrees: sparkles are spread over a bin, and edges of bins show on smooth surfaces under small lights. Take them for "
-                  "environments, not for lamps.",
+    "environments, not for lamps.",
     "moments": "One smooth lobe for each pixel: no sparkle, whatever the light. It is right where slopes are about normally distributed and a pixel holds so many "
-               "facets that nothing sparkles, as the noise seen from afar. Elsewhere the lobe lights directions that have no facets, and lobes of grooves and threads run "
-               "together.",
+    "facets that nothing sparkles, as the noise seen from afar. Elsewhere the lobe lights directions that have no facets, and lobes of grooves and threads run "
+    "together.",
 }
 
 
@@ -126,9 +126,16 @@ def misses(rows, **wanted):
 
 
 def overview_table(rows, models, lights):
-    columns = [("energy, small light", "energy", {"light": lights[0]}), ("energy, large light", "energy", {"light": lights[-1]}), ("RMSE", "rmse", {}),
-               ("FLIP", "flip", {}), ("flicker", "flicker", {}), ("change with size", "change with size", {}), ("steps at borders", "steps at borders", {}),
-               ("time of a mean, µs", "microseconds of a mean", {})]
+    columns = [
+        ("energy, small light", "energy", {"light": lights[0]}),
+        ("energy, large light", "energy", {"light": lights[-1]}),
+        ("RMSE", "rmse", {}),
+        ("FLIP", "flip", {}),
+        ("flicker", "flicker", {}),
+        ("change with size", "change with size", {}),
+        ("steps at borders", "steps at borders", {}),
+        ("time of a mean, µs", "microseconds of a mean", {}),
+    ]
     columns = [column for column in columns if values(rows, figure=column[1])]
     lines = ["| method | " + " | ".join(title for title, *_ in columns) + " |", "|---" * (len(columns) + 1) + "|"]
     for model in models:
@@ -141,11 +148,23 @@ def overview_table(rows, models, lights):
 
 
 def map_section(rows, name, models, distances, lights):
-    lines = [f"### {name}", "", f"![Pictures of {name} by every method](limits-{name}.png)", "",
-             "| method | bytes | " + " | ".join(f"distance {distance:g}" for distance in distances) + " |", "|---" * (len(distances) + 2) + "|"]
+    lines = [
+        f"### {name}",
+        "",
+        f"![Pictures of {name} by every method](limits-{name}.png)",
+        "",
+        "| method | bytes | " + " | ".join(f"distance {distance:g}" for distance in distances) + " |",
+        "|---" * (len(distances) + 2) + "|",
+    ]
     for model in models:
-        errors = [" / ".join(shown_value("rmse", value) for light in lights for value in values(rows, map=name, model=model, figure="rmse", distance=distance, light=light))
-                  for distance in distances]
+        errors = [
+            " / ".join(
+                shown_value("rmse", value)
+                for light in lights
+                for value in values(rows, map=name, model=model, figure="rmse", distance=distance, light=light)
+            )
+            for distance in distances
+        ]
         size = values(rows, map=name, model=model, figure="bytes")
         lines.append(f"| {model} | {size[0] / 1e6:.1f} MB | " + " | ".join(errors) + " |")
     return "\n".join(lines)
@@ -163,12 +182,25 @@ def failure_section(rows, model):
     if not over:
         return text + f"All {len(judged)} targets are met."
     lines = [f"- {row['figure']}: {shown_value(row['figure'], row['value'])} ({place_of(row)})" for row in over]
-    return text + f"<details><summary>{len(over)} of {len(judged)} targets missed</summary>\n\n" + "\n".join(lines) + "\n\n</details>"
+    return (
+        text
+        + f"<details><summary>{len(over)} of {len(judged)} targets missed</summary>\n\n"
+        + "\n".join(lines)
+        + "\n\n</details>"
+    )
 
 
 def reference_change(rows):
-    spans = [f"{name}: {span('change with size', found)}" for name in REFERENCES if (found := values(rows, model=name, figure="change with size"))]
-    return "Pictures by brute force change by so much for footprints larger by 1 %: " + "; ".join(spans) + ". Footprints with hard edges change more."
+    spans = [
+        f"{name}: {span('change with size', found)}"
+        for name in REFERENCES
+        if (found := values(rows, model=name, figure="change with size"))
+    ]
+    return (
+        "Pictures by brute force change by so much for footprints larger by 1 %: "
+        + "; ".join(spans)
+        + ". Footprints with hard edges change more."
+    )
 
 
 def footprints_in_the_middle(texels, size, distances):
@@ -184,11 +216,18 @@ def write(results, docs):
     models = [model for model in ordered("model") if model in MODELS]
     text = PAGE.format(
         machine="{processor}, {cores} cores; load {load:.1f} before the run; revision {revision}.".format(**results["machine"]),
-        size=results["size"], texels=results["texels"], map_count=len(names), small=lights[0], large=lights[-1],
-        sigmas=footprints_in_the_middle(results["texels"], results["size"], distances), level_0=results["level_0_texels"],
-        overview=overview_table(rows, models, lights), reference_change=reference_change(rows),
+        size=results["size"],
+        texels=results["texels"],
+        map_count=len(names),
+        small=lights[0],
+        large=lights[-1],
+        sigmas=footprints_in_the_middle(results["texels"], results["size"], distances),
+        level_0=results["level_0_texels"],
+        overview=overview_table(rows, models, lights),
+        reference_change=reference_change(rows),
         failures="\n\n".join(failure_section(rows, model) for model in models),
-        maps="\n\n".join(map_section(rows, name, models, distances, lights) for name in names))
+        maps="\n\n".join(map_section(rows, name, models, distances, lights) for name in names),
+    )
     stability = docs / "stability.json"
     if stability.exists():
         text = with_section(text, json.loads(stability.read_text()))

@@ -72,10 +72,18 @@ def test_a_curved_pixel_sees_what_many_samples_of_it_see(tools, tmp_path):
     """The highlight of a small light on a smooth ball is narrower than a pixel."""
     gallery = gallery_of(tools, tmp_path, ["flat"], "--allow-constant")
     shifts = [k / 8 for k in range(8)]
-    draw = lambda shift, *options: gallery.draw("Reference", 2, [0.5], "--shape", "sphere", "--shift-x", shift, "--shift-y", shift / 2, *options).radiance[0].sum()
+    draw = (
+        lambda shift, *options: gallery.draw(
+            "Reference", 2, [0.5], "--shape", "sphere", "--shift-x", shift, "--shift-y", shift / 2, *options
+        )
+        .radiance[0]
+        .sum()
+    )
     truth = draw(0, "--samples", 32)
     plain, curved = (np.array([draw(shift, *options) for shift in shifts]) / truth for options in ([], ["--curvature"]))
-    print(f"light of one sample over that of many: {plain.min():.2f} to {plain.max():.2f}, with curvature {curved.min():.2f} to {curved.max():.2f}")
+    print(
+        f"light of one sample over that of many: {plain.min():.2f} to {plain.max():.2f}, with curvature {curved.min():.2f} to {curved.max():.2f}"
+    )
     assert plain.min() < 0.1 and plain.max() > 20  # so that the test can fail
     assert abs(curved - 1).max() < 0.2
 

@@ -75,10 +75,26 @@ class Cluster:
             (folder / name).mkdir()
         (folder / "munge.key").write_bytes(os.urandom(128))
         (folder / "munge.key").chmod(0o400)
-        (folder / "slurm.conf").write_text(CONFIGURATION.format(host=socket.gethostname().split(".")[0], folder=folder, ports=free_ports(2), cpus=os.cpu_count()))
-        self.environment = {**os.environ, "SLURM_CONF": str(folder / "slurm.conf"), "PATH": f"{BIN}:/usr/sbin:{os.environ['PATH']}"}
-        self.start("munged", "--foreground", "--force", f"--socket={folder}/munge.socket", f"--key-file={folder}/munge.key",
-                   f"--pid-file={folder}/munged.pid", f"--seed-file={folder}/munged.seed", f"--log-file={folder}/munged.log")
+        (folder / "slurm.conf").write_text(
+            CONFIGURATION.format(
+                host=socket.gethostname().split(".")[0], folder=folder, ports=free_ports(2), cpus=os.cpu_count()
+            )
+        )
+        self.environment = {
+            **os.environ,
+            "SLURM_CONF": str(folder / "slurm.conf"),
+            "PATH": f"{BIN}:/usr/sbin:{os.environ['PATH']}",
+        }
+        self.start(
+            "munged",
+            "--foreground",
+            "--force",
+            f"--socket={folder}/munge.socket",
+            f"--key-file={folder}/munge.key",
+            f"--pid-file={folder}/munged.pid",
+            f"--seed-file={folder}/munged.seed",
+            f"--log-file={folder}/munged.log",
+        )
         wait_until((folder / "munge.socket").exists, "munged does not start")
         self.start("slurmctld", "-D", "-c")
         self.start("slurmd", "-D")
@@ -89,7 +105,9 @@ class Cluster:
             self.daemons.append(subprocess.Popen(words, env=self.environment, stdout=output, stderr=output))
 
     def run(self, *words, folder=None):
-        return subprocess.run(list(map(str, words)), env=self.environment, cwd=folder, capture_output=True, text=True, timeout=60).stdout
+        return subprocess.run(
+            list(map(str, words)), env=self.environment, cwd=folder, capture_output=True, text=True, timeout=60
+        ).stdout
 
     def states(self, job):
         """{task: state} of the tasks of a job."""
@@ -111,9 +129,17 @@ class Cluster:
 def cluster(tmp_path_factory):
     if os.getuid() != 0:
         pytest.skip("needs root")
-    missing = [name for name in ("slurmctld", "slurmd", "sbatch", "munged") if shutil.which(name, path=f"/usr/sbin:{os.environ['PATH']}") is None]
+    missing = [
+        name
+        for name in ("slurmctld", "slurmd", "sbatch", "munged")
+        if shutil.which(name, path=f"/usr/sbin:{os.environ['PATH']}") is None
+    ]
     if missing and os.environ.get("GLINT_TEST_INSTALL"):
-        subprocess.run(["apt-get", "-q", "-y", "install", "--no-install-recommends", *PACKAGES], check=True, env={**os.environ, "DEBIAN_FRONTEND": "noninteractive"})
+        subprocess.run(
+            ["apt-get", "-q", "-y", "install", "--no-install-recommends", *PACKAGES],
+            check=True,
+            env={**os.environ, "DEBIAN_FRONTEND": "noninteractive"},
+        )
     elif missing:
         pytest.skip(f"{missing} are not installed; set GLINT_TEST_INSTALL to install {PACKAGES}")
     cluster = Cluster(tmp_path_factory.mktemp("slurm"))
@@ -155,10 +181,15 @@ def test_an_array_whose_worker_is_killed_ends_with_every_asset_as_a_local_run_ma
     tool(tmp_path / "local", "glint-farm", "run", "farm.json")
     folder = tmp_path / "slurm"
 
-    job = cluster.run("sbatch", "--parsable", f"--array=1-{TASKS}", ROOT / "pipelines/farm/glint-farm.sbatch", "farm.json", folder=folder).strip()
+    job = cluster.run(
+        "sbatch", "--parsable", f"--array=1-{TASKS}", ROOT / "pipelines/farm/glint-farm.sbatch", "farm.json", folder=folder
+    ).strip()
     assert job.isdigit(), (cluster.folder / "slurmctld.log").read_text()[-2000:]
     wait_until(lambda: kill_task(1), "task 1 does not start")
-    wait_until(lambda: set(cluster.states(job).values()) <= {"COMPLETED", "FAILED", "NODE_FAIL"} and len(cluster.states(job)) == TASKS, "tasks do not end")
+    wait_until(
+        lambda: set(cluster.states(job).values()) <= {"COMPLETED", "FAILED", "NODE_FAIL"} and len(cluster.states(job)) == TASKS,
+        "tasks do not end",
+    )
     assert cluster.states(job)[1] == "FAILED"
     status = json.loads(tool(folder, "glint-farm", "status", "farm.json", "--json"))["result"]
     assert status["done"] < status["entries"], "the kill came mid-way"

@@ -27,7 +27,9 @@ SMALL = 0.003
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
     path = tmp_path_factory.mktemp("stability") / "results.json"
-    process = subprocess.run([BIN / "glint-bench", "--stability", "--quick", "-o", path], capture_output=True, text=True, timeout=800)
+    process = subprocess.run(
+        [BIN / "glint-bench", "--stability", "--quick", "-o", path], capture_output=True, text=True, timeout=800
+    )
     assert process.returncode == 0, process.stderr
     assert not list(path.parent.glob("*.assets"))
     return json.loads(path.read_text())
@@ -44,8 +46,11 @@ def test_results_are_as_described(measured):
 def test_no_method_gets_worse(measured):
     recorded, now = points_of(json.loads((HERE / "recorded.json").read_text())), points_of(measured)
     assert now.keys() == recorded.keys()
-    worse = [(name, before["value"], now[name].get("value")) for name, before in recorded.items()
-             if "value" in before and not now[name].get("value", float("inf")) <= WORSE * before["value"] + SMALL]
+    worse = [
+        (name, before["value"], now[name].get("value"))
+        for name, before in recorded.items()
+        if "value" in before and not now[name].get("value", float("inf")) <= WORSE * before["value"] + SMALL
+    ]
     assert worse == []
 
 

@@ -15,12 +15,24 @@ from limits_section import SHORT, series_of, with_section  # noqa: E402
 
 COLUMNS = 3
 SMALLEST = 1e-4  # figures below are drawn there
-COLORS = {"moments": "C0", "bin map": "C1", "histograms": "C2", "pyramid": "C3", "tucker": "C4", "cp": "C5", "pyramid with --normals": "C6"}
+COLORS = {
+    "moments": "C0",
+    "bin map": "C1",
+    "histograms": "C2",
+    "pyramid": "C3",
+    "tucker": "C4",
+    "cp": "C5",
+    "pyramid with --normals": "C6",
+}
 
 
 def draw(axes, test):
     for series in series_of(test):
-        points = sorted((point["x"], max(SMALLEST, point["value"])) for point in test["points"] if point["series"] == series and "value" in point)
+        points = sorted(
+            (point["x"], max(SMALLEST, point["value"]))
+            for point in test["points"]
+            if point["series"] == series and "value" in point
+        )
         name = SHORT.get(series, series)
         axes.plot(*zip(*points), marker="o", markersize=3, linewidth=1.3, color=COLORS.get(name), label=name)
     xs = sorted({point["x"] for point in test["points"]})

@@ -1,10 +1,10 @@
 """Mitsuba 3 plugins of glint: the BSDF `glint` and the integrator `glint_path`. See docs/MITSUBA.md.
 
-    import mitsuba as mi
-    import glint_ndf.mitsuba
-    mi.set_variant("llvm_ad_rgb")
-    scene = mi.load_dict({... "bsdf": {"type": "glint", "asset": "flakes.pyramid.glint", "material": "Al"} ...})
-    image = glint_ndf.mitsuba.render(scene, spp=16)
+import mitsuba as mi
+import glint_ndf.mitsuba
+mi.set_variant("llvm_ad_rgb")
+scene = mi.load_dict({... "bsdf": {"type": "glint", "asset": "flakes.pyramid.glint", "material": "Al"} ...})
+image = glint_ndf.mitsuba.render(scene, spp=16)
 """
 
 from . import llvm as _llvm

@@ -27,7 +27,9 @@ class AssetFile:
         self._next = now + _INTERVAL
         if self._look() != self._identity:
             raise PluginError(
-                self.plugin, "the asset was replaced, changed or removed after the scene was loaded; load the scene again", self.path
+                self.plugin,
+                "the asset was replaced, changed or removed after the scene was loaded; load the scene again",
+                self.path,
             )
 
     def _look(self):

@@ -75,6 +75,8 @@ def bounced(beam, si, lit, pdf, mirrored):
 
 def _curvature(si):
     """Mean curvature towards the side that is seen, 1 / scene units: above 0 where the surface bulges. 0 where it is unknown."""
-    along = [dr.dot(dn, dp) / dr.maximum(dr.squared_norm(dp), _LEAST) for dn, dp in ((si.dn_du, si.dp_du), (si.dn_dv, si.dp_dv))]
+    along = [
+        dr.dot(dn, dp) / dr.maximum(dr.squared_norm(dp), _LEAST) for dn, dp in ((si.dn_du, si.dp_du), (si.dn_dv, si.dp_dv))
+    ]
     mean = dr.select(si.wi.z > 0, 0.5, -0.5) * (along[0] + along[1])
     return dr.select(dr.isfinite(mean), mean, 0)

@@ -95,7 +95,11 @@ def _internal_reflectance(eta, table):
     """
     nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE)
     cosine = 0.5 * (nodes + 1)
-    albedo = _dielectric(cosine, eta) if table is None else np.interp(np.sqrt(cosine) * (_TABLE_SIZE - 1), np.arange(_TABLE_SIZE), table)
+    albedo = (
+        _dielectric(cosine, eta)
+        if table is None
+        else np.interp(np.sqrt(cosine) * (_TABLE_SIZE - 1), np.arange(_TABLE_SIZE), table)
+    )
     return 1 - (1 - float(np.sum(weights * cosine * albedo))) / eta**2
 
 
@@ -115,7 +119,11 @@ def _albedos(eta, alpha, cosines):
     z = 1 / np.sqrt(1 + tan2)
     radius = np.sqrt(1 - z * z)
     h = np.stack(
-        [radius[:, None] * np.cos(azimuth), radius[:, None] * np.sin(azimuth), np.broadcast_to(z[:, None], (len(z), _QUADRATURE))],
+        [
+            radius[:, None] * np.cos(azimuth),
+            radius[:, None] * np.sin(azimuth),
+            np.broadcast_to(z[:, None], (len(z), _QUADRATURE)),
+        ],
         axis=-1,
     )
     albedos = np.empty(len(cosines))

@@ -52,7 +52,8 @@ def make_class():
                     self._prefilter = Prefilter.of(scene, self.lobes)
                     passes = _passes(sensor, samples) if develop else [samples]
                     return _mean_of_passes(
-                        lambda part, n: self._render_pass(scene, sensor, _seed(seed, part), n, samples, develop, evaluate), passes
+                        lambda part, n: self._render_pass(scene, sensor, _seed(seed, part), n, samples, develop, evaluate),
+                        passes,
                     )
             finally:
                 self._rendering = False
@@ -148,7 +149,9 @@ def _trace(options, prefilter, scene, sampler, ray, active):
 def _behind_emitters(scene, ray, si, active):
     """The first hit of a camera ray that does not emit; emitting shapes before it are passed."""
     while True:
-        emits = active & (si.shape != None) & si.shape.is_emitter() if is_jit() else si.is_valid() and si.shape.is_emitter()  # noqa: E711
+        emits = (
+            active & (si.shape != None) & si.shape.is_emitter() if is_jit() else si.is_valid() and si.shape.is_emitter()
+        )  # noqa: E711
         if not dr.any(emits):
             return si
         flags = mi.RayFlags.All | mi.RayFlags.dNSdUV

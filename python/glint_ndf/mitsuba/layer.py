@@ -70,7 +70,9 @@ class GlintLayer:
             return  # refused when it is opened
         for name, kinds in _KINDS_OF_OPTIONS.items():
             if options.given(name) and self.kind not in kinds:
-                options.refuse(name, f"is for assets of kind {', '.join(kinds)}, and {self.path} is of kind {self.kind}; leave it out")
+                options.refuse(
+                    name, f"is for assets of kind {', '.join(kinds)}, and {self.path} is of kind {self.kind}; leave it out"
+                )
 
     def _open_displaced(self, options):
         displaced = _opened(self.plugin, self.path, lambda: gn.open_displaced(self.path))

@@ -248,7 +248,9 @@ def _roundness(base):
         along_normal = _value(base, diffuse, 1, 1, uv)
         if along_normal > 0:
             mean = sum(
-                4 * a * m * b * _value(base, diffuse, m, c, uv) for m, a in zip(cosines, weights) for c, b in zip(cosines, weights)
+                4 * a * m * b * _value(base, diffuse, m, c, uv)
+                for m, a in zip(cosines, weights)
+                for c, b in zip(cosines, weights)
             )
             return float(mean / along_normal)
     return 0.0  # black

@@ -11,7 +11,16 @@ import MaterialX as mx
 
 LIBRARY = pathlib.Path(mx.__file__).parent / "libraries" / "stdlib" / "genglsl"
 # Functions that mx_flake reaches.
-NOISE = ("mx_floor", "mx_rotl32", "mx_bjmix", "mx_bjfinal", "mx_bits_to_01", "mx_hash_int", "mx_cell_noise_float", "mx_cell_noise_vec3")
+NOISE = (
+    "mx_floor",
+    "mx_rotl32",
+    "mx_bjmix",
+    "mx_bjfinal",
+    "mx_bits_to_01",
+    "mx_hash_int",
+    "mx_cell_noise_float",
+    "mx_cell_noise_vec3",
+)
 
 SHIM = """
 #include <cmath>
@@ -70,12 +79,26 @@ def compiled(folder):
     (folder / "node.cpp").write_text(SHIM + code + MAIN)
     compiler = shutil.which("c++")
     # GLSL's constants are floats, and nothing is fused.
-    subprocess.run([compiler, "-std=c++20", "-O2", "-fsingle-precision-constant", "-ffp-contract=off", "-o", folder / "node", folder / "node.cpp"], check=True)
+    subprocess.run(
+        [
+            compiler,
+            "-std=c++20",
+            "-O2",
+            "-fsingle-precision-constant",
+            "-ffp-contract=off",
+            "-o",
+            folder / "node",
+            folder / "node.cpp",
+        ],
+        check=True,
+    )
     return folder / "node"
 
 
 def evaluate(program, width, height, size, roughness, coverage, z=0):
     """presence [rows][columns], and normals [rows][columns][2]; bottom row first."""
-    output = subprocess.run([program, *map(str, (width, height, size, roughness, coverage, z))], capture_output=True, check=True).stdout
+    output = subprocess.run(
+        [program, *map(str, (width, height, size, roughness, coverage, z))], capture_output=True, check=True
+    ).stdout
     pixels = np.frombuffer(output, np.float32).reshape(height, width, 3)
     return pixels[..., 0], pixels[..., 1:]

@@ -15,7 +15,9 @@ from conftest import PIPELINES, run
 
 PYTHON = os.environ.get("GLINT_BLENDER_PYTHON", sys.executable)  # bpy needs an older numpy than others
 HAS_BLENDER = subprocess.run([PYTHON, "-c", "import bpy"], capture_output=True).returncode == 0
-pytestmark = pytest.mark.skipif(not HAS_BLENDER, reason="no module bpy; see requirements-blender.txt, and set GLINT_BLENDER_PYTHON")
+pytestmark = pytest.mark.skipif(
+    not HAS_BLENDER, reason="no module bpy; see requirements-blender.txt, and set GLINT_BLENDER_PYTHON"
+)
 
 SCRIPT = PIPELINES / "blender" / "moments_material.py"
 HEIGHT = 4  # of the camera; the corners of the square have slopes of 0.35
@@ -40,7 +42,11 @@ numpy.save(sys.argv[2], numpy.array(image.pixels[:]).reshape(image.size[1], imag
 def make(folder, map_file, roughness, kind="normal"):
     """Textures of a map. Returns the matrix alpha^2 of the whole map, and the last level, which has one texel."""
     (folder / "t").mkdir()
-    run(folder, f"ingest {map_file} --kind {kind} -o n.glint", f"moments n.glint -o m.glint --finest 0 --roughness {roughness} --lobe materialx --bits 16 --textures t")
+    run(
+        folder,
+        f"ingest {map_file} --kind {kind} -o n.glint",
+        f"moments n.glint -o m.glint --finest 0 --roughness {roughness} --lobe materialx --bits 16 --textures t",
+    )
     with h5py.File(folder / "m.glint") as file:
         level = int(file.attrs["level_count"]) - 1
         xx, xy, yy = file[f"level_{level:02}/moments"][0, 0, 2:]
@@ -49,9 +55,29 @@ def make(folder, map_file, roughness, kind="normal"):
 
 def draw(folder, level, turn_deg=0):
     """Light of a picture, linear; bottom row first."""
-    arguments = ["t", "-o", "picture.exr", "--level", level, "--turn-deg", turn_deg, "--height", HEIGHT, "--lamp-radius", 0, "--power", POWER, "--resolution", RESOLUTION, "--samples", 16]
+    arguments = [
+        "t",
+        "-o",
+        "picture.exr",
+        "--level",
+        level,
+        "--turn-deg",
+        turn_deg,
+        "--height",
+        HEIGHT,
+        "--lamp-radius",
+        0,
+        "--power",
+        POWER,
+        "--resolution",
+        RESOLUTION,
+        "--samples",
+        16,
+    ]
     subprocess.run([PYTHON, SCRIPT, *map(str, arguments)], cwd=folder, check=True, capture_output=True, timeout=300)
-    subprocess.run([PYTHON, "-c", READ, folder / "picture.exr", folder / "picture.npy"], check=True, capture_output=True, timeout=60)
+    subprocess.run(
+        [PYTHON, "-c", READ, folder / "picture.exr", folder / "picture.npy"], check=True, capture_output=True, timeout=60
+    )
     return np.load(folder / "picture.npy")[..., 1]
 
 
@@ -125,7 +151,9 @@ def test_blender_stretches_lobes_to_ten_to_one_at_most(tmp_path):
     assert large * small == pytest.approx(expected[0] * expected[1], rel=2 * ALPHA_ERROR)
 
 
-@pytest.mark.parametrize("name, message", [("a.png", "normal_00.png: no such texture"), ("a.jpeg", "a.jpeg is neither .png nor .exr")])
+@pytest.mark.parametrize(
+    "name, message", [("a.png", "normal_00.png: no such texture"), ("a.jpeg", "a.jpeg is neither .png nor .exr")]
+)
 def test_wrong_use_is_refused_and_leaves_nothing(tmp_path, name, message):
     process = subprocess.run([PYTHON, SCRIPT, tmp_path, "-o", tmp_path / name], capture_output=True, text=True)
     assert process.returncode != 0 and message in process.stderr

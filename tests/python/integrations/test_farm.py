@@ -21,7 +21,10 @@ def folder(tmp_path):
     """A folder with a manifest of six assets, which is named by its path."""
     (tmp_path / "maps").mkdir()
     for seed in range(3):
-        subprocess.run([BIN / "glint-synth", "flakes", "--size", "32", "--seed", str(seed), "-o", tmp_path / f"maps/{seed}.png"], check=True)
+        subprocess.run(
+            [BIN / "glint-synth", "flakes", "--size", "32", "--seed", str(seed), "-o", tmp_path / f"maps/{seed}.png"],
+            check=True,
+        )
     subprocess.run([BIN / "glint-farm", "plan", "maps", "-o", "farm.json", "--make", "sat"], cwd=tmp_path, check=True)
     return tmp_path
 
@@ -33,7 +36,9 @@ def done(folder):
 
 def openjd(folder, *words):
     template = PIPELINES / "farm/glint-farm.openjd.yaml"
-    return subprocess.run([OPENJD, words[0], template, *words[1:]], cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    return subprocess.run(
+        [OPENJD, words[0], template, *words[1:]], cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=120
+    )
 
 
 def test_the_template_of_open_job_description_is_valid(folder):
@@ -60,11 +65,19 @@ def act(folder, **inputs):
     """Runs the steps in bash of the composite action, as GitHub does."""
     action = yaml.safe_load((PIPELINES / "ci/validate-assets/action.yml").read_text())
     assert action["runs"]["using"] == "composite" and all({"name"} < set(step) for step in action["runs"]["steps"])
-    values = {name: value["default"] for name, value in action["inputs"].items()} | {k.replace("_", "-"): v for k, v in inputs.items()}
+    values = {name: value["default"] for name, value in action["inputs"].items()} | {
+        k.replace("_", "-"): v for k, v in inputs.items()
+    }
     assert set(values) == set(action["inputs"])
     step = next(step for step in action["runs"]["steps"] if "run" in step)
-    environment = ENVIRONMENT | {name: values[text[len("${{ inputs."):-len(" }}")]] for name, text in step["env"].items()}
-    return subprocess.run(["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", step["run"]], cwd=folder, env=environment, capture_output=True, text=True)
+    environment = ENVIRONMENT | {name: values[text[len("${{ inputs.") : -len(" }}")]] for name, text in step["env"].items()}
+    return subprocess.run(
+        ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", step["run"]],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+    )
 
 
 def test_the_action_checks_files_and_manifests(folder):

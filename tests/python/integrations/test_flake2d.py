@@ -29,13 +29,18 @@ def normals_of(folder, options):
         return np.array(file["normals"])
 
 
-@pytest.mark.parametrize("width, height, size, roughness, coverage", [
-    (512, 512, 0.033, 0.3, 0.5),
-    (300, 500, 0.0123, 0.6, 0.95),
-    (400, 200, 0.21, 0.15, 0.2),
-])
+@pytest.mark.parametrize(
+    "width, height, size, roughness, coverage",
+    [
+        (512, 512, 0.033, 0.3, 0.5),
+        (300, 500, 0.0123, 0.6, 0.95),
+        (400, 200, 0.21, 0.15, 0.2),
+    ],
+)
 def test_texels_are_those_of_the_node(node, tmp_path, width, height, size, roughness, coverage):
-    normals = normals_of(tmp_path, f"--size {width}x{height} --flake-size-uv {size} --roughness {roughness} --coverage {coverage}")
+    normals = normals_of(
+        tmp_path, f"--size {width}x{height} --flake-size-uv {size} --roughness {roughness} --coverage {coverage}"
+    )
     presence, expected = node_code.evaluate(node, width, height, size, roughness, coverage)
     assert (presence > 0).mean() == pytest.approx(coverage, abs=0.1)
     assert share_that_differs(normals, expected) < EDGE_SHARE

@@ -39,14 +39,21 @@ def test_the_node_takes_an_asset_and_gives_a_bsdf(library):
     metal = library.getNodeDef("ND_conductor_bsdf")
     for name in ("weight", "ior", "extinction", "normal", "tangent"):
         ours, theirs = definition.getInput(name), metal.getInput(name)
-        assert (ours.getType(), ours.getValueString(), ours.getDefaultGeomPropString()) == (theirs.getType(), theirs.getValueString(), theirs.getDefaultGeomPropString())
+        assert (ours.getType(), ours.getValueString(), ours.getDefaultGeomPropString()) == (
+            theirs.getType(),
+            theirs.getValueString(),
+            theirs.getDefaultGeomPropString(),
+        )
 
 
-@pytest.mark.parametrize("change", [
-    lambda node: node.setInputValue("file", "a.glint", "filename"),  # an input that the node does not have
-    lambda node: node.getInput("asset").setType("string"),
-    lambda node: node.setInputValue("roughness", mx.Vector2(0.1, 0.1)),
-])
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda node: node.setInputValue("file", "a.glint", "filename"),  # an input that the node does not have
+        lambda node: node.getInput("asset").setType("string"),
+        lambda node: node.setInputValue("roughness", mx.Vector2(0.1, 0.1)),
+    ],
+)
 def test_wrong_inputs_are_not_valid(library, change):
     document = read(PIPELINES / "materialx" / "car_paint.mtlx", library)
     change(document.getNode("flakes"))
@@ -61,10 +68,13 @@ def test_the_asset_is_found_from_the_document(library, car_paint):
     assert subprocess.run([BIN / "glint-validate", path], capture_output=True).returncode == 0
 
 
-@pytest.mark.parametrize("generator, call", [
-    (PyMaterialXGenGlsl.GlslShaderGenerator, "mx_conductor_bsdf("),
-    (PyMaterialXGenOsl.OslShaderGenerator, "conductor_bsdf("),
-])
+@pytest.mark.parametrize(
+    "generator, call",
+    [
+        (PyMaterialXGenGlsl.GlslShaderGenerator, "mx_conductor_bsdf("),
+        (PyMaterialXGenOsl.OslShaderGenerator, "conductor_bsdf("),
+    ],
+)
 def test_renderers_without_glint_fall_back_to_one_lobe(library, generator, call):
     """Code for them has a conductor of the roughness that the document gives."""
     document = read(PIPELINES / "materialx" / "car_paint.mtlx", library)

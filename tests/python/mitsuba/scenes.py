@@ -30,7 +30,9 @@ def make_scene(bsdf, light, integrator="path", size=16, distance=3.0, turn=0.0):
         "sampler": {"type": "independent"},
     }
     parts = {"square": square, "light": lights[light], "camera": camera}
-    return mi.load_dict({"type": "scene", "integrator": integrator if isinstance(integrator, dict) else {"type": integrator}, **parts})
+    return mi.load_dict(
+        {"type": "scene", "integrator": integrator if isinstance(integrator, dict) else {"type": integrator}, **parts}
+    )
 
 
 def glint(asset, **parameters):

@@ -27,7 +27,9 @@ def z_values(a, b):
 
 @pytest.mark.parametrize("kind", ["normals", "ndf-pyramid"])
 def test_a_flat_map_is_a_rough_conductor(llvm, flat, kind):
-    asset, options = (flat, {"sigma_r": SMALL_ROUGHNESS}) if kind == "normals" else (gn.pyramid(flat, stride=4, sigma_r=SMALL_ROUGHNESS), {})
+    asset, options = (
+        (flat, {"sigma_r": SMALL_ROUGHNESS}) if kind == "normals" else (gn.pyramid(flat, stride=4, sigma_r=SMALL_ROUGHNESS), {})
+    )
     ours = make_scene(glint(asset, material="Au", sigma=1.0, **options), "area")
     theirs = make_scene({"type": "roughconductor", "alpha": 2**0.5 * SMALL_ROUGHNESS, "material": "Au"}, "area")
     z = z_values(render_batches(ours, 128, 8), render_batches(theirs, 128, 8, seed=99))
@@ -133,7 +135,9 @@ def test_light_has_derivatives_by_the_textures_of_the_conductor(llvm, noise_pyra
         total = dr.sum(mi.render(scene, parameters, spp=128).array)
         dr.backward(total)
     assert float(dr.detach(total).numpy().item()) > 0
-    assert dr.grad(parameters[key]).numpy().sum() == pytest.approx(dr.detach(total).numpy().item() / reflectance, rel=NOISE_OF_LIGHT)
+    assert dr.grad(parameters[key]).numpy().sum() == pytest.approx(
+        dr.detach(total).numpy().item() / reflectance, rel=NOISE_OF_LIGHT
+    )
 
 
 def moments_of_highlight(image):

@@ -38,7 +38,11 @@ def test_a_missing_file(any_variant):
 def test_the_text_of_an_error_of_loading_ends_with_that_of_the_plugin(any_variant):
     with pytest.raises(RuntimeError) as caught:
         mi.load_dict({"type": "glint", "asset": "no/such.glint"})
-    assert str(caught.value).rstrip().endswith("PluginError: glint: no/such.glint: there is no such file; give the path of a .glint asset")
+    assert (
+        str(caught.value)
+        .rstrip()
+        .endswith("PluginError: glint: no/such.glint: there is no such file; give the path of a .glint asset")
+    )
 
 
 def test_a_missing_asset(llvm):

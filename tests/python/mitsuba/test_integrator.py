@@ -40,7 +40,9 @@ def room(**parameters):
     )
 
 
-@pytest.mark.parametrize("options", [{"max_depth": 6}, {"max_depth": 2}, {"max_depth": 1}, {"max_depth": 5, "hide_emitters": True}])
+@pytest.mark.parametrize(
+    "options", [{"max_depth": 6}, {"max_depth": 2}, {"max_depth": 1}, {"max_depth": 5, "hide_emitters": True}]
+)
 def test_the_light_is_that_of_path(llvm, options):
     mean_a, error_a = render_batches(room(type="glint_path", **options), 64, 4)
     mean_b, error_b = render_batches(room(type="path", **options), 64, 4, seed=77)
@@ -178,7 +180,11 @@ def straight_down(noise_pyramid, mirror, footprint):
         },
     }
     if up:
-        scene["mirror"] = {"type": "rectangle", "to_world": transform().translate([0, 0, 2]).rotate([1, 0, 0], 180), "bsdf": mirror}
+        scene["mirror"] = {
+            "type": "rectangle",
+            "to_world": transform().translate([0, 0, 2]).rotate([1, 0, 0], 180),
+            "bsdf": mirror,
+        }
     return mi.load_dict(scene)
 
 

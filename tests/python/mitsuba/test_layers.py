@@ -36,7 +36,10 @@ WHITE_BASES = {
     "smooth metal": ({"type": "conductor", "material": "none"}, 0.93),
     "metal": ({"type": "roughconductor", "material": "none", "alpha": 0.1}, 0.93),
     "rough metal": ({"type": "roughconductor", "material": "none", "alpha": 0.3}, 0.6),
-    "principled metal": ({"type": "principled", "base_color": {"type": "rgb", "value": 1.0}, "metallic": 1.0, "roughness": 0.3}, 0.85),
+    "principled metal": (
+        {"type": "principled", "base_color": {"type": "rgb", "value": 1.0}, "metallic": 1.0, "roughness": 0.3},
+        0.85,
+    ),
     "principled": ({"type": "principled", "base_color": {"type": "rgb", "value": 1.0}, "roughness": 0.5}, 0.4),
     "mixed": ({"type": "blendbsdf", "weight": 0.5, "a": WHITE, "b": {"type": "roughconductor", "material": "none"}}, 0.7),
 }
@@ -63,7 +66,9 @@ def test_a_coat_adds_no_energy_to_any_base(llvm, noise_pyramid, base, coat):
 
 def test_a_base_of_two_parts_answers_the_same_for_each_part(llvm, noise_pyramid):
     """What contexts for each component of a coated base answer adds up to the whole."""
-    bsdf = mi.load_dict(stack(noise_pyramid, coat=1.5, transparency=1.0, base={"type": "roughplastic", "diffuse_reflectance": 1.0}))
+    bsdf = mi.load_dict(
+        stack(noise_pyramid, coat=1.5, transparency=1.0, base={"type": "roughplastic", "diffuse_reflectance": 1.0})
+    )
     si = dr.zeros(mi.SurfaceInteraction3f)
     si.wi = dr.normalize(mi.Vector3f(0.1, 0.2, 1))
     lit = dr.normalize(mi.Vector3f(-0.2, -0.1, 1))
@@ -129,7 +134,10 @@ def test_smooth_coats_mirror(llvm, noise_pyramid):
     si.wi = [0, 0, 1]
     random = np.random.default_rng(3)
     drawn, weight = bsdf.sample(
-        mi.BSDFContext(), si, mi.Float(random.random(lanes, dtype=np.float32)), mi.Point2f(*random.random((2, lanes), dtype=np.float32))
+        mi.BSDFContext(),
+        si,
+        mi.Float(random.random(lanes, dtype=np.float32)),
+        mi.Point2f(*random.random((2, lanes), dtype=np.float32)),
     )
     mirrored = np.array(mi.has_flag(drawn.sampled_type, mi.BSDFFlags.DeltaReflection))
     reflectance = 0.04
@@ -208,7 +216,10 @@ def test_a_coat_of_the_index_of_air_is_no_coat(llvm, noise_pyramid):
 def test_coat_alpha_is_the_roughness_of_a_coat_or_of_its_bin_map(llvm, noise, noise_pyramid):
     """No other asset of a coat reads it."""
     flakes = gn.bin_map(gn.synth("flakes", 64, seed=3), alpha=0.1, alpha_max=0.3)
-    assert mi.load_dict(stack(noise_pyramid, coat=1.5, coat_asset=flakes.path, coat_alpha=0.2, coat_sigma=4.0)).layers.coat.alpha == 0
+    assert (
+        mi.load_dict(stack(noise_pyramid, coat=1.5, coat_asset=flakes.path, coat_alpha=0.2, coat_sigma=4.0)).layers.coat.alpha
+        == 0
+    )
     with pytest.raises(Exception, match="'coat_alpha' is for assets of kind bin-map"):
         mi.load_dict(stack(noise_pyramid, coat=1.5, coat_asset=noise.path, coat_alpha=0.2))
 

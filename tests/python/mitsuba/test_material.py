@@ -65,10 +65,17 @@ def test_a_scene_can_take_the_alternative_of_a_described_parameter(llvm, write, 
     rough = mi.load_dict({"type": "glint", "description": described, "coat_asset": noise_pyramid.path, "coat_sigma": 4.0})
     assert rough.layers.coat.layer is not None
 
-    with_normals = write(changed(layers={"coat": {"ior": 1.5, "asset": {"file": "flakes.glint"}, "placement": {"uv_scale": 3}}}))
+    with_normals = write(
+        changed(layers={"coat": {"ior": 1.5, "asset": {"file": "flakes.glint"}, "placement": {"uv_scale": 3}}})
+    )
     assert mi.load_dict({"type": "glint", "description": with_normals, "coat_alpha": 0.2}).layers.coat.layer is None
-    assert mi.load_dict({"type": "glint", "description": with_normals, "coat_asset": noise_pyramid.path}).layers.coat.layer is not None
-    assert mi.load_dict({"type": "glint", "description": with_normals, "coat_texels_per_unit": 50.0}).layers.coat.layer is not None
+    assert (
+        mi.load_dict({"type": "glint", "description": with_normals, "coat_asset": noise_pyramid.path}).layers.coat.layer
+        is not None
+    )
+    assert (
+        mi.load_dict({"type": "glint", "description": with_normals, "coat_texels_per_unit": 50.0}).layers.coat.layer is not None
+    )
     named = write(changed(optics={"material": "Au"}))
     assert mi.load_dict({"type": "glint", "description": named, "eta": 1.5, "k": 7.0}).layers.conductor is not None
 
@@ -159,7 +166,9 @@ def test_every_parameter_of_a_description_is_known_to_the_plugin(llvm, write, no
 
 
 @pytest.mark.parametrize("prefix", ["", "coat_"])
-@pytest.mark.parametrize("option", [{"sigma_r": 0.02}, {"alpha": 0.1}, {"surface": "flat"}, {"boundary": "wrap"}, {"variant": "full"}])
+@pytest.mark.parametrize(
+    "option", [{"sigma_r": 0.02}, {"alpha": 0.1}, {"surface": "flat"}, {"boundary": "wrap"}, {"variant": "full"}]
+)
 def test_options_of_other_kinds_are_refused(llvm, noise_pyramid, prefix, option):
     """The message says which kinds read the option, and of which kind the asset is."""
     (name, value), path = *option.items(), noise_pyramid.path

@@ -49,7 +49,9 @@ def interactions(lanes, random):
     return si, lit, mi.Point2f(numbers(0, 1), numbers(0, 1))
 
 
-@pytest.mark.parametrize("variant, lanes, rounds", [("llvm_ad_rgb", 5000, 1), ("llvm_ad_spectral", 5000, 1), ("scalar_rgb", 1, 200)])
+@pytest.mark.parametrize(
+    "variant, lanes, rounds", [("llvm_ad_rgb", 5000, 1), ("llvm_ad_spectral", 5000, 1), ("scalar_rgb", 1, 200)]
+)
 @pytest.mark.parametrize("optics", [{}, {"material": "Au"}], ids=["mirror", "gold"])
 def test_both_forms_answer_the_same(variant, lanes, rounds, optics, noise_pyramid, folder):
     mi.set_variant(variant)
@@ -77,8 +79,10 @@ def test_both_forms_answer_the_same(variant, lanes, rounds, optics, noise_pyrami
 
 def test_pictures_are_the_same(llvm, noise_pyramid, loaded):
     integrator = {"type": "glint_path", "max_depth": 3}
-    images = [render(make_scene({"type": name, "asset": noise_pyramid.path, "material": "Al"}, "area", integrator), 16)
-              for name in ("glint", "glint_native")]
+    images = [
+        render(make_scene({"type": name, "asset": noise_pyramid.path, "material": "Al"}, "area", integrator), 16)
+        for name in ("glint", "glint_native")
+    ]
     assert images[0].max() > 0.1
     assert np.abs(images[0] - images[1]).max() < 1e-3 * images[0].max()
 
@@ -93,20 +97,23 @@ def test_footprints_without_extent_are_the_narrowest_of_the_asset(noise_pyramid,
     assert values[0] == pytest.approx(values[1], rel=1e-5)
 
 
-@pytest.mark.parametrize("parameters, words", [
-    ({"asset": "/nowhere.glint"}, "nowhere.glint"),
-    ({"interpolation": "cubic"}, "give footprint or trilinear"),
-    ({"uv_scale": 1.0, "texels_per_unit": 5.0}, "give one of them"),
-    ({"facets": "beckmann"}, "bin-map"),
-    ({"uv_scale": -1.0}, "uv_scale"),
-    ({"uv_scale": float("nan")}, "uv_scale"),
-    ({"texels_per_unit": 0.0}, "texels_per_unit"),
-    ({"sigma": -4.0}, "sigma"),
-    ({"footprint_scale": -1.0}, "footprint_scale"),
-    ({"footprint_parts": 99}, "footprint_parts"),
-    ({"coat": 1.5}, "coat"),
-    ({}, "asset"),
-])
+@pytest.mark.parametrize(
+    "parameters, words",
+    [
+        ({"asset": "/nowhere.glint"}, "nowhere.glint"),
+        ({"interpolation": "cubic"}, "give footprint or trilinear"),
+        ({"uv_scale": 1.0, "texels_per_unit": 5.0}, "give one of them"),
+        ({"facets": "beckmann"}, "bin-map"),
+        ({"uv_scale": -1.0}, "uv_scale"),
+        ({"uv_scale": float("nan")}, "uv_scale"),
+        ({"texels_per_unit": 0.0}, "texels_per_unit"),
+        ({"sigma": -4.0}, "sigma"),
+        ({"footprint_scale": -1.0}, "footprint_scale"),
+        ({"footprint_parts": 99}, "footprint_parts"),
+        ({"coat": 1.5}, "coat"),
+        ({}, "asset"),
+    ],
+)
 def test_errors_name_the_plugin_and_what_is_wrong(parameters, words, llvm, noise_pyramid, loaded):
     parameters = {"asset": noise_pyramid.path, **parameters} if parameters else {}
     with pytest.raises(RuntimeError) as raised:
@@ -134,8 +141,10 @@ def test_failed_plugins_close_their_assets(llvm, noise_pyramid, loaded, tmp_path
 
 def test_assets_are_found_beside_the_scene(llvm, noise_pyramid, loaded, tmp_path):
     noise_pyramid.save(tmp_path / "noise.glint")
-    (tmp_path / "scene.xml").write_text('<scene version="3.0.0"><shape type="rectangle"><bsdf type="glint_native">'
-                                        '<string name="asset" value="noise.glint"/></bsdf></shape></scene>')
+    (tmp_path / "scene.xml").write_text(
+        '<scene version="3.0.0"><shape type="rectangle"><bsdf type="glint_native">'
+        '<string name="asset" value="noise.glint"/></bsdf></shape></scene>'
+    )
     assert "noise.glint" in str(mi.load_file(str(tmp_path / "scene.xml")).shapes()[0].bsdf())
 
 

@@ -33,10 +33,21 @@ def dictionary(distance, asset, **film):
     place[2, 3] = -distance
     return {
         "type": "scene",
-        "camera": {"type": "perspective", "fov": 40, "to_world": place.tolist(), "film": {"type": "hdrfilm", "width": 800, "height": 600, **film},
-                   "sampler": {"type": "independent", "sample_count": 16}},
-        "panel": {"type": "ply", "filename": "quad.ply",
-                  "bsdf": {"type": "twosided", "bsdf": {"type": "glint", "asset": str(asset), "sigma_r": 0.02, "uv_scale": COPIES_OF_A_UV}}},
+        "camera": {
+            "type": "perspective",
+            "fov": 40,
+            "to_world": place.tolist(),
+            "film": {"type": "hdrfilm", "width": 800, "height": 600, **film},
+            "sampler": {"type": "independent", "sample_count": 16},
+        },
+        "panel": {
+            "type": "ply",
+            "filename": "quad.ply",
+            "bsdf": {
+                "type": "twosided",
+                "bsdf": {"type": "glint", "asset": str(asset), "sigma_r": 0.02, "uv_scale": COPIES_OF_A_UV},
+            },
+        },
         "lamp": {"type": "point", "position": [0, 0, -30]},
     }
 
@@ -73,8 +84,13 @@ def check_material(scene):
 def test_frames_of_a_path_give_the_distances(write_scene, run_tool, tmp_path):
     done, scene = write_scene("at20.json", "at8.json")
     assert done.returncode == 0, done.stderr
-    assert scene["camera"] == {"nearest": pytest.approx(8, rel=NEARLY), "farthest": pytest.approx(20, rel=NEARLY),
-                               "field_of_view_deg": pytest.approx(40, rel=NEARLY), "columns": 800, "samples_per_pixel": 16}
+    assert scene["camera"] == {
+        "nearest": pytest.approx(8, rel=NEARLY),
+        "farthest": pytest.approx(20, rel=NEARLY),
+        "field_of_view_deg": pytest.approx(40, rel=NEARLY),
+        "columns": 800,
+        "samples_per_pixel": 16,
+    }
     check_material(scene)
     scene["unit_m"] = 0.01
     (tmp_path / "out.json").write_text(json.dumps(scene))
@@ -89,11 +105,19 @@ def test_a_part_of_a_picture_has_the_pixels_of_the_whole(write_scene, tmp_path):
     assert (scene["camera"]["columns"], scene["camera"]["field_of_view_deg"]) == (800, pytest.approx(40, rel=NEARLY))
 
 
-@pytest.mark.parametrize("emitter, light", [
-    ({"type": "envmap", "filename": "sky.hdr"}, {"type": "environment", "band_limit_deg": 45}), ({"type": "constant"}, {"type": "environment", "band_limit_deg": 180}),
-    ({"type": "directional"}, {"type": "directional"}), ({"type": "spot"}, {"type": "point"})])
+@pytest.mark.parametrize(
+    "emitter, light",
+    [
+        ({"type": "envmap", "filename": "sky.hdr"}, {"type": "environment", "band_limit_deg": 45}),
+        ({"type": "constant"}, {"type": "environment", "band_limit_deg": 180}),
+        ({"type": "directional"}, {"type": "directional"}),
+        ({"type": "spot"}, {"type": "point"}),
+    ],
+)
 def test_lights_are_told_apart(write_scene, tmp_path, emitter, light):
-    (tmp_path / "sky.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n" + 8 * 16 * bytes([128, 128, 128, 129]))
+    (tmp_path / "sky.hdr").write_bytes(
+        b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n" + 8 * 16 * bytes([128, 128, 128, 129])
+    )
     scene = dictionary(8, tmp_path / "flakes.glint")
     (tmp_path / "lit.json").write_text(json.dumps(scene | {"lamp": emitter}))
     done, asked = write_scene("lit.json")
@@ -101,7 +125,9 @@ def test_lights_are_told_apart(write_scene, tmp_path, emitter, light):
     (found,) = asked["lights"]
     assert found["type"] == light["type"]
     # Mitsuba adds columns to the image.
-    assert found.get("band_limit_deg") == (pytest.approx(light["band_limit_deg"], rel=0.15) if "band_limit_deg" in light else None)
+    assert found.get("band_limit_deg") == (
+        pytest.approx(light["band_limit_deg"], rel=0.15) if "band_limit_deg" in light else None
+    )
 
 
 def test_xml_is_read_too(write_scene):
@@ -111,9 +137,17 @@ def test_xml_is_read_too(write_scene):
     check_material(scene)
 
 
-@pytest.mark.parametrize("arguments, text", [
-    (["plain.json"], "no mesh has the BSDF glint"), (["missing.xml"], "missing.xml: there is no such file"), (["broken.json"], "is no JSON"),
-    (["broken.xml"], "is no XML"), (["behind.json"], "behind the camera"), (["at8.json", "--map", "flakes.png"], "is not ID=FILE")])
+@pytest.mark.parametrize(
+    "arguments, text",
+    [
+        (["plain.json"], "no mesh has the BSDF glint"),
+        (["missing.xml"], "missing.xml: there is no such file"),
+        (["broken.json"], "is no JSON"),
+        (["broken.xml"], "is no XML"),
+        (["behind.json"], "behind the camera"),
+        (["at8.json", "--map", "flakes.png"], "is not ID=FILE"),
+    ],
+)
 def test_bad_input_is_refused(write_scene, tmp_path, arguments, text):
     (tmp_path / "broken.json").write_text("{")
     (tmp_path / "broken.xml").write_text("<scene>")

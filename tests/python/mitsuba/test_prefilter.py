@@ -72,7 +72,11 @@ def plate(noise_pyramid, prefilter, size=12, **more):
             "type": "scene",
             "integrator": {"type": "glint_path", "max_depth": 2, "prefilter": prefilter},
             "plate": {"type": "rectangle", "bsdf": glint(noise_pyramid, material="Al", sigma=20.0)},
-            "blocker": {"type": "rectangle", "to_world": transform().translate([3, 0, 1]).rotate([0, 1, 0], -90), "bsdf": {"type": "diffuse"}},
+            "blocker": {
+                "type": "rectangle",
+                "to_world": transform().translate([3, 0, 1]).rotate([0, 1, 0], -90),
+                "bsdf": {"type": "diffuse"},
+            },
             "sky": {"type": "envmap", "bitmap": mi.Bitmap(sky()), "to_world": transform().rotate([1, 0, 0], 90)},
             "camera": {
                 "type": "perspective",

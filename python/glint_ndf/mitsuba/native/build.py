@@ -38,7 +38,9 @@ def load(folder=None):
 def compiled_plugin(folder=None) -> pathlib.Path:
     """The plugin `FOLDER/HASH/plugins/glint_native.so`, compiled where it is not there. HASH is that of the source and the versions."""
     if platform.machine() not in ("x86_64", "AMD64"):
-        raise gn.UnsupportedError(f"glint_native: is for x86-64, and this processor is {platform.machine()}; take the BSDF `glint`")
+        raise gn.UnsupportedError(
+            f"glint_native: is for x86-64, and this processor is {platform.machine()}; take the BSDF `glint`"
+        )
     compiler = shlex.split(os.environ.get("CXX", "g++"))
     if not compiler or shutil.which(compiler[0]) is None:
         raise gn.UnsupportedError("glint_native: there is no C++ compiler; install g++, or name one in CXX")
@@ -65,13 +67,23 @@ def _flags() -> list[str]:
     """Flags of the compiler. Mitsuba's wheel is compiled for x86-64-v2, and its classes differ for other processors."""
     mitsuba, drjit, nanobind = _home_of("mitsuba"), _home_of("drjit"), _home_of("nanobind")
     module = pathlib.Path(gn._glint.__file__)
-    includes = [mitsuba / "include", drjit / "include", nanobind / "include", nanobind / "ext" / "robin_map" / "include",
-                module.parent / "include"]
-    libraries = [(mitsuba, ["-lmitsuba"]), (drjit, ["-ldrjit-core", "-ldrjit-extra", "-lnanothread"]),
-                 (module.parent, [f"-l:{module.name}"])]
+    includes = [
+        mitsuba / "include",
+        drjit / "include",
+        nanobind / "include",
+        nanobind / "ext" / "robin_map" / "include",
+        module.parent / "include",
+    ]
+    libraries = [
+        (mitsuba, ["-lmitsuba"]),
+        (drjit, ["-ldrjit-core", "-ldrjit-extra", "-lnanothread"]),
+        (module.parent, [f"-l:{module.name}"]),
+    ]
     for folder in includes:
         if not folder.is_dir():
-            raise gn.UnsupportedError(f"glint_native: there are no headers in {folder}; install the wheels of Mitsuba, Dr.Jit and nanobind")
+            raise gn.UnsupportedError(
+                f"glint_native: there are no headers in {folder}; install the wheels of Mitsuba, Dr.Jit and nanobind"
+            )
     flags = ["-std=c++20", "-O2", "-march=x86-64-v2", "-fPIC", "-shared", "-fvisibility=hidden", "-w"]
     flags += [f"-I{folder}" for folder in includes] + [str(_SOURCE)]
     for folder, names in libraries:
