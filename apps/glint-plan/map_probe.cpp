@@ -136,12 +136,13 @@ Costs MapProbe::costs(std::size_t candidate) {
 }
 
 double MapProbe::compressionFactor(std::size_t candidate) {
-  constexpr double kMost = 1.15;  // a compression that falls so short of its tolerance cannot err as much as it may
+  constexpr double kMost = 1.15;  // what falls shorter than this has all it can keep, on the whole map as on the crop
   const double given = toleranceOf(all_[candidate]);
   if (edge_ == 0 || given == 0) return 1;
   const double reached = kept(fmt::format("{} reached", all_[candidate].name()),
                               [&] { return part(true).maker->make(part(true).maker->all()[candidate]).reached; });
-  return std::clamp(given / std::max(reached, 1e-9), 1.0, kMost);
+  const double factor = given / std::max(reached, 1e-9);
+  return factor > kMost ? 1 : std::max(factor, 1.0);
 }
 
 PlaceErrors MapProbe::errorsOf(std::size_t candidate, std::size_t size, double tolerance) {

@@ -42,7 +42,7 @@ const Candidate* pyramidOf(const MaterialPlan& plan) {
 std::string objectionTo(const PlanOption& option, double tolerance) {
   const std::string name = option.candidate.name();
   if (!option.errors || surelyWithin(*option.errors, tolerance))
-    return fmt::format("{} would be over a budget: {}, {:.2g} s to prepare, {} for a density.", name,
+    return fmt::format("{} would be over a budget: {}, {:.3g} s to prepare, {} for a density.", name,
                        sizeText(option.costs.bytes), option.costs.preparation_s, queryTimeText(option.costs.query_ns));
   if (surelySeen(*option.errors) <= tolerance)
     return fmt::format("{} would be cheaper, but its bias is {:.2g}.", name, option.errors->bias);

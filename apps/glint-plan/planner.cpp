@@ -195,21 +195,26 @@ std::size_t Planner::measureLadder(Work& work, const std::vector<PlanOption*>& l
   return k;
 }
 
-bool Planner::isClosed(const Work& work, const std::vector<PlanOption*>& ladder, std::size_t last, double own) const {
+bool Planner::isSettled(const Work& work, const std::vector<PlanOption*>& ladder, std::size_t last, double own) const {
   const SceneMaterial& material = *work.plan.material;
   const bool times_count =
       scene_.goal == Goal::query_ns || limitOf(material.budgets.query_ns, scene_.budgets.query_ns) < kNoLimit;
   const PlanOption& option = *ladder[last];
   if (times_count || !option.costed) return false;
-  const bool good = option.errors && !option.at_least;
+  const bool good = option.errors && !option.at_least && affordable(work, option);
   if (last == 0) return good || (work.found && option.cost(scene_.goal) >= work.plan.choice().cost(scene_.goal));
   // Independent errors add up as squares: without that of the pyramid the coarser setting would be too coarse still.
   const std::optional<PlaceErrors>& coarser = ladder[last - 1]->errors;
   return good && coarser && coarser->seen * coarser->seen - own * own > material.tolerance * material.tolerance;
 }
 
+bool Planner::isCheaper(Work& work, PlanOption& option) {
+  return cost(work, option) && work.found && option.cost(scene_.goal) < work.plan.choice().cost(scene_.goal);
+}
+
 void Planner::measureCompressed(Work& work, bool all) {
   std::map<std::string, std::size_t> last;  // setting that the ladder of a method ended with, on images of fewer pixels
+  std::set<std::string> settled;            // methods that more pixels help only where they make smaller files
   std::set<std::string> closed;             // methods that more pixels do not help
   for (PlanOption& pyramid : work.plan.options) {
     if (pyramid.candidate.tool != "glint-pyramid") continue;
@@ -225,8 +230,12 @@ void Planner::measureCompressed(Work& work, bool all) {
       const auto known = last.find(method);
       const std::size_t first =
           known == last.end() ? firstGuess(ladder, pyramid.errors->seen, work.plan.material->tolerance) : known->second;
+      if (!all && settled.contains(method) && !isCheaper(work, *ladder[first])) {
+        closed.insert(method);
+        continue;
+      }
       last[method] = measureLadder(work, ladder, first, all);
-      if (!all && isClosed(work, ladder, last[method], pyramid.errors->seen)) closed.insert(method);
+      if (isSettled(work, ladder, last[method], pyramid.errors->seen)) settled.insert(method);
     }
   }
 }
@@ -234,7 +243,6 @@ void Planner::measureCompressed(Work& work, bool all) {
 void Planner::refuse(Work& work) {
   // The option that would do if one budget alone were larger, and else the one that is nearest to all budgets.
   const SceneMaterial& material = *work.plan.material;
-  measureCompressed(work, true);
   std::string text, fields, needs;
   for (const BudgetKind& kind : kBudgets) {
     const double own = (material.budgets.*kind.limit).value_or(kNoLimit);
@@ -324,6 +332,7 @@ std::vector<MaterialPlan> Planner::plan() {
         if (option.candidate.source.empty()) cost(*work, option);
       choose(*work);
       measureCompressed(*work, false);
+      if (!choose(*work)) measureCompressed(*work, true);
       if (!choose(*work)) refuse(*work);
     } catch (const Error&) {
       work->cache->save();

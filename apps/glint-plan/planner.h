@@ -62,10 +62,12 @@ class Planner {
   /// @param first  number of the setting to begin with
   /// @return number of the setting that it ended with
   std::size_t measureLadder(Work& work, const std::vector<PlanOption*>& ladder, std::size_t first, bool all);
-  /// Whether a method needs no images of more pixels: they take more at every setting, and allow no coarser one.
+  /// Whether images of more pixels allow a method no coarser setting. They may still take fewer bytes at the same setting.
   /// @param last  number of the setting that a ladder ended with
   /// @param own   seen error of the pyramid
-  bool isClosed(const Work& work, const std::vector<PlanOption*>& ladder, std::size_t last, double own) const;
+  bool isSettled(const Work& work, const std::vector<PlanOption*>& ladder, std::size_t last, double own) const;
+  /// Whether an option costs less than the choice so far.
+  bool isCheaper(Work& work, PlanOption& option);
   /// Measures the costs of an option, unless they are known.
   /// @return whether it can be made
   bool cost(Work& work, PlanOption& option);

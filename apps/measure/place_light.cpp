@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <numbers>
 
 #include "glint/bake/common/seen_error.h"
@@ -15,8 +14,8 @@
 namespace glint::apps {
 namespace {
 
-/// Lobes end at so many deviations, beyond which 6e-5 of their mass lies.
-constexpr float kReach = 4;
+/// Lobes end at so many deviations: beyond, a lobe of the deviation .005 has a density below 2e-3, and wider ones have less.
+constexpr float kReach = 5.5f;
 
 /// Shares of a blurred lobe in the pixels along one axis, for positions of its centre in the middle pixel. A light blurs by a box
 /// along each axis, so a blurred lobe is still a product of two such profiles.
@@ -119,36 +118,46 @@ class LightImage {
   std::vector<float> pixels_;
 };
 
-/// Weights of normals in squares, so that normals which are nearly the same have one lobe together.
+/// Normals in squares of the disk: those of a square have one lobe together, at their mean.
 class NormalSquares {
  public:
   /// @param per_pixel  squares in a pixel along each axis
   NormalSquares(int per_pixel, int resolution)
-      : side_(per_pixel * resolution), weights_(static_cast<std::size_t>(side_) * side_, 0.0f) {}
+      : side_(per_pixel * resolution), squares_(static_cast<std::size_t>(side_) * side_) {}
 
   void add(float weight, Vec2 normal) {
-    const std::size_t square = static_cast<std::size_t>(along(normal.y)) * side_ + along(normal.x);
-    if (weights_[square] == 0) touched_.push_back(square);
-    weights_[square] += weight;
+    const int x = along(normal.x), y = along(normal.y);
+    const std::size_t k = static_cast<std::size_t>(y) * side_ + x;
+    Square& square = squares_[k];
+    if (square.weight == 0) touched_.push_back(k);
+    square.weight += weight;
+    square.offset = square.offset + weight * (normal - Vec2{middle(x), middle(y)});
   }
 
-  /// Calls visit(weight, middle) for the squares that have weight, in the order in which they got it, and empties them.
+  /// Calls visit(weight, mean normal) for the squares that have weight, in the order in which they got it, and empties them.
   template <class Visit>
   void drain(const Visit& visit) {
-    const auto middle = [&](std::size_t k) { return 2 * (static_cast<float>(k) + 0.5f) / static_cast<float>(side_) - 1; };
     const auto side = static_cast<std::size_t>(side_);
-    for (const std::size_t square : touched_) {
-      if (weights_[square] > 0) visit(weights_[square], Vec2{middle(square % side), middle(square / side)});
-      weights_[square] = 0;
+    for (const std::size_t k : touched_) {
+      Square& square = squares_[k];
+      const Vec2 centre = {middle(static_cast<int>(k % side)), middle(static_cast<int>(k / side))};
+      if (square.weight > 0) visit(square.weight, centre + (1 / square.weight) * square.offset);
+      square = {};
     }
     touched_.clear();
   }
 
  private:
+  struct Square {
+    float weight = 0;
+    Vec2 offset;  ///< sum of weight times (normal - middle of the square)
+  };
+
   int along(float x) const { return std::clamp(static_cast<int>((x + 1) * 0.5f * static_cast<float>(side_)), 0, side_ - 1); }
+  float middle(int k) const { return 2 * (static_cast<float>(k) + 0.5f) / static_cast<float>(side_) - 1; }
 
   int side_;
-  std::vector<float> weights_;
+  std::vector<Square> squares_;
   std::vector<std::size_t> touched_;
 };
 
@@ -156,7 +165,7 @@ class NormalSquares {
 /// so narrow that each normal has its own.
 int squaresPerPixel(float sigma_pixels) {
   constexpr float kPerSigma = 6;
-  constexpr int kMost = 8;  // squares that fit into caches
+  constexpr int kMost = 8;  // 50 MB of squares at 256 pixels, of which few are touched
   const int squares = static_cast<int>(std::ceil(kPerSigma / sigma_pixels));
   return squares <= kMost ? squares : 0;
 }
@@ -207,27 +216,15 @@ PlaceLight placeLight(const NormalMap& map, std::span<const Footprint> footprint
 }
 
 std::vector<double> leastLight(const NormalMap& map, float sigma_texels, float sigma_r, double light_deg, int resolution) {
-  // Normals are counted in squares of a quarter of a pixel.
-  constexpr int kSquares = 4;
-  const int side = kSquares * resolution;
-  std::vector<std::uint32_t> counts(static_cast<std::size_t>(side) * side, 0);
-  const auto square = [&](float x) {
-    return std::clamp(static_cast<int>((x + 1) * 0.5f * static_cast<float>(side)), 0, side - 1);
-  };
-  for (const Vec2& n : map.normals) ++counts[static_cast<std::size_t>(square(n.y)) * side + square(n.x)];
+  constexpr int kSquares = 4;  // in a pixel along each axis
+  NormalSquares normals(kSquares, resolution);
+  for (const Vec2& n : map.normals) normals.add(1, n);
 
   // The mean over texels of their lobes, and of the squares of their lobes.
   const BlurredProfile profile(sigma_r, light_deg, resolution);
   LightImage mean(profile, resolution);
   std::vector<double> squares(static_cast<std::size_t>(resolution) * resolution, 0.0);
-  for (int y = 0; y < side; ++y) {
-    for (int x = 0; x < side; ++x) {
-      const std::uint32_t count = counts[static_cast<std::size_t>(y) * side + x];
-      if (count == 0) continue;
-      const auto centre = [&](int k) { return 2 * (static_cast<float>(k) + 0.5f) / static_cast<float>(side) - 1; };
-      mean.addPoint(static_cast<float>(count), {centre(x), centre(y)}, squares);
-    }
-  }
+  normals.drain([&](float count, Vec2 normal) { mean.addPoint(count, normal, squares); });
 
   // A footprint has the weight 1 / (4 pi sigma^2) in the sum of the squares of its weights.
   const double overlap = std::min(1.0, 1 / (4 * std::numbers::pi * double{sigma_texels} * sigma_texels));

@@ -9,6 +9,7 @@ import json
 import os
 import pathlib
 import resource
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -81,9 +82,8 @@ class Run:
 
     def make_maps(self):
         image = self.maps / f"{self.scene.name}.exr"
-        if not image.exists():
-            self.tool("synth", *self.scene.map, "--size", SIZE, "--seed", 7, "-o", image)
-        if self.scene.sky and not (self.maps / planned_scenes.SKY).exists():
+        self.tool("synth", *self.scene.map, "--size", SIZE, "--seed", 7, "-o", image, "--force")
+        if self.scene.sky:
             write_radiance(planned_scenes.sky_image(), self.maps / planned_scenes.SKY)
 
     def plan(self, asked):
@@ -95,7 +95,7 @@ class Run:
             "plan", path, "--maps", self.maps, "-o", self.folder / "plan.json", "--make", self.folder / "plan.mk", "--force"
         )
         planned = children_seconds()
-        subprocess.run(["rm", "-rf", self.folder / "assets"], check=True)
+        shutil.rmtree(self.folder / "assets", ignore_errors=True)
         make = [
             "make",
             "-s",
@@ -263,7 +263,7 @@ def run_scene(scene, arguments, gallery):
     print("\n".join([*TABLE_HEAD, *rows_of(entry)]), flush=True)
     if gallery:
         picture, entry["flip"] = render(run, gallery, plan, paper)
-        entry["picture"] = picture.name
+        entry["picture"] = f"{scene.name}/{picture.name}"
         if arguments.docs:
             folder = arguments.docs / "pictures/plans"
             folder.mkdir(parents=True, exist_ok=True)

@@ -19,8 +19,10 @@ MAPS = [("flakes", "flakes", 3), ("isotropic", "noise", 4), ("brushed", "brushed
 POINT = {"type": "point"}
 # Goals of the planner: the share of plans that hold, the median and the largest factor over the cheapest candidate that holds.
 GOALS = {"held": 0.95, "median": 1.2, "worst": 1.5}
+DIFFERS = 7  # exit code of glint-plan where a plan does not hold
 COLUMNS = (
     "seed",
+    "size",
     "map",
     "smallest_texels",
     "largest_texels",
@@ -63,19 +65,23 @@ def make_maps(programs, folder, size):
             )
 
 
-def measured(programs, folder, seed):
+def measured(programs, folder, seed, size):
     """A row of COLUMNS: plans a random scene, builds and checks it, and sweeps the candidates that could be cheaper."""
     scene = random_scene(seed)
     (folder / "scene.json").write_text(json.dumps(scene))
     plan = [programs / "glint-plan", "scene.json", "-o", "plan.json", "--cache", "probes", "--force", "--quiet"]
     subprocess.run(plan, cwd=folder, check=True)
     check = [programs / "glint-plan", "--check", "plan.json", "--sweep", "--json", "--quiet"]
-    found = json.loads(subprocess.run(check, cwd=folder, stdout=subprocess.PIPE, text=True).stdout)["result"]["materials"][0]
+    checked = subprocess.run(check, cwd=folder, stdout=subprocess.PIPE, text=True)
+    if checked.returncode not in (0, DIFFERS):
+        raise SystemExit(f"scene {seed}: glint-plan --check ended with {checked.returncode}")
+    found = json.loads(checked.stdout)["result"]["materials"][0]
     planned = json.loads((folder / "plan.json").read_text())["materials"][0]
     (material,), (light,) = scene["materials"], scene["lights"]
     good = [o for o in found["sweep"] if o["seen"] <= material["tolerance"] and o["bias"] <= material["tolerance"] / 3]
     return {
         "seed": seed,
+        "size": size,
         "map": material["map"].removesuffix(".png"),
         **material["footprints"],
         "sigma_r": material["sigma_r"],
@@ -96,7 +102,8 @@ def summary(rows):
         float(row["over_cheapest"]) for row in rows if float(row["over_cheapest"]) > 0
     ]  # 0: nothing that is as cheap holds
     count = sum(int(row["holds"]) for row in rows)
-    return {"count": count, "held": count / len(rows), "median": statistics.median(factors), "worst": max(factors)}
+    known = factors or [float("nan")]
+    return {"count": count, "held": count / len(rows), "median": statistics.median(known), "worst": max(known)}
 
 
 def read_rows(path):
@@ -146,14 +153,14 @@ def calibration_section(docs):
     return f"""
 ## Do plans hold?
 
-`glint-plan` on {len(rows)} random scenes: flakes, noise and brushed metal; footprints of 2 to 64 texels; point lights and environments; tolerances of .1 to .4. Each plan
+`glint-plan` on {len(rows)} random scenes of maps of {rows[0]["size"]}^2 texels: flakes, noise and brushed metal; footprints of 2 to 64 texels; point lights and environments; tolerances of .1 to .4. Each plan
 was built and measured on the whole map at other places, and so was every candidate that could be cheaper. **{figures["count"]} of {len(rows)} plans hold** (the goal is 19 of
 20). They take {figures["median"]:.3g} times the bytes of the cheapest candidate that holds in the median, and {figures["worst"]:.3g} times in the worst case (the goals are {GOALS["median"]} and {GOALS["worst"]}).
 [plan-calibration.csv](plan-calibration.csv) has every scene; `tests/bench/plan_calibration.py` measures it.
 
 ![Actual against predicted errors over tolerances, and the bytes of plans over those of the cheapest candidates](plan-calibration.png)
 
-Points above the line are plans that do not hold.
+Points above the level line are plans whose error is larger than asked; others do not hold because of their bias.
 """
 
 
@@ -161,16 +168,23 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bin", type=pathlib.Path, default="build/bin", help="folder of the programs")
     parser.add_argument("--out", type=pathlib.Path, default="build/plan_calibration", help="folder to make")
-    parser.add_argument("--scenes", type=int, default=30, help="number of scenes")
-    parser.add_argument("--size", type=int, default=512, help="texels of a map along each axis")
+    parser.add_argument("--scenes", type=int, default=30, help="number of scenes, 1 or more")
+    parser.add_argument(
+        "--size",
+        type=int,
+        default=1024,
+        help="texels of a map along each axis; plans measure maps of 512 and less whole, and predict nothing",
+    )
     parser.add_argument("--docs", type=pathlib.Path, help="also write DOCS/plan-calibration.csv and its chart")
     arguments = parser.parse_args()
     programs = arguments.bin.resolve()
     make_maps(programs, arguments.out, arguments.size)
     record = arguments.out / "rows.json"
     rows = json.loads(record.read_text()) if record.exists() else []
+    if any(row["size"] != arguments.size for row in rows):
+        raise SystemExit(f"{record} is of maps of {rows[0]['size']} texels: remove it, or give another --out")
     for seed in range(len(rows), arguments.scenes):
-        rows.append(measured(programs, arguments.out, seed))
+        rows.append(measured(programs, arguments.out, seed, arguments.size))
         record.write_text(json.dumps(rows, indent=1) + "\n")
         row = rows[-1]
         print(

@@ -17,7 +17,7 @@ LEAST_THAT_HOLD, MOST_MEDIAN_FACTOR, MOST_FACTOR = 0.85, 1.2, 2.5
 
 def test_random_plans_hold_and_are_nearly_the_cheapest(tmp_path):
     plan_calibration.make_maps(BIN, tmp_path, TEXELS)
-    rows = [plan_calibration.measured(BIN, tmp_path, seed) for seed in range(SCENES)]
+    rows = [plan_calibration.measured(BIN, tmp_path, seed, TEXELS) for seed in range(SCENES)]
     figures = plan_calibration.summary(rows)
     print(figures, [row["over_cheapest"] for row in rows])
     assert figures["held"] >= LEAST_THAT_HOLD

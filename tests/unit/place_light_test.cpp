@@ -17,6 +17,7 @@ constexpr int kEdge = 64, kResolution = 128, kCellPixels = 2;
 constexpr float kSigmaR = 0.03f, kSigma = 2;
 constexpr float kLargeSigma = 12;  // footprints whose texels are added up in squares
 constexpr double kBright = 0.1;    // cells of more light, in which no end of a lobe counts
+constexpr double kSeen2 = 1e-6;    // square of the least light that errors relate to
 
 std::vector<Footprint> randomFootprints(int count, float sigma) {
   std::mt19937 random(7);
@@ -52,7 +53,7 @@ INSTANTIATE_TEST_SUITE_P(, PlaceLightOfSize, testing::Values(kSigma, kLargeSigma
 TEST_P(PlaceLightOfSize, IsThatOfExactImages) {
   // Profiles are tabulated for 256 places in a pixel, and boxes of lights are sums in steps of a quarter of a pixel.
   constexpr double kTabulated = 0.02;
-  constexpr double kInSquares = 0.1;  // normals are moved to the middles of squares, which counts where light fades
+  constexpr double kInSquares = 0.1;  // normals of a square have one lobe, which counts where light fades
   const double most = GetParam() > kSigma ? kInSquares : kTabulated;
   ASSERT_EQ(bake::seenCellPixels(kResolution), kCellPixels);
   const test::OwnedMap map = randomMap(0.4f);
@@ -73,6 +74,21 @@ TEST_P(PlaceLightOfSize, IsThatOfExactImages) {
   }
 }
 
+TEST_P(PlaceLightOfSize, OfAFlatMapIsThatOfOneLobeToItsEnd) {
+  constexpr double kTabulated = 0.1;  // of 256 places in a pixel: most where a lobe is steepest
+  const test::OwnedMap map = {kEdge, kEdge, std::vector<Vec2>(static_cast<std::size_t>(kEdge) * kEdge, Vec2{})};
+  const std::vector<Footprint> footprints = randomFootprints(3, GetParam());
+  const std::vector<double> exact = exactLight(map.map(), footprints, 0);
+  const PlaceLight light = placeLight(map.map(), footprints, kSigmaR, 0, kResolution);
+  int seen = 0;
+  for (std::size_t cell = 0; cell < exact.size(); ++cell) {
+    if (exact[cell] < kSeen2) continue;
+    ++seen;
+    EXPECT_NEAR(light.squares[cell] / 3, exact[cell], kTabulated * exact[cell]) << "cell " << cell;
+  }
+  EXPECT_GT(seen, 200);
+}
+
 TEST(PlaceLight, OfUnrelatedTexelsIsTheLeast) {
   // Of the mean over all bright cells, from 400 places that overlap.
   constexpr double kOfPlaces = 0.1;
@@ -88,7 +104,7 @@ TEST(PlaceLight, OfUnrelatedTexelsIsTheLeast) {
 TEST(PlaceLight, OfOneTexelIsNotMissed) {
   // One texel of a flat map is tilted, and no footprint is near it.
   constexpr Vec2 kTilted = {33.0f / 64, 33.0f / 64};  // middle of a cell
-  constexpr double kQuantised = 0.05;                 // normals are counted in squares of a quarter of a pixel
+  constexpr double kQuantised = 0.05;                 // profiles are tabulated
   std::vector<Vec2> normals(static_cast<std::size_t>(kEdge) * kEdge, Vec2{});
   normals[0] = kTilted;
   const test::OwnedMap map = {kEdge, kEdge, std::move(normals)};
