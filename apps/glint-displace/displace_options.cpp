@@ -35,8 +35,7 @@ double meanFitError(const bake::DisplacementData::Level& level) {
 DisplaceOptions::DisplaceOptions(Tool& tool) : images_(tool) {
   const Option& factor = tool.option("--factor", factor_,
                                      "texels of the map along a side of a downsampled cell; where it does not divide the map, "
-                                     "cells are as near to it as "
-                                     "whole numbers of cells allow")
+                                     "the nearest whole number of cells is taken")
                              .range(2, 65536);
   factors_given_ =
       &tool.option("--factors", factors_, "several levels of detail, e.g. 4,16,64").range(2, 65536).excludes(factor);
@@ -48,7 +47,7 @@ DisplaceOptions::DisplaceOptions(Tool& tool) : images_(tool) {
   tool.option("--angular", values_.angular, "directions of light and view: the square of this").range(3, kMostAngular);
   tool.option("--spatial", values_.spatial, "patches of the spatial factor along each axis").range(1, 16);
   tool.option("--scale-tolerance", values_.scale_tolerance,
-              "terms are added to the scaling T S until they miss at most this part of it; 0: T S alone")
+              "terms are added to the scaling T S until they miss at most this part of it, or are eight; 0: T S alone")
       .range(0, 1);
   tool.option("--bounces", bounces_,
               "reflections of a light path at most; 1: shadowing and masking only; auto: until it escapes");
@@ -92,7 +91,8 @@ bake::DisplaceOptions DisplaceOptions::values(const HeightMap& map) const {
 void requireDisplaceMemory(const Tool& tool, const HeightMap& map, const bake::DisplaceOptions& options) {
   constexpr double kUsual = 15.0 * 15.0;        // directions that BytesPerTexel counts
   constexpr double kOfPatch = 16, kOfAll = 64;  // bytes of a pair of directions: sums and results of a patch, tables and chunks
-  const bool fine = options.factors.front()<kFineFactor, many = options.angular> 15;
+  const bool fine = options.factors.front() < kFineFactor;
+  const bool many = options.angular > 15;
   const double directions = std::max(kUsual, static_cast<double>(options.angular) * options.angular);
   const double masks = 4 * (directions - kUsual) / 16;
   const double pairs = options.texture.channels * (directions * directions - kUsual * kUsual) *
@@ -105,16 +105,19 @@ void requireDisplaceMemory(const Tool& tool, const HeightMap& map, const bake::D
                             : "take a smaller map");
 }
 
-void warnAbout(Tool& tool, const bake::DisplacementData& data) {
+void warnAbout(Tool& tool, const bake::DisplacementData& data, float tolerance) {
   for (std::size_t l = 0; l < data.levels.size(); ++l) {
     const DisplacementLevel& level = data.shape.levels[l];
     const auto warn = [&](const std::string& what) { tool.warn(fmt::format("factor {}: {}", level.factor, what)); };
-    if (level.scale_residual > kResidual)
+    if (tolerance > 0 && level.scale_residual > tolerance)
+      warn(fmt::format(
+          "{} terms of the scaling miss {:.2g} % of it, more than --scale-tolerance allows; take a larger --spatial",
+          data.shape.more_terms + 1, 100 * level.scale_residual));
+    if (tolerance == 0 && level.scale_residual > kResidual)
       warn(
-          fmt::format("the scaling differs between parts of the map: {} {:.0f} % of it (the best product T S would leave "
+          fmt::format("the scaling differs between parts of the map: T S misses {:.0f} % of it (the best product would leave "
                       "{:.0f} %); --scale-tolerance adds terms",
-                      data.shape.more_terms > 0 ? "the terms miss" : "T S misses", 100 * level.scale_residual,
-                      100 * std::sqrt(1 - level.rank1_energy)));
+                      100 * level.scale_residual, 100 * std::sqrt(1 - level.rank1_energy)));
     if (level.distant_share > kDistant)
       warn(
           fmt::format("{:.1f} % of the reflected light hops farther than a cell; it is kept in the mean but not in its place. "

@@ -39,7 +39,8 @@ BaseBrdf parseBase(const std::string& text);
 void requireDisplaceMemory(const Tool& tool, const HeightMap& map, const bake::DisplaceOptions& options);
 
 /// Warns where the model's assumptions do not hold: T S is not R, light hops between cells, or lobes do not fit.
-void warnAbout(Tool& tool, const bake::DisplacementData& data);
+/// @param tolerance  what the scaling may miss, as it was asked; 0: not asked
+void warnAbout(Tool& tool, const bake::DisplacementData& data, float tolerance);
 
 /// Levels with their cells, bytes and measures.
 nlohmann::json displacementJson(const bake::DisplacementData& data);

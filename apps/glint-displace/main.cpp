@@ -26,7 +26,7 @@ int main(int argc, char** argv) {
     const formats::Provenance provenance = tool.provenance();
     const bake::DisplacementData data = bake::displace(map, values, tool.progress("levels"));
     formats::writeAsset(output.path(), data.view(), provenance, output.writeOptions());
-    apps::warnAbout(tool, data);
+    apps::warnAbout(tool, data, values.scale_tolerance);
     tool.setResult(apps::displacementJson(data));
     tool.summary(apps::displacementText(data));
   });

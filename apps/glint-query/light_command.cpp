@@ -76,7 +76,7 @@ LightCommand::LightCommand(Tool& tool)
       .range(0, 1);
   tool.option("--ndf-epsilon", options_.ndf_epsilon,
               "leave out bands in which all coefficients of the footprint's normals are at most this share of their mean; e.g. "
-              "1e-6")
+              "1e-6. Sums of more than 128 bands leave out none")
       .range(0, 1);
   addReflectance();
   for (const CommandForm& form : {kDistributionForm, kReflectanceForm}) tool.pointTo(form.line, form.options);

@@ -26,10 +26,9 @@ int main(int argc, char** argv) {
       const bake::Environment environment = apps::readLight(tool, options.light(), options.areaLights());
       const formats::Provenance provenance = tool.provenance();
       const bake::ShLightData light = bake::buildShLight(environment, options.lightOptions(), tool.progress("directions"));
-      formats::writeAsset(output.path(), light.view(), provenance, output.writeOptions());
       result = apps::lightJson(light.view());
-      if (options.gaussians() > 0)
-        result["gaussians"] = apps::gaussiansJson(bake::fitGaussians(environment, {.lobes = options.gaussians()}));
+      if (options.gaussians() > 0) result["gaussians"] = apps::gaussiansJson(environment, options.light(), options.gaussians());
+      formats::writeAsset(output.path(), light.view(), provenance, output.writeOptions());
     }
     tool.setResult(result);
     tool.summary(apps::tableText(result));

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -30,7 +31,8 @@ ShLobesOptions::ShLobesOptions(Tool& tool) {
       .defaultText("none");
   tool.option("--gaussians", gaussians_,
               "--light: fits so many spherical Gaussians to the light as well, and prints them with --json; 0: none")
-      .range(0, bake::kMostGaussians);
+      .range(0, bake::kMostGaussians)
+      .unrecorded();
   tool.option("--order", order_, "highest band of the spherical harmonics").range(0, kMaxShOrder);
   tool.option("--grid", grid_, "directions, ROWSxCOLUMNS; lobes: none for no table").defaultText("65x128; --light: 17x32");
   tool.choice("--precision", precision_, {{"f16", ShPrecision::f16}, {"f32", ShPrecision::f32}}, "type of the coefficients");
@@ -99,7 +101,11 @@ nlohmann::json lightJson(const ShLight& light) {
           {"table_bytes", coefficients * (light.precision == ShPrecision::f16 ? 2 : 4)}};
 }
 
-nlohmann::json gaussiansJson(const bake::GaussianFit& fit) {
+nlohmann::json gaussiansJson(const bake::Environment& environment, const std::string& path, int count) {
+  if (std::none_of(environment.rgb.begin(), environment.rgb.end(), [](float value) { return value > 0; }))
+    throw Error(ErrorCode::invalid_input, "light.black", path, "", "has no light that lobes could be fitted to",
+                "give another light, or leave out --gaussians");
+  const bake::GaussianFit fit = bake::fitGaussians(environment, {.lobes = count});
   nlohmann::json lobes = nlohmann::json::array();
   for (const SphericalGaussian& g : fit.lobes)
     lobes.push_back({{"axis", {g.axis.x, g.axis.y, g.axis.z}},

@@ -40,8 +40,9 @@ class ShLobesOptions {
 
 nlohmann::json lobesJson(const ShLobes& lobes);
 nlohmann::json lightJson(const ShLight& light);
-/// Axes, sharpness and amplitudes of spherical Gaussians, and the error of the fit.
-nlohmann::json gaussiansJson(const bake::GaussianFit& fit);
+/// Axes, sharpness and amplitudes of spherical Gaussians that are fitted to an environment, and the error of the fit.
+/// @param path  of the light, for errors. Throws Error invalid_input if there is no light
+nlohmann::json gaussiansJson(const bake::Environment& environment, const std::string& path, int count);
 /// The result of a function above for people, in one line.
 std::string tableText(const nlohmann::json& table);
 

@@ -508,7 +508,8 @@ typedef struct glint_displaced_info {
   int32_t base;        /* GLINT_BASE_*: what the original surface is made of */
   float texel_size_um; /* of the original; 0: unknown */
   uint64_t file_bytes; /* size of the asset */
-  /* Texels of the original along a side of a cell of each level, increasing; 0 beyond level_count. */
+  /* Of each level, increasing; 0 beyond level_count. Texels of the original along a side of a cell where this divides the map; else
+     the number of cells is the nearest whole one. */
   int32_t factors[GLINT_DISPLACED_MAX_LEVELS];
 } glint_displaced_info;
 

@@ -51,12 +51,12 @@ static_assert(sizeof(MapSlopes) == 20);
 /// One level of detail.
 ///
 /// Vertex (I, J) lies over texel (I width / columns, J height / rows) of the original; cell (I, J) is the rectangle between
-/// vertices (I, J) and (I + 1, J + 1), wrapped. Its sides are `factor` texels where this divides the map, and else as near to
-/// `factor` as whole numbers of cells allow. All arrays have J slowest.
+/// vertices (I, J) and (I + 1, J + 1), wrapped. Its sides are `factor` texels where this divides the map; else the
+/// number of cells is the nearest whole one. All arrays have J slowest.
 struct DisplacementLevel {
   int factor = 0;           ///< texels of the original along a side of a cell
   int columns = 0;          ///< displacementCells(width, factor)
-  int rows = 0;             ///< height / factor
+  int rows = 0;             ///< displacementCells(height, factor)
   int spatial_columns = 0;  ///< columns of T, at most `columns`
   int spatial_rows = 0;
 

@@ -393,7 +393,7 @@ def displace(
         heights: asset of kind heights.
         factors: texels along a side of a cell of each level: rising, at most the shorter side of the map.
         base: "diffuse" with `albedo`, or "ggx" with roughness `alpha` and a conductor's `eta` and `k`.
-        scale_tolerance: terms are added to the scaling T S until they miss at most this part of it; 0: T S alone.
+        scale_tolerance: terms are added to the scaling T S until they miss at most this part of it, or are eight; 0: T S alone.
     """
     options = dict(
         factors=list(factors),

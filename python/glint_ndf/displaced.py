@@ -32,7 +32,7 @@ class Displaced:
     width: int  #: of the original map, texels
     height: int  #: of the original map, texels
     level_count: int
-    factors: list[int]  #: texels of the original along a side of a cell of each level
+    factors: list[int]  #: of each level: texels of the original along a side of a cell, where this divides the map; else about so many
     channels: int  #: 3, or 1: red, green and blue are the same
     base: str  #: "diffuse" or "ggx"
     texel_size_um: float  #: of the original; 0: unknown

@@ -84,6 +84,7 @@ def test_warns_of_distant_interreflections(glint):
         (["--scale-tolerance", "2"], 1, ""),
         (["--factor", "1"], 1, ""),
         (["--factors", "16,4"], 1, "--factors: is not 2 or more and ascending"),
+        (["--factors", "43,50"], 1, "the factors 43 and 50 have the same cells on this map"),
         (["--factor", "4", "--factors", "4,8"], 1, ""),
         (["--base", "diffuse:1.5"], 1, "gain"),
         (["--base", "diffuse:0"], 1, "absorb"),

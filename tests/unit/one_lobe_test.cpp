@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 #include <numeric>
 #include <vector>
 
@@ -64,6 +65,23 @@ TEST(GaussianFit, FindsTheLobesThatAnEnvironmentIsMadeOf) {
   }
 }
 
+constexpr double kRounding = 1e-4;
+
+TEST(GaussianFit, OneBrightPixelKeepsItsLight) {
+  for (const int rows : {64, 128, 200}) {
+    bake::Environment environment = test::makeEnvironment(rows, [](Vec3, int) { return 0.0f; });
+    const std::size_t sun = static_cast<std::size_t>(rows * 3 / 10) * environment.width + 5;
+    for (std::size_t c = 0; c < 3; ++c) environment.rgb[3 * sun + c] = 1e4f;
+    const bake::GaussianFit fit = fitOf(environment, 2);
+    double light = 0;
+    for (const SphericalGaussian& lobe : fit.lobes) light += integralOf(lobe) * lobe.amplitude.g;
+    EXPECT_NEAR(light, fluxOf(environment)[1], kRounding * light) << rows << " rows";
+    // No narrower than what it was fitted to: a pixel, or four pixels of more than 128 rows.
+    const double side = std::numbers::pi * (rows > 128 ? 2 : 1) / rows;
+    EXPECT_LE(fit.lobes.front().sharpness, 12.001 / (side * side)) << rows << " rows";
+  }
+}
+
 TEST(GaussianFit, MoreLobesErrLessAndKeepTheLight) {
   const bake::Environment environment = test::testEnvironment(TestLight::studio, 32);
   const std::array<double, 3> flux = fluxOf(environment);
@@ -79,7 +97,7 @@ TEST(GaussianFit, MoreLobesErrLessAndKeepTheLight) {
       given[0] += integralOf(lobe) * lobe.amplitude.r, given[1] += integralOf(lobe) * lobe.amplitude.g;
       given[2] += integralOf(lobe) * lobe.amplitude.b;
     }
-    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(given[c], flux[c], 0.02 * flux[c]);  // pixels sum lobes at their centres
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(given[c], flux[c], kRounding * flux[c]);
   }
   EXPECT_LT(before, 0.5);
 }

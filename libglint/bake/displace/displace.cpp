@@ -96,6 +96,18 @@ void checkMap(const HeightMap& map, const DisplaceOptions& options) {
                 "the texel at " + texelName(map.width, map.height, k) + " is not finite",
                 "make the map again with glint-ingest --fix-invalid");
   }
+  if (std::min(map.width, map.height) < 2)
+    throw Error(
+        ErrorCode::invalid_input, "displace.factor", "", "heights",
+        "the map of " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels has no cell of two texels",
+        "take a map of 2 x 2 texels or more");
+  for (std::size_t k = 1; k < options.factors.size(); ++k) {
+    const int coarse = options.factors[k], fine = options.factors[k - 1];
+    if (CellGrid::of(map.width, map.height, coarse) == CellGrid::of(map.width, map.height, fine))
+      throw Error(ErrorCode::usage, "displace.factor", "", "--factors",
+                  "the factors " + std::to_string(fine) + " and " + std::to_string(coarse) + " have the same cells on this map",
+                  "leave out one of them");
+  }
   for (const int factor : options.factors) {
     if (factor <= std::min(map.width, map.height)) continue;
     throw Error(ErrorCode::invalid_input, "displace.factor", "", "factor " + std::to_string(factor),

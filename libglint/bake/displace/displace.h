@@ -13,11 +13,12 @@ namespace glint::bake {
 struct DisplaceOptions {
   std::vector<int> factors = {16};  ///< factor of each level: ascending, at most the shorter side of the map
   BaseBrdf base;
-  BaseTexture texture;        ///< how the base varies over the map
-  int lobes = kMaxLobes;      ///< lobes of each cell, 1 to kMaxLobes
-  int angular = 15;           ///< N: N^2 directions, 3 to kMostAngular
-  int spatial = 4;            ///< M: T has M^2 patches, 1 to 16; fewer where a level has fewer cells
-  float scale_tolerance = 0;  ///< terms are added to T S until |R - sum| / |R| is at most this; 0: T S alone
+  BaseTexture texture;    ///< how the base varies over the map
+  int lobes = kMaxLobes;  ///< lobes of each cell, 1 to kMaxLobes
+  int angular = 15;       ///< N: N^2 directions, 3 to kMostAngular
+  int spatial = 4;        ///< M: T has M^2 patches, 1 to 16; fewer where a level has fewer cells
+  float scale_tolerance =
+      0;  ///< terms are added to T S until |R - sum| / |R| is at most this, or are kMostScaleTerms; 0: T S alone
   int bounces = kAllBounces;  ///< most scattering events of a light path; 1: shadowing and masking only
   std::uint64_t seed = 1;
 };
@@ -55,7 +56,7 @@ class DisplacementData {
 /// Where the base varies, every lobe has the mean colour and roughness of its normals, and each channel its own T and S. So the
 /// result keeps the correlation of colours and normals (Fig. 14).
 ///
-/// Cells of a factor that does not divide the map are as near to it as whole numbers of cells allow: CellGrid.
+/// Where a factor does not divide the map, the nearest whole number of cells is taken: CellGrid.
 ///
 /// The original surface is the periodic triangulation of the heights (HeightSurface). On a flat map T = S = 1.
 /// @throws Error usage if an option is out of range; invalid_input if heights are not finite, a facet is steeper than 80

@@ -34,9 +34,12 @@ struct Lobe {
   double share = 0;  ///< of the power
 };
 
-std::vector<Pixel> pixelsOf(const Environment& e, int height) {
+/// Rows and columns of the environment that one pixel averages.
+int blockOf(const Environment& e, int height) { return std::max(1, (e.height + height - 1) / height); }
+
+std::vector<Pixel> pixelsOf(const Environment& e, int block) {
   const double pi = std::numbers::pi;
-  const int block = std::max(1, (e.height + height - 1) / height), rows = (e.height + block - 1) / block;
+  const int rows = (e.height + block - 1) / block;
   std::vector<Pixel> pixels;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < 2 * rows; ++column) {
@@ -166,6 +169,24 @@ std::vector<Lobe> bestLobes(const std::vector<Pixel>& pixels, const GaussianFitO
   return best;
 }
 
+/// Values of lobes of amplitude 1 as means over pixels: those at the middles of pixels, scaled so that the light of a lobe is its
+/// integral, however few pixels it covers; [pixels][lobes].
+Eigen::MatrixXd valuesOf(const std::vector<Pixel>& pixels, const std::vector<Lobe>& lobes) {
+  Eigen::MatrixXd values(static_cast<Eigen::Index>(pixels.size()), static_cast<Eigen::Index>(lobes.size()));
+  for (Eigen::Index k = 0; k < values.cols(); ++k) {
+    const Lobe& lobe = lobes[static_cast<std::size_t>(k)];
+    const SphericalGaussian unit = {lobe.axis, static_cast<float>(lobe.sharpness), {}};
+    double light = 0;
+    for (Eigen::Index p = 0; p < values.rows(); ++p) {
+      const Pixel& pixel = pixels[static_cast<std::size_t>(p)];
+      values(p, k) = valueOf(unit, pixel.direction);
+      light += pixel.solid_angle * values(p, k);
+    }
+    if (light > 0) values.col(k) *= double{integralOf(unit)} / light;
+  }
+  return values;
+}
+
 /// The amplitudes of the least squared error that are not negative, by multiplicative steps (Lee and Seung 2001); [lobes][3].
 Eigen::MatrixXd amplitudesOf(const std::vector<Pixel>& pixels, const std::vector<Lobe>& lobes, const Eigen::MatrixXd& values) {
   const auto count = static_cast<Eigen::Index>(lobes.size());
@@ -207,19 +228,14 @@ void check(const GaussianFitOptions& o) {
 GaussianFit fitGaussians(const Environment& environment, const GaussianFitOptions& options) {
   check(options);
   requireUsable(environment);
-  const std::vector<Pixel> pixels = pixelsOf(environment, options.height);
+  const int block = blockOf(environment, options.height);
+  const std::vector<Pixel> pixels = pixelsOf(environment, block);
   if (std::none_of(pixels.begin(), pixels.end(), [](const Pixel& p) { return p.power > 0; }))
     throw Error(ErrorCode::invalid_input, "light.black", "", "environment", "has no light", "give an environment with light");
   // A lobe as wide as a pixel: 12 over the square of its side.
-  const double side = std::numbers::pi / std::min(options.height, environment.height), most_sharpness = 12 / (side * side);
+  const double side = std::numbers::pi * block / environment.height, most_sharpness = 12 / (side * side);
   const std::vector<Lobe> lobes = bestLobes(pixels, options, most_sharpness);
-  Eigen::MatrixXd values(static_cast<Eigen::Index>(pixels.size()), static_cast<Eigen::Index>(lobes.size()));
-  for (Eigen::Index k = 0; k < values.cols(); ++k) {
-    const Lobe& lobe = lobes[static_cast<std::size_t>(k)];
-    for (Eigen::Index p = 0; p < values.rows(); ++p)
-      values(p, k) =
-          valueOf({lobe.axis, static_cast<float>(lobe.sharpness), {}}, pixels[static_cast<std::size_t>(p)].direction);
-  }
+  const Eigen::MatrixXd values = valuesOf(pixels, lobes);
   const Eigen::MatrixXd amplitudes = amplitudesOf(pixels, lobes, values), fitted = values * amplitudes;
   GaussianFit fit;
   double difference = 0, norm = 0;

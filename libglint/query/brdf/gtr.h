@@ -50,7 +50,7 @@ struct GtrDistribution {
 /// T(m) = E[max(0, q - m)] over slopes q along the azimuth. T is computed once, by quadrature, at kNodes values of m that are
 /// even in log(1 + m / alpha); between these its logarithm is a cubic: within 2e-3 of the quadrature.
 ///
-/// Directions are unit vectors with w.z > 0. Allocates nothing; 516 bytes.
+/// Directions are unit vectors with w.z > 0. Allocates nothing; 520 bytes.
 class GtrMasking {
  public:
   /// @param flakes  parameters out of range are clamped; NaN counts as the smallest

@@ -24,7 +24,7 @@ class ShBandLimit {
   static constexpr int kAxes = 24;
   static constexpr int kMostOrder = 128;  ///< highest band that can be looked at; beyond, nothing is known
   /// Norms count for so many times their estimate.
-  static constexpr double kSafety = 2;
+  static constexpr double kSafety = 3;
 
   /// @param order  highest band, at most kMostOrder
   GLINT_HD explicit ShBandLimit(int order) : order_(std::min(order, int{kMostOrder})) {
@@ -66,8 +66,8 @@ class ShBandLimit {
     return (2 * l + 1) * std::sqrt(squares / (4 * std::numbers::pi * kAxes));
   }
 
-  /// Last band whose norm, by kSafety times its estimate, is above epsilon times the norm of band 0: every coefficient of the
-  /// bands beyond is smaller.
+  /// Last band whose norm, by kSafety times its estimate, is above epsilon times the norm of band 0: coefficients of
+  /// the bands beyond are smaller, unless the estimate falls to a third of the norm (least seen: .42, for arcs of normals).
   /// @param zonal  f_l of the lobe, at least order() + 1 numbers
   GLINT_HD int last(std::span<const float> zonal, double epsilon) const {
     const double least = epsilon * zonalFactor(0, zonal.data()[0]) * norm(0);
