@@ -10,6 +10,9 @@ namespace glint::apps {
 /// What --keep-normals asks for.
 enum class KeepNormals : unsigned char { as_input, none, f32, i16 };
 
+/// Memory that keptNormals takes at its peak, bytes.
+double keptBytes(const NearNormals& normals, KeepNormals keep);
+
 /// Normals in the form that was asked for; nothing for `none`.
 /// @param normals  those of the map, or of an asset that keeps them
 /// @throws Error   failed: keeping them takes more than --max-memory

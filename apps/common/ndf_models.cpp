@@ -91,10 +91,11 @@ void NdfAsset::addBinOptions() {
                 "and less exact (kind bin-map)"));
   }
   if (!asks({"histogram-sat"})) return;
-  useOnly({"histogram-sat"}, "--bins",
-          tool_.choice("--bins", options_.histogram_bins, {{"lobes", HistogramBins::lobes}, {"even", HistogramBins::even}},
-                       "where the normals of a bin are: in a lobe with their mean and spread over the map, or even over the "
-                       "bin, which is quicker and shows borders of bins under small lights (kind histogram-sat)"));
+  useOnly(
+      {"histogram-sat"}, "--bins",
+      tool_.choice("--bins", options_.histogram_bins, {{"even", HistogramBins::even}, {"lobes", HistogramBins::lobes}},
+                   "where the normals of a bin are: even over the bin, which shows borders of bins under small lights, or in "
+                   "a lobe with their mean and spread over the map, which is slower (kind histogram-sat)"));
   useOnly({"histogram-sat"}, "--gaussian-boxes",
           tool_.choice("--gaussian-boxes", options_.gaussian_boxes, {{"1", GaussianBoxes::one}, {"3", GaussianBoxes::three}},
                        "boxes that stand for a Gaussian footprint (kind histogram-sat)"));
@@ -192,8 +193,10 @@ std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint)
   if (std::holds_alternative<api::UdimNdf>(model())) {
     const float sigma = meanSigma(footprint), finest = info().finest_sigma_texels;
     if (sigma >= finest * 0.999f || opened_->asset().kind() == "slope-moments") return {};
-    return FootprintFault{fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
-                          "add --normals with the pattern of the assets that the pyramids were made from"};
+    return FootprintFault{
+        fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
+        "add --normals with the pattern of the assets that the pyramids were made from, or make every pyramid with "
+        "--keep-normals"};
   }
   return std::visit(
       [&](const auto& m) -> std::optional<FootprintFault> {

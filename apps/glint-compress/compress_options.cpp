@@ -67,7 +67,7 @@ CompressOptions::CompressOptions(Tool& tool) : tool_(tool) {
       .recordedIfGiven();
   tool.option("--normals", normals_,
               "asset of kind normals that the pyramid was made from, to keep its normals where the pyramid keeps none")
-      .recordedIfGiven();
+      .unrecorded();
   tool.addCheck([this] {
     if (normals_.empty()) return;
     if (keep_ == KeepNormals::none)
@@ -103,7 +103,8 @@ std::optional<bake::NearNormalsData> CompressOptions::kept(const formats::Asset&
   if (normals) {
     const auto& map = normals->get<NormalMap>();
     api::requireSameMap(asset, path, pyramid.shape.width, pyramid.shape.height, map, normalsOf(tile));
-    return keptNormals(tool_, map, keep_ == KeepNormals::as_input ? KeepNormals::i16 : keep_);
+    const bool floats = pyramid.near_normals && !pyramid.near_normals->coded();
+    return keptNormals(tool_, map, keep_ != KeepNormals::as_input ? keep_ : floats ? KeepNormals::f32 : KeepNormals::i16);
   }
   if (pyramid.near_normals) {
     if (keep_ == KeepNormals::f32 && pyramid.near_normals->coded())

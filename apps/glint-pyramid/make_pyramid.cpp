@@ -9,9 +9,10 @@ namespace glint::apps {
 PyramidReport makePyramid(Tool& tool, const NormalMap& map, const bake::PyramidOptions& values, KeepNormals keep,
                           const std::string& output, const formats::Provenance& provenance,
                           const formats::WriteOptions& write) {
-  tool.requireMemory(bake::pyramidBytes(map, values, static_cast<double>(tool.maxMemory())), "the NDF images", kLessMemory);
-  const bake::NdfPyramidData pyramid = bake::buildPyramid(map, values, tool.progress("images"));
+  tool.requireMemory(bake::pyramidBytes(map, values, static_cast<double>(tool.maxMemory())) + keptBytes(map, keep),
+                     "the NDF images", kLessMemory);
   const auto kept = keptNormals(tool, map, keep);
+  const bake::NdfPyramidData pyramid = bake::buildPyramid(map, values, tool.progress("images"));
   NdfPyramid asset = pyramid.view();
   if (kept) asset.near_normals = kept->view();
   formats::writeAsset(output, asset, provenance, write);

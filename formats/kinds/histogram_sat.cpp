@@ -161,9 +161,7 @@ struct KindDescription<HistogramSat> {
     const auto inside = [](Vec2 n) { return dot(n, n) < 1; };
     if (!std::all_of(sat.bin_normals.begin(), sat.bin_normals.end(), inside))
       findings.add("histogram.bin_normals", "/bin_normals", "are not all inside the unit disk");
-    const auto usable = [](const MapSlopes& s) {
-      return std::isfinite(s.mean.x) && std::isfinite(s.mean.y) && isCovariance(s.covariance);
-    };
+    const auto usable = [](const MapSlopes& s) { return areUsable(s) && isCovariance(s.covariance); };
     if (!std::all_of(sat.bin_slopes.begin(), sat.bin_slopes.end(), usable))
       findings.add("histogram.bin_slopes", "/bin_slopes", "are not all finite means and covariances");
     if (!totalsCount(sat)) findings.add("histogram.totals", "/bin_totals", "are not the numbers of texels, all above 0");

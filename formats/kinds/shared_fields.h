@@ -3,6 +3,7 @@
 // Private to formats/: what several kinds have.
 
 #include <cfloat>
+#include <cmath>
 #include <string_view>
 #include <vector>
 
@@ -39,6 +40,15 @@ void describeSlopes(Fields auto& fields, auto& slopes) {
                "mean slope of the map's texels along u and v");
   fields.reals("slope_covariance", "3", {&slopes.covariance.xx, &slopes.covariance.xy, &slopes.covariance.yy},
                {-kMaxCovariance, kMaxCovariance}, "1", "uu, uv, vv of the slopes of the map's texels");
+}
+
+/// Whether moments are those of slopes that a normal map can have: finite, and of the range of describeSlopes.
+inline bool areUsable(const MapSlopes& s) {
+  constexpr float kMostSlope = 1e6f, kMostCovariance = 1e12f;
+  const Covariance& c = s.covariance;
+  const auto within = [](float x, float most) { return std::abs(x) <= most; };
+  return within(s.mean.x, kMostSlope) && within(s.mean.y, kMostSlope) && within(c.xx, kMostCovariance) &&
+         within(c.xy, kMostCovariance) && within(c.yy, kMostCovariance);
 }
 
 /// What all pyramids of NDF images share.

@@ -9,15 +9,6 @@ namespace {
 
 std::string levelObject(int l) { return "/" + levelPath("level_{l}/moments", l); }
 
-/// Whether moments are those of slopes that a normal map can have: finite, and of the range of slope_mean and slope_covariance.
-bool areUsable(const MapSlopes& s) {
-  constexpr float kMostSlope = 1e6f, kMostCovariance = 1e12f;
-  const Covariance& c = s.covariance;
-  const auto within = [](float x, float most) { return std::abs(x) <= most; };
-  return within(s.mean.x, kMostSlope) && within(s.mean.y, kMostSlope) && within(c.xx, kMostCovariance) &&
-         within(c.xy, kMostCovariance) && within(c.yy, kMostCovariance);
-}
-
 }  // namespace
 
 template <>

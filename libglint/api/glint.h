@@ -87,8 +87,10 @@ enum {
 };
 
 enum {
-  GLINT_BINS_LOBES = 0, /* a lobe with the mean and the spread of the bin's normals over the whole map, continuous */
-  GLINT_BINS_EVEN = 1   /* even over the bin: quicker, and lights smaller than a bin show its borders */
+  GLINT_BINS_EVEN = 0, /* even over the bin: lights smaller than a bin show its borders */
+  GLINT_BINS_LOBES =
+      1 /* a lobe with the mean and the spread of the bin's normals over the whole map: continuous, and slower; even
+                          in the outermost ring of bins */
 };
 
 /* Structs that start with a struct_size may grow: it says which version of the struct the caller has. A size that is smaller
@@ -211,7 +213,7 @@ GLINT_API glint_status glint_ndf_slopes(const glint_ndf* ndf, float mean[2], flo
  * which the message tells apart. */
 GLINT_API glint_status glint_ndf_pack(const glint_ndf* ndf, void* buffer, size_t capacity, size_t* size);
 
-/* The region of texture space that a shading point sees. */
+/* The region of texture space that a shading point sees. Made by the functions below; who fills it by hand begins with {0}. */
 enum { GLINT_FOOTPRINT_GAUSSIAN = 0, GLINT_FOOTPRINT_BOX = 1 };
 typedef struct glint_footprint {
   int32_t kind; /* GLINT_FOOTPRINT_*; other values count as Gaussian */

@@ -19,9 +19,9 @@ struct NdfOptions {
   Boundary boundary = Boundary::wrap;  ///< kind normals: beyond the border of the map
   float sigma_r = 0.005f;              ///< kinds normals, slope-moments and histogram-sat: intrinsic roughness, disk units
   float alpha = 0;                     ///< kind bin-map: Beckmann roughness, in the range of the asset; 0: the smallest
-  BinEstimator estimator = BinEstimator::exact;         ///< kind bin-map: how densities are made of the texels
-  GaussianBoxes gaussian_boxes = GaussianBoxes::one;    ///< kind histogram-sat: boxes that stand for a Gaussian footprint
-  HistogramBins histogram_bins = HistogramBins::lobes;  ///< kind histogram-sat: where the normals of a bin are
+  BinEstimator estimator = BinEstimator::exact;        ///< kind bin-map: how densities are made of the texels
+  GaussianBoxes gaussian_boxes = GaussianBoxes::one;   ///< kind histogram-sat: boxes that stand for a Gaussian footprint
+  HistogramBins histogram_bins = HistogramBins::even;  ///< kind histogram-sat: where the normals of a bin are
   float slant_tolerance = kSlantTolerance;  ///< kind histogram-sat: share of a slanted footprint that may be misplaced
   int footprint_parts =
       IsotropicParts::kMost;  ///< kinds ndf-pyramid, ndf-cp and slope-moments: most round footprints that stand

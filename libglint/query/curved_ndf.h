@@ -55,7 +55,8 @@ class CurvedNdf {
   }
 
   /// Average density over a box of half vectors. Along each axis the box and the spread of the pixel change places if the box is the
-  /// narrower: the model answers the mean over the wider one, and Gauss's rule of three points adds up the other.
+  /// narrower: the model answers the mean over the wider one, and Gauss's rule of three points adds up the other. The rule is exact
+  /// for lobes wider than the narrower box; of lobes that are much narrower it may miss, or count twice, up to a fifth.
   GLINT_HD NdfValueOf<M> mean(const Footprint& p, const Box2& range) const {
     if (isFlat()) return model_->mean(p, range);
     const Vec2 centre = 0.5f * (range.low + range.high), half = {0.5f * range.width(), 0.5f * range.height()};

@@ -25,10 +25,10 @@ enum class GaussianBoxes : std::uint8_t {
 
 /// Where the normals of a bin are, between the borders of the bin.
 enum class HistogramBins : std::uint8_t {
-  /// A lobe of slopes with the mean and the spread that the texels of the bin have over the whole map, blurred by the lobe of a
-  /// facet. Continuous in the half vector.
-  lobes,
   even,  ///< spread evenly over the bin, as a histogram is drawn. Lights smaller than a bin show its borders
+  /// A lobe of slopes with the mean and the spread that the texels of the bin have over the whole map, blurred by the lobe of a
+  /// facet. Continuous in the half vector, but in the outermost ring of bins, whose slopes have no useful moments: even there.
+  lobes,
 };
 
 /// Share of a footprint with slanted sides that HistogramNdf may count in a wrong place, unless it is told otherwise.
@@ -54,9 +54,10 @@ class HistogramNdf {
 
  public:
   /// @param slant_tolerance  share of a footprint with slanted sides that may be misplaced, >= 0; 0: none, all boxes are exact
+  /// @param shape            where the normals of a bin are; lobes cost O(bins) a density, and a mean some 1 to 10 us for each bin
   /// @param sigma_r          with lobes: intrinsic roughness of the facets, disk units
   GLINT_HD explicit HistogramNdf(const HistogramSat& sat, GaussianBoxes gaussian = GaussianBoxes::one,
-                                 float slant_tolerance = kSlantTolerance, HistogramBins shape = HistogramBins::lobes,
+                                 float slant_tolerance = kSlantTolerance, HistogramBins shape = HistogramBins::even,
                                  float sigma_r = kHistogramRoughness)
       : sat_(sat),
         bins_(sat.theta_bins, sat.phi_bins),
@@ -104,7 +105,7 @@ class HistogramNdf {
     if (shape_ == HistogramBins::lobes) {
       BinCounts counts;
       const double total = histogram(p, counts);
-      return lobeDensity(counts, total, h);
+      return mixedDensity(counts, total, h);
     }
     const int id = bins_.find(h), bin = binOf(id);
     if (bin < 0) return 0;
@@ -123,7 +124,7 @@ class HistogramNdf {
     double mass = 0;
     for (int bin = 0; bin < sat_.bin_count; ++bin) {
       if (counts.totals[bin] <= 0) continue;
-      if (shape_ == HistogramBins::lobes) {
+      if (hasLobe(bin)) {
         mass += counts.totals[bin] * double{lobe(bin).mass(box)};
         continue;
       }
@@ -153,18 +154,30 @@ class HistogramNdf {
     const int id = sat_.bin_ids.data()[chosen];
     const auto within = clampUnit(static_cast<float>(rest / counts.totals[chosen]));
     if (shape_ == HistogramBins::lobes) {
-      const HalfVectorSample drawn = lobe(chosen).sample({within, xi.y});
-      return drawn.pdf > 0 ? drawnAt(drawn.h, lobeDensity(counts, area, drawn.h)) : HalfVectorSample{};
+      const HalfVectorSample drawn =
+          hasLobe(chosen) ? lobe(chosen).sample({within, xi.y}) : HalfVectorSample{bins_.point(id, {within, xi.y}), 1};
+      return drawn.pdf > 0 ? drawnAt(drawn.h, mixedDensity(counts, area, drawn.h)) : HalfVectorSample{};
     }
     return {bins_.point(id, {within, xi.y}), static_cast<float>(counts.totals[chosen] / (total * bins_.area(id)))};
   }
 
  private:
   GLINT_HD SlopeLobe lobe(int bin) const { return {sat_.bin_slopes.data()[bin], sigma_r_}; }
-  GLINT_HD float lobeDensity(const BinCounts& counts, double total, Vec2 h) const {
+  /// Whether a bin is drawn as a lobe: not in the outermost ring.
+  GLINT_HD bool hasLobe(int bin) const {
+    return shape_ == HistogramBins::lobes && sat_.bin_ids.data()[bin] < (sat_.theta_bins - 1) * sat_.phi_bins;
+  }
+  /// Density of lobes and of even bins together.
+  GLINT_HD float mixedDensity(const BinCounts& counts, double total, Vec2 h) const {
+    const int id = bins_.find(h);
     double sum = 0;
-    for (int bin = 0; bin < sat_.bin_count; ++bin)
-      if (counts.totals[bin] > 0) sum += counts.totals[bin] * double{lobe(bin).density(h)};
+    for (int bin = 0; bin < sat_.bin_count; ++bin) {
+      if (counts.totals[bin] <= 0) continue;
+      if (hasLobe(bin))
+        sum += counts.totals[bin] * double{lobe(bin).density(h)};
+      else if (sat_.bin_ids.data()[bin] == id)
+        sum += counts.totals[bin] / bins_.area(id);
+    }
     return finitePositive(static_cast<float>(sum / total));
   }
 

@@ -20,7 +20,7 @@ _PIXELS = {"smooth": 0, "constant": 1}
 _FRESNELS = {"mirror": 0, "dielectric": 1, "conductor": 2}
 _FACETS = {"distribution": 0, "beckmann": 1}
 _ESTIMATORS = {"exact": 0, "published": 1}
-_BINS = {"lobes": 0, "even": 1}
+_BINS = {"even": 0, "lobes": 1}
 _SLANT_EXACT = -1.0
 
 #: Kinds of planes without end: the whole parts of uv count.
@@ -287,7 +287,7 @@ def open(
     interpolation: str = "footprint",
     pixels: str = "smooth",
     estimator: str = "exact",
-    bins: str = "lobes",
+    bins: str = "even",
     verify_hashes: bool = False,
 ) -> Ndf:
     """Opens an asset that holds a distribution of normals. The file is checked, and then mapped. Options of other kinds are ignored.
@@ -306,8 +306,8 @@ def open(
         interpolation: kinds with levels: "footprint", or "trilinear" (quicker, and answers a wider footprint).
         pixels: kinds with levels: "smooth", or "constant" (quicker; small lights show the borders of pixels).
         estimator: kind bin-map: "exact", or "published" (densities by the centres of 21 bins: quicker, and less exact).
-        bins: kind histogram-sat: where the normals of a bin are: "lobes" (with their mean and spread over the map), or "even" over the
-            bin (quicker; small lights show the borders of bins).
+        bins: kind histogram-sat: where the normals of a bin are: "even" over the bin (small lights show the borders of bins), or
+            "lobes" (with their mean and spread over the map; slower).
         verify_hashes: compare all arrays with their hashes.
 
     Raises:

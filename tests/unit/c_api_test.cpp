@@ -429,6 +429,19 @@ TEST(CApi, OptionsOfHistogramsReachTheModel) {
     EXPECT_EQ(density, same.mean(round, {{-0.3f, -0.2f}, {0.1f, 0.2f}}));
     round_answers.push_back(density);
   }
+  for (const auto& [bins, shape] :
+       {std::pair{GLINT_BINS_EVEN, HistogramBins::even}, {GLINT_BINS_LOBES, HistogramBins::lobes}}) {
+    glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+    options.bins = bins;
+    options.sigma_r = 0.02f;
+    const Handle ndf = openHandle("histogram-sat", &options);
+    const HistogramNdf same(histograms.sat, GaussianBoxes::one, kSlantTolerance, shape, 0.02f);
+    float density = -1;
+    glint_density(ndf.get(), &c_round, 0.1f, 0.05f, &density);
+    EXPECT_EQ(density, same.density(round, {0.1f, 0.05f}));
+    round_answers.push_back(density);
+  }
+  EXPECT_NE(round_answers[4], round_answers[5]);
   EXPECT_NE(slanted_answers[1], slanted_answers[2]);  // or the options would not be seen
   EXPECT_NE(round_answers[0], round_answers[3]);
 }

@@ -815,6 +815,14 @@ std::vector<Fixture> histogramFixtures() {
           "histogram.bin_slopes", Base::histograms,
           [](const Patch& patch) { patch.change<MapSlopes>("bin_slopes", 0, [](MapSlopes& s) { s.mean.y = kNan; }); }, true),
       patched(
+          "histogram.bin_slopes", Base::histograms,
+          [](const Patch& patch) {
+            patch.change<MapSlopes>("bin_slopes", 0, [](MapSlopes& s) {
+              s.covariance.xx = s.covariance.yy = std::numeric_limits<float>::infinity();
+            });
+          },
+          true),
+      patched(
           "histogram.bin_normals", Base::histograms,
           [](const Patch& patch) { patch.change<Vec2>("bin_normals", 1, [](Vec2& n) { n.x = kNan; }); }, true),
       patched(

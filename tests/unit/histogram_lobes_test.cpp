@@ -116,6 +116,20 @@ TEST(HistogramLobes, BinsKeepTheMassOfTheirCounts) {
   EXPECT_NEAR(ndf.density(p, {0.4f, 0.1f}), truth.density(p, {0.4f, 0.1f}), 0.02f * truth.density(p, {0.4f, 0.1f}));
 }
 
+TEST(HistogramLobes, SteepNormalsStayOnTheirSide) {
+  // Slopes of the outermost ring have a spread that no lobe of slopes can stand for.
+  std::vector<Vec2> normals;
+  for (int k = 0; k < 64 * 64; ++k) normals.push_back({k % 50 == 0 ? 0.99999f : 0.99027f, 0});
+  const test::OwnedMap map(64, 64, normals);
+  const auto data = bake::buildHistogramSat(map.map(), {9, 32, 8});
+  const HistogramNdf ndf(data.view(), GaussianBoxes::one, 0, HistogramBins::lobes, 0.01f);
+  EXPECT_EQ(ndf.mean(kFootprint, {{-1, -1}, {0, 1}}), 0);
+  EXPECT_NEAR(2 * ndf.mean(kFootprint, {{0, -1}, {1, 1}}), 1, 1e-4f);
+  const HalfVectorSample s = ndf.sample(kFootprint, {0.3f, 0.6f});
+  EXPECT_GT(s.h.x, 0.9f);
+  EXPECT_NEAR(s.pdf, ndf.density(kFootprint, s.h), 1e-4f * s.pdf);
+}
+
 TEST(HistogramLobes, MeanIsTheAverageOfTheDensity) {
   const Case c(bake::SynthKind::isotropic);
   const HistogramNdf ndf = c.ndf(HistogramBins::lobes, 0.02f);

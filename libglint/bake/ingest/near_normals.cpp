@@ -26,8 +26,9 @@ float stepOf(const NearNormals& normals) {
   return step;
 }
 
-/// The nearest code whose normal lies inside the disk.
+/// The nearest code whose normal lies inside the disk; that of a flat facet for what is no number.
 NormalCode codeOf(Vec2 n, float step) {
+  if (!std::isfinite(n.x) || !std::isfinite(n.y)) return {};
   const auto nearest = [&](float x) { return std::clamp(std::nearbyint(x / step), -kMostCode, kMostCode); };
   Vec2 code = {nearest(n.x), nearest(n.y)};
   while (!(dot(step * code, step * code) < 1)) {
@@ -84,8 +85,8 @@ NearNormalsData keepNormals(const NearNormals& normals, NearType type) {
         codes.push_back({codeOf(b.low_x, step), codeOf(b.low_y, step), codeOf(b.high_x, step), codeOf(b.high_y, step)});
       data.view_.bounds[l].nodes = codes.data();
     }
-    arrays->normals = {};
-    arrays->bounds = {};
+    arrays->normals = std::vector<Vec2>();
+    arrays->bounds = std::vector<NormalBoundsStorage>();
   }
   data.arrays_ = std::move(arrays);
   return data;
