@@ -16,7 +16,8 @@ struct WriteOptions {
   std::optional<UdimPlace> udim = {};
 };
 
-/// Writes an asset of any kind, e.g. writeAsset(path, normal_map, provenance). The file appears whole or not at all: it is written under a temporary name, read back and checked as a
+/// Writes an asset of any kind, e.g. writeAsset(path, normal_map, provenance). The file appears whole or not at all: it is
+/// written under a temporary name, read back and checked as a
 /// reader would, and then given its name as AtomicFile does, which also says what happens to links, permissions, devices and
 /// pipes. On failure the temporary file is removed and an old file stays; what a killed run leaves under a temporary name, the
 /// next run that writes the same file removes. The same arguments give the same bytes; bytes between the objects of a file are

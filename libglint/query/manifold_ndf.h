@@ -23,7 +23,8 @@ namespace glint {
 /// size, over that of the density). Towards half vectors farther than the ball from all normals the density is 0.
 ///
 /// The min-max pyramid of the map makes the cost of a query follow the number of facets near the half vector; maps without it are
-/// answered too, more slowly. Takes a NormalMap, or the normals that an asset keeps. Gaussian and box footprints, flat and smooth surfaces. Stores nothing. Thread-safe, allocates nothing; the
+/// answered too, more slowly. Takes a NormalMap, or the normals that an asset keeps. Gaussian and box footprints, flat and
+/// smooth surfaces. Stores nothing. Thread-safe, allocates nothing; the
 /// map must outlive it.
 class ManifoldNdf {
  public:

@@ -17,7 +17,8 @@ namespace glint {
 ///
 /// Footprints are answered as isotropic Gaussians of the same mean square size. Between the centres and the sizes of the images
 /// see Interpolation. ManifoldNdf answers footprints below level 0 from the normals of the map, given or kept in the asset, blended
-/// with the images up to a fifth above it (TexelBlend). Without normals level 0 answers them, too wide (smallestSigma). Answers of footprints larger than the
+/// with the images up to a fifth above it (TexelBlend). Without normals level 0 answers them, too wide (smallestSigma). Answers
+/// of footprints larger than the
 /// map tend to its mean (SliceChooser). Between the half vectors of a pixel see Pixels. Thread-safe, allocates nothing; the arrays
 /// must outlive it.
 class PyramidNdf {

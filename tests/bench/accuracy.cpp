@@ -1,6 +1,7 @@
 // How far pyramids, compressed or not, are from the Reference:
 //   glint-accuracy NORMALS.glint ASSET.glint... [--samples N]
-// For every footprint-size octave: errors of the images (at centres, trilinear is the image), and of answers at random places for a size between two levels. JSON on
+// For every footprint-size octave: errors of the images (at centres, trilinear is the image), and of answers at random places
+// for a size between two levels. JSON on
 // stdout.
 
 #include <tbb/parallel_for.h>

@@ -3,7 +3,8 @@
 //
 // The test writes lines "CLASS NUMBER ERROR" to descriptor 198: of the calls of this class, the one of this number (from 1) fails
 // with this errno; 0 lets all succeed, and of the class `none` nothing fails. An ERROR of -1 makes the call transfer one byte
-// only; one of -2 sends TERM to the process at the call. The library answers each line on descriptor 199: the wait status of the child, and the number of its calls of each class.
+// only; one of -2 sends TERM to the process at the call. The library answers each line on descriptor 199: the wait status of
+// the child, and the number of its calls of each class.
 //
 // Calls that the C library makes by itself (fwrite to a file, dlopen) are not seen. Calls before main() are not counted.
 

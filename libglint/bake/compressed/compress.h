@@ -48,7 +48,8 @@ struct CompressionOptions {
   std::optional<CoefficientType> coefficient_type;
 
   /// Regions along each axis of the map, 1..255. 0: the default of the method, 8 for cp (Deng 2022, section 4.2) and 1
-  /// otherwise, or more where a region would hold more than 65536 images. With tucker, level 0 and level 1 have regions of their own, and all coarser levels share theirs. With a
+  /// otherwise, or more where a region would hold more than 65536 images. With tucker, level 0 and level 1 have regions of
+  /// their own, and all coarser levels share theirs. With a
   /// tolerance for the seen error, level 2 has regions of its own, too, whatever the method.
   int regions = 0;
 
