@@ -213,7 +213,7 @@ What `glint-plan` saves against the setting of Deng 2022 (images of 256 x 256 pi
 `plan_cloth.json`; `pipelines/scenes/planned_scenes.py` has them for Mitsuba.
 
 Errors are [seen errors](METHODS.md#seen-error) in the worst size of footprints that the scene asks. The file is all that queries read: with the normals, where
-footprints are smaller than the finest level. Times to prepare are processor time, from the image on; a density is asked on one thread of {machine}.
+footprints are smaller than the finest level. There texels answer: such a row is nearly exact, and slow. Times to prepare are processor time, from the image on; a density is asked on one thread of {machine}.
 """
 
 
@@ -231,6 +231,7 @@ def page(entries, machine, folder=""):
             textwrap.fill(
                 f"Footprints of {asked['smallest_texels']:.3g} to {asked['largest_texels']:.3g} texels, the least "
                 f"{ {'bytes': 'bytes', 'query_ns': 'time of a density', 'preparation_s': 'time to prepare'}[entry['minimise']] }. "
+                + "".join(f"The budget of {name} is {value:.3g}. " for name, value in entry.get("budgets", {}).items())
                 + " ".join(plan["reasons"] + ["Left out: " + text[0].lower() + text[1:] for text in plan["left_out"]])
                 + f" The plan took {entry['plan_s']:.0f} s of processor time.",
                 WIDTH,
@@ -256,6 +257,7 @@ def run_scene(scene, arguments, gallery):
         "name": scene.name,
         "title": scene.title,
         "minimise": scene.minimise,
+        "budgets": asked["materials"][0].get("budgets", {}) | asked.get("budgets", {}),
         "plan": plan,
         "plan_s": plan_s,
         "make_s": make_s,
