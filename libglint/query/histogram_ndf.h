@@ -54,7 +54,7 @@ class HistogramNdf {
 
  public:
   /// @param slant_tolerance  share of a footprint with slanted sides that may be misplaced, >= 0; 0: none, all boxes are exact
-  /// @param shape            where the normals of a bin are; lobes cost O(bins) a density, and a mean some 1 to 10 us for each bin
+  /// @param shape            where the normals of a bin are; with lobes a density and a mean cost O(bins)
   /// @param sigma_r          with lobes: intrinsic roughness of the facets, disk units
   GLINT_HD explicit HistogramNdf(const HistogramSat& sat, GaussianBoxes gaussian = GaussianBoxes::one,
                                  float slant_tolerance = kSlantTolerance, HistogramBins shape = HistogramBins::even,

@@ -67,7 +67,7 @@ class ShBandLimit {
   }
 
   /// Last band whose norm, by kSafety times its estimate, is above epsilon times the norm of band 0: coefficients of
-  /// the bands beyond are smaller, unless the estimate falls to a third of the norm (least seen: .42, for arcs of normals).
+  /// the bands beyond are smaller, unless the estimate falls to a third of the norm.
   /// @param zonal  f_l of the lobe, at least order() + 1 numbers
   GLINT_HD int last(std::span<const float> zonal, double epsilon) const {
     const double least = epsilon * zonalFactor(0, zonal.data()[0]) * norm(0);
