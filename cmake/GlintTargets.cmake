@@ -8,8 +8,11 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(THREADS_PREFER_PTHREAD_FLAG ON)
 find_package(Threads REQUIRED)
 
+# For whoever builds once: large headers are parsed once, and sources that agree on names are compiled together. Off for whoever changes
+# sources: a change then compiles one of them, not its group, and ccache, which keeps no objects of precompiled headers, is used.
+option(GLINT_FAST_FULL_BUILD "Precompile headers and compile sources together" ON)
 find_program(CCACHE_PROGRAM ccache)
-if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+if(CCACHE_PROGRAM AND NOT GLINT_FAST_FULL_BUILD AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
   set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
 endif()
@@ -76,15 +79,6 @@ function(glint_add_library room)
     $<BUILD_INTERFACE:${GLINT_INCLUDE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   set_target_properties(glint_${room} PROPERTIES EXPORT_NAME ${room} CXX_EXTENSIONS OFF)
 endfunction()
-
-# For whoever builds once: large headers are parsed once, and sources that agree on names are compiled together. Off where ccache is,
-# which keeps no objects that were compiled with precompiled headers, and wherever sources change: a change then compiles its group.
-if(CCACHE_PROGRAM)
-  set(fast_full_build OFF)
-else()
-  set(fast_full_build ON)
-endif()
-option(GLINT_FAST_FULL_BUILD "Precompile headers and compile sources together" ${fast_full_build})
 
 # Of headers that make each source that does not need them slower (CLI11, nlohmann-json): only where most sources do.
 function(glint_precompile_headers owner)
