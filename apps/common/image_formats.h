@@ -29,10 +29,12 @@ struct MipLevel {
 /// The formats of OpenImageIO, in a shared object of their own: programs and inputs that do not need that library must not wait
 /// until it and the hundreds that it links to are loaded.
 struct ImageFormats {
+  const char* version;  ///< of the project. Programs and the shared object must be of one version
   /// @throws Error invalid_input, unsupported
-  /// @param part  number (from 0) or name of one of several images; empty: the first
+  /// @param part   number (from 0) or name of one of several images; empty: the one that has the layer, or the first
+  /// @param layer  empty: any
   /// @param most_bytes  of pixels, as checkDeclaredSize() has it
-  StoredImage (*read)(const std::string& path, const std::string& part, std::uint64_t most_bytes);
+  StoredImage (*read)(const std::string& path, const std::string& part, const std::string& layer, std::uint64_t most_bytes);
   /// The bytes of an image file. @throws Error usage, unsupported
   std::vector<unsigned char> (*encode)(const std::string& path, int width, int height, int channels,
                                        std::span<const float> pixels, PixelFormat format);
@@ -67,6 +69,7 @@ void checkDeclaredSize(const std::string& path, const std::string& format, std::
 void checkSystemReason(const std::string& path, int error);
 
 /// The number of the part that is meant.
+/// @param part   number or name; empty: the first
 /// @param names  of all parts
 /// @throws Error invalid_input if there is none
 int findPart(const std::string& path, const std::string& part, const std::vector<std::string>& names);

@@ -14,7 +14,8 @@ void ImageOptions::declare(Tool& tool) {
   using Alpha = ImageChoice::Alpha;
   tool.option("--subimage", choice_.part, "number, from 0, or name of one of several images in the file (parts, pages)")
       .defaultText("0, with a warning that names the others");
-  tool.option("--layer", choice_.layer, "channels whose names start with this and a point")
+  tool.option("--layer", choice_.layer,
+              "channels whose names start with this and a point, or the image of this name, in the first image that has them")
       .defaultText("the layer of the first channel, with a warning that names the others");
   tool.option("--channels", choice_.channels,
               "what to read, in order: letters of r g b a (rg, ag, ...) or names with commas between them. Two channels of a "
@@ -32,7 +33,7 @@ Image readInputImage(Tool& tool, const std::string& path, const ImageChoice& cho
   Image image = readImage(path, choice);
   for (const std::string& note : image.notes) tool.warn(path + ": " + note);
   // The first image of a PSD is all of its layers together, as it is shown.
-  if (image.parts.size() > 1 && choice.part.empty() && image.format != "psd") {
+  if (image.parts.size() > 1 && choice.part.empty() && choice.layer.empty() && image.format != "psd") {
     tool.warn(fmt::format("{}: holds {} images, of which the first was read: {}; {}", path, image.parts.size(),
                           partList(image.parts), remedy));
   }

@@ -6,6 +6,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <new>
@@ -36,7 +37,13 @@ const ImageFormats& imageFormats() {
                   "the part that reads and writes images cannot be loaded" + reason,
                   "install the whole package: this file belongs to the programs");
     }
-    return *static_cast<const ImageFormats*>(table);
+    const auto& formats = *static_cast<const ImageFormats*>(table);
+    if (std::strcmp(formats.version, GLINT_VERSION) != 0) {
+      throw Error(ErrorCode::failed, "image.formats", path, "",
+                  "is of another version (" + std::string(formats.version) + ") than this program (" GLINT_VERSION ")",
+                  "install the whole package: this file belongs to the programs");
+    }
+    return formats;
   }();
   return loaded;
 }
@@ -55,7 +62,7 @@ Image readImage(const std::string& path, const ImageChoice& choice) {
   checkRegular(path);
   const bool png = isPng(path);
   const std::uint64_t most_bytes = choice.of_any_size ? std::numeric_limits<std::uint64_t>::max() : availableMemory();
-  StoredImage stored = png ? readPng(path, most_bytes) : imageFormats().read(path, choice.part, most_bytes);
+  StoredImage stored = png ? readPng(path, most_bytes) : imageFormats().read(path, choice.part, choice.layer, most_bytes);
   Image& image = stored.image;
   if (png) findPart(path, choice.part, image.parts);
   if (image.format == "jpeg") checkJpegComplete(path);

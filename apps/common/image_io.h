@@ -44,7 +44,7 @@ struct ImageChoice {
   enum class Window : std::uint8_t { display, data };
   enum class Alpha : std::uint8_t { automatic, divide, ignore };
 
-  std::string part = {};      ///< number (from 0) or name of one of several images; empty: the first
+  std::string part = {};      ///< number (from 0) or name of one of several images; empty: the one with the layer, or the first
   std::string layer = {};     ///< the channels whose names start with this and a point; empty: the layer of the first channel
   std::string channels = {};  ///< letters such as "rg", or names with commas between them; empty: all of the layer
   Window window = Window::display;  ///< what the file shows, or what it stores

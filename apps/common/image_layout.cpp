@@ -37,12 +37,6 @@ void rearrange(Image& image, int width, int height, const Source& source) {
   image.height = height;
 }
 
-/// "normal" of "normal.X", "" of "R".
-std::string layerOf(const std::string& channel) {
-  const std::size_t point = channel.rfind('.');
-  return point == std::string::npos ? "" : channel.substr(0, point);
-}
-
 std::string channelList(const Image& image) {
   return nameList(image.channel_names, [](std::size_t, const std::string& name) { return name; });
 }
@@ -179,13 +173,17 @@ void selectLayer(Image& image, const std::string& layer, const std::string& path
     const std::string name = layerOf(channel);
     if (std::find(image.layers.begin(), image.layers.end(), name) == image.layers.end()) image.layers.push_back(name);
   }
-  image.layer = layer.empty() ? image.layers.front() : layer;
+  const bool known = std::find(image.layers.begin(), image.layers.end(), layer) != image.layers.end();
+  const bool is_part = !known && !image.parts.empty() && image.parts[static_cast<std::size_t>(image.part)] == layer;
+  image.layer = layer.empty() || is_part ? image.layers.front() : layer;
   std::vector<int> kept;
   for (int c = 0; c < image.channels; ++c)
     if (layerOf(image.channel_names[static_cast<std::size_t>(c)]) == image.layer) kept.push_back(c);
   if (kept.empty()) {
     throw Error(ErrorCode::invalid_input, "image.layer", path, "", "has no layer \"" + layer + "\"",
-                "its channels are " + channelList(image));
+                (image.parts.size() > 1 ? "its images are " + partList(image.parts) + "; the channels of the first are "
+                                        : "its channels are ") +
+                    channelList(image));
   }
   // Each layer of an OpenEXR file may have an alpha of its own.
   const auto alpha = std::find_if(kept.begin(), kept.end(),

@@ -14,8 +14,14 @@ void cropToDisplay(StoredImage& stored, const ImageChoice& choice, const std::st
 /// Turns and mirrors the pixels as the orientation says.
 void orient(StoredImage& stored);
 
+/// "normal" of "normal.X", "" of "R".
+inline std::string layerOf(const std::string& channel) {
+  const std::size_t point = channel.rfind('.');
+  return point == std::string::npos ? "" : channel.substr(0, point);
+}
+
 /// Keeps the channels of one layer: their names start with the layer's name and a point.
-/// @param layer  name; empty: the layer of the first channel
+/// @param layer  name, or name of the part that was read; empty: the layer of the first channel
 /// @throws Error invalid_input if there is no such layer
 void selectLayer(Image& image, const std::string& layer, const std::string& path);
 

@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "common/image_formats.h"
+#include "common/image_layout.h"
 #include "glint/model/error.h"
 
 namespace glint::apps {
@@ -128,15 +129,32 @@ std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
               unreadableRemedy(reason));
 }
 
-/// Names of all images of a file: parts of OpenEXR, pages of TIFF. Those after the most are not looked for.
-std::vector<std::string> partNames(const std::string& path) {
+/// What a file says about its images (parts of OpenEXR, pages of TIFF) before their pixels are read.
+struct Parts {
+  std::vector<std::string> names;
+  int first_with_layer = -1;  ///< number of the first part that has the layer, or its name; -1: none
+};
+
+bool hasLayer(const OIIO::ImageSpec& spec, const std::string& layer) {
+  return std::any_of(spec.channelnames.begin(), spec.channelnames.end(),
+                     [&](const std::string& channel) { return layerOf(channel) == layer; });
+}
+
+/// Parts after the most are not looked for.
+Parts findParts(const std::string& path, const std::string& layer) {
   constexpr int kMost = 1000;
   const auto input = open(path);  // of its own: some readers (WebP) cannot go back
-  std::vector<std::string> names = {std::string(input->spec().get_string_attribute("oiio:subimagename"))};
-  while (static_cast<int>(names.size()) < kMost && input->seek_subimage(static_cast<int>(names.size()), 0))
-    names.push_back(std::string(input->spec().get_string_attribute("oiio:subimagename")));
+  Parts parts;
+  int of_that_name = -1;
+  do {
+    const int number = static_cast<int>(parts.names.size());
+    parts.names.push_back(std::string(input->spec().get_string_attribute("oiio:subimagename")));
+    if (parts.first_with_layer < 0 && hasLayer(input->spec(), layer)) parts.first_with_layer = number;
+    if (of_that_name < 0 && parts.names.back() == layer) of_that_name = number;
+  } while (static_cast<int>(parts.names.size()) < kMost && input->seek_subimage(static_cast<int>(parts.names.size()), 0));
+  if (parts.first_with_layer < 0) parts.first_with_layer = of_that_name;
   (void)input->geterror();  // says that there is no further one
-  return names;
+  return parts;
 }
 
 /// Whether the other channels are multiplied by alpha. Readers of formats that are not listed tell nothing and do nothing.
@@ -167,13 +185,15 @@ void invertWhiteZero(const OIIO::ImageSpec& spec, const std::string& path, Image
   for (std::uint16_t& code : *codes) code = static_cast<std::uint16_t>(65535 - code);
 }
 
-StoredImage readImageFile(const std::string& path, const std::string& part, std::uint64_t most_bytes) {
+StoredImage readImageFile(const std::string& path, const std::string& part, const std::string& layer,
+                          std::uint64_t most_bytes) {
   // OpenImageIO has threads of its own, which --threads is to limit as well.
   OIIO::attribute("threads", static_cast<int>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
   StoredImage stored;
   Image& image = stored.image;
-  image.parts = partNames(path);
-  image.part = findPart(path, part, image.parts);
+  const Parts parts = findParts(path, layer);
+  image.parts = parts.names;
+  image.part = part.empty() && !layer.empty() ? std::max(parts.first_with_layer, 0) : findPart(path, part, image.parts);
   const auto input = open(path);
   if (image.part > 0 && !input->seek_subimage(image.part, 0)) throwDamagedImage(path, trimmed(input->geterror()));
   const OIIO::ImageSpec spec = input->spec();
@@ -269,6 +289,9 @@ std::vector<float> infernoColours(int size, std::span<const float> grey) {
 
 /// What imageFormats() looks up.
 extern "C" const glint::apps::ImageFormats glint_image_formats;
-const glint::apps::ImageFormats glint_image_formats = {glint::apps::readImageFile, glint::apps::encodeImage,
-                                                       glint::apps::encodeTexture, glint::apps::isWritableName,
+const glint::apps::ImageFormats glint_image_formats = {GLINT_VERSION,
+                                                       glint::apps::readImageFile,
+                                                       glint::apps::encodeImage,
+                                                       glint::apps::encodeTexture,
+                                                       glint::apps::isWritableName,
                                                        glint::apps::infernoColours};

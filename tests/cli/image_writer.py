@@ -49,11 +49,13 @@ def write(path, pixels, kind="float", names=None, window=None, display=None, **a
     output.close()
 
 
-def write_parts(path, parts, kind="float", names=("", "")):
+def write_parts(path, parts, kind="float", names=("", ""), channels=(None, None)):
     output = oiio.ImageOutput.create(str(path))
     specs = []
-    for pixels, name in zip(parts, names):
+    for pixels, name, channel_names in zip(parts, names, channels):
         spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], pixels.shape[2], kind)
+        if channel_names:
+            spec.channelnames = channel_names
         if name:
             spec.attribute("oiio:subimagename", name)
         specs.append(spec)

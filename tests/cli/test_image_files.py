@@ -205,6 +205,19 @@ def test_layers_are_chosen_by_name(glint):
     refused(glint, "l.exr", "bumps.X", options=["--layer", "bumps", "--channels", "xya"])
 
 
+def test_layers_are_found_in_any_part(glint):
+    """A renderer writes each layer as a part: its channels have the layer's name, or only the part has."""
+    first, second = unorm(surface()), unorm(surface(steepness=0.2))
+    write_parts(glint.folder / "p.exr", [first, second], names=("beauty", "bumps"))
+    write_parts(glint.folder / "q.exr", [first, second], names=("a", "b"), channels=(None, ("bumps.X", "bumps.Y", "bumps.Z")))
+    for image in ("p.exr", "q.exr"):
+        assert ingest(glint, image, "--layer", "bumps").stderr == ""
+        assert data(glint) == pytest.approx(surface(steepness=0.2)[..., :2], abs=HALF)
+    (glint.folder / "o.glint").unlink()
+    refused(glint, "p.exr", "1 (bumps)", options=["--layer", "dents"])
+    refused(glint, "q.exr", "bumps", options=["--layer", "bumps", "--subimage", "0"])
+
+
 # --- conventions for two channels
 
 
@@ -258,6 +271,24 @@ def test_x_and_y_in_grey_and_alpha_need_a_word(glint, grey, alpha, option):
     refused(glint, "d.png", "--channels ag", "--channels ra")
     ingest(glint, "d.png", "--channels", option)
     assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
+
+
+def test_x_in_red_or_in_alpha_needs_a_word(glint):
+    """Red and blue of one value say nothing of where x is; the z of grooves along x varies."""
+    n = codes(surface())
+    half = numpy.full_like(n[..., 0], 128)
+    Image.fromarray(numpy.stack([half, n[..., 1], half, n[..., 0]], axis=-1)).save(glint.folder / "d.png")
+    refused(glint, "d.png", "--channels ag", "--channels rg")
+    ingest(glint, "d.png", "--channels", "ag")
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
+    grooves = surface()
+    grooves[..., 0] = 0
+    grooves /= numpy.linalg.norm(grooves, axis=-1, keepdims=True)
+    Image.fromarray(numpy.concatenate([codes(grooves), n[..., :1]], axis=-1)).save(glint.folder / "g.png")
+    ingest(glint, "g.png", "--channels", "rgb")
+    plain = data(glint)
+    ingest(glint, "g.png", "--alpha", "ignore")
+    assert numpy.array_equal(data(glint), plain)
 
 
 def dds(path, code, dxgi=None):

@@ -55,7 +55,7 @@ TEST_F(ImageFile, ReadsPngAsOpenImageIoDoes) {
   for (int channels = 1; channels <= 4; ++channels) {
     for (const PixelFormat format : {PixelFormat::u8, PixelFormat::u16}) {
       writeImage(path("a.png"), 13, 7, channels, std::span(pixels).first(13 * 7 * channels), format);
-      const Image direct = readImage(path("a.png")), other = imageFormats().read(path("a.png"), "", kPlenty).image;
+      const Image direct = readImage(path("a.png")), other = imageFormats().read(path("a.png"), "", "", kPlenty).image;
       EXPECT_EQ(direct.channels, channels);
       EXPECT_EQ(direct.channel_names, other.channel_names);
       EXPECT_EQ(direct.bits, other.bits);

@@ -222,8 +222,14 @@ NormalLayout findLayout(const PixelArray& image, const IngestOptions& p) {
                  "say which is x and which is y: --channels ag or --channels ra");
   }
   // DXT5nm has x in alpha, and red constant at 0 or 1. As x, such a red would leave no room for y and z.
+  if (!alpha || !isConstant(image, 0) || isConstant(image, 1)) return layout;
   const float red = pixelValue(image, 0, 0);
-  if (!alpha || !isConstant(image, 0) || (red > kRedEnd && red < 1 - kRedEnd) || isConstant(image, 1)) return layout;
+  if (red > kRedEnd && red < 1 - kRedEnd) {
+    // Grooves along x have such a red, but their z changes.
+    if (!isConstant(image, 2)) return layout;
+    throwInvalid("normals.channels", p.name, "", "red and blue are constant, and alpha is not: x may be in red or in alpha",
+                 "say which channels are x and y: --channels ag, or --channels rg if alpha is something else");
+  }
   if (!isConstant(image, 2) && !areSame(image, 1, 2)) {
     throwInvalid("normals.channels", p.name, "", "red is constant, so x is in alpha; blue may be z or something else",
                  "say which channels are x, y and z: --channels agb, or --channels ag if blue is not z");
