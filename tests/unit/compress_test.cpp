@@ -453,6 +453,39 @@ TEST(Compress, StoresFlakesAsSpotsInHalfTheBytesOfColumns) {
   EXPECT_LT(2 * spots.total_bytes, columns.total_bytes);
 }
 
+TEST(Compress, SpotsHaveTheLightOfTheirBlocks) {
+  // Many small flakes: the spots that a tolerance leaves out hold light, which no direction may lose.
+  constexpr double kMost = 0.02;  // density_scales, and images whose light is scaled otherwise
+  PyramidShape shape = test::makeShape(256, 64, 16, 1);
+  shape.sigma_r = 0.02f;
+  const TestPyramid pyramid = test::makePyramid(test::flakes(256, 6, 4000, 2), shape);
+  auto o = options(CompressionMethod::tucker, CoefficientType::i8, 16, 1);
+  o.metric = ErrorMetric::seen;
+  o.tolerance = 0.4;
+  const auto data = compressPyramid(pyramid.view(), o);
+  const int per_row = shape.resolution / kBlockSize;
+  std::vector<double> truths(data.view().block_places.size()), shown(truths.size());
+  const NdfPyramid stored = pyramid.view();
+  for (std::size_t i = 0; i < stored.shape.levels[0].imageCount(); ++i) {
+    const auto truth = test::storedImage(stored, 0, i);
+    const auto image = test::decodeDensities(data.view(), static_cast<std::uint32_t>(i));
+    for (std::size_t p = 0; p < truth.size(); ++p) {
+      const auto x = static_cast<int>(p) % shape.resolution, y = static_cast<int>(p) / shape.resolution;
+      const auto block = static_cast<std::size_t>(y / kBlockSize * per_row + x / kBlockSize);
+      truths[block] += truth[p];
+      shown[block] += image[p];
+    }
+  }
+  int blocks = 0;
+  for (std::size_t place = 0; place < data.place_blocks.size(); ++place) {
+    const std::size_t block = data.place_blocks[place];
+    if (data.clusters[place].columns > 0 || !(shown[block] > 0)) continue;
+    EXPECT_NEAR(shown[block] / truths[block], 1, kMost) << block;
+    ++blocks;
+  }
+  EXPECT_GE(blocks, 2);
+}
+
 TEST(Compress, SpendsFewerBytesOnALargerTolerance) {
   std::uint64_t previous = std::numeric_limits<std::uint64_t>::max();
   for (const double tolerance : {0.05, 0.1, 0.2, 0.4, 0.8}) {

@@ -268,6 +268,20 @@ float restOf(const float* slice, const SliceSpots& spots, const SpotFinder& find
   return finder.restDensity(match, left);
 }
 
+/// Light of a slice: the sum of its pixels, which are not scaled.
+double lightOf(const float* slice, const float* factors) {
+  double light = 0;
+  for (int p = 0; p < kBlockPixels; ++p) light += slice[p] / factors[p];
+  return light;
+}
+
+/// Factor of the spots and rests of a cluster that gives them its light. Spots that are left out take light away, most where facets
+/// are many and small: a direction would be too dark in all places, which is seen sooner than single spots that are too bright.
+double lightFactor(double truth, double decoded) {
+  constexpr double kMost = 1.25;
+  return decoded > 0 ? std::clamp(truth / decoded, 1 / kMost, kMost) : 1.0;
+}
+
 /// Quantises a cluster of spots, writes it as ndf_cp.h says, and compares its decoded slices with the originals.
 void encodeSpots(const SliceIndex& index, std::size_t cluster, const float* factors, const SpotFinder& finder,
                  const std::vector<SliceSpots>& spots, EncodedCluster& out, SliceComparer& comparer) {
@@ -298,17 +312,31 @@ void encodeSpots(const SliceIndex& index, std::size_t cluster, const float* fact
     out.coefficients[spotCountsOffset(count) + count + k] = static_cast<std::byte>(codes[out.kept[k]]);
     out.spots += spots[out.kept[k]].size();
   }
-  // Write the spots, and decode every slice as a reader does.
-  for (std::uint32_t s = 0; s < all; ++s) {
-    index.load(cluster, static_cast<int>(s), 1, factors, slice.data());
-    finder.setEven(most_rest * blockMass(codes[s]), decoded.data());
-    for (const Spot& spot : spots[s]) {
+  // Write the spots.
+  std::vector<std::uint16_t> weights;
+  for (const SliceSpots& slice_spots : spots) {
+    for (const Spot& spot : slice_spots) {
       const float weight = std::clamp(std::round(spot.weight / out.scales[0]), 0.0f, 65535.0f);
-      append(out.coefficients, NdfSpot{spot.x, spot.y, static_cast<std::uint16_t>(weight)});
-      finder.add(spot.x, spot.y, out.scales[0] * weight, decoded.data());
+      weights.push_back(static_cast<std::uint16_t>(weight));
+      append(out.coefficients, NdfSpot{spot.x, spot.y, weights.back()});
     }
-    comparer.add(slice.data(), decoded.data());
   }
+  // Decodes every slice as a reader does.
+  const auto forEachSlice = [&](auto visit) {
+    auto weight = weights.begin();
+    for (std::uint32_t s = 0; s < all; ++s) {
+      index.load(cluster, static_cast<int>(s), 1, factors, slice.data());
+      finder.setEven(out.scales[1] * blockMass(codes[s]), decoded.data());
+      for (const Spot& spot : spots[s]) finder.add(spot.x, spot.y, out.scales[0] * *weight++, decoded.data());
+      visit(slice.data(), decoded.data());
+    }
+  };
+  double truth_light = 0, decoded_light = 0;
+  forEachSlice([&](const float* truth, const float* image) {
+    truth_light += lightOf(truth, factors), decoded_light += lightOf(image, factors);
+  });
+  for (float& scale : out.scales) scale *= static_cast<float>(lightFactor(truth_light, decoded_light));
+  forEachSlice([&](const float* truth, const float* image) { comparer.add(truth, image); });
 }
 
 /// Slices that are worth storing: they hold at least the weighted energy `least`, or more than a 256th of the mass of their

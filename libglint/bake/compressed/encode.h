@@ -29,7 +29,8 @@ struct EncodedCluster {
 };
 
 /// Quantises the basis of a cluster, solves the coefficients of every slice for the quantised basis by least squares, and
-/// quantises the coefficients. Finds the floors of its decoded slices. A basis of spots is quantised spot by spot.
+/// quantises the coefficients. Finds the floors of its decoded slices. A basis of spots is quantised spot by spot; all spots together
+/// have the light of their slices, so that a direction is not too dark where many small spots were left out.
 /// @param per_byte        weighted energy that a slice must hold for each byte of its coefficients to be stored. A slice with a
 ///                        large part of its image's mass is always stored. Not used for spots
 /// @param density_scales  [images]: factors of the densities that errors are measured with (NdfCp::density_scales)
