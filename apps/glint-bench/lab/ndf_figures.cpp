@@ -26,9 +26,15 @@ Footprint askedShape(const Footprint& gaussian, const api::NdfInfo& info) {
 
 std::vector<Footprint> roundFootprints(std::uint64_t seed, std::size_t count, float sigma_texels) {
   constexpr std::uint64_t kStream = 2000;
+  // Steps of the sequence R2 (Roberts 2018): 1/g and 1/g^2, where g^3 = g + 1.
+  constexpr double kStepX = 0.7548776662466927, kStepY = 0.5698402909980532;
+  const Vec2 start = bake::randomPair(seed, kStream, 0);
+  const auto wrapped = [](double x) { return static_cast<float>(x - std::floor(x)); };
   std::vector<Footprint> footprints;
-  for (std::size_t k = 0; k < count; ++k)
-    footprints.push_back(Footprint::isotropic(bake::randomPair(seed, kStream, k), sigma_texels));
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto n = static_cast<double>(k);
+    footprints.push_back(Footprint::isotropic({wrapped(start.x + n * kStepX), wrapped(start.y + n * kStepY)}, sigma_texels));
+  }
   return footprints;
 }
 

@@ -12,7 +12,8 @@ namespace glint::apps {
 /// errors are those of the method, and not of the shape.
 Footprint askedShape(const Footprint& gaussian, const api::NdfInfo& info);
 
-/// Round footprints at random places of a map.
+/// Round footprints at places that cover a map evenly, from a random one on. Where random places leave gaps, half vectors of the
+/// facets there count as dark, and a faint light towards one of them as a large seen error.
 std::vector<Footprint> roundFootprints(std::uint64_t seed, std::size_t count, float sigma_texels);
 
 /// Exact NDF images of some footprints, as Gaussians and as boxes.
