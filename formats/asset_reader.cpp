@@ -60,6 +60,14 @@ const AssetInfo& Asset::info() const { return state_->loaded.info; }
 
 const AnyAsset& Asset::any() const { return *state_->loaded.asset; }
 
+void Asset::leaveOutNearNormals() {
+  std::visit(
+      [](auto& asset) {
+        if constexpr (requires { asset.near_normals.reset(); }) asset.near_normals.reset();
+      },
+      *state_->loaded.asset);
+}
+
 void Asset::refuse(const AnyAsset& wanted) const {
   const std::string kind(kinds()[wanted.index()]->schema.name);
   const bool shard = std::holds_alternative<NdfPyramidShard>(any());

@@ -88,7 +88,7 @@ class Asset {
   /// Opens and checks an asset.
   /// @throws Error  io: cannot be opened; invalid_input: breaks a rule (its id is in the error); unsupported: a newer major
   ///                version, an unknown feature or kind
-  /// @note O(size of the index arrays); with verify_hashes or copy O(file). Thread-safe, without a lock.
+  /// @note O(size of the index arrays); with verify_hashes or copy O(file). Thread-safe
   static Asset open(const std::filesystem::path& path, const OpenOptions& options = {});
 
   /// The same for the bytes of a file in memory, which must stay unchanged as long as the asset. They are copied with
@@ -123,6 +123,10 @@ class Asset {
 
   /// The asset as a variant of all kinds, for std::visit.
   const AnyAsset& any() const;
+
+  /// Leaves out the normals that a pyramid keeps for footprints below level 0: the asset is then as one that keeps none. No effect
+  /// on other kinds. Models made before still use them.
+  void leaveOutNearNormals();
 
  private:
   struct State;

@@ -60,8 +60,14 @@ bool checkValue(const AttributeValue& value, const std::string& object, const At
 bool checkAttribute(const Attributes& attributes, const std::string& object, const AttributeSchema& schema,
                     const SizeScope& scope, int minor, Findings& findings) {
   const auto found = attributes.find(schema.name);
-  if (found != attributes.end()) return checkValue(found->second, object, schema, scope, findings);
-  const bool wanted = schema.needs.empty() ? schema.required : attributes.contains(schema.needs);
+  const bool with_others = schema.needs.empty() || attributes.contains(schema.needs);
+  if (found != attributes.end()) {
+    if (with_others) return checkValue(found->second, object, schema, scope, findings);
+    findings.add("attribute.unknown", object + "@" + std::string(schema.name),
+                 "is not in the schema without " + std::string(schema.needs));
+    return true;
+  }
+  const bool wanted = schema.needs.empty() ? schema.required : with_others;
   if (!wanted || schema.since > minor) return true;
   findings.add("attribute.missing", object + "@" + std::string(schema.name), "is missing");
   return false;
@@ -118,6 +124,7 @@ bool checkRoot(const FileStructure& structure, const KindSchema& schema, SizeSco
     }
     const auto found = structure.attributes.find(attribute.name);
     if (attribute.type != ElementType::i32 || found == structure.attributes.end()) continue;
+    if (!attribute.needs.empty() && !structure.attributes.contains(attribute.needs)) continue;
     std::vector<std::uint64_t>& values = scope.values[std::string(attribute.name)];
     for (const double number : found->second.numbers) {
       values.push_back(static_cast<std::uint64_t>(number));

@@ -29,7 +29,8 @@ struct UdimPlace {
   friend bool operator==(const UdimPlace&, const UdimPlace&) = default;
 };
 
-/// Whether a path names the files of a UDIM set: it holds `<UDIM>`, as in MaterialX, Mari and Arnold, or `%(UDIM)d`, as in Houdini.
+/// Whether a path names the files of a UDIM set: it holds `<UDIM>`, as in MaterialX and Mari, `<udim>`, as in Arnold, or `%(UDIM)d`, as in
+/// Houdini.
 bool isUdimPattern(const std::filesystem::path& path);
 
 /// The file of one tile: the token is replaced by the number.
@@ -38,6 +39,11 @@ std::filesystem::path udimFile(const std::filesystem::path& pattern, int tile);
 /// The tiles of a set that have a file, ascending.
 /// @throws Error usage: no token in the name of the file, or more than one; io: the folder cannot be read, or holds no file of the set
 std::vector<int> udimTiles(const std::filesystem::path& pattern);
+
+/// Names of files that have another number than that of a tile in the place of the token, such as name.0999.exr or name.10011.exr,
+/// ascending. Nothing reads them.
+/// @throws Error as udimTiles
+std::vector<std::string> udimStrays(const std::filesystem::path& pattern);
 
 /// Refuses a pattern whose token is not in the name of the file, or that has more than one.
 /// @throws Error usage

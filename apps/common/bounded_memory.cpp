@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "glint/formats/mapped_files.h"
 #include "glint/formats/system_error.h"
 
 namespace glint::apps {
@@ -107,6 +108,12 @@ void* BoundedMemory::mapFile(std::size_t bytes) {
   return memory;
 }
 
+void BoundedMemory::watchMappedFiles() {
+  const std::scoped_lock lock(mutex_);
+  watches_mapped_files_ = true;
+  startWatcher();
+}
+
 void BoundedMemory::startWatcher() {
   if (watcher_.joinable()) return;
   try {
@@ -119,6 +126,7 @@ void BoundedMemory::startWatcher() {
 void BoundedMemory::giveUpPages() noexcept {
   // Of a shared map of a file this loses nothing: pages that were written stay in the cache of files.
   for (const auto& [memory, bytes] : files_) ::madvise(memory, bytes, MADV_DONTNEED);
+  if (watches_mapped_files_) formats::giveBackMappedFiles();
 }
 
 void BoundedMemory::watch() noexcept {

@@ -30,6 +30,9 @@ class BoundedMemory : public std::pmr::memory_resource {
   BoundedMemory& operator=(const BoundedMemory&) = delete;
   ~BoundedMemory() override;
 
+  /// Counts the maps of assets, too: gives up their pages as soon as the process has more than its share, as those of arrays.
+  void watchMappedFiles();
+
   /// Bytes of arrays that are or were in files.
   std::uint64_t filedBytes() const { return filed_bytes_; }
 
@@ -51,7 +54,7 @@ class BoundedMemory : public std::pmr::memory_resource {
   std::atomic<std::uint64_t> held_bytes_ = 0, filed_bytes_ = 0;
   std::mutex mutex_;
   std::map<void*, std::size_t> files_;
-  bool stops_ = false;
+  bool stops_ = false, watches_mapped_files_ = false;
   std::condition_variable wakes_;
   std::thread watcher_;
 };

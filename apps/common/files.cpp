@@ -180,6 +180,8 @@ std::vector<std::string> addInputs(Tool& tool, const std::string& path, UdimSets
     refuseUdim(path, "is a UDIM set, which " + tool.name() + " does not take");
   } else {
     for (const int tile : formats::udimTiles(path)) files.push_back(formats::udimFile(path, tile));
+    for (const std::string& stray : formats::udimStrays(path))
+      tool.warn(stray + ": is left out of " + path + ": the numbers of tiles are 1001 to 9999");
   }
   for (const std::string& file : files) {
     checkRegular(file);
@@ -217,6 +219,23 @@ OutputFile::OutputFile(Tool& tool, OutputFormat format, const std::string& help,
   tool.addCheck([this, &tool, format, &input] { check(tool, format, input.tiles()); });
 }
 
+namespace {
+
+/// Warns of files of tiles that the set does not have any more: whoever opens the pattern would open them, too.
+void warnOfOtherTiles(Tool& tool, const std::string& pattern, const std::vector<int>& tiles) {
+  std::vector<int> there;
+  try {
+    there = formats::udimTiles(pattern);
+  } catch (const Error&) {
+    return;  // none is there yet; a folder that cannot be written is an error of its own
+  }
+  for (const int tile : there)
+    if (!std::binary_search(tiles.begin(), tiles.end(), tile))
+      tool.warn(formats::udimFile(pattern, tile).string() + ": is of a tile that the input has no file of: remove it");
+}
+
+}  // namespace
+
 void OutputFile::check(Tool& tool, OutputFormat format, const std::vector<int>& tiles) const {
   const bool pattern = formats::isUdimPattern(path_);
   if (pattern != !tiles.empty())
@@ -229,6 +248,7 @@ void OutputFile::check(Tool& tool, OutputFormat format, const std::vector<int>& 
     return;
   }
   formats::checkUdimPattern(path_);
+  warnOfOtherTiles(tool, path_, tiles);
   tool.makesMore();  // forEachMap skips tile by tile
   for (const int tile : tiles) {
     const std::string file = formats::udimFile(path_, tile);

@@ -12,7 +12,6 @@ namespace glint::apps {
 /// builder takes more. pyramidBytes() of the builder and the tables of others are estimates of their own.
 struct BytesPerTexel {
   static constexpr double kSynth = 96;            ///< normals or heights, the spectrum of noise, the encoded image
-  static constexpr double kBinMap = 32;           ///< texels sorted by bins, twice
   static constexpr double kMoments = 28;          ///< six moments of all levels
   static constexpr double kTextures = 160;        ///< the same, and pictures of them
   static constexpr double kExplicit = 20;         ///< normals, and their bounds
@@ -24,6 +23,9 @@ struct BytesPerTexel {
   static constexpr double kPicture = 40;          ///< densities or colours, and the encoded picture
 };
 inline constexpr int kFineFactor = 8;
+
+/// Memory that is taken beside arrays in files (FiledMemory): rows that are being read, and small arrays.
+inline constexpr double kLeastBytes = 16 << 20;
 
 /// Refuses work on so many texels if it takes more than --max-memory.
 /// @param what  "a bin map of"; the size is added

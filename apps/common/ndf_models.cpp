@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/files.h"
+#include "common/texel_checks.h"
 #include "glint/api/alternatives.h"
 #include "glint/api/plane_position.h"
 #include "glint/bake/common/reference_image.h"
@@ -40,6 +41,11 @@ void NdfAsset::addPyramidOptions() {
               "--normals", normals_path_,
               "asset of kind normals that the pyramid was made from, for footprints below its finest level; instead of the "
               "normals that the pyramid keeps, if it does"));
+  useOnly(
+      {"ndf-pyramid", "ndf-cp"}, "--kept-normals",
+      tool_.choice("--kept-normals", options_.use_kept_normals, {{"used", true}, {"ignored", false}},
+                   "whether the normals that the pyramid keeps answer small footprints: without them it answers as one that "
+                   "keeps none, to compare, or for speed (kinds ndf-pyramid and ndf-cp)"));
   useOnly({"ndf-pyramid", "ndf-cp", "slope-moments", "wang-cp", "wang-pyramid", "wave-pyramid"}, "--parts",
           tool_
               .option("--parts", options_.footprint_parts,
@@ -143,6 +149,7 @@ void NdfAsset::open(const formats::OpenOptions& checks) {
 
 std::optional<std::vector<float>> NdfAsset::scatteredImage(const Footprint& footprint, int size) const {
   if (!std::holds_alternative<Reference>(model()) || options_.surface != Surface::flat) return std::nullopt;
+  if (tool_.trust()) requireNormals(opened_->asset().get<NormalMap>(), path_);
   return bake::referenceImage(opened_->asset().get<NormalMap>(), options_.sigma_r, options_.surface, options_.boundary,
                               footprint, size);
 }
@@ -188,15 +195,21 @@ bool NdfAsset::widens(const Footprint& footprint) const {
       model());
 }
 
+std::string NdfAsset::normalsRemedy() const {
+  if (!options_.use_kept_normals) return "leave --kept-normals ignored out, of a pyramid that was made with --keep-normals";
+  if (std::holds_alternative<api::UdimNdf>(model()))
+    return "add --normals with the pattern of the assets that the pyramids were made from, or make every pyramid with "
+           "--keep-normals";
+  return "add --normals with the asset that the pyramid was made from, or make the pyramid with --keep-normals";
+}
+
 std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint) const {
   if (opened_->hasNormals()) return {};
   if (std::holds_alternative<api::UdimNdf>(model())) {
     const float sigma = meanSigma(footprint), finest = info().finest_sigma_texels;
     if (sigma >= finest * 0.999f || opened_->asset().kind() == "slope-moments") return {};
-    return FootprintFault{
-        fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
-        "add --normals with the pattern of the assets that the pyramids were made from, or make every pyramid with "
-        "--keep-normals"};
+    return FootprintFault{fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
+                          normalsRemedy()};
   }
   return std::visit(
       [&](const auto& m) -> std::optional<FootprintFault> {
@@ -207,7 +220,7 @@ std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint)
               fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
               opened_->asset().kind() == "wave-pyramid"
                   ? "make the pyramid again with a smaller --stride: without their neighbours texels do not diffract"
-                  : "add --normals with the asset that the pyramid was made from, or make the pyramid with --keep-normals"};
+                  : normalsRemedy()};
         } else {
           return {};
         }

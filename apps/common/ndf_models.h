@@ -54,6 +54,9 @@ class NdfAsset {
   /// Why the asset cannot answer for a footprint without --normals; nothing if it can.
   std::optional<FootprintFault> unanswerable(const Footprint& footprint) const;
 
+  /// How to have footprints below the finest level answered.
+  std::string normalsRemedy() const;
+
   /// Whether the asset answers a wider footprint, for want of --normals.
   bool widens(const Footprint& footprint) const;
 

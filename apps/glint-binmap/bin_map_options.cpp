@@ -5,6 +5,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "common/memory_needs.h"
 #include "common/numbers.h"
 #include "glint/model/error.h"
 
@@ -31,6 +32,12 @@ BinMapOptions::BinMapOptions(Tool& tool) {
               "asked with any roughness between them. The default is the roughness of the other tools' --sigma-r 0.005");
   tool.addCheck([this] { parseAlpha(alpha_, options_); });
   tool.option("--leaf-size", options_.leaf_size, "texels of a cell of the map within a list, on average at least");
+}
+
+double BinMapOptions::leastBytes() const {
+  constexpr double kBytesPerBin = 16;  // counts, blocks and nodes of all bins
+  const double bins = bake::binsPerAxis(options_.alpha >= bake::kMinBinAlpha ? options_.alpha : bake::kMinBinAlpha);
+  return kLeastBytes + kBytesPerBin * bins * bins;
 }
 
 BuiltBinMap BinMapOptions::build(const NormalMap& map, const bake::ProgressFn& progress) const {

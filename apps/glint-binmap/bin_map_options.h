@@ -19,6 +19,8 @@ class BinMapOptions {
  public:
   explicit BinMapOptions(Tool& tool);
 
+  /// Memory that a bin map takes beside arrays that may be in files, bytes.
+  double leastBytes() const;
   /// @throws what bake::buildBinMap throws
   BuiltBinMap build(const NormalMap& map, const bake::ProgressFn& progress) const;
 

@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "common/filed_memory.h"
 #include "common/files.h"
 #include "common/input_asset.h"
 #include "common/memory_needs.h"
@@ -21,12 +22,13 @@ int main(int argc, char** argv) {
   apps::BinMapOptions options(tool);
 
   return tool.run(argc, argv, [&] {
+    const apps::FiledMemory memory(tool, output.path(), options.leastBytes(), "any bin map");
     const formats::Asset asset = apps::openInput(tool, input.path());
     const formats::Provenance provenance = tool.provenance();
     const auto& map = asset.get<NormalMap>();
-    apps::requireMemoryFor(tool, "a bin map of", map.width, map.height, apps::BytesPerTexel::kBinMap);
     const apps::BuiltBinMap built = options.build(map, tool.progress("passes"));
     formats::writeAsset(output.path(), built.data.view(), provenance, output.writeOptions());
+    memory.warnAbout(tool);
     tool.setResult(apps::binMapJson(built));
     tool.summary(apps::binMapText(built));
   });

@@ -1,5 +1,7 @@
 #include "glint-farm/map_folder.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <map>
@@ -45,6 +47,26 @@ void addFlags(FarmJob& job, const RecipeStep& step, const std::string& stem, con
   }
 }
 
+/// Adds jobs that make a pyramid in parts, and one that joins them. The parts are named as glint.mk names them.
+/// @param whole  the job of one run: "NAME.pyramid.glint"
+void addShards(std::vector<FarmJob>& jobs, const FarmJob& whole, int count) {
+  const std::string ending = ".glint", stem = whole.output.substr(0, whole.output.size() - ending.size());
+  FarmJob join;
+  join.output = whole.output;
+  join.command = {"glint-merge"};
+  for (int index = 1; index <= count; ++index) {
+    FarmJob part = whole;
+    part.output = fmt::format("{}.{}of{}{}", stem, index, count, ending);
+    std::replace(part.command.begin(), part.command.end(), whole.output, part.output);
+    part.command.insert(part.command.end(), {"--region", fmt::format("{}/{}", index, count)});
+    join.inputs.push_back(part.output);
+    join.command.push_back(part.output);
+    jobs.push_back(std::move(part));
+  }
+  join.command.insert(join.command.end(), {"-o", join.output});
+  jobs.push_back(std::move(join));
+}
+
 void refuseTwins(const std::vector<std::string>& images, const std::string& folder) {
   std::map<std::string, std::string> by_stem;
   for (const std::string& image : images) {
@@ -82,7 +104,7 @@ std::vector<std::string> imagesIn(const std::string& folder, const std::string& 
 }
 
 std::vector<FarmJob> jobsOf(const std::string& image, const std::string& maps, const std::string& assets,
-                            const std::string& here, const std::vector<RecipeStep>& recipe) {
+                            const std::string& here, const std::vector<RecipeStep>& recipe, int map_shards) {
   const std::string stem = fs::path(image).replace_extension().string();
   std::map<std::string, std::string> made;  // kind -> file
   std::vector<FarmJob> jobs;
@@ -95,7 +117,10 @@ std::vector<FarmJob> jobsOf(const std::string& image, const std::string& maps, c
     job.command.insert(job.command.end(), kind.command.begin() + 1, kind.command.end());
     addFlags(job, step, stem, here);
     made[kind.name] = job.output;
-    jobs.push_back(std::move(job));
+    if (map_shards > 1 && kind.name == std::string("pyramid"))
+      addShards(jobs, job, map_shards);
+    else
+      jobs.push_back(std::move(job));
   }
   return jobs;
 }

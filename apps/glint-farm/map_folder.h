@@ -18,7 +18,8 @@ std::vector<std::string> imagesIn(const std::string& folder, const std::string& 
 /// @param maps    folder of the image, as the manifest's folder sees it
 /// @param assets  folder of the assets, likewise
 /// @param here    folder in which flags name files, likewise
+/// @param map_shards  parts in which a pyramid is made, which a job of its own joins; 1: one run
 std::vector<FarmJob> jobsOf(const std::string& image, const std::string& maps, const std::string& assets,
-                            const std::string& here, const std::vector<RecipeStep>& recipe);
+                            const std::string& here, const std::vector<RecipeStep>& recipe, int map_shards);
 
 }  // namespace glint::apps

@@ -11,6 +11,7 @@
 #include "glint-farm/jobs_file.h"
 #include "glint-farm/manifest_builder.h"
 #include "glint-farm/map_folder.h"
+#include "glint/model/ndf_pyramid_shard.h"
 #include "manifest/entry_records.h"
 
 namespace glint::apps {
@@ -61,6 +62,11 @@ FarmPlanCommand::FarmPlanCommand(Tool& tool)
       ->allow_extra_args(false)
       ->type_name("KIND")
       ->default_str("");
+  tool.option(
+          "--map-shards", map_shards_,
+          "make each pyramid in so many parts, which glint-merge joins: for maps whose images are too many for one run; see "
+          "glint-pyramid --region")
+      .range(1, kMostRegions);
   tool.option("--assets", assets_, "folder of the assets").defaultText("assets, beside the manifest").unrecorded();
   tool.addCheck([this] { check(); });
 }
@@ -72,8 +78,8 @@ void FarmPlanCommand::check() {
   if (!folder_.empty() && makes_.empty())
     refuse("--make", "nothing is to be made of the images",
            "give a kind, such as --make pyramid; the kinds are " + recipeKindNames());
-  if (!from_.empty() && !(makes_.empty() && assets_.empty()))
-    refuse("--from", "a plan says what to make, and where", "leave out --make and --assets");
+  if (!from_.empty() && !(makes_.empty() && assets_.empty() && map_shards_ == 1))
+    refuse("--from", "a plan says what to make, and where", "leave out --make, --assets and --map-shards");
   if (!from_.empty()) {
     checkRegular(from_);
     tool_.addInput(from_);
@@ -93,7 +99,7 @@ void FarmPlanCommand::run() {
     if (assets_.empty()) assets_ = folder + "/assets";
     const std::string there = seenFrom(folder_, folder), assets = seenFrom(assets_, folder), here = seenFrom(".", folder);
     for (const std::string& image : imagesIn(folder_, assets_)) {
-      std::vector<FarmJob> of_image = jobsOf(image, there, assets, here, recipe);
+      std::vector<FarmJob> of_image = jobsOf(image, there, assets, here, recipe, map_shards_);
       maps.push_back(of_image.front().inputs.front());
       std::move(of_image.begin(), of_image.end(), std::back_inserter(jobs));
     }

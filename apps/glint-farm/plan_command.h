@@ -23,6 +23,7 @@ class FarmPlanCommand {
   Tool& tool_;
   std::string folder_, from_, assets_;
   std::vector<std::string> makes_;
+  int map_shards_ = 1;
   OutputFile output_;
 };
 

@@ -1,7 +1,8 @@
 #include <nlohmann/json.hpp>
 
+#include "common/filed_memory.h"
 #include "common/files.h"
-#include "glint-ingest/ingest_memory.h"
+#include "common/memory_needs.h"
 #include "glint-ingest/ingest_options.h"
 #include "glint-ingest/normals_output.h"
 #include "glint-ingest/udim_ingest.h"
@@ -22,7 +23,7 @@ int main(int argc, char** argv) {
 
   return tool.run(argc, argv, [&] {
     if (input.isSet()) return set.run();
-    const apps::IngestMemory memory(tool, output.path());
+    const apps::FiledMemory memory(tool, output.path(), apps::kLeastBytes, "any image");
     const apps::Image image = options.read(tool, input.path(), true);
     const bake::IngestOptions values = options.values(tool, input.path(), image);
     const formats::Provenance provenance = tool.provenance();

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <cstring>
+#include <memory_resource>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "common/input_asset.h"
+#include "glint/bake/ingest/near_normals.h"
 #include "glint/bake/pyramid/join.h"
 #include "glint/formats/hash.h"
 #include "glint/formats/streamed_writer.h"
@@ -54,6 +57,12 @@ std::string firstDifference(const std::string& text, const std::string& of_first
     if (*found != value) return fmt::format("--{} is {}, not {}", key, found->dump(), value.dump());
   }
   return "it has more parameters";
+}
+
+/// Whether both pyramids keep normals of the same type, or none.
+bool keepSame(const NdfPyramidShard& a, const NdfPyramidShard& b) {
+  return a.near_normals.has_value() == b.near_normals.has_value() &&
+         (!a.near_normals || a.near_normals->type == b.near_normals->type);
 }
 
 /// Whether all but the arrays are the same.
@@ -108,7 +117,7 @@ void Shards::requireSameRun(const File& file, const File& first) {
   if (run.command_json != first_run.command_json)
     refuseDifferent(file.path, fmt::format("was made with other parameters than {}: {}", first.path,
                                            firstDifference(run.command_json, first_run.command_json)));
-  if (shard.level_choice != other.level_choice || !sameShape(shard.images, other.images))
+  if (shard.level_choice != other.level_choice || !sameShape(shard.images, other.images) || !keepSame(shard, other))
     refuseDifferent(file.path, fmt::format("holds images of a pyramid of another shape than {}", first.path));
 }
 
@@ -133,13 +142,13 @@ void Shards::requireAllRegions() const {
 
 namespace {
 
-/// The bytes of an array of a level of all shards, one after the other, read from their files.
-formats::ByteSource joinedArray(const Shards& shards, int level, const std::string& name) {
+/// The bytes of an array of all shards, one after the other, read from their files.
+/// @param object  path of the array, such as "/level_00/masks"
+formats::ByteSource joinedArray(const Shards& shards, const std::string& object) {
   struct Piece {
     std::string path, hash;
     std::uint64_t offset, size_bytes;
   };
-  const std::string object = fmt::format("/level_{:02}/{}", level, name);
   std::vector<Piece> pieces;
   for (std::size_t k = 0; k < shards.views().size(); ++k) {
     const std::vector<formats::DatasetInfo>& datasets = shards.info(k).datasets;
@@ -160,28 +169,47 @@ formats::ByteSource joinedArray(const Shards& shards, int level, const std::stri
   };
 }
 
+/// The normals that the pyramid keeps, from those of all shards; nothing where they keep none.
+std::optional<bake::NearNormalsData> joinedNormals(const Shards& shards, const PyramidShape& shape) {
+  const std::optional<ShardNormals>& first = shards.views().front().near_normals;
+  if (!first) return {};
+  std::pmr::vector<Vec2> normals(rowMajorIndex(0, shape.height, shape.width));
+  std::byte* to = std::as_writable_bytes(std::span(normals)).data();
+  joinedArray(shards, "/near/normals")([&](std::span<const std::byte> bytes) {
+    std::memcpy(to, bytes.data(), bytes.size());  // the rows of all regions are those of the map
+    to += bytes.size();
+  });
+  NearNormals near;
+  near.width = shape.width;
+  near.height = shape.height;
+  near.texels = normals.data();
+  return bake::keepNormals(near, first->type);
+}
+
 }  // namespace
 
-PyramidShape writeJoined(const Shards& shards, const OutputFile& output) {
+JoinedPyramid writeJoined(const Shards& shards, const OutputFile& output) {
   const std::vector<NdfPyramidShard>& views = shards.views();
   NdfPyramid pyramid;
   pyramid.shape = bake::joinedShape(views);
   pyramid.precision = views.front().images.precision;
   pyramid.value_scale = views.front().images.value_scale;
-  std::vector<std::vector<std::uint32_t>> ranks(static_cast<std::size_t>(pyramid.shape.level_count));
+  std::vector<std::pmr::vector<std::uint32_t>> ranks(static_cast<std::size_t>(pyramid.shape.level_count));
   formats::ByteSources sources;
   for (int l = 0; l < pyramid.shape.level_count; ++l) {
     const int from = bake::levelInShards(views.front(), pyramid.shape, l);
-    std::vector<std::uint32_t>& level_ranks = ranks[static_cast<std::size_t>(l)];
+    std::pmr::vector<std::uint32_t>& level_ranks = ranks[static_cast<std::size_t>(l)];
     level_ranks = bake::joinedRanks(views, from);
     const std::size_t blocks = level_ranks.back();
     pyramid.levels[l] = {formats::spanOfSize<std::uint64_t>(level_ranks.size() - 1), level_ranks,
                          formats::spanOfSize<float>(blocks), formats::spanOfSize<float>(1).data()};
     for (const char* name : {"masks", "block_means", "pixels"})
-      sources[fmt::format("/level_{:02}/{}", l, name)] = joinedArray(shards, from, name);
+      sources[fmt::format("/level_{:02}/{}", l, name)] = joinedArray(shards, fmt::format("/level_{:02}/{}", from, name));
   }
+  const std::optional<bake::NearNormalsData> kept = joinedNormals(shards, pyramid.shape);
+  if (kept) pyramid.near_normals = kept->view();
   formats::writeStreamedAsset(output.path(), pyramid, shards.record(), sources, output.writeOptions());
-  return pyramid.shape;
+  return {pyramid.shape, kept ? bake::nearBytes(kept->view()) : 0};
 }
 
 }  // namespace glint::apps

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -39,8 +40,14 @@ class Shards {
   formats::Provenance record_;
 };
 
-/// Joins shards and writes the pyramid. Images go from file to file in pieces, and are never in memory together.
-/// @return the shape of the pyramid
-PyramidShape writeJoined(const Shards& shards, const OutputFile& output);
+/// What shards were joined to.
+struct JoinedPyramid {
+  PyramidShape shape;
+  std::uint64_t near_bytes = 0;  ///< of the normals that it keeps, and of their bounds
+};
+
+/// Joins shards and writes the pyramid. Images go from file to file in pieces, and are never in memory together. Indices and kept
+/// normals are in memory of the default resource.
+JoinedPyramid writeJoined(const Shards& shards, const OutputFile& output);
 
 }  // namespace glint::apps

@@ -18,7 +18,8 @@ using apps::kLessMemory;
 /// Writes the images of all tiles of a plane.
 void makeWangPyramid(apps::Tool& tool, const WangTiles& tiles, const apps::PyramidOptions& options,
                      const formats::Provenance& provenance, const apps::OutputFile& output) {
-  options.refuseKeeping("the images of Wang tiles");
+  options.refuseKeeping("the images of Wang tiles",
+                        "leave it out, and give a smaller --stride, or ask the tiles themselves: glint-query takes wang-tiles");
   const bake::PyramidOptions values = options.values();
   tool.requireMemory(bake::wangPyramidBytes(tiles, values, static_cast<double>(tool.maxMemory())), "the NDF images",
                      kLessMemory);

@@ -26,7 +26,7 @@ class PyramidOptions {
   /// Refuses --keep-normals for what keeps none.
   /// @param what    "the images of Wang tiles"
   /// @throws Error usage
-  void refuseKeeping(const std::string& what, const std::string& remedy = "leave --keep-normals out") const;
+  void refuseKeeping(const std::string& what, const std::string& remedy) const;
   /// Whether the resolution is to follow from the roughness.
   bool autoResolution() const { return resolution_ == "auto"; }
   /// The first of the options that was given and that only geometric optics has; empty: none.

@@ -2,41 +2,32 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "common/input_asset.h"
 #include "common/part.h"
+#include "common/texel_checks.h"
 #include "glint/formats/asset_reader.h"
 #include "glint/formats/asset_writer.h"
-#include "glint/model/counted.h"
-#include "glint/model/texel_name.h"
 
 namespace glint::apps {
 namespace {
 
-/// Refuses texels that are no normals, which builders would follow out of their arrays.
-void checkNormals(const NormalMap& map, const std::vector<std::uint8_t>& rows, const std::string& path) {
-  TexelTally infinite(map.width, map.height), outside(map.width, map.height);
-  for (std::size_t j = 0; j < rows.size(); ++j) {
-    if (rows[j] == 0) continue;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(map.width); ++i) {
-      const std::size_t k = j * static_cast<std::size_t>(map.width) + i;
-      const Vec2 n = map.normals[k];
-      if (!std::isfinite(n.x) || !std::isfinite(n.y))
-        infinite.add(k);
-      else if (!(dot(n, n) < 1))
-        outside.add(k);
-    }
-  }
-  const auto refuse = [&](const TexelTally& tally, const char* rule, const Subject& subject, const char* what) {
-    if (tally.count() == 0) return;
-    throw Error(ErrorCode::invalid_input, rule, path, "/normals",
-                counted(tally.count(), subject) + " " + what + " (first at " + tally.firstName() + ")",
-                "make it again with glint-ingest");
-  };
-  refuse(infinite, "normals.finite", {"texel is", "texels are"}, "not finite");
-  refuse(outside, "normals.disk", {"normal is", "normals are"}, "not inside the unit disk");
+/// The rows of texels that a shard is made of: those that its images reach, and those whose normals it keeps.
+std::vector<std::uint8_t> rowsUsed(const PyramidShape& shape, PyramidRegion region, bool keeps) {
+  std::vector<std::uint8_t> rows = bake::rowsReached(shape, region);
+  const ImageRows own = regionTexels(shape.height, region);
+  if (keeps) std::fill(rows.begin() + own.first, rows.begin() + own.end, std::uint8_t{1});
+  return rows;
+}
+
+/// The normals of a region.
+ShardNormals normalsOf(const NormalMap& map, PyramidRegion region, KeepNormals keep) {
+  const ImageRows rows = regionTexels(map.height, region);
+  const auto width = static_cast<std::size_t>(map.width);
+  return {keep == KeepNormals::i16 ? NearType::i16 : NearType::f32, rows.count(),
+          map.normals.subspan(static_cast<std::size_t>(rows.first) * width, static_cast<std::size_t>(rows.count()) * width)};
 }
 
 }  // namespace
@@ -62,7 +53,6 @@ RegionOption::RegionOption(Tool& tool, const WaveOptions& wave) {
 
 void makeShard(Tool& tool, const InputFile& input, const PyramidOptions& options, const RegionOption& option,
                const OutputFile& output) {
-  options.refuseKeeping("shards", "leave it out here, and give glint-compress --normals and --keep-normals");
   if (input.isSet()) refuseUdim(input.path(), "is a UDIM set, and --region divides one map");
   const formats::Asset asset = formats::Asset::open(input.path(), {.verify_hashes = !tool.trust(), .hash_in_pieces = true});
   if (asset.info().udim) refuseUdim(input.path(), "is a tile of a UDIM set, and --region divides maps without margins");
@@ -73,14 +63,17 @@ void makeShard(Tool& tool, const InputFile& input, const PyramidOptions& options
   const bake::PyramidOptions values = options.values();
   bake::checkPyramidOptions(values);
   const PyramidRegion region = option.region();
-  if (!tool.trust())
-    checkNormals(map, bake::rowsReached(bake::pyramidShape(map.width, map.height, values), region), input.path());
+  const PyramidShape shape = bake::pyramidShape(map.width, map.height, values);
+  requireNormals(map, input.path(), rowsUsed(shape, region, options.keepsNormals()));
   tool.requireMemory(bake::pyramidBytes(map, values, static_cast<double>(tool.maxMemory()), region), "the NDF images",
                      "divide the map into more regions, or give a larger --stride");
   const formats::Provenance provenance = tool.provenance();
   const bake::NdfPyramidShardData shard = bake::buildPyramidShard(map, values, region, tool.progress("images"));
-  formats::writeAsset(output.path(), shard.view(), provenance, output.writeOptions());
+  NdfPyramidShard view = shard.view();
+  if (options.keepsNormals()) view.near_normals = normalsOf(map, region, options.keep());
+  formats::writeAsset(output.path(), view, provenance, output.writeOptions());
   nlohmann::json result = pyramidJson(shard.images, region);
+  if (view.near_normals) result["near_normals_bytes"] = view.near_normals->normals.size_bytes();
   result["region"] = {{"index", region.index}, {"count", region.count}};
   tool.setResult(result);
   tool.summary(pyramidText(shard.images, region));

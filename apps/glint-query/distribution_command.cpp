@@ -88,10 +88,8 @@ void DistributionCommand::run() {
 }
 
 void DistributionCommand::warnOfWidening(const std::string& which) {
-  tool_.warn(
-      fmt::format("{}: {} answered up to {:.3g} texels wide; add --normals with the asset that the pyramid was made from, or "
-                  "make the pyramid with --keep-normals",
-                  asset_.path(), which, asset_.info().smallest_sigma_texels));
+  tool_.warn(fmt::format("{}: {} answered up to {:.3g} texels wide; {}", asset_.path(), which,
+                         asset_.info().smallest_sigma_texels, asset_.normalsRemedy()));
 }
 
 void DistributionCommand::answerTable() {

@@ -1,7 +1,9 @@
 #include <nlohmann/json.hpp>
 
+#include "common/filed_memory.h"
 #include "common/files.h"
 #include "common/input_asset.h"
+#include "common/memory_needs.h"
 #include "common/tool.h"
 #include "glint-sat/sat_options.h"
 #include "glint/formats/asset_writer.h"
@@ -21,10 +23,12 @@ int main(int argc, char** argv) {
   return tool.run(argc, argv, [&] {
     const formats::Asset asset = apps::openInput(tool, input.path());
     const auto& map = asset.get<NormalMap>();
-    tool.requireMemory(bake::histogramSatBytes(map, options.values()), "the tables", "give a larger --stride, or fewer --bins");
+    const apps::FiledMemory memory(tool, output.path(), apps::kLeastBytes + bake::histogramStatisticsBytes(options.values()),
+                                   "any table");
     const formats::Provenance provenance = tool.provenance();
     const bake::HistogramSatData sat = bake::buildHistogramSat(map, options.values(), tool.progress("tables"));
     formats::writeAsset(output.path(), sat.view(), provenance, output.writeOptions());
+    memory.warnAbout(tool);
     tool.setResult(apps::satJson(sat));
     tool.summary(apps::satText(sat));
   });

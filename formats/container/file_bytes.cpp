@@ -13,6 +13,7 @@
 
 #include "glint/formats/descriptor.h"
 #include "glint/formats/findings.h"
+#include "glint/formats/mapped_files.h"
 #include "glint/formats/system_error.h"
 
 namespace glint::formats {
@@ -38,7 +39,9 @@ void readAll(int file, std::uint64_t offset, std::span<std::byte> to) {
 void FileBytes::Release::operator()(std::byte* bytes) const { ::operator delete(bytes, kAlignment); }
 
 FileBytes::~FileBytes() {
-  if (mapped_) ::munmap(const_cast<std::byte*>(bytes_.data()), bytes_.size());
+  if (!mapped_) return;
+  forgetMappedFile(bytes_);
+  ::munmap(const_cast<std::byte*>(bytes_.data()), bytes_.size());
 }
 
 void FileBytes::swap(FileBytes& other) noexcept {
@@ -71,6 +74,7 @@ FileBytes FileBytes::ofFile(const std::filesystem::path& path, bool copy) {
   if (address == MAP_FAILED) throwUnreadable({}, "cannot be mapped", errno);
   bytes.bytes_ = {static_cast<const std::byte*>(address), size};
   bytes.mapped_ = true;
+  rememberMappedFile(bytes.bytes_);
   return bytes;
 }
 

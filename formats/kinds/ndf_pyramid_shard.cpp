@@ -1,6 +1,7 @@
 #include "glint/model/ndf_pyramid_shard.h"
 
 #include "glint/formats/kinds/description.h"
+#include "glint/formats/kinds/near_fields.h"
 #include "glint/formats/kinds/pyramid_fields.h"
 
 namespace glint::formats {
@@ -12,7 +13,8 @@ struct KindDescription<NdfPyramidShard> {
   static std::vector<Rule> indexRules() {
     return {errorRule("shard.region", "region_index is at most region_count"),
             errorRule("shard.mean", "the last level is the mean of the map"),
-            errorRule("shard.rows", "level_region_rows are the rows whose centres lie in the region")};
+            errorRule("shard.rows", "level_region_rows are the rows whose centres lie in the region"),
+            errorRule("shard.near_rows", "near_rows are the rows of texels of the region")};
   }
   static std::vector<Rule> valueRules() { return {}; }
 
@@ -26,8 +28,16 @@ struct KindDescription<NdfPyramidShard> {
     const auto rows = [&](int l) -> auto& { return shard.rows[l]; };
     fields.levelIntegers("level_region_rows", shard.images.shape.level_count, rows, {0, kMaxMapSize}, "1",
                          "rows of footprints of each level that are in the region");
+    fields.together(kNearNormals, shard.near_normals, [&](auto&& near) {
+      fields.choice(kNearNormals, near.type, "f32|i16", "type of the normals that the joined pyramid keeps");
+      fields.integer("near_rows", near.rows, {0, kMaxMapSize}, "1", "rows of texels that are in the region");
+    });
     describePyramidLevels(fields, shard.images, [](int, std::uint64_t) {},
                           {"level_region_rows[l]", "level_region_rows[l] * level_columns[l] * mask_words + 1"});
+    fields.together(kNearNormals, shard.near_normals, [&](auto&& near) {
+      fields.array("near/normals", near.normals, {"near_rows", "width", "2"}, "1",
+                   "(nx, ny) of the texels of the region on the unit disk, bottom row first");
+    });
   }
 
   static void checkIndex(const NdfPyramidShard& shard, Findings& findings) {
@@ -45,6 +55,12 @@ struct KindDescription<NdfPyramidShard> {
                      "has " + std::to_string(shard.rows[l]) + " rows of level " + std::to_string(l) + ", not " +
                          std::to_string(expected));
     }
+    if (shard.near_normals) {
+      const int expected = regionTexels(shape.height, shard.region).count();
+      if (shard.near_normals->rows != expected)
+        findings.add("shard.near_rows", "/@near_rows",
+                     "is " + std::to_string(shard.near_normals->rows) + ", not " + std::to_string(expected));
+    }
     checkPyramidIndex(shard.images, findings);
   }
 
@@ -52,6 +68,12 @@ struct KindDescription<NdfPyramidShard> {
     NdfPyramid held = shard.images;  // whose levels are as large as their arrays
     for (int l = 0; l < held.shape.level_count; ++l) held.shape.levels[l].rows = shard.rows[l];
     checkPyramidValues(held, findings);
+    if (!shard.near_normals) return;
+    NearNormals near;
+    near.width = shard.images.shape.width;
+    near.height = shard.near_normals->rows;
+    near.texels = shard.near_normals->normals.data();
+    checkNearDisk(near, findings);
   }
 };
 

@@ -66,15 +66,19 @@ void checkNearIndex(const std::optional<NearNormals>& near, Findings& findings) 
                  "has " + std::to_string(top.columns) + " x " + std::to_string(top.rows) + " nodes, not one");
 }
 
-void checkNearValues(const std::optional<NearNormals>& near, Findings& findings) {
-  if (!near) return;
-  TexelTally outside(near->width, near->height);
-  const std::size_t texels = rowMajorIndex(0, near->height, near->width);
+void checkNearDisk(const NearNormals& near, Findings& findings) {
+  TexelTally outside(near.width, near.height);
+  const std::size_t texels = rowMajorIndex(0, near.height, near.width);
   for (std::size_t k = 0; k < texels; ++k) {
-    const Vec2 n = near->normal(k);
+    const Vec2 n = near.normal(k);
     if (!(dot(n, n) < 1)) outside.add(k);
   }
   report(outside, "near.disk", "/near/normals", {"normal is", "normals are"}, "not inside the unit disk", findings);
+}
+
+void checkNearValues(const std::optional<NearNormals>& near, Findings& findings) {
+  if (!near) return;
+  checkNearDisk(*near, findings);
   checkBounds(*near, "near.bounds", "near/bounds/level_{l}", findings);
 }
 

@@ -52,6 +52,8 @@ void describeNearArrays(Fields auto& fields, auto& asset) {
 
 /// Rules near.step and near.bounds_levels.
 void checkNearIndex(const std::optional<NearNormals>& near, Findings& findings);
+/// Rule near.disk.
+void checkNearDisk(const NearNormals& near, Findings& findings);
 /// Rules near.disk and near.bounds.
 void checkNearValues(const std::optional<NearNormals>& near, Findings& findings);
 

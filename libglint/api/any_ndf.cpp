@@ -166,6 +166,7 @@ OpenedNdf OpenedNdf::open(formats::Asset asset, const std::filesystem::path& pat
 OpenedNdf OpenedNdf::openMap(formats::Asset asset, const std::filesystem::path& path, const NdfOptions& options) {
   OpenedNdf opened(path, options);
   opened.asset_ = std::move(asset);
+  if (!options.use_kept_normals) opened.asset_->leaveOutNearNormals();
   if (!options.normals.empty()) opened.normals_ = formats::Asset::open(options.normals, options.checks);
   const std::string_view kind = opened.asset_->kind();
   if (!answersNdf(kind)) refuseKind(kind, path);

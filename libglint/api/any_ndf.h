@@ -56,7 +56,8 @@ class OpenedNdf {
   /// Bytes of the asset, or of all tiles.
   std::uint64_t fileBytes() const;
   const std::filesystem::path& path() const { return path_; }
-  /// Whether footprints below level 0 are answered from the texels: of `options.normals`, or of the normals that the asset keeps.
+  /// Whether footprints below level 0 are answered from the texels: of `options.normals`, or of the normals that the asset keeps
+  /// where `options.use_kept_normals` is set.
   bool hasNormals() const;
   /// The map of `options.normals`; nullptr if there is none, and for UDIM sets, which have one for each tile.
   const NormalMap* normals() const { return normals_ ? &normals_->get<NormalMap>() : nullptr; }

@@ -141,7 +141,7 @@ using namespace glint::api::c;
 constexpr float kLeastSigmaR = 1e-4f, kMostSigmaR = 0.25f;
 /// Size of the options in the first version of the struct.
 constexpr std::size_t kFirstOptionsSize = offsetof(glint_open_options, verify_hashes) + sizeof(int32_t);
-static_assert(offsetof(glint_open_options, reserved) + sizeof(int32_t) == sizeof(glint_open_options),
+static_assert(offsetof(glint_open_options, kept_normals) + sizeof(int32_t) == sizeof(glint_open_options),
               "padding at the end would be read as a member by a later library");
 
 /// @return null if the options can be used, else the fault
@@ -164,7 +164,8 @@ const char* takeOptions(const glint_open_options* from, glint_open_options& to) 
     return "unknown interpolation";
   if (to.pixels != GLINT_PIXELS_SMOOTH && to.pixels != GLINT_PIXELS_CONSTANT) return "unknown pixels";
   if (to.bins != GLINT_BINS_LOBES && to.bins != GLINT_BINS_EVEN) return "unknown bins";
-  if (to.reserved != 0) return "reserved is not 0";
+  if (to.kept_normals != GLINT_KEPT_NORMALS_USED && to.kept_normals != GLINT_KEPT_NORMALS_IGNORED)
+    return "unknown kept_normals";
   if (to.estimator != GLINT_ESTIMATOR_EXACT && to.estimator != GLINT_ESTIMATOR_PUBLISHED) return "unknown estimator";
   return nullptr;
 }
@@ -173,6 +174,7 @@ api::NdfOptions optionsOf(const glint_open_options& o) {
   api::NdfOptions options;
   if (o.normals_path != nullptr) options.normals = o.normals_path;
   if (o.sigma_r != 0) options.sigma_r = o.sigma_r;
+  options.use_kept_normals = o.kept_normals == GLINT_KEPT_NORMALS_USED;
   options.surface = static_cast<Surface>(o.surface);
   options.boundary = static_cast<Boundary>(o.boundary);
   options.checks.verify_hashes = o.verify_hashes != 0;

@@ -92,6 +92,10 @@ enum {
       1 /* a lobe with the mean and the spread of the bin's normals over the whole map: continuous, and slower; even
                           in the outermost ring of bins */
 };
+enum {
+  GLINT_KEPT_NORMALS_USED = 0,   /* footprints below level 0 are answered from them */
+  GLINT_KEPT_NORMALS_IGNORED = 1 /* the asset answers as one that keeps none: to compare, or for speed */
+};
 
 /* Structs that start with a struct_size may grow: it says which version of the struct the caller has. A size that is smaller
  * than the first version's or above this is no size of a struct, and GLINT_ERROR_USAGE. */
@@ -103,7 +107,7 @@ typedef struct glint_open_options {
   size_t struct_size;       /* sizeof(glint_open_options) */
   const char* normals_path; /* asset of kind normals that the pyramid was made from: it answers footprints below level 0. Null:
                                the normals that the pyramid keeps answer them (glint-pyramid --keep-normals), and the nearest
-                               level where it keeps none */
+                               level where it keeps none, or where kept_normals says so */
   float sigma_r;            /* kinds normals, slope-moments and histogram-sat: intrinsic roughness, disk units, 1e-4 to 0.25; 0:
                                0.005 */
   int32_t surface;          /* kind normals: GLINT_SURFACE_* */
@@ -120,11 +124,11 @@ typedef struct glint_open_options {
                                answered */
   int32_t pixels;           /* kinds with levels of images: GLINT_PIXELS_*, how densities run between half vectors of one pixel
                                of an image */
-  int32_t copy;      /* not 0: copy the bytes of the asset into memory of its own. For files that others may truncate while
+  int32_t copy;         /* not 0: copy the bytes of the asset into memory of its own. For files that others may truncate while
                                they are open, which would end the program with SIGBUS, and for memory that does not stay */
-  int32_t estimator; /* kind bin-map: GLINT_ESTIMATOR_*, how densities are made of the texels; means and samples are exact */
-  int32_t bins;      /* kind histogram-sat: GLINT_BINS_*, where the normals of a bin are */
-  int32_t reserved;  /* 0 */
+  int32_t estimator;    /* kind bin-map: GLINT_ESTIMATOR_*, how densities are made of the texels; means and samples are exact */
+  int32_t bins;         /* kind histogram-sat: GLINT_BINS_*, where the normals of a bin are */
+  int32_t kept_normals; /* kinds ndf-pyramid and ndf-cp: GLINT_KEPT_NORMALS_*, whether the asset's own normals are used */
 } glint_open_options;
 
 #define GLINT_SLANT_EXACT (-1.0f)

@@ -30,6 +30,9 @@ struct NdfOptions {
   Interpolation interpolation = Interpolation::footprint;
   /// Kinds ndf-pyramid and ndf-cp: how densities run between half vectors of one pixel.
   Pixels pixels = Pixels::smooth;
+  /// Kinds ndf-pyramid and ndf-cp: whether the normals that the asset keeps answer footprints below level 0. Without them the asset
+  /// answers as one that keeps none.
+  bool use_kept_normals = true;
   formats::OpenOptions checks;  ///< checks of the asset and of `normals`
 };
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <span>
 
 #include "glint/model/ndf_pyramid.h"
 
@@ -38,6 +40,19 @@ constexpr ImageRows regionRows(const PyramidShape& shape, int level, PyramidRegi
   return {first(region.index - 1), first(region.index)};
 }
 
+/// The rows of texels that a region has: a band of the map.
+constexpr ImageRows regionTexels(int height, PyramidRegion region) {
+  const auto first = [&](std::int64_t band) { return static_cast<int>(height * band / region.count); };
+  return {first(region.index - 1), first(region.index)};
+}
+
+/// The normals of one region, of a pyramid that keeps the normals of its map.
+struct ShardNormals {
+  NearType type = NearType::f32;  ///< of the normals that the joined pyramid keeps
+  int rows = 0;                   ///< rows of texels that are here: those of regionTexels()
+  std::span<const Vec2> normals;  ///< [rows][width], as the map has them
+};
+
 /// How the number of levels of a pyramid is found.
 enum class LevelChoice : std::uint8_t {
   given,     ///< all levels stay
@@ -51,6 +66,7 @@ struct NdfPyramidShard {
   int rows[kMaxPyramidLevels] = {};  ///< rows of images of each level that are here: those of regionRows()
   /// The shape is that of the whole pyramid. Arrays of a level hold the rows that are here.
   NdfPyramid images;
+  std::optional<ShardNormals> near_normals;  ///< nothing where the pyramid keeps none
 };
 
 }  // namespace glint

@@ -7,6 +7,7 @@
 
 #include "assets.h"
 #include "build_job.h"
+#include "glint/api/any_ndf.h"
 #include "glint/bake/bin_map/bin_map.h"
 #include "glint/bake/compressed/compress.h"
 #include "glint/bake/displace/displace.h"
@@ -98,8 +99,31 @@ nb::dict reportDict(const bake::CompressionReport& r) {
   return d;
 }
 
-nb::dict compress(const BuildJob& job, const std::string& method, int rank, double tolerance, const std::string& metric,
-                  const std::string& quantize, bool spots, int regions, double min_improvement, int max_iterations) {
+/// What a compressed pyramid keeps.
+/// @param type     that is asked for; nothing: that of the pyramid, or 16 bits of `normals`
+/// @param normals  the map that the pyramid was made from, and its file; may be empty
+/// @throws Error usage: there are no such normals; invalid_input: they are of another map
+std::optional<bake::NearNormalsData> keptBy(const formats::Asset& input, const std::string& path, std::optional<NearType> type,
+                                            const std::optional<formats::Asset>& normals, const std::string& normals_path) {
+  const NdfPyramid& from = input.get<NdfPyramid>();
+  if (normals) {
+    const NormalMap& map = normals->get<NormalMap>();
+    api::requireSameMap(input, path, from.shape.width, from.shape.height, map, normals_path);
+    const bool floats = from.near_normals && !from.near_normals->coded();
+    return bake::keepNormals(map, type.value_or(floats ? NearType::f32 : NearType::i16));
+  }
+  const bool fewer = from.near_normals && from.near_normals->coded() && type == NearType::f32;
+  if ((type && !from.near_normals) || fewer)
+    throw Error(ErrorCode::usage, "api.arguments", path, "keep_normals",
+                fewer ? "the pyramid keeps normals in 16 bits, and \"f32\" asks for more" : "the pyramid keeps no normals",
+                "give normals=, the asset that the pyramid was made from");
+  if (!from.near_normals) return {};
+  return bake::keepNormals(*from.near_normals, type.value_or(from.near_normals->type));
+}
+
+nb::dict compress(const BuildJob& job, const std::string& normals_path, const std::string& method, int rank, double tolerance,
+                  const std::string& metric, const std::string& quantize, bool spots, int regions, double min_improvement,
+                  int max_iterations, const std::string& keep_normals) {
   bake::CompressionOptions o;
   using Method = std::optional<CompressionMethod>;
   o.method = choose<Method>("method", method,
@@ -120,10 +144,25 @@ nb::dict compress(const BuildJob& job, const std::string& method, int rank, doub
   o.max_iterations = max_iterations;
   const formats::Asset input = openInput(job);
   const NdfPyramid& from = input.get<NdfPyramid>();
+  enum class Keep { as_pyramid, none, i16, f32 };
+  const Keep keep = choose<Keep>("keep_normals", keep_normals,
+                                 {{"auto", Keep::as_pyramid}, {"none", Keep::none}, {"i16", Keep::i16}, {"f32", Keep::f32}});
+  std::optional<formats::Asset> normals;
+  if (!normals_path.empty()) {
+    if (keep == Keep::none)
+      throw Error(ErrorCode::usage, "api.arguments", "", "normals", "keep_normals=\"none\" keeps none of them",
+                  "leave one of them out");
+    normals = unlocked([&] { return formats::Asset::openForBuilding(normals_path); });
+  }
+  std::optional<NearType> as_asked;
+  if (keep == Keep::i16 || keep == Keep::f32) as_asked = keep == Keep::i16 ? NearType::i16 : NearType::f32;
+  formats::Provenance provenance = formats::chained(provenanceOf(job), input.info().provenance);
+  if (normals) provenance.inputs.push_back({"normals", unlocked([&] { return formats::hashFile(normals_path); })});
   bake::CompressionReport report;
-  run(job, formats::chained(provenanceOf(job), input.info().provenance), [&](const bake::ProgressFn& progress) {
-    WithNormals<bake::NdfCpData> made{bake::compressPyramid(from, o, &report, progress), {}};
-    if (from.near_normals) made.kept = kept(*from.near_normals, from.near_normals->type);
+  run(job, provenance, [&](const bake::ProgressFn& progress) {
+    WithNormals<bake::NdfCpData> made;
+    if (keep != Keep::none) made.kept = keptBy(input, job.input, as_asked, normals, normals_path);
+    made.images = bake::compressPyramid(from, o, &report, progress);
     return made;
   });
   return reportDict(report);
@@ -198,9 +237,9 @@ void bindBuilders(nb::module_& m) {
         nb::arg("keep_normals"));
   m.def("wave_pyramid", &wavePyramid, nb::arg("job"), words_only, nb::arg("stride"), nb::arg("overlap"), nb::arg("resolution"),
         nb::arg("levels"), nb::arg("precision"), nb::arg("coherence_um"), nb::arg("wavelengths_um"), nb::arg("spectral"));
-  m.def("compress", &compress, nb::arg("job"), words_only, nb::arg("method"), nb::arg("rank"), nb::arg("tolerance"),
-        nb::arg("metric"), nb::arg("quantize"), nb::arg("spots"), nb::arg("regions"), nb::arg("min_improvement"),
-        nb::arg("max_iterations"));
+  m.def("compress", &compress, nb::arg("job"), nb::arg("normals_path"), words_only, nb::arg("method"), nb::arg("rank"),
+        nb::arg("tolerance"), nb::arg("metric"), nb::arg("quantize"), nb::arg("spots"), nb::arg("regions"),
+        nb::arg("min_improvement"), nb::arg("max_iterations"), nb::arg("keep_normals"));
   m.def("bin_map", &binMap, nb::arg("job"), words_only, nb::arg("alpha"), nb::arg("alpha_max"), nb::arg("leaf_size"));
   m.def("histogram", &histogram, nb::arg("job"), words_only, nb::arg("theta_bins"), nb::arg("phi_bins"), nb::arg("stride"));
   m.def("moments", &moments, nb::arg("job"), words_only, nb::arg("finest_level"), nb::arg("boundary"), nb::arg("gradient"));

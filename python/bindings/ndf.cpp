@@ -45,7 +45,7 @@ nb::dict infoDict(const Ndf& ndf) {
 
 Ndf open(const std::string& path, const std::optional<std::string>& normals, float sigma_r, int surface, int boundary,
          float alpha, float slant_tolerance, int gaussian_boxes, int footprint_parts, int interpolation, int pixels,
-         int estimator, int bins, bool verify_hashes) {
+         int estimator, int bins, int kept_normals, bool verify_hashes) {
   glint_open_options o = GLINT_OPEN_OPTIONS_INIT;
   if (normals) o.normals_path = normals->c_str();
   o.sigma_r = sigma_r;
@@ -60,6 +60,7 @@ Ndf open(const std::string& path, const std::optional<std::string>& normals, flo
   o.pixels = pixels;
   o.estimator = estimator;
   o.bins = bins;
+  o.kept_normals = kept_normals;
   glint_ndf* ndf = nullptr;
   const nb::gil_scoped_release others_may_run;
   check(glint_ndf_open(path.c_str(), &o, &ndf));
@@ -144,7 +145,7 @@ void bindNdf(nb::module_& m) {
   m.def("open_ndf", &open, nb::arg("path"), nb::arg("normals").none(), nb::kw_only(), nb::arg("sigma_r"), nb::arg("surface"),
         nb::arg("boundary"), nb::arg("alpha"), nb::arg("slant_tolerance"), nb::arg("gaussian_boxes"),
         nb::arg("footprint_parts"), nb::arg("interpolation"), nb::arg("pixels"), nb::arg("estimator"), nb::arg("bins"),
-        nb::arg("verify_hashes"));
+        nb::arg("kept_normals"), nb::arg("verify_hashes"));
 }
 
 }  // namespace glint::python

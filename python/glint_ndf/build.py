@@ -24,7 +24,7 @@ def _made(
     source: Asset | np.ndarray | None,
     threads: int,
     progress: Progress | None,
-    *arrays: np.ndarray,
+    *arrays: np.ndarray | str,
 ) -> Asset:
     """Runs a builder of the extension module into a temporary file."""
     options = {name: _checked(name, value) for name, value in options.items()}
@@ -288,6 +288,8 @@ def compress(
     regions: int | str = "auto",
     min_improvement: float = 1e-4,
     max_iterations: int = 500,
+    keep_normals: str = "auto",
+    normals: Asset | None = None,
     threads: int = 0,
     progress: Progress | None = None,
 ) -> Asset:
@@ -299,6 +301,9 @@ def compress(
         rank: columns of every cluster, 1 to 256; 16 unless there is a tolerance.
         tolerance: instead of `rank`: largest error in `metric`; columns and bits are chosen to meet it in few bytes.
         metric: "seen": what a person sees towards each half vector, in every level; "l2": the error of all images together.
+        keep_normals: normals of the map in the asset, for footprints below the finest level: "none", "i16" or "f32"; "auto": those that
+            the pyramid keeps, or those of `normals` in 16 bits.
+        normals: the asset of kind normals that the pyramid was made from, to keep its normals where the pyramid keeps none.
 
     Returns:
         An asset whose `report` has the errors ("seen", "seen_worst", "bias", "rel_l2") and "total_bytes".
@@ -318,8 +323,10 @@ def compress(
         regions=_auto("regions", regions),
         min_improvement=min_improvement,
         max_iterations=max_iterations,
+        keep_normals=keep_normals,
     )
-    return _made("compress", options, _expect(ndf_pyramid, "ndf_pyramid"), threads, progress)
+    of_texels = "" if normals is None else _expect(normals, "normals").path
+    return _made("compress", options, _expect(ndf_pyramid, "ndf_pyramid"), threads, progress, of_texels)
 
 
 def bin_map(

@@ -21,6 +21,7 @@ _FRESNELS = {"mirror": 0, "dielectric": 1, "conductor": 2}
 _FACETS = {"distribution": 0, "beckmann": 1}
 _ESTIMATORS = {"exact": 0, "published": 1}
 _BINS = {"even": 0, "lobes": 1}
+_KEPT_NORMALS = {"used": 0, "ignored": 1}
 _SLANT_EXACT = -1.0
 
 #: Kinds of planes without end: the whole parts of uv count.
@@ -288,6 +289,7 @@ def open(
     pixels: str = "smooth",
     estimator: str = "exact",
     bins: str = "even",
+    kept_normals: str = "used",
     verify_hashes: bool = False,
 ) -> Ndf:
     """Opens an asset that holds a distribution of normals. The file is checked, and then mapped. Options of other kinds are ignored.
@@ -308,6 +310,8 @@ def open(
         estimator: kind bin-map: "exact", or "published" (densities by the centres of 21 bins: quicker, and less exact).
         bins: kind histogram-sat: where the normals of a bin are: "even" over the bin (small lights show the borders of bins), or
             "lobes" (with their mean and spread over the map; slower).
+        kept_normals: kinds ndf-pyramid and ndf-cp: "used", or "ignored" (the asset answers as one that keeps no normals: to compare,
+            or for speed).
         verify_hashes: compare all arrays with their hashes.
 
     Raises:
@@ -328,6 +332,7 @@ def open(
         pixels=_word("pixels", pixels, _PIXELS),
         estimator=_word("estimator", estimator, _ESTIMATORS),
         bins=_word("bins", bins, _BINS),
+        kept_normals=_word("kept_normals", kept_normals, _KEPT_NORMALS),
         verify_hashes=verify_hashes,
     )
     of_texels = None if normals is None else normals.path if isinstance(normals, Asset) else os.fspath(normals)

@@ -95,6 +95,64 @@ def test_normals_that_are_none_are_named_by_their_texel(glint, assets, tool, arg
     assert not any((assets / name).exists() for name in ["out.glint", "out.exr", "out.csv"])
 
 
+@pytest.mark.parametrize("value", [*BAD.values(), -1e30], ids=[*BAD, "huge"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        "pyramid bad.glint -o out.glint --stride 16",
+        "pyramid bad.glint -o out.glint --stride 16 --surface smooth",
+        "pyramid bad.glint -o out.glint --stride 16 --keep-normals i16",
+        "pyramid bad.glint -o out.glint --stride 16 --region 2/2",
+        "sat bad.glint -o out.glint",
+        "moments bad.glint -o out.glint",
+        "binmap bad.glint -o out.glint",
+        "tiny bad.glint -o out.glint --cut 16",
+        "wang bad.glint -o out.glint --size 16",
+        "query bad.glint --uv .5 .5 --sigma 9 --image out.exr",
+    ],
+)
+def test_normals_that_are_none_stop_builders_that_trust_their_input(glint, assets, line, value):
+    with_value(assets, "normals.glint", "normals", 2 * TEXEL, value)
+    process = glint(*line.split(), "--trust")
+    assert process.returncode == 3 and process.stderr.count("\n") == 1, process.stderr
+    assert "column 3, row 7 from the top" in process.stderr and "bad.glint" in process.stderr
+    assert not any((assets / name).exists() for name in ["out.glint", "out.exr"])
+
+
+@pytest.mark.parametrize("value", BAD.values(), ids=BAD.keys())
+def test_other_texels_that_are_none_stop_builders_that_trust_their_input(glint, assets, value):
+    with_value(assets, "tiles.glint", "normals", 2 * (16 * 16 + 40), value, "bad-tiles.glint")
+    lines = [
+        "pyramid bad-tiles.glint -o out.glint --stride 4",
+        "wang bad-tiles.glint -o out.glint --explicit 32 32",
+    ]
+    if not math.isfinite(value):
+        with_value(assets, "waves.glint", "heights", TEXEL, value)
+        lines += [
+            "pyramid bad.glint -o out.glint --optics wave --stride 32 --resolution 64 --wavelengths 3",
+            "displace bad.glint -o out.glint --factor 16 --base diffuse:0.8",
+            "moments bad.glint -o out.glint",
+        ]
+    for line in lines:
+        process = glint(*line.split(), "--trust")
+        assert process.returncode == 3 and process.stderr.count("\n") == 1, (line, process.stderr)
+        assert ("tile 1 " if "tiles" in line else "column 3, row 7 from the top") in process.stderr
+        assert not (assets / "out.glint").exists()
+
+
+@pytest.mark.parametrize("dataset", ["level_00/pixels", "level_00/block_means"])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1e30], ids=["nan", "infinite", "negative"])
+def test_pyramids_with_bad_values_do_not_crash_a_compression_that_trusts_them(glint, assets, dataset, value):
+    assert glint("pyramid", "normals.glint", "-o", "f32.glint", "--stride", "16", "--precision", "float").returncode == 0
+    bad = with_value(assets, "f32.glint", dataset, 0, value)
+    for method in ("cp", "tucker", "pca"):
+        for size in (["--rank", "4"], ["--tolerance", ".2"]):
+            process = glint("compress", bad, "-o", "out.glint", "--force", "--method", method, *size, "--trust")
+            assert process.returncode in (0, 3, 4), process.stderr
+            asked = glint("query", "out.glint", "--uv", ".1", ".1", "--sigma", "20", "--half", ".1", "0")
+            assert asked.returncode in (0, 2, 3), asked.stderr  # 2: nothing was made
+
+
 @pytest.mark.parametrize("value", BAD.values(), ids=BAD.keys())
 def test_one_query_of_normals_that_are_none_is_refused(glint, assets, value):
     bad = with_value(assets, "normals.glint", "normals", 2 * TEXEL, value)

@@ -216,6 +216,24 @@ def test_percent_stands_for_the_map_and_files_in_flags_are_inputs(farm):
     assert changed["key"] != entry["key"]
 
 
+def test_pyramids_in_shards_are_those_of_one_run(farm):
+    makes = (f"{PYRAMID} --keep-normals i16", "cp --rank 4")
+    plan(farm, *makes)
+    run(farm)
+    whole = contents(farm.folder / "assets")
+    shutil.rmtree(farm.folder / "assets")
+    assert plan(farm, *makes, source=("maps", "--map-shards", "3"))["entries"] == 3 * (1 + 3 + 1 + 1)
+    check_schema(manifest(farm), "farm-manifest")
+    assert run(farm, "--jobs", "2")["entries"] == 18
+    parts = contents(farm.folder / "assets")
+    assert {name: parts[name] for name in whole} == whole
+    assert sorted(set(parts) - set(whole))[:3] == [f"a.pyramid.{i}of3.glint" for i in (1, 2, 3)]
+    (farm.folder / "assets/b.pyramid.2of3.glint").unlink()
+    (farm.folder / "assets/b.pyramid.glint").unlink()
+    run(farm)
+    assert contents(farm.folder / "assets") == parts
+
+
 @pytest.mark.parametrize(
     "words, told",
     [
@@ -225,6 +243,8 @@ def test_percent_stands_for_the_map_and_files_in_flags_are_inputs(farm):
         (["plan", "maps", "-o", "m.json", "--make", "cp", "--make", "cp --rank 4"], "in one --make"),
         (["plan", "maps", "--from", "maps/a.png", "-o", "m.json"], "exclude each other"),
         (["plan", "--from", "maps/a.png", "-o", "m.json", "--make", "cp"], "leave out --make"),
+        (["plan", "--from", "maps/a.png", "-o", "m.json", "--map-shards", "2"], "leave out --make"),
+        (["plan", "maps", "-o", "m.json", "--make", "cp", "--map-shards", "2000"], "--map-shards"),
         (["plan", "--from", "maps/a.png", "-o", "m.json"], "glint-plan SCENE"),
         (["plan", ".", "-o", "maps/a.png", "--make", "cp"], "--force"),
         (["run", "maps/a.png"], "glint-farm plan"),

@@ -69,6 +69,53 @@ def test_compressed_pyramids_keep_what_their_pyramids_keep(made):
     assert size("none.glint") == size("plain.cp.glint") < size("c16.glint") < size("c.glint")
 
 
+def test_what_is_kept_can_be_ignored(made):
+    half = ("--half", *peak(made))
+    larger = ("query", "--uv", ".3", ".7", "--sigma", "7", *half, "--json")  # a little above level 0, blended with the texels
+    density = lambda *asset: json.loads(made(*larger, *asset).stdout)["result"]["density"]
+    plain = density("plain.glint")
+    assert density("f32.glint") != plain
+    assert density("f32.glint", "--kept-normals", "ignored") == plain
+    refused = made("query", "f32.glint", *SMALL, *half, "--kept-normals", "ignored")
+    assert refused.returncode == 1 and "leave --kept-normals ignored out" in refused.stderr
+
+
+@pytest.mark.parametrize("size, more, count", [("130x66", "", 3), ("33x190", " --boundary clamp", 4), ("190x7", "", 9)])
+@pytest.mark.parametrize("kept", ["i16", "f32"])
+def test_shards_keep_what_one_run_keeps(glint, size, more, count, kept):
+    """One texel is steeper than all others, and decides the step of the codes of all regions."""
+    numpy = pytest.importorskip("numpy")
+    from image_writer import write
+
+    width, height = map(int, size.split("x"))
+    normals = numpy.random.default_rng(1).uniform(-0.2, 0.2, (height, width, 2))
+    normals[-2, width // 2] = 0.1, 0.8
+    z = numpy.sqrt(1 - (normals**2).sum(-1, keepdims=True))
+    write(glint.folder / "n.exr", numpy.concatenate([normals, z], -1).astype(numpy.float32))
+    flags = f"{PYRAMID.replace('--levels 2', '--levels 1').replace('16', '4')}{more} --keep-normals {kept}"
+    run_all(glint, "ingest n.exr -o n.glint --encoding snorm", f"pyramid n.glint -o whole.glint {flags}")
+    shards = [f"{i}of{count}.glint" for i in range(1, count + 1)]
+    run_all(glint, *[f"pyramid n.glint -o {i}of{count}.glint --region {i}/{count} {flags}" for i in range(1, count + 1)])
+    assert glint("validate", *shards).returncode == 0
+    report = json.loads(glint("merge", *reversed(shards), "-o", "joined.glint", "--json").stdout)["result"]
+    assert (glint.folder / "joined.glint").read_bytes() == (glint.folder / "whole.glint").read_bytes()
+    assert report["near_normals_bytes"] > width * height * (4 if kept == "i16" else 8)
+    run_all(glint, f"merge {' '.join(shards)} -o filed.glint --max-memory 17M")
+    assert (glint.folder / "filed.glint").read_bytes() == (glint.folder / "whole.glint").read_bytes()
+
+
+def test_shards_that_keep_other_normals_are_refused(made):
+    run_all(
+        made,
+        f"pyramid map.glint -o 1.glint --region 1/2 {PYRAMID} --keep-normals i16",
+        f"pyramid map.glint -o 2.glint --region 2/2 {PYRAMID} --keep-normals f32",
+        f"pyramid map.glint -o plain2.glint --region 2/2 {PYRAMID}",
+    )
+    for other in ("2.glint", "plain2.glint"):
+        process = made("merge", "1.glint", other, "-o", "joined.glint")
+        assert process.returncode == 3 and "--keep-normals" in process.stderr, process.stderr
+
+
 def test_info_and_reports_say_what_is_kept(made):
     properties = lambda name: json.loads(made("info", name, "--json").stdout)["result"]["properties"]
     assert "near_normals" not in properties("plain.glint")
@@ -105,8 +152,7 @@ def test_results_do_not_depend_on_threads(made):
         ("compress i16.glint -o c.glint --keep-normals f32", 1, "keeps normals in 16 bits"),
         ("compress plain.glint -o c.glint --keep-normals none --normals map.glint", 1, "leave one of them out"),
         ("compress plain.glint -o c.glint --normals other.glint", 3, "this is not the map that plain.glint was made from"),
-        (f"pyramid map.glint -o s.glint {PYRAMID} --keep-normals i16 --region 1/2", 1, "glint-compress --normals"),
-        (f"pyramid w.glint -o s.glint --stride 8 --resolution 64 --sigma-r .02 --keep-normals i16", 1, "keep no normals"),
+        (f"pyramid w.glint -o s.glint --stride 8 --resolution 64 --sigma-r .02 --keep-normals i16", 1, "ask the tiles themselves"),
         ("pyramid h.glint -o s.glint --optics wave --keep-normals i16", 1, "--keep-normals"),
     ],
 )

@@ -30,12 +30,6 @@ RUNS = {
         "2M",
     ),
     "compress": ("compress pyramid.glint -o out.glint --rank 4", "compress coarse.glint -o out.glint --rank 4", "2M"),
-    "binmap": ("binmap large.glint -o out.glint", "binmap map.glint -o out.glint", "2M"),
-    "sat": (
-        "sat middle.glint -o out.glint --bins 64x32 --stride 4",
-        "sat middle.glint -o out.glint --bins 9x16 --stride 64",
-        "2M",
-    ),
     "moments": ("moments large.glint -o out.glint", "moments map.glint -o out.glint", "2M"),
     "textures": (
         "moments map.glint -o out.glint --textures textures",
@@ -223,6 +217,26 @@ def test_ingest_keeps_to_the_limit(folder):
     ), f"takes {bound / MB:.0f} MB, and {free / MB:.0f} MB without a limit"
     for name in ("huge.exr", "bound.glint"):
         (folder / name).unlink()
+
+
+TABLES = [
+    ("binmap", "--alpha .02"),
+    ("binmap", "--alpha .005:.1 --leaf-size 4"),
+    ("sat", "--bins 9x32 --stride 8"),
+    ("sat", "--bins 40x50 --stride 32"),
+]
+
+
+@pytest.mark.parametrize("tool, flags", TABLES)
+def test_tables_larger_than_the_memory_are_the_same_asset(folder, tool, flags):
+    source = "large.glint" if tool == "binmap" else "middle.glint"
+    for name, more in (("fits.glint", []), ("filed.glint", ["--max-memory", "33M"])):
+        code, error = run(folder, f"{tool} {source} -o {name} --force {flags}", *more)
+        assert code == 0, error
+    assert (folder / "fits.glint").read_bytes() == (folder / "filed.glint").read_bytes()
+    assert not [name for name in os.listdir(folder) if name.startswith(".glint")], "temporary files are gone"
+    code, error = run(folder, f"{tool} {source} -o less.glint {flags}", "--max-memory", "2M")
+    assert code == 4 and "--max-memory" in error and not (folder / "less.glint").exists()
 
 
 def test_programs_that_the_bench_starts_keep_the_limit(folder):

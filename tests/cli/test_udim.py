@@ -205,6 +205,23 @@ def test_a_damaged_tile_is_named_and_leaves_no_asset(glint):
     assert glint("ingest", "n.<UDIM>.exr", "-o", "n.<UDIM>.glint", "--fix-invalid").returncode == 0
 
 
+def test_files_that_a_set_leaves_out_and_tiles_that_are_gone_are_named(glint):
+    make_images(glint.folder, large_normals(), tiles=(1001, 1002))
+    image = (glint.folder / "n.1001.exr").read_bytes()
+    for name in ("n.0999.exr", "n.10011.exr"):
+        (glint.folder / name).write_bytes(image)
+    process = glint("ingest", "n.<udim>.exr", "-o", "n.<UDIM>.glint")  # lower case, as Arnold has it
+    assert process.returncode == 0, process.stderr
+    assert [line.split(": ")[2] for line in process.stderr.splitlines()] == ["n.0999.exr", "n.10011.exr"]
+    assert sorted(path.name for path in glint.folder.glob("n.*.glint")) == ["n.1001.glint", "n.1002.glint"]
+    for name in ("n.0999.exr", "n.10011.exr", "n.1002.exr"):
+        (glint.folder / name).unlink()
+    process = glint("ingest", "n.<UDIM>.exr", "-o", "n.<UDIM>.glint")
+    assert process.returncode == 0 and "n.1002.glint: is of a tile that the input has no file of: remove it" in process.stderr
+    (glint.folder / "n.1002.glint").unlink()
+    assert glint("ingest", "n.<UDIM>.exr", "-o", "n.<UDIM>.glint").stderr == ""
+
+
 def test_wrong_uses_say_what_to_do(glint):
     make_images(glint.folder, large_normals(), tiles=(1001, 1002))
     run_all(glint, "ingest n.<UDIM>.exr -o n.<UDIM>.glint --udim-margin 64", "ingest n.exr -o n.glint")

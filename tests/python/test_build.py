@@ -121,6 +121,27 @@ def test_assets_name_what_they_were_made_of_and_how(noise):
         compressed.open(normals=gn.synth("isotropic", 256, seed=77))
 
 
+def test_compressed_pyramids_keep_normals(noise):
+    bare, kept = gn.pyramid(noise), gn.pyramid(noise, keep_normals="i16")
+    kept_type = lambda asset: gn.info(asset)["properties"].get("near_normals")
+    assert kept_type(gn.compress(kept, rank=2)) == "i16"
+    assert kept_type(gn.compress(kept, rank=2, keep_normals="none")) is None
+    assert kept_type(gn.compress(bare, rank=2, normals=noise)) == "i16"
+    floats = gn.compress(bare, rank=2, normals=noise, keep_normals="f32")
+    assert kept_type(floats) == "f32" and floats.open().has_normals
+    assert not floats.open(kept_normals="ignored").has_normals
+    for source, options, text in (
+        (bare, dict(keep_normals="i16"), "normals="),
+        (kept, dict(keep_normals="f32"), "normals="),
+        (bare, dict(keep_normals="none", normals=noise), "leave one of them out"),
+        (bare, dict(keep_normals="i8"), "give one of"),
+    ):
+        with pytest.raises(gn.ArgumentError, match=text):
+            gn.compress(source, rank=2, **options)
+    with pytest.raises(gn.InvalidInputError):
+        gn.compress(bare, rank=2, normals=gn.synth("isotropic", 256, seed=77))
+
+
 def test_results_do_not_depend_on_threads(noise):
     assert arrays_of(gn.pyramid(noise, threads=1)) == arrays_of(gn.pyramid(noise, threads=2))
 

@@ -617,6 +617,14 @@ SamplePyramidShard samplePyramidShard(int size) {
   return sample;
 }
 
+SamplePyramidShard samplePyramidShardWithNormals(int size) {
+  SamplePyramidShard sample = samplePyramidShard(size);
+  sample.whole.kept = sampleNearNormals(size, NearType::f32);
+  const std::span<const Vec2> normals = sample.whole.kept.normals;
+  sample.shard.near_normals = {NearType::i16, size / 2, normals.first(static_cast<std::size_t>(size) * size / 2)};
+  return sample;
+}
+
 SampleTinyExample sampleTinyExample(int size, TinyMode mode) {
   SampleTinyExample sample;
   sample.normals = sampleNormals(size, size, false).normals;
@@ -1119,6 +1127,7 @@ std::vector<SampleAsset> sampleAssets() {
       {"ndf-cp-normals-f32", [] { return owned(sampleNdfCpWithNormals(32, NearType::f32), &SampleNdfCp::ndf); }},
       {"ndf-pyramid-normals-i16", [] { return owned(samplePyramidWithNormals(32, NearType::i16), &SamplePyramid::pyramid); }},
       {"ndf-pyramid-shard", [] { return owned(samplePyramidShard(64), &SamplePyramidShard::shard); }},
+      {"ndf-pyramid-shard-normals", [] { return owned(samplePyramidShardWithNormals(32), &SamplePyramidShard::shard); }},
       {"normals", [] { return owned(sampleNormals(64, 48), &SampleNormals::map); }},
       {"sh-light", [] { return owned(sampleShLight(), &SampleShLight::light); }},
       {"sh-lobes", [] { return owned(sampleShLobes(), &SampleShLobes::lobes); }},

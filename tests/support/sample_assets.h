@@ -183,6 +183,8 @@ SamplePyramid samplePyramidWithNormals(int size, NearType type);
 SampleNdfCp sampleNdfCpWithNormals(int size, NearType type);
 /// The first of two regions of samplePyramid, which has no image of the last level.
 SamplePyramidShard samplePyramidShard(int size);
+/// The same, of a pyramid that keeps normals in 16 bits.
+SamplePyramidShard samplePyramidShardWithNormals(int size);
 /// The same images, each block approximated by a constant and slopes; two regions.
 SampleNdfCp sampleNdfCp(int size, CompressionMethod method, CoefficientType type, SampleForm form = SampleForm::wide);
 

@@ -39,6 +39,7 @@ enum class Base {
   pyramid_normals,
   compressed_normals,
   shard,
+  shard_normals,
   compressed,
   compressed_f32,
   spots,
@@ -56,11 +57,14 @@ enum class Base {
   displacement,
   displacement_rgb
 };
-constexpr Base kBases[] = {
-    Base::pyramid_normals, Base::compressed_normals, Base::normals,      Base::heights,         Base::pyramid,    Base::shard,
-    Base::compressed,      Base::compressed_f32,     Base::spots,        Base::bin_map,         Base::histograms, Base::moments,
-    Base::tiny_scattered,  Base::tiny_tiled,         Base::wang_tiles,   Base::wang_pyramid,    Base::wang_cp,    Base::wave,
-    Base::sh_lobes,        Base::sh_light,           Base::displacement, Base::displacement_rgb};
+constexpr Base kBases[] = {Base::shard_normals, Base::pyramid_normals, Base::compressed_normals,
+                           Base::normals,       Base::heights,         Base::pyramid,
+                           Base::shard,         Base::compressed,      Base::compressed_f32,
+                           Base::spots,         Base::bin_map,         Base::histograms,
+                           Base::moments,       Base::tiny_scattered,  Base::tiny_tiled,
+                           Base::wang_tiles,    Base::wang_pyramid,    Base::wang_cp,
+                           Base::wave,          Base::sh_lobes,        Base::sh_light,
+                           Base::displacement,  Base::displacement_rgb};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -77,6 +81,8 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleNdfCpWithNormals(32, NearType::f32).ndf, provenance);
     case Base::shard:
       return writeAsset(path, test::samplePyramidShard(32).shard, provenance);
+    case Base::shard_normals:
+      return writeAsset(path, test::samplePyramidShardWithNormals(32).shard, provenance);
     case Base::compressed:
       return writeAsset(path, test::sampleNdfCp(32, CompressionMethod::cp, CoefficientType::i8).ndf, provenance);
     case Base::displacement:
@@ -463,6 +469,8 @@ std::vector<Fixture> datasetFixtures() {
               [](const Patch& patch) { patch.remove("/", "near_bounds_level_count"); }),
       patched(
           "dataset.unknown", Base::pyramid_normals, [](const Patch& patch) { patch.remove("/", "near_normals"); }, true),
+      patched(
+          "attribute.unknown", Base::pyramid, [](const Patch& patch) { patch.setReal("near_step", 0); }, true),
       patched("dataset.type", Base::pyramid_normals, [](const Patch& patch) { patch.setText("near_normals", "f32"); }),
       patched("dataset.missing", Base::pyramid, [](const Patch& patch) { H5Ldelete(patch.file(), "level_01/masks", 0); }),
       patched("dataset.type", Base::heights,
@@ -892,6 +900,16 @@ std::vector<Fixture> shardFixtures() {
   return {
       patched("shard.region", Base::shard, [](const Patch& patch) { patch.setInteger("region_index", 3); }),
       patched("shard.rows", Base::shard, [](const Patch& patch) { patch.setInteger("region_count", 4); }),
+      {"shard.near_rows", Base::shard_normals,
+       [](const fs::path& path) {
+         const Patch patch(path);
+         patch.setInteger("near_rows", kSize / 2);
+         patch.replace("near/normals", H5T_IEEE_F32LE, {kSize / 2, 32, 2}, true);
+       }},
+      patched("attribute.missing", Base::shard_normals, [](const Patch& patch) { patch.remove("/", "near_rows"); }),
+      patched(
+          "near.disk", Base::shard_normals,
+          [](const Patch& patch) { patch.change<Vec2>("near/normals", 7, [](Vec2& n) { n.y = kNan; }); }, true),
   };
 }
 

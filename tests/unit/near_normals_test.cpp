@@ -6,8 +6,10 @@
 
 #include <cmath>
 #include <random>
+#include <string>
 #include <vector>
 
+#include "glint.h"
 #include "glint/api/pack.h"
 #include "glint/bake/compressed/compress.h"
 #include "glint/formats/asset_writer.h"
@@ -238,6 +240,46 @@ TEST(NearNormals, FilesKeepThemWithoutAnotherFile) {
     const auto packed_cp = api::pack(c);
     EXPECT_TRUE(api::viewPacked(packed_cp).hasNormals());
     expectSameBits(api::viewPacked(packed_cp).cpNdf(), CpNdf(compressed.ndf), normals.map, 30);
+  }
+}
+
+TEST(NearNormals, AreNotUsedWhereThatIsAskedFor) {
+  const test::TempFolder folder;
+  const auto normals = test::sampleNormals(32, 32);
+  const auto pyramid = test::samplePyramidWithNormals(32, NearType::i16);
+  const auto compressed = test::sampleNdfCpWithNormals(32, NearType::f32);
+  NdfPyramid bare_pyramid = pyramid.pyramid;
+  NdfCp bare_compressed = compressed.ndf;
+  bare_pyramid.near_normals.reset();
+  bare_compressed.near_normals.reset();
+  formats::writeAsset(folder / "p.glint", pyramid.pyramid, test::sampleProvenance());
+  formats::writeAsset(folder / "c.glint", compressed.ndf, test::sampleProvenance());
+  api::NdfOptions options;
+  options.use_kept_normals = false;
+  const auto p = api::OpenedNdf::open(folder / "p.glint", options), c = api::OpenedNdf::open(folder / "c.glint", options);
+  EXPECT_FALSE(p.hasNormals());
+  EXPECT_GT(p.info().smallest_sigma_texels, 0);
+  expectSameBits(p.model(), AnisotropicNdf<PyramidNdf>(PyramidNdf(bare_pyramid)), normals.map, 30);
+  expectSameBits(c.model(), AnisotropicNdf<CpNdf>(CpNdf(bare_compressed)), normals.map, 30);
+  EXPECT_LT(api::pack(p).size(), api::pack(opened(folder / "p.glint")).size());
+}
+
+TEST(NearNormals, AreNotUsedInCWhereThatIsAskedFor) {
+  const test::TempFolder folder;
+  formats::writeAsset(folder / "p.glint", test::samplePyramidWithNormals(32, NearType::i16).pyramid, test::sampleProvenance());
+  const std::string path = (folder / "p.glint").string();
+  for (const int kept : {int{GLINT_KEPT_NORMALS_USED}, int{GLINT_KEPT_NORMALS_IGNORED}, 2}) {
+    glint_open_options options = GLINT_OPEN_OPTIONS_INIT;
+    options.kept_normals = kept;
+    glint_ndf* ndf = nullptr;
+    const glint_status status = glint_ndf_open(path.c_str(), &options, &ndf);
+    EXPECT_EQ(status, kept == 2 ? GLINT_ERROR_USAGE : GLINT_OK);
+    if (ndf == nullptr) continue;
+    glint_ndf_info info = {};
+    info.struct_size = sizeof info;
+    EXPECT_EQ(glint_ndf_get_info(ndf, &info), GLINT_OK);
+    EXPECT_EQ(info.has_normals, kept == GLINT_KEPT_NORMALS_USED ? 1 : 0);
+    glint_ndf_close(ndf);
   }
 }
 

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -73,7 +74,7 @@ void expectJoined(const NormalMap& map, const bake::PyramidOptions& options, int
     const auto& expected = whole.levels[static_cast<std::size_t>(l)];
     EXPECT_EQ(masks, expected.masks);
     EXPECT_EQ(pixels, expected.half_pixels);
-    EXPECT_EQ(bake::joinedRanks(views, static_cast<int>(from)), expected.mask_ranks);
+    EXPECT_TRUE(std::ranges::equal(bake::joinedRanks(views, static_cast<int>(from)), expected.mask_ranks));
     EXPECT_EQ(shape.levels[l].stride, whole.shape.levels[l].stride);
   }
 }

@@ -512,6 +512,20 @@ TEST(Udim, PatternsFindTilesOfEveryForm) {
   EXPECT_EQ(formats::udimTiles(tiles.file("map.%(UDIM)d.glint")), (std::vector<int>{1001, 1012}));
   EXPECT_EQ(formats::udimFile("a/x.%(UDIM)d.exr", 1023), std::filesystem::path("a/x.1023.exr"));
   EXPECT_FALSE(formats::isUdimPattern("a/x.1001.exr"));
+  EXPECT_EQ(formats::udimTiles(tiles.file("map.<udim>.glint")), (std::vector<int>{1001, 1012}));
+  EXPECT_EQ(formats::udimFile("a/x.<udim>.exr", 1023), std::filesystem::path("a/x.1023.exr"));
+}
+
+TEST(Udim, NumbersThatAreNoTilesAreNamed) {
+  const Tiles tiles({1001});
+  const auto pattern = tiles.writeNormals();
+  EXPECT_TRUE(formats::udimStrays(pattern).empty());
+  for (const char* name :
+       {"map.1000.glint", "map.0999.glint", "map.10011.glint", "map.7.glint", "map.10a1.glint", "map..glint"})
+    std::filesystem::copy(formats::udimFile(pattern, 1001), tiles.file(name));
+  EXPECT_EQ(formats::udimTiles(pattern), std::vector<int>{1001});
+  EXPECT_EQ(formats::udimStrays(pattern),
+            (std::vector<std::string>{"map.0999.glint", "map.1000.glint", "map.10011.glint", "map.7.glint"}));
 }
 
 TEST(Udim, TilesAreValidAssetsAndBadPlacesAreNot) {

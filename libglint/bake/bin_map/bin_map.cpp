@@ -62,7 +62,7 @@ float binAlpha(float alpha_min, float alpha_max, int subbin_bits) {
   return alpha_min == alpha_max ? alpha_min : std::min(std::sqrt(alpha_min * alpha_max), finest);
 }
 
-CompactCountsData compactCounts(const std::vector<std::uint64_t>& values) {
+CompactCountsData compactCounts(std::span<const std::uint64_t> values) {
   CompactCountsData data;
   const auto fits = [&](int shift) {
     const std::size_t step = std::size_t{1} << shift;

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory_resource>
+#include <span>
 #include <vector>
 
 #include "glint/bake/common/progress.h"
@@ -37,16 +39,16 @@ float binAlpha(float alpha_min, float alpha_max, int subbin_bits);
 /// A CompactCounts that owns its arrays.
 struct CompactCountsData {
   std::vector<std::uint64_t> bases;
-  std::vector<std::uint16_t> offsets;
+  std::pmr::vector<std::uint16_t> offsets;
   int shift = 0;
 
   CompactCounts view() const { return {bases, offsets, shift}; }
 };
 
 /// Packs a non-decreasing sequence with as few bases as 16-bit offsets allow.
-CompactCountsData compactCounts(const std::vector<std::uint64_t>& values);
+CompactCountsData compactCounts(std::span<const std::uint64_t> values);
 
-/// A BinMap that owns its arrays.
+/// A BinMap that owns its arrays. Those that grow with the map are in memory of the default resource.
 struct BinMapData {
   int width = 0, height = 0;
   float alpha = 0, alpha_min = 0, alpha_max = 0;
@@ -55,8 +57,9 @@ struct BinMapData {
   std::vector<std::uint32_t> nodes;
   std::vector<std::uint16_t> block_moments;
   CompactCountsData cell_starts;
-  std::vector<std::uint32_t> texels, class_keys;
-  std::vector<std::uint16_t> texel_classes;
+  std::pmr::vector<std::uint32_t> texels;
+  std::vector<std::uint32_t> class_keys;
+  std::pmr::vector<std::uint16_t> texel_classes;
 
   /// Spans over the arrays; valid while this object lives and is not changed.
   BinMap view() const;
@@ -68,7 +71,7 @@ struct BinMapData {
 /// map (Atanasov 2021, section 5.4; there each bin has a list of its own).
 ///
 /// Two passes: the first moves texels to about 512 buckets of neighbouring tiles, the second sorts each bucket by cell, inside
-/// the cache. O(texels + bins).
+/// the cache. O(texels + bins). Both passes write large arrays from their beginnings on, or buckets, so that these may be in files.
 /// @throws Error usage for options out of range; invalid_input for normals outside the disk; unsupported for maps whose columns
 ///         and rows need more than 28 bits together (16384 x 16384)
 BinMapData buildBinMap(const NormalMap& map, const BinMapOptions& options, const ProgressFn& progress = {});

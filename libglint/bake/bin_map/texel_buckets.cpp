@@ -93,7 +93,7 @@ TexelBuckets fillBuckets(const NormalMap& map, const TexelCode& code, const BinG
   std::vector<std::uint16_t> run_buckets;
   TexelBuckets buckets = joinTiles(grid, counts, map.normals.size(), run_buckets);
   std::vector<std::vector<std::uint64_t>> cursors = firstTexels(counts, run_buckets, buckets);
-  buckets.texels = std::make_unique_for_overwrite<BinnedTexel[]>(map.normals.size());
+  buckets.texels = makeLargeArray<BinnedTexel>(map.normals.size());
   BinnedTexel* texels = buckets.texels.get();
   const auto width = static_cast<std::uint32_t>(map.width);
   tbb::parallel_for(std::size_t{0}, kMapParts, [&](std::size_t part) {

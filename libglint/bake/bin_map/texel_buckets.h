@@ -2,10 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "glint/bake/bin_map/bin_grid.h"
+#include "glint/bake/common/large_array.h"
 #include "glint/model/bin_map.h"
 
 namespace glint::bake {
@@ -32,7 +32,7 @@ struct BinnedTexel {
 struct TexelBuckets {
   std::vector<std::size_t> first_tiles;     ///< [buckets + 1]
   std::vector<std::uint64_t> first_texels;  ///< [buckets + 1]: index in `texels` at which a bucket begins
-  std::unique_ptr<BinnedTexel[]> texels;
+  LargeArray<BinnedTexel> texels;
 
   std::size_t count() const { return first_tiles.size() - 1; }
 };

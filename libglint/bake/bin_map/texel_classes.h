@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory_resource>
 #include <vector>
 
 #include "glint/bake/bin_map/bin_grid.h"
@@ -9,10 +10,10 @@
 
 namespace glint::bake {
 
-/// Classes of blocks, and the class of every texel.
+/// Classes of blocks, and the class of every texel, in memory of the default resource.
 struct TexelClasses {
-  std::vector<std::uint32_t> class_keys;     ///< as BinMap::class_keys
-  std::vector<std::uint16_t> texel_classes;  ///< as BinMap::texel_classes
+  std::vector<std::uint32_t> class_keys;          ///< as BinMap::class_keys
+  std::pmr::vector<std::uint16_t> texel_classes;  ///< as BinMap::texel_classes
 };
 
 /// Makes a class of every block, or of several neighbouring blocks where there are more blocks than classes can be, and writes

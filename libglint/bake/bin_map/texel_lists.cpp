@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include <span>
 #include <utility>
 
 #include "glint/math/half.h"
@@ -53,7 +54,7 @@ class BlockPacker {
 };
 
 /// Stores the mean and the covariance of the sub-bins of the texels [begin, end) of a block, as BinMap::block_moments.
-void storeMoments(const TexelCode& code, const std::vector<std::uint32_t>& texels, std::uint64_t begin, std::uint64_t end,
+void storeMoments(const TexelCode& code, std::span<const std::uint32_t> texels, std::uint64_t begin, std::uint64_t end,
                   std::uint16_t* moments) {
   std::uint64_t x = 0, y = 0;
   double xx = 0, xy = 0, yy = 0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory_resource>
 #include <vector>
 
 #include "glint/bake/bin_map/block_trees.h"
@@ -9,11 +10,11 @@
 
 namespace glint::bake {
 
-/// The texels of all blocks, sorted by cell.
+/// The texels of all blocks, sorted by cell. Arrays that grow with the map are in memory of the default resource.
 struct TexelLists {
-  std::vector<std::uint32_t> texels;         ///< as BinMap::texels
-  std::vector<std::uint64_t> cell_starts;    ///< [cells + 1]: index in `texels` at which a cell begins
-  std::vector<std::uint16_t> block_moments;  ///< as BinMap::block_moments
+  std::pmr::vector<std::uint32_t> texels;       ///< as BinMap::texels
+  std::pmr::vector<std::uint64_t> cell_starts;  ///< [cells + 1]: index in `texels` at which a cell begins
+  std::vector<std::uint16_t> block_moments;     ///< as BinMap::block_moments
 };
 
 /// Sorts the texels of every bucket by the cells of their blocks. O(texels); a bucket stays in the cache.

@@ -26,6 +26,8 @@ constexpr int kParts = 64;
 constexpr int kCoarseTexels = 32;
 /// Number of counters that one task sums down a table. They stay in the first-level cache.
 constexpr std::size_t kColumnCounters = 4096;
+/// Rows of a table that are summed before the next ones.
+constexpr std::size_t kBandRows = 64;
 
 void checkOptions(const NormalMap& map, const HistogramSatOptions& options) {
   const auto require = [](bool holds, const char* object, const std::string& what, const char* remedy) {
@@ -70,6 +72,8 @@ void forEachPart(int count, Visitor&& visitor) {
 
 /// Number of texels of each bin of directions, and sums of their normals and slopes.
 struct BinStatistics {
+  static constexpr std::size_t kBytes = sizeof(std::uint64_t) + 2 * sizeof(double) + sizeof(SlopeSums);  ///< of a bin
+
   std::vector<std::uint64_t> counts;
   std::vector<double> sums_x, sums_y;
   std::vector<SlopeSums> slopes;
@@ -143,17 +147,20 @@ void keepOccurring(const BinStatistics& statistics, HistogramSatData& sat) {
   });
 }
 
-/// Sums down a table of `rows` rows: adds each row of counters to the next.
+/// Sums down a table of `rows` rows: adds each row of counters to the next. Band after band, so that a table in a file is read and
+/// written from its beginning to its end.
 template <class Counter>
 void sumDown(Counter* table, std::size_t rows, std::size_t row_counters) {
-  tbb::parallel_for(std::size_t{0}, (row_counters + kColumnCounters - 1) / kColumnCounters, [&](std::size_t chunk) {
-    const std::size_t begin = chunk * kColumnCounters, end = std::min(begin + kColumnCounters, row_counters);
-    for (std::size_t b = 1; b < rows; ++b) {
-      const Counter* above = table + (b - 1) * row_counters;
-      Counter* here = table + b * row_counters;
-      for (std::size_t k = begin; k < end; ++k) here[k] = static_cast<Counter>(here[k] + above[k]);
-    }
-  });
+  for (std::size_t first = 1; first < rows; first += kBandRows) {
+    tbb::parallel_for(std::size_t{0}, (row_counters + kColumnCounters - 1) / kColumnCounters, [&](std::size_t chunk) {
+      const std::size_t begin = chunk * kColumnCounters, end = std::min(begin + kColumnCounters, row_counters);
+      for (std::size_t b = first; b < std::min(first + kBandRows, rows); ++b) {
+        const Counter* above = table + (b - 1) * row_counters;
+        Counter* here = table + b * row_counters;
+        for (std::size_t k = begin; k < end; ++k) here[k] = static_cast<Counter>(here[k] + above[k]);
+      }
+    });
+  }
 }
 
 /// Builds the summed-area table with points at every `stride` texels.
@@ -229,24 +236,9 @@ std::size_t HistogramSatData::sizeBytes() const {
          sat.column_sums.size_bytes();
 }
 
-double histogramSatBytes(const NormalMap& map, const HistogramSatOptions& options) {
-  checkOptions(map, options);
-  HistogramSat shape = shapeFor(map, options);
-  const SphericalBins bins(options.theta_bins, options.phi_bins);
-  std::vector<bool> occurs(static_cast<std::size_t>(bins.count()));
-  for (const Vec2 n : map.normals) {
-    if (std::isnan(dot(n, n))) continue;  // buildHistogramSat() refuses it
-    occurs[static_cast<std::size_t>(bins.find(n))] = true;
-  }
-  shape.bin_count = static_cast<int>(std::count(occurs.begin(), occurs.end(), true));
-  const double counters = shape.rowLength();
-  const auto points = [&](int stride) { return static_cast<double>(shape.pointsX(stride)) * shape.pointsY(stride); };
-  const double texels = static_cast<double>(map.width) * map.height;
-  // Lines of texels in both directions have a point in every line_stride texels.
-  const double lines = 2 * (texels / shape.line_stride + map.width + map.height);
-  return texels * sizeof(std::uint16_t) +
-         counters * (points(shape.stride) * sizeof(std::uint16_t) + points(shape.coarse_stride) * sizeof(std::uint32_t) +
-                     lines * sizeof(std::uint16_t));
+double histogramStatisticsBytes(const HistogramSatOptions& options) {
+  // Of each part, and of all.
+  return (kParts + 1.0) * options.theta_bins * options.phi_bins * static_cast<double>(BinStatistics::kBytes);
 }
 
 HistogramSatData buildHistogramSat(const NormalMap& map, const HistogramSatOptions& options, const ProgressFn& progress) {

@@ -2,10 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <vector>
 
+#include "glint/bake/common/large_array.h"
 #include "glint/bake/common/progress.h"
 #include "glint/model/histogram_sat.h"
 #include "glint/model/normal_map.h"
@@ -18,15 +18,14 @@ struct HistogramSatOptions {
   int stride = 8;  ///< texels between points of the fine table, 1..128; small strides take memory, large ones time of queries
 };
 
-/// A large array whose values are not set when it is allocated, since builders write all of them.
+/// A LargeArray and its size.
 template <class T>
 struct CounterArray {
-  std::unique_ptr<T[]> values;
+  LargeArray<T> values;
   std::size_t size = 0;
 
-  /// @throws std::bad_alloc
   void allocate(std::size_t count) {
-    values = std::make_unique_for_overwrite<T[]>(count);
+    values = makeLargeArray<T>(count);
     size = count;
   }
   std::span<const T> view() const { return {values.get(), size}; }
@@ -48,14 +47,14 @@ class HistogramSatData {
   std::size_t sizeBytes() const;
 };
 
-/// The memory of the tables of a map, bytes, as far as the map's directions fill its bins.
-/// @throws Error as buildHistogramSat. O(texels)
-double histogramSatBytes(const NormalMap& map, const HistogramSatOptions& options);
+/// The memory of statistics of bins that buildHistogramSat takes beside the arrays of a HistogramSatData, bytes.
+double histogramStatisticsBytes(const HistogramSatOptions& options);
 
 /// Accumulates the histograms of a map (Gamboa 2018, section 4.1).
 ///
 /// Each texel gets the bin of its normal. Then each table counts the texels of its cells, and sums counts along rows and down
-/// columns: every counter is written once and added to once. Sums of integers do not depend on the number of threads.
+/// columns: every counter is written once and added to once. Sums of integers do not depend on the number of threads. Tables are
+/// in memory of the default resource, written and read from their beginnings on, so that they may be in files.
 /// @throws Error (usage) for options out of range; (unsupported) for maps of more than 2^32 texels
 HistogramSatData buildHistogramSat(const NormalMap& map, const HistogramSatOptions& options, const ProgressFn& progress = {});
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory_resource>
 #include <vector>
 
 #include "glint/bake/ingest/normal_bounds.h"
@@ -43,10 +44,10 @@ std::int16_t codeOf(float bound, float step) { return static_cast<std::int16_t>(
 }  // namespace
 
 struct NearNormalsData::Arrays {
-  std::vector<Vec2> normals;
+  std::pmr::vector<Vec2> normals;
   std::vector<NormalBoundsStorage> bounds;
-  std::vector<NormalCode> codes;
-  std::vector<std::vector<CodeBounds>> code_bounds;
+  std::pmr::vector<NormalCode> codes;
+  std::vector<std::pmr::vector<CodeBounds>> code_bounds;
 };
 
 NearNormalsData keepNormals(const NearNormals& normals, NearType type) {
@@ -80,12 +81,13 @@ NearNormalsData keepNormals(const NearNormals& normals, NearType type) {
     data.view_.texels = arrays->codes.data();
     arrays->code_bounds.resize(static_cast<std::size_t>(map.bounds_level_count));
     for (int l = 0; l < map.bounds_level_count; ++l) {
-      std::vector<CodeBounds>& codes = arrays->code_bounds[static_cast<std::size_t>(l)];
+      std::pmr::vector<CodeBounds>& codes = arrays->code_bounds[static_cast<std::size_t>(l)];
+      codes.reserve(map.bounds[l].nodes.size());
       for (const NormalBounds& b : map.bounds[l].nodes)
         codes.push_back({codeOf(b.low_x, step), codeOf(b.low_y, step), codeOf(b.high_x, step), codeOf(b.high_y, step)});
       data.view_.bounds[l].nodes = codes.data();
     }
-    arrays->normals = std::vector<Vec2>();
+    arrays->normals = std::pmr::vector<Vec2>();
     arrays->bounds = std::vector<NormalBoundsStorage>();
   }
   data.arrays_ = std::move(arrays);

@@ -27,7 +27,7 @@ class NearNormalsData {
 /// @param normals  a NormalMap, or normals that an asset keeps; finite, inside the disk. Must outlive the result, which points to its
 ///                 arrays where these are of the type already
 /// @param type     of the result. f32 of normals in 16 bits has the same values in twice the bytes
-/// @note O(texels). The result does not depend on the number of threads
+/// @note O(texels), in memory of the default resource. The result does not depend on the number of threads
 NearNormalsData keepNormals(const NearNormals& normals, NearType type);
 
 /// Memory that keepNormals takes at its peak, bytes, without the arrays of its input.

@@ -29,10 +29,10 @@ int levelInShards(const NdfPyramidShard& shard, const PyramidShape& joined, int 
   return level < joined.footprintLevels() ? level : shard.images.shape.level_count - 1;
 }
 
-std::vector<std::uint32_t> joinedRanks(std::span<const NdfPyramidShard> shards, int level) {
+std::pmr::vector<std::uint32_t> joinedRanks(std::span<const NdfPyramidShard> shards, int level) {
   std::size_t words = 1;
   for (const NdfPyramidShard& shard : shards) words += shard.images.levels[level].masks.size();
-  std::vector<std::uint32_t> ranks;
+  std::pmr::vector<std::uint32_t> ranks;
   ranks.reserve(words);
   std::uint64_t blocks = 0;
   for (const NdfPyramidShard& shard : shards) {

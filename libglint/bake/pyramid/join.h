@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory_resource>
 #include <span>
 #include <vector>
 
@@ -18,7 +19,8 @@ int levelInShards(const NdfPyramidShard& shard, const PyramidShape& joined, int 
 
 /// mask_ranks of a level of the joined pyramid. Its other arrays are those of the shards, one after the other.
 /// @param level  of the shards
+/// @return in memory of the default resource
 /// @throws Error failed if the level has more blocks than 32 bits count
-std::vector<std::uint32_t> joinedRanks(std::span<const NdfPyramidShard> shards, int level);
+std::pmr::vector<std::uint32_t> joinedRanks(std::span<const NdfPyramidShard> shards, int level);
 
 }  // namespace glint::bake

@@ -1,4 +1,4 @@
-#include "glint-ingest/ingest_memory.h"
+#include "common/filed_memory.h"
 
 #include <linux/magic.h>
 #include <sys/vfs.h>
@@ -12,9 +12,8 @@
 namespace glint::apps {
 namespace {
 
-std::uint64_t mostBytes(const Tool& tool) {
-  constexpr double kLeastBytes = 16 << 20;  // rows that are being read, and small arrays
-  tool.requireMemory(kLeastBytes, "any image", "leave --max-memory out");
+std::uint64_t mostBytes(const Tool& tool, double least_bytes, const std::string& what) {
+  tool.requireMemory(least_bytes, what, "leave --max-memory out");
   return tool.limitsMemory() ? tool.maxMemory() : tool.maxMemory() / 2;
 }
 
@@ -39,10 +38,12 @@ std::string folderFor(const std::string& output) {
 
 }  // namespace
 
-IngestMemory::IngestMemory(const Tool& tool, const std::string& output)
-    : folder_(folderFor(output)), memory_(mostBytes(tool), folder_), default_(memory_) {}
+FiledMemory::FiledMemory(const Tool& tool, const std::string& output, double least_bytes, const std::string& what)
+    : folder_(folderFor(output)), memory_(mostBytes(tool, least_bytes, what), folder_), default_(memory_) {
+  memory_.watchMappedFiles();
+}
 
-void IngestMemory::warnAbout(Tool& tool) const {
+void FiledMemory::warnAbout(Tool& tool) const {
   if (memory_.filedBytes() == 0 || !isInMemory(folder_)) return;
   tool.warn(folder_ +
             ": temporary files of this run were in memory (tmpfs), beyond --max-memory; set TMPDIR to a folder on a disk");
