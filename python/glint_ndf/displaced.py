@@ -32,7 +32,8 @@ class Displaced:
     width: int  #: of the original map, texels
     height: int  #: of the original map, texels
     level_count: int
-    factors: list[int]  #: of each level: texels of the original along a side of a cell, where this divides the map; else about so many
+    #: of each level: texels of the original along a side of a cell; about so many where they do not divide the map
+    factors: list[int]
     channels: int  #: 3, or 1: red, green and blue are the same
     base: str  #: "diffuse" or "ggx"
     texel_size_um: float  #: of the original; 0: unknown

@@ -152,7 +152,11 @@ def test_results_do_not_depend_on_threads(made):
         ("compress i16.glint -o c.glint --keep-normals f32", 1, "keeps normals in 16 bits"),
         ("compress plain.glint -o c.glint --keep-normals none --normals map.glint", 1, "leave one of them out"),
         ("compress plain.glint -o c.glint --normals other.glint", 3, "this is not the map that plain.glint was made from"),
-        (f"pyramid w.glint -o s.glint --stride 8 --resolution 64 --sigma-r .02 --keep-normals i16", 1, "ask the tiles themselves"),
+        (
+            f"pyramid w.glint -o s.glint --stride 8 --resolution 64 --sigma-r .02 --keep-normals i16",
+            1,
+            "ask the tiles themselves",
+        ),
         ("pyramid h.glint -o s.glint --optics wave --keep-normals i16", 1, "--keep-normals"),
     ],
 )
