@@ -67,7 +67,7 @@ void planScene(Tool& tool, const PlanOptions& options) {
   Scene scene = readScene(options.scene());
   const std::string maps = options.maps(folderOf(options.scene()));
   checkMaps(tool, scene, maps);
-  const AssetFolder folder(options.assets(), options.removesAssets());
+  const AssetFolder folder = options.assetFolder();
   measureEnvironments(tool, folder, scene, maps);
   if (options.explains()) {
     const std::string text = explained(tool, folder, scene, maps);
@@ -100,7 +100,7 @@ void checkScene(Tool& tool, const PlanOptions& options) {
   PlanFile plan = readPlan(options.check());
   const std::string maps = options.maps(plan.maps);
   checkMaps(tool, plan.scene, maps);
-  const AssetFolder folder(options.assets(), options.removesAssets());
+  const AssetFolder folder = options.assetFolder();
   measureEnvironments(tool, folder, plan.scene, maps);
   const std::vector<CheckedMaterial> checked = checkPlan(tool, folder, plan, maps, options.sweeps(), options.asksPaper());
   tool.setResult(checkJson(plan, checked));

@@ -35,7 +35,7 @@ const MadeAsset& AssetMaker::make(const Candidate& candidate) {
   for (const std::string& flag : childFlags(tool_)) words.push_back(flag);
   const bool compresses = source != nullptr;
   if (compresses) words.push_back("--json");
-  const ChildRun run = runProgram(words, {compresses});
+  const ChildRun run = runProgram(words, {.keep_output = compresses, .shared_file = folder_.lock()});
   if (run.exit_code != 0) {
     failed_[name] = run.message;
     throw Error(ErrorCode::failed, "plan.candidate", "", "", run.message);
