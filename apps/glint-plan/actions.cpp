@@ -45,7 +45,8 @@ std::string explained(Tool& tool, const AssetFolder& folder, const Scene& scene,
   return sceneText(scene, questions);
 }
 
-nlohmann::json resultOf(const std::vector<MaterialPlan>& plans) {
+/// @param rules  whether there are rules for Make
+nlohmann::json resultOf(const std::vector<MaterialPlan>& plans, bool rules) {
   nlohmann::json list = nlohmann::json::array();
   for (const MaterialPlan& plan : plans) {
     const PlanOption& choice = plan.choice();
@@ -57,6 +58,7 @@ nlohmann::json resultOf(const std::vector<MaterialPlan>& plans) {
                     {"preparation_s", choice.costs.preparation_s},
                     {"query_ns", choice.costs.query_ns},
                     {"probe_s", plan.probe_s}});
+    if (rules) list.back()["file"] = ruleFileOf(plan);
   }
   return {{"materials", std::move(list)}};
 }
@@ -88,7 +90,7 @@ void planScene(Tool& tool, const PlanOptions& options) {
   if (!options.rules().empty()) writeTextFile(options.rules(), rules);
   if (!options.jobs().empty())
     writeTextFile(options.jobs(), planJobs(tool, plans, seenFrom(options.jobs(), maps)).dump(1) + "\n");
-  tool.setResult(resultOf(plans));
+  tool.setResult(resultOf(plans, !options.rules().empty()));
   const std::string text = planText(scene, plans);
   if (options.output().empty())
     tool.print(text);

@@ -160,8 +160,10 @@ def test_another_map_than_the_planned_one_is_refused(plan, glint):
 
 
 def test_rules_build_exactly_the_plan(plan, glint):
-    process, made = plan(scene(material("noise64.png", tolerance=MOMENTS_HOLD, **ROUGH), lights=SKY), "--make", "plan.mk")
+    noise = scene(material("noise64.png", tolerance=MOMENTS_HOLD, **ROUGH), lights=SKY)
+    process, made = plan(noise, "--make", "plan.mk", "--json")
     assert process.returncode == 0, process.stderr
+    assert json.loads(process.stdout)["result"]["materials"][0]["file"] == "noise64.moments.glint"
     make = ["make", "-s", "-f", "plan.mk", f"GLINT_BIN={BIN}", f"GLINT_MK={ROOT}/pipelines/glint.mk"]
     built = subprocess.run(make, cwd=glint.folder, capture_output=True, text=True)
     assert built.returncode == 0, built.stderr
