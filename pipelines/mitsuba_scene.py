@@ -18,6 +18,8 @@ import numpy as np
 
 SHARP = {"point", "spot", "directional"}
 NEAREST_SHARE = 1e-3  # smallest distance over the largest
+# Mitsuba repeats the last column of an environment before its first one, and the first one after its last.
+REPEATED_COLUMNS = 2
 
 
 def read_json(path):
@@ -85,10 +87,8 @@ def light_of(emitter, mi):
         return {"type": "directional" if "directional" in kind else "point"}
     if "envmap" in kind or "environmentmap" in kind:
         # Two columns of pixels, which is the finest wave that an image can hold.
-        return {
-            "type": "environment",
-            "band_limit_deg": min(180.0, 360 / max(1, int(mi.traverse(emitter)["data"].shape[1]) // 2)),
-        }
+        columns = int(mi.traverse(emitter)["data"].shape[1]) - REPEATED_COLUMNS
+        return {"type": "environment", "band_limit_deg": min(180.0, 360 / max(1, columns // 2))}
     if "constant" in kind:
         return {"type": "environment", "band_limit_deg": 180}
     return None  # an area light: its shape says how large it looks
@@ -146,7 +146,8 @@ def glints_of_xml(path):
 
 
 def material_of(name, glint, shape, file, tolerance, mi):
-    if not shape.is_mesh():
+    # A rectangle of Mitsuba calls itself a mesh, and has no vertices.
+    if not (shape.is_mesh() and "vertex_positions" in mi.traverse(shape)):
         sys.exit(f"{name}: is no mesh, so its uv have no scale; write it as a .ply or .obj")
     if file is None:
         sys.exit(f"{name}: its BSDF names no asset; name a map with --map {name}=FILE")

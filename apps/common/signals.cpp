@@ -27,6 +27,16 @@ static_assert(std::atomic<int>::is_always_lock_free, "a handler of signals sets 
 std::atomic<int> children_without_slot = 0;  // being started
 static_assert(std::atomic<int>::is_always_lock_free, "a handler of signals reads it");
 
+using CleanFn = void (*)() noexcept;
+std::atomic<CleanFn> clean_at_end = nullptr;
+static_assert(std::atomic<CleanFn>::is_always_lock_free, "a handler of signals reads it");
+
+/// Removes what the process has not finished.
+void cleanUp() noexcept {
+  if (const CleanFn clean = clean_at_end) clean();
+  formats::removeTemporaryFiles();
+}
+
 void endChildren() {
   // By other threads only: who starts a child holds signals back. Starting takes milliseconds.
   constexpr int kMostWait_ms = 1000;
@@ -36,8 +46,10 @@ void endChildren() {
 }
 
 void endBy(int signal) {
+  int none = 0;
+  stop_signal.compare_exchange_strong(none, signal);  // other threads start no more children
   endChildren();
-  formats::removeTemporaryFiles();
+  cleanUp();
   struct sigaction fatal = {};
   fatal.sa_handler = SIG_DFL;
   ::sigaction(signal, &fatal, nullptr);
@@ -59,7 +71,7 @@ void stopBy(int signal) {
 
 /// Writes a message without taking memory, and ends the process.
 [[noreturn]] void endUncaught(const char* what, const char* remedy) noexcept {
-  formats::removeTemporaryFiles();
+  cleanUp();
   const char* const name = ::program_invocation_short_name;
   for (const char* part : {name, ": error: ", what, "; ", remedy, "\n"}) {
     if (::write(STDERR_FILENO, part, std::strlen(part)) < 0) break;
@@ -163,6 +175,9 @@ StopScope::~StopScope() {
   for (std::size_t k = 0; k < kSignals.size(); ++k) ::sigaction(kSignals[k], &old_[k], nullptr);
   stop_signal = 0;
 }
+
+EndScope::EndScope(void (*clean)() noexcept) { clean_at_end = clean; }
+EndScope::~EndScope() { clean_at_end = nullptr; }
 
 int StopScope::stopped() const { return stop_signal; }
 

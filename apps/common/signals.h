@@ -63,6 +63,17 @@ class StopScope {
   std::array<struct sigaction, kSignals.size()> old_ = {};
 };
 
+/// As long as the scope lives, a signal that ends the process calls a function first, after its children got TERM. One scope at a
+/// time.
+class EndScope {
+ public:
+  /// @param clean  may be called at any time and from any thread, and calls nothing that POSIX does not allow in handlers
+  explicit EndScope(void (*clean)() noexcept);
+  EndScope(const EndScope&) = delete;
+  EndScope& operator=(const EndScope&) = delete;
+  ~EndScope();
+};
+
 /// Removes temporary files and ends the process by a signal: a shell sees 128 + n.
 [[noreturn]] void endBySignal(int signal);
 

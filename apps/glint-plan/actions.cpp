@@ -45,7 +45,8 @@ std::string explained(Tool& tool, const AssetFolder& folder, const Scene& scene,
   return sceneText(scene, questions);
 }
 
-nlohmann::json resultOf(const std::vector<MaterialPlan>& plans) {
+/// @param rules  whether there are rules for Make
+nlohmann::json resultOf(const std::vector<MaterialPlan>& plans, bool rules) {
   nlohmann::json list = nlohmann::json::array();
   for (const MaterialPlan& plan : plans) {
     const PlanOption& choice = plan.choice();
@@ -57,6 +58,7 @@ nlohmann::json resultOf(const std::vector<MaterialPlan>& plans) {
                     {"preparation_s", choice.costs.preparation_s},
                     {"query_ns", choice.costs.query_ns},
                     {"probe_s", plan.probe_s}});
+    if (rules) list.back()["file"] = ruleFileOf(plan);
   }
   return {{"materials", std::move(list)}};
 }
@@ -67,7 +69,7 @@ void planScene(Tool& tool, const PlanOptions& options) {
   Scene scene = readScene(options.scene());
   const std::string maps = options.maps(folderOf(options.scene()));
   checkMaps(tool, scene, maps);
-  const AssetFolder folder(options.assets(), options.removesAssets());
+  const AssetFolder folder = options.assetFolder();
   measureEnvironments(tool, folder, scene, maps);
   if (options.explains()) {
     const std::string text = explained(tool, folder, scene, maps);
@@ -88,7 +90,7 @@ void planScene(Tool& tool, const PlanOptions& options) {
   if (!options.rules().empty()) writeTextFile(options.rules(), rules);
   if (!options.jobs().empty())
     writeTextFile(options.jobs(), planJobs(tool, plans, seenFrom(options.jobs(), maps)).dump(1) + "\n");
-  tool.setResult(resultOf(plans));
+  tool.setResult(resultOf(plans, !options.rules().empty()));
   const std::string text = planText(scene, plans);
   if (options.output().empty())
     tool.print(text);
@@ -100,7 +102,7 @@ void checkScene(Tool& tool, const PlanOptions& options) {
   PlanFile plan = readPlan(options.check());
   const std::string maps = options.maps(plan.maps);
   checkMaps(tool, plan.scene, maps);
-  const AssetFolder folder(options.assets(), options.removesAssets());
+  const AssetFolder folder = options.assetFolder();
   measureEnvironments(tool, folder, plan.scene, maps);
   const std::vector<CheckedMaterial> checked = checkPlan(tool, folder, plan, maps, options.sweeps(), options.asksPaper());
   tool.setResult(checkJson(plan, checked));

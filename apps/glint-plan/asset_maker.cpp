@@ -1,5 +1,6 @@
 #include "glint-plan/asset_maker.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -35,22 +36,40 @@ const MadeAsset& AssetMaker::make(const Candidate& candidate) {
   for (const std::string& flag : childFlags(tool_)) words.push_back(flag);
   const bool compresses = source != nullptr;
   if (compresses) words.push_back("--json");
-  const ChildRun run = runProgram(words, {compresses});
+  const ChildRun run = runProgram(words, {.keep_output = compresses, .shared_file = folder_.lock()});
   if (run.exit_code != 0) {
     failed_[name] = run.message;
     throw Error(ErrorCode::failed, "plan.candidate", "", "", run.message);
   }
   made.bytes = bytesOf(made.file);
-  made.seconds = input.seconds + run.wall_s;
+  // Where other programs take processors away, the program waits; alone it would take no longer than all its threads one by one.
+  made.seconds = input.seconds + std::min(run.wall_s, run.cpu_s);
   if (compresses) made.reached = nlohmann::json::parse(run.output).at("result").at("total").at("seen").get<double>();
   return made_[name] = made;
 }
 
-api::OpenedNdf AssetMaker::open(const Candidate& candidate) {
+api::OpenedNdf AssetMaker::open(const Candidate& candidate) { return openFile(candidate, make(candidate).file); }
+
+api::OpenedNdf AssetMaker::openFile(const Candidate& candidate, const std::string& file) const {
   api::NdfOptions options;
   options.sigma_r = sigma_r_;
   if (candidate.takes_normals) options.normals = path_;
-  return api::OpenedNdf::open(make(candidate).file, options);
+  return api::OpenedNdf::open(file, options);
+}
+
+std::list<api::OpenedNdf> AssetMaker::openCopies(const Candidate& candidate, int count) {
+  const std::string original = make(candidate).file;
+  std::list<api::OpenedNdf> copies;
+  copies.push_back(openFile(candidate, original));
+  for (int k = 1; k < count; ++k) {
+    const std::string copy = original + "." + std::to_string(k);
+    std::error_code error;
+    std::filesystem::copy_file(original, copy, std::filesystem::copy_options::overwrite_existing, error);
+    if (error) throw Error(ErrorCode::io, "output.write", copy, "", "cannot be written: " + error.message());
+    copies.push_back(openFile(candidate, copy));
+    std::filesystem::remove(copy);
+  }
+  return copies;
 }
 
 }  // namespace glint::apps

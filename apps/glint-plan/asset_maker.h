@@ -1,5 +1,6 @@
 #pragma once
 
+#include <list>
 #include <map>
 #include <string>
 #include <vector>
@@ -33,9 +34,13 @@ class AssetMaker {
   /// @throws Error failed, with the message of the program that does not make it
   const MadeAsset& make(const Candidate& candidate);
   api::OpenedNdf open(const Candidate& candidate);
+  /// The asset of a candidate so many times, each at other addresses. Copies have no names by the time they are returned.
+  std::list<api::OpenedNdf> openCopies(const Candidate& candidate, int count);
   const std::vector<Candidate>& all() const { return all_; }
 
  private:
+  api::OpenedNdf openFile(const Candidate& candidate, const std::string& file) const;
+
   Tool& tool_;
   const AssetFolder& folder_;
   std::string hash_, label_, path_;

@@ -51,7 +51,8 @@ void measureEnvironments(Tool& tool, const AssetFolder& folder, Scene& scene, co
     checkSceneFile(tool, scene, field, image);
     const std::string table = folder.fileOf(formats::hashFile(image), "light");
     const ChildRun run = runProgram({"glint-shlobes", "--light", image, "-o", table, "--order", std::to_string(kMostBands),
-                                     "--grid", "3x4", "--force", "--quiet", "--threads", std::to_string(tool.threads())});
+                                     "--grid", "3x4", "--force", "--quiet", "--threads", std::to_string(tool.threads())},
+                                    {.shared_file = folder.lock()});
     if (run.exit_code != 0) {
       throw Error(ErrorCode::invalid_input, "scene.light", scene.file, field, run.message,
                   "give an image of a whole sphere, twice as wide as high, or band_limit_deg");

@@ -19,9 +19,11 @@
 namespace glint::apps {
 namespace {
 
-constexpr int kVersion = 4;  // of the way in which probes measure: other versions' measurements are not used
-constexpr int kQueries = 512;
-constexpr double kLongestErrors_s = 3, kLongestTime_s = 0.004;
+constexpr int kVersion = 5;  // of the way in which probes measure: other versions' measurements are not used
+constexpr double kLongestErrors_s = 3, kLongestTime_s = 0.006;
+/// Larger sets of copies take longer to make than they teach: caches and tables of pages hold less.
+constexpr double kMostCopied_bytes = 320e6;
+constexpr int kMostCopies = 64;
 /// Places after which errors are looked at: candidates that are clearly good or clearly bad are asked no more.
 constexpr int kSteps[] = {8, kUsualPlaces, kQuestionPlaces};
 
@@ -49,6 +51,7 @@ struct MapProbe::Part {
   std::optional<formats::Asset> asset;
   std::optional<AssetMaker> maker;
   std::list<PlaceTruth> truths;
+  std::vector<BenchQuery> queries;  ///< that are timed
 };
 
 MapProbe::MapProbe(Tool& tool, const AssetFolder& folder, const PlanMap& map, const MapQuestion& question, ProbeCache& cache)
@@ -108,12 +111,25 @@ Costs MapProbe::costsOf(bool large, std::size_t candidate) {
   Costs costs;
   costs.bytes = kept(key + "bytes", [&] { return made().bytes; });
   costs.preparation_s = kept(key + "preparation_s", [&] { return made().seconds; });
-  costs.query_ns = kept(key + "query_ns", [&] {
-    Part& asked = part(large);
-    const auto queries = benchQueries(asked.asset->get<NormalMap>(), tool_.seed(), kQueries, sizes_);
-    return densityTime(asked.maker->open(asked.maker->all()[candidate]), queries, kLongestTime_s);
-  });
   return costs;
+}
+
+double MapProbe::queryTime(std::size_t candidate) {
+  return kept(all_[candidate].name() + " query_ns", [&] {
+    Part& asked = part(true);
+    const Candidate& probed = asked.maker->all()[candidate];
+    if (asked.queries.empty()) asked.queries = benchQueries(asked.asset->get<NormalMap>(), tool_.seed(), kTimedQueries, sizes_);
+    // Caches that hold the asset of a small map do not hold that of a large one. Copies of the small one, as many as make up the large
+    // one, are missed as often.
+    const double bytes = asked.maker->make(probed).bytes;
+    const double times = edge_ > 0 ? static_cast<double>(map_.normals().normals.size()) / edgeTexels(true) : 1;
+    const double enough = std::clamp(kMostCopied_bytes / bytes, 1.0, double{kMostCopies});
+    const std::list<api::OpenedNdf> copies =
+        asked.maker->openCopies(probed, static_cast<int>(std::ceil(std::min(times, enough))));
+    AskedNdf ndf{{}, asked.queries};
+    for (const api::OpenedNdf& copy : copies) ndf.copies.push_back(&copy);
+    return densityTimes({&ndf, 1}, kLongestTime_s).front();
+  });
 }
 
 Costs MapProbe::costs(std::size_t candidate) {
@@ -122,13 +138,10 @@ Costs MapProbe::costs(std::size_t candidate) {
     const Costs other = costsOf(false, candidate);
     const double texels = static_cast<double>(map_.normals().normals.size());
     const double n1 = edgeTexels(false), n2 = edgeTexels(true);
-    // Each factor of four in size adds as much as the last: misses of the caches.
-    constexpr double kMostSlower = 3;
-    const double slower = std::max(0.0, costs.query_ns - other.query_ns) * std::log2(texels / n2) / 2;
-    costs.query_ns = std::min(costs.query_ns + slower, kMostSlower * costs.query_ns);
     costs.bytes = extrapolated(texels, n1, other.bytes, n2, costs.bytes);
     costs.preparation_s = extrapolated(texels, n1, other.preparation_s, n2, costs.preparation_s);
   }
+  costs.query_ns = queryTime(candidate);
   if (all_[candidate].tool.empty()) costs.bytes = map_.bytes;
   if (all_[candidate].takes_normals) costs.bytes += map_.bytes;
   costs.preparation_s += map_.ingest_s;

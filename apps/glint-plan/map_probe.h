@@ -73,7 +73,10 @@ class MapProbe {
  private:
   struct Part;
   Part& part(bool large);
+  /// Bytes and time to prepare, of a probe.
   Costs costsOf(bool large, std::size_t candidate);
+  /// Nanoseconds of a density of the whole map.
+  double queryTime(std::size_t candidate);
   PlaceErrors errorsOf(std::size_t candidate, std::size_t size, double tolerance);
   /// How many times as large errors of a compression are on the whole map: it has more blocks there to choose from, and comes nearer
   /// to the tolerance that it was given.

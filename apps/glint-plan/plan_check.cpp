@@ -13,7 +13,6 @@
 namespace glint::apps {
 namespace {
 
-constexpr int kCheckedQueries = 4096;
 constexpr double kCheckLongestErrors_s = 30, kCheckLongestTime_s = 0.02;
 
 /// Measures candidates on one whole map.
@@ -30,17 +29,24 @@ class MapCheck {
     const std::uint64_t other_places = tool.seed() + 1;
     for (std::size_t k = 0; k < sizes_.size(); ++k)
       truths_.push_back(questionTruth(normals, question_, other_places, k, sizes_[k]));
-    queries_ = benchQueries(normals, other_places, kCheckedQueries, sizes_);
+    queries_ = benchQueries(normals, other_places, kTimedQueries, sizes_);
   }
 
-  /// What a candidate costs; its errors are not measured.
-  CheckedOption costOf(const Candidate& candidate) {
-    const MadeAsset made = maker_.make(candidate);
-    CheckedOption option;
-    option.name = candidate.name();
-    option.costs = {made.bytes + (candidate.takes_normals ? map_.bytes : 0), made.seconds + map_.ingest_s,
-                    densityTime(maker_.open(candidate), queries_, kCheckLongestTime_s)};
-    return option;
+  /// What candidates cost, timed in turns; their errors are not measured.
+  std::vector<CheckedOption> costsOf(const std::vector<Candidate>& candidates) {
+    std::vector<CheckedOption> options;
+    std::list<api::OpenedNdf> ndfs;
+    std::vector<AskedNdf> asked;
+    for (const Candidate& candidate : candidates) {
+      const MadeAsset& made = maker_.make(candidate);
+      options.emplace_back();
+      options.back().name = candidate.name();
+      options.back().costs = {made.bytes + (candidate.takes_normals ? map_.bytes : 0), made.seconds + map_.ingest_s, 0};
+      asked.push_back({{&ndfs.emplace_back(maker_.open(candidate))}, queries_});
+    }
+    const std::vector<double> ns = densityTimes(asked, kCheckLongestTime_s);
+    for (std::size_t k = 0; k < options.size(); ++k) options[k].costs.query_ns = ns[k];
+    return options;
   }
 
   /// @param enough  a tolerance: measuring ends at the first size that does not meet it
@@ -58,13 +64,6 @@ class MapCheck {
       if (hopeless || largest.seen > enough || largest.bias > kBiasShare * enough) break;
     }
     return largest;
-  }
-
-  /// What a candidate costs, and its errors.
-  CheckedOption measured(const Candidate& candidate) {
-    CheckedOption option = costOf(candidate);
-    option.errors = errorsOf(candidate);
-    return option;
   }
 
  private:
@@ -108,7 +107,7 @@ void sweepCandidates(MapCheck& check, const std::vector<Candidate>& all, Goal go
     const std::string ladder = candidate.method + " of " + candidate.source;
     if (!candidate.source.empty() && ladder == done) continue;
     try {
-      CheckedOption option = check.costOf(candidate);
+      CheckedOption option = check.costsOf({candidate}).front();
       const bool dear = costOf(option.costs, goal) > planned;
       if (!dear) option.errors = check.errorsOf(candidate, material.tolerance);
       if (dear || material.holds(option)) done = ladder;
@@ -138,9 +137,12 @@ std::vector<CheckedMaterial> checkPlan(Tool& tool, const AssetFolder& folder, co
     std::vector<Candidate> known = all;
     known.insert(known.end(), of_paper.begin(), of_paper.end());
     MapCheck check(tool, folder, map, question, std::move(known));
-    CheckedOption actual = check.measured(planned.candidate);
-    checked.push_back({&planned, std::move(actual), material.tolerance, {}, {}});
-    if (paper) checked.back().paper = check.measured(of_paper.back());
+    std::vector<Candidate> candidates = {planned.candidate};
+    if (paper) candidates.push_back(of_paper.back());
+    std::vector<CheckedOption> options = check.costsOf(candidates);
+    for (std::size_t k = 0; k < options.size(); ++k) options[k].errors = check.errorsOf(candidates[k]);
+    checked.push_back({&planned, std::move(options.front()), material.tolerance, {}, {}});
+    if (paper) checked.back().paper = std::move(options.back()), checked.back().paper->programs = of_paper;
     if (sweep) sweepCandidates(check, all, plan.scene.goal, checked.back(), warnings);
     if (progress) progress(checked.size(), plan.materials.size());
   }
@@ -179,6 +181,8 @@ nlohmann::json checkJson(const PlanFile& plan, const std::vector<CheckedMaterial
     if (material.paper) {
       entry["paper"] = costsJson(material.paper->costs, material.paper->errors);
       entry["paper"]["name"] = material.paper->name;
+      for (const Candidate& made : material.paper->programs)
+        entry["paper"]["programs"].push_back({{"tool", made.tool}, {"flags", made.flags}});
     }
     if (!material.sweep.empty()) {
       entry["over_cheapest"] = material.overCheapest(plan.scene.goal);

@@ -14,7 +14,8 @@ namespace glint::apps {
 struct CheckedOption {
   std::string name;
   Costs costs;
-  PlaceErrors errors;  ///< at the sizes with the largest
+  PlaceErrors errors;               ///< at the sizes with the largest
+  std::vector<Candidate> programs;  ///< of the paper's setting: those that make the asset of the map, in their order
 };
 
 /// A material's part of a plan, as it was predicted and as it is.

@@ -65,8 +65,7 @@ class Rules {
     const Candidate& chosen = plan.choice().candidate;
     if (const Candidate* source = plan.choiceSource()) addFlags(plan, name, *source);
     addFlags(plan, name, chosen);
-    const std::string suffix = suffixOf(chosen);
-    targets_.insert(name + (suffix.empty() ? "" : "." + suffix) + ".glint");
+    targets_.insert(ruleFileOf(plan));
     if (chosen.takes_normals) targets_.insert(name + ".glint");
   }
 
@@ -110,6 +109,11 @@ class Rules {
 };
 
 }  // namespace
+
+std::string ruleFileOf(const MaterialPlan& plan) {
+  const std::string suffix = suffixOf(plan.choice().candidate);
+  return fs::path(plan.material->map).stem().string() + (suffix.empty() ? "" : "." + suffix) + ".glint";
+}
 
 std::string planRules(const std::vector<MaterialPlan>& plans, const std::string& maps, const std::string& pipeline) {
   Rules rules;

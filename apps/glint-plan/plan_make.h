@@ -13,4 +13,7 @@ namespace glint::apps {
 /// @throws Error unsupported if glint.mk cannot build two of the assets side by side, or a name cannot stand in a Makefile
 std::string planRules(const std::vector<MaterialPlan>& plans, const std::string& maps, const std::string& pipeline);
 
+/// The file that these rules make for the queries of a material: "car.tucker.glint".
+std::string ruleFileOf(const MaterialPlan& plan);
+
 }  // namespace glint::apps

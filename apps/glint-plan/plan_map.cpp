@@ -48,11 +48,11 @@ PlanMap openMap(Tool& tool, const AssetFolder& folder, const Scene& scene, const
     std::vector<std::string> words = {"glint-ingest", map.image, "-o", map.path, "--force", "--quiet"};
     words.insert(words.end(), material.ingest_flags.begin(), material.ingest_flags.end());
     for (const std::string& flag : childFlags(tool)) words.push_back(flag);
-    const ChildRun run = runProgram(words);
+    const ChildRun run = runProgram(words, {.shared_file = folder.lock()});
     if (run.exit_code != 0)
       throw Error(ErrorCode::invalid_input, "scene.map", scene.file, material.path + ".map", run.message,
                   "say in the scene how the image is read: kind, convention, height_scale");
-    map.ingest_s = run.wall_s;
+    map.ingest_s = std::min(run.wall_s, run.cpu_s);
   }
   map.asset = openInput(tool, map.path);
   map.bytes = static_cast<double>(fs::file_size(map.path));

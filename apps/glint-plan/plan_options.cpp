@@ -1,7 +1,5 @@
 #include "glint-plan/plan_options.h"
 
-#include <unistd.h>
-
 #include <filesystem>
 
 #include "common/files.h"
@@ -60,11 +58,12 @@ void PlanOptions::checkFiles() {
   if (!output_.empty()) checkOutput(tool_, output_, OutputFormat::plan), tool_.addOutput(output_);
   if (!rules_.empty()) checkOutput(tool_, rules_, OutputFormat::plan_rules), tool_.addOutput(rules_);
   if (!jobs_.empty()) checkOutput(tool_, jobs_, OutputFormat::plan), tool_.addOutput(jobs_);
-  if (!assets_option_->given()) {
-    // Beside the plan, so that large assets are on a disk that was meant for them.
-    const fs::path beside = output_.empty() ? fs::temp_directory_path() / "glint-plan" : fs::path(output_);
-    assets_ = beside.string() + ".assets-" + std::to_string(::getpid());
-  }
+}
+
+AssetFolder PlanOptions::assetFolder() const {
+  if (assets_option_->given()) return AssetFolder(assets_, false);
+  // Beside the plan, so that large assets are on a disk that was meant for them.
+  return AssetFolder::temporary((output_.empty() ? fs::temp_directory_path() / "glint-plan" : fs::path(output_)).string());
 }
 
 }  // namespace glint::apps

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "common/tool.h"
+#include "measure/asset_folder.h"
 
 namespace glint::apps {
 
@@ -23,8 +24,8 @@ class PlanOptions {
   /// The folder of maps: the one that was given, or else this one.
   std::string maps(const std::string& other) const { return maps_.empty() ? other : maps_; }
   /// The folder for assets, which is removed unless it was given.
-  const std::string& assets() const { return assets_; }
-  bool removesAssets() const { return !assets_option_->given(); }
+  /// @throws Error io
+  AssetFolder assetFolder() const;
 
  private:
   void checkFiles();

@@ -27,6 +27,8 @@ struct MapQuestion {
 inline constexpr int kQuestionSizes = 5;
 /// Places at which the error of a plan is measured.
 inline constexpr int kQuestionPlaces = 96;
+/// Questions with which the time of a density is measured, of a probe as of a whole map.
+inline constexpr int kTimedQueries = 4096;
 
 /// The truth about round footprints of one size at random places of a map.
 /// @param number  of the size: each has other places

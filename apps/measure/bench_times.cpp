@@ -4,12 +4,12 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <nlohmann/json.hpp>
 #include <vector>
 
 #include "glint/api/batch.h"
 #include "glint/math/gaussian.h"
+#include "measure/time_rounds.h"
 
 namespace glint::apps {
 namespace {
@@ -23,34 +23,14 @@ void keep(float answer) { asm volatile("" : : "x"(answer) : "memory"); }
 
 double wallSeconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-/// Time that this thread has had of a processor.
-double threadSeconds() {
-  std::timespec time{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 /// Times ask(k) for k < count. Runs of slow questions end early, those of quick ones go round.
-/// @param now  a clock, seconds
 template <class Ask>
-nlohmann::json timeOf(std::size_t count, double longest_s, const Ask& ask, double (*now)() = wallSeconds) {
+nlohmann::json timeOf(std::size_t count, double longest_s, const Ask& ask) {
   std::array<double, kRuns> ns{};
   std::size_t next = 0;
   for (int run = -1; run < kRuns; ++run) {  // the first warms up
-    constexpr double kQuick_s = 5e-6;       // questions of which the clock would take a share
-    constexpr std::size_t kBetweenLooks = 64;
-    const double start = now();
-    std::size_t asked = 0;
-    double seconds = 0;
-    do {
-      const bool quick = asked > 0 && seconds < kQuick_s * static_cast<double>(asked);
-      for (std::size_t k = 0; k < (quick ? kBetweenLooks : 1); ++k, ++asked) {
-        ask(next);
-        next = next + 1 < count ? next + 1 : 0;
-      }
-      seconds = now() - start;
-    } while (seconds < longest_s && (asked < count || seconds < kShortestRun_s));
-    if (run >= 0) ns[static_cast<std::size_t>(run)] = 1e9 * seconds / static_cast<double>(asked);
+    const double seconds = runOf(count, next, kShortestRun_s, longest_s, ask, wallSeconds);
+    if (run >= 0) ns[static_cast<std::size_t>(run)] = 1e9 * seconds;
   }
   std::sort(ns.begin(), ns.end());
   return {{"ns", ns[kRuns / 2]}, {"spread", ns.back() / ns.front()}};
@@ -111,11 +91,18 @@ nlohmann::json benchTimes(const api::OpenedNdf& ndf, std::span<const BenchQuery>
   return times;
 }
 
-double densityTime(const api::OpenedNdf& ndf, std::span<const BenchQuery> queries, double longest_s) {
-  const nlohmann::json time = timeOf(
-      queries.size(), longest_s, [&](std::size_t k) { keep(ndf.model().density(queries[k].footprint, queries[k].half)); },
-      threadSeconds);
-  return time["ns"].get<double>();
+std::vector<double> densityTimes(std::span<const AskedNdf> ndfs, double longest_s) {
+  std::vector<TimedQuestions> things;
+  for (const AskedNdf& asked : ndfs) {
+    things.push_back({asked.queries.size(), [&asked](std::size_t k) {
+                        const BenchQuery& q = asked.queries[k];
+                        keep(asked.copies[k % asked.copies.size()]->model().density(q.footprint, q.half));
+                      }});
+  }
+  std::vector<double> ns;
+  for (std::vector<double>& rounds : timeInTurns(things, {.longest_s = longest_s}))
+    ns.push_back(1e9 * calmTime(std::move(rounds)));
+  return ns;
 }
 
 nlohmann::json plainLobeTime(std::span<const BenchQuery> queries) {

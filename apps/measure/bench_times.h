@@ -23,9 +23,16 @@ struct SizedQueries {
 nlohmann::json benchTimes(const api::OpenedNdf& ndf, std::span<const BenchQuery> queries, std::span<const SizedQueries> sizes,
                           double longest_s);
 
-/// Nanoseconds of a density, on one thread: the median of five runs over all questions.
-/// @param longest_s  after which a run of slow questions ends
-double densityTime(const api::OpenedNdf& ndf, std::span<const BenchQuery> queries, double longest_s);
+/// A model that is asked: question k by copy k modulo their number.
+struct AskedNdf {
+  std::vector<const api::OpenedNdf*> copies;
+  std::span<const BenchQuery> queries;
+};
+
+/// Nanoseconds of a density of each model, processor time of one thread: they are asked in turns, and the time is the lower quartile
+/// of the rounds (time_rounds.h). Questions go anywhere on the map, as those of rays without an order do.
+/// @param longest_s  after which the turn of a slow model ends
+std::vector<double> densityTimes(std::span<const AskedNdf> ndfs, double longest_s);
 
 /// Nanoseconds of a plain microfacet lobe (anisotropic GGX), for comparison in the same run: {ns, spread}.
 nlohmann::json plainLobeTime(std::span<const BenchQuery> queries);

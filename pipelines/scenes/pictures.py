@@ -53,6 +53,14 @@ def sheet(titled, columns, notes):
     return page
 
 
+def framed(pixels, frame):
+    """A picture with a frame round a part of it: (left, top, width, height) in pixels."""
+    page = to_image(pixels)
+    left, top, width, height = frame
+    PIL.ImageDraw.Draw(page).rectangle((left - 1, top - 1, left + width, top + height), outline=(255, 255, 255))
+    return np.asarray(page) / 255
+
+
 def with_inset(pixels, detail, frame, corner):
     """A picture with a detail of it, rendered larger, in a corner.
 

@@ -6,7 +6,6 @@ Without Mitsuba, `--no-pictures` takes the scenes of data-samples/ and leaves th
 
 import argparse
 import json
-import os
 import pathlib
 import resource
 import shutil
@@ -22,15 +21,14 @@ sys.path.insert(0, str(ROOT / "pipelines"))
 import kit as kits  # noqa: E402
 import pictures  # noqa: E402
 import planned_scenes  # noqa: E402
+from machine import machine, machine_text  # noqa: E402
 
 SIZE = 2048  # texels of a map along each axis
 UNIT_M = 0.01
-SPP = 16
+SPP, DETAIL_SPP = 16, 8  # of a whole picture, and of a detail
 WIDTH = 150  # characters of a line of the page
 DIFFERS = 7  # exit code of glint-plan where a plan does not hold
-# The setting of Deng 2022, as glint-plan --check --paper has it.
-PAPER_PYRAMID = ("--stride", 32, "--overlap", 1, "--resolution", 256)
-PAPER_COMPRESS = ("--method", "cp", "--rank", 16)
+PLANNED, PAPER, EXACT = "planned", "as in the paper", "brute force"
 
 
 def sample_of(scene):
@@ -88,46 +86,30 @@ class Run:
 
     def plan(self, asked):
         """Plans and builds. @return (plan, seconds of processor time of the plan, and of Make)"""
-        path = self.folder / "scene.json"
+        path, plan, rules = (self.folder / name for name in ("scene.json", "plan.json", "plan.mk"))
         path.write_text(json.dumps(asked, indent=1) + "\n")
         start = children_seconds()
-        self.tool(
-            "plan", path, "--maps", self.maps, "-o", self.folder / "plan.json", "--make", self.folder / "plan.mk", "--force"
-        )
+        made = self.tool("plan", path, "--maps", self.maps, "-o", plan, "--make", rules, "--force")
         planned = children_seconds()
         shutil.rmtree(self.folder / "assets", ignore_errors=True)
-        make = [
-            "make",
-            "-s",
-            "-f",
-            self.folder / "plan.mk",
-            f"GLINT_BIN={self.bin}",
-            f"GLINT_MK={ROOT}/pipelines/glint.mk",
-            f"GLINT_OUT={self.folder}/assets",
-        ]
-        subprocess.run(make, check=True)
-        return json.loads((self.folder / "plan.json").read_text()), planned - start, children_seconds() - planned
+        variables = {"GLINT_BIN": self.bin, "GLINT_MK": ROOT / "pipelines/glint.mk", "GLINT_OUT": self.folder / "assets"}
+        subprocess.run(["make", "-s", "-f", rules, *(f"{name}={value}" for name, value in variables.items())], check=True)
+        self.asset = self.folder / "assets" / made["materials"][0]["file"]
+        return json.loads(plan.read_text()), planned - start, children_seconds() - planned
 
     def check(self):
         return self.tool("plan", "--check", self.folder / "plan.json", "--paper", expected=(0, DIFFERS))["materials"][0]
 
-    def asset(self, plan):
-        """The file that queries read, and that of the normals."""
-        asset = plan["materials"][0]["asset"]
-        normals = self.folder / f"assets/{self.scene.name}.glint"
-        if not asset["tool"]:
-            return normals, normals
-        suffix = asset["method"] if asset["tool"] == "glint-compress" else asset["tool"].removeprefix("glint-")
-        return normals.with_suffix(f".{suffix}.glint"), normals
-
-    def make_paper(self):
-        """Builds the setting of Deng 2022, from the image. @return (file, seconds of processor time)"""
-        normals, pyramid, asset = (self.folder / f"paper.{kind}.glint" for kind in ("normals", "pyramid", "cp"))
+    def make_paper(self, programs):
+        """Builds the setting of the paper, from the image. @return seconds of processor time"""
         start = children_seconds()
-        self.tool("ingest", self.maps / f"{self.scene.name}.exr", "-o", normals, "--force")
-        self.tool("pyramid", normals, "-o", pyramid, *PAPER_PYRAMID, "--sigma-r", self.scene.sigma_r, "--force")
-        self.tool("compress", pyramid, "-o", asset, *PAPER_COMPRESS, "--force")
-        return asset, children_seconds() - start
+        self.normals = self.paper = self.folder / "paper.normals.glint"
+        self.tool("ingest", self.maps / f"{self.scene.name}.exr", "-o", self.normals, "--force")
+        for program in programs:
+            source, name = self.paper, program["tool"].removeprefix("glint-")
+            self.paper = self.folder / f"paper.{name}.glint"
+            self.tool(name, source, "-o", self.paper, *program["flags"], "--force")
+        return children_seconds() - start
 
 
 def children_seconds():
@@ -147,33 +129,67 @@ def write_radiance(image, path):
     )
 
 
-def render(run, gallery, plan, paper, exact):
-    """One sheet: every view by the plan, by the paper's setting, and with `exact` by brute force, to which FLIP errors relate."""
+class Renderer:
+    """Renders the views of one scene."""
+
+    def __init__(self, run, gallery):
+        scene = self.scene = run.scene
+        self.gallery, self.kit = gallery, run.kit
+        self.files = {PLANNED: run.asset, PAPER: run.paper, EXACT: run.normals}
+        self.map = kits.Map(run.kit, scene.name, SIZE, scene.texel_um * 1e-4, scene.sigma_r, run.normals, run.normals)
+
+    def draw(self, view, title, spp=SPP, crop=None):
+        bsdf = self.scene.bsdf(self.kit, self.map, self.files[title])
+        description = self.scene.description(self.kit, view, bsdf, spp, crop)
+        return self.gallery.render(f"{self.scene.name}, {view}, {title}", description, self.scene.exposure)
+
+
+def render(run, gallery):
+    """One sheet. The plan renders all views, and the paper's setting all but the hardest; a detail of that one is by both and by brute force, to
+    which FLIP errors relate. Noise is part of them: samples of other assets go other ways, though random numbers are the same.
+
+    @return (file, [{view, setting, seconds, flip}])
+    """
     from models import flip
 
-    scene = run.scene
-    asset, normals = run.asset(plan)
-    of = kits.Map(run.kit, scene.name, SIZE, scene.texel_um * 1e-4, scene.sigma_r, normals, normals)
-    sheet, notes, errors = {}, {}, []
-    for view in scene.views:
-        drawn = {}
-        files = [("planned", asset), ("as in the paper", paper)] + [("exact", normals)] * exact
-        for title, file in files:
-            bsdf = scene.bsdf(run.kit, of, file)
-            drawn[title] = gallery.render(
-                f"{scene.name}, {view}, {title}", scene.description(run.kit, view, bsdf, SPP), scene.exposure
-            )
-        for title, picture in drawn.items():
-            key = f"{view}: {title}" if len(scene.views) > 1 else title
-            notes[key] = f"{picture.seconds:.0f} s"
-            sheet[key] = picture.srgb()
-            if exact and title != "exact":
-                error = flip(drawn["exact"].srgb(), picture.srgb())
-                notes[key] += f", FLIP {error:.3f}"
-                errors.append({"view": view, "setting": title, "flip": error})
+    scene, renderer = run.scene, Renderer(run, gallery)
+    *others, hardest = scene.views
+    sheet, notes, figures = {}, {}, []
+
+    def show(view, title, picture, pixels, error=None):
+        key = f"{view}: {title}"
+        sheet[key] = pixels
+        notes[key] = f"{picture.seconds:.2g} s" + (f", FLIP {error:.3f}" if error is not None else "")
+        figures.append({"view": view, "setting": title, "seconds": picture.seconds, "flip": error})
+
+    for view, title in [(view, title) for view in others for title in (PLANNED, PAPER)] + [(hardest, PLANNED)]:
+        picture = renderer.draw(view, title)
+        pixels = picture.srgb()
+        show(view, title, picture, pictures.framed(pixels, scene.detail) if view == hardest else pixels)
+    details = {title: renderer.draw(hardest, title, DETAIL_SPP, scene.detail) for title in (PLANNED, PAPER, EXACT)}
+    larger = planned_scenes.SIZE[0] // scene.detail[2]
+    for title, picture in details.items():
+        error = None if title == EXACT else flip(details[EXACT].srgb(), picture.srgb())
+        show("the detail", title, picture, picture.srgb().repeat(larger, 0).repeat(larger, 1), error)
     file = run.folder / "pictures.png"
-    pictures.save(pictures.sheet(sheet, 3 if exact else 2, notes), file)
-    return file, errors
+    pictures.save(pictures.sheet(sheet, 3 if others else 2, notes), file)
+    return file, figures
+
+
+def caption(entry):
+    """What is seen on the sheet, with its figures."""
+    figures = entry["pictures"]
+    details = {f["setting"]: f for f in figures if f["view"] == "the detail"}
+    scene = next(make() for make in planned_scenes.SCENES if make().name == entry["name"])
+    seconds = lambda f: f"{f['seconds']:.2g} s"
+    by = lambda title: f"{seconds(details[title])}, FLIP {details[title]['flip']:.3f}"
+    whole = ", ".join(f"{f['view']} {f['setting']} {seconds(f)}" for f in figures if f["view"] != "the detail")
+    width, height = scene.detail[2:]
+    return (
+        f"Seconds of processor time: {whole}, with {SPP} samples a pixel. The detail, {width} x {height} of the {planned_scenes.SIZE[0]} x "
+        f"{planned_scenes.SIZE[1]} pixels with {DETAIL_SPP} samples: {PLANNED} {by(PLANNED)}; {PAPER} {by(PAPER)}; {EXACT} "
+        f"{seconds(details[EXACT])}."
+    )
 
 
 def size_text(value):
@@ -213,18 +229,27 @@ What `glint-plan` saves against the setting of Deng 2022 (images of 256 x 256 pi
 `plan_cloth.json`; `pipelines/scenes/planned_scenes.py` has them for Mitsuba.
 
 Errors are [seen errors](METHODS.md#seen-error) in the worst size of footprints that the scene asks. The file is all that queries read: with the normals, where
-footprints are smaller than the finest level. There texels answer: such a row is nearly exact, and slow. Times to prepare are processor time, from the image on; a density is asked on one thread of {machine}.
+footprints are smaller than the finest level. There texels answer: such a row is nearly exact, and slow. Times to prepare are processor time, from the
+image on; that of a density is processor time of one thread, for questions anywhere on the map. FLIP errors are those of a detail, against brute
+force. Part of each is the noise of few samples: the ring's is .05 by the paper's setting, too, where the same texels answer as by brute force.
+
+{machine}
 """
 
 
-def page(entries, machine, folder=""):
-    lines = [HEAD.format(machine=machine), *TABLE_HEAD]
+def page(entries, folder=""):
+    machines = dict.fromkeys(entry["machine"] for entry in entries)
+    lines = [HEAD.format(machine="\n".join(machines)), *TABLE_HEAD]
     for entry in entries:
         lines += rows_of(entry)
     for entry in entries:
         lines += ["", f"## {entry['title']}", ""]
         if entry.get("picture"):
-            lines += [f"![{entry['title']}: by the plan, and by the paper's setting]({folder}{entry['picture']})", ""]
+            lines += [
+                f"![{entry['title']}: by the plan, and a detail by the plan, by the paper's setting and by brute force]({folder}{entry['picture']})",
+                "",
+                *([textwrap.fill(caption(entry), WIDTH), ""] if "pictures" in entry else []),
+            ]
         plan = entry["plan"]["materials"][0]
         asked = plan["question"]
         lines += [
@@ -240,43 +265,57 @@ def page(entries, machine, folder=""):
     return "\n".join(lines) + "\n"
 
 
-def machine_text():
-    busy = ", which was busy" if os.getloadavg()[0] > 2 * os.cpu_count() else ""
-    return f"a machine of {os.cpu_count()} cores{busy}"
-
-
-def run_scene(scene, arguments, gallery):
+def run_scene(scene, arguments, gallery, old):
+    """An entry of the record. @param old  the entry of an earlier run, of which --keep keeps a part; or None"""
     run = Run(scene, arguments.out, arguments.bin.resolve())
+    kept = arguments.keep if old else None
+    entry = old if kept else new_entry(run, arguments, gallery)
+    run.asset, run.paper, run.normals = (run.folder / entry["files"][title] for title in (PLANNED, PAPER, EXACT))
+    if kept == "plans":
+        entry |= {"machine": machine_text(machine()), "check": run.check()}
+    print("\n".join([*TABLE_HEAD, *rows_of(entry)]), flush=True)
+    if gallery:
+        picture, entry["pictures"] = render(run, gallery)
+        entry["picture"] = f"{scene.name}/{picture.name}"
+        if arguments.docs:
+            to_documents(scene, picture, arguments.docs)
+    return entry
+
+
+def new_entry(run, arguments, gallery):
+    """Makes the map, the plan and the assets of a scene, and checks the plan."""
+    scene, measured_on = run.scene, machine_text(machine())
     run.make_maps()
     asked = question(run.kit, scene) if gallery else json.loads(sample_of(scene).read_text())
     if arguments.docs and gallery:
         sample_of(scene).write_text(json.dumps(asked, indent=1) + "\n")
     plan, plan_s, make_s = run.plan(asked)
-    paper, paper_s = run.make_paper()
-    entry = {
+    checked = run.check()
+    paper_s = run.make_paper(checked["paper"]["programs"])
+    files = {PLANNED: run.asset, PAPER: run.paper, EXACT: run.normals}
+    return {
         "name": scene.name,
         "title": scene.title,
         "minimise": scene.minimise,
         "budgets": asked["materials"][0].get("budgets", {}) | asked.get("budgets", {}),
+        "machine": measured_on,
         "plan": plan,
         "plan_s": plan_s,
         "make_s": make_s,
         "paper_s": paper_s,
-        "check": run.check(),
+        "files": {title: str(file.relative_to(run.folder)) for title, file in files.items()},
+        "check": checked,
     }
-    print("\n".join([*TABLE_HEAD, *rows_of(entry)]), flush=True)
-    if gallery:
-        picture, entry["flip"] = render(run, gallery, plan, paper, arguments.exact)
-        entry["picture"] = f"{scene.name}/{picture.name}"
-        if arguments.docs:
-            folder = arguments.docs / "pictures/plans"
-            folder.mkdir(parents=True, exist_ok=True)
-            named = picture.with_name(f"{scene.name}.png")
-            named.write_bytes(picture.read_bytes())
-            for old in folder.glob(f"{scene.name}.*"):
-                old.unlink()
-            pictures.for_documents(named, folder)
-    return entry
+
+
+def to_documents(scene, picture, docs):
+    folder = docs / "pictures/plans"
+    folder.mkdir(parents=True, exist_ok=True)
+    named = picture.with_name(f"{scene.name}.png")
+    named.write_bytes(picture.read_bytes())
+    for old in folder.glob(f"{scene.name}.*"):
+        old.unlink()
+    pictures.for_documents(named, folder)
 
 
 def main():
@@ -289,7 +328,11 @@ def main():
         choices=[scene().name for scene in planned_scenes.SCENES],
         help="this scene; may be given again",
     )
-    parser.add_argument("--exact", action="store_true", help="also render by brute force: hours where footprints are large")
+    parser.add_argument(
+        "--keep",
+        choices=["plans", "checks"],
+        help="of an earlier run in --out: plans and assets, and with `checks` the figures of the table, too",
+    )
     parser.add_argument("--no-pictures", action="store_true", help="without Mitsuba: plans, assets and figures alone")
     parser.add_argument(
         "--docs", type=pathlib.Path, help="also write DOCS/PLANS.md; with pictures also DOCS/pictures/plans and data-samples/"
@@ -308,13 +351,13 @@ def main():
     for scene in [make() for make in planned_scenes.SCENES]:
         if arguments.only and scene.name not in arguments.only:
             continue
-        entries[scene.name] = run_scene(scene, arguments, gallery)
+        entries[scene.name] = run_scene(scene, arguments, gallery, entries.get(scene.name))
         record.write_text(json.dumps(list(entries.values()), indent=1) + "\n")
-    (arguments.out / "PLANS.md").write_text(page(entries.values(), machine_text()))
+    (arguments.out / "PLANS.md").write_text(page(entries.values()))
     if arguments.docs:
         for entry in entries.values():
             entry["picture"] = next((path.name for path in (arguments.docs / "pictures/plans").glob(f"{entry['name']}.*")), "")
-        (arguments.docs / "PLANS.md").write_text(page(entries.values(), machine_text(), "pictures/plans/"))
+        (arguments.docs / "PLANS.md").write_text(page(entries.values(), "pictures/plans/"))
     if wrong := [entry["title"] for entry in entries.values() if not entry["check"]["holds"]]:
         sys.exit("these plans do not hold: " + ", ".join(wrong))
 

@@ -29,22 +29,23 @@ class PlannedScene:
     sigma_r: float
     tolerance: float
     minimise: str
-    views: dict  # title -> camera: (origin, target, degrees across)
+    views: dict  # title -> camera: (origin, target, degrees across); the last is the hardest
+    detail: tuple  # of the hardest view, for brute force: (left, top, width, height), pixels; SIZE is a whole number of them wide
     surroundings: Callable  # kit -> dictionary of all but camera and BSDF
     bsdf: Callable  # (kit, map, asset) -> dictionary
     budgets: dict = dataclasses.field(default_factory=dict)  # as a scene of glint-plan has them
     exposure: float = 1.0
     sky: bool = False  # whether SKY is the only light
 
-    def description(self, kit, view, bsdf, spp, size=SIZE):
-        """The dictionary of Mitsuba."""
+    def description(self, kit, view, bsdf, spp, crop=None):
+        """The dictionary of Mitsuba. @param crop  a part of the film, whose pixels are those of the whole"""
         parts = self.surroundings(kit)
         parts[self.shape] = parts[self.shape] | {"bsdf": bsdf}
         origin, target, degrees = self.views[view]
         return {
             "type": "scene",
             "integrator": kit.integrator(2),
-            "camera": look_at(origin, target, degrees, size, spp),
+            "camera": look_at(origin, target, degrees, SIZE, spp, crop=crop),
             **parts,
         }
 
@@ -88,6 +89,7 @@ def car():
         0.3,
         "bytes",
         views,
+        (128, 96, 64, 48),
         surroundings,
         paint,
     )
@@ -131,6 +133,7 @@ def ring():
         0.2,
         "query_ns",
         views,
+        (70, 132, 64, 48),
         surroundings,
         gold,
         budgets={"bytes": 60e6},
@@ -173,6 +176,7 @@ def silk():
         0.2,
         "bytes",
         views,
+        (150, 70, 32, 24),
         surroundings,
         thread,
         exposure=1.5,

@@ -7,11 +7,11 @@ import argparse
 import json
 import os
 import pathlib
-import platform
 import subprocess
 import sys
 
-sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "pipelines/demo"))
+sys.path[:0] = [str(pathlib.Path(__file__).parents[2] / folder) for folder in ("pipelines", "pipelines/demo")]
+from machine import machine  # noqa: E402
 from processes import Tools  # noqa: E402
 
 # Inputs: name -> arguments of glint-synth.
@@ -655,22 +655,6 @@ def call(command, stderr=None):
     if process.returncode != 0:
         sys.exit(f"failed with exit code {process.returncode}: {' '.join(map(str, command))}")
     return process.stdout
-
-
-def machine():
-    model = next(
-        (line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), platform.machine()
-    )
-    revision = subprocess.run(
-        ["git", "describe", "--always", "--dirty"], capture_output=True, text=True, cwd=pathlib.Path(__file__).parent
-    )
-    return {
-        "processor": model,
-        "cores": os.cpu_count(),
-        "system": platform.platform(),
-        "load": os.getloadavg()[0],
-        "revision": revision.stdout.strip(),
-    }
 
 
 def main():

@@ -11,7 +11,9 @@ import pathlib
 import re
 import sys
 
+sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "pipelines"))
 from charts import chart, light_error_chart, light_time_chart, preparation_chart, stride_chart
+from machine import machine_text
 from plan_calibration import calibration_section
 from scenes import scene_section
 from words import percents, sizes, span, times
@@ -588,7 +590,7 @@ def main():
     accuracy = {path.name.split(".")[0]: json.loads(path.read_text()) for path in sorted(folder.glob("*.accuracy.json"))}
     light = json.loads((folder / "light.json").read_text()) if (folder / "light.json").exists() else {}
     docs.mkdir(exist_ok=True)
-    machine = "{processor}, {cores} cores; load {load:.1f} before the run; revision {revision}.".format(**results["machine"])
+    machine = machine_text(results["machine"])
     repeats = f"the median of {results['repeats']} runs" if results["repeats"] > 1 else "of one run"
     data = points(accuracy, rows)
     links = ", ".join(f"[{title}](#{anchor(title)})" for title, *_ in by_method(rows))

@@ -101,7 +101,7 @@ MAKE = [
     "bench normals.glint -o bench.json --quick --only moments,histograms",
     "bench --stability -o stability.json --quick --only one-direction",
     "bench --preset xing2024 -o paper.json --quick",
-    "plan scene.json -o plan.json",
+    "plan scene.json -o plan.json --make plan.mk",
     "plan scene.json --explain",
     "plan --check plan.json --sweep --paper",
     "displace heights.glint -o displaced.glint --factors 4,16 --angular 3 --spatial 2",

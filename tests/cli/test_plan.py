@@ -1,11 +1,15 @@
 """glint-plan: the cheapest method for every map of a scene; plans hold; errors name the field of the scene."""
 
+import contextlib
 import json
 import math
+import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
+import time
 
 import jsonschema
 import pytest
@@ -156,8 +160,10 @@ def test_another_map_than_the_planned_one_is_refused(plan, glint):
 
 
 def test_rules_build_exactly_the_plan(plan, glint):
-    process, made = plan(scene(material("noise64.png", tolerance=MOMENTS_HOLD, **ROUGH), lights=SKY), "--make", "plan.mk")
+    noise = scene(material("noise64.png", tolerance=MOMENTS_HOLD, **ROUGH), lights=SKY)
+    process, made = plan(noise, "--make", "plan.mk", "--json")
     assert process.returncode == 0, process.stderr
+    assert json.loads(process.stdout)["result"]["materials"][0]["file"] == "noise64.moments.glint"
     make = ["make", "-s", "-f", "plan.mk", f"GLINT_BIN={BIN}", f"GLINT_MK={ROOT}/pipelines/glint.mk"]
     built = subprocess.run(make, cwd=glint.folder, capture_output=True, text=True)
     assert built.returncode == 0, built.stderr
@@ -231,6 +237,58 @@ def test_measurements_are_kept(plan, glint, shared):
     )
     _, second = plan(document, "--cache", "probes")
     assert second["materials"][0]["predicted"]["seen"] == 0.25, "the kept measurement is used"
+
+
+@pytest.fixture
+def start(glint, shared, monkeypatch):
+    """start() -> (process, its folder of assets), a plan that is under way, in a session of its own."""
+    scratch = glint.folder / "scratch"
+    scratch.mkdir()
+    monkeypatch.setenv("TMPDIR", str(scratch))
+    shutil.copy(shared / "flakes.png", glint.folder)
+    (glint.folder / "scene.json").write_text(json.dumps(SHARP))
+    processes = []
+
+    def run():
+        command = [BIN / "glint-plan", "scene.json", "--quiet"]
+        processes.append(subprocess.Popen(command, cwd=glint.folder, start_new_session=True, stdout=subprocess.DEVNULL))
+        folder = scratch / f"glint-plan.assets-{processes[-1].pid}"
+        while not list(folder.glob("*.glint")):
+            assert processes[-1].poll() is None, "it ended before it was looked at"
+            time.sleep(0.002)
+        return processes[-1], folder
+
+    yield run
+    for process in processes:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_removes_the_assets(start, number):
+    process, folder = start()
+    process.send_signal(number)
+    assert process.wait() == -number
+    assert not folder.exists()
+
+
+def test_assets_of_killed_plans_go_with_the_next_plan_and_those_of_living_ones_stay(start, glint):
+    living, kept = start()
+    os.killpg(living.pid, signal.SIGSTOP)
+    killed, left = start()
+    os.killpg(killed.pid, signal.SIGKILL)
+    killed.wait()
+    others = kept.with_name("glint-plan.assets-1")
+    others.mkdir()
+    (others / "0123abcd-notes.glint").touch()
+    assert left.exists()
+    assert glint("plan", "scene.json", "--explain").returncode == 0
+    assert not left.exists() and kept.exists() and list(others.iterdir()), "only what is surely a dead plan's is removed"
+    os.killpg(living.pid, signal.SIGKILL)
+    living.wait()
+    assert glint("plan", "scene.json", "--explain").returncode == 0
+    assert list(kept.parent.iterdir()) == [others]
 
 
 def test_explanation_is_in_words(plan, glint):

@@ -79,6 +79,16 @@ def test_readme_is_short():
     assert len(README.splitlines()) <= MOST_README_LINES, "move the details to docs/"
 
 
+def test_plans_are_those_of_their_page():
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in (ROOT / "docs/PLANS.md").read_text().splitlines()]
+    table = [row for row in cells if len(row) == 8][2:]
+    assert len(table) == 9, "three rows of three scenes"
+    for plan, paper in zip(table[::3], table[1::3]):
+        title, _, asked, _, *ours = plan
+        seen, file, density = (f"{ours[k]} ({paper[4 + k]})" for k in (0, 1, 3))
+        assert f"| {title} | {asked} | {seen} | {file} | {density} |" in README.splitlines()
+
+
 def test_projects_that_link_are_those_that_are_built():
     inside, installed = blocks(LINKING, "cmake")
     assert inside in (ROOT / "tests/consumer/CMakeLists.txt").read_text()

@@ -17,8 +17,8 @@ import measures
 from contact_sheet import contact_sheet
 from gallery import MAPS, MODELS, Gallery, has_blocks, reference_of
 
-sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "tests/bench"))
-from bench import machine  # noqa: E402
+sys.path[:0] = [str(pathlib.Path(__file__).parents[2] / folder) for folder in ("pipelines", "pipelines/demo")]
+from machine import machine  # noqa: E402
 from processes import Tools  # noqa: E402
 
 TEXELS = 1024

@@ -8,7 +8,9 @@ import textwrap
 from math import radians, tan
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "stability"))
+sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "pipelines"))
 from limits_section import with_section
+from machine import machine_text
 from gallery import MODELS, REFERENCES, reference_of
 
 # Largest values that a good method has. Steps: 1 is the noise beside a side of a block, which the sides of five pictures tell to a tenth.
@@ -215,7 +217,7 @@ def write(results, docs):
     distances, lights, names = sorted(ordered("distance")), sorted(ordered("light")), ordered("map")
     models = [model for model in ordered("model") if model in MODELS]
     text = PAGE.format(
-        machine="{processor}, {cores} cores; load {load:.1f} before the run; revision {revision}.".format(**results["machine"]),
+        machine=machine_text(results["machine"]),
         size=results["size"],
         texels=results["texels"],
         map_count=len(names),
