@@ -89,16 +89,20 @@ bake::DisplaceOptions DisplaceOptions::values(const HeightMap& map) const {
 }
 
 void requireDisplaceMemory(const Tool& tool, const HeightMap& map, const bake::DisplaceOptions& options) {
-  constexpr double kUsual = 15.0 * 15.0;        // directions that BytesPerTexel counts
-  constexpr double kOfPatch = 16, kOfAll = 64;  // bytes of a pair of directions: sums and results of a patch, tables and chunks
+  constexpr int kUsual = 15;  // directions along an axis that BytesPerTexel counts
   const bool fine = options.factors.front() < kFineFactor;
-  const bool many = options.angular > 15;
-  const double directions = std::max(kUsual, static_cast<double>(options.angular) * options.angular);
-  const double masks = 4 * (directions - kUsual) / 16;
-  const double pairs = options.texture.channels * (directions * directions - kUsual * kUsual) *
-                       (kOfPatch * options.spatial * options.spatial + kOfAll);
+  const bool many = options.angular > kUsual;
+  const double directions = static_cast<double>(options.angular) * options.angular;
+  const double masks = many ? 4 * (directions - kUsual * kUsual) / 16 : 0;
+  bake::DisplaceOptions usual = options;
+  usual.angular = kUsual, usual.scale_tolerance = 0;
+  const auto pairsOf = [&](const bake::DisplaceOptions& of) {
+    return bake::displacementPairBytes(map.width, map.height, of, tool.threads());
+  };
   const double texels = static_cast<double>(map.width) * map.height;
-  tool.requireMemory(texels * ((fine ? BytesPerTexel::kDisplaceFinely : BytesPerTexel::kDisplace) + masks) + pairs,
+  const double counted = texels * (fine ? BytesPerTexel::kDisplaceFinely : BytesPerTexel::kDisplace);
+  const double pairs = many ? pairsOf(options) - std::min(pairsOf(usual), counted) : 0;
+  tool.requireMemory(counted + texels * masks + pairs,
                      fmt::format("a displacement of {} x {} texels in {:.0f} directions", map.width, map.height, directions),
                      many   ? "give a smaller --angular or --spatial, or take a smaller map"
                      : fine ? "give a larger --factor, or take a smaller map"

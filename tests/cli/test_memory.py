@@ -46,6 +46,11 @@ RUNS = {
         "displace heights.glint -o out.glint --factor 32 --base diffuse:0.8",
         "2M",
     ),
+    "angular": (
+        "displace relief.glint -o out.glint --factor 8 --base diffuse:0.8 --bounces 1 --angular 25 --spatial 4",
+        "displace relief.glint -o out.glint --factor 8 --base diffuse:0.8 --bounces 1 --angular 15 --spatial 1",
+        "2M",
+    ),
     "shlobes": ("shlobes --sigma-r 0.05 --order 120 -o out.glint", "shlobes --sigma-r 0.05 --order 20 -o out.glint", "8M"),
     "light": (
         "shlobes --light lights.json --order 90 --grid 5x8 -o out.glint",
@@ -72,6 +77,8 @@ MAKE = [
     "ingest heights.exr --kind height --to heights -o heights.glint",
     "synth isotropic --height --size 128 -o small-heights.exr",
     "ingest small-heights.exr --kind height --to heights --texel-size-um 1 -o small-heights.glint",
+    "synth weave --height --size 32 -o relief.exr",
+    "ingest relief.exr --kind height --to heights -o relief.glint",
     "pyramid map.glint -o pyramid.glint --stride 16",
     "pyramid map.glint -o coarse.glint --stride 128",
     "wang map.glint -o tiles.glint --size 32",

@@ -207,8 +207,8 @@ double patchError(const Built& built, const EffectiveBrdf& original, const Effec
   return std::sqrt(error / all);
 }
 
-TEST(Displace, MoreTermsKeepMapsWhoseScalingDiffersFromPlaceToPlace) {
-  // Four kinds of relief, one in each quarter: deep grooves along x, along y, noise, and nothing.
+/// Four kinds of relief, one in each quarter: deep grooves along x, along y, noise, and nothing.
+OwnedSurface fourReliefs() {
   OwnedSurface map{64, 64, std::vector<float>(64 * 64)};
   const OwnedSurface noise = test::synthSurface(SynthKind::isotropic, 64, 64);
   for (int j = 0; j < 64; ++j) {
@@ -218,6 +218,72 @@ TEST(Displace, MoreTermsKeepMapsWhoseScalingDiffersFromPlaceToPlace) {
       if (j >= 32 && i < 32) h = noise.heights[static_cast<std::size_t>(j) * 64 + i];
     }
   }
+  return map;
+}
+
+/// |R - scale| / |R| of the scaling function that queries answer at the middles of 2 x 2 patches, of the worst channel.
+double queriedResidual(const OwnedSurface& map, const DisplaceOptions& options, const DisplacedBrdf& brdf, int level) {
+  const DisplacementLevel& l = brdf.asset().levels[level];
+  const auto surface = map.surface();
+  const auto directions = angularDirections(options.angular);
+  const VisibilityMasks masks(surface, directions);
+  const PatchGrid grid{2, 2, l.columns, l.rows, l.factor};
+  EffectiveOptions effective{options.base, options.bounces, options.seed, {}, 0, 0, options.texture};
+  const EffectiveBrdf original = effectiveBrdf(surface, masks, directions, grid, effective);
+  std::vector<float> cells;
+  for (const float h : l.heights) cells.push_back(h / static_cast<float>(l.factor));
+  const auto channels = static_cast<std::size_t>(brdf.asset().channels);
+  const LobeField field{options.base, static_cast<std::size_t>(options.lobes), channels, l.lobes, l.lobe_colors, l.lobe_alphas};
+  const EffectiveBrdf low = lowBrdf(cells, field, directions, grid);
+  double error[3] = {}, norm[3] = {};
+  for (std::size_t p = 0; p < 4; ++p) {
+    const Vec2 uv = {0.25f + 0.5f * static_cast<float>(p % 2) + 0.5f / static_cast<float>(map.width),
+                     0.25f + 0.5f * static_cast<float>(p / 2) + 0.5f / static_cast<float>(map.height)};
+    for (std::size_t o = 0; o < directions.size(); ++o) {
+      for (std::size_t i = 0; i <= o; ++i) {
+        if (directions[i].z < kGrazingCosine || directions[o].z < kGrazingCosine) continue;
+        const Rgb scale = brdf.scale(level, uv, directions[i], directions[o]);
+        const float of_channel[3] = {scale.r, scale.g, scale.b};
+        for (std::size_t c = 0; c < channels; ++c) {
+          const std::size_t k = i * directions.size() + o;
+          const double ratio = double{original.patch(p, c)[k]} / low.patch(p, c)[k];
+          error[c] += (ratio - of_channel[c]) * (ratio - of_channel[c]), norm[c] += ratio * ratio;
+        }
+      }
+    }
+  }
+  double worst = 0;
+  for (std::size_t c = 0; c < channels; ++c) worst = std::max(worst, std::sqrt(error[c] / norm[c]));
+  return worst;
+}
+
+TEST(Displace, MoreTermsOfColoursAndTwoLevelsAreWhatARendererGets) {
+  const OwnedSurface map = fourReliefs();
+  for (const BaseBrdf& base : {BaseBrdf{BaseBrdf::Kind::diffuse, 0.8f, 0, 1, 0}, ggx(0.3f)}) {
+    DisplaceOptions options = quick({8, 16}, base);
+    options.bounces = 1;
+    options.texture.channels = 3;
+    for (int k = 0; k < 64 * 64; ++k)  // red grooves along x, green grooves along y, and blue noise
+      for (int c = 0; c < 3; ++c) options.texture.colors.push_back(0.2f + 0.7f * (c == k / 32 % 2 + 2 * (k / 2048 % 2)));
+    options.scale_tolerance = 0.03f;
+    const Built built(map, options);
+    const DisplacedBrdf brdf(built.asset);
+    const auto terms = static_cast<std::size_t>(built.asset.more_terms);
+    EXPECT_GT(terms, 0u);
+    for (int l = 0; l < 2; ++l) {
+      const DisplacementLevel& level = built.asset.levels[l];
+      EXPECT_EQ(level.spatial_terms.size(), terms * 4 * 3);
+      EXPECT_EQ(level.angular_terms.size(), terms * 49 * 50 / 2 * 3);
+      EXPECT_GT(level.rank1_residual, 0.08f);
+      EXPECT_LE(level.scale_residual, 0.03f);
+      // Grid directions and the middles of patches are met but for rounding.
+      EXPECT_NEAR(queriedResidual(map, options, brdf, l), level.scale_residual, 1e-3) << l;
+    }
+  }
+}
+
+TEST(Displace, MoreTermsKeepMapsWhoseScalingDiffersFromPlaceToPlace) {
+  const OwnedSurface map = fourReliefs();
   DisplaceOptions options = quick({8});
   options.bounces = 1;
   const Built one(map, options);

@@ -9,6 +9,7 @@
 
 #include "glint/bake/displace/downsample_heights.h"
 #include "glint/bake/displace/low_brdf.h"
+#include "glint/bake/displace/ordered_sums.h"
 #include "glint/bake/displace/scaling_function.h"
 #include "glint/bake/displace/vmf_fit.h"
 #include "glint/math/half.h"
@@ -298,6 +299,30 @@ void fitCells(const HeightSurface& surface, const FacetBase& base, const CellGri
       for (float& alpha : alphas) alpha = alpha > 0 ? std::sqrt(alpha) : base.base().alpha;
     }
   });
+}
+
+double displacementPairBytes(int width, int height, const DisplaceOptions& options, int threads) {
+  constexpr double kFloat = sizeof(float), kDouble = sizeof(double), kHalf = sizeof(std::uint16_t);
+  const auto channels = static_cast<double>(options.texture.channels);
+  const double n = static_cast<double>(options.angular) * options.angular, padded = 8 * std::ceil(n / 8);
+  const CellGrid finest = CellGrid::of(width, height, options.factors[0]);
+  const double patches =
+      static_cast<double>(std::min(options.spatial, finest.columns)) * std::min(options.spatial, finest.rows);
+  const double sum = channels * padded * padded * kFloat, brdf = channels * patches * n * n * kFloat;
+  const auto held = [&](double chunks) {
+    return std::min(chunks, std::max(4.0, std::floor(static_cast<double>(kOrderedSumBytes) / sum))) * sum;
+  };
+  // Chunks of samples and of cells, with one more for each patch, as the estimators cut them.
+  const bool glossy = options.base.kind == BaseBrdf::Kind::ggx;
+  const double facets = std::min(2.0 * width * height, glossy ? 0x1p21 : 0x1p18);
+  const double cells = std::min(4096.0, static_cast<double>(finest.columns) * finest.rows);
+  const double estimating = kDouble * channels * patches * n * n + std::max(held(patches + facets / 8192), brdf) +
+                            (glossy ? 3 * kFloat * n * n : 0) + (options.factors.size() > 1 ? brdf : 0);
+  const double lowering = 2 * brdf + held(patches + cells / 32) + threads * sum + 4 * kFloat * n * padded;
+  const double terms = options.scale_tolerance > 0 ? kMostScaleTerms : 1;
+  const double factoring = 2 * brdf + 2 * kDouble * n * n + (channels + 1) * terms * n * n / 2 * kFloat;
+  const double stored = static_cast<double>(options.factors.size()) * channels * terms * n * n / 2 * kHalf;
+  return std::max({estimating, lowering, factoring}) + stored;
 }
 
 DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, const ProgressFn& progress) {

@@ -26,6 +26,11 @@ struct DisplaceOptions {
 /// Steepest slope that `displace` accepts: 80 degrees. One normal for each facet does not resolve light between steeper walls.
 inline constexpr float kSteepestSlope = 5.6712818f;
 
+/// Memory that tables over pairs of directions take at the peak of `displace`, bytes: what grows with the fourth power of
+/// `angular`. Sums and results of all patches, sums of tasks that wait to be added, terms of the scaling function.
+/// @param threads  that work at a time
+double displacementPairBytes(int width, int height, const DisplaceOptions& options, int threads);
+
 /// A Displacement that owns its arrays.
 class DisplacementData {
  public:

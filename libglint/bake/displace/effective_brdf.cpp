@@ -21,8 +21,11 @@ double PatchGrid::share(int patch) const {
 
 std::vector<double> EffectiveBrdf::mean(const PatchGrid& grid, std::size_t channel) const {
   std::vector<double> mean(directions * directions);
-  for (int p = 0; p < grid.count(); ++p)
-    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += grid.share(p) * patch(static_cast<std::size_t>(p), channel)[k];
+  for (int p = 0; p < grid.count(); ++p) {
+    const double share = grid.share(p);
+    const std::span<const float> of_patch = patch(static_cast<std::size_t>(p), channel);
+    for (std::size_t k = 0; k < mean.size(); ++k) mean[k] += share * of_patch[k];
+  }
   return mean;
 }
 
