@@ -30,7 +30,9 @@ class PlannedScene:
     tolerance: float
     minimise: str
     views: dict  # title -> camera: (origin, target, degrees across); the last is the hardest
-    detail: tuple  # of the hardest view, for brute force: (left, top, width, height), pixels; SIZE is a whole number of them wide
+    detail: (
+        tuple  # of the hardest view, for brute force: (left, top, width, height), pixels; SIZE is a whole number of them wide
+    )
     surroundings: Callable  # kit -> dictionary of all but camera and BSDF
     bsdf: Callable  # (kit, map, asset) -> dictionary
     budgets: dict = dataclasses.field(default_factory=dict)  # as a scene of glint-plan has them

@@ -80,7 +80,9 @@ def test_readme_is_short():
 
 
 def test_plans_are_those_of_their_page():
-    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in (ROOT / "docs/PLANS.md").read_text().splitlines()]
+    cells = [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in (ROOT / "docs/PLANS.md").read_text().splitlines()
+    ]
     table = [row for row in cells if len(row) == 8][2:]
     assert len(table) == 9, "three rows of three scenes"
     for plan, paper in zip(table[::3], table[1::3]):
