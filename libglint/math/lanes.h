@@ -176,18 +176,6 @@ GLINT_LANE V decayOf(const V& exponent) {
   return p * p;
 }
 
-/// x^-power for x in [1, 1e9] and power in [0, 4]. Relative error below 2e-4; results below 4e-18 count as that. The logarithm
-/// is 64 times that of the 64th root, by the series of the inverse hyperbolic tangent.
-template <class V>
-GLINT_LANE V inversePowerOf(const V& x, float power) {
-  V root = rootOf(rootOf(rootOf(x)));
-  root = rootOf(rootOf(rootOf(root)));
-  const V z = (root - V::all(1)) / (root + V::all(1)), z2 = z * z;
-  const V series = ((V::all(0.14285714f) * z2 + V::all(0.2f)) * z2 + V::all(0.33333333f)) * z2 + V::all(1);
-  const V half = decayOf(V::all(64 * power) * (z * series));
-  return half * half;
-}
-
 /// Upper tail of the standard normal distribution, 1 - Phi(x) for x >= 0. Absolute error below 1e-6 (Abramowitz and Stegun, 7.1.28).
 template <class V>
 GLINT_LANE V normalTailOf(const V& x) {

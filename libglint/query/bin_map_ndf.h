@@ -8,7 +8,6 @@
 #include "glint/math/half.h"
 #include "glint/query/detail/bin_map/bin_window.h"
 #include "glint/query/detail/bin_map/facet_lobe.h"
-#include "glint/query/detail/bin_map/gtr_lobe.h"
 #include "glint/query/detail/bin_map/lobe_sums.h"
 #include "glint/query/detail/bin_map/subbin_moments.h"
 #include "glint/query/detail/common/sampling.h"
@@ -37,11 +36,6 @@ enum class BinEstimator {
 /// density is continuous in footprint and half vector. Blocks farther than kNear deviations from the half vector are counted, and
 /// answered by the Gaussian of all their texels, the sooner the farther they are (farShare).
 ///
-/// Lobes of facets are Gaussians, or GTR distributions (GtrLobe). These have no end, so all texels of the footprint count. Up to
-/// as many texels as the map has blocks are looked up one by one. In larger footprints blocks count as one facet, or by their
-/// numbers of texels, under the rules above, with the width of the lobe at the distance of the block in place of a deviation.
-/// The density then errs by 1 % in the root mean square (tests/unit/gtr_lobe_test.cpp), and costs a visit to all blocks.
-///
 /// Boxes are answered exactly, Gaussians by the box of the same second moments. TexelCover also says how boxes without area and
 /// boxes larger than the map are answered. Thread-safe, allocates nothing; the arrays must outlive it.
 class BinMapNdf {
@@ -58,15 +52,8 @@ class BinMapNdf {
   GLINT_HD explicit BinMapNdf(const BinMap& map) : BinMapNdf(map, map.alpha_min) {}
   /// @param alpha  Beckmann roughness of the facets, alpha_min to alpha_max of the map
   /// @param estimator  of densities; means and samples are exact
-  /// @param gtr_gamma  exponent of a GTR distribution of microfacets, whose roughness is alpha: kLeastGamma to kMostGamma of
-  ///                   GtrDistribution, clamped; 0: the Gaussian of Beckmann. Its densities are always exact
-  GLINT_HD BinMapNdf(const BinMap& map, float alpha, BinEstimator estimator = BinEstimator::exact, float gtr_gamma = 0)
+  GLINT_HD BinMapNdf(const BinMap& map, float alpha, BinEstimator estimator = BinEstimator::exact)
       : blocks_(map), sigma_(alpha * kInvSqrt2), wider_(alpha / map.alpha), estimator_(estimator) {
-    if (gtr_gamma > 0) {
-      const GtrDistribution of = GtrMasking::inRange({gtr_gamma, alpha});
-      gtr_ = GtrLobe(of), microfacet_masking_ = GtrMasking(of);
-      estimator_ = BinEstimator::exact;
-    }
     bin_size_ = 2.0f / static_cast<float>(map.bins_per_axis);
     block_classes_ = map.classCount() == map.blockCount();
   }
@@ -74,13 +61,6 @@ class BinMapNdf {
   GLINT_HD const BinMap& map() const { return blocks_.map(); }
   /// Deviation of a facet's lobe, disk units.
   GLINT_HD float sigma() const { return sigma_; }
-
-  /// The GTR lobe of a facet; not `given` where lobes are Gaussians.
-  GLINT_HD const GtrLobe& gtr() const { return gtr_; }
-  /// Masking of the microfacets of a facet, in its frame, where lobes are GTR.
-  GLINT_HD const GtrMasking& microfacetMasking() const { return microfacet_masking_; }
-  /// Distance from a facet's normal within which the lobe has the share u of its mass.
-  GLINT_HD float lobeRadius(float u) const { return gtr_.given() ? gtr_.radius(u) : sigma_ * FacetLobe::radius(u); }
 
   /// Density towards h, per unit projected area; >= 0.
   GLINT_HD float density(const Footprint& p, Vec2 h) const {
@@ -103,7 +83,7 @@ class BinMapNdf {
   GLINT_HD HalfVectorSample sample(const Footprint& p, Vec2 xi) const {
     Vec2 normal;
     if (!sampleNormal(p, xi, normal)) return {};
-    const float radius = lobeRadius(xi.x), angle = 2 * kPi * xi.y;
+    const float radius = sigma_ * FacetLobe::radius(xi.x), angle = 2 * kPi * xi.y;
     const Vec2 h = normal + radius * Vec2{std::cos(angle), std::sin(angle)};
     return insideSquare(h) ? drawnAt(h, exactDensity(p, h)) : HalfVectorSample{};
   }
@@ -143,7 +123,7 @@ class BinMapNdf {
   template <class Visitor>
   GLINT_HD void forEachFacet(const Footprint& p, const Box2& support, Visitor&& visitor) const {
     const TexelCover cover(p, map().width, map().height);
-    const BinReach reach(support, lobeReach());
+    const BinReach reach(support, kBinReach * sigma_);
     if (answeredByTexel(cover)) {
       forEachFacetByTexel(cover, reach, visitor);
       return;
@@ -163,22 +143,14 @@ class BinMapNdf {
   struct BinReach {
     GLINT_HD BinReach(const Box2& box, float distance) : support(box), radius(distance) {}
     /// Whether a part of a square is in reach.
-    GLINT_HD bool meets(Vec2 low, float side) const { return squaredDistance(low, side) <= radius * radius; }
-    /// Square of the distance between a square and the box.
-    GLINT_HD float squaredDistance(Vec2 low, float side) const {
+    GLINT_HD bool meets(Vec2 low, float side) const {
       const float dx = std::max({low.x - support.high.x, support.low.x - low.x - side, 0.0f});
       const float dy = std::max({low.y - support.high.y, support.low.y - low.y - side, 0.0f});
-      return dx * dx + dy * dy;
+      return dx * dx + dy * dy <= radius * radius;
     }
     Box2 support;
     float radius;
   };
-
-  /// Distance from a half vector up to which facets count.
-  GLINT_HD float lobeReach() const {
-    constexpr float kWholeSquare = 4;
-    return gtr_.given() ? kWholeSquare : kBinReach * sigma_;
-  }
 
   static GLINT_HD float fraction(float x) { return x - std::floor(x); }
 
@@ -248,7 +220,7 @@ class BinMapNdf {
 
   GLINT_DEVICE_CALL GLINT_HD float exactDensity(const Footprint& p, Vec2 h) const {
     const TexelCover cover(p, map().width, map().height);
-    const BinReach reach({h, h}, lobeReach());
+    const BinReach reach({h, h}, kBinReach * sigma_);
     double sum = 0;
     const auto add = [&](const BinFacet& f) { sum += f.weight * lobe(f, h); };
     if (answeredByTexel(cover)) {
@@ -256,8 +228,7 @@ class BinMapNdf {
       return finitePositive(static_cast<float>(sum));
     }
     BlockLobes blocks(*this, cover, h);
-    forEachBlockInReach(reach,
-                        [&](const BinBlock& block) { blocks.add(block, reach.squaredDistance(corner(block), sideOf(block))); });
+    forEachBlockInReach(reach, [&](const BinBlock& block) { blocks.add(block); });
     return finitePositive(static_cast<float>(blocks.sum() / cover.area()));
   }
 
@@ -274,16 +245,9 @@ class BinMapNdf {
   }
 
   /// Whether looking up every texel of a footprint is quicker than reading lists.
-  GLINT_HD bool answeredByTexel(const TexelCover& cover) const {
-    const double most = mostLookedUp();
-    return cover.area() <= most && boxTexels(cover) <= 2 * most;
+  static GLINT_HD bool answeredByTexel(const TexelCover& cover) {
+    return cover.area() <= kMostLookedUp && boxTexels(cover) <= 2 * kMostLookedUp;
   }
-  /// Area of a footprint up to which all its texels may be looked up. A GTR lobe reaches all blocks, each at the cost of a texel.
-  GLINT_HD double mostLookedUp() const {
-    return gtr_.given() ? std::max(double{kMostLookedUp}, static_cast<double>(map().blockCount())) : double{kMostLookedUp};
-  }
-  /// Weight, 0 to 1, with which blocks may count as a whole in a footprint that is little larger.
-  GLINT_HD double largeShare(const TexelCover& cover) const { return std::clamp(cover.area() / mostLookedUp() - 1, 0.0, 1.0); }
 
   template <class Visitor>
   GLINT_HD void forEachBlockInReach(const BinReach& reach, Visitor&& visitor) const {
@@ -441,20 +405,12 @@ class BinMapNdf {
 
   /// Weight, 0 to 1, with which a block counts as one facet. The wider lobes are against the block, the fewer texels are needed
   /// for the same error. Is 0 in footprints of few texels, so that the answer equals looking up texel by texel.
-  /// @param squared  square of the distance between the block and the half vectors that are asked
-  GLINT_HD double mergedShare(const TexelCover& cover, const BinBlock& block, float squared) const {
-    const double wider = widerAt(squared) / block.side();
+  GLINT_HD double mergedShare(const TexelCover& cover, const BinBlock& block) const {
+    const double wider = double{wider_} / block.side();
     if (wider < kNarrowestMerged) return 0;
     const double texels = std::min(std::max(1.0, wider * wider) * expectedTexels(cover, block), cover.area());
-    const double share = std::clamp((texels - kFewTexels) / (kManyTexels - kFewTexels), 0.0, 1.0);
-    return gtr_.given() ? share * largeShare(cover) : share;
+    return std::clamp((texels - kFewTexels) / (kManyTexels - kFewTexels), 0.0, 1.0);
   }
-
-  /// Width of the lobe at a distance from its normal, over the width that the bins are made for.
-  GLINT_HD double widerAt(float squared_distance) const {
-    return gtr_.given() ? std::sqrt(double{gtr_.squaredWidth(squared_distance)}) / double{map().alpha} : double{wider_};
-  }
-  GLINT_HD float sideOf(const BinBlock& block) const { return bin_size_ * static_cast<float>(block.side()); }
 
   /// Sums over all texels of a block.
   GLINT_HD SubbinMoments momentsOf(const BinBlock& block, const TexelCode& code) const {
@@ -488,21 +444,17 @@ class BinMapNdf {
 
   /// Weight, 0 to 1, with which the texels of a block count by the moments of the whole block. Their lobes are in reach of h, but so far
   /// that the density hardly depends on where in the block the texels of the footprint are.
-  /// @param distance2  square of the distance between the block and h
-  GLINT_HD double farShare(const TexelCover& cover, const BinBlock& block, float distance2) const {
-    if (widerAt(distance2) / block.side() < kNarrowestMerged) return 0;
+  GLINT_HD double farShare(const TexelCover& cover, const BinBlock& block, Vec2 h) const {
+    if (double{wider_} / block.side() < kNarrowestMerged) return 0;
+    const Vec2 low = corner(block);
+    const float side = bin_size_ * static_cast<float>(block.side());
+    const float dx = std::max({low.x - h.x, h.x - low.x - side, 0.0f}), dy = std::max({low.y - h.y, h.y - low.y - side, 0.0f});
+    const float squared = (dx * dx + dy * dy) / (sigma_ * sigma_);
+    if (squared <= kNear * kNear) return 0;
     // What an answer errs by is the less against the densities nearby, the more texels there are and the farther they are.
-    double more = 0;
-    if (gtr_.given()) {
-      // The share by which lobes of texels differ from the lobe of the block's mean falls with the distance in sides of blocks.
-      more = double{distance2} / (double{sideOf(block)} * double{sideOf(block)});
-    } else {
-      const float squared = distance2 / (sigma_ * sigma_);
-      if (squared <= kNear * kNear) return 0;
-      more = double{std::exp(0.5f * squared) - std::exp(0.5f * kNear * kNear)};
-    }
+    const double more = std::exp(0.5f * squared) - std::exp(0.5f * kNear * kNear);
     const double texels = (more * expectedTexels(cover, block) - kFewTexels) / (kManyTexels - kFewTexels);
-    return std::clamp(texels, 0.0, 1.0) * largeShare(cover);
+    return std::clamp(texels, 0.0, 1.0) * std::clamp(cover.area() / kMostLookedUp - 1, 0.0, 1.0);
   }
   /// Texels of a block in the footprint, if they were spread evenly over the map.
   GLINT_HD double expectedTexels(const TexelCover& cover, const BinBlock& block) const {
@@ -523,14 +475,10 @@ class BinMapNdf {
   class BlockLobes {
    public:
     GLINT_HD BlockLobes(const BinMapNdf& ndf, const TexelCover& cover, Vec2 h)
-        : ndf_(ndf),
-          cover_(cover),
-          h_(h),
-          factor_(ndf.gtr_.given() ? double{ndf.gtr_.peak()}
-                                   : 1 / double{2 * kPi * FacetLobe::kMass * ndf.sigma_ * ndf.sigma_}) {}
-    GLINT_HD void add(const BinBlock& block, float squared) {
-      const double far = ndf_.farShare(cover_, block, squared);
-      const double merged = (1 - far) * ndf_.mergedShare(cover_, block, squared), apart = 1 - far - merged;
+        : ndf_(ndf), cover_(cover), h_(h), factor_(1 / double{2 * kPi * FacetLobe::kMass * ndf.sigma_ * ndf.sigma_}) {}
+    GLINT_HD void add(const BinBlock& block) {
+      const double far = ndf_.farShare(cover_, block, h_);
+      const double merged = (1 - far) * ndf_.mergedShare(cover_, block), apart = 1 - far - merged;
       if (merged > 0)
         ndf_.visitMerged(cover_, block, merged * cover_.area(), rows_,
                          [&](const BinFacet& f) { sum_ += f.weight * ndf_.lobe(f, h_); });
@@ -577,7 +525,6 @@ class BinMapNdf {
     const TexelCode code = blocks_.code(block);
     const float size = subbinSize(block, code), middle = 0.5f * static_cast<float>(1 << code.subbin_bits);
     const Vec2 at = (1 / size) * (h - corner(block)) - Vec2{middle, middle};
-    if (gtr_.given()) return {at.x, at.y, gtr_.steepness() * size * size, gtr_.gamma(), 1 / (size * size)};
     return {at.x, at.y, 0.5f * size * size / (sigma_ * sigma_)};
   }
 
@@ -636,7 +583,7 @@ class BinMapNdf {
   template <class Visitor>
   GLINT_HD void visitBlock(const TexelCover& cover, const BinBlock& block, const BinReach& reach, CellRows& rows,
                            Visitor& visitor) const {
-    const double merged = mergedShare(cover, block, reach.squaredDistance(corner(block), sideOf(block)));
+    const double merged = mergedShare(cover, block);
     if (merged < 1) {
       EachTexel<Visitor> each(*this, cover, block, reach, (1 - merged) / cover.area(), visitor);
       blocks_.forEachRun(cover, block, rows, each);
@@ -653,14 +600,12 @@ class BinMapNdf {
   }
 
   GLINT_HD double lobe(const BinFacet& f, Vec2 h) const {
-    if (gtr_.given()) return gtr_.density(f.spread, h - f.normal);
     const float squared = sigma_ * sigma_;
     return FacetLobe::density({squared + f.spread.xx, f.spread.xy, squared + f.spread.yy}, h - f.normal);
   }
 
   /// Mass of a facet in a box. Takes the lobe for a Gaussian that does not end, which is right to 1e-4.
   GLINT_HD double mass(const BinFacet& f, const Box2& box) const {
-    if (gtr_.given()) return gtr_.mass(f.spread, {box.low - f.normal, box.high - f.normal});
     return gaussianMass(box.low.x, box.high.x, f.normal.x, std::sqrt(sigma_ * sigma_ + f.spread.xx)) *
            gaussianMass(box.low.y, box.high.y, f.normal.y, std::sqrt(sigma_ * sigma_ + f.spread.yy));
   }
@@ -682,8 +627,6 @@ class BinMapNdf {
   float sigma_ = 0;
   float wider_ = 1;  ///< deviation of the lobe over the deviation that the bins are made for
   float bin_size_ = 0;
-  GtrLobe gtr_;
-  GtrMasking microfacet_masking_;
   BinEstimator estimator_;
   bool block_classes_ = false;  ///< whether the class of a texel is the number of its block
 };

@@ -57,20 +57,6 @@ void addFacets(std::span<const FacetShares> facets, int resolution, std::vector<
   });
 }
 
-/// Adds GTR facets, which reach all pixels: O(facets pixels).
-void addGtrFacets(const GtrLobe& gtr, std::span<const BinFacet> facets, int resolution, std::vector<double>& image) {
-  const float pixel = 2.0f / static_cast<float>(resolution);
-  tbb::parallel_for(0, resolution, [&](int y) {
-    double* row = image.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(resolution);
-    for (const BinFacet& f : facets) {
-      for (int x = 0; x < resolution; ++x) {
-        const Vec2 low = Vec2{static_cast<float>(x) * pixel - 1, static_cast<float>(y) * pixel - 1} - f.normal;
-        row[x] += f.weight * gtr.mass(f.spread, {low, low + Vec2{pixel, pixel}});
-      }
-    }
-  });
-}
-
 }  // namespace
 
 std::vector<float> binMapImage(const BinMapNdf& ndf, const Footprint& footprint, int resolution, const ProgressFn& progress) {
@@ -82,12 +68,6 @@ std::vector<float> binMapImage(const BinMapNdf& ndf, const Footprint& footprint,
   std::vector<double> sums(side * side, 0.0);
   ProgressCounter counter(progress, facets.size());
   for (std::size_t k = 0; k < facets.size(); k += kAtOnce) {
-    if (ndf.gtr().given()) {
-      const std::span<const BinFacet> part = std::span(facets).subspan(k, std::min(kAtOnce, facets.size() - k));
-      addGtrFacets(ndf.gtr(), part, resolution, sums);
-      for (std::size_t i = 0; i < part.size(); ++i) counter.advance();
-      continue;
-    }
     std::vector<FacetShares> some;
     for (std::size_t i = k; i < std::min(k + kAtOnce, facets.size()); ++i) {
       const BinFacet& f = facets[i];

@@ -9,13 +9,13 @@
 
 namespace glint {
 
-/// The micro-BRDF form of a bin map (Atanasov 2021, Eq. 5, 11 and 15): every texel is a facet of Beckmann or GTR microfacets
-/// around its own normal t, which shadow and mask each other, and the map shadows and masks the facets:
+/// The micro-BRDF form of a bin map (Atanasov 2021, Eq. 5, 11 and 15): every texel is a facet of Beckmann microfacets around
+/// its own normal t, which shadow and mask each other, and the map shadows and masks the facets:
 ///
 ///   f = F(wo . h) Gx(wi, wo) / (4 wi.z wo.z) * sum over texels of share * D(h, t) G(wi, wo, t) / t.z
 ///
-/// with D the distribution of the NDF's roughness, Beckmann's or GTR, in the frame of t, G its Smith term in that frame, Gx
-/// that of the map's slopes. As the roughness falls this becomes MicrofacetBrdf of the same BinMapNdf; where facets are rough or steep it
+/// with D the Beckmann distribution of the NDF's roughness in the frame of t, G its Smith term in that frame, Gx that of the
+/// map's slopes. As the roughness falls this becomes MicrofacetBrdf of the same BinMapNdf; where facets are rough or steep it
 /// keeps what that loses: lobes are round about each facet's normal instead of round in the disk, and no facet shines through
 /// its own back.
 ///
@@ -78,10 +78,8 @@ class BasicBinMapBrdf {
     Vec2 normal;
     if (!ndf_.sampleNormal(footprint_, xi, normal)) return {};
     const Frame t(normal);
-    // A GTR lobe is drawn in the disk of the facet, Beckmann's in the plane of its slopes.
-    const float radius = ndf_.lobeRadius(xi.x), angle = 2 * kPi * xi.y;
-    const float z = ndf_.gtr().given() ? std::sqrt(std::max(0.0f, (1 - radius) * (1 + radius))) : 1.0f;
-    const Vec3 m = t.world({radius * std::cos(angle), radius * std::sin(angle), z});
+    const float radius = ndf_.sigma() * FacetLobe::radius(xi.x), angle = 2 * kPi * xi.y;
+    const Vec3 m = t.world({radius * std::cos(angle), radius * std::sin(angle), 1});
     const float twice = 2 * dot(m, wo) / dot(m, m);
     const Vec3 wi = twice * m + -1.0f * wo;
     if (!(twice > 0 && aboveHorizon(wi))) return {};
@@ -160,28 +158,15 @@ class BasicBinMapBrdf {
     const Frame t(normal);
     const Vec3 local = t.local(h);
     if (!(local.z > 0)) return;
-    if (ndf_.gtr().given()) {
-      const float distribution = ndf_.gtr().density({local.x, local.y});
-      add(weight, distribution, t, local, ndf_.microfacetMasking(), wi, wo, sums);
-      return;
-    }
     const float variance = ndf_.sigma() * ndf_.sigma();
     const Covariance slopes = {variance, 0, variance};
     const float lobe = FacetLobe::density(slopes, {local.x / local.z, local.y / local.z});
     if (lobe == 0) return;
-    const float cosine2 = local.z * local.z;
-    add(weight, lobe / (cosine2 * cosine2), t, local, SmithMasking({{0, 0}, slopes}, 0), wi, wo, sums);
-  }
-
-  /// @param distribution  D of the half vector, `local` in the frame of the facet
-  /// @param microfacets   masking of the facet's own
-  template <class Microfacets>
-  GLINT_HD static void add(double weight, float distribution, const Frame& t, Vec3 local, const Microfacets& microfacets,
-                           Vec3 wi, Vec3 wo, Sums& sums) {
+    const float cosine2 = local.z * local.z, distribution = lobe / (cosine2 * cosine2);
     sums.drawn += weight * double{distribution} * double{local.z};
     const Vec3 i = t.local(wi), o = t.local(wo);
     if (!(i.z > 0 && o.z > 0)) return;
-    sums.reflected += weight * double{distribution} * double{microfacets.g2(i, o)} / double{t.normal.z};
+    sums.reflected += weight * double{distribution} * double{SmithMasking({{0, 0}, slopes}, 0).g2(i, o)} / double{t.normal.z};
   }
 
   BinMapNdf ndf_;

@@ -53,8 +53,6 @@ struct GtrDistribution {
 /// Directions are unit vectors with w.z > 0. Allocates nothing; 520 bytes.
 class GtrMasking {
  public:
-  /// Of no flakes, for members that are set later: asks nothing but assignment.
-  GtrMasking() = default;
   /// @param flakes  parameters out of range are clamped; NaN counts as the smallest
   GLINT_HD explicit GtrMasking(GtrDistribution flakes) : flakes_(inRange(flakes)) {
     for (int k = 0; k < kNodes; ++k) {
@@ -85,14 +83,6 @@ class GtrMasking {
     return 0.25f / (projectedArea(wi) * wo.z + projectedArea(wo) * wi.z - wi.z * wo.z);
   }
 
-  /// Parameters moved into their range; NaN counts as the smallest.
-  static GLINT_HD GtrDistribution inRange(GtrDistribution g) {
-    using G = GtrDistribution;
-    const auto clamped = [](float x, float low, float high) { return x > low ? std::min(x, high) : low; };
-    return {clamped(g.gamma, float{G::kLeastGamma}, float{G::kMostGamma}),
-            clamped(g.alpha, float{G::kLeastAlpha}, float{G::kMostAlpha})};
-  }
-
   /// T(m) by quadrature, exact to 1e-5 of it: E[max(0, q - m)] is the integral of 2 y p(r) (y - m atan(y / m)) dy over the
   /// slopes r^2 = m^2 + y^2, summed over even steps of log y.
   GLINT_HD double excess(double m) const {
@@ -114,6 +104,13 @@ class GtrMasking {
   static constexpr int kNodes = 128;
   static constexpr double kStep = 0.18;  ///< of log(1 + m / alpha); the last node is beyond 1e5
 
+  static GLINT_HD GtrDistribution inRange(GtrDistribution g) {
+    using G = GtrDistribution;
+    const auto clamped = [](float x, float low, float high) { return x > low ? std::min(x, high) : low; };
+    return {clamped(g.gamma, float{G::kLeastGamma}, float{G::kMostGamma}),
+            clamped(g.alpha, float{G::kLeastAlpha}, float{G::kMostAlpha})};
+  }
+
   GLINT_HD float meanExcess(float m) const {
     const float place = std::min(std::log1p(m / flakes_.alpha) / static_cast<float>(kStep), static_cast<float>(kNodes - 1));
     const int k = std::min(static_cast<int>(place), kNodes - 2);
@@ -128,7 +125,7 @@ class GtrMasking {
   }
 
   GtrDistribution flakes_;
-  float logs_[kNodes] = {};  ///< logarithm of T(m) (m + alpha)
+  float logs_[kNodes];  ///< logarithm of T(m) (m + alpha)
 };
 
 }  // namespace glint

@@ -97,9 +97,9 @@ struct Avx2Texels {
   }
 
   /// SingleTexels::lobes.
-  template <unsigned kCut, class Lobe>
+  template <unsigned kCut>
   GLINT_AVX2 static float lobes(const std::uint32_t* texels, int count, const Parts& parts, const SubbinFields& fields,
-                                const Lobe& lobe) {
+                                const SubbinLobe& lobe) {
     const Positions positions(fields);
     __m256 sums = _mm256_setzero_ps();
     int k = 0;
@@ -148,8 +148,7 @@ struct Avx2Texels {
           middle(_mm256_set1_ps(f.middle)) {}
     GLINT_AVX2 __m256 x(__m256i texels) const { return position(texels, shift_x); }
     GLINT_AVX2 __m256 y(__m256i texels) const { return position(texels, shift_y); }
-    template <class Lobe>
-    GLINT_AVX2 __m256 lobes(__m256i texels, const Lobe& lobe) const {
+    GLINT_AVX2 __m256 lobes(__m256i texels, const SubbinLobe& lobe) const {
       return reinterpret_cast<__m256>(lobe.at(lanes(x(texels)), lanes(y(texels))).v);
     }
 

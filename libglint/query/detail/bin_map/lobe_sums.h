@@ -55,10 +55,7 @@ class LobeSums : public RunReader<LobeSums, LobeBlock> {
       const auto count = static_cast<int>(std::min(sizeOf(item) - k, kMostSummed));
       // `whole` has counted runs that are not cut.
       if (kCut != 0 && item.block->count) area += double{Texels::template sum<kCut>(texels, count, parts)};
-      if (!item.block->add) continue;
-      const SubbinLobe& lobe = item.block->lobe;
-      lobes += double{lobe.gamma > 0 ? Texels::template lobes<kCut>(texels, count, parts, fields, SubbinGtr{lobe})
-                                     : Texels::template lobes<kCut>(texels, count, parts, fields, lobe)};
+      if (item.block->add) lobes += double{Texels::template lobes<kCut>(texels, count, parts, fields, item.block->lobe)};
     }
     areas_[indexOf(*item.block)] += area;
     lobes_[indexOf(*item.block)] += lobes;
@@ -68,9 +65,7 @@ class LobeSums : public RunReader<LobeSums, LobeBlock> {
     const SubbinFields fields(item.block->code);
     double areas = 0, lobes = 0;
     forEachTurned(item, [&](std::uint32_t texel, auto area) {
-      const Lanes1 x = {fields.x(texel)}, y = {fields.y(texel)};
-      const SubbinLobe& of = item.block->lobe;
-      const float lobe = !item.block->add ? 0 : of.gamma > 0 ? SubbinGtr{of}.at(x, y).v : of.at(x, y).v;
+      const float lobe = item.block->add ? item.block->lobe.at(Lanes1{fields.x(texel)}, Lanes1{fields.y(texel)}).v : 0;
       if (!item.block->count && !(lobe > 0)) return;
       const double covered = area();
       areas += covered, lobes += double{lobe} * covered;

@@ -108,29 +108,14 @@ struct SubbinFields {
 
 /// The lobes of texels (FacetLobe) at one half vector, without their common factor. Positions are those of SubbinFields.
 struct SubbinLobe {
-  float x, y;  ///< the half vector
-  float
-      exponent;  ///< half the square of a sub-bin over the variance of the lobe; of a GTR lobe, GtrLobe::steepness of a sub-bin
-  float gamma = 0;  ///< exponent of a GTR lobe; 0: FacetLobe
-  float end = 0;    ///< squared distance at which a GTR lobe ends, sub-bins
+  float x, y;      ///< the half vector
+  float exponent;  ///< half the square of a sub-bin over the variance of the lobe
 
   /// @tparam V  Lanes1 or Lanes8: positions of one normal or of eight
   template <class V>
   GLINT_LANE V at(const V& normal_x, const V& normal_y) const {
     const V dx = normal_x - V::all(x), dy = normal_y - V::all(y);
     return upperOf(decayOf(V::all(exponent) * (dx * dx + dy * dy)) - V::all(FacetLobe::kEnd), V::all(0));
-  }
-};
-
-/// The same for GtrLobe.
-struct SubbinGtr {
-  SubbinLobe of;
-
-  template <class V>
-  GLINT_LANE V at(const V& normal_x, const V& normal_y) const {
-    const V dx = normal_x - V::all(of.x), dy = normal_y - V::all(of.y), squared = dx * dx + dy * dy;
-    const V lobe = inversePowerOf(V::all(of.exponent) * squared + V::all(1), of.gamma);
-    return where(less(squared, V::all(of.end)), lobe, V::all(0));
   }
 };
 
@@ -172,10 +157,9 @@ struct SingleTexels {
   }
 
   /// Sum of the weights of a list times the lobes at a half vector, added in eight sums like `sum`.
-  /// @tparam Lobe  SubbinLobe or SubbinGtr
-  template <unsigned kCut, class Lobe>
+  template <unsigned kCut>
   static GLINT_HD float lobes(const std::uint32_t* texels, int count, const Parts& parts, const SubbinFields& fields,
-                              const Lobe& lobe) {
+                              const SubbinLobe& lobe) {
     float sums[8] = {};
     for (int k = 0; k < count; ++k)
       sums[k % 8] += parts.of<kCut>(texels[k]) * lobe.at(Lanes1{fields.x(texels[k])}, Lanes1{fields.y(texels[k])}).v;
