@@ -181,7 +181,8 @@ std::vector<std::string> addInputs(Tool& tool, const std::string& path, UdimSets
   } else {
     for (const int tile : formats::udimTiles(path)) files.push_back(formats::udimFile(path, tile));
     for (const std::string& stray : formats::udimStrays(path))
-      tool.warn(stray + ": is left out of " + path + ": the numbers of tiles are 1001 to 9999");
+      tool.warn((std::filesystem::path(path).parent_path() / stray).string() + ": is left out of " + path +
+                ": the numbers of tiles are 1001 to 9999");
   }
   for (const std::string& file : files) {
     checkRegular(file);

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
 
@@ -36,7 +37,9 @@ BinMapOptions::BinMapOptions(Tool& tool) {
 
 double BinMapOptions::leastBytes() const {
   constexpr double kBytesPerBin = 16;  // counts, blocks and nodes of all bins
-  const double bins = bake::binsPerAxis(options_.alpha >= bake::kMinBinAlpha ? options_.alpha : bake::kMinBinAlpha);
+  constexpr int kMostBits = 32;        // of codes, so that a range of roughness counts as its geometric mean
+  const float alpha = std::max(options_.alpha, bake::kMinBinAlpha);
+  const double bins = bake::binsPerAxis(bake::binAlpha(alpha, std::max(alpha, options_.alpha_max), kMostBits));
   return kLeastBytes + kBytesPerBin * bins * bins;
 }
 

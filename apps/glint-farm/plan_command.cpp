@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "common/input_name.h"
 #include "glint-farm/jobs_file.h"
@@ -27,6 +28,20 @@ std::string seenFrom(const std::string& folder, const std::string& manifest_fold
 
 [[noreturn]] void refuse(const std::string& object, const std::string& what, const std::string& remedy) {
   throw Error(ErrorCode::usage, "cli.usage", "", object, what, remedy);
+}
+
+/// Refuses what --map-shards cannot divide.
+void checkShards(const std::vector<RecipeStep>& recipe, int map_shards) {
+  if (map_shards == 1) return;
+  const auto step = std::find_if(recipe.begin(), recipe.end(),
+                                 [](const RecipeStep& s) { return s.kind->name == std::string_view("pyramid"); });
+  if (step == recipe.end())
+    refuse("--map-shards", "no pyramid is made, and only pyramids are made in parts", "add --make pyramid");
+  for (const auto& flag : step->flags) {
+    for (const char* whole : {"--region", "--optics"})
+      if (flag.word.starts_with(whole))
+        refuse("--map-shards", "parts are made by --region, and of normals only", "leave " + std::string(whole) + " out");
+  }
 }
 
 std::size_t countDone(const Manifest& manifest) {
@@ -62,10 +77,10 @@ FarmPlanCommand::FarmPlanCommand(Tool& tool)
       ->allow_extra_args(false)
       ->type_name("KIND")
       ->default_str("");
-  tool.option(
-          "--map-shards", map_shards_,
-          "make each pyramid in so many parts, which glint-merge joins: for maps whose images are too many for one run; see "
-          "glint-pyramid --region")
+  tool.option("--map-shards", map_shards_,
+              "make each pyramid of normals in so many parts, which glint-merge joins: for maps whose images are too many for "
+              "one run; see "
+              "glint-pyramid --region")
       .range(1, kMostRegions);
   tool.option("--assets", assets_, "folder of the assets").defaultText("assets, beside the manifest").unrecorded();
   tool.addCheck([this] { check(); });
@@ -84,7 +99,7 @@ void FarmPlanCommand::check() {
     checkRegular(from_);
     tool_.addInput(from_);
   }
-  recipeOf(makes_);
+  checkShards(recipeOf(makes_), map_shards_);
 }
 
 void FarmPlanCommand::run() {

@@ -1,5 +1,8 @@
 #include "glint-plan/asset_maker.h"
 
+#include <fmt/format.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -8,6 +11,8 @@
 #include "glint-plan/plan_candidates.h"
 
 namespace glint::apps {
+
+namespace fs = std::filesystem;
 
 AssetMaker::AssetMaker(Tool& tool, const AssetFolder& folder, std::string hash, std::string label, std::string path,
                        std::vector<Candidate> all, float sigma_r)
@@ -48,26 +53,36 @@ const MadeAsset& AssetMaker::make(const Candidate& candidate) {
   return made_[name] = made;
 }
 
-api::OpenedNdf AssetMaker::open(const Candidate& candidate) { return openFile(candidate, make(candidate).file); }
+api::OpenedNdf AssetMaker::open(const Candidate& candidate) { return openFile(candidate, make(candidate).file, path_); }
 
-api::OpenedNdf AssetMaker::openFile(const Candidate& candidate, const std::string& file) const {
+api::OpenedNdf AssetMaker::openFile(const Candidate& candidate, const std::string& file, const std::string& map) const {
   api::NdfOptions options;
   options.sigma_r = sigma_r_;
-  if (candidate.takes_normals) options.normals = path_;
+  if (candidate.takes_normals) options.normals = map;
   return api::OpenedNdf::open(file, options);
+}
+
+std::optional<std::string> AssetMaker::copyOf(const std::string& file, int number) const {
+  const std::string label = fs::path(file).filename().string();
+  const std::string copy = folder_.fileOf(hash_, fmt::format("copy {} {} {}", ::getpid(), number, label));
+  std::error_code error;
+  fs::copy_file(file, copy, error);
+  if (!error) return copy;
+  fs::remove(copy, error);
+  return std::nullopt;
 }
 
 std::list<api::OpenedNdf> AssetMaker::openCopies(const Candidate& candidate, int count) {
   const std::string original = make(candidate).file;
   std::list<api::OpenedNdf> copies;
-  copies.push_back(openFile(candidate, original));
+  copies.push_back(openFile(candidate, original, path_));
   for (int k = 1; k < count; ++k) {
-    const std::string copy = original + "." + std::to_string(k);
-    std::error_code error;
-    std::filesystem::copy_file(original, copy, std::filesystem::copy_options::overwrite_existing, error);
-    if (error) throw Error(ErrorCode::io, "output.write", copy, "", "cannot be written: " + error.message());
-    copies.push_back(openFile(candidate, copy));
-    std::filesystem::remove(copy);
+    const std::optional<std::string> copy = copyOf(original, k);
+    const std::optional<std::string> map = candidate.takes_normals && copy ? copyOf(path_, k) : path_;
+    if (copy && map) copies.push_back(openFile(candidate, *copy, *map));
+    if (copy) fs::remove(*copy);
+    if (map && *map != path_) fs::remove(*map);
+    if (!copy || !map) break;  // the disk is full
   }
   return copies;
 }

@@ -2,6 +2,7 @@
 
 #include <list>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -34,12 +35,16 @@ class AssetMaker {
   /// @throws Error failed, with the message of the program that does not make it
   const MadeAsset& make(const Candidate& candidate);
   api::OpenedNdf open(const Candidate& candidate);
-  /// The asset of a candidate so many times, each at other addresses. Copies have no names by the time they are returned.
+  /// The asset of a candidate so many times, with the map where it takes normals, each at other addresses. Fewer where the disk has
+  /// no room. Copies have no names by the time they are returned.
   std::list<api::OpenedNdf> openCopies(const Candidate& candidate, int count);
   const std::vector<Candidate>& all() const { return all_; }
 
  private:
-  api::OpenedNdf openFile(const Candidate& candidate, const std::string& file) const;
+  /// @param map  given to candidates that take normals
+  api::OpenedNdf openFile(const Candidate& candidate, const std::string& file, const std::string& map) const;
+  /// @return name of a copy in the folder of assets; nothing where there is no room
+  std::optional<std::string> copyOf(const std::string& file, int number) const;
 
   Tool& tool_;
   const AssetFolder& folder_;

@@ -21,10 +21,10 @@ int main(int argc, char** argv) {
   apps::SatOptions options(tool);
 
   return tool.run(argc, argv, [&] {
-    const formats::Asset asset = apps::openInput(tool, input.path());
-    const auto& map = asset.get<NormalMap>();
     const apps::FiledMemory memory(tool, output.path(), apps::kLeastBytes + bake::histogramStatisticsBytes(options.values()),
                                    "any table");
+    const formats::Asset asset = apps::openInput(tool, input.path());
+    const auto& map = asset.get<NormalMap>();
     const formats::Provenance provenance = tool.provenance();
     const bake::HistogramSatData sat = bake::buildHistogramSat(map, options.values(), tool.progress("tables"));
     formats::writeAsset(output.path(), sat.view(), provenance, output.writeOptions());

@@ -55,12 +55,28 @@ void removeOurs(int folder, std::string_view part_of_name) noexcept {
   }
 }
 
+/// Unlinks the lock of a folder that holds nothing else. A file of a program that has not ended keeps the lock, by which a later
+/// process knows whose folder it is.
+void removeLock(int folder) noexcept {
+  alignas(dirent64) std::array<char, 4096> entries;
+  ::lseek(folder, 0, SEEK_SET);
+  for (ssize_t bytes = 0; (bytes = ::getdents64(folder, entries.data(), entries.size())) > 0;) {
+    for (ssize_t at = 0; at < bytes;) {
+      const auto* entry = reinterpret_cast<const dirent64*>(entries.data() + at);
+      at += entry->d_reclen;
+      const std::string_view name = entry->d_name;
+      if (name != "." && name != ".." && name != kLockName) return;
+    }
+  }
+  ::unlinkat(folder, kLockName, 0);
+}
+
 /// Removes a folder of assets, as removeOurs. Files of others keep it.
 /// @return whether it is gone
 bool removeFolder(const char* path) noexcept {
   {
     const formats::Descriptor folder(::open(path, kFolder));
-    if (folder.id >= 0) removeOurs(folder.id, ""), ::unlinkat(folder.id, kLockName, 0);
+    if (folder.id >= 0) removeOurs(folder.id, ""), removeLock(folder.id);
   }
   return ::rmdir(path) == 0 || errno == ENOENT;
 }
@@ -107,12 +123,10 @@ void removeStale(const std::string& base) {
     const formats::Descriptor folder(::open(entry->path().c_str(), kFolder | O_NOFOLLOW));
     if (folder.id < 0) continue;
     const formats::Descriptor lock(::openat(folder.id, kLockName, O_RDWR | O_CLOEXEC | O_NOFOLLOW));
-    if (lock.id >= 0) {
-      if (!lockFile(lock.id, F_OFD_SETLK)) continue;
-      removeOurs(folder.id, "");
-      ::unlinkat(folder.id, kLockName, 0);
-    }
-    ::rmdir(entry->path().c_str());  // fails if anything is in it: without a lock it is nobody's that we know
+    if (lock.id < 0 || !lockFile(lock.id, F_OFD_SETLK)) continue;
+    removeOurs(folder.id, "");
+    removeLock(folder.id);
+    ::rmdir(entry->path().c_str());  // fails if anything is in it
   }
 }
 
@@ -159,7 +173,7 @@ AssetFolder::AssetFolder(const std::string& path, bool remove) : path_(path), re
   std::error_code error;
   fs::create_directories(path, error);
   if (error || !fs::is_directory(path, error)) throwNoFolder(path, error.message());
-  if (!remove) return;
+  if (!remove) return holdLock();
   for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
     if (isOurs(entry.path().filename().string()) && entry.is_regular_file()) continue;
     throw Error(ErrorCode::usage, "output.ours", path, "",
@@ -167,6 +181,14 @@ AssetFolder::AssetFolder(const std::string& path, bool remove) : path_(path), re
                 "name a folder with --assets");
   }
   removeAtSignals();
+}
+
+/// Keeps the folder of a killed process, which is used again, from those that remove such folders.
+void AssetFolder::holdLock() {
+  lock_ = ::open((path_ + "/" + kLockName).c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW);
+  if (lock_ < 0 || lockFile(lock_, F_OFD_SETLK)) return;
+  throw Error(ErrorCode::usage, "output.ours", path_, "", "is the temporary folder of a program that runs",
+              "name another folder with --assets");
 }
 
 void AssetFolder::removeAtSignals() {

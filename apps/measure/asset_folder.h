@@ -23,8 +23,8 @@ class AssetFolder {
   /// processes have left.
   ///
   /// A file in the folder is locked as long as its process lives, or a program that the process gave lock() to. Only folders whose
-  /// file this process can lock are removed, so processes of other machines and containers keep theirs. Where there are no locks,
-  /// no folder is removed.
+  /// file this process can lock are removed, so processes of other containers keep theirs, and those of other machines where the file system
+  /// shares locks. Where there are no locks, no folder is removed.
   /// @throws Error io
   static AssetFolder temporary(const std::string& base);
 
@@ -42,6 +42,7 @@ class AssetFolder {
  private:
   struct Locked;
   explicit AssetFolder(const Locked& made);
+  void holdLock();
   void removeAtSignals();
 
   std::string path_;

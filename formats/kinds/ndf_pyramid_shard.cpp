@@ -73,7 +73,7 @@ struct KindDescription<NdfPyramidShard> {
     near.width = shard.images.shape.width;
     near.height = shard.near_normals->rows;
     near.texels = shard.near_normals->normals.data();
-    checkNearDisk(near, findings);
+    checkNearDisk(near, findings, "not inside the unit disk (rows are those of the region)");
   }
 };
 

@@ -66,14 +66,14 @@ void checkNearIndex(const std::optional<NearNormals>& near, Findings& findings) 
                  "has " + std::to_string(top.columns) + " x " + std::to_string(top.rows) + " nodes, not one");
 }
 
-void checkNearDisk(const NearNormals& near, Findings& findings) {
+void checkNearDisk(const NearNormals& near, Findings& findings, const std::string& fault) {
   TexelTally outside(near.width, near.height);
   const std::size_t texels = rowMajorIndex(0, near.height, near.width);
   for (std::size_t k = 0; k < texels; ++k) {
     const Vec2 n = near.normal(k);
     if (!(dot(n, n) < 1)) outside.add(k);
   }
-  report(outside, "near.disk", "/near/normals", {"normal is", "normals are"}, "not inside the unit disk", findings);
+  report(outside, "near.disk", "/near/normals", {"normal is", "normals are"}, fault, findings);
 }
 
 void checkNearValues(const std::optional<NearNormals>& near, Findings& findings) {

@@ -53,7 +53,7 @@ void describeNearArrays(Fields auto& fields, auto& asset) {
 /// Rules near.step and near.bounds_levels.
 void checkNearIndex(const std::optional<NearNormals>& near, Findings& findings);
 /// Rule near.disk.
-void checkNearDisk(const NearNormals& near, Findings& findings);
+void checkNearDisk(const NearNormals& near, Findings& findings, const std::string& fault = "not inside the unit disk");
 /// Rules near.disk and near.bounds.
 void checkNearValues(const std::optional<NearNormals>& near, Findings& findings);
 
