@@ -2,6 +2,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+
 #include "glint/bake/bin_map/bin_map_image.h"
 
 namespace glint::apps {
@@ -10,16 +12,20 @@ namespace {
 using CompressedNdf = AnisotropicNdf<CpNdf>;
 
 /// Mean density of a square of the image. A compressed pyramid's means of ranges take off no floors, and would show a haze that its
-/// densities do not have; means over its own pixels take them off.
+/// densities do not have; means over its own pixels take them off. Where squares are no groups of its pixels, points
+/// of each give the mean, but with texels below level 0, whose lobes may be narrower.
 float squareMean(const CompressedNdf& ndf, const Footprint& footprint, Vec2 low, float side, int resolution) {
   const int own = ndf.round().shape().resolution;
-  if (own % resolution != 0) return ndf.mean(footprint, {low, low + Vec2{side, side}});
-  const int pixels = own / resolution;
+  const bool groups = own % resolution == 0;
+  if (!groups && ndf.round().hasNormals()) return ndf.mean(footprint, {low, low + Vec2{side, side}});
+  constexpr int kPoints = 2;  // along each axis
+  const int pixels = groups ? own / resolution : std::max(kPoints, kPoints * (own / resolution));
   const float step = side / static_cast<float>(pixels);
+  const auto at = [&](Vec2 h) { return groups ? ndf.pixelMean(footprint, h) : ndf.density(footprint, h); };
   double sum = 0;
   for (int j = 0; j < pixels; ++j)
     for (int i = 0; i < pixels; ++i)
-      sum += ndf.pixelMean(footprint, low + Vec2{(static_cast<float>(i) + 0.5f) * step, (static_cast<float>(j) + 0.5f) * step});
+      sum += at(low + Vec2{(static_cast<float>(i) + 0.5f) * step, (static_cast<float>(j) + 0.5f) * step});
   return static_cast<float>(sum / (pixels * pixels));
 }
 

@@ -36,8 +36,8 @@ BinMapOptions::BinMapOptions(Tool& tool) {
 }
 
 double BinMapOptions::leastBytes() const {
-  constexpr double kBytesPerBin = 16;  // counts, blocks and nodes of all bins
-  constexpr int kMostBits = 32;        // of codes, so that a range of roughness counts as its geometric mean
+  constexpr double kBytesPerBin = 4;  // at least: maps of many texels have more
+  constexpr int kMostBits = 32;       // of codes, so that a range of roughness counts as its geometric mean
   const float alpha = std::max(options_.alpha, bake::kMinBinAlpha);
   const double bins = bake::binsPerAxis(bake::binAlpha(alpha, std::max(alpha, options_.alpha_max), kMostBits));
   return kLeastBytes + kBytesPerBin * bins * bins;

@@ -123,10 +123,12 @@ void removeStale(const std::string& base) {
     const formats::Descriptor folder(::open(entry->path().c_str(), kFolder | O_NOFOLLOW));
     if (folder.id < 0) continue;
     const formats::Descriptor lock(::openat(folder.id, kLockName, O_RDWR | O_CLOEXEC | O_NOFOLLOW));
-    if (lock.id < 0 || !lockFile(lock.id, F_OFD_SETLK)) continue;
-    removeOurs(folder.id, "");
-    removeLock(folder.id);
-    ::rmdir(entry->path().c_str());  // fails if anything is in it
+    if (lock.id >= 0) {
+      if (!lockFile(lock.id, F_OFD_SETLK)) continue;
+      removeOurs(folder.id, "");
+      removeLock(folder.id);
+    }
+    ::rmdir(entry->path().c_str());  // fails if anything is in it: without a lock it is nobody's that we know
   }
 }
 
@@ -173,7 +175,10 @@ AssetFolder::AssetFolder(const std::string& path, bool remove) : path_(path), re
   std::error_code error;
   fs::create_directories(path, error);
   if (error || !fs::is_directory(path, error)) throwNoFolder(path, error.message());
-  if (!remove) return holdLock();
+  if (!remove) {
+    holdLock();
+    return;
+  }
   for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
     if (isOurs(entry.path().filename().string()) && entry.is_regular_file()) continue;
     throw Error(ErrorCode::usage, "output.ours", path, "",

@@ -1244,7 +1244,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 25u);
+  EXPECT_EQ(count, 26u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
