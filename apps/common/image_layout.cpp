@@ -180,10 +180,11 @@ void selectLayer(Image& image, const std::string& layer, const std::string& path
   for (int c = 0; c < image.channels; ++c)
     if (layerOf(image.channel_names[static_cast<std::size_t>(c)]) == image.layer) kept.push_back(c);
   if (kept.empty()) {
-    throw Error(ErrorCode::invalid_input, "image.layer", path, "", "has no layer \"" + layer + "\"",
-                (image.parts.size() > 1 ? "its images are " + partList(image.parts) + "; the channels of the first are "
-                                        : "its channels are ") +
-                    channelList(image));
+    throw Error(
+        ErrorCode::invalid_input, "image.layer", path, "", "has no layer \"" + layer + "\"",
+        (image.parts.size() > 1 ? "its images are " + partList(image.parts) + "; the channels of the one that was read are "
+                                : "its channels are ") +
+            channelList(image));
   }
   // Each layer of an OpenEXR file may have an alpha of its own.
   const auto alpha = std::find_if(kept.begin(), kept.end(),

@@ -68,7 +68,7 @@ std::optional<std::string> AssetMaker::copyOf(const std::string& file, int numbe
   std::error_code error;
   fs::copy_file(file, copy, error);
   if (!error) return copy;
-  fs::remove(copy, error);
+  if (error != std::errc::file_exists) fs::remove(copy, error);
   return std::nullopt;
 }
 
@@ -80,8 +80,9 @@ std::list<api::OpenedNdf> AssetMaker::openCopies(const Candidate& candidate, int
     const std::optional<std::string> copy = copyOf(original, k);
     const std::optional<std::string> map = candidate.takes_normals && copy ? copyOf(path_, k) : path_;
     if (copy && map) copies.push_back(openFile(candidate, *copy, *map));
-    if (copy) fs::remove(*copy);
-    if (map && *map != path_) fs::remove(*map);
+    std::error_code none;
+    if (copy) fs::remove(*copy, none);
+    if (map && *map != path_) fs::remove(*map, none);
     if (!copy || !map) break;  // the disk is full
   }
   return copies;

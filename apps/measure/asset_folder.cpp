@@ -191,7 +191,7 @@ AssetFolder::AssetFolder(const std::string& path, bool remove) : path_(path), re
 /// Keeps the folder of a killed process, which is used again, from those that remove such folders.
 void AssetFolder::holdLock() {
   lock_ = ::open((path_ + "/" + kLockName).c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW);
-  if (lock_ < 0 || lockFile(lock_, F_OFD_SETLK)) return;
+  if (lock_ < 0 || lockFile(lock_, F_OFD_SETLK) || (errno != EAGAIN && errno != EACCES)) return;
   throw Error(ErrorCode::usage, "output.ours", path_, "", "is the temporary folder of a program that runs",
               "name another folder with --assets");
 }
@@ -207,6 +207,8 @@ void AssetFolder::removeAtSignals() {
 
 AssetFolder::~AssetFolder() {
   if (remove_) removeFolder(path_.c_str());
+  // A folder that stays is no longer one that the next process removes.
+  if (!remove_ && lock_ >= 0) ::unlink((path_ + "/" + kLockName).c_str());
   end_.reset();
   if (lock_ >= 0) ::close(lock_);
 }
