@@ -8,9 +8,9 @@
 namespace glint::apps {
 
 /// The memory of a run whose large arrays need not fit: at most --max-memory, by default half of what there is. It is the default
-/// resource as long as this lives.
+/// resource as long as this lives. Memory beside large arrays, such as that of the program, comes on top.
 ///
-/// Memory beside large arrays, such as that of the program, comes on top. Arrays that do not fit are in temporary files in the folder of the output, or, where that is in memory (tmpfs) or the output is a
+/// Arrays that do not fit are in temporary files in the folder of the output, or, where that is in memory (tmpfs) or the output is a
 /// pipe, in the folder of TMPDIR, by default /var/tmp. Pages of mapped assets count, too, and are given up.
 class FiledMemory {
  public:

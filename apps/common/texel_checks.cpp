@@ -27,6 +27,12 @@ void requireTiles(const WangTiles& tiles, const std::string& path) {
   }
 }
 
+void requireKept(const NdfPyramidShard& shard, const std::string& path) {
+  if (!shard.near_normals || areInside(shard.near_normals->normals)) return;
+  throw Error(ErrorCode::invalid_input, "near.disk", path, "/near/normals",
+              "has normals that are not finite and inside the unit disk", "make it again with glint-pyramid");
+}
+
 void requireHeights(const HeightMap& map, const std::string& path) {
   const auto bad = std::find_if_not(map.heights.begin(), map.heights.end(), [](float h) { return std::isfinite(h); });
   if (bad == map.heights.end()) return;
@@ -64,6 +70,7 @@ void requireNormals(const NormalMap& map, const std::string& path, std::span<con
 void requireTexels(const formats::Asset& asset, const std::string& path) {
   if (const auto* map = std::get_if<NormalMap>(&asset.any())) requireNormals(*map, path);
   if (const auto* tiles = std::get_if<WangTiles>(&asset.any())) requireTiles(*tiles, path);
+  if (const auto* shard = std::get_if<NdfPyramidShard>(&asset.any())) requireKept(*shard, path);
   if (const auto* heights = std::get_if<HeightMap>(&asset.any())) requireHeights(*heights, path);
 }
 

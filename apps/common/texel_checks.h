@@ -16,7 +16,7 @@ namespace glint::apps {
 /// @note one pass over the normals, which is little beside any work with them
 void requireNormals(const NormalMap& map, const std::string& path, std::span<const std::uint8_t> rows = {});
 
-/// Refuses texels that builders cannot work with, of kinds normals, wang-tiles and heights: also what --trust leaves.
+/// Refuses texels that builders cannot work with, of kinds normals, wang-tiles and heights, and kept in shards: also what --trust leaves.
 /// @throws Error invalid_input
 void requireTexels(const formats::Asset& asset, const std::string& path);
 

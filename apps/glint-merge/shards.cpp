@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "common/input_asset.h"
+#include "common/texel_checks.h"
 #include "glint/bake/ingest/near_normals.h"
 #include "glint/bake/pyramid/join.h"
 #include "glint/formats/hash.h"
@@ -31,6 +32,7 @@ formats::Asset openShard(const Tool& tool, const std::string& path) {
     throw Error(ErrorCode::unsupported, "merge.kind", path, "",
                 "is of kind " + std::string(checked.kind()) + ", not ndf-pyramid-shard",
                 "give only the outputs of glint-pyramid --region");
+  if (tool.trust()) requireTexels(checked, path);
   return formats::Asset::open(path);
 }
 

@@ -35,40 +35,45 @@ bool isOurs(std::string_view name) {
   return name.find_first_not_of(kDigits) == 8 && name[8] == '-' && name.find(".glint") != std::string_view::npos;
 }
 
-/// Removes assets of an open folder. A handler of signals may call it: it takes no memory.
-void removeOurs(int folder, std::string_view part_of_name) noexcept {
-  alignas(dirent64) std::array<char, 4096> entries;
-  bool removed = true;
-  while (removed) {  // some file systems leave out entries while others are removed
-    removed = false;
-    ::lseek(folder, 0, SEEK_SET);
-    for (ssize_t bytes = 0; (bytes = ::getdents64(folder, entries.data(), entries.size())) > 0;) {
-      for (ssize_t at = 0; at < bytes;) {
-        const auto* entry = reinterpret_cast<const dirent64*>(entries.data() + at);
-        at += entry->d_reclen;
-        const std::string_view name = entry->d_name;
-        const bool is_file = entry->d_type == DT_REG || entry->d_type == DT_UNKNOWN;
-        if (is_file && isOurs(name) && name.find(part_of_name) != std::string_view::npos)
-          removed |= ::unlinkat(folder, entry->d_name, 0) == 0;
-      }
-    }
-  }
-}
-
-/// Unlinks the lock of a folder that holds nothing else. A file of a program that has not ended keeps the lock, by which a later
-/// process knows whose folder it is.
-void removeLock(int folder) noexcept {
+/// Calls visit(entry) for the entries of an open folder, until one returns false. A handler of signals may call it: it takes no
+/// memory.
+template <class Visit>
+void forEachEntry(int folder, const Visit& visit) noexcept {
   alignas(dirent64) std::array<char, 4096> entries;
   ::lseek(folder, 0, SEEK_SET);
   for (ssize_t bytes = 0; (bytes = ::getdents64(folder, entries.data(), entries.size())) > 0;) {
     for (ssize_t at = 0; at < bytes;) {
       const auto* entry = reinterpret_cast<const dirent64*>(entries.data() + at);
       at += entry->d_reclen;
-      const std::string_view name = entry->d_name;
-      if (name != "." && name != ".." && name != kLockName) return;
+      if (!visit(*entry)) return;
     }
   }
-  ::unlinkat(folder, kLockName, 0);
+}
+
+/// Removes assets of an open folder. A handler of signals may call it.
+void removeOurs(int folder, std::string_view part_of_name) noexcept {
+  bool removed = true;
+  while (removed) {  // some file systems leave out entries while others are removed
+    removed = false;
+    forEachEntry(folder, [&](const dirent64& entry) {
+      const std::string_view name = entry.d_name;
+      const bool is_file = entry.d_type == DT_REG || entry.d_type == DT_UNKNOWN;
+      if (is_file && isOurs(name) && name.find(part_of_name) != std::string_view::npos)
+        removed |= ::unlinkat(folder, entry.d_name, 0) == 0;
+      return true;
+    });
+  }
+}
+
+/// Unlinks the lock of a folder that holds nothing else. A file of a program that has not ended keeps the lock, by which a later
+/// process knows whose folder it is.
+void removeLock(int folder) noexcept {
+  bool alone = true;
+  forEachEntry(folder, [&](const dirent64& entry) {
+    const std::string_view name = entry.d_name;
+    return alone = name == "." || name == ".." || name == kLockName;
+  });
+  if (alone) ::unlinkat(folder, kLockName, 0);
 }
 
 /// Removes a folder of assets, as removeOurs. Files of others keep it.

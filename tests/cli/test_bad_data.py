@@ -140,6 +140,18 @@ def test_other_texels_that_are_none_stop_builders_that_trust_their_input(glint, 
         assert not (assets / "out.glint").exists()
 
 
+@pytest.mark.parametrize("value", BAD.values(), ids=BAD.keys())
+@pytest.mark.parametrize("kept", ["i16", "f32"])
+def test_kept_normals_that_are_none_stop_a_merge_that_trusts_its_shards(glint, assets, kept, value):
+    for k in (1, 2):
+        line = f"pyramid normals.glint -o shard{k}.glint --force --stride 16 --keep-normals {kept} --region {k}/2"
+        assert glint(*line.split()).returncode == 0
+    with_value(assets, "shard2.glint", "near/normals", 7, value)
+    process = glint("merge", "shard1.glint", "bad.glint", "-o", "out.glint", "--trust")
+    assert process.returncode == 3 and "bad.glint" in process.stderr and process.stderr.count("\n") == 1, process.stderr
+    assert not (assets / "out.glint").exists()
+
+
 @pytest.mark.parametrize("dataset", ["level_00/pixels", "level_00/block_means"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1e30], ids=["nan", "infinite", "negative"])
 def test_pyramids_with_bad_values_do_not_crash_a_compression_that_trusts_them(glint, assets, dataset, value):
