@@ -195,7 +195,16 @@ PlaceErrors MapProbe::errors(std::size_t candidate, double tolerance) {
     const PlaceErrors errors = errorsOf(candidate, size, tolerance);
     if (needs(errors) > needs(largest)) largest = errors;
   }
+  if (surelyWithin(largest, tolerance)) largest.seen = std::max(largest.seen, seenBeyondProbe(candidate, tolerance));
   return largest;
+}
+
+double MapProbe::seenBeyondProbe(std::size_t candidate, double tolerance) {
+  const double given = toleranceOf(all_[candidate]);
+  if (given == 0 || question_.footprints.largest <= sizes_.back()) return 0;
+  const auto source =
+      std::find_if(all_.begin(), all_.end(), [&](const Candidate& c) { return c.name() == all_[candidate].source; });
+  return std::hypot(given, errors(static_cast<std::size_t>(source - all_.begin()), tolerance).seen);
 }
 
 }  // namespace glint::apps

@@ -81,6 +81,9 @@ class MapProbe {
   /// How many times as large errors of a compression are on the whole map: it has more blocks there to choose from, and comes nearer
   /// to the tolerance that it was given.
   double compressionFactor(std::size_t candidate);
+  /// Seen error of a compression at footprints that are too large for the probe; 0: there are none. On the whole map every level errs
+  /// as its tolerance allows, beside what its pyramid errs between images.
+  double seenBeyondProbe(std::size_t candidate, double tolerance);
   /// The value of a key in the cache, or that of a measurement.
   template <class Measure>
   double kept(const std::string& key, const Measure& measure);
