@@ -62,7 +62,9 @@ std::vector<std::string_view> ndfKinds() {
 }
 
 struct OpenedNdf::Set {
-  Set(std::vector<OpenedNdf> opened, std::vector<UdimTile> models) : maps(std::move(opened)), tiles(std::move(models)) {}
+  explicit Set(std::vector<OpenedNdf> opened) : maps(std::move(opened)), tiles(tilesOf(maps)) {}
+  static std::vector<UdimTile> tilesOf(const std::vector<OpenedNdf>& maps);
+
   std::vector<OpenedNdf> maps;  // one for each tile
   UdimTiles tiles;              // points into maps
 };
@@ -91,17 +93,18 @@ void requireTile(const formats::Asset& asset, const std::filesystem::path& path,
               "give the file the name that it was made with, or make it again");
 }
 
-UdimModels::Any tileModel(const AnyNdf& any, const std::filesystem::path& path, std::string_view kind) {
-  return std::visit(
-      [&]<class Model>(const Model& model) -> UdimModels::Any {
-        if constexpr (std::is_constructible_v<UdimModels::Variant, Model>) return UdimModels::Any(model);
-        std::vector<std::string_view> kinds;
-        UdimModels::forEach([&]<class Other>(std::type_identity<Other>) { kinds.push_back(NdfTraits<Other>::kKind); });
-        throw Error(ErrorCode::unsupported, "udim.kind", path.string(), "",
-                    "is a tile of kind " + std::string(kind) + ", and no such tiles are answered as a set",
-                    "make tiles of kind " + alternatives(kinds));
-      },
-      any);
+/// The models that tiles can have.
+using TileModels = NdfModelList<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, MomentsNdf>;
+
+/// Refuses tiles whose model does not answer a map of margins.
+void requireTileModel(const OpenedNdf& tile) {
+  std::vector<std::string_view> kinds;
+  TileModels::forEach([&]<class Model>(std::type_identity<Model>) { kinds.push_back(NdfTraits<Model>::kKind); });
+  const std::string_view kind = tile.asset().kind();
+  if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) return;
+  throw Error(ErrorCode::unsupported, "udim.kind", tile.path().string(), "",
+              "is a tile of kind " + std::string(kind) + ", and no such tiles are answered as a set",
+              "make tiles of kind " + alternatives(kinds));
 }
 
 /// What a set is: as its first tile, with the sizes of the largest tile and the widest of the smallest footprints.
@@ -182,20 +185,24 @@ OpenedNdf OpenedNdf::openMap(formats::Asset asset, const std::filesystem::path& 
   return opened;
 }
 
-OpenedNdf OpenedNdf::openSet(std::vector<OpenedNdf> maps, const std::filesystem::path& path, const NdfOptions& options) {
+std::vector<UdimTile> OpenedNdf::Set::tilesOf(const std::vector<OpenedNdf>& maps) {
   std::vector<UdimTile> tiles;
   for (const OpenedNdf& map : maps) {
-    const std::string_view kind = map.asset().kind();
-    if (kind != maps.front().asset().kind())
-      throw Error(
-          ErrorCode::invalid_input, "udim.kind", map.path().string(), "",
-          "is of kind " + std::string(kind) + ", and the first tile of kind " + std::string(maps.front().asset().kind()),
-          "make all tiles by the same tool");
-    tiles.push_back(
-        {placeOf(map.asset(), map.path()), map.info().width, map.info().height, tileModel(map.model(), map.path(), kind)});
+    const std::string_view kind = map.asset().kind(), first = maps.front().asset().kind();
+    if (kind != first)
+      throw Error(ErrorCode::invalid_input, "udim.kind", map.path().string(), "",
+                  "is of kind " + std::string(kind) + ", and the first tile of kind " + std::string(first),
+                  "make all tiles by the same tool");
+    const formats::UdimPlace place = placeOf(map.asset(), map.path());
+    requireTileModel(map);
+    tiles.push_back({place, map.info().width, map.info().height, &map.model()});
   }
+  return tiles;
+}
+
+OpenedNdf OpenedNdf::openSet(std::vector<OpenedNdf> maps, const std::filesystem::path& path, const NdfOptions& options) {
   OpenedNdf opened(path, options);
-  const auto set = std::make_shared<Set>(std::move(maps), std::move(tiles));
+  const auto set = std::make_shared<Set>(std::move(maps));
   opened.model_ = UdimNdf(set->tiles);
   opened.info_ = setInfo(set->tiles, set->maps);
   opened.set_ = set;

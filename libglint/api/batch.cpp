@@ -35,18 +35,9 @@ class PyramidChunk {
   PyramidReader::FoundPixels pixels_[kChunk];
 };
 
-/// Models without an overload below are asked one query at a time.
-template <class Model>
-void modelDensities(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
-                    float* out) {
-  for (std::size_t k = 0; k < count; ++k) out[k] = modelAt(model, footprints, k).density(footprints[k], halves[k]);
-}
-
 /// Three chunks are in flight, one step apart. While the memory fetches what one chunk needs next, the other two are computed.
-/// Smooth pixels are asked one query at a time: each reads so many pixels that its own misses overlap.
-void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints,
-                    const HalfVectorArrays& halves, float* out) {
-  if (model.pixels() == Pixels::smooth) return modelDensities<PyramidNdf>(model, count, footprints, halves, out);
+void pyramidDensities(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints,
+                      const HalfVectorArrays& halves, float* out) {
   PyramidChunk stages[3];
   const std::size_t chunks = (count + kChunk - 1) / kChunk;
   const auto lanesOf = [&](std::size_t k) { return static_cast<int>(std::min(count - k * kChunk, std::size_t{kChunk})); };
@@ -68,8 +59,8 @@ void modelDensities(const PyramidNdf& model, std::size_t count, const FootprintA
   }
 }
 
-void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
-                float* out) {
+void pyramidMeans(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
+                  float* out) {
   const PyramidReader& reader = model.reader();
   PyramidSlices slices[kChunk];
   bool from_texels[kChunk];
@@ -96,16 +87,9 @@ void modelMeans(const PyramidNdf& model, std::size_t count, const FootprintArray
   }
 }
 
-template <class Model>
-void modelSamples(const Model& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
-                  const SampleArrays& out) {
-  for (std::size_t k = 0; k < count; ++k) out.set(k, modelAt(model, footprints, k).sample(footprints[k], xi[k]));
-}
-
-/// Every loop is a step of all samples, and prefetches what the next loop reads. Smooth pixels: as for densities.
-void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
-                  const SampleArrays& out) {
-  if (model.pixels() == Pixels::smooth) return modelSamples<PyramidNdf>(model, count, footprints, xi, out);
+/// Every loop is a step of all samples, and prefetches what the next loop reads.
+void pyramidSamples(const PyramidNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
+                    const SampleArrays& out) {
   const PyramidReader& reader = model.reader();
   PyramidReader::Draw draws[kChunk];
   PyramidReader::FoundPixels pixels[kChunk];
@@ -136,12 +120,6 @@ void modelSamples(const PyramidNdf& model, std::size_t count, const FootprintArr
   }
 }
 
-template <class Model>
-void modelMeans(const Model& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges,
-                float* out) {
-  for (std::size_t k = 0; k < count; ++k) out[k] = modelAt(model, footprints, k).mean(footprints[k], ranges[k]);
-}
-
 /// Whether every footprint of a batch is asked as it is, not as several parts.
 bool allWhole(const AnisotropicNdf<PyramidNdf>& model, std::size_t count, const FootprintArrays& footprints) {
   if (footprints.sigma.data != nullptr) return true;
@@ -150,50 +128,48 @@ bool allWhole(const AnisotropicNdf<PyramidNdf>& model, std::size_t count, const 
   return true;
 }
 
-/// Calls ask(model) with the model that answers a batch. A pyramid answers a batch of round footprints by its own model of round
-/// footprints, which answers many queries at once. Every other batch goes to the model as it is.
-template <class Ask>
-void askModel(const AnyNdf& any, std::size_t count, const FootprintArrays& footprints, Ask&& ask) {
+/// The pyramid whose queries are answered many at once; nullptr where they are asked one by one.
+const PyramidNdf* batchedPyramid(const AnyNdf& any, std::size_t count, const FootprintArrays& footprints) {
   const auto* pyramid = std::get_if<AnisotropicNdf<PyramidNdf>>(&any);
-  if (pyramid != nullptr && allWhole(*pyramid, count, footprints)) return ask(pyramid->round());
-  std::visit(ask, any);
+  return pyramid != nullptr && !footprints.curved() && allWhole(*pyramid, count, footprints) ? &pyramid->round() : nullptr;
 }
 
-/// Calls ask(k, model) with the model of each query, averaged over the half vectors of its pixel.
+/// Calls ask(k, model) with the model at the position of each query, averaged over the half vectors of its pixel.
 template <class Ask>
-void askCurved(const AnyNdf& any, std::size_t count, const FootprintArrays& footprints, Ask&& ask) {
-  const auto each = [&](const auto& model) {
-    for (std::size_t k = 0; k < count; ++k) {
-      const auto& at = modelAt(model, footprints, k);
-      ask(k, CurvedNdf(at, footprints.spread(k)));
+void askEach(const AnyNdf& any, std::size_t count, const FootprintArrays& footprints, Ask&& ask) {
+  const bool moves = footprints.precise_u.data != nullptr && isEndless(any);
+  for (std::size_t k = 0; k < count; ++k) {
+    if (moves) {
+      const AnyNdf moved = movedTo(any, footprints, k);
+      ask(k, CurvedNdf(moved, footprints.spread(k)));
+    } else {
+      ask(k, CurvedNdf(any, footprints.spread(k)));
     }
-  };
-  std::visit(each, any);
+  }
 }
 
 }  // namespace
 
 void densities(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& halves,
                float* out) {
-  if (footprints.curved())
-    return askCurved(model, count, footprints,
-                     [&](std::size_t k, const auto& m) { out[k] = m.density(footprints[k], halves[k]); });
-  askModel(model, count, footprints, [&](const auto& m) { modelDensities(m, count, footprints, halves, out); });
+  // Smooth pixels are asked one by one: each query reads so many pixels that its own misses overlap.
+  const PyramidNdf* pyramid = batchedPyramid(model, count, footprints);
+  if (pyramid != nullptr && pyramid->pixels() != Pixels::smooth)
+    return pyramidDensities(*pyramid, count, footprints, halves, out);
+  askEach(model, count, footprints, [&](std::size_t k, const auto& m) { out[k] = m.density(footprints[k], halves[k]); });
 }
 
 void means(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const RangeArrays& ranges, float* out) {
-  if (footprints.curved())
-    return askCurved(model, count, footprints,
-                     [&](std::size_t k, const auto& m) { out[k] = m.mean(footprints[k], ranges[k]); });
-  askModel(model, count, footprints, [&](const auto& m) { modelMeans(m, count, footprints, ranges, out); });
+  if (const PyramidNdf* pyramid = batchedPyramid(model, count, footprints))
+    return pyramidMeans(*pyramid, count, footprints, ranges, out);
+  askEach(model, count, footprints, [&](std::size_t k, const auto& m) { out[k] = m.mean(footprints[k], ranges[k]); });
 }
 
 void samples(const AnyNdf& model, std::size_t count, const FootprintArrays& footprints, const HalfVectorArrays& xi,
              const SampleArrays& out) {
-  if (footprints.curved())
-    return askCurved(model, count, footprints,
-                     [&](std::size_t k, const auto& m) { out.set(k, m.sample(footprints[k], xi[k])); });
-  askModel(model, count, footprints, [&](const auto& m) { modelSamples(m, count, footprints, xi, out); });
+  const PyramidNdf* pyramid = batchedPyramid(model, count, footprints);
+  if (pyramid != nullptr && pyramid->pixels() != Pixels::smooth) return pyramidSamples(*pyramid, count, footprints, xi, out);
+  askEach(model, count, footprints, [&](std::size_t k, const auto& m) { out.set(k, m.sample(footprints[k], xi[k])); });
 }
 
 }  // namespace glint::api

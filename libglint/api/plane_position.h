@@ -38,20 +38,9 @@ float densityAt(const NdfModels::Any& model, double u, double v, const Footprint
 float meanAt(const NdfModels::Any& model, double u, double v, const Footprint& p, const Box2& range, Vec2 spread = {});
 HalfVectorSample sampleAt(const NdfModels::Any& model, double u, double v, const Footprint& p, Vec2 xi, Vec2 spread = {});
 
-/// The model for query k of a batch: a plane without end is moved to the cell of a centre that is given precisely.
-template <class Model>
-const Model& modelAt(const Model& model, const FootprintArrays&, std::size_t) {
-  return model;
-}
-template <EndlessNdf Model>
-Model modelAt(const Model& plane, const FootprintArrays& footprints, std::size_t k) {
-  if (footprints.precise_u.data == nullptr) return plane;
-  return plane.movedTo(planeCell(footprints.precise_u[k]), planeCell(footprints.precise_v[k]));
-}
-
-/// The same of any model.
+/// The model for query k of a batch: moved where centres are given precisely.
 inline NdfModels::Any movedTo(const NdfModels::Any& model, const FootprintArrays& footprints, std::size_t k) {
-  return std::visit([&](const auto& m) { return NdfModels::Any(modelAt(m, footprints, k)); }, model);
+  return footprints.precise_u.data == nullptr ? model : movedTo(model, footprints.precise_u[k], footprints.precise_v[k]);
 }
 
 }  // namespace glint::api

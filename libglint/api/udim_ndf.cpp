@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "glint/api/ndf_models.h"
 #include "glint/query/detail/common/sampling.h"
 
 namespace glint::api {
-
-template class OneOfNdfs<UdimModels>;
-
 namespace {
 
 /// A tile answers alone where less than this share of a footprint lies beyond its map.
@@ -133,7 +131,7 @@ void UdimNdf::forEachPart(const Footprint& p, Visit&& visit) const {
   const double inside = shareOf({column - left, column + 1 + right}, at.u, at.sigma_u) *
                         shareOf({row - below, row + 1 + above}, at.v, at.sigma_v);
   const Footprint here = placed(p, *tiles_, *own, at.u, at.v);
-  if (inside >= 1 - kLeastRest || tiles_->tiles().size() == 1) return visit(own->model, here, 1.0f);
+  if (inside >= 1 - kLeastRest || tiles_->tiles().size() == 1) return visit(*own->model, here, 1.0f);
 
   // Shares of the tiles, and of their parts that the own map covers.
   const auto eachTile = [&](auto&& take) {
@@ -154,25 +152,27 @@ void UdimNdf::forEachPart(const Footprint& p, Visit&& visit) const {
     all += whole, covered += part;
     if (&tile == own) of_own = whole;
   });
-  if (all - covered < kLeastRest * covered) return visit(own->model, here, 1.0f);
+  if (all - covered < kLeastRest * covered) return visit(*own->model, here, 1.0f);
   // The own map stands for the covered parts of other tiles as far as it covers what lies outside its own. A footprint much larger
   // than the margins so weighs all tiles by their own shares, from whichever tile it is asked.
   const double credit = all > of_own ? (covered - of_own) / (all - of_own) : 1;
-  visit(own->model, here, static_cast<float>((of_own + credit * (covered - of_own)) / all));
+  visit(*own->model, here, static_cast<float>((of_own + credit * (covered - of_own)) / all));
   eachTile([&](const UdimTile& tile, double whole, double part, double u, double v) {
-    if (&tile != own) visit(tile.model, placed(p, *tiles_, tile, u, v), static_cast<float>((whole - credit * part) / all));
+    if (&tile != own) visit(*tile.model, placed(p, *tiles_, tile, u, v), static_cast<float>((whole - credit * part) / all));
   });
 }
 
 float UdimNdf::density(const Footprint& p, Vec2 h) const {
   float sum = 0;
-  forEachPart(p, [&](const auto& model, const Footprint& part, float weight) { sum += weight * model.density(part, h); });
+  forEachPart(
+      p, [&](const NdfModels::Any& model, const Footprint& part, float weight) { sum += weight * model.density(part, h); });
   return sum;
 }
 
 float UdimNdf::mean(const Footprint& p, const Box2& range) const {
   float sum = 0;
-  forEachPart(p, [&](const auto& model, const Footprint& part, float weight) { sum += weight * model.mean(part, range); });
+  forEachPart(
+      p, [&](const NdfModels::Any& model, const Footprint& part, float weight) { sum += weight * model.mean(part, range); });
   return sum;
 }
 
@@ -180,8 +180,8 @@ HalfVectorSample UdimNdf::sample(const Footprint& p, Vec2 xi) const {
   xi = clampUnit(xi);
   float below = 0, weight_drawn = 0;
   HalfVectorSample drawn;
-  const UdimModels::Any* from = nullptr;
-  forEachPart(p, [&](const auto& model, const Footprint& part, float weight) {
+  const NdfModels::Any* from = nullptr;
+  forEachPart(p, [&](const NdfModels::Any& model, const Footprint& part, float weight) {
     const float above = below + weight;
     if (from == nullptr && weight > 0 && xi.x < above) {
       drawn = model.sample(part, {clampUnit((xi.x - below) / weight), xi.y});
@@ -191,7 +191,7 @@ HalfVectorSample UdimNdf::sample(const Footprint& p, Vec2 xi) const {
   });
   if (from == nullptr || !(drawn.pdf > 0) || weight_drawn == 1) return drawn;
   float pdf = weight_drawn * drawn.pdf;
-  forEachPart(p, [&](const auto& model, const Footprint& part, float weight) {
+  forEachPart(p, [&](const NdfModels::Any& model, const Footprint& part, float weight) {
     if (&model != from) pdf += weight * model.density(part, drawn.h);
   });
   return {drawn.h, pdf};

@@ -3,25 +3,21 @@
 #include <cstdint>
 #include <vector>
 
-#include "glint/api/models/compressed.h"
-#include "glint/api/models/moments.h"
-#include "glint/api/models/pyramid.h"
-#include "glint/api/models/reference.h"
+#include "glint/api/models/ndf_traits.h"
 #include "glint/api/ndf_model_list.h"
 #include "glint/formats/udim.h"
 
 namespace glint::api {
 
-/// The models that tiles of a UDIM set can have.
-using UdimModels = NdfModelList<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, MomentsNdf>;
-extern template class OneOfNdfs<UdimModels>;
+struct NdfModels;
 
-/// A tile of a UDIM set. Its model answers a map that holds the tile and margins of texels of its neighbours.
+/// A tile of a UDIM set. Its model answers a map that holds the tile and margins of texels of its neighbours; it must outlive the
+/// tile.
 struct UdimTile {
   formats::UdimPlace place;
   int width = 0;   ///< of the model's map, margins included, texels
   int height = 0;  ///< of the model's map, margins included, texels
-  UdimModels::Any model;
+  const OneOfNdfs<NdfModels>* model = nullptr;
 };
 
 /// The tiles of a set.
