@@ -33,6 +33,8 @@ constexpr double kLeastCorrection = 0.05, kMostCorrection = 16;
 // Largest error of an angular block over the tolerance. Without it, blocks in which errors are cheap have small errors, and pay
 // for large ones in the block of sparse flakes that most lights show.
 constexpr double kWorstBlock = 2;
+// Shares by which scales of images may move before the errors of cells are measured again: for a report, and to bound blocks.
+constexpr float kSameScale = 1e-3f, kNearlySameScale = 1e-2f;
 // Searches for sizes with which all blocks keep their bounds.
 constexpr int kMostRounds = 4;
 
@@ -164,7 +166,7 @@ class Compressor {
     if (options_.tolerance > 0) return meetTolerance();
     // The first pass finds the scales of images, and the second measures errors with them.
     const std::vector<char> all(groups_.size(), 1);
-    for (int pass = 0; pass < 2; ++pass) encode(std::vector<int>(index_.clusterCount(), 0), all);
+    for (int pass = 0; pass < 2; ++pass) encode(std::vector<int>(index_.clusterCount(), 0), all, kSameScale);
     return true;
   }
 
@@ -186,7 +188,6 @@ class Compressor {
   struct LevelGroup {
     double energy = 0;
     std::uint64_t slices = 0;
-    double gain_per_byte = 0;  ///< weighted squared error that a byte must remove to be worth storing
   };
 
   std::size_t clustersPerGroup() const { return index_.clusterCount() / groups_.size(); }
@@ -267,11 +268,14 @@ class Compressor {
     });
   }
 
-  /// Encodes the clusters of some groups, and scales the images. Groups have images of their own, so that others stay as they are.
-  void encode(const std::vector<int>& selection, const std::vector<char>& groups) {
+  /// Encodes the clusters of some groups, but for those that are so encoded, and scales the images. Groups have images of their own,
+  /// so that others stay as they are.
+  /// @param same_scale  clusters are measured again where a scale of their images has moved by more than this share
+  void encode(const std::vector<int>& selection, const std::vector<char>& groups, float same_scale) {
     progress_.grow(index_.clusterCount());
     forEachCluster([&](std::size_t c) {
-      if (groups[c / clustersPerGroup()]) encodeOne(c, selection[c]);
+      if (groups[c / clustersPerGroup()] && (selection[c] != selection_[c] || isRescaled(c, same_scale)))
+        encodeOne(c, selection[c]);
     });
     scaleImages();
     measureLevels();
@@ -287,13 +291,24 @@ class Compressor {
     selection_[c] = choice;
   }
 
-  /// Weighted squared error that a byte of a cluster must remove to be worth storing: what the last byte of its group removes,
-  /// or the last byte of the cluster where its bound asks for more.
-  double gainPerByte(std::size_t c, int choice) {
-    const double group = groupOf(c).gain_per_byte;
-    if (choice == 0 || group == 0) return group;
-    const SizeChoice &last = models_[c].choices()[choice], &before = models_[c].choices()[choice - 1];
-    return std::min(group, (before.error - last.error) / static_cast<double>(last.bytes - before.bytes));
+  /// Whether the scales of images have moved since the errors of a cluster were measured. Errors of slices follow the scales, but
+  /// sums over cells do not.
+  bool isRescaled(std::size_t c, float share) const {
+    for (int s = 0; s < index_.sliceCount(c); ++s) {
+      const float then = encoded_[c].errors.slices[s].seen_scale;
+      const float now = measuredScale(density_scales_[index_.sliceImage(c, s)]);
+      if (std::abs(now - then) > share * then) return true;
+    }
+    return false;
+  }
+
+  /// Weighted squared error that a byte of a cluster must remove to be worth storing: what a byte of its next step would remove. So
+  /// the coefficients of a cluster depend on its choice alone.
+  double gainPerByte(std::size_t c, int choice) const {
+    const auto& choices = models_[c].choices();
+    const auto next = static_cast<std::size_t>(choice) + 1;
+    if (next >= choices.size() || options_.method == CompressionMethod::cp) return 0;
+    return (choices[next - 1].error - choices[next].error) / static_cast<double>(choices[next].bytes - choices[next - 1].bytes);
   }
 
   /// Finds the scale with which each image integrates to its mass.
@@ -462,6 +477,7 @@ class Compressor {
         if (searched[g]) searches[g].setBounds(boundsOf(g));
       }
     }
+    encode(selection_, std::vector<char>(groups_.size(), 1), kSameScale);
     bool met = true;
     for (std::size_t g = 0; g < groups_.size(); ++g) met &= measuredError(g) <= budget(g);
     return met;
@@ -469,19 +485,17 @@ class Compressor {
 
   /// Runs the searches of some groups to their ends, and encodes what they found.
   void search(std::vector<ToleranceSearch>& searches, const std::vector<char>& groups) {
-    const auto encodeChosen = [&](const std::vector<char>& which) {
+    const auto encodeChosen = [&](const std::vector<char>& which, float same_scale) {
       std::vector<int> selection;
-      for (std::size_t g = 0; g < groups_.size(); ++g) {
-        selection.insert(selection.end(), searches[g].selection().begin(), searches[g].selection().end());
-        if (options_.method != CompressionMethod::cp) groups_[g].gain_per_byte = searches[g].gainPerByte();
-      }
-      encode(selection, which);
+      for (const ToleranceSearch& search : searches)
+        selection.insert(selection.end(), search.selection().begin(), search.selection().end());
+      encode(selection, which, same_scale);
     };
     for (std::vector<char> active = groups; std::any_of(active.begin(), active.end(), [](char a) { return a; });) {
-      encodeChosen(active);
+      encodeChosen(active, std::numeric_limits<float>::infinity());
       for (std::size_t g = 0; g < groups_.size(); ++g) active[g] = active[g] && searches[g].next(measuredError(g));
     }
-    encodeChosen(groups);
+    encodeChosen(groups, kNearlySameScale);
   }
 
   /// Whether the errors of blocks are bounded. Other ranks of cp are other decompositions, which cost most of the time.

@@ -9,6 +9,8 @@ namespace {
 // The search ends when the measured error lies between this part of the tolerance and all of it.
 constexpr double kTightness = 0.985;
 constexpr int kMostCorrections = 16;
+// Corrections that follow the line between two trials; the others halve the interval.
+constexpr int kLineCorrections = 8;
 
 }  // namespace
 
@@ -51,12 +53,6 @@ std::vector<int> RankAllocator::allocate(double squared_error) const {
   return selection;
 }
 
-double RankAllocator::gainPerByte(double squared_error) const {
-  double gain = bound_steps_ > 0 && bound_steps_ < steps_.size() ? steps_[bound_steps_].gain_per_byte : 0;
-  for (std::size_t i = bound_steps_; i < steps_.size() && errors_[i] > squared_error; ++i) gain = steps_[i].gain_per_byte;
-  return gain;
-}
-
 double RankAllocator::error(std::span<const int> selection) const {
   double sum = 0;
   for (std::size_t c = 0; c < clusters_.size(); ++c) sum += clusters_[c][static_cast<std::size_t>(selection[c])].error;
@@ -68,7 +64,7 @@ ToleranceSearch::ToleranceSearch(std::vector<std::span<const SizeChoice>> cluste
 
 void ToleranceSearch::setBounds(std::span<const double> bounds) {
   allocator_.setBounds(bounds);
-  met_ = failed_ = 0;
+  met_ = failed_ = {};
   corrections_ = 0;
   done_ = false;
   selection_ = allocator_.allocate(target_);
@@ -79,21 +75,33 @@ bool ToleranceSearch::next(double measured) {
   // Note whether this target met the budget, and stop if it did so closely enough.
   const bool met = measured <= budget_;
   if (met) {
-    met_ = std::max(met_, target_);
-    if (measured >= kTightness * kTightness * budget_ || met_ >= allocator_.largestError()) return finish(target_);
-  } else {
-    failed_ = failed_ > 0 ? std::min(failed_, target_) : target_;
+    if (target_ > met_.target) met_ = {target_, measured};
+    if (measured >= kTightness * kTightness * budget_ || target_ >= allocator_.largestError()) return finish(target_);
+  } else if (failed_.target == 0 || target_ < failed_.target) {
+    failed_ = {target_, measured};
   }
-  if (++corrections_ == kMostCorrections || (!met && target_ <= allocator_.smallestError())) return finish(met_);
-  // Aim in proportion, at the middle of the wanted interval; inside the known interval, or beyond its open end.
-  target_ = allocator_.error(selection_) * budget_ * (1 + kTightness * kTightness) / (2 * measured);
-  const bool outside = (met_ > 0 && target_ <= met_) || (failed_ > 0 && target_ >= failed_);
-  if (outside && met_ > 0 && failed_ > 0)
-    target_ = std::sqrt(met_ * failed_);
-  else if (outside)
-    target_ = met_ > 0 ? 2 * met_ : failed_ / 2;
+  if (++corrections_ == kMostCorrections || (!met && target_ <= allocator_.smallestError())) return finish(met_.target);
+  target_ = nextTarget(measured);
   selection_ = allocator_.allocate(target_);
   return true;
+}
+
+double ToleranceSearch::nextTarget(double measured) const {
+  // Aim at the middle of the wanted interval.
+  const double aim = budget_ * (1 + kTightness * kTightness) / 2;
+  if (met_.target > 0 && failed_.target > 0) {
+    constexpr double kNearestEnd = 0.1;
+    double share = 0.5;
+    if (corrections_ <= kLineCorrections && met_.measured > 0)
+      share =
+          std::clamp(std::log(aim / met_.measured) / std::log(failed_.measured / met_.measured), kNearestEnd, 1 - kNearestEnd);
+    return met_.target * std::pow(failed_.target / met_.target, share);
+  }
+  // In proportion; beyond the end that is known.
+  const double target = allocator_.error(selection_) * aim / measured;
+  if (met_.target > 0 && target <= met_.target) return 2 * met_.target;
+  if (failed_.target > 0 && target >= failed_.target) return failed_.target / 2;
+  return target;
 }
 
 bool ToleranceSearch::finish(double target) {

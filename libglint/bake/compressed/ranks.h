@@ -25,10 +25,6 @@ class RankAllocator {
   /// @return choice of each cluster; the last choice of every cluster if even these have a larger error
   std::vector<int> allocate(double squared_error) const;
 
-  /// Squared error per byte that the last step of allocate(squared_error) removes, or where the bounds alone ask for steps, that
-  /// the next step would remove.
-  double gainPerByte(double squared_error) const;
-
   /// Sum of the errors of a selection, before quantisation.
   double error(std::span<const int> selection) const;
 
@@ -54,8 +50,8 @@ class RankAllocator {
 
 /// Searches the error for an allocator to aim at so that the error measured after quantisation meets a budget.
 ///
-/// The two errors are nearly proportional, so a few corrections of the target suffice. Where they are not, the search halves
-/// the interval between a target that met the budget and a target that failed.
+/// The two errors are nearly proportional, so a few corrections of the target suffice. Between a target that met the budget and a
+/// target that failed, the search follows the line through both, in logarithms. Where that does not end, it halves the interval.
 class ToleranceSearch {
  public:
   /// @param budget  largest squared error that is allowed; the search uses it up as far as single steps and bounds allow
@@ -67,19 +63,22 @@ class ToleranceSearch {
   /// Choices to encode and measure next; once the search is done, the choices to keep.
   const std::vector<int>& selection() const { return selection_; }
 
-  /// Squared error that a byte must remove to be as good as the last byte of selection(); 0 when every byte is worth storing.
-  double gainPerByte() const { return target_ > 0 ? allocator_.gainPerByte(target_) : 0; }
-
   /// @param measured  squared error of selection()
   /// @return false when the search is done
   bool next(double measured);
 
  private:
+  /// A target, and what was measured of its selection; 0: none yet.
+  struct Trial {
+    double target = 0, measured = 0;
+  };
+
   bool finish(double target);
+  double nextTarget(double measured) const;
 
   RankAllocator allocator_;
   double budget_, target_;
-  double met_ = 0, failed_ = 0;  // largest target that met the budget, smallest that failed; 0: none yet
+  Trial met_, failed_;  // of the largest target that met the budget, and the smallest that failed
   int corrections_ = 0;
   bool done_ = false;
   std::vector<int> selection_;

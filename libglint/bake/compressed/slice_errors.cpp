@@ -60,8 +60,7 @@ const float* SliceComparer::pixelWeights(int level) {
 void SliceComparer::add(const float* slice, const float* decoded) {
   const std::uint32_t image = index_.sliceImage(cluster_, static_cast<int>(errors_.slices.size()));
   const int level = index_.level(image), cell_pixels = weights_.cellPixels(), side = kBlockSize / cell_pixels;
-  // Scales far from 1 belong to images that lost most of their mass. Large scales would cost ScaledError its precision.
-  const float density_scale = std::clamp(density_scales_[image], 0.5f, 2.0f), *pixel_weights = pixelWeights(level);
+  const float density_scale = measuredScale(density_scales_[image]), *pixel_weights = pixelWeights(level);
   double* cell_sums = errors_.cell_sums.data() + static_cast<std::size_t>(level) * weights_.cellCount();
   double* cell_errors = errors_.cell_errors.data() + static_cast<std::size_t>(level) * weights_.cellCount();
   ScaledErrorSums plain, seen;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -39,6 +40,10 @@ struct ClusterErrors {
   std::vector<double> cell_sums;    ///< [levels][cells of a block]: sum of decoded densities over slices and pixels
   std::vector<double> cell_errors;  ///< [levels][cells of a block]: sum of their squared errors
 };
+
+/// Scale with which the densities of an image are measured. Scales far from 1 belong to images that lost most of their mass. Large
+/// scales would cost ScaledError its precision.
+inline float measuredScale(float density_scale) { return std::clamp(density_scale, 0.5f, 2.0f); }
 
 /// Compares slices of a cluster with their decoded forms, one by one.
 class SliceComparer {
