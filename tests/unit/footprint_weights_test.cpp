@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <random>
+#include <string>
 
 #include "glint/math/gaussian.h"
 #include "glint/query/anisotropic_ndf.h"
@@ -84,6 +85,32 @@ TEST(PrincipalAxes, AreThoseOfTheCovariance) {
   const PrincipalAxes along_v = principalAxes({4, 0, 900});
   EXPECT_EQ(along_v.x, 0);
   EXPECT_EQ(along_v.y, 1);
+}
+
+TEST(FootprintWeights, OfEvenGaussiansCountEachTexelOnce) {
+  constexpr float kRounding = 1e-4f;
+  const struct {
+    int width, height;
+    Covariance covariance;
+    bool even;
+  } cases[] = {{70, 4, {4900, 0, 4900}, true},      {4, 70, {1e12f, 0, 1e12f}, true},    {31, 17, {2000, 300, 2000}, true},
+               {31, 17, {2000, 1900, 2000}, false}, {70, 4, {4000, 0, 4000}, false},     {1, 1, {1, 0, 1}, true},
+               {2048, 2048, {5e6f, 0, 5e6f}, true}, {2048, 2048, {5e6f, 0, 4e6f}, false}};
+  for (const auto& c : cases) {
+    SCOPED_TRACE(std::to_string(c.width) + " " + std::to_string(c.covariance.yy));
+    const FootprintWeights weights(Footprint::gaussian({0.3f, 0.9f}, c.covariance), c.width, c.height);
+    EXPECT_EQ(weights.isBox(), c.even);
+    const FootprintWeights clamped(Footprint::gaussian({0.3f, 0.9f}, c.covariance), c.width, c.height, Boundary::clamp);
+    EXPECT_FALSE(clamped.isBox());
+    if (!c.even) continue;
+    EXPECT_EQ(weights.closedFormTotal(), c.width * c.height);
+    for (int j = weights.row_begin; j < weights.row_end; ++j) {
+      for (int i = weights.column_begin; i<weights.column_end; i += c.width> 1000 && i < c.width - 2 ? 97 : 1) {
+        const bool inside = i >= 0 && i < c.width && j >= 0 && j < c.height;
+        ASSERT_NEAR(weights.texel(i, j), inside ? 1 : 0, kRounding) << i << ' ' << j;
+      }
+    }
+  }
 }
 
 TEST(FootprintWeights, CentresCloseBelow0AreAtTheEndOfTheMap) {

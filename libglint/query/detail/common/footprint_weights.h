@@ -99,6 +99,13 @@ GLINT_DEVICE_CALL inline GLINT_HD UsableCovariance usableCovariance(Covariance c
                             h * h * (s[1] * s[1] + t[1] * t[1]));
 }
 
+/// Whether a Gaussian weighs a periodic map evenly, to 5e-9: along no wave of the map has it less than a turn's variance.
+inline GLINT_HD bool weighsEvenly(const UsableCovariance& c, int width, int height) {
+  constexpr double kRounding = 1e-6;
+  const double w = width, h = height, xx = c.xx / (w * w), xy = c.xy / (w * h), yy = c.yy / (h * h);
+  return 0.5 * (xx + yy) - std::sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy) >= 1 - kRounding;
+}
+
 /// Half axes of a box, texels.
 inline GLINT_HD AxisPair halfAxes(const Footprint& box) { return {{box.axis_a.x, box.axis_a.y}, {box.axis_b.x, box.axis_b.y}}; }
 
@@ -158,8 +165,9 @@ inline GLINT_HD SmallPolygon clipToUnitBox(const Vec2* points, int count, Vec2 o
 /// and triangles at their centroids; a box weighs both by the covered area. Weights are relative: divide by their sum.
 ///
 /// Every footprint has an answer, because sizes are made usable first: see `usableCovariance` for Gaussians and `shortenedBox`
-/// for boxes. Boxes without area or of infinite size are answered as the Gaussian of the same moments. With Boundary::clamp
-/// nothing is shortened.
+/// for boxes. Boxes without area or of infinite size are answered as the Gaussian of the same moments. With Boundary::wrap a
+/// Gaussian that weighs the map evenly is a box over the whole map, so that each texel is summed once. With Boundary::clamp nothing
+/// is shortened.
 class FootprintWeights {
  public:
   GLINT_HD FootprintWeights(const Footprint& p, int width, int height, Boundary boundary = Boundary::wrap) {
@@ -168,7 +176,8 @@ class FootprintWeights {
     is_box_ = p.kind == Footprint::Kind::box && setBox(p, width, height, boundary);
     if (is_box_) return;
     const bool wrap = boundary == Boundary::wrap;
-    setGaussian(wrap ? usableCovariance(p.covariance, width, height) : positiveCovariance(p.covariance));
+    const UsableCovariance c = wrap ? usableCovariance(p.covariance, width, height) : positiveCovariance(p.covariance);
+    wrap&& weighsEvenly(c, width, height) ? setWholeMap(width, height) : setGaussian(c);
   }
 
   /// Half-open range of texels that can have weight.
@@ -279,6 +288,12 @@ class FootprintWeights {
     }
     setRange(std::fabs(ax) + std::fabs(bx), std::fabs(ay) + std::fabs(by));
     return true;
+  }
+
+  GLINT_HD void setWholeMap(int width, int height) {
+    const float half_width = 0.5f * static_cast<float>(width), half_height = 0.5f * static_cast<float>(height);
+    centre_x_ = half_width, centre_y_ = half_height;
+    is_box_ = setBox(Footprint::box({0.5f, 0.5f}, {half_width, 0}, {0, half_height}), width, height, Boundary::clamp);
   }
 
   GLINT_HD void setGaussian(const UsableCovariance& c) {
