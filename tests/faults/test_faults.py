@@ -20,7 +20,7 @@ OPENER = pathlib.Path(os.environ["GLINT_FAULT_OPENER"]).resolve()
 ALL = os.environ.get("GLINT_FAULTS") == "all"
 PART, PARTS = (int(word) for word in os.environ.get("GLINT_FAULTS_PART", "0/1").split("/"))
 # Calls of a class that fail in each program, unless all do: as many as SECONDS allow.
-LEAST, MOST_SAMPLED, SECONDS = 3, 12, 2
+LEAST, MOST_SAMPLED, SECONDS = 3, 12, 0.6
 MOST = 1000  # of all: some programs take memory more often
 
 LONGEST_ERROR = 2000  # bytes, as in test_outputs.py

@@ -143,7 +143,7 @@ TEST(Manifold, DensitiesAreThoseOfTheReferenceWithinTheStatedErrorInEveryOctaveO
     options.width = 93, options.height = 70;
     const OwnedMap owned(93, 70, bake::synthNormals(options));
     for (const Surroundings& around : kSurroundings) {
-      for (const float sigma_r : {0.001f, 0.005f, 0.02f, 0.1f}) {
+      for (const float sigma_r : {0.001f, 0.02f, 0.1f}) {
         const Reference reference(owned.map(), sigma_r, around.surface, around.boundary, Reference::Search::pruned);
         const ManifoldNdf ndf(owned.map(), sigma_r, around.surface, around.boundary);
         const float largest = sigma_r < 0.01f ? 4 : 16;  // the reference takes milliseconds beyond
@@ -409,8 +409,8 @@ TEST(Manifold, OneLaneAndEightAgree) {
 }
 
 TEST(Manifold, SamplesFollowTheDensity) {
-  // Counts of 64 cells by 40000 samples: a cell has some hundreds, so a standard error of some percent.
-  constexpr int kSamples = 200 * 200, kCells = 8;
+  // Counts of 64 cells by 10000 samples: a cell has some hundred, so a standard error of some percent.
+  constexpr int kSide = 100, kSamples = kSide * kSide, kCells = 8;
   for (const Surroundings& around : kSurroundings) {
     Random random(9);
     const float sigma_r = 0.03f;
@@ -420,8 +420,8 @@ TEST(Manifold, SamplesFollowTheDensity) {
     const float reach = 0.2f;
     double counts[kCells * kCells] = {};
     for (int k = 0; k < kSamples; ++k) {
-      const HalfVectorSample s = ndf.sample(
-          p, {(static_cast<float>(k % 200) + random.unit()) / 200, (static_cast<float>(k / 200) + random.unit()) / 200});
+      const HalfVectorSample s = ndf.sample(p, {(static_cast<float>(k % kSide) + random.unit()) / kSide,
+                                                (static_cast<float>(k / kSide) + random.unit()) / kSide});
       if (!(s.pdf > 0)) continue;
       if (k % 100 == 0) {
         EXPECT_EQ(s.pdf, ndf.density(p, s.h));
