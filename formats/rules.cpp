@@ -72,7 +72,7 @@ constexpr std::array kIndexRules = {
     Rule{"shape.resolution", error, invalid_input, "the image resolution is a multiple of 16", kMakeAgain},
     Rule{"shape.strides", error, invalid_input, "each level's stride is twice the one before", kMakeAgain},
     Rule{"shape.slopes", error, invalid_input, "slope_covariance is a covariance", kMakeAgain},
-    Rule{"shape.grid", error, invalid_input, "a level's grid is ceil(size overlap / stride), or 1 x 1 of the last level",
+    Rule{"shape.grid", error, invalid_input, "a level's grid is that of its stride, or 1 x 1 of the last level",
          kMakeAgain},
     Rule{"near.step", error, invalid_input, "near_step is 1 for f32, and a power of two up to 2^-15 for i16", kMakeAgain},
     Rule{"near.bounds_levels", error, invalid_input, "the coarsest level of the bounds of kept normals is one node",

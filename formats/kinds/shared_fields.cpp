@@ -25,12 +25,13 @@ void checkShape(const PyramidShape& shape, Findings& findings) {
     if (l > 0 && grid.stride != 2 * shape.levels[l - 1].stride) {
       findings.add("shape.strides", "/@level_strides", "level " + std::to_string(l) + " is not twice the level before");
     }
-    const int columns = shape.centresAlong(shape.width, grid.stride), rows = shape.centresAlong(shape.height, grid.stride);
+    const PyramidGrid expected = shape.gridOf(grid.stride);
     const bool is_mean = l == shape.footprintLevels();
-    if (!is_mean && (grid.columns != columns || grid.rows != rows)) {
+    if (!is_mean && (grid.columns != expected.columns || grid.rows != expected.rows)) {
       findings.add("shape.grid", "/@level_columns",
                    "level " + std::to_string(l) + " has " + std::to_string(grid.columns) + " x " + std::to_string(grid.rows) +
-                       " footprints, not ceil(size overlap / stride)" + (l + 1 == shape.level_count ? ", nor 1 x 1" : ""));
+                       " footprints, not " + std::to_string(expected.columns) + " x " + std::to_string(expected.rows) +
+                       (l + 1 == shape.level_count ? ", nor 1 x 1" : ""));
     }
   }
 }

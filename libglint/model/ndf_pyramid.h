@@ -24,11 +24,14 @@ inline constexpr int kMostMaskWords = 64;
 /// Most footprints in a stride along each axis.
 inline constexpr float kMostOverlap = 4;
 
+/// Least columns and rows of the largest footprints below the size of a map (PyramidShape::gridOf).
+inline constexpr int kLastCentres = 12;
+
 /// The grid of footprints of one level. PyramidShape::centre has their centres.
 struct PyramidGrid {
   float stride = 0;  ///< texels; the footprint has a deviation of kFootprintPerStride strides
-  int columns = 0;   ///< ceil(width overlap / stride); 1 in the mean of the map
-  int rows = 0;      ///< ceil(height overlap / stride); 1 in the mean of the map
+  int columns = 0;   ///< as in PyramidShape::gridOf; 1 in the mean of the map
+  int rows = 0;      ///< as in PyramidShape::gridOf; 1 in the mean of the map
 
   GLINT_HD constexpr std::size_t imageCount() const { return rowMajorIndex(0, rows, columns); }
 };
@@ -52,10 +55,23 @@ struct PyramidShape {
   GLINT_HD constexpr bool endsInMean() const { return level_count > 1 && levels[level_count - 1].imageCount() == 1; }
   /// Levels of Gaussian footprints: all levels but the mean.
   GLINT_HD constexpr int footprintLevels() const { return level_count - (endsInMean() ? 1 : 0); }
-  /// Columns or rows of a level of footprints.
+  /// Columns or rows of a level of footprints, but for those of gridOf.
   /// @param size  width or height of the map, texels
   GLINT_HD int centresAlong(int size, float stride) const {
     return static_cast<int>(std::ceil(static_cast<double>(size) * double{overlap} / double{stride}));
+  }
+  /// The grid of a level of footprints. On a map that repeats, the largest footprints below its size still see its slowest wave. Answers
+  /// above their size depend on this level and the mean of the map alone, so this level has at least kLastCentres columns and rows,
+  /// unless the map is far thinner than its footprints. With an overlap of 1, all levels are those of Deng 2022.
+  GLINT_HD PyramidGrid gridOf(float stride) const {
+    constexpr float kFarThinner = 1.5f;  // strides in which Gaussians keep 2e-4 of the slowest wave
+    const bool last =
+        boundary == Boundary::wrap && overlap > 1 && 2 * stride >= static_cast<float>(width > height ? width : height);
+    const auto along = [&](int size) {
+      const int count = centresAlong(size, stride);
+      return last && count < kLastCentres && stride < kFarThinner * static_cast<float>(size) ? int{kLastCentres} : count;
+    };
+    return {stride, along(width), along(height)};
   }
   /// Distance between neighbouring centres of a level of footprints along u and v, texels.
   GLINT_HD Vec2 spacing(int level) const {

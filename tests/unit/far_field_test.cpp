@@ -136,6 +136,44 @@ TEST(FarField, FadesAsTheSlowestWaveDoesAboveTheLastFootprints) {
   }
 }
 
+/// Two shapes with normals of their own on a nearly flat map, as a logo or a trim sheet has them.
+std::vector<Vec2> logo(int width, int height) {
+  std::mt19937 random(13);
+  std::normal_distribution<float> gaussian(0, 0.03f);
+  std::vector<Vec2> normals(static_cast<std::size_t>(width) * height);
+  for (std::size_t k = 0; k < normals.size(); ++k) {
+    const float u = (static_cast<float>(k % static_cast<std::size_t>(width)) + 0.5f) / static_cast<float>(width);
+    const float v = (static_cast<float>(k / static_cast<std::size_t>(width)) + 0.5f) / static_cast<float>(height);
+    const bool disc = (u - 0.35f) * (u - 0.35f) + (v - 0.4f) * (v - 0.4f)<0.05f, strip = u> 0.8f;
+    normals[k] = {gaussian(random) + (disc ? -0.25f : 0), gaussian(random) + (disc ? 0.1f : 0) + (strip ? -0.3f : 0)};
+  }
+  return normals;
+}
+
+TEST(FarField, IsRightFromTheLastLevelOnWhereverShapesLie) {
+  // Dim places are dim beside what the map shows on average: both count.
+  constexpr double kError = 0.02, kShare = 0.25;
+  constexpr Box2 kDisc = {{-0.3125f, 0.0625f}, {-0.1875f, 0.1875f}};
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> unit(0, 1);
+  for (const auto& [width, height] : {std::pair{128, 128}, {100, 90}, {192, 48}, {60, 144}}) {
+    const OwnedMap owned(width, height, logo(width, height));
+    const bake::NdfPyramidData data = bake::buildPyramid(owned.map(), options(8));
+    const PyramidNdf model(data.view());
+    const int last = data.shape.footprintLevels() - 1;
+    const float sigma = kFootprintPerStride * data.shape.levels[last].stride;
+    const double mean = truth(owned.map(), Boundary::wrap, {0, 0}, 1e3, kDisc);
+    for (const float times : {1.0f, 1.05f, 1.1f, 1.16f, 1.25f, 1.4f, 1.6f, 2.0f, 3.0f, 10.0f}) {
+      for (int k = 0; k < 8; ++k) {
+        const Vec2 uv = {unit(random), unit(random)};
+        const double exact = truth(owned.map(), Boundary::wrap, uv, double{times * sigma}, kDisc);
+        EXPECT_NEAR(model.mean(Footprint::isotropic(uv, times * sigma), kDisc), exact, kError * std::max(exact, kShare * mean))
+            << width << 'x' << height << ", " << times << " at " << uv.x << ' ' << uv.y;
+      }
+    }
+  }
+}
+
 TEST(FarField, OfAMapThatEndsTendsToItsMean) {
   constexpr double kNearError = 0.08, kFarError = 0.02;
   const OwnedMap owned(128, 128, halves(128, 128));

@@ -183,7 +183,7 @@ PyramidShape pyramidShape(int width, int height, const PyramidOptions& o) {
   for (float stride = o.stride; shape.level_count < kMaxFootprintLevels; stride *= 2) {
     if (shape.level_count > 0 && stride >= longest) break;
     if (o.levels > 0 && shape.level_count == o.levels) break;
-    shape.levels[shape.level_count++] = {stride, shape.centresAlong(width, stride), shape.centresAlong(height, stride)};
+    shape.levels[shape.level_count++] = shape.gridOf(stride);
   }
   if (shape.level_count < o.levels)
     throw Error(ErrorCode::usage, "option.range", {}, "--levels",

@@ -95,11 +95,9 @@ class SliceChooser {
     const float finest = finestSigma(shape), first_ratio = trilinear ? 1 : fadeStart(shape.overlap);
     per_first_variance_ = 1 / (first_ratio * finest * finest);
     last_level_ = shape.footprintLevels() - 1;
-    largest_variance_ = (trilinear ? 1 : 1 + kLastPerSquareGap * squareGap(shape.overlap)) * finest * finest;
-    for (int l = 0; l < last_level_; ++l) largest_variance_ *= 4;
-    largest_ratio_ = largest_variance_ * per_first_variance_;
+    for (int l = 0; l <= last_level_; ++l) setLevel(shape, l, l);
+    setLast(shape, trilinear);
     decay_ = shape.endsInMean() ? farDecay() : 0;
-    for (int l = 0; l < shape.level_count; ++l) setLevel(shape, l);
   }
 
   /// Chooses images for a footprint; see Interpolation. Footprints below the finest level get the finest level. Footprints above
@@ -160,10 +158,13 @@ class SliceChooser {
   struct LevelCentres {
     float extent[2];          ///< size of the map, in gaps between centres
     float last[2];            ///< last column and row
+    float before[2];          ///< gaps from the border of the map to the first centre
+    float step[2];            ///< columns or rows of the level from one centre to the next
     float per_border_gap[2];  ///< 1 / (gap from the last centre across the border to the first)
     float per_square_gap[2];  ///< 1 / (square of the gap between centres, texels^2)
     float variance;           ///< of the footprints, texels^2
-    std::int32_t columns;
+    std::int32_t columns;     ///< of the level
+    std::int32_t level;
   };
 
   /// Interpolation::footprint fades from one level to the next where the kernel of the finer level gets too short. The fade ends
@@ -177,6 +178,12 @@ class SliceChooser {
   /// exactly, since what is left of the slowest wave of the map depends on it.
   static constexpr float kLastPerSquareGap = 0.7f;
 
+  /// Grids of a dense last level: all its images, every second, and every third.
+  static constexpr int kLastGrids = 3;
+  static_assert(kLastCentres % 2 == 0 && kLastCentres % 3 == 0);
+  /// Squares of its gap that the kernels of such a grid have where it fades in: kernels of less see more than they should.
+  static constexpr float kNarrow = 0.2f, kEnough = 0.3f;
+
   /// Square of the gap between centres, in deviations of a footprint.
   static GLINT_HD float squareGap(float overlap) {
     const float gap = 1 / (kFootprintPerStride * overlap);
@@ -187,11 +194,63 @@ class SliceChooser {
     return (kFadeEnd + kFadeEndPerSquareGap * squareGap(overlap)) / (kFadeSizes * kFadeSizes);
   }
 
-  GLINT_HD void setLevel(const PyramidShape& shape, int l) {
+  /// Sets the grids of the last level of footprints, and how far it answers alone.
+  ///
+  /// Where its images are nearer to each other than those of other levels (PyramidShape::gridOf), footprints up to twice its size are
+  /// answered from them, and need kernels of all widths: those of every image, of every second, and of every third. The fade to
+  /// this level ends about at its size: there the finer level lacks what this level has too much.
+  GLINT_HD void setLast(const PyramidShape& shape, bool trilinear) {
+    const PyramidGrid& grid = shape.levels[last_level_];
+    const float longest = std::sqrt(std::max(largest_u_, largest_v_)), variance = levels_[last_level_].variance;
+    const int count = largest_u_ < largest_v_ ? grid.rows : grid.columns;
+    const bool dense = !trilinear && count > shape.centresAlong(static_cast<int>(longest), grid.stride);
+    last_grids_ = dense ? kLastGrids : 1;
+    for (int k = 1; k < last_grids_; ++k) levels_[last_level_ + k] = sparser(levels_[last_level_], k + 1);
+    if (shape.endsInMean()) setLevel(shape, last_level_ + 1, last_level_ + last_grids_);
+    const float gap = longest / static_cast<float>(count);
+    last_square_gap_ = gap * gap;
+    const float widest = dense ? kLastGrids * kLastGrids * last_square_gap_ : squareGap(shape.overlap) * variance;
+    largest_variance_ = variance + (trilinear ? 0 : kLastPerSquareGap * widest);
+    largest_ratio_ = largest_variance_ * per_first_variance_;
+    last_variance_ = variance;
+    last_end_ = variance + kEnough * last_square_gap_;
+    last_begin_ = dense ? last_end_ / (kFadeSizes * kFadeSizes) : largest_variance_;
+    per_last_fade_ = 1 / (last_end_ - last_begin_);
+  }
+
+  /// Every centre number k, from the first on, along each axis that has many.
+  static GLINT_HD LevelCentres sparser(LevelCentres centres, int k) {
+    const auto step = static_cast<float>(k);
+    for (int axis = 0; axis < 2; ++axis) {
+      if (centres.last[axis] + 1 < kLastCentres) continue;
+      centres.extent[axis] /= step;
+      centres.last[axis] = (centres.last[axis] + 1) / step - 1;
+      centres.before[axis] /= step;
+      centres.per_square_gap[axis] /= step * step;
+      centres.step[axis] = step;
+    }
+    return centres;
+  }
+
+  /// The place of a footprint larger than last_begin_ among the grids of the last level.
+  GLINT_HD LevelPlace placeInLast(float variance) const {
+    if (variance < last_end_ && last_level_ > 0) return {last_level_ - 1, (variance - last_begin_) * per_last_fade_};
+    const float lacking = variance - last_variance_;
+    for (int k = 0; k + 1 < last_grids_; ++k) {
+      const float gaps_of_next = lacking / (static_cast<float>((k + 2) * (k + 2)) * last_square_gap_);
+      if (gaps_of_next < kNarrow) return {last_level_ + k, 0};
+      if (gaps_of_next < kEnough) return {last_level_ + k, (gaps_of_next - kNarrow) / (kEnough - kNarrow)};
+    }
+    return {last_level_ + last_grids_ - 1, 0};
+  }
+
+  /// @param at  where in levels_
+  GLINT_HD void setLevel(const PyramidShape& shape, int l, int at) {
     const PyramidGrid& grid = shape.levels[l];
     const Vec2 gap = shape.spacing(l);
     const float sigma = kFootprintPerStride * grid.stride;
-    LevelCentres& to = levels_[l];
+    LevelCentres& to = levels_[at];
+    to.level = l;
     setAxis(0, grid.columns, static_cast<float>(shape.width) / gap.x, gap.x, to);
     setAxis(1, grid.rows, static_cast<float>(shape.height) / gap.y, gap.y, to);
     to.variance = sigma * sigma;
@@ -200,6 +259,8 @@ class SliceChooser {
   static GLINT_HD void setAxis(int axis, int count, float extent, float gap, LevelCentres& to) {
     to.extent[axis] = count > 1 ? extent : 1;  // a single centre is its own neighbour, however little of its gap the map fills
     to.last[axis] = static_cast<float>(count - 1);
+    to.before[axis] = 0.5f;
+    to.step[axis] = 1;
     to.per_border_gap[axis] = 1 / (to.extent[axis] - to.last[axis]);
     to.per_square_gap[axis] = 1 / (gap * gap);
   }
@@ -213,6 +274,7 @@ class SliceChooser {
   GLINT_HD LevelPlace levelOf(float variance) const {
     const float ratio = variance * per_first_variance_, beyond = ratio - largest_ratio_;
     if (!(beyond > 0)) {
+      if (variance > last_begin_) return placeInLast(variance);
       const LevelPlace between = levelPlace(ratio > 1 ? ratio : 1, interpolation_);
       return between.first < last_level_ ? between : LevelPlace{last_level_, 0};
     }
@@ -221,7 +283,7 @@ class SliceChooser {
     // 1 / exp(x), or 1 / (1 + x), in plain arithmetic: device code has the same bits.
     const float wave = wraps_ ? 1.0f : 0.0f;
     const float series = 1 + x * (1 + wave * (x / 2) * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6 * (1 + x / 7))))));
-    return {last_level_, 1 - 1 / series};
+    return {last_level_ + last_grids_ - 1, 1 - 1 / series};
   }
 
   GLINT_HD void addLevel(int level, float share, Vec2 centre, float variance, PyramidSlices& out) const {
@@ -246,7 +308,7 @@ class SliceChooser {
   GLINT_HD Position positionOn(const LevelCentres& centres, int axis, float coordinate) const {
     const float turn = coordinate - std::floor(coordinate);
     const float u = turn >= 0 ? turn < kBelowOne ? turn : float{kBelowOne} : 0.0f;  // numbers that are not finite become 0
-    const float at = u * centres.extent[axis] - 0.5f, last = centres.last[axis];
+    const float at = u * centres.extent[axis] - centres.before[axis], last = centres.last[axis];
     if (!wraps_) {
       const float low = std::floor(at);  // at most the last: the border is half a gap beyond it
       return {low < last ? low : last, at - low};
@@ -293,9 +355,12 @@ class SliceChooser {
         out);
   }
 
-  GLINT_HD void addGroup(int level, Float4 rows, Float4 columns, Float4 weights, PyramidSlices& out) const {
-    out.levels[out.count / 4] = level;
-    storeIndices(rows, levels_[level].columns, columns, out.images + out.count);
+  /// @param at  which of levels_
+  GLINT_HD void addGroup(int at, Float4 rows, Float4 columns, Float4 weights, PyramidSlices& out) const {
+    const LevelCentres& centres = levels_[at];
+    out.levels[out.count / 4] = centres.level;
+    storeIndices(Float4::all(centres.step[1]) * rows, centres.columns, Float4::all(centres.step[0]) * columns,
+                 out.images + out.count);
     weights.store(out.weights + out.count);
     out.count += 4;
   }
@@ -316,9 +381,14 @@ class SliceChooser {
   float per_first_variance_;     // 1 / (largest variance that level 0 answers alone)
   float largest_variance_;       // that the last level of footprints answers alone, texels^2
   float largest_ratio_;          // largest_variance_ * per_first_variance_
+  float last_variance_;          // of the last level of footprints, texels^2
+  float last_begin_, last_end_;  // variances between which that level fades in; from the first on placeInLast chooses, texels^2
+  float last_square_gap_;        // of the last level along the longer side of the map, texels^2
+  float per_last_fade_;          // 1 / (last_end_ - last_begin_)
   float decay_;
-  int last_level_;  // of footprints
-  LevelCentres levels_[kMaxPyramidLevels];
+  int last_level_;                                       // of footprints
+  int last_grids_;                                       // of that level
+  LevelCentres levels_[kMaxPyramidLevels + kLastGrids];  // levels of footprints, sparser grids of the last one, and the mean
 };
 
 /// The pixel that contains a half vector: number of its block, and its column and row in the block. Valid for |h.x|, |h.y| <=
