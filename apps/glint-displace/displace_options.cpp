@@ -15,6 +15,8 @@ namespace {
 constexpr float kResidual = 0.1f;
 constexpr float kDistant = 0.02f;
 constexpr double kFitError = 0.2;
+/// The tables of a base in the asset, their light, and the base at its own resolution; of each channel.
+constexpr double kTableBytes = 16e6;
 
 float number(const std::string& text, const std::string& whole) {
   float value = 0;
@@ -32,7 +34,7 @@ double meanFitError(const bake::DisplacementData::Level& level) {
 
 }  // namespace
 
-DisplaceOptions::DisplaceOptions(Tool& tool) : images_(tool) {
+DisplaceOptions::DisplaceOptions(Tool& tool) : images_(tool), table_(tool) {
   const Option& factor = tool.option("--factor", factor_,
                                      "texels of the map along a side of a downsampled cell; where it does not divide the map, "
                                      "the nearest whole number of cells is taken")
@@ -42,7 +44,8 @@ DisplaceOptions::DisplaceOptions(Tool& tool) : images_(tool) {
   base_given_ =
       &tool.option("--base", base_,
                    "reflectance of the surface: diffuse:RHO (albedo above 0, at most 1), ggx:ALPHA (0.05 to 1; reflects "
-                   "all light) or ggx:ALPHA:ETA,K (a conductor)");
+                   "all light) or ggx:ALPHA:ETA,K (a conductor)")
+           .excludes(table_.option());
   tool.option("--lobes", values_.lobes, "lobes of normals in each cell").range(1, kMaxLobes);
   tool.option("--angular", values_.angular, "directions of light and view: the square of this").range(3, kMostAngular);
   tool.option("--spatial", values_.spatial, "patches of the spatial factor along each axis").range(1, 16);
@@ -81,6 +84,8 @@ bake::DisplaceOptions DisplaceOptions::values(const HeightMap& map) const {
   options.factors = factors_given_->given() ? factors_ : std::vector<int>{factor_};
   options.base = parseBase(images_.colored() && !base_given_->given() ? "diffuse:1" : base_);
   options.texture = images_.read(map.width, map.height);
+  options.table = table_.read();
+  if (options.table) options.base = options.table->base();
   if (bounces_ == "auto") return options;
   if (!parseNumber(bounces_, options.bounces).empty() || options.bounces < 1 || options.bounces > bake::kAllBounces)
     throw Error(ErrorCode::usage, "option.range", {}, "--bounces", "'" + bounces_ + "' is not a number of reflections",
@@ -100,9 +105,10 @@ void requireDisplaceMemory(const Tool& tool, const HeightMap& map, const bake::D
     return bake::displacementPairBytes(map.width, map.height, of, tool.threads());
   };
   const double texels = static_cast<double>(map.width) * map.height;
+  const double table = options.table ? kTableBytes * options.channels() : 0;
   const double counted = texels * (fine ? BytesPerTexel::kDisplaceFinely : BytesPerTexel::kDisplace);
   const double pairs = many ? pairsOf(options) - std::min(pairsOf(usual), counted) : 0;
-  tool.requireMemory(counted + texels * masks + pairs,
+  tool.requireMemory(counted + texels * masks + pairs + table,
                      fmt::format("a displacement of {} x {} texels in {:.0f} directions", map.width, map.height, directions),
                      many   ? "give a smaller --angular or --spatial, or take a smaller map"
                      : fine ? "give a larger --factor, or take a smaller map"

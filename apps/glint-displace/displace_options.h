@@ -6,6 +6,7 @@
 
 #include "common/tool.h"
 #include "glint-displace/base_images.h"
+#include "glint-displace/base_table_file.h"
 #include "glint/bake/displace/displace.h"
 
 namespace glint::apps {
@@ -15,8 +16,9 @@ class DisplaceOptions {
  public:
   explicit DisplaceOptions(Tool& tool);
 
-  /// Valid after parsing; reads the images of the base.
-  /// @throws Error usage if --base or --bounces cannot be read; invalid_input if an image does not fit the map
+  /// Valid after parsing; reads the images and the table of the base.
+  /// @throws Error usage if --base or --bounces cannot be read; invalid_input if an image does not fit the map, or the table
+  ///         cannot be used
   bake::DisplaceOptions values(const HeightMap& map) const;
 
  private:
@@ -24,6 +26,7 @@ class DisplaceOptions {
   std::vector<int> factors_;
   std::string base_ = "diffuse:0.8";
   BaseImages images_;
+  BaseTableFile table_;
   std::string bounces_ = "auto";
   bake::DisplaceOptions values_;
   const Option* factors_given_ = nullptr;

@@ -9,10 +9,13 @@
 using namespace glint;
 
 int main(int argc, char** argv) {
-  apps::Tool tool({"glint-displace",
-                   "Downsamples a displacement map and keeps its appearance: normals become lobes for each cell, and "
-                   "shadowing, masking and interreflections become factors for pairs of directions.",
-                   "glint-displace weave.glint -o weave.displaced.glint --factor 16 --base diffuse:0.8"});
+  apps::Tool tool(
+      {"glint-displace",
+       "Downsamples a displacement map and keeps its appearance: normals become lobes for each cell, and "
+       "shadowing, masking and interreflections become factors for pairs of directions.",
+       "glint-displace weave.glint -o weave.displaced.glint --factor 16 --base diffuse:0.8",
+       "A measured material as the base, from a table in the form of the MERL database:\n"
+       "  glint-displace weave.glint -o weave.displaced.glint --factor 16 --base-table gold-metallic-paint.binary"});
   const apps::InputFile input(tool, "asset of kind heights, from glint-ingest --kind height --to heights", "HEIGHTS");
   const apps::OutputFile output(tool, apps::OutputFormat::asset, "asset (.glint) of kind displacement");
   apps::DisplaceOptions options(tool);

@@ -7,12 +7,14 @@
 namespace glint::formats {
 namespace {
 
-static_assert(kMostScaleTerms == 8);  // sizes of arrays below
+// Sizes of arrays below.
+static_assert(kMostScaleTerms == 8 && kBaseTables == 14 && kBaseTableDifference == 32 && kBaseTableHalf == 48);
 
 void describeBase(Fields auto& fields, auto& base) {
-  fields.choice("base", base.kind, "diffuse|ggx", "reflectance of a facet of the original surface");
-  fields.real("albedo", base.albedo, {0, 1}, "1", "diffuse: albedo; ggx: 1");
-  fields.real("alpha", base.alpha, {0, 1}, "1", "ggx: roughness; diffuse: 0");
+  fields.choice("base", base.kind, "diffuse|ggx|table", "reflectance of a facet of the original surface");
+  fields.real("albedo", base.albedo, {0, 1}, "1", "diffuse: albedo; others: 1");
+  fields.real("alpha", base.alpha, {0, 1}, "1",
+              "ggx: roughness; table: roughness of the lobe that samples are drawn from; diffuse: 0");
   fields.real("eta", base.eta, {FLT_MIN, 100}, "1", "ggx: refractive index of the conductor");
   fields.real("k", base.k, {0, 100}, "1", "ggx: extinction of the conductor; with eta 1 and k 0 it reflects all light");
 }
@@ -109,12 +111,14 @@ struct KindDescription<Displacement> {
 
   static std::vector<Rule> indexRules() {
     return {
-        errorRule("displacement.levels", "factors ascend, are at most the map's sides, and give the level's numbers of cells")};
+        errorRule("displacement.levels", "factors ascend, are at most the map's sides, and give the level's numbers of cells"),
+        errorRule("displacement.base", "a base that is a table has its numbers, and other bases have none")};
   }
   static std::vector<Rule> valueRules() {
     return {errorRule("displacement.heights", "downsampled heights are finite"),
             errorRule("displacement.lobes", "lobes have centres in the disk, bandwidths up to 1e6 and amplitudes of 0 or more"),
             errorRule("displacement.bases", "colours of lobes are 0 to 1, and their alphas above 0 and at most 1"),
+            errorRule("displacement.base_table", "values of the base's tables are finite and not negative"),
             errorRule("displacement.scales", "scaling functions are finite and not negative"),
             errorRule("displacement.terms", "further terms of the scaling functions are finite"),
             errorRule("displacement.singular_values", "shares of singular values are 0 to 1"),
@@ -137,6 +141,12 @@ struct KindDescription<Displacement> {
     describeLevelSizes(fields, d);
     fields.derived("angular_pairs", "ceil_div(angular * angular * (angular * angular + 1), 2)", "pairs of directions");
     fields.derived("channels", "2 * rgb + 1", "numbers of a colour, of T and of S");
+    fields.together("diffuse_share", d.table, [&](auto&& table) {
+      fields.real("diffuse_share", table.diffuse_share, {0, 1}, "1",
+                  "table: share of the samples that are drawn by the cosine");
+      fields.array("base_table", table.values, {"14", "32", "48", "48", "channels"}, "1/sr",
+                   "the base at each difference angle and place of the normal: averaged over lobes, and itself");
+    });
     fields.levels("level_count", d.level_count, [&](int l) { describeLevel(fields, d.levels[l]); });
     fields.levels("level_count * ceil_div(more_terms, 7)", d.more_terms > 0 ? d.level_count : 0,
                   [&](int l) { describeTerms(fields, d.levels[l]); });
@@ -152,6 +162,10 @@ struct KindDescription<Displacement> {
   }
 
   static void checkIndex(const Displacement& displacement, Findings& findings) {
+    if (displacement.table.has_value() != (displacement.base.kind == BaseBrdf::Kind::table))
+      findings.add(
+          "displacement.base", "/@base",
+          displacement.table ? "the base is no table, and the file has one" : "the base is a table, and the file has none");
     for (int l = 0; l < displacement.level_count; ++l) {
       const DisplacementLevel& level = displacement.levels[l];
       const auto covers = [&](int cells, int texels) {
@@ -168,6 +182,11 @@ struct KindDescription<Displacement> {
   }
 
   static void checkValues(const Displacement& displacement, Findings& findings) {
+    if (displacement.table)
+      reportUnless(
+          displacement.table->values.size(),
+          [&](std::size_t k) { return displacement.table->values[k] >= 0 && std::isfinite(displacement.table->values[k]); },
+          "displacement.base_table", "/base_table", {"value is", "values are"}, "negative or not finite", findings);
     for (int l = 0; l < displacement.level_count; ++l) checkLevel(displacement.levels[l], l, findings);
   }
 };

@@ -23,7 +23,8 @@ using namespace glint::api::c;
 
 static_assert(GLINT_DISPLACED_MAX_LEVELS == kMaxDisplacementLevels);
 static_assert(static_cast<int>(BaseBrdf::Kind::diffuse) == GLINT_BASE_DIFFUSE &&
-              static_cast<int>(BaseBrdf::Kind::ggx) == GLINT_BASE_GGX);
+              static_cast<int>(BaseBrdf::Kind::ggx) == GLINT_BASE_GGX &&
+              static_cast<int>(BaseBrdf::Kind::table) == GLINT_BASE_TABLE);
 
 DisplacedVariant variantOf(int32_t variant) {
   if (variant == GLINT_DISPLACED_LOBES) return DisplacedVariant::lobes;

@@ -483,7 +483,7 @@ GLINT_API glint_status glint_lobes_evaluate(const glint_spherical_gaussian* lobe
 typedef struct glint_displaced glint_displaced;
 
 enum { GLINT_DISPLACED_MAX_LEVELS = 8 };
-enum { GLINT_BASE_DIFFUSE = 0, GLINT_BASE_GGX = 1 };
+enum { GLINT_BASE_DIFFUSE = 0, GLINT_BASE_GGX = 1, GLINT_BASE_TABLE = 2 };
 enum {
   GLINT_DISPLACED_FULL = 0,
   GLINT_DISPLACED_LOBES = 1, /* the lobes of normals alone: no shadowing, no interreflections */

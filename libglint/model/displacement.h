@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "glint/math/vec.h"
@@ -19,6 +20,15 @@ inline constexpr int kMostAngular = 45;
 /// Most terms T S of a scaling function, and the number of its singular values that an asset tells.
 inline constexpr int kMostScaleTerms = 8;
 
+/// Tables of a base BRDF: the number of nodes along sqrt(1 - cos theta_d), and along each axis of the square of half-angle
+/// coordinates (`TablePoint` of base_table.h).
+inline constexpr int kBaseTableDifference = 32;
+inline constexpr int kBaseTableHalf = 48;
+/// Tables of an asset. Table k < kBaseTables - 1 has f cos(wi) cos(wo) averaged over normals of a von Mises-Fisher lobe of
+/// bandwidth 2^k; the last table has f itself.
+inline constexpr int kBaseTables = 14;
+inline constexpr std::size_t kBaseTableNodes = static_cast<std::size_t>(kBaseTableDifference) * kBaseTableHalf * kBaseTableHalf;
+
 /// Cells along an axis of a level: the nearest number to texels / factor, at least 1. A cell is texels / cells long.
 constexpr int displacementCells(int texels, int factor) { return std::max(1, (2 * texels + factor) / (2 * factor)); }
 
@@ -30,12 +40,19 @@ struct BaseBrdf {
   enum class Kind : std::uint8_t {
     diffuse,  ///< albedo / pi
     ggx,      ///< D G1 G1 F / (4 cos cos), roughness alpha
+    table,    ///< isotropic, given by numbers: BaseTable
   };
   Kind kind = Kind::diffuse;
   float albedo = 1;  ///< diffuse: 0 < albedo <= 1
-  float alpha = 0;   ///< ggx: roughness
+  float alpha = 0;   ///< ggx: roughness; table: roughness of the lobe that samples are drawn from
   float eta = 1;     ///< ggx: refractive index and extinction of a conductor; eta 1 and k 0: F = 1
   float k = 0;
+};
+
+/// The numbers of a base of kind `table`.
+struct BaseTable {
+  float diffuse_share = 0;        ///< share of the samples that are drawn by the cosine, the others by alpha's lobe
+  std::span<const float> values;  ///< [kBaseTables][kBaseTableDifference][kBaseTableHalf][kBaseTableHalf][channels], >= 0
 };
 
 /// One lobe of a cell's distribution of normals: amplitude * kappa / (4 pi sinh kappa) exp(kappa dot(mu, n)) (Wu 2019, Eq. 4).
@@ -90,10 +107,11 @@ struct Displacement {
   int height = 0;  ///< of the original, texels
   float texel_size_um = 0;
   BaseBrdf base;
-  int channels = 1;    ///< of colours, T and S: 1, or 3 for linear red, green and blue
-  int lobe_count = 0;  ///< lobes of each cell, 1 to kMaxLobes
-  int angular = 0;     ///< N: S has N^2 directions of either kind, the cells of concentric_map.h
-  int more_terms = 0;  ///< terms of the scaling function beyond T S, 0 to kMostScaleTerms - 1
+  std::optional<BaseTable> table;  ///< the numbers of a base of kind `table`; nothing for others
+  int channels = 1;                ///< of colours, T and S: 1, or 3 for linear red, green and blue
+  int lobe_count = 0;              ///< lobes of each cell, 1 to kMaxLobes
+  int angular = 0;                 ///< N: S has N^2 directions of either kind, the cells of concentric_map.h
+  int more_terms = 0;              ///< terms of the scaling function beyond T S, 0 to kMostScaleTerms - 1
   int level_count = 0;
   DisplacementLevel levels[kMaxDisplacementLevels];
 };

@@ -3,7 +3,11 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <memory>
 
 #include "assets.h"
 #include "build_job.h"
@@ -11,6 +15,7 @@
 #include "glint/bake/bin_map/bin_map.h"
 #include "glint/bake/compressed/compress.h"
 #include "glint/bake/displace/displace.h"
+#include "glint/bake/displace/merl_table.h"
 #include "glint/bake/histogram/histogram_sat.h"
 #include "glint/bake/ingest/near_normals.h"
 #include "glint/bake/moments/slope_moments.h"
@@ -195,11 +200,37 @@ void moments(const BuildJob& job, int finest_level, const std::string& boundary,
   });
 }
 
-void displace(const BuildJob& job, const std::vector<int>& factors, const std::string& base, float albedo, float alpha,
-              float eta, float k, int lobes, int angular, int spatial, float scale_tolerance, int bounces, std::uint64_t seed) {
+/// A base BRDF from a file in MERL's form.
+std::shared_ptr<const bake::MeasuredBrdf> measuredBrdf(const std::string& path) {
+  std::error_code failed;
+  const std::uintmax_t size = std::filesystem::file_size(path, failed);
+  std::ifstream file(path, std::ios::binary);
+  if (failed || !file)
+    throw Error(ErrorCode::io, "file.readable", path, "", "cannot be read", "check the path and the permissions");
+  std::vector<std::byte> bytes(std::min<std::uintmax_t>(size, 12));
+  const auto read = [&](std::size_t first) {
+    file.read(reinterpret_cast<char*>(bytes.data() + first), static_cast<std::streamsize>(bytes.size() - first));
+    bytes.resize(first + static_cast<std::size_t>(file.gcount()));
+  };
+  try {
+    read(0);
+    bake::checkMerlSize(bytes, size);
+    const std::size_t head = bytes.size();
+    bytes.resize(size);
+    read(head);
+    return std::make_shared<const bake::MeasuredBrdf>(bake::readMerl(bytes));
+  } catch (const Error& error) {
+    throw Error(error.code(), error.rule(), path, error.object(), error.clause(), error.remedy());
+  }
+}
+
+void displace(const BuildJob& job, const std::string& table_path, const std::vector<int>& factors, const std::string& base,
+              float albedo, float alpha, float eta, float k, int lobes, int angular, int spatial, float scale_tolerance,
+              int bounces, std::uint64_t seed) {
   bake::DisplaceOptions o;
   o.factors = factors;
-  o.base.kind = choose<BaseBrdf::Kind>("base", base, {{"diffuse", BaseBrdf::Kind::diffuse}, {"ggx", BaseBrdf::Kind::ggx}});
+  o.base.kind = choose<BaseBrdf::Kind>(
+      "base", base, {{"diffuse", BaseBrdf::Kind::diffuse}, {"ggx", BaseBrdf::Kind::ggx}, {"table", BaseBrdf::Kind::table}});
   o.base.albedo = albedo;
   o.base.alpha = alpha;
   o.base.eta = eta;
@@ -212,7 +243,14 @@ void displace(const BuildJob& job, const std::vector<int>& factors, const std::s
   o.seed = seed;
   const formats::Asset input = openInput(job);
   const HeightMap& map = input.get<HeightMap>();
-  run(job, provenanceOf(job), [&](const bake::ProgressFn& progress) { return bake::displace(map, o, progress); });
+  formats::Provenance provenance = provenanceOf(job);
+  if (o.base.kind == BaseBrdf::Kind::table) {
+    o.table = unlocked([&] { return measuredBrdf(table_path); });
+    o.base = o.table->base();
+    provenance.inputs.push_back(
+        {std::filesystem::path(table_path).filename().string(), unlocked([&] { return formats::hashFile(table_path); })});
+  }
+  run(job, provenance, [&](const bake::ProgressFn& progress) { return bake::displace(map, o, progress); });
 }
 
 }  // namespace
@@ -243,9 +281,9 @@ void bindBuilders(nb::module_& m) {
   m.def("bin_map", &binMap, nb::arg("job"), words_only, nb::arg("alpha"), nb::arg("alpha_max"), nb::arg("leaf_size"));
   m.def("histogram", &histogram, nb::arg("job"), words_only, nb::arg("theta_bins"), nb::arg("phi_bins"), nb::arg("stride"));
   m.def("moments", &moments, nb::arg("job"), words_only, nb::arg("finest_level"), nb::arg("boundary"), nb::arg("gradient"));
-  m.def("displace", &displace, nb::arg("job"), words_only, nb::arg("factors"), nb::arg("base"), nb::arg("albedo"),
-        nb::arg("alpha"), nb::arg("eta"), nb::arg("k"), nb::arg("lobes"), nb::arg("angular"), nb::arg("spatial"),
-        nb::arg("scale_tolerance"), nb::arg("bounces"), nb::arg("seed"));
+  m.def("displace", &displace, nb::arg("job"), nb::arg("table_path"), words_only, nb::arg("factors"), nb::arg("base"),
+        nb::arg("albedo"), nb::arg("alpha"), nb::arg("eta"), nb::arg("k"), nb::arg("lobes"), nb::arg("angular"),
+        nb::arg("spatial"), nb::arg("scale_tolerance"), nb::arg("bounces"), nb::arg("seed"));
   m.def("even_wavelengths", [](int count) {
     if (count < 1 || count > kMostWaveChannels)
       throw Error(ErrorCode::usage, "option.range", "", "wavelengths", std::to_string(count) + " wavelengths",

@@ -27,7 +27,7 @@ nb::dict infoDict(const Displaced& displaced) {
   d["height"] = info.height;
   d["level_count"] = info.level_count;
   d["channels"] = info.channels;
-  d["base"] = info.base == GLINT_BASE_DIFFUSE ? "diffuse" : "ggx";
+  d["base"] = info.base == GLINT_BASE_DIFFUSE ? "diffuse" : info.base == GLINT_BASE_GGX ? "ggx" : "table";
   d["texel_size_um"] = info.texel_size_um;
   d["file_bytes"] = info.file_bytes;
   d["factors"] = factors;

@@ -7,12 +7,13 @@ total. Results do not depend on the number of threads. Errors are those of the t
 from __future__ import annotations
 
 import json
+import os
 from typing import Any, Callable, Sequence
 
 import numpy as np
 
 from . import _glint
-from .assets import Asset, temporary_file
+from .assets import Asset, PathLike, temporary_file
 from .errors import ArgumentError
 
 Progress = Callable[[int, int], None]
@@ -385,6 +386,7 @@ def displace(
     alpha: float = 0.0,
     eta: float = 1.0,
     k: float = 0.0,
+    table: PathLike | None = None,
     lobes: int = 6,
     angular: int = 15,
     spatial: int = 4,
@@ -399,9 +401,13 @@ def displace(
     Args:
         heights: asset of kind heights.
         factors: texels along a side of a cell of each level: rising, at most the shorter side of the map.
-        base: "diffuse" with `albedo`, or "ggx" with roughness `alpha` and a conductor's `eta` and `k`.
+        base: "diffuse" with `albedo`, "ggx" with roughness `alpha` and a conductor's `eta` and `k`, or "table".
+        table: file of an isotropic BRDF in MERL's form, for the base "table". Values below 0, which mark bins without a
+            measurement, count as black.
         scale_tolerance: terms are added to the scaling T S until they miss at most this part of it, or are eight; 0: T S alone.
     """
+    if (base == "table") != (table is not None):
+        raise ArgumentError('table: goes with base="table"; give both, or neither')
     options = dict(
         factors=list(factors),
         base=base,
@@ -416,7 +422,8 @@ def displace(
         bounces=bounces,
         seed=seed,
     )
-    return _made("displace", options, _expect(heights, "heights"), threads, progress)
+    path = "" if table is None else os.fspath(table)
+    return _made("displace", options, _expect(heights, "heights"), threads, progress, path)
 
 
 def _auto(name: str, value: int | str) -> int:

@@ -35,7 +35,7 @@ class Displaced:
     #: of each level: texels of the original along a side of a cell; about so many where they do not divide the map
     factors: list[int]
     channels: int  #: 3, or 1: red, green and blue are the same
-    base: str  #: "diffuse" or "ggx"
+    base: str  #: "diffuse", "ggx" or "table"
     texel_size_um: float  #: of the original; 0: unknown
     file_bytes: int  #: size of the asset
 

@@ -95,6 +95,9 @@ def test_warns_of_distant_interreflections(glint):
         (["--bounces", "0"], 1, "auto"),
         (["--bounces", "many"], 1, "auto"),
         (["--lobes", "7"], 1, ""),
+        (["--base-table", "no.binary"], 2, "no.binary"),
+        (["--base-table", "h.glint"], 3, "h.glint: the first 12 bytes say"),
+        (["--base-table", "h.glint", "--base", "ggx:0.3"], 1, "--base"),
     ],
 )
 def test_wrong_use_is_refused_and_leaves_nothing(glint, heights, options, code, message):
@@ -421,3 +424,58 @@ def test_flat_maps_are_left_alone(glint):
     with h5py.File(glint.folder / "d.glint") as file:
         assert numpy.allclose(file["level_00/angular_scale"][...], 1, atol=2e-3)
         assert numpy.allclose(file["level_00/spatial_scale"][...], 1, atol=1e-4)
+
+
+def write_merl(path, brdf, bins=(12, 16, 20)):
+    """A table in MERL's form: brdf(theta_half, theta_diff, phi_diff) of each channel at the middles of bins, 1/sr."""
+    half, difference, azimuth = (numpy.arange(n) + 0.5 for n in bins)
+    angles = numpy.meshgrid(
+        numpy.pi / 2 * (half / bins[0]) ** 2, numpy.pi / 2 * difference / bins[1], numpy.pi * azimuth / bins[2], indexing="ij"
+    )
+    planes = [numpy.broadcast_to(f, bins) / scale for f, scale in zip(brdf(*angles), [1 / 1500, 1.15 / 1500, 1.66 / 1500])]
+    path.write_bytes(numpy.array(bins, "<i4").tobytes() + numpy.array(planes, "<f8").tobytes())
+
+
+def test_a_table_of_a_lambert_is_a_lambert(glint, heights):
+    write_merl(glint.folder / "grey.binary", lambda *_: 3 * [0.6 / numpy.pi])
+    process = glint("displace", heights, "-o", "t.glint", "--factor", "8", "--base-table", "grey.binary", *QUICK)
+    assert process.returncode == 0 and "grey.binary" not in process.stderr, process.stderr
+    assert glint("validate", "t.glint").returncode == 0
+    glint("displace", heights, "-o", "d.glint", "--factor", "8", "--base", "diffuse:0.6", *QUICK)
+    with h5py.File(glint.folder / "t.glint") as table, h5py.File(glint.folder / "d.glint") as diffuse:
+        assert table.attrs["base"] == b"table"
+        assert b"grey.binary" in b"".join(table.attrs["inputs"])
+        assert table["base_table"].shape == (14, 32, 48, 48, 1)
+        # Table 13 is f, at every node.
+        assert table["base_table"][13] == pytest.approx(0.6 / numpy.pi, rel=1e-5)
+        # The means over lobes of a Lambert come from a formula, those of a table from its nodes.
+        means = [file["level_00/angular_scale"][...].astype(float).mean() for file in (table, diffuse)]
+        assert means[0] == pytest.approx(means[1], rel=0.03)
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        (lambda b: b"", "0 bytes are too few for a table"),
+        (lambda b: b[:-1], "bytes are too few for 12 x 16 x 20 bins, which take 92172"),
+        (lambda b: b + b"\0", "bytes are too many for 12 x 16 x 20 bins"),
+        (lambda b: b"\x89PNG\r\n\x1a\n" + b[8:], "the first 12 bytes say"),
+        (lambda b: b[:12] + numpy.float64("nan").tobytes() + b[20:], "bin red, theta_half 0, theta_diff 0, phi_diff 0"),
+        (lambda b: b[:12] + 1000 * numpy.float64("inf").tobytes() + b[8012:], "1000 values are not finite"),
+    ],
+)
+def test_files_that_are_no_table_are_refused(glint, heights, change, message):
+    write_merl(glint.folder / "a.binary", lambda *_: [0.2, 0.2, 0.2])
+    (glint.folder / "a.binary").write_bytes(change((glint.folder / "a.binary").read_bytes()))
+    process = glint("displace", heights, "-o", "t.glint", "--base-table", "a.binary")
+    assert process.returncode == 3
+    assert "a.binary: " in process.stderr and len(process.stderr.splitlines()) == 1
+    assert message in process.stderr
+    assert not (glint.folder / "t.glint").exists()
+
+
+def test_bins_without_a_measurement_are_counted(glint, heights):
+    write_merl(glint.folder / "a.binary", lambda half, *_: 3 * [numpy.where(half > 1.3, -1, 0.2)])
+    process = glint("displace", heights, "-o", "t.glint", "--factor", "8", "--base-table", "a.binary", *QUICK)
+    assert process.returncode == 0
+    assert "a.binary: 960 of 11520 values are negative" in process.stderr

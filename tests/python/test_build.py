@@ -67,6 +67,14 @@ def test_displaced_and_waves_are_those_of_the_tools(run_tool, tmp_path):
     heights.save(tmp_path / "h.glint")
     run_tool("glint-displace", tmp_path / "h.glint", "-o", tmp_path / "d.glint", "--factor", "8", "--base", "diffuse:0.5")
     assert arrays_of(gn.displace(heights, factors=[8], albedo=0.5)) == arrays_of(tmp_path / "d.glint")
+    bins = np.array([4, 4, 4], "<i4").tobytes()
+    (tmp_path / "grey.binary").write_bytes(bins + np.repeat(np.array([1500, 1500 / 1.15, 1500 / 1.66]) / 8, 64).tobytes())
+    table = ["--base-table", tmp_path / "grey.binary"]
+    run_tool("glint-displace", tmp_path / "h.glint", "-o", tmp_path / "t.glint", "--factor", "8", *table)
+    displaced = gn.displace(heights, factors=[8], base="table", table=tmp_path / "grey.binary")
+    assert arrays_of(displaced) == arrays_of(tmp_path / "t.glint")
+    with pytest.raises(gn.ArgumentError, match="table"):
+        gn.displace(heights, base="table")
     run_tool(
         "glint-pyramid",
         tmp_path / "h.glint",

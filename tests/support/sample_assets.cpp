@@ -559,6 +559,16 @@ SampleDisplacement sampleDisplacement(int size, bool colored) {
   return sample;
 }
 
+SampleDisplacement sampleDisplacedTable(int size) {
+  SampleDisplacement sample = sampleDisplacement(size);
+  Displacement& d = sample.displacement;
+  d.base = {BaseBrdf::Kind::table, 1, 0.25f, 1, 0};
+  for (std::size_t k = 0; k < kBaseTables * kBaseTableNodes; ++k)
+    sample.base_table.push_back(0.0625f * static_cast<float>(k % 48 + k / 48 % 48 + k / 2304 % 32 + k / kBaseTableNodes));
+  d.table = BaseTable{0.375f, sample.base_table};
+  return sample;
+}
+
 namespace {
 
 /// Stores the occupied blocks of the images of a level.

@@ -39,6 +39,7 @@ struct SampleDisplacement {
     std::vector<float> singular_shares;
   };
   std::vector<Level> levels;
+  std::vector<float> base_table;
   Displacement displacement;
 };
 
@@ -174,6 +175,8 @@ SampleHeights sampleHeights(int width, int height);
 /// Two levels (factors 4 and 8) over bumps, with lobes and scales from formulas; angular 3, two lobes.
 /// @param colored  with three channels, colours and roughness of lobes
 SampleDisplacement sampleDisplacement(int size, bool colored = false);
+/// The same, grey, with a base that is a table: its values grow along every axis.
+SampleDisplacement sampleDisplacedTable(int size);
 /// NDF images of sampleNormals(size, size) at strides size/4, size/2 and size, 64^2 pixels, sigma_r 0.05.
 SamplePyramid samplePyramid(int size, BlockPrecision precision);
 /// The normals of sampleNormals(size, size), in 16 bits with a step of 2^-15 or as they are.

@@ -145,6 +145,19 @@ TEST(AssetRoundTrip, HeightsComeBackBitExact) {
   EXPECT_TRUE(validateAsset(folder / "a.glint").findings.empty());
 }
 
+TEST(AssetRoundTrip, TablesOfDisplacementsComeBackBitExact) {
+  const TempFolder folder;
+  const auto sample = test::sampleDisplacedTable(32);
+  writeAsset(folder / "a.glint", sample.displacement, test::sampleProvenance());
+  const Asset asset = Asset::open(folder / "a.glint", {.verify_hashes = true});
+  const Displacement& d = asset.get<Displacement>();
+  EXPECT_EQ(d.base.kind, BaseBrdf::Kind::table);
+  ASSERT_TRUE(d.table);
+  EXPECT_EQ(d.table->diffuse_share, 0.375f);
+  EXPECT_TRUE(std::ranges::equal(d.table->values, sample.base_table));
+  EXPECT_TRUE(validateAsset(folder / "a.glint").findings.empty());
+}
+
 TEST(AssetRoundTrip, DisplacementsComeBackBitExact) {
   const TempFolder folder;
   for (const bool colored : {false, true}) {

@@ -55,16 +55,17 @@ enum class Base {
   sh_lobes,
   sh_light,
   displacement,
-  displacement_rgb
+  displacement_rgb,
+  displacement_table
 };
-constexpr Base kBases[] = {Base::shard_normals, Base::pyramid_normals, Base::compressed_normals,
-                           Base::normals,       Base::heights,         Base::pyramid,
-                           Base::shard,         Base::compressed,      Base::compressed_f32,
-                           Base::spots,         Base::bin_map,         Base::histograms,
-                           Base::moments,       Base::tiny_scattered,  Base::tiny_tiled,
-                           Base::wang_tiles,    Base::wang_pyramid,    Base::wang_cp,
-                           Base::wave,          Base::sh_lobes,        Base::sh_light,
-                           Base::displacement,  Base::displacement_rgb};
+constexpr Base kBases[] = {Base::shard_normals, Base::pyramid_normals,  Base::compressed_normals,
+                           Base::normals,       Base::heights,          Base::pyramid,
+                           Base::shard,         Base::compressed,       Base::compressed_f32,
+                           Base::spots,         Base::bin_map,          Base::histograms,
+                           Base::moments,       Base::tiny_scattered,   Base::tiny_tiled,
+                           Base::wang_tiles,    Base::wang_pyramid,     Base::wang_cp,
+                           Base::wave,          Base::sh_lobes,         Base::sh_light,
+                           Base::displacement,  Base::displacement_rgb, Base::displacement_table};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -92,6 +93,8 @@ void writeBase(const fs::path& path, Base base) {
           path, test::sampleNdfCp(32, CompressionMethod::tucker, CoefficientType::i8, test::SampleForm::spots).ndf, provenance);
     case Base::displacement_rgb:
       return writeAsset(path, test::sampleDisplacement(32, true).displacement, provenance);
+    case Base::displacement_table:
+      return writeAsset(path, test::sampleDisplacedTable(32).displacement, provenance);
     case Base::compressed_f32:
       return writeAsset(path, test::sampleNdfCp(32, CompressionMethod::cp, CoefficientType::f32).ndf, provenance);
     case Base::bin_map:
@@ -633,6 +636,12 @@ std::vector<Fixture> displacementFixtures() {
       patched("displacement.levels", Base::displacement, [](const Patch& patch) { patch.setInteger("width", 36); }),
       patched("displacement.levels", Base::displacement, [](const Patch& patch) { patch.setInteger("width", 3); }),
       patched("dataset.missing", Base::displacement, [](const Patch& patch) { patch.setInteger("more_terms", 1); }),
+      patched("displacement.base", Base::displacement, [](const Patch& patch) { patch.setText("base", "table"); }),
+      patched("displacement.base", Base::displacement_table, [](const Patch& patch) { patch.setText("base", "ggx"); }),
+      patched("dataset.missing", Base::displacement, [](const Patch& patch) { patch.setReal("diffuse_share", 0.5f); }),
+      patched(
+          "displacement.base_table", Base::displacement_table,
+          [](const Patch& patch) { patch.change<float>("base_table", 40000, [](float& f) { f = -0.5f; }); }, true),
       patched("displacement.levels", Base::displacement,
               [](const Patch& patch) {
                 const int factors[2] = {4, 4};

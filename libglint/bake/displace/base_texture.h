@@ -24,11 +24,12 @@ using Color = std::array<float, 3>;
 /// the mean of its corners.
 class FacetBase {
  public:
-  FacetBase(const HeightSurface& surface, const BaseBrdf& base, const BaseTexture& texture)
-      : surface_(surface), base_(base), texture_(texture) {}
+  /// @param channels  of the base itself: 1, or 3 for a coloured table
+  FacetBase(const HeightSurface& surface, const BaseBrdf& base, const BaseTexture& texture, int channels = 1)
+      : surface_(surface), base_(base), texture_(texture), channels_(std::max(channels, texture.channels)) {}
 
   const BaseBrdf& base() const { return base_; }
-  int channels() const { return texture_.channels; }
+  int channels() const { return channels_; }
   bool colored() const { return !texture_.colors.empty(); }
   bool rough() const { return !texture_.roughness.empty(); }
 
@@ -42,6 +43,7 @@ class FacetBase {
       const auto at = [&](std::size_t corner) { return texture_.colors[corners[corner] * count + c]; };
       color[c] = (at(0) + at(1) + at(2)) / 3;
     }
+    if (count == 1) color[1] = color[2] = color[0];
     return color;
   }
 
@@ -64,6 +66,7 @@ class FacetBase {
   HeightSurface surface_;
   const BaseBrdf& base_;
   const BaseTexture& texture_;
+  int channels_;
 };
 
 }  // namespace glint::bake

@@ -12,7 +12,7 @@ BrdfScene::BrdfScene(const HeightSurface& heights, const VisibilityMasks& visibi
       grid(patch_grid),
       options(estimate),
       tracer(surface),
-      base(surface, options.base, options.texture) {}
+      base(surface, options.base, options.texture, options.channels()) {}
 
 std::vector<PatchFacets> BrdfScene::patches(std::size_t samples) const {
   std::vector<PatchFacets> list;

@@ -35,11 +35,12 @@ void checkOptions(const DisplaceOptions& o) {
   require(o.angular >= 3 && o.angular <= kMostAngular, "--angular", "3 to 45");
   require(o.spatial >= 1 && o.spatial <= 16, "--spatial", "1 to 16");
   require(o.scale_tolerance >= 0 && o.scale_tolerance <= 1, "--scale-tolerance", "0 to 1");
+  require((o.base.kind == BaseBrdf::Kind::table) == (o.table != nullptr), "--base", "a table, or anything else without one");
   require(o.bounces >= 1 && o.bounces <= kAllBounces, "--bounces", "1 to 64");
   if (o.base.kind == BaseBrdf::Kind::diffuse) {
     require(o.base.albedo > 0 && o.base.albedo <= 1, "--base",
             "an albedo above 0 and at most 1: a base may neither absorb all light nor gain any");
-  } else {
+  } else if (o.base.kind == BaseBrdf::Kind::ggx) {
     require(o.base.alpha >= kLeastAlpha && o.base.alpha <= 1, "--base", "a roughness of 0.05 to 1");
     require(o.base.eta > 0 && o.base.eta <= 100 && o.base.k >= 0 && o.base.k <= 100, "--base",
             "a refractive index above 0 and an extinction of 0 or more, both at most 100");
@@ -81,8 +82,10 @@ void checkTexture(const HeightMap& map, const DisplaceOptions& options) {
     throw Error(ErrorCode::invalid_input, "displace.texture", "", "colours", "are all black: nothing is reflected",
                 "give an image with some light in it");
   if (t.roughness.empty()) return;
-  if (options.base.kind == BaseBrdf::Kind::diffuse)
-    throw Error(ErrorCode::usage, "displace.texture", "", "roughness", "a diffuse base has no roughness", "take a ggx base");
+  if (options.base.kind != BaseBrdf::Kind::ggx)
+    throw Error(ErrorCode::usage, "displace.texture", "", "roughness",
+                options.table ? "the roughness of a table is in its numbers" : "a diffuse base has no roughness",
+                "take a ggx base");
   requireTexels(map, t.roughness.size(), 1, "displace.texture", "roughness",
                 "0.05 to 1 when multiplied by the base's " + fmt::format("{}", options.base.alpha),
                 "raise the darkest texels of the image", [&](std::size_t k) {
@@ -239,17 +242,22 @@ std::size_t factorChannels(const EffectiveBrdf& original, const EffectiveBrdf& l
 
 /// Builds one level: heights, lobes, and scaling functions.
 /// @param original  effective BRDFs of the original surface, on the same patches
+/// @param table     BaseTable::values
 /// @return terms of the scaling function
 std::size_t buildLevel(const HeightMap& map, const DisplaceOptions& options, const PatchGrid& grid,
-                       const EffectiveBrdf& original, std::span<const Vec3> directions, DisplacementLevel& shape,
-                       DisplacementData::Level& level) {
+                       const EffectiveBrdf& original, std::span<const Vec3> directions, std::span<const float> table,
+                       DisplacementLevel& shape, DisplacementData::Level& level) {
   const HeightSurface surface(map.width, map.height, map.heights);
   const std::vector<float> heights = lowHeights(map, grid.cells(), grid.factor);
   for (const float h : heights) level.heights.push_back(h * static_cast<float>(grid.factor));
-  fitCells(surface, FacetBase(surface, options.base, options.texture), grid.cells(), options.lobes, level);
-  const LobeField field{options.base,      static_cast<std::size_t>(options.lobes),
-                        original.channels, level.lobes,
-                        level.lobe_colors, level.lobe_alphas};
+  fitCells(surface, FacetBase(surface, options.base, options.texture, options.channels()), grid.cells(), options.lobes, level);
+  const LobeField field{options.base,
+                        static_cast<std::size_t>(options.lobes),
+                        original.channels,
+                        level.lobes,
+                        level.lobe_colors,
+                        level.lobe_alphas,
+                        table};
   const EffectiveBrdf low = lowBrdf(heights, field, directions, grid);
   const std::size_t terms = factorChannels(original, low, directions, grid, options.scale_tolerance, shape, level);
   shape.factor = grid.factor;
@@ -262,6 +270,7 @@ std::size_t buildLevel(const HeightMap& map, const DisplaceOptions& options, con
 
 Displacement DisplacementData::view() const {
   Displacement out = shape;
+  if (out.table) out.table->values = base_table;
   for (std::size_t l = 0; l < levels.size(); ++l) {
     DisplacementLevel& to = out.levels[l];
     const Level& from = levels[l];
@@ -303,7 +312,7 @@ void fitCells(const HeightSurface& surface, const FacetBase& base, const CellGri
 
 double displacementPairBytes(int width, int height, const DisplaceOptions& options, int threads) {
   constexpr double kFloat = sizeof(float), kDouble = sizeof(double), kHalf = sizeof(std::uint16_t);
-  const auto channels = static_cast<double>(options.texture.channels);
+  const auto channels = static_cast<double>(options.channels());
   const double n = static_cast<double>(options.angular) * options.angular, padded = 8 * std::ceil(n / 8);
   const CellGrid finest = CellGrid::of(width, height, options.factors[0]);
   const double patches =
@@ -313,7 +322,7 @@ double displacementPairBytes(int width, int height, const DisplaceOptions& optio
     return std::min(chunks, std::max(4.0, std::floor(static_cast<double>(kOrderedSumBytes) / sum))) * sum;
   };
   // Chunks of samples and of cells, with one more for each patch, as the estimators cut them.
-  const bool glossy = options.base.kind == BaseBrdf::Kind::ggx;
+  const bool glossy = options.base.kind != BaseBrdf::Kind::diffuse;
   const double facets = std::min(2.0 * width * height, glossy ? 0x1p21 : 0x1p18);
   const double cells = std::min(4096.0, static_cast<double>(finest.columns) * finest.rows);
   const double estimating = kDouble * channels * patches * n * n + std::max(held(patches + facets / 8192), brdf) +
@@ -335,13 +344,17 @@ DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, 
   const VisibilityMasks masks(surface, directions);
   DisplacementData data;
   data.shape.width = map.width, data.shape.height = map.height, data.shape.texel_size_um = map.texel_size_um;
-  data.shape.base = options.base, data.shape.channels = options.texture.channels;
+  data.shape.base = options.base, data.shape.channels = options.channels();
   data.shape.lobe_count = options.lobes, data.shape.angular = options.angular;
   data.shape.level_count = static_cast<int>(options.factors.size());
   data.levels.resize(options.factors.size());
 
   // Estimate the light that the original reflects, and factor it for each level.
-  EffectiveOptions effective{options.base, options.bounces, options.seed, {}, 0, 0, options.texture};
+  EffectiveOptions effective{options.base, options.bounces, options.seed, {}, 0, 0, options.texture, options.table};
+  if (options.table) {
+    data.base_table = options.table->assetTables(options.channels());
+    data.shape.table = BaseTable{options.table->diffuseShare(), {}};
+  }
   for (const int factor : options.factors) effective.distant_cells.push_back(static_cast<float>(factor));
   const std::size_t total = kProgressUnits * options.factors.size();
   std::size_t terms = 1;
@@ -360,7 +373,7 @@ DisplacementData displace(const HeightMap& map, const DisplaceOptions& options, 
     DisplacementLevel& shape = data.shape.levels[l];
     shape.interreflected_share = static_cast<float>(original.interreflected);
     shape.distant_share = static_cast<float>(original.distant[l]);
-    terms = std::max(terms, buildLevel(map, options, grid, original, directions, shape, data.levels[l]));
+    terms = std::max(terms, buildLevel(map, options, grid, original, directions, data.base_table, shape, data.levels[l]));
     if (progress) progress((l + 1) * kProgressUnits, total);
   }
   // All levels have as many terms as the level that needs most of them.

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "glint/bake/common/progress.h"
@@ -13,7 +15,9 @@ namespace glint::bake {
 struct DisplaceOptions {
   std::vector<int> factors = {16};  ///< factor of each level: ascending, at most the shorter side of the map
   BaseBrdf base;
-  BaseTexture texture;    ///< how the base varies over the map
+  BaseTexture texture;  ///< how the base varies over the map
+  /// Numbers of a base of kind `table`, whose `base()` is then `base`; null for others.
+  std::shared_ptr<const MeasuredBrdf> table = {};
   int lobes = kMaxLobes;  ///< lobes of each cell, 1 to kMaxLobes
   int angular = 15;       ///< N: N^2 directions, 3 to kMostAngular
   int spatial = 4;        ///< M: T has M^2 patches, 1 to 16; fewer where a level has fewer cells
@@ -21,6 +25,9 @@ struct DisplaceOptions {
       0;  ///< terms are added to T S until |R - sum| / |R| is at most this, or are kMostScaleTerms; 0: T S alone
   int bounces = kAllBounces;  ///< most scattering events of a light path; 1: shadowing and masking only
   std::uint64_t seed = 1;
+
+  /// Channels of colours, T and S: 1, or 3 where the table or the texture has colours.
+  int channels() const { return table ? std::max(table->channels(), texture.channels) : texture.channels; }
 };
 
 /// Steepest slope that `displace` accepts: 80 degrees. One normal for each facet does not resolve light between steeper walls.
@@ -50,6 +57,7 @@ class DisplacementData {
 
   Displacement shape;  ///< sizes and parameters; its spans are empty
   std::vector<Level> levels;
+  std::vector<float> base_table;  ///< of a base of kind `table`; else empty
 
   /// Spans over the arrays; valid while this object lives and is not changed.
   Displacement view() const;
@@ -60,6 +68,8 @@ class DisplacementData {
 ///
 /// Where the base varies, every lobe has the mean colour and roughness of its normals, and each channel its own T and S. So the
 /// result keeps the correlation of colours and normals (Fig. 14).
+///
+/// A base that is a table is kept in the result, averaged over lobes of several bandwidths: so every lobe reflects by the table.
 ///
 /// Where a factor does not divide the map, the nearest whole number of cells is taken: CellGrid.
 ///

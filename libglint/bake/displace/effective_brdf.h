@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -8,6 +10,7 @@
 #include "glint/bake/displace/base_texture.h"
 #include "glint/bake/displace/cell_grid.h"
 #include "glint/bake/displace/height_surface.h"
+#include "glint/bake/displace/measured_brdf.h"
 #include "glint/bake/displace/visibility_masks.h"
 #include "glint/model/displacement.h"
 
@@ -55,7 +58,11 @@ struct EffectiveOptions {
   /// together. 0: as many as the base needs.
   std::size_t facet_samples = 0;
   std::size_t walks = 0;
-  BaseTexture texture = {};  ///< how the base varies
+  BaseTexture texture = {};                        ///< how the base varies
+  std::shared_ptr<const MeasuredBrdf> table = {};  ///< base of kind `table`: its numbers
+
+  /// Channels of the light that is reflected: 1, or 3 where the table or the texture has colours.
+  int channels() const { return table ? std::max(table->channels(), texture.channels) : texture.channels; }
 };
 
 /// Effective BRDF of each patch, times the visible projected area of the view: f_eff(wi, wo) A(wo) of Wu 2019 (Eq. 6, 17, 25).

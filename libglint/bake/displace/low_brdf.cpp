@@ -10,6 +10,7 @@
 #include "glint/bake/common/simd.h"
 #include "glint/bake/displace/effective_kernels.h"
 #include "glint/bake/displace/ordered_sums.h"
+#include "glint/bake/displace/table_kernels.h"
 #include "glint/query/brdf/vmf_lobe.h"
 
 namespace glint::bake {
@@ -132,7 +133,11 @@ class LowEstimator {
         heights_(refined(grid.coarse_x, grid.coarse_y, heights, parts_)),
         surface_(grid.coarse_x * parts_, grid.coarse_y * parts_, heights_),
         seen_(squared(directions, grid)),
-        masks_(surface_, squared(directions, grid)) {}
+        masks_(surface_, squared(directions, grid)) {
+    if (field.table.empty()) return;
+    frames_ = PairFrames(directions_);
+    tables_ = TableNodes(field.table, kBaseTableDifference, kBaseTableHalf, static_cast<int>(field.channels));
+  }
 
   EffectiveBrdf sum() const {
     // Zeros for all patches.
@@ -247,6 +252,10 @@ class LowEstimator {
       const float alpha = field_.alphas.empty() ? field_.base.alpha : field_.alphas[first + l];
       float weights[3];
       for (std::size_t c = 0; c < field_.channels; ++c) weights[c] = lobes[l].amplitude * color(first + l, c);
+      if (field_.base.kind == BaseBrdf::Kind::table) {
+        addTableLobe(directions_, frames_, tables_, lobes[l], {weights, field_.channels}, s.pairs.data());
+        continue;
+      }
       addGgxLobe(directions_, pairs_, alpha, lobes[l], {weights, field_.channels}, s.row.data(), s.pairs.data());
     }
   }
@@ -272,6 +281,8 @@ class LowEstimator {
   LobeField field_;
   DirectionTable directions_;
   PairTable pairs_;
+  PairFrames frames_;  ///< of a table, as tables_
+  TableNodes tables_;
   PatchGrid grid_;
   int parts_;  ///< smaller cells along a side of a cell, so that a cell can be shadowed in part
   std::vector<float> heights_;

@@ -13,9 +13,10 @@ struct LobeField {
   BaseBrdf base;
   std::size_t lobe_count = 0;  ///< lobes of one cell
   std::size_t channels = 1;
-  std::span<const VmfLobe> lobes;  ///< [coarse_y][coarse_x][lobe_count]
-  std::span<const float> colors;   ///< [coarse_y][coarse_x][lobe_count][channels]; empty: all 1
-  std::span<const float> alphas;   ///< [coarse_y][coarse_x][lobe_count]; empty: all the base's alpha
+  std::span<const VmfLobe> lobes;     ///< [coarse_y][coarse_x][lobe_count]
+  std::span<const float> colors;      ///< [coarse_y][coarse_x][lobe_count][channels]; empty: all 1
+  std::span<const float> alphas;      ///< [coarse_y][coarse_x][lobe_count]; empty: all the base's alpha
+  std::span<const float> table = {};  ///< BaseTable::values; empty unless the base is a table
 };
 
 /// Computes what a downsampled surface reflects when every cell has its multi-lobe BRDF f'_low (Wu 2019, Eq. 12), with

@@ -11,6 +11,7 @@
 #include "glint/math/tangents.h"
 #include "glint/model/displacement.h"
 #include "glint/query/brdf/base_brdf.h"
+#include "glint/query/brdf/base_table.h"
 #include "glint/query/brdf/smith.h"
 #include "glint/query/brdf/vmf_lobe.h"
 #include "glint/query/detail/common/footprint_weights.h"
@@ -135,7 +136,7 @@ class DisplacedBrdf {
   }
 
   /// Draws wi for a view wo: a lobe by its amplitude times the mean of its colour, then a cosine around its centre (diffuse),
-  /// or a normal of the widened lobe to reflect at (ggx).
+  /// or a normal of the widened lobe to reflect at (ggx). A table chooses between the two by its diffuse share.
   /// @param xi  uniform in [0, 1)^2; others are clamped, NaN counts as 0
   GLINT_HD DirectionSample sample(int level, Vec2 uv, Vec3 wo, Vec2 xi) const {
     if (!isDirection(wo)) return {};
@@ -148,11 +149,14 @@ class DisplacedBrdf {
     for (const std::size_t last = first + static_cast<std::size_t>(asset_.lobe_count) - 1;
          lobe < last && l.lobes[lobe + 1].amplitude > 0 && left >= share; share = lobeShare(l, ++lobe))
       left -= share;
-    const float unit = clampUnit(left / std::max(share, 1e-20f));
+    float unit = clampUnit(left / std::max(share, 1e-20f));
+    const float even = cosineShare();
+    const bool by_cosine = unit < even;
+    unit = clampUnit(by_cosine ? unit / even : (unit - even) / std::max(1 - even, 1e-20f));
     const Vec3 axis = lobeCentre(l.lobes[lobe]);
     const float angle = 2 * kPi * xi.y;
     Vec3 wi;
-    if (asset_.base.kind == BaseBrdf::Kind::diffuse) {
+    if (by_cosine) {
       wi = around(axis, std::sqrt(1 - unit), angle);
     } else {
       const float a = spreadRoughness(lobeAlpha(l, lobe), l.lobes[lobe].kappa);
@@ -169,16 +173,17 @@ class DisplacedBrdf {
     if (!(isDirection(wi) && isDirection(wo))) return 0;
     const DisplacementLevel& l = asset_.levels[level];
     const std::size_t first = place(l, uv).cell * static_cast<std::size_t>(asset_.lobe_count);
-    const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
+    const float even = cosineShare();
     const Vec3 sum = wi + wo;
     const float length = std::sqrt(std::max(1e-20f, dot(sum, sum)));
     const Vec3 h = (1 / length) * sum;
     float density = 0;
     for (std::size_t k = first; k < first + static_cast<std::size_t>(asset_.lobe_count); ++k) {
-      const float c = dot(lobeCentre(l.lobes[k]), diffuse ? wi : h);
-      if (c <= 0) continue;
-      const float of_lobe =
-          diffuse ? c * kInversePi : ggxDensity(c, spreadRoughness(lobeAlpha(l, k), l.lobes[k].kappa)) * c / (2 * length);
+      const Vec3 axis = lobeCentre(l.lobes[k]);
+      float of_lobe = even > 0 ? even * kInversePi * std::max(0.0f, dot(axis, wi)) : 0.0f;
+      const float c = dot(axis, h);
+      if (even < 1 && c > 0)
+        of_lobe += (1 - even) * ggxDensity(c, spreadRoughness(lobeAlpha(l, k), l.lobes[k].kappa)) * c / (2 * length);
       density += lobeShare(l, k) * of_lobe;
     }
     return finitePositive(density / totalShare(l, first));
@@ -254,6 +259,7 @@ class DisplacedBrdf {
   /// Integral of f cos(wi) cos(wo) D over the normals of a cell: f'_low without the terms of the downsampled facet.
   GLINT_HD Rgb timesCosines(const DisplacementLevel& l, std::size_t cell, Vec3 wi, Vec3 wo) const {
     const std::size_t first = cell * static_cast<std::size_t>(asset_.lobe_count);
+    if (asset_.base.kind == BaseBrdf::Kind::table) return tableTimesCosines(l, first, wi, wo);
     const bool diffuse = asset_.base.kind == BaseBrdf::Kind::diffuse;
     const float cosine = dot(wi, wo);
     const Vec3 sum = wi + wo;
@@ -326,6 +332,35 @@ class DisplacedBrdf {
     return total;
   }
 
+  /// Share of the samples that are drawn by the cosine around a lobe's centre.
+  GLINT_HD float cosineShare() const {
+    if (asset_.base.kind == BaseBrdf::Kind::table) return std::clamp(asset_.table->diffuse_share, 0.0f, 1.0f);
+    return asset_.base.kind == BaseBrdf::Kind::diffuse ? 1.0f : 0.0f;
+  }
+
+  /// timesCosines of a base that is a table.
+  /// @param first  the first lobe of the cell
+  GLINT_HD Rgb tableTimesCosines(const DisplacementLevel& l, std::size_t first, Vec3 wi, Vec3 wo) const {
+    const TablePair pair = tablePair(wi, wo);
+    Rgb total;
+    for (std::size_t k = first; k < first + static_cast<std::size_t>(asset_.lobe_count) && l.lobes[k].amplitude > 0; ++k) {
+      const VmfLobe& lobe = l.lobes[k];
+      total = total + lobe.amplitude * (lobeColor(l, k) * tableLobe(asset_.table->values.data(), asset_.channels, pair,
+                                                                    lobeCentre(lobe), lobe.kappa, wi, wo));
+    }
+    return {std::max(0.0f, total.r), std::max(0.0f, total.g), std::max(0.0f, total.b)};
+  }
+
+  /// singleLobe of a base that is a table: a von Mises-Fisher lobe of the slopes' mean and mean variance.
+  GLINT_HD Rgb singleTableLobe(const MapSlopes& m, Vec3 wi, Vec3 wo) const {
+    const float z = 1 / std::sqrt(1 + dot(m.mean, m.mean));
+    const float kappa = 1 / std::clamp(0.5f * (m.covariance.xx + m.covariance.yy), 1 / kMaxKappa, 1.0f);
+    const Vec3 centre = {-m.mean.x * z, -m.mean.y * z, z};
+    const float amplitude = 1 / (vmfMeanCosine(kappa) * z);  // normals cover the area of the cell
+    return amplitude * SmithMasking(m, 1e-4f).g2(wi, wo) *
+           tableLobe(asset_.table->values.data(), asset_.channels, tablePair(wi, wo), centre, kappa, wi, wo);
+  }
+
   /// The direction at this cosine and azimuth around an axis.
   static GLINT_HD Vec3 around(Vec3 axis, float cosine, float angle) {
     const Tangents frame = tangentsOf(axis);
@@ -346,6 +381,7 @@ class DisplacedBrdf {
       width += amplitude * alpha * alpha;
       area += amplitude;
     }
+    if (asset_.base.kind == BaseBrdf::Kind::table) return (1 / area) * (color * singleTableLobe(l.slopes[cell], wi, wo));
     return singleLobe(l.slopes[cell], width / area, wi, wo) / area * color;
   }
 
