@@ -15,6 +15,7 @@
 #include "glint/model/tiny_example.h"
 #include "glint/model/wang_images.h"
 #include "glint/model/wang_tiles.h"
+#include "glint/model/wave_cp.h"
 #include "glint/model/wave_pyramid.h"
 
 namespace glint::formats {
@@ -22,7 +23,7 @@ namespace glint::formats {
 /// The struct of any kind of asset: the one list of kinds, in the order of their names. To add a kind, add its struct and its
 /// name here, and describe the kind in a file of formats/kinds/.
 using AnyAsset = std::variant<BinMap, Displacement, HeightMap, HistogramSat, NdfCp, NdfPyramid, NdfPyramidShard, NormalMap,
-                              ShLight, ShLobes, SlopeMoments, TinyExample, WangCp, WangPyramid, WangTiles, WavePyramid>;
+                              ShLight, ShLobes, SlopeMoments, TinyExample, WangCp, WangPyramid, WangTiles, WaveCp, WavePyramid>;
 
 /// Name of the kind whose assets are of struct `Model`, as files and messages have it, e.g. "bin-map".
 template <class Model>
@@ -57,6 +58,8 @@ template <>
 inline constexpr std::string_view kKindName<WangPyramid> = "wang-pyramid";
 template <>
 inline constexpr std::string_view kKindName<WangTiles> = "wang-tiles";
+template <>
+inline constexpr std::string_view kKindName<WaveCp> = "wave-cp";
 template <>
 inline constexpr std::string_view kKindName<WavePyramid> = "wave-pyramid";
 

@@ -9,7 +9,7 @@
 #
 #   image (png, exr, tif, jpg, ...)  ->  NAME.glint  ->  NAME.pyramid.glint  ->  NAME.cp.glint | NAME.tucker.glint | NAME.pca.glint
 #                                                    ->  NAME.binmap.glint | NAME.sat.glint | NAME.moments.glint | NAME.tiny.glint | NAME.wang.glint
-#   image of heights                     ->  NAME.heights.glint  ->  NAME.displaced.glint | NAME.wave.glint
+#   image of heights                     ->  NAME.heights.glint  ->  NAME.displaced.glint | NAME.wave.glint  ->  NAME.wavecp.glint
 #   environment (exr, hdr) or lights (json)  ->  NAME.light.glint
 #   no file, but GLINT_LOBES_FLAGS_NAME := --sigma-r 0.01  ->  NAME.lobes.glint
 #
@@ -50,6 +50,7 @@ GLINT_WANG_FLAGS ?=
 GLINT_HEIGHTS_FLAGS ?=
 GLINT_DISPLACE_FLAGS ?= --factor 16
 GLINT_WAVE_FLAGS ?=
+GLINT_WAVECP_FLAGS ?= --tolerance 0.1
 GLINT_LIGHT_FLAGS ?=
 GLINT_LOBES_FLAGS ?=
 
@@ -73,7 +74,7 @@ glint_one = $(if $(word 2,$(3)),$(error $(GLINT_MAPS)/$(1).$(firstword $(3)) and
 glint_apart = $(if $(and $(call glint_types,$(1),$(GLINT_IMAGES)),$(call glint_types,$(1).$(2),$(GLINT_IMAGES))),$(error images \
   $(GLINT_MAPS)/$(1) and $(GLINT_MAPS)/$(1).$(2) would both make $(GLINT_OUT)/$(1).$(2).glint; rename one of them))
 # The same for an image $(1) whose name ends as those of assets do: its stem and its ending, taken apart by the shell.
-glint_endings := pyramid cp tucker pca binmap sat moments tiny wang heights displaced wave light lobes
+glint_endings := pyramid cp tucker pca binmap sat moments tiny wang heights displaced wave wavecp light lobes
 glint_bar := |
 glint_empty :=
 glint_any_ending := $(subst $(glint_empty) $(glint_empty),\$(glint_bar),$(glint_endings))
@@ -138,6 +139,9 @@ $(foreach type,$(GLINT_LIGHTS),$(eval $(call glint_light_rule,$(type))))
 $(GLINT_OUT)/%.wave.glint: $(GLINT_OUT)/%.heights.glint $(GLINT_SETTINGS)
 	$(call glint_apart,$*,wave)$(call glint_tool,glint-pyramid) $(call glint_quote,$<) $(glint_out) --optics wave $(call glint_flags,GLINT_WAVE_FLAGS)
 
+$(GLINT_OUT)/%.wavecp.glint: $(GLINT_OUT)/%.wave.glint $(GLINT_SETTINGS)
+	$(call glint_apart,$*,wavecp)$(call glint_tool,glint-compress) $(call glint_quote,$<) $(glint_out) $(call glint_flags,GLINT_WAVECP_FLAGS)
+
 $(GLINT_OUT)/%.displaced.glint: $(GLINT_OUT)/%.heights.glint $(GLINT_SETTINGS)
 	$(call glint_apart,$*,displaced)$(call glint_tool,glint-displace) $(call glint_quote,$<) $(glint_out) $(call glint_flags,GLINT_DISPLACE_FLAGS)
 
@@ -150,7 +154,7 @@ $(GLINT_OUT):
 	mkdir -p $(call glint_quote,$@)
 
 # Make would delete the steps between an image and what was asked for.
-.PRECIOUS: $(GLINT_OUT)/%.glint $(GLINT_OUT)/%.heights.glint $(GLINT_OUT)/%.pyramid.glint
+.PRECIOUS: $(GLINT_OUT)/%.glint $(GLINT_OUT)/%.heights.glint $(GLINT_OUT)/%.pyramid.glint $(GLINT_OUT)/%.wave.glint
 # The tools replace their output in one step, or not at all; this covers what is not theirs.
 .DELETE_ON_ERROR:
 

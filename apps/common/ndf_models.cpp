@@ -10,6 +10,7 @@
 #include "common/texel_checks.h"
 #include "glint/api/alternatives.h"
 #include "glint/api/plane_position.h"
+#include "glint/api/wave_colours.h"
 #include "glint/bake/common/reference_image.h"
 
 namespace glint::apps {
@@ -23,7 +24,7 @@ NdfAsset::NdfAsset(Tool& tool, const AskedAssets& asked) : tool_(tool), asked_(a
               "asset of kind " + api::alternatives(asked.kinds) +
                   (asked.udim_sets ? "; 'name.<UDIM>.glint': a UDIM set, --uv counts tiles" : ""))
       .required();
-  if (asks({"ndf-pyramid", "ndf-cp", "wave-pyramid"})) addPyramidOptions();
+  if (asks({"ndf-pyramid", "ndf-cp", "wave-cp", "wave-pyramid"})) addPyramidOptions();
   addNormalsOptions();
   addBinOptions();
   tool.addCheck([this] { check(); });
@@ -46,27 +47,28 @@ void NdfAsset::addPyramidOptions() {
       tool_.choice("--kept-normals", options_.use_kept_normals, {{"used", true}, {"ignored", false}},
                    "whether the normals that the pyramid keeps answer small footprints: without them it answers as one that "
                    "keeps none, to compare, or for speed (kinds ndf-pyramid and ndf-cp)"));
-  useOnly({"ndf-pyramid", "ndf-cp", "slope-moments", "wang-cp", "wang-pyramid", "wave-pyramid"}, "--parts",
+  useOnly({"ndf-pyramid", "ndf-cp", "slope-moments", "wang-cp", "wang-pyramid", "wave-cp", "wave-pyramid"}, "--parts",
           tool_
               .option("--parts", options_.footprint_parts,
                       "most round footprints that stand for a stretched one; 1: one of the same mean square size (kinds "
-                      "ndf-pyramid, ndf-cp, slope-moments, wang-cp, wang-pyramid and wave-pyramid)")
+                      "ndf-pyramid, ndf-cp, slope-moments, wang-cp, wang-pyramid, wave-cp and wave-pyramid)")
               .range(1, IsotropicParts::kMost));
   addImageOptions();
 }
 
 void NdfAsset::addImageOptions() {
-  useOnly({"ndf-pyramid", "ndf-cp", "wave-pyramid"}, "--interpolation",
-          tool_.choice("--interpolation", options_.interpolation,
-                       {{"footprint", Interpolation::footprint}, {"trilinear", Interpolation::trilinear}},
-                       "how footprints between the stored ones are answered: by images that together see the footprint, or "
-                       "trilinearly, which is quicker and sees a wider one (kinds ndf-pyramid, ndf-cp and wave-pyramid)"));
   useOnly(
-      {"ndf-pyramid", "ndf-cp", "wang-cp", "wang-pyramid", "wave-pyramid"}, "--pixels",
+      {"ndf-pyramid", "ndf-cp", "wave-cp", "wave-pyramid"}, "--interpolation",
+      tool_.choice("--interpolation", options_.interpolation,
+                   {{"footprint", Interpolation::footprint}, {"trilinear", Interpolation::trilinear}},
+                   "how footprints between the stored ones are answered: by images that together see the footprint, or "
+                   "trilinearly, which is quicker and sees a wider one (kinds ndf-pyramid, ndf-cp, wave-cp and wave-pyramid)"));
+  useOnly(
+      {"ndf-pyramid", "ndf-cp", "wang-cp", "wang-pyramid", "wave-cp", "wave-pyramid"}, "--pixels",
       tool_.choice("--pixels", options_.pixels, {{"smooth", Pixels::smooth}, {"constant", Pixels::constant}},
                    "how densities run between half vectors of one pixel of an image: continuously, or constant, which is "
                    "quicker and shows borders of pixels under small lights (kinds ndf-pyramid, ndf-cp, wang-cp, wang-pyramid "
-                   "and wave-pyramid)"));
+                   "wave-cp and wave-pyramid)"));
 }
 
 void NdfAsset::addNormalsOptions() {
@@ -154,13 +156,17 @@ std::optional<std::vector<float>> NdfAsset::scatteredImage(const Footprint& foot
                               footprint, size);
 }
 
-std::optional<std::vector<float>> NdfAsset::colourImage(const Footprint& footprint, int size) const {
-  const auto* asked = std::get_if<AnisotropicNdf<WaveNdf>>(&model());
-  if (asked == nullptr) return std::nullopt;
-  const AnisotropicNdf<WaveNdf> constant(WaveNdf(asked->round().wavePyramid(), options_.interpolation, Pixels::constant),
-                                         options_.footprint_parts);
+namespace {
+
+const WavePyramid& assetOf(const WaveNdf& model) { return model.wavePyramid(); }
+const WaveCp& assetOf(const WaveCpNdf& model) { return model.waveCp(); }
+
+/// Linear sRGB of the pixels of an image, [size][size][3].
+/// @param constant  a model whose pixels are constant
+template <class Model>
+std::vector<float> colourPixels(const Model& constant, const Footprint& footprint, int size, int resolution) {
   // Points of a pixel along each axis: one where the pixels are those of the images.
-  const int points = size == info().resolution ? 1 : 4;
+  const int points = size == resolution ? 1 : 4;
   const float step = 2 / static_cast<float>(size * points);
   std::vector<float> image(static_cast<std::size_t>(size) * static_cast<std::size_t>(size) * 3);
   tbb::parallel_for(0, size, [&](int y) {
@@ -176,6 +182,20 @@ std::optional<std::vector<float>> NdfAsset::colourImage(const Footprint& footpri
     }
   });
   return image;
+}
+
+}  // namespace
+
+std::optional<std::vector<float>> NdfAsset::colourImage(const Footprint& footprint, int size) const {
+  using Image = std::optional<std::vector<float>>;
+  return api::askWave(
+      model(),
+      [&](const auto& asked) -> Image {
+        using Round = std::remove_cvref_t<decltype(asked.round())>;
+        const Round constant(assetOf(asked.round()), options_.interpolation, Pixels::constant);
+        return colourPixels(AnisotropicNdf<Round>(constant, options_.footprint_parts), footprint, size, info().resolution);
+      },
+      []() -> Image { return std::nullopt; });
 }
 
 bool NdfAsset::lacksTileAt(double u, double v) const {
@@ -218,7 +238,7 @@ std::optional<FootprintFault> NdfAsset::unanswerable(const Footprint& footprint)
           if (sigma >= finest * 0.999f) return {};
           return FootprintFault{
               fmt::format("a footprint of {:.3g} texels is below the finest level, {:.3g} texels", sigma, finest),
-              opened_->asset().kind() == "wave-pyramid"
+              api::isWave(model())
                   ? "make the pyramid again with a smaller --stride: without their neighbours texels do not diffract"
                   : normalsRemedy()};
         } else {

@@ -43,7 +43,7 @@ class NdfAsset {
   /// Intrinsic roughness of the facets: the asset's own, or --sigma-r where it has none.
   float facetRoughness() const { return info().sigma_r > 0 ? info().sigma_r : options_.sigma_r; }
 
-  /// Picture of a footprint in colour, of kind wave-pyramid; nothing for other kinds.
+  /// Picture of a footprint in colour, of kinds wave-pyramid and wave-cp; nothing for other kinds.
   /// @return [size][size][3]: means of pixels in linear sRGB, bottom row first
   std::optional<std::vector<float>> colourImage(const Footprint& footprint, int size) const;
 

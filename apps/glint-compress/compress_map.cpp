@@ -4,6 +4,7 @@
 
 #include "common/input_asset.h"
 #include "glint/bake/wang/tile_pyramid.h"
+#include "glint/bake/wave/compress_wave.h"
 #include "glint/formats/asset_writer.h"
 
 namespace glint::apps {
@@ -24,6 +25,9 @@ nlohmann::json compressMap(Tool& tool, const CompressOptions& options, const Map
     const auto& tiles = asset.get<WangPyramid>();
     const auto data = compress(tiles.images, bake::imageMasses(tiles), options, report, tool);
     formats::writeAsset(files.output, WangCp{tiles.plane, data.view()}, provenance, output.writeOptions());
+  } else if (asset.kind() == "wave-pyramid") {
+    const auto data = bake::compressWavePyramid(asset.get<WavePyramid>(), options.values(), &report, tool.progress("compress"));
+    formats::writeAsset(files.output, data.view(), provenance, output.writeOptions(asset.info().udim));
   } else {
     const auto data = compress(asset.get<NdfPyramid>(), {}, options, report, tool);
     NdfCp compressed = data.view();

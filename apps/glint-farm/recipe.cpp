@@ -31,6 +31,7 @@ const RecipeKind kKinds[] = {
     {"tiny", ".tiny", "normals", {"glint-tiny"}, {"--cut", "32"}},
     {"wang", ".wang", "normals", {"glint-wang"}, {}},
     {"wave", ".wave", "heights", {"glint-pyramid", "--optics", "wave"}, {}},
+    {"wavecp", ".wavecp", "wave", {"glint-compress"}, {"--tolerance", "0.1"}},
     {"displaced", ".displaced", "heights", {"glint-displace"}, {"--factor", "16"}},
 };
 

@@ -99,6 +99,8 @@ ordered_json statisticsOf(const NdfCp& ndf, const formats::AssetInfo& info) {
           {"ranks", std::move(histogram)}};
 }
 
+ordered_json statisticsOf(const WaveCp& wave, const formats::AssetInfo& info) { return statisticsOf(wave.images, info); }
+
 ordered_json statisticsOf(const BinMap& map, const formats::AssetInfo&) {
   return {{"bins", static_cast<std::uint64_t>(map.bins_per_axis) * static_cast<std::uint64_t>(map.bins_per_axis)},
           {"bins_of_a_tile", std::uint64_t{1} << 2 * map.tile_bits},

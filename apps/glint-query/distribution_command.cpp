@@ -10,6 +10,7 @@
 #include "glint-query/command_forms.h"
 #include "glint-query/usage.h"
 #include "glint/api/plane_position.h"
+#include "glint/api/wave_colours.h"
 
 namespace glint::apps {
 HalfVectorOptions::HalfVectorOptions(Tool& tool) {
@@ -117,9 +118,9 @@ void DistributionCommand::writeSamples() {
 void DistributionCommand::answerOne() {
   Query q = halves_.query(footprint_.footprint());
   q.u = footprint_.u(), q.v = footprint_.v();
-  if (q.half && std::holds_alternative<AnisotropicNdf<WaveNdf>>(asset_.model())) {
+  if (q.half && api::isWave(asset_.model())) {
     if (halves_.spreadOption().given())
-      throwUsage("--spread with --half: colours of a wave-pyramid have no averages", "give --range, or leave --spread out");
+      throwUsage("--spread with --half: colours of diffraction have no averages", "give --range, or leave --spread out");
     return answerColour(q);
   }
   const float value = answer(asset_.model(), q);
@@ -129,11 +130,10 @@ void DistributionCommand::answerOne() {
 }
 
 void DistributionCommand::answerColour(const Query& q) {
-  const auto& wave = std::get<AnisotropicNdf<WaveNdf>>(asset_.model());
-  const auto ask = [&] { return wave.densityRgb(q.footprint, *q.half); };
+  const auto ask = [&] { return api::densityRgb(asset_.model(), q.footprint, *q.half); };
   const Rgb rgb = ask();
-  std::vector<float> spectrum(static_cast<std::size_t>(wave.round().channels()));
-  wave.densitySpectrum(q.footprint, *q.half, spectrum.data());
+  std::vector<float> spectrum(static_cast<std::size_t>(api::channelCount(asset_.model())));
+  api::densitySpectrum(asset_.model(), q.footprint, *q.half, spectrum.data());
   tool_.print(fmt::format("{:.9g} {:.9g} {:.9g}\n", rgb.r, rgb.g, rgb.b));
   reportTimed(tool_,
               {{"density", answer(asset_.model(), q)},

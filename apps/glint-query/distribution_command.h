@@ -43,7 +43,7 @@ class DistributionCommand {
   void warnOfWidening(const std::string& which);
   void answerTable();
   void answerOne();
-  /// The colour of a wave-pyramid towards psi.
+  /// The colour of a wave-pyramid or wave-cp towards psi.
   void answerColour(const Query& query);
   void writeSamples();
   void writePicture();

@@ -8,6 +8,7 @@
 #include "glint/formats/kinds/shared_fields.h"
 #include "glint/formats/kinds/tally.h"
 #include "glint/formats/kinds/wang_fields.h"
+#include "glint/formats/kinds/wave_fields.h"
 #include "glint/formats/number_text.h"
 #include "glint/math/half.h"
 
@@ -540,5 +541,32 @@ struct KindDescription<WangCp> {
 };
 
 template const Kind& kindOf<WangCp>();
+
+template <>
+struct KindDescription<WaveCp> {
+  static constexpr std::string_view kTitle = "Compressed pyramid of NDF images under wave optics";
+
+  static std::vector<Rule> indexRules() { return {}; }
+  static std::vector<Rule> valueRules() { return {}; }
+
+  static void describe(Fields auto& fields, auto& wave) {
+    describeShape(fields, wave.shape);
+    describeChannels(fields, wave);
+    fields.set(wave.images.shape, channelShape(wave.shape, wave.channels));
+    KindDescription<NdfCp>::describeCompression(fields, wave.images);
+  }
+
+  static void checkIndex(const WaveCp& wave, Findings& findings) {
+    checkShape(wave.shape, findings);
+    checkChannels(wave.meaning, wave.channels, wave.wavelengths_um, wave.channel_rgb, findings);
+    KindDescription<NdfCp>::checkFactorIndex(wave.images, findings);
+  }
+
+  static void checkValues(const WaveCp& wave, Findings& findings) {
+    KindDescription<NdfCp>::checkValues(wave.images, findings);
+  }
+};
+
+template const Kind& kindOf<WaveCp>();
 
 }  // namespace glint::formats

@@ -1,20 +1,15 @@
-#include <algorithm>
 #include <cmath>
 
 #include "glint/formats/kinds/description.h"
 #include "glint/formats/kinds/pyramid_fields.h"
 #include "glint/formats/kinds/tally.h"
+#include "glint/formats/kinds/wave_fields.h"
 
 namespace glint::formats {
 namespace {
 
-constexpr Range kWavelengths = {0.01, 10};  // um
-constexpr float kMostWeight = 100;          // of a channel in red, green or blue: far beyond the largest, 3.2
-constexpr double kWhiteTolerance = 1e-3;
 /// Both sides are rounded to half precision: 2^-11 relative each, 2^-25 near zero.
 constexpr double kGreyTolerance = 2e-3, kGreyFloor = 0x1p-23;
-
-bool isUsable(Rgb c) { return std::abs(c.r) <= kMostWeight && std::abs(c.g) <= kMostWeight && std::abs(c.b) <= kMostWeight; }
 
 std::string pixelsObject(int l) { return "/" + levelPath("level_{l}/channel_pixels", l); }
 
@@ -60,13 +55,7 @@ struct KindDescription<WavePyramid> {
 
   static void describe(Fields auto& fields, auto& wave) {
     describePyramidAttributes(fields, wave.grey);
-    fields.choice("channel_meaning", wave.meaning, "xyz|spectral", "what the channels are");
-    fields.integer("channels", wave.channels, {1, kMostWaveChannels}, "1", "number of channels");
-    fields.real("texel_size_um", wave.texel_size_um, kPositive, "um", "width of a texel of the height field");
-    fields.real("coherence_um", wave.coherence_um, kPositive, "um", "deviation of the coherence area");
-    fields.array("wavelengths_um", wave.wavelengths_um, {"wavelength_count"}, "um", "wavelengths, rising");
-    fields.array("channel_rgb", wave.channel_rgb, {"channels", "3"}, "1",
-                 "linear red, green and blue (sRGB, D65) of a density of 1 in each channel");
+    describeChannels(fields, wave);
     describePyramidLevels(fields, wave.grey, [&](int l, std::uint64_t blocks) {
       fields.data("level_{l}/channel_pixels", wave.pixels[l], blocks * kBlockPixels * static_cast<std::uint64_t>(wave.channels),
                   {{"precision=f16", ElementType::f16}, {"precision=f32", ElementType::f32}},
@@ -77,38 +66,12 @@ struct KindDescription<WavePyramid> {
 
   static void checkIndex(const WavePyramid& wave, Findings& findings) {
     checkPyramidIndex(wave.grey, findings);
-    const std::size_t count = wave.wavelengths_um.size();
-    const std::size_t needed = wave.meaning == WaveChannels::xyz ? 3 : count;
-    if (count < 1 || count > kMostWaveChannels || static_cast<std::size_t>(wave.channels) != needed)
-      findings.add("wave.channels", "/@channels",
-                   "is " + std::to_string(wave.channels) + " with " + std::to_string(count) + " wavelengths");
-    for (std::size_t k = 0; k < count; ++k) {
-      const float here = wave.wavelengths_um[k];
-      const bool rises = k == 0 || wave.wavelengths_um[k - 1] < here;
-      if (rises && here >= static_cast<float>(kWavelengths.minimum) && here <= static_cast<float>(kWavelengths.maximum))
-        continue;
-      findings.add("wave.wavelengths", "/wavelengths_um", "does not rise within 0.01 to 10 at element " + std::to_string(k));
-      break;
-    }
-    checkColours(wave, findings);
+    checkChannels(wave.meaning, wave.channels, wave.wavelengths_um, wave.channel_rgb, findings);
   }
 
   static void checkValues(const WavePyramid& wave, Findings& findings) {
     checkPyramidValues(wave.grey, findings, true);
     for (int l = 0; l < wave.grey.shape.level_count; ++l) checkLevel(wave, l, findings);
-  }
-
- private:
-  static void checkColours(const WavePyramid& wave, Findings& findings) {
-    double sums[3] = {};
-    bool usable = true;
-    for (const Rgb& c : wave.channel_rgb) {
-      usable = usable && isUsable(c);
-      sums[0] += c.r, sums[1] += c.g, sums[2] += c.b;
-    }
-    const auto isWhite = [](double sum) { return std::abs(sum - 1) <= kWhiteTolerance; };
-    if (!usable || !std::all_of(sums, sums + 3, isWhite))
-      findings.add("wave.colours", "/channel_rgb", "does not sum to white, or has numbers beyond 100");
   }
 };
 

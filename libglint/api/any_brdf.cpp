@@ -5,18 +5,16 @@
 namespace glint::api {
 namespace {
 
-bool isWave(const OpenedNdf& opened) { return std::holds_alternative<AnisotropicNdf<WaveNdf>>(opened.model()); }
-
 /// Distributions of psi are asked by WaveBrdf, whatever is asked for.
 BrdfFacets usedFacets(const OpenedNdf& opened, BrdfFacets facets) {
-  return facets == BrdfFacets::distribution && isWave(opened) ? BrdfFacets::waves : facets;
+  return facets == BrdfFacets::distribution && isWave(opened.model()) ? BrdfFacets::waves : facets;
 }
 
 SmithMasking maskingOf(const OpenedNdf& opened, BrdfFacets facets) {
-  if (facets == BrdfFacets::waves && !isWave(opened))
+  if (facets == BrdfFacets::waves && !isWave(opened.model()))
     throw Error(ErrorCode::unsupported, "api.facets", opened.path().string(), "",
-                "waves are answered by a wave-pyramid, and this is of kind " + std::string(opened.asset().kind()),
-                "open an asset of kind wave-pyramid, or take facets of the distribution");
+                "waves are answered by a wave-pyramid or wave-cp, and this is of kind " + std::string(opened.asset().kind()),
+                "open an asset of one of these kinds, or take facets of the distribution");
   if (facets != BrdfFacets::beckmann) return opened.masking();
   if (!std::holds_alternative<BinMapNdf>(opened.model()))
     throw Error(ErrorCode::unsupported, "api.facets", opened.path().string(), "",

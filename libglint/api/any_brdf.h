@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "glint/api/any_ndf.h"
+#include "glint/api/wave_colours.h"
 #include "glint/query/brdf/bin_map_brdf.h"
 #include "glint/query/brdf/microfacet_brdf.h"
 #include "glint/query/brdf/wave_brdf.h"
@@ -17,7 +18,7 @@ namespace glint::api {
 enum class BrdfFacets : std::uint8_t {
   distribution,  ///< mirrors, as dense as the NDF says: MicrofacetBrdf
   beckmann,      ///< kind bin-map: texels are facets of Beckmann microfacets that mask themselves: BinMapBrdf
-  waves,         ///< kind wave-pyramid, and only there: WaveBrdf. `distribution` of this kind is the same
+  waves,         ///< kinds wave-pyramid and wave-cp, and only there: WaveBrdf. `distribution` of these kinds is the same
 };
 
 /// A BRDF over a texture, of an asset of any kind that answers an NDF: a model, masking by the slopes of the map, and what the
@@ -28,7 +29,7 @@ enum class BrdfFacets : std::uint8_t {
 class AnyBrdf {
  public:
   /// Kind normals: sums the slopes of all texels once where the asset does not hold them.
-  /// @throws Error  unsupported: Beckmann facets of another kind than bin-map, or waves of another kind than wave-pyramid
+  /// @throws Error  unsupported: Beckmann facets of another kind than bin-map, or waves of another kind than wave-pyramid and wave-cp
   AnyBrdf(const OpenedNdf& opened, const Fresnel& fresnel, BrdfFacets facets = BrdfFacets::distribution);
   AnyBrdf(const OpenedNdf&& opened, const Fresnel& fresnel, BrdfFacets facets = BrdfFacets::distribution) = delete;
 
@@ -41,9 +42,10 @@ class AnyBrdf {
   template <class Ask>
   auto at(const Footprint& footprint, Ask&& ask) const {
     if (facets_ == BrdfFacets::beckmann) return ask(BinMapBrdf(std::get<BinMapNdf>(model_), footprint, masking_, fresnel_));
-    if (facets_ == BrdfFacets::waves)
-      return ask(WaveBrdf(std::get<AnisotropicNdf<WaveNdf>>(model_), footprint, masking_, fresnel_));
-    return ask(MicrofacetBrdf(model_, footprint, masking_, fresnel_));
+    const auto askFacets = [&] { return ask(MicrofacetBrdf(model_, footprint, masking_, fresnel_)); };
+    if (facets_ != BrdfFacets::waves) return askFacets();
+    return askWave(
+        model_, [&](const auto& wave) { return ask(WaveBrdf(wave, footprint, masking_, fresnel_)); }, askFacets);
   }
 
   /// The same on a curved surface, whose pixel sees a box of half vectors: the BRDF of a CurvedNdf.

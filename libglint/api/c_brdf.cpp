@@ -154,7 +154,7 @@ glint_status askMicrofacets(const char* where, const glint_brdf* brdf, const gli
   if (any.facets() == api::BrdfFacets::beckmann)
     return usage(where, "Beckmann facets have no averages over half vectors; make the BRDF with GLINT_FACETS_OF_DISTRIBUTION");
   if (any.facets() == api::BrdfFacets::waves)
-    return usage(where, "colours of a wave-pyramid have no averages over half vectors; take glint_brdf_evaluate and _sample");
+    return usage(where, "colours of diffraction have no averages over half vectors; take glint_brdf_evaluate and _sample");
   any.at(footprintFor(any, footprint), spreadOf(footprint), [&](const auto& b) {
     if constexpr (requires { b.valueOf(Vec3{}, Vec3{}, HalfVector{}, 0.0f); }) ask(b);
   });

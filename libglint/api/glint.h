@@ -138,7 +138,7 @@ typedef struct glint_open_options {
 /* clang-format on */
 
 /* Opens an asset of any kind that holds a distribution of normals: normals, ndf-pyramid, ndf-cp, bin-map, histogram-sat,
- * slope-moments, tiny-example, wang-cp, wang-pyramid, wang-tiles, wave-pyramid.
+ * slope-moments, tiny-example, wang-cp, wang-pyramid, wang-tiles, wave-cp, wave-pyramid.
  *
  * The file is checked, then mapped; what queries read is not copied. Safe on untrusted files. A file must not be changed in
  * place while it is open (the tools never do: they replace files).
@@ -283,18 +283,18 @@ GLINT_API glint_status glint_footprint_set_spread(glint_footprint* footprint, co
 GLINT_API glint_status glint_density(const glint_ndf* ndf, const glint_footprint* footprint, float hx, float hy,
                                      float* density);
 
-/* Density in linear sRGB towards a point psi, of kind wave-pyramid; other kinds: the density of glint_density in each channel.
+/* Density in linear sRGB towards a point psi, of kinds wave-pyramid and wave-cp; other kinds: the density of glint_density in each channel.
  *
  * psi = ((wi + wo) / 2)_xy: for directions near the normal, the half vector. A flat mirror is white. rgb: three floats. They are
  * finite, and may be below 0: colours of few wavelengths lie outside the gamut. Footprints and status as for glint_density. */
 GLINT_API glint_status glint_density_rgb(const glint_ndf* ndf, const glint_footprint* footprint, float psi_x, float psi_y,
                                          float rgb[3]);
 
-/* Number of channels of kind wave-pyramid: 3 for CIE X, Y and Z, else one for each wavelength; 1 for other kinds. Returns
+/* Number of channels of kinds wave-pyramid and wave-cp: 3 for CIE X, Y and Z, else one for each wavelength; 1 for other kinds. Returns
  * GLINT_ERROR_USAGE for null arguments, else GLINT_OK. */
 GLINT_API glint_status glint_ndf_channels(const glint_ndf* ndf, int32_t* channels);
 
-/* Density of each channel towards psi; other kinds than wave-pyramid: the density of glint_density.
+/* Density of each channel towards psi; other kinds than wave-pyramid and wave-cp: the density of glint_density.
  * capacity: floats of `densities`, at least the channels. Returns GLINT_ERROR_USAGE for null arguments or too small a capacity,
  * else GLINT_OK. Footprints as for glint_density. */
 GLINT_API glint_status glint_density_spectrum(const glint_ndf* ndf, const glint_footprint* footprint, float psi_x, float psi_y,

@@ -21,9 +21,9 @@ namespace glint::api {
 ///
 /// A plane of tiles is a line for each form of its tiles. A plane of tiles of several models holds them as a variant over a list of
 /// these models, and visits the variant once in each question, after it has chosen the tile: its models do not multiply it.
-using AssetModels =
-    NdfModelList<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, BinMapNdf, HistogramNdf, MomentsNdf,
-                 TinyExampleNdf, WangReference, WangPlane<PyramidTiles>, WangPlane<CompressedTiles>, AnisotropicNdf<WaveNdf>>;
+using AssetModels = NdfModelList<Reference, AnisotropicNdf<PyramidNdf>, AnisotropicNdf<CpNdf>, BinMapNdf, HistogramNdf,
+                                 MomentsNdf, TinyExampleNdf, WangReference, WangPlane<PyramidTiles>, WangPlane<CompressedTiles>,
+                                 AnisotropicNdf<WaveNdf>, AnisotropicNdf<WaveCpNdf>>;
 
 /// These models, and that of a UDIM set, which is several assets. forEach visits the models of assets only.
 struct NdfModels : AssetModels {

@@ -6,14 +6,21 @@
 
 namespace glint::api {
 
-/// Calls ask(model) with the model of a wave-pyramid, or other() for every other model.
+/// Calls ask(model) with the model of a wave-pyramid or a wave-cp, or other() for every other model.
 template <class Ask, class Other>
 auto askWave(const AnyNdf& model, Ask&& ask, Other&& other) {
-  const auto* wave = std::get_if<AnisotropicNdf<WaveNdf>>(&model);
-  return wave != nullptr ? ask(*wave) : other();
+  if (const auto* wave = std::get_if<AnisotropicNdf<WaveNdf>>(&model)) return ask(*wave);
+  if (const auto* wave = std::get_if<AnisotropicNdf<WaveCpNdf>>(&model)) return ask(*wave);
+  return other();
 }
 
-/// Channels of a model: those of a wave-pyramid; 1 for every other model.
+/// Whether a model is a distribution of psi, with channels.
+inline bool isWave(const AnyNdf& model) {
+  return askWave(
+      model, [](const auto&) { return true; }, [] { return false; });
+}
+
+/// Channels of a model: those of a wave-pyramid or wave-cp; 1 for every other model.
 inline int channelCount(const AnyNdf& model) {
   return askWave(
       model, [](const auto& wave) { return wave.round().channels(); }, [] { return 1; });

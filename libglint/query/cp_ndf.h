@@ -94,20 +94,23 @@ class CpNdf {
   /// see BoxEdge.
   GLINT_HD float signedMean(const Footprint& p, const Box2& range) const {
     if (!(range.width() > 0 && range.height() > 0)) return 0;
-    return below_.mean(p, range, [&] {
-      const PyramidSlices chosen = chooser_.choose(p);
-      return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
-        double sum = 0;
-        forEachBlock(shape(), range, pixels_, [&](int block, const BlockBox& box) {
-          sum += double{sumSlices(chosen, block, ndf_.image_scales.data(), BoxOf<Reader>{reader, box}, Signed{})};
-        });
-        return static_cast<float>(sum / double{areaInPixels(shape(), range)});
-      });
-    });
+    return below_.mean(p, range, [&] { return signedImageMean(chooser_.choose(p), range, pixels_); });
   }
 
  private:
   friend class CompressedTiles;  // asks images that it has chosen itself
+  friend class WaveCpNdf;        // likewise, of several channels
+
+  /// signedMean of chosen images. The range has an area.
+  GLINT_HD float signedImageMean(const PyramidSlices& chosen, const Box2& range, Pixels pixels) const {
+    return withReader(ndf_, [&]<class Reader>(const Reader& reader) {
+      double sum = 0;
+      forEachBlock(shape(), range, pixels, [&](int block, const BlockBox& box) {
+        sum += double{sumSlices(chosen, block, ndf_.image_scales.data(), BoxOf<Reader>{reader, box}, Signed{})};
+      });
+      return static_cast<float>(sum / double{areaInPixels(shape(), range)});
+    });
+  }
 
   GLINT_HD float imageDensity(const Footprint& p, Vec2 h) const {
     const PyramidSlices chosen = chooser_.choose(p);
@@ -264,7 +267,7 @@ class CpNdf {
     forEachBlockOfWindow(shape(), place, [&](int block, int x, int y) {
       const SlicePlaces places = findSlices(ndf_, chosen, block, ndf_.density_scales.data());
       prefetchRows(reader, places);
-      addWindow(reader, places, x, y, window);
+      addWindows(reader, &places, 1, x, y, &window);
     });
     return window.pixels();
   }
@@ -274,66 +277,99 @@ class CpNdf {
       if (places.weights[k] > 0) prefetch(reader.row(ndf_.clusters.data()[places.clusters[k]], places.slices[k]));
   }
 
-  /// Adds the part of a window that lies in a block. Pixels of a slice are less their floors, and negative ones count as 0.
-  /// @param x, y  column and row of the window's first pixel in the block, -2 to 15
+  /// Adds the parts of windows that lie in a block. Pixels of a slice are less their floors, and negative ones count as 0.
+  /// @param places   [count]: slices of each window
+  /// @param count    of windows, 1 to kMostWindows
+  /// @param x, y     column and row of a window's first pixel in the block, -2 to 15
+  /// @param windows  [count]
   template <class Reader>
-  GLINT_HD void addWindow(const Reader& reader, const SlicePlaces& places, int x, int y, WindowRows& window) const {
+  GLINT_HD void addWindows(const Reader& reader, const SlicePlaces* places, int count, int x, int y,
+                           WindowRows* windows) const {
 #ifdef GLINT_AVX2
-    if (hasAvx2()) return addWindowAvx2(reader, places, x, y, window);
+    if (hasAvx2()) return addWindowsAvx2(reader, places, count, x, y, windows);
 #endif
-    addWindowBy(reader, places, x, y, window);
+    addWindowsBy(reader, places, count, x, y, windows);
   }
 #ifdef GLINT_AVX2
   template <class Reader>
-  GLINT_AVX2 GLINT_FLATTEN void addWindowAvx2(const Reader& reader, const SlicePlaces& places, int x, int y,
-                                              WindowRows& window) const {
-    addWindowBy(typename Reader::Avx2(reader), places, x, y, window);
+  GLINT_AVX2 GLINT_FLATTEN void addWindowsAvx2(const Reader& reader, const SlicePlaces* places, int count, int x, int y,
+                                               WindowRows* windows) const {
+    addWindowsBy(typename Reader::Avx2(reader), places, count, x, y, windows);
   }
 #endif
 
-  template <class Reader>
-  GLINT_HD void addWindowBy(const Reader& reader, const SlicePlaces& places, int x, int y, WindowRows& window) const {
-    unsigned left = counted(places);
-    while (left != 0) {
-      const std::uint32_t at = places.clusters[lowestBit(left)];
-      const unsigned here = countedIn(places, at);
-      left &= ~here;
-      const NdfCluster& cluster = ndf_.clusters.data()[at];
-      cluster.columns == 0 ? addWindowOfSpots(cluster, places, here, x, y, window)
-                           : addWindowOfColumns(reader, cluster, places, here, x, y, window);
-    }
-  }
+  /// Windows that are summed at once: they share the values of columns.
+  static constexpr int kMostWindows = 4;
 
-  /// @param here  bit k: slice k of `places` is in the cluster
   template <class Reader>
-  GLINT_HD void addWindowOfColumns(const Reader& reader, const NdfCluster& cluster, const SlicePlaces& places, unsigned here,
-                                   int x, int y, WindowRows& window) const {
-    constexpr int kRows = ColumnWindows::kRows;
-    ColumnWindows columns;
-    reader.window(cluster, x, y, columns);
-    Float4 floors[kRows];
-    PixelFloors(ndf_, cluster).window(x, y, floors);
-    for (; here != 0; here &= here - 1) {
-      const int slice = lowestBit(here);
-      float scaled[kMaxColumns];
-      reader.scaledCoefficients(cluster, reader.row(cluster, places.slices[slice]), scaled);
-      // Two sums of each row, so that an addition need not wait for the previous one.
-      Float4 even[kRows], odd[kRows];
-      for (int row = 0; row < kRows; ++row) even[row] = odd[row] = Float4::zero();
-      int k = 0;
-      for (; k + 2 <= cluster.columns; k += 2) {
-        for (int row = 0; row < kRows; ++row) {
-          even[row] = even[row] + Float4::all(scaled[k]) * columns.row(k, row);
-          odd[row] = odd[row] + Float4::all(scaled[k + 1]) * columns.row(k + 1, row);
+  GLINT_HD void addWindowsBy(const Reader& reader, const SlicePlaces* places, int count, int x, int y,
+                             WindowRows* windows) const {
+    unsigned left[kMostWindows];  // bit k: slice k of the window's places is yet to be added
+    for (int w = 0; w < count; ++w) left[w] = counted(places[w]);
+    for (int w = 0; w < count; ++w) {
+      while (left[w] != 0) {
+        const std::uint32_t at = places[w].clusters[lowestBit(left[w])];
+        unsigned here[kMostWindows] = {};
+        for (int other = w; other < count; ++other) {
+          here[other] = countedIn(places[other], at);
+          left[other] &= ~here[other];
+        }
+        const NdfCluster& cluster = ndf_.clusters.data()[at];
+        if (cluster.columns == 0) {
+          for (int other = w; other < count; ++other)
+            addWindowOfSpots(cluster, places[other], here[other], x, y, windows[other]);
+        } else {
+          const ClusterWindow<Reader> columns(ndf_, reader, cluster, x, y);
+          for (int other = w; other < count; ++other) columns.add(places[other], here[other], windows[other]);
         }
       }
-      if (k < cluster.columns)
-        for (int row = 0; row < kRows; ++row) even[row] = even[row] + Float4::all(scaled[k]) * columns.row(k, row);
-      for (int row = 0; row < kRows; ++row)
-        window.rows[row] =
-            window.rows[row] + Float4::all(places.weights[slice]) * (even[row] + odd[row] - floors[row]).positive();
     }
   }
+
+  /// The columns of a cluster at the pixels of a window.
+  template <class Reader>
+  class ClusterWindow {
+    static constexpr int kRows = ColumnWindows::kRows;
+
+   public:
+    /// @param x, y  column and row of the window's first pixel in the block, -2 to 15
+    GLINT_HD ClusterWindow(const NdfCp& ndf, const Reader& reader, const NdfCluster& cluster, int x, int y)
+        : reader_(reader), cluster_(cluster) {
+      reader.window(cluster, x, y, columns_);
+      PixelFloors(ndf, cluster).window(x, y, floors_);
+    }
+
+    /// Adds slices of the cluster.
+    /// @param here  bit k: slice k of `places` is in the cluster
+    GLINT_HD void add(const SlicePlaces& places, unsigned here, WindowRows& window) const {
+      for (; here != 0; here &= here - 1) {
+        const int slice = lowestBit(here);
+        float scaled[kMaxColumns];
+        reader_.scaledCoefficients(cluster_, reader_.row(cluster_, places.slices[slice]), scaled);
+        // Two sums of each row, so that an addition need not wait for the previous one.
+        Float4 even[kRows], odd[kRows];
+        for (int row = 0; row < kRows; ++row) even[row] = odd[row] = Float4::zero();
+        int k = 0;
+        for (; k + 2 <= cluster_.columns; k += 2) {
+          for (int row = 0; row < kRows; ++row) {
+            even[row] = even[row] + Float4::all(scaled[k]) * columns_.row(k, row);
+            odd[row] = odd[row] + Float4::all(scaled[k + 1]) * columns_.row(k + 1, row);
+          }
+        }
+        if (k < cluster_.columns)
+          for (int row = 0; row < kRows; ++row) even[row] = even[row] + Float4::all(scaled[k]) * columns_.row(k, row);
+        for (int row = 0; row < kRows; ++row)
+          window.rows[row] =
+              window.rows[row] + Float4::all(places.weights[slice]) * (even[row] + odd[row] - floors_[row]).positive();
+      }
+    }
+
+   private:
+    const Reader& reader_;
+    const NdfCluster& cluster_;
+    ColumnWindows columns_;
+    Float4 floors_[kRows];
+  };
 
   GLINT_HD void addWindowOfSpots(const NdfCluster& cluster, const SlicePlaces& places, unsigned here, int x, int y,
                                  WindowRows& window) const {

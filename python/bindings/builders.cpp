@@ -21,6 +21,7 @@
 #include "glint/bake/moments/slope_moments.h"
 #include "glint/bake/pyramid/pyramid.h"
 #include "glint/bake/wave/colour_weights.h"
+#include "glint/bake/wave/compress_wave.h"
 #include "glint/bake/wave/wave_pyramid.h"
 
 namespace glint::python {
@@ -148,7 +149,6 @@ nb::dict compress(const BuildJob& job, const std::string& normals_path, const st
   o.min_improvement = min_improvement;
   o.max_iterations = max_iterations;
   const formats::Asset input = openInput(job);
-  const NdfPyramid& from = input.get<NdfPyramid>();
   enum class Keep { as_pyramid, none, i16, f32 };
   const Keep keep = choose<Keep>("keep_normals", keep_normals,
                                  {{"auto", Keep::as_pyramid}, {"none", Keep::none}, {"i16", Keep::i16}, {"f32", Keep::f32}});
@@ -164,10 +164,19 @@ nb::dict compress(const BuildJob& job, const std::string& normals_path, const st
   formats::Provenance provenance = formats::chained(provenanceOf(job), input.info().provenance);
   if (normals) provenance.inputs.push_back({"normals", unlocked([&] { return formats::hashFile(normals_path); })});
   bake::CompressionReport report;
+  if (input.kind() == formats::kKindName<WavePyramid>) {
+    if (as_asked || normals)
+      throw Error(ErrorCode::usage, "api.arguments", job.input, "keep_normals", "a wave-pyramid keeps no normals",
+                  "leave keep_normals and normals out");
+    run(job, provenance, [&](const bake::ProgressFn& progress) {
+      return bake::compressWavePyramid(input.get<WavePyramid>(), o, &report, progress);
+    });
+    return reportDict(report);
+  }
   run(job, provenance, [&](const bake::ProgressFn& progress) {
     WithNormals<bake::NdfCpData> made;
     if (keep != Keep::none) made.kept = keptBy(input, job.input, as_asked, normals, normals_path);
-    made.images = bake::compressPyramid(from, o, &report, progress);
+    made.images = bake::compressPyramid(input.get<NdfPyramid>(), o, &report, progress);
     return made;
   });
   return reportDict(report);

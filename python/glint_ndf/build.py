@@ -297,7 +297,7 @@ def compress(
     """Compresses a pyramid (Deng 2022, section 4.2), as ``glint-compress``.
 
     Args:
-        ndf_pyramid: asset of kind ndf-pyramid.
+        ndf_pyramid: asset of kind ndf-pyramid or wave-pyramid; the latter keeps no normals.
         method: "tucker", "pca" or "cp" (the paper's); "auto": tucker, and pca where tucker cannot meet a tolerance.
         rank: columns of every cluster, 1 to 256; 16 unless there is a tolerance.
         tolerance: instead of `rank`: largest error in `metric`; columns and bits are chosen to meet it in few bytes.

@@ -55,7 +55,7 @@ class Ndf:
         for name, value in handle.info().items():
             setattr(self, name, value)
 
-    kind: str  #: "normals", "ndf-pyramid", "ndf-cp", "bin-map", "histogram-sat", "slope-moments", "tiny-example", "wang-cp", "wang-pyramid", "wang-tiles" or "wave-pyramid"
+    kind: str  #: "normals", "ndf-pyramid", "ndf-cp", "bin-map", "histogram-sat", "slope-moments", "tiny-example", "wang-cp", "wang-pyramid", "wang-tiles", "wave-cp" or "wave-pyramid"
     width: int  #: of the normal map, texels
     height: int  #: of the normal map, texels
     resolution: int  #: pixels of an NDF image along each axis; 256 where there are none
@@ -77,7 +77,7 @@ class Ndf:
 
     @property
     def channels(self) -> int:
-        """Channels of kind wave-pyramid: 3 for CIE X, Y and Z, else one for each wavelength. 1 for other kinds."""
+        """Channels of kinds wave-pyramid and wave-cp: 3 for CIE X, Y and Z, else one for each wavelength. 1 for other kinds."""
         return self._handle.channels()
 
     def slopes(self) -> tuple[tuple[float, float], tuple[float, float, float]]:
@@ -102,7 +102,7 @@ class Ndf:
         return batch.shaped(out)
 
     def density_rgb(self, uv, psi, *, sigma=None, covariance=None, box=None, threads: int = 0) -> np.ndarray:
-        """Density in linear sRGB towards psi = ((wi + wo) / 2)_xy, of kind wave-pyramid; others: the density in each channel.
+        """Density in linear sRGB towards psi = ((wi + wo) / 2)_xy, of kinds wave-pyramid and wave-cp; others: the density in each channel.
 
         Returns:
             [..., 3] float32. Colours of few wavelengths may be below 0.

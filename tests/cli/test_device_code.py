@@ -119,6 +119,7 @@ def test_query_headers_compile_as_device_code(clang, tmp_path):
         "14TinyExampleNdfE",
         "13WangReferenceE",
         "7WaveNdfE",
+        "9WaveCpNdfE",
     )
     for name in (*(f"answerINS_{model}" for model in models), "answerPacked", "weigh", "drawBrdf", "shade", "reflect", "light"):
         assert name in kernels

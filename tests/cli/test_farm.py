@@ -160,7 +160,7 @@ def test_duplicates_are_made_once_and_have_all_their_names(farm):
 
 def test_flags_and_names_are_those_of_the_rules_for_make(farm):
     """The commands of a plan are those that glint.mk would run."""
-    kinds = ["pyramid", "cp", "tucker", "pca", "binmap", "sat", "moments", "tiny", "wang", "heights", "wave", "displaced"]
+    kinds = ["pyramid", "cp", "tucker", "pca", "binmap", "sat", "moments", "tiny", "wang", "heights", "wave", "wavecp", "displaced"]
     plan(farm, *kinds)
     makefile = f"GLINT_MAPS := maps\nGLINT_OUT := assets\ninclude {ROOT}/pipelines/glint.mk\nall: {' '.join(f'assets/a.{kind}.glint' for kind in kinds)}\n"
     (farm.folder / "Makefile").write_text(makefile)

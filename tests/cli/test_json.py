@@ -51,6 +51,7 @@ ASSETS = (
     "wangpyramid",
     "wangcp",
     "wave",
+    "wavecp",
     "lobes",
     "zonal",
     "light",
@@ -95,6 +96,7 @@ MAKE = [
     "synth grating --size 64 --height --texel-size-um 1 --depth-um .2 -o g.exr",
     "ingest g.exr --kind height --to heights --height-scale-um 1 --texel-size-um 1 -o grating.glint",
     "pyramid grating.glint -o wave.glint --optics wave --coherence-um 4 --wavelengths 3 --resolution 64 --stride 8",
+    "compress wave.glint -o wavecp.glint --tolerance .2",
     "shlobes -o lobes.glint --sigma-r .1 --order 6 --grid 5x8 --precision f32",
     "shlobes -o zonal.glint --sigma-r .1 --order 6 --grid none",
     "shlobes --light lights.json -o light.glint --order 6 --grid 5x8 --gaussians 2",
@@ -119,7 +121,7 @@ QUERY = "query {asset}.glint --uv .3 .6 --sigma 4 {asked}"
 ASKED = [
     *(
         QUERY.format(asset=asset, asked="--half 0 .1")
-        for asset in ("normals", "pyramid", "cp", "bins", "sat", "moments", "tiny", "wave", "reflectance displaced")
+        for asset in ("normals", "pyramid", "cp", "bins", "sat", "moments", "tiny", "wave", "wavecp", "reflectance displaced")
     ),
     *(QUERY.format(asset=asset, asked="--half .1 0 --repeat 15") for asset in ("pyramid", "reflectance displaced")),
     *(QUERY.format(asset=asset, asked="--image ndf.png --image-size 16") for asset in ("tucker", "reflectance displaced")),

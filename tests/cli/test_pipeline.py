@@ -19,7 +19,7 @@ GLINT_WANG_FLAGS := --size 64
 GLINT_DISPLACE_FLAGS := --factors 16,64 --angular 5
 GLINT_HEIGHTS_FLAGS_dunes := --texel-size-um 1
 GLINT_WAVE_FLAGS := --wavelengths 2 --resolution 64 --stride 64
-all: $(foreach method,cp tucker pca binmap sat moments tiny wang,assets/flakes.$(method).glint) assets/dunes.pca.glint assets/dunes.displaced.glint assets/dunes.wave.glint
+all: $(foreach method,cp tucker pca binmap sat moments tiny wang,assets/flakes.$(method).glint) assets/dunes.pca.glint assets/dunes.displaced.glint assets/dunes.wavecp.glint
 include {root}/pipelines/glint.mk
 """
 
@@ -63,7 +63,7 @@ def later(path):
 
 def test_images_become_assets_and_only_changes_are_made_again(project):
     first = tools(project("-j2"))
-    assert first == ["glint-binmap"] + ["glint-compress"] * 4 + ["glint-displace"] + ["glint-ingest"] * 3 + [
+    assert first == ["glint-binmap"] + ["glint-compress"] * 5 + ["glint-displace"] + ["glint-ingest"] * 3 + [
         "glint-moments"
     ] + ["glint-pyramid"] * 3 + ["glint-sat", "glint-tiny", "glint-wang"]
     made = {p.name for p in (project.folder / "assets").glob("*.glint")}
@@ -86,6 +86,7 @@ def test_images_become_assets_and_only_changes_are_made_again(project):
             "dunes.heights",
             "dunes.displaced",
             "dunes.wave",
+            "dunes.wavecp",
         )
     }
     assert subprocess.run([BIN / "glint-validate", *(project.folder / "assets").glob("*.glint")]).returncode == 0
@@ -94,6 +95,7 @@ def test_images_become_assets_and_only_changes_are_made_again(project):
 
     later(project.folder / "maps/dunes.exr")
     assert tools(project("-j2")) == [
+        "glint-compress",
         "glint-compress",
         "glint-displace",
         "glint-ingest",
@@ -268,7 +270,7 @@ def test_two_images_of_one_name_are_an_error(folder, first, second):
     assert folder.made() == ["glint-ingest"] * 2
 
 
-@pytest.mark.parametrize("ending", "pyramid cp tucker pca binmap sat moments tiny wang heights displaced wave light".split())
+@pytest.mark.parametrize("ending", "pyramid cp tucker pca binmap sat moments tiny wang heights displaced wave wavecp light".split())
 def test_an_image_named_as_an_asset_of_another_image_is_an_error(folder, ending):
     """old wood.sat.glint would be the histograms of "old wood", or the normals of "old wood.sat"."""
     folder.image("old wood.png")

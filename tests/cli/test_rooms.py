@@ -38,7 +38,7 @@ FOLDERS = {
         "sh": {"common"},
         "displace": {"common"},
         "wang": {"common", "pyramid"},
-        "wave": {"common", "pyramid"},
+        "wave": {"common", "compressed", "pyramid"},
     },
     "query/detail": {
         "common": set(),

@@ -11,6 +11,7 @@
 #include "glint/query/ray_footprint.h"
 #include "glint/query/tiny_example_ndf.h"
 #include "glint/query/wang_reference.h"
+#include "glint/query/wave_cp_ndf.h"
 #include "glint/query/wave_ndf.h"
 
 namespace glint::device {
@@ -25,6 +26,8 @@ template __global__ void answer<TinyExampleNdf>(TinyExampleNdf, const Footprint*
 template __global__ void draw<TinyExampleNdf>(TinyExampleNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 template __global__ void answer<WaveNdf>(WaveNdf, const Footprint*, const Vec2*, float, int, float*, float*);
 template __global__ void draw<WaveNdf>(WaveNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
+template __global__ void answer<WaveCpNdf>(WaveCpNdf, const Footprint*, const Vec2*, float, int, float*, float*);
+template __global__ void draw<WaveCpNdf>(WaveCpNdf, const Footprint*, const Vec2*, int, HalfVectorSample*);
 
 /// A shading point under wave optics.
 __global__ void diffract(const WaveNdf ndf, const SmithMasking masking, const Vec2* uv, const Vec3* wo, const Vec2* xi,

@@ -46,6 +46,9 @@ inline void writeSample(std::type_identity<HistogramSat>, const std::string& pat
 inline void writeSample(std::type_identity<WavePyramid>, const std::string& path) {
   formats::writeAsset(path, sampleWavePyramid(kSize, WaveChannels::xyz, BlockPrecision::f16).wave, sampleProvenance());
 }
+inline void writeSample(std::type_identity<WaveCp>, const std::string& path) {
+  formats::writeAsset(path, sampleWaveCp(kSize, WaveChannels::xyz).wave, sampleProvenance());
+}
 inline void writeSample(std::type_identity<SlopeMoments>, const std::string& path) {
   formats::writeAsset(path, sampleSlopeMoments(kSize, kSize).moments, sampleProvenance());
 }

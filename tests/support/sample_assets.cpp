@@ -680,6 +680,19 @@ SampleTinyExample sampleTinyExample(int size, TinyMode mode) {
   return sample;
 }
 
+namespace {
+
+/// Wavelengths and colours of channels, which sum to white.
+void fillChannels(int channels, std::vector<float>& wavelengths_um, std::vector<Rgb>& channel_rgb) {
+  for (int k = 0; k < channels; ++k) {
+    wavelengths_um.push_back(0.4f + 0.0625f * static_cast<float>(k));
+    const float even = 1 / static_cast<float>(channels), lean = k == 0 ? 0.5f : k == 1 ? -0.5f : 0.0f;
+    channel_rgb.push_back({even + lean, even, even - lean});
+  }
+}
+
+}  // namespace
+
 SampleWavePyramid sampleWavePyramid(int size, WaveChannels meaning, BlockPrecision precision) {
   SampleWavePyramid sample;
   sample.grey = samplePyramid(size, precision);
@@ -691,11 +704,7 @@ SampleWavePyramid sampleWavePyramid(int size, WaveChannels meaning, BlockPrecisi
   wave.channels = static_cast<int>(shares.size());
   wave.texel_size_um = 1;
   wave.coherence_um = 8;
-  for (int k = 0; k < wave.channels; ++k) {
-    sample.wavelengths_um.push_back(0.4f + 0.0625f * static_cast<float>(k));
-    const float even = 1 / static_cast<float>(wave.channels), lean = k == 0 ? 0.5f : k == 1 ? -0.5f : 0.0f;
-    sample.channel_rgb.push_back({even + lean, even, even - lean});
-  }
+  fillChannels(wave.channels, sample.wavelengths_um, sample.channel_rgb);
   wave.wavelengths_um = sample.wavelengths_um;
   wave.channel_rgb = sample.channel_rgb;
   for (std::size_t l = 0; l < sample.grey.levels.size(); ++l) {
@@ -1053,6 +1062,33 @@ SampleWangPyramid sampleWangPyramid() {
   return sample;
 }
 
+SampleWaveCp sampleWaveCp(int size, WaveChannels meaning) {
+  SampleWaveCp sample;
+  WaveCp& wave = sample.wave;
+  wave.meaning = meaning;
+  wave.channels = meaning == WaveChannels::xyz ? 3 : 5;
+  wave.texel_size_um = 1;
+  wave.coherence_um = 8;
+  fillChannels(wave.channels, sample.wavelengths_um, sample.channel_rgb);
+  wave.wavelengths_um = sample.wavelengths_um;
+  wave.channel_rgb = sample.channel_rgb;
+  wave.shape = sampleShape(size);
+  const SampleNormals normals = sampleNormals(size, size, false);
+  std::vector<std::vector<Image>> images;
+  for (int l = 0; l < wave.shape.level_count; ++l) {
+    std::vector<Image>& level = images.emplace_back();
+    for (int c = 0; c < wave.channels; ++c)
+      for (Image& image : levelImages(normals.map, wave.shape.levels[l])) {
+        for (auto row = image.begin(); row != image.end(); row += kResolution) std::rotate(row, row + 4 * c, row + kResolution);
+        level.push_back(std::move(image));
+      }
+  }
+  sample.images = ndfCpOf(channelShape(wave.shape, wave.channels), std::move(images), CompressionMethod::tucker,
+                          CoefficientType::i8, SampleForm::wide);
+  wave.images = sample.images.ndf;
+  return sample;
+}
+
 SampleWangCp sampleWangCp() {
   SampleWangCp sample;
   PyramidShape shape;
@@ -1147,6 +1183,7 @@ std::vector<SampleAsset> sampleAssets() {
       {"wang-cp", [] { return owned(sampleWangCp(), &SampleWangCp::asset); }},
       {"wang-pyramid", [] { return owned(sampleWangPyramid(), &SampleWangPyramid::asset); }},
       {"wang-tiles", [] { return owned(sampleWangTiles(), &SampleWangTiles::tiles); }},
+      {"wave-cp", [] { return owned(sampleWaveCp(64, WaveChannels::xyz), &SampleWaveCp::wave); }},
       {"wave-pyramid",
        [] { return owned(sampleWavePyramid(64, WaveChannels::xyz, BlockPrecision::f16), &SampleWavePyramid::wave); }},
   };

@@ -144,6 +144,13 @@ struct SampleWangTiles {
   WangTiles tiles;
 };
 
+struct SampleWaveCp {
+  SampleNdfCp images;
+  std::vector<float> wavelengths_um;
+  std::vector<Rgb> channel_rgb;
+  WaveCp wave;
+};
+
 struct SampleWangPyramid {
   SamplePyramid images;
   std::vector<float> masses;
@@ -198,6 +205,8 @@ SampleBinMap sampleBinMap(int width, int height);
 SampleHistograms sampleHistograms(int width, int height);
 /// samplePyramid with channels: channel c is brighter than the mean by the same share at every pixel.
 SampleWavePyramid sampleWavePyramid(int size, WaveChannels meaning, BlockPrecision precision);
+/// sampleNdfCp with channels: channel c has the images of the sample, turned by 4 c pixels along x.
+SampleWaveCp sampleWaveCp(int size, WaveChannels meaning);
 /// Level 1 and up of a chain, whose slopes are simple fractions. Half the width and half the height, rounded down, are powers of two.
 SampleSlopeMoments sampleSlopeMoments(int width, int height);
 /// An example of the normals of sampleNormals. Its images have a pixel for each texel.

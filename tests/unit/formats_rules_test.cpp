@@ -52,20 +52,38 @@ enum class Base {
   wang_pyramid,
   wang_cp,
   wave,
+  wave_cp,
   sh_lobes,
   sh_light,
   displacement,
   displacement_rgb,
   displacement_table
 };
-constexpr Base kBases[] = {Base::shard_normals, Base::pyramid_normals,  Base::compressed_normals,
-                           Base::normals,       Base::heights,          Base::pyramid,
-                           Base::shard,         Base::compressed,       Base::compressed_f32,
-                           Base::spots,         Base::bin_map,          Base::histograms,
-                           Base::moments,       Base::tiny_scattered,   Base::tiny_tiled,
-                           Base::wang_tiles,    Base::wang_pyramid,     Base::wang_cp,
-                           Base::wave,          Base::sh_lobes,         Base::sh_light,
-                           Base::displacement,  Base::displacement_rgb, Base::displacement_table};
+constexpr Base kBases[] = {Base::shard_normals,
+                           Base::pyramid_normals,
+                           Base::compressed_normals,
+                           Base::normals,
+                           Base::heights,
+                           Base::pyramid,
+                           Base::shard,
+                           Base::compressed,
+                           Base::compressed_f32,
+                           Base::spots,
+                           Base::bin_map,
+                           Base::histograms,
+                           Base::moments,
+                           Base::tiny_scattered,
+                           Base::tiny_tiled,
+                           Base::wang_tiles,
+                           Base::wang_pyramid,
+                           Base::wang_cp,
+                           Base::wave,
+                           Base::wave_cp,
+                           Base::sh_lobes,
+                           Base::sh_light,
+                           Base::displacement,
+                           Base::displacement_rgb,
+                           Base::displacement_table};
 
 void writeBase(const fs::path& path, Base base) {
   const Provenance provenance = test::sampleProvenance();
@@ -115,6 +133,8 @@ void writeBase(const fs::path& path, Base base) {
       return writeAsset(path, test::sampleWangCp().asset, provenance);
     case Base::wave:
       return writeAsset(path, test::sampleWavePyramid(64, WaveChannels::spectral, BlockPrecision::f16).wave, provenance);
+    case Base::wave_cp:
+      return writeAsset(path, test::sampleWaveCp(64, WaveChannels::spectral).wave, provenance);
     case Base::sh_lobes:
       return writeAsset(path, test::sampleShLobes().lobes, provenance);
     case Base::sh_light:
@@ -561,15 +581,17 @@ std::vector<Fixture> pyramidFixtures() {
   };
 }
 
+/// Shortens the arrays of images of a compressed pyramid to 20.
+void keep20Images(const Patch& patch) {
+  for (const char* path : {"image_regions", "image_slots"}) patch.replace(path, H5T_STD_U16LE, {20}, true);
+  for (const char* path : {"image_scales", "density_scales"}) patch.replace(path, H5T_IEEE_F32LE, {20}, true);
+  patch.replace("block_masks", H5T_STD_U64LE, {20, 1}, true);
+  patch.replace("first_block", H5T_STD_U32LE, {21}, true);
+}
+
 std::vector<Fixture> ndfCpFixtures() {
   return {
-      patched("compressed.images", Base::compressed,
-              [](const Patch& patch) {
-                for (const char* path : {"image_regions", "image_slots"}) patch.replace(path, H5T_STD_U16LE, {20}, true);
-                for (const char* path : {"image_scales", "density_scales"}) patch.replace(path, H5T_IEEE_F32LE, {20}, true);
-                patch.replace("block_masks", H5T_STD_U64LE, {20, 1}, true);
-                patch.replace("first_block", H5T_STD_U32LE, {21}, true);
-              }),
+      patched("compressed.images", Base::compressed, &keep20Images),
       patched("compressed.slots", Base::compressed,
               [](const Patch& patch) { patch.change<std::uint16_t>("image_regions", 5, [](auto& region) { region = 2; }); }),
       patched("compressed.slots", Base::compressed,
@@ -876,6 +898,12 @@ std::vector<Fixture> waveFixtures() {
   constexpr std::uint16_t kHalfNan = 0x7e00, kHalfOfMinus1 = 0xbc00, kHalfOf9 = 0x4880;
   return {
       patched("wave.channels", Base::wave, [](const Patch& patch) { patch.setText("channel_meaning", "xyz"); }),
+      patched("wave.channels", Base::wave_cp, [](const Patch& patch) { patch.setText("channel_meaning", "xyz"); }),
+      patched("wave.wavelengths", Base::wave_cp,
+              [](const Patch& patch) { patch.change<float>("wavelengths_um", 1, [](float& number) { number = 0.7f; }); }),
+      patched("wave.colours", Base::wave_cp,
+              [](const Patch& patch) { patch.change<float>("channel_rgb", 3, [](float& number) { number = 0.5f; }); }),
+      patched("compressed.images", Base::wave_cp, &keep20Images),
       changed("wave.wavelengths", "wavelengths_um", 1, 0.7f),
       changed("wave.wavelengths", "wavelengths_um", 0, 0),
       changed("wave.wavelengths", "wavelengths_um", 4, kNan),
@@ -1297,6 +1325,9 @@ TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
   EXPECT_EQ(tile_images.get<WangPyramid>().plane.grids[0].margin, 1);
   EXPECT_EQ(tile_images.get<WangPyramid>().plane.grids[0].masses[1], 0.75f);
   EXPECT_EQ(Asset::open(folder / "wang-cp.glint").get<WangCp>().images.shape.levels[0].rows, 16);
+  const Asset compressed_wave = Asset::open(folder / "wave-cp.glint");
+  EXPECT_EQ(compressed_wave.get<WaveCp>().images.shape.levels[0].rows, 3 * compressed_wave.get<WaveCp>().shape.levels[0].rows);
+  EXPECT_EQ(compressed_wave.get<WaveCp>().wavelengths_um[2], 0.4f + 0.125f);
   const Asset wave_asset = Asset::open(folder / "wave-pyramid.glint");
   const WavePyramid& wave = wave_asset.get<WavePyramid>();
   EXPECT_EQ(wave.channel_rgb[1], (Rgb{1 / 3.0f - 0.5f, 1 / 3.0f, 1 / 3.0f + 0.5f}));

@@ -250,5 +250,36 @@ TEST_F(WaveAsset, AnswersColoursThroughTheCInterface) {
   glint_ndf_close(ndf);
 }
 
+TEST(WaveCpAsset, IsAnsweredAsAWavePyramid) {
+  const test::TempFolder folder;
+  const auto path = folder.path() / "w.glint";
+  const test::SampleWaveCp compressed = test::sampleWaveCp(kSize, WaveChannels::spectral);
+  formats::writeAsset(path, compressed.wave, test::sampleProvenance());
+  const api::OpenedNdf opened = api::OpenedNdf::open(path);
+  ASSERT_TRUE(api::isWave(opened.model()));
+  ASSERT_EQ(api::channelCount(opened.model()), 5);
+  const AnisotropicNdf<WaveCpNdf> model(WaveCpNdf(compressed.wave));
+  const api::AnyBrdf any(opened, Fresnel::mirror());
+  EXPECT_EQ(any.facets(), api::BrdfFacets::waves);
+  const Vec3 wi = directionOf(0.1f, 0.05f), wo = directionOf(-0.02f, 0.1f);
+  for (const Question& q : someQuestions()) {
+    EXPECT_EQ(opened.model().density(q.footprint, q.psi), model.density(q.footprint, q.psi));
+    EXPECT_EQ(api::densityRgb(opened.model(), q.footprint, q.psi), model.densityRgb(q.footprint, q.psi));
+    const WaveBrdf brdf(model, q.footprint, opened.masking(), Fresnel::mirror());
+    EXPECT_EQ(any.evaluate(q.footprint, wi, wo), brdf.evaluate(wi, wo));
+    EXPECT_EQ(any.sample(q.footprint, wo, {0.3f, 0.8f}).wi.x, brdf.sample(wo, {0.3f, 0.8f}).wi.x);
+  }
+  glint_ndf* ndf = nullptr;
+  ASSERT_EQ(glint_ndf_open(path.string().c_str(), nullptr, &ndf), GLINT_OK);
+  const glint_footprint at = glint_footprint_isotropic(0.25, 0.75, 9);
+  float rgb[3], spectrum[5], expected[5];
+  EXPECT_EQ(glint_density_rgb(ndf, &at, 0.1f, -0.1f, rgb), GLINT_OK);
+  EXPECT_EQ((Rgb{rgb[0], rgb[1], rgb[2]}), model.densityRgb(Footprint::isotropic({0.25f, 0.75f}, 9), {0.1f, -0.1f}));
+  EXPECT_EQ(glint_density_spectrum(ndf, &at, 0.1f, -0.1f, spectrum, 5), GLINT_OK);
+  model.densitySpectrum(Footprint::isotropic({0.25f, 0.75f}, 9), {0.1f, -0.1f}, expected);
+  EXPECT_TRUE(std::equal(spectrum, spectrum + 5, expected));
+  glint_ndf_close(ndf);
+}
+
 }  // namespace
 }  // namespace glint::wave_query_test

@@ -19,7 +19,7 @@ from .wavefront import require_numbers
 
 _VARIANTS = ("full", "lobes", "single")
 
-_WITH_LEVELS = ("ndf-pyramid", "ndf-cp", "wave-pyramid")
+_WITH_LEVELS = ("ndf-pyramid", "ndf-cp", "wave-cp", "wave-pyramid")
 _WITH_IMAGES = (*_WITH_LEVELS, "wang-cp", "wang-pyramid")
 _WITH_NDF = (*_WITH_IMAGES, "slope-moments", "bin-map", "histogram-sat", "tiny-example", "wang-tiles", "normals")
 
@@ -103,7 +103,7 @@ class GlintLayer:
         self.lobe = _opened(self.plugin, self.path, lambda: self._lobe_of(ndf, facets))
 
     def _lobe_of(self, ndf, facets):
-        wavelengths = wavelengths_of(self.path) if mi.is_spectral and ndf.kind == "wave-pyramid" else None
+        wavelengths = wavelengths_of(self.path) if mi.is_spectral and ndf.kind in ("wave-cp", "wave-pyramid") else None
         return GlintLobe(ndf, facets) if wavelengths is None else SpectralLobe(ndf, wavelengths)
 
     def check(self, si):

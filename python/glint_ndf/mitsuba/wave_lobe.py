@@ -1,4 +1,4 @@
-"""Reflection by a wave-pyramid with a channel for each wavelength, for spectral variants."""
+"""Reflection by a wave-pyramid or wave-cp with a channel for each wavelength, for spectral variants."""
 
 import glint_ndf as gn
 import numpy as np

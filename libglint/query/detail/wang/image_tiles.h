@@ -72,14 +72,7 @@ class CompressedTiles {
     return images_.imageMean(chosen, place);
   }
   GLINT_HD float mean(const PyramidSlices& chosen, const Box2& range, Pixels pixels) const {
-    return withReader(ndf(), [&]<class Reader>(const Reader& reader) {
-      double sum = 0;
-      forEachBlock(shape(), range, pixels, [&](int block, const BlockBox& box) {
-        sum += double{
-            images_.sumSlices(chosen, block, ndf().image_scales.data(), CpNdf::BoxOf<Reader>{reader, box}, CpNdf::Signed{})};
-      });
-      return static_cast<float>(sum / double{areaInPixels(shape(), range)});
-    });
+    return images_.signedImageMean(chosen, range, pixels);
   }
   GLINT_HD PixelPlace draw(const PyramidSlice& image, Vec2& xi) const {
     PyramidSlices alone;
