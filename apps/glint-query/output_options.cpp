@@ -42,8 +42,9 @@ void TableOptions::write(const std::string& text) const {
 }
 
 PictureOptions::PictureOptions(Tool& tool) : tool_(tool) {
-  option_ = &tool.option("--image", path_,
-                         "write the NDF image: densities (kinds wave-pyramid and wave-cp: linear sRGB) as .exr, colours as .png");
+  option_ =
+      &tool.option("--image", path_,
+                   "write the NDF image: densities (kinds wave-pyramid and wave-cp: linear sRGB) as .exr, colours as .png");
   tool.option("--image-size", size_, "pixels of the image along each axis")
       .range(1, 4096)
       .defaultText("the asset's own, or 256");
