@@ -198,7 +198,8 @@ class GlintNative final : public BSDF<Float, Spectrum> {
 
   explicit GlintNative(const Properties& props) : Base(props), asset_(props) {
     if (asset_.coloured() && !is_rgb_v<Spectrum>)
-      Throw("glint_native: %s: colours of kinds wave-pyramid and wave-cp need an RGB variant; take the BSDF `glint`", asset_.path());
+      Throw("glint_native: %s: colours of kinds wave-pyramid and wave-cp need an RGB variant; take the BSDF `glint`",
+            asset_.path());
     const float scale = numberOf(props, "uv_scale", 1.f, 0.f, true);
     const bool in_texels = props.has_property("texels_per_unit");
     if (in_texels && props.has_property("uv_scale"))
