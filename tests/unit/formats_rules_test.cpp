@@ -1281,7 +1281,7 @@ TEST(GoldenFiles, OfVersion1_0KeepTheirValues) {
     EXPECT_EQ(Asset::open(entry.path()).info().provenance, test::sampleProvenance());
     ++count;
   }
-  EXPECT_EQ(count, 26u);
+  EXPECT_EQ(count, 27u);
 }
 
 TEST(GoldenFiles, OfVersion1_0GiveTheRecordedValues) {
