@@ -22,7 +22,7 @@
 # An image may be replaced by one of another type. Two images of one name are an error, because they would be one asset. Names may hold
 # blanks and signs; in a Makefile write them as Make wants them: assets/a\ b.glint, $$ for $, \# and \: for # and :. Of all images
 # together, $(call glint_all,pyramid) names the assets of a kind, written so. Names with ; | or = cannot be targets of Make, nor can
-# GLINT_MAPS and GLINT_OUT hold blanks.
+# GLINT_MAPS and GLINT_OUT hold blanks or signs but . _ / + @ ~ and -.
 
 GLINT_MAPS ?= .
 GLINT_OUT ?= .
@@ -56,6 +56,11 @@ GLINT_LOBES_FLAGS ?=
 
 $(foreach folder,GLINT_MAPS GLINT_OUT,$(if $(word 2,$($(folder))),$(error $(folder) is "$($(folder))", and lists of Make cannot hold \
   a folder with a blank in its name; make a symbolic link to it, and name the link)))
+
+# Rules, patterns and commands each give signs a meaning of their own.
+$(foreach folder,GLINT_MAPS GLINT_OUT,$(if $(shell printf %s '$(subst ','\'',$($(folder)))' | LC_ALL=C tr -d 'A-Za-z0-9._/+@~\200-\377-'),\
+  $(error $(folder) is "$($(folder))", and rules of Make can hold folders of letters, digits and . _ / + @ ~ - alone; make a symbolic link \
+  to it, and name the link)))
 
 # A text as one word of the shell.
 glint_quote = '$(subst ','\'',$(1))'

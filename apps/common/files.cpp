@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <string_view>
 
 #include "common/answer_columns.h"
@@ -69,9 +70,31 @@ std::string headOf(const std::string& path, std::size_t most) {
 }
 
 bool isImage(std::string_view start) {
-  static constexpr std::array kImages = {"\x89PNG"sv, "\x76\x2f\x31\x01"sv, "II*\0"sv, "MM\0*"sv, "#?RADIANCE"sv, "PF\n"sv,
-                                         "Pf\n"sv,    "\xff\xd8\xff"sv};
-  return std::any_of(kImages.begin(), kImages.end(), [&](std::string_view magic) { return start.starts_with(magic); });
+  static constexpr std::array kImages = {"\x89PNG"sv, "\x76\x2f\x31\x01"sv, "II*\0"sv, "MM\0*"sv, "II+\0"sv,
+                                         "MM\0+"sv,   "#?RADIANCE"sv,       "PF\n"sv,  "Pf\n"sv,  "P5\n"sv,
+                                         "P6\n"sv,    "\xff\xd8\xff"sv,     "BM"sv,    "GIF8"sv,  "DDS "sv};
+  const bool webp = start.starts_with("RIFF"sv) && start.substr(8).starts_with("WEBP"sv);
+  return webp || std::any_of(kImages.begin(), kImages.end(), [&](std::string_view magic) { return start.starts_with(magic); });
+}
+
+/// Whether a file is an image of TGA, which only its end says.
+bool isTga(const std::string& path) {
+  constexpr std::string_view kSignature = "TRUEVISION-XFILE.\0"sv;
+  std::ifstream file(path, std::ios::binary);
+  std::string end(kSignature.size(), ' ');
+  file.seekg(-static_cast<std::streamoff>(end.size()), std::ios::end);
+  file.read(end.data(), static_cast<std::streamsize>(end.size()));
+  return file.good() && end == kSignature;
+}
+
+/// A name as one word of a command, for people to paste.
+std::string shellWord(const std::string& name) {
+  constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._/+@-";
+  const std::string word = name.starts_with('-') ? "./" + name : name;
+  if (!word.empty() && word.find_first_not_of(kPlain) == std::string::npos) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? "'\\''" : std::string(1, c);
+  return quoted + "'";
 }
 
 /// Whether the first bytes of a file show that it is an earlier result of the same kind.
@@ -83,7 +106,7 @@ bool mayReplace(const std::string& path, OutputFormat format) {
     case OutputFormat::asset:
       return head.starts_with("\x89HDF\r\n\x1a\n"sv) && head.find("glint_format") != std::string::npos;
     case OutputFormat::image:
-      return isImage(head);
+      return isImage(head) || isTga(path);
     case OutputFormat::table:
       return isAnswerHeader(std::string_view(head).substr(0, head.find('\n')));
     case OutputFormat::depfile:
@@ -356,7 +379,8 @@ void checkOutput(Tool& tool, const std::string& path, OutputFormat format) {
   const fs::path folder = folderOf(target.path);
   struct stat info {};
   if (::stat(folder.c_str(), &info) != 0 || !S_ISDIR(info.st_mode)) {
-    throwIo("output.folder", path, "there is no folder " + folder.string(), "make it with mkdir -p " + folder.string());
+    throwIo("output.folder", path, "there is no folder " + folder.string(),
+            "make it with mkdir -p " + shellWord(folder.string()));
   }
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
     throwIo("output.folder", path, "the folder " + folder.string() + " cannot be written: " + systemError(),

@@ -31,7 +31,9 @@ const ImageFormats& imageFormats() {
     if (!table) {
       if (errno == ENOMEM) throw std::bad_alloc();
       const char* text = ::dlerror();
-      const std::string reason = text ? " (" + std::string(text) + ")" : "";  // the text goes with the next call
+      const std::string reason = text ? " (" + std::string(text) + ")" : "";             // the text goes with the next call
+      for (const char* of_memory : {"failed to map segment", "cannot allocate memory"})  // the linker sets no errno
+        if (reason.find(of_memory) != std::string::npos) throw std::bad_alloc();
       if (std::filesystem::exists(path)) checkSystemReads(path);
       throw Error(ErrorCode::failed, "image.formats", path, "",
                   "the part that reads and writes images cannot be loaded" + reason,

@@ -20,9 +20,21 @@ std::span<const std::byte> withoutByteOrderMark(std::span<const std::byte> bytes
   return marked ? bytes.subspan(kMark.size()) : bytes;
 }
 
+/// Throws if a text is of 16-bit characters: with a byte-order mark or without, it has bytes of 0.
+void checkEncoding(const std::string& path, std::span<const std::byte> text) {
+  constexpr std::array kMarks = {std::array{std::byte{0xFF}, std::byte{0xFE}}, std::array{std::byte{0xFE}, std::byte{0xFF}}};
+  const bool marked = std::any_of(kMarks.begin(), kMarks.end(), [&](const auto& mark) {
+    return text.size() >= mark.size() && std::equal(mark.begin(), mark.end(), text.begin());
+  });
+  if (!marked && std::find(text.begin(), text.end(), std::byte{0}) == text.end()) return;
+  throw Error(ErrorCode::invalid_input, "csv.encoding", path, "", "the text is not UTF-8",
+              "save the table as CSV UTF-8 with commas between columns");
+}
+
 Rows parseCsv(const std::string& path) {
   const std::vector<std::byte> bytes = readFile(path);
   const std::span<const std::byte> text = withoutByteOrderMark(bytes);
+  checkEncoding(path, text);
   csv_parser parser;
   if (csv_init(&parser, CSV_STRICT | CSV_STRICT_FINI) != 0) throw std::bad_alloc();
   const std::unique_ptr<csv_parser, void (*)(csv_parser*)> guard(&parser, csv_free);
@@ -42,8 +54,9 @@ Rows parseCsv(const std::string& path) {
   const bool ok = csv_parse(&parser, text.data(), text.size(), onField, onRow, &state) == text.size() &&
                   csv_fini(&parser, onField, onRow, &state) == 0;
   if (!ok)
-    throw Error(ErrorCode::invalid_input, "csv.syntax", path, fmt::format("row {}", state.rows.size() + 1),
-                csv_strerror(csv_error(&parser)), "quote fields as RFC 4180 says");
+    throw Error(ErrorCode::invalid_input, "csv.syntax", path,
+                state.rows.empty() ? "header" : fmt::format("row {}", state.rows.size()), csv_strerror(csv_error(&parser)),
+                "quote fields as RFC 4180 says");
   if (state.rows.empty())
     throw Error(ErrorCode::invalid_input, "csv.empty", path, "", "the table is empty",
                 "give a header and a row for each query");
@@ -60,18 +73,46 @@ std::string csvField(const std::string& text) {
 
 }  // namespace
 
-CsvTable CsvTable::read(const std::string& path) {
+CsvTable CsvTable::read(const std::string& path, const std::function<void(const CsvTable&)>& check_columns) {
   CsvTable table;
   table.path_ = path;
   table.rows_ = parseCsv(path);
   for (const std::string& name : table.rows_.front()) table.keys_.push_back(columnKey(name));
-  for (std::size_t r = 1; r < table.rows_.size(); ++r) {
-    if (table.rows_[r].size() == table.rows_.front().size()) continue;
-    table.fail("csv.row", r - 1,
-               fmt::format("{} fields where the header has {}", table.rows_[r].size(), table.rows_.front().size()),
-               "give every row as many fields");
-  }
+  table.checkHeader();
+  check_columns(table);
+  table.checkRows();
   return table;
+}
+
+void CsvTable::checkHeader() const {
+  const auto refuse = [&](const std::string& what, const std::string& remedy) {
+    throw Error(ErrorCode::invalid_input, "csv.columns", path_, "header", what, remedy);
+  };
+  const std::string& first = rows_.front().front();
+  if (first.starts_with('#')) refuse("the first line is a comment", "begin the table with its header; leave comments out");
+  if (rows_.front().size() > 1) return;
+  for (const auto& [sign, name] : {std::pair(';', "semicolons"), std::pair('\t', "tabs")}) {
+    if (first.find(sign) != std::string::npos)
+      refuse(fmt::format("the columns {} are separated by {}", header(), name),
+             "separate columns by commas, and write numbers with a decimal point");
+  }
+}
+
+void CsvTable::checkRows() const {
+  const std::size_t columns = rows_.front().size();
+  for (std::size_t r = 1; r < rows_.size(); ++r) {
+    if (rows_[r].size() == columns) continue;
+    const bool comment = !rows_[r].empty() && rows_[r].front().starts_with('#');
+    fail("csv.row", r - 1,
+         comment ? "is a comment" : fmt::format("{} fields where the header has {}", rows_[r].size(), columns),
+         comment ? "leave comments out" : "give every row as many fields");
+  }
+}
+
+void CsvTable::failPart(std::span<const char* const> names) const {
+  throw Error(ErrorCode::invalid_input, "csv.columns", path_, "header",
+              fmt::format("the columns {} name a part of {}", header(), fmt::join(names, ",")),
+              fmt::format("name all of {}, or none", fmt::join(names, ",")));
 }
 
 std::size_t CsvTable::find(const std::string& name) const {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,8 +16,9 @@ namespace glint::apps {
 /// skipped. Names of columns match in any case and with blanks around them; parseNumber reads the numbers.
 class CsvTable {
  public:
+  /// @param check_columns  throws unless the header names what is needed; it is judged before the rows
   /// @throws Error io; invalid_input that names the row
-  static CsvTable read(const std::string& path);
+  static CsvTable read(const std::string& path, const std::function<void(const CsvTable&)>& check_columns);
 
   const std::string& path() const { return path_; }
   /// Rows below the header.
@@ -25,6 +27,17 @@ class CsvTable {
   template <std::size_t N>
   bool has(const std::array<const char*, N>& names) const {
     return std::all_of(names.begin(), names.end(), [&](const char* name) { return find(name) < keys_.size(); });
+  }
+
+  /// Whether some of the columns are there and others are not.
+  template <std::size_t N>
+  bool hasPart(const std::array<const char*, N>& names) const {
+    return !has(names) && std::any_of(names.begin(), names.end(), [&](const char* name) { return find(name) < keys_.size(); });
+  }
+  /// @throws Error invalid_input if some of the columns are there and others are not
+  template <std::size_t N>
+  void requireWhole(const std::array<const char*, N>& names) const {
+    if (hasPart(names)) failPart(names);
   }
 
   /// Numbers of one row, 0 being the first below the header.
@@ -60,6 +73,9 @@ class CsvTable {
 
  private:
   std::size_t find(const std::string& name) const;
+  [[noreturn]] void failPart(std::span<const char* const> names) const;
+  void checkHeader() const;
+  void checkRows() const;
   template <class T>
   T number(const char* column, std::size_t row) const;
 

@@ -95,14 +95,17 @@ void DistributionCommand::warnOfWidening(const std::string& which) {
 
 void DistributionCommand::answerTable() {
   const QueryTable table = QueryTable::read(table_.csv());
-  std::size_t widened = 0;
+  std::size_t widened = 0, outside = 0;
   for (std::size_t row = 0; row < table.queries().size(); ++row) {
+    outside += asset_.lacksTileAt(table.queries()[row].u, table.queries()[row].v) ? 1 : 0;
     if (const auto fault = asset_.unanswerable(table.queries()[row].footprint))
       throw Error(ErrorCode::usage, "query.footprint", table_.csv(), fmt::format("row {}", row + 1), fault->what,
                   fault->remedy);
     widened += asset_.widens(table.queries()[row].footprint) ? 1 : 0;
   }
   if (widened > 0) warnOfWidening(fmt::format("{} footprints are", widened));
+  if (outside > 0)
+    tool_.warn(fmt::format("{}: has no tile at {} of the footprints: densities are 0 there", asset_.path(), outside));
   table_.write(table.withAnswers(answerAll(asset_.model(), table.queries())));
   tool_.setResult({{"queries", table.queries().size()}});
 }

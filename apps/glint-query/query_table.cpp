@@ -6,6 +6,11 @@ namespace glint::apps {
 namespace {
 
 void requireColumns(const CsvTable& columns) {
+  columns.requireWhole(kSpread);
+  columns.requireWhole(kCovariance);
+  columns.requireWhole(kBox);
+  columns.requireWhole(kHalf);
+  columns.requireWhole(kRange);
   const int sizes = columns.has(kSigma) + columns.has(kCovariance) + columns.has(kBox);
   const int targets = columns.has(kHalf) + columns.has(kRange);
   if (columns.has(kCentre) && sizes == 1 && targets == 1) return;
@@ -54,14 +59,13 @@ Query readQuery(const CsvTable& columns, std::size_t row) {
 }  // namespace
 
 QueryTable QueryTable::read(const std::string& path) {
-  QueryTable table{CsvTable::read(path)};
-  requireColumns(table.table_);
+  QueryTable table{CsvTable::read(path, requireColumns)};
   for (std::size_t r = 0; r < table.table_.count(); ++r) table.queries_.push_back(readQuery(table.table_, r));
   return table;
 }
 
 std::string QueryTable::withAnswers(std::span<const float> answers) const {
-  const std::string name = !queries_.empty() && queries_.front().range ? kMean : kDensity;
+  const std::string name = table_.has(kRange) ? kMean : kDensity;
   return table_.withColumns({&name, 1}, answers);
 }
 

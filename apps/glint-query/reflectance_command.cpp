@@ -40,6 +40,18 @@ std::optional<FootprintFault> levelFault(const Displacement& asset, int level) {
   return FootprintFault{fmt::format("the asset has no level {}", level), fmt::format("give 0 to {}", asset.level_count - 1)};
 }
 
+bool asksReflection(const CsvTable& table) { return table.has(kLight) && table.has(kView); }
+
+void requireColumns(const CsvTable& table) {
+  table.requireWhole(kLight);
+  table.requireWhole(kView);
+  table.requireWhole(kHalf);
+  if (!table.has(kCentre) || table.has(kSigma) == table.has(kLevel) || asksReflection(table) == table.has(kHalf))
+    throw Error(ErrorCode::invalid_input, "csv.columns", table.path(), "header",
+                "the columns " + table.header() + " do not make one query of a displacement",
+                "name u,v; sigma or level; wix,wiy,wiz,wox,woy,woz or hx,hy");
+}
+
 /// The direction in three columns of a row.
 Vec3 directionOf(const CsvTable& table, std::size_t row, const std::array<const char*, 3>& columns) {
   const auto [x, y, z] = table.numbers(columns, row);
@@ -170,12 +182,8 @@ void ReflectanceCommand::writeSamples(const DisplacedBrdf& brdf, const Displaced
 }
 
 void ReflectanceCommand::answerTable(const DisplacedBrdf& brdf) const {
-  const CsvTable table = CsvTable::read(table_.csv());
-  const bool reflects = table.has(kLight) && table.has(kView);
-  if (!table.has(kCentre) || table.has(kSigma) == table.has(kLevel) || reflects == table.has(kHalf))
-    throw Error(ErrorCode::invalid_input, "csv.columns", table.path(), "header",
-                "the columns " + table.header() + " do not make one query of a displacement",
-                "name u,v; sigma or level; wix,wiy,wiz,wox,woy,woz or hx,hy");
+  const CsvTable table = CsvTable::read(table_.csv(), requireColumns);
+  const bool reflects = asksReflection(table);
   std::vector<std::string> names = {reflects ? kReflected : kDensity};
   if (reflects && brdf.asset().channels == 3) names.assign(kReflectedRgb.begin(), kReflectedRgb.end());
   std::vector<float> answers;

@@ -168,6 +168,28 @@ def test_columns_that_make_no_query_are_named(glint, assets):
     assert "two columns are named u" in process.stderr
 
 
+@pytest.mark.parametrize(
+    "table, message",
+    [
+        ("u,v,sigma,hx,hy,spread_y\n0,0,20,0,0,.1\n", "name all of spread_x,spread_y"),
+        ("u;v;sigma;hx;hy\n0,3;0,7;20;0;0\n", "separated by semicolons"),
+        ("# queries\nu,v,sigma,hx,hy\n0,0,20,0,0\n", "the first line is a comment"),
+        ("u,v,sigma,hx\n0,0,20,0,0\n", "name all of hx,hy"),
+        ("u,v,sigma\n0,0,20,0\n", "do not make one query"),
+        ("u,v,sigma,hx,hy\n0,0,20,0,0\n0,0,20,0\n", "row 2: 4 fields"),
+        ('u,v,sigma,hx,hy\n0,0,20,0,0\n0,0,"20"x,0,0\n', "row 2: "),
+        ("u\0,\0v\0", "not UTF-8"),
+    ],
+)
+def test_tables_are_judged_by_text_then_columns_then_rows(glint, assets, table, message):
+    process = ask_table(glint, assets["normals"], table)
+    assert process.returncode == 3 and message in process.stderr, process.stderr
+
+
+def test_a_table_of_a_header_gets_the_column_that_its_rows_would_get(glint, assets):
+    assert ask_table(glint, assets["normals"], "u,v,sigma,x0,y0,x1,y1\n").stdout == "u,v,sigma,x0,y0,x1,y1,mean\n"
+
+
 @pytest.mark.parametrize("cell", ["nan", "inf", "", "x", "1e99", "0x1", "1 2"])
 def test_cells_that_are_no_numbers_are_refused_by_row_and_column(glint, assets, cell):
     process = ask_table(glint, assets["normals"], f"u,v,sigma,hx,hy\n.3,.7,20,0,0\n.3,.7,20,{cell},0\n")
