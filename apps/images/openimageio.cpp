@@ -164,6 +164,12 @@ bool isAssociated(const OIIO::ImageInput& input, const OIIO::ImageSpec& spec) {
          spec.get_int_attribute("oiio:UnassociatedAlpha") == 0;
 }
 
+/// The names of all channels. A reader that names fewer than it has (FITS) knows none: R, G, B, A in their order, then others.
+std::vector<std::string> channelNames(const OIIO::ImageSpec& spec) {
+  if (static_cast<int>(spec.channelnames.size()) == spec.nchannels) return spec.channelnames;
+  return OIIO::ImageSpec(1, 1, spec.nchannels, spec.format).channelnames;
+}
+
 /// Number in the file that a value of 1 stands for.
 double codeScale(const OIIO::ImageSpec& spec) {
   if (spec.format.is_floating_point()) return 1;
@@ -201,7 +207,7 @@ StoredImage readImageFile(const std::string& path, const std::string& part, cons
   image.width = spec.width;
   image.height = spec.height;
   image.channels = spec.nchannels;
-  image.channel_names.assign(spec.channelnames.begin(), spec.channelnames.end());
+  image.channel_names = channelNames(spec);
   image.format = input->format_name();
   image.bits = spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.basesize()) * 8);
   image.floating = spec.format.is_floating_point();

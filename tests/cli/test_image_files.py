@@ -218,6 +218,23 @@ def test_layers_are_found_in_any_part(glint):
     refused(glint, "q.exr", "bumps", options=["--layer", "bumps", "--subimage", "0"])
 
 
+def test_channels_that_a_reader_does_not_name_are_read(glint):
+    """OpenImageIO names one channel of a FITS file, however many there are."""
+    write(glint.folder / "r.fits", surface())
+    ingest(glint, "r.fits", "--encoding", "snorm")
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=HALF)
+    ingest(glint, "r.fits", "--encoding", "snorm", "--channels", "rg", "--force")
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=HALF)
+    for channels in (2, 5):
+        pixels = numpy.zeros((40, 48, channels))
+        pixels[..., :2] = surface()[..., :2]
+        write(glint.folder / "c.fits", pixels)
+        ingest(glint, "c.fits", "--encoding", "snorm", "--channels", "rg", "--force")
+        assert data(glint) == pytest.approx(surface()[..., :2], abs=HALF)
+    light = glint("shlobes", "--light", "r.fits", "-o", "l.glint", "--order", 4)
+    assert light.returncode in (0, 3), light.stderr
+
+
 # --- conventions for two channels
 
 
