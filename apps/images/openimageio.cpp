@@ -53,6 +53,16 @@ void checkSize(const OIIO::ImageSpec& spec, const std::string& path, const std::
   checkDeclaredSize(path, format, spec.image_bytes(true), most_bytes);
 }
 
+/// OpenImageIO leaves tiles of such TIFFs unread, and reports success: it forgets all but 1 to 16 and 32 bits.
+void checkTiledBits(const OIIO::ImageSpec& spec, const std::string& path, std::string_view format) {
+  const int bits = spec.get_int_attribute("oiio:BitsPerSample", static_cast<int>(spec.format.basesize()) * 8);
+  const bool is_read = bits <= 16 || bits == 32;
+  if (format != "tiff" || spec.tile_width == 0 || (is_read && spec.format != OIIO::TypeDesc::DOUBLE)) return;
+  throw Error(ErrorCode::unsupported, "image.tiled_bits", path, "",
+              fmt::format("is a TIFF in tiles whose numbers have {} bits, which cannot be read", bits),
+              "export it with 32 bits (float32), or in strips instead of tiles");
+}
+
 /// @throws Error usage if a value does not fit
 template <class T>
 std::vector<T> toCodes(std::span<const float> values, const std::string& path) {
@@ -204,6 +214,7 @@ StoredImage readImageFile(const std::string& path, const std::string& part, cons
   if (image.part > 0 && !input->seek_subimage(image.part, 0)) throwDamagedImage(path, trimmed(input->geterror()));
   const OIIO::ImageSpec spec = input->spec();
   checkSize(spec, path, input->format_name(), most_bytes);
+  checkTiledBits(spec, path, input->format_name());
   image.width = spec.width;
   image.height = spec.height;
   image.channels = spec.nchannels;

@@ -119,6 +119,25 @@ def test_the_blue_of_filtered_maps_is_z(glint, kind, options, factor):
 # --- heights
 
 
+@pytest.mark.parametrize("channels, end", [(1, "<"), (1, ">"), (3, "<")])
+def test_tiles_of_doubles_are_refused_and_strips_read(glint, channels, end):
+    """OpenImageIO 2.4 leaves such tiles unread and says that it has read them."""
+    kind = ["--kind", "height", "--to", "heights"] if channels == 1 else ["--encoding", "snorm"]
+    pixels = surface() if channels == 3 else numpy.random.default_rng(1).random((40, 48, 1)) * 100
+    spec = oiio.ImageSpec(48, 40, channels, "double")
+    spec.attribute("tiff:endian", {"<": "little", ">": "big"}[end])
+    for tile in (16, 0):
+        spec.tile_width = spec.tile_height = tile
+        output = oiio.ImageOutput.create("d.tif")
+        assert output.open(str(glint.folder / "d.tif"), spec) and output.write_image(pixels), output.geterror()
+        output.close()
+        if tile > 0:
+            refused(glint, "d.tif", "64 bits", "float32", "strips", options=kind, code=5)
+    ingest(glint, "d.tif", *kind)
+    values = data(glint, "heights" if channels == 1 else "normals")
+    assert values == pytest.approx(pixels[..., 0] if channels == 1 else pixels[..., :2], abs=1e-4)
+
+
 def test_cliffs_are_moved_to_the_rim_and_counted(glint):
     heights = numpy.zeros((32, 32, 1), numpy.uint16)
     heights[10:20, 12:22] = 65535
