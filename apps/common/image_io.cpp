@@ -58,6 +58,16 @@ void checkJpegComplete(const std::string& path) {
   if (std::find_end(bytes.begin(), bytes.end(), kEndOfImage.begin(), kEndOfImage.end()) == bytes.end())
     throwDamagedImage(path, "the end marker of the JPEG is missing");
 }
+
+/// Takes from the tags of a TIFF what OpenImageIO does not tell, or tells wrongly.
+void readTiffTags(Image& image, const std::string& path) {
+  if (lacksBitsPerSample(path, image.part)) {
+    throw Error(ErrorCode::unsupported, "image.bits", path, "",
+                "is a TIFF that does not say how many bits a sample has (tag 258), which means 1 bit and cannot be read",
+                "export it with 8 bits or as PNG");
+  }
+  image.no_data = geoTiffNoData(path, image.part);
+}
 }  // namespace
 
 Image readImage(const std::string& path, const ImageChoice& choice) {
@@ -69,7 +79,7 @@ Image readImage(const std::string& path, const ImageChoice& choice) {
   if (png) findPart(path, choice.part, image.parts);
   if (image.format == "jpeg") checkJpegComplete(path);
   if (image.format == "webp") stored.orientation = webpOrientation(path);
-  if (image.format == "tiff") image.no_data = geoTiffNoData(path, image.part);
+  if (image.format == "tiff") readTiffTags(image, path);
   if (choice.window == ImageChoice::Window::display) cropToDisplay(stored, choice, path);
   orient(stored);
   const bool full_names = choice.channels.find('.') != std::string::npos;

@@ -13,7 +13,7 @@
 namespace glint::apps {
 namespace {
 
-constexpr std::uint64_t kOrientation = 274, kGdalNoData = 42113;
+constexpr std::uint64_t kImageWidth = 256, kBitsPerSample = 258, kOrientation = 274, kGdalNoData = 42113;
 constexpr std::uint64_t kShort = 3;
 /// Numbers in text are shorter than this.
 constexpr std::uint64_t kLongestText = 256;
@@ -82,16 +82,30 @@ class TiffReader {
   bool big_ = false;
 };
 
-}  // namespace
-
-std::optional<double> geoTiffNoData(const std::string& path, int directory) {
-  std::ifstream file(path, std::ios::binary);
-  TiffReader reader([&](std::uint64_t offset, std::span<std::byte> bytes) {
+/// Reads the bytes of a file. It must outlive what is returned.
+ReadBytes bytesOf(std::ifstream& file) {
+  return [&file](std::uint64_t offset, std::span<std::byte> bytes) {
     file.clear();
     file.seekg(static_cast<std::streamoff>(offset & INT64_MAX));
     file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     return file.good();
-  });
+  };
+}
+
+/// Whether a directory of a TIFF is there, and has no such tag.
+bool lacks(const std::string& path, int directory, std::uint64_t tag) {
+  std::ifstream file(path, std::ios::binary);
+  TiffReader reader(bytesOf(file));
+  return reader.find(directory, kImageWidth) && !reader.find(directory, tag);
+}
+
+}  // namespace
+
+bool lacksBitsPerSample(const std::string& path, int directory) { return lacks(path, directory, kBitsPerSample); }
+
+std::optional<double> geoTiffNoData(const std::string& path, int directory) {
+  std::ifstream file(path, std::ios::binary);
+  TiffReader reader(bytesOf(file));
   const std::optional<Tag> tag = reader.find(directory, kGdalNoData);
   if (!tag) return {};
   const std::string text = reader.text(*tag);

@@ -138,6 +138,20 @@ def test_tiles_of_doubles_are_refused_and_strips_read(glint, channels, end):
     assert values == pytest.approx(pixels[..., 0] if channels == 1 else pixels[..., :2], abs=1e-4)
 
 
+@pytest.mark.parametrize("compression", [None, "group4"])
+def test_a_tiff_that_does_not_say_its_bits_is_refused(glint, compression):
+    """Pillow leaves out the tag where its default, 1, is right; OpenImageIO takes 8 for the default."""
+    bits = numpy.random.default_rng(1).random((40, 48)) > 0.5
+    image = Image.fromarray(bits.astype(numpy.uint8) * 255)
+    image.convert("1").save(glint.folder / "b.tif", compression=compression)
+    heights = ["--kind", "height", "--to", "heights"]
+    refused(glint, "b.tif", "tag 258", "8 bits", options=heights, code=5)
+    for remedy in ("8.tif", "b.png"):
+        (image if remedy == "8.tif" else image.convert("1")).save(glint.folder / remedy)
+        ingest(glint, remedy, *heights, "--force")
+        assert numpy.array_equal(data(glint, "heights") > 0.5, bits)
+
+
 def test_cliffs_are_moved_to_the_rim_and_counted(glint):
     heights = numpy.zeros((32, 32, 1), numpy.uint16)
     heights[10:20, 12:22] = 65535
