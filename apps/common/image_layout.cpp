@@ -54,6 +54,8 @@ int channelOfLetter(const Image& image, char letter) {
   for (int c = 0; c < image.channels; ++c) {
     if (layerPart(image.channel_names[static_cast<std::size_t>(c)]) == std::string(1, letter)) return c;
   }
+  // Grey and alpha are red, green, blue and alpha in fewer bytes.
+  if (image.channels == 2 && image.alpha >= 0 && std::string("rgb").find(letter) != std::string::npos) return 1 - image.alpha;
   for (int c = 0; c < std::min(image.channels, 4); ++c)
     if (std::string(kChannelLetters[c]).find(letter) != std::string::npos) return c;
   return -1;

@@ -26,7 +26,8 @@ inline std::string layerOf(const std::string& channel) {
 void selectLayer(Image& image, const std::string& layer, const std::string& path);
 
 /// Numbers of the channels that are meant: names with commas between them, or letters. A letter is the channel of this name,
-/// else one by its place: r and x are the first, g and y the second, b and z the third, a the fourth.
+/// else one by its place: r and x are the first, g and y the second, b and z the third, a the fourth. In an image of grey and
+/// alpha, r, g and b are grey.
 /// @throws Error invalid_input if one is missing
 std::vector<int> findChannels(const Image& image, const std::string& channels, const std::string& path);
 

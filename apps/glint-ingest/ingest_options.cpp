@@ -123,6 +123,7 @@ Image IngestOptions::read(Tool& tool, const std::string& path, bool of_any_size)
 bake::PixelArray pixelArray(const Image& image) {
   bake::PixelArray array{image.width, image.height, image.channels, {}, image.code_scale};
   array.inverted = image.inverted;
+  array.grey_alpha = image.channels == 2 && image.alpha >= 0;
   // Integers with a sign are read as floats, and so are integers that were divided by alpha.
   const bool floats = std::holds_alternative<PixelVector<float>>(image.pixels);
   if (floats && !image.floating) array.step = static_cast<float>(1 / image.code_scale);

@@ -290,6 +290,32 @@ def test_x_and_y_in_grey_and_alpha_need_a_word(glint, grey, alpha, option):
     assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
 
 
+@pytest.mark.parametrize("name, kind", [("d.png", "uint8"), ("d.png", "uint16"), ("d.tif", "uint16"), ("d.tif", "float")])
+@pytest.mark.parametrize("grey, alpha, option", [(1, 0, "ag"), (0, 1, "ra")])
+def test_grey_and_alpha_of_two_channels_need_the_same_word(glint, name, kind, grey, alpha, option):
+    """Optimisers store an image whose red, green and blue are the same as grey and alpha."""
+    n = unorm(surface())
+    pixels = n[..., [grey, alpha]]
+    write(glint.folder / name, pixels, kind, names=["Y", "A"], **{"oiio:UnassociatedAlpha": 1})
+    refused(glint, name, "--channels ag", "--channels ra")
+    ingest(glint, name, "--channels", option)
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
+
+
+def test_grey_without_alpha_is_no_normal_map(glint):
+    grey = numpy.stack([unorm(surface())[..., 0], numpy.ones((40, 48), numpy.float32)], axis=-1)
+    write(glint.folder / "d.png", grey, "uint8", names=["Y", "A"])
+    refused(glint, "d.png", "--kind height")
+    ingest(glint, "d.png", "--kind", "height")
+
+
+def test_two_channels_without_alpha_are_x_and_y(glint):
+    for name, kind in (("d.exr", "float"), ("d.tif", "uint16")):
+        write(glint.folder / name, unorm(surface())[..., :2], kind, names=["R", "G"])
+        ingest(glint, name, "--force")
+        assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
+
+
 def test_x_in_red_or_in_alpha_needs_a_word(glint):
     """Red and blue of one value say nothing of where x is; the z of grooves along x varies."""
     n = codes(surface())

@@ -210,15 +210,17 @@ bool areSame(const PixelArray& image, int a, int b) {
 NormalLayout findLayout(const PixelArray& image, const IngestOptions& p) {
   NormalLayout layout;
   if (image.channels == 2) layout = {NormalChannels::rg, 0, 1, -1};
-  if (image.channels < 3 || p.trust_channels) return layout;
-  const bool alpha = image.channels > 3 && !isConstant(image, 3);
-  const bool grey = !isConstant(image, 0) && areSame(image, 0, 1) && areSame(image, 0, 2);
+  if ((image.channels < 3 && !image.grey_alpha) || p.trust_channels) return layout;
+  const int last = image.grey_alpha ? 1 : 3;
+  const bool alpha = image.channels > last && !isConstant(image, last);
+  const bool grey = image.grey_alpha || (!isConstant(image, 0) && areSame(image, 0, 1) && areSame(image, 0, 2));
+  const std::string what = image.grey_alpha ? "there is no colour but grey" : "red, green and blue are the same";
   if (grey && !alpha) {
-    throwInvalid("normals.channels", p.name, "", "red, green and blue are the same: this is no normal map",
+    throwInvalid("normals.channels", p.name, "", what + ": this is no normal map",
                  "read heights with --kind height");
   }
   if (grey) {
-    throwInvalid("normals.channels", p.name, "", "red, green and blue are the same, so x and y are among grey and alpha",
+    throwInvalid("normals.channels", p.name, "", what + ", so x and y are among grey and alpha",
                  "say which is x and which is y: --channels ag or --channels ra");
   }
   // DXT5nm has x in alpha, and red constant at 0 or 1. As x, such a red would leave no room for y and z.

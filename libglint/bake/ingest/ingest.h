@@ -23,6 +23,7 @@ struct PixelArray {
   double code_scale = 1;  ///< number in the file that became a float of 1
   bool inverted = false;  ///< the file held code_scale minus the code: 0 is white in it
   float step = 0;         ///< difference of neighbouring codes, if floats were computed from integer codes; 0: unknown
+  bool grey_alpha = false;  ///< the two channels are grey and alpha, and not red and green
 };
 
 /// Direction of +y in the file: up (opengl) or down (directx).
