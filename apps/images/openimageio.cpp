@@ -2,6 +2,7 @@
 #include <OpenImageIO/imagebuf.h>
 #include <OpenImageIO/imagebufalgo.h>
 #include <OpenImageIO/imageio.h>
+#include <OpenImageIO/strutil.h>
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
@@ -126,15 +127,45 @@ std::string unreadableRemedy(const std::string& reason) {
   return "check that the file is complete and in a format that oiiotool --info can read";
 }
 
+/// Names of readers to try: the one of the file name extension, then all.
+std::vector<std::string> readersFor(const std::string& path) {
+  // "tiff:tif,tiff;jpeg:jpg,jpe": names, and extensions, which are names as well.
+  const std::string known = ":" + OIIO::get_string_attribute("extension_list") + ";";
+  const std::string extension = OIIO::Strutil::lower(OIIO::Filesystem::extension(path, false));
+  std::vector<std::string> readers = OIIO::Strutil::splits(OIIO::get_string_attribute("input_format_list"), ",");
+  for (const char* const end : {",", ";"})
+    for (const char* const start : {",", ":"})
+      if (!extension.empty() && known.find(start + extension + end) != std::string::npos) {
+        readers.insert(readers.begin(), extension);
+        return readers;
+      }
+  return readers;
+}
+
+/// Opens a file by one reader after the other. ImageInput::open takes text after a question mark in a name for options of a
+/// reader; readers themselves do not.
+/// @param reason  of the first reader, if none opens the file
+std::unique_ptr<OIIO::ImageInput> openByReaders(const std::string& path, const OIIO::ImageSpec& config, std::string& reason) {
+  OIIO::ImageSpec patient = config, spec;
+  patient.attribute("nowait", 1);  // for readers of sockets
+  for (const std::string& reader : readersFor(path)) {
+    auto input = OIIO::ImageInput::create(reader);
+    if (input && input->open(path, spec, patient)) return input;
+    if (input && reason.empty()) reason = input->geterror();
+  }
+  return nullptr;
+}
+
 std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   errno = 0;
-  auto input = OIIO::ImageInput::open(path, &config);
+  std::string reason;
+  auto input = path.find('?') == std::string::npos ? OIIO::ImageInput::open(path, &config) : openByReaders(path, config, reason);
   if (input) return input;
   checkSystemReason(path, errno);
   checkSystemReads(path);
-  const std::string reason = trimmed(OIIO::geterror());
+  reason = trimmed(reason.empty() ? OIIO::geterror() : reason);
   throw Error(ErrorCode::invalid_input, "image.readable", path, "", "cannot be read as an image: " + reason,
               unreadableRemedy(reason));
 }

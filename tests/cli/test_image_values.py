@@ -323,6 +323,27 @@ def test_names_that_are_no_text_are_named(glint):
     assert not (glint.folder / "o.glint").exists()
 
 
+@pytest.mark.parametrize("name", ["a?b.tif", "a?b=c.exr", "?.EXR", "q?/x.tif", "r?.fits", "p?.png", "wrong?.hdr", "none?x"])
+def test_a_question_mark_is_part_of_a_name(glint, name):
+    """OpenImageIO takes the text after it for options of a reader."""
+    path = glint.folder / name
+    path.parent.mkdir(exist_ok=True)
+    kind = {".png": ".png", ".fits": ".fits"}.get(path.suffix, ".tif" if path.suffix == ".tif" else ".exr")
+    write(glint.folder / f"plain{kind}", unorm(surface()), "uint8" if kind == ".png" else "float")
+    os.rename(glint.folder / f"plain{kind}", path)
+    ingest(glint, name)
+    assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
+    path.write_bytes(b"no image")
+    (glint.folder / "o.glint").unlink()
+    refused(glint, name, "image")
+
+
+def test_a_question_mark_is_part_of_the_name_of_an_output(glint):
+    assert glint("synth", "flakes", "--size", "16", "-o", "o?p.exr").returncode == 0
+    assert (glint.folder / "o?p.exr").exists()
+    ingest(glint, "o?p.exr")
+
+
 def test_the_longest_names_work(glint):
     name = "n" * 251 + ".png"
     Image.fromarray(codes(surface())).save(glint.folder / name)
