@@ -130,7 +130,7 @@ std::string unreadableRemedy(const std::string& reason) {
 /// Names of readers to try: the one of the file name extension, then all.
 std::vector<std::string> readersFor(const std::string& path) {
   // "tiff:tif,tiff;jpeg:jpg,jpe": names, and extensions, which are names as well.
-  const std::string known = ":" + OIIO::get_string_attribute("extension_list") + ";";
+  const std::string known = ":" + std::string(OIIO::get_string_attribute("extension_list")) + ";";
   const std::string extension = OIIO::Strutil::lower(OIIO::Filesystem::extension(path, false));
   std::vector<std::string> readers = OIIO::Strutil::splits(OIIO::get_string_attribute("input_format_list"), ",");
   for (const char* const end : {",", ";"})
