@@ -31,13 +31,16 @@ def codes(normals):
     return numpy.round(255 * unorm(normals)).astype(numpy.uint8)
 
 
-def write(path, pixels, kind="float", names=None, window=None, display=None, **attributes):
-    """Writes pixels [height][width][channels]; window: column and row of the first pixel; display: width and height."""
+def write(path, pixels, kind="float", names=None, window=None, display=None, alpha=-1, **attributes):
+    """Writes pixels [height][width][channels]; window: column and row of the first pixel; display: width and height;
+    alpha: number of that channel."""
     pixels = numpy.ascontiguousarray(pixels)
     height, width, channels = pixels.shape
     spec = oiio.ImageSpec(width, height, channels, kind)
     if names:
         spec.channelnames = names
+    if alpha >= 0:
+        spec.alpha_channel = alpha
     if window:
         spec.x, spec.y = window
         spec.full_width, spec.full_height = display

@@ -225,7 +225,7 @@ def test_channels_that_a_reader_does_not_name_are_read(glint):
     assert data(glint) == pytest.approx(surface()[..., :2], abs=HALF)
     ingest(glint, "r.fits", "--encoding", "snorm", "--channels", "rg", "--force")
     assert data(glint) == pytest.approx(surface()[..., :2], abs=HALF)
-    for channels in (2, 5):
+    for channels in (2, 4):
         pixels = numpy.zeros((40, 48, channels))
         pixels[..., :2] = surface()[..., :2]
         write(glint.folder / "c.fits", pixels)
@@ -290,13 +290,13 @@ def test_x_and_y_in_grey_and_alpha_need_a_word(glint, grey, alpha, option):
     assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
 
 
-@pytest.mark.parametrize("name, kind", [("d.png", "uint8"), ("d.png", "uint16"), ("d.tif", "uint16"), ("d.tif", "float")])
+@pytest.mark.parametrize("name, kind", [("d.png", "uint8"), ("d.png", "uint16"), ("d.tif", "float")])
 @pytest.mark.parametrize("grey, alpha, option", [(1, 0, "ag"), (0, 1, "ra")])
 def test_grey_and_alpha_of_two_channels_need_the_same_word(glint, name, kind, grey, alpha, option):
     """Optimisers store an image whose red, green and blue are the same as grey and alpha."""
     n = unorm(surface())
     pixels = n[..., [grey, alpha]]
-    write(glint.folder / name, pixels, kind, names=["Y", "A"], **{"oiio:UnassociatedAlpha": 1})
+    write(glint.folder / name, pixels, kind, names=["Y", "A"], alpha=1, **{"oiio:UnassociatedAlpha": 1})
     refused(glint, name, "--channels ag", "--channels ra")
     ingest(glint, name, "--channels", option)
     assert data(glint) == pytest.approx(surface()[..., :2], abs=CODE)
