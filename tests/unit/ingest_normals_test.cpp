@@ -115,6 +115,26 @@ TEST(IngestNormals, FindsSignedFloats) {
   EXPECT_NEAR(result.normals[7].x, map.normals[7].x, 1e-6f);
 }
 
+TEST(IngestNormals, NormalisesVectorsOfAnyLength) {
+  const TestMap map;
+  std::vector<float> vectors;
+  for (const float c : map.colours) vectors.push_back(2 * c - 1);
+  IngestOptions p = plain();
+  p.encoding = Encoding::snorm;
+  for (const float length : {1e-38f, 1e-30f, 1e-20f, 1e15f, 1e30f, 3e38f}) {
+    const float direction[3][3] = {{1, 0, 1}, {-1, 1, 1}, {0, 1, 1}};
+    for (std::size_t t = 0; t < 3; ++t)
+      for (std::size_t c = 0; c < 3; ++c) vectors[3 * t + c] = length * direction[t][c];
+    const auto result = ingestNormals({map.width, map.height, 3, std::span<const float>(vectors)}, p);
+    EXPECT_NEAR(result.normals[0].x, std::sqrt(0.5f), 1e-6f) << length;
+    EXPECT_EQ(result.normals[0].y, 0) << length;
+    EXPECT_NEAR(result.normals[1].x, -std::sqrt(1 / 3.0f), 1e-6f) << length;
+    EXPECT_NEAR(result.normals[2].y, std::sqrt(0.5f), 1e-6f) << length;
+    EXPECT_EQ(result.report.repaired, 0u) << length;
+    EXPECT_TRUE(std::isfinite(result.report.slopes.covariance.xx)) << length;
+  }
+}
+
 TEST(IngestNormals, SignedCodesHaveAnExactZero) {
   std::vector<std::uint8_t> codes = {128, 128, 255, 255, 128, 128 + 2};
   IngestOptions p = plain();

@@ -60,12 +60,12 @@ Vec2 triangularNoise(std::uint64_t seed, std::size_t texel) {
 template <class T>
 constexpr float kCodes = std::is_floating_point_v<T> ? 1.0f : static_cast<float>(std::numeric_limits<T>::max());
 
-/// Decodes pixel values to components of a vector: n = scale * value + offset. Neighbouring codes differ by `scale`.
+/// Decodes pixel values to components of a vector: n = scale * value + offset. Neighbouring codes differ by `scale`. Components
+/// are doubles, so that squares of the largest and the smallest floats are numbers, too.
 struct Decoder {
   float scale = 2;
   float offset = -1;
-  float floor =
-      -std::numeric_limits<float>::max();  ///< smallest component: the lowest code of snorm means -1, as in graphics APIs
+  double floor = -HUGE_VAL;  ///< smallest component: the lowest code of snorm means -1, as in graphics APIs
 
   template <class T>
   static Decoder of(Encoding encoding) {
@@ -74,8 +74,8 @@ struct Decoder {
     const float half = static_cast<float>((std::numeric_limits<T>::max() + 1) / 2);
     return {1 / (half - 1), -half / (half - 1), -1};
   }
-  float operator()(float value) const {
-    const float n = scale * value + offset;
+  double operator()(float value) const {
+    const double n = double{scale} * value + offset;
     return n < floor ? floor : n;  // unlike std::max, keeps NaN
   }
 };
@@ -171,42 +171,43 @@ struct NormalDecoder {
       return {kNaN, kNaN};
     }
     // Decode the components.
-    float x = decode(value(layout.x));
-    float y = decode(value(layout.y));
-    float z = three ? decode(value(layout.z)) : 0;
+    double x = decode(value(layout.x));
+    double y = decode(value(layout.y));
+    const double z = three ? decode(value(layout.z)) : 0;
     if (!std::isfinite(x + y + z)) {
       if (faults.non_finite++ == 0) faults.first_non_finite = t;
       return {kNaN, kNaN};
     }
     // Sort out vectors that do not point up: by rounding alone onto the rim, others as unusable.
     if (three) {
-      const float length = std::sqrt(x * x + y * y + z * z);
+      const double length = std::sqrt(x * x + y * y + z * z);
       if (std::abs(length - 1) > tolerance) ++faults.non_unit;
-      if (z <= 0 && z >= -rounding && length > 0.5f) return onRim(x, y, faults);
+      if (z <= 0 && z >= -rounding && length > 0.5) return onRim(x, y, faults);
       if (z <= 0) return downward(t, faults);
-    } else if (const float r2 = x * x + y * y; r2 >= 1) {
-      const float limit = 1 + rounding;
+    } else if (const double r2 = x * x + y * y; r2 >= 1) {
+      const double limit = 1.0 + rounding;
       return r2 <= limit * limit ? onRim(x, y, faults) : downward(t, faults);
     }
     // Add noise, and project on the disk.
     if (dither > 0) {
       const Vec2 noise = dither * triangularNoise(options.seed, t);
-      const Vec2 moved = {x + noise.x, y + noise.y};
-      if (three || dot(moved, moved) < 1) x = moved.x, y = moved.y;
+      const double moved_x = x + noise.x, moved_y = y + noise.y;
+      if (three || moved_x * moved_x + moved_y * moved_y < 1) x = moved_x, y = moved_y;
     }
     if (three) {
-      const float scale = 1 / std::sqrt(x * x + y * y + z * z);
+      const double scale = 1 / std::sqrt(x * x + y * y + z * z);
       x *= scale;
       y *= scale;
-      if (x * x + y * y >= 1) return onRim(x, y, faults);
     }
-    return {x, y};
+    const Vec2 n = {static_cast<float>(x), static_cast<float>(y)};
+    return dot(n, n) >= 1 ? onRim(x, y, faults) : n;
   }
 
  private:
-  static Vec2 onRim(float x, float y, Faults& faults) {
+  static Vec2 onRim(double x, double y, Faults& faults) {
     ++faults.clipped;
-    return kRimRadius / std::sqrt(x * x + y * y) * Vec2{x, y};
+    const double scale = kRimRadius / std::sqrt(x * x + y * y);
+    return {static_cast<float>(scale * x), static_cast<float>(scale * y)};
   }
   static Vec2 downward(std::size_t t, Faults& faults) {
     if (faults.downward++ == 0) faults.first_downward = t;
