@@ -161,7 +161,8 @@ std::unique_ptr<OIIO::ImageInput> open(const std::string& path) {
   config.attribute("oiio:UnassociatedAlpha", 1);
   errno = 0;
   std::string reason;
-  auto input = path.find('?') == std::string::npos ? OIIO::ImageInput::open(path, &config) : openByReaders(path, config, reason);
+  auto input =
+      path.find('?') == std::string::npos ? OIIO::ImageInput::open(path, &config) : openByReaders(path, config, reason);
   if (input) return input;
   checkSystemReason(path, errno);
   checkSystemReads(path);

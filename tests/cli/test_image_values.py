@@ -76,6 +76,15 @@ def test_real_precision_is_left_alone(glint, name, kind):
     assert not result["coarse_codes"] and not result["dequantized"]
 
 
+@pytest.mark.parametrize("length", [1e-30, 1e-20, 1e30, 3e38])
+def test_vectors_of_any_length_are_normalised(glint, length):
+    pixels = surface(32, 32).astype(numpy.float32)
+    pixels[4, 5] = numpy.array([1, 0, 1]) * length
+    write(glint.folder / "v.exr", pixels)
+    ingest(glint, "v.exr", "--encoding", "snorm")
+    assert data(glint)[4, 5] == pytest.approx([0.5**0.5, 0], abs=1e-6)
+
+
 def test_a_few_texels_that_point_down_are_repaired_and_counted(glint):
     pixels = codes(surface(64, 64))
     for column in (5, 9, 30, 50):

@@ -216,8 +216,7 @@ NormalLayout findLayout(const PixelArray& image, const IngestOptions& p) {
   const bool grey = image.grey_alpha || (!isConstant(image, 0) && areSame(image, 0, 1) && areSame(image, 0, 2));
   const std::string what = image.grey_alpha ? "there is no colour but grey" : "red, green and blue are the same";
   if (grey && !alpha) {
-    throwInvalid("normals.channels", p.name, "", what + ": this is no normal map",
-                 "read heights with --kind height");
+    throwInvalid("normals.channels", p.name, "", what + ": this is no normal map", "read heights with --kind height");
   }
   if (grey) {
     throwInvalid("normals.channels", p.name, "", what + ", so x and y are among grey and alpha",

@@ -20,9 +20,9 @@ struct PixelArray {
   int height = 0;
   int channels = 0;
   std::variant<std::span<const std::uint8_t>, std::span<const std::uint16_t>, std::span<const float>> pixels;
-  double code_scale = 1;  ///< number in the file that became a float of 1
-  bool inverted = false;  ///< the file held code_scale minus the code: 0 is white in it
-  float step = 0;         ///< difference of neighbouring codes, if floats were computed from integer codes; 0: unknown
+  double code_scale = 1;    ///< number in the file that became a float of 1
+  bool inverted = false;    ///< the file held code_scale minus the code: 0 is white in it
+  float step = 0;           ///< difference of neighbouring codes, if floats were computed from integer codes; 0: unknown
   bool grey_alpha = false;  ///< the two channels are grey and alpha, and not red and green
 };
 
