@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import signal
 import socket
@@ -466,3 +467,26 @@ def test_bytes_between_objects_are_zero(shell):
             at = end
         assert at == len(raw)
         assert between and between == bytes(len(between))
+
+
+@pytest.mark.parametrize("folder", ["my maps", "it's", "$(touch pwn)", "-p"])
+def test_a_remedy_can_be_pasted(shell, folder):
+    synth = f'glint-synth flakes --size 16 -o {shlex.quote("./" + folder)}/a.png'
+    process = shell(synth)
+    assert process.returncode == 2
+    assert shell(process.stderr.decode().split("make it with ")[1]).returncode == 0
+    assert shell(synth).returncode == 0
+    assert not (shell.folder / "pwn").exists()
+
+
+@pytest.mark.parametrize("name", ["a.bmp", "a.tga", "a.webp", "a.ppm", "a.gif"])
+def test_a_picture_replaces_a_picture_of_any_format(shell, name):
+    for _ in range(2):
+        process = shell(f"glint-synth flakes --size 16 -o {name}")
+        assert process.returncode == 0, process.stderr
+
+
+def test_a_limit_of_memory_is_not_blamed_on_the_installation(shell):
+    process = shell("ulimit -v 300000; glint-synth flakes --size 16 -o a.exr")
+    assert process.returncode == 4
+    assert b"memory" in process.stderr and b"install" not in process.stderr

@@ -229,11 +229,12 @@ def test_names_that_make_cannot_hold_are_an_error_that_names_the_image(folder, n
     assert f"maps/{name}.png: a name with '{name[1]}' cannot stand in a depfile" in process.stderr
 
 
-def test_folders_with_blanks_are_an_error_that_names_them(folder):
-    folder.write("assets/x.glint", "GLINT_OUT := my assets")
+@pytest.mark.parametrize("name", ["my assets", "a,b", "o'x", "a&b", "a(b)", "o%d", "a=b", "a:b", "o;x"])
+def test_folders_that_make_cannot_hold_are_an_error_that_names_them(folder, name):
+    folder.write("assets/x.glint", f"GLINT_OUT := {name}")
     process = folder.make()
     assert process.returncode == 2
-    assert 'GLINT_OUT is "my assets"' in process.stderr
+    assert f'GLINT_OUT is "{name}"' in process.stderr
 
 
 @pytest.mark.parametrize("name", ["wood", "old wood"])

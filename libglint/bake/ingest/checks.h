@@ -33,7 +33,8 @@ struct NormalLayout {
 
 /// Finds the channels of x, y and z. A constant blue channel still counts as z here: only the vectors tell whether it is
 /// (measureVectors).
-/// @throws Error invalid_input if red, green and blue are the same, also as grey and alpha of two channels, or if blue may be z or something else
+/// @throws Error invalid_input if red, green and blue are the same, also as grey and alpha of two channels, or if blue may be z or
+///         something else
 NormalLayout findLayout(const PixelArray& image, const IngestOptions& options);
 
 /// Whether a channel has the same value in all pixels.
