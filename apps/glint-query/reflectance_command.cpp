@@ -42,7 +42,7 @@ std::optional<FootprintFault> levelFault(const Displacement& asset, int level) {
 
 bool asksReflection(const CsvTable& table) { return table.has(kLight) && table.has(kView); }
 
-void requireColumns(const CsvTable& table) {
+void requireReflectanceColumns(const CsvTable& table) {
   table.requireWhole(kLight);
   table.requireWhole(kView);
   table.requireWhole(kHalf);
@@ -182,7 +182,7 @@ void ReflectanceCommand::writeSamples(const DisplacedBrdf& brdf, const Displaced
 }
 
 void ReflectanceCommand::answerTable(const DisplacedBrdf& brdf) const {
-  const CsvTable table = CsvTable::read(table_.csv(), requireColumns);
+  const CsvTable table = CsvTable::read(table_.csv(), requireReflectanceColumns);
   const bool reflects = asksReflection(table);
   std::vector<std::string> names = {reflects ? kReflected : kDensity};
   if (reflects && brdf.asset().channels == 3) names.assign(kReflectedRgb.begin(), kReflectedRgb.end());

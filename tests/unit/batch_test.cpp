@@ -147,7 +147,7 @@ TEST(Batch, WhatEmptyClustersSayIsNotFollowed) {
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     bake::CompressionOptions c;
     c.method = method;
-    c.regions = 8;
+    c.regions = 16;
     bake::NdfCpData data = bake::compressPyramid(pyramid.view(), c);
     int empty = 0;
     for (NdfCluster& cluster : data.clusters) {
