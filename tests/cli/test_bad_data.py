@@ -295,7 +295,8 @@ def test_flipped_bits_are_refused_unless_they_are_trusted(glint, assets, source,
     path.write_bytes(data)
     process = glint(*command)
     assert process.returncode == 3, process.stderr
-    assert "has bytes with hash" in process.stderr
+    # A bound of normals that is too small by a bit is found by its texels first.
+    assert "has bytes with hash" in process.stderr or "does not hold all texels" in process.stderr
     assert process.stdout == "" and not (assets / "out.glint").exists()
     trusted = glint(*command, "--trust")
     if "--normals" in line:

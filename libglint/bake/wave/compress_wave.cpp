@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 
+#include "glint/bake/compressed/slices.h"
 #include "glint/math/half.h"
 #include "glint/model/error.h"
 
@@ -90,8 +91,14 @@ WaveCp WaveCpData::view() const {
 WaveCpData compressWavePyramid(const WavePyramid& wave, const CompressionOptions& options, CompressionReport* report,
                                const ProgressFn& progress) {
   const ChannelImages channels(wave, 0, wave.channels);
+  const NdfPyramid images = channels.view();
+  std::size_t count = 0;
+  for (int l = 0; l < images.shape.level_count; ++l) count += images.shape.levels[l].imageCount();
+  // Regions are bands of rows, and would part the channels before they part the map.
+  CompressionOptions shared = options;
+  if (options.regions == 0 && count <= SliceIndex::kMostImages) shared.regions = 1;
   WaveCpData data;
-  data.images = compressPyramid(channels.view(), options, report, progress);
+  data.images = compressPyramid(images, shared, report, progress);
   if (report != nullptr) report->ratio_to_stored = storedBytes(wave) / static_cast<double>(report->total_bytes);
   data.shape.shape = wave.grey.shape;
   data.shape.meaning = wave.meaning;

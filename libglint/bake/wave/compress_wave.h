@@ -26,7 +26,8 @@ class WaveCpData {
 /// channel count as two places, and a channel is seen beside the brightest one towards the same psi.
 ///
 /// Images of channels integrate to 1 afterwards. Where light leaves the square of psi, the pyramid has less; this counts as an error.
-/// @param options  `image_masses` must be empty; the rest as for compressPyramid
+/// @param options  `image_masses` must be empty; `regions` of 0 is one region as far as its images can be counted, and more regions
+///                 have bases for fewer channels; the rest as for compressPyramid
 /// @param report   filled when not null; `ratio_to_stored` is that of the whole wave pyramid, with its grey pixels
 /// @throws Error   as compressPyramid
 /// @note memory: a copy of the pixels of the channels, and that of compressPyramid
