@@ -6,6 +6,7 @@ import os
 import pathlib
 import re
 import shutil
+import struct
 import subprocess
 import sys
 
@@ -58,6 +59,7 @@ ASSETS = (
     "displaced",
     "rough",
     "colored",
+    "measured",
 )
 
 # Commands in the order that they run: each may read what the commands before it wrote.
@@ -77,7 +79,7 @@ MAKE = [
     "pyramid normals.glint -o second.glint --resolution 64 --stride 8 --sigma-r .02 --keep-normals i16 --region 2/2",
     "merge second.glint shard.glint -o joined.glint",
     "compress pyramid.glint -o cp.glint --method cp --rank 8",
-    "compress pyramid.glint -o tucker.glint --method tucker --tolerance .1",
+    "compress pyramid.glint -o tucker.glint --method tucker --tolerance .2",
     "compress pyramid.glint -o pca.glint --method pca --rank 4 --quantize f32",
     "pyramid normals.glint -o kept.glint --resolution 64 --stride 8 --sigma-r .02 --keep-normals i16",
     "compress kept.glint -o kept.cp.glint --method cp --rank 4",
@@ -110,6 +112,7 @@ MAKE = [
     "displace heights.glint -o rough.glint --base ggx:.3:1,2 --factor 8 --angular 3 --spatial 2",
     "displace heights.glint -o colored.glint --base-color n.png --factor 8 --angular 3 --spatial 2",
     "displace flat.glint -o level.glint --factor 8 --angular 3 --spatial 2",
+    "displace heights.glint -o measured.glint --base-table grey.binary --factor 8 --angular 3 --spatial 2",
     "pyramid normals.glint -o pyramid.glint --resolution 64 --stride 8 --sigma-r .02 --skip-unchanged",
     "ingest tile.<UDIM>.exr -o tile.<UDIM>.glint",
     "farm plan --from plan.json -o farm.json",
@@ -157,6 +160,9 @@ def documents(tmp_path_factory):
     """[(schema, command, document)] of every command, and of the lines of progress."""
     folder = tmp_path_factory.mktemp("json")
     (folder / "lights.json").write_text(json.dumps(LIGHTS))
+    # The same reflectance in all bins, in units of MERL's channels.
+    grey = [0.2 * scale for scale in (1500, 1500 / 1.15, 1500 / 1.66) for _ in range(8 * 8 * 8)]
+    (folder / "grey.binary").write_bytes(struct.pack(f"<3i{len(grey)}d", 8, 8, 8, *grey))
     (folder / "scene.json").write_text(json.dumps(SCENE))
     for name, text in QUERIES.items():
         (folder / name).write_text(text)

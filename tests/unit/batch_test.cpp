@@ -142,12 +142,16 @@ TEST(Batch, DensitiesOfCompressedPyramidsAreThoseOfSingleQueries) {
 }
 
 TEST(Batch, WhatEmptyClustersSayIsNotFollowed) {
-  const test::OwnedMap map(96, 64, test::synthesised(bake::SynthKind::flakes, 96, 64, 0.25f));
+  // Regions of the flat half have no slices in most blocks.
+  std::vector<Vec2> normals = test::synthesised(bake::SynthKind::flakes, 96, 64, 0.25f);
+  for (std::size_t k = 0; k < normals.size(); ++k)
+    if (k % 96 < 48) normals[k] = {};
+  const test::OwnedMap map(96, 64, normals);
   const bake::NdfPyramidData pyramid = test::smallPyramid(map.map());
   for (const auto method : {CompressionMethod::cp, CompressionMethod::tucker, CompressionMethod::pca}) {
     bake::CompressionOptions c;
     c.method = method;
-    c.regions = 16;
+    c.regions = 8;
     bake::NdfCpData data = bake::compressPyramid(pyramid.view(), c);
     int empty = 0;
     for (NdfCluster& cluster : data.clusters) {
