@@ -30,7 +30,7 @@ def test_every_level_meets_a_tolerance_of_the_relative_error(glint, sample, tole
     )
     assert process.returncode == 0, process.stderr
     result = json.loads(process.stdout)["result"]
-    assert 0.97 * tolerance <= result["total"]["rel_l2"] <= tolerance
+    assert 0.96 * tolerance <= result["total"]["rel_l2"] <= tolerance
     *own, third, mean = result["levels"]
     assert len(own) == 2, "each is a group of its own"
     for level in own:
